@@ -1,6 +1,6 @@
 //! Images with level of detail against images of the meshes themselves, in eight times as many rows and columns.
 
-use super::super::{CameraCfg, RasterCfg};
+use super::super::{CameraCfg, Channels, RasterCfg};
 use super::harness::{Image, Still, look};
 use super::robots::{sr5, sr5_view};
 use super::scenes::{EXACT, checker_plane};
@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use scene::mesh::TriMesh;
 use scene::shape::{Cylinder, Mesh, Sphere};
 use scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 /// Rows and columns of fine pixels in a pixel.
 const TIMES: usize = 8;
@@ -25,8 +25,8 @@ fn prepared(mesh: &TriMesh) -> Mesh {
     Mesh { mesh: Arc::new(RenderMesh::new(mesh, RenderMesh::CREASE)) }
 }
 
-/// A dense ball, a dense cylinder and a dense bumpy ball, apart from each other, before a ground.
-fn dense() -> (RenderScene, Vec<PoseF32>) {
+/// A dense ball, a dense cylinder and a dense bumpy ball, without levels.
+static PREPARED: LazyLock<[RenderMesh; 3]> = LazyLock::new(|| {
     let mut bumpy = Shape::from(Sphere { radius: 0.15 }).tessellate(220);
     for p in &mut bumpy.positions {
         let k = 1.0 + 0.1 * (40.0 * p[0]).sin() * (37.0 * p[1]).cos() * (35.0 * p[2]).sin();
@@ -34,10 +34,25 @@ fn dense() -> (RenderScene, Vec<PoseF32>) {
     }
     let cylinder = Shape::from(Cylinder { radius: 0.1, half_length: 0.2 }).tessellate(700);
     let ball = Shape::from(Sphere { radius: 0.15 }).tessellate(200);
+    [ball, cylinder, bumpy].map(|mesh| RenderMesh::new(&mesh, RenderMesh::CREASE))
+});
+
+/// Those meshes, apart from each other, before a ground. All tests share them and their levels.
+fn dense() -> (RenderScene, Vec<PoseF32>) {
+    static MESHES: LazyLock<[Mesh; 3]> = LazyLock::new(new_meshes);
+    scene_of(&MESHES)
+}
+
+/// Copies of the meshes whose levels have yet to be made.
+fn new_meshes() -> [Mesh; 3] {
+    PREPARED.clone().map(|mesh| Mesh { mesh: Arc::new(mesh) })
+}
+
+fn scene_of(meshes: &[Mesh; 3]) -> (RenderScene, Vec<PoseF32>) {
     let mut instances = vec![checker_plane()];
     let mut poses = vec![PoseF32::from_translation([0., 0., -0.3])];
-    for (k, mesh) in [ball, cylinder, bumpy].iter().enumerate() {
-        instances.push(Instance::new(prepared(mesh), Material::from_rgba([0.8, 0.6, 0.3, 1.0]), k as i32 + 1));
+    for (k, mesh) in meshes.iter().enumerate() {
+        instances.push(Instance::new(mesh.clone(), Material::from_rgba([0.8, 0.6, 0.3, 1.0]), k as i32 + 1));
         let pose = scene::pose::from_xyz_rpy([0.0, 0.4 * k as f64 - 0.4, 0.0], [0.3 * k as f64, 0.2, 0.1]);
         poses.push(PoseF32::from(&pose));
     }
@@ -47,40 +62,37 @@ fn dense() -> (RenderScene, Vec<PoseF32>) {
     (scene, poses)
 }
 
-/// The image of the meshes themselves within half a pixel of each pixel's centre.
-struct Around {
-    width: usize,
-    masks: Vec<i32>,
-    depths: Vec<f32>,
+/// The image of the meshes themselves, and all within half a pixel of each pixel's centre.
+struct Truth<'a> {
+    view: &'a View,
+    plain: Image,
+    fine: Image,
+    /// Fine pixels near the centre of a pixel, counted from the one above and left of the pixel.
+    near: Vec<usize>,
 }
 
-impl Around {
-    fn new(still: &Still) -> Self {
+impl<'a> Truth<'a> {
+    fn new(still: &'a Still) -> Self {
         // An odd number of fine pixels would have one at the centre; all of them are within reach here.
         let (k, View { width, height, fx, fy, cx, cy, .. }) = (TIMES as f32, still.view);
         let (width, height) = (width * TIMES, height * TIMES);
         let view = View { width, height, fx: fx * k, fy: fy * k, cx: cx * k, cy: cy * k, ..still.view };
         let cfg = RasterCfg { shadows: false, samples: 1, ..OFF };
-        let image = Still { cfg, view, ..still.clone() }.draw();
-        Self { width, masks: image.mask().to_vec(), depths: image.depth().to_vec() }
+        let channels = Channels { mask: true, depth: true, ..Channels::NONE };
+        let fine = Still { cfg, view, channels, ..still.clone() }.draw();
+        // As far as levels reach, and half the diagonal of a fine pixel farther, so that nothing between fine pixels is missed.
+        let reach = PIXELS * TIMES as f64 + std::f64::consts::FRAC_1_SQRT_2;
+        let middle = (TIMES + 1) as f64 / 2.0;
+        assert!(reach < middle + 1.0, "one fine pixel beside the pixel is enough");
+        let within = |k: &usize| ((k % width) as f64 - middle).hypot((k / width) as f64 - middle) <= reach;
+        let near = (0..(TIMES + 2) * width).filter(within).collect();
+        Self { view: &still.view, plain: still.draw(), fine, near }
     }
 
-    /// Masks and depths that the mesh has near a pixel's centre: as far as levels reach, and half the diagonal of a fine
-    /// pixel farther, so that nothing between fine pixels is missed.
+    /// Masks and depths that the mesh has near the centre of an inner pixel.
     fn near(&self, x: usize, y: usize) -> impl Iterator<Item = (i32, f32)> {
-        let reach = PIXELS * TIMES as f64 + std::f64::consts::FRAC_1_SQRT_2;
-        let height = self.masks.len() / self.width;
-        let middle = [x, y].map(|i| ((i * TIMES + TIMES / 2) as f64) - 0.5);
-        let span =
-            move |c: f64, size: usize| (c - reach).ceil().max(0.0) as usize..((c + reach) as usize + 1).min(size);
-        span(middle[1], height).flat_map(move |row| {
-            let dy = row as f64 - middle[1];
-            span(middle[0], self.width).filter_map(move |column| {
-                let dx = column as f64 - middle[0];
-                let at = row * self.width + column;
-                (dx * dx + dy * dy <= reach * reach).then(|| (self.masks[at], self.depths[at]))
-            })
-        })
+        let first = (y * TIMES - 1) * self.fine.width + x * TIMES - 1;
+        self.near.iter().map(move |k| (self.fine.mask()[first + k], self.fine.depth()[first + k]))
     }
 }
 
@@ -99,52 +111,57 @@ struct Found {
     changed: usize,
 }
 
-/// Compares an image with the meshes themselves.
-fn compare(still: &Still, coarse: &Image) -> Found {
-    let (around, plain, view) = (Around::new(still), still.draw(), &still.view);
-    let mut found = Found::default();
-    for k in plain.inner() {
-        let (x, y, mask, depth, own) =
-            (k % view.width, k / view.width, coarse.mask()[k], coarse.depth()[k], plain.depth()[k]);
-        found.changed += usize::from(depth.to_bits() != own.to_bits());
-        if !around.near(x, y).any(|(id, _)| id == mask) {
-            found.masks += 1;
-            continue;
+impl Truth<'_> {
+    /// Compares an image with the meshes themselves.
+    fn compare(&self, coarse: &Image) -> Found {
+        let Self { view, plain, .. } = self;
+        let mut found = Found::default();
+        for k in plain.inner() {
+            let (mask, depth, own) = (coarse.mask()[k], coarse.depth()[k], plain.depth()[k]);
+            found.changed += usize::from(depth.to_bits() != own.to_bits());
+            let (mut seen, mut alone, mut low, mut high) = (false, true, f32::MAX, f32::MIN);
+            for (id, depth) in self.near(k % view.width, k / view.width) {
+                (seen, alone) = (seen || id == mask, alone && id == mask);
+                (low, high) = (low.min(depth), high.max(depth));
+            }
+            if !seen {
+                found.masks += 1;
+                continue;
+            }
+            // Silhouettes, against other things or the same: steeper than 4 over the pixel and its half neighbours. There
+            // depth falls like a root of the distance from the edge, and edges are between fine pixels. The ground has
+            // no levels.
+            let width = 2.0 * PIXELS as f32 * low / view.fx;
+            if !alone || mask == 0 || mask == 100 || high - low > 4.0 * width {
+                continue;
+            }
+            found.compared += 1;
+            found.depths += usize::from(depth < low - METRES || depth > high + METRES);
+            let to = Vector3::from(plain.position()[k]) - Vector3::from(view.world_from_camera.translation);
+            let cosine = -to.dot(&Vector3::from(plain.normal()[k])) / to.norm();
+            if cosine > 0.9 && high - low < width {
+                found.facing = found.facing.max((depth - own).abs());
+            }
         }
-        let (low, high) = around.near(x, y).fold((f32::MAX, f32::MIN), |(l, h), (_, d)| (l.min(d), h.max(d)));
-        // Silhouettes, against other things or the same: steeper than 4 over the pixel and its half neighbours. There
-        // depth falls like a root of the distance from the edge, and edges are between fine pixels. The ground has
-        // no levels.
-        let width = 2.0 * PIXELS as f32 * low / view.fx;
-        let alone = around.near(x, y).all(|(id, _)| id == mask) && mask != 0 && mask != 100;
-        if !alone || high - low > 4.0 * width {
-            continue;
-        }
-        found.compared += 1;
-        found.depths += usize::from(depth < low - METRES || depth > high + METRES);
-        let to = Vector3::from(plain.position()[k]) - Vector3::from(view.world_from_camera.translation);
-        let cosine = -to.dot(&Vector3::from(plain.normal()[k])) / to.norm();
-        if cosine > 0.9 && high - low < width {
-            found.facing = found.facing.max((depth - own).abs());
-        }
+        found
     }
-    found
 }
 
 /// The image with levels, and images that are wrong: with the camera a pixel to the side, and 3 mm back.
 fn check(name: &str, scene: (RenderScene, Vec<PoseF32>), view: View) {
     let still = Still { cfg: OFF, ..Still::new(scene, view) };
-    let found = compare(&still, &still.with(|still| still.cfg = ON).draw());
+    let truth = Truth::new(&still);
+    let found = truth.compare(&still.with(|still| still.cfg = ON).draw());
     assert!(found.changed * 4 > found.compared, "{name}: levels are in use: {found:?}");
     assert_eq!((found.masks, found.depths), (0, 0), "{name}: {found:?}");
     // 1 mm off, seen at an angle of up to acos 0.9.
     assert!(found.compared > 100 && found.facing <= 1.2e-3, "{name}: {found:?}");
-    let wrong = compare(&still, &still.from(View { cx: view.cx + 1.0, ..view }));
+    let wrong = truth.compare(&still.from(View { cx: view.cx + 1.0, ..view }));
     assert!(wrong.masks > 0, "{name}: a mask that is a pixel off must be found: {wrong:?}");
     let mut back = view;
     let forward = [0, 1, 2].map(|k| back.world_from_camera.rotation[k][2]);
     (0..3).for_each(|k| back.world_from_camera.translation[k] -= 0.003 * forward[k]);
-    let wrong = compare(&still, &still.from(back));
+    let wrong = truth.compare(&still.from(back));
     assert!(wrong.depths > 0 && wrong.facing > 2e-3, "{name}: depths that are 3 mm off must be found: {wrong:?}");
 }
 
@@ -168,7 +185,15 @@ fn vendor_sr5_meshes() {
 
 /// Dense meshes, a veil and a glass among them.
 pub(super) fn veiled() -> Still {
-    let (scene, poses) = dense();
+    veiled_scene(dense())
+}
+
+/// [`veiled`], whose levels have yet to be made.
+pub(super) fn new_veiled() -> Still {
+    veiled_scene(scene_of(&new_meshes()))
+}
+
+fn veiled_scene((scene, poses): (RenderScene, Vec<PoseF32>)) -> Still {
     let mut instances = scene.instances().to_vec();
     (instances[1].material.rgba[3], instances[2].material.rgba[3]) = (0.4, 0.7);
     let mut veiled = RenderScene::new(instances).unwrap();
@@ -194,7 +219,7 @@ fn independent_levels() {
 /// Meshes with texture coordinates have no levels; without a texture they look the same.
 #[test]
 fn textured_meshes() {
-    let of = |textured: bool, cfg| {
+    let of = |textured: bool| {
         let mut still = veiled();
         let mut instances = still.scene.instances().to_vec();
         for instance in &mut instances[1..] {
@@ -205,10 +230,12 @@ fn textured_meshes() {
         let lights = std::mem::take(&mut still.scene.lights);
         still.scene = RenderScene::new(instances).unwrap();
         still.scene.lights = lights;
-        Still { cfg, ..still }.draw().bits()
+        still
     };
-    let expected = of(false, OFF);
-    assert!(of(true, OFF) == expected && of(true, ON) == expected);
-    assert!(of(false, ON) != expected, "levels are in use");
+    let (plain, textured) = (of(false), of(true));
+    let draw = |still: &Still, cfg| still.with(|still| still.cfg = cfg).draw().bits();
+    let expected = draw(&plain, OFF);
+    assert!(draw(&textured, OFF) == expected && draw(&textured, ON) == expected);
+    assert!(draw(&plain, ON) != expected, "levels are in use");
     assert!(CameraCfg::default().raster.lod, "levels are the default");
 }

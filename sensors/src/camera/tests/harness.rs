@@ -67,9 +67,19 @@ impl Still {
 
     /// The image with an instruction set.
     pub(super) fn draw_on(&self, level: Level) -> Result<Image, RenderError> {
+        self.draw_by(&mut self.rasterizer(level))
+    }
+
+    /// A rasterizer with the settings of the still.
+    pub(super) fn rasterizer(&self, level: Level) -> Rasterizer {
         let mut rasterizer = Rasterizer::with_level(self.cfg, level);
         (rasterizer.renderer, rasterizer.stops) = (self.renderer, self.stops);
         (rasterizer.aperture, rasterizer.shutter) = (self.aperture, self.shutter);
+        rasterizer
+    }
+
+    /// The image by a rasterizer, with its settings; it keeps what it builds of meshes.
+    pub(super) fn draw_by(&self, rasterizer: &mut Rasterizer) -> Result<Image, RenderError> {
         let mut frame = self.frame();
         rasterizer.render_take(&self.shot(), &self.take(), &mut frame.as_mut())?;
         Ok(Image { frame, width: self.view.width })
@@ -104,29 +114,44 @@ impl Still {
 }
 
 /// Asserts that stills have the same bits with every instruction set, and in batches of these sizes for these numbers of
-/// threads. Scenes are made anew for each batch, so that threads meet while assets of meshes are built.
-pub(super) fn assert_same_bits(what: &str, make: &dyn Fn() -> Vec<Still>, threads: &[usize], batches: &[usize]) {
-    let stills = make();
-    let expected: Vec<Vec<u32>> = stills.iter().map(|still| still.draw().bits()).collect();
-    for level in levels() {
-        for (k, still) in stills.iter().enumerate() {
-            assert!(still.draw_on(level).unwrap().bits() == expected[k], "{what}: still {k} by {level:?}");
+/// threads. A batch begins anew with the first of the `kinds` of stills where it has more. Scenes are made anew for each batch, so
+/// that threads meet while assets of meshes are built. Returns an image of each kind.
+pub(super) fn assert_same_bits(
+    what: &str,
+    (kinds, make): (usize, &dyn Fn(usize) -> Still),
+    threads: &[usize],
+    batches: &[usize],
+) -> Vec<Image> {
+    // The best one is that of the images.
+    let best = format!("{:?}", Level::best());
+    let others: Vec<Level> = levels().into_iter().filter(|level| format!("{level:?}") != best).collect();
+    let image = |k| {
+        let still = make(k);
+        let image = still.draw();
+        for &level in &others {
+            assert!(still.draw_on(level).unwrap().same_bits(&image), "{what}: still {k} by {level:?}");
         }
-    }
+        image
+    };
+    let images: Vec<Image> = (0..kinds).map(image).collect();
     for (&threads, &count) in threads.iter().flat_map(|threads| batches.iter().map(move |count| (threads, count))) {
-        let stills = &make()[..count];
-        let Still { cfg, renderer, aperture, shutter, .. } = stills[0];
+        let made: Vec<Still> = (0..kinds.min(count)).map(make).collect();
+        let stills: Vec<&Still> = made.iter().cycle().take(count).collect();
+        let Still { cfg, renderer, aperture, shutter, .. } = *stills[0];
         let mut parallel = ParallelRasterizer::new(cfg, threads);
         parallel.set_renderer(renderer);
         parallel.set_light(aperture, shutter);
-        let mut frames: Vec<Frame> = stills.iter().map(Still::frame).collect();
-        let mut jobs: Vec<_> = stills.iter().map(Still::shot).zip(frames.iter_mut().map(Frame::as_mut)).collect();
-        parallel.render_takes(&mut jobs, &stills.iter().map(Still::take).collect::<Vec<_>>()).unwrap();
+        let mut frames: Vec<Frame> = stills.iter().map(|still| still.frame()).collect();
+        let mut jobs: Vec<_> =
+            stills.iter().map(|still| still.shot()).zip(frames.iter_mut().map(Frame::as_mut)).collect();
+        let takes: Vec<Take<'_>> = stills.iter().map(|still| still.take()).collect();
+        parallel.render_takes(&mut jobs, &takes).unwrap();
         for (k, frame) in frames.into_iter().enumerate() {
             let image = Image { width: stills[k].view.width, frame };
-            assert!(image.bits() == expected[k], "{what}: still {k} of {count}, {threads} threads");
+            assert!(image.same_bits(&images[k % kinds]), "{what}: still {k} of {count}, {threads} threads");
         }
     }
+    images
 }
 
 /// An image; channels by pixel, row by row.
@@ -194,13 +219,24 @@ impl Image {
         self.check("", tolerance).count(&self.channel(0), |x, y| expected(y * self.width + x))
     }
 
+    /// True if all channels have the same bits: NaN equals itself.
+    pub(super) fn same_bits(&self, other: &Self) -> bool {
+        self.bits() == other.bits()
+    }
+
     /// All channels as bits: NaN would equal itself.
     pub(super) fn bits(&self) -> Vec<u32> {
         let Frame { color, albedo, mask, depth, distance, normal, shading_normal, position, flow, .. } = &self.frame;
-        let mut out: Vec<u32> = [color, albedo].into_iter().flatten().flatten().map(|&x| x.into()).collect();
-        out.extend(mask.iter().flatten().map(|&x| x as u32));
-        let floats = [depth, distance, normal, shading_normal, position, flow];
-        out.extend(floats.into_iter().flatten().flatten().map(|x| x.to_bits()));
+        let mut out = Vec::new();
+        for bytes in [color, albedo].into_iter().flatten() {
+            out.extend(bytes.iter().map(|&x| u32::from(x)));
+        }
+        for ids in mask {
+            out.extend(ids.iter().map(|&x| x as u32));
+        }
+        for floats in [depth, distance, normal, shading_normal, position, flow].into_iter().flatten() {
+            out.extend(floats.iter().map(|x| x.to_bits()));
+        }
         out
     }
 

@@ -11,6 +11,7 @@ use super::scenes::{Random, figure, random};
 use super::stage::{self, BALL, GROUND, RADIUS, built, context};
 use super::traced::{Comparison, compare};
 use crate::SensorError;
+use crate::lanes::Level;
 use crate::sensor::{Sensor, SensorCfg};
 use crate::visibility::raster::tile::SAMPLES;
 use crate::visibility::{RenderError, View};
@@ -131,8 +132,10 @@ fn single_pixels() {
         let rays = rays_of(lens, pixels, SIZE);
         let still = Still::new(scene, look(SIZE, 0.9, [1.3, -0.8, 0.9], [0.1, 0., 0.4]));
         let mut still = Still { renderer: Renderer::FastRayTraced, lens: Some(rays.clone()), ..still };
-        let image = still.draw();
-        let camera = still.view.world_from_camera;
+        let mut rasterizer = still.rasterizer(Level::best());
+        let image = still.draw_by(&mut rasterizer).unwrap();
+        let view = still.view;
+        let camera = view.world_from_camera;
         still.lens = None;
         for at in (0..SIZE[0] * SIZE[1]).step_by(13) {
             let Some(ray) = rays.optics().unproject([(at % SIZE[0]) as f64 + 0.5, (at / SIZE[0]) as f64 + 0.5]) else {
@@ -143,8 +146,8 @@ fn single_pixels() {
             let y = z.cross(&x);
             let rotation = [0, 1, 2].map(|i| [x[i] as f32, y[i] as f32, z[i] as f32]);
             let world_from_camera = PoseF32 { rotation, ..camera };
-            let one = View { width: 1, height: 1, fx: 1e6, fy: 1e6, cx: 0.5, cy: 0.5, world_from_camera, ..still.view };
-            let alone = still.from(one);
+            let one = View { width: 1, height: 1, fx: 1e6, fy: 1e6, cx: 0.5, cy: 0.5, world_from_camera, ..view };
+            let alone = Still { view: one, ..still.clone() }.draw_by(&mut rasterizer).unwrap();
             let (a, b) = (image.distance()[at], alone.depth()[0]);
             let cosine = Vector3::from(image.normal()[at]).dot(&Vector3::from(alone.normal()[0]));
             // Forward lenses have near and far along their axis: nothing here is near either.
@@ -188,7 +191,7 @@ fn lens_without_distortion() {
 /// Samples of colours go through the lens, each where it is in the pixel.
 #[test]
 fn sample_rays() {
-    use crate::lanes::{Level, at_level, load};
+    use crate::lanes::{at_level, load};
     let pixels = PixelIntrinsics { fx: 20.0, fy: 22.0, cx: 30.25, cy: 25.5 };
     let rays = rays_of(FISHEYE.into(), pixels, SIZE);
     for (k, offset) in SAMPLES.iter().enumerate() {

@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use scene::mesh::TriMesh;
 use scene::shape::Mesh;
 use scene::{Material, PoseF32, RenderMesh, RenderScene, Shape};
+use std::cell::Cell;
 use std::f64::consts::FRAC_PI_8;
 use std::sync::Arc;
 
@@ -25,7 +26,7 @@ struct Hit {
 struct Caster<'a> {
     scene: &'a RenderScene,
     poses: Vec<(Matrix3<f64>, V)>,
-    meshes: Vec<Option<TriMesh>>,
+    meshes: Vec<Option<Vec<Block>>>,
     view: View,
 }
 
@@ -36,7 +37,7 @@ impl<'a> Caster<'a> {
             let rows = Matrix3::from_row_slice(&[r[0], r[1], r[2]].concat());
             (rows, V::from(p.translation.map(f64::from)))
         };
-        let mesh = |s: &Shape| matches!(s, Shape::Mesh(_) | Shape::HeightField(_)).then(|| s.tessellate(0));
+        let mesh = |s: &Shape| matches!(s, Shape::Mesh(_) | Shape::HeightField(_)).then(|| blocks(&s.tessellate(0)));
         let meshes = scene.instances().iter().map(|i| mesh(&i.shape)).collect();
         Self { scene, poses: poses.iter().map(wide).collect(), meshes, view: *view }
     }
@@ -49,30 +50,35 @@ impl<'a> Caster<'a> {
         let d = V::new(r[0].dot(&c), r[1].dot(&c), r[2].dot(&c));
         let o = V::from(w.world_from_camera.translation.map(f64::from));
         let (near, far) = (f64::from(w.near), f64::from(w.far));
-        let mut best: Option<Hit> = None;
+        let best: Cell<Option<Hit>> = Cell::new(None);
         for (k, instance) in self.scene.instances().iter().enumerate() {
             let (rotation, translation) = &self.poses[k];
             let (lo, ld) = (rotation.tr_mul(&(o - translation)), rotation.tr_mul(&d));
             let mut offer = |t: f64, n: V| {
-                if t >= near && t <= far && best.is_none_or(|b| t < b.t) {
+                if t >= near && t <= far && best.get().is_none_or(|b| t < b.t) {
                     let n = rotation * n.normalize();
                     let normal = if n.dot(&d) > 0.0 { -n } else { n };
-                    best = Some(Hit { t, normal, instance: k });
+                    best.set(Some(Hit { t, normal, instance: k }));
                 }
             };
-            match &self.meshes[k] {
-                Some(mesh) => triangles(mesh, lo, ld, &mut offer),
-                None => shape(&instance.shape, lo, ld, &mut offer),
+            let Some(blocks) = &self.meshes[k] else {
+                shape(&instance.shape, lo, ld, &mut offer);
+                continue;
+            };
+            for block in blocks {
+                if block.enters(lo, ld) <= best.get().map_or(far, |b| b.t) {
+                    block.triangles(lo, ld, &mut offer);
+                }
             }
         }
-        best
+        best.get()
     }
 }
 
-/// All solutions of a t² + 2 b t + c = 0.
-fn quadratic(a: f64, b: f64, c: f64) -> Vec<f64> {
-    let d = b * b - a * c;
-    if a == 0.0 || d < 0.0 { vec![] } else { vec![(-b - d.sqrt()) / a, (-b + d.sqrt()) / a] }
+/// Both solutions of a t² + 2 b t + c = 0; not a number where there are none.
+fn quadratic(a: f64, b: f64, c: f64) -> [f64; 2] {
+    let root = (b * b - a * c).sqrt();
+    if a == 0.0 { [f64::NAN; 2] } else { [(-b - root) / a, (-b + root) / a] }
 }
 
 fn shape(shape: &Shape, o: V, d: V, offer: &mut dyn FnMut(f64, V)) {
@@ -144,18 +150,52 @@ fn side(o: V, d: V, r: f64, h: f64, offer: &mut dyn FnMut(f64, V)) {
     }
 }
 
-/// Source: Möller and Trumbore, Fast, minimum storage ray/triangle intersection, 1997.
-fn triangles(mesh: &TriMesh, o: V, d: V, offer: &mut dyn FnMut(f64, V)) {
-    for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|i| V::from(mesh.positions[i as usize].map(f64::from)));
-        let (ab, ac) = (b - a, c - a);
-        let p = d.cross(&ac);
-        let det = ab.dot(&p);
-        let s = (o - a) / det;
-        let (u, q) = (s.dot(&p), s.cross(&ab));
-        let v = d.dot(&q);
-        if det != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
-            offer(ac.dot(&q), ab.cross(&ac));
+/// Some triangles of a mesh: a corner and the edges from it, and a box around all of them.
+struct Block {
+    low: V,
+    high: V,
+    triangles: Vec<[V; 3]>,
+}
+
+/// The triangles of a mesh, in their order.
+fn blocks(mesh: &TriMesh) -> Vec<Block> {
+    let block = |triangles: &[[u32; 3]]| {
+        let corner = |i: u32| V::from(mesh.positions[i as usize].map(f64::from));
+        let corners = triangles.as_flattened().iter().map(|&i| corner(i));
+        let (low, high) = (corners.clone().reduce(|a, b| a.inf(&b)).unwrap(), corners.reduce(|a, b| a.sup(&b)).unwrap());
+        // Wider by more than what rounding moves a hit, 1e-16 of the coordinates.
+        let wider = V::repeat(1e-9 * (low.amax() + high.amax()));
+        let edges = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(corner);
+            [a, b - a, c - a]
+        };
+        Block { low: low - wider, high: high + wider, triangles: triangles.iter().map(edges).collect() }
+    };
+    mesh.triangles.chunks(16).map(block).collect()
+}
+
+impl Block {
+    /// Where a ray enters the box, infinity if it misses it: no triangle is nearer.
+    fn enters(&self, o: V, d: V) -> f64 {
+        let (mut from, mut to) = (0.0f64, f64::INFINITY);
+        for k in 0..3 {
+            let (a, b) = ((self.low[k] - o[k]) / d[k], (self.high[k] - o[k]) / d[k]);
+            (from, to) = (from.max(a.min(b)), to.min(a.max(b)));
+        }
+        if from <= to { from } else { f64::INFINITY }
+    }
+
+    /// Source: Möller and Trumbore, Fast, minimum storage ray/triangle intersection, 1997.
+    fn triangles(&self, o: V, d: V, offer: &mut dyn FnMut(f64, V)) {
+        for [a, ab, ac] in &self.triangles {
+            let p = d.cross(ac);
+            let det = ab.dot(&p);
+            let s = (o - a) / det;
+            let (u, q) = (s.dot(&p), s.cross(ab));
+            let v = d.dot(&q);
+            if det != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
+                offer(ac.dot(&q), ab.cross(ac));
+            }
         }
     }
 }

@@ -6,32 +6,39 @@ use crate::visibility::View;
 use scene::mesh::{TextureSource, load};
 use scene::shape::Mesh;
 use scene::{Instance, Material, Pose, PoseF32, RenderMesh, RenderScene, Texture, TextureKind};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
-/// Copies of the vendor's SR5, one beside the other, on a checkered ground; mask ids count links.
+/// The joint frames of the vendor's SR5 at rest, bent a little: (mesh, translation and rotation about an axis from the link before).
+const SR5: [(&str, [f64; 3], [f64; 3]); 7] = [
+    ("base", [0.; 3], [0.; 3]),
+    ("link1", [0., 0., 0.328], [0., 0., 0.4]),
+    ("link2", [0.; 3], [0., 0.3, 0.]),
+    ("link3", [0.05, 0., 0.4], [0., 1.1, 0.]),
+    ("link4", [-0.05, 0., 0.4], [0., 0., 0.3]),
+    ("link5", [0., 0.136, 0.], [0., 0.9, 0.]),
+    ("link6", [0., 0., 0.1035], [0., 0., 0.]),
+];
+
+/// The meshes of its links, which all tests share.
+static SR5_MESHES: LazyLock<[Mesh; 7]> = LazyLock::new(|| {
+    let folder = testkit::needs::robot("rokae_description/urdf/SR5.urdf").with_file_name("../meshes/xMateSR5/visual");
+    SR5.map(|(name, ..)| {
+        let mesh = load(&folder.join(format!("xMateSR5_{name}.stl"))).unwrap().scaled([0.001; 3]);
+        Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) }
+    })
+});
+
+/// Copies of the robot, one beside the other, on a checkered ground; mask ids count links.
 pub(super) fn sr5(copies: usize) -> (RenderScene, Vec<PoseF32>) {
-    let meshes = testkit::needs::robot("rokae_description/urdf/SR5.urdf").with_file_name("../meshes/xMateSR5/visual");
-    // The joint frames at rest, bent a little: (mesh, translation and rotation about an axis from the link before).
-    let links: [(&str, [f64; 3], [f64; 3]); 7] = [
-        ("base", [0.; 3], [0.; 3]),
-        ("link1", [0., 0., 0.328], [0., 0., 0.4]),
-        ("link2", [0.; 3], [0., 0.3, 0.]),
-        ("link3", [0.05, 0., 0.4], [0., 1.1, 0.]),
-        ("link4", [-0.05, 0., 0.4], [0., 0., 0.3]),
-        ("link5", [0., 0.136, 0.], [0., 0.9, 0.]),
-        ("link6", [0., 0., 0.1035], [0., 0., 0.]),
-    ];
     let white = Material { rgba: [0.92, 0.92, 0.93, 1.0], specular: 0.4, shininess: 0.4, ..Material::default() };
     let mut instances = vec![checker_plane()];
     let mut poses = vec![PoseF32::IDENTITY];
     let mut world = Pose::identity();
-    for (k, (name, xyz, rpy)) in links.into_iter().enumerate() {
+    for (k, ((_, xyz, rpy), mesh)) in SR5.into_iter().zip(&*SR5_MESHES).enumerate() {
         world *= scene::pose::from_xyz_rpy(xyz, rpy);
-        let mesh = load(&meshes.join(format!("xMateSR5_{name}.stl"))).unwrap().scaled([0.001; 3]);
-        let mesh = Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE));
         for copy in 0..copies {
             let id = (7 * copy + k) as i32 + 1;
-            instances.push(Instance::new(Mesh { mesh: Arc::clone(&mesh) }, white.clone(), id));
+            instances.push(Instance::new(mesh.clone(), white.clone(), id));
             let beside = scene::pose::from_xyz_rpy([0.1 * copy as f64, 0.45 * copy as f64, 0.], [0.; 3]);
             poses.push(PoseF32::from(&(beside * world)));
         }
@@ -64,9 +71,11 @@ fn textures_of_anymal() {
     let meshes = testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf").with_file_name("../meshes");
     let mut instances = vec![checker_plane()];
     let mut poses = vec![PoseF32::IDENTITY];
-    let parts = [("base", 0., 0.), ("top_shell", 0., 0.), ("bottom_shell", 0., 0.), ("face", 0.4145, 0.)];
-    for (k, (file, x, yaw)) in parts.into_iter().chain([("face", -0.4145, std::f64::consts::PI)]).enumerate() {
-        let mesh = load(&meshes.join(format!("{file}.dae"))).unwrap();
+    let [base, top, bottom, face] =
+        ["base", "top_shell", "bottom_shell", "face"].map(|file| load(&meshes.join(format!("{file}.dae"))).unwrap());
+    let back = (&face, -0.4145, std::f64::consts::PI);
+    let parts = [(&base, 0., 0.), (&top, 0., 0.), (&bottom, 0., 0.), (&face, 0.4145, 0.), back];
+    for (k, (mesh, x, yaw)) in parts.into_iter().enumerate() {
         for part in &mesh.parts {
             let mut material = Material { rgba: [0.7, 0.7, 0.7, 1.0], specular: 0.3, ..Material::default() };
             if let Some(m) = part.material.map(|m| &mesh.materials[m]) {
@@ -78,7 +87,7 @@ fn textures_of_anymal() {
                     material.texture = Some(Arc::new(texture));
                 }
             }
-            let mesh = Arc::new(RenderMesh::of_part(&mesh, part, RenderMesh::CREASE));
+            let mesh = Arc::new(RenderMesh::of_part(mesh, part, RenderMesh::CREASE));
             instances.push(Instance::new(Mesh { mesh }, material, k as i32 + 1));
             poses.push(PoseF32::from(&scene::pose::from_xyz_rpy([x, 0., 0.3], [0., 0., yaw])));
         }

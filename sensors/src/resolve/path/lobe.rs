@@ -314,19 +314,22 @@ mod tests {
     /// an order below what is asked. Chosen ones: 2^14 points of a net.
     #[test]
     fn energy() {
+        let n = 1000;
+        let cell = |k: i32| (f64::from(k) + 0.5) / f64::from(n);
+        let heights: Vec<[f64; 2]> = (0..n).map(|k| [cell(k), (1.0 - cell(k).powi(2)).sqrt()]).collect();
+        let turns: Vec<[f64; 2]> = (0..n).map(|k| turn(cell(k))).collect();
         for (specular, shininess, albedo) in
             [(1.0, 1.0, 0.0), (0.5, 0.5, 0.5), (1.0, 0.05, 1.0), (0.0, 0.5, 1.0), (1.0, 0.0, 1.0), (0.02, 1.0, 0.9)]
         {
             let lobe = lobe(specular, shininess, albedo);
             for cos in [1.0, 0.7, 0.3, 0.1] {
                 let o = toward(cos);
-                let n = 1000;
                 let mut all = 0.0;
-                for k in 0..n * n {
-                    let (z, part) = ((f64::from(k % n) + 0.5) / f64::from(n), (f64::from(k / n) + 0.5) / f64::from(n));
-                    let (r, [c, s]) = ((1.0 - z * z).sqrt(), turn(part));
-                    let Scatter { below, layer } = lobe.scatter(o, [r * c, r * s, z]);
-                    all += (below[0] + layer[0]) * 2.0 * PI / f64::from(n * n);
+                for [c, s] in &turns {
+                    for [z, r] in &heights {
+                        let Scatter { below, layer } = lobe.scatter(o, [r * c, r * s, *z]);
+                        all += (below[0] + layer[0]) * 2.0 * PI / f64::from(n * n);
+                    }
                 }
                 let chosen = mean(&lobe, o, ([1, 2], 3), 14, |next| next.weight[0]);
                 let what = format!("specular {specular}, shininess {shininess}, albedo {albedo}, cosine {cos}");
