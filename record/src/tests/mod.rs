@@ -1,8 +1,34 @@
-//! A scene with something of everything, and MCAP files as lists of messages.
+//! Recordings: their content, held against the simulation and read by independent readers.
 
+mod contents;
+mod episodes;
+mod hdf5;
+mod images;
+mod kill;
+mod lerobot;
+mod outcomes;
+mod readers;
+mod refusals;
+mod scenes;
+mod stage;
+
+pub(crate) use crate::{
+    Format, Record, RecordError, Recorded, RecorderCfg, RecorderId, Recording, StageCfg, Topic, Wanted, recover,
+    recover_to,
+};
+pub(crate) use scene::Pose;
+pub(crate) use sensors::camera::{
+    Camera, CameraCfg, CameraConvention, Channels, Extrinsics, Intrinsics, Placement, RasterCfg, Renderer,
+    StereoCameraCfg,
+};
+pub(crate) use sensors::ray::RayCasterCfg;
+pub(crate) use sensors::{ContactSensorCfg, ImuCfg, JointStateCfg, Sampled};
+pub(crate) use sim::{
+    BodyType, DriveCfg, DriveType, EnvId, MjcfCfg, MjcfFile, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManager,
+    SimulationManagerCfg,
+};
 use std::borrow::Borrow;
 use std::path::Path;
-
 pub(crate) use testkit::worlds::RecordedWorld as World;
 
 /// Steps between two images, and between two measurements of the IMU.

@@ -2,9 +2,7 @@
 
 use super::episodes::Expected;
 use super::readers::{bits, python, said};
-use super::support::World;
-use kinetoscope::prelude::*;
-use kinetoscope::record::Format;
+use super::*;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -114,7 +112,7 @@ fn h5py_reads_many_episodes_and_long_ones() {
         let begun = heights.len() - ENVS;
         let q = sim.mjcf_part(cart).get_qpos();
         heights[begun..].iter_mut().enumerate().for_each(|(env, rows)| rows.push(q.row(env).to_vec()));
-        let force = kinetoscope::ndarray::Array2::from_shape_fn((ENVS, 1), |(env, _)| (env + step) as f64 * 0.01);
+        let force = ndarray::Array2::from_shape_fn((ENVS, 1), |(env, _)| (env + step) as f64 * 0.01);
         sim.mjcf_part_mut(cart).set_ctrl(&force, None, None).unwrap();
         sim.update(1);
     }
@@ -186,7 +184,7 @@ fn a_full_disk_leaves_nothing_that_looks_whole() {
         let output = std::process::Command::new("sh")
             .args(["-c", "trap '' XFSZ; ulimit -f \"$1\"; shift; exec \"$@\"", "sh", &blocks.to_string()])
             .arg(std::env::current_exe().unwrap())
-            .args(["--exact", "hdf5::scenario_records_to_a_full_disk", "--ignored", "--nocapture", "--test-threads=1"])
+            .args(["--exact", "tests::hdf5::scenario_records_to_a_full_disk", "--ignored", "--nocapture", "--test-threads=1"])
             .env(FILE, folder.path().join("run.hdf5"))
             .env("TMPDIR", folder.path())
             .output()

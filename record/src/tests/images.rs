@@ -1,10 +1,8 @@
 //! Folders of pictures, and animations.
 
 use super::readers::{python, said};
-use super::support::{PICTURE_EVERY, World};
-use kinetoscope::ndarray::Axis;
-use kinetoscope::prelude::*;
-use kinetoscope::record::Format;
+use ndarray::Axis;
+use super::*;
 use std::path::Path;
 
 const STEPS: u32 = 4 * PICTURE_EVERY;

@@ -1,13 +1,12 @@
 //! Rewards and ends of a task, as datasets and other recordings have them.
 
 use super::readers::{python, said};
-use kinetoscope::env::{
+use env::{
     ActionTerm, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, Space, TerminationTerm,
 };
-use kinetoscope::ndarray::{Array2, array};
-use kinetoscope::prelude::*;
-use kinetoscope::record::{Recording, Wanted};
-use kinetoscope::sim::{JointIndex, MjcfFile, Outcome};
+use ndarray::{Array2, array};
+use super::*;
+use sim::{JointIndex, MjcfFile, Outcome};
 use std::path::Path;
 
 const ENVS: usize = 3;
@@ -225,7 +224,7 @@ fn whoever_has_a_task_tells_what_comes_of_it() {
     assert_eq!(sim.outcome().map(|outcome| outcome.rewards.to_vec()), Some(vec![0.0; ENVS]));
     let recorder = sim.record(RecorderCfg::new(&path).with_topics([Topic::Outcomes])).unwrap();
     let outcome = |reward: f64, count: usize| {
-        let ends = kinetoscope::ndarray::Array1::from_elem(ENVS, false);
+        let ends = ndarray::Array1::from_elem(ENVS, false);
         let rewards = (0..count).map(|env| reward + env as f64).collect();
         Outcome { rewards, terminated: ends.clone(), truncated: ends }
     };

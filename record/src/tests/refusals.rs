@@ -1,8 +1,6 @@
 //! Recordings that cannot be begun, and what is said.
 
-use super::support::World;
-use kinetoscope::prelude::*;
-use kinetoscope::record::Format;
+use super::*;
 use std::fs;
 
 fn refusal(cfg: RecorderCfg) -> (RecordError, String) {
@@ -180,8 +178,7 @@ fn what_is_recorded_must_stay_what_it_is() {
     world.step(1);
     assert!(!world.sim.observer(recorder).unwrap().has_failed());
     // A second robot has joints, which the sensor of all joints now measures.
-    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
-    world.sim.add_robot(RobotCfg { uid: "other".into(), urdf, ..Default::default() }).unwrap();
+    world.sim.add_robot(testkit::worlds::sr5("other")).unwrap();
     world.step(2);
     let error = world.sim.finish_recording(recorder).unwrap_err();
     let RecordError::BrokenOff { error, kept: None, .. } = error else { panic!("{error}") };

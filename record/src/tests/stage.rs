@@ -1,9 +1,7 @@
 //! Films of the stage.
 
 use super::readers::{python, said};
-use super::support::World;
-use kinetoscope::prelude::*;
-use kinetoscope::record::{Format, StageCfg};
+use super::*;
 use std::path::Path;
 
 const SIZE: [usize; 2] = [96, 64];

@@ -1,12 +1,10 @@
 //! Readers that nobody here wrote: NumPy, the `mcap` package with its decoder of ROS 2 messages, Pillow, PyAV with FFmpeg.
 
-use super::support::{PICTURE_EVERY, World};
-use kinetoscope::ndarray::Axis;
-use kinetoscope::prelude::*;
-use kinetoscope::record::recover_to;
-use kinetoscope::sensors::camera::Lens;
-use kinetoscope::sensors::camera::lens::{OpenCvFisheye, Panorama};
-use kinetoscope::sensors::ray::pattern::Grid;
+use ndarray::Axis;
+use super::*;
+use sensors::camera::Lens;
+use sensors::camera::lens::{OpenCvFisheye, Panorama};
+use sensors::ray::pattern::Grid;
 use std::path::Path;
 pub(crate) use testkit::needs::{python_readers as python, read_json};
 
@@ -14,7 +12,7 @@ const STEPS: u32 = 4 * PICTURE_EVERY;
 
 /// The JSON that a script of this folder prints about a file.
 pub(crate) fn said(python: &Path, script: &str, file: &Path) -> serde_json::Value {
-    read_json(python, &Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/record").join(script), file)
+    read_json(python, &Path::new(env!("CARGO_MANIFEST_DIR")).join("src/tests").join(script), file)
 }
 
 /// Numbers with a fraction as texts of their bits, as the scripts give them: nothing is lost between the programs.

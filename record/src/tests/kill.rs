@@ -1,9 +1,7 @@
 //! Processes that are killed while they record: what was recorded more than a second before can be read, where the file is
 //! written as fast as it is recorded.
 
-use super::support::{World, messages, of};
-use kinetoscope::prelude::*;
-use kinetoscope::record;
+use super::*;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::Stdio;
@@ -101,7 +99,7 @@ fn kill_once(folder: &Path, kill: u32, dt: f64) {
     assert!(short || old > 0, "it had done nothing a second before the end");
     assert!(!path.exists(), "what was killed has not the name of a whole file");
     assert!(short || path.with_extension("mcap.part").exists());
-    let recovered = match record::recover(&path) {
+    let recovered = match recover(&path) {
         Ok(recovered) => recovered,
         Err(error) => {
             // Nothing was a second old, and nothing was whole yet: what there is stays, and is no whole file.
@@ -132,9 +130,9 @@ fn kill_once(folder: &Path, kill: u32, dt: f64) {
 fn what_is_no_recording_is_not_recovered() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    assert!(record::recover(&path).unwrap_err().to_string().contains("run.mcap.part"));
+    assert!(recover(&path).unwrap_err().to_string().contains("run.mcap.part"));
     std::fs::write(folder.path().join("run.mcap.part"), "something else").unwrap();
-    let error = record::recover(&path).unwrap_err().to_string();
+    let error = recover(&path).unwrap_err().to_string();
     assert!(error.contains("nothing of it can be read"), "{error}");
     let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(left, ["run.mcap.part"]);

@@ -2,8 +2,7 @@
 
 use super::episodes::Expected;
 use super::readers::{python, said};
-use super::support::World;
-use kinetoscope::prelude::*;
+use super::*;
 
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]

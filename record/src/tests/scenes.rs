@@ -1,10 +1,9 @@
 //! What recordings tell viewers of how environments look, read by the package `mcap` and held against MuJoCo's geoms.
 
 use super::readers::{python, said};
-use super::support::World;
-use kinetoscope::prelude::*;
-use kinetoscope::scene::{PoseF32, Shape};
-use kinetoscope::sim::{BodyType, Look, Property};
+use super::*;
+use scene::{PoseF32, Shape};
+use sim::{BodyType, Look, Property};
 use serde_json::Value;
 
 const STEPS: u32 = 30;
@@ -159,5 +158,5 @@ fn what_has_no_recorded_pose_is_told_and_not_drawn() {
     let recorder =
         world.sim.record(RecorderCfg { scene: false, ..RecorderCfg::new(&path) }.with_topics(topics)).unwrap();
     assert_eq!(world.sim.finish_recording(recorder).unwrap().left_out, [""; 0]);
-    assert!(super::support::messages(&path).iter().all(|message| !message.topic.ends_with("/scene")));
+    assert!(super::messages(&path).iter().all(|message| !message.topic.ends_with("/scene")));
 }

@@ -1,9 +1,8 @@
 //! What is in recordings, held against what was read from the simulation meanwhile.
 
-use super::support::{IMU_EVERY, Message, PICTURE_EVERY, World, bytes, contains, messages, of};
-use kinetoscope::ndarray::Axis;
-use kinetoscope::prelude::*;
-use kinetoscope::sensors::Sampled;
+use ndarray::Axis;
+use super::*;
+use sensors::Sampled;
 
 const STEPS: u32 = 20;
 

@@ -1,8 +1,7 @@
 //! Frames and episodes as they are expected of a run, for the datasets that have them.
 
-use super::support::World;
-use kinetoscope::ndarray::Axis;
-use kinetoscope::sensors::Sampled;
+use ndarray::Axis;
+use sensors::Sampled;
 
 /// What a row of an environment is expected to be.
 #[derive(Clone, Debug, Default)]
@@ -76,7 +75,7 @@ impl Expected {
             color.rows().into_iter().flat_map(|p| [p[0], p[1], p[2]]).map(|byte| format!("{byte:02x}")).collect()
         };
         let imu = world.sim.sensor(world.imu).unwrap();
-        let of = |values: kinetoscope::ndarray::Array2<f64>| values.row(env).to_vec();
+        let of = |values: ndarray::Array2<f64>| values.row(env).to_vec();
         self.were[env] = now;
         Row {
             positions: of(robot.get_qpos()),
