@@ -1,13 +1,8 @@
-//! Recordings that cannot be begun, and what is said.
+//! Recordings that cannot be begun, and their errors.
 
 use super::*;
 use std::fs;
-
-fn refusal(cfg: RecorderCfg) -> (RecordError, String) {
-    let error = World::new(1, 1).sim.record(cfg).unwrap_err();
-    let text = error.to_string();
-    (error, text)
-}
+use testkit::refusal::assert_error;
 
 /// A name for each format that is a file.
 fn files() -> impl Iterator<Item = String> {
@@ -15,166 +10,127 @@ fn files() -> impl Iterator<Item = String> {
     Format::all().filter(move |(format, _)| is_file(format)).map(|(_, end)| format!("run.{end}"))
 }
 
+/// Files stay, and are replaced at the end if they may be; a folder of another origin is never replaced.
 #[test]
-fn files_that_are_there_stay_as_they_are() {
+fn taken_names() {
     let folder = tempfile::tempdir().unwrap();
+    let mut world = World::new(1, 1);
     for name in files() {
         let path = folder.path().join(&name);
         fs::write(&path, "precious").unwrap();
-        let (error, text) = refusal(RecorderCfg::new(&path));
-        assert!(matches!(error, RecordError::Exists { .. }) && text.contains(&name), "{text}");
+        assert_error(world.sim.record(RecorderCfg::new(&path)), "Exists", &[&name]);
         assert_eq!(fs::read_to_string(&path).unwrap(), "precious");
-        // Replaced, if it may be, at the end.
-        let mut world = World::new(1, 1);
-        let recorder = world.sim.record(RecorderCfg { overwrite: true, ..RecorderCfg::new(&path) }).unwrap();
+        let recorder = world.sim.record(overwriting(RecorderCfg::new(&path))).unwrap();
         (0..6).for_each(|step| world.step(step));
         assert_eq!(fs::read_to_string(&path).unwrap(), "precious");
         world.sim.finish_recording(recorder).unwrap();
         assert_ne!(fs::read(&path).unwrap(), b"precious");
     }
-    for name in ["pictures", "run.lerobot"] {
-        let mine = folder.path().join(name);
-        fs::create_dir(&mine).unwrap();
-        fs::write(mine.join("one"), "precious").unwrap();
-        assert!(matches!(refusal(RecorderCfg::new(&mine)).0, RecordError::Exists { .. }));
-        // Whatever is allowed: it is no recorder's.
-        let cfg = RecorderCfg { overwrite: true, ..RecorderCfg::new(&mine) };
-        assert!(matches!(refusal(cfg).0, RecordError::Exists { .. }));
-        assert_eq!(fs::read_to_string(mine.join("one")).unwrap(), "precious");
+    // Found by reading: every dataset has `meta/info.json`, so a dataset of another program was taken for a recorder's and replaced.
+    for file in ["images/one", "run.lerobot/one", "other.lerobot/meta/info.json"] {
+        let file = folder.path().join(file);
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(&file, "precious").unwrap();
+        let cfg = RecorderCfg::new(file.ancestors().find(|path| path.parent() == Some(folder.path())).unwrap());
+        for cfg in [cfg.clone(), overwriting(cfg)] {
+            assert_error(world.sim.record(cfg), "Exists", &[]);
+        }
+        assert_eq!(fs::read_to_string(&file).unwrap(), "precious");
     }
+    // A recording that was killed can be recovered, and is not overwritten.
+    let part = folder.path().join("killed.mcap.part");
+    fs::write(&part, "precious").unwrap();
+    assert_error(world.sim.record(RecorderCfg::new(folder.path().join("killed.mcap"))), "Unfinished", &["recover"]);
+    assert_eq!(fs::read_to_string(part).unwrap(), "precious");
 }
 
+/// Places where nothing can be written.
 #[test]
-fn a_recording_that_was_killed_is_not_written_over() {
+fn places() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("run.mcap.part"), "precious").unwrap();
-    let (error, text) = refusal(RecorderCfg::new(folder.path().join("run.mcap")));
-    assert!(matches!(error, RecordError::Unfinished { .. }) && text.contains("recover"), "{text}");
-    assert_eq!(fs::read_to_string(folder.path().join("run.mcap.part")).unwrap(), "precious");
-}
-
-#[test]
-fn folders_where_nothing_can_be_written_are_an_error_at_the_start() {
-    let folder = tempfile::tempdir().unwrap();
+    let mut world = World::new(1, 1);
     // Not even an administrator writes below a file.
     let file = folder.path().join("file");
     fs::write(&file, "").unwrap();
-    for name in files().chain(["pictures".into(), "run.lerobot".into()]) {
-        for place in [file.join(&name), folder.path().join("missing").join(&name)] {
-            if !files().any(|file| file == name) && place.starts_with(folder.path().join("missing")) {
-                continue; // Folders of pictures are made.
-            }
-            let (error, text) = refusal(RecorderCfg::new(&place));
-            assert!(matches!(error, RecordError::File { .. }) && text.contains(&name), "{text}");
-        }
+    for name in files().chain(["images".into(), "run.lerobot".into()]) {
+        assert_error(world.sim.record(RecorderCfg::new(file.join(&name))), "File", &[&name]);
     }
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing was left");
-}
-
-#[test]
-fn wrong_names_and_numbers_are_said_with_what_would_be_right() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.mcap");
-    let with = |topic| RecorderCfg::new(&path).with_topics([topic]);
-    for (cfg, words) in [
-        (with(Topic::JointStates("amr".into())), vec!["amr", "arm"]),
-        (with(Topic::Sensor("camra".into())), vec!["camra", "camera"]),
-        (with(Topic::ObjectPose("cub".into())), vec!["cub", "cube"]),
-        (with(Topic::channel("camera", "dept")), vec!["camera/dept", "camera/depth"]),
-        (with(Topic::channel("camera", "normal")), vec!["camera/normal", "camera/depth"]),
-        (with(Topic::channel("imu", "depth")), vec!["imu/depth"]),
-        (RecorderCfg { every: 0, ..RecorderCfg::new(&path) }, vec!["every", "at least 1"]),
-        (RecorderCfg { packets: 1, ..RecorderCfg::new(&path) }, vec!["packets", "at least 2"]),
-        (
-            RecorderCfg { every: 3, ..RecorderCfg::new(folder.path().join("run.lerobot")) },
-            vec!["run.lerobot", "33.333", "2, 4, 1 would do"],
-        ),
-        (
-            RecorderCfg::new(folder.path().join("run.lerobot")).with_topics([Topic::Sensor("imu".into())]),
-            vec!["no place", "sensors alone"],
-        ),
-        (RecorderCfg { envs: Some(vec![EnvId(3)]), ..RecorderCfg::new(&path) }, vec!["environment 3"]),
-        (RecorderCfg { envs: Some(vec![EnvId(0); 2]), ..RecorderCfg::new(&path) }, vec!["twice"]),
-        (RecorderCfg { topics: vec![], ..RecorderCfg::new(&path) }, vec!["nothing to record"]),
-        (RecorderCfg { envs: Some(vec![]), ..RecorderCfg::new(&path) }, vec!["number of envs is 0", "at least 1"]),
-        (
-            RecorderCfg::new(folder.path().join("run.avi")),
-            vec![".avi", ".mcap", ".npz", ".apng", ".gif", ".webp", ".mp4", ".lerobot"],
-        ),
-        (
-            RecorderCfg::new(folder.path().join("run.apng")).with_topics([Topic::JointStates("arm".into())]),
-            vec!["no place", "JointStates"],
-        ),
-    ] {
-        let (_, text) = refusal(cfg);
-        assert!(words.iter().all(|word| text.contains(word)), "{text}: {words:?}");
-    }
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was left");
-}
-
-/// Root cause: whether a folder may be replaced by a file was asked when the recording ended.
-#[test]
-fn no_file_replaces_a_folder() {
-    let folder = tempfile::tempdir().unwrap();
     for name in files() {
+        // Folders of images are made; files need their folder.
+        let missing = folder.path().join("missing").join(&name);
+        assert_error(world.sim.record(RecorderCfg::new(missing)), "File", &[&name]);
+        // Root cause: the check that a file may not replace a folder was made when the recording ended.
         let path = folder.path().join(&name);
         fs::create_dir(&path).unwrap();
-        let (error, text) = refusal(RecorderCfg { overwrite: true, ..RecorderCfg::new(&path) });
-        assert!(matches!(error, RecordError::File { .. }) && text.contains("this is a folder"), "{text}");
-        assert!(path.is_dir());
+        assert_error(world.sim.record(overwriting(RecorderCfg::new(&path))), "File", &["this is a folder"]);
         fs::remove_dir(&path).unwrap();
     }
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was left");
+    assert_eq!(names(&folder), ["file"], "nothing was left");
 }
 
-/// Root cause: a topic was looked for by its name alone, so that an IMU called `tf` was written as transforms.
+/// Wrong names and numbers; the message has what would be right.
 #[test]
-fn two_kinds_of_messages_do_not_share_a_topic() {
-    let folder = tempfile::tempdir().unwrap();
+fn configurations() {
+    let (folder, path) = scratch("run.mcap");
+    let new = |name: &str| RecorderCfg::new(folder.path().join(name));
+    let with = |topic| new("run.mcap").with_topics([topic]);
+    let run = || RecorderCfg::new(&path);
+    let ends = [".avi", ".mcap", ".npz", ".apng", ".gif", ".webp", ".mp4", ".lerobot"];
+    let rows: [(RecorderCfg, &[&str]); 16] = [
+        (with(Topic::JointStates("amr".into())), &["amr", "arm"]),
+        (with(Topic::Sensor("camra".into())), &["camra", "camera"]),
+        (with(Topic::ObjectPose("cub".into())), &["cub", "cube"]),
+        (with(Topic::channel("camera", "dept")), &["camera/dept", "camera/depth"]),
+        (with(Topic::channel("camera", "normal")), &["camera/normal", "camera/depth"]),
+        (with(Topic::channel("imu", "depth")), &["imu/depth"]),
+        (RecorderCfg { every: 0, ..run() }, &["every", "at least 1"]),
+        (RecorderCfg { packets: 1, ..run() }, &["packets", "at least 2"]),
+        (RecorderCfg { every: 3, ..new("run.lerobot") }, &["run.lerobot", "33.333", "2, 4, 1 would do"]),
+        (new("run.lerobot").with_topics([Topic::Sensor("imu".into())]), &["no place", "sensors alone"]),
+        (RecorderCfg { envs: Some(vec![EnvId(3)]), ..run() }, &["environment 3"]),
+        (RecorderCfg { envs: Some(vec![EnvId(0); 2]), ..run() }, &["twice"]),
+        (RecorderCfg { topics: vec![], ..run() }, &["nothing to record"]),
+        (RecorderCfg { envs: Some(vec![]), ..run() }, &["number of envs is 0", "at least 1"]),
+        (new("run.avi"), &ends),
+        (new("run.apng").with_topics([Topic::JointStates("arm".into())]), &["no place", "JointStates"]),
+    ];
     let mut world = World::new(1, 1);
-    world.sim.add_sensor("tf", ImuCfg::on("cube")).unwrap();
-    let error = world.sim.record(RecorderCfg::new(folder.path().join("run.mcap"))).unwrap_err();
-    assert!(matches!(&error, RecordError::SameName { name, .. } if name == "tf"), "{error}");
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing was left");
-    // The control: arrays of archives have names of their own.
-    let recorder = world.sim.record(RecorderCfg::new(folder.path().join("run.npz"))).unwrap();
-    world.sim.finish_recording(recorder).unwrap();
-}
-
-#[test]
-fn sensors_have_names_that_stay_in_the_folder() {
-    for uid in ["/tmp/x", "../x", "..", "a\\b", ""] {
-        let error = World::new(1, 1).sim.add_sensor(uid, JointStateCfg::default()).unwrap_err();
-        assert!(error.to_string().contains("not usable"), "{error}");
+    for (cfg, parts) in rows {
+        assert_error(world.sim.record(cfg), "", parts);
     }
+    for uid in ["/tmp/x", "../x", "..", "a\\b", ""] {
+        assert_error(world.sim.add_sensor(uid, JointStateCfg::default()), "", &["not usable"]);
+    }
+    // Root cause: a topic was looked up by its name alone, so that an IMU called `tf` was written as transforms.
+    world.sim.add_sensor("tf", ImuCfg::on("cube")).unwrap();
+    assert_error(world.sim.record(run()), "SameName { path", &["\"tf\""]);
+    assert!(names(&folder).is_empty(), "nothing was left");
+    // Control: arrays of archives have names of their own.
+    record_steps(&mut world, new("run.npz"), 0);
 }
 
+/// The unreadable rest of a killed archive is replaced; two recorders do not write one file.
 #[test]
-fn archives_that_were_killed_are_in_nobodys_way() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.npz");
-    // Before its end, there is nothing in it.
+fn busy_archive() {
+    let (folder, path) = scratch("run.npz");
     fs::write(folder.path().join("run.npz.part"), "").unwrap();
     let mut world = World::new(1, 1);
     let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
-    // Two recorders, one file.
-    let error = world.sim.record(RecorderCfg { overwrite: true, ..RecorderCfg::new(&path) }).unwrap_err();
-    assert!(matches!(error, RecordError::Busy { .. }), "{error}");
+    assert_error(world.sim.record(overwriting(RecorderCfg::new(&path))), "Busy", &[]);
     world.step(0);
     world.sim.finish_recording(recorder).unwrap();
     assert!(path.exists());
 }
 
+/// Recorded entities must not change while they are recorded.
 #[test]
-fn what_is_recorded_must_stay_what_it_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.npz");
+fn changed_scene() {
+    let (_folder, path) = scratch("run.npz");
     let mut world = World::new(1, 1);
     let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
     world.step(0);
-    let ball = RigidObjectCfg { uid: "ball".into(), shape: ObjectShape::Sphere { radius: 0.1 }, ..Default::default() };
-    // Another object changes nothing of what is recorded.
-    world.sim.add_rigid_object(ball).unwrap();
+    // Another object changes nothing that is recorded.
+    testkit::worlds::add_ball(&mut world.sim, "ball", [0.0; 3]);
     world.step(1);
     assert!(!world.sim.observer(recorder).unwrap().has_failed());
     // A second robot has joints, which the sensor of all joints now measures.
