@@ -50,6 +50,8 @@ mod scene_update;
 mod source;
 mod stage;
 mod stream;
+#[cfg(test)]
+mod tests;
 mod topic;
 mod writer;
 mod zip;

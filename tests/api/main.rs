@@ -10,6 +10,7 @@ mod kinematics;
 mod mjcf;
 mod mjcf_robot;
 mod objects;
+mod recording;
 mod robot;
 mod scene;
 mod sensors;

@@ -232,7 +232,7 @@ mod tests {
     fn targets_of_cargo() {
         assert_eq!(target("api").join(" "), "--package kinetoscope --test api");
         assert_eq!(target("kinetoscope-scene").join(" "), "--package kinetoscope-scene --lib");
-        assert_eq!(target("kinetoscope-record/record").join(" "), "--package kinetoscope-record --test record");
+        assert_eq!(target("kinetoscope-cli/cli").join(" "), "--package kinetoscope-cli --test cli");
     }
 
     #[test]

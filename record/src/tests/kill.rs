@@ -1,11 +1,8 @@
-//! Processes that are killed while they record: what was recorded more than a second before can be read, where the file is
-//! written as fast as it is recorded.
+//! Processes that are killed while they record: everything recorded more than a second before can be read, where the file
+//! is written while it is recorded.
 
-use super::support::{World, messages, of};
-use kinetoscope::prelude::*;
-use kinetoscope::record;
+use super::*;
 use std::io::{BufRead, BufReader, Write};
-use std::path::Path;
 use std::process::Stdio;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::channel;
@@ -13,15 +10,15 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Set in child processes only: the file to record to.
 const FILE: &str = "KINETOSCOPE_TEST_RECORD_TO";
-/// How many processes are killed: 50 where all is checked, else few.
+/// Number of processes that are killed: 50 in CI, else few.
 const KILLS: &str = "KINETOSCOPE_TEST_KILLS";
-/// How many of them are at work at a time: they mostly sleep.
+/// Number of processes at a time: they mostly sleep.
 const AT_A_TIME: u32 = 8;
 
-/// Records until it is killed, and says which steps it has done.
+/// Records until it is killed, and prints which steps it has done.
 #[test]
 #[ignore = "runs in a process of its own"]
-fn scenario_records_for_ever() {
+fn scenario_endless() {
     let Some(path) = std::env::var_os(FILE) else { return };
     let mut world = World::new(2, 1);
     // Its life begins before there is a file.
@@ -36,10 +33,10 @@ fn scenario_records_for_ever() {
     }
 }
 
-/// Kills a process after so long from its first step on (`begun`), or from before there is a file. Gives the steps that it had done
-/// one second before.
+/// Kills a process `life` after its first step (`begun`), or after a time before there is a file. Returns the steps that it had
+/// done one second before.
 fn kill_after(path: &Path, life: Duration, begun: bool) -> u64 {
-    let mut child = testkit::process::command(module_path!(), "scenario_records_for_ever")
+    let mut child = testkit::process::command(module_path!(), "scenario_endless")
         .env(FILE, path)
         .stdout(Stdio::piped())
         .spawn()
@@ -57,7 +54,7 @@ fn kill_after(path: &Path, life: Duration, begun: bool) -> u64 {
     while begun && done.iter().all(|(_, steps)| *steps == 0) {
         done.push(heard.recv().unwrap());
     }
-    // Whatever it does then, also in the middle of its first line or its file's first bytes.
+    // The end may come at any point, also within its first line or the first bytes of its file.
     std::thread::sleep(life);
     let end = Instant::now();
     // SIGKILL, on Unix.
@@ -70,11 +67,10 @@ fn kill_after(path: &Path, life: Duration, begun: bool) -> u64 {
 }
 
 #[test]
-fn what_is_older_than_a_second_survives_a_kill() {
+fn readable_rows() {
     let usual = if std::env::var_os("CI").is_some() { 50 } else { 4 };
     let kills: u32 = std::env::var(KILLS).ok().and_then(|count| count.parse().ok()).unwrap_or(usual);
     let folder = tempfile::tempdir().unwrap();
-    let dt = World::new(1, 1).sim.cfg().physics_dt;
     let next = AtomicU32::new(0);
     let work = || {
         loop {
@@ -82,15 +78,15 @@ fn what_is_older_than_a_second_survives_a_kill() {
             if kill >= kills {
                 return;
             }
-            kill_once(folder.path(), kill, dt);
+            kill_once(folder.path(), kill);
         }
     };
-    // One that panics is noticed at the end.
+    // A thread that panics is noticed at the end.
     std::thread::scope(|scope| (0..AT_A_TIME.min(kills)).for_each(|_| drop(scope.spawn(work))));
     assert_eq!(next.load(Ordering::Relaxed), kills + AT_A_TIME.min(kills), "each of them was killed");
 }
 
-fn kill_once(folder: &Path, kill: u32, dt: f64) {
+fn kill_once(folder: &Path, kill: u32) {
     let path = folder.join(format!("{kill}.mcap"));
     // Another time at every run, anywhere between two flushes.
     let chance = u64::from(SystemTime::now().duration_since(UNIX_EPOCH).unwrap().subsec_micros());
@@ -99,12 +95,12 @@ fn kill_once(folder: &Path, kill: u32, dt: f64) {
     let life = Duration::from_millis(if short { chance % 1200 } else { 1200 + chance % 1000 });
     let old = kill_after(&path, life, !short);
     assert!(short || old > 0, "it had done nothing a second before the end");
-    assert!(!path.exists(), "what was killed has not the name of a whole file");
+    assert!(!path.exists(), "only a whole file has its name");
     assert!(short || path.with_extension("mcap.part").exists());
-    let recovered = match record::recover(&path) {
+    let recovered = match recover(&path) {
         Ok(recovered) => recovered,
         Err(error) => {
-            // Nothing was a second old, and nothing was whole yet: what there is stays, and is no whole file.
+            // Nothing was a second old, and nothing was whole yet: the part stays, and no file gets the name.
             let said = error.to_string();
             let begun = ["there is no whole message", "this is no MCAP file", "entity not found"];
             assert!(old == 0 && begun.iter().any(|what| said.contains(what)), "step {old}: {said}");
@@ -118,8 +114,7 @@ fn kill_once(folder: &Path, kill: u32, dt: f64) {
     let all = messages(&path);
     assert_eq!(all.len() as u64, recovered.messages);
     for env in 0..2 {
-        let states = of(&all, &format!("/env_{env}/arm/joint_states"));
-        let steps: Vec<u64> = states.iter().map(|m| (m.time as f64 / 1e9 / dt).round() as u64).collect();
+        let steps = steps_of(&all, &format!("/env_{env}/arm/joint_states"));
         assert!(steps.iter().copied().eq(0..steps.len() as u64), "every step, in order");
         let last = steps.last().copied().unwrap_or(0);
         assert!(old == 0 || !steps.is_empty());
@@ -129,13 +124,11 @@ fn kill_once(folder: &Path, kill: u32, dt: f64) {
 }
 
 #[test]
-fn what_is_no_recording_is_not_recovered() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.mcap");
-    assert!(record::recover(&path).unwrap_err().to_string().contains("run.mcap.part"));
+fn no_recording() {
+    let (folder, path) = scratch("run.mcap");
+    assert!(recover(&path).unwrap_err().to_string().contains("run.mcap.part"));
     std::fs::write(folder.path().join("run.mcap.part"), "something else").unwrap();
-    let error = record::recover(&path).unwrap_err().to_string();
+    let error = recover(&path).unwrap_err().to_string();
     assert!(error.contains("nothing of it can be read"), "{error}");
-    let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-    assert_eq!(left, ["run.mcap.part"]);
+    assert_eq!(names(&folder), ["run.mcap.part"]);
 }

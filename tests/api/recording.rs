@@ -1,15 +1,16 @@
 //! The record button of views writes files, as the recorder does.
 
-use super::support::{World, bytes, contains, messages, of};
 use kinetoscope::prelude::*;
-use kinetoscope::view::{Command, Viewer, Wants};
+use kinetoscope::record::{Recording, Wanted};
+use kinetoscope::view::{Command, Recording as _, Viewer, Wants};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard};
+use testkit::worlds::{RecordedWorld, sr5};
 
-/// A world with a button, and somebody who presses it.
+/// A world with a button, and a viewer that presses it.
 struct Watched {
-    world: World,
+    world: RecordedWorld,
     files: Arc<Mutex<FileRecording>>,
     viewer: Viewer,
     step: u32,
@@ -17,9 +18,13 @@ struct Watched {
     positions: BTreeMap<u64, Vec<f64>>,
 }
 
+fn nanos(seconds: f64) -> u64 {
+    (seconds * 1e9).round() as u64
+}
+
 impl Watched {
     fn new(path: &Path) -> Self {
-        let mut world = World::new(1, 1);
+        let mut world = RecordedWorld::new(1, 1);
         let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(path))));
         world.sim.record_button(RecordButton::shared(Arc::clone(&files)));
         let viewer = world.sim.viewer(Wants { rate: 1000.0, ..Wants::default() });
@@ -33,54 +38,67 @@ impl Watched {
     fn step(&mut self) {
         self.world.step(self.step);
         self.step += 1;
-        let time = (self.world.sim.time()[0] * 1e9).round() as u64;
-        self.positions.insert(time, self.world.sim.robot(self.world.arm).get_qpos().into_iter().collect());
+        let positions = self.world.sim.robot(self.world.arm).get_qpos().into_iter().collect();
+        self.positions.insert(nanos(self.world.sim.time()[0]), positions);
     }
 
-    /// How the recording stands, as viewers see it.
+    /// State of the recording in the views: running or not, and its text.
     fn seen(&self) -> (bool, String) {
         let state = self.viewer.newest().unwrap().run.recording.clone().unwrap();
         (state.on, state.text)
     }
 
-    /// Steps until viewers see the recording so.
-    fn step_until(&mut self, what: &str, is: impl Fn(bool, &str) -> bool) {
+    /// The reason why a command was refused.
+    fn refused(&self) -> Option<String> {
+        self.viewer.newest().unwrap().run.refused.clone()
+    }
+
+    /// Steps until this holds.
+    fn step_until(&mut self, what: &str, is: impl Fn(&Self) -> bool) {
         for _ in 0..20_000 {
-            let (on, text) = self.seen();
-            if is(on, &text) {
+            if is(self) {
                 return;
             }
             self.step();
         }
-        panic!("never: {what}; {:?}, {:?}", self.seen(), self.viewer.newest().unwrap().run.refused);
+        panic!("never: {what}; {:?}, {:?}", self.seen(), self.refused());
     }
 
     fn press(&mut self, on: bool) {
         self.viewer.send(Command::Record(on));
-        self.step_until("the button is obeyed", |is, _| is == on);
+        self.step_until("the button is obeyed", |own| own.seen().0 == on);
     }
 
-    /// Every row of a file is what the simulation was at its time, and none is left out.
+    /// Ends the recording in the program.
+    fn end(&mut self) -> Vec<Recorded> {
+        let mut files = self.files.lock().unwrap();
+        let recorded = files.end(&mut self.world.sim).unwrap();
+        assert!(files.end(&mut self.world.sim).unwrap().is_empty(), "a recording is returned once");
+        recorded
+    }
+
+    /// Every row of a file is the state of the simulation at its time, and no row is missing.
     fn check(&self, path: &Path, recorded: &Recorded) {
-        let all = messages(path);
-        let rows = of(&all, "/env_0/arm/joint_states");
-        assert_eq!((recorded.path.as_path(), rows.len() as u64), (path, recorded.packets));
-        assert!(rows.len() > 5, "{}", rows.len());
-        for pair in rows.windows(2) {
+        let recording = Recording::open(path).unwrap();
+        let topic = recording.topic("/env_0/arm/joint_states", None).unwrap();
+        assert_eq!((recorded.path.as_path(), topic.count), (path, recorded.packets));
+        assert!(topic.count > 5, "{topic:?}");
+        let robot = self.world.sim.robot(self.world.arm);
+        let wanted = robot.joint_names().iter().map(|joint| Wanted::new(&topic.name, format!("position[{joint}]")));
+        for (joint, samples) in recording.samples(&wanted.collect::<Vec<_>>()).unwrap().iter().enumerate() {
+            let times: Vec<u64> = samples.times.iter().map(|time| nanos(*time)).collect();
             // Steps of 10 ms.
-            assert_eq!(pair[1].time - pair[0].time, 10_000_000);
+            assert!(times.windows(2).all(|pair| pair[1] - pair[0] == 10_000_000), "{times:?}");
+            let expected: Vec<f64> = times.iter().map(|time| self.positions[time][joint]).collect();
+            assert_eq!(samples.values, expected, "joint {joint}");
+            // Control: another time has other positions.
+            assert_ne!(expected[0], expected[5], "joint {joint}");
         }
-        for row in &rows {
-            let positions = bytes(&self.positions[&row.time]);
-            assert!(contains(&row.data, &positions));
-        }
-        // The control: the positions of another time are not in it.
-        assert!(!contains(&rows[0].data, &bytes(&self.positions[&rows[5].time])));
     }
 }
 
 #[test]
-fn a_button_that_is_pressed_writes_a_file_and_pressed_again_another() {
+fn button() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut watched = Watched::new(&path);
@@ -88,85 +106,72 @@ fn a_button_that_is_pressed_writes_a_file_and_pressed_again_another() {
     assert_eq!(watched.seen(), (false, String::new()));
     for name in ["run.mcap", "run-2.mcap"] {
         watched.press(true);
-        assert!(!folder.path().join(name).exists(), "it has its name when it is whole");
-        watched.step_until("rows are counted", |_, text| {
+        assert!(!folder.path().join(name).exists(), "a file has its name when it is whole");
+        watched.step_until("rows are counted", |own| {
+            let text = own.seen().1;
             text.strip_prefix(&format!("{name}: ")).and_then(|t| t.strip_suffix(" rows")).is_some_and(|n| n.len() > 1)
         });
         watched.press(false);
         assert!(watched.seen().1.starts_with(&format!("{name}: ")) && watched.seen().1.ends_with(" MB"));
     }
-    let mut sim = std::mem::replace(&mut watched.world, World::new(1, 1)).sim;
-    let recorded = watched.files().end(&mut sim).unwrap();
+    let recorded = watched.end();
     assert_eq!(recorded.len(), 2);
     for (recorded, name) in recorded.iter().zip(["run.mcap", "run-2.mcap"]) {
         watched.check(&folder.path().join(name), recorded);
     }
-    assert!(watched.files().end(&mut sim).unwrap().is_empty(), "told once");
 }
 
 #[test]
-fn a_recording_is_whole_when_the_viewer_that_began_it_is_gone() {
+fn viewer_that_leaves() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut watched = Watched::new(&path);
     watched.press(true);
     (0..20).for_each(|_| watched.step());
-    // Somebody else stays, and sees it end.
+    // Another viewer stays, and sees the recording end.
     let gone = std::mem::replace(&mut watched.viewer, watched.world.sim.viewer(Wants::default()));
     drop(gone);
-    watched.step_until("it ends", |on, _| !on);
-    let mut sim = std::mem::replace(&mut watched.world, World::new(1, 1)).sim;
-    let recorded = watched.files().end(&mut sim).unwrap();
+    watched.step_until("it ends", |own| !own.seen().0);
+    let recorded = watched.end();
     watched.check(&path, &recorded[0]);
 }
 
+/// The button takes the next free name; the program gets an error.
 #[test]
-fn what_is_there_is_passed_over_by_the_button_and_refused_to_the_program() {
+fn taken_names() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     std::fs::write(&path, "precious").unwrap();
-    std::fs::write(folder.path().join("run-2.mcap.part"), "left by one that was killed").unwrap();
+    std::fs::write(folder.path().join("run-2.mcap.part"), "left by a killed process").unwrap();
     let mut watched = Watched::new(&path);
-    let error = watched.files().begin(&mut World::new(1, 1).sim).unwrap_err();
+    let error = watched.files().begin(&mut RecordedWorld::new(1, 1).sim).unwrap_err();
     assert!(matches!(error, RecordError::Exists { .. }), "{error}");
     watched.press(true);
     assert!(watched.seen().1.starts_with("run-3.mcap: "), "{:?}", watched.seen());
     watched.press(false);
     assert!(folder.path().join("run-3.mcap").is_file());
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "precious");
-}
-
-#[test]
-fn what_cannot_be_recorded_is_said() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut watched = Watched::new(&folder.path().join("missing").join("run.mcap"));
+    // A folder that is missing is reported to the viewer.
+    let mut watched = Watched::new(&folder.path().join("missing/run.mcap"));
     watched.viewer.send(Command::Record(true));
-    for _ in 0..20_000 {
-        watched.step();
-        if watched.viewer.newest().unwrap().run.refused.is_some() {
-            break;
-        }
-    }
-    let run = watched.viewer.newest().unwrap().run.clone();
-    assert!(run.refused.is_some_and(|reason| reason.contains("missing")) && !run.recording.unwrap().on);
+    watched.step_until("it is refused", |own| own.refused().is_some());
+    assert!(watched.refused().unwrap().contains("missing") && !watched.seen().0);
 }
 
-/// Root cause: an error of a recording that the button had ended was told to the viewer only, and a program that asked at its end
-/// heard that all was well.
+/// Root cause: an error of a recording that the button had ended was reported to the viewer only, and a program that asked at
+/// its end got no error.
 #[test]
-fn a_recording_that_the_button_ended_badly_is_an_error_at_the_end() {
-    use kinetoscope::view::Recording as _;
+fn broken_recording() {
     let folder = tempfile::tempdir().unwrap();
-    let mut world = World::new(1, 1);
+    let mut world = RecordedWorld::new(1, 1);
     let mut files = FileRecording::new(RecorderCfg::new(folder.path().join("run.npz")));
     files.set(&mut world.sim, true).unwrap();
     world.step(0);
     // A second robot has joints, which the sensor of all joints now measures.
-    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf").unwrap());
-    world.sim.add_robot(RobotCfg { uid: "other".into(), urdf, ..Default::default() }).unwrap();
+    world.sim.add_robot(sr5("other")).unwrap();
     world.step(1);
     let said = files.set(&mut world.sim, false).unwrap_err();
-    // Another one, which is well.
+    // Another recording, which is well.
     files.set(&mut world.sim, true).unwrap();
     world.step(2);
     let error = files.end(&mut world.sim).unwrap_err();

@@ -1,10 +1,8 @@
-//! Frames and episodes as they are expected of a run, for the datasets that have them.
+//! Frames and episodes that a run should have in datasets.
 
-use super::support::World;
-use kinetoscope::ndarray::Axis;
-use kinetoscope::sensors::Sampled;
+use super::*;
 
-/// What a row of an environment is expected to be.
+/// Expected values of a row of an environment.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Row {
     pub(crate) positions: Vec<f64>,
@@ -14,19 +12,19 @@ pub(crate) struct Row {
     pub(crate) targets: [Vec<f64>; 3],
     pub(crate) cube: Vec<f64>,
     /// Measured last since the environment was reset; red, green and blue as hexadecimal numbers.
-    pub(crate) picture: Option<String>,
+    pub(crate) image: Option<String>,
     pub(crate) acceleration: Option<Vec<f64>>,
     joints: bool,
 }
 
 impl Row {
-    /// Everything that a frame needs.
+    /// True if it has everything that a frame needs.
     fn is_whole(&self) -> bool {
-        self.picture.is_some() && self.acceleration.is_some() && self.joints
+        self.image.is_some() && self.acceleration.is_some() && self.joints
     }
 }
 
-/// What is expected of a run.
+/// Expected rows of a run.
 pub(crate) struct Expected {
     /// Rows of each environment, from one reset to the next, in the order in which they began.
     runs: Vec<(usize, Vec<Row>)>,
@@ -42,41 +40,46 @@ fn counts(world: &World, env: usize) -> [u64; 3] {
 }
 
 impl Expected {
-    /// The rows of the beginning.
-    pub(crate) fn new(world: &World) -> Self {
-        let envs = 0..world.sim.num_envs();
-        let mut all = Self { runs: Vec::new(), were: envs.clone().map(|env| counts(world, env)).collect() };
-        envs.for_each(|env| all.begin(world, env));
-        all
+    /// Records a run in which environment 1 is reset after a step, and collects what is expected of it.
+    pub(crate) fn record(path: &Path, steps: u32, reset_after: u32) -> (World, Self, Recorded) {
+        let mut world = World::new(2, 2);
+        let cfg = RecorderCfg { task: "wave at the cube".into(), ..RecorderCfg::new(path) };
+        let recorder = world.sim.record(cfg).unwrap();
+        let mut all = Self { runs: Vec::new(), were: vec![[0; 3]; 2] };
+        (0..2).for_each(|env| all.begin(&world, env));
+        for step in 0..steps {
+            world.step(step);
+            for env in 0..2 {
+                let last = all.runs.iter().rposition(|(of, _)| *of == env).unwrap();
+                let before = all.runs[last].1.last().unwrap().clone();
+                let row = all.row(&world, env, &before);
+                all.runs[last].1.push(row);
+            }
+            if step == reset_after {
+                world.sim.reset(Some(&[EnvId(1)])).unwrap();
+                all.begin(&world, 1);
+            }
+        }
+        assert!(!path.exists(), "a dataset has its name when it is whole");
+        let recorded = world.sim.finish_recording(recorder).unwrap();
+        (world, all, recorded)
     }
 
-    /// An environment was reset, or there is one now.
-    pub(crate) fn begin(&mut self, world: &World, env: usize) {
+    fn begin(&mut self, world: &World, env: usize) {
         self.were[env] = counts(world, env);
         let row = self.row(world, env, &Row::default());
         self.runs.push((env, vec![row]));
-    }
-
-    /// A step was done.
-    pub(crate) fn stepped(&mut self, world: &World) {
-        for env in 0..world.sim.num_envs() {
-            let last = self.runs.iter().rposition(|(of, _)| *of == env).unwrap();
-            let before = self.runs[last].1.last().unwrap().clone();
-            let row = self.row(world, env, &before);
-            self.runs[last].1.push(row);
-        }
     }
 
     fn row(&mut self, world: &World, env: usize, before: &Row) -> Row {
         let robot = world.sim.robot(world.arm);
         let (now, were) = (counts(world, env), self.were[env]);
         let color = || {
-            let camera = world.sim.sensor(world.camera).unwrap();
-            let color = camera.color().unwrap().index_axis(Axis(0), env).to_owned();
-            color.rows().into_iter().flat_map(|p| [p[0], p[1], p[2]]).map(|byte| format!("{byte:02x}")).collect()
+            let color = world.sim.sensor(world.camera).unwrap().color().unwrap().index_axis(Axis(0), env).to_owned();
+            rgb(&color).iter().map(|byte| format!("{byte:02x}")).collect()
         };
         let imu = world.sim.sensor(world.imu).unwrap();
-        let of = |values: kinetoscope::ndarray::Array2<f64>| values.row(env).to_vec();
+        let of = |values: Array2<f64>| values.row(env).to_vec();
         self.were[env] = now;
         Row {
             positions: of(robot.get_qpos()),
@@ -84,7 +87,7 @@ impl Expected {
             efforts: of(robot.get_qf()),
             targets: [of(robot.get_target_qpos()), of(robot.get_target_qvel()), of(robot.get_target_qf())],
             cube: of(world.sim.rigid_object(world.cube).get_pose()),
-            picture: if now[0] == were[0] { before.picture.clone() } else { Some(color()) },
+            image: if now[0] == were[0] { before.image.clone() } else { Some(color()) },
             acceleration: match now[1] == were[1] {
                 true => before.acceleration.clone(),
                 false => Some(imu.lin_acc_b().row(env).to_vec()),
@@ -93,7 +96,7 @@ impl Expected {
         }
     }
 
-    /// The environment of each episode, and its frames, with the row after each, which has its action: the last row has none.
+    /// The environment of each episode and its frames, each with the row that follows, which has its action. The last row is no frame.
     pub(crate) fn episodes(&self) -> Vec<(usize, Vec<[&Row; 2]>)> {
         let of = |(env, rows): &'_ (usize, Vec<Row>)| -> (usize, Vec<[usize; 2]>) {
             let whole = (1..rows.len()).filter(|next| rows[next - 1].is_whole()).map(|next| [next - 1, next]);
@@ -101,8 +104,8 @@ impl Expected {
             assert!(frames.len() > 5 && frames.len() + 1 < rows.len(), "frames, and rows before the first");
             (*env, frames)
         };
-        let places = self.runs.iter().map(of).zip(&self.runs);
-        places
+        let indices = self.runs.iter().map(of).zip(&self.runs);
+        indices
             .map(|((env, frames), (_, rows))| (env, frames.into_iter().map(|pair| pair.map(|k| &rows[k])).collect()))
             .collect()
     }

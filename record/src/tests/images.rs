@@ -1,0 +1,266 @@
+//! Folders of images, animations, and images of the stage.
+
+use super::*;
+
+const STEPS: u32 = 4 * IMAGE_EVERY;
+
+/// Records, and returns color and depth of environment 1.
+fn recorded(cfg: RecorderCfg) -> (Recorded, Vec<Vec<u8>>, Vec<Vec<f32>>) {
+    let mut world = World::new(2, 2);
+    let recorder = world.sim.record(cfg).unwrap();
+    let (mut colors, mut depths) = (Vec::new(), Vec::new());
+    for step in 0..STEPS {
+        world.step(step);
+        if (step + 1) % IMAGE_EVERY == 0 {
+            let camera = world.sim.sensor(world.camera).unwrap();
+            colors.push(rgb(&camera.color().unwrap().index_axis(Axis(0), 1).to_owned()));
+            depths.push(camera.depth().unwrap().index_axis(Axis(0), 1).iter().copied().collect());
+        }
+    }
+    (world.sim.finish_recording(recorder).unwrap(), colors, depths)
+}
+
+/// A folder has every image to the last bit, and depth to the millimetre.
+#[test]
+fn folder() {
+    let (_folder, path) = scratch("images");
+    let (_, colors, depths) = recorded(RecorderCfg::new(&path));
+    for (channel, env) in [("color", 0), ("color", 1), ("depth", 0), ("depth", 1)] {
+        assert_eq!(names(path.join(format!("camera/{channel}/env_{env}"))).len(), colors.len(), "{channel} {env}");
+    }
+    let image = |channel: &str, k: usize| {
+        image::open(path.join(format!("camera/{channel}/env_1/{k:06}.png"))).unwrap()
+    };
+    let mut seen = 0;
+    for (k, (color, depth)) in colors.iter().zip(&depths).enumerate() {
+        assert_eq!(image("color", k).to_rgb8().as_raw(), color);
+        for (found, depth) in image("depth", k).as_luma16().unwrap().iter().zip(depth) {
+            let metres = f32::from(*found) / 1000.0;
+            // Half a millimetre of rounding, and that of f32 at some metres.
+            let same = if depth.is_finite() { (metres - depth).abs() < 0.000_501 } else { *found == 0 };
+            assert!(same, "{found} mm for {depth} m");
+            seen += u32::from(depth.is_finite());
+        }
+    }
+    assert!(seen > 100, "the camera sees something in {seen} pixels");
+    assert!(!path.join("camera/mask").exists(), "a mask is no image to look at");
+}
+
+#[test]
+#[ignore = "needs Python readers of recordings: cargo xtask test"]
+fn folder_by_pillow() {
+    let (_folder, path) = scratch("images");
+    let (_, colors, depths) = recorded(RecorderCfg::new(&path));
+    let found = said("read_pictures.py", &path);
+    for (k, (color, depth)) in colors.iter().zip(&depths).enumerate() {
+        let step = u64::from(IMAGE_EVERY) * (k as u64 + 1);
+        let of = |channel: &str| &found[format!("camera/{channel}/env_1/{k:06}.png")];
+        assert_eq!(*of("color"), json!(["RGB", [32, 24], weighed(color, |byte| u64::from(*byte)), step]));
+        // A miss is 0; half a millimetre rounds away from it.
+        let mm = |depth: &f32| if depth.is_finite() { (depth * 1000.0).round() as u64 } else { 0 };
+        let [mode, size, sum, at] = &list(of("depth"))[..] else { panic!("{}", of("depth")) };
+        assert!(["I;16", "I"].contains(&mode.as_str().unwrap()), "{mode}");
+        assert_eq!((size, at, sum), (&json!([32, 24]), &json!(step), &json!(weighed(depth, mm))));
+    }
+}
+
+/// A folder has its name when it is whole, and nothing of the folder that it replaces.
+#[test]
+fn overwritten_folder() {
+    let (folder, path) = scratch("images");
+    let part = folder.path().join("images.part");
+    let (was, ..) = recorded(RecorderCfg::new(&path));
+    // Masks are asked for with the rest of the camera, and have no place.
+    let mut world = World::new(2, 1);
+    let cfg = RecorderCfg::new(&path).with_topics([Topic::Sensor("camera".into())]);
+    let error = world.sim.record(cfg.clone()).unwrap_err();
+    assert!(matches!(error, RecordError::Exists { .. }), "{error}");
+    let recorder = world.sim.record(overwriting(cfg.clone())).unwrap();
+    assert!(matches!(world.sim.record(overwriting(cfg)), Err(RecordError::Busy { .. })));
+    (0..IMAGE_EVERY).for_each(|step| world.step(step));
+    world.sim.observer_mut(recorder).unwrap().catch_up();
+    assert!(path.join("camera/color/env_0/000003.png").exists() && part.join("camera/color/env_0/000000.png").exists());
+    let time = world.sim.time()[1];
+    let recorded = world.sim.finish_recording(recorder).unwrap();
+    assert!(was.left_out.is_empty() && recorded.left_out.iter().any(|what| what.contains("camera/mask")), "{recorded}");
+    assert!(!part.exists());
+    assert_eq!(names(path.join("camera/color/env_0")), ["000000.png"], "one image, none of the four before");
+    let times = std::fs::read_to_string(path.join("times.csv")).unwrap();
+    let lines: Vec<&str> = times.lines().collect();
+    assert_eq!((lines.len(), lines[0]), (5, "picture,step,time,recorded_time"));
+    let line = format!("\"camera/color/env_1/000000.png\",{IMAGE_EVERY},{time},{time}");
+    assert!(lines.contains(&line.as_str()), "{times}");
+}
+
+/// Formats that show one camera in one environment.
+fn animations() -> impl Iterator<Item = (Format, &'static str)> {
+    Format::all().filter(|(format, _)| format.is_animation())
+}
+
+/// Checks the pixels of a frame.
+fn check_frame(end: &str, frame: &Value, color: &[u8]) {
+    let bytes = |plane: &str| -> Vec<u8> {
+        let hex = frame[plane].as_str().unwrap();
+        (0..hex.len()).step_by(2).map(|k| u8::from_str_radix(&hex[k..k + 2], 16).unwrap()).collect()
+    };
+    let pixels = color.as_chunks::<3>().0;
+    match end {
+        "apng" | "webp" => assert_eq!(bytes("rgb"), color, "{end}: without loss"),
+        "gif" => {
+            let known: std::collections::BTreeSet<_> = pixels.iter().collect();
+            assert!(known.len() <= 256, "{} colors", known.len());
+            assert_eq!(bytes("rgb"), color, "so many are a palette");
+        }
+        "mp4" => {
+            // ITU-R BT.709, 8 bits, limited range: half of rounding, and the error of constants in 65536ths.
+            let close = |found: u8, wanted: f64| assert!((f64::from(found) - wanted).abs() < 0.52, "{found} {wanted}");
+            let luma = |[r, g, b]: [f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+            let scaled = |p: &[u8; 3]| [p[0], p[1], p[2]].map(|x| f64::from(x) / 255.0);
+            for (found, pixel) in bytes("y").into_iter().zip(pixels) {
+                close(found, 16.0 + 219.0 * luma(scaled(pixel)));
+            }
+            let width = usize::try_from(frame["size"][0].as_u64().unwrap()).unwrap();
+            for (k, (blue, red)) in bytes("u").into_iter().zip(bytes("v")).enumerate() {
+                let (x, y) = (2 * (k % (width / 2)), 2 * (k / (width / 2)));
+                let four = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(dy, dx)| scaled(&pixels[(y + dy) * width + x + dx]));
+                let mean = [0, 1, 2].map(|c| four.iter().map(|p| p[c]).sum::<f64>() / 4.0);
+                close(blue, 128.0 + 224.0 * (mean[2] - luma(mean)) / 1.8556);
+                close(red, 128.0 + 224.0 * (mean[0] - luma(mean)) / 1.5748);
+            }
+            assert_eq!((bytes("y").len(), bytes("u").len()), (pixels.len(), pixels.len() / 4));
+            assert_eq!(frame["colour"], json!([1, 13, 1, "tv"]));
+        }
+        _ => panic!("{end}: its frames are not checked"),
+    }
+}
+
+#[test]
+#[ignore = "needs Python readers of recordings: cargo xtask test"]
+fn animation_frames() {
+    for (_, end) in animations() {
+        let (_folder, path) = scratch(&format!("run.{end}"));
+        let (recorded, colors, _) =
+            recorded(RecorderCfg { envs: Some(vec![EnvId(1)]), ..RecorderCfg::new(&path) });
+        assert_eq!(recorded.bytes, path.metadata().unwrap().len());
+        let found = said("read_animation.py", &path);
+        let frames = list(&found["frames"]);
+        assert_eq!(frames.len(), colors.len(), "{end}");
+        for (k, (frame, color)) in frames.iter().zip(&colors).enumerate() {
+            // Five steps of 10 ms.
+            assert_eq!((&frame["from"], &frame["until"]), (&(50 * k).into(), &(50 * (k + 1)).into()), "{end}: {k}");
+            check_frame(end, frame, color);
+        }
+        assert_ne!(colors[0], colors[3], "something moves");
+    }
+}
+
+/// An animation shows one camera in one environment.
+#[test]
+fn animation_streams() {
+    for (format, end) in animations() {
+        let (folder, path) = scratch(&format!("run.{end}"));
+        let mut world = World::new(2, 1);
+        let cfg = RecorderCfg::new(&path).with_topics([Topic::Sensor("camera".into())]);
+        let error = world.sim.record(cfg).unwrap_err();
+        assert!(matches!(&error, RecordError::TooMany { .. }), "{error}");
+        assert!(error.to_string().contains("camera/color in 2 environments"), "{error}");
+        // Without a topic, the first of each is taken.
+        let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
+        let streams: Vec<_> =
+            world.sim.observer(recorder).unwrap().streams().map(|s| (s.name.clone(), s.env_ids.clone())).collect();
+        assert_eq!(streams, [("camera/color".to_string(), vec![0])]);
+        // A recording without a frame is no file.
+        let error = world.sim.finish_recording(recorder).unwrap_err().to_string();
+        assert!(error.contains("no frame"), "{}: {error}", format.name());
+        assert!(names(&folder).is_empty());
+    }
+}
+
+#[test]
+fn odd_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = World::new(1, 1);
+    world.sim.add_sensor("odd", CameraCfg { width: 33, height: 24, ..CameraCfg::default() }).unwrap();
+    let cfg = |end| RecorderCfg::new(folder.path().join(end)).with_topics([Topic::channel("odd", "color")]);
+    let error = world.sim.record(cfg("run.mp4")).unwrap_err();
+    assert!(matches!(error, RecordError::Size { width: 33, height: 24, .. }), "{error}");
+    assert!(error.to_string().contains("run.mp4") && error.to_string().contains("even numbers"), "{error}");
+    assert!(names(&folder).is_empty(), "nothing was begun");
+    record_steps(&mut world, cfg("run.webp"), IMAGE_EVERY);
+}
+
+const STAGE: [usize; 2] = [96, 64];
+
+/// Records the stage for 0.3 s, at 20 images per second.
+#[test]
+#[ignore = "needs Python readers of recordings: cargo xtask test"]
+fn stage_animations() {
+    for (_, end) in animations() {
+        let (_folder, path) = scratch(&format!("run.{end}"));
+        let stage = StageCfg { size: STAGE, rate: 20.0, ..StageCfg::default() };
+        let cfg = RecorderCfg { stage, topics: vec![Topic::Stage], ..RecorderCfg::new(&path) };
+        record_steps(&mut World::new(2, 2), cfg, 30);
+        if end == "mp4" {
+            // The script checks the rate of smaller images.
+            assert!(std::fs::metadata(&path).unwrap().len() > 1000);
+            continue;
+        }
+        let found = said("read_animation.py", &path);
+        let frames = list(&found["frames"]);
+        let times: Vec<u64> = frames.iter().map(|frame| frame["from"].as_u64().unwrap()).collect();
+        assert_eq!(times, [0, 50, 100, 150, 200, 250, 300], "{end}");
+        assert!(frames.iter().all(|frame| frame["size"] == json!(STAGE)), "{end}");
+        assert!(frames.windows(2).any(|pair| pair[0]["rgb"] != pair[1]["rgb"]), "{end}: something moves");
+    }
+}
+
+/// The judge is the rasterizer of cameras at the viewpoint of the stage: of one environment, both see the same.
+#[test]
+fn stage_by_camera() {
+    let (_folder, path) = scratch("images");
+    let mut world = World::new(1, 1);
+    let (eye, target) = ([1.6, 1.1, 1.2], [0.3, 0.1, 0.3]);
+    let camera = CameraCfg {
+        width: STAGE[0],
+        height: STAGE[1],
+        intrinsics: Intrinsics::Fovy { radians: std::f64::consts::FRAC_PI_4 },
+        extrinsics: look_at(eye, target),
+        near: 0.05,
+        far: 500.0,
+        raster: RasterCfg { samples: 4, ..RasterCfg::default() },
+        channels: Channels { color: true, ..Channels::NONE },
+        update_period: 0.05,
+        ..CameraCfg::default()
+    };
+    world.sim.add_sensor("judge", camera).unwrap();
+    let stage = StageCfg { size: STAGE, rate: 20.0, eye: Some(eye), target: Some(target) };
+    let topics = vec![Topic::Stage, Topic::channel("judge", "color")];
+    record_steps(&mut world, RecorderCfg { stage, topics, ..RecorderCfg::new(&path) }, 20);
+    let image = |of: &str, k: usize| std::fs::read(path.join(format!("{of}/color/env_0/{k:06}.png"))).unwrap();
+    for k in 0..4 {
+        // The stage is drawn at the beginning too.
+        assert!(image("stage", k + 1) == image("judge", k), "image {k}");
+    }
+    assert!(image("stage", 1) != image("stage", 4), "control: it moves");
+}
+
+/// Without a camera, the stage is what there is to see.
+#[test]
+fn stage_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut sim = simulation(2);
+    sim.add_rigid_object(testkit::worlds::object("cube", ObjectShape::cube(0.2), [0.0; 3])).unwrap();
+    for name in ["run.gif", "images"] {
+        let recorded = record(&mut sim, RecorderCfg::new(folder.path().join(name)), |sim| sim.update(10));
+        assert!(recorded.packets > 1, "{name}");
+    }
+    assert!(folder.path().join("images/stage/color/env_0/000000.png").is_file());
+    for (stage, wrong) in [
+        (StageCfg { rate: 0.0, ..StageCfg::default() }, "rate"),
+        (StageCfg { size: [0, 10], ..StageCfg::default() }, "pixels"),
+        (StageCfg { eye: Some([1.0; 3]), target: Some([1.0; 3]), ..StageCfg::default() }, "from"),
+    ] {
+        let cfg = RecorderCfg { stage, ..RecorderCfg::new(folder.path().join("wrong.gif")) };
+        testkit::refusal::assert_error(sim.record(cfg), "Stage", &[wrong]);
+    }
+}

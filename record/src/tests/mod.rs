@@ -1,0 +1,210 @@
+//! Recordings: their content, held against the simulation and read by independent readers; and shared parts of the tests
+//! of this crate.
+
+mod contents;
+mod episodes;
+mod hdf5;
+mod images;
+mod kill;
+mod lerobot;
+mod outcomes;
+mod readers;
+mod refusals;
+mod scenes;
+
+pub(crate) use crate::{
+    Format, Record, RecordError, Recorded, RecorderCfg, Recording, StageCfg, Topic, Wanted, recover, recover_to,
+};
+pub(crate) use crate::{npy, zip};
+pub(crate) use ndarray::{Array2, Axis, array};
+pub(crate) use scene::Pose;
+pub(crate) use sensors::camera::{
+    Camera, CameraCfg, CameraConvention, Channels, Intrinsics, RasterCfg, Renderer, StereoCameraCfg,
+};
+pub(crate) use sensors::ray::pattern::Grid;
+pub(crate) use sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
+pub(crate) use sensors::{ContactSensorCfg, ImuCfg, JointStateCfg, Sampled, SamplingCfg};
+pub(crate) use serde_json::{Value, json};
+pub(crate) use sim::{BodyType, EnvId, MjcfCfg, ObjectShape, RobotCfg, SensorId, SimulationManager};
+pub(crate) use std::path::{Path, PathBuf};
+pub(crate) use testkit::worlds::{RecordedWorld as World, look_at};
+
+use std::borrow::Borrow;
+use tempfile::TempDir;
+use testkit::needs::{python_readers, read_json};
+
+/// Steps between two images, and between two measurements of the IMU, of [`World`].
+pub(crate) const IMAGE_EVERY: u32 = World::IMAGE_EVERY;
+pub(crate) const IMU_EVERY: u32 = World::IMU_EVERY;
+
+/// A folder that is removed with the value, and the path of a file in it.
+pub(crate) fn scratch(name: &str) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    (folder, path)
+}
+
+/// Names in a folder, sorted.
+pub(crate) fn names(folder: impl AsRef<Path>) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// A simulation without objects.
+pub(crate) fn simulation(num_envs: usize) -> SimulationManager {
+    testkit::worlds::sim(testkit::worlds::cfg(num_envs, 2))
+}
+
+/// A ball that falls.
+pub(crate) fn falling(num_envs: usize) -> SimulationManager {
+    let mut sim = simulation(num_envs);
+    let ball = r#"<mujoco><worldbody><body name="ball" pos="0 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
+    sim.add_mjcf(MjcfCfg::text("ball", ball)).unwrap();
+    sim
+}
+
+/// Records what `run` does.
+pub(crate) fn record(
+    sim: &mut SimulationManager,
+    cfg: RecorderCfg,
+    run: impl FnOnce(&mut SimulationManager),
+) -> Recorded {
+    let recorder = sim.record(cfg).unwrap();
+    run(sim);
+    sim.finish_recording(recorder).unwrap()
+}
+
+/// Records steps of a world.
+pub(crate) fn record_steps(world: &mut World, cfg: RecorderCfg, steps: u32) -> Recorded {
+    let recorder = world.sim.record(cfg).unwrap();
+    (0..steps).for_each(|step| world.step(step));
+    world.sim.finish_recording(recorder).unwrap()
+}
+
+/// The same configuration, which may replace files.
+pub(crate) fn overwriting(cfg: RecorderCfg) -> RecorderCfg {
+    RecorderCfg { overwrite: true, ..cfg }
+}
+
+pub(crate) fn nanos(seconds: f64) -> u64 {
+    (seconds * 1e9).round() as u64
+}
+
+/// A message of an MCAP file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Message {
+    pub(crate) topic: String,
+    pub(crate) schema: String,
+    pub(crate) time: u64,
+    pub(crate) data: Vec<u8>,
+}
+
+impl Message {
+    /// The number of the step at its time, of steps of 10 ms.
+    pub(crate) fn step(&self) -> u64 {
+        (self.time as f64 / 1e7).round() as u64
+    }
+
+    /// True if its data contain these bytes.
+    pub(crate) fn contains(&self, part: &[u8]) -> bool {
+        self.data.windows(part.len()).any(|window| window == part)
+    }
+}
+
+pub(crate) fn messages(path: &Path) -> Vec<Message> {
+    let bytes = std::fs::read(path).unwrap();
+    let all = mcap::MessageStream::new(&bytes).unwrap().map(|message| {
+        let message = message.unwrap();
+        Message {
+            topic: message.channel.topic.clone(),
+            schema: message.channel.schema.as_ref().unwrap().name.clone(),
+            time: message.log_time,
+            data: message.data.to_vec(),
+        }
+    });
+    all.collect()
+}
+
+/// The messages of one topic.
+pub(crate) fn of<'m>(messages: &'m [Message], topic: &str) -> Vec<&'m Message> {
+    messages.iter().filter(|message| message.topic == topic).collect()
+}
+
+/// The numbers of the steps at which a topic has messages.
+pub(crate) fn steps_of(messages: &[Message], topic: &str) -> Vec<u64> {
+    of(messages, topic).iter().map(|message| message.step()).collect()
+}
+
+/// Texts of the events in an MCAP file.
+pub(crate) fn logs(path: &Path) -> Vec<String> {
+    let text = |message: &&Message| String::from_utf8_lossy(&message.data).into_owned();
+    of(&messages(path), "/events").iter().map(text).collect()
+}
+
+/// The bytes of numbers in messages.
+pub(crate) fn bytes(numbers: impl IntoIterator<Item: Borrow<f64>>) -> Vec<u8> {
+    numbers.into_iter().flat_map(|x| x.borrow().to_le_bytes()).collect()
+}
+
+/// A member of a NumPy archive.
+pub(crate) fn member(path: &Path, name: &str) -> Vec<u8> {
+    let members = zip::parse(&std::fs::read(path).unwrap()).unwrap();
+    members.into_iter().find(|(known, _)| known == name).unwrap_or_else(|| panic!("no {name}")).1
+}
+
+/// An array of a NumPy archive: type, number of rows and bytes.
+pub(crate) fn rows(path: &Path, name: &str) -> (String, usize, Vec<u8>) {
+    let member = member(path, &format!("{name}.npy"));
+    let (descr, shape, data) = npy::parse(&member).unwrap();
+    (descr.to_string(), shape[0], data.to_vec())
+}
+
+/// An array of numbers in double precision of a NumPy archive.
+pub(crate) fn numbers_of(path: &Path, name: &str) -> Vec<f64> {
+    let (descr, _, data) = rows(path, name);
+    assert_eq!(descr, "<f8");
+    data.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
+}
+
+/// The JSON that a script of this folder prints about a file.
+pub(crate) fn said(script: &str, file: &Path) -> Value {
+    read_json(&python_readers(), &Path::new(env!("CARGO_MANIFEST_DIR")).join("src/tests").join(script), file)
+}
+
+/// Numbers with a fraction as texts of their bits, as the scripts give them: nothing is lost between the programs.
+pub(crate) fn bits(value: Value) -> Value {
+    match value {
+        Value::Number(number) if number.is_f64() => number.as_f64().unwrap().to_bits().to_string().into(),
+        Value::Array(values) => values.into_iter().map(bits).collect(),
+        Value::Object(values) => values.into_iter().map(|(name, value)| (name, bits(value))).collect(),
+        other => other,
+    }
+}
+
+/// A number from the text of its bits.
+pub(crate) fn number(text: &Value) -> f64 {
+    f64::from_bits(text.as_str().unwrap().parse().unwrap())
+}
+
+/// Numbers from texts of their bits.
+pub(crate) fn numbers(values: &Value) -> Vec<f64> {
+    list(values).iter().map(number).collect()
+}
+
+/// The elements of a JSON array.
+pub(crate) fn list(value: &Value) -> &Vec<Value> {
+    value.as_array().unwrap()
+}
+
+/// The sum of numbers, each by its place, so that no number may stand for another.
+pub(crate) fn weighed<T>(numbers: impl IntoIterator<Item = T>, number: impl Fn(T) -> u64) -> u64 {
+    numbers.into_iter().zip(1..).map(|(x, k)| number(x) * k).sum()
+}
+
+/// Red, green and blue of an image with opacity.
+pub(crate) fn rgb(color: &ndarray::Array3<u8>) -> Vec<u8> {
+    color.rows().into_iter().flat_map(|p| [p[0], p[1], p[2]]).collect()
+}

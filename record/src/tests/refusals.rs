@@ -1,0 +1,142 @@
+//! Recordings that cannot be begun, and their errors.
+
+use super::*;
+use std::fs;
+use testkit::refusal::assert_error;
+
+/// A name for each format that is a file.
+fn files() -> impl Iterator<Item = String> {
+    let is_file = |format: &Format| format.is_built() && ![Format::Pictures, Format::LeRobot].contains(format);
+    Format::all().filter(move |(format, _)| is_file(format)).map(|(_, end)| format!("run.{end}"))
+}
+
+/// Files stay, and are replaced at the end if they may be; a folder of another origin is never replaced.
+#[test]
+fn taken_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = World::new(1, 1);
+    for name in files() {
+        let path = folder.path().join(&name);
+        fs::write(&path, "precious").unwrap();
+        assert_error(world.sim.record(RecorderCfg::new(&path)), "Exists", &[&name]);
+        assert_eq!(fs::read_to_string(&path).unwrap(), "precious");
+        let recorder = world.sim.record(overwriting(RecorderCfg::new(&path))).unwrap();
+        (0..6).for_each(|step| world.step(step));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "precious");
+        world.sim.finish_recording(recorder).unwrap();
+        assert_ne!(fs::read(&path).unwrap(), b"precious");
+    }
+    // Found by reading: every dataset has `meta/info.json`, so a dataset of another program was taken for a recorder's and replaced.
+    for file in ["images/one", "run.lerobot/one", "other.lerobot/meta/info.json"] {
+        let file = folder.path().join(file);
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(&file, "precious").unwrap();
+        let cfg = RecorderCfg::new(file.ancestors().find(|path| path.parent() == Some(folder.path())).unwrap());
+        for cfg in [cfg.clone(), overwriting(cfg)] {
+            assert_error(world.sim.record(cfg), "Exists", &[]);
+        }
+        assert_eq!(fs::read_to_string(&file).unwrap(), "precious");
+    }
+    // A recording that was killed can be recovered, and is not overwritten.
+    let part = folder.path().join("killed.mcap.part");
+    fs::write(&part, "precious").unwrap();
+    assert_error(world.sim.record(RecorderCfg::new(folder.path().join("killed.mcap"))), "Unfinished", &["recover"]);
+    assert_eq!(fs::read_to_string(part).unwrap(), "precious");
+}
+
+/// Places where nothing can be written.
+#[test]
+fn places() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = World::new(1, 1);
+    // Not even an administrator writes below a file.
+    let file = folder.path().join("file");
+    fs::write(&file, "").unwrap();
+    for name in files().chain(["images".into(), "run.lerobot".into()]) {
+        assert_error(world.sim.record(RecorderCfg::new(file.join(&name))), "File", &[&name]);
+    }
+    for name in files() {
+        // Folders of images are made; files need their folder.
+        let missing = folder.path().join("missing").join(&name);
+        assert_error(world.sim.record(RecorderCfg::new(missing)), "File", &[&name]);
+        // Root cause: the check that a file may not replace a folder was made when the recording ended.
+        let path = folder.path().join(&name);
+        fs::create_dir(&path).unwrap();
+        assert_error(world.sim.record(overwriting(RecorderCfg::new(&path))), "File", &["this is a folder"]);
+        fs::remove_dir(&path).unwrap();
+    }
+    assert_eq!(names(&folder), ["file"], "nothing was left");
+}
+
+/// Wrong names and numbers; the message has what would be right.
+#[test]
+fn configurations() {
+    let (folder, path) = scratch("run.mcap");
+    let new = |name: &str| RecorderCfg::new(folder.path().join(name));
+    let with = |topic| new("run.mcap").with_topics([topic]);
+    let run = || RecorderCfg::new(&path);
+    let ends = [".avi", ".mcap", ".npz", ".apng", ".gif", ".webp", ".mp4", ".lerobot"];
+    let rows: [(RecorderCfg, &[&str]); 16] = [
+        (with(Topic::JointStates("amr".into())), &["amr", "arm"]),
+        (with(Topic::Sensor("camra".into())), &["camra", "camera"]),
+        (with(Topic::ObjectPose("cub".into())), &["cub", "cube"]),
+        (with(Topic::channel("camera", "dept")), &["camera/dept", "camera/depth"]),
+        (with(Topic::channel("camera", "normal")), &["camera/normal", "camera/depth"]),
+        (with(Topic::channel("imu", "depth")), &["imu/depth"]),
+        (RecorderCfg { every: 0, ..run() }, &["every", "at least 1"]),
+        (RecorderCfg { packets: 1, ..run() }, &["packets", "at least 2"]),
+        (RecorderCfg { every: 3, ..new("run.lerobot") }, &["run.lerobot", "33.333", "2, 4, 1 would do"]),
+        (new("run.lerobot").with_topics([Topic::Sensor("imu".into())]), &["no place", "sensors alone"]),
+        (RecorderCfg { envs: Some(vec![EnvId(3)]), ..run() }, &["environment 3"]),
+        (RecorderCfg { envs: Some(vec![EnvId(0); 2]), ..run() }, &["twice"]),
+        (RecorderCfg { topics: vec![], ..run() }, &["nothing to record"]),
+        (RecorderCfg { envs: Some(vec![]), ..run() }, &["number of envs is 0", "at least 1"]),
+        (new("run.avi"), &ends),
+        (new("run.apng").with_topics([Topic::JointStates("arm".into())]), &["no place", "JointStates"]),
+    ];
+    let mut world = World::new(1, 1);
+    for (cfg, parts) in rows {
+        assert_error(world.sim.record(cfg), "", parts);
+    }
+    for uid in ["/tmp/x", "../x", "..", "a\\b", ""] {
+        assert_error(world.sim.add_sensor(uid, JointStateCfg::default()), "", &["not usable"]);
+    }
+    // Root cause: a topic was looked up by its name alone, so that an IMU called `tf` was written as transforms.
+    world.sim.add_sensor("tf", ImuCfg::on("cube")).unwrap();
+    assert_error(world.sim.record(run()), "SameName { path", &["\"tf\""]);
+    assert!(names(&folder).is_empty(), "nothing was left");
+    // Control: arrays of archives have names of their own.
+    record_steps(&mut world, new("run.npz"), 0);
+}
+
+/// The unreadable rest of a killed archive is replaced; two recorders do not write one file.
+#[test]
+fn busy_archive() {
+    let (folder, path) = scratch("run.npz");
+    fs::write(folder.path().join("run.npz.part"), "").unwrap();
+    let mut world = World::new(1, 1);
+    let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
+    assert_error(world.sim.record(overwriting(RecorderCfg::new(&path))), "Busy", &[]);
+    world.step(0);
+    world.sim.finish_recording(recorder).unwrap();
+    assert!(path.exists());
+}
+
+/// Recorded entities must not change while they are recorded.
+#[test]
+fn changed_scene() {
+    let (_folder, path) = scratch("run.npz");
+    let mut world = World::new(1, 1);
+    let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
+    world.step(0);
+    // Another object changes nothing that is recorded.
+    testkit::worlds::add_ball(&mut world.sim, "ball", [0.0; 3]);
+    world.step(1);
+    assert!(!world.sim.observer(recorder).unwrap().has_failed());
+    // A second robot has joints, which the sensor of all joints now measures.
+    world.sim.add_robot(testkit::worlds::sr5("other")).unwrap();
+    world.step(2);
+    let error = world.sim.finish_recording(recorder).unwrap_err();
+    let RecordError::BrokenOff { error, kept: None, .. } = error else { panic!("{error}") };
+    assert!(matches!(&*error, RecordError::Changed { stream, .. } if stream == "joints"), "{error}");
+}
