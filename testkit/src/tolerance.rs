@@ -1,5 +1,7 @@
 //! Comparison within a tolerance that carries its derivation, so that a failure says why the limit is what it is.
 
+use std::borrow::Borrow;
+
 /// A limit on the error, and where the limit comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
@@ -63,14 +65,14 @@ impl std::ops::Mul<f64> for Tolerance {
 /// # Panics
 /// If one is not; the message names `what`, the index, both values, the limit and its derivation.
 #[track_caller]
-pub fn assert_close<'a>(
+pub fn assert_close(
     what: &str,
-    found: impl IntoIterator<Item = &'a f64>,
-    expected: impl IntoIterator<Item = &'a f64>,
+    found: impl IntoIterator<Item = impl Borrow<f64>>,
+    expected: impl IntoIterator<Item = impl Borrow<f64>>,
     tolerance: Tolerance,
 ) {
     let (found, expected): (Vec<f64>, Vec<f64>) =
-        (found.into_iter().copied().collect(), expected.into_iter().copied().collect());
+        (found.into_iter().map(|x| *x.borrow()).collect(), expected.into_iter().map(|x| *x.borrow()).collect());
     assert_eq!(found.len(), expected.len(), "{what}: lengths");
     let failed = (0..found.len()).find(|&k| !tolerance.holds(found[k], expected[k]));
     if let Some(k) = failed {
@@ -87,13 +89,13 @@ pub fn assert_close<'a>(
 /// # Panics
 /// As [`assert_close`].
 #[track_caller]
-pub fn assert_vector<'a>(
+pub fn assert_vector(
     what: &str,
-    found: impl IntoIterator<Item = &'a f64>,
-    expected: impl IntoIterator<Item = &'a f64>,
+    found: impl IntoIterator<Item = impl Borrow<f64>>,
+    expected: impl IntoIterator<Item = impl Borrow<f64>>,
     tolerance: Tolerance,
 ) {
-    let expected: Vec<f64> = expected.into_iter().copied().collect();
+    let expected: Vec<f64> = expected.into_iter().map(|x| *x.borrow()).collect();
     let largest = expected.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
     let limit = Tolerance::absolute(tolerance.limit(largest), tolerance.derivation);
     assert_close(what, found, &expected, limit);
