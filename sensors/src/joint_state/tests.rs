@@ -1,7 +1,7 @@
 //! The joint state sensor, and with it the contract of every sensor with a sampler.
 
 use super::*;
-use ndarray::{Array2, Axis, array};
+use ndarray::{Array2, array};
 
 const DT: f64 = 0.005;
 
@@ -54,36 +54,6 @@ fn values() {
     assert_eq!(sensor.effort_history(), &sensor.position_history() + 1000.0);
     assert_eq!(sensor.stamp_history(), array![[0.03, 0.02], [0.03, 0.02]]);
     assert_eq!(sensor.force_stamp_history(), array![[0.025, 0.015], [0.025, 0.015]]);
-}
-
-#[test]
-fn resets() {
-    let mut sensor = built(JointStateCfg { sampling: sampling(0.01, 3), ..Default::default() });
-    (1..=5).for_each(|step| sensor.update(&state([step, step])).unwrap());
-    sensor.reset(&[1], &state([5, 0])).unwrap();
-    assert_eq!(sensor.sample_counts(), array![2, 0]);
-    assert_eq!(sensor.positions(), array![[4.0, 14.0, 24.0], [100.0, 110.0, 120.0]], "fresh, and only there");
-    assert_eq!(sensor.stamps(), array![0.02, 0.0]);
-    assert_eq!((sensor.history_filled(0), sensor.history_filled(1)), (2, 0));
-    assert!(sensor.position_history().index_axis(Axis(0), 1).iter().all(|&x| x == 0.0));
-    sensor.update(&state([6, 1])).unwrap();
-    assert_eq!(sensor.sample_counts(), array![3, 0]);
-    sensor.update(&state([7, 2])).unwrap();
-    assert_eq!(sensor.sample_counts(), array![3, 1]);
-    assert_eq!(sensor.stamp_history(), array![[0.03, 0.02, 0.01], [0.01, 0.0, 0.0]]);
-}
-
-/// An environment that stands still measures nothing; a reset alone keeps the steps of the environment.
-#[test]
-fn phases() {
-    let mut sensor = built(JointStateCfg::default());
-    (1..=3).for_each(|step| sensor.update(&state([step, 1])).unwrap());
-    assert_eq!((sensor.sample_counts(), sensor.position_history().dim()), (array![3, 1].view(), (2, 0, 3)));
-    let mut sensor = built(JointStateCfg { sampling: sampling(0.02, 0), ..Default::default() });
-    sensor.update(&state([3, 3])).unwrap();
-    sensor.reset(&[0], &state([3, 3])).unwrap();
-    (4..=7).for_each(|step| sensor.update(&state([step, step])).unwrap());
-    assert_eq!(sensor.stamps(), array![0.035, 0.02]);
 }
 
 #[test]

@@ -298,9 +298,9 @@ fn lazy_and_eager() {
     assert!(lazy.draws() < eager.draws(), "{} {}", lazy.draws(), eager.draws());
 }
 
-/// Threads change no bit, and some environments are those of all.
+/// Threads change no bit.
 #[test]
-fn threads_and_environments() {
+fn threads() {
     let images = |context: &SensorContext| {
         let mut camera = built(&troubled(), context);
         (1..=12).for_each(|step| camera.update(&state(&[step; 5])).unwrap());
@@ -310,19 +310,6 @@ fn threads_and_environments() {
     assert!(by_threads.iter().all(|other| *other == by_threads[0]));
     let seed = context(5).seed + 1;
     assert!(images(&SensorContext { seed, ..context(5) }) != by_threads[0], "the control: another seed");
-    let (mut all, mut some) =
-        (built(&troubled(), &context(4)), built(&CameraCfg { env_ids: Some(vec![3, 1]), ..troubled() }, &context(4)));
-    for now in 1..=14 {
-        for camera in [&mut all, &mut some] {
-            camera.update(&state(&[now, now + 1, now, now])).unwrap();
-            if now == 8 {
-                camera.reset(&[0, 1], &state(&[8, 9, 8, 8])).unwrap();
-            }
-        }
-    }
-    assert_eq!(bits(&some, 0..2), bits(&all, [3, 1]));
-    assert_eq!(past_bits(&some, 0, 1), past_bits(&all, 3, 1));
-    assert_ne!(bits(&all, [3]), bits(&all, [2]), "the control");
 }
 
 #[test]

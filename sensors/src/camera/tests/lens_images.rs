@@ -123,44 +123,6 @@ fn channels() {
     }
 }
 
-/// A pixel shows what an image of one pixel of a pinhole shows that looks the same way: of meshes, boxes and all else.
-#[test]
-fn single_pixels() {
-    let (mut compared, mut different, mut seen) = (0, 0, 0);
-    for (k, (lens, pixels)) in all().into_iter().enumerate() {
-        let scene = if k % 2 == 0 { figure() } else { random(&mut Random(k as u64), 1.5) };
-        let rays = rays_of(lens, pixels, SIZE);
-        let still = Still::new(scene, look(SIZE, 0.9, [1.3, -0.8, 0.9], [0.1, 0., 0.4]));
-        let mut still = Still { renderer: Renderer::FastRayTraced, lens: Some(rays.clone()), ..still };
-        let mut rasterizer = still.rasterizer(Level::best());
-        let image = still.draw_by(&mut rasterizer).unwrap();
-        let view = still.view;
-        let camera = view.world_from_camera;
-        still.lens = None;
-        for at in (0..SIZE[0] * SIZE[1]).step_by(13) {
-            let Some(ray) = rays.optics().unproject([(at % SIZE[0]) as f64 + 0.5, (at / SIZE[0]) as f64 + 0.5]) else {
-                continue;
-            };
-            let z = Vector3::from(camera.rotation.map(|r| Vector3::from(r.map(f64::from)).dot(&Vector3::from(ray))));
-            let x = z.cross(&if z.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() }).normalize();
-            let y = z.cross(&x);
-            let rotation = [0, 1, 2].map(|i| [x[i] as f32, y[i] as f32, z[i] as f32]);
-            let world_from_camera = PoseF32 { rotation, ..camera };
-            let one = View { width: 1, height: 1, fx: 1e6, fy: 1e6, cx: 0.5, cy: 0.5, world_from_camera, ..view };
-            let alone = Still { view: one, ..still.clone() }.draw_by(&mut rasterizer).unwrap();
-            let (a, b) = (image.distance()[at], alone.depth()[0]);
-            let cosine = Vector3::from(image.normal()[at]).dot(&Vector3::from(alone.normal()[0]));
-            // Forward lenses have near and far along their axis: nothing here is near either.
-            let near = a == b || (a - b).abs() <= 1e-4 * b && cosine > 0.9999;
-            compared += 1;
-            seen += usize::from(alone.mask()[0] != 0);
-            different += usize::from(image.mask()[at] != alone.mask()[0] || !near);
-        }
-    }
-    // Rays that are 1e-7 apart see different triangles within that of an edge: one pixel in thousands.
-    assert!(compared > 1500 && seen > compared / 4 && different * 500 <= compared, "{different} of {compared}");
-}
-
 #[test]
 fn lens_without_distortion() {
     let bits = |lens, renderer| stage::bits(&built(&CameraCfg { lens, renderer, ..stage::cfg() }, &context(1)), 0..1);

@@ -71,17 +71,13 @@ fn white() {
 /// An environment has its noise and its imperfections whichever process it is in.
 #[test]
 fn first_env() {
-    let cfg = down(&[("depth", NoiseCfg::white(0.1))]);
-    let part = SensorContext { first_env: 2, ..context(2) };
-    assert_eq!(errors(&cfg, &context(4), 3), errors(&cfg, &part, 1));
-    assert_ne!(errors(&cfg, &context(4), 1), errors(&cfg, &part, 1), "the control");
     let imperfections = Imperfections {
         shot_noise: Some(ShotNoise { electrons: 500.0 }),
         read_noise: Some(ReadNoise { std: 0.01 }),
         depth_noise: Some(DepthNoise::NGUYEN),
         ..Imperfections::default()
     };
-    let cfg = CameraCfg { imperfections, ..down(&[]) };
+    let cfg = CameraCfg { imperfections, ..down(&[("depth", NoiseCfg::white(0.1))]) };
     // The lights depend on the environment.
     let at = |envs: usize, step: u64| {
         let mut state = state(&vec![step; envs]);

@@ -312,19 +312,3 @@ fn latency() {
     assert_eq!(camera.distance_history().dim(), (1, 2, 64 * 48));
     assert_eq!(camera.due_in(&[4]), 1);
 }
-
-/// One ray per pixel in 3 environments of 3072 rays: enough for two threads.
-#[test]
-fn threads() {
-    let taken = |threads| {
-        let mut camera = cfg().build(&SensorContext { threads, ..context(3) }).unwrap();
-        let lens = |k: f64| Intrinsics::Pixels { fx: 50.0 + k, fy: 60.0, cx: 30.0, cy: 20.0 };
-        camera.set_intrinsics(&[0.0, 1.0, 2.0].map(lens), None).unwrap();
-        camera.reset(&[0, 1, 2], &state(&[0; 3])).unwrap();
-        (1..5).for_each(|step| camera.update(&state(&[step; 3])).unwrap());
-        let depth: Vec<u32> = camera.depth().iter().map(|x| x.to_bits()).collect();
-        (depth, camera.normal().to_owned(), camera.mask().to_owned())
-    };
-    let one = taken(1);
-    assert!([2, 4].map(taken).iter().all(|several| *several == one));
-}

@@ -84,20 +84,6 @@ fn brute_force() {
     }
 }
 
-/// The control: the triangles of other terrain give other distances.
-#[test]
-fn other_terrain() {
-    let (a, b) = (rough(&mut Dice(1), 9, 9), rough(&mut Dice(2), 9, 9));
-    let (walk, triangles) = (solid(&a), triangles(&b));
-    let mut dice = Dice(3);
-    let differ = |ray: &Ray| match (distance(&walk, ray), nearest(ray, &triangles, 0.0)) {
-        (Some((t, _)), Some(u)) => (t - u).abs() > 1e-3,
-        (t, u) => t.is_some() != u.is_some(),
-    };
-    let differing = (0..1000).filter(|_| differ(&dice.ray(6.0, 1.0))).count();
-    assert!(differing > 300, "{differing}");
-}
-
 /// Straight down on points, edges, diagonals and the rim of the grid: hits at the height given by the four corners.
 #[test]
 fn scans_from_above() {
