@@ -58,11 +58,6 @@ fn values() {
 
 #[test]
 fn mistakes() {
-    let far = JointStateCfg { joints: Some(vec!["a".into(), "d".into()]), ..Default::default() };
-    let error = far.build(&context()).unwrap_err();
-    assert_eq!(error.to_string(), "there is no joint \"d\"; known are \"a\", \"b\", \"c\"");
-    let period = JointStateCfg { sampling: sampling(0.007, 0), ..Default::default() };
-    assert!(matches!(period.build(&context()), Err(SensorError::PeriodNotMultiple { .. })));
     let rounded =
         JointStateCfg { sampling: SamplingCfg { round_period: true, ..sampling(0.007, 0) }, ..Default::default() };
     assert_eq!(built(rounded).schedule().period_steps(), 1);
@@ -79,10 +74,6 @@ fn mistakes() {
     assert!(matches!(error, SensorError::MissingFields { .. }));
     assert_eq!(error.to_string(), "the joint state sensor was given a state without joint_efforts, joint_state");
     assert_eq!(sensor.positions(), before);
-    // Root cause: an empty list was accepted, which gave a sensor of no numbers.
-    let nothing = JointStateCfg { joints: Some(vec![]), ..JointStateCfg::default() };
-    let error = nothing.build(&context()).unwrap_err();
-    assert!(matches!(&error, SensorError::NothingChosen { candidates, .. } if *candidates == *context().joints));
     let nobody = SensorContext { joints: [].into(), ..context() };
     assert_eq!(JointStateCfg::default().build(&nobody).unwrap().joint_names(), [""; 0], "all of none");
 }

@@ -195,18 +195,3 @@ fn veiled_scene((scene, poses): (RenderScene, Vec<PoseF32>)) -> Still {
     veiled.lights = scene.lights;
     Still { cfg: OFF, ..Still::new((veiled, poses), look([203, 150], 0.8, [1.2, 0.4, 0.5], [0.; 3])) }
 }
-
-/// Other things change no level.
-#[test]
-fn independent_levels() {
-    let (scene, poses) = dense();
-    let view = look([160, 120], 0.8, [1.2, 0.4, 0.5], [0.; 3]);
-    let draw = |scene, poses| Still { cfg: ON, ..Still::new((scene, poses), view) }.draw();
-    let all = draw(scene.clone(), poses.clone());
-    for (k, instance) in scene.instances().iter().enumerate().skip(1) {
-        let alone = draw(RenderScene::new(vec![instance.clone()]).unwrap(), vec![poses[k]]);
-        let here: Vec<usize> = (0..160 * 120).filter(|&i| all.mask()[i] == k as i32).collect();
-        let same = |i: &usize| alone.mask()[*i] == k as i32 && all.depth()[*i].to_bits() == alone.depth()[*i].to_bits();
-        assert!(here.len() > 200 && here.iter().all(same), "instance {k}");
-    }
-}

@@ -9,7 +9,7 @@ use super::harness::{Image, Still, look, pinhole, point, wide};
 use super::scenes::{Random, random};
 use super::stage::{BALL, GROUND, SIZE, ball, built, cfg, context, state, tip};
 use crate::sensor::Sensor;
-use crate::visibility::{RenderError, View};
+use crate::visibility::View;
 use nalgebra::{Matrix3, Point3, Vector3};
 use ndarray::{Array2, Axis};
 use scene::pose::{from_row, from_xyz_rpy, to_row};
@@ -174,25 +174,6 @@ fn homography() {
         assert_eq!(*flow, if *id == 0 { [f32::INFINITY; 2] } else { [0.0; 2] });
     }
     assert!(still.draw().flow().iter().flatten().all(|&x| x == f32::INFINITY), "there is no frame before");
-}
-
-#[test]
-fn refused_frames_before() {
-    let still = Still::new(random(&mut Random(4), 1.0), look([20, 16], 1.0, [2.5, 0.3, 0.8], [0.0; 3]));
-    let error = |channels, change: fn(&mut Vec<PoseF32>, &mut View)| {
-        let (mut poses, mut view) = (still.poses.clone(), still.view);
-        change(&mut poses, &mut view);
-        Still { channels, before: Some((poses, view)), ..still.clone() }.try_draw().err()
-    };
-    let expected = still.poses.len();
-    let few = |poses: &mut Vec<PoseF32>, _: &mut View| poses.truncate(poses.len() - 1);
-    assert_eq!(error(WANTED, few), Some(RenderError::PoseCount { expected, found: expected - 1 }));
-    let pose = error(WANTED, |poses, _| poses[2].translation[0] = f32::NAN);
-    assert!(matches!(pose, Some(RenderError::InstancePose { instance: 2, .. })), "{pose:?}");
-    let flat = error(WANTED, |_, view| view.fx = 0.0);
-    assert!(matches!(flat, Some(RenderError::Intrinsics { .. })), "{flat:?}");
-    // Other channels do not need it.
-    assert_eq!(error(Channels { depth: true, ..Channels::NONE }, few), None);
 }
 
 /// The flow of an environment, by pixel.

@@ -266,23 +266,9 @@ fn moved_fixed_target() {
 fn mistakes() {
     let error = |cfg: RayCasterCfg| cfg.build(&context(1, 1)).unwrap_err().to_string();
     let named = |name: &str| RayCasterCfg { targets: HitTargets::Named(vec![name.into()]), ..scanner() };
-    for (cfg, part) in [
-        (RayCasterCfg { parent: Some("bsae".into()), ..scanner() }, "dog/base"),
-        (named("gruond"), "ground"),
-        // An object in a group that is not hit.
-        (RayCasterCfg { groups: 1 << 5, ..named("ground") }, "\"ground\""),
-        (RayCasterCfg { pattern: Grid { resolution: 0.0, ..Grid::default() }.into(), ..scanner() }, "resolution"),
-        (RayCasterCfg { max_distance: 0.0, ..scanner() }, "max_distance"),
-        (RayCasterCfg { max_distance: -1.0, ..scanner() }, "max_distance"),
-        (RayCasterCfg { max_distance: f64::NAN, ..scanner() }, "max_distance"),
-        (RayCasterCfg { drift: [0.1, -0.1], ..scanner() }, "drift"),
-        (RayCasterCfg { drift: [f64::NAN, 0.1], ..scanner() }, "NaN"),
-        (RayCasterCfg { offset: Pose::translation(f64::NAN, 0.0, 0.0), ..scanner() }, "offset"),
-        (RayCasterCfg { sampling: SamplingCfg::every(0.007), ..scanner() }, "update_period"),
-    ] {
-        let text = error(cfg);
-        assert!(text.contains(part), "{text}");
-    }
+    // An object in a group that is not hit.
+    let text = error(RayCasterCfg { groups: 1 << 5, ..named("ground") });
+    assert!(text.contains("\"ground\""), "{text}");
     assert!(named("ground").build(&context(1, 1)).is_ok());
     // An invisible object, unless some environment sees it; the candidates are objects that can be hit.
     let look = |visible: [bool; 5]| {

@@ -207,26 +207,6 @@ fn far_rays() {
     assert!(near.wrong == 0 && near.columns == near.packets && near.hits > 8000, "{near:?}");
 }
 
-/// Columns are for meshes that are spread out, of triangles of about the same size.
-#[test]
-fn meshes_without_columns() {
-    let mut dice = Dice(53);
-    let ground = sheet(&mut dice, 25, 0.0);
-    let wall: Vec<Triangle> = ground.iter().map(|t| t.map(|p| [0.5, p[0], p[1]])).collect();
-    let all = [[-1.5, -1.5, 0.0], [1.5, -1.5, 0.0], [1.5, 1.5, 0.0]];
-    let mix = |(k, t): (usize, &Triangle)| if k.is_multiple_of(40) { all } else { *t };
-    let mixed: Vec<Triangle> = ground.iter().enumerate().map(mix).collect();
-    for (what, triangles, expected) in [
-        ("ground", &ground[..], true),
-        ("few", &ground[..100], false),
-        ("none", &[], false),
-        ("a wall, without extent along x", &wall, false),
-        ("of very different sizes", &mixed, false),
-    ] {
-        assert_eq!(MeshTree::of_triangles(triangles).columns(ABOVE).is_some(), expected, "{what}");
-    }
-}
-
 /// A packet whose columns hold too many triangles takes the tree.
 #[test]
 fn crowded_columns() {
