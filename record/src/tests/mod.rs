@@ -1,6 +1,7 @@
 //! Recordings: their content, held against the simulation and read by independent readers; and shared parts of the tests
 //! of this crate.
 
+mod archives;
 mod contents;
 mod episodes;
 mod hdf5;
@@ -21,14 +22,15 @@ pub(crate) use scene::Pose;
 pub(crate) use sensors::camera::{
     Camera, CameraCfg, CameraConvention, Channels, Intrinsics, RasterCfg, Renderer, StereoCameraCfg,
 };
+pub(crate) use sensors::ray::RayCasterCfg;
 pub(crate) use sensors::ray::pattern::Grid;
-pub(crate) use sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
-pub(crate) use sensors::{ContactSensorCfg, ImuCfg, JointStateCfg, Sampled, SamplingCfg};
+pub(crate) use sensors::{ContactSensorCfg, ImuCfg, JointStateCfg, Sampled};
 pub(crate) use serde_json::{Value, json};
-pub(crate) use sim::{BodyType, EnvId, MjcfCfg, ObjectShape, RobotCfg, SensorId, SimulationManager};
+pub(crate) use sim::{EnvId, MjcfCfg, ObjectShape, SimulationManager};
 pub(crate) use std::path::{Path, PathBuf};
 pub(crate) use testkit::worlds::{RecordedWorld as World, look_at};
 
+pub(crate) use archives::{falling, member, numbers_of, rows};
 use std::borrow::Borrow;
 use tempfile::TempDir;
 use testkit::needs::{python_readers, read_json};
@@ -56,14 +58,6 @@ pub(crate) fn names(folder: impl AsRef<Path>) -> Vec<String> {
 /// A simulation without objects.
 pub(crate) fn simulation(num_envs: usize) -> SimulationManager {
     testkit::worlds::sim(testkit::worlds::cfg(num_envs, 2))
-}
-
-/// A ball that falls.
-pub(crate) fn falling(num_envs: usize) -> SimulationManager {
-    let mut sim = simulation(num_envs);
-    let ball = r#"<mujoco><worldbody><body name="ball" pos="0 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
-    sim.add_mjcf(MjcfCfg::text("ball", ball)).unwrap();
-    sim
 }
 
 /// Records what `run` does.
@@ -147,26 +141,6 @@ pub(crate) fn logs(path: &Path) -> Vec<String> {
 /// The bytes of numbers in messages.
 pub(crate) fn bytes(numbers: impl IntoIterator<Item: Borrow<f64>>) -> Vec<u8> {
     numbers.into_iter().flat_map(|x| x.borrow().to_le_bytes()).collect()
-}
-
-/// A member of a NumPy archive.
-pub(crate) fn member(path: &Path, name: &str) -> Vec<u8> {
-    let members = zip::parse(&std::fs::read(path).unwrap()).unwrap();
-    members.into_iter().find(|(known, _)| known == name).unwrap_or_else(|| panic!("no {name}")).1
-}
-
-/// An array of a NumPy archive: type, number of rows and bytes.
-pub(crate) fn rows(path: &Path, name: &str) -> (String, usize, Vec<u8>) {
-    let member = member(path, &format!("{name}.npy"));
-    let (descr, shape, data) = npy::parse(&member).unwrap();
-    (descr.to_string(), shape[0], data.to_vec())
-}
-
-/// An array of numbers in double precision of a NumPy archive.
-pub(crate) fn numbers_of(path: &Path, name: &str) -> Vec<f64> {
-    let (descr, _, data) = rows(path, name);
-    assert_eq!(descr, "<f8");
-    data.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
 }
 
 /// The JSON that a script of this folder prints about a file.
