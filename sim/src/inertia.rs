@@ -322,18 +322,6 @@ mod tests {
     }
 
     #[test]
-    fn combine_and_move() {
-        let pose = from_xyz_rpy([0.3, -2.0, 1.0], [0.4, 1.2, -2.0]);
-        let tensor = tensor(0.3, 0.02, 0.01, 0.4, -0.03, 0.5);
-        let a = RigidInertia { com: Vector3::new(0.1, 0.2, 0.3), ..body(2.0, tensor) };
-        let b = RigidInertia { com: Vector3::new(-1.0, 0.0, 0.5), ..diagonal(0.7, 0.01, 0.02, 0.02) };
-        let moved_after = a.combine(&b).transformed(&pose);
-        let moved_before = a.transformed(&pose).combine(&b.transformed(&pose));
-        assert!((moved_after.inertia - moved_before.inertia).amax() < 1e-13);
-        assert!((moved_after.com - moved_before.com).amax() < 1e-14);
-    }
-
-    #[test]
     fn inertial_frame() {
         let inertial = Inertial {
             source: Source::new("a.urdf", 1),
