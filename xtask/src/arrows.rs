@@ -157,23 +157,18 @@ mod tests {
         differences(&written_arrows(&page(arrows)).expect("a block"), &used_arrows(&metadata()))
     }
 
+    /// Arrows that are missing on either side are named.
     #[test]
-    fn the_same_arrows_on_both_sides_pass() {
-        assert_eq!(findings("sim -> scene  # poses\ntests -> sim"), [""; 0]);
-    }
-
-    #[test]
-    fn an_arrow_that_is_not_written_is_named_with_its_kind() {
-        let found = findings("sim -> scene");
-        assert_eq!(found.len(), 1);
-        assert!(found[0].starts_with("tests -> sim (build dependency"), "{}", found[0]);
-    }
-
-    #[test]
-    fn an_arrow_that_nobody_uses_is_named() {
-        let found = findings("sim -> scene\ntests -> sim\nscene -> sim");
-        assert_eq!(found.len(), 1);
-        assert!(found[0].starts_with("scene -> sim is among"), "{}", found[0]);
+    fn both_sides() {
+        for (arrows, named) in [
+            ("sim -> scene  # poses\ntests -> sim", None),
+            ("sim -> scene", Some("tests -> sim (build dependency")),
+            ("sim -> scene\ntests -> sim\nscene -> sim", Some("scene -> sim is among")),
+        ] {
+            let found = findings(arrows);
+            assert_eq!(found.len(), usize::from(named.is_some()), "{found:?}");
+            assert!(found.iter().all(|text| text.starts_with(named.unwrap_or_default())), "{found:?}");
+        }
     }
 
     #[test]

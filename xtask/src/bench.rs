@@ -252,12 +252,8 @@ mod tests {
     }
 
     #[test]
-    fn a_row_without_its_name_is_an_error() {
+    fn broken_rows() {
         assert!(tables(&[json!({"case": "x"})]).is_err());
-    }
-
-    #[test]
-    fn a_run_that_wrote_no_rows_is_an_error() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         let file = dir.path().join("rows.json");
         assert!(read_rows(&file).is_err());
