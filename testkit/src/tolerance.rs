@@ -1,5 +1,7 @@
 //! Comparison within a tolerance that carries its derivation, so that a failure says why the limit is what it is.
 
+use std::borrow::Borrow;
+
 /// A limit on the error, and where the limit comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
@@ -13,37 +15,31 @@ pub struct Tolerance {
 
 impl Tolerance {
     /// A limit on the absolute error.
-    #[must_use]
     pub const fn absolute(limit: f64, derivation: &'static str) -> Self {
         Self { absolute: limit, relative: 0.0, derivation }
     }
 
     /// A limit on the error relative to the expected value.
-    #[must_use]
     pub const fn relative(limit: f64, derivation: &'static str) -> Self {
         Self { absolute: 0.0, relative: limit, derivation }
     }
 
     /// A limit on the error relative to an expected value larger than one, and on the absolute error of a smaller one.
-    #[must_use]
     pub const fn mixed(limit: f64, derivation: &'static str) -> Self {
         Self { absolute: limit, relative: limit, derivation }
     }
 
     /// The rounding error of `operations` operations in double precision on numbers of the expected size, or of size one.
-    #[must_use]
     pub const fn rounding(operations: f64) -> Self {
         Self::mixed(operations * f64::EPSILON, "rounding in double precision")
     }
 
     /// Largest absolute error of a value.
-    #[must_use]
     pub const fn limit(&self, expected: f64) -> f64 {
         self.absolute.max(self.relative * expected.abs())
     }
 
     /// True if `found` is within the limit of `expected`; equal values are, infinities included, and NaN is not.
-    #[must_use]
     pub fn holds(&self, found: f64, expected: f64) -> bool {
         found == expected || (found - expected).abs() <= self.limit(expected)
     }
@@ -59,18 +55,15 @@ impl std::ops::Mul<f64> for Tolerance {
 }
 
 /// Asserts that every element is within the tolerance.
-///
-/// # Panics
-/// If one is not; the message names `what`, the index, both values, the limit and its derivation.
 #[track_caller]
-pub fn assert_close<'a>(
+pub fn assert_close(
     what: &str,
-    found: impl IntoIterator<Item = &'a f64>,
-    expected: impl IntoIterator<Item = &'a f64>,
+    found: impl IntoIterator<Item = impl Borrow<f64>>,
+    expected: impl IntoIterator<Item = impl Borrow<f64>>,
     tolerance: Tolerance,
 ) {
     let (found, expected): (Vec<f64>, Vec<f64>) =
-        (found.into_iter().copied().collect(), expected.into_iter().copied().collect());
+        (found.into_iter().map(|x| *x.borrow()).collect(), expected.into_iter().map(|x| *x.borrow()).collect());
     assert_eq!(found.len(), expected.len(), "{what}: lengths");
     let failed = (0..found.len()).find(|&k| !tolerance.holds(found[k], expected[k]));
     if let Some(k) = failed {
@@ -83,26 +76,20 @@ pub fn assert_close<'a>(
 }
 
 /// As [`assert_close`], with the limit of the largest expected element for every element.
-///
-/// # Panics
-/// As [`assert_close`].
 #[track_caller]
-pub fn assert_vector<'a>(
+pub fn assert_vector(
     what: &str,
-    found: impl IntoIterator<Item = &'a f64>,
-    expected: impl IntoIterator<Item = &'a f64>,
+    found: impl IntoIterator<Item = impl Borrow<f64>>,
+    expected: impl IntoIterator<Item = impl Borrow<f64>>,
     tolerance: Tolerance,
 ) {
-    let expected: Vec<f64> = expected.into_iter().copied().collect();
+    let expected: Vec<f64> = expected.into_iter().map(|x| *x.borrow()).collect();
     let largest = expected.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
     let limit = Tolerance::absolute(tolerance.limit(largest), tolerance.derivation);
     assert_close(what, found, &expected, limit);
 }
 
 /// Asserts that a number is within the tolerance.
-///
-/// # Panics
-/// As [`assert_close`].
 #[track_caller]
 pub fn assert_number(what: &str, found: f64, expected: f64, tolerance: Tolerance) {
     assert_close(what, [&found], [&expected], tolerance);
