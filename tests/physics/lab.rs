@@ -5,6 +5,8 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_row, to_row};
 use kinetoscope::sim::{self, Cone};
 use nalgebra::{UnitQuaternion, Vector3};
+/// The default drive, evaluated at the end of the step, and none: joints move freely.
+pub(crate) use testkit::worlds::{gains as implicit, no_drive as passive};
 
 /// Gravity on earth \[m/s²\].
 pub(crate) const G: f64 = 9.81;
@@ -48,16 +50,6 @@ pub(crate) fn with_dt(dt: f64, cfg: SimulationManagerCfg) -> SimulationManagerCf
 /// Runge-Kutta of order 4: for passive robots, and those of [`explicit`] drives.
 pub(crate) fn rk4(cfg: SimulationManagerCfg) -> SimulationManagerCfg {
     SimulationManagerCfg { integrator: Integrator::Rk4, ..cfg }
-}
-
-/// No drive: joints move freely.
-pub(crate) fn passive() -> DriveCfg {
-    DriveCfg { drive_type: DriveType::None, ..DriveCfg::default() }
-}
-
-/// The default drive, evaluated at the end of the step.
-pub(crate) fn implicit(stiffness: f64, damping: f64) -> DriveCfg {
-    DriveCfg { stiffness: stiffness.into(), damping: damping.into(), ..DriveCfg::default() }
 }
 
 /// MuJoCo's own actuators, evaluated at the start of the step.
