@@ -298,9 +298,5 @@ mod tests {
         assert!(archive.array("ball/state/positions").is_ok());
         let error = archive.array("ball/state/velocities").unwrap_err().to_string();
         assert!(error.contains("velocities.npy is damaged"), "{error}");
-        for end in [0, 10, bytes.len() / 2, bytes.len() - 1] {
-            std::fs::write(&path, &bytes[..end]).unwrap();
-            assert!(matches!(Archive::read(&path), Err(RecordError::Malformed { .. })), "{end}");
-        }
     }
 }
