@@ -247,7 +247,7 @@ mod tests {
 
     /// Root cause: the whole file was brought into memory, pictures and all, to give a few numbers of it.
     #[test]
-    fn no_more_is_read_than_is_asked_for() {
+    fn lazy_reading() {
         let (_folder, path) = scratch("run.npz");
         let mut sim = falling(2);
         let camera = CameraCfg {
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_found_where_it_is_read() {
+    fn damage() {
         let (_folder, path) = scratch("run.npz");
         record(&mut falling(1), RecorderCfg::new(&path), |sim| sim.update(20));
         let mut bytes = std::fs::read(&path).unwrap();

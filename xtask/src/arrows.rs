@@ -172,20 +172,20 @@ mod tests {
     }
 
     #[test]
-    fn a_page_without_a_block_or_with_a_broken_line_is_an_error() {
+    fn broken_pages() {
         assert!(written_arrows("# A\n").is_err());
         assert!(written_arrows(&page("sim => scene")).is_err());
     }
 
     #[test]
-    fn a_circle_is_named() {
+    fn circle() {
         let arrows = |text: &str| written_arrows(&page(text)).expect("a block");
         assert_eq!(cycle(&arrows("a -> b\nb -> c\na -> c")), None);
         assert!(cycle(&arrows("a -> b\nb -> c\nc -> b")).is_some_and(|text| text.contains("c -> b")));
     }
 
     #[test]
-    fn a_dependency_outside_of_the_table_is_named() {
+    fn unlisted() {
         let toml = "[workspace.dependencies]\nregex = \"1\" # patterns\n";
         let found = unlisted_dependencies(&metadata(), toml);
         assert_eq!(found.len(), 1);
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_are_told_from_other_code() {
+    fn paths() {
         let page = "`sim/src/lib.rs`, `Cargo.toml` and `docs/`, but `sim::mj`, `a -> b`, `x/y z`, `cargo xtask ci`, \
                     `target/wheels`\n```text\n`no/where`\n```\n";
         assert_eq!(named_paths(page), ["sim/src/lib.rs", "Cargo.toml", "docs/"]);

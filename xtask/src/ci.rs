@@ -283,12 +283,12 @@ mod tests {
     }
 
     #[test]
-    fn quick_leaves_out_everything_long() {
+    fn quick_run() {
         assert_eq!(names(true, None), ["setup", "fmt", "arrows", "rules", "docs", "clippy", "unit"]);
     }
 
     #[test]
-    fn the_full_run_ends_with_the_look_at_the_tree() {
+    fn full_run() {
         let names = names(false, None);
         assert!(!names.contains(&"unit"));
         assert!(names.contains(&"test") && names.contains(&"test-4"));
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn one_stage_can_be_repeated_alone() {
+    fn one_stage() {
         for stage in STAGES {
             assert_eq!(names(false, Some(stage.name)), [stage.name]);
         }

@@ -655,7 +655,7 @@ mod tests {
     }
 
     #[test]
-    fn examples_are_files_and_folders_with_a_main() {
+    fn files_and_folders() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         for path in ["examples/a.rs", "examples/b/main.rs", "examples/common/mod.rs", "examples/README.md"] {
             crate::wheel::tests::write(&dir.path().join(path), "");
@@ -681,7 +681,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_or_broken_report_is_found() {
+    fn broken_reports() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         let path = dir.path().join("report.json");
         assert!(check_report(&path, anything).is_err());

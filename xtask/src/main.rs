@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn arguments_after_two_dashes_reach_the_test_binaries() {
+    fn test_arguments() {
         let cli = Cli::try_parse_from(["cargo xtask", "test", "gravity", "--", "--nocapture"]).expect("valid");
         let Task::Test(args) = cli.command else { panic!("parsed as another task") };
         assert_eq!(args.filter.as_deref(), Some("gravity"));
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn demo_takes_flags_with_and_without_two_dashes() {
+    fn demo_flags() {
         for line in [
             &["cargo xtask", "demo", "--steps", "7"][..],
             &["cargo xtask", "demo", "--", "--steps", "7"],

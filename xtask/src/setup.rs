@@ -434,7 +434,7 @@ mod tests {
     }
 
     #[test]
-    fn the_line_to_run_by_hand_is_one_command() {
+    fn one_command() {
         let line = "sudo sh -c 'apt-get update && apt-get install -y --no-install-recommends gcc libmujoco-dev'";
         assert_eq!(by_hand(&["gcc", "libmujoco-dev"]), line);
     }

@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_and_literals_are_no_code() {
+    fn code() {
         let text =
             "let a = \"unsafe \\\" x\"; // unsafe\n/* unsafe /* b */ unsafe */ let c = r#\"unsafe \"# ; let q = '\"';";
         let code = code_only(text);
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn crates_that_must_forbid_unsafe_code_are_named() {
+    fn forbidden_unsafe_code() {
         assert_eq!(missing_forbid(&[]).len(), FORBID_UNSAFE.len());
         let mut files = file("scene/src/lib.rs", "//! Doc.\n#![forbid(unsafe_code)]\n");
         files.extend(file("sensors/src/lib.rs", "// #![forbid(unsafe_code)]\n"));
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_801_lines_is_too_long() {
+    fn length() {
         assert!(long_files(&file("a.rs", &"\n".repeat(800))).is_empty());
         assert_eq!(long_files(&file("a.rs", &"\n".repeat(801))).len(), 1);
         assert!(long_files(&file("a.xml", &"\n".repeat(801))).is_empty());
@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn absolute_paths_of_one_machine_are_found() {
+    fn absolute_paths() {
         for folder in FOREIGN_FOLDERS {
             assert_eq!(foreign_paths(&file("a.md", &format!("see /{folder}/x"))).len(), 1);
             assert_eq!(foreign_paths(&file("a.md", &format!("file:///{folder}/x"))).len(), 1);
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dependency_without_a_reason_is_named() {
+    fn reasons() {
         let toml = "[workspace.dependencies]\n# Rooms.\nscene = { path = \"scene\" }\n\
             clap = { version = \"4\", features = [\n  \"derive\",\n] } # flags\nserde = \"1\"\nregex = \"1\" #\n\
             [workspace.lints.rust]\nfoo = 1\n";
@@ -391,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn target_folders_and_version_control_are_not_looked_at() {
+    fn skipped_folders() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         for path in ["a/b.rs", "target/c.rs", "other-target/CACHEDIR.TAG", "other-target/d.rs", ".git/e"] {
             crate::wheel::tests::write(&dir.path().join(path), "");

@@ -171,7 +171,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn only_finished_wheels_of_this_version_are_found() {
+    fn finished_wheels() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         write(&dir.path().join("mujoco_core-3.9.0-cp311-cp311-any.whl"), "");
         write(&dir.path().join(format!("mujoco_core-{VERSION}-cp311-cp311-any.whl.part")), "");
@@ -182,7 +182,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_broken_wheel_is_an_error_and_leaves_nothing() {
+    fn broken_wheel() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         let wheel = dir.path().join(format!("mujoco_core-{VERSION}-broken.whl"));
         write(&wheel, "not a zip file");

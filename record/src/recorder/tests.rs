@@ -401,6 +401,7 @@ fn chunks(file: &[u8]) -> Vec<std::ops::Range<usize>> {
 #[test]
 fn damage() {
     let (folder, path) = scratch("run.mcap");
+    assert!(recover(&path).unwrap_err().to_string().contains("run.mcap.part"));
     let mut sim = falling(16);
     sim.record(RecorderCfg::new(&path)).unwrap();
     sim.update(3000);

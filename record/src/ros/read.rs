@@ -396,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_messages_have_names() {
+    fn names() {
         let names = ["J1".to_string(), "J.2".to_string()];
         let joints = read(Schema::JointState, |cdr| joint_state(cdr, STAMP, &names, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
         let mut fields = Vec::new();
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn structures_in_lists_go_by_their_names() {
+    fn structures() {
         let frames = ["a".to_string(), "b/c".to_string()];
         let poses: Vec<f64> = (0..14).map(f64::from).collect();
         let value = read(Schema::TfMessage, |cdr| transforms(cdr, STAMP, "env_0/", &frames, &poses));
@@ -425,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn fixed_lists_bytes_and_plain_lists_are_read() {
+    fn lists() {
         let value = read(Schema::Imu, |cdr| imu(cdr, STAMP, &[0.1, 0.2, 0.3, 0.4], &[1.0, 2.0, 3.0], &[4.0, 5.0, 6.0]));
         assert_eq!(number(&value, "linear_acceleration.z"), Some(6.0));
         assert_eq!(number(&value, "orientation_covariance[8]"), Some(0.0));
@@ -445,7 +445,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_message_is_refused() {
+    fn damage() {
         let kind = MessageType::parse(&Schema::JointState.text()).unwrap();
         let mut cdr = Cdr::default();
         cdr.begin();
