@@ -246,7 +246,7 @@ mod tests {
             ("a.jpg", "Extension", ""),
             ("a", "Extension", ""),
             ("a.png.part", "Extension", ""),
-            ("no/such/a.png", "NoFolder", "no/such"),
+            ("no/such/a.png", "NoFolder", "no/such to write it"),
             ("taken.png", "File", ""),
         ];
         let rows = rows.map(|(name, kind, part)| (name, sim.screenshot(folder.path().join(name)), kind, [part]));
