@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_goes_on_over_a_reset_and_is_untouched_before() {
+    fn resets() {
         let mut clock = Clock::new(0.25, 8, &[2.0, 2.0]);
         assert_eq!([clock.stamp(0, 2.5), clock.stamp(1, 2.5)], [2.5, 2.5]);
         clock.restarted(&[1], &[2.5, 0.0], 10);

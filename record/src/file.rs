@@ -240,15 +240,9 @@ pub(crate) mod tests {
         }
     }
 
-    fn folder() -> (tempfile::TempDir, PathBuf) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("run.npz");
-        (folder, path)
-    }
-
     #[test]
-    fn a_whole_file_whose_name_is_taken_is_kept() {
-        let (_folder, path) = folder();
+    fn taken_name() {
+        let (_folder, path) = crate::tests::scratch("run.npz");
         let (mut part, mut file) = PartFile::create(&path, false, false).unwrap();
         file.write_all(b"whole").unwrap();
         fs::write(&path, "precious").unwrap();
@@ -267,40 +261,5 @@ pub(crate) mod tests {
         file.write_all(b"whole").unwrap();
         assert_eq!((part.commit().unwrap(), fs::read(&path).unwrap()), (5, b"whole".to_vec()));
         assert!(!part_of(&path).exists());
-    }
-
-    #[test]
-    fn two_recorders_do_not_share_a_file() {
-        let (_folder, path) = folder();
-        let (mut part, mut file) = PartFile::create(&path, true, false).unwrap();
-        file.write_all(b"first").unwrap();
-        for overwrite in [true, false] {
-            let error = PartFile::create(&path, overwrite, false).unwrap_err();
-            assert!(matches!(error, RecordError::Busy { .. }), "{error}");
-        }
-        part.commit().unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"first");
-        drop((part, file));
-        // The control: what nobody writes any more is replaced.
-        fs::write(part_of(&path), "left").unwrap();
-        assert!(matches!(
-            PartFile::create(&path, false, true),
-            Err(RecordError::Exists { .. } | RecordError::Unfinished { .. })
-        ));
-        let (mut part, mut file) = PartFile::create(&path, true, false).unwrap();
-        file.write_all(b"second").unwrap();
-        part.commit().unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"second");
-    }
-
-    #[test]
-    fn what_a_killed_archive_leaves_is_in_nobodys_way() {
-        let (_folder, path) = folder();
-        fs::write(part_of(&path), "").unwrap();
-        let (mut part, _file) = PartFile::create(&path, false, false).unwrap();
-        part.commit().unwrap();
-        let (part, _file) = PartFile::create(&path, true, false).unwrap();
-        drop(part);
-        assert!(!part_of(&path).exists(), "what nobody can read is taken away");
     }
 }

@@ -114,7 +114,7 @@ mod tests {
 
     /// Root cause: what was to be replaced was deleted before the new one had its name.
     #[test]
-    fn what_is_replaced_is_there_until_the_new_one_is() {
+    fn replacement() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run");
         let make = |what: &str| {

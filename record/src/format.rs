@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_format_is_in_the_list_once() {
+    fn list() {
         use Format::{Apng, Gif, Hdf5, LeRobot, Mcap, Mp4, Npz, Pictures, Webp};
         let wanted = [Mcap, Npz, Pictures, LeRobot, Hdf5, Apng, Gif, Webp, Mp4];
         assert!(Format::all().map(|(format, _)| format).eq(wanted));

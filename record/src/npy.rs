@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn headers_are_those_that_numpy_writes() {
+    fn headers() {
         // What numpy.save writes for zeros((2,), float64) and zeros((2, 3, 4), float32), without the data.
         let one = b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (2,), }";
         let header_of_one = header(Element::F64, &[2]).unwrap();

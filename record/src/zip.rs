@@ -336,7 +336,7 @@ mod tests {
     use std::io::Cursor;
 
     #[test]
-    fn what_was_put_in_comes_out_and_damage_is_found() {
+    fn round_trip_and_damage() {
         let mut archive = Archive::new(Cursor::new(Vec::new()));
         archive.add("a.npy", b"head", &mut &b" and data"[..]).unwrap();
         archive.add("empty", b"", &mut io::empty()).unwrap();

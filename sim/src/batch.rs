@@ -584,21 +584,6 @@ mod tests {
     }
 
     #[test]
-    fn every_environment_once() {
-        let mut batch = pendulums(50, 4);
-        for step in 1..=20 {
-            // The first share is slow: the others help with it.
-            batch.run(Arc::new(|i, env| {
-                if i < 12 {
-                    std::thread::sleep(std::time::Duration::from_micros(50));
-                }
-                env.step(1);
-            }));
-            batch.for_each(|_, env| assert_eq!(env.steps(), step));
-        }
-    }
-
-    #[test]
     fn beyond_the_cache() {
         let (mut many, mut few) = (pendulums(1000, 3), pendulums(10, 1));
         assert!(many.shared.cold && !few.shared.cold);

@@ -275,8 +275,6 @@ fn sorted_eigen(symmetric: &Matrix3<f64>) -> (Vector3<f64>, UnitQuaternion<f64>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::Source;
-    use scene::pose::from_xyz_rpy;
 
     fn tensor(ixx: f64, ixy: f64, ixz: f64, iyy: f64, iyz: f64, izz: f64) -> Matrix3<f64> {
         Matrix3::new(ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz)
@@ -319,32 +317,6 @@ mod tests {
         assert_eq!(fused.mass, 3.0);
         assert_eq!(RigidInertia::ZERO.combine(&left), left);
         assert_eq!(left.combine(&RigidInertia::ZERO), left);
-    }
-
-    #[test]
-    fn combine_and_move() {
-        let pose = from_xyz_rpy([0.3, -2.0, 1.0], [0.4, 1.2, -2.0]);
-        let tensor = tensor(0.3, 0.02, 0.01, 0.4, -0.03, 0.5);
-        let a = RigidInertia { com: Vector3::new(0.1, 0.2, 0.3), ..body(2.0, tensor) };
-        let b = RigidInertia { com: Vector3::new(-1.0, 0.0, 0.5), ..diagonal(0.7, 0.01, 0.02, 0.02) };
-        let moved_after = a.combine(&b).transformed(&pose);
-        let moved_before = a.transformed(&pose).combine(&b.transformed(&pose));
-        assert!((moved_after.inertia - moved_before.inertia).amax() < 1e-13);
-        assert!((moved_after.com - moved_before.com).amax() < 1e-14);
-    }
-
-    #[test]
-    fn inertial_frame() {
-        let inertial = Inertial {
-            source: Source::new("a.urdf", 1),
-            link_from_com: from_xyz_rpy([1.0, 2.0, 3.0], [0.0, 0.0, std::f64::consts::FRAC_PI_2]),
-            mass: 2.0,
-            inertia: Matrix3::from_diagonal(&Vector3::new(1.0, 2.0, 2.5)),
-        };
-        let b = RigidInertia::from_inertial(&inertial);
-        assert_eq!(b.com, Vector3::new(1.0, 2.0, 3.0));
-        // A quarter turn about z exchanges x and y.
-        assert!((b.inertia - Matrix3::from_diagonal(&Vector3::new(2.0, 1.0, 2.5))).amax() < 1e-15);
     }
 
     #[test]

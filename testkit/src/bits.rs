@@ -33,9 +33,6 @@ pub fn bits<'a, T: Bits + 'a>(values: impl IntoIterator<Item = &'a T>) -> Vec<u6
 }
 
 /// Asserts that both sequences have the same bits.
-///
-/// # Panics
-/// If they differ; the message names `what` and the first index that differs.
 #[track_caller]
 pub fn assert_same_bits<'a, T: Bits + 'a>(
     what: &str,

@@ -17,9 +17,6 @@ pub struct ImageCheck<'a> {
 
 impl ImageCheck<'_> {
     /// Compares with an answer for each pixel `(column, row)`; pixels without an answer (`None`) are left out.
-    ///
-    /// # Panics
-    /// If too many pixels differ; the message names the first ones and the file that shows where they are.
     #[track_caller]
     pub fn assert_matches(&self, found: &[f32], expected: impl Fn(usize, usize) -> Option<f64>) {
         let [width, height] = self.size;
@@ -66,9 +63,6 @@ impl ImageCheck<'_> {
     }
 
     /// Compares with another image.
-    ///
-    /// # Panics
-    /// As [`Self::assert_matches`].
     #[track_caller]
     pub fn assert_same(&self, found: &[f32], expected: &[f32]) {
         assert_eq!(found.len(), expected.len(), "{}: number of pixels", self.name);

@@ -14,8 +14,8 @@
 //! | `x_server` (feature `x_server`) | an X server without a screen |
 //! | `worlds` (feature `worlds`) | simulations, robots, objects and cameras |
 //!
-//! Without its features nothing here depends on another crate of the workspace, so that unit tests of every crate
-//! can use it.
+//! Functions panic where a test should fail; the message says what was expected. Without its features nothing here depends
+//! on another crate of the workspace, so that unit tests of every crate can use it.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 #![forbid(unsafe_code)]
 

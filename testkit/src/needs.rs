@@ -22,10 +22,6 @@ fn robot_folders() -> impl Iterator<Item = PathBuf> {
 }
 
 /// A folder with URDF files of real robots.
-///
-/// # Panics
-/// If no folder exists.
-#[must_use]
 pub fn robots_dir() -> PathBuf {
     robot_folders()
         .find(|dir| dir.is_dir())
@@ -33,10 +29,6 @@ pub fn robots_dir() -> PathBuf {
 }
 
 /// A file of a real robot, its path relative to the folder of robots.
-///
-/// # Panics
-/// If no folder of robots has it.
-#[must_use]
 pub fn robot(path: &str) -> PathBuf {
     robot_folders()
         .map(|dir| dir.join(path))
@@ -45,10 +37,6 @@ pub fn robot(path: &str) -> PathBuf {
 }
 
 /// A model that comes with MuJoCo, for example `humanoid/humanoid.xml`, or their folder for an empty path.
-///
-/// # Panics
-/// If the models are not installed.
-#[must_use]
 pub fn sample_model(path: &str) -> PathBuf {
     let found = Path::new("/usr/share/mujoco/model").join(path);
     assert!(found.exists(), "{} is absent: apt-get install libmujoco-samples", found.display());
@@ -56,10 +44,6 @@ pub fn sample_model(path: &str) -> PathBuf {
 }
 
 /// All files below `folder` with this extension, in any case, sorted by path.
-///
-/// # Panics
-/// If a folder cannot be read.
-#[must_use]
 pub fn files_below(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let (mut folders, mut files) = (vec![folder.to_path_buf()], Vec::new());
     while let Some(folder) = folders.pop() {
@@ -82,28 +66,16 @@ fn python(variable: &str) -> PathBuf {
 }
 
 /// The Python that reads recordings.
-///
-/// # Panics
-/// If [`READERS`] is not set.
-#[must_use]
 pub fn python_readers() -> PathBuf {
     python(READERS)
 }
 
 /// The Python that draws with MuJoCo's own renderer.
-///
-/// # Panics
-/// If [`RENDERER`] is not set.
-#[must_use]
 pub fn python_renderer() -> PathBuf {
     python(RENDERER)
 }
 
 /// Runs a Python script on a file and parses the JSON that it prints.
-///
-/// # Panics
-/// If the script fails or prints something else.
-#[must_use]
 pub fn read_json(python: &Path, script: &Path, file: &Path) -> serde_json::Value {
     let output = Command::new(python).arg(script).arg(file).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -111,10 +83,6 @@ pub fn read_json(python: &Path, script: &Path, file: &Path) -> serde_json::Value
 }
 
 /// The browser.
-///
-/// # Panics
-/// If the search path has no browser.
-#[must_use]
 pub fn chromium() -> PathBuf {
     let folders: Vec<PathBuf> = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
     let names = ["chromium", "chromium-browser", "google-chrome"];

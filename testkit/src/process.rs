@@ -11,13 +11,11 @@ use std::process::{Command, Output};
 const VARIABLE: &str = "KINETOSCOPE_TEST_CHILD";
 
 /// True in a process that [`run`] or [`command`] started.
-#[must_use]
 pub fn is_child() -> bool {
     std::env::var_os(VARIABLE).is_some()
 }
 
 /// The command that runs one test of this binary alone. `module` is `module_path!()` of the test, `test` its name.
-#[must_use]
 pub fn command(module: &str, test: &str) -> Command {
     // Names of tests lack the name of the binary.
     let name = module.split_once("::").map_or_else(|| test.to_string(), |(_, path)| format!("{path}::{test}"));
@@ -27,21 +25,16 @@ pub fn command(module: &str, test: &str) -> Command {
 }
 
 /// Runs one test of this binary in folder `dir` and waits for its end.
-#[must_use]
 pub fn run(module: &str, test: &str, dir: &Path, variables: &[(&str, &str)]) -> Output {
     command(module, test).current_dir(dir).envs(variables.iter().copied()).output().unwrap()
 }
 
 /// Output as text.
-#[must_use]
 pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// Runs one test of this binary and asserts that it passes; its output is the message otherwise.
-///
-/// # Panics
-/// If it fails, or does not exist.
 #[track_caller]
 pub fn assert_passes(module: &str, test: &str, variables: &[(&str, &str)]) {
     let output = run(module, test, &std::env::temp_dir(), variables);

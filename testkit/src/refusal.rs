@@ -18,9 +18,6 @@ fn assert_none(findings: &[String]) {
 
 /// Asserts that every row `(what, result, variant, parts)` is an error that `Debug` shows with `variant` at its beginning, and
 /// whose message contains each of `parts`. Rows may be lazy: the mistakes are made in their order.
-///
-/// # Panics
-/// If any row is not; the message lists all of them.
 #[track_caller]
 pub fn assert_refused<'a, W: Display, T, E: Debug + Display, V: AsRef<str>, P: AsRef<[&'a str]>>(
     rows: impl IntoIterator<Item = (W, Result<T, E>, V, P)>,
@@ -33,9 +30,6 @@ pub fn assert_refused<'a, W: Display, T, E: Debug + Display, V: AsRef<str>, P: A
 
 /// As [`assert_refused`] for rows `(what, mistake, variant, parts)`: `make` makes each mistake, and what `fingerprint` returns
 /// must stay the same.
-///
-/// # Panics
-/// If any row is not refused so, or changes something; the message lists all of them.
 #[track_caller]
 pub fn assert_refused_unchanged<'a, S, F, W, M, T, E, V, P>(
     state: &mut S,
@@ -64,9 +58,6 @@ pub fn assert_refused_unchanged<'a, S, F, W, M, T, E, V, P>(
 
 /// Asserts that a result is an error whose variant and fields, as `Debug` shows them, contain `kind`, and whose message
 /// contains each of `parts`.
-///
-/// # Panics
-/// If it is not; the message shows what came instead.
 #[track_caller]
 pub fn assert_error<T, E: Debug + Display>(result: Result<T, E>, kind: &str, parts: &[&str]) {
     let Err(error) = result else { panic!("accepted, expected {kind} {parts:?}") };

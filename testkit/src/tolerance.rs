@@ -15,37 +15,31 @@ pub struct Tolerance {
 
 impl Tolerance {
     /// A limit on the absolute error.
-    #[must_use]
     pub const fn absolute(limit: f64, derivation: &'static str) -> Self {
         Self { absolute: limit, relative: 0.0, derivation }
     }
 
     /// A limit on the error relative to the expected value.
-    #[must_use]
     pub const fn relative(limit: f64, derivation: &'static str) -> Self {
         Self { absolute: 0.0, relative: limit, derivation }
     }
 
     /// A limit on the error relative to an expected value larger than one, and on the absolute error of a smaller one.
-    #[must_use]
     pub const fn mixed(limit: f64, derivation: &'static str) -> Self {
         Self { absolute: limit, relative: limit, derivation }
     }
 
     /// The rounding error of `operations` operations in double precision on numbers of the expected size, or of size one.
-    #[must_use]
     pub const fn rounding(operations: f64) -> Self {
         Self::mixed(operations * f64::EPSILON, "rounding in double precision")
     }
 
     /// Largest absolute error of a value.
-    #[must_use]
     pub const fn limit(&self, expected: f64) -> f64 {
         self.absolute.max(self.relative * expected.abs())
     }
 
     /// True if `found` is within the limit of `expected`; equal values are, infinities included, and NaN is not.
-    #[must_use]
     pub fn holds(&self, found: f64, expected: f64) -> bool {
         found == expected || (found - expected).abs() <= self.limit(expected)
     }
@@ -61,9 +55,6 @@ impl std::ops::Mul<f64> for Tolerance {
 }
 
 /// Asserts that every element is within the tolerance.
-///
-/// # Panics
-/// If one is not; the message names `what`, the index, both values, the limit and its derivation.
 #[track_caller]
 pub fn assert_close(
     what: &str,
@@ -85,9 +76,6 @@ pub fn assert_close(
 }
 
 /// As [`assert_close`], with the limit of the largest expected element for every element.
-///
-/// # Panics
-/// As [`assert_close`].
 #[track_caller]
 pub fn assert_vector(
     what: &str,
@@ -102,9 +90,6 @@ pub fn assert_vector(
 }
 
 /// Asserts that a number is within the tolerance.
-///
-/// # Panics
-/// As [`assert_close`].
 #[track_caller]
 pub fn assert_number(what: &str, found: f64, expected: f64, tolerance: Tolerance) {
     assert_close(what, [&found], [&expected], tolerance);

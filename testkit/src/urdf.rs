@@ -3,13 +3,11 @@
 use std::path::{Path, PathBuf};
 
 /// A robot of these elements; the first element is in line 2.
-#[must_use]
 pub fn robot(name: &str, elements: &str) -> String {
     format!("<robot name=\"{name}\">\n{elements}\n</robot>")
 }
 
 /// A link with a mass at `com` and the same moment about all axes there; `more` is further content (visuals, collisions).
-#[must_use]
 pub fn link(name: &str, mass: f64, moment: f64, [x, y, z]: [f64; 3], more: &str) -> String {
     format!(
         "<link name=\"{name}\"><inertial><origin xyz=\"{x} {y} {z}\"/><mass value=\"{mass}\"/><inertia ixx=\"{moment}\" \
@@ -18,7 +16,6 @@ pub fn link(name: &str, mass: f64, moment: f64, [x, y, z]: [f64; 3], more: &str)
 }
 
 /// A joint at `at` in the frame of its parent; `more` is further content (limit, dynamics, mimic).
-#[must_use]
 pub fn joint(
     name: &str,
     kind: &str,
@@ -34,13 +31,11 @@ pub fn joint(
 }
 
 /// A limit element \[rad or m, N m or N, rad/s or m/s\].
-#[must_use]
 pub fn limit([lower, upper]: [f64; 2], effort: f64, velocity: f64) -> String {
     format!("<limit lower=\"{lower}\" upper=\"{upper}\" effort=\"{effort}\" velocity=\"{velocity}\"/>")
 }
 
 /// A collision element with this geometry, for example `<sphere radius="0.1"/>`, at `at`.
-#[must_use]
 pub fn collision(geometry: &str, [x, y, z]: [f64; 3]) -> String {
     format!("<collision><origin xyz=\"{x} {y} {z}\"/><geometry>{geometry}</geometry></collision>")
 }
@@ -57,15 +52,11 @@ impl Default for Files {
 
 impl Files {
     /// The folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         self.0.path()
     }
 
     /// Writes a file, with its folders, and returns its path.
-    ///
-    /// # Panics
-    /// If it cannot be written.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.path().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();

@@ -6,9 +6,6 @@ use std::time::{Duration, Instant};
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Waits for a value.
-///
-/// # Panics
-/// If it does not come; the message names `what`.
 #[track_caller]
 pub fn some<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
@@ -22,19 +19,12 @@ pub fn some<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
 }
 
 /// Waits until a condition holds.
-///
-/// # Panics
-/// If it does not; the message names `what`.
 #[track_caller]
 pub fn until(what: &str, mut holds: impl FnMut() -> bool) {
     some(what, || holds().then_some(()));
 }
 
 /// Number of threads of this process, and of files that it has open. For a process of its own ([`crate::process`]).
-///
-/// # Panics
-/// If there is no `/proc`.
-#[must_use]
 pub fn threads_and_files() -> [usize; 2] {
     ["task", "fd"].map(|of| std::fs::read_dir(format!("/proc/self/{of}")).unwrap().count())
 }

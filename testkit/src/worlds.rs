@@ -6,59 +6,47 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::env::Env;
 
 /// A configuration with this number of threads.
-#[must_use]
 pub fn cfg(num_envs: usize, threads: usize) -> SimulationManagerCfg {
     SimulationManagerCfg { num_envs, threads: Some(threads), ..Default::default() }
 }
 
 /// A configuration with two threads, and without ground and lights.
-#[must_use]
 pub fn empty_cfg(num_envs: usize) -> SimulationManagerCfg {
     SimulationManagerCfg { ground: None, lights: vec![], ..cfg(num_envs, 2) }
 }
 
 /// A configuration of [`empty_cfg`] without gravity.
-#[must_use]
 pub fn weightless_cfg(num_envs: usize) -> SimulationManagerCfg {
     SimulationManagerCfg { gravity: [0.0; 3].into(), ..empty_cfg(num_envs) }
 }
 
 /// A simulation with this configuration.
-///
-/// # Panics
-/// If the configuration is refused.
-#[must_use]
 #[track_caller]
 pub fn sim(cfg: SimulationManagerCfg) -> SimulationManager {
     SimulationManager::new(cfg).unwrap()
 }
 
 /// An object with its origin at `at`, of the default density.
-#[must_use]
 pub fn object(uid: &str, shape: ObjectShape, [x, y, z]: [f64; 3]) -> RigidObjectCfg {
     RigidObjectCfg { uid: uid.into(), shape, init_pose: Pose::translation(x, y, z), ..Default::default() }
 }
 
 /// A cube of this side \[m\] and mass \[kg\].
-#[must_use]
 pub fn cube(uid: &str, side: f64, mass: f64, at: [f64; 3]) -> RigidObjectCfg {
     RigidObjectCfg { mass: Some(mass), ..object(uid, ObjectShape::cube(side), at) }
 }
 
 /// A ball of this radius \[m\] and mass \[kg\].
-#[must_use]
 pub fn ball(uid: &str, radius: f64, mass: f64, at: [f64; 3]) -> RigidObjectCfg {
     RigidObjectCfg { mass: Some(mass), ..object(uid, ObjectShape::Sphere { radius }, at) }
 }
 
 /// The same object, fixed in the world.
-#[must_use]
 pub fn fixed(object: RigidObjectCfg) -> RigidObjectCfg {
     RigidObjectCfg { body_type: BodyType::Static, ..object }
 }
 
 /// A robot of one URDF file.
-#[must_use]
 pub fn urdf_robot(uid: &str, urdf: impl AsRef<std::path::Path>) -> RobotCfg {
     RobotCfg { uid: uid.into(), urdf: UrdfCfg::single(urdf), ..Default::default() }
 }
@@ -69,37 +57,26 @@ pub fn text_robot(files: &Files, uid: &str, urdf: &str) -> RobotCfg {
 }
 
 /// A robot of MJCF text.
-#[must_use]
 pub fn mjcf_robot(uid: &str, mjcf: &str) -> RobotCfg {
     RobotCfg { uid: uid.into(), mjcf: Some(MjcfFile::text(mjcf)), ..Default::default() }
 }
 
 /// The same robot without drives.
-#[must_use]
 pub fn passive(robot: RobotCfg) -> RobotCfg {
     RobotCfg { drive: DriveCfg { drive_type: DriveType::None, ..Default::default() }, ..robot }
 }
 
 /// Gains for all joints.
-#[must_use]
 pub fn gains(stiffness: f64, damping: f64) -> DriveCfg {
     DriveCfg { stiffness: stiffness.into(), damping: damping.into(), ..Default::default() }
 }
 
 /// The bundled arm of six joints.
-///
-/// # Panics
-/// If the assets are missing.
-#[must_use]
 pub fn sr5(uid: &str) -> RobotCfg {
     urdf_robot(uid, assets::path("sr5/SR5.urdf").unwrap())
 }
 
 /// The bundled arm with the bundled hand.
-///
-/// # Panics
-/// If the assets are missing.
-#[must_use]
 pub fn arm_and_hand(uid: &str) -> RobotCfg {
     let part = |name, file| ComponentCfg::new(name, assets::path(file).unwrap());
     let components = vec![part("arm", "sr5/SR5.urdf"), part("hand", "revo1_left/revo1_left.urdf")];
@@ -107,13 +84,11 @@ pub fn arm_and_hand(uid: &str) -> RobotCfg {
 }
 
 /// A batch of one row.
-#[must_use]
 pub fn row<const K: usize>(values: [f64; K]) -> Array2<f64> {
     Array2::from_shape_fn((1, K), |(_, k)| values[k])
 }
 
 /// A camera at `eye` that looks at `target`, z up, with a vertical field of view of 0.9 rad.
-#[must_use]
 pub fn camera([width, height]: [usize; 2], eye: [f64; 3], target: [f64; 3], channels: Channels) -> CameraCfg {
     let placement = Placement::LookAt { eye, target, up: [0.0, 0.0, 1.0] };
     CameraCfg {
@@ -127,7 +102,6 @@ pub fn camera([width, height]: [usize; 2], eye: [f64; 3], target: [f64; 3], chan
 }
 
 /// Bits of everything that decides the next step of an environment, of the efforts, and the number of contacts.
-#[must_use]
 pub fn bits_of(env: &Env) -> Vec<u64> {
     let data = env.data();
     [&[data.time()], data.qpos(), data.qvel(), data.qacc_warmstart(), &env.drives.position, &env.drives.effort]
@@ -139,7 +113,6 @@ pub fn bits_of(env: &Env) -> Vec<u64> {
 }
 
 /// [`bits_of`] each environment of a simulation.
-#[must_use]
 pub fn all_bits(sim: &SimulationManager) -> Vec<Vec<u64>> {
     let mut bits = Vec::new();
     sim.batch().for_each(|_, env| bits.push(bits_of(env)));
@@ -170,10 +143,6 @@ impl RecordedWorld {
     pub const IMU_EVERY: u32 = 2;
 
     /// Builds it.
-    ///
-    /// # Panics
-    /// If a part of it is refused.
-    #[must_use]
     pub fn new(num_envs: usize, threads: usize) -> Self {
         let cfg = cfg(num_envs, threads);
         let dt = cfg.physics_dt;
@@ -201,9 +170,6 @@ impl RecordedWorld {
     }
 
     /// Targets that change at every step, in each environment differently, and one step.
-    ///
-    /// # Panics
-    /// If the targets are refused.
     pub fn step(&mut self, step: u32) {
         let (envs, dof) = (self.sim.num_envs(), self.sim.robot(self.arm).dof());
         let target = |(env, joint)| 0.3 * (0.1 * f64::from(step) + joint as f64 + env as f64).sin();
@@ -214,19 +180,16 @@ impl RecordedWorld {
 }
 
 /// The pose in a row of a batch of poses.
-#[must_use]
 pub fn pose_in(poses: &Array2<f64>, row: usize) -> Pose {
     kinetoscope::scene::pose::from_row(&std::array::from_fn(|k| poses[(row, k)]))
 }
 
 /// Distance \[m\] and angle \[rad\] between two poses.
-#[must_use]
 pub fn errors(a: &Pose, b: &Pose) -> (f64, f64) {
     ((a.translation.vector - b.translation.vector).norm(), a.rotation.angle_to(&b.rotation))
 }
 
 /// The number of diagnostics whose text contains all of these words.
-#[must_use]
 pub fn count_diagnostics(sim: &SimulationManager, words: &[&str]) -> usize {
     sim.diagnostics()
         .iter()
@@ -236,31 +199,22 @@ pub fn count_diagnostics(sim: &SimulationManager, words: &[&str]) -> usize {
 }
 
 /// Extrinsics of a camera without a parent at `eye` that looks at `target`, z up.
-#[must_use]
 pub fn look_at(eye: [f64; 3], target: [f64; 3]) -> Extrinsics {
     let placement = Placement::LookAt { eye, target, up: [0.0, 0.0, 1.0] };
     Extrinsics { placement, ..Extrinsics::default() }
 }
 
 /// The mask id of an object.
-///
-/// # Panics
-/// If no object has this name.
-#[must_use]
 pub fn mask_id(sim: &SimulationManager, object: &str) -> i32 {
     sim.mask_ids().iter().find(|id| id.object == object).expect("an object of this name").id
 }
 
 /// A configuration in which no joint has a drive.
-#[must_use]
 pub fn no_drive() -> DriveCfg {
     DriveCfg { drive_type: DriveType::None, ..Default::default() }
 }
 
 /// Adds a small ball of the default density at `at`, which compiles the model again.
-///
-/// # Panics
-/// If it is refused.
 #[track_caller]
 pub fn add_ball(sim: &mut SimulationManager, uid: &str, at: [f64; 3]) -> ObjectId {
     sim.add_rigid_object(object(uid, ObjectShape::Sphere { radius: 0.1 }, at)).unwrap()

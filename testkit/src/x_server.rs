@@ -17,10 +17,6 @@ pub struct Display {
 
 impl Display {
     /// Starts a server with a screen of this size, for example `800x600`.
-    ///
-    /// # Panics
-    /// If Xvfb is not installed.
-    #[must_use]
     pub fn start(screen: &str) -> Self {
         let screen = format!("{screen}x24");
         let command = ["-displayfd", "1", "-screen", "0", &screen, "-nolisten", "tcp", "-noreset"];
@@ -32,19 +28,12 @@ impl Display {
     }
 
     /// Sends the server a signal by its name.
-    ///
-    /// # Panics
-    /// If it cannot be sent.
     pub fn signal(&self, name: &str) {
         let sent = Command::new("kill").args(["-s", name, &self.server.id().to_string()]).status().unwrap();
         assert!(sent.success(), "{name}");
     }
 
     /// Connects as a client.
-    ///
-    /// # Panics
-    /// If the server does not accept.
-    #[must_use]
     pub fn connect(&self) -> RustConnection {
         x11rb::connect(Some(&self.name)).unwrap().0
     }
@@ -58,10 +47,6 @@ impl Drop for Display {
 }
 
 /// A part of the screen, row by row: red, green and blue.
-///
-/// # Panics
-/// If the server does not answer.
-#[must_use]
 pub fn screenshot(connection: &RustConnection, corner: [usize; 2], size: [usize; 2]) -> Vec<[u8; 3]> {
     let root = connection.setup().roots[0].root;
     let ([x, y], [width, height]) = (corner.map(|n| n as i16), size.map(|n| n as u16));
@@ -71,9 +56,6 @@ pub fn screenshot(connection: &RustConnection, corner: [usize; 2], size: [usize;
 }
 
 /// Closes a window as window managers do it.
-///
-/// # Panics
-/// If the server does not answer.
 pub fn close(connection: &RustConnection, window: u32) {
     let atom = |name: &[u8]| connection.intern_atom(false, name).unwrap().reply().unwrap().atom;
     let data = [atom(b"WM_DELETE_WINDOW"), 0, 0, 0, 0];

@@ -82,7 +82,7 @@ pub(crate) fn apex_off(e: f64, height: f64, h: f64, g: f64) -> f64 {
 }
 
 #[test]
-fn steps_of_a_contact_come_out_near_its_restitution() {
+fn restitution() {
     // Without damping the steps keep v² + ω² x² - ω² h x v; the surfaces sink in by a part p of a step and leave by q of
     // one, which is 1/4 ω² h² = 2.5 % of v² between the two at most: 1.2 % of v.
     assert!(off(1.0) < 0.0124 + IMPEDANCE);

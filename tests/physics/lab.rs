@@ -5,6 +5,9 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_row, to_row};
 use kinetoscope::sim::{self, Cone};
 use nalgebra::{UnitQuaternion, Vector3};
+use testkit::urdf::Files;
+/// The default drive, evaluated at the end of the step, and none: joints move freely.
+pub(crate) use testkit::worlds::{gains as implicit, no_drive as passive};
 
 /// Gravity on earth \[m/s²\].
 pub(crate) const G: f64 = 9.81;
@@ -50,16 +53,6 @@ pub(crate) fn rk4(cfg: SimulationManagerCfg) -> SimulationManagerCfg {
     SimulationManagerCfg { integrator: Integrator::Rk4, ..cfg }
 }
 
-/// No drive: joints move freely.
-pub(crate) fn passive() -> DriveCfg {
-    DriveCfg { drive_type: DriveType::None, ..DriveCfg::default() }
-}
-
-/// The default drive, evaluated at the end of the step.
-pub(crate) fn implicit(stiffness: f64, damping: f64) -> DriveCfg {
-    DriveCfg { stiffness: stiffness.into(), damping: damping.into(), ..DriveCfg::default() }
-}
-
 /// MuJoCo's own actuators, evaluated at the start of the step.
 pub(crate) fn explicit(stiffness: f64, damping: f64) -> DriveCfg {
     DriveCfg { model: DriveModel::Actuator, ..implicit(stiffness, damping) }
@@ -69,19 +62,17 @@ pub(crate) fn explicit(stiffness: f64, damping: f64) -> DriveCfg {
 #[derive(Debug)]
 pub(crate) struct Lab {
     pub(crate) sim: SimulationManager,
-    files: tempfile::TempDir,
+    files: Files,
 }
 
 impl Lab {
     pub(crate) fn new(cfg: SimulationManagerCfg) -> Self {
-        Self { sim: SimulationManager::new(cfg).unwrap(), files: tempfile::tempdir().unwrap() }
+        Self { sim: SimulationManager::new(cfg).unwrap(), files: Files::default() }
     }
 
     /// A file in this lab's folder.
     pub(crate) fn file(&self, name: &str, text: &str) -> std::path::PathBuf {
-        let path = self.files.path().join(name);
-        std::fs::write(&path, text).unwrap();
-        path
+        self.files.write(name, text)
     }
 
     /// A robot of this text; `cfg` says everything but the file.
@@ -115,7 +106,7 @@ impl Lab {
         let steps = seconds / self.dt();
         assert!((steps - steps.round()).abs() < 1e-6, "{seconds} s are no whole number of steps");
         self.sim.update(steps.round() as u32);
-        self.assert_well();
+        assert_well(&self.sim);
     }
 
     /// Steps `steps` times and looks after each, `t` being the time \[s\] since the call.
@@ -124,7 +115,7 @@ impl Lab {
             self.sim.update(1);
             look(f64::from(step) * self.dt(), &self.sim);
         }
-        self.assert_well();
+        assert_well(&self.sim);
     }
 
     /// Period \[s\] in which the only joint of a robot swings through 0, from where it stands to five passages, two in a
@@ -139,14 +130,6 @@ impl Lab {
             before = [t, q];
         });
         (times[4] - times[0]) / 2.0
-    }
-
-    /// No environment diverged, and MuJoCo warned of nothing.
-    #[track_caller]
-    pub(crate) fn assert_well(&self) {
-        assert!(self.sim.diverged().is_empty(), "{:?}", self.sim.diverged());
-        let counts = self.sim.warning_counts();
-        assert!(!counts.keys().any(|name| name.starts_with("mujoco")), "{counts:?}");
     }
 
     /// Positions and velocities of all joints, in their order.
@@ -206,6 +189,14 @@ impl Lab {
     pub(crate) fn body(&self, object: ObjectId) -> Body {
         body(&self.sim, object)
     }
+}
+
+/// Asserts that no environment diverged, and that MuJoCo warned of nothing.
+#[track_caller]
+pub(crate) fn assert_well(sim: &SimulationManager) {
+    assert!(sim.diverged().is_empty(), "{:?}", sim.diverged());
+    let counts = sim.warning_counts();
+    assert!(!counts.keys().any(|name| name.starts_with("mujoco")), "{counts:?}");
 }
 
 /// Where a body is and how it moves, in the world; velocity is that of its frame.

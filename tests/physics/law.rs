@@ -163,13 +163,13 @@ mod tests {
     }
 
     #[test]
-    fn the_worse_of_anything_and_nan_is_nan() {
+    fn worse_of_nan() {
         assert_eq!([1.0, 3.0, 2.0].into_iter().fold(0.0, worse), 3.0);
         assert!([1.0, f64::NAN, 2.0].into_iter().fold(0.0, worse).is_nan());
     }
 
     #[test]
-    fn a_row_holds_within_its_tolerance_and_a_control_must_not() {
+    fn rows_and_controls() {
         assert!(of(1.0, 1.05, 0.1, 2.0).is_empty());
         assert!(of(1.0, 1.05, 0.01, 2.0)[0].contains("off by 5.0"));
         assert!(of(1.0, f64::NAN, 0.1, 2.0)[0].contains("NaN"));
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_without_rows_and_a_row_without_control_fail() {
+    fn missing_rows_and_controls() {
         assert_eq!(Measured::default().failures(), ["a law needs rows"]);
         let mut m = Measured::default();
         m.row("x", "", 1.0, 1.0, (0.0, "the same number"));

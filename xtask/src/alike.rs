@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_off_silhouettes_must_be_the_same_and_the_colour_another() {
+    fn same_things_in_other_colors() {
         let ours = folder(0.0, 8, "ours");
         // Two columns of each half are whole in two rows.
         let seen = |dir: &tempfile::TempDir| {

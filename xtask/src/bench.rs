@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_both_runs_share_one_table_per_benchmark() {
+    fn both_runs() {
         let rows = [
             row("step", "2.2.2", json!(200_000.0), json!(1.255)),
             row("camera", "2.2.2", json!(12.345), json!(3.0)),
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn tables_of_one_benchmark_replace_only_theirs() {
+    fn one_benchmark() {
         let page = |step: f64, camera: f64| {
             let rows =
                 [row("step", "2.2.2", json!(step), json!(1.0)), row("camera", "2.2.2", json!(camera), json!(2.0))];
@@ -252,12 +252,8 @@ mod tests {
     }
 
     #[test]
-    fn a_row_without_its_name_is_an_error() {
+    fn broken_rows() {
         assert!(tables(&[json!({"case": "x"})]).is_err());
-    }
-
-    #[test]
-    fn a_run_that_wrote_no_rows_is_an_error() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         let file = dir.path().join("rows.json");
         assert!(read_rows(&file).is_err());

@@ -283,12 +283,12 @@ mod tests {
     }
 
     #[test]
-    fn quick_leaves_out_everything_long() {
+    fn quick_run() {
         assert_eq!(names(true, None), ["setup", "fmt", "arrows", "rules", "docs", "clippy", "unit"]);
     }
 
     #[test]
-    fn the_full_run_ends_with_the_look_at_the_tree() {
+    fn full_run() {
         let names = names(false, None);
         assert!(!names.contains(&"unit"));
         assert!(names.contains(&"test") && names.contains(&"test-4"));
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn one_stage_can_be_repeated_alone() {
+    fn one_stage() {
         for stage in STAGES {
             assert_eq!(names(false, Some(stage.name)), [stage.name]);
         }
@@ -315,29 +315,24 @@ mod tests {
         assert_eq!(words, expected.map(|line| line.split(' ').collect::<Vec<_>>()));
     }
 
+    /// A new file is found, and the log of MuJoCo although git ignores it.
     #[test]
-    fn a_file_that_a_test_left_behind_is_found() {
+    fn files_left_behind() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         let git = |args: &[&str]| Cmd::new("git").args(args).current_dir(dir.path()).output().expect("git works");
         git(&["init", "--quiet"]);
         let repo =
             Repo { root: dir.path().into(), target: dir.path().join("target"), metadata: serde_json::Value::Null };
-        std::fs::write(dir.path().join("before.txt"), "").expect("writable");
+        let write = |file: &str| crate::wheel::tests::write(&dir.path().join(file), "");
+        write("before.txt");
         let context = Context { repo: &repo, changed_before: changed_files(&repo) };
         assert!(leftovers(&context).is_ok());
-        std::fs::create_dir_all(dir.path().join("sub")).expect("writable");
-        std::fs::write(dir.path().join("sub/dump.xml"), "").expect("writable");
+        write("sub/dump.xml");
         let failure = leftovers(&context).expect_err("a new file");
         assert!(failure.message.contains("sub/dump.xml"), "{failure}");
-    }
-
-    #[test]
-    fn the_log_of_mujoco_is_found_although_git_ignores_it() {
-        let dir = tempfile::tempdir().expect("a scratch folder");
-        std::fs::create_dir_all(dir.path().join("sim")).expect("writable");
-        std::fs::write(dir.path().join("sim/MUJOCO_LOG.TXT"), "").expect("writable");
-        let repo =
-            Repo { root: dir.path().into(), target: dir.path().join("target"), metadata: serde_json::Value::Null };
-        assert!(leftovers(&Context { repo: &repo, changed_before: None }).is_err());
+        let context = Context { repo: &repo, changed_before: None };
+        assert!(leftovers(&context).is_ok());
+        write("sim/MUJOCO_LOG.TXT");
+        assert!(leftovers(&context).is_err());
     }
 }

@@ -72,12 +72,12 @@ mod tests {
     }
 
     #[test]
-    fn defaults_stand_without_flags_of_the_user() {
+    fn defaults() {
         assert_eq!(merged(DEFAULTS, &[]), words("--headless --num-envs 4 --steps 2004"));
     }
 
     #[test]
-    fn what_flags_ask_for_is_built() {
+    fn features() {
         assert_eq!(rooms(&words("--seed 3 --overwrite")), ["--no-default-features"]);
         for flags in ["--serve", "--serve=127.0.0.1:0", "--seed 3 --record run.mcap"] {
             assert!(rooms(&words(flags)).is_empty(), "{flags}");
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flag_of_the_user_replaces_the_default_in_either_spelling() {
+    fn spellings() {
         assert_eq!(merged(DEFAULTS, &words("--num_envs 9")), words("--headless --steps 2004 --num_envs 9"));
         assert_eq!(merged(DEFAULTS, &words("--steps=1")), words("--headless --num-envs 4 --steps=1"));
         assert_eq!(merged(DEFAULTS, &words("--seed 3")), words("--headless --num-envs 4 --steps 2004 --seed 3"));

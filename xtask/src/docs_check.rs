@@ -112,33 +112,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_promised_commands_must_stand_in_a_code_block() {
+    fn promised_commands() {
         assert_eq!(missing_commands("```sh\n$ cargo xtask demo\ncargo xtask test   # all\n```\n"), [""; 0]);
         assert_eq!(missing_commands("Run cargo xtask demo.\n```sh\ncargo xtask test\n```\n").len(), 1);
         assert_eq!(missing_commands("").len(), 2);
     }
 
     #[test]
-    fn a_command_that_does_not_exist_is_found() {
-        assert!(commands_that_do_not_parse("```\ncargo xtask test --mujoco 4\ncargo build\n```").is_empty());
-        assert_eq!(commands_that_do_not_parse("```\ncargo xtask fly\n```").len(), 1);
-        assert_eq!(commands_that_do_not_parse("```\ncargo xtask test --mujoco 9\n```").len(), 1);
-    }
-
-    #[test]
-    fn the_test_command_parses() {
+    fn commands() {
+        for (text, bad) in [
+            ("```\ncargo xtask test --mujoco 4\ncargo build\n```", 0),
+            ("```\ncargo xtask fly\n```", 1),
+            ("```\ncargo xtask test --mujoco 9\n```", 1),
+        ] {
+            assert_eq!(commands_that_do_not_parse(text).len(), bad, "{text}");
+        }
         assert!(parse(TEST_COMMAND).is_ok());
     }
 
     #[test]
-    fn links_into_the_tree_are_told_from_others() {
+    fn links() {
         let page = "[a](docs/a.md#part) ![b](b.png \"title\") [c](https://example.org/x) [d](#part) `[e](e.md)`\n\
                     ```\n[f](f.md)\n```\n[g](g.md)";
         assert_eq!(relative_links(page), ["docs/a.md", "b.png", "g.md"]);
     }
 
     #[test]
-    fn pages_of_the_project_are_told_from_others() {
+    fn pages() {
         assert!(is_page("README.md") && is_page("docs/decisions/0001-a.md"));
         assert!(!is_page("assets/arm/README.md") && !is_page("docs/a.png"));
     }

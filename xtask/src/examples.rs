@@ -643,7 +643,7 @@ mod tests {
     }
 
     #[test]
-    fn an_example_without_a_row_and_a_row_without_an_example_are_named() {
+    fn gaps_of_the_table() {
         let mut all: Vec<&str> = TABLE.iter().map(|row| row.example).collect();
         all.sort_unstable();
         all.dedup();
@@ -655,12 +655,10 @@ mod tests {
     }
 
     #[test]
-    fn examples_are_files_and_folders_with_a_main() {
+    fn files_and_folders() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         for path in ["examples/a.rs", "examples/b/main.rs", "examples/common/mod.rs", "examples/README.md"] {
-            let path = dir.path().join(path);
-            fs::create_dir_all(path.parent().expect("has a parent")).expect("writable");
-            fs::write(path, "").expect("writable");
+            crate::wheel::tests::write(&dir.path().join(path), "");
         }
         assert_eq!(examples(dir.path()), ["a", "b"]);
     }
@@ -683,7 +681,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_or_broken_report_is_found() {
+    fn broken_reports() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         let path = dir.path().join("report.json");
         assert!(check_report(&path, anything).is_err());
@@ -696,16 +694,20 @@ mod tests {
     }
 
     #[test]
-    fn disparities_have_to_lead_to_points() {
+    fn disparities() {
         let report = |points: f64, low: f64, error: f64| {
             json!({ "width": 20, "height": 10, "points": points, "disparity_min": low, "disparity_max": 9.0,
                     "points_compared": 0.8 * points, "disagreement_pixels": error })
         };
-        assert_eq!(disparity_leads_to_the_points(&report(100.0, 1.0, 1e-4)), Ok(()));
-        assert!(disparity_leads_to_the_points(&report(10.0, 1.0, 1e-4)).is_err(), "few points");
-        assert!(disparity_leads_to_the_points(&report(100.0, 0.0, 1e-4)).is_err(), "infinitely far points");
-        assert!(disparity_leads_to_the_points(&report(100.0, 1.0, 0.2)).is_err(), "elsewhere");
-        assert!(disparity_leads_to_the_points(&json!({})).is_err());
+        for (what, report, good) in [
+            ("as it should be", report(100.0, 1.0, 1e-4), true),
+            ("few points", report(10.0, 1.0, 1e-4), false),
+            ("infinitely far points", report(100.0, 0.0, 1e-4), false),
+            ("points elsewhere", report(100.0, 1.0, 0.2), false),
+            ("empty", json!({}), false),
+        ] {
+            assert_eq!(disparity_leads_to_the_points(&report).is_ok(), good, "{what}");
+        }
     }
 
     /// A report of 16 environments, the first of which is `odd` and the others `rest`.
@@ -715,55 +717,59 @@ mod tests {
     }
 
     #[test]
-    fn trials_have_to_succeed_in_enough_environments() {
-        let good = json!({ "success": true, "diverged": null });
-        let bad = json!({ "success": false, "diverged": null });
-        assert_eq!(enough_succeeded(&trial(16, &good, &good)), Ok(()));
-        assert_eq!(enough_succeeded(&trial(15, &bad, &good)), Ok(()));
-        assert!(enough_succeeded(&trial(1, &good, &bad)).is_err(), "too few");
-        assert!(enough_succeeded(&trial(16, &bad, &good)).is_err(), "another number than is claimed");
+    fn successes() {
+        let (good, bad) = (json!({ "success": true, "diverged": null }), json!({ "success": false, "diverged": null }));
         let diverged = json!({ "success": true, "diverged": "step 7: bad acceleration" });
-        assert!(enough_succeeded(&trial(16, &diverged, &good)).is_err());
-        let mut few = trial(16, &good, &good);
-        few["needed"] = json!(1);
-        assert!(enough_succeeded(&few).is_err(), "{few}");
-        few["num_envs"] = json!(4);
-        assert!(enough_succeeded(&few).is_err(), "{few}");
-        assert!(enough_succeeded(&json!({ "steps": 4 })).is_err());
+        let changed = |changes: &[(&str, u64)]| {
+            let mut report = trial(16, &good, &good);
+            changes.iter().for_each(|(name, count)| report[*name] = json!(count));
+            report
+        };
+        for (what, report, passes) in [
+            ("all", trial(16, &good, &good), true),
+            ("all but one", trial(15, &bad, &good), true),
+            ("too few", trial(1, &good, &bad), false),
+            ("another number than is claimed", trial(16, &bad, &good), false),
+            ("one diverged", trial(16, &diverged, &good), false),
+            ("few are needed", changed(&[("needed", 1)]), false),
+            ("of few environments", changed(&[("needed", 1), ("num_envs", 4)]), false),
+            ("no trial", json!({ "steps": 4 }), false),
+        ] {
+            assert_eq!(enough_succeeded(&report).is_ok(), passes, "{what}");
+        }
     }
 
     #[test]
-    fn robots_have_to_be_pushed_and_policies_to_learn() {
+    fn balance_and_learning() {
         let row = |tilt: f64, airborne: f64| json!({ "success": true, "diverged": null, "largest_tilt": tilt, "airborne": airborne });
         let good = row(0.3, 0.2);
-        assert_eq!(balanced(&trial(16, &good, &good)), Ok(()));
-        assert!(balanced(&trial(16, &row(0.05, 0.2), &good)).is_err(), "hardly tilted");
-        assert!(balanced(&trial(16, &row(0.3, 0.0), &good)).is_err(), "never in the air");
-        let report = |before: f64, after: f64, needed: f64, envs: u64| {
-            json!({ "reached_before": before, "reached_after": after,
-                    "needed": needed, "num_envs": envs })
-        };
-        assert_eq!(learned(&report(0.01, 0.95, 0.9, 256)), Ok(()));
-        for bad in [
-            report(0.2, 0.95, 0.9, 256),
-            report(0.0, 0.89, 0.9, 256),
-            report(0.0, 0.95, 0.5, 256),
-            report(0.0, 0.95, 0.9, 16),
+        // The first is hardly tilted; the second is never in the air.
+        for (odd, passes) in [(good.clone(), true), (row(0.05, 0.2), false), (row(0.3, 0.0), false)] {
+            assert_eq!(balanced(&trial(16, &odd, &good)).is_ok(), passes, "{odd}");
+        }
+        for (before, after, needed, envs, passes) in [
+            (0.01, 0.95, 0.9, 256, true),
+            (0.2, 0.95, 0.9, 256, false),
+            (0.0, 0.89, 0.9, 256, false),
+            (0.0, 0.95, 0.5, 256, false),
+            (0.0, 0.95, 0.9, 16, false),
         ] {
-            assert!(learned(&bad).is_err(), "{bad}");
+            let report =
+                json!({ "reached_before": before, "reached_after": after, "needed": needed, "num_envs": envs });
+            assert_eq!(learned(&report).is_ok(), passes, "{report}");
         }
-        let control = |after: f64, signal: bool, iterations: u64| {
-            json!({ "reached_before": 0.01, "reached_after": after, "signal": signal, "iterations": iterations,
-                    "num_envs": 256 })
-        };
-        assert_eq!(not_learned(&control(0.02, false, 32)), Ok(()));
-        for bad in [control(0.06, false, 32), control(0.01, true, 32), control(0.01, false, 0), json!({})] {
-            assert!(not_learned(&bad).is_err(), "{bad}");
+        for (after, signal, iterations, passes) in
+            [(0.02, false, 32, true), (0.06, false, 32, false), (0.01, true, 32, false), (0.01, false, 0, false)]
+        {
+            let control = json!({ "reached_before": 0.01, "reached_after": after, "signal": signal,
+                                  "iterations": iterations, "num_envs": 256 });
+            assert_eq!(not_learned(&control).is_ok(), passes, "{control}");
         }
+        assert!(not_learned(&json!({})).is_err());
     }
 
     #[test]
-    fn controls_have_to_fail_as_they_should() {
+    fn controls() {
         let row = |lifted: bool, planned: bool, open: f64| {
             let diverged = Value::Null;
             json!({ "success": false, "diverged": diverged, "lifted": lifted, "planned": planned,

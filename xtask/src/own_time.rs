@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_others_took_is_not_its_own() {
+    fn foreign_time() {
         // Alone, on one core of two and on both.
         assert_eq!([alone(10.0, 10.0, 10.0, 2.0), alone(10.0, 20.0, 20.0, 2.0)], [10.0, 10.0]);
         // It waited for others as long as it worked.
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn the_kernel_is_understood() {
+    fn counts_of_the_kernel() {
         let text = "cpu  100 20 30 9000 500 6 7 8 0 0\ncpu0 1 1 1\ncpu1 1 1 1\nintr 5\n";
         let (busy, cores) = machine(text).unwrap_or_default();
         assert!((busy - 1.71).abs() < 1e-9 && cores == 2.0, "{busy} {cores}");

@@ -425,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_has_a_row_for_each_version_and_is_true_of_what_it_was_made_from() {
+    fn rows_of_both_versions() {
         let runs = [run("2.2.2", 1.095), run("4.0.0", 1.095_000_01)];
         let page = page(&runs).expect("they agree");
         assert!(page.contains("| [free_fall](../tests/physics/rigid_body/free_fall.rs) | \\|z\\| = g t²/2 | height [m] | 1.095 | 1.095 | 0.0e0 | 1.0e-6 | 2.2.2 | pass |"), "{page}");
@@ -456,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reason_needs_a_difference() {
+    fn reason_without_difference() {
         let mut runs = [run("2.2.2", 1.095), run("4.0.0", 1.095)];
         for run in &mut runs {
             run.rows[0].lines_differ = Some("it was mended".into());
@@ -470,7 +470,7 @@ mod tests {
     }
 
     #[test]
-    fn a_difference_of_the_lines_needs_a_reason() {
+    fn difference_without_reason() {
         let mut runs = [run("2.2.2", 1.095), run("4.0.0", 1.095 + 5e-7)];
         let failure = page(&runs).expect_err("no reason");
         assert!(failure.message.contains("free_fall"), "{failure}");
@@ -487,7 +487,7 @@ mod tests {
     }
 
     #[test]
-    fn a_control_that_holds_is_told() {
+    fn controls() {
         let control =
             |misses: bool| serde_json::json!({ "quantity": "height", "without": "without gravity", "misses": misses });
         let law = |misses| {
@@ -512,7 +512,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_that_differ_are_drawn_for_each_line() {
+    fn curves() {
         let plot = |y: f64| {
             let series = vec![Series { name: "RK4".into(), points: vec![[1.0, y], [2.0, 1.0]] }];
             Plot { title: "t".into(), axes: ["x".into(), "y".into()], log: false, series }
@@ -526,7 +526,7 @@ mod tests {
     }
 
     #[test]
-    fn files_of_unknown_groups_and_empty_folders_are_errors() {
+    fn broken_folders() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         assert!(read(dir.path()).is_err());
         std::fs::write(dir.path().join("x.json"), "{\"group\": \"cooking\"}").expect("writable");

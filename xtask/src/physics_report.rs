@@ -138,7 +138,7 @@ mod tests {
     use crate::plot::{Plot, Series};
 
     #[test]
-    fn a_picture_that_the_report_would_not_write_is_told() {
+    fn pictures() {
         let of = |name: &str, size: f64| {
             let series = vec![Series { name: "RK4".into(), points: vec![[0.0, 0.0], [1.0, size], [2.0, 0.0]] }];
             let plot = Plot { title: "t".into(), axes: ["x".into(), "y".into()], log: false, series };

@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_stay_inside_of_the_frame() {
+    fn frame() {
         let text = svg(&plot(false, &[[0.0, -3.0], [1.0, 5.0], [2.0, 1.0]]));
         let line = text.lines().find(|line| line.starts_with("<polyline")).expect("a curve");
         let points = line.split("points=\"").nth(1).expect("its points").trim_end_matches("\"/>");
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithms_have_decades_and_no_zeros() {
+    fn logarithms() {
         let text = svg(&plot(true, &[[1e-3, 1e-9], [1e-2, 1e-5], [1e-1, 0.0]]));
         assert!(text.contains(">1e-3<") && text.contains(">1e-6<"), "{text}");
         assert_eq!(text.matches("<circle").count(), 2);
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_draw_is_a_frame() {
+    fn no_curves() {
         for points in [&[][..], &[[1.0, 2.0]], &[[f64::NAN, 1.0]]] {
             let text = svg(&plot(false, points));
             assert!(text.ends_with("</svg>\n") && !text.contains("NaN"), "{text}");
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn the_legend_is_where_no_curve_is() {
+    fn legend_place() {
         let [left, top, right, bottom] = FRAME;
         // Through two opposite corners, or with an end in three of them: one is empty, and which one is known.
         let free = [
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn places_agree_within_a_pixel() {
+    fn near_places() {
         assert!(are_near("1.0,2.5 b", "1.2,2.4 b", 0.5));
         assert!(!are_near("1.0,2.5 b", "1.0,3.5 b", 0.5));
         assert!(!are_near("1.0,2.5 b", "1.0,2.5 c", 0.5));
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_agree_that_show_the_same_numbers() {
+    fn same_numbers() {
         let points = [[0.0, 1.0], [1.0, 3.0], [2.0, 2.0]];
         let text = svg(&plot(false, &points));
         assert!(agree(&text, &text, 0.0));

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bars_fill_and_times_are_words() {
+    fn bars_and_times() {
         assert_eq!(bar(0, 4), "[--------------------] ");
         assert_eq!(bar(1, 4), "[#####---------------] ");
         assert_eq!([bar(4, 4), bar(9, 4)], ["[####################] "; 2]);

@@ -243,20 +243,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_command_prints_as_it_would_be_typed() {
+    fn shown() {
         let cmd = Cmd::new("cargo").args(["doc", "--no-deps", "joint[1-6]"]).env("RUSTDOCFLAGS", "-D warnings");
         assert_eq!(cmd.to_string(), "RUSTDOCFLAGS='-D warnings' cargo doc --no-deps 'joint[1-6]'");
     }
 
     #[test]
-    fn a_failing_child_is_reported_with_its_exit_code() {
+    fn exit_code() {
         let failure = Cmd::new("sh").args(["-c", "exit 7"]).run().expect_err("exit code 7");
         assert_eq!(failure.code, 7);
         assert_eq!(failure.again.as_deref(), Some("sh -c 'exit 7'"));
     }
 
     #[test]
-    fn a_child_that_does_not_end_is_killed() {
+    fn time_limit() {
         let start = Instant::now();
         let result = Cmd::new("sleep").arg("60").exit_code_within(Duration::from_millis(100));
         assert!(result.is_err());
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_that_does_not_exist_is_an_error() {
+    fn no_program() {
         assert!(Cmd::new("no-such-program-here").output().is_err());
         assert!(!Cmd::new("no-such-program-here").succeeds());
     }

@@ -378,55 +378,49 @@ fn apt_install(root: &[&str], names: &[&str]) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
 
-    fn machine(files: &[&str]) -> (tempfile::TempDir, Machine) {
+    /// True if a machine with these files has something.
+    fn has(need: Need, files: &[&str]) -> bool {
         let dir = tempfile::tempdir().expect("a scratch folder");
-        for file in files {
-            let path = dir.path().join(file);
-            fs::create_dir_all(path.parent().expect("has a parent")).expect("writable");
-            fs::write(path, "").expect("writable");
-        }
+        files.iter().for_each(|file| crate::wheel::tests::write(&dir.path().join(file), ""));
         let search_path = vec![dir.path().join("usr/bin")];
         let machine =
             Machine { root: dir.path().to_path_buf(), search_path, libclang_path: None, python_has: |_| false };
-        (dir, machine)
+        assert_eq!(missing(&machine, &[need]).is_empty(), machine.has(need));
+        machine.has(need)
     }
 
     #[test]
-    fn an_empty_machine_lacks_everything() {
-        let (_dir, machine) = machine(&[]);
-        let needs = [Need::Compiler, Need::Libclang, Need::MuJoCo, Need::Models, Need::Pip];
-        assert_eq!(missing(&machine, &needs), needs);
-        assert_eq!(packages(&needs[..3]), ["gcc", "libc6-dev", "libclang-dev", "libmujoco-dev"]);
-    }
-
-    #[test]
-    fn a_header_without_its_library_is_not_enough() {
-        let (_dir, with_header) = machine(&["usr/include/mujoco/mujoco.h"]);
-        assert!(!with_header.has(Need::MuJoCo));
-        let library = format!("usr/lib/{}-linux-gnu/libmujoco.so", env::consts::ARCH);
-        let (_dir, with_both) = machine(&["usr/include/mujoco/mujoco.h", &library]);
-        assert!(with_both.has(Need::MuJoCo));
-    }
-
-    #[test]
-    fn libclang_needs_its_library_and_its_headers() {
-        let (library, headers) =
-            ("usr/lib/llvm-14/lib/libclang-14.so.1", "usr/lib/llvm-14/lib/clang/14/include/stddef.h");
-        assert!(!machine(&[library]).1.has(Need::Libclang));
-        assert!(!machine(&[headers]).1.has(Need::Libclang));
-        assert!(!machine(&["usr/lib/llvm-14/lib/libclang-cpp.so.14", headers]).1.has(Need::Libclang));
-        let (_dir, both) = machine(&[library, headers]);
-        assert!(both.has(Need::Libclang));
-    }
-
-    #[test]
-    fn a_compiler_needs_the_c_headers() {
-        let (_dir, alone) = machine(&["usr/bin/cc"]);
-        assert!(!alone.has(Need::Compiler));
-        let (_dir, complete) = machine(&["usr/bin/cc", "usr/include/stdlib.h"]);
-        assert!(complete.has(Need::Compiler));
+    fn needs() {
+        let library = |name| format!("usr/lib/{}-linux-gnu/{name}", env::consts::ARCH);
+        let (mujoco, mesa) = (library("libmujoco.so"), library("libOSMesa.so.8"));
+        let (header, clang) = ("usr/include/mujoco/mujoco.h", "usr/lib/llvm-14/lib/libclang-14.so.1");
+        let clang_headers = "usr/lib/llvm-14/lib/clang/14/include/stddef.h";
+        for (need, files, expected) in [
+            (Need::Compiler, &[][..], false),
+            (Need::Compiler, &["usr/bin/cc"], false),
+            (Need::Compiler, &["usr/bin/cc", "usr/include/stdlib.h"], true),
+            (Need::Libclang, &[clang], false),
+            (Need::Libclang, &[clang_headers], false),
+            (Need::Libclang, &["usr/lib/llvm-14/lib/libclang-cpp.so.14", clang_headers], false),
+            (Need::Libclang, &[clang, clang_headers], true),
+            (Need::MuJoCo, &[header], false),
+            (Need::MuJoCo, &[header, &mujoco], true),
+            (Need::Models, &[], false),
+            (Need::Pip, &[], false),
+            (Need::OsMesa, &["usr/lib/libGL.so.1"], false),
+            (Need::OsMesa, &[&mesa], true),
+            (Need::Chromium, &["usr/bin/firefox"], false),
+            (Need::Chromium, &["usr/bin/chromium"], true),
+            (Need::Chromium, &["usr/bin/google-chrome"], true),
+            (Need::Xvfb, &["usr/share/doc/xvfb/copyright"], false),
+            (Need::Xvfb, &["usr/bin/Xvfb"], true),
+        ] {
+            assert_eq!(has(need, files), expected, "{need:?}: {files:?}");
+        }
+        let needs = [Need::Compiler, Need::Libclang, Need::MuJoCo, Need::OsMesa, Need::Chromium, Need::Xvfb];
+        let names = ["gcc", "libc6-dev", "libclang-dev", "libmujoco-dev", "libosmesa6", "chromium", "xvfb"];
+        assert_eq!(packages(&needs), names);
     }
 
     #[test]
@@ -440,36 +434,9 @@ mod tests {
     }
 
     #[test]
-    fn osmesa_is_looked_for_where_libraries_are() {
-        assert!(!machine(&["usr/lib/libGL.so.1"]).1.has(Need::OsMesa));
-        let library = format!("usr/lib/{}-linux-gnu/libOSMesa.so.8", env::consts::ARCH);
-        assert!(machine(&[&library]).1.has(Need::OsMesa));
-        assert_eq!(packages(&[Need::OsMesa]), ["libosmesa6"]);
-    }
-
-    #[test]
-    fn any_chromium_on_the_search_path_will_do() {
-        assert!(!machine(&["usr/bin/firefox"]).1.has(Need::Chromium));
-        assert!(machine(&["usr/bin/chromium"]).1.has(Need::Chromium));
-        assert!(machine(&["usr/bin/google-chrome"]).1.has(Need::Chromium));
-        assert_eq!(packages(&[Need::Chromium]), ["chromium"]);
-    }
-
-    #[test]
-    fn xvfb_is_a_program() {
-        assert!(!machine(&["usr/share/doc/xvfb/copyright"]).1.has(Need::Xvfb));
-        let (_dir, with) = machine(&["usr/bin/Xvfb"]);
-        assert!(with.has(Need::Xvfb));
-        assert_eq!(packages(&[Need::Xvfb]), ["xvfb"]);
-    }
-
-    #[test]
-    fn the_line_to_run_by_hand_is_one_command() {
-        let line = by_hand(&["libclang-dev", "libmujoco-dev"]);
-        assert_eq!(
-            line,
-            "sudo sh -c 'apt-get update && apt-get install -y --no-install-recommends libclang-dev libmujoco-dev'"
-        );
+    fn one_command() {
+        let line = "sudo sh -c 'apt-get update && apt-get install -y --no-install-recommends gcc libmujoco-dev'";
+        assert_eq!(by_hand(&["gcc", "libmujoco-dev"]), line);
     }
 
     #[test]

@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn comments_and_literals_are_no_code() {
+    fn code() {
         let text =
             "let a = \"unsafe \\\" x\"; // unsafe\n/* unsafe /* b */ unsafe */ let c = r#\"unsafe \"# ; let q = '\"';";
         let code = code_only(text);
@@ -312,60 +312,64 @@ mod tests {
         assert_eq!(code_only("b'\\'' x br\"y\" z").split_whitespace().collect::<Vec<_>>(), ["b", "x", "z"]);
     }
 
+    /// Unsafe code may stand in the crates of MuJoCo, in comments and in other files.
     #[test]
-    fn unsafe_code_is_found_with_its_line() {
-        let text = "fn f() {\n    unsafe { g() }\n}";
-        assert_eq!(unsafe_outside_the_wall(&file("sim/src/batch.rs", text)).len(), 1);
-        assert!(unsafe_outside_the_wall(&file("sim/src/batch.rs", text))[0].starts_with("sim/src/batch.rs:2:"));
-        for text in ["unsafe impl Send for A {}", "#![allow(unsafe_code)]", "#[allow(dead_code, unsafe_code)] mod a;"] {
-            assert_eq!(unsafe_outside_the_wall(&file("sim/src/lib.rs", text)).len(), 1, "{text}");
-        }
-    }
-
-    #[test]
-    fn unsafe_code_may_stand_in_the_wall_and_in_prose() {
+    fn unsafe_code() {
         let text = "unsafe fn f() {}";
-        assert!(unsafe_outside_the_wall(&file("mujoco-sys/src/lib.rs", text)).is_empty());
-        assert!(unsafe_outside_the_wall(&file("sim/src/mj/data.rs", text)).is_empty());
-        assert_eq!(unsafe_outside_the_wall(&file("sim/src/mjcf.rs", text)).len(), 1);
-        assert!(unsafe_outside_the_wall(&file("a.rs", "#![forbid(unsafe_code)] // unsafe {\n")).is_empty());
-        assert!(unsafe_outside_the_wall(&file("README.md", text)).is_empty());
+        for (path, text, found) in [
+            ("sim/src/batch.rs", "fn f() {\n    unsafe { g() }\n}", 1),
+            ("sim/src/lib.rs", "unsafe impl Send for A {}", 1),
+            ("sim/src/lib.rs", "#![allow(unsafe_code)]", 1),
+            ("sim/src/lib.rs", "#[allow(dead_code, unsafe_code)] mod a;", 1),
+            ("sim/src/mjcf.rs", text, 1),
+            ("mujoco-sys/src/lib.rs", text, 0),
+            ("sim/src/mj/data.rs", text, 0),
+            ("a.rs", "#![forbid(unsafe_code)] // unsafe {\n", 0),
+            ("README.md", text, 0),
+        ] {
+            assert_eq!(unsafe_outside_the_wall(&file(path, text)).len(), found, "{path}: {text}");
+        }
+        let place = unsafe_outside_the_wall(&file("sim/src/batch.rs", "fn f() {\n    unsafe { g() }\n}"));
+        assert!(place[0].starts_with("sim/src/batch.rs:2:"), "{place:?}");
     }
 
     #[test]
-    fn crates_that_must_forbid_unsafe_code_are_named() {
+    fn forbidden_unsafe_code() {
         assert_eq!(missing_forbid(&[]).len(), FORBID_UNSAFE.len());
         let mut files = file("scene/src/lib.rs", "//! Doc.\n#![forbid(unsafe_code)]\n");
         files.extend(file("sensors/src/lib.rs", "// #![forbid(unsafe_code)]\n"));
-        files.extend(file("env/src/lib.rs", "#![forbid(unsafe_code)]\n"));
-        files.extend(file("record/src/lib.rs", "#![forbid(unsafe_code)]\n"));
-        files.extend(file("view/src/lib.rs", "#![forbid(unsafe_code)]\n"));
+        for path in ["env/src/lib.rs", "record/src/lib.rs", "view/src/lib.rs"] {
+            files.extend(file(path, "#![forbid(unsafe_code)]\n"));
+        }
         assert_eq!(missing_forbid(&files), ["sensors/src/lib.rs: must say #![forbid(unsafe_code)]"]);
     }
 
     #[test]
-    fn a_file_of_801_lines_is_too_long() {
+    fn length() {
         assert!(long_files(&file("a.rs", &"\n".repeat(800))).is_empty());
         assert_eq!(long_files(&file("a.rs", &"\n".repeat(801))).len(), 1);
         assert!(long_files(&file("a.xml", &"\n".repeat(801))).is_empty());
     }
 
     #[test]
-    fn stubs_are_found_in_code_only() {
-        for text in ["fn f() { todo!() }", "unimplemented!(\"x\")", "dbg!(a);", "#[ignore]", "#[ignore = \"slow\"]"] {
-            assert_eq!(stubs(&file("a.rs", text)).len(), 1, "{text}");
+    fn stubs_in_code() {
+        for (text, found) in [
+            ("fn f() { todo!() }", 1),
+            ("unimplemented!(\"x\")", 1),
+            ("dbg!(a);", 1),
+            ("#[ignore]", 1),
+            ("#[ignore = \"slow\"]", 1),
+            ("#[cfg_attr(miri, ignore)]", 1),
+            ("fn a() {}\n#[ignore = \"needs Xvfb: cargo xtask test\"]\nfn b() {}", 0),
+            ("fn a() {}\n#[ignore = \"runs in a process of its own\"]\nfn b() {}", 0),
+            ("// todo!()\nlet ignore = \"dbg!\"; fn todo() {} if ignore != a[0] {}", 0),
+        ] {
+            assert_eq!(stubs(&file("a.rs", text)).len(), found, "{text}");
         }
-        assert_eq!(stubs(&file("a.rs", "#[cfg_attr(miri, ignore)]")).len(), 1);
-        for reason in ["needs Xvfb: cargo xtask test", "runs in a process of its own"] {
-            assert!(stubs(&file("a.rs", &format!("fn a() {{}}\n#[ignore = \"{reason}\"]\nfn b() {{}}"))).is_empty());
-        }
-        assert!(
-            stubs(&file("a.rs", "// todo!()\nlet ignore = \"dbg!\"; fn todo() {} if ignore != a[0] {}")).is_empty()
-        );
     }
 
     #[test]
-    fn absolute_paths_of_one_machine_are_found() {
+    fn absolute_paths() {
         for folder in FOREIGN_FOLDERS {
             assert_eq!(foreign_paths(&file("a.md", &format!("see /{folder}/x"))).len(), 1);
             assert_eq!(foreign_paths(&file("a.md", &format!("file:///{folder}/x"))).len(), 1);
@@ -375,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dependency_without_a_reason_is_named() {
+    fn reasons() {
         let toml = "[workspace.dependencies]\n# Rooms.\nscene = { path = \"scene\" }\n\
             clap = { version = \"4\", features = [\n  \"derive\",\n] } # flags\nserde = \"1\"\nregex = \"1\" #\n\
             [workspace.lints.rust]\nfoo = 1\n";
@@ -387,12 +391,10 @@ mod tests {
     }
 
     #[test]
-    fn target_folders_and_version_control_are_not_looked_at() {
+    fn skipped_folders() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         for path in ["a/b.rs", "target/c.rs", "other-target/CACHEDIR.TAG", "other-target/d.rs", ".git/e"] {
-            let path = dir.path().join(path);
-            std::fs::create_dir_all(path.parent().expect("has a parent")).expect("writable");
-            std::fs::write(path, "").expect("writable");
+            crate::wheel::tests::write(&dir.path().join(path), "");
         }
         assert_eq!(files_below(dir.path()), ["a/b.rs"]);
     }

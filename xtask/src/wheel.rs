@@ -152,30 +152,26 @@ fn remove_file(file: &Path) -> Outcome {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn write(path: &Path, text: &str) {
+    /// Writes a file, with its folders.
+    pub(crate) fn write(path: &Path, text: &str) {
         fs::create_dir_all(path.parent().expect("has a parent")).expect("writable");
         fs::write(path, text).expect("writable");
     }
 
-    fn content(dir: &Path) {
-        write(&dir.join("mujoco/include/mujoco/mujoco.h"), "header");
-        write(&dir.join(format!("mujoco/libmujoco.so.{VERSION}")), "library");
-    }
-
     #[test]
-    fn half_an_unpacked_wheel_is_not_taken_for_a_whole_one() {
+    fn half_a_wheel() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         write(&dir.path().join("mujoco/include/mujoco/mujoco.h"), "header");
         assert!(!is_complete(dir.path()));
-        content(dir.path());
+        write(&dir.path().join(format!("mujoco/libmujoco.so.{VERSION}")), "library");
         assert!(is_complete(dir.path()));
     }
 
     #[test]
-    fn only_finished_wheels_of_this_version_are_found() {
+    fn finished_wheels() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         write(&dir.path().join("mujoco_core-3.9.0-cp311-cp311-any.whl"), "");
         write(&dir.path().join(format!("mujoco_core-{VERSION}-cp311-cp311-any.whl.part")), "");
@@ -186,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_wheel_is_an_error_and_leaves_nothing() {
+    fn broken_wheel() {
         let dir = tempfile::tempdir().expect("a scratch folder");
         let wheel = dir.path().join(format!("mujoco_core-{VERSION}-broken.whl"));
         write(&wheel, "not a zip file");

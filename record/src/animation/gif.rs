@@ -52,7 +52,7 @@ mod tests {
     use std::io::{BufWriter, Seek, SeekFrom};
 
     #[test]
-    fn the_palette_of_many_colours_is_chosen_for_the_picture() {
+    fn palette() {
         let mut file = tempfile::tempfile().unwrap();
         let mut out: Out = BufWriter::new(Box::new(file.try_clone().unwrap()));
         let mut encoder = begin([64, 64]).unwrap();

@@ -392,7 +392,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_the_codes_of_the_standard() {
+    fn exp_golomb() {
         // Table 9-2: 1, 010, 011, 00100, 00101, ...
         let mut bits = Bits::default();
         [0, 1, 2, 3, 4].into_iter().for_each(|number| bits.ue(number));
@@ -404,14 +404,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_in_a_unit_looks_like_its_beginning() {
+    fn start_codes() {
         let mut unit = Vec::new();
         escape(&[0, 0, 1, 0, 0, 0, 0, 0, 4], &mut unit);
         assert_eq!(unit, [0, 0, 3, 1, 0, 0, 3, 0, 0, 3, 0, 4]);
     }
 
     #[test]
-    fn grey_has_no_colour_and_black_and_white_are_the_ends() {
+    fn colors() {
         for grey in 0..=255 {
             assert_eq!(chroma([4 * grey; 3]), [128, 128], "{grey}");
         }
@@ -422,7 +422,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_still_is_not_sent() {
+    fn still_images() {
         let size = [64, 48];
         let mut stream = Stream::new(size).unwrap_or_else(|fits| panic!("{fits}"));
         let noise = |seed: u32| -> Vec<u8> {
@@ -440,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_that_no_stream_has_are_said() {
+    fn sizes() {
         for size in [[33, 24], [0, 2], [2, 16_882], [16_880, 4_096]] {
             assert!(Stream::new(size).is_err_and(|fits| fits.contains("even")), "{size:?}");
         }

@@ -109,7 +109,7 @@ mod tests {
 
     /// The judge: frame sizes and the rates that they reach at most, as table A-6 of the standard lists them for levels.
     #[test]
-    fn a_level_is_the_first_that_table_a_1_allows() {
+    fn frame_sizes() {
         for (sides, rate, code) in [
             ([128, 96], 30, 10),
             ([176, 144], 15, 10),
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_has_the_bytes_too() {
+    fn bit_rates() {
         // 64 000 bits in a second are 800 bytes ten times: level 1; one byte more is level 1.1.
         assert_eq!([800, 801].map(|bytes| of([128, 96], 10, bytes)), [10, 11]);
         // One picture alone, of as many bits as come in in a second of levels 1 and 1.1, and a byte more.

@@ -163,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_rounded_does_not_add_up() {
+    fn durations() {
         // 30 frames a second in hundredths of a second: 3, 4, 3, 3, 4, ...
         let shown = |k: u32| [f64::from(k) / 30.0, f64::from(k + 1) / 30.0];
         let all: Vec<u64> = (0..30).map(|k| duration(shown(k), 100.0, 9).unwrap()).collect();

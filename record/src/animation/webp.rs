@@ -96,7 +96,7 @@ mod tests {
 
     /// Root cause: the length of a file was looked at when its last frame had been written, hours later.
     #[test]
-    fn a_frame_that_does_not_fit_any_more_is_an_error_at_once() {
+    fn length_limit() {
         let rgba = [7; 4 * 16 * 16];
         // One frame alone, and what it takes.
         let frame_at = |length: u64| {

@@ -1,30 +1,20 @@
 use super::*;
-use crate::cfg::RecorderCfg;
-use crate::recorder::Record;
-use crate::recover::recover;
-use crate::topic::Topic;
-use scene::Pose;
-use sim::{BodyType, EnvId, MjcfCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManagerCfg, UrdfCfg};
-use std::path::Path;
+use crate::tests::*;
+use sim::{BodyType, RigidObjectCfg, RobotCfg};
+use testkit::worlds::{object, sr5};
 
 const STEPS: usize = 30;
 
 /// An arm that moves, one with a free base, a cube that falls, a box that is moved by hand, a part with a ball and a slide.
 fn busy() -> SimulationManager {
-    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
-    let urdf = UrdfCfg::single(Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/sr5/SR5.urdf"));
-    sim.add_robot(RobotCfg { uid: "arm".into(), urdf: urdf.clone(), ..Default::default() }).unwrap();
+    let mut sim = simulation(2);
+    sim.add_robot(sr5("arm")).unwrap();
     let init_pose = Pose::translation(2.0, 0.0, 1.0);
-    sim.add_robot(RobotCfg { uid: "loose".into(), urdf, fix_base: false, init_pose, ..Default::default() }).unwrap();
-    let object = |uid: &str, body_type, x| RigidObjectCfg {
-        uid: uid.into(),
-        shape: ObjectShape::cube(0.1),
-        body_type,
-        init_pose: Pose::translation(x, 1.0, 0.8),
-        ..Default::default()
-    };
-    sim.add_rigid_object(object("cube", BodyType::Dynamic, 0.0)).unwrap();
-    sim.add_rigid_object(object("hand", BodyType::Kinematic, 1.0)).unwrap();
+    sim.add_robot(RobotCfg { fix_base: false, init_pose, ..sr5("loose") }).unwrap();
+    for (uid, body_type, x) in [("cube", BodyType::Dynamic, 0.0), ("hand", BodyType::Kinematic, 1.0)] {
+        let object = object(uid, ObjectShape::cube(0.1), [x, 1.0, 0.8]);
+        sim.add_rigid_object(RigidObjectCfg { body_type, ..object }).unwrap();
+    }
     let part = r#"<mujoco><worldbody><body name="ball" pos="-1 0 2"><joint name="swing" type="ball"/>
         <geom size="0.1" pos="0.3 0 0"/><body name="tip" pos="0.5 0 0"><joint name="x" type="slide" axis="0 0 1"/>
         <geom size="0.05"/></body></body></worldbody></mujoco>"#;
@@ -100,8 +90,9 @@ fn largest_difference(
     largest
 }
 
+/// A recording alone shows where everything was.
 #[test]
-fn a_recording_alone_is_enough_to_show_where_everything_was() {
+fn poses_of_a_recording() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["run.mcap", "run.npz"] {
         let path = folder.path().join(name);
@@ -125,9 +116,9 @@ fn a_recording_alone_is_enough_to_show_where_everything_was() {
     }
 }
 
-/// From step 15 on nothing is known of environment 1, as of one that diverged: there it stays, whichever moment was shown before.
+/// From step 15 on nothing is known of environment 1, as of one that diverged: it stays there, whichever frame was shown before.
 #[test]
-fn what_diverged_is_shown_where_it_last_was_wherever_one_seeks_from() {
+fn divergence() {
     const LOST: usize = 15;
     let folder = tempfile::tempdir().unwrap();
     for name in ["run.mcap", "run.npz"] {
@@ -158,9 +149,8 @@ fn what_diverged_is_shown_where_it_last_was_wherever_one_seeks_from() {
 }
 
 #[test]
-fn without_a_scene_one_is_asked_for_and_a_given_one_does() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.npz");
+fn without_a_scene() {
+    let (_folder, path) = scratch("run.npz");
     let all = recorded(&path, false);
     let recording = Recording::open(&path).unwrap();
     let error = Film::of(&recording, None).unwrap_err().to_string();
@@ -168,38 +158,26 @@ fn without_a_scene_one_is_asked_for_and_a_given_one_does() {
     let (mut film, mut sim) = Film::of(&recording, Some(&busy())).unwrap();
     let largest = largest_difference(&mut film, &mut sim, &all);
     assert!(largest.0 < 1e-9, "{largest:?}");
-    // A scene in which nothing is called so.
-    let mut other = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
-    other
-        .add_mjcf(MjcfCfg::text(
-            "other",
-            r#"<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#,
-        ))
-        .unwrap();
-    let error = Film::of(&recording, Some(&other)).unwrap_err().to_string();
+    // A scene without these names.
+    let error = Film::of(&recording, Some(&falling(2))).unwrap_err().to_string();
     assert!(error.contains("nothing that moves"), "{error}");
 }
 
+/// Joints that were not recorded are named.
 #[test]
-fn what_was_not_recorded_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.mcap");
-    let mut sim = busy();
-    let recorder = sim.record(RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())])).unwrap();
-    sim.update(3);
-    sim.finish_recording(recorder).unwrap();
+fn unrecorded_joints() {
+    let (_folder, path) = scratch("run.mcap");
+    let cfg = RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())]);
+    record(&mut busy(), cfg, |sim| sim.update(3));
     let (film, _) = Film::of(&Recording::open(&path).unwrap(), None).unwrap();
     let unmoved = film.unmoved();
-    assert!(
-        unmoved.contains(&"cube/free".to_string()) && !unmoved.iter().any(|joint| joint.starts_with("arm/")),
-        "{unmoved:?}"
-    );
+    assert!(unmoved.iter().any(|joint| joint == "cube/free"), "{unmoved:?}");
+    assert!(!unmoved.iter().any(|joint| joint.starts_with("arm/")), "{unmoved:?}");
 }
 
 #[test]
-fn a_recovered_recording_has_its_scene_still() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.mcap");
+fn recovered_recording() {
+    let (_folder, path) = scratch("run.mcap");
     let mut sim = busy();
     sim.record(RecorderCfg::new(&path)).unwrap();
     sim.update(40);
@@ -210,7 +188,7 @@ fn a_recovered_recording_has_its_scene_still() {
 }
 
 #[test]
-fn a_scene_that_is_no_scene_is_refused() {
+fn damaged_scenes() {
     let packed = scene_file::pack(&busy()).unwrap().0;
     let path = Path::new("run.mcap");
     assert!(scene_file::unpack(&packed, path).is_ok());

@@ -336,7 +336,7 @@ mod tests {
 
     /// Root cause: sizes were made numbers of 64 bits, and written where readers take 32.
     #[test]
-    fn a_page_that_is_too_large_for_its_head_is_an_error() {
+    fn large_pages() {
         let most = i32::MAX as usize;
         // Field 2 of 32 bits, zigzag: twice the size, seven bits in a byte, behind field 1, which is 0.
         assert_eq!(page_head(most, 1).unwrap()[2..8], [0x15, 0xfe, 0xff, 0xff, 0xff, 0x0f]);
@@ -347,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_as_thrift_has_them() {
+    fn thrift_numbers() {
         // Of the compact protocol's description: 50 399 is 0xdf 0x89 0x03; -1 becomes 1, 1 becomes 2.
         let mut bytes = Vec::new();
         varint(50_399, &mut bytes);

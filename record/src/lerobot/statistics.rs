@@ -101,7 +101,7 @@ mod tests {
 
     /// Root cause: one number that was not finite made mean and deviation of all frames `null`.
     #[test]
-    fn what_is_not_finite_is_in_no_statistics() {
+    fn not_finite() {
         let mut all = Statistics::new(3);
         for row in [[1.0, f32::NAN, 5.0], [f32::INFINITY, f32::NAN, 7.0], [3.0, f32::NEG_INFINITY, 9.0]] {
             all.add(&row);

@@ -1,7 +1,7 @@
 use super::*;
-use crate::cfg::RecorderCfg;
-use crate::recorder::Record;
-use sim::{DriveCfg, DriveType, EnvId, MjcfFile, RobotCfg, SimulationManager, SimulationManagerCfg};
+use crate::tests::*;
+use testkit::refusal::assert_error;
+use testkit::worlds::{mjcf_robot, passive};
 
 /// A mass of 1 kg that slides on a spring of 40 N/m, without friction.
 const SPRING: &str = r#"<mujoco><worldbody><body name="cart" pos="0 0 1">
@@ -9,26 +9,23 @@ const SPRING: &str = r#"<mujoco><worldbody><body name="cart" pos="0 0 1">
 const STEPS: u32 = 300;
 
 fn carts(names: &[&str]) -> SimulationManager {
-    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
+    let mut sim = simulation(2);
     for name in names {
-        let mjcf = Some(MjcfFile { path: "cart.xml".into(), text: Some(SPRING.into()) });
-        let drive = DriveCfg { drive_type: DriveType::None, ..Default::default() };
-        let cart = sim.add_robot(RobotCfg { uid: (*name).into(), mjcf, drive, ..Default::default() }).unwrap();
-        sim.robot_mut(cart).write_qpos(&ndarray::array![[0.3], [0.1]], None, None).unwrap();
+        let cart = sim.add_robot(passive(mjcf_robot(name, SPRING))).unwrap();
+        sim.robot_mut(cart).write_qpos(&array![[0.3], [0.1]], None, None).unwrap();
     }
     sim
 }
 
 fn recorded(path: &Path, reset_at: Option<u32>) {
-    let mut sim = carts(&["cart"]);
-    let recorder = sim.record(RecorderCfg::new(path)).unwrap();
-    for step in 0..STEPS {
-        if reset_at == Some(step) {
-            sim.reset(Some(&[EnvId(1)])).unwrap();
+    record(&mut carts(&["cart"]), RecorderCfg::new(path), |sim| {
+        for step in 0..STEPS {
+            if reset_at == Some(step) {
+                sim.reset(Some(&[EnvId(1)])).unwrap();
+            }
+            sim.update(1);
         }
-        sim.update(1);
-    }
-    sim.finish_recording(recorder).unwrap();
+    });
 }
 
 /// What MuJoCo's Euler steps of length h make of a spring, exactly: v' = v - h w² x and x' = x + h v' give
@@ -41,7 +38,7 @@ fn swing(start: f64, step: u32) -> f64 {
 }
 
 #[test]
-fn a_recorded_swing_is_the_swing_of_the_formula_in_both_formats() {
+fn spring() {
     let folder = tempfile::tempdir().unwrap();
     let mut all = Vec::new();
     for name in ["run.mcap", "run.npz"] {
@@ -50,10 +47,7 @@ fn a_recorded_swing_is_the_swing_of_the_formula_in_both_formats() {
         let recording = Recording::open(&path).unwrap();
         assert_eq!(recording.env_ids(), [0, 1]);
         let [first, second] = [None, Some(1)].map(|env| recording.topic("joint_states", env).unwrap());
-        assert_eq!(
-            (first.name.as_str(), second.name.as_str()),
-            ("/env_0/cart/joint_states", "/env_1/cart/joint_states")
-        );
+        assert_eq!([&first.name, &second.name], ["/env_0/cart/joint_states", "/env_1/cart/joint_states"]);
         assert_eq!(first.count, u64::from(STEPS) + 1);
         let wanted = [first, second].map(|topic| Wanted::new(&topic.name, "position[x]"));
         let samples = recording.samples(&wanted).unwrap();
@@ -74,15 +68,14 @@ fn a_recorded_swing_is_the_swing_of_the_formula_in_both_formats() {
 }
 
 #[test]
-fn time_goes_on_over_a_reset_in_both_formats() {
+fn reset() {
     let folder = tempfile::tempdir().unwrap();
     let read = |name: &str| {
         let path = folder.path().join(name);
         recorded(&path, Some(100));
         let recording = Recording::open(&path).unwrap();
-        recording
-            .samples(&[0, 1].map(|env| Wanted::new(format!("/env_{env}/cart/joint_states"), "position[x]")))
-            .unwrap()
+        let wanted = [0, 1].map(|env| Wanted::new(format!("/env_{env}/cart/joint_states"), "position[x]"));
+        recording.samples(&wanted).unwrap()
     };
     let [mcap, npz] = ["run.mcap", "run.npz"].map(read);
     for (a, b) in mcap.iter().zip(&npz) {
@@ -96,36 +89,29 @@ fn time_goes_on_over_a_reset_in_both_formats() {
     assert_eq!(npz[1].values[101], 0.0, "a reset is to the initial state");
 }
 
+/// Errors name the candidates.
 #[test]
-fn what_is_not_there_is_said_with_what_is() {
-    let folder = tempfile::tempdir().unwrap();
+fn unknown_names() {
     for name in ["run.mcap", "run.npz"] {
-        let path = folder.path().join(name);
-        let mut sim = carts(&["left", "right"]);
-        let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
-        sim.update(3);
-        sim.finish_recording(recorder).unwrap();
+        let (_folder, path) = scratch(name);
+        record(&mut carts(&["left", "right"]), RecorderCfg::new(&path), |sim| sim.update(3));
         let recording = Recording::open(&path).unwrap();
-        let said = |name: &str, env| recording.topic(name, env).unwrap_err().to_string();
-        let error = said("joint_states", None);
-        assert!(error.contains("/env_0/left/joint_states, /env_0/right/joint_states"), "{error}");
-        assert!(
-            said("left/joint_state", None).contains("known are /left/joint_states"),
-            "{}",
-            said("left/joint_state", None)
+        assert_error(
+            recording.topic("joint_states", None),
+            "",
+            &["/env_0/left/joint_states, /env_0/right/joint_states"],
         );
-        assert!(said("left/joint_states", Some(2)).contains("environment 2"));
+        assert_error(recording.topic("left/joint_state", None), "", &["known are /left/joint_states"]);
+        assert_error(recording.topic("left/joint_states", Some(2)), "", &["environment 2"]);
         assert_eq!(recording.topic("/left/joint_states", Some(1)).unwrap().name, "/env_1/left/joint_states");
-        let error =
-            recording.samples(&[Wanted::new("/env_0/left/joint_states", "position[y]")]).unwrap_err().to_string();
-        assert!(error.contains("position[x]"), "{error}");
-        let error = recording.samples(&[Wanted::new("/env_9/left", "position[x]")]).unwrap_err();
-        assert!(matches!(error, RecordError::UnknownName { what: "topic", .. }), "{error}");
+        let wanted = |topic: &str, field: &str| recording.samples(&[Wanted::new(topic, field)]);
+        assert_error(wanted("/env_0/left/joint_states", "position[y]"), "", &["position[x]"]);
+        assert_error(wanted("/env_9/left", "position[x]"), "UnknownName { what: \"topic\"", &[]);
     }
 }
 
 #[test]
-fn what_is_no_whole_recording_is_refused() {
+fn damaged_recordings() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["run.mcap", "run.npz"] {
         let path = folder.path().join(name);
@@ -156,15 +142,14 @@ fn what_is_no_whole_recording_is_refused() {
         assert!(all_of_it.is_ok() || name == "run.mcap", "{all_of_it:?}");
     }
     for (name, words) in [("none.mcap", "No such file"), ("a.mcap.part", "recover"), ("a.bag", ".mcap or .npz")] {
-        let error = Recording::open(folder.path().join(name)).unwrap_err().to_string();
-        assert!(error.contains(words), "{error}");
+        assert_error(Recording::open(folder.path().join(name)), "", &[words]);
     }
 }
 
-/// Root cause: of topics whose messages all have the same fields only the first message was looked at when a recording was opened,
-/// so that a later one made all reading fail; and of others one message cost all.
+/// Root cause: of topics with the same fields in all messages only the first was read at opening, so that a later damaged one
+/// made all reading fail.
 #[test]
-fn messages_that_cannot_be_read_are_told_and_cost_no_others() {
+fn unreadable_messages() {
     let folder = tempfile::tempdir().unwrap();
     let (path, other) = (folder.path().join("run.mcap"), folder.path().join("other.mcap"));
     recorded(&path, None);

@@ -1,18 +1,15 @@
 use super::*;
-use crate::cfg::RecorderCfg;
-use crate::npy;
-use crate::recorder::Record;
-use crate::topic::Topic;
-use crate::zip;
-use sim::{LinkId, MjcfCfg, RobotCfg, SimulationManagerCfg, UrdfCfg, WrenchFrame};
+use crate::tests::*;
+use sim::{LinkId, SimulationManagerCfg, WrenchFrame};
 use std::fs::File;
+use testkit::refusal::assert_error;
+use testkit::worlds::sr5;
 
 const STEPS: u32 = 40;
 
 fn arms() -> SimulationManager {
-    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
-    let urdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/sr5/SR5.urdf");
-    sim.add_robot(RobotCfg { uid: "arm".into(), urdf: UrdfCfg::single(urdf), ..Default::default() }).unwrap();
+    let mut sim = simulation(2);
+    sim.add_robot(sr5("arm")).unwrap();
     let pusher = r#"<mujoco><worldbody><body name="slider"><joint name="x" type="slide" axis="1 0 0"/>
         <geom size="0.1" pos="3 0 1"/></body></worldbody><actuator><motor joint="x"/></actuator></mujoco>"#;
     sim.add_mjcf(MjcfCfg::text("pusher", pusher)).unwrap();
@@ -46,7 +43,7 @@ fn recording(path: &Path, at_step: impl FnMut(&mut SimulationManager, u32)) {
 }
 
 #[test]
-fn recorded_actions_give_the_recorded_states_bit_for_bit() {
+fn same_bits() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["run.npz", "run.mcap"] {
         let path = folder.path().join(name);
@@ -62,9 +59,9 @@ fn recorded_actions_give_the_recorded_states_bit_for_bit() {
     }
 }
 
-/// What a recorder that was killed has left is verified as far as it goes.
+/// A recovered recording is verified as far as it goes.
 #[test]
-fn what_was_recovered_is_verified_too() {
+fn recovered_recording() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut sim = arms();
@@ -87,7 +84,7 @@ fn what_was_recovered_is_verified_too() {
 }
 
 #[test]
-fn what_was_done_otherwise_is_found_at_its_step() {
+fn other_actions() {
     let folder = tempfile::tempdir().unwrap();
     for end in ["npz", "mcap"] {
         // A push that is no action, before step 12 of environment 1.
@@ -121,93 +118,74 @@ fn what_was_done_otherwise_is_found_at_its_step() {
     }
 }
 
-/// The same archive with one recorded target changed.
-fn with_another_target(path: &Path, row: usize, to: &Path) {
-    let bytes = std::fs::read(path).unwrap();
+/// The same archive with other data of some arrays.
+fn changed(path: &Path, to: &Path, change: impl Fn(&str, &mut Vec<u8>)) {
     let mut archive = zip::Archive::new(File::create(to).unwrap());
-    let mut changed = 0;
-    for (name, data) in zip::parse(&bytes).unwrap() {
-        let mut data = data.to_vec();
-        if name == "arm/targets/positions.npy" {
-            let (_, shape, numbers) = npy::parse(&data).unwrap();
-            let at = data.len() - numbers.len() + 8 * row * shape[1] * shape[2];
-            let old = f64::from_le_bytes(*data[at..].first_chunk().unwrap());
-            data[at..at + 8].copy_from_slice(&(old + 1e-9).to_le_bytes());
-            changed += 1;
-        }
+    for (name, mut data) in zip::parse(&std::fs::read(path).unwrap()).unwrap() {
+        change(&name, &mut data);
         archive.add(&name, b"", &mut &data[..]).unwrap();
     }
     archive.finish().unwrap();
-    assert_eq!(changed, 1);
+}
+
+/// Changes a number, counted in an array.
+fn change(data: &mut [u8], place: usize, to: impl Fn(f64) -> f64) {
+    let at = data.len() - npy::parse(data).unwrap().2.len() + 8 * place;
+    let old = f64::from_le_bytes(*data[at..].first_chunk().unwrap());
+    data[at..at + 8].copy_from_slice(&to(old).to_le_bytes());
 }
 
 #[test]
-fn a_changed_target_is_found_at_its_step() {
+fn changed_target() {
     let folder = tempfile::tempdir().unwrap();
     let (path, other) = (folder.path().join("run.npz"), folder.path().join("other.npz"));
     recording(&path, |_, _| ());
-    with_another_target(&path, 17, &other);
+    changed(&path, &other, |name, data| {
+        if name == "arm/targets/positions.npy" {
+            let shape = npy::parse(data).unwrap().1;
+            change(data, 17 * shape[1] * shape[2], |old| old + 1e-9);
+        }
+    });
     let difference = verify(&mut arms(), &other).unwrap().difference.unwrap();
-    // Row 17 is that of step 17: its target acted in that step.
+    // The target of row 17 acted in step 17.
     assert_eq!((difference.step, difference.env), (17, 0), "{difference:?}");
     assert!(difference.array.starts_with("arm/joint_states/"), "{difference:?}");
 }
 
-/// The same archive with one recorded step changed.
-fn with_another_step(path: &Path, row: usize, step: f64, to: &Path) {
-    let bytes = std::fs::read(path).unwrap();
-    let mut archive = zip::Archive::new(File::create(to).unwrap());
-    for (name, data) in zip::parse(&bytes).unwrap() {
-        let mut data = data.to_vec();
-        if name.ends_with("/step.npy") && !name.starts_with("events/") {
-            let at = data.len() - npy::parse(&data).unwrap().2.len() + 8 * row;
-            data[at..at + 8].copy_from_slice(&step.to_le_bytes());
-        }
-        archive.add(&name, b"", &mut &data[..]).unwrap();
-    }
-    archive.finish().unwrap();
-}
-
 #[test]
-fn what_lacks_actions_or_steps_is_refused() {
+fn lacking_actions_or_steps() {
     let folder = tempfile::tempdir().unwrap();
     let (path, other) = (folder.path().join("run.npz"), folder.path().join("other.npz"));
-    for (topics, words) in [
-        (vec![Topic::JointStates("arm".into()), Topic::MjcfState("pusher".into())], "no targets of arm"),
-        (vec![Topic::JointStates("arm".into()), Topic::Targets("arm".into())], "no controls of pusher"),
+    for (topic, words) in [
+        (Topic::MjcfState("pusher".into()), "no targets of arm"),
+        (Topic::Targets("arm".into()), "no controls of pusher"),
     ] {
-        let mut sim = arms();
-        let cfg = RecorderCfg { overwrite: true, ..RecorderCfg::new(&path).with_topics(topics) };
-        let recorder = sim.record(cfg).unwrap();
-        sim.update(3);
-        sim.finish_recording(recorder).unwrap();
-        let error = verify(&mut arms(), &path).unwrap_err().to_string();
-        assert!(error.contains(words), "{error}");
+        let cfg = overwriting(RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into()), topic]));
+        record(&mut arms(), cfg, |sim| sim.update(3));
+        assert_error(verify(&mut arms(), &path), "", &[words]);
     }
     std::fs::remove_file(&path).unwrap();
     recording(&path, |_, _| ());
     for (row, step, words) in
         [(0, 1.0, "step 0"), (5, f64::NAN, "every step"), (5, 9.0, "every step"), (5, 1.0, "every step")]
     {
-        with_another_step(&path, row, step, &other);
-        let error = verify(&mut arms(), &other).unwrap_err().to_string();
-        assert!(error.contains(words), "{error}");
+        changed(&path, &other, |name, data| {
+            if name.ends_with("/step.npy") && !name.starts_with("events/") {
+                change(data, row, |_| step);
+            }
+        });
+        assert_error(verify(&mut arms(), &other), "", &[words]);
     }
 }
 
 #[test]
-fn what_cannot_be_compared_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.npz");
+fn other_simulations() {
+    let (_folder, path) = scratch("run.npz");
     recording(&path, |_, _| ());
-    let mut other = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() }).unwrap();
-    let error = verify(&mut other, &path).unwrap_err().to_string();
-    assert!(error.contains("scene"), "{error}");
+    assert_error(verify(&mut simulation(2), &path), "", &["scene"]);
     let cfg = SimulationManagerCfg { num_envs: 2, physics_dt: 0.002, ..Default::default() };
-    let error = verify(&mut SimulationManager::new(cfg).unwrap(), &path).unwrap_err().to_string();
-    assert!(error.contains("physics_dt"), "{error}");
+    assert_error(verify(&mut SimulationManager::new(cfg).unwrap(), &path), "", &["physics_dt"]);
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-    let error = verify(&mut arms(), &path).unwrap_err().to_string();
-    assert!(error.contains("damaged"), "{error}");
+    assert_error(verify(&mut arms(), &path), "", &["damaged"]);
 }

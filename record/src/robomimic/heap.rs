@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pieces_are_found_in_any_order_also_while_others_come() {
+    fn any_order() {
         let folder = tempfile::tempdir().unwrap();
         let mut heap = Heap::create(folder.path()).unwrap();
         let pieces: Vec<Vec<u8>> = (0..50_u8).map(|k| vec![k; 37 * usize::from(k)]).collect();

@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_aligned_from_behind_the_header() {
+    fn alignment() {
         let mut cdr = Cdr::default();
         cdr.begin();
         cdr.u8(7);

@@ -215,7 +215,7 @@ mod tests {
     /// Root cause: lists were written as often as there were rows of as many numbers as joints, which is never without joints; the
     /// message ended before its lists.
     #[test]
-    fn joints_of_which_there_are_none_have_three_lists_of_nothing() {
+    fn no_joints() {
         let of = |names: &[String], rows: &[f64]| {
             let mut cdr = Cdr::default();
             cdr.begin();

@@ -208,7 +208,7 @@ mod tests {
 
     /// Root cause: the list was written by hand beside that of the cameras, and lacked two of its channels.
     #[test]
-    fn every_channel_of_a_camera_is_recorded() {
+    fn channels() {
         let recorded: Vec<&str> = CAMERA.iter().map(|(name, ..)| *name).collect();
         assert_eq!(recorded, Channels::NAMES);
         let bytes: usize = CAMERA.iter().map(|(_, element, components)| element.bytes() * components).sum();

@@ -115,24 +115,26 @@ fn no_side_effect() {
     assert_eq!(recorded, alone);
 }
 
+/// Time goes on over a reset, and the state after it has a message of its own in its environment.
 #[test]
 fn reset() {
-    let (_folder, path) = scratch("run.mcap");
-    let mut world = World::new(2, 2);
-    let cfg = RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())]);
-    let recorder = world.sim.record(cfg).unwrap();
-    (0..6).for_each(|step| world.step(step));
-    world.sim.reset(Some(&[EnvId(1)])).unwrap();
-    (6..10).for_each(|step| world.step(step));
-    world.sim.finish_recording(recorder).unwrap();
-    let all = messages(&path);
-    let steps = |env: usize| steps_of(&all, &format!("/env_{env}/arm/joint_states"));
-    assert_eq!(steps(0), (0..=10).collect::<Vec<_>>());
-    // Time goes on, and the state after the reset has a message of its own.
-    assert_eq!(steps(1), [0, 1, 2, 3, 4, 5, 6, 6, 7, 8, 9, 10]);
-    let events = logs(&path);
-    assert!(events.iter().any(|event| event.contains("env_1") && event.contains("reset at step 6")), "{events:?}");
-    assert!(!events.iter().any(|event| event.contains("env_0") && event.contains("reset")), "{events:?}");
+    let at_each: &[u64] = &[0, 1, 2, 3, 4, 5, 6, 6, 7, 8, 9, 10];
+    for (every, undisturbed, reset) in [(1, &(0..=10).collect::<Vec<_>>()[..], at_each), (10, &[0, 10], &[0, 6, 10])] {
+        let (_folder, path) = scratch("run.mcap");
+        let mut world = World::new(2, 2);
+        let cfg = RecorderCfg { every, ..RecorderCfg::new(&path).with_topics([Topic::JointStates("arm".into())]) };
+        let recorder = world.sim.record(cfg).unwrap();
+        (0..6).for_each(|step| world.step(step));
+        world.sim.reset(Some(&[EnvId(1)])).unwrap();
+        (6..10).for_each(|step| world.step(step));
+        world.sim.finish_recording(recorder).unwrap();
+        let all = messages(&path);
+        let steps = |env: usize| steps_of(&all, &format!("/env_{env}/arm/joint_states"));
+        assert_eq!((&steps(0)[..], &steps(1)[..]), (undisturbed, reset));
+        let events = logs(&path);
+        assert!(events.iter().any(|event| event.contains("env_1") && event.contains("reset at step 6")), "{events:?}");
+        assert!(!events.iter().any(|event| event.contains("env_0") && event.contains("reset")), "{events:?}");
+    }
 }
 
 /// Topics, environments and rates that a configuration chooses.

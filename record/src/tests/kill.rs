@@ -122,13 +122,3 @@ fn kill_once(folder: &Path, kill: u32) {
         assert!(last >= old, "step {old} was done a second before the end; the file ends with {last}");
     }
 }
-
-#[test]
-fn no_recording() {
-    let (folder, path) = scratch("run.mcap");
-    assert!(recover(&path).unwrap_err().to_string().contains("run.mcap.part"));
-    std::fs::write(folder.path().join("run.mcap.part"), "something else").unwrap();
-    let error = recover(&path).unwrap_err().to_string();
-    assert!(error.contains("nothing of it can be read"), "{error}");
-    assert_eq!(names(&folder), ["run.mcap.part"]);
-}

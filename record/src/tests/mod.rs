@@ -1,6 +1,7 @@
 //! Recordings: their content, held against the simulation and read by independent readers; and shared parts of the tests
 //! of this crate.
 
+mod archives;
 mod contents;
 mod episodes;
 mod hdf5;
@@ -29,6 +30,7 @@ pub(crate) use sim::{EnvId, MjcfCfg, ObjectShape, SimulationManager};
 pub(crate) use std::path::{Path, PathBuf};
 pub(crate) use testkit::worlds::{RecordedWorld as World, look_at};
 
+pub(crate) use archives::{falling, member, numbers_of, rows};
 use std::borrow::Borrow;
 use tempfile::TempDir;
 use testkit::needs::{python_readers, read_json};

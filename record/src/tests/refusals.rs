@@ -122,21 +122,33 @@ fn busy_archive() {
     assert!(path.exists());
 }
 
-/// Recorded entities must not change while they are recorded.
+/// Recorded entities must not change while they are recorded. Messages remain, under another name, and nothing waits for ever.
 #[test]
 fn changed_scene() {
-    let (_folder, path) = scratch("run.npz");
-    let mut world = World::new(1, 1);
-    let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
-    world.step(0);
-    // Another object changes nothing that is recorded.
-    testkit::worlds::add_ball(&mut world.sim, "ball", [0.0; 3]);
-    world.step(1);
-    assert!(!world.sim.observer(recorder).unwrap().has_failed());
-    // A second robot has joints, which the sensor of all joints now measures.
-    world.sim.add_robot(testkit::worlds::sr5("other")).unwrap();
-    world.step(2);
-    let error = world.sim.finish_recording(recorder).unwrap_err();
-    let RecordError::BrokenOff { error, kept: None, .. } = error else { panic!("{error}") };
-    assert!(matches!(&*error, RecordError::Changed { stream, .. } if stream == "joints"), "{error}");
+    for (name, keeps) in [("run.npz", false), ("run.mcap", true)] {
+        let (_folder, path) = scratch(name);
+        let mut world = World::new(1, 1);
+        let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
+        world.step(0);
+        // Another object changes nothing that is recorded.
+        testkit::worlds::add_ball(&mut world.sim, "ball", [0.0; 3]);
+        world.step(1);
+        assert!(!world.sim.observer(recorder).unwrap().has_failed());
+        // A second robot has joints, which the sensor of all joints now measures.
+        world.sim.add_robot(testkit::worlds::sr5("other")).unwrap();
+        world.step(2);
+        let observer = world.sim.observer_mut(recorder).unwrap();
+        assert!(observer.has_failed());
+        observer.catch_up();
+        let error = world.sim.finish_recording(recorder).unwrap_err();
+        let RecordError::BrokenOff { error, also, kept } = error else { panic!("{error}") };
+        assert!(matches!(&*error, RecordError::Changed { stream, .. } if stream == "joints"), "{error}");
+        assert!(also.is_none() && !path.exists(), "{name}");
+        assert_eq!(kept, keeps.then(|| path.with_extension("mcap.part")));
+        if keeps {
+            recover(&path).unwrap();
+            let steps = steps_of(&messages(&path), "/env_0/arm/joint_states");
+            assert_eq!(steps[..3], [0, 1, 2], "{steps:?}");
+        }
+    }
 }

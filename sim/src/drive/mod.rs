@@ -121,21 +121,4 @@ mod tests {
         }
         assert!("froce".parse::<DriveType>().unwrap_err().contains("force"));
     }
-
-    #[test]
-    fn gains() {
-        // Whatever the unit, doubling stiffness and damping doubles the actuator's gains.
-        let joint = JointInfo { effective_inertia: 0.3 };
-        for mode in DriveType::ALL {
-            let (one, two) = (mode.mode().actuator(5.0, 2.0, &joint), mode.mode().actuator(10.0, 4.0, &joint));
-            match (one, two) {
-                (Some(one), Some(two)) => {
-                    assert!((two.kp - 2.0 * one.kp).abs() < 1e-12 && (two.kd - 2.0 * one.kd).abs() < 1e-12);
-                    assert!(one.kp > 0.0 && one.kd > 0.0);
-                }
-                (None, None) => assert_eq!(*mode, DriveType::None),
-                other => panic!("{mode:?}: {other:?}"),
-            }
-        }
-    }
 }

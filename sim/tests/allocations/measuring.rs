@@ -10,35 +10,14 @@ use sensors::camera::{Channels, Extrinsics, Imperfections, Intrinsics, Placement
 use sensors::ray::HitTargets;
 use sensors::ray::pattern::Lidar;
 use sensors::{
-    CameraCfg, Channel, ContactSensorCfg, Crew, EngineSensor, FrameTransformerCfg, ImuCfg, JointWrenchCfg,
-    MujocoSensorCfg, NoiseCfg, RayCasterCameraCfg, RayCasterCfg, Requires, Sampler, SamplingCfg, Schedule, Sensor,
-    SensorCfg, SensorContext, SensorError, SensorSlot, TargetFrameCfg,
+    CameraCfg, ContactSensorCfg, Crew, EngineSensor, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg,
+    NoiseCfg, RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, Schedule, Sensor, SensorCfg, SensorContext,
+    SensorError, SensorSlot, TargetFrameCfg,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 const NOISE: NoiseCfg = NoiseCfg { std: 0.1, bias_std: 0.1, bias_walk: 0.1, resolution: 0.01 };
-
-#[test]
-fn sampler() {
-    let context = SensorContext { num_envs: 3, dt: 0.01, ..SensorContext::default() };
-    let sampling = SamplingCfg { history_length: 4, latency_steps: 5, dropout: 0.1, ..SamplingCfg::every(0.02) };
-    let cfg = SamplingCfg { noise: [("a".to_string(), NOISE)].into(), ..sampling };
-    let channels = [Channel::new("a", 6), Channel::exact("b", 2)];
-    let mut sampler = Sampler::new("test", Requires::NONE, &context, &cfg, &channels).unwrap();
-    let mut state = SceneState::new(3);
-    let measure = |env: usize, row: &mut [f64]| row.fill(env as f64);
-    let count = allocations(|| {
-        for step in 1..=100 {
-            state.step.fill(step);
-            sampler.update(&state, measure).unwrap();
-            sampler.refresh(&[1], &state, measure).unwrap();
-        }
-        state.step[2] = 0;
-        sampler.reset(&[2], &state, measure).unwrap();
-    });
-    assert_eq!(count, 0);
-}
 
 /// A state with these numbers of contacts.
 fn state([a, b]: [usize; 2]) -> SceneState {
@@ -75,7 +54,8 @@ fn numbers() {
         sampling: sampling(),
         ..ContactSensorCfg::of(".*")
     };
-    let imu = ImuCfg { sampling: sampling(), ..ImuCfg::on("b") };
+    let noisy = SamplingCfg { dropout: 0.1, noise: [("lin_acc_b".to_string(), NOISE)].into(), ..sampling() };
+    let imu = ImuCfg { sampling: noisy, ..ImuCfg::on("b") };
     let targets = vec![TargetFrameCfg::of(".*")];
     let frames = FrameTransformerCfg { sampling: sampling(), ..FrameTransformerCfg::from("a", targets) };
     let (links, frame) = (vec!["[ab]".into()], vec!["c".into()]);

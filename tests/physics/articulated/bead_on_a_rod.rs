@@ -35,13 +35,8 @@ fn holds() {
         m.row("velocity after 1 s", "m/s", speed, v, platform);
         let torque = MASS * (radius * radius - START * START) * SPIN;
         // ω is 3 with 16 digits, times 1e6 kg m².
-        m.row(
-            "angular momentum that the platform lost",
-            "kg m²/s",
-            torque,
-            lost,
-            (1e-4 * torque, "rounding of ω times I"),
-        );
+        let within = (1e-4 * torque, "rounding of ω times I");
+        m.row("angular momentum that the platform lost", "kg m²/s", torque, lost, within);
         let [still, no_speed, kept] = flown(0.0);
         m.control("radius after 1 s", "without the turn", still);
         m.control("velocity after 1 s", "without the turn", no_speed);

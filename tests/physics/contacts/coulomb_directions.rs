@@ -14,6 +14,7 @@ use crate::law::law;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::Cone;
 use nalgebra::{Rotation2, Vector2};
+use testkit::worlds::ball;
 
 const FRICTION: f64 = 0.3;
 const SPEED: f64 = 4.0;
@@ -26,13 +27,7 @@ const ROUNDING: f64 = STEPS as f64 * 20.0 * f64::EPSILON / 2.0;
 /// Friction in parts of the normal force, of a ball that slides at this angle to x.
 fn slid(angle: f64, cone: Cone, coefficient: f64) -> Vector2<f64> {
     let mut lab = Lab::new(SimulationManagerCfg { cone, ..slope(0.0, coefficient) });
-    let ball = lab.object(RigidObjectCfg {
-        uid: "ball".into(),
-        shape: ObjectShape::Sphere { radius: 0.2 },
-        mass: Some(1.5),
-        init_pose: Pose::translation(0.0, 0.0, 0.2),
-        ..RigidObjectCfg::default()
-    });
+    let ball = lab.object(ball("ball", 0.2, 1.5, [0.0, 0.0, 0.2]));
     let id = lab.sim.add_sensor("contact", ContactSensorCfg::of("ball")).unwrap();
     lab.run(0.5);
     let way = Rotation2::new(angle) * Vector2::x();

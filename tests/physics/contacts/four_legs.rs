@@ -10,6 +10,7 @@ use crate::lab::*;
 use crate::law::law;
 use crate::urdf::{Joint, Link, urdf};
 use kinetoscope::prelude::*;
+use testkit::worlds::cube;
 
 const TABLE: f64 = 6.0;
 const LEG: f64 = 0.5;
@@ -33,13 +34,7 @@ fn legs(load: f64, at: [f64; 2]) -> [f64; 4] {
     }
     let mut lab = Lab::new(slope(0.0, 1.0));
     lab.free(&urdf(&links, &joints), [0.0, 0.0, HEIGHT]);
-    lab.object(RigidObjectCfg {
-        uid: "load".into(),
-        shape: ObjectShape::cube(0.1),
-        mass: Some(load),
-        init_pose: Pose::translation(at[0], at[1], HEIGHT + 0.02 + 0.05),
-        ..RigidObjectCfg::default()
-    });
+    lab.object(cube("load", 0.1, load, [at[0], at[1], HEIGHT + 0.02 + 0.05]));
     let bodies = (0..4).map(|k| format!("leg{k}")).collect();
     let id = lab.sim.add_sensor("scales", ContactSensorCfg { bodies, ..ContactSensorCfg::default() }).unwrap();
     lab.run(3.0);

@@ -8,6 +8,7 @@ use crate::lab::*;
 use crate::law::law;
 use crate::urdf::{Joint, Link, base, urdf};
 use kinetoscope::prelude::*;
+use testkit::worlds::cube;
 
 const PLATE: f64 = 2.0;
 const MASS: f64 = 3.0;
@@ -19,13 +20,7 @@ fn weighed(mass: f64, drive: DriveCfg, force: f64) -> [f64; 4] {
     let joint = Joint::slide("spring", ["base", "plate"], [0.0, 0.0, 1.0]);
     let text = urdf(&[base(), Link::brick("plate", PLATE, [0.6, 0.6, 0.05])], &[joint]);
     let scale = lab.robot(&text, RobotCfg { uid: "scale".into(), drive, ..RobotCfg::default() });
-    lab.object(RigidObjectCfg {
-        uid: "load".into(),
-        shape: ObjectShape::cube(0.2),
-        mass: Some(mass),
-        init_pose: Pose::translation(0.05, -0.02, 0.125),
-        ..RigidObjectCfg::default()
-    });
+    lab.object(cube("load", 0.2, mass, [0.05, -0.02, 0.125]));
     let bodies = vec!["load".into(), "scale/plate".into()];
     let id = lab.sim.add_sensor("contact", ContactSensorCfg { bodies, ..ContactSensorCfg::default() }).unwrap();
     lab.push_joints(scale, &[force]);

@@ -14,6 +14,7 @@ use crate::lab::*;
 use crate::law::law;
 use kinetoscope::ndarray::Axis;
 use kinetoscope::prelude::*;
+use testkit::worlds::{fixed, object};
 
 const RADIUS: f64 = 0.3;
 
@@ -53,13 +54,8 @@ fn centres(center: [f64; 3], r: f64) -> (Seen, f64) {
 fn seen((at, radius): Ball, (center, r): Ball, rays: bool) -> (Seen, f64, f64) {
     let mut lab = Lab::new(weightless());
     // The optical frame (x right, y down, z forward) looks along the world's x.
-    let ball = lab.object(RigidObjectCfg {
-        uid: "ball".into(),
-        shape: ObjectShape::Sphere { radius },
-        body_type: BodyType::Static,
-        init_pose: Pose::translation(at[2], -at[0], -at[1]),
-        ..RigidObjectCfg::default()
-    });
+    let ball = fixed(object("ball", ObjectShape::Sphere { radius }, [at[2], -at[0], -at[1]]));
+    let ball = lab.object(ball);
     let id = lab.sim.rigid_object(ball).mask_id();
     let [width, height] = SIZE;
     let intrinsics = Intrinsics::Pixels { fx: FOCAL, fy: FOCAL, cx: MIDDLE[0], cy: MIDDLE[1] };

@@ -9,6 +9,7 @@ use crate::bounce::off;
 use crate::lab::*;
 use crate::law::law;
 use kinetoscope::prelude::*;
+use testkit::worlds::ball;
 
 /// Step \[s\].
 const H: f64 = 2e-4;
@@ -24,14 +25,8 @@ struct Times {
 
 fn bounced(h: f64, restitution: f64, height: f64, seconds: f64) -> Times {
     let mut lab = Lab::new(SimulationManagerCfg { ground: Some(GroundCfg::default()), ..with_dt(h, earth()) });
-    lab.object(RigidObjectCfg {
-        uid: "ball".into(),
-        shape: ObjectShape::Sphere { radius: RADIUS },
-        mass: Some(0.7),
-        restitution: Some(restitution),
-        init_pose: Pose::translation(0.0, 0.0, RADIUS + height),
-        ..RigidObjectCfg::default()
-    });
+    let ball = ball("ball", RADIUS, 0.7, [0.0, 0.0, RADIUS + height]);
+    lab.object(RigidObjectCfg { restitution: Some(restitution), ..ball });
     let watched = ContactSensorCfg { track_air_time: true, force_threshold: 0.0, ..ContactSensorCfg::of("ball") };
     let id = lab.sim.add_sensor("contact", watched).unwrap();
     let mut times = Times::default();
@@ -58,25 +53,15 @@ fn holds() {
         let coarse = bounced(2.0 * H, 1.0, HEIGHT, 0.8);
         m.row("contact, e = 1", "s", 10.0 * H, elastic.contact[0], (2.0 * H, "a step on both ends"));
         m.control("contact, e = 1", "in steps of twice the length", coarse.contact[0]);
-        m.row(
-            "flight 1, e = 1",
-            "s",
-            2.0 * fall,
-            elastic.air[1],
-            (off(1.0) * 2.0 * fall + 2.0 * H, "the steps of a contact; a step on both ends"),
-        );
+        let within = (off(1.0) * 2.0 * fall + 2.0 * H, "the steps of a contact; a step on both ends");
+        m.row("flight 1, e = 1", "s", 2.0 * fall, elastic.air[1], within);
         m.control("flight 1, e = 1", "with e = 0.8", dull.air[1]);
         for k in 1..=2 {
             let quantity = format!("flight {k}, e = 0.8");
             let expected = 0.8_f64.powi(k) * 2.0 * fall;
             let promised = f64::from(k) * off(0.8) / 0.8 * expected + 2.0 * H;
-            m.row(
-                &quantity,
-                "s",
-                expected,
-                dull.air[k as usize],
-                (promised, "the steps of each contact; a step on both ends"),
-            );
+            let within = (promised, "the steps of each contact; a step on both ends");
+            m.row(&quantity, "s", expected, dull.air[k as usize], within);
             m.control(&quantity, "with e = 1", elastic.air[k as usize]);
         }
     });

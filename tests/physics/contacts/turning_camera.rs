@@ -13,6 +13,7 @@ use crate::urdf::{Joint, Link, base, urdf};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::MaskId;
 use std::f64::consts::{PI, TAU};
+use testkit::worlds::{fixed, object};
 
 const RIM: f64 = 1.2;
 const EYE: f64 = 0.3;
@@ -46,13 +47,7 @@ fn seen(turns: Turns, spin: f64, seconds: f64) -> Seen {
     };
     let robot = lab.mechanism(&text);
     if turns == Turns::Camera {
-        lab.object(RigidObjectCfg {
-            uid: "ball".into(),
-            shape: ObjectShape::Sphere { radius: RADIUS },
-            body_type: BodyType::Static,
-            init_pose: Pose::translation(BALL[0], 0.0, BALL[1]),
-            ..RigidObjectCfg::default()
-        });
+        lab.object(fixed(object("ball", ObjectShape::Sphere { radius: RADIUS }, [BALL[0], 0.0, BALL[1]])));
     }
     let [width, height] = SIZE;
     let target = [eye[0] - 1.0, eye[1], eye[2]];
@@ -86,20 +81,9 @@ fn holds() {
             let ball = seen(turns, SPIN, seconds);
             let of = |what: &str| format!("{what} after {seconds} s, {name}");
             let edge = 4.0 * (TAU * (form.area / PI).sqrt()).sqrt();
-            m.row(
-                &of("u of the middle"),
-                "pixels",
-                form.centroid[0],
-                ball.centroid[0],
-                (0.1, "pixels of the silhouette"),
-            );
-            m.row(
-                &of("v of the middle"),
-                "pixels",
-                form.centroid[1],
-                ball.centroid[1],
-                (0.1, "pixels of the silhouette"),
-            );
+            let within = (0.1, "pixels of the silhouette");
+            m.row(&of("u of the middle"), "pixels", form.centroid[0], ball.centroid[0], within);
+            m.row(&of("v of the middle"), "pixels", form.centroid[1], ball.centroid[1], within);
             m.row(&of("area"), "pixels", form.area, ball.area, (edge, "pixels of the silhouette"));
             m.control(&of("u of the middle"), "standing still", still.centroid[0]);
             m.control(&of("v of the middle"), "standing still", still.centroid[1]);

@@ -24,6 +24,7 @@ use crate::urdf::{Joint, Link, base, urdf};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
 use nalgebra::Vector3;
+use testkit::worlds::cube;
 
 const LIMIT: f64 = 5.0;
 const MASS: f64 = 0.2;
@@ -59,12 +60,7 @@ fn pinch(drive: DriveCfg, limit: f64, friction: f64) -> Pinch {
     let joints = [slide("left_joint", "left", -x), slide("right_joint", "right", x)];
     let hand = RobotCfg { uid: "hand".into(), drive, ..RobotCfg::default() };
     let hand = lab.robot(&urdf(&[base(), finger("left"), finger("right")], &joints), hand);
-    let block = lab.object(RigidObjectCfg {
-        uid: "block".into(),
-        shape: ObjectShape::cube(GRIP),
-        mass: Some(MASS),
-        ..RigidObjectCfg::default()
-    });
+    let block = lab.object(cube("block", GRIP, MASS, [0.0; 3]));
     let filters = vec!["hand/left".into(), "hand/right".into()];
     let touch = lab.sim.add_sensor("touch", ContactSensorCfg { filters, ..ContactSensorCfg::of("block") }).unwrap();
     lab.sim.robot_mut(hand).set_qpos(&row(&[0.02, 0.02]), None, None).unwrap();

@@ -39,13 +39,8 @@ fn holds() {
             let rounding = (1e-11, "rounding of 200 sums");
             m.row(&of("velocity after 50 ms"), "rad/s", end * (1.0 - left), found[0], rounding);
             let smooth = end * (1.0 - (-0.05 * DAMPING / MOMENT).exp());
-            m.row(
-                &of("the same in continuous time"),
-                "rad/s",
-                smooth,
-                found[0],
-                (a / 2.0 * end, "h d/2I, next order too"),
-            );
+            let within = (a / 2.0 * end, "h d/2I, next order too");
+            m.row(&of("the same in continuous time"), "rad/s", smooth, found[0], within);
             m.row(&of("velocity under a load"), "rad/s", end, found[1], (1e-7, "e^-20 of it is left"));
             m.row(&of("effort under a load"), "N m", -LOAD, found[2], (1e-7, "e^-20 of it is left"));
             m.control(&of("velocity after 50 ms"), "with twice the damping", hard[0]);

@@ -8,18 +8,14 @@ use crate::lab::*;
 use crate::law::law;
 use kinetoscope::prelude::*;
 use nalgebra::Vector3;
+use testkit::worlds::object;
 
 /// Velocities after half a second, less what both had from the start.
 fn parted(along: [f64; 3], faster: f64) -> [Vector3<f64>; 2] {
     let mut lab = Lab::new(weightless());
     let mut ball = |uid: &str, at: [f64; 3]| {
-        lab.object(RigidObjectCfg {
-            uid: uid.into(),
-            shape: ObjectShape::Sphere { radius: 0.1 },
-            restitution: Some(0.7),
-            init_pose: Pose::translation(at[0], at[1], at[2]),
-            ..RigidObjectCfg::default()
-        })
+        let ball = object(uid, ObjectShape::Sphere { radius: 0.1 }, at);
+        lab.object(RigidObjectCfg { restitution: Some(0.7), ..ball })
     };
     let (left, right) = (ball("left", [-0.3, 0.03, 0.0]), ball("right", [0.0; 3]));
     lab.write_velocity(left, [along[0] + 1.0 + faster, along[1], along[2]], [0.0; 3]);

@@ -49,9 +49,7 @@ impl Fall {
     #[track_caller]
     pub(super) fn update(&mut self, steps: u32) {
         self.sim.update(steps);
-        assert!(self.sim.diverged().is_empty(), "{:?}", self.sim.diverged());
-        let counts = self.sim.warning_counts();
-        assert!(!counts.keys().any(|name| name.starts_with("mujoco")), "{counts:?}");
+        assert_well(&self.sim);
     }
 
     /// Everything that moves in one environment.

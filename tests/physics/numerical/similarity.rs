@@ -16,7 +16,7 @@ fn swung(length: f64, dt: f64) -> [f64; 2] {
     let robot = lab.mechanism(&urdf(&[base(), rod], &[joint]));
     lab.write_joints(robot, &[1.1], &[0.0]);
     lab.sim.update(2000);
-    lab.assert_well();
+    assert_well(&lab.sim);
     [lab.q(robot)[0], lab.v(robot)[0]]
 }
 

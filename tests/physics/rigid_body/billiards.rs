@@ -10,6 +10,7 @@ use crate::lab::*;
 use crate::law::law;
 use kinetoscope::prelude::*;
 use nalgebra::Vector3;
+use testkit::worlds::ball;
 
 const RADIUS: f64 = 0.1;
 
@@ -17,15 +18,8 @@ const RADIUS: f64 = 0.1;
 fn hit(impact: f64, restitution: f64, drag: f64) -> [Vector3<f64>; 2] {
     let mut lab = Lab::new(SimulationManagerCfg { friction: [0.0; 3], ..with_dt(1e-4, weightless()) });
     let mut ball = |uid: &str, at: [f64; 3], linear_damping: f64| {
-        lab.object(RigidObjectCfg {
-            uid: uid.into(),
-            shape: ObjectShape::Sphere { radius: RADIUS },
-            mass: Some(0.17),
-            restitution: Some(restitution),
-            linear_damping,
-            init_pose: Pose::translation(at[0], at[1], at[2]),
-            ..RigidObjectCfg::default()
-        })
+        let ball = ball(uid, RADIUS, 0.17, at);
+        lab.object(RigidObjectCfg { restitution: Some(restitution), linear_damping, ..ball })
     };
     let (cue, other) = (ball("cue", [-0.4, impact, 0.0], 0.0), ball("other", [0.0; 3], drag));
     lab.write_velocity(cue, [1.0, 0.0, 0.0], [0.0; 3]);

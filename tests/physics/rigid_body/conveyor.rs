@@ -18,6 +18,7 @@ use crate::law::law;
 use crate::urdf::{Joint, Link, base, urdf};
 use kinetoscope::prelude::*;
 use nalgebra::Vector3;
+use testkit::worlds::ball;
 
 const BOARD: f64 = 10.0;
 const BALL: f64 = 1.0;
@@ -52,14 +53,8 @@ fn pulled(friction_of_balls: f64) -> Pulled {
     let balls: Vec<ObjectId> = (0..BALLS)
         .map(|k| {
             let side = |bit: usize| if k >> bit & 1 == 1 { 2.0 } else { -2.0 };
-            lab.object(RigidObjectCfg {
-                uid: format!("ball {k}"),
-                shape: ObjectShape::Sphere { radius: RADIUS },
-                mass: Some(BALL),
-                friction: Some([friction_of_balls, 0.0, 0.0]),
-                init_pose: Pose::translation(side(0), side(1), 0.5 + RADIUS),
-                ..RigidObjectCfg::default()
-            })
+            let ball = ball(&format!("ball {k}"), RADIUS, BALL, [side(0), side(1), 0.5 + RADIUS]);
+            lab.object(RigidObjectCfg { friction: Some([friction_of_balls, 0.0, 0.0]), ..ball })
         })
         .collect();
     lab.run(0.5);
@@ -101,11 +96,8 @@ fn holds() {
             for (quantity, found) in [("a + n m b/M", &rolling), ("a + n m b/M, balls slip", &slipping)] {
                 m.row(quantity, "m/s²", pull, force(found), solver);
                 // As if the balls weighed a tenth less.
-                m.control(
-                    quantity,
-                    "without a tenth of the balls",
-                    found.board + 0.9 * n * BALL / BOARD * found.ball[0],
-                );
+                let other = found.board + 0.9 * n * BALL / BOARD * found.ball[0];
+                m.control(quantity, "without a tenth of the balls", other);
             }
 
             let with_hops = |p: &Pulled| p.ball[0] - SLIPPERY * p.ball[1];

@@ -30,6 +30,7 @@ use crate::lab::*;
 use crate::law::law;
 use kinetoscope::prelude::*;
 use nalgebra::{Vector2, Vector3};
+use testkit::worlds::{ball, object};
 
 const BOX: f64 = 10.0;
 const BALL: f64 = 1.0;
@@ -50,24 +51,14 @@ fn expected() -> [f64; 2] {
 /// Roots of the mean squares of what the velocities of box and balls are off by \[m/s\].
 fn off(friction_of_balls: f64) -> [f64; 2] {
     let mut lab = Lab::new(slope(0.0, FRICTION[0]));
-    let board = lab.object(RigidObjectCfg {
-        uid: "board".into(),
-        friction: Some([0.0; 3]),
-        shape: ObjectShape::Box { size: [20.0, 20.0, 0.5] },
-        mass: Some(BOX),
-        init_pose: Pose::translation(0.0, 0.0, 0.25),
-        ..RigidObjectCfg::default()
-    });
+    let board = object("board", ObjectShape::Box { size: [20.0, 20.0, 0.5] }, [0.0, 0.0, 0.25]);
+    let board = lab.object(RigidObjectCfg { friction: Some([0.0; 3]), mass: Some(BOX), ..board });
     let place = |k: usize| 2.0 * (k as f64 - 0.5 * (ROWS - 1) as f64);
-    let ball = |k: usize| RigidObjectCfg {
-        uid: format!("ball {k}"),
-        shape: ObjectShape::Sphere { radius: RADIUS },
-        mass: Some(BALL),
-        friction: Some([friction_of_balls, 0.0, 0.0]),
-        init_pose: Pose::translation(place(k / ROWS), place(k % ROWS), 0.5 + RADIUS),
-        ..RigidObjectCfg::default()
+    let mut add = |k: usize| {
+        let ball = ball(&format!("ball {k}"), RADIUS, BALL, [place(k / ROWS), place(k % ROWS), 0.5 + RADIUS]);
+        lab.object(RigidObjectCfg { friction: Some([friction_of_balls, 0.0, 0.0]), ..ball })
     };
-    let balls: Vec<ObjectId> = (0..ROWS * ROWS).map(|k| lab.object(ball(k))).collect();
+    let balls: Vec<ObjectId> = (0..ROWS * ROWS).map(&mut add).collect();
     lab.run(0.5);
     let along = Vector2::new(0.5, 0.75_f64.sqrt());
     lab.push(board, PULL * Vector3::new(along.x, along.y, 0.0), Vector3::zeros());

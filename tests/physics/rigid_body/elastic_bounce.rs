@@ -8,6 +8,7 @@ use crate::bounce::{apex, apex_off, apex_rest};
 use crate::lab::*;
 use crate::law::law;
 use kinetoscope::prelude::*;
+use testkit::worlds::ball;
 
 /// Step \[s\].
 const H: f64 = 1e-4;
@@ -18,13 +19,8 @@ const RADIUS: f64 = 0.1;
 fn apexes(restitution: Option<f64>, bounces: usize) -> (Vec<f64>, Vec<[f64; 2]>) {
     let cfg = SimulationManagerCfg { ground: Some(GroundCfg::default()), ..with_dt(H, earth()) };
     let mut lab = Lab::new(cfg);
-    let ball = lab.object(RigidObjectCfg {
-        shape: ObjectShape::Sphere { radius: RADIUS },
-        mass: Some(0.7),
-        restitution,
-        init_pose: Pose::translation(0.0, 0.0, RADIUS + HEIGHT),
-        ..RigidObjectCfg::default()
-    });
+    let ball = ball("ball", RADIUS, 0.7, [0.0, 0.0, RADIUS + HEIGHT]);
+    let ball = lab.object(RigidObjectCfg { restitution, ..ball });
     let (mut apexes, mut rising, mut curve) = (Vec::new(), false, Vec::new());
     let steps = 6_400 * (bounces as u32 + 1);
     lab.watch(steps, |t, sim| {

@@ -9,6 +9,7 @@ use crate::bounce::off;
 use crate::lab::*;
 use crate::law::law;
 use kinetoscope::prelude::*;
+use testkit::worlds::ball;
 
 const RADIUS: f64 = 0.1;
 
@@ -18,15 +19,8 @@ fn knocked(restitution: Option<f64>, linear_damping: f64) -> Vec<f64> {
     let balls: Vec<ObjectId> = (0..5)
         .map(|k| {
             let at = f64::from(k) * (2.0 * RADIUS + 0.01) - if k == 0 { 0.2 } else { 0.0 };
-            lab.object(RigidObjectCfg {
-                uid: format!("ball {k}"),
-                shape: ObjectShape::Sphere { radius: RADIUS },
-                mass: Some(0.3),
-                restitution,
-                linear_damping,
-                init_pose: Pose::translation(at, 0.0, 0.0),
-                ..RigidObjectCfg::default()
-            })
+            let ball = ball(&format!("ball {k}"), RADIUS, 0.3, [at, 0.0, 0.0]);
+            lab.object(RigidObjectCfg { restitution, linear_damping, ..ball })
         })
         .collect();
     lab.write_velocity(balls[0], [1.0, 0.0, 0.0], [0.0; 3]);

@@ -26,13 +26,8 @@ fn holds() {
         let a = 3.0 / 5.0 * G * sin;
         let unit = MASS * RADIUS * RADIUS;
         let arm = a * depth(G * cos) / (2.0 * RADIUS);
-        m.row(
-            "acceleration on 10°",
-            "m/s²",
-            a,
-            rolling(2.0 / 3.0 * unit),
-            (arm, "the arm is half of the depth shorter"),
-        );
+        let within = (arm, "the arm is half of the depth shorter");
+        m.row("acceleration on 10°", "m/s²", a, rolling(2.0 / 3.0 * unit), within);
         m.control("acceleration on 10°", "with the moment of a full ball", rolling(0.4 * unit));
     });
 }

@@ -12,6 +12,7 @@ use crate::lab::*;
 use crate::law::law;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
+use testkit::worlds::object;
 
 const EDGE: f64 = 0.1;
 
@@ -21,13 +22,9 @@ fn stacked(boxes: usize) -> Vec<f64> {
     let ids: Vec<ObjectId> = (0..boxes)
         .map(|k| {
             let width = 0.3 - 0.02 * k as f64;
-            lab.object(RigidObjectCfg {
-                uid: format!("box {k}"),
-                shape: ObjectShape::Box { size: [width, width, EDGE] },
-                mass: Some(1.0),
-                init_pose: Pose::translation(0.0, 0.0, (k as f64 + 0.5) * EDGE),
-                ..RigidObjectCfg::default()
-            })
+            let shape = ObjectShape::Box { size: [width, width, EDGE] };
+            let cube = object(&format!("box {k}"), shape, [0.0, 0.0, (k as f64 + 0.5) * EDGE]);
+            lab.object(RigidObjectCfg { mass: Some(1.0), ..cube })
         })
         .collect();
     lab.run(3.0);

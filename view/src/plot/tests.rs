@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use super::*;
+use testkit::refusal::assert_error;
 use testkit::svg::curves;
 
 fn sine(points: u32) -> Plot {
@@ -102,9 +103,7 @@ fn files() {
     let files = std::fs::read_dir(folder.path()).unwrap().count();
     assert_eq!(files, 2, "nothing else is left");
     for (name, words) in [("a.gif", ".svg or .png"), ("a", ".svg or .png"), ("no/such/folder/a.svg", "No such file")] {
-        let error = plot.write(folder.path().join(name)).unwrap_err().to_string();
-        assert!(error.contains(words), "{error}");
+        assert_error(plot.write(folder.path().join(name)), "", &[words]);
     }
-    let error = Plot { size: [20, 540], ..plot }.write(&svg).unwrap_err();
-    assert!(matches!(error, PlotError::Size { width: 20, .. }), "{error}");
+    assert_error(Plot { size: [20, 540], ..plot }.write(&svg), "Size { width: 20", &[]);
 }

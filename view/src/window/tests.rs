@@ -125,24 +125,24 @@ fn keys_and_repeats() {
 /// Each key of an overlay turns that one, and no other, and back again.
 #[test]
 fn overlay_keys() {
-    let begin = Overlays::default();
-    for (key, expected) in [
-        ("o", Overlays { sensors: !begin.sensors, ..begin }),
-        ("c", Overlays { contacts: !begin.contacts, ..begin }),
-        ("f", Overlays { frames: !begin.frames, ..begin }),
-        ("j", Overlays { joints: !begin.joints, ..begin }),
-        ("m", Overlays { masses: !begin.masses, ..begin }),
-        ("t", Overlays { names: !begin.names, ..begin }),
-        ("l", Overlays { trails: !begin.trails, ..begin }),
-        ("k", Overlays { collisions: !begin.collisions, ..begin }),
-        ("u", Overlays { visuals: !begin.visuals, ..begin }),
-    ] {
-        let mut shows = shows(1);
-        for expected in [expected, begin] {
-            shows.type_in(key);
-            assert_eq!(shows.app.overlays(), expected, "{key}");
-        }
+    let turns: [(&str, fn(&mut Overlays) -> &mut bool); 9] = [
+        ("o", |all| &mut all.sensors),
+        ("c", |all| &mut all.contacts),
+        ("f", |all| &mut all.frames),
+        ("j", |all| &mut all.joints),
+        ("m", |all| &mut all.masses),
+        ("t", |all| &mut all.names),
+        ("l", |all| &mut all.trails),
+        ("k", |all| &mut all.collisions),
+        ("u", |all| &mut all.visuals),
+    ];
+    let (mut shows, mut expected) = (shows(1), Overlays::default());
+    for (key, turned) in [turns, turns].concat() {
+        *turned(&mut expected) ^= true;
+        shows.type_in(key);
+        assert_eq!(shows.app.overlays(), expected, "{key}");
     }
+    assert_eq!(expected, Overlays::default());
 }
 
 #[test]
@@ -447,24 +447,6 @@ fn every_size() {
     let with = shows.drawn();
     shows.press(Key::F1);
     assert!(unlike(&with, &shows.drawn()) > 50_000, "{}", unlike(&with, &shows.drawn()));
-}
-
-/// All environments stand in a grid, or one is shown alone.
-#[test]
-fn grid() {
-    let mut shows = shows(16);
-    shows.app.handle(Input::Resize([960, 540]));
-    let grid = shows.drawn();
-    // Sixteen red cubes: from right to left more than a third of the image.
-    let red = |x: usize, y: usize| grid.pixel(x, y).is_some_and(|p| p[0] > 100 && p[1] < p[0] / 2);
-    let columns: Vec<usize> = (0..960).filter(|&x| (80..540).any(|y| red(x, y))).collect();
-    assert!(columns[columns.len() - 1] - columns[0] > 960 / 3, "{columns:?}");
-    shows.press(Key::PageDown);
-    let alone = shows.drawn();
-    assert!(unlike(&grid, &alone) > 100_000, "{}", unlike(&grid, &alone));
-    shows.press(Key::Tab);
-    // The sliders shade 210 pixels of each row.
-    assert!(unlike(&shows.drawn(), &alone) > 100 * 540, "{}", unlike(&shows.drawn(), &alone));
 }
 
 /// A held key of flight goes where it says, and nowhere else: ahead along the view, right of it, and up in the world, by the

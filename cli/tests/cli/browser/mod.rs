@@ -2,12 +2,11 @@
 
 mod chromium;
 
-use super::serve::running::{Running, play_fall};
+use super::serve::running::{Running, button, play_fall};
 use chromium::{Chromium, Tab};
 use kinetoscope::prelude::*;
 use serde_json::json;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use testkit::wait;
 
@@ -286,10 +285,7 @@ fn time_line() {
 #[ignore = "needs Chromium: cargo xtask test"]
 fn record_button() {
     let browser = browser();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.npz");
-    let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(&path))));
-    let recording = Some(RecordButton::shared(files));
+    let (_folder, path, recording) = button();
     let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { recording, ..ServeCfg::default() });
     let mut tab = page(&browser, &running.url);
     tab.wait_until("a button", "!$('record').hidden && $('record').textContent === 'Record'");

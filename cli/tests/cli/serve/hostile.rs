@@ -23,6 +23,7 @@ fn garbage() {
         b"GET\r\n\r\n",
         b"GET / HTTP/1.1\r\nHost localhost\r\n\r\n",
         b"GET / HTTP/3.0\r\nHost: localhost\r\n\r\n",
+        b"G@T / HTTP/1.1\nHost\n\n",
         b"GET / HTTP/1.1\r\nHost: \xff\xfe\r\n\r\n",
         b"GET /\x01 HTTP/1.1\r\nHost: localhost\r\n\r\n",
         b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",

@@ -1,12 +1,10 @@
 //! Commands of viewers: targets, pause, speed, selection, the spring, and recordings.
 
-use super::running::{Running, play_fall};
+use super::running::{Running, button};
 use super::visitor::{Came, Visitor};
 use crate::support::red;
 use kinetoscope::prelude::*;
 use serde_json::{Value, json};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
 
 /// Weight of the cube \[N\]: 1 kg.
 const WEIGHT: f64 = 9.81;
@@ -73,47 +71,6 @@ fn targets() {
 }
 
 #[test]
-fn pause_step_and_reset() {
-    let running = Running::start(1);
-    let mut visitor = Visitor::enter(running.address);
-    running.wait_until("it steps", |now| now.steps > 20);
-    let held = visitor.pause()["steps"].as_u64().unwrap();
-    std::thread::sleep(Duration::from_millis(400));
-    // The program sees the step that holds only when it goes on.
-    let before = running.now().steps;
-    assert!(before == held || before + 1 == held, "{before} and {held}");
-    visitor.ask(json!({"do": "step"}));
-    let state = visitor.wait_state("a step further", |state| state["steps"].as_u64() > Some(held));
-    assert_eq!((state["steps"].as_u64(), &state["paused"]), (Some(held + 1), &json!(true)));
-    std::thread::sleep(Duration::from_millis(200));
-    assert!(running.now().steps <= before + 1);
-    visitor.ask(json!({"do": "play"}));
-    running.wait_until("it goes on", |now| now.steps > before + 20);
-    visitor.wait_state("the state says so", |state| state["paused"] == false);
-
-    visitor.wait_state("some time has passed", |state| state["time"].as_f64() > Some(0.3));
-    visitor.pause();
-    visitor.ask(json!({"do": "reset"}));
-    let state = visitor.wait_state("reset", |state| state["time"].as_f64() < Some(0.1));
-    assert_eq!(state["time"].as_f64(), Some(0.0), "{state}");
-}
-
-#[test]
-fn slow_motion() {
-    let running = Running::start(1);
-    let mut visitor = Visitor::enter(running.address);
-    // From before it is asked for: its state may come late.
-    let start = Instant::now();
-    visitor.ask(json!({"do": "speed", "factor": 0.1}));
-    let time = |state: &Value| state["time"].as_f64().unwrap();
-    let from = time(&visitor.wait_state("slow motion", |state| state["speed"] == 0.1));
-    let passed = time(&visitor.wait_state("0.2 s are simulated", |state| time(state) > from + 0.2)) - from;
-    // A tenth of the time that passed on the wall, or less where the machine is busy; steps come in blocks of 8 ms of it, or
-    // one by one, which 0.1 s is more than.
-    assert!(passed <= 0.1 * (start.elapsed().as_secs_f64() + 0.1), "{passed} s in {:?}", start.elapsed());
-}
-
-#[test]
 fn refusals() {
     let running = Running::start(1);
     let mut visitor = Visitor::enter(running.address);
@@ -147,10 +104,6 @@ fn at_rest(running: &Running, env: usize) -> (Visitor, [f64; 2]) {
     (visitor, [x / 640.0, y / 360.0])
 }
 
-fn height(state: &Value) -> Option<f64> {
-    numbers(&state["selected"]["position"]).get(2).copied()
-}
-
 /// A click on a resting body selects it: its pose, and the force that carries it.
 #[test]
 fn selection() {
@@ -182,36 +135,6 @@ fn selection() {
     visitor.wait_state("nothing", |state| state["selected"].is_null());
 }
 
-/// A body hangs on the spring, and falls when it is let go or when the viewer leaves.
-#[test]
-fn spring() {
-    let running = Running::start(1);
-    let (mut visitor, [x, y]) = at_rest(&running, 0);
-    assert_eq!(visitor.wait_state("a state", |_| true)["selected"], Value::Null);
-    visitor.ask(json!({"do": "grab", "x": x, "y": y}));
-    visitor.wait_state("held, it is selected", |state| state["selected"]["name"] == "cube");
-    visitor.ask(json!({"do": "pull", "x": x, "y": y - 0.35}));
-    // In the air nothing touches it.
-    let state = visitor.wait_state("it is in the air", |state| {
-        height(state) > Some(0.3) && state["selected"]["contacts"] == 0 && state["selected"]["force"].is_array()
-    });
-    assert_eq!(numbers(&state["selected"]["force"]), [0.0; 3]);
-    visitor.ask(json!({"do": "release"}));
-    let state = visitor.wait_state("it has fallen and is at rest", |state| {
-        let force = numbers(&state["selected"]["force"]);
-        force.len() == 3 && (force[2] - WEIGHT).abs() < 1e-2 * WEIGHT && height(state) < Some(0.3)
-    });
-    // On a face, it is as high as before; on an edge no force would stay.
-    assert!(height(&state).unwrap() > 0.19, "{state}");
-
-    let (mut other, [x, y]) = at_rest(&running, 0);
-    other.ask(json!({"do": "grab", "x": x, "y": y}));
-    other.ask(json!({"do": "pull", "x": x, "y": y - 0.35}));
-    visitor.wait_state("another viewer pulls it up", |state| height(state) > Some(0.3));
-    drop(other);
-    visitor.wait_state("it falls", |state| height(state).is_some_and(|z| z < 0.25));
-}
-
 #[test]
 fn record_button() {
     // Without a button, pressing it is refused.
@@ -221,10 +144,7 @@ fn record_button() {
     visitor.ask(json!({"do": "record", "on": true}));
     visitor.wait_state("a refusal", |state| state["refused"].as_str().is_some_and(|why| why.contains("record button")));
     drop((visitor, running));
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.npz");
-    let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(&path))));
-    let recording = Some(RecordButton::shared(files));
+    let (_folder, path, recording) = button();
     let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { recording, ..ServeCfg::default() });
     let mut visitor = Visitor::enter(running.address);
     visitor.wait_state("a button", |state| state["recording"] == json!({"on": false, "text": ""}));
@@ -239,36 +159,4 @@ fn record_button() {
     other.ask(json!({"do": "record", "on": false}));
     let state = visitor.wait_state("it has ended", |state| state["recording"]["on"] == false);
     assert!(text(&state).ends_with(" MB") && path.is_file(), "{state}");
-}
-
-/// The time line of a recording: a seek shows the scene of that time.
-#[test]
-fn seek() {
-    // From 3 m, in half a second, it falls 1.2 m.
-    play_fall(3.0, |address, _| {
-        let mut visitor = Visitor::enter(address);
-        visitor.ask(json!({"do": "size", "width": 320, "height": 240}));
-        visitor.ask(json!({"do": "pause"}));
-        let mut row = |time: f64| {
-            visitor.ask(json!({"do": "seek", "time": time}));
-            let near = |now: &Value| now.as_f64().is_some_and(|now| (now - time).abs() < 1e-6);
-            let state = visitor.wait_state("its time", |state| near(&state["timeline"]["now"]));
-            assert!(state["paused"] == true && near(&state["time"]), "{state}");
-            assert_eq!([&state["timeline"]["start"], &state["timeline"]["end"]], [&json!(0.0), &json!(0.5)]);
-            // The first image may be an old one; two equal ones are not. A turn by nothing makes the server draw again.
-            let mut last = f64::NAN;
-            loop {
-                visitor.ask(json!({"do": "orbit", "dx": 0.0, "dy": 0.0}));
-                let (_, [_, now]) = red(&visitor.wait_image("stage", |_, _| true));
-                if (now - last).abs() < 0.1 {
-                    return now;
-                }
-                last = now;
-            }
-        };
-        let (begun, ended, again) = (row(0.0), row(0.5), row(0.0));
-        assert!(ended > begun + 10.0 && (begun - again).abs() < 1.0, "{begun} {ended} {again}");
-        visitor.ask(json!({"do": "play"}));
-        visitor.wait_state("the end", |state| state["timeline"]["now"] == 0.5 && state["paused"] == true);
-    });
 }

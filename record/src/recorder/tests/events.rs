@@ -1,85 +1,65 @@
 //! Events, notes and rates.
 
 use super::*;
+use serde_json::json;
 use sim::mj;
 
-/// What a NumPy archive says in `notes.jsonl`.
+/// The lines of `notes.jsonl` of a NumPy archive.
 fn notes(path: &Path) -> Vec<serde_json::Value> {
-    let bytes = std::fs::read(path).unwrap();
-    let members = zip::parse(&bytes).unwrap();
-    let (_, text) = members.iter().find(|(name, _)| *name == "notes.jsonl").unwrap();
-    std::str::from_utf8(text).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    let text = String::from_utf8(crate::tests::member(path, "notes.jsonl")).unwrap();
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 /// Whole numbers of an array of events.
 fn whole(path: &Path, name: &str) -> Vec<i32> {
-    let bytes = std::fs::read(path).unwrap();
-    let members = zip::parse(&bytes).unwrap();
-    let (_, data) = members.iter().find(|(known, _)| *known == format!("events/{name}.npy")).unwrap();
-    match npy::parse(data).unwrap() {
-        ("<i4", _, data) => data.as_chunks::<4>().0.iter().map(|bytes| i32::from_le_bytes(*bytes)).collect(),
-        (_, _, data) => data.iter().map(|byte| i32::from(*byte)).collect(),
+    let (descr, _, data) = rows(path, &format!("events/{name}"));
+    match descr.as_str() {
+        "<i4" => data.as_chunks::<4>().0.iter().map(|bytes| i32::from_le_bytes(*bytes)).collect(),
+        _ => data.iter().map(|byte| i32::from(*byte)).collect(),
     }
 }
 
-/// What the messages of a topic say.
-fn logs(path: &Path) -> Vec<String> {
-    let bytes = std::fs::read(path).unwrap();
-    let all = mcap::MessageStream::new(&bytes).unwrap().map(std::result::Result::unwrap);
-    let of = all.filter(|message| message.channel.topic == "/events");
-    of.map(|message| String::from_utf8_lossy(&message.data).into_owned()).collect()
-}
-
+/// Notes and resets are recorded with their step and environment, and change no state.
 #[test]
-fn notes_and_resets_are_told_with_their_step_and_environment() {
+fn notes_and_resets() {
     let folder = tempfile::tempdir().unwrap();
-    let [npz, mcap] = ["run.npz", "run.mcap"].map(|name| folder.path().join(name));
-    for path in [&npz, &mcap] {
+    let [npz, mcap, plain] = ["run.npz", "run.mcap", "plain.npz"].map(|name| folder.path().join(name));
+    for path in [&npz, &mcap, &plain] {
+        let with_notes = path != &plain;
         let mut sim = falling(3);
         let envs = Some(vec![EnvId(0), EnvId(2)]);
         let recorder = sim.record(RecorderCfg { envs, ..RecorderCfg::new(path) }).unwrap();
         sim.update(4);
-        sim.note(recorder, Some(EnvId(2)), "the ball is \"low\"").unwrap();
-        sim.note(recorder, Some(EnvId(1)), "nobody records this one").unwrap();
+        if with_notes {
+            sim.note(recorder, Some(EnvId(2)), "the ball is \"low\"").unwrap();
+            sim.note(recorder, Some(EnvId(1)), "of an environment that is not recorded").unwrap();
+        }
         sim.reset(Some(&[EnvId(0)])).unwrap();
         sim.update(2);
-        sim.note(recorder, None, "over").unwrap();
+        if with_notes {
+            sim.note(recorder, None, "over").unwrap();
+        }
         let error = sim.note(recorder, Some(EnvId(3)), "where").unwrap_err();
         assert!(matches!(error, RecordError::Env { env: 3, count: 3 }), "{error}");
         sim.finish_recording(recorder).unwrap();
         assert!(sim.note(recorder, None, "too late").is_err());
     }
-    assert_eq!(array(&npz, "events/step"), [4.0, 4.0, 6.0, 6.0]);
+    assert_eq!(numbers_of(&npz, "events/step"), [4.0, 4.0, 6.0, 6.0]);
     assert_eq!(whole(&npz, "env"), [2, 0, 0, 2]);
     assert_eq!(whole(&npz, "kind"), [3, 0, 3, 3]);
-    let told = notes(&npz);
-    let of = |k: usize, event: u64, env: u64, text: &str| {
-        assert_eq!((&told[k]["event"], &told[k]["env"]), (&event.into(), &env.into()), "{told:?}");
-        assert_eq!(told[k]["text"], text);
-    };
-    of(0, 0, 2, "the ball is \"low\"");
-    of(1, 2, 0, "over");
-    of(2, 3, 2, "over");
-    assert_eq!(told.len(), 3);
+    let found = notes(&npz);
+    let found: Vec<_> = found.iter().map(|note| ["event", "env", "text"].map(|field| note[field].clone())).collect();
+    let expected = [(0, 2, "the ball is \"low\""), (2, 0, "over"), (3, 2, "over")];
+    assert_eq!(found, expected.map(|(event, env, text)| [json!(event), json!(env), json!(text)]));
     let logs = logs(&mcap);
     assert_eq!(logs.len(), 4);
     assert!(logs[0].contains("note at step 4") && logs[0].contains("the ball is \"low\""), "{logs:?}");
-    // Notes are no states: what is recorded beside them is what it would be without.
-    let mut sim = falling(3);
-    let plain = folder.path().join("plain.npz");
-    let envs = Some(vec![EnvId(0), EnvId(2)]);
-    let recorder = sim.record(RecorderCfg { envs, ..RecorderCfg::new(&plain) }).unwrap();
-    sim.update(4);
-    sim.reset(Some(&[EnvId(0)])).unwrap();
-    sim.update(2);
-    sim.finish_recording(recorder).unwrap();
-    assert_eq!(array(&npz, "ball/state/positions"), array(&plain, "ball/state/positions"));
+    assert_eq!(numbers_of(&npz, "ball/state/positions"), numbers_of(&plain, "ball/state/positions"));
 }
 
 #[test]
-fn an_environment_that_diverges_is_told_once_and_again_after_a_reset() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.npz");
+fn divergence() {
+    let (_folder, path) = scratch("run.npz");
     let mut sim = falling(2);
     let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
     let ball = sim.mjcf_id("ball").unwrap();
@@ -100,14 +80,14 @@ fn an_environment_that_diverges_is_told_once_and_again_after_a_reset() {
     let (kinds, envs) = (whole(&path, "kind"), whole(&path, "env"));
     assert_eq!(kinds, [1, 2, 0, 1, 2]);
     assert_eq!(envs, [1; 5]);
-    assert_eq!(array(&path, "events/step"), [3.0, 4.0, 7.0, 8.0, 9.0]);
+    assert_eq!(numbers_of(&path, "events/step"), [3.0, 4.0, 7.0, 8.0, 9.0]);
     let why = notes(&path);
     assert_eq!(why.len(), 2);
     assert!(why.iter().all(|note| note["text"].as_str().unwrap().starts_with("step ")), "{why:?}");
 }
 
 #[test]
-fn what_has_a_rate_of_its_own_has_rows_at_its_steps() {
+fn rates() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.npz");
     let recorded = |rates: &[(&str, u64)], path: &Path| {
@@ -122,18 +102,18 @@ fn what_has_a_rate_of_its_own_has_rows_at_its_steps() {
         sim.finish_recording(recorder)
     };
     recorded(&[("ball", 8), ("imu", 5)], &path).unwrap();
-    assert_eq!(array(&path, "ball/state/step"), [0.0, 8.0, 16.0]);
+    assert_eq!(numbers_of(&path, "ball/state/step"), [0.0, 8.0, 16.0]);
     // It measures at even steps; at every fifth step, what it measured last.
-    assert_eq!(array(&path, "imu/step"), [5.0, 10.0, 15.0, 20.0]);
-    assert_eq!(array(&path, "second/step").len(), 20, "the other one as ever");
-    let dt = SimulationManagerCfg::default().physics_dt;
-    let captured: Vec<u64> = array(&path, "imu/time").iter().map(|time| (time / dt).round() as u64).collect();
+    assert_eq!(numbers_of(&path, "imu/step"), [5.0, 10.0, 15.0, 20.0]);
+    assert_eq!(numbers_of(&path, "second/step").len(), 20, "the other one as ever");
+    let dt = falling(1).cfg().physics_dt;
+    let captured: Vec<u64> = numbers_of(&path, "imu/time").iter().map(|time| (time / dt).round() as u64).collect();
     // Steps 4, 10, 14, 20; accelerations are of the beginning of a step.
     assert_eq!(captured, [3, 9, 13, 19]);
     // The control: without, as often as `every` says and whenever it measures.
     recorded(&[], &path).unwrap();
-    assert_eq!(array(&path, "ball/state/step"), [0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0]);
-    assert_eq!(array(&path, "imu/step").len(), 10);
+    assert_eq!(numbers_of(&path, "ball/state/step"), [0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0]);
+    assert_eq!(numbers_of(&path, "imu/step").len(), 10);
     let error = recorded(&[("ball", 0)], &path).unwrap_err();
     assert!(matches!(error, RecordError::OutOfRange { .. }), "{error}");
     let error = recorded(&[("bal", 2)], &path).unwrap_err();
@@ -145,9 +125,8 @@ fn what_has_a_rate_of_its_own_has_rows_at_its_steps() {
 }
 
 #[test]
-fn events_alone_are_a_recording() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.mcap");
+fn events_alone() {
+    let (folder, path) = scratch("run.mcap");
     let mut sim = falling(2);
     let recorder = sim.record(RecorderCfg::new(&path).with_topics([Topic::Events])).unwrap();
     sim.update(3);
@@ -162,9 +141,8 @@ fn events_alone_are_a_recording() {
 }
 
 #[test]
-fn a_full_disk_is_told_before_the_end() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.mcap");
+fn early_failure() {
+    let (_folder, path) = scratch("run.mcap");
     let mut sim = falling(4);
     let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(&path) };
     let recorder = Recorder::start(&mut sim, cfg, &Disk::full_after(20_000)).unwrap();

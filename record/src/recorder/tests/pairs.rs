@@ -18,10 +18,9 @@ fn toed_in(left_to_right_pos: [f64; 3]) -> StereoCameraCfg {
     StereoCameraCfg { camera, left_to_right_pos, left_to_right_rot, ..StereoCameraCfg::default() }
 }
 
-/// Root cause: R and P of a pair were made of its baseline alone, which a pair that is not parallel was said to have none of: P of its
-/// right eye had no fourth column, R was the identity, and nobody was told.
+/// Root cause: R and P were made of the baseline alone, which was taken for zero of a pair that is not parallel.
 #[test]
-fn recorded_calibrations_of_a_pair_rectify_it() {
+fn calibrations() {
     let folder = tempfile::tempdir().unwrap();
     let (archive, messages) = (folder.path().join("run.npz"), folder.path().join("run.mcap"));
     let mut sim = falling(2);
@@ -50,7 +49,8 @@ fn recorded_calibrations_of_a_pair_rectify_it() {
             assert_eq!((read("r", 9), read("p", 12)), (r.as_slice().to_vec(), p.as_slice().to_vec()), "{topic}");
         }
         // Archives count pixels as cameras do.
-        let [r, p] = ["rectification", "projection"].map(|part| array(&archive, &format!("eyes/{eye}/lens/{part}")));
+        let [r, p] =
+            ["rectification", "projection"].map(|part| numbers_of(&archive, &format!("eyes/{eye}/lens/{part}")));
         let (last_r, last_p) = (&r[r.len() - 9..], &p[p.len() - 12..]);
         let found = sim.sensor(id).unwrap().rectification(1).unwrap();
         assert_eq!(last_r, found.rotations[k].transpose().as_slice());
@@ -62,11 +62,10 @@ fn recorded_calibrations_of_a_pair_rectify_it() {
     );
 }
 
-/// What has no R and P is told, and is recorded as a camera alone.
+/// A pair that cannot be rectified is recorded as cameras alone.
 #[test]
-fn pairs_that_cannot_be_rectified_are_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.mcap");
+fn no_rectification() {
+    let (_folder, path) = scratch("run.mcap");
     let mut sim = falling(1);
     sim.add_sensor("eyes", toed_in([-0.1, 0.0, 0.0])).unwrap();
     let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
