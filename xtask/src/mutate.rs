@@ -1,6 +1,6 @@
 //! `cargo xtask mutate`: breaks the code in one place, runs the tests that should notice, and so for every mutation of the
-//! lists (`mutations/`). All are done in a copy of the tree below the target folder. A run of the whole list writes
-//! `docs/mutations.md`.
+//! lists (`mutations/`). All are done in a copy of the tree below the target folder. What was tried is written to
+//! `docs/mutations.md`; rows of other mutations stay.
 
 use crate::mutations::{self, Mutation};
 use crate::progress::Progress;
@@ -28,7 +28,7 @@ enum Verdict {
 }
 
 pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
-    check(&repo.root)?;
+    fits(&repo.root)?;
     let ready = setup::prepare(repo, Wanted { line: Some(Line::Debian), extras: &[] })?;
     let folder = repo.target.join("mutate");
     let tree = folder.join("tree");
@@ -36,7 +36,7 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     let is_chosen = |filter: &String, mutation: &Mutation| mutation.name.contains(filter) || mutation.tests.0 == filter;
     let chosen = |mutation: &&Mutation| args.filter.as_ref().is_none_or(|filter| is_chosen(filter, mutation));
     let chosen: Vec<&Mutation> = mutations::all().filter(chosen).collect();
-    let (mut findings, mut table, mut rows) = (Vec::new(), String::new(), Vec::new());
+    let (mut findings, mut table) = (Vec::new(), String::new());
     let test = |binary: &str, words: &[&str]| {
         let cargo = ready.cargo().current_dir(&tree).env("CARGO_TARGET_DIR", folder.join("target"));
         cargo.arg("test").args(target(binary)).arg("--").arg("--include-ignored").args(words).success_and_output()
@@ -73,9 +73,9 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
         };
         println!("{line}");
         table.push_str(&format!("{line}\n"));
-        if let Verdict::Caught(by, _) = &verdict {
-            rows.push(row(mutation, by));
-        }
+        let by: &[String] = if let Verdict::Caught(by, _) = &verdict { by } else { &[] };
+        let path = repo.root.join(PAGE);
+        write(&path, &page(&read(&path)?, &row(mutation, by)))?;
         // A law that is said to notice must.
         if !matches!(&verdict, Verdict::Caught(_, not_by) if not_by.is_empty()) {
             findings.push(line);
@@ -86,30 +86,41 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     }
     progress.end();
     println!("\n{table}");
-    no_findings("mutations that no test noticed", &findings)?;
-    if args.filter.is_none() { write(&repo.root.join(PAGE), &page(&rows)) } else { Ok(()) }
+    no_findings("mutations that no test noticed", &findings)
 }
 
-/// Where the last run of the whole list is written to.
+/// Where the results are written to.
 const PAGE: &str = "docs/mutations.md";
 
-fn page(rows: &[String]) -> String {
+/// The page with a new row; those of other mutations are taken from the page as it was.
+fn page(old: &str, new: &str) -> String {
+    let row_of = |mutation: &Mutation| {
+        let beginning = beginning(mutation);
+        [new].into_iter().chain(old.split_inclusive('\n')).find(|row| row.starts_with(&beginning))
+    };
+    let rows: Vec<&str> = mutations::all().filter_map(row_of).collect();
     let head = format!(
         "# Mutations\n\nWritten by `cargo xtask mutate`; do not edit. The code is broken in {} places, one by one, on MuJoCo 2.2.2, and \
-         tests are run that have to notice: each of these changes made the tests fail that are named behind it.\n\n\
+         tests are run that have to notice: each of these changes made the tests fail that are named behind it, or survived.\n\n\
          | what is wrong then | file | caught by |\n|---|---|---|\n",
         rows.len()
     );
     head + &rows.concat()
 }
 
-fn row(mutation: &Mutation, caught_by: &[String]) -> String {
-    let by: Vec<String> = caught_by.iter().map(|name| format!("`{}`", name.trim_end_matches("::holds"))).collect();
-    format!("| {} | [{}](../{}) | {} |\n", mutation.name, mutation.file, mutation.file, by.join(", "))
+/// How the row of a mutation begins.
+fn beginning(mutation: &Mutation) -> String {
+    format!("| {} | [{}]", mutation.name, mutation.file)
 }
 
-/// Every mutation still finds its place: the search text stands in the file exactly once. And the page is of this list.
-pub(crate) fn check(root: &Path) -> Outcome {
+fn row(mutation: &Mutation, caught_by: &[String]) -> String {
+    let by: Vec<String> = caught_by.iter().map(|name| format!("`{}`", name.trim_end_matches("::holds"))).collect();
+    let by = if by.is_empty() { "nothing".into() } else { by.join(", ") };
+    format!("{}(../{}) | {} |\n", beginning(mutation), mutation.file, by)
+}
+
+/// Every mutation still finds its place: the search text stands in the file exactly once.
+fn fits(root: &Path) -> Outcome {
     let mut findings = Vec::new();
     for Mutation { name, file, search, replacement, .. } in mutations::all() {
         let times = read(&root.join(file))?.matches(search).count();
@@ -117,11 +128,15 @@ pub(crate) fn check(root: &Path) -> Outcome {
             findings.push(format!("{name}: its text stands {times} times in {file}, not once: {search:?}"));
         }
     }
-    no_findings("mutations that do not fit the code (xtask/src/mutations)", &findings)?;
+    no_findings("mutations that do not fit the code (xtask/src/mutations)", &findings)
+}
+
+/// Every mutation finds its place, and the page is of this list.
+pub(crate) fn check(root: &Path) -> Outcome {
+    fits(root)?;
     let page = read(&root.join(PAGE))?;
-    let wanted = |mutation: &Mutation| format!("| {} | [{}]", mutation.name, mutation.file);
     let mut findings: Vec<String> =
-        mutations::all().filter(|mutation| !page.contains(&wanted(mutation))).map(|m| m.name.to_string()).collect();
+        mutations::all().filter(|mutation| !page.contains(&beginning(mutation))).map(|m| m.name.to_string()).collect();
     let rows = page.lines().filter(|line| line.starts_with("| ")).count() - 1;
     let count = mutations::all().count();
     if findings.is_empty() && rows != count {
@@ -210,7 +225,7 @@ mod tests {
         let all: Vec<&Mutation> = mutations::all().collect();
         assert!(all.len() >= 80);
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        check(&root).expect("every text stands once");
+        fits(&root).expect("every text stands once");
         for (k, mutation) in all.iter().enumerate() {
             assert!(all[..k].iter().all(|other| other.name != mutation.name), "{}", mutation.name);
             assert!(!mutation.tests.1.is_empty(), "{}", mutation.name);
@@ -243,6 +258,15 @@ mod tests {
             assert!(words.iter().all(|word| all[binary].contains(word)), "{}", mutation.name);
         }
         assert!(all["physics"].windows(2).all(|pair| pair[0] != pair[1]), "{all:?}");
+    }
+
+    #[test]
+    fn pages() {
+        let [first, second] = [0, 1].map(|k| mutations::all().nth(k).expect("there are two"));
+        let old = page(&page("", &row(second, &["old".into()])), &row(first, &[]));
+        assert!(old.contains("in 2 places") && old.ends_with("| `old` |\n"), "{old}");
+        let new = page(&old, &row(second, &["new::holds".into()]));
+        assert!(new.ends_with(&(row(first, &[]) + &row(second, &["new".into()]))), "{new}");
     }
 
     #[test]

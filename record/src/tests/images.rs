@@ -28,9 +28,7 @@ fn folder() {
     for (channel, env) in [("color", 0), ("color", 1), ("depth", 0), ("depth", 1)] {
         assert_eq!(names(path.join(format!("camera/{channel}/env_{env}"))).len(), colors.len(), "{channel} {env}");
     }
-    let image = |channel: &str, k: usize| {
-        image::open(path.join(format!("camera/{channel}/env_1/{k:06}.png"))).unwrap()
-    };
+    let image = |channel: &str, k: usize| image::open(path.join(format!("camera/{channel}/env_1/{k:06}.png"))).unwrap();
     let mut seen = 0;
     for (k, (color, depth)) in colors.iter().zip(&depths).enumerate() {
         assert_eq!(image("color", k).to_rgb8().as_raw(), color);
@@ -139,8 +137,7 @@ fn check_frame(end: &str, frame: &Value, color: &[u8]) {
 fn animation_frames() {
     for (_, end) in animations() {
         let (_folder, path) = scratch(&format!("run.{end}"));
-        let (recorded, colors, _) =
-            recorded(RecorderCfg { envs: Some(vec![EnvId(1)]), ..RecorderCfg::new(&path) });
+        let (recorded, colors, _) = recorded(RecorderCfg { envs: Some(vec![EnvId(1)]), ..RecorderCfg::new(&path) });
         assert_eq!(recorded.bytes, path.metadata().unwrap().len());
         let found = said("read_animation.py", &path);
         let frames = list(&found["frames"]);

@@ -167,11 +167,11 @@ fn sensed(path: &Path) -> Value {
         "distances": distances.iter().map(|x| x.to_bits().to_string()).collect::<Vec<_>>(),
         "hit_ids": hits.iter().map(|k| ids[*k]).collect::<Vec<i32>>(),
         "hit_normals": of_hits(scanner.normals().index_axis(Axis(0), 1)),
-        "scanner": [scanner.pos_w().row(1).to_vec(), scanner.quat_w().row(1).to_vec()].concat(),
+        "scanner": ([scanner.pos_w().row(1).to_vec(), scanner.quat_w().row(1).to_vec()].concat()),
         "mask_ids": names,
         "bodies": "cube",
         "fish": ["equidistant", [0.02, -0.003, 0.0005, -0.0001], ros_matrix(sim.sensor(fish).unwrap())],
-        "infos": ["eye", "fish", "pair/left", "pair/right"].map(|camera| format!("/env_1/{camera}/camera_info")),
+        "infos": (["eye", "fish", "pair/left", "pair/right"].map(|camera| format!("/env_1/{camera}/camera_info"))),
         "projections": projections,
         "round": true,
     });

@@ -117,8 +117,7 @@ fn missing_poses() {
     let recorded = record_steps(&mut world, cfg(&path), 3);
     assert_eq!(recorded.left_out, ["of the scene for viewers: arm (poses that are not recorded)"]);
     let found = said("read_scenes.py", &path);
-    let names: Vec<&str> =
-        entities(&found["updates"][0]).map(|entity| entity["name"].as_str().unwrap()).collect();
+    let names: Vec<&str> = entities(&found["updates"][0]).map(|entity| entity["name"].as_str().unwrap()).collect();
     assert!(names.contains(&"cube") && names.contains(&"ground"), "{names:?}");
     // The link that is welded to the world stands where it is.
     assert!(names.iter().all(|name| !name.starts_with("arm/") || *name == "arm/base_link"), "{names:?}");

@@ -1,7 +1,7 @@
 //! Parts move as their files do alone, also twice in a scene, beside robots and after more was added.
 
 use super::*;
-use kinetoscope::ndarray::{Array2, array};
+use kinetoscope::ndarray::array;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::mj::{ObjectKind, compile_file};
 use testkit::tolerance::{Tolerance, assert_close, assert_number};
@@ -226,23 +226,4 @@ fn additions() {
     sim.update(10);
     assert!(sim.diverged().is_empty());
     assert_ne!(state(&sim).0, before.0);
-}
-
-/// Environments that have different controls have the same bits on any number of threads, those of sensors too.
-#[test]
-fn threads() {
-    let run = |threads| {
-        let cfg = SimulationManagerCfg { physics_dt: 0.002, ..testkit::worlds::cfg(5, threads) };
-        let mut sim = sim(cfg);
-        let part = sim.add_mjcf(MjcfCfg::text("m", MACHINE)).unwrap();
-        let id = sim.add_sensor("all", MujocoSensorCfg::default()).unwrap();
-        let controls = Array2::from_shape_fn((5, 3), |(env, k)| 0.1 * env as f64 - 0.2 * k as f64);
-        sim.mjcf_part_mut(part).set_ctrl(&controls, None, None).unwrap();
-        sim.update(150);
-        (sim.mjcf_part(part).get_qpos(), sim.sensor(id).unwrap().values().to_owned())
-    };
-    let ((qpos, values), (other_qpos, other_values)) = (run(1), run(3));
-    testkit::bits::assert_same_bits("positions", &qpos, &other_qpos);
-    testkit::bits::assert_same_bits("sensors", &values, &other_values);
-    assert_ne!(qpos.row(0), qpos.row(1));
 }

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use testkit::bits::bits;
 use testkit::refusal::assert_error;
 use testkit::tolerance::{Tolerance, assert_close};
-use testkit::worlds::{count_diagnostics, pose_in, row, sr5};
+use testkit::worlds::{count_diagnostics, pose_in, sr5};
 
 /// A machine with all of MuJoCo's sensors.
 fn sensing(num_envs: usize) -> (SimulationManager, MjcfId, SensorId<MujocoSensor>) {
@@ -131,37 +131,6 @@ fn names_units_and_rate() {
     assert_eq!(sim.sensor(id).unwrap().sample_counts()[0], 0);
 }
 
-/// A block of 2 kg that stands on the ground, a light of 0.3 kg that hangs in the world.
-const AT_REST: &str = include_str!("../../data/mjcf/at_rest.xml");
-
-/// At rest an accelerometer reads +g, what touches carries the weight, and a mount holds force and torque of its load.
-#[test]
-fn at_rest() {
-    let (mut sim, part) = with(1, AT_REST);
-    let id = sim.add_sensor("all", MujocoSensorCfg::default()).unwrap();
-    let reads = |sim: &SimulationManager, name: &str, expected: &[f64], (limit, derivation)| {
-        let found = sim.sensor(id).unwrap().value(name).unwrap();
-        assert_close(name, found.row(0), expected, Tolerance::absolute(limit, derivation));
-    };
-    let (rounding, still) = ("rounding", "soft contacts of 20 ms: e^-100 of the motion is left, and the solver's 1e-8");
-    // Statics of the mount are exact from the start: weight in the centre of the light, 0.1 m along x. MuJoCo gives what the
-    // light exerts on the ceiling's side as the force that holds it: up, and r x F = (0.1, 0, -0.4) x (0, 0, m g).
-    let (g, weight) = (9.81, 0.3 * 9.81);
-    reads(&sim, "force", &[0.0, 0.0, weight], (1e-12, rounding));
-    reads(&sim, "torque", &[0.0, -0.1 * weight, 0.0], (1e-12, rounding));
-    reads(&sim, "pos", &[1.0, 0.0, 1.8], (1e-15, rounding));
-    // The block sinks into its soft contact for some tenths of a second (time constant 20 ms): after 2 s it stands.
-    sim.update(1000);
-    reads(&sim, "acc", &[0.0, 0.0, g], (1e-6, still));
-    reads(&sim, "gyro", &[0.0; 3], (1e-6, still));
-    reads(&sim, "touch", &[2.0 * g], (1e-5, still));
-    // Thrown up it falls freely: nothing is felt, and nothing touches.
-    sim.mjcf_part_mut(part).write_qvel(&row([0.0, 0.0, 3.0, 0.0, 0.0, 0.0]), None).unwrap();
-    sim.update(100);
-    reads(&sim, "acc", &[0.0; 3], (1e-9, rounding));
-    reads(&sim, "touch", &[0.0], (1e-12, rounding));
-}
-
 /// A joint of every type, and actuators without and with an activation.
 const MOVERS: &str = include_str!("../../data/mjcf/movers.xml");
 
@@ -225,71 +194,6 @@ fn joints_of_robots() {
     assert_eq!(sensor.forces().row(0).to_vec()[1..], qf.row(0).to_vec()[..2]);
     assert!(qf[(0, 1)].abs() > 1.0, "the control: it carries a load");
     assert_error(empty(1).add_sensor("none", ActuatorStateCfg::default()), "", &["measure nothing"]);
-}
-
-/// Masses with centres in the frame of the arm: the arm's own, and that of the tool, which is welded to it and has its mass
-/// in its origin.
-const LOADS: [(f64, [f64; 3]); 2] = [(1.5, [0.2, 0.0, -0.1]), (2.0, [0.35, 0.1, -0.4])];
-const PALM: [f64; 3] = [0.05, -0.02, 0.1];
-
-/// A crane that stands in one environment and turns freely about the vertical in the other. What its joint exerts carries
-/// all that is beyond it and bends its way: `F = sum m (omega x (omega x c) - g)`, and about the palm
-/// `T = sum (c - p) x m (omega x (omega x c) - g)`, both turned into the axes of the palm.
-#[test]
-fn wrench_at_a_site() {
-    let turn = from_xyz_rpy([0.0; 3], [0.4, -0.2, 0.7]).rotation;
-    let joined = |v: &[f64]| v.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
-    // Moments that are alike about all axes: turning needs no torque of its own.
-    let inertial = |mass: f64, at: &[f64]| {
-        format!(r#"<inertial pos="{}" mass="{mass}" diaginertia="0.01 0.01 0.01"/>"#, joined(at))
-    };
-    let crane = format!(
-        r#"<mujoco><worldbody><body name="arm" pos="0 0 2"><joint name="turn" axis="0 0 1"/>{}
-        <body name="tool" pos="{}">{}<site name="palm" pos="{}" quat="{}"/></body></body></worldbody></mujoco>"#,
-        inertial(LOADS[0].0, &LOADS[0].1),
-        joined(&LOADS[1].1),
-        inertial(LOADS[1].0, &[0.0; 3]),
-        joined(&PALM),
-        joined(&[turn.w, turn.i, turn.j, turn.k]),
-    );
-    let mut sim = empty(2);
-    // The part stands turned about the vertical, which changes nothing in the axes of its bodies.
-    let init_pose = from_xyz_rpy([0.3, -0.2, 0.1], [0.0, 0.0, 0.5]);
-    let part = sim.add_mjcf(MjcfCfg { init_pose, ..MjcfCfg::text("m", crane) }).unwrap();
-    let cfg = JointWrenchCfg { links: vec!["m/arm".into()], frames: vec!["m/palm".into()], ..Default::default() };
-    let id = sim.add_sensor("wrench", cfg).unwrap();
-    let omegas = [0.0, 3.0];
-    sim.mjcf_part_mut(part).write_qvel(&array![[omegas[0]], [omegas[1]]], None).unwrap();
-    let palm = Vector3::from(LOADS[1].1) + Vector3::from(PALM);
-    let up = Vector3::new(0.0, 0.0, 9.81);
-    let wrench_about = |p: Vector3<f64>, omega: f64| {
-        LOADS.iter().fold((Vector3::zeros(), Vector3::zeros()), |(force, torque), (mass, com)| {
-            let com = Vector3::from(*com);
-            let needed = *mass * (up - omega * omega * Vector3::new(com.x, com.y, 0.0));
-            (force + needed, torque + (com - p).cross(&needed))
-        })
-    };
-    // Sums of a few numbers of at most 100, with 16 digits, through chains of frames of unit length: 1e-13.
-    let same = |found: ArrayView3<'_, f64>, env: usize, b: usize, expected: Vector3<f64>| {
-        let found = Vector3::from_fn(|k, _| found[(env, b, k)]);
-        assert!((found - expected).norm() < 1e-11, "environment {env}, {b}: {found} is not {expected}");
-    };
-    for _ in 0..4 {
-        let sensor = sim.sensor(id).unwrap();
-        assert_eq!(sensor.link_names(), ["m/arm", "m/palm"]);
-        for (env, omega) in omegas.into_iter().enumerate() {
-            for (b, about, axes) in [(0, Vector3::zeros(), UnitQuaternion::identity()), (1, palm, turn.inverse())] {
-                let (force, torque) = wrench_about(about, omega);
-                same(sensor.forces(), env, b, axes * force);
-                same(sensor.torques(), env, b, axes * torque);
-            }
-        }
-        sim.update(30);
-    }
-    // The controls: the palm is elsewhere and turned, and turning is felt.
-    let (still, turning) = (wrench_about(palm, 0.0), wrench_about(palm, 3.0));
-    assert!((still.1 - wrench_about(Vector3::zeros(), 0.0).1).norm() > 1.0 && (turning.0 - still.0).norm() > 1.0);
-    assert!((turn.inverse() * still.0 - still.0).norm() > 1.0);
 }
 
 /// Sites are frames where MuJoCo has them, for sensors of frames, cameras and the handle of the part.

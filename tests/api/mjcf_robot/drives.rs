@@ -90,23 +90,6 @@ fn compared(
     [worst, farthest]
 }
 
-/// The drive that stands for an actuator is its law. Ours is evaluated at the end of the step of h = 1e-4 s, which adds a damping
-/// of `h kp = 2e-3` to the 0.8 N m s/rad of joint and drive: a quarter of a percent, of which 2e-3 rad are left of 0.5. The
-/// length of the actuator is twice the angle.
-#[test]
-fn servo() {
-    let text = r#"<mujoco><option timestep="0.0001" gravity="0 0 0"/><default><geom contype="0" conaffinity="0"/></default>
-        <worldbody><body name="base"><geom size="0.1" mass="1"/>
-        <body><joint name="j" axis="0 0 1" damping="0.4"/><geom type="capsule" size="0.02" fromto="0 0 0 0.3 0 0" mass="1"/></body>
-        </body></worldbody>
-        <actuator><general joint="j" gear="2" gaintype="fixed" biastype="affine" gainprm="5" biasprm="0 -5 -0.1"/></actuator>
-        </mujoco>"#;
-    let (sim, id, data) = fine(text);
-    assert_eq!((sim.robot(id).get_stiffness()[(0, 0)], sim.robot(id).get_damping()[(0, 0)]), (20.0, 0.4));
-    let [worst, farthest] = compared((sim, id, data), 0.5, 1.0, [50, 50]);
-    assert!(worst < 2e-3 && farthest > 0.5, "{worst} rad; it overshoots: {farthest}");
-}
-
 /// `a` follows `b` by -0.5 and `c` follows `a` by 3; the actuators are at the ends of the chain.
 pub(super) const CHAIN: &str = include_str!("../../data/mjcf/chain.xml");
 

@@ -242,56 +242,17 @@ fn quadruped() {
     assert!(there.iter().zip(&here).all(|(a, b)| (a - b).abs() < 1e-8) && there[2] > 500.0, "{there:?} {here:?}");
 }
 
-/// The depth of a foot in the ground at rest. A row of a contact holds f = a_ref / R there, with R = A (1 - d) / d and
-/// a_ref = d δ / (d² t²), A being the inverse weight of the foot's body, t = 0.02 s and d = 0.95 the time constant and the
-/// impedance of MuJoCo's defaults beyond a depth of 1 mm (the chapter "Computation" of its manual, "Solver parameters" and
-/// "Parameters"). So δ = f (1 - d) A t².
-fn depth_at_rest(force: f64, inverse_weight: f64) -> f64 {
-    const IMPEDANCE: f64 = 0.95;
-    const TIME: f64 = 0.02;
-    force * (1.0 - IMPEDANCE) * inverse_weight * TIME * TIME
-}
-
-/// Both stand on their feet, each as deep in the ground as its load presses it; A is that of the shank which a foot from a
-/// URDF is fused to, and in the file that of the foot itself, a body of its own, whose middle is lower. Drives of 80 N m/rad
-/// are soft, and loaded feet creep apart at a constant rate: the base has sunk by that rate times the two seconds, less the
-/// part of a second until it had landed. But for both, the two stand equally high.
+/// Both stand on four feet, which carry the weight.
 #[test]
 fn quadruped_stands() {
-    const TIME: f64 = 2.0;
-    // Mean depth of the feet, height of the base, and the velocity at which it sinks.
-    let [urdf, xml] = quadrupeds().map(|(mut sim, id)| {
+    for (mut sim, id) in quadrupeds() {
         let feet = sim.add_sensor("feet", ContactSensorCfg::of(".*_FOOT")).unwrap();
-        sim.update((TIME / sim.cfg().physics_dt).round() as u32);
+        sim.update((2.0 / sim.cfg().physics_dt).round() as u32);
         assert!(sim.diverged().is_empty());
-        let sensor = sim.sensor(feet).unwrap();
-        let forces = sensor.net_forces_w().index_axis(Axis(2), 2).row(0).to_vec();
-        let weight: f64 = forces.iter().sum();
+        let weight: f64 = sim.sensor(feet).unwrap().net_forces_w().index_axis(Axis(2), 2).row(0).iter().sum();
         // The mass has three decimals: 5e-4 kg are 5e-3 N; as much again is an acceleration of 1e-4 m/s² that is left.
         assert!((weight - 52.135 * 9.81).abs() < 1e-2, "{weight} N");
-        let legs: Vec<String> = sensor.body_names().iter().map(|name| name.replace("_FOOT", "_")).collect();
-        let depths: f64 = sim.batch().read(0, |env| {
-            let (contacts, model) = (env.data().contact(), env.data().model());
-            assert_eq!(contacts.len(), 4);
-            let depth = |(leg, force): (&String, &f64)| {
-                let bodies = |geom: i32| model.geom_bodyid()[geom as usize] as usize;
-                let is_its = |body: &usize| model.name(ObjectKind::Body, *body).is_some_and(|n| n.starts_with(leg));
-                let (dist, body) = contacts
-                    .iter()
-                    .find_map(|c| Some((c.dist, [c.geom1, c.geom2].map(bodies).into_iter().find(is_its)?)))
-                    .unwrap();
-                let expected = depth_at_rest(*force, model.body_invweight0()[2 * body]);
-                // Of the force in the last step, and the depth after it, at 1e-4 m/s at most: 1e-6 m in 1e-2 s.
-                assert!((-dist - expected).abs() < 1e-6, "{leg}: {dist}, not {expected}");
-                expected
-            };
-            legs.iter().zip(&forces).map(depth).sum()
-        });
-        [depths / 4.0, sim.robot(id).get_root_pose()[(0, 2)], -sim.robot(id).get_root_velocity()[(0, 2)]]
-    });
-    let level = |[depth, height, sinks]: [f64; 3]| height + depth + sinks * TIME;
-    let (apart, allowed) = ((level(urdf) - level(xml)).abs(), 0.5 * urdf[2].max(xml[2]));
-    assert!(apart < allowed && urdf[1] > 0.4, "{apart} m of {allowed} m");
-    // The controls: without the depths, or without what creeps, they would not.
-    assert!((urdf[0] - xml[0]).abs() > 5.0 * allowed && (urdf[2] - xml[2]).abs() * TIME > 2.0 * allowed);
+        assert_eq!(sim.batch().read(0, |env| env.data().contact().len()), 4);
+        assert!(sim.robot(id).get_root_pose()[(0, 2)] > 0.4);
+    }
 }

@@ -90,54 +90,6 @@ fn combinations() {
     assert!(parted([None, None]) < 0.2, "{}", parted([None, None]));
 }
 
-/// MuJoCo's steps of the spring and damper, by hand: `x'' = max(0, ...)` on the free fall, with explicit forces. `efc_force`
-/// of a contact through the centre of mass is that of a single row with A = 1/m.
-fn recursion(mut z: f64, [stiffness, damping]: [f64; 2], h: f64, steps: u32) -> (f64, f64) {
-    let mut v = 0.0;
-    for _ in 0..steps {
-        let free = -9.81;
-        // a = d (-B v - K x) + (1 - d) free with d = 0.9999, B = damping/d and K = stiffness/d² times the impedance d.
-        let held = -damping * v - stiffness * z + 1e-4 * free;
-        let a = if z < 0.0 { held.max(free) } else { free };
-        v += h * a;
-        z += h * v;
-    }
-    (z, v)
-}
-
-/// A ball dropped on the ground, step by step as the recursion says, flies off with its part of the velocity.
-#[test]
-fn dropped_ball() {
-    for wanted in [0.25, 0.5, 0.75, 0.95] {
-        let h = 1e-3;
-        let mut sim = sim(SimulationManagerCfg { physics_dt: h, ..SimulationManagerCfg::manipulation() });
-        let init_pose = Pose::translation(0.0, 0.0, 0.6004);
-        let id = sim.add_rigid_object(RigidObjectCfg { init_pose, ..bouncy("ball", 0.7, Some(wanted)) }).unwrap();
-        // solref of the object, as its model has it.
-        let solref = sim.batch().read(0, |env| {
-            let model = env.data().model();
-            let geom = (0..model.ngeom()).find(|&g| model.geom_solref()[2 * g] < 0.0).unwrap();
-            [-model.geom_solref()[2 * geom], -model.geom_solref()[2 * geom + 1]]
-        });
-        let [mut down, mut up] = [0.0_f64; 2];
-        for step in 1..=600 {
-            sim.update(1);
-            let (z, v) = recursion(0.5004, solref, h, step);
-            let (height, speed) =
-                (sim.rigid_object(id).get_pose()[(0, 2)] - 0.1, sim.rigid_object(id).get_velocity()[(0, 2)]);
-            let apart = (height - z).abs().max((speed - v).abs());
-            assert!(apart < 1e-4, "{wanted}, step {step}: {height} {z}, {speed} {v}");
-            // The first bounce alone.
-            if step < 400 {
-                (down, up) = (down.min(speed), up.max(speed));
-            }
-        }
-        // Torricelli, and a contact of 10 ms.
-        assert!((down + (2.0 * 9.81 * 0.5004_f64).sqrt()).abs() < 0.02, "{down}");
-        assert!(is_near(up / -down, wanted), "{wanted}: {}", up / -down);
-    }
-}
-
 /// A ball above a block on the ground.
 fn stack() -> (SimulationManager, [ObjectId; 2]) {
     let mut sim = sim(SimulationManagerCfg { num_envs: 2, physics_dt: 2e-3, ..Default::default() });

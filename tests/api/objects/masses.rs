@@ -212,24 +212,6 @@ fn friction() {
     assert_error(refused, "NotDynamic { argument: \"set_mass\", object: \"shelf\"", &[]);
 }
 
-/// A ball that is heavy below stands up again; an even one does not.
-#[test]
-fn tumbler() {
-    let upright = std::f64::consts::FRAC_PI_2;
-    for (center_of_mass, expected) in [(Some([0.0, 0.0, -0.06]), 0.0), (None, upright)] {
-        let mut sim = sim(SimulationManagerCfg { physics_dt: 2e-3, ..Default::default() });
-        let ball = object("ball", ObjectShape::Sphere { radius: 0.1 }, [0.0, 0.0, 0.1]);
-        let id = sim.add_rigid_object(RigidObjectCfg { center_of_mass, angular_damping: 0.02, ..ball }).unwrap();
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        sim.rigid_object_mut(id).write_pose(&row([0.0, 0.0, 0.1, half, half, 0.0, 0.0]), None).unwrap();
-        sim.update(10_000);
-        let q = sim.rigid_object(id).get_pose();
-        // The angle from upright to its z axis.
-        let angle = (1.0 - 2.0 * (q[(0, 4)].powi(2) + q[(0, 5)].powi(2))).acos();
-        assert!((angle - expected).abs() < 0.02, "{center_of_mass:?}: {angle}");
-    }
-}
-
 /// On the ground a margin is air; between two, 2.2.2 takes the larger, 4.x the sum.
 #[test]
 fn margins() {

@@ -36,24 +36,6 @@ fn paddle_pushes() {
     assert!(sim.rigid_object(paddle).get_velocity().iter().all(|v| *v == 0.0));
 }
 
-/// A table that is raised carries a cube up with it; a quaternion of length 2 is normalised.
-#[test]
-fn table_carries() {
-    let mut sim = empty(2);
-    let table = kinematic(object("table", ObjectShape::Box { size: [1.0, 1.0, 0.1] }, [0.0; 3]));
-    let table = sim.add_rigid_object(table).unwrap();
-    let cube = sim.add_rigid_object(object("cube", ObjectShape::cube(0.2), [0.0, 0.0, 0.15])).unwrap();
-    for step in 1..=1000 {
-        let rows = Array2::from(vec![at(0.0, 0.0), [0.0, 0.0, 2e-4 * f64::from(step), 2.0, 0.0, 0.0, 0.0]]);
-        sim.rigid_object_mut(table).write_pose(&rows, None).unwrap();
-        sim.update(1);
-    }
-    sim.update(500);
-    let z = sim.rigid_object(cube).get_pose();
-    assert!((z[(0, 2)] - 0.15).abs() < 1e-3 && (z[(1, 2)] - 0.35).abs() < 1e-3, "{z}");
-    assert_eq!(sim.rigid_object(table).get_pose()[(1, 3)], 1.0);
-}
-
 /// Reset, snapshots and additions know where a kinematic object is.
 #[test]
 fn kinematic_state() {

@@ -32,9 +32,17 @@ fn configurations() {
         ("restitution", RigidObjectCfg { restitution: Some(1.1), ..cube() }),
         ("restitution", RigidObjectCfg { restitution: Some(nan), ..cube() }),
         ("contact_margin", RigidObjectCfg { contact_margin: -1e-3, ..cube() }),
+        ("shape", RigidObjectCfg { shape: ObjectShape::cube(0.0), ..cube() }),
+        ("shape", RigidObjectCfg { shape: ObjectShape::Sphere { radius: nan }, ..cube() }),
+        ("density", RigidObjectCfg { density: 0.0, ..cube() }),
+        ("friction", RigidObjectCfg { friction: Some([-1.0, 0.0, 0.0]), ..cube() }),
+        ("rgba", RigidObjectCfg { rgba: [2.0, 0.0, 0.0, 1.0], ..cube() }),
     ];
     let variant = |field| format!("Config {{ field: {field:?}");
     assert_refused(rows.map(|(field, cfg)| (field, sim.add_rigid_object(cfg), variant(field), [])));
+    for uid in ["world", "a/b"] {
+        assert!(sim.add_rigid_object(object(uid, ObjectShape::cube(0.1), [0.0; 3])).is_err(), "{uid}");
+    }
     // Control: what is left out of each is good.
     sim.add_rigid_object(cube()).unwrap();
 }

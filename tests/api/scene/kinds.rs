@@ -1,12 +1,10 @@
 //! Every kind of entity from a file, a sensor of one's own among them.
 
+use crate::sensors::custom::{Speed, SpeedCfg};
 use kinetoscope::prelude::*;
-use kinetoscope::scene::SceneState;
 use kinetoscope::sensors::camera::imperfection::{Holes, ReadNoise, ShotNoise, Vignetting};
 use kinetoscope::sensors::ray::RayPattern;
 use kinetoscope::sensors::ray::pattern::{Bpearl, Custom, Grid, GridOrder, Lidar, Pinhole};
-use kinetoscope::sensors::{Channel, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
-use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 fn read(text: &str) -> SceneCfg {
@@ -217,87 +215,25 @@ fn cameras() {
     );
 }
 
-/// A sensor that is not of the library: heights of bodies above a level.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct AltimeterCfg {
-    body: String,
-    #[serde(default)]
-    level: f64,
-}
-
-#[derive(Debug)]
-struct Altimeter {
-    body: usize,
-    level: f64,
-    sampler: Sampler,
-}
-
-impl Altimeter {
-    fn read(body: usize, level: f64) -> impl Fn(&SceneState, usize, &mut [f64]) {
-        move |state, env, row| {
-            if let Some(poses) = &state.body_poses {
-                row[0] = poses[(env, body, 2)] - level;
-            }
-        }
-    }
-}
-
-impl SensorCfg for AltimeterCfg {
-    type Sensor = Altimeter;
-
-    fn requires(&self) -> Requires {
-        Requires::POSES
-    }
-
-    fn build(&self, context: &SensorContext) -> Result<Altimeter, SensorError> {
-        let channels = [Channel::new("altitude", 1)];
-        Ok(Altimeter {
-            body: context.body(&self.body)?,
-            level: self.level,
-            sampler: Sampler::new("altimeter", self.requires(), context, &SamplingCfg::default(), &channels)?,
-        })
-    }
-}
-
-impl Sensor for Altimeter {
-    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
-        let read = Self::read(self.body, self.level);
-        self.sampler.update(state, |env, row| read(state, env, row))
-    }
-
-    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        let read = Self::read(self.body, self.level);
-        self.sampler.reset(env_ids, state, |env, row| read(state, env, row))
-    }
-
-    fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        let read = Self::read(self.body, self.level);
-        self.sampler.refresh(env_ids, state, |env, row| read(state, env, row))
-    }
-}
-
-impl Sampled for Altimeter {
-    fn sampler(&self) -> &Sampler {
-        &self.sampler
-    }
-}
-
 #[test]
 fn own_sensor() {
-    let types = EntityTypes::default().with_sensor::<AltimeterCfg>("altimeter");
+    let types = EntityTypes::default().with_sensor::<SpeedCfg>("speedometer");
     let text = "[entities.ball]\ntype = \"rigid_object\"\nshape.sphere.radius = 0.1\ninit_pose.pos = [0, 0, 5]\n\
-                [entities.height]\ntype = \"altimeter\"\nbody = \"{ENV}/ball\"\nlevel = 1\n";
+                [entities.speed]\ntype = \"speedometer\"\nbody = \"{ENV}/ball\"\nlevel = 1\n";
     let cfg = SceneCfg::from_toml(text, "scene.toml", &types).unwrap();
     let written = cfg.to_toml(&types).unwrap();
     let scene = InteractiveScene::new(SceneCfg::from_toml(&written, "scene.toml", &types).unwrap()).unwrap();
-    let altimeter = scene.sensor::<Altimeter>("height").unwrap();
-    assert_eq!(altimeter.sampler.values("altitude").iter().copied().collect::<Vec<_>>(), [4.0]);
+    let speed = scene.sensor::<Speed>("speed").unwrap();
+    assert_eq!(
+        speed.sampler.values("speed").iter().copied().collect::<Vec<_>>(),
+        [-1.0],
+        "at rest, above a level of 1"
+    );
 
     let error = SceneCfg::from_toml(&text.replace("level", "levle"), "scene.toml", &types).unwrap_err().to_string();
     assert!(error.starts_with("scene.toml:8: ") && error.contains("`level`"), "{error}");
     let error = cfg.to_toml(&EntityTypes::default()).unwrap_err().to_string();
-    assert!(error.contains("height") && error.contains("with_sensor"), "{error}");
+    assert!(error.contains("speed") && error.contains("with_sensor"), "{error}");
     assert!(SceneCfg::from_toml(text, "scene.toml", &EntityTypes::default()).is_err());
     // From a file the same; without the type it says which there are.
     let files = tempfile::tempdir().unwrap();
@@ -306,7 +242,7 @@ fn own_sensor() {
     let read = SceneCfg::from_file_with(&path, &types).unwrap();
     assert_eq!(read.to_toml(&types).unwrap(), written);
     let error = SceneCfg::from_file(&path).unwrap_err().to_string();
-    assert!(error.contains("own.toml:6") && error.contains("\"height\"") && error.contains("rigid_object"), "{error}");
+    assert!(error.contains("own.toml:6") && error.contains("\"speed\"") && error.contains("rigid_object"), "{error}");
     let error = SceneCfg::from_file_with(files.path().join("none.toml"), &types).unwrap_err();
     assert!(matches!(&error, Error::File { path, .. } if path.ends_with("none.toml")), "{error:?}");
 }

@@ -119,6 +119,7 @@ fn values() {
     let rows: Rows<'_> = &[
         (2, "[simulation]\nnum_envs = \"two\"", "two|usize"),
         (2, "[simulation]\nnum_envs = -1", "-1"),
+        (4, "@imu\n[entities.s.sampling]\nhistory_length = -1", "-1"),
         (3, "[simulation]\n\ngravity = [0, 1]", "array of length 3"),
         (2, "[simulation]\nground = true", "true|false for none"),
         (2, "[simulation]\nlights = [{ direction = 3 }]", "integer `3`|array of length 3"),

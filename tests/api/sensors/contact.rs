@@ -1,10 +1,9 @@
 //! Contact forces, points and times in a running simulation, against Newton's laws and closed forms.
 
-use super::worlds::{G, add_robot, ball, cfg, cube, fixed, joint, link, pose_in, row, sim};
+use super::worlds::{G, ball, cfg, cube, fixed, pose_in, row, sim};
 use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
-use kinetoscope::sim::Cone;
 use nalgebra::Vector3;
 use testkit::tolerance::{Tolerance, assert_close, assert_number};
 use testkit::worlds;
@@ -58,33 +57,6 @@ fn newtons_second_law() {
     assert!(touched > 300 && flying > 10, "{touched} steps with contact, {flying} without");
     // The remaining motion after two seconds is far below a thousandth of gravity.
     assert_close("weight at rest", sim.sensor(id).unwrap().net_forces_w(), &[0.0, 0.0, mass * G], STILL * (mass * G));
-}
-
-/// A slope of 20 degrees, as a tilted gravity: the normal force is m g cos, friction m g sin. Net forces are normal ones
-/// only: with friction in them they would have an x component.
-#[test]
-fn normal_and_friction() {
-    let (sin, cos) = 20.0_f64.to_radians().sin_cos();
-    let gravity = G * Vector3::new(sin, 0.0, -cos);
-    let settings = SimulationManagerCfg { gravity, cone: Cone::Elliptic, impratio: 10.0, ..cfg(1) };
-    let mut sim = worlds::sim(settings);
-    let mass = 1.5;
-    sim.add_rigid_object(cube("box", 0.2, mass, [0.0, 0.0, 0.1])).unwrap();
-    let filters = strings(&["ground"]);
-    let watch = ContactSensorCfg { track_contact_points: true, filters, ..ContactSensorCfg::of("box") };
-    let id = sim.add_sensor("contact", watch).unwrap();
-    sim.update(1000);
-    let sensor = sim.sensor(id).unwrap();
-    let weight = mass * G;
-    // At rest up to a creep that changes by less than a thousandth of gravity.
-    let near = STILL * weight;
-    assert_close("normal force", sensor.net_forces_w(), &[0.0, 0.0, weight * cos], near);
-    assert_close("friction", sensor.friction_forces_w(), &[-weight * sin, 0.0, 0.0], near);
-    assert_close("both", sensor.total_forces_w(), &[-weight * sin, 0.0, weight * cos], near);
-    assert_eq!(sensor.net_forces_w()[(0, 0, 0)], 0.0, "the normal of the ground is z, to the last bit");
-    assert!(sensor.force_matrix_w().iter().eq(sensor.net_forces_w()));
-    let points = sensor.contact_points_w().unwrap();
-    assert!(points[(0, 0, 2)].abs() < 0.01 && sensor.contact_counts().unwrap()[(0, 0)] >= 3.0, "{points}");
 }
 
 fn pairs(bodies: &str, filters: &[&str]) -> ContactSensorCfg {
@@ -206,33 +178,6 @@ fn action_and_reaction() {
         let none = Vector3::zeros();
         assert_eq!((counts[(a, b)], vector(&force, a, b), vector(&points, a, b)), (0.0, none, none), "no contact");
     }
-}
-
-/// A foot behind a fixed joint is a body of its own: it carries the robot, and the body that it is fused to nothing.
-#[test]
-fn fused_feet() {
-    let mut content = link("base", 4.0, 0.1, [0.0; 3], "");
-    for (k, at) in [[0.2, 0.0, -0.3], [-0.1, 0.17, -0.3], [-0.1, -0.17, -0.3]].into_iter().enumerate() {
-        let (foot, ball) = (format!("FOOT{k}"), testkit::urdf::collision(r#"<sphere radius="0.05"/>"#, [0.0; 3]));
-        content += &link(&foot, 0.1, 1e-4, [0.0; 3], &ball);
-        content += &joint(&format!("fixed{k}"), "fixed", ["base", &foot], at, "0 0 1");
-    }
-    let mut sim = sim(1);
-    let dog = add_robot(&mut sim, "dog", &content, |cfg| {
-        (cfg.fix_base, cfg.init_pose) = (false, Pose::translation(0.0, 0.0, 0.35));
-    });
-    let bodies = strings(&[".*FOOT.", "dog/base"]);
-    let id = sim.add_sensor("feet", ContactSensorCfg { bodies, track_pose: true, ..Default::default() }).unwrap();
-    sim.update(1000);
-    let sensor = sim.sensor(id).unwrap();
-    assert_eq!(sensor.body_names(), ["dog/FOOT0", "dog/FOOT1", "dog/FOOT2", "dog/base"]);
-    let net = sensor.net_forces_w();
-    let weight = 4.3 * G;
-    assert_number("weight on the feet", (0..3).map(|foot| net[(0, foot, 2)]).sum::<f64>(), weight, STILL * weight);
-    assert!((0..3).all(|foot| net[(0, foot, 2)] > 0.2 * weight), "{net}");
-    assert!(net.index_axis(Axis(1), 3).iter().all(|force| *force == 0.0));
-    let pose = sim.robot(dog).link_pose("FOOT1").unwrap();
-    assert_eq!(sensor.pos_w().unwrap().index_axis(Axis(1), 1), pose.slice(s![.., ..3]));
 }
 
 /// Right after a write, forces are those of the state that was written, and so are their stamps.

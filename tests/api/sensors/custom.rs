@@ -1,89 +1,29 @@
-//! Sensors that another crate defines.
+//! A sensor that another crate defines.
 
-use super::worlds::{ball, sim, sr5};
-use kinetoscope::ndarray::array;
+use super::worlds::{ball, sim};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::SceneState;
-use kinetoscope::sensors::{Channel, Requires, Sampler, Schedule, Sensor, SensorCfg, SensorContext, SensorError};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use kinetoscope::sensors::{Channel, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
+use serde::{Deserialize, Serialize};
 use testkit::tolerance::{Tolerance, assert_close};
 
-/// Height of the last body, at every step, or lazily every 0.03 s; counts its measurements.
-#[derive(Clone, Default)]
-struct HeightCfg {
-    lazy: bool,
-    measured: Arc<AtomicUsize>,
+/// Speed of a body above a level, with everything that a sampler provides: rate, latency, noise.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SpeedCfg {
+    body: String,
+    #[serde(default)]
+    level: f64,
+    #[serde(default)]
+    sampling: SamplingCfg,
 }
 
 #[derive(Debug)]
-struct Height(Vec<f64>, Arc<AtomicUsize>);
-
-impl SensorCfg for HeightCfg {
-    type Sensor = Height;
-
-    fn requires(&self) -> Requires {
-        Requires::POSES
-    }
-
-    fn lazy(&self, dt: f64) -> Option<Schedule> {
-        self.lazy.then(|| Schedule::new(0.03, dt, false).unwrap())
-    }
-
-    fn build(&self, context: &SensorContext) -> Result<Height, SensorError> {
-        Ok(Height(vec![f64::NAN; context.num_envs], Arc::clone(&self.measured)))
-    }
+pub(crate) struct Speed {
+    body: usize,
+    level: f64,
+    pub(crate) sampler: Sampler,
 }
-
-impl Sensor for Height {
-    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
-        self.1.fetch_add(1, Ordering::Relaxed);
-        self.refresh(&[], state)
-    }
-
-    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.refresh(env_ids, state)
-    }
-
-    fn refresh(&mut self, _env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        let missing = SensorError::MissingFields { sensor: "height", missing: Requires::POSES };
-        let poses = state.body_poses.as_ref().ok_or(missing)?;
-        self.0.iter_mut().enumerate().for_each(|(env, height)| *height = poses[(env, poses.dim().1 - 1, 2)]);
-        Ok(())
-    }
-}
-
-/// A lazy sensor holds what it would have measured when it was due, and measures once for all readers.
-#[test]
-fn eager_and_lazy() {
-    let mut sim = testkit::worlds::sim(testkit::worlds::cfg(3, 2));
-    let robot = sim.add_robot(sr5("robot")).unwrap();
-    sim.robot_mut(robot).set_qpos(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
-    let cfg = HeightCfg { lazy: true, ..Default::default() };
-    let eager = sim.add_sensor("eager", HeightCfg::default()).unwrap();
-    let lazy = sim.add_sensor("lazy", cfg.clone()).unwrap();
-    let height = |sim: &SimulationManager| sim.robot(robot).link_pose("ee_link").unwrap().column(2).to_vec();
-    let start = height(&sim);
-    assert_eq!(sim.sensor(lazy).unwrap().0, start);
-    // The instant of the last measurement, not that of the reading: periods are three steps.
-    for (steps, moves) in [(2, false), (10, true), (2, false)] {
-        let before = sim.sensor(lazy).unwrap().0.clone();
-        sim.update(steps);
-        assert_eq!(sim.sensor(eager).unwrap().0, height(&sim));
-        let expected = if moves { height(&sim) } else { before };
-        for _ in 0..3 {
-            assert_eq!(sim.sensor(lazy).unwrap().0, expected, "{steps} steps");
-        }
-    }
-    assert_ne!(height(&sim), start);
-    assert_eq!(cfg.measured.load(Ordering::Relaxed), 1, "four measurements were due, one was made");
-}
-
-/// Speed of a body, with everything that a sampler provides: rate, latency, noise.
-#[derive(Debug)]
-struct Speed(usize, Sampler);
-
-struct SpeedCfg(&'static str, SamplingCfg);
 
 impl SensorCfg for SpeedCfg {
     type Sensor = Speed;
@@ -93,31 +33,37 @@ impl SensorCfg for SpeedCfg {
     }
 
     fn build(&self, context: &SensorContext) -> Result<Speed, SensorError> {
-        let sampler = Sampler::new("speed", self.requires(), context, &self.1, &[Channel::new("speed", 1)])?;
-        Ok(Speed(context.body(self.0)?, sampler))
+        let channels = [Channel::new("speed", 1)];
+        let sampler = Sampler::new("speed", self.requires(), context, &self.sampling, &channels)?;
+        Ok(Speed { body: context.body(&self.body)?, level: self.level, sampler })
     }
 }
 
-fn speed(body: usize, state: &SceneState, env: usize) -> f64 {
-    let velocity = |k| state.body_velocities.as_ref().map_or(0.0, |v| v[(env, body, k)]);
-    (0..3).map(|k| velocity(k).powi(2)).sum::<f64>().sqrt()
+fn read(body: usize, level: f64) -> impl Fn(&SceneState, usize, &mut [f64]) {
+    move |state, env, row| {
+        let velocity = |k| state.body_velocities.as_ref().map_or(0.0, |v| v[(env, body, k)]);
+        row[0] = (0..3).map(|k| velocity(k).powi(2)).sum::<f64>().sqrt() - level;
+    }
 }
 
 impl Sensor for Speed {
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
-        self.1.update(state, |env, row| row[0] = speed(self.0, state, env))
+        let read = read(self.body, self.level);
+        self.sampler.update(state, |env, row| read(state, env, row))
     }
 
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.1.reset(env_ids, state, |env, row| row[0] = speed(self.0, state, env))
+        let read = read(self.body, self.level);
+        self.sampler.reset(env_ids, state, |env, row| read(state, env, row))
     }
 
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
-        self.1.refresh(env_ids, state, |env, row| row[0] = speed(self.0, state, env))
+        let read = read(self.body, self.level);
+        self.sampler.refresh(env_ids, state, |env, row| read(state, env, row))
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {
-        self.1.due_in(step)
+        self.sampler.due_in(step)
     }
 }
 
@@ -126,10 +72,10 @@ impl Sensor for Speed {
 fn sampler() {
     let mut sim = sim(2);
     sim.add_rigid_object(ball("ball", 0.05, 1.0, [0.0, 0.0, 90.0])).unwrap();
-    let late = SamplingCfg { latency_steps: 4, ..SamplingCfg::every(0.01) };
-    let id = sim.add_sensor("speed", SpeedCfg("ball", late)).unwrap();
+    let sampling = SamplingCfg { latency_steps: 4, ..SamplingCfg::every(0.01) };
+    let id = sim.add_sensor("speed", SpeedCfg { body: "ball".into(), level: 0.0, sampling }).unwrap();
     sim.update(101);
     // The newest capture that is 4 steps old is that of step 96.
     let limit = Tolerance::absolute(1e-12, "rounding of 96 sums of numbers up to 5");
-    assert_close("speed", sim.sensor(id).unwrap().1.values("speed"), &[9.81 * 96.0 * 0.005; 2], limit);
+    assert_close("speed", sim.sensor(id).unwrap().sampler.values("speed"), &[9.81 * 96.0 * 0.005; 2], limit);
 }

@@ -1,7 +1,7 @@
 //! Sensors in a running simulation: schedule, values, resets, and sensors of other crates.
 
 mod contact;
-mod custom;
+pub(crate) mod custom;
 mod debug_vis;
 mod frames;
 mod imu;

@@ -295,13 +295,3 @@ fn samplings() {
     });
     assert_eq!(asked, other);
 }
-
-/// A history below zero, in a file: the error names its line.
-#[test]
-fn negative_history() {
-    for kind in ["contact_sensor", "imu", "joint_state", "ray_caster", "ray_caster_camera"] {
-        let text = format!("[entities.s]\ntype = \"{kind}\"\n\n[entities.s.sampling]\nhistory_length = -1");
-        let error = SceneCfg::from_toml(&text, "scene.toml", &EntityTypes::default()).unwrap_err().to_string();
-        assert!(error.starts_with("scene.toml:5: ") && error.contains("-1"), "{error}");
-    }
-}

@@ -88,25 +88,6 @@ fn contact_history() {
     assert_newest_first("friction", &friction, &sensor.friction_forces_w_history().into_dyn());
 }
 
-#[test]
-fn actuator_history() {
-    let (mut sim, robot) = arm(2);
-    let sampling = remembering(SamplingCfg::default());
-    let id = sim.add_sensor("actuators", ActuatorStateCfg { sampling, ..Default::default() }).unwrap();
-    let (mut controls, mut forces) = (Vec::new(), Vec::new());
-    for step in 0..8 {
-        let target = Array2::from_elem((2, 6), 0.02 * f64::from(step));
-        sim.robot_mut(robot).set_qpos(&target, None, None).unwrap();
-        sim.update(1);
-        let sensor = sim.sensor(id).unwrap();
-        controls.push(sensor.controls().to_owned().into_dyn());
-        forces.push(sensor.forces().to_owned().into_dyn());
-    }
-    let sensor = sim.sensor(id).unwrap();
-    assert_newest_first("controls", &controls, &sensor.control_history().into_dyn());
-    assert_newest_first("forces", &forces, &sensor.force_history().into_dyn());
-}
-
 const STEPS: u64 = 1_000_000;
 
 /// Steps of 5 ms between two measurements, and their latency.

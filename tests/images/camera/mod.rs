@@ -4,7 +4,6 @@ mod files;
 mod markers;
 mod models;
 mod mujoco_renderer;
-mod objects;
 mod overview;
 mod placement;
 mod rays;

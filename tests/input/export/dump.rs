@@ -1,6 +1,6 @@
 //! The files of a dump against the simulation they come from.
 
-use super::robots::{anymal, bundled, dump, simulation, vendor_arm_and_hand};
+use super::robots::{anymal, bundled, dump, simulation};
 use crate::support::exported;
 use crate::urdf::assert_same;
 use kinetoscope::prelude::*;
@@ -170,23 +170,6 @@ fn alike_names_of_meshes() {
     let objs = files(out.path()).keys().filter(|name| name.ends_with(".obj")).count();
     assert_eq!(objs, 2 + 7, "{:?}", files(out.path()).keys());
     assert_eq!(exported(out.path()).unwrap().nmesh(), 2 + 7 + 8, "two parts, seven files, eight hulls");
-}
-
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn vendor_robots_together() {
-    let other = vendor_arm_and_hand();
-    let (mut sim, _) = simulation(bundled());
-    for (i, robot) in [other.clone(), RobotCfg { uid: "third".into(), ..other }].into_iter().enumerate() {
-        let init_pose = Pose::translation(2.0 * (i + 1) as f64, 0.0, 0.0);
-        sim.add_robot(RobotCfg { init_pose, ..robot }).unwrap();
-    }
-    let dir = dump(&sim);
-    let export = exported(dir.path()).unwrap();
-    assert_eq!(names(&export, ObjectKind::Body), names(sim.batch().model(), ObjectKind::Body));
-    for uid in ["sr5", "inspire", "third"] {
-        assert!(dir.path().join(format!("{uid}.urdf")).is_file());
-    }
 }
 
 #[test]

@@ -30,58 +30,45 @@ fn mesh_scales(robot: &RobotDescription) -> Vec<f64> {
     robot.links.iter().flat_map(|link| &link.collisions).map(|c| scale(&c.geometry)).collect()
 }
 
+/// Numbers of the vendors' files, and of two of them together.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
-fn vendor_sr5() {
-    let Assembly { description: robot, diagnostics } = load(SR5);
-    assert_eq!((robot.name.as_str(), count(&robot, JointKind::Revolute)), ("xMateSR5", 6));
-    assert!((robot.total_mass() - 13.622).abs() < 1e-12, "{}", robot.total_mass());
-    assert_eq!(robot.link(robot.root).name, "world");
+fn vendors() {
+    let [sr5, hand, anymal] = [SR5, HAND, ANYMAL].map(load);
+    let said = |of: &Assembly| of.diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+    for (of, joints, mass, root, parts) in [
+        (&sr5, (6, None), (13.622, 1e-12), "world", ["SR5.urdf:64: ", "xMateSR5_joint_7"]),
+        (&anymal, (12, Some(65)), (52.135, 5e-4), "base", ["anymal.urdf:430: ", "material \"orange\""]),
+    ] {
+        let robot = &of.description;
+        assert_eq!(count(robot, JointKind::Revolute), joints.0, "{}", robot.name);
+        assert!(joints.1.is_none_or(|fixed| count(robot, JointKind::Fixed) == fixed), "{}", robot.name);
+        assert!((robot.total_mass() - mass.0).abs() < mass.1, "{}", robot.total_mass());
+        assert_eq!((robot.link(robot.root).name.as_str(), of.diagnostics.len()), (root, 1));
+        assert!(parts.iter().all(|part| said(of).contains(part)), "{}", said(of));
+    }
+    let (robot, fingers) = (&sr5.description, &hand.description);
     let efforts: Vec<_> = robot.drivable_joints().map(|(_, j)| j.limit.as_ref().unwrap().effort.unwrap()).collect();
     assert_eq!(efforts, [113.0, 113.0, 70.0, 25.0, 25.0, 19.0]);
-    assert!(mesh_scales(&robot).iter().all(|&scale| scale == 0.001));
+    assert!(mesh_scales(robot).iter().all(|&scale| scale == 0.001));
     let rgba = robot.links[1].visuals[0].material.as_ref().unwrap().rgba;
     assert_eq!(rgba, Some([1.0; 4]), "the material \"white\" is defined at the top of the file");
-    assert_eq!(diagnostics.len(), 1, "{diagnostics:#?}");
-    assert_eq!(diagnostics[0].kind, DiagnosticKind::ReferenceUnknown);
-    let text = diagnostics[0].to_string();
-    assert!(text.contains("SR5.urdf:64: ") && diagnostics[0].message.contains("xMateSR5_joint_7"), "{text}");
-}
+    let followers = fingers.joints.iter().filter(|j| j.mimic.is_some()).count();
+    assert_eq!((count(fingers, JointKind::Revolute), followers, said(&hand).as_str()), (12, 6, ""));
+    let (driver, multiplier, _) = fingers.mimic_driver(fingers.joint_id("L_thumb_distal_joint").unwrap());
+    assert_eq!((fingers.joint(driver).name.as_str(), multiplier), ("L_thumb_proximal_pitch_joint", 2.4));
+    assert!(fingers.link(fingers.root).inertial.is_none(), "the mount is empty");
+    mesh_scales(fingers);
 
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn vendor_inspire_hand() {
-    let Assembly { description: robot, diagnostics } = load(HAND);
-    assert_eq!(count(&robot, JointKind::Revolute), 12);
-    assert_eq!(robot.joints.iter().filter(|j| j.mimic.is_some()).count(), 6);
-    let (driver, multiplier, _) = robot.mimic_driver(robot.joint_id("L_thumb_distal_joint").unwrap());
-    assert_eq!((robot.joint(driver).name.as_str(), multiplier), ("L_thumb_proximal_pitch_joint", 2.4));
-    assert!(robot.link(robot.root).inertial.is_none(), "the mount is empty");
-    mesh_scales(&robot);
-    assert_eq!(count_by_name(&diagnostics), Default::default());
-}
-
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn anymal() {
-    let Assembly { description: robot, diagnostics } = load(ANYMAL);
-    assert!((robot.total_mass() - 52.135).abs() < 5e-4, "{}", robot.total_mass());
-    assert_eq!((count(&robot, JointKind::Revolute), count(&robot, JointKind::Fixed)), (12, 65));
-    assert_eq!(robot.link(robot.root).name, "base");
-    assert_eq!(diagnostics.len(), 1, "{diagnostics:#?}");
-    assert_eq!(diagnostics[0].kind, DiagnosticKind::MaterialUndefined);
-    assert!(diagnostics[0].to_string().contains("anymal.urdf:430: material \"orange\""));
-}
-
-#[test]
-#[ignore = "needs real robots: cargo xtask test"]
-fn vendor_arm_with_hand() {
-    let components = vec![ComponentCfg::new("arm", robot(SR5)), ComponentCfg::new("hand", robot(HAND))];
-    let robot = assemble(&UrdfCfg { components, ..Default::default() }).unwrap().description;
-    let connector = robot.joint(robot.joint_id("arm_TO_hand_CONNECTOR").unwrap());
-    assert_eq!(robot.link(connector.parent).name, "xMateSR5_link6");
-    assert_eq!(robot.link(connector.child).name, "left_wrist_yaw_link");
-    assert_eq!((robot.drivable_joints().count(), robot.name.as_str()), (18, "xMateSR5_Lhand"));
+    let components = vec![
+        ComponentCfg::new("arm", testkit::needs::robot(SR5)),
+        ComponentCfg::new("hand", testkit::needs::robot(HAND)),
+    ];
+    let both = assemble(&UrdfCfg { components, ..Default::default() }).unwrap().description;
+    let connector = both.joint(both.joint_id("arm_TO_hand_CONNECTOR").unwrap());
+    assert_eq!(both.link(connector.parent).name, "xMateSR5_link6");
+    assert_eq!(both.link(connector.child).name, "left_wrist_yaw_link");
+    assert_eq!((both.drivable_joints().count(), both.name.as_str()), (18, "xMateSR5_Lhand"));
 }
 
 /// Materials and meshes, exactly, without the URIs of the meshes.

@@ -231,7 +231,7 @@ impl Image {
         for bytes in [color, albedo].into_iter().flatten() {
             out.extend(bytes.iter().map(|&x| u32::from(x)));
         }
-        for ids in mask {
+        if let Some(ids) = mask {
             out.extend(ids.iter().map(|&x| x as u32));
         }
         for floats in [depth, distance, normal, shading_normal, position, flow].into_iter().flatten() {

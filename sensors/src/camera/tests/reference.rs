@@ -162,7 +162,8 @@ fn blocks(mesh: &TriMesh) -> Vec<Block> {
     let block = |triangles: &[[u32; 3]]| {
         let corner = |i: u32| V::from(mesh.positions[i as usize].map(f64::from));
         let corners = triangles.as_flattened().iter().map(|&i| corner(i));
-        let (low, high) = (corners.clone().reduce(|a, b| a.inf(&b)).unwrap(), corners.reduce(|a, b| a.sup(&b)).unwrap());
+        let (low, high) =
+            (corners.clone().reduce(|a, b| a.inf(&b)).unwrap(), corners.reduce(|a, b| a.sup(&b)).unwrap());
         // Wider by more than what rounding moves a hit, 1e-16 of the coordinates.
         let wider = V::repeat(1e-9 * (low.amax() + high.amax()));
         let edges = |t: &[u32; 3]| {
