@@ -1,10 +1,14 @@
-//! A place to measure in: a simulation with robots from URDF text and rigid objects, and their states as vectors.
+//! A place to measure in: a simulation with robots from URDF text and rigid objects, and their states as vectors. A law finds
+//! everything that it needs here.
 
+pub(crate) use crate::law::{law, worse};
+pub(crate) use crate::urdf::{Joint, Link, POINT, base, urdf};
 use kinetoscope::ndarray::{Array2, Array3};
-use kinetoscope::prelude::*;
+pub(crate) use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_row, to_row};
 use kinetoscope::sim::{self, Cone};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::UnitQuaternion;
+pub(crate) use nalgebra::Vector3;
 use testkit::urdf::Files;
 /// The default drive, evaluated at the end of the step, and none: joints move freely.
 pub(crate) use testkit::worlds::{gains as implicit, no_drive as passive};

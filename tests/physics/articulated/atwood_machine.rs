@@ -5,8 +5,6 @@
 //! yields holds its load, and the velocities are a rigid rope's. Rounding of 500 sums of up to 5 m/s: 1e-12.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
 
 /// Velocities of both after half a second.
 fn fell(masses: [f64; 2], coupled: bool) -> [f64; 2] {

@@ -4,8 +4,6 @@
 //! Tolerance: the platform loses m (r² - r₀²)/I of Ω, 2e-6, of which the radius feels Ω t tanh of as much: 1e-5 of r.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
 
 const PLATFORM: f64 = 1e6;
 const MASS: f64 = 0.5;

@@ -5,8 +5,6 @@
 //! Tolerance: third-order terms, ε² of the angle grown by ω t/4: 1e-5 of the angle, with ε = 1e-3 hanging and 1e-5 upright.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
 use std::f64::consts::PI;
 
 const CART: f64 = 1.5;

@@ -5,8 +5,6 @@
 //! of 3000 sums of up to 13 rad, 2e-15 each, 1e-11.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
 
 const LENGTH: f64 = 0.8;
 const ANGLE: f64 = 0.9;

@@ -7,10 +7,7 @@
 use super::newton_euler::{Motion, Tree, joints};
 use super::subjects::EARTH;
 use crate::lab::*;
-use crate::law::{law, worse};
 use crate::numerical::double_pendulum::{Rods, Steps};
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
 const START: ([f64; 2], [f64; 2]) = ([FRAC_PI_2, 0.0], [0.0, 0.0]);

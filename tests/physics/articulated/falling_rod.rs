@@ -6,9 +6,6 @@
 //! digits in each of 400 steps.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 const LENGTH: f64 = 1.4;
 

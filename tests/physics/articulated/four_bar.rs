@@ -14,9 +14,6 @@
 //! is off by 0.02823 rad/s, with the second alone by 0.04124. Solver, tolerance and warm start change nothing.
 
 use crate::lab::*;
-use crate::law::{law, worse};
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 const FRAME: f64 = 0.3;
 const CRANK: f64 = 0.1;

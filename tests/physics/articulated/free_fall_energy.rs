@@ -21,8 +21,6 @@
 use super::newton_euler::{Motion, Tree, joints};
 use super::subjects::EARTH;
 use crate::lab::*;
-use crate::law::{law, worse};
-use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
 use nalgebra::{Point3, Vector3};
 use std::path::PathBuf;

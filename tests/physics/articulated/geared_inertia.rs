@@ -3,8 +3,6 @@
 //! Tolerance: as for `atwood_machine`, a soft coupling yields in places and not in velocities; rounding of 500 sums, 1e-12.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
 
 const MOMENTS: [f64; 2] = [0.2, 0.05];
 const RATIO: f64 = -3.0;

@@ -5,9 +5,6 @@
 //! axes: I Ω² δ = 5e-6 N m. The yaw drive has come to rest after 2 s.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 const ROTOR: f64 = 0.02;
 const YAW: f64 = 1.5;

@@ -6,9 +6,6 @@
 
 use super::newton_euler::{Motion, Tree, joints};
 use crate::lab::*;
-use crate::law::{law, worse};
-use kinetoscope::prelude::*;
-use nalgebra::Vector3;
 
 /// Largest momentum \[kg m/s\] and angular momentum \[kg m²/s\] in 1 s, and the largest velocity of a joint.
 fn largest(cfg: SimulationManagerCfg) -> [f64; 3] {

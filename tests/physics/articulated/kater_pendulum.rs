@@ -5,9 +5,7 @@
 //! Tolerance: as for `pendulum_period`, 1e-9 of the period.
 
 use crate::lab::*;
-use crate::law::law;
 use crate::rigid_body::dzhanibekov::complete_elliptic;
-use crate::urdf::{Joint, Link, base, urdf};
 
 const MASS: f64 = 2.0;
 const GYRATION: f64 = 0.3;

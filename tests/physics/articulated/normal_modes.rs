@@ -4,8 +4,6 @@
 //! Tolerance: the motion is linear up to ε² of it, which shifts ω t by some ε² ω t: 2e-7 of ε = 1e-4 rad; 1e-6.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
 
 const LENGTH: f64 = 0.5;
 const SMALL: f64 = 1e-4;

@@ -5,9 +5,6 @@
 //! Tolerance: rounding of the principal axes, 1e-12.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, urdf};
-use kinetoscope::prelude::*;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 const TORQUE: [f64; 3] = [0.5, -0.8, 1.1];

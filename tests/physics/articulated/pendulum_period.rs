@@ -4,10 +4,7 @@
 //! acceleration passes through 0, off by less than h³. 1e-9 of the period.
 
 use crate::lab::*;
-use crate::law::law;
 use crate::rigid_body::dzhanibekov::complete_elliptic;
-use crate::urdf::{Joint, Link, POINT, base, urdf};
-use kinetoscope::prelude::*;
 
 const LENGTH: f64 = 1.0;
 

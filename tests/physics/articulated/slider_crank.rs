@@ -6,9 +6,6 @@
 //! critically damped spring of the time constant 2 h, is stretched by (2 h)² of that at most: 4.7e-5 m.
 
 use crate::lab::*;
-use crate::law::{law, worse};
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 const CRANK: f64 = 0.1;
 const ROD: f64 = 0.35;

@@ -4,8 +4,6 @@
 use super::newton_euler::{Joints, Motion, Tree, joints};
 use crate::lab::*;
 use crate::law::worse;
-use crate::urdf::{Joint, Link, urdf};
-use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use nalgebra::{Matrix3, Vector3};
 

@@ -4,8 +4,6 @@
 //! Tolerance: rounding of 1000 divisions.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
 
 const MOMENT: f64 = 0.05;
 const DAMPING: f64 = 0.1;

@@ -10,8 +10,6 @@
 //! which some 20 numbers are added up.
 
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 use kinetoscope::sim::Cone;
 use nalgebra::{Rotation2, Vector2};
 use testkit::worlds::ball;

@@ -7,9 +7,6 @@
 //! of what is asymmetric.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, urdf};
-use kinetoscope::prelude::*;
 use testkit::worlds::cube;
 
 const TABLE: f64 = 6.0;

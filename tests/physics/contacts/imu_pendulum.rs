@@ -6,9 +6,6 @@
 //! h)², 1e-7, and by what a step misses of an extremum, as much; 1e-6 g.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 const LENGTH: f64 = 1.0;
 const START: f64 = 1.0;

@@ -4,9 +4,6 @@
 //! Tolerance: ω is constant, and α τ/I, to rounding: 1e-10.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 const MOMENT: f64 = 0.08;
 const RADIUS: f64 = 0.4;

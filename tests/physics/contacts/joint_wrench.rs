@@ -5,9 +5,6 @@
 //! Tolerance: rounding of accelerations over a step of 1 ms, times 3 kg: 1e-9.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 use nalgebra::Matrix3;
 
 const MASS: f64 = 3.0;

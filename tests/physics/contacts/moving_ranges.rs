@@ -7,8 +7,6 @@
 //! few of them: 1e-6 m.
 
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 use kinetoscope::sensors::ray::pattern::Custom;
 use std::f64::consts::FRAC_PI_4;
 

@@ -5,9 +5,6 @@
 //! weight.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 use testkit::worlds::cube;
 
 const PLATE: f64 = 2.0;

@@ -11,9 +11,7 @@
 
 use super::ball_in_picture::{FOCAL, MIDDLE, SIZE, Seen, expected, found};
 use crate::lab::*;
-use crate::law::law;
 use kinetoscope::ndarray::Axis;
-use kinetoscope::prelude::*;
 use testkit::worlds::{fixed, object};
 
 const RADIUS: f64 = 0.3;

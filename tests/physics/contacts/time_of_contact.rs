@@ -7,8 +7,6 @@
 
 use crate::bounce::off;
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 use testkit::worlds::ball;
 
 /// Step \[s\].

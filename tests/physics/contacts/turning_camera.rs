@@ -8,9 +8,6 @@
 
 use super::ball_in_picture::{FOCAL, MIDDLE, SIZE, Seen, expected, found};
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 use kinetoscope::sim::MaskId;
 use std::f64::consts::{PI, TAU};
 use testkit::worlds::{fixed, object};

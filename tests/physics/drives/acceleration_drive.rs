@@ -6,9 +6,6 @@
 
 use super::wheel::{Wheel, hinge};
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 const STIFFNESS: f64 = 90.0;
 const DAMPING: f64 = 15.0;

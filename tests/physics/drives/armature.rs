@@ -11,9 +11,6 @@
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 const ROTOR: f64 = 0.02;
 const SECOND: f64 = 0.03;

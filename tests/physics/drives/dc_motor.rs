@@ -7,8 +7,6 @@
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 
 const STALL: f64 = 1.0;
 const LIMIT: f64 = 0.6;

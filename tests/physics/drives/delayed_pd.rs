@@ -5,8 +5,6 @@
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 
 const STEPS: usize = 300;
 

@@ -9,8 +9,6 @@
 
 use super::wheel::{MOMENT, Wheel, hinge};
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 
 const FRICTION: f64 = 1.0;
 const START: f64 = 2.0;

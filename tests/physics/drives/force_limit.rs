@@ -8,8 +8,6 @@
 use super::variants::{self, Variant};
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 
 const LIMIT: f64 = 2.0;
 const STEPS: u32 = 200;

@@ -9,9 +9,6 @@
 //! step of h is itself rounded to ε v/h.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 const START: [f64; 2] = [0.4, -0.9];
 

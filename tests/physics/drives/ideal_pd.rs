@@ -16,8 +16,6 @@
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 
 const H: f64 = 1e-3;
 const START: f64 = 0.01;

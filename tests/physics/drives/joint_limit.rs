@@ -7,9 +7,7 @@
 
 use super::wheel::{MOMENT, Wheel, hinge};
 use crate::lab::*;
-use crate::law::law;
 use crate::rigid_body::soft_contact::depth;
-use crate::urdf::Joint;
 
 const RANGE: [f64; 2] = [-0.4, 0.7];
 const EFFORT: f64 = 0.6;

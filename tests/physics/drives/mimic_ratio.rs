@@ -11,10 +11,6 @@
 //! drive pulls with k q* on both inertias.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
-use nalgebra::Vector3;
 
 const MOMENTS: [f64; 2] = [0.05, 0.01];
 const RATIO: f64 = -1.5;

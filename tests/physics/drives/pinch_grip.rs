@@ -18,12 +18,8 @@
 //! forces are off by m α = m √(2 · 8 · 1e-8) at most, what slides by that over m, and what creeps by as much of itself as f.
 
 use crate::lab::*;
-use crate::law::law;
 use crate::rigid_body::soft_contact::{LARGEST, TIME, depth, impedance};
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
-use nalgebra::Vector3;
 use testkit::worlds::cube;
 
 const LIMIT: f64 = 5.0;

@@ -17,8 +17,6 @@
 use super::variants::{self, Variant};
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 use std::f64::consts::PI;
 
 const H: f64 = 1e-4;

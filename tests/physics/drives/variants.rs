@@ -2,7 +2,6 @@
 
 use super::wheel::MOMENT;
 use crate::lab::*;
-use kinetoscope::prelude::*;
 
 /// Of the models that hear of their targets late \[steps\].
 const DELAY: u32 = 40;

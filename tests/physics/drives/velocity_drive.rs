@@ -6,8 +6,6 @@
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 
 const DAMPING: f64 = 1.0;
 const SPEED: f64 = 3.0;

@@ -6,8 +6,6 @@
 
 use super::wheel::{MOMENT, Wheel, hinge};
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 
 const DAMPING: f64 = 0.5;
 const START: f64 = 4.0;

@@ -1,8 +1,6 @@
 //! A wheel on a motor, without gravity: what most laws of drives are measured on.
 
 use crate::lab::*;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 /// Its moment of inertia \[kg m²\].
 pub(super) const MOMENT: f64 = 0.05;

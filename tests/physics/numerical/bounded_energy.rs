@@ -5,9 +5,6 @@
 //! Tolerance: the next term of H~, h ω of the first: 1.5 % at 5 ms. Runge-Kutta's energy does not swing at all but leaks.
 
 use crate::lab::*;
-use crate::law::{law, worse};
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
 
 const START: f64 = 1.2;
 const STEP: f64 = 5e-3;

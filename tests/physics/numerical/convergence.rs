@@ -4,7 +4,6 @@
 
 use crate::articulated::double_pendulum_energy;
 use crate::lab::*;
-use kinetoscope::prelude::*;
 use std::f64::consts::{FRAC_PI_2, LN_2};
 
 /// Angles of the joints of the double pendulum \[rad\], and their velocities \[rad/s\], at the start.

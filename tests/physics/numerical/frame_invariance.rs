@@ -6,8 +6,6 @@
 use super::double_pendulum::{Rods, Steps, swing};
 use crate::articulated::double_pendulum_energy;
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 const START: ([f64; 2], [f64; 2]) = ([1.0, 0.5], [0.0, 1.0]);

@@ -5,9 +5,6 @@
 //! of 1e5/s² over ten steps: 1e-10.
 
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
-use nalgebra::Vector3;
 use testkit::worlds::object;
 
 /// Velocities after half a second, less what both had from the start.

@@ -7,9 +7,6 @@
 use super::convergence::{errors, off, order};
 use super::free_rotation;
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
 
 const MOMENTS: [f64; 3] = [0.01, 0.02, 0.025];

@@ -2,7 +2,6 @@
 
 use crate::lab::*;
 use crate::law::worse;
-use kinetoscope::prelude::*;
 
 /// A quadruped of each environment that falls from half a metre, otherwise turned and pushed in each.
 #[derive(Debug)]

@@ -4,8 +4,6 @@
 //! Tolerance: rounding, 2000 steps; 1e-10. Control: the same step for both.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
 
 /// Angle and velocity after 2000 steps.
 fn swung(length: f64, dt: f64) -> [f64; 2] {

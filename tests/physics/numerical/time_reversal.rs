@@ -9,8 +9,6 @@
 use super::double_pendulum::{Rods, Steps, swing};
 use crate::articulated::double_pendulum_energy;
 use crate::lab::*;
-use crate::law::{law, worse};
-use kinetoscope::prelude::*;
 
 const START: [f64; 2] = [1.3, -0.4];
 const STEP: f64 = 1e-3;

@@ -6,9 +6,6 @@
 //! by ω h/2 per radian, percents.
 
 use crate::lab::*;
-use crate::law::{law, worse};
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
 use nalgebra::{Matrix3, Vector3};
 

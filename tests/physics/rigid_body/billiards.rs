@@ -7,9 +7,6 @@
 //! 2r: 0.5 %; twice, as they come and go: 1 %.
 
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
-use nalgebra::Vector3;
 use testkit::worlds::ball;
 
 const RADIUS: f64 = 0.1;

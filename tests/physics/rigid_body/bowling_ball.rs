@@ -10,8 +10,6 @@
 use super::sliding_block::SOLVER;
 use super::soft_contact::depth;
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Link, urdf};
 
 const RADIUS: f64 = 0.5;
 const START: f64 = 1.0;

@@ -5,9 +5,6 @@
 //! Tolerance: rounding of one step.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, urdf};
-use nalgebra::Vector3;
 
 const LENGTH: f64 = 1.2;
 const MASS: f64 = 0.5;

@@ -14,10 +14,6 @@
 use super::sliding_block::SOLVER;
 use super::soft_contact::depth;
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
-use kinetoscope::prelude::*;
-use nalgebra::Vector3;
 use testkit::worlds::ball;
 
 const BOARD: f64 = 10.0;

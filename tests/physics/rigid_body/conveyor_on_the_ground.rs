@@ -27,8 +27,6 @@
 
 use super::soft_contact::{LARGEST, TIME};
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 use nalgebra::{Vector2, Vector3};
 use testkit::worlds::{ball, object};
 

@@ -4,8 +4,6 @@
 //! Tolerance: rounding; at the end e^-25 of the limit is missing.
 
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 
 const MASS: f64 = 0.4;
 const DRAG: f64 = 1.0;

@@ -12,9 +12,6 @@
 //! size over λ. RK4's is (ω h)⁴ of the angle, 1e-9; the crossing, read off a straight line, is good to h² ω'' h/ω' ~ 1e-8.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
 const MOMENTS: [f64; 3] = [0.01, 0.02, 0.028];

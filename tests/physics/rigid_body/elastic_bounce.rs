@@ -6,8 +6,6 @@
 
 use crate::bounce::{apex, apex_off, apex_rest};
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 use testkit::worlds::ball;
 
 /// Step \[s\].

@@ -4,9 +4,6 @@
 //! Tolerance: rounding, 1000 sums of numbers below 10, each off by at most 1e-15.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
 
 /// Height after a second from 6 m.
 fn height(cfg: SimulationManagerCfg) -> f64 {

@@ -10,9 +10,6 @@ use super::incline::{Descent, descent};
 use super::sliding_block::SOLVER;
 use super::stick_creep;
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
 
 const FRICTION: f64 = 0.5;
 const HEIGHT: f64 = 0.02;

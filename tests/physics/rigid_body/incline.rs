@@ -1,8 +1,6 @@
 //! What goes down a slope: a plane that gravity is tilted against, which is the same and needs no second shape.
 
 use crate::lab::*;
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
 
 /// Mean accelerations of a link \[m/s²\].
 #[derive(Clone, Copy, Debug)]

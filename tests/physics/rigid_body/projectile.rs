@@ -5,9 +5,6 @@
 //! Tolerance: rounding, 1200 sums of numbers below 10.
 
 use crate::lab::*;
-use crate::law::{law, worse};
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
 
 const STEPS: u32 = 1201;
 const THROW: [f64; 2] = [3.0, -2.0];

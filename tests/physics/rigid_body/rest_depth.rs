@@ -6,10 +6,6 @@
 
 use super::soft_contact::depth;
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
-use nalgebra::Vector3;
 
 const RADIUS: f64 = 0.1;
 

@@ -6,8 +6,6 @@
 use super::incline::acceleration;
 use super::soft_contact::depth;
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::Link;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use std::f64::consts::FRAC_PI_2;
 

@@ -6,9 +6,6 @@
 use super::incline::acceleration;
 use super::soft_contact::depth;
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::Link;
-use kinetoscope::prelude::*;
 
 const RADIUS: f64 = 0.5;
 const MASS: f64 = 0.8;

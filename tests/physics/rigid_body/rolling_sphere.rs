@@ -7,9 +7,6 @@
 use super::incline::acceleration;
 use super::soft_contact::depth;
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::Link;
-use kinetoscope::prelude::*;
 
 const RADIUS: f64 = 0.5;
 

@@ -19,9 +19,6 @@
 use super::incline::{Descent, FROM, UNTIL, descent};
 use super::soft_contact::{LARGEST, TIME, depth};
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::Link;
-use kinetoscope::prelude::*;
 use kinetoscope::sim::Cone;
 
 /// The solver ends where a step gains less than this \[m/s²\].

@@ -6,8 +6,6 @@
 //! steady motion; RK4 of a motion that is steady; rounding of 2000 sums of up to 300 rad, 1e-13 each: 1e-10.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, base, urdf};
 
 const MASS: f64 = 0.5;
 const ARM: f64 = 0.1;

@@ -9,8 +9,6 @@
 
 use super::soft_contact::depth;
 use crate::lab::*;
-use crate::law::law;
-use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
 use testkit::worlds::object;
 

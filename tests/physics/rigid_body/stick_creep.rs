@@ -11,9 +11,6 @@
 
 use super::soft_contact::{LARGEST, TIME, depth, impedance};
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
 
 const ANGLE: f64 = 10.0;
 

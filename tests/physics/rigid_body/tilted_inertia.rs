@@ -5,9 +5,6 @@
 //! Tolerance: rounding of the principal axes, 1e-12 of the largest component, which is below 1.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 const TORQUE: [f64; 3] = [0.7, -1.1, 0.4];

@@ -6,8 +6,6 @@
 
 use super::soft_contact::depth;
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Link, urdf};
 use std::f64::consts::FRAC_PI_2;
 
 /// The turn after 4 s \[rad\].

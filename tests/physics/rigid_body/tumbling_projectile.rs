@@ -7,9 +7,6 @@
 //! (ω h)⁴ ω t/120, 3e-8 rad, times the offset of 0.1 m at most: 1e-8 m.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Link, urdf};
-use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{TARGET, Target};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 

@@ -4,9 +4,6 @@
 //! Tolerance: RK4 of a linear oscillator is off by (ω h)⁴ ω t/120 of the amplitude: 3e-9 after 2 s at 11.5 rad/s.
 
 use crate::lab::*;
-use crate::law::law;
-use crate::urdf::{Joint, Link, urdf};
-use kinetoscope::prelude::*;
 
 const MASSES: [f64; 2] = [1.0, 3.0];
 const STIFFNESS: f64 = 100.0;

@@ -2,11 +2,12 @@
 
 mod chromium;
 
-use super::serve::running::{Running, button, play_fall};
+use super::serve::running::{Running, play_fall};
 use chromium::{Chromium, Tab};
 use kinetoscope::prelude::*;
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use testkit::wait;
 
@@ -274,10 +275,10 @@ fn time_line() {
         tab.wait_until("it holds", "$('pause').textContent === 'Play'");
         assert_content(&mut tab);
     });
-    // The control: a simulation that runs has no time line.
+    // The control: a simulation that runs has no time line, and without a recorder no button.
     let running = Running::start(1);
     let mut tab = page_of(&browser, &running);
-    assert_eq!(tab.evaluate("$('timeline-row').hidden"), true);
+    assert_eq!(tab.evaluate("[$('timeline-row').hidden, $('record').hidden]"), json!([true, true]));
     assert_eq!(tab.evaluate("$('timeline-row').getBoundingClientRect().height"), 0);
 }
 
@@ -285,7 +286,10 @@ fn time_line() {
 #[ignore = "needs Chromium: cargo xtask test"]
 fn record_button() {
     let browser = browser();
-    let (_folder, path, recording) = button();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    let files = Arc::new(Mutex::new(FileRecording::new(RecorderCfg::new(&path))));
+    let recording = Some(RecordButton::shared(files));
     let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { recording, ..ServeCfg::default() });
     let mut tab = page(&browser, &running.url);
     tab.wait_until("a button", "!$('record').hidden && $('record').textContent === 'Record'");
@@ -294,6 +298,7 @@ fn record_button() {
     tab.wait_until("its rows", "/^run.npz: \\d\\d+ rows$/.test($('record-text').textContent)");
     tab.click("$('record')");
     tab.wait_until("it has ended", "$('record').textContent === 'Record'");
+    tab.wait_until("its size", "/^run.npz: .* MB$/.test($('record-text').textContent)");
     assert!(path.is_file());
     assert_eq!(tab.complaints(), Vec::<String>::new());
 }

@@ -7,7 +7,6 @@ use kinetoscope::record::{Film, Recording};
 use kinetoscope::view::control::{Play, Speed};
 use kinetoscope::view::{Command, Viewer, Viewing, Wants};
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -116,14 +115,6 @@ impl Drop for Running {
         let ended = self.thread.take().unwrap().join();
         assert!(ended.is_ok() || std::thread::panicking(), "the simulation's thread panicked");
     }
-}
-
-/// A record button, and the file `run.npz` that it records to.
-pub(crate) fn button() -> (tempfile::TempDir, PathBuf, Option<RecordButton>) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("run.npz");
-    let files = FileRecording::new(RecorderCfg::new(&path));
-    (folder, path, Some(RecordButton::shared(Arc::new(Mutex::new(files)))))
 }
 
 /// Plays a recording of half a second, in which the cube of [`scene`] falls from `height`, for as long as `watch` takes.

@@ -1,9 +1,8 @@
 //! Commands of viewers: targets, pause, speed, selection, the spring, and recordings.
 
-use super::running::{Running, button};
+use super::running::Running;
 use super::visitor::{Came, Visitor};
 use crate::support::red;
-use kinetoscope::prelude::*;
 use serde_json::{Value, json};
 
 /// Weight of the cube \[N\]: 1 kg.
@@ -88,6 +87,9 @@ fn refusals() {
         (json!({"do": "grab", "x": 2.0, "y": 0.5}), "0 to 1"),
         (json!({"do": "select", "x": 0.5}), "missing field `y`"),
     ]);
+    // What the simulation refuses is in its state.
+    visitor.ask(json!({"do": "record", "on": true}));
+    visitor.wait_state("a refusal", |state| state["refused"].as_str().is_some_and(|why| why.contains("record button")));
     running.wait_for_steps(10);
 }
 
@@ -133,30 +135,4 @@ fn selection() {
     select(y, "the cube", &|selected| selected["name"] == "cube");
     visitor.ask(json!({"do": "unselect"}));
     visitor.wait_state("nothing", |state| state["selected"].is_null());
-}
-
-#[test]
-fn record_button() {
-    // Without a button, pressing it is refused.
-    let running = Running::start(1);
-    let mut visitor = Visitor::enter(running.address);
-    assert_eq!(visitor.wait_state("a state", |_| true)["recording"], Value::Null);
-    visitor.ask(json!({"do": "record", "on": true}));
-    visitor.wait_state("a refusal", |state| state["refused"].as_str().is_some_and(|why| why.contains("record button")));
-    drop((visitor, running));
-    let (_folder, path, recording) = button();
-    let running = Running::start_at(1, "127.0.0.1:0", ServeCfg { recording, ..ServeCfg::default() });
-    let mut visitor = Visitor::enter(running.address);
-    visitor.wait_state("a button", |state| state["recording"] == json!({"on": false, "text": ""}));
-    visitor.ask(json!({"do": "record", "on": true}));
-    let text = |state: &Value| state["recording"]["text"].as_str().unwrap_or_default().to_owned();
-    let state = visitor.wait_state("it records", |state| state["recording"]["on"] == true);
-    assert!(text(&state).starts_with("run.npz: "), "{state}");
-    // Another viewer sees it, and ends it.
-    let mut other = Visitor::enter(running.address);
-    other.wait_state("rows", |state| state["recording"]["on"] == true && text(state).len() > "run.npz: 9 rows".len());
-    assert!(!path.exists());
-    other.ask(json!({"do": "record", "on": false}));
-    let state = visitor.wait_state("it has ended", |state| state["recording"]["on"] == false);
-    assert!(text(&state).ends_with(" MB") && path.is_file(), "{state}");
 }
