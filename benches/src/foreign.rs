@@ -28,3 +28,31 @@ fn process_ticks(stat: &str) -> Option<u64> {
     let mut fields = stat.get(stat.rfind(')')? + 1..)?.split_whitespace().skip(11);
     Some(fields.next()?.parse::<u64>().ok()? + fields.next()?.parse::<u64>().ok()?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn idle_and_guest_times_do_not_count() {
+        assert_eq!(busy_ticks("cpu  1 2 4 1000 2000 8 16 32 4000 8000\ncpu0 1"), Some(63));
+    }
+
+    #[test]
+    fn a_name_with_blanks_and_parentheses_is_skipped() {
+        assert_eq!(process_ticks("7 (a) b) S 1 2 3 4 5 6 7 8 9 10 30 12 0 0"), Some(42));
+    }
+
+    #[test]
+    fn our_own_work_is_not_foreign() {
+        let (Some(before), start) = (seconds(&[]), std::time::Instant::now()) else { return };
+        let mut x = 1_u64;
+        while start.elapsed().as_secs_f64() < 0.3 {
+            x = std::hint::black_box(x.wrapping_mul(3));
+        }
+        let all = seconds(&[]).unwrap_or(f64::NAN) - before;
+        // Others may work at the same time: at most all other cores.
+        let others = (std::thread::available_parallelism().map_or(1, usize::from) - 1) as f64;
+        assert!(all < 0.3 * others + 0.15, "{all}");
+    }
+}

@@ -230,3 +230,53 @@ pub(crate) fn median(mut values: Vec<f64>) -> f64 {
         n => 0.5 * (values[n / 2 - 1] + values[n / 2]),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Sleeper(u64);
+
+    impl Side for Sleeper {
+        fn restart(&mut self) -> Outcome<()> {
+            Ok(())
+        }
+
+        fn block(&mut self, steps: u32) -> Outcome<Duration> {
+            Ok(Duration::from_millis(self.0 * u64::from(steps)))
+        }
+    }
+
+    #[test]
+    fn a_side_that_takes_twice_as_long_has_half_the_ratio() {
+        let (mut ours, mut rival) = (Sleeper(20), Sleeper(10));
+        let plan = Plan { seconds: 0.0, restart_after: 100 };
+        let times = measure(plan, &mut [&mut ours, &mut rival]).expect("sleeps");
+        assert!((times.ratio(0, 1) - 0.5).abs() < 1e-12);
+        assert!((times.per_step(0) - 0.02).abs() < 1e-12);
+    }
+
+    #[test]
+    fn who_is_first_cancels_out() {
+        // The side that is created first is twice as fast.
+        let both = in_both_orders(|order| {
+            let created = std::cell::Cell::new(0);
+            let next = || {
+                created.set(created.get() + 50);
+                Ok(Sleeper(created.get()))
+            };
+            let (mut ours, mut rival) = order.create(next, next)?;
+            measure(Plan { seconds: 0.0, restart_after: 100 }, &mut [&mut ours, &mut rival])
+        })
+        .expect("sleeps");
+        assert!((both.ratio(0, 1) - 1.0).abs() < 1e-12);
+        assert!((both.rate(0, 3) - 3.0 * (20.0 + 10.0) / 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn medians() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), 2.5);
+        assert!(median(Vec::new()).is_nan());
+    }
+}

@@ -102,3 +102,18 @@ pub(crate) fn table(rows: &[Row]) -> String {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_has_the_agreed_keys_and_a_miss_is_marked() {
+        let row = Row::new("step", "arm, 64 envs", "env-steps/s", 2, 90.0).against("bare loop", 100.0, 0.9);
+        let json = serde_json::to_value(&row).unwrap_or_default();
+        let keys: Vec<&String> = json.as_object().map(|o| o.keys().collect()).unwrap_or_default();
+        assert_eq!(keys, ["bench", "case", "mujoco", "ours", "ratio", "rival", "rival_name", "threads", "unit"]);
+        assert!(table(&[row.clone().wanted(0.97)]).contains("MISSES"));
+        assert!(!table(&[row.wanted(0.8)]).contains("MISSES"));
+    }
+}
