@@ -3,7 +3,6 @@
 use super::assert_same;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::description::{Geometry, JointKind, Material};
-use kinetoscope::sim::diagnostic::count_by_name;
 use kinetoscope::sim::urdf::{Assembly, assemble, parse_file, write_urdf};
 use kinetoscope::sim::{DiagnosticKind, RobotDescription};
 use testkit::needs::{files_below, robot, robots_dir};
