@@ -338,12 +338,9 @@ fn broken_meshes() {
         assert_eq!((code, warnings(&json)), (1, vec![format!("robot.urdf:3: {kind}")]), "{file}");
         let message = json["warnings"][0]["message"].as_str().unwrap();
         assert!(message.contains("\"base\"") && message.contains(file), "{message}");
-
         let refused = run(&[&mesh("collision", file)]);
         assert_eq!((refused.code, refused.out.as_str()), (2, ""), "{file}");
-        for part in ["robot.urdf:3: ", "\"base\"", file] {
-            assert!(refused.err.contains(part), "{part}: {}", refused.err);
-        }
+        assert!(refused.err.contains("robot.urdf:3: ") && refused.err.contains(file), "{}", refused.err);
     }
 }
 

@@ -63,21 +63,6 @@ fn one_file_twice() {
     assert_eq!(sim.robot(right).joint_names(), sim.robot(left).joint_names());
 }
 
-/// A scene file names the MJCF of a robot by its path, beside the file.
-#[test]
-fn scene_files() {
-    let files = Files::default();
-    files.write("odd.xml", ODD);
-    let text = "[entities.arm]\ntype = \"robot\"\nmjcf = \"odd.xml\"\ndrive.stiffness = 500.0\n";
-    let path = files.write("scene.toml", text);
-    let written = SceneCfg::from_file(&path).unwrap().to_toml(&EntityTypes::default()).unwrap();
-    for file in [path, files.write("again.toml", written)] {
-        let scene = InteractiveScene::from_file(&file).unwrap();
-        let arm = scene.robot("arm").unwrap();
-        assert_eq!((arm.dof(), arm.get_stiffness()[(0, 0)]), (7, 500.0));
-    }
-}
-
 /// A dump opens in plain MuJoCo and is the same robot, drives included. As a URDF it is the same tree: its joints and masses,
 /// without shapes.
 #[test]

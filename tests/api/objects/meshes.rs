@@ -196,18 +196,3 @@ fn exported() {
     let text = std::fs::read_to_string(other).unwrap();
     assert_eq!(text.contains("simple=\"false\""), TARGET == Target::V2, "2.2.2 does not know the attribute");
 }
-
-#[test]
-fn scene_files() {
-    let files = Files::default();
-    obj(&files, "b.obj", &brick([0.5, 0.5, 0.5], [0.0; 3]));
-    let text = "[entities.brick]\ntype = \"rigid_object\"\nbody_type = \"kinematic\"\nrestitution = 0.5\n\
-                shape.mesh = { path = \"b.obj\", scale = [2, 1, 1] }\n\
-                [entities.cone]\ntype = \"rigid_object\"\nshape.cone = { radius = 0.1, height = 0.3 }\nlinear_damping = 0.2\n";
-    let built = InteractiveScene::from_file(files.write("scene.toml", text)).unwrap();
-    let sim = built.sim();
-    let [brick, cone] = ["brick", "cone"].map(|uid| sim.rigid_object(sim.rigid_object_id(uid).unwrap()));
-    assert!((brick.mass() - 250.0).abs() < 1e-9);
-    assert_eq!((brick.cfg().body_type, brick.cfg().restitution), (BodyType::Kinematic, Some(0.5)));
-    assert_eq!(cone.cfg().linear_damping, 0.2);
-}

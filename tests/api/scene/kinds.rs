@@ -86,17 +86,23 @@ fn robot_of_components() {
     assert_eq!((robot.hull.max_vertices, robot.hull.min_thickness), (32, None));
     assert!(robot.self_collision && robot.fix_base);
     assert_eq!(robot.payload, [("ee.*".to_string(), 0.5)]);
+    let scene = read("[entities.arm]\ntype = \"robot\"\nmjcf = \"odd.xml\"\ndrive.stiffness = 500.0\n");
+    let [(_, EntityCfg::Robot(of_mjcf))] = scene.entities.as_slice() else { panic!("{scene:?}") };
+    assert_eq!(of_mjcf.mjcf.as_ref().unwrap().path, Path::new("somewhere/odd.xml"));
     let turned = robot.init_pose * nalgebra::Point3::new(1.0, 0.0, 0.0);
     assert!((turned - nalgebra::Point3::new(0.0, 1.0, 1.0)).norm() < 1e-15);
 }
 
 #[test]
 fn shapes() {
+    let brick = ObjectShape::Mesh { path: "somewhere/b.obj".into(), scale: [2.0, 1.0, 1.0], hull: Default::default() };
     for (shape, expected) in [
         ("shape.box.size = [1, 2, 3]", ObjectShape::Box { size: [1.0, 2.0, 3.0] }),
         ("shape.sphere.radius = 0.5", ObjectShape::Sphere { radius: 0.5 }),
         ("shape.cylinder = { radius = 0.5, length = 2 }", ObjectShape::Cylinder { radius: 0.5, length: 2.0 }),
         ("shape = { capsule = { radius = 0.5, length = 2 } }", ObjectShape::Capsule { radius: 0.5, length: 2.0 }),
+        ("shape.cone = { radius = 0.1, height = 0.3 }", ObjectShape::Cone { radius: 0.1, height: 0.3 }),
+        ("shape.mesh = { path = \"b.obj\", scale = [2, 1, 1] }", brick),
     ] {
         let scene = read(&format!("[entities.o]\ntype = \"rigid_object\"\nbody_type = \"static\"\n{shape}"));
         let [(_, EntityCfg::RigidObject(object))] = scene.entities.as_slice() else { panic!("{scene:?}") };

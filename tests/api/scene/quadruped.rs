@@ -93,10 +93,6 @@ fn same_bits() {
     robot.drive.stiffness = 79.0.into();
     let found = says(&mut InteractiveScene::new(softer).unwrap(), 100);
     assert!(found.iter().zip(&expected).filter(|(found, expected)| found != expected).count() >= 6);
-    // Written and read again it moves the same, too.
-    let expected = says(&mut InteractiveScene::new(declared()).unwrap(), 20);
-    let again = super::round_trip::again(&declared());
-    assert_eq!(says(&mut InteractiveScene::new(again).unwrap(), 20), expected);
 }
 
 #[test]
