@@ -139,10 +139,8 @@ fn gripper() {
         let (mut sim, id, data) = fine(&text);
         let of = sim.robot(id);
         assert_eq!(of.joint_id("left").unwrap(), JointIndex(0));
-        assert_eq!(
-            (of.get_stiffness()[(0, 0)], of.get_damping()[(0, 0)], of.qf_limits()[(0, 0)]),
-            (100.0, 10.0, 100.0)
-        );
+        let numbers = [of.get_stiffness(), of.get_damping()].map(|gains| gains[(0, 0)]);
+        assert_eq!((numbers, of.qf_limits()[(0, 0)]), ([100.0, 10.0], 100.0));
         is_said(&sim, &["actuator \"grip\" acts on the tendon \"split\""]);
         assert_eq!(count_diagnostics(&sim, &["ctrlrange"]), 0, "it is all that the fingers can do");
         if scale != 1.0 {

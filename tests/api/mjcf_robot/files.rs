@@ -6,7 +6,7 @@ use kinetoscope::sim::DiagnosticKind;
 use kinetoscope::sim::mj::{TARGET, Target, compile_file};
 use testkit::refusal::assert_error;
 use testkit::urdf::Files;
-use testkit::worlds::{errors, pose_in, sr5, urdf_robot};
+use testkit::worlds::{errors, pose_in, urdf_robot};
 
 /// Elements without a name are called by their number.
 #[test]
@@ -48,19 +48,6 @@ fn control_parts() {
     assert_eq!(named[..6], ["base", "shoulder", "fore", "carriage", "plate", "hand"]);
     assert!(named.contains(&"tip") && named.contains(&"shoulder_site"), "{named:?}");
     assert_eq!(of.description().links.len() - named.len(), 2 + 2 + 1);
-}
-
-/// Robots of one file differ by their uid.
-#[test]
-fn one_file_twice() {
-    let (mut sim, left) = with(1, robot("left", ODD));
-    let right = sim.add_robot(robot("right", ODD)).unwrap();
-    assert_error(sim.add_robot(robot("left", ODD)), "DuplicateUid", &[]);
-    sim.add_mjcf(MjcfCfg::text("part", ODD)).unwrap();
-    sim.add_robot(sr5("sr5")).unwrap();
-    sim.robot_mut(right).write_qpos(&array![[0.3]], Some(&[JointIndex(6)]), None).unwrap();
-    assert_eq!((sim.robot(left).get_qpos()[(0, 6)], sim.robot(right).get_qpos()[(0, 6)]), (0.0, 0.3));
-    assert_eq!(sim.robot(right).joint_names(), sim.robot(left).joint_names());
 }
 
 /// A dump opens in plain MuJoCo and is the same robot, drives included. As a URDF it is the same tree: its joints and masses,

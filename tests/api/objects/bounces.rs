@@ -108,10 +108,8 @@ fn excluded_objects() {
     let stand = |sim: &mut SimulationManager, ids: [ObjectId; 2], expected: [f64; 2]| {
         sim.update(500);
         let z = ids.map(|id| sim.rigid_object(id).get_pose()[(1, 2)]);
-        assert!(
-            (0..2).all(|k| (z[k] - expected[k]).abs() < 1e-3 || expected[k] == f64::NEG_INFINITY && z[k] < -4.0),
-            "{z:?}"
-        );
+        let lies = |k: usize| (z[k] - expected[k]).abs() < 1e-3 || expected[k] == f64::NEG_INFINITY && z[k] < -4.0;
+        assert!(lies(0) && lies(1), "{z:?}");
     };
     let (mut sim, ids) = stack();
     for (one, other) in [("bal", "block"), ("block", "bal"), ("ground", "bal")] {

@@ -69,10 +69,8 @@ fn robot_of_components() {
     let [(name, EntityCfg::Robot(robot))] = scene.entities.as_slice() else { panic!("{scene:?}") };
     assert_eq!((name.as_str(), robot.uid.as_str()), ("arm", "arm"));
     let [arm, hand] = robot.urdf.components.as_slice() else { panic!("{robot:?}") };
-    assert_eq!(
-        (arm.urdf.as_path(), hand.urdf.as_path()),
-        (Path::new("somewhere/arm.urdf"), Path::new("/abs/hand.urdf"))
-    );
+    let paths = [arm, hand].map(|part| part.urdf.as_path());
+    assert_eq!(paths, ["somewhere/arm.urdf", "/abs/hand.urdf"].map(Path::new));
     assert_eq!((hand.transform, hand.prefix.as_deref()), (Pose::translation(0.0, 0.0, 0.1), Some("h_")));
     assert_eq!(robot.urdf.packages["meshes"], Path::new("somewhere/../meshes"));
     assert_eq!(robot.urdf.name_case, NameCaseCfg { joint: NameCase::Upper, link: NameCase::Original });
@@ -230,11 +228,7 @@ fn own_sensor() {
     let written = cfg.to_toml(&types).unwrap();
     let scene = InteractiveScene::new(SceneCfg::from_toml(&written, "scene.toml", &types).unwrap()).unwrap();
     let speed = scene.sensor::<Speed>("speed").unwrap();
-    assert_eq!(
-        speed.sampler.values("speed").iter().copied().collect::<Vec<_>>(),
-        [-1.0],
-        "at rest, above a level of 1"
-    );
+    assert_eq!(speed.sampler.values("speed").iter().copied().collect::<Vec<_>>(), [-1.0], "it rests");
 
     let error = SceneCfg::from_toml(&text.replace("level", "levle"), "scene.toml", &types).unwrap_err().to_string();
     assert!(error.starts_with("scene.toml:8: ") && error.contains("`level`"), "{error}");
