@@ -309,7 +309,7 @@ fn warnings_of_the_simulation() {
 
     let still = folder.urdf(&["<link name=\"base\"/>"]);
     assert_eq!(run(&[&still]).code, 0, "what stands still needs no mass");
-    assert_eq!(warnings(&report(&[&still, "--floating-base"]).1), ["robot.urdf:2: massless-link"]);
+    assert_eq!(warnings(&report(&[&still, "--floating_base"]).1), ["robot.urdf:2: massless-link"]);
 }
 
 #[test]

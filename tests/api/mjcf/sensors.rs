@@ -1,4 +1,4 @@
-//! Sensors of parts: MuJoCo's own, joints and actuators, wrenches and frames, against MuJoCo and closed forms.
+//! Sensors of parts: MuJoCo's own, joints and actuators, and frames, against MuJoCo and closed forms.
 
 use super::*;
 use kinetoscope::ndarray::{Array2, ArrayView3, Axis, array};

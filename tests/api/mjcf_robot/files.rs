@@ -1,4 +1,4 @@
-//! Names and control parts, scene files, dumps, and MuJoCo's own sample models as robots.
+//! Names and control parts, dumps, and MuJoCo's own sample models as robots.
 
 use super::*;
 use kinetoscope::ndarray::array;
@@ -6,7 +6,7 @@ use kinetoscope::sim::DiagnosticKind;
 use kinetoscope::sim::mj::{TARGET, Target, compile_file};
 use testkit::refusal::assert_error;
 use testkit::urdf::Files;
-use testkit::worlds::{errors, pose_in, urdf_robot};
+use testkit::worlds::{errors, gains, pose_in, urdf_robot};
 
 /// Elements without a name are called by their number.
 #[test]
@@ -54,7 +54,7 @@ fn control_parts() {
 /// without shapes.
 #[test]
 fn dumps() {
-    let (mut sim, id) = super::scenes::moving();
+    let (mut sim, id) = with(1, RobotCfg { drive: gains(300.0, 30.0), ..robot("odd", ODD) });
     let files = Files::default();
     sim.dump(files.folder()).unwrap();
     let file = if TARGET == Target::V2 { "robot.mjcf2.xml" } else { "robot.mjcf4.xml" };

@@ -1,5 +1,4 @@
-//! Bounces: against the closed form, against the recursion of MuJoCo's steps, and between two that both bounce; pairs that
-//! never collide.
+//! Bounces against the closed form; pairs that never collide.
 
 use super::*;
 use kinetoscope::sim::Cone;
@@ -20,7 +19,7 @@ fn meet(mut sim: SimulationManager, [left, right]: [RigidObjectCfg; 2], phase: f
 }
 
 /// The error that ten steps in a contact leave of the closed form, over all places in a step where the surfaces may meet:
-/// worked out with the recursion below for 400 of them, as [`RigidObjectCfg::restitution`] says it; straight lines between.
+/// worked out with the recursion of `tests/physics/bounce.rs` for 400 of them, as [`RigidObjectCfg::restitution`] says it; straight lines between.
 const BAND: [[f64; 3]; 6] = [
     [0.14, -0.08, 0.04],
     [0.3, -0.08, 0.04],

@@ -1,4 +1,4 @@
-//! Objects that are meshes, and cones: mass, motion, sensors, collision and export.
+//! Objects that are meshes, and cones: mass, sensors, collision and export.
 
 use super::*;
 use kinetoscope::ndarray::array;

@@ -1,4 +1,4 @@
-//! Terrain in a simulation: heights that rays and cameras measure, against the array and against `mj_ray`; objects that lie
+//! Terrain in a simulation: heights that rays measure, against the array and against `mj_ray`; objects that lie
 //! on it; exports; and refused terrains.
 
 use kinetoscope::ndarray::Array2;
