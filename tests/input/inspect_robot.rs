@@ -95,10 +95,6 @@ fn warnings(report: &Value) -> Vec<String> {
     report["warnings"].as_array().unwrap().iter().map(of).collect()
 }
 
-fn vendor(name: &str) -> String {
-    testkit::needs::robot(name).to_str().unwrap().to_owned()
-}
-
 const SR5: &str = "sr5/SR5.urdf";
 const HAND: &str = "revo1_left/revo1_left.urdf";
 const ANYMAL: &str = "anymal_c_simple_description/urdf/anymal.urdf";
@@ -266,8 +262,9 @@ fn dynamics() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn dynamics_of_anymal() {
-    let anymal = vendor(ANYMAL);
-    compare_with_mujoco(&[&anymal], components(&[&anymal]), true);
+    let anymal = testkit::needs::robot(ANYMAL);
+    let anymal = anymal.to_str().unwrap();
+    compare_with_mujoco(&[anymal], components(&[anymal]), true);
 }
 
 #[test]

@@ -41,16 +41,6 @@ fn height_of(sim: &SimulationManager, ball: ObjectId) -> f64 {
     sim.rigid_object(ball).get_pose()[(0, 2)]
 }
 
-/// Rays straight down over the whole field and beyond, none of them through a point of the grid.
-fn from_above() -> RayCasterCfg {
-    RayCasterCfg {
-        offset: Pose::translation(0.413, -0.287, 5.0),
-        pattern: Grid { resolution: 0.037, size: [4.0, 4.0], ..Grid::default() }.into(),
-        targets: HitTargets::Named(vec!["bumps".into()]),
-        ..RayCasterCfg::default()
-    }
-}
-
 /// Height of the surface as the configuration describes it, computed with barycentric weights; `None` beside it.
 fn height(cfg: &TerrainCfg, heights: &Array2<f64>, [x, y]: [f64; 2]) -> Option<f64> {
     let local = cfg.init_pose.inverse() * Point3::new(x, y, 0.0);
@@ -77,7 +67,14 @@ fn rays() {
     let shifted = Array2::from_shape_fn(cfg.heights.dim(), |(r, c)| cfg.heights[(r, (c + 1).min(last))]);
     let mut sim = empty();
     let id = sim.add_terrain(cfg.clone()).unwrap();
-    let scanner = sim.add_sensor("scanner", from_above()).unwrap();
+    // Straight down over the whole field and beyond, none through a point of the grid.
+    let scanner = RayCasterCfg {
+        offset: Pose::translation(0.413, -0.287, 5.0),
+        pattern: Grid { resolution: 0.037, size: [4.0, 4.0], ..Grid::default() }.into(),
+        targets: HitTargets::Named(vec!["bumps".into()]),
+        ..RayCasterCfg::default()
+    };
+    let scanner = sim.add_sensor("scanner", scanner).unwrap();
     sim.update(1);
     let (scanner, terrain) = (sim.sensor(scanner).unwrap(), sim.terrain(id));
     let (start, hit, mask) = (scanner.ray_starts(), scanner.hits(), scanner.hit_mask());
