@@ -13,6 +13,8 @@ const EXACT: Tolerance =
 /// Relative error of forces at rest. Contacts forget motion with their time constant of 20 ms: after five seconds e^-250 of
 /// it is left. The rest is the solver's tolerance of 1e-8.
 const REST: Tolerance = Tolerance::absolute(1e-8, "the solver's, for forces of 1 N at rest");
+/// Relative error of forces while a motion dies away, whose acceleration is below a thousandth of gravity.
+const STILL: Tolerance = Tolerance::absolute(1e-3, "less than a thousandth of gravity is left, for forces of 1 N");
 const SUM: Tolerance =
     Tolerance::absolute(1e-11, "rounding of 60 N in some hundred sums, and of velocities of 1e-2 m/s / 5 ms: 1e-12");
 const STAMP: Tolerance = Tolerance::absolute(1e-12, "rounding of ten sums of the step");
@@ -26,6 +28,35 @@ fn strings(names: &[&str]) -> Vec<String> {
 
 fn velocity(sim: &SimulationManager, object: ObjectId) -> Vector3<f64> {
     row(&sim.rigid_object(object).get_velocity(), 0, 0)
+}
+
+/// In every step of a fall, a bounce and the rest after it: the force of the contacts is what the change of velocity needs,
+/// `m (dv / dt - g)`, and at rest it is the weight.
+#[test]
+fn newtons_second_law() {
+    let mut sim = sim(1);
+    let (mass, dt) = (2.5, sim.cfg().physics_dt);
+    let box_ = sim.add_rigid_object(cube("box", 0.2, mass, [0.0, 0.0, 0.3])).unwrap();
+    let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
+    let mut before = velocity(&sim, box_);
+    let (mut touched, mut flying) = (0, 0);
+    for _ in 0..600 {
+        sim.update(1);
+        let after = velocity(&sim, box_);
+        let expected = mass * ((after - before) / dt - Vector3::new(0.0, 0.0, -G));
+        assert_close(
+            "force of the contacts",
+            sim.sensor(id).unwrap().total_forces_w(),
+            expected.as_slice(),
+            EXACT * 1e3,
+        );
+        touched += u32::from(expected.z > 1.0);
+        flying += u32::from(expected.z.abs() < 1e-6);
+        before = after;
+    }
+    assert!(touched > 300 && flying > 10, "{touched} steps with contact, {flying} without");
+    // The remaining motion after two seconds is far below a thousandth of gravity.
+    assert_close("weight at rest", sim.sensor(id).unwrap().net_forces_w(), &[0.0, 0.0, mass * G], STILL * (mass * G));
 }
 
 fn pairs(bodies: &str, filters: &[&str]) -> ContactSensorCfg {
