@@ -2,6 +2,7 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::channel::Depth;
+use kinetoscope::sensors::camera::imperfection::DepthNoise;
 use testkit::worlds::{cfg, look_at, object};
 
 /// A camera on the ground, below a ball that falls.
@@ -73,6 +74,30 @@ fn due_instant_and_reset() {
     assert_eq!(sim.sensor(id).unwrap().frame_counts().to_vec(), [0, 10]);
     sim.update(5);
     assert_eq!(sim.sensor(id).unwrap().frame_counts().to_vec(), [1, 11]);
+}
+
+/// `update(n)` is n times `update(1)`, images included.
+#[test]
+fn strides() {
+    let noise = [("depth".to_string(), NoiseCfg { std: 0.01, bias_walk: 0.1, ..Default::default() })].into();
+    let imperfections = Imperfections { depth_noise: Some(DepthNoise::default()), ..Default::default() };
+    let exact = CameraCfg { history_length: 2, ..below(0.03) };
+    let noisy = CameraCfg { latency_steps: 4, dropout: 0.2, noise, imperfections, ..exact.clone() };
+    for cfg in [exact, noisy] {
+        let images = |stride: u32| {
+            let (mut sim, id) = world(1, cfg.clone());
+            let joints = sim.add_sensor("every step", JointStateCfg::default()).unwrap();
+            (0..36 / stride).for_each(|_| sim.update(stride));
+            assert_eq!(sim.sensor(joints).unwrap().sample_counts()[0], 36);
+            let camera = sim.sensor(id).unwrap();
+            let (depth, history) = (camera.depth().unwrap().to_owned(), camera.history::<Depth>().unwrap().to_owned());
+            (depth, history, camera.frame_counts()[0], camera.stamps()[0].to_bits())
+        };
+        let one = images(1);
+        assert_eq!(images(36), one);
+        assert_eq!(images(12), one);
+        assert!(one.2 == 12 || cfg.latency_steps > 0, "{} images", one.2);
+    }
 }
 
 /// Steps are 10 ms, images two steps apart and three steps late: after 20 steps, the newest to be seen is that of step 16. A
