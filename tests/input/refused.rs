@@ -102,7 +102,7 @@ fn rows() -> Vec<Row> {
         ("no pattern", parts(&[("arm", &["h("])]), &["\"h(\"", "not a regular"]),
         ("huge pattern", parts(&[("arm", &["(h{1000}){1000}{1000}"])]), &["pattern", "size"]),
         (
-            "two parts of one name",
+            "two parts of a name",
             parts(&[("arm", &["hinge"]), ("arm", &["h.*"])]),
             &["control part \"arm\" is given twice"],
         ),
@@ -143,7 +143,7 @@ fn rows() -> Vec<Row> {
         ("sphere of nothing", collides("<sphere radius=\"0\"/>"), &["robot.urdf:3", "link \"arm\"", "radius"]),
         ("box of nothing", collides("<box size=\"1 0 1\"/>"), &["robot.urdf:3", "link \"arm\"", "size"]),
         (
-            "chain too deep",
+            "too deep",
             text(chain(600, "continuous", "")),
             &["robot.urdf:", "moving bodies below the root", "fixed joints"],
         ),

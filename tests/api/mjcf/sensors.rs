@@ -95,10 +95,10 @@ fn after_a_write() {
     assert_eq!(sim.sensor(id).unwrap().values().row(1), at_start.row(1));
 }
 
-/// Names, dimensions and units are those of the types; rate, history and resets those of all sensors.
+/// Names, dimensions and units are those of the types.
 #[test]
-fn names_units_and_rate() {
-    let (mut sim, part) = with(1, MACHINE);
+fn names_and_units() {
+    let (mut sim, _) = with(1, MACHINE);
     let patterns = ["acc", "touch", "angle", "speed", "turn", "length", "sensor13", "clock"];
     let named = |names: &[&str]| MujocoSensorCfg {
         sensors: Some(names.iter().map(|&name| name.into()).collect()),
@@ -113,22 +113,6 @@ fn names_units_and_rate() {
     let kinds: Vec<&str> = sensor.sensors().iter().map(|s| s.kind.as_ref()).collect();
     assert_eq!(kinds[..4], ["accelerometer", "touch", "jointpos", "jointvel"]);
     assert_error(sim.add_sensor("wrong", named(&["accc"])), "", &["\"acc\""]);
-
-    let sampling = SamplingCfg { history_length: 3, ..SamplingCfg::every(0.01) };
-    let id = sim.add_sensor("angle", MujocoSensorCfg { sampling, ..named(&["angle"]) }).unwrap();
-    let mut angles = Vec::new();
-    for step in 1..=23_u32 {
-        sim.update(1);
-        if step % 5 == 0 {
-            angles.push(sim.mjcf_part(part).get_qpos()[(0, 0)]);
-        }
-    }
-    let sensor = sim.sensor(id).unwrap();
-    assert_eq!((sensor.sample_counts()[0], sensor.values()[(0, 0)]), (4, angles[3]));
-    let history: Vec<f64> = (0..3).map(|age| sensor.value_history()[(0, age, 0)]).collect();
-    assert_eq!(history, [angles[3], angles[2], angles[1]]);
-    sim.reset(None).unwrap();
-    assert_eq!(sim.sensor(id).unwrap().sample_counts()[0], 0);
 }
 
 /// A joint of every type, and actuators without and with an activation.
@@ -194,6 +178,71 @@ fn joints_of_robots() {
     assert_eq!(sensor.forces().row(0).to_vec()[1..], qf.row(0).to_vec()[..2]);
     assert!(qf[(0, 1)].abs() > 1.0, "the control: it carries a load");
     assert_error(empty(1).add_sensor("none", ActuatorStateCfg::default()), "", &["measure nothing"]);
+}
+
+/// Masses with centres in the frame of the arm: the arm's own, and that of the tool, which is welded to it and has its mass
+/// in its origin.
+const LOADS: [(f64, [f64; 3]); 2] = [(1.5, [0.2, 0.0, -0.1]), (2.0, [0.35, 0.1, -0.4])];
+const PALM: [f64; 3] = [0.05, -0.02, 0.1];
+
+/// A crane that stands in one environment and turns freely about the vertical in the other. What its joint exerts carries
+/// all that is beyond it and bends its way: `F = sum m (omega x (omega x c) - g)`, and about the palm
+/// `T = sum (c - p) x m (omega x (omega x c) - g)`, both turned into the axes of the palm.
+#[test]
+fn wrench_at_a_site() {
+    let turn = from_xyz_rpy([0.0; 3], [0.4, -0.2, 0.7]).rotation;
+    let joined = |v: &[f64]| v.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+    // Moments that are alike about all axes: turning needs no torque of its own.
+    let inertial = |mass: f64, at: &[f64]| {
+        format!(r#"<inertial pos="{}" mass="{mass}" diaginertia="0.01 0.01 0.01"/>"#, joined(at))
+    };
+    let crane = format!(
+        r#"<mujoco><worldbody><body name="arm" pos="0 0 2"><joint name="turn" axis="0 0 1"/>{}
+        <body name="tool" pos="{}">{}<site name="palm" pos="{}" quat="{}"/></body></body></worldbody></mujoco>"#,
+        inertial(LOADS[0].0, &LOADS[0].1),
+        joined(&LOADS[1].1),
+        inertial(LOADS[1].0, &[0.0; 3]),
+        joined(&PALM),
+        joined(&[turn.w, turn.i, turn.j, turn.k]),
+    );
+    let mut sim = empty(2);
+    // The part stands turned about the vertical, which changes nothing in the axes of its bodies.
+    let init_pose = from_xyz_rpy([0.3, -0.2, 0.1], [0.0, 0.0, 0.5]);
+    let part = sim.add_mjcf(MjcfCfg { init_pose, ..MjcfCfg::text("m", crane) }).unwrap();
+    let cfg = JointWrenchCfg { links: vec!["m/arm".into()], frames: vec!["m/palm".into()], ..Default::default() };
+    let id = sim.add_sensor("wrench", cfg).unwrap();
+    let omegas = [0.0, 3.0];
+    sim.mjcf_part_mut(part).write_qvel(&array![[omegas[0]], [omegas[1]]], None).unwrap();
+    let palm = Vector3::from(LOADS[1].1) + Vector3::from(PALM);
+    let up = Vector3::new(0.0, 0.0, 9.81);
+    let wrench_about = |p: Vector3<f64>, omega: f64| {
+        LOADS.iter().fold((Vector3::zeros(), Vector3::zeros()), |(force, torque), (mass, com)| {
+            let com = Vector3::from(*com);
+            let needed = *mass * (up - omega * omega * Vector3::new(com.x, com.y, 0.0));
+            (force + needed, torque + (com - p).cross(&needed))
+        })
+    };
+    // Sums of a few numbers of at most 100, with 16 digits, through chains of frames of unit length: 1e-13.
+    let same = |found: ArrayView3<'_, f64>, env: usize, b: usize, expected: Vector3<f64>| {
+        let found = Vector3::from_fn(|k, _| found[(env, b, k)]);
+        assert!((found - expected).norm() < 1e-11, "environment {env}, {b}: {found} is not {expected}");
+    };
+    for _ in 0..4 {
+        let sensor = sim.sensor(id).unwrap();
+        assert_eq!(sensor.link_names(), ["m/arm", "m/palm"]);
+        for (env, omega) in omegas.into_iter().enumerate() {
+            for (b, about, axes) in [(0, Vector3::zeros(), UnitQuaternion::identity()), (1, palm, turn.inverse())] {
+                let (force, torque) = wrench_about(about, omega);
+                same(sensor.forces(), env, b, axes * force);
+                same(sensor.torques(), env, b, axes * torque);
+            }
+        }
+        sim.update(30);
+    }
+    // The controls: the palm is elsewhere and turned, and turning is felt.
+    let (still, turning) = (wrench_about(palm, 0.0), wrench_about(palm, 3.0));
+    assert!((still.1 - wrench_about(Vector3::zeros(), 0.0).1).norm() > 1.0 && (turning.0 - still.0).norm() > 1.0);
+    assert!((turn.inverse() * still.0 - still.0).norm() > 1.0);
 }
 
 /// Sites are frames where MuJoCo has them, for sensors of frames, cameras and the handle of the part.

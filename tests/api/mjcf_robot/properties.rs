@@ -32,14 +32,6 @@ fn far(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |far, (a, b)| far.max((a - b).abs()))
 }
 
-/// [`SLED`] with other numbers.
-fn edited(edits: &[[&str; 2]]) -> String {
-    edits.iter().fold(SLED.to_string(), |text, [from, to]| {
-        assert_eq!(text.matches(from).count(), 1, "{from}");
-        text.replace(from, to)
-    })
-}
-
 /// A property that one environment gets, its value, and the numbers of another file: its words before and after.
 type Change = (Property, &'static str, &'static [f64], [&'static str; 2]);
 
@@ -67,7 +59,8 @@ fn as_another_file() {
         let (mut sim, id) = sledding(SLED, 2);
         let of = format!("r/{name}");
         sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(property, &of, value)).unwrap();
-        let (mut judge, of_judge) = sledding(&edited(&[edit]), 1);
+        assert_eq!(SLED.matches(edit[0]).count(), 1, "{edit:?}");
+        let (mut judge, of_judge) = sledding(&SLED.replace(edit[0], edit[1]), 1);
         let (mine, expected) = (slide(&mut sim, id), slide(&mut judge, of_judge));
         let (apart, control) = (far(&mine[1], &expected[0]), far(&mine[0], &mine[1]));
         assert!(apart < 1e-9, "{property:?} of {name}: {apart}");

@@ -1,34 +1,19 @@
-//! Robots from MJCF in scenes: snapshots, additions, wrenches, self-collision, sensors and cameras.
+//! Robots from MJCF in scenes: gravity compensation, self-collision and sensors.
 
 use super::*;
-use kinetoscope::ndarray::{Array3, Axis, array};
+use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::sensors::ray::pattern::Grid;
-use testkit::refusal::assert_error;
 use testkit::worlds::gains;
 
-/// Three environments on their way to different targets.
-pub(super) fn moving() -> (SimulationManager, RobotId) {
-    let (mut sim, id) = with(3, RobotCfg { drive: gains(300.0, 30.0), ..robot("odd", ODD) });
-    let targets = Array2::from_shape_fn((3, 7), |(env, joint)| 0.1 * env as f64 - 0.05 * joint as f64);
-    sim.robot_mut(id).set_qpos(&targets, None, None).unwrap();
-    (sim, id)
-}
-
-/// Gravity compensation of all links holds an arm that nothing else holds; an external wrench moves it.
+/// Gravity compensation of all links holds an arm that nothing else holds.
 #[test]
-fn wrenches_and_gravity_compensation() {
+fn gravity_compensation() {
     let (mut sim, id) = with(2, passive(robot("odd", &ODD.replace(r#"stiffness="1.5""#, ""))));
     let (start, second) = (sim.robot(id).get_qpos(), Some(&[EnvId(1)][..]));
     sim.robot_mut(id).set_gravity_compensation(true, None, second).unwrap();
     sim.update(100);
     let off = sim.robot(id).get_qpos() - &start;
     assert!(largest(off.row(1)) < 1e-9 && largest(off.row(0)) > 0.05, "{off}");
-    let hand = sim.robot(id).link_id("hand").unwrap();
-    let forces = Array3::from_shape_fn((1, 1, 3), |(_, _, k)| [0.0, 0.0, 5.0][k]);
-    let none = Array3::zeros((1, 1, 3));
-    sim.robot_mut(id).set_external_wrench(&forces, &none, WrenchFrame::World, Some(&[hand]), second).unwrap();
-    sim.update(50);
-    assert!(largest((sim.robot(id).get_qpos() - &start).row(1)) > 0.01);
 }
 
 /// Two fingers that close on each other: they pass through each other unless told to collide; a pair of the file holds only
@@ -55,24 +40,17 @@ fn self_collision() {
 /// A leg that stands on a foot, with its body on a slide, and sensors of its own.
 const LEG: &str = include_str!("../../data/mjcf/leg.xml");
 
-fn standing(with_part: bool) -> (SimulationManager, RobotId) {
-    let mut sim = testkit::worlds::sim(SimulationManagerCfg { num_envs: 2, ..SimulationManagerCfg::legged() });
-    if with_part {
-        let part = r#"<mujoco><worldbody><body pos="3 0 1"><joint name="j"/><geom size="0.1"/></body></worldbody>
-            <sensor><clock name="clock"/><jointvel name="v" joint="j"/></sensor></mujoco>"#;
-        sim.add_mjcf(MjcfCfg::text("part", part)).unwrap();
-    }
-    let id = sim.add_robot(RobotCfg { fix_base: false, ..robot("leg", LEG) }).unwrap();
-    // The control: an unknown link is an error that lists those there are.
-    assert_error(sim.add_sensor("contact", ContactSensorCfg::of("leg/foots")), "", &["leg/foot"]);
-    (sim, id)
-}
-
 /// Sensors find the links of a robot by name.
 #[test]
 fn sensors() {
     for with_part in [false, true] {
-        let (mut sim, id) = standing(with_part);
+        let mut sim = testkit::worlds::sim(SimulationManagerCfg { num_envs: 2, ..SimulationManagerCfg::legged() });
+        if with_part {
+            let part = r#"<mujoco><worldbody><body pos="3 0 1"><joint name="j"/><geom size="0.1"/></body></worldbody>
+                <sensor><clock name="clock"/><jointvel name="v" joint="j"/></sensor></mujoco>"#;
+            sim.add_mjcf(MjcfCfg::text("part", part)).unwrap();
+        }
+        let id = sim.add_robot(RobotCfg { fix_base: false, ..robot("leg", LEG) }).unwrap();
         let bodies = vec!["leg/foot".into(), "leg/body".into()];
         let contact = sim.add_sensor("contact", ContactSensorCfg { bodies, ..Default::default() }).unwrap();
         let imu = sim.add_sensor("imu", ImuCfg::on("leg/imu")).unwrap();

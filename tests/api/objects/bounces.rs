@@ -1,5 +1,4 @@
-//! Bounces: against the closed form, against the recursion of MuJoCo's steps, and between two that both bounce; pairs that
-//! never collide.
+//! Bounces against the closed form; pairs that never collide.
 
 use super::*;
 use kinetoscope::sim::Cone;
@@ -20,7 +19,7 @@ fn meet(mut sim: SimulationManager, [left, right]: [RigidObjectCfg; 2], phase: f
 }
 
 /// The error that ten steps in a contact leave of the closed form, over all places in a step where the surfaces may meet:
-/// worked out with the recursion below for 400 of them, as [`RigidObjectCfg::restitution`] says it; straight lines between.
+/// worked out with the recursion of `tests/physics/bounce.rs` for 400 of them, as [`RigidObjectCfg::restitution`] says it; straight lines between.
 const BAND: [[f64; 3]; 6] = [
     [0.14, -0.08, 0.04],
     [0.3, -0.08, 0.04],
@@ -108,10 +107,8 @@ fn excluded_objects() {
     let stand = |sim: &mut SimulationManager, ids: [ObjectId; 2], expected: [f64; 2]| {
         sim.update(500);
         let z = ids.map(|id| sim.rigid_object(id).get_pose()[(1, 2)]);
-        assert!(
-            (0..2).all(|k| (z[k] - expected[k]).abs() < 1e-3 || expected[k] == f64::NEG_INFINITY && z[k] < -4.0),
-            "{z:?}"
-        );
+        let lies = |k: usize| (z[k] - expected[k]).abs() < 1e-3 || expected[k] == f64::NEG_INFINITY && z[k] < -4.0;
+        assert!(lies(0) && lies(1), "{z:?}");
     };
     let (mut sim, ids) = stack();
     for (one, other) in [("bal", "block"), ("block", "bal"), ("ground", "bal")] {

@@ -108,19 +108,16 @@ fn refusals() {
     assert!(matches!(group.write_pose(&narrow, None), Err(Error::Shape { expected, .. }) if expected == [2, 3, 7]));
     let wide = group.write_velocity(&Array3::zeros((2, 3, 7)), None);
     assert!(matches!(wide, Err(Error::Shape { argument: "write_velocity", expected, .. }) if expected == [2, 3, 6]));
-    for (result, kind, parts) in [
-        (group.write_pose(&poses, twice), "Repeated {", &["first: 0, second: 1"][..]),
-        (group.write_velocity(&velocities, twice), "Repeated {", &["first: 0, second: 1"]),
-        (group.write_pose(&poses, Some(&[EnvId(2)])), "UnknownIndex {", &["index: 2"]),
-        (group.write_pose(&changed(&poses, (1, 2, 1), nan), None), "NotFinite {", &["row: 1, column: 1"]),
-        (group.write_velocity(&changed(&velocities, (0, 1, 4), nan), None), "NotFinite {", &["row: 0, column: 4"]),
-        (group.write_pose(&changed(&poses, (1, 2, 3), 0.0), None), "Config { field: \"write_pose\"", &[]),
+    for (result, [kind, part]) in [
+        (group.write_pose(&poses, twice), ["Repeated {", "first: 0, second: 1"]),
+        (group.write_velocity(&velocities, twice), ["Repeated {", "first: 0, second: 1"]),
+        (group.write_pose(&poses, Some(&[EnvId(2)])), ["UnknownIndex {", "index: 2"]),
+        (group.write_pose(&changed(&poses, (1, 2, 1), nan), None), ["NotFinite {", "row: 1, column: 1"]),
+        (group.write_velocity(&changed(&velocities, (0, 1, 4), nan), None), ["NotFinite {", "row: 0, column: 4"]),
+        (group.write_pose(&changed(&poses, (1, 2, 3), 0.0), None), ["Config {", "field: \"write_pose\""]),
     ] {
-        for part in parts {
-            let shown = format!("{result:?}");
-            assert!(shown.contains(part), "{shown}: {part}");
-        }
-        assert_error(result, kind, &[]);
+        let shown = format!("{:?}", result.unwrap_err());
+        assert!(shown.starts_with(kind) && shown.contains(part), "{shown} is not {kind} {part}");
     }
     assert_eq!((group.read().get_pose(), group.read().get_velocity()), before);
     group.write_pose(&poses, None).unwrap();

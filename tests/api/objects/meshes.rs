@@ -1,4 +1,4 @@
-//! Objects that are meshes, and cones: mass, motion, sensors, collision and export.
+//! Objects that are meshes, and cones: mass, sensors, collision and export.
 
 use super::*;
 use kinetoscope::ndarray::array;
@@ -22,7 +22,7 @@ fn body(sim: &SimulationManager, id: ObjectId) -> (f64, Vector3<f64>, Matrix3<f6
     })
 }
 
-/// Sides that single precision has: mass, moments and motion of the mesh are those of the box, to rounding.
+/// Sides that single precision has: mass, centre and moments of the mesh are those of the box, to rounding.
 #[test]
 fn box_mesh() {
     let files = Files::default();
@@ -37,15 +37,6 @@ fn box_mesh() {
     assert!((mass - 700.0 * 0.25 * 0.5 * 0.125).abs() < 1e-12);
     assert!((m - mass).abs() < 1e-12 && (c - com).norm() < 1e-12 && (t - tensor).norm() < 1e-12, "{m} {c} {t}");
     assert_eq!(sim.rigid_object(meshed).mass(), m);
-    // Tumbling about the middle axis is the most sensitive motion a free body has: e^(w t) of rounding.
-    let spin = row([0.1, 0.2, 0.3, 3.0, 0.01, 0.02]);
-    for id in [boxed, meshed] {
-        sim.rigid_object_mut(id).write_velocity(&spin, None).unwrap();
-    }
-    sim.update(2000);
-    let [a, b] = [boxed, meshed].map(|id| sim.rigid_object(id).get_velocity());
-    assert!((&a - &b).iter().all(|d| d.abs() < 1e-9), "{a} {b}");
-    assert!((&a - &spin).iter().any(|d| d.abs() > 0.1), "it tumbled: {a}");
 }
 
 /// The frame of a mesh is that of its file: a brick that has its corner there has its centre of mass elsewhere, here twice
@@ -85,7 +76,7 @@ fn scanner(x: f64, y: f64, resolution: f64, side: f64, target: &str) -> RayCaste
     }
 }
 
-/// Rays and depth are those of the triangles, down in the hollow; MuJoCo's own ray, of the hull, ends at its top, and so does
+/// Rays meet the triangles, down in the hollow; MuJoCo's own ray, of the hull, ends at its top, and so does
 /// a ball that lies on it.
 #[test]
 fn hollow_and_hull() {
@@ -96,16 +87,6 @@ fn hollow_and_hull() {
     let ball = object("ball", ObjectShape::Sphere { radius: 0.05 }, [0.2, 0.1, 0.56]);
     let ball = sim.add_rigid_object(ball).unwrap();
     let scanner = sim.add_sensor("scanner", scanner(0.2, 0.1, 0.0317, 0.9, "channel")).unwrap();
-    let placement = Placement::LookAt { eye: [0.2, 0.1, 2.5], target: [0.2, 0.1, 0.0], up: [0.0, 1.0, 0.0] };
-    let camera = CameraCfg {
-        width: 90,
-        height: 90,
-        intrinsics: Intrinsics::Fovy { radians: 0.5 },
-        extrinsics: Extrinsics { placement, ..Default::default() },
-        channels: Channels { depth: true, mask: true, ..Channels::default() },
-        ..Default::default()
-    };
-    let camera = sim.add_sensor("camera", camera).unwrap();
     sim.update(400);
     let lies = sim.rigid_object(ball).get_pose();
     assert!((lies[(0, 2)] - 0.55).abs() < 1e-3, "on the hull: {}", lies[(0, 2)]);
@@ -122,10 +103,6 @@ fn hollow_and_hull() {
         *if expected < 0.3 { &mut floor } else { &mut walls } += 1;
     }
     assert!(floor > 300 && walls > 150, "{floor} {walls}");
-    // Beside the ball, in the middle row: the floor is 2.4 m below.
-    let (seen, at) = (sim.sensor(camera).unwrap(), (0, 45, 45 + 10));
-    let (depth, mask) = (seen.depth().unwrap()[at], seen.mask().unwrap()[at]);
-    assert!(mask == mask_id && (depth - 2.4).abs() < 1e-5, "{mask} {depth}");
     let mujoco = |groups| {
         let ray = sim.batch().read(0, |env| env.data().ray([0.35, 0.1, 2.0], [0.0, 0.0, -1.0], groups)).unwrap();
         ray.map(|hit| hit.distance)
@@ -218,19 +195,4 @@ fn exported() {
     assert_eq!((model.ngeom(), seen), (3, 2), "the hull of the channel is not shown, its mesh and the cone are");
     let text = std::fs::read_to_string(other).unwrap();
     assert_eq!(text.contains("simple=\"false\""), TARGET == Target::V2, "2.2.2 does not know the attribute");
-}
-
-#[test]
-fn scene_files() {
-    let files = Files::default();
-    obj(&files, "b.obj", &brick([0.5, 0.5, 0.5], [0.0; 3]));
-    let text = "[entities.brick]\ntype = \"rigid_object\"\nbody_type = \"kinematic\"\nrestitution = 0.5\n\
-                shape.mesh = { path = \"b.obj\", scale = [2, 1, 1] }\n\
-                [entities.cone]\ntype = \"rigid_object\"\nshape.cone = { radius = 0.1, height = 0.3 }\nlinear_damping = 0.2\n";
-    let built = InteractiveScene::from_file(files.write("scene.toml", text)).unwrap();
-    let sim = built.sim();
-    let [brick, cone] = ["brick", "cone"].map(|uid| sim.rigid_object(sim.rigid_object_id(uid).unwrap()));
-    assert!((brick.mass() - 250.0).abs() < 1e-9);
-    assert_eq!((brick.cfg().body_type, brick.cfg().restitution), (BodyType::Kinematic, Some(0.5)));
-    assert_eq!(cone.cfg().linear_damping, 0.2);
 }

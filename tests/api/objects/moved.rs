@@ -155,32 +155,20 @@ fn ramp() {
     assert!((along / expected - 1.0).abs() < 0.01, "{along}, not {expected}");
 }
 
-/// Random places by name, as any property; cameras look where the shelf is, and rays meet it where MuJoCo's do.
+/// Random places by name, as any property; rays meet the shelf where MuJoCo's do.
 #[test]
 fn drawn_places() {
     let (mut sim, shelf_id, _) = shelf(2, 0.5);
-    let camera = CameraCfg {
-        width: 9,
-        height: 9,
-        intrinsics: Intrinsics::Pixels { fx: 9.0, fy: 9.0, cx: 4.5, cy: 4.5 },
-        channels: Channels::from_names(&["depth"]).unwrap(),
-        ..Default::default()
-    };
     // Off edges, where rounding decides.
     let rays = RayCasterCfg { offset: Pose::translation(0.013, 0.007, 3.0), ..Default::default() };
-    let (camera, rays) = (sim.add_sensor("camera", camera).unwrap(), sim.add_sensor("rays", rays).unwrap());
-    let eye = sim.sensor_mut(camera).unwrap();
-    eye.look_at(&[[0.1, 0.1, 3.0]], &[[0.1, 0.1, 0.0]], &[[1.0, 0.0, 0.0]], None).unwrap();
+    let rays = sim.add_sensor("rays", rays).unwrap();
     let draw = Randomization::new().with(Property::Position, "shelf", Draw::Add([-0.05, 0.05]));
     sim.randomize(&draw, Some(SECOND)).unwrap();
     let place = sim.rigid_object(shelf_id).get_pose();
     let moved: Vec<f64> = (0..3).map(|k| place[(1, k)] - place[(0, k)]).collect();
     assert!(moved.iter().all(|d| d.abs() <= 0.05 && *d != 0.0), "{moved:?}");
-    let (depth, rays) = (sim.sensor(camera).unwrap().depth().unwrap().to_owned(), sim.sensor(rays).unwrap());
+    let rays = sim.sensor(rays).unwrap();
     for env in 0..2 {
-        // The ball is 10 cm beside the middle of the image in both directions.
-        let expected = 3.0 - place[(env, 2)] - 0.02;
-        assert!((f64::from(depth[(env, 4, 4)]) - expected).abs() < 3e-6, "{}", depth[(env, 4, 4)]);
         for k in 0..rays.num_rays() {
             let start = [0, 1, 2].map(|axis| rays.ray_starts()[(env, k, axis)]);
             let hit = sim.batch().read(env, |env| env.data().ray(start, [0.0, 0.0, -1.0], 0b111)).unwrap();

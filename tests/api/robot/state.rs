@@ -404,9 +404,7 @@ fn parts() {
         (efforts[(env, six.0)], efforts[(env, four.0)]) = (f6, f4);
     }
     let robot = sim.robot(arm);
-    assert_eq!(
-        [robot.get_target_qpos(), robot.get_target_qvel(), robot.get_target_qf()],
-        [positions, velocities, efforts]
-    );
+    let targets = [robot.get_target_qpos(), robot.get_target_qvel(), robot.get_target_qf()];
+    assert_eq!(targets, [positions, velocities, efforts]);
     assert_error(sim.robot_mut(arm).into_part("wrst").map(drop), "", &["wrst", "wrist"]);
 }

@@ -69,10 +69,8 @@ fn robot_of_components() {
     let [(name, EntityCfg::Robot(robot))] = scene.entities.as_slice() else { panic!("{scene:?}") };
     assert_eq!((name.as_str(), robot.uid.as_str()), ("arm", "arm"));
     let [arm, hand] = robot.urdf.components.as_slice() else { panic!("{robot:?}") };
-    assert_eq!(
-        (arm.urdf.as_path(), hand.urdf.as_path()),
-        (Path::new("somewhere/arm.urdf"), Path::new("/abs/hand.urdf"))
-    );
+    let paths = [arm, hand].map(|part| part.urdf.as_path());
+    assert_eq!(paths, ["somewhere/arm.urdf", "/abs/hand.urdf"].map(Path::new));
     assert_eq!((hand.transform, hand.prefix.as_deref()), (Pose::translation(0.0, 0.0, 0.1), Some("h_")));
     assert_eq!(robot.urdf.packages["meshes"], Path::new("somewhere/../meshes"));
     assert_eq!(robot.urdf.name_case, NameCaseCfg { joint: NameCase::Upper, link: NameCase::Original });
@@ -86,17 +84,23 @@ fn robot_of_components() {
     assert_eq!((robot.hull.max_vertices, robot.hull.min_thickness), (32, None));
     assert!(robot.self_collision && robot.fix_base);
     assert_eq!(robot.payload, [("ee.*".to_string(), 0.5)]);
+    let scene = read("[entities.arm]\ntype = \"robot\"\nmjcf = \"odd.xml\"\ndrive.stiffness = 500.0\n");
+    let [(_, EntityCfg::Robot(of_mjcf))] = scene.entities.as_slice() else { panic!("{scene:?}") };
+    assert_eq!(of_mjcf.mjcf.as_ref().unwrap().path, Path::new("somewhere/odd.xml"));
     let turned = robot.init_pose * nalgebra::Point3::new(1.0, 0.0, 0.0);
     assert!((turned - nalgebra::Point3::new(0.0, 1.0, 1.0)).norm() < 1e-15);
 }
 
 #[test]
 fn shapes() {
+    let brick = ObjectShape::Mesh { path: "somewhere/b.obj".into(), scale: [2.0, 1.0, 1.0], hull: Default::default() };
     for (shape, expected) in [
         ("shape.box.size = [1, 2, 3]", ObjectShape::Box { size: [1.0, 2.0, 3.0] }),
         ("shape.sphere.radius = 0.5", ObjectShape::Sphere { radius: 0.5 }),
         ("shape.cylinder = { radius = 0.5, length = 2 }", ObjectShape::Cylinder { radius: 0.5, length: 2.0 }),
         ("shape = { capsule = { radius = 0.5, length = 2 } }", ObjectShape::Capsule { radius: 0.5, length: 2.0 }),
+        ("shape.cone = { radius = 0.1, height = 0.3 }", ObjectShape::Cone { radius: 0.1, height: 0.3 }),
+        ("shape.mesh = { path = \"b.obj\", scale = [2, 1, 1] }", brick),
     ] {
         let scene = read(&format!("[entities.o]\ntype = \"rigid_object\"\nbody_type = \"static\"\n{shape}"));
         let [(_, EntityCfg::RigidObject(object))] = scene.entities.as_slice() else { panic!("{scene:?}") };
@@ -224,11 +228,7 @@ fn own_sensor() {
     let written = cfg.to_toml(&types).unwrap();
     let scene = InteractiveScene::new(SceneCfg::from_toml(&written, "scene.toml", &types).unwrap()).unwrap();
     let speed = scene.sensor::<Speed>("speed").unwrap();
-    assert_eq!(
-        speed.sampler.values("speed").iter().copied().collect::<Vec<_>>(),
-        [-1.0],
-        "at rest, above a level of 1"
-    );
+    assert_eq!(speed.sampler.values("speed").iter().copied().collect::<Vec<_>>(), [-1.0], "it rests");
 
     let error = SceneCfg::from_toml(&text.replace("level", "levle"), "scene.toml", &types).unwrap_err().to_string();
     assert!(error.starts_with("scene.toml:8: ") && error.contains("`level`"), "{error}");

@@ -71,11 +71,8 @@ fn run(cfg: SceneCfg) -> ([f64; 2], Array3<f64>, bool) {
     scene.update_for(1.0).unwrap();
     let height = |name: &str| scene.rigid_object(name).unwrap().get_pose()[(1, 2)];
     let felt = scene.sensor::<ContactSensor>("touch").unwrap().force_matrix_w();
-    (
-        [height("ball"), height("block")],
-        scene.rigid_object_group("cubes").unwrap().get_pose(),
-        felt.iter().any(|f| *f != 0.0),
-    )
+    let cubes = scene.rigid_object_group("cubes").unwrap().get_pose();
+    ([height("ball"), height("block")], cubes, felt.iter().any(|f| *f != 0.0))
 }
 
 /// An excluded pair falls through to the ground, the welded cube hangs, the others have landed; the controls are the scene

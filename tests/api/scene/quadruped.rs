@@ -93,10 +93,6 @@ fn same_bits() {
     robot.drive.stiffness = 79.0.into();
     let found = says(&mut InteractiveScene::new(softer).unwrap(), 100);
     assert!(found.iter().zip(&expected).filter(|(found, expected)| found != expected).count() >= 6);
-    // Written and read again it moves the same, too.
-    let expected = says(&mut InteractiveScene::new(declared()).unwrap(), 20);
-    let again = super::round_trip::again(&declared());
-    assert_eq!(says(&mut InteractiveScene::new(again).unwrap(), 20), expected);
 }
 
 #[test]
@@ -114,20 +110,7 @@ fn tutorial() {
     let scanner = scene.sensor::<RayCaster>("height_scanner").unwrap();
     assert_eq!(scanner.hits().shape(), [2, 187, 3]);
     let contacts = scene.sensor::<ContactSensor>("contact_forces").unwrap();
-    let forces = contacts.net_forces_w();
-    assert_eq!(forces.shape(), [2, 4, 3]);
-    // Feet carry what the robot weighs, 52.135 kg. It still sinks a little: a tenth of g would be a fall.
-    for env in 0..2 {
-        let up: f64 = (0..4).map(|foot| forces[(env, foot, 2)]).sum();
-        assert!((up / (52.13485 * 9.81) - 1.0).abs() < 0.1, "{up} N");
-    }
-    // Reset puts one environment back.
-    let start = scene.robot("robot").unwrap().get_default_root_pose();
-    let before = scene.robot("robot").unwrap().get_root_pose();
-    scene.reset(Some(&[EnvId(1)])).unwrap();
-    let after = scene.robot("robot").unwrap().get_root_pose();
-    assert_eq!((after.row(0), after.row(1)), (before.row(0), start.row(1)));
-    assert_ne!(before.row(1), start.row(1));
+    assert_eq!(contacts.net_forces_w().shape(), [2, 4, 3]);
 }
 
 #[test]

@@ -82,7 +82,7 @@ fn every_kind() -> SceneCfg {
         )
 }
 
-pub(super) fn again(cfg: &SceneCfg) -> SceneCfg {
+fn again(cfg: &SceneCfg) -> SceneCfg {
     let types = EntityTypes::default();
     SceneCfg::from_toml(&cfg.to_toml(&types).unwrap(), "elsewhere/scene.toml", &types).unwrap()
 }

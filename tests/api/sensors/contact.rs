@@ -149,12 +149,8 @@ fn action_and_reaction() {
         }
         let below = if a == 0 { 3 } else { a - 1 };
         let above = needed[a..].iter().sum::<Vector3<f64>>();
-        assert_close(
-            "force on what is above",
-            &(vector(&force, a, below) + vector(&friction, a, below)),
-            above.as_slice(),
-            SUM,
-        );
+        let both = vector(&force, a, below) + vector(&friction, a, below);
+        assert_close("force on what is above", &both, above.as_slice(), SUM);
         assert_close("total force", sensor.total_forces_w().slice(s![0, a, ..]), needed[a].as_slice(), SUM);
         let others = (0..3).map(|b| vector(&force, a, b)).sum::<Vector3<f64>>();
         assert_close("sum of the boxes", &vector(&force, a, 4), others.as_slice(), EXACT * 1e2);

@@ -1,11 +1,84 @@
-//! A sensor that another crate defines.
+//! Sensors that another crate defines.
 
-use super::worlds::{ball, sim};
+use super::worlds::{ball, sim, sr5};
+use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::SceneState;
-use kinetoscope::sensors::{Channel, Requires, Sampler, Sensor, SensorCfg, SensorContext, SensorError};
+use kinetoscope::sensors::{Channel, Requires, Sampler, Schedule, Sensor, SensorCfg, SensorContext, SensorError};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use testkit::tolerance::{Tolerance, assert_close};
+
+/// Height of the last body, at every step, or lazily every 0.03 s; counts its measurements.
+#[derive(Clone, Default)]
+struct HeightCfg {
+    lazy: bool,
+    measured: Arc<AtomicUsize>,
+}
+
+#[derive(Debug)]
+struct Height(Vec<f64>, Arc<AtomicUsize>);
+
+impl SensorCfg for HeightCfg {
+    type Sensor = Height;
+
+    fn requires(&self) -> Requires {
+        Requires::POSES
+    }
+
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.lazy.then(|| Schedule::new(0.03, dt, false).unwrap())
+    }
+
+    fn build(&self, context: &SensorContext) -> Result<Height, SensorError> {
+        Ok(Height(vec![f64::NAN; context.num_envs], Arc::clone(&self.measured)))
+    }
+}
+
+impl Sensor for Height {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        self.1.fetch_add(1, Ordering::Relaxed);
+        self.refresh(&[], state)
+    }
+
+    fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        self.refresh(env_ids, state)
+    }
+
+    fn refresh(&mut self, _env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
+        let missing = SensorError::MissingFields { sensor: "height", missing: Requires::POSES };
+        let poses = state.body_poses.as_ref().ok_or(missing)?;
+        self.0.iter_mut().enumerate().for_each(|(env, height)| *height = poses[(env, poses.dim().1 - 1, 2)]);
+        Ok(())
+    }
+}
+
+/// A lazy sensor holds what it would have measured when it was due, and measures once for all readers.
+#[test]
+fn eager_and_lazy() {
+    let mut sim = testkit::worlds::sim(testkit::worlds::cfg(3, 2));
+    let robot = sim.add_robot(sr5("robot")).unwrap();
+    sim.robot_mut(robot).set_qpos(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
+    let cfg = HeightCfg { lazy: true, ..Default::default() };
+    let eager = sim.add_sensor("eager", HeightCfg::default()).unwrap();
+    let lazy = sim.add_sensor("lazy", cfg.clone()).unwrap();
+    let height = |sim: &SimulationManager| sim.robot(robot).link_pose("ee_link").unwrap().column(2).to_vec();
+    let start = height(&sim);
+    assert_eq!(sim.sensor(lazy).unwrap().0, start);
+    // The instant of the last measurement, not that of the reading: periods are three steps.
+    for (steps, moves) in [(2, false), (10, true), (2, false)] {
+        let before = sim.sensor(lazy).unwrap().0.clone();
+        sim.update(steps);
+        assert_eq!(sim.sensor(eager).unwrap().0, height(&sim));
+        let expected = if moves { height(&sim) } else { before };
+        for _ in 0..3 {
+            assert_eq!(sim.sensor(lazy).unwrap().0, expected, "{steps} steps");
+        }
+    }
+    assert_ne!(height(&sim), start);
+    assert_eq!(cfg.measured.load(Ordering::Relaxed), 1, "four measurements were due, one was made");
+}
 
 /// Speed of a body above a level, with everything that a sampler provides: rate, latency, noise.
 #[derive(Clone, Debug, Serialize, Deserialize)]

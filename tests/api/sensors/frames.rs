@@ -33,19 +33,11 @@ fn targets_from_the_source() {
         // Both come from MuJoCo's body quaternion, with one sign.
         let found: Vec<f64> =
             bare.source_pos_w().row(env).into_iter().chain(bare.source_quat_w().row(env)).copied().collect();
-        assert_close(
-            "pose of the source",
-            &found,
-            sim.robot(arm).link_pose("link3").unwrap().row(env).as_slice().unwrap(),
-            EXACT,
-        );
+        let link3 = sim.robot(arm).link_pose("link3").unwrap();
+        assert_close("pose of the source", &found, link3.row(env), EXACT);
         let source = link("link2", env) * offset;
-        assert_close(
-            "position of the source",
-            sensor.source_pos_w().row(env),
-            source.translation.vector.as_slice(),
-            EXACT,
-        );
+        let at = source.translation.vector;
+        assert_close("position of the source", sensor.source_pos_w().row(env), at.as_slice(), EXACT);
         for (m, target) in [(1, link("ee_link", env) * offset), (2, link("link2", env)), (3, link("link3", env))] {
             let seen = source.inverse() * target;
             let check = |view: ArrayView3<'_, f64>, expected: &[f64]| {

@@ -4,9 +4,9 @@
 use super::worlds::{cfg, cube, look_at, sr5};
 use kinetoscope::ndarray::{Array2, ArrayBase, Axis, Data, RemoveAxis, array};
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::SensorCfg;
 use kinetoscope::sensors::camera::channel::Depth;
 use kinetoscope::sensors::ray::pattern::Grid;
-use kinetoscope::sensors::{Sensor, SensorCfg};
 use kinetoscope::sim::mj;
 use std::collections::BTreeMap;
 use testkit::bits::Bits;
@@ -283,16 +283,11 @@ fn eager_and_lazy() {
             sim.update([7, 1, 7, 0][k as usize % 4]);
             readers.read(&sim, &mut all);
         }
-        let counts = sensor::<RayCaster>(&sim).sample_counts().to_vec();
+        let counts = sim.sensor(sim.sensor_ids::<RayCaster>()[0].1).unwrap().sample_counts().to_vec();
         assert_eq!(counts, [38, 23, 15, 38, 38], "every step since the last reset");
         all
     });
     assert_same("lazy sensors", &lazy, &eager);
-}
-
-/// The only sensor of its kind.
-fn sensor<S: Sensor>(sim: &SimulationManager) -> &S {
-    sim.sensor(sim.sensor_ids::<S>()[0].1).unwrap()
 }
 
 /// States of a simulation with targets, writes and resets on the way.

@@ -10,14 +10,6 @@ fn remembering(sampling: SamplingCfg) -> SamplingCfg {
     SamplingCfg { history_length: LENGTH, ..sampling }
 }
 
-/// An arm that moves, at 100 Hz.
-fn arm(num_envs: usize) -> (SimulationManager, RobotId) {
-    let mut sim = testkit::worlds::sim(testkit::worlds::cfg(num_envs, 2));
-    let robot = sim.add_robot(sr5("robot")).unwrap();
-    sim.robot_mut(robot).set_qpos(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
-    (sim, robot)
-}
-
 /// Compares readings, oldest first, with a history of shape (N, T, ...).
 fn assert_newest_first(name: &str, read: &[ArrayD<f64>], history: &ArrayViewD<'_, f64>) {
     assert_eq!(history.shape()[1], LENGTH, "{name}");
@@ -32,7 +24,9 @@ fn assert_newest_first(name: &str, read: &[ArrayD<f64>], history: &ArrayViewD<'_
 /// environment only.
 #[test]
 fn joint_state() {
-    let (mut sim, robot) = arm(2);
+    let mut sim = testkit::worlds::sim(testkit::worlds::cfg(2, 2));
+    let robot = sim.add_robot(sr5("robot")).unwrap();
+    sim.robot_mut(robot).set_qpos(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
     let slow = JointStateCfg { sampling: remembering(SamplingCfg::every(0.05)), ..Default::default() };
     let id = sim.add_sensor("joints", slow).unwrap();
     let always = sim.add_sensor("always", JointStateCfg::default()).unwrap();

@@ -2,8 +2,9 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, PoseF32};
-use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
+use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, RasterCfg, Rasterizer, look_at_pose};
 use kinetoscope::sensors::visibility::View;
+use kinetoscope::sim::staying_crew;
 use testkit::worlds::{cfg, fixed, mask_id, object};
 
 const SIZE: [usize; 2] = [400, 400];
@@ -77,4 +78,30 @@ fn selection_and_refusals() {
     assert!(Still::overview(&mut sim, Some(&[EnvId(4)]), &[]).is_err());
     let marker = Marker::sphere([0.0; 3], 0.1, [1.0; 4]);
     assert!(Still::overview(&mut sim, None, &[(EnvId(9), marker)]).is_err());
+}
+
+/// Persistent worker threads draw the images of a single thread, and go on drawing after another pool was dropped.
+#[test]
+fn persistent_threads() {
+    let mut sim = balls(5);
+    let still = Still::overview(&mut sim, None, &[]).unwrap();
+    let channels = Channels { depth: true, mask: true, position: true, ..Channels::default() };
+    let draw = |rasterizer: &mut ParallelRasterizer| {
+        let views = [0.0, 0.4, 0.8, 1.2].map(|shift| View { cx: 200.0 + 100.0 * shift, ..above() });
+        let mut frames = [(); 4].map(|()| Frame::new(SIZE[0], SIZE[1], channels));
+        let shots = views.iter().map(|view| still.shot(view)).zip(&mut frames);
+        let mut jobs: Vec<_> = shots.map(|(shot, frame)| (shot, frame.as_mut())).collect();
+        rasterizer.render(&mut jobs).unwrap();
+        drop(jobs);
+        frames
+    };
+    let alone = draw(&mut ParallelRasterizer::new(RasterCfg::default(), 1));
+    let ball = mask_id(&sim, "ball");
+    assert!(alone.iter().all(|frame| frame.mask.as_ref().unwrap().contains(&ball)));
+    let mut staying = ParallelRasterizer::new(RasterCfg::default(), 3).with_crew(staying_crew());
+    assert_eq!(draw(&mut staying), alone);
+    let mut other = ParallelRasterizer::new(RasterCfg::default(), 2).with_crew(staying_crew());
+    assert_eq!(draw(&mut other), alone);
+    drop(other);
+    assert_eq!(draw(&mut staying), alone);
 }

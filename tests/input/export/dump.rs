@@ -108,7 +108,7 @@ fn urdf(cfg: RobotCfg) {
     assert_same(sim.robot(id).description(), &again);
 }
 
-/// Its textures, its mass and its feet.
+/// Its textures, its mass, and where its inertias were repaired.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn anymal_c() {
@@ -119,12 +119,6 @@ fn anymal_c() {
     assert_eq!((images, export.ntex()), (17, 17), "17 JPEG files");
     assert!(export.nmesh() > 17, "{}", export.nmesh());
     assert!((robot.total_mass() - 52.135).abs() < 5e-4, "{}", robot.total_mass());
-    let bodies = names(sim.batch().model(), ObjectKind::Body);
-    for (foot, front, left) in [("LF", 1.0, 1.0), ("RF", 1.0, -1.0), ("LH", -1.0, 1.0), ("RH", -1.0, -1.0)] {
-        let pose = robot.link_pose(&format!("{foot}_FOOT")).unwrap();
-        assert!(pose[(0, 0)] * front > 0.2 && pose[(0, 1)] * left > 0.1, "{foot} is at {pose}");
-        assert!(!bodies.contains(&format!("anymal/{foot}_FOOT")), "it is fused");
-    }
     let repaired: Vec<_> = sim.diagnostics().iter().filter(|d| d.kind == DiagnosticKind::InertiaRepaired).collect();
     assert_eq!(repaired.len(), 5, "{repaired:#?}");
     let urdf = std::fs::read_to_string(robot.description().links[0].source.file.as_path()).unwrap();

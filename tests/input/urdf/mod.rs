@@ -39,12 +39,8 @@ pub(crate) fn assert_same(a: &RobotDescription, b: &RobotDescription) {
     let mimic = |j: &Joint| j.mimic.as_ref().map(|m| (m.joint, m.multiplier, m.offset));
     for (x, y) in a.joints.iter().zip(&b.joints) {
         assert_eq!((&x.name, x.kind, x.parent, x.child), (&y.name, y.kind, y.parent, y.child));
-        assert_eq!(
-            (x.damping, x.friction, limit(x), mimic(x)),
-            (y.damping, y.friction, limit(y), mimic(y)),
-            "{}",
-            x.name
-        );
+        let numbers = |j: &Joint| (j.damping, j.friction, limit(j), mimic(j));
+        assert_eq!(numbers(x), numbers(y), "{}", x.name);
         assert!(near(&x.parent_from_joint, &y.parent_from_joint), "{}", x.name);
         assert!((x.axis.into_inner() - y.axis.into_inner()).norm() < 1e-15, "{}", x.name);
     }
