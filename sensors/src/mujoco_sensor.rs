@@ -245,9 +245,14 @@ mod tests {
     #[test]
     fn mistakes() {
         let wrong = |cfg: MujocoSensorCfg| cfg.build(&context()).unwrap_err().to_string();
+        // Root cause: an empty list was accepted, which gave a sensor of no numbers.
+        let nothing =
+            "the MuJoCo sensor would measure nothing: sensors: there is no MuJoCo sensor; known are \"a/pos\",";
+        assert!(wrong(cfg(&[])).starts_with(nothing), "{}", wrong(cfg(&[])));
         let nobody = SensorContext { engine_sensors: [].into(), ..context() };
         let error = MujocoSensorCfg::default().build(&nobody).unwrap_err();
         assert!(matches!(&error, SensorError::NothingChosen { candidates, .. } if candidates.is_empty()), "{error}");
+        assert!(wrong(cfg(&["pso"])).starts_with("there is no MuJoCo sensor \"pso\"; known are \"pos\""));
         assert!(wrong(cfg(&["a/.*", "pos"])).contains("matched by both"));
         let noise = BTreeMap::from([("values".to_string(), NoiseCfg::default())]);
         let noisy = |patterns| MujocoSensorCfg {

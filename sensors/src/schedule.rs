@@ -179,6 +179,14 @@ mod tests {
         }
     }
 
+    /// Counting seconds in f32, as others do, turns intervals of 20 steps into 21 after 3200 steps.
+    #[test]
+    fn million_steps() {
+        let mut phases = schedule(0.1, 0.005).phases(1);
+        let due = (1..=1_000_000u64).filter(|&step| phases.is_due(0, step));
+        assert!(due.eq((1..=50_000).map(|k| 20 * k)));
+    }
+
     /// Measurements that were not read are counted, and steps that cannot be due may be left out.
     #[test]
     fn skipped_steps() {

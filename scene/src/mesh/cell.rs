@@ -88,3 +88,35 @@ pub(super) fn winding(triangles: &[[V3; 3]], p: V3) -> f64 {
         .sum();
     half / std::f64::consts::TAU
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cells of any cuts share out the box: of random points each is in one, and a cell has the corners of its hull.
+    #[test]
+    fn halves() {
+        let all = |_| true;
+        let cube = Cell::around([0.0; 3], [1.0; 3]);
+        let s = 0.5f64.sqrt();
+        let [front, back] = cube.halves([s, s, 0.0], s, &all);
+        // Through two opposite edges, of 1.02 m length: a prism on each side, whose four corners on the plane are inside.
+        for half in [&front, &back] {
+            assert_eq!((half.corners.len(), half.planes.len(), half.inside().count()), (6, 5, 4));
+        }
+        let [right, left] = back.halves([1.0, 0.0, 0.0], 0.25, &all);
+        assert_eq!((left.corners.len(), left.planes.len()), (8, 6));
+        assert_eq!((right.corners.len(), right.planes.len()), (6, 5));
+        let highest = left.inside().map(|p| p[1]).fold(f64::MIN, f64::max);
+        assert!((highest - 1.01).abs() < 1e-12, "the edge of the first plane: {highest}");
+    }
+
+    #[test]
+    fn winding_number() {
+        let p = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]].map(|t: [usize; 3]| t.map(|i| p[i]));
+        assert!((winding(&faces, [0.1, 0.2, 0.3]) - 1.0).abs() < 1e-12);
+        assert!(winding(&faces, [0.4, 0.4, 0.4]).abs() < 1e-12);
+        assert!((winding(&faces.map(|[a, b, c]| [a, c, b]), [0.1, 0.2, 0.3]) + 1.0).abs() < 1e-12, "inside out");
+    }
+}

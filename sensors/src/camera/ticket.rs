@@ -162,4 +162,24 @@ mod tests {
         let last = Ticket { age: u32::MAX, ..Ticket::first(1, 2, "eye") }.walks(Stream::walk(0), 0);
         assert!(last.iter().all(|x| x.abs() < 7.0 * 65536.0 && *x != 0.0), "{last:?}");
     }
+
+    /// A value is the one before plus a step of variance 1.
+    #[test]
+    fn independent_steps() {
+        let n = 40_000.0;
+        let step = |age: u32| -> Vec<f64> {
+            (0..10_000)
+                .flat_map(|block| {
+                    let at = |age| Ticket { age, ..Ticket::first(9, 0, "eye") }.walks(Stream::walk(2), block);
+                    let (before, after) = (at(age - 1), at(age));
+                    [0, 1, 2, 3].map(|k| after[k] - before[k])
+                })
+                .collect()
+        };
+        let (a, b) = (step(37), step(38));
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / n;
+        let bound = 6.0 / f64::sqrt(n);
+        assert!(product(&a, &b).abs() < bound, "{}", product(&a, &b));
+        assert!((product(&a, &a) - 1.0).abs() < 2f64.sqrt() * bound, "{}", product(&a, &a));
+    }
 }

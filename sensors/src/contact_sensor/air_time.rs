@@ -141,4 +141,24 @@ mod tests {
         ];
         assert_eq!(reads, expected);
     }
+
+    /// The next measurement reports a touch between two; a touch at the reset is no first contact.
+    #[test]
+    fn first_contact() {
+        let mut row = [0.0; 6];
+        let mut times = AirTimes::new(1, 1, 0.5, 1.0);
+        for (step, f) in [(1, 0.0), (2, 9.0), (3, 0.0), (4, 0.0)] {
+            times.look(0, step, |net| net[0] += f);
+        }
+        times.read(0, &mut row);
+        assert_eq!(row, [1.0, 0.0, 0.5, 0.5, 1.0, 1.0]);
+        let mut times = AirTimes::new(2, 1, 0.5, 1.0);
+        times.reset(1, 0, |net| net[1] = -3.0);
+        times.look(1, 1, |net| net[1] = -3.0);
+        times.look(1, 1, |net| net[1] = 0.0);
+        times.read(1, &mut row);
+        assert_eq!(row, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
+        times.read(0, &mut row);
+        assert_eq!(row, [0.0; 6], "the other environment");
+    }
 }

@@ -139,11 +139,24 @@ fn air_times() {
 #[test]
 fn mistakes() {
     let wrong = |cfg: ContactSensorCfg| cfg.build(&context(2)).unwrap_err();
+    let filtered =
+        |filter: &str, of: &str| ContactSensorCfg { filters: vec![filter.into()], ..ContactSensorCfg::of(of) };
     let friction = ContactSensorCfg { track_friction_forces: true, ..ContactSensorCfg::of("cube") };
-    let text = wrong(friction).to_string();
-    assert!(text.contains("`filters`") && text.contains("friction_forces_w"), "{text}");
-    let others = ContactSensorCfg { filters: vec!["LF_FOOT".into()], ..ContactSensorCfg::of(".*_FOOT") };
-    assert!(others.build(&context(2)).is_ok(), "the other foot may touch it");
+    for (cfg, start, parts) in [
+        (ContactSensorCfg::of("foot"), "there is no body \"foot\"; known are", ["LF_FOOT", ""]),
+        (ContactSensorCfg::default(), "there are no bodies to watch", ["dog/base", ""]),
+        (friction, "", ["`filters`", "friction_forces_w"]),
+        (filtered("grond", "cube"), "", ["\"ground\"", ""]),
+    ] {
+        let text = wrong(cfg).to_string();
+        assert!(text.starts_with(start) && parts.iter().all(|part| text.contains(part)), "{text}");
+    }
+    assert!(matches!(wrong(filtered("cu.e", "cube")), SensorError::OwnFilter { .. }));
+    assert!(filtered("LF_FOOT", ".*_FOOT").build(&context(2)).is_ok(), "the other foot may touch it");
+    for force_threshold in [-1.0, f64::NAN, f64::INFINITY] {
+        let cfg = ContactSensorCfg { force_threshold, ..ContactSensorCfg::of("cube") };
+        assert!(matches!(wrong(cfg), SensorError::OutOfRange { .. }));
+    }
     let twice = ContactSensorCfg { bodies: vec!["cube".into(), "cube".into()], ..Default::default() };
     assert!(matches!(wrong(twice), SensorError::Pattern(_)));
     let mut sensor = ContactSensorCfg::of("cube").build(&context(2)).unwrap();

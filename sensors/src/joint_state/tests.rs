@@ -1,7 +1,7 @@
 //! The joint state sensor, and with it the contract of every sensor with a sampler.
 
 use super::*;
-use ndarray::{Array2, array};
+use ndarray::{Array2, Axis, array};
 
 const DT: f64 = 0.005;
 
@@ -57,7 +57,42 @@ fn values() {
 }
 
 #[test]
+fn resets() {
+    let mut sensor = built(JointStateCfg { sampling: sampling(0.01, 3), ..Default::default() });
+    (1..=5).for_each(|step| sensor.update(&state([step, step])).unwrap());
+    sensor.reset(&[1], &state([5, 0])).unwrap();
+    assert_eq!(sensor.sample_counts(), array![2, 0]);
+    assert_eq!(sensor.positions(), array![[4.0, 14.0, 24.0], [100.0, 110.0, 120.0]], "fresh, and only there");
+    assert_eq!(sensor.stamps(), array![0.02, 0.0]);
+    assert_eq!((sensor.history_filled(0), sensor.history_filled(1)), (2, 0));
+    assert!(sensor.position_history().index_axis(Axis(0), 1).iter().all(|&x| x == 0.0));
+    sensor.update(&state([6, 1])).unwrap();
+    assert_eq!(sensor.sample_counts(), array![3, 0]);
+    sensor.update(&state([7, 2])).unwrap();
+    assert_eq!(sensor.sample_counts(), array![3, 1]);
+    assert_eq!(sensor.stamp_history(), array![[0.03, 0.02, 0.01], [0.01, 0.0, 0.0]]);
+}
+
+/// An environment that stands still measures nothing; a reset alone keeps the steps of the environment.
+#[test]
+fn phases() {
+    let mut sensor = built(JointStateCfg::default());
+    (1..=3).for_each(|step| sensor.update(&state([step, 1])).unwrap());
+    assert_eq!((sensor.sample_counts(), sensor.position_history().dim()), (array![3, 1].view(), (2, 0, 3)));
+    let mut sensor = built(JointStateCfg { sampling: sampling(0.02, 0), ..Default::default() });
+    sensor.update(&state([3, 3])).unwrap();
+    sensor.reset(&[0], &state([3, 3])).unwrap();
+    (4..=7).for_each(|step| sensor.update(&state([step, step])).unwrap());
+    assert_eq!(sensor.stamps(), array![0.035, 0.02]);
+}
+
+#[test]
 fn mistakes() {
+    let far = JointStateCfg { joints: Some(vec!["a".into(), "d".into()]), ..Default::default() };
+    let error = far.build(&context()).unwrap_err();
+    assert_eq!(error.to_string(), "there is no joint \"d\"; known are \"a\", \"b\", \"c\"");
+    let period = JointStateCfg { sampling: sampling(0.007, 0), ..Default::default() };
+    assert!(matches!(period.build(&context()), Err(SensorError::PeriodNotMultiple { .. })));
     let rounded =
         JointStateCfg { sampling: SamplingCfg { round_period: true, ..sampling(0.007, 0) }, ..Default::default() };
     assert_eq!(built(rounded).schedule().period_steps(), 1);
@@ -74,6 +109,10 @@ fn mistakes() {
     assert!(matches!(error, SensorError::MissingFields { .. }));
     assert_eq!(error.to_string(), "the joint state sensor was given a state without joint_efforts, joint_state");
     assert_eq!(sensor.positions(), before);
+    // Root cause: an empty list was accepted, which gave a sensor of no numbers.
+    let nothing = JointStateCfg { joints: Some(vec![]), ..JointStateCfg::default() };
+    let error = nothing.build(&context()).unwrap_err();
+    assert!(matches!(&error, SensorError::NothingChosen { candidates, .. } if *candidates == *context().joints));
     let nobody = SensorContext { joints: [].into(), ..context() };
     assert_eq!(JointStateCfg::default().build(&nobody).unwrap().joint_names(), [""; 0], "all of none");
 }

@@ -140,7 +140,7 @@ mod tests {
     use crate::lanes::{Level, at_level};
     use crate::ray::RayAssets;
     use crate::visibility::raster::Layer;
-    use scene::shape::{Plane, Sphere};
+    use scene::shape::{Box, Plane, Sphere};
     use scene::{Instance, Material, PoseF32, RenderScene, Shape};
 
     const UP: [f32; 3] = [0.0, 0.0, 1.0];
@@ -168,6 +168,26 @@ mod tests {
     /// Of a net of 4096 points, those in the cells that an edge goes through are uncertain: about twice 64 of them, half of
     /// which are on the right side: sqrt(128) / 2 / 4096 is a standard deviation of at most 0.0014.
     const NOISE: f64 = 5.0 * 0.0014;
+
+    /// Beside a wall of height h that goes on and on, at the distance d: (1 - d / sqrt(d² + h²)) / 2, which is a half in its
+    /// corner. Source: Howell, A catalog of radiation heat transfer configuration factors, B-1 (infinitely long).
+    #[test]
+    fn wall() {
+        let wall = |height: f32| {
+            let half = [0.5, 5000.0, height];
+            (Box { half }.into(), PoseF32::from_translation([-0.5, 0.0, 0.0]))
+        };
+        for (height, distance) in [(1.0f32, 1.0f32), (2.0, 0.5), (1.0, 4.0), (3000.0, 0.01)] {
+            let (d, h) = (f64::from(distance), f64::from(height));
+            let expected = 0.5 * (1.0 - d / d.hypot(h));
+            let [above, below] = blocked(vec![wall(height)], [distance, 0.0, 0.0], [UP; 2]);
+            assert!((above - expected).abs() < NOISE && below == 0.0, "{height} {distance}: {above}, not {expected}");
+        }
+        let [corner, _] = blocked(vec![wall(3000.0)], [0.001, 0.0, 0.0], [UP; 2]);
+        assert!((corner - 0.5).abs() < NOISE);
+        // Nothing in the way: nothing is blocked, exactly. A control: the wall takes something everywhere above.
+        assert_eq!(blocked(vec![], [0.3, 0.2, 0.0], [UP; 2]), [0.0; 2]);
+    }
 
     /// Below a ball: (r / d)²; on a wall half of the light is from below, and the floor takes it.
     #[test]

@@ -274,4 +274,11 @@ fn mistakes() {
             assert!(matches!(wrong(with_noise("a", noise)), SensorError::OutOfRange { .. }));
         }
     }
+    for dropout in [-0.1, 1.1, f64::NAN] {
+        assert!(matches!(wrong(SamplingCfg { dropout, ..SamplingCfg::default() }), SensorError::OutOfRange { .. }));
+    }
+    let history = SamplingCfg { history_length: usize::MAX, ..SamplingCfg::default() };
+    let latency = SamplingCfg { latency_steps: u32::MAX, ..SamplingCfg::default() };
+    assert!([history, latency].map(wrong).iter().all(|error| matches!(error, SensorError::TooLarge { .. })));
+    assert!(matches!(wrong(SamplingCfg::every(0.007)), SensorError::PeriodNotMultiple { .. }));
 }

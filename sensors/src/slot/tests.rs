@@ -123,9 +123,24 @@ fn counting(fails: bool, panics: bool) -> (SensorSlot, Arc<AtomicUsize>) {
     (slot, count)
 }
 
-/// Several threads may read at once; one of them measures, once.
 #[test]
-fn concurrent_readers() {
+fn measurements_on_demand() {
+    let (mut slot, count) = counting(false, false);
+    let count = || count.load(Ordering::Relaxed);
+    (1..=9).for_each(|step| slot.update(&state([step; ENVS], NOT_WRITTEN)));
+    assert_eq!(count(), 0);
+    assert!(slot.sensor().is_ok() && slot.sensor().is_ok() && slot.sensor_mut().is_ok());
+    assert_eq!(count(), 1, "once, however often it is read");
+    slot.update(&state([10; ENVS], NOT_WRITTEN));
+    slot.reset(&[0, 1, 2], &state([0; ENVS], NOT_WRITTEN));
+    assert_eq!(count(), 1, "a reset drops what was due");
+    slot.update(&state([2; ENVS], NOT_WRITTEN));
+    slot.refresh(&[1], &state([2; ENVS], [0, 1, 0]));
+    assert_eq!(count(), 2, "a refresh comes after what was due before");
+    slot.update(&state([3; ENVS], [0, 1, 0]));
+    assert!(slot.sensor().is_ok());
+    assert_eq!(count(), 2, "nothing was due");
+    // Several threads may read at once; one of them measures.
     for _ in 0..50 {
         let (mut slot, count) = counting(false, false);
         slot.update(&state([2; ENVS], NOT_WRITTEN));

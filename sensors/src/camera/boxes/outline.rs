@@ -261,12 +261,29 @@ mod tests {
         PoseF32::from(&scene::pose::from_xyz_rpy(at, rpy))
     }
 
+    /// The rays to a ball fill a cone of half the angle asin(r / d) about the direction of its centre, in the plane of y = 0
+    /// too: so u is cx + fx tan(atan2(x, z) ± asin(r / hypot(x, z))).
+    #[test]
+    fn balls() {
+        for (at, radius) in [([0.3, -0.2, 2.0], 0.25), ([-3.0, 1.0, 1.5], 0.4), ([0.0, 0.0, 0.6], 0.45)] {
+            let found = of(Sphere { radius: radius as f32 }, &pose([0.4, 0.3, -1.0], at)).unwrap();
+            let radius = f64::from(radius as f32);
+            let end = |x: f64, sign: f64| (x.atan2(at[2]) + sign * (radius / x.hypot(at[2])).asin()).tan();
+            for (axis, (f, c)) in [(500.0, 4310.5), (520.0, 4250.25)].into_iter().enumerate() {
+                for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
+                    let expected = f * end(at[axis], sign) + c;
+                    // The pose is in single precision: 1e-7 of metres, magnified by f / z and by the slant.
+                    assert!((found[axis][side] - expected).abs() < 2e-3, "{at:?}: {found:?}, {expected}");
+                }
+            }
+        }
+    }
+
     /// Points of fine triangles are on the surface, so they are inside of the outline; the outermost is near its edge: a
     /// circle's polygon is inside by R (1 - cos(pi / n)), times f / z and the slant of what is seen.
     #[test]
     fn shapes() {
         let shapes: Vec<Shape> = vec![
-            Sphere { radius: 0.15 }.into(),
             Ellipsoid { radii: [0.3, 0.1, 0.2] }.into(),
             Capsule { radius: 0.1, half_length: 0.3 }.into(),
             Cylinder { radius: 0.2, half_length: 0.25 }.into(),

@@ -236,6 +236,23 @@ fn spoilt_depths(imperfections: &Imperfections, depths: &[f32], view: &View) -> 
     spoilt_behind(imperfections, depths, pinhole(view, &ticket(1)))
 }
 
+/// Holes and noise are the same in depth and distance of a camera, and in each alone.
+#[test]
+fn distances() {
+    let (view, n) = (view([60, 40], 50.0), 60 * 40);
+    let reaches: Vec<f32> = (0..n).map(|k| if k % 60 < 30 { 2.0 } else { 1.0 }).collect();
+    for rays in lenses(&view) {
+        let baseline = if rays.is_none() { 0.075 } else { 0.0 };
+        let holes = Some(Holes { baseline, ..Holes::default() });
+        let all = Imperfections { depth_noise: Some(DepthNoise::NGUYEN), holes, ..Imperfections::default() };
+        let ticket = ticket(1);
+        let found = spoilt_behind(&all, &reaches, Picture { rays: rays.as_ref(), ..pinhole(&view, &ticket) });
+        assert!(rays.is_some() || found.iter().any(|reach| reach.is_infinite()), "there are holes");
+        let same = found.iter().zip(&reaches).filter(|(found, reach)| found == reach).count();
+        assert!(same < 10, "there is noise, but for {same}");
+    }
+}
+
 /// The standard deviation of depth, as a function of depth \[m\].
 type Law = fn(f64) -> f64;
 
@@ -465,6 +482,33 @@ fn focal_length_unit() {
         for (pixel, (found, expected)) in of(scale).into_iter().zip(&expected).enumerate() {
             assert!((found - expected).abs() < 1e-6, "{scale} {pixel}: {found} is not {expected}");
         }
+    }
+}
+
+/// Under a sky that is equally bright everywhere, a lens that sees up to the angle theta collects pi sin² theta of light, up to
+/// a right angle, however it spreads it: the sum over all pixels times the area of one.
+#[test]
+fn light_of_sky() {
+    use crate::camera::lens::{Equisolid, Orthographic, Stereographic};
+    use std::f64::consts::PI;
+    let (size, f) = ([300, 300], 50.0);
+    let pixels = PixelIntrinsics { fx: f, fy: f, cx: 150.0, cy: 150.0 };
+    let all: [(Lens, f64); 6] = [
+        (Equidistant { max_angle: 1.0 }.into(), 1.0),
+        (Equidistant { max_angle: 2.5 }.into(), FRAC_PI_2),
+        (Equisolid { max_angle: 2.8 }.into(), FRAC_PI_2),
+        (Orthographic { max_angle: 1.2 }.into(), 1.2),
+        (Stereographic { max_angle: 1.9 }.into(), FRAC_PI_2),
+        (OpenCv { k1: -0.1, max_angle: Some(0.9), ..OpenCv::default() }.into(), 0.9),
+    ];
+    for (lens, most) in all {
+        let rays = LensRays::new(&Optics::new(lens, pixels).unwrap(), size, 1).unwrap();
+        let found = left(&rays, size).iter().sum::<f64>() / (f * f);
+        let expected = PI * most.sin().powi(2);
+        // Of a sharp edge at radius r only pixels on it, 2 pi r of them, may be counted wrong, by half each at most and
+        // by chance: their square root is enough six times.
+        let edge = (2.0 * PI * rays.optics().domain().radius * f).sqrt() * 0.5 * 6.0 / (f * f);
+        assert!((found - expected).abs() < edge.min(0.01 * expected), "{}: {found} is not {expected}", lens.name());
     }
 }
 

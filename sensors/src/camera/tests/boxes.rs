@@ -7,11 +7,11 @@ use super::super::{
 use super::harness::{Still, at, point, things};
 use super::scenes::{Random, every_shape, random};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 use ndarray::Array2;
 use scene::pose::from_xyz_rpy;
 use scene::shape::{Box, Capsule, Ellipsoid, Plane, Sphere};
-use scene::{Instance, Material, PoseF32, RenderScene, SceneState, Shape, VisibleState};
+use scene::{Instance, Material, Pose, PoseF32, RenderScene, SceneState, Shape, VisibleState};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -176,6 +176,63 @@ fn ball(radius: f32, pose: PoseF32) -> (Shape, Material, PoseF32) {
     (Sphere { radius }.into(), Material::default(), pose)
 }
 
+/// A wall of 2 by 2 m before the camera, 3.9 m away, and a screen in front of its half y < 0: the edge is at u = cx, between two
+/// pixels, so that exactly half of the wall's pixels are hidden.
+#[test]
+fn half_hidden_wall() {
+    let scene = things([block([0.1, 1.0, 1.0], [4.0, 0.0, 0.0]), block([0.1, 2.0, 2.0], [2.0, -2.0, 0.0])]);
+    let (camera, segmentation) = (seen(&ahead(), &scene), table(&scene.0));
+    let [wall, screen] = segmentation.occlusions(SegmentLevel::Instance, &camera, 0).unwrap()[..] else { panic!() };
+    assert_eq!((wall.ratio(), wall.visible_pixels * 2), (0.5, wall.alone_pixels));
+    assert_eq!((screen.id, screen.ratio()), (2, 0.0), "parts that the image cuts off are not hidden");
+    let boxes = segmentation.boxes_2d(SegmentLevel::Instance, &camera, 0).unwrap();
+    let Box2d { tight: Some(tight), loose: Some(loose), .. } = boxes[0] else { panic!("{:?}", boxes[0]) };
+    // y points left; the wall's front is 3.9 m away.
+    let (u, v) = (80.0 / 3.9, 84.0 / 3.9);
+    assert_box(loose, [48.0 - u, 36.0 - v, 48.0 + u, 36.0 + v], 1e-4);
+    assert_eq!((tight.min, tight.max), ([(48.0 - u).round(), (36.0 - v).round()], [48.0, (36.0 + v).round()]));
+    assert_eq!(boxes[1].loose.map(|b| b.max), Some([96.0, 72.0]), "clipped to the image");
+}
+
+#[track_caller]
+fn assert_box(found: PixelBox, expected: [f64; 4], tolerance: f64) {
+    let edges = [found.min, found.max].concat();
+    assert!(edges.iter().zip(expected).all(|(a, b)| (a - b).abs() < tolerance), "{found:?}, {expected:?}");
+}
+
+/// A ball on the axis of a lens, 2 m away, and one 20 degrees to the left, with screens before the right half of each: the lens
+/// shows a ball of radius r at distance d as wide as the cone around it, 2 f asin(r / d).
+#[test]
+fn lens_cones() {
+    // y points left. A screen from the axis to the right, and the same turned with the second ball.
+    let aside = -20f64.to_radians();
+    let turned = |angle: f64, place: [f64; 3]| {
+        let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -angle);
+        PoseF32::from(&Pose::from_parts((rotation * Vector3::from(place)).into(), rotation))
+    };
+    let ball = |angle| ball(0.3, turned(angle, [2.0, 0.0, 0.0]));
+    let screen =
+        |angle| (Box { half: [0.01, 0.08, 1.0] }.into(), Material::default(), turned(angle, [1.0, -0.08, 0.0]));
+    let scene = things([ball(0.0), ball(aside), screen(0.0), screen(aside)]);
+    let (camera, segmentation) = (seen(&behind_a_lens(ahead()), &scene), table(&scene.0));
+    let boxes = segmentation.boxes_2d(SegmentLevel::Instance, &camera, 0).unwrap();
+    let cone = (0.3f64 / 2.0).asin();
+    for (found, middle) in boxes.iter().zip([0.0, aside]) {
+        let Box2d { tight: Some(tight), loose: Some(loose), visible_pixels, .. } = *found else { panic!("{found:?}") };
+        // Edges are those of whole pixels: of those whose middle is inside, in the rows whose middle is half a pixel from the
+        // axis, where the cone is narrower by (1/2)²/(2 f sin(cone)) pixels, 0.01.
+        let edges = [48.0 + 80.0 * (middle - cone), 48.0 + 80.0 * (middle + cone)];
+        assert_box(loose, [edges[0], loose.min[1], edges[1], loose.max[1]], 0.52);
+        assert!((tight.max[0] - (48.0 + 80.0 * middle)).abs() < 0.52, "{tight:?}");
+        assert_eq!((tight.min, tight.max[1]), (loose.min, loose.max[1]));
+        if middle == 0.0 {
+            assert!((loose.min[1] - (36.0 - 84.0 * cone)).abs() < 0.52, "{loose:?}");
+            let occlusion = segmentation.occlusions(SegmentLevel::Instance, &camera, 0).unwrap()[0];
+            assert_eq!((occlusion.visible_pixels, occlusion.alone_pixels), (visible_pixels, 2 * visible_pixels));
+        }
+    }
+}
+
 /// Two cubes of one class, the second wholly beside the image and higher: the class ends where the first cube does.
 #[test]
 fn class_beside_image() {
@@ -188,8 +245,7 @@ fn class_beside_image() {
     assert_eq!(class, cubes);
     // Corners of the front are 1.9 m away, of the back 2.1 m; y points left, z up.
     let expected = [48.0 + 80.0 * 0.1 / 2.1, 36.0 + 84.0 * 0.3 / 2.1, 48.0 + 80.0 * 0.3 / 1.9, 36.0 + 84.0 * 0.5 / 1.9];
-    let edges = [class[0].min, class[0].max].concat();
-    assert!(edges.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4), "{edges:?}, {expected:?}");
+    assert_box(class[0], expected, 1e-4);
 }
 
 #[test]
@@ -218,51 +274,81 @@ fn without_box() {
     assert_eq!(boxes(&seen(&ahead(), &scene)), CameraError::ThingPose { env: 0, id: 1 }.into());
 }
 
-/// Boxes of every shape, and of a link of two that stand askew in it. Fine triangles touch all six sides from inside, to the gap
-/// of their polygons, R (1 - cos(pi / 256)) < 4e-5 m; corners are those of the box, mapped; and pixels of the link are in it.
+/// A link of an ellipsoid and a capsule that stand askew in it: half lengths along the link's axes are those of the shapes,
+/// sqrt(sum of (R a)²) and r + h |R z|.
 #[test]
 fn solid_boxes() {
+    let link_from =
+        [from_xyz_rpy([0.2, -0.1, 0.3], [0.4, 0.5, -0.6]), from_xyz_rpy([-0.3, 0.1, 0.05], [-0.9, 0.2, 1.3])];
+    let (radii, radius, half_length) = ([0.3f32, 0.1, 0.2], 0.05f32, 0.25f32);
     let part = |shape: Shape, k: usize| Instance {
-        frame_from_instance: from_xyz_rpy([0.1 + 0.1 * k as f64, 0.2, -0.1], [0.3 + k as f64, 0.7, -0.2]),
+        frame_from_instance: link_from[k],
         ..Instance::new(shape, Material::default(), 7)
     };
-    let mut links: Vec<Vec<Instance>> = every_shape().into_iter().zip(0..).map(|(s, k)| vec![part(s, k)]).collect();
-    let capsule = Capsule { radius: 0.05, half_length: 0.25 };
-    links.push(vec![part(Ellipsoid { radii: [0.3, 0.1, 0.2] }.into(), 0), part(capsule.into(), 5)]);
-    let world_from_link = from_xyz_rpy([0.2, 0.3, 0.2], [1.0, -0.4, 2.0]);
-    for parts in links {
-        let corners = |part: &Instance| {
-            let positions = part.shape.tessellate(256).positions.into_iter();
-            positions.map(|p| part.frame_from_instance * Point3::from(p).cast::<f64>()).collect::<Vec<_>>()
-        };
-        let points: Vec<Point3<f64>> = parts.iter().flat_map(corners).collect();
-        let what = parts[0].shape.name();
-        let mut poses: Vec<PoseF32> =
-            parts.iter().map(|part| PoseF32::from(&(world_from_link * part.frame_from_instance))).collect();
-        poses.push(at(0.0, 0.0, -1.0));
-        let ground = Instance::new(Plane::INFINITE, Material::default(), 8);
-        let scene = (RenderScene::new([parts, vec![ground]].concat()).unwrap(), poses);
-        let camera = seen(&cfg([2.0, 0.1, 0.4], [0.3, 0.2, 0.2]), &scene);
-        let boxes = table(&scene.0).boxes_3d(SegmentLevel::Link, &camera, 0).unwrap();
+    let ground = Instance::new(Plane::INFINITE, Material::default(), 8);
+    let parts = [part(Ellipsoid { radii }.into(), 0), part(Capsule { radius, half_length }.into(), 1), ground];
+    let scene = RenderScene::new(parts.into()).unwrap();
+    let rotations = link_from.map(|pose| Rotation3::from(pose.rotation));
+    let reach = |k: usize, axis: usize| -> f64 {
+        let row = [0, 1, 2].map(|j| rotations[k][(axis, j)]);
+        match k {
+            0 => Vector3::from([0, 1, 2].map(|j| row[j] * f64::from(radii[j]))).norm(),
+            _ => f64::from(radius) + f64::from(half_length) * row[2].abs(),
+        }
+    };
+    for world_from_link in [Pose::identity(), from_xyz_rpy([0.5, 0.3, 0.2], [1.0, -0.4, 2.0])] {
+        let place = |k: usize| PoseF32::from(&(world_from_link * link_from[k]));
+        let poses = vec![place(0), place(1), at(0.0, 0.0, -1.0)];
+        let camera = seen(&cfg([2.0, 0.1, 0.4], [0.3, 0.2, 0.2]), &(scene.clone(), poses));
+        let boxes = table(&scene).boxes_3d(SegmentLevel::Link, &camera, 0).unwrap();
         let [found] = boxes[..] else { panic!("a plane without end has no box: {boxes:?}") };
         for axis in 0..3 {
-            let end = |pick: fn(f64, f64) -> f64| points.iter().map(|p| p[axis]).reduce(pick).unwrap();
-            let off = [found.min[axis] - end(f64::min), end(f64::max) - found.max[axis]];
-            assert!(off.iter().all(|x| (-4e-5..2e-6).contains(x)), "{what}: {off:?}");
+            let side = |sign: f64| [0, 1].map(|k| link_from[k].translation.vector[axis] + sign * reach(k, axis));
+            let ([a, b], [c, d]) = (side(-1.0), side(1.0));
+            // Poses are in single precision: some 1e-7 m, and as many rad.
+            assert!(
+                (found.min[axis] - a.min(b)).abs() < 2e-6 && (found.max[axis] - c.max(d)).abs() < 2e-6,
+                "{found:?}"
+            );
         }
+        // Corners: the box, mapped.
         let corners = found.corners().map(Point3::from);
         for (k, corner) in corners.iter().enumerate() {
             let local = [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { found.max[axis] } else { found.min[axis] });
-            // Poses are in single precision: some 1e-7 m, and as many rad.
-            assert!((corner - world_from_link * Point3::from(local)).norm() < 2e-6, "{what}: {corner:?}");
+            assert!((corner - world_from_link * Point3::from(local)).norm() < 2e-6, "{corner:?}");
         }
+        // Two corners, each rounded as above.
         let across = (corners[7] - corners[0]).norm();
-        assert!((across - Vector3::from(found.size()).norm()).abs() < 4e-6, "{what}: {across}");
+        assert!((across - Vector3::from(found.size()).norm()).abs() < 4e-6, "{across}");
         let middle = nalgebra::center(&corners[0], &corners[7]);
-        assert!((Point3::from(found.center()) - middle).norm() < 1e-12, "{what}");
-        for ((row, v, u), _) in camera.mask().unwrap().indexed_iter().filter(|(_, id)| **id == 7) {
+        assert!((Point3::from(found.center()) - middle).norm() < 1e-12);
+        // All visible points of the link are in it.
+        let mask = camera.mask().unwrap();
+        let shown: Vec<_> = mask.indexed_iter().filter(|(_, id)| **id == 7).map(|(at, _)| at).collect();
+        for &(row, v, u) in &shown {
             let p = world_from_link.inverse() * point(&camera, [row, v, u]);
-            assert!((0..3).all(|k| p[k] > found.min[k] - 1e-5 && p[k] < found.max[k] + 1e-5), "{what}: {p}");
+            assert!((0..3).all(|k| p[k] > found.min[k] - 1e-5 && p[k] < found.max[k] + 1e-5), "{p}");
+        }
+        assert!(shown.len() > 50, "{}", shown.len());
+    }
+}
+
+/// Every shape: fine triangles of it touch all six sides of its box from inside, to the gap of their polygons, R (1 -
+/// cos(pi / 256)) < 4e-5 m.
+#[test]
+fn tight_solids() {
+    for (k, shape) in every_shape().into_iter().enumerate() {
+        let frame_from_instance = from_xyz_rpy([0.1, 0.2, -0.1], [0.3 + k as f64, 0.7, -0.2]);
+        let instance = Instance { frame_from_instance, ..Instance::new(shape.clone(), Material::default(), 1) };
+        let scene = (RenderScene::new(vec![instance]).unwrap(), vec![PoseF32::from(&frame_from_instance)]);
+        let camera = seen(&cfg([2.0, 0.0, 0.5], [0.0; 3]), &scene);
+        let found = table(&scene.0).boxes_3d(SegmentLevel::Semantic, &camera, 0).unwrap()[0];
+        let positions = shape.tessellate(256).positions;
+        let points: Vec<_> = positions.iter().map(|p| frame_from_instance * Point3::from(*p).cast::<f64>()).collect();
+        for axis in 0..3 {
+            let end = |pick: fn(f64, f64) -> f64| points.iter().map(|p| p[axis]).reduce(pick).unwrap();
+            let off = [found.min[axis] - end(f64::min), end(f64::max) - found.max[axis]];
+            assert!(off.iter().all(|x| (-4e-5..1e-6).contains(x)), "{}: {off:?}", shape.name());
         }
     }
 }

@@ -7,8 +7,8 @@ use super::super::{
     CalibrationError, CameraCfg, CameraInfo, DistortionModel, Intrinsics, Lens, LensRays, Optics, PixelIntrinsics,
     Renderer,
 };
-use super::harness::opencv;
-use super::stage::{built, cfg, context};
+use super::harness::{opencv, point};
+use super::stage::{built, cfg, context, pose_of};
 use testkit::urdf::Files;
 
 /// As `cameracalibrator` writes it, with what some drivers add.
@@ -50,7 +50,8 @@ fn twin(info: &CameraInfo, renderer: Renderer) -> CameraCfg {
     twin
 }
 
-/// OpenCV and ROS count pixels from the centre of the first one.
+/// OpenCV and ROS count pixels from the centre of the first one: the camera sees in pixel (i, j) the point that the model of
+/// OpenCV's documentation brings to (i, j) with the numbers of the file, not one that is half a pixel beside it.
 #[test]
 fn real_file() {
     let info = CameraInfo::parse(FILE, "left.yaml").unwrap();
@@ -62,6 +63,21 @@ fn real_file() {
     assert_eq!(info.lens(), Lens::from(lens));
     assert_eq!((info.projection_matrix[(0, 2)], info.projection_matrix[(1, 1)]), (32.30114, 59.23112));
     let camera = built(&twin(&info, Renderer::FastRayTraced), &context(1));
+    let (pose, k, d) = (pose_of(&camera, 0), &info.camera_matrix, &info.distortion_coefficients);
+    let mut seen = 0;
+    for ((_, row, column), _) in camera.depth().unwrap().indexed_iter().filter(|(_, depth)| depth.is_finite()) {
+        seen += 1;
+        let local = pose.inverse() * point(&camera, [0, row, column]);
+        let (x, y) = (local.x / local.z, local.y / local.z);
+        let r2 = x * x + y * y;
+        let radial = 1.0 + d[0] * r2 + d[1] * r2 * r2;
+        let x2 = x * radial + 2.0 * d[2] * x * y + d[3] * (r2 + 2.0 * x * x);
+        let y2 = y * radial + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y;
+        let off = [k[(0, 0)] * x2 + k[(0, 2)] - column as f64, k[(1, 1)] * y2 + k[(1, 2)] - row as f64];
+        // Points and rays have 24 bits, of an image of 64 pixels: some 1e-5 of a pixel.
+        assert!(off.iter().all(|off| off.abs() < 1e-4), "({column}, {row}): {off:?}");
+    }
+    assert!(seen > 1000, "{seen}");
     // The camera has the same calibration, to the rounding of half a pixel there and back.
     let own = camera.camera_info("twin", 0).unwrap();
     assert_eq!(own.distortion_model, info.distortion_model);

@@ -1,6 +1,6 @@
 //! Bad input and odd scenes.
 
-use super::super::{Channels, FrameMut, RasterCfg, Rasterizer, Renderer};
+use super::super::{FrameMut, RasterCfg, Rasterizer, Renderer};
 use super::harness::{Still, at, look, things};
 use super::scenes::every_shape;
 use crate::visibility::{RenderError, View};
@@ -19,14 +19,11 @@ fn of(shape: impl Into<Shape>) -> Still {
 
 #[test]
 fn refused_input() {
-    let good = of(Sphere { radius: 0.5 }).with(|still| still.before = Some((still.poses.clone(), still.view)));
+    let good = of(Sphere { radius: 0.5 });
     good.draw();
-    // The frame before is for flow only.
-    let depth = Channels { depth: true, ..Channels::NONE };
-    good.with(|still| (still.before, still.channels) = (Some((vec![], still.view)), depth)).draw();
     let paths = |samples, max_bounces| Renderer::RayTraced { samples, max_bounces, denoise: false, seed: 0 };
     type Row = (&'static str, fn(&mut Still), fn(&RenderError) -> bool);
-    let rows: [Row; 15] = [
+    let rows: [Row; 12] = [
         ("width", |s| s.view.width = 0, |e| matches!(e, RenderError::Size { .. })),
         ("height", |s| s.view.height = 10_000, |e| matches!(e, RenderError::Size { .. })),
         ("fx", |s| s.view.fx = f32::NAN, |e| matches!(e, RenderError::Intrinsics { .. })),
@@ -45,17 +42,6 @@ fn refused_input() {
         ),
         ("rotation", |s| s.poses[0].rotation = [[0.0; 3]; 3], |e| matches!(e, RenderError::InstancePose { .. })),
         ("poses", |s| s.poses.clear(), |e| *e == RenderError::PoseCount { expected: 1, found: 0 }),
-        (
-            "poses before",
-            |s| s.before.as_mut().unwrap().0.clear(),
-            |e| *e == RenderError::PoseCount { expected: 1, found: 0 },
-        ),
-        (
-            "pose before",
-            |s| s.before.as_mut().unwrap().0[0].translation[0] = f32::NAN,
-            |e| matches!(e, RenderError::InstancePose { instance: 0, .. }),
-        ),
-        ("lens before", |s| s.before.as_mut().unwrap().1.fx = 0.0, |e| matches!(e, RenderError::Intrinsics { .. })),
         ("samples", |s| s.cfg.samples = 3, |e| *e == RenderError::Samples { samples: 3 }),
         (
             "bounces",

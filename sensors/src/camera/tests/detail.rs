@@ -1,11 +1,12 @@
 //! Images with level of detail against images of the meshes themselves, in eight times as many rows and columns.
 
-use super::super::{Channels, RasterCfg};
+use super::super::{CameraCfg, Channels, RasterCfg};
 use super::harness::{Image, Still, look};
 use super::robots::{sr5, sr5_view};
 use super::scenes::{EXACT, checker_plane};
 use crate::visibility::View;
 use nalgebra::Vector3;
+use scene::mesh::TriMesh;
 use scene::shape::{Cylinder, Mesh, Sphere};
 use scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
 use std::sync::{Arc, LazyLock};
@@ -19,6 +20,10 @@ const METRES: f32 = 1e-3 + 1e-6;
 
 const OFF: RasterCfg = EXACT;
 pub(super) const ON: RasterCfg = RasterCfg { lod: true, ..OFF };
+
+fn prepared(mesh: &TriMesh) -> Mesh {
+    Mesh { mesh: Arc::new(RenderMesh::new(mesh, RenderMesh::CREASE)) }
+}
 
 /// A dense ball, a dense cylinder and a dense bumpy ball, without levels.
 static PREPARED: LazyLock<[RenderMesh; 3]> = LazyLock::new(|| {
@@ -194,4 +199,43 @@ fn veiled_scene((scene, poses): (RenderScene, Vec<PoseF32>)) -> Still {
     let mut veiled = RenderScene::new(instances).unwrap();
     veiled.lights = scene.lights;
     Still { cfg: OFF, ..Still::new((veiled, poses), look([203, 150], 0.8, [1.2, 0.4, 0.5], [0.; 3])) }
+}
+
+/// Other things change no level.
+#[test]
+fn independent_levels() {
+    let (scene, poses) = dense();
+    let view = look([160, 120], 0.8, [1.2, 0.4, 0.5], [0.; 3]);
+    let draw = |scene, poses| Still { cfg: ON, ..Still::new((scene, poses), view) }.draw();
+    let all = draw(scene.clone(), poses.clone());
+    for (k, instance) in scene.instances().iter().enumerate().skip(1) {
+        let alone = draw(RenderScene::new(vec![instance.clone()]).unwrap(), vec![poses[k]]);
+        let here: Vec<usize> = (0..160 * 120).filter(|&i| all.mask()[i] == k as i32).collect();
+        let same = |i: &usize| alone.mask()[*i] == k as i32 && all.depth()[*i].to_bits() == alone.depth()[*i].to_bits();
+        assert!(here.len() > 200 && here.iter().all(same), "instance {k}");
+    }
+}
+
+/// Meshes with texture coordinates have no levels; without a texture they look the same.
+#[test]
+fn textured_meshes() {
+    let of = |textured: bool| {
+        let mut still = veiled();
+        let mut instances = still.scene.instances().to_vec();
+        for instance in &mut instances[1..] {
+            let mut mesh = instance.shape.tessellate(0);
+            mesh.uvs = textured.then(|| vec![[0.0; 2]; mesh.positions.len()]);
+            instance.shape = prepared(&mesh).into();
+        }
+        let lights = std::mem::take(&mut still.scene.lights);
+        still.scene = RenderScene::new(instances).unwrap();
+        still.scene.lights = lights;
+        still
+    };
+    let (plain, textured) = (of(false), of(true));
+    let draw = |still: &Still, cfg| still.with(|still| still.cfg = cfg).draw().bits();
+    let expected = draw(&plain, OFF);
+    assert!(draw(&textured, OFF) == expected && draw(&textured, ON) == expected);
+    assert!(draw(&plain, ON) != expected, "levels are in use");
+    assert!(CameraCfg::default().raster.lod, "levels are the default");
 }

@@ -97,15 +97,21 @@ fn latency() {
 
 #[test]
 fn history_shapes() {
-    let mut camera = built(&CameraCfg { history_length: 4, ..cfg() }, &context(3));
+    let context = context(3);
+    let mut camera = built(&CameraCfg { history_length: 4, ..cfg() }, &context);
     camera.update(&state(&[1, 1, 1])).unwrap();
+    assert_eq!(camera.history::<Depth>().unwrap().dim(), (3, 4, 32, 48));
     assert_eq!(camera.history::<Color>().unwrap().dim(), (3, 4, 32, 48, 4));
     assert_eq!((camera.stamp_history().dim(), camera.history_length()), ((3, 4), 4));
     assert_eq!(camera.history::<Depth>().unwrap().index_axis_move(Axis(1), 0), camera.depth().unwrap());
-    let none = built(&CameraCfg { channels: depth_only(), ..cfg() }, &context(3));
+    let none = built(&cfg(), &context);
     assert_eq!(none.history::<Depth>().unwrap().dim(), (3, 0, 32, 48));
+    assert_eq!(none.history::<Normal>().unwrap().dim(), (3, 0, 32, 48, 3));
     assert_eq!((none.stamp_history().dim(), none.history_length(), none.history_filled(2)), ((3, 0), 0, Ok(0)));
-    assert!(none.history_filled(3).is_err() && none.history::<Mask>().is_err());
+    assert!(none.history_filled(3).is_err());
+    let camera = built(&CameraCfg { channels: depth_only(), history_length: 1, ..cfg() }, &context);
+    let error = camera.history::<Mask>().unwrap_err().to_string();
+    assert_eq!(error, "the camera does not measure mask; it measures depth");
 }
 
 /// Images of the history are drawn when they are read, each once.
@@ -292,9 +298,9 @@ fn lazy_and_eager() {
     assert!(lazy.draws() < eager.draws(), "{} {}", lazy.draws(), eager.draws());
 }
 
-/// Threads change no bit.
+/// Threads change no bit, and some environments are those of all.
 #[test]
-fn threads() {
+fn threads_and_environments() {
     let images = |context: &SensorContext| {
         let mut camera = built(&troubled(), context);
         (1..=12).for_each(|step| camera.update(&state(&[step; 5])).unwrap());
@@ -304,6 +310,19 @@ fn threads() {
     assert!(by_threads.iter().all(|other| *other == by_threads[0]));
     let seed = context(5).seed + 1;
     assert!(images(&SensorContext { seed, ..context(5) }) != by_threads[0], "the control: another seed");
+    let (mut all, mut some) =
+        (built(&troubled(), &context(4)), built(&CameraCfg { env_ids: Some(vec![3, 1]), ..troubled() }, &context(4)));
+    for now in 1..=14 {
+        for camera in [&mut all, &mut some] {
+            camera.update(&state(&[now, now + 1, now, now])).unwrap();
+            if now == 8 {
+                camera.reset(&[0, 1], &state(&[8, 9, 8, 8])).unwrap();
+            }
+        }
+    }
+    assert_eq!(bits(&some, 0..2), bits(&all, [3, 1]));
+    assert_eq!(past_bits(&some, 0, 1), past_bits(&all, 3, 1));
+    assert_ne!(bits(&all, [3]), bits(&all, [2]), "the control");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use super::harness::opencv;
 /// A factory's calibration of an OAK-D's colour camera on a TurtleBot 4, 250 x 250 pixels, rounded to five digits. Its radial
 /// factor has a pole at 33.965 degrees and a zero at 33.970.
 const OAK_D: [f64; 8] = [-4.8608, 17.282, 0.000204, 0.001025, -25.172, -4.9436, 17.514, -25.291];
+const OAK_D_PIXELS: PixelIntrinsics = PixelIntrinsics { fx: 196.5, fy: 196.5, cx: 127.4, cy: 126.3 };
 /// That of an OAK-D Lite: 37.00 and 37.07 degrees. Its bridge is the longest.
 const OAK_D_LITE: [f64; 8] = [
     -4.0933966636657715,
@@ -102,6 +103,36 @@ fn bridges() {
     // A control: the formula alone runs away before the pole, and comes from the other side.
     let of = |degrees: f64| formula(&OAK_D, [degrees.to_radians().tan(), 0.0])[0];
     assert!(of(33.9648) > 3.0 && of(33.9649) < -3.0, "{} {}", of(33.9648), of(33.9649));
+}
+
+/// The whole image of that camera: each pixel that is not on the bridge is where OpenCV's formula brings its ray to, and no ray
+/// is on the spike, which is up to 46 pixels aside.
+#[test]
+fn oak_d() {
+    let optics = optics(&OAK_D, OAK_D_PIXELS);
+    let rays = LensRays::new(&optics, [250, 250], 1).unwrap();
+    let mut bridged = 0;
+    for k in 0..250 * 250 {
+        let (column, row) = (k % 250, k / 250);
+        let at = [column as f64 + 0.5, row as f64 + 0.5];
+        let [x, y, z] = optics.unproject(at).unwrap();
+        let direction = [x / z, y / z];
+        let [u, v] = formula(&OAK_D, direction);
+        let found = [OAK_D_PIXELS.cx + OAK_D_PIXELS.fx * u, OAK_D_PIXELS.cy + OAK_D_PIXELS.fy * v];
+        let off = (found[0] - at[0]).hypot(found[1] - at[1]);
+        let degrees = direction[0].hypot(direction[1]).atan().to_degrees();
+        if (degrees - 33.965).abs() < 0.44 {
+            bridged += 1;
+        } else {
+            assert!(off < 1e-10, "{at:?}: {off}");
+        }
+        let [a, b] = [(at[0] - OAK_D_PIXELS.cx) / OAK_D_PIXELS.fx, (at[1] - OAK_D_PIXELS.cy) / OAK_D_PIXELS.fy];
+        let aside = OAK_D_PIXELS.fx * (direction[0] - a).hypot(direction[1] - b);
+        assert!(aside < 4.0, "{at:?} looks {aside} pixels aside");
+        assert_ne!(rays.direction(0, [column, row]), [0.0; 3]);
+    }
+    // A ring of 0.87 degrees that is squeezed to 0.74 pixels, and meets the corners alone.
+    assert!((50..500).contains(&bridged), "{bridged}");
 }
 
 /// Poles that are no surplus of a fit end the lens: the image where it would be without pole and zero, if there are directions

@@ -68,38 +68,38 @@ fn white() {
     }
 }
 
-/// An environment has its noise, that of paths too, and its imperfections whichever process it is in, and with any threads.
+/// An environment has its noise and its imperfections whichever process it is in.
 #[test]
 fn first_env() {
+    let cfg = down(&[("depth", NoiseCfg::white(0.1))]);
+    let part = SensorContext { first_env: 2, ..context(2) };
+    assert_eq!(errors(&cfg, &context(4), 3), errors(&cfg, &part, 1));
+    assert_ne!(errors(&cfg, &context(4), 1), errors(&cfg, &part, 1), "the control");
     let imperfections = Imperfections {
         shot_noise: Some(ShotNoise { electrons: 500.0 }),
         read_noise: Some(ReadNoise { std: 0.01 }),
         depth_noise: Some(DepthNoise::NGUYEN),
         ..Imperfections::default()
     };
-    let noisy = CameraCfg { imperfections, ..down(&[("depth", NoiseCfg::white(0.1))]) };
-    let renderer = Renderer::RayTraced { samples: 2, max_bounces: 1, denoise: false, seed: 3 };
+    let cfg = CameraCfg { imperfections, ..down(&[]) };
     // The lights depend on the environment.
     let at = |envs: usize, step: u64| {
         let mut state = state(&vec![step; envs]);
         state.visible.as_mut().unwrap().lights.iter_mut().for_each(|light| light.direction = [0.0, 0.3, -1.0]);
         state
     };
-    for cfg in [noisy, CameraCfg { renderer, ..down(&[]) }] {
-        let seen = |context: &SensorContext, row: usize| {
-            let mut camera = built(&cfg, context);
-            [1, 2].map(|step| {
-                camera.update(&at(context.num_envs, step)).unwrap();
-                bits(&camera, [row])
-            })
-        };
-        let whole = context(8);
-        let alone = |first_env| seen(&SensorContext { first_env, threads: 3, ..context(1) }, 0);
-        assert!(alone(7) == seen(&whole, 7) && alone(6) == seen(&whole, 6));
-        let [first, second] = alone(7);
-        assert!(alone(6) != seen(&whole, 7) && first != second, "the controls: another environment, another image");
-        assert!(seen(&SensorContext { seed: 9, ..context(8) }, 7) != alone(7), "another seed");
-    }
+    let seen = |context: &SensorContext, row: usize| {
+        let mut camera = built(&cfg, context);
+        [1, 2].map(|step| {
+            camera.update(&at(context.num_envs, step)).unwrap();
+            bits(&camera, [row])
+        })
+    };
+    let whole = context(8);
+    let alone = |first_env| seen(&SensorContext { first_env, ..context(1) }, 0);
+    assert!(alone(7) == seen(&whole, 7) && alone(6) == seen(&whole, 6));
+    let [first, second] = alone(7);
+    assert!(alone(6) != seen(&whole, 7) && first != second, "the controls: another environment, another image");
 }
 
 #[test]

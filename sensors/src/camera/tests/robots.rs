@@ -1,11 +1,11 @@
 //! Robots of vendors, drawn from their own meshes.
 
-use super::harness::look;
+use super::harness::{Still, look};
 use super::scenes::checker_plane;
 use crate::visibility::View;
-use scene::mesh::load;
+use scene::mesh::{TextureSource, load};
 use scene::shape::Mesh;
-use scene::{Instance, Material, Pose, PoseF32, RenderMesh, RenderScene};
+use scene::{Instance, Material, Pose, PoseF32, RenderMesh, RenderScene, Texture, TextureKind};
 use std::sync::{Arc, LazyLock};
 
 /// The joint frames of the vendor's SR5 at rest, bent a little: (mesh, translation and rotation about an axis from the link before).
@@ -53,4 +53,48 @@ pub(super) fn sr5(copies: usize) -> (RenderScene, Vec<PoseF32>) {
 pub(super) fn sr5_view(copies: usize, size: [usize; 2]) -> View {
     let y = 0.2 * copies as f32 - 0.1;
     look(size, 0.7, [1.5 * (copies as f32).sqrt(), -1.1, 1.0], [0.3, y, 0.45])
+}
+
+#[test]
+#[ignore = "needs real robots: cargo xtask test"]
+fn vendor_sr5_links() {
+    for copies in [1, 3] {
+        let image = Still::new(sr5(copies), sr5_view(copies, [640, 480])).draw();
+        assert!((1..=7 * copies as i32).all(|id| image.mask().contains(&id)), "every link of {copies} is seen");
+    }
+}
+
+/// The meshes of ANYmal's base, each with its JPEG texture.
+#[test]
+#[ignore = "needs real robots: cargo xtask test"]
+fn textures_of_anymal() {
+    let meshes = testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf").with_file_name("../meshes");
+    let mut instances = vec![checker_plane()];
+    let mut poses = vec![PoseF32::IDENTITY];
+    let [base, top, bottom, face] =
+        ["base", "top_shell", "bottom_shell", "face"].map(|file| load(&meshes.join(format!("{file}.dae"))).unwrap());
+    let back = (&face, -0.4145, std::f64::consts::PI);
+    let parts = [(&base, 0., 0.), (&top, 0., 0.), (&bottom, 0., 0.), (&face, 0.4145, 0.), back];
+    for (k, (mesh, x, yaw)) in parts.into_iter().enumerate() {
+        for part in &mesh.parts {
+            let mut material = Material { rgba: [0.7, 0.7, 0.7, 1.0], specular: 0.3, ..Material::default() };
+            if let Some(m) = part.material.map(|m| &mesh.materials[m]) {
+                material.rgba = m.rgba;
+                if let Some(TextureSource::File(path)) = &m.texture {
+                    let image = image::open(path).unwrap().to_rgb8();
+                    let (w, h) = image.dimensions();
+                    let texture = Texture::new(TextureKind::TwoD, w, h, 3, image.as_raw()).unwrap();
+                    material.texture = Some(Arc::new(texture));
+                }
+            }
+            let mesh = Arc::new(RenderMesh::of_part(mesh, part, RenderMesh::CREASE));
+            instances.push(Instance::new(Mesh { mesh }, material, k as i32 + 1));
+            poses.push(PoseF32::from(&scene::pose::from_xyz_rpy([x, 0., 0.3], [0., 0., yaw])));
+        }
+    }
+    assert!(instances.iter().any(|instance| instance.material.texture.is_some() && instance.mask_id < 100));
+    let mut scene = RenderScene::new(instances).unwrap();
+    scene.lights[0].direction = [0.1, 0.8, -1.0];
+    let image = Still::new((scene, poses), look([640, 480], 0.6, [1.3, -0.9, 0.9], [0.0, 0., 0.3])).draw();
+    assert!([1, 2, 4].iter().all(|id| image.mask().contains(id)), "base, shell and face are seen");
 }

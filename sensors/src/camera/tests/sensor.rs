@@ -2,12 +2,13 @@
 
 use super::super::channel::Depth;
 use super::super::*;
-use super::stage::{BALL, DT, GROUND, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
+use super::stage::{BALL, DT, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
 use crate::error::SensorError;
 use crate::sensor::{Requires, Sensor, SensorCfg};
-use nalgebra::{Matrix3, Point3, Quaternion, UnitQuaternion, Vector3};
+use crate::visibility::RenderError;
+use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use ndarray::{Array2, Axis, array};
-use scene::pose::{from_row, from_xyz_rpy, to_row};
+use scene::pose::{from_row, from_wxyz, from_xyz_rpy, to_row};
 use scene::{Pose, PoseF32, SceneState};
 
 const CONVENTIONS: [CameraConvention; 3] = [CameraConvention::Ros, CameraConvention::OpenGl, CameraConvention::World];
@@ -24,12 +25,13 @@ fn lazy_draws() {
     let mut camera = built(&cfg(), &context(3));
     assert_eq!(camera.draws(), 0, "not read yet");
     camera.depth().unwrap();
-    let memory = camera.color().unwrap().as_ptr();
+    camera.color().unwrap();
     camera.point_cloud(1, Default::default()).unwrap();
     assert_eq!(camera.draws(), 3);
     (1..=5).for_each(|step| camera.update(&state(&[step; 3])).unwrap());
     assert_eq!((camera.draws(), camera.frame_counts()), (3, array![5, 5, 5].view()));
-    assert_eq!((camera.color().unwrap().as_ptr(), camera.draws()), (memory, 6), "memory stays where it is");
+    camera.color().unwrap();
+    assert_eq!(camera.draws(), 6);
     // An environment that stands still is not drawn again.
     for _ in 0..2 {
         camera.update(&state(&[6, 5, 6])).unwrap();
@@ -46,10 +48,50 @@ fn lazy_draws() {
     assert_eq!(camera.draws(), 9);
 }
 
-/// Poses stay over a reset until they are restored.
+/// Images show the instant of capture, however late they are read.
+#[test]
+fn instant_of_capture() {
+    let context = context(2);
+    let period = CameraCfg { update_period: 0.02, ..cfg() };
+    let (mut lazy, mut eager) = (built(&period, &context), built(&CameraCfg { lazy: false, ..period }, &context));
+    assert_eq!(eager.draws(), 2);
+    let mut due = Vec::new();
+    for step in 1..=11 {
+        due.push(lazy.due_in(&[step - 1, step - 1]));
+        lazy.update(&state(&[step, step])).unwrap();
+        eager.update(&state(&[step, step])).unwrap();
+    }
+    assert_eq!(due, [4, 3, 2, 1, 4, 3, 2, 1, 4, 3, 2]);
+    assert_eq!((lazy.draws(), eager.draws()), (0, 6));
+    let memory = lazy.color().unwrap().as_ptr();
+    assert_eq!(bits(&lazy, 0..2), bits(&eager, 0..2));
+    assert_eq!((lazy.draws(), eager.draws()), (2, 6));
+    assert_eq!((lazy.stamps(), lazy.schedule().period_steps()), (array![8.0 * DT, 8.0 * DT].view(), 4));
+    let mut fresh = built(&cfg(), &context);
+    fresh.refresh(&[0, 1], &state(&[8, 8])).unwrap();
+    assert_eq!(bits(&lazy, 0..2), bits(&fresh, 0..2), "as of step 8");
+    lazy.update(&state(&[12, 12])).unwrap();
+    assert_eq!(lazy.color().unwrap().as_ptr(), memory, "memory stays where it is");
+}
+
+/// Resets and refreshes show the state and count nothing; poses stay over a reset until they are restored.
 #[test]
 fn resets() {
     let context = context(2);
+    let mut camera = built(&CameraCfg { update_period: 0.02, ..cfg() }, &context);
+    (1..=6).for_each(|step| camera.update(&state(&[step, step])).unwrap());
+    assert_eq!(camera.frame_counts(), array![1, 1]);
+    let before = bits(&camera, [0]);
+    camera.reset(&[1], &state(&[6, 0])).unwrap();
+    assert_eq!((camera.frame_counts(), camera.stamps()), (array![1, 0].view(), array![4.0 * DT, 0.0].view()));
+    assert_eq!(bits(&camera, [0]), before);
+    assert_eq!(bits(&camera, [1]), bits(&built(&cfg(), &context), [1]), "as at step 0");
+    camera.refresh(&[0], &state(&[7, 9])).unwrap();
+    assert_eq!((camera.frame_counts(), camera.stamps()), (array![1, 0].view(), array![7.0 * DT, 0.0].view()));
+    camera.update(&state(&[8, 2])).unwrap();
+    camera.update(&state(&[10, 4])).unwrap();
+    assert_eq!((camera.frame_counts(), camera.stamps()), (array![2, 1].view(), array![8.0 * DT, 4.0 * DT].view()));
+
     let mut camera = built(&cfg(), &context);
     let local = |camera: &Camera| camera.local_pose(CameraConvention::OpenGl);
     let configured = local(&camera);
@@ -101,6 +143,18 @@ fn requirements() {
     let mut free = cfg().build(&crate::SensorContext { bodies: Vec::new().into(), ..context(1) }).unwrap();
     free.reset(&[0], &bare).unwrap();
     free.color().unwrap();
+}
+
+#[test]
+fn hidden_groups() {
+    let mut context = context(1);
+    let mut instances = context.scene.as_ref().unwrap().instances().to_vec();
+    instances[1].group = 3;
+    context.scene = Some(scene::RenderScene::new(instances).unwrap().into());
+    let sees_ball = |cfg: &CameraCfg| built(cfg, &context).mask().unwrap().iter().any(|&id| id == BALL);
+    let mut everything = cfg();
+    everything.raster.groups = u32::MAX;
+    assert_eq!([&cfg(), &everything].map(sees_ball), [false, true]);
 }
 
 #[test]
@@ -222,6 +276,31 @@ fn channels() {
     assert_eq!(bits(&camera, 0..3), bits(&built(&cfg(), &context), 0..3));
 }
 
+/// The ground seen from straight above, in all conventions.
+#[test]
+fn conventions() {
+    // The right of the image is +x.
+    let forward_left_up = [-Vector3::z(), -Vector3::x(), Vector3::y()];
+    let world = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&forward_left_up));
+    let rotations =
+        [from_wxyz([0., 1., 0., 0.]), UnitQuaternion::identity(), UnitQuaternion::from_rotation_matrix(&world)];
+    for (convention, rotation) in CONVENTIONS.into_iter().zip(rotations) {
+        let placement = Placement::Pose { pos: [5.0, 0.2, 2.5], rotation };
+        let cfg = CameraCfg { extrinsics: Extrinsics { placement, convention, parent: None }, ..cfg() };
+        let camera = built(&cfg, &context(1));
+        assert!(camera.depth().unwrap().iter().all(|z| (z - 2.5).abs() < 1e-5), "{convention:?}");
+        let corner = [0, 1].map(|k| f64::from(camera.position().unwrap()[(0, 0, 0, k)]));
+        let expected = [5.0 + (0.5 - 22.25) / 40.0 * 2.5, 0.2 - (0.5 - 17.5) / 52.0 * 2.5];
+        assert!((0..2).all(|k| (corner[k] - expected[k]).abs() < 1e-4), "{convention:?}: {corner:?}");
+        let distance = f64::from(camera.distance().unwrap()[(0, 0, 0)]);
+        assert!((distance - 2.5 * ray(&LENS.matrix(48, 32).unwrap(), 0, 0).norm()).abs() < 1e-5);
+        let pose = Pose::from_parts([5.0, 0.2, 2.5].into(), rotation);
+        for row in [camera.local_pose(convention), camera.pose_w(convention)] {
+            assert!(row.iter().zip(to_row(&pose)).all(|(a, b)| (a - b).abs() < 1e-12), "{row}");
+        }
+    }
+}
+
 /// An attached camera is a free one that moves.
 #[test]
 fn attached() {
@@ -268,6 +347,41 @@ fn world_pose_of_attached() {
     assert!(close(found.row(1), to_row(&moved)) && close(found.row(0), to_row(&there)));
 }
 
+/// Straight up and straight down; the other environments stay.
+#[test]
+fn vertical() {
+    let mut camera = built(&cfg(), &context(3));
+    let before = bits(&camera, [0, 2]);
+    camera.look_at(&[[5.0, 0.0, 2.0]], &[[5.0, 0.0, 0.0]], &UP, Some(&[1])).unwrap();
+    assert_eq!(bits(&camera, [0, 2]), before);
+    assert!(camera.depth().unwrap().index_axis(Axis(0), 1).iter().all(|z| (z - 2.0).abs() < 1e-5));
+    // The upward direction of the image is +y.
+    let y = |row: usize| camera.position().unwrap()[(1, row, 0, 1)];
+    assert!(y(0) > y(31));
+    camera.look_at(&[[5.0, 0.0, 2.0]], &[[5.0, 0.0, 9.0]], &UP, Some(&[1])).unwrap();
+    assert!(camera.depth().unwrap().index_axis(Axis(0), 1).iter().all(|&z| z == f32::INFINITY));
+    assert!(camera.mask().unwrap().index_axis(Axis(0), 1).iter().all(|&id| id == 0));
+    assert_eq!(bits(&camera, [0, 2]), before);
+}
+
+#[test]
+fn misses() {
+    let context = context(2);
+    let camera = built(&cfg(), &context);
+    let ids = camera.mask().unwrap();
+    assert!(ids.iter().filter(|&&id| id == 0).count() > 100);
+    for (depth_miss, value) in [(DepthMiss::Inf, f32::INFINITY), (DepthMiss::Far, 100.0), (DepthMiss::Zero, 0.0)] {
+        let other = built(&CameraCfg { depth_miss, ..cfg() }, &context);
+        for (there, here) in [(camera.depth(), other.depth()), (camera.distance(), other.distance())] {
+            for ((a, b), id) in there.unwrap().iter().zip(here.unwrap()).zip(ids) {
+                assert_eq!(*b, if *id == 0 { value } else { *a });
+            }
+        }
+        let cloud = other.point_cloud(0, PointFrame::World).unwrap();
+        assert_eq!(cloud, camera.point_cloud(0, PointFrame::World).unwrap());
+    }
+}
+
 /// Points are those of the position channel; in the camera's own frame z is the depth.
 #[test]
 fn points() {
@@ -307,24 +421,25 @@ fn refused(cfg: CameraCfg) -> SensorError {
 #[test]
 fn bad_configurations() {
     use SensorError::Camera;
-    let pixels = |fx| Intrinsics::Pixels { fx, fy: 1.0, cx: 0.0, cy: 0.0 };
-    let samples = RasterCfg { samples: 3, ..RasterCfg::default() };
-    for (cfg, variant) in [
-        (CameraCfg { height: 0, ..cfg() }, "Camera(View(Size"),
-        (CameraCfg { width: usize::MAX, ..cfg() }, "Camera(View(Size"),
-        (CameraCfg { width: 1 << 40, height: 1 << 40, ..cfg() }, "Camera(View(Size"),
-        (CameraCfg { near: -1.0, ..cfg() }, "Camera(View(Range"),
-        (CameraCfg { near: 1.0, far: 1.0, ..cfg() }, "Camera(View(Range"),
-        (CameraCfg { far: f64::INFINITY, ..cfg() }, "Camera(View(Range"),
-        (CameraCfg { far: 1e300, ..cfg() }, "Camera(View(Range"),
-        (CameraCfg { intrinsics: pixels(-5.0), ..cfg() }, "Camera(Lens"),
-        (CameraCfg { intrinsics: pixels(f64::NAN), ..cfg() }, "Camera(Lens"),
-        (CameraCfg { intrinsics: pixels(1e30), ..cfg() }, "Camera(View("),
-        (CameraCfg { raster: samples, ..cfg() }, "Camera(View(Samples { samples: 3 }"),
-    ] {
-        let error = refused(cfg);
-        assert!(format!("{error:?}").starts_with(variant), "{variant}: {error:?}");
+    for (width, height) in [(0, 32), (48, 0), (usize::MAX, 2), (10_000, 10_000), (1 << 40, 1 << 40)] {
+        let error = refused(CameraCfg { width, height, ..cfg() });
+        assert!(matches!(error, Camera(CameraError::View(RenderError::Size { .. }))), "{error}");
     }
+    for (near, far) in
+        [(0.0, 1.0), (-1.0, 1.0), (2.0, 1.0), (1.0, 1.0), (f64::NAN, 1.0), (0.1, f64::INFINITY), (0.1, 1e300)]
+    {
+        let error = refused(CameraCfg { near, far, ..cfg() });
+        assert!(matches!(error, Camera(CameraError::View(RenderError::Range { .. }))), "{error}");
+    }
+    let lens = |fx| CameraCfg { intrinsics: Intrinsics::Pixels { fx, fy: 1.0, cx: 0.0, cy: 0.0 }, ..cfg() };
+    for fx in [0.0, -5.0, f64::NAN, f64::INFINITY] {
+        let error = refused(lens(fx));
+        assert!(matches!(error, Camera(CameraError::Lens { what: "fx", .. })), "{error}");
+    }
+    assert!(matches!(refused(lens(1e30)), Camera(CameraError::View(_))));
+    let mut samples = cfg();
+    samples.raster.samples = 3;
+    assert!(matches!(refused(samples), Camera(CameraError::View(RenderError::Samples { samples: 3 }))));
 
     let place = |placement| CameraCfg { extrinsics: Extrinsics { placement, ..Default::default() }, ..cfg() };
     let nan = Placement::Pose { pos: [0.0, f64::NAN, 0.0], rotation: UnitQuaternion::identity() };

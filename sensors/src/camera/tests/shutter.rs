@@ -7,7 +7,7 @@ use super::harness::{Image, Still, linear, matt, things, unlit};
 use super::lenses::rays_of;
 use super::stage::{DT, SIZE, ball, bits, built, cfg, context, state};
 use crate::error::SensorError;
-use crate::sensor::{Sensor, SensorCfg};
+use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::visibility::{RenderError, View};
 use ndarray::Axis;
 use scene::shape::Box;
@@ -190,21 +190,24 @@ fn refusals() {
             assert!(matches!(error, RenderError::NeedsPaths { .. }), "{error}");
         }
     }
-    let of = |aperture, shutter| CameraCfg { renderer: PATHS, aperture: Some(aperture), shutter, ..cfg() };
-    let instant = Shutter::default();
-    assert!(of(good, instant).build(&context(1)).is_ok());
-    for (cfg, variant) in [
-        (of(Aperture { focal_length: 0.0, ..good }, instant), "Aperture { what: \"focal_length\""),
-        (of(Aperture { focal_length: f64::INFINITY, ..good }, instant), "Aperture { what: \"focal_length\""),
-        (of(Aperture { f_number: f64::NAN, ..good }, instant), "Aperture { what: \"f_number\""),
-        (of(Aperture { f_number: 1e-300, ..good }, instant), "Aperture { what: \"f_number\""),
-        (of(Aperture { focus_distance: 0.05, ..good }, instant), "Aperture { what: \"focus_distance\""),
-        (of(good, Shutter { row_time: -1e-3, ..instant }), "Shutter"),
-        (of(good, Shutter { row_time: f64::NAN, ..instant }), "Shutter"),
-        (of(good, Shutter { exposure_time: f64::INFINITY, ..instant }), "Shutter"),
+    let of = |aperture| CameraCfg { renderer: PATHS, aperture: Some(aperture), ..cfg() };
+    assert!(of(good).build(&context(1)).is_ok());
+    for (bad, field) in [
+        (Aperture { focal_length: 0.0, ..good }, "focal_length"),
+        (Aperture { focal_length: f64::INFINITY, ..good }, "focal_length"),
+        (Aperture { f_number: -1.0, ..good }, "f_number"),
+        (Aperture { f_number: f64::NAN, ..good }, "f_number"),
+        (Aperture { f_number: 1e-300, ..good }, "f_number"),
+        (Aperture { focus_distance: 0.05, ..good }, "focus_distance"),
+        (Aperture { focus_distance: f64::NAN, ..good }, "focus_distance"),
     ] {
-        let error = view_error(cfg);
-        assert!(format!("{error:?}").starts_with(variant), "{variant}: {error:?}");
+        let error = view_error(of(bad));
+        assert!(matches!(error, RenderError::Aperture { what, .. } if what == field), "{field}: {error}");
+    }
+    for (row_time, exposure_time) in [(-1e-3, 0.0), (f64::NAN, 0.0), (0.0, f64::INFINITY)] {
+        let shutter = Shutter { row_time, exposure_time };
+        let error = view_error(CameraCfg { shutter, renderer: PATHS, ..cfg() });
+        assert!(matches!(error, RenderError::Shutter { .. }), "{error}");
     }
     // A frame every 4 steps, which takes 5.
     let shutter = Shutter { row_time: 0.0, exposure_time: 4.5 * DT };
@@ -317,4 +320,44 @@ fn latency() {
     }
     assert!(bits(&late, [0]) == old[2]);
     assert_eq!(late.history::<Mask>().unwrap().index_axis(Axis(1), 0), late.mask().unwrap());
+}
+
+/// Noise of paths is another one in each environment and frame, and the same in any batch and for any number of threads.
+#[test]
+fn noise_keys() {
+    // The same things in all environments.
+    let at = |envs: usize, step: u64| {
+        let mut state = state(&vec![step; envs]);
+        let visible = state.visible.as_mut().unwrap();
+        for env in 0..envs {
+            visible.instance_poses[(env, 1)] = PoseF32::from_translation([0.0, 0.0, 0.5]);
+            visible.lights[(env, 0)].direction = [0.0, 0.3, -1.0];
+        }
+        state
+    };
+    let raster = RasterCfg { groups: u32::MAX, ..RasterCfg::default() };
+    let channels = Channels { color: true, ..Channels::default() };
+    let cfg = CameraCfg { renderer: PATHS, channels, raster, ..cfg() };
+    // By step and environment.
+    let images = |cfg: &CameraCfg, context: &SensorContext| {
+        let mut camera = cfg.build(context).unwrap();
+        let envs: Vec<usize> = (0..context.num_envs).collect();
+        camera.reset(&envs, &at(envs.len(), 0)).unwrap();
+        let mut all = vec![camera.color().unwrap().to_owned()];
+        for step in 1..3 {
+            camera.update(&at(envs.len(), step)).unwrap();
+            all.push(camera.color().unwrap().to_owned());
+        }
+        let of = |images: &ndarray::Array4<u8>| images.outer_iter().map(|image| image.to_owned()).collect::<Vec<_>>();
+        all.iter().map(of).collect::<Vec<_>>()
+    };
+    let three = images(&cfg, &context(3));
+    assert!(three[0][0] != three[1][0] && three[1][0] != three[1][1], "other frames and environments");
+    // Environment 2 alone, as a part of a larger batch, with more threads.
+    let alone = images(&cfg, &SensorContext { first_env: 2, threads: 3, ..context(1) });
+    assert!((0..3).all(|step| alone[step][0] == three[step][2]));
+    // Controls: other seeds, of the simulation or the renderer, have other noise.
+    assert!(images(&cfg, &SensorContext { seed: 9, ..context(3) })[1][0] != three[1][0]);
+    let renderer = Renderer::RayTraced { samples: 2, max_bounces: 1, denoise: false, seed: 4 };
+    assert!(images(&CameraCfg { renderer, ..cfg }, &context(3))[1][0] != three[1][0]);
 }

@@ -59,63 +59,43 @@ fn built(cfg: &RayCasterCameraCfg, n: usize) -> RayCasterCamera {
     camera
 }
 
-/// The point of every pixel, from its depth and in all lists of points, lies on the surface of its mask id; the normal is that of
-/// the surface. Depths are single precision: 5 m times 6e-8, and as much again along the ray. Counts misses, floor and ball.
-fn check(camera: &RayCasterCamera, env: usize, (fx, fy, cx, cy): (f64, f64, f64, f64)) -> [usize; 3] {
-    let pose = from_row(&std::array::from_fn(|k| camera.pose_w(CameraConvention::Ros)[(env, k)]));
-    let ball = Point3::new(0.2, 0.0, 0.5 + 0.1 * env as f64);
-    let [own, world] = [PointFrame::Camera, PointFrame::World].map(|frame| camera.points(frame));
-    let map = camera.point_map(env, PointFrame::World).unwrap();
-    let mut seen = [0; 3];
-    for (v, u) in (0..48).flat_map(|v| (0..64).map(move |u| (v, u))) {
-        let (at, k) = ((env, v, u), 64 * v + u);
-        let d = Vector3::new((u as f64 + 0.5 - cx) / fx, (v as f64 + 0.5 - cy) / fy, 1.0);
-        let (depth, distance) = (f64::from(camera.depth()[at]), f64::from(camera.distance()[at]));
-        let normal = [0, 1, 2].map(|axis| camera.normal()[(env, v, u, axis)]);
-        let of_map = Point3::from([0, 1, 2].map(|axis| f64::from(map[(v, u, axis)])));
-        let id = camera.mask()[at];
-        seen[[0, FLOOR, BALL].iter().position(|known| *known == id).unwrap()] += 1;
-        if id == 0 {
-            assert!(depth == f64::INFINITY && distance == f64::INFINITY && normal == [0.0; 3]);
-            assert!(of_map.iter().all(|x| *x == f64::INFINITY));
-            continue;
-        }
-        assert!((distance - depth * d.norm()).abs() < 2e-6);
-        let [own, world] = [&own, &world].map(|p| Point3::from([0, 1, 2].map(|axis| f64::from(p[(env, k, axis)]))));
-        for p in [pose * Point3::from(d * depth), of_map, world, pose * own] {
-            let off = if id == BALL { (p - ball).norm() - 0.5 } else { p.z };
-            assert!(off.abs() < 2e-6, "{at:?}: {off}");
-        }
-        let n = if id == BALL { (of_map - ball) / 0.5 } else { Vector3::z() };
-        let tolerance = if id == BALL { 1e-5 } else { 0.0 };
-        assert!((0..3).all(|k| (n[k] - f64::from(normal[k])).abs() <= tolerance));
-    }
-    assert_eq!(camera.point_cloud(env, PointFrame::World).unwrap().nrows(), seen[1] + seen[2]);
-    seen
-}
-
-const WIDE: (f64, f64, f64, f64) = (40.0, 45.0, 20.0, 30.0);
-const WIDE_PIXELS: Intrinsics = Intrinsics::Pixels { fx: 40.0, fy: 45.0, cx: 20.0, cy: 30.0 };
-
-/// As configured, and from another place through another lens in one environment.
+/// The point of every pixel, from its depth and in the point map, lies on the surface of its mask id; the normal is that
+/// of the surface. Depths are single precision: 5 m times 6e-8, and as much again along the ray.
 #[test]
 fn pixels() {
-    let lens = (50.0, 60.0, 30.5, 20.25);
-    let mut camera = built(&cfg(), 2);
-    let seen = [0, 1].map(|env| check(&camera, env, lens));
-    assert!((0..3).all(|k| seen[0][k] + seen[1][k] > 200), "misses, floor, ball: {seen:?}");
-    camera.look_at(&[[-1.5, 0.5, 1.5]], &[[0.0; 3]], &[[0.0, 0.0, 1.0]], Some(&[1])).unwrap();
-    camera.set_intrinsics(&[WIDE_PIXELS], Some(&[1])).unwrap();
-    assert_eq!(camera.intrinsic_matrices()[(1, 0, 0)], 50.0, "of the current image");
-    camera.update(&state(&[1, 1])).unwrap();
-    assert_eq!(camera.points(PointFrame::World).dim(), (2, 64 * 48, 3));
-    assert_eq!(check(&camera, 0, lens), seen[0]);
-    assert_ne!(check(&camera, 1, WIDE), seen[1]);
-    let matrix = array![[40.0, 0.0, 20.0], [0.0, 45.0, 30.0], [0.0, 0.0, 1.0]];
-    assert_eq!(camera.intrinsic_matrices().index_axis(ndarray::Axis(0), 1), matrix);
-    camera.restore(None).unwrap();
-    camera.update(&state(&[2, 2])).unwrap();
-    assert_eq!(camera.depth(), built(&cfg(), 2).depth(), "as configured");
+    let camera = built(&cfg(), 2);
+    let mut seen = [0; 3];
+    for env in 0..2 {
+        let pose = from_row(&std::array::from_fn(|k| camera.pose_w(CameraConvention::Ros)[(env, k)]));
+        let ball = Point3::new(0.2, 0.0, 0.5 + 0.1 * env as f64);
+        let map = camera.point_map(env, PointFrame::World).unwrap();
+        let before = seen;
+        for (v, u) in (0..48).flat_map(|v| (0..64).map(move |u| (v, u))) {
+            let at = (env, v, u);
+            let d = Vector3::new((u as f64 + 0.5 - 30.5) / 50.0, (v as f64 + 0.5 - 20.25) / 60.0, 1.0);
+            let (depth, distance) = (f64::from(camera.depth()[at]), f64::from(camera.distance()[at]));
+            let normal: Vec<f32> = (0..3).map(|k| camera.normal()[(env, v, u, k)]).collect();
+            let points = [pose * Point3::from(d * depth), Point3::from([0, 1, 2].map(|k| f64::from(map[(v, u, k)])))];
+            let id = camera.mask()[at];
+            seen[[0, FLOOR, BALL].iter().position(|known| *known == id).unwrap()] += 1;
+            if id == 0 {
+                assert!(depth == f64::INFINITY && distance == f64::INFINITY && normal == [0.0; 3]);
+                assert!(points[1].iter().all(|x| *x == f64::INFINITY));
+                continue;
+            }
+            assert!((distance - depth * d.norm()).abs() < 2e-6);
+            for p in points {
+                let off = if id == BALL { (p - ball).norm() - 0.5 } else { p.z };
+                assert!(off.abs() < 2e-6, "{at:?}: {off}");
+            }
+            let n = if id == BALL { (points[0] - ball) / 0.5 } else { Vector3::z() };
+            let tolerance = if id == BALL { 1e-5 } else { 0.0 };
+            assert!((0..3).all(|k| (n[k] - f64::from(normal[k])).abs() <= tolerance));
+        }
+        let hits = (1..3).map(|k| seen[k] - before[k]).sum::<usize>();
+        assert_eq!(camera.point_cloud(env, PointFrame::World).unwrap().nrows(), hits);
+    }
+    assert!(seen.iter().all(|n| *n > 200), "misses, floor, ball: {seen:?}");
 }
 
 #[test]
@@ -163,10 +143,13 @@ fn attached() {
 fn mistakes() {
     let error = |cfg: RayCasterCameraCfg| cfg.build(&context(1)).unwrap_err().to_string();
     assert!(error(RayCasterCameraCfg { width: 0, ..cfg() }).contains("0e0 rays"));
+    assert!(error(RayCasterCameraCfg { max_distance: f64::NAN, ..cfg() }).contains("max_distance"));
+    assert!(error(RayCasterCameraCfg { intrinsics: Intrinsics::Fovy { radians: 4.0 }, ..cfg() }).contains("angle"));
     let on = |parent: &str| RayCasterCameraCfg {
         extrinsics: Extrinsics { parent: Some(parent.into()), ..cfg().extrinsics },
         ..cfg()
     };
+    assert!(error(on("bal")).contains("ball"));
     let mut camera = built(&cfg(), 1);
     let two = [Pose::identity(), Pose::identity()];
     assert!(matches!(camera.set_local_pose(&two, None, CameraConvention::Ros), Err(SensorError::Camera(_))));
@@ -192,9 +175,57 @@ fn down(x: f64, y: f64, z: f64) -> [[[f64; 3]; 1]; 3] {
     [[[x, y, z]], [[x, y, 0.0]], [[0.0, 1.0, 0.0]]]
 }
 
+const WIDE: (f64, f64, f64, f64) = (40.0, 45.0, 20.0, 30.0);
+
+fn wide() -> Intrinsics {
+    let (fx, fy, cx, cy) = WIDE;
+    Intrinsics::Pixels { fx, fy, cx, cy }
+}
+
 /// Only the floor.
 fn floor_only() -> RayCasterCameraCfg {
     RayCasterCameraCfg { targets: crate::ray::HitTargets::StaticOnly, ..cfg() }
+}
+
+/// From 2 m and from 1.5 m above the floor, through two lenses: depths, distances and points of every pixel in closed form,
+/// to three roundings of single precision, 3 m times 6e-8.
+#[test]
+fn lenses() {
+    let mut camera = built(&floor_only(), 2);
+    let views = [((50.0, 60.0, 30.5, 20.25), (0.25, -0.5, 2.0)), (WIDE, (-0.125, 0.5, 1.5))];
+    for (env, (_, (x, y, z))) in views.into_iter().enumerate() {
+        let [eye, target, up] = down(x, y, z);
+        camera.look_at(&eye, &target, &up, Some(&[env])).unwrap();
+    }
+    camera.set_intrinsics(&[wide()], Some(&[1])).unwrap();
+    assert_eq!(camera.intrinsic_matrices()[(1, 0, 0)], 50.0, "of the current image");
+    camera.update(&state(&[1, 1])).unwrap();
+    let (camera_points, world) = (camera.points(PointFrame::Camera), camera.points(PointFrame::World));
+    assert_eq!(world.dim(), (2, 64 * 48, 3));
+    for (env, ((fx, fy, cx, cy), (x, y, z))) in views.into_iter().enumerate() {
+        let matrix = array![[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]];
+        assert_eq!(camera.intrinsic_matrices().index_axis(ndarray::Axis(0), env), matrix);
+        for k in 0..64 * 48 {
+            let (u, v) = (k % 64, k / 64);
+            let (right, below) = ((u as f64 + 0.5 - cx) / fx, (v as f64 + 0.5 - cy) / fy);
+            let near =
+                |found: f32, expected: f64| assert!((f64::from(found) - expected).abs() < 6e-7, "{found} {expected}");
+            near(camera.depth()[(env, v, u)], z);
+            near(camera.distance()[(env, v, u)], z * (1.0 + right * right + below * below).sqrt());
+            let (own, there) = ([right * z, below * z, z], [x + right * z, y - below * z, 0.0]);
+            for axis in 0..3 {
+                near(camera_points[(env, k, axis)], own[axis]);
+                near(world[(env, k, axis)], there[axis]);
+            }
+        }
+        let map = camera.point_map(env, PointFrame::World).unwrap();
+        assert!(map.iter().eq(world.index_axis(ndarray::Axis(0), env).iter()));
+        assert_eq!(camera.point_cloud(env, PointFrame::World).unwrap().dim(), (64 * 48, 3));
+    }
+    assert!(camera.distance()[(0, 0, 0)] != camera.distance()[(1, 0, 0)], "the control: lenses differ");
+    camera.restore(None).unwrap();
+    camera.update(&state(&[2, 2])).unwrap();
+    assert_eq!(camera.depth(), built(&floor_only(), 2).depth(), "as configured");
 }
 
 fn noisy(noise: NoiseCfg) -> RayCasterCameraCfg {
@@ -267,7 +298,7 @@ fn latency() {
     let [eye, target, up] = down(0.0, 0.0, 2.0);
     camera.update(&state(&[1])).unwrap();
     camera.look_at(&eye, &target, &up, None).unwrap();
-    camera.set_intrinsics(&[WIDE_PIXELS], None).unwrap();
+    camera.set_intrinsics(&[wide()], None).unwrap();
     let mut read = Vec::new();
     for step in 2..=4 {
         camera.update(&state(&[step])).unwrap();
@@ -280,4 +311,20 @@ fn latency() {
     assert_eq!(read, [(0.0, 0, 50.0), (0.01, 1, 50.0), (0.02, 2, 40.0)]);
     assert_eq!(camera.distance_history().dim(), (1, 2, 64 * 48));
     assert_eq!(camera.due_in(&[4]), 1);
+}
+
+/// One ray per pixel in 3 environments of 3072 rays: enough for two threads.
+#[test]
+fn threads() {
+    let taken = |threads| {
+        let mut camera = cfg().build(&SensorContext { threads, ..context(3) }).unwrap();
+        let lens = |k: f64| Intrinsics::Pixels { fx: 50.0 + k, fy: 60.0, cx: 30.0, cy: 20.0 };
+        camera.set_intrinsics(&[0.0, 1.0, 2.0].map(lens), None).unwrap();
+        camera.reset(&[0, 1, 2], &state(&[0; 3])).unwrap();
+        (1..5).for_each(|step| camera.update(&state(&[step; 3])).unwrap());
+        let depth: Vec<u32> = camera.depth().iter().map(|x| x.to_bits()).collect();
+        (depth, camera.normal().to_owned(), camera.mask().to_owned())
+    };
+    let one = taken(1);
+    assert!([2, 4].map(taken).iter().all(|several| *several == one));
 }

@@ -2,10 +2,10 @@
 
 use super::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
 use crate::ray::pattern::{Custom, Grid, Lidar};
-use crate::sampling::SamplingCfg;
+use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::{NoiseCfg, SensorError};
-use ndarray::{Array2, Array3};
+use ndarray::{Array2, Array3, Axis};
 use scene::pose::{from_xyz_rpy, to_row};
 use scene::shape::{Box, Plane, Sphere};
 use scene::{Instance, Material, OwnScene, Pose, PoseF64, RenderScene, SceneState};
@@ -203,6 +203,34 @@ fn misses() {
     assert!(misses > 10 && misses < 110, "{misses}");
 }
 
+/// What one environment measures does not depend on the others, nor on threads.
+#[test]
+fn environments_and_threads() {
+    let cfg = RayCasterCfg {
+        parent: Some("base".into()),
+        pattern: Lidar { channels: 40, ..Lidar::default() }.into(),
+        ..RayCasterCfg::default()
+    };
+    let steps = [3, 4, 5, 6];
+    let bits = |caster: &RayCaster, env: usize| -> Vec<u64> {
+        let all = [caster.hits().into_dyn(), caster.normals().into_dyn(), caster.distances().into_dyn()];
+        all.iter().flat_map(|a| testkit::bits::bits(a.index_axis(Axis(0), env).iter())).collect()
+    };
+    let one = built_in(&cfg, &context(4, 1), &state(&steps));
+    // 36000 rays in 4 environments are worth four threads.
+    let four = built_in(&cfg, &context(4, 4), &state(&steps));
+    for (env, &step) in steps.iter().enumerate() {
+        assert_eq!(bits(&one, env), bits(&four, env));
+        let alone = built_in(&cfg, &context(1, 1), &state_with(&[step], |_, step| base(env, step)));
+        // Alone, the ball is where it is in environment 0: rays that do not hit it are the same.
+        let same = (0..one.num_rays()).filter(|&k| one.hit_ids()[(env, k)] != BALL && alone.hit_ids()[(0, k)] != BALL);
+        let distances = |k| [one.distances()[(env, k)], alone.distances()[(0, k)]].map(f64::to_bits);
+        let equal: Vec<bool> = same.map(distances).map(|[a, b]| a == b).collect();
+        assert!(equal.len() > 30_000 && equal.iter().all(|equal| *equal));
+    }
+    assert_ne!(bits(&one, 0), bits(&one, 1), "the control");
+}
+
 #[test]
 fn drift() {
     let cfg = RayCasterCfg { drift: [-0.1, 0.3], ..scanner() };
@@ -223,6 +251,27 @@ fn drift() {
     assert!((drift(&caster, 1, 1)[0] - first[1][0]).abs() < 1e-12, "only there");
     let again = built_in(&cfg, &context, &state(&[0, 0]));
     assert_eq!(drift(&again, 1, 0), first[1], "the same seed");
+}
+
+#[test]
+fn latency_and_history() {
+    let sampling = SamplingCfg { update_period: 0.01, history_length: 2, latency_steps: 1, ..SamplingCfg::default() };
+    let mut caster = built_in(&RayCasterCfg { sampling, ..scanner() }, &context(1, 1), &state(&[0]));
+    let y = |step: u64| base(0, step).translation.vector.y;
+    assert!((caster.pos_w()[(0, 1)] - y(0)).abs() < 1e-12, "a reset refreshes");
+    for step in 1..=4 {
+        caster.update(&state(&[step])).unwrap();
+        // Captured at 2 and 4, readable one step later.
+        let captured = if step >= 3 { 2 } else { 0 };
+        assert!((caster.pos_w()[(0, 1)] - y(captured)).abs() < 1e-12, "step {step}");
+        let ray = caster.ray_starts();
+        let hit = caster.hits();
+        assert!((ray[(0, 0, 0)] - hit[(0, 0, 0)]).abs() < 1e-12, "points belong to their rays");
+    }
+    assert_eq!((caster.sample_counts()[0], caster.history_filled(0)), (1, 1));
+    assert_eq!(caster.stamps()[0], 0.01);
+    assert_eq!(caster.distance_history().dim(), (1, 2, 187));
+    assert_eq!(caster.distance_history()[(0, 0, 0)], caster.distances()[(0, 0)]);
 }
 
 fn noisy(std: f64) -> RayCasterCfg {
@@ -266,9 +315,23 @@ fn moved_fixed_target() {
 fn mistakes() {
     let error = |cfg: RayCasterCfg| cfg.build(&context(1, 1)).unwrap_err().to_string();
     let named = |name: &str| RayCasterCfg { targets: HitTargets::Named(vec![name.into()]), ..scanner() };
-    // An object in a group that is not hit.
-    let text = error(RayCasterCfg { groups: 1 << 5, ..named("ground") });
-    assert!(text.contains("\"ground\""), "{text}");
+    for (cfg, part) in [
+        (RayCasterCfg { parent: Some("bsae".into()), ..scanner() }, "dog/base"),
+        (named("gruond"), "ground"),
+        // An object in a group that is not hit.
+        (RayCasterCfg { groups: 1 << 5, ..named("ground") }, "\"ground\""),
+        (RayCasterCfg { pattern: Grid { resolution: 0.0, ..Grid::default() }.into(), ..scanner() }, "resolution"),
+        (RayCasterCfg { max_distance: 0.0, ..scanner() }, "max_distance"),
+        (RayCasterCfg { max_distance: -1.0, ..scanner() }, "max_distance"),
+        (RayCasterCfg { max_distance: f64::NAN, ..scanner() }, "max_distance"),
+        (RayCasterCfg { drift: [0.1, -0.1], ..scanner() }, "drift"),
+        (RayCasterCfg { drift: [f64::NAN, 0.1], ..scanner() }, "NaN"),
+        (RayCasterCfg { offset: Pose::translation(f64::NAN, 0.0, 0.0), ..scanner() }, "offset"),
+        (RayCasterCfg { sampling: SamplingCfg::every(0.007), ..scanner() }, "update_period"),
+    ] {
+        let text = error(cfg);
+        assert!(text.contains(part), "{text}");
+    }
     assert!(named("ground").build(&context(1, 1)).is_ok());
     // An invisible object, unless some environment sees it; the candidates are objects that can be hit.
     let look = |visible: [bool; 5]| {

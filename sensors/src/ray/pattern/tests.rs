@@ -74,21 +74,27 @@ fn pinholes() {
     }
 }
 
-/// Those that are not refused alike through a simulation.
 #[test]
 fn mistakes() {
-    let grid = Grid::default;
-    let lidar = Lidar::default;
-    let lens = Intrinsics::Fovy { radians: 4.0 };
-    let rows: [(RayPattern, &str); 6] = [
-        (Grid { size: [-1.0, 1.0], ..grid() }.into(), "size along x"),
-        (Grid { direction: [0.0; 3], ..grid() }.into(), "direction other than zero"),
-        (Lidar { horizontal_fov_deg: [0.0, 400.0], ..lidar() }.into(), "400"),
-        (Lidar { vertical_fov_deg: [0.0, 91.0], ..lidar() }.into(), "91"),
-        (Pinhole { intrinsics: lens, ..Pinhole::default() }.into(), "angle"),
-        (Custom { starts: vec![[0.0; 3]; 2], directions: vec![[1.0; 3]] }.into(), "2 starts and 1"),
-    ];
-    for (pattern, part) in rows {
-        assert!(pattern.rays().unwrap_err().to_string().contains(part), "{part}");
+    let error = |pattern: RayPattern| pattern.rays().unwrap_err().to_string();
+    for resolution in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+        let text = error(Grid { resolution, ..Grid::default() }.into());
+        assert!(text.contains("resolution") && text.contains("positive"), "{text}");
+        assert!(error(Lidar { horizontal_resolution_deg: resolution, ..Lidar::default() }.into()).contains("positive"));
+        assert!(
+            error(Bpearl { horizontal_resolution_deg: resolution, ..Bpearl::default() }.into()).contains("positive")
+        );
     }
+    assert!(error(Grid { resolution: 1e-9, ..Grid::default() }.into()).contains("between 1 and 16777216"));
+    assert!(error(Grid { size: [-1.0, 1.0], ..Grid::default() }.into()).contains("size along x"));
+    assert!(error(Grid { direction: [0.0; 3], ..Grid::default() }.into()).contains("direction other than zero"));
+    assert!(error(Lidar { channels: 0, ..Lidar::default() }.into()).contains("0e0 rays"));
+    assert!(error(Lidar { horizontal_fov_deg: [0.0, 400.0], ..Lidar::default() }.into()).contains("400"));
+    assert!(error(Lidar { vertical_fov_deg: [0.0, 91.0], ..Lidar::default() }.into()).contains("91"));
+    let lens = Intrinsics::Fovy { radians: 4.0 };
+    assert!(error(Pinhole { intrinsics: lens, ..Pinhole::default() }.into()).contains("angle"));
+    assert!(error(Custom { starts: vec![[0.0; 3]; 2], directions: vec![[1.0; 3]] }.into()).contains("2 starts and 1"));
+    let text = error(Custom { starts: vec![[f64::NAN, 0.0, 0.0]], directions: vec![[1.0; 3]] }.into());
+    assert!(text.contains("ray 0"), "{text}");
+    assert!(error(Custom::default().into()).contains("0e0 rays"));
 }

@@ -1,17 +1,20 @@
 //! Steep rays in packets, which look into columns, find what single rays find in the tree, to the bit.
 
-use super::packets::Compare;
+use super::packets::{Compare, targets};
 use super::trees::soup;
 use super::{Dice, bits};
 use crate::lanes::{Scalar, at_level, levels};
-use crate::ray::Ray;
 use crate::ray::bvh::Stack;
 use crate::ray::packet::{Packet, WIDTH};
+use crate::ray::pattern::Grid;
 use crate::ray::shape::mesh::columns::{Columns, are_steep};
 use crate::ray::shape::mesh::{Mesh, MeshTree};
 use crate::ray::shape::{ForShape, RayShape, Touches};
 use crate::ray::triangle::{Shear, ShearPacket, Triangle};
 use crate::ray::vector::{along, cross, dot, scale, sub, to_f64, unit};
+use crate::ray::{Ray, RayHit, RayPattern, RayWorld};
+use scene::mesh::TriMesh;
+use scene::{PoseF64, RenderMesh, Shape, pose};
 use std::sync::Arc;
 
 /// The axes of columns along z.
@@ -207,6 +210,26 @@ fn far_rays() {
     assert!(near.wrong == 0 && near.columns == near.packets && near.hits > 8000, "{near:?}");
 }
 
+/// Columns are for meshes that are spread out, of triangles of about the same size.
+#[test]
+fn meshes_without_columns() {
+    let mut dice = Dice(53);
+    let ground = sheet(&mut dice, 25, 0.0);
+    let wall: Vec<Triangle> = ground.iter().map(|t| t.map(|p| [0.5, p[0], p[1]])).collect();
+    let all = [[-1.5, -1.5, 0.0], [1.5, -1.5, 0.0], [1.5, 1.5, 0.0]];
+    let mix = |(k, t): (usize, &Triangle)| if k.is_multiple_of(40) { all } else { *t };
+    let mixed: Vec<Triangle> = ground.iter().enumerate().map(mix).collect();
+    for (what, triangles, expected) in [
+        ("ground", &ground[..], true),
+        ("few", &ground[..100], false),
+        ("none", &[], false),
+        ("a wall, without extent along x", &wall, false),
+        ("of very different sizes", &mixed, false),
+    ] {
+        assert_eq!(MeshTree::of_triangles(triangles).columns(ABOVE).is_some(), expected, "{what}");
+    }
+}
+
 /// A packet whose columns hold too many triangles takes the tree.
 #[test]
 fn crowded_columns() {
@@ -264,4 +287,50 @@ fn inside_by_signs(ray: &Ray, triangle: &Triangle) -> bool {
     let edges = [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]];
     let mixed = edges.iter().any(|&x| x < 0.0) && edges.iter().any(|&x| x > 0.0);
     !mixed && edges.iter().sum::<f64>() != 0.0
+}
+
+/// Height scanners over and beside fixed and moving meshes: scans of the whole world, and every ray alone.
+#[test]
+fn scans() {
+    let mut dice = Dice(56);
+    let mesh = |triangles: &[Triangle]| {
+        let positions = triangles.iter().flatten().copied().collect();
+        let triangles = (0..triangles.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+        let mesh = TriMesh { positions, triangles, ..TriMesh::default() };
+        Shape::from(scene::shape::Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) })
+    };
+    let (ground, heap) = (mesh(&sheet(&mut dice, 40, 0.0)), mesh(&soup(&mut dice, 400, [0.0; 3])));
+    let targets = targets(&[ground.clone(), ground, heap.clone(), heap], 4, |k| k < 2);
+    let pattern = RayPattern::from(Grid::default()).rays().unwrap();
+    let (mut hits, mut seen) = (0, [0; 4]);
+    for round in 0..12 {
+        let mut placed = |far: f64| PoseF64::from(&pose::from_xyz_rpy(dice.point(far), dice.point(1.0)));
+        // The first two at the same place: the first one counts.
+        let poses = [PoseF64::IDENTITY, PoseF64::IDENTITY, placed(1.0), placed(1.0)];
+        let poses = if round % 3 == 0 { poses } else { [PoseF64::IDENTITY, placed(0.3), poses[2], poses[3]] };
+        let roll = if round % 2 == 0 { 0.0 } else { 0.4 };
+        let yaw = dice.number(-3.0, 3.0);
+        let at = pose::from_xyz_rpy([dice.number(-2.0, 2.0), dice.number(-2.0, 2.0), 6.0], [roll, -roll, yaw]);
+        let mut rays: Vec<Ray> = pattern.iter().map(|ray| ray.mapped_by(&PoseF64::from(&at))).collect();
+        rays[round * 7].origin[1] = f64::NAN;
+        for level in levels() {
+            let mut world = RayWorld::with_level(&targets, level);
+            world.place(&poses);
+            let mut together = vec![RayHit::MISS; rays.len()];
+            world.cast(&rays, 8.0, &mut together);
+            for (ray, hit) in rays.iter().zip(&together) {
+                let mut alone = *hit;
+                world.cast(std::slice::from_ref(ray), 8.0, std::slice::from_mut(&mut alone));
+                assert_eq!(
+                    (alone, alone.distance.to_bits()),
+                    (*hit, hit.distance.to_bits()),
+                    "round {round}, {level:?}"
+                );
+            }
+            for hit in together.iter().filter(|hit| hit.is_hit()) {
+                (hits, seen[hit.instance as usize]) = (hits + 1, seen[hit.instance as usize] + 1);
+            }
+        }
+    }
+    assert!(hits > 2000 && seen.iter().all(|&n| n > 5), "{hits} {seen:?}");
 }

@@ -84,6 +84,20 @@ fn brute_force() {
     }
 }
 
+/// The control: the triangles of other terrain give other distances.
+#[test]
+fn other_terrain() {
+    let (a, b) = (rough(&mut Dice(1), 9, 9), rough(&mut Dice(2), 9, 9));
+    let (walk, triangles) = (solid(&a), triangles(&b));
+    let mut dice = Dice(3);
+    let differ = |ray: &Ray| match (distance(&walk, ray), nearest(ray, &triangles, 0.0)) {
+        (Some((t, _)), Some(u)) => (t - u).abs() > 1e-3,
+        (t, u) => t.is_some() != u.is_some(),
+    };
+    let differing = (0..1000).filter(|_| differ(&dice.ray(6.0, 1.0))).count();
+    assert!(differing > 300, "{differing}");
+}
+
 /// Straight down on points, edges, diagonals and the rim of the grid: hits at the height given by the four corners.
 #[test]
 fn scans_from_above() {
@@ -102,6 +116,21 @@ fn scans_from_above() {
     }
     let beyond = Ray { origin: [2.0 + 1e-9, 0.0, 20.0], direction: [0.0, 0.0, -1.0] };
     assert_eq!(distance(&walk, &beyond), None);
+}
+
+/// Terrain at one height is a box: a wall, the floor, and from inside.
+#[test]
+fn level() {
+    let field = HeightField::new([2.0, 1.0, 1.0, 0.5], 5, 9, &[0.75; 45]).unwrap();
+    let walk = solid(&field);
+    let hit = |origin: [f64; 3], direction: [f64; 3]| distance(&walk, &Ray { origin, direction });
+    assert_eq!(hit([5.0, 0.3, 0.1], [-1.0, 0.0, 0.0]), Some((3.0, [1.0, 0.0, 0.0])), "a wall");
+    assert_eq!(hit([5.0, 0.3, 0.8], [-1.0, 0.0, 0.0]), None, "over it");
+    assert_eq!(hit([0.1, 0.2, -3.0], [0.0, 0.0, 1.0]), Some((2.5, [0.0, 0.0, 1.0])), "the floor");
+    assert_eq!(hit([0.1, 0.2, 20.0], [0.0, 0.0, -1.0]), Some((19.25, [0.0, 0.0, 1.0])), "the surface");
+    assert_eq!(hit([0.1, 0.2, 0.25], [0.0, 0.0, 1.0]).unwrap().0, 0.5, "from inside, the surface");
+    assert_eq!(hit([0.1, 0.2, 0.25], [0.0, 0.0, -1.0]).unwrap().0, 0.75, "from inside, the floor");
+    assert_eq!(hit([0.5, 0.0, 0.25], [0.0, -1.0, 0.0]).unwrap().0, 1.0, "from inside, a wall");
 }
 
 /// Long flat rays over large terrain, whose peak is at (-212, 188), 2 m high, its foot a metre around.

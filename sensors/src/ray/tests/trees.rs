@@ -8,8 +8,8 @@ use crate::ray::shape::RayShape;
 use crate::ray::shape::mesh::{Mesh, MeshBuilder, MeshTree};
 use crate::ray::triangle::{Shear, Triangle, normal};
 use crate::ray::vector::{V3, cross, dot, sub, to_f64, unit};
-use scene::RenderMesh;
 use scene::mesh::TriMesh;
+use scene::{RenderMesh, Shape};
 use std::sync::Arc;
 
 /// Distance of a triangle along a ray, from either side. Source: Möller, Trumbore: Fast, minimum storage ray/triangle
@@ -210,5 +210,21 @@ fn same_tree() {
         }
         order.sort_unstable();
         assert!(order.into_iter().eq(0..boxes.len() as u32), "everything once");
+    }
+}
+
+/// A mesh of a shape is hit where the shape is, up to the flatness of its triangles.
+#[test]
+fn tessellated_ball() {
+    let ball = Shape::from(scene::shape::Sphere { radius: 0.5 }).tessellate(256);
+    let mesh = Mesh::of_tree(Arc::new(MeshBuilder::default().build(&RenderMesh::new(&ball, RenderMesh::CREASE))));
+    // The sagitta of 1/256 of a turn.
+    let flat = 0.5 * (1.0 - (std::f64::consts::PI / 256.0).cos()) * 2.0;
+    for k in 0..100 {
+        let x = f64::from(k) / 101.0 * 0.4;
+        let ray = Ray { origin: [x, 0.1, 20.0], direction: [0.0, 0.0, -1.0] };
+        let exact = 20.0 - (0.25 - x * x - 0.01f64).sqrt();
+        let t = distance(&mesh, &ray, f64::INFINITY).unwrap();
+        assert!(t - exact < 3.0 * flat && t > exact - 1e-6, "{t} {exact}");
     }
 }

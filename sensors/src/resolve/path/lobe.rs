@@ -299,6 +299,16 @@ mod tests {
         [(1.0 - cos * cos).sqrt(), 0.0, cos]
     }
 
+    #[test]
+    fn turns() {
+        for k in 0..=1000 {
+            let part = f64::from(k) / 1000.0;
+            let angle = part * 2.0 * PI;
+            let [cos, sin] = turn(part);
+            assert!((cos - angle.cos()).abs() < 1e-14 && (sin - angle.sin()).abs() < 1e-14, "{part}");
+        }
+    }
+
     /// Light from everywhere: the sum over a grid of directions and the mean of chosen ones are the same, and not more than
     /// comes in. The grid's error is that of the midpoint rule, which is largest for sharp highlights: at 1000 x 1000 cells
     /// an order below what is asked. Chosen ones: 2^14 points of a net.
@@ -437,5 +447,17 @@ mod tests {
                 assert!((found - expected).abs() < 0.03, "specular {specular}, {cos}: {found}, not {expected}");
             }
         }
+    }
+
+    #[test]
+    fn mirrors() {
+        let lobe = Lobe::new(&Material { reflectance: 0.4, specular: 0.0, ..Material::default() }, [0.5; 3], true);
+        let o = toward(0.6);
+        assert!(lobe.choose(o, 0.39, [0.5; 2]).unwrap().mirrored && !lobe.choose(o, 0.41, [0.5; 2]).unwrap().mirrored);
+        assert_eq!(lobe.choose(o, 0.0, [0.5; 2]).unwrap().direction, [-o[0], 0.0, 0.6]);
+        // What is not mirrored is Lambert's: 0.6 of 0.5, of which 0.6 are chosen.
+        assert!((lobe.choose(o, 0.8, [0.3, 0.2]).unwrap().weight[0] - 0.5).abs() < 1e-6);
+        let all = lobe.scatter(o, [0.0, 0.0, 1.0]).below[0] * PI;
+        assert!((all - 0.6 * 0.5).abs() < 1e-6);
     }
 }

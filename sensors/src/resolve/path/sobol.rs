@@ -78,6 +78,20 @@ impl Sample {
 mod tests {
     use super::*;
 
+    /// The textbook's sum: every bit of the index adds a direction number, of which each is the one before times 1 + x.
+    #[test]
+    fn second_dimension() {
+        for k in 0..100_000u32 {
+            let index = if k < 1000 { k } else { mix(k) };
+            let (mut rest, mut sum, mut direction) = (index, 0, 1u32 << 31);
+            while rest != 0 {
+                sum ^= if rest & 1 == 1 { direction } else { 0 };
+                (rest, direction) = (rest >> 1, direction ^ direction >> 1);
+            }
+            assert_eq!(second(index.reverse_bits()), sum, "{index}");
+        }
+    }
+
     /// A net: one sample in every box of the same area, however it is cut in halves.
     #[test]
     fn net() {

@@ -40,3 +40,59 @@ fn tolerance(projection: &Projection, camera_from_instance: &PoseF32, [lo, hi]: 
         (slope(projection.width, projection.cx, projection.fx), slope(projection.height, projection.cy, projection.fy));
     DISTANCE.min(PIXELS * near / (f * (1.0 + x * x + y * y).sqrt()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::visibility::View;
+
+    #[test]
+    fn half_a_pixel() {
+        let bounds = [[-0.1, -0.2, -0.3], [0.3, 0.2, 0.1]];
+        let view = View {
+            width: 320,
+            height: 200,
+            fx: 250.0,
+            fy: 310.0,
+            cx: 120.0,
+            cy: 90.0,
+            near: 0.01,
+            far: 100.0,
+            world_from_camera: PoseF32::IDENTITY,
+        };
+        let projection = Projection::from(&view);
+        let mut closest = 0.0f64;
+        for distance in [0.4, 0.45, 0.5, 0.6] {
+            let pose = PoseF32::from_translation([0.0, 0.0, distance]);
+            let allowed = f64::from(tolerance(&projection, &pose, bounds));
+            assert!(allowed > 0.0 && allowed <= f64::from(DISTANCE));
+            let z = f64::from(distance) - 0.3;
+            let f = [250.0, 310.0];
+            let at = |p: [f64; 3]| [f[0] * p[0] / p[2] + 120.0, f[1] * p[1] / p[2] + 90.0];
+            // The nearest point that is seen in the farthest corner of the picture, moved in every direction.
+            let p = [200.0 / f[0] * z, 110.0 / f[1] * z, z];
+            let steps = 64;
+            for i in 0..steps * steps {
+                let turn = std::f64::consts::TAU / f64::from(steps);
+                let (a, b) = (turn * f64::from(i % steps), turn * f64::from(i / steps));
+                let d = [a.cos() * b.cos(), a.sin() * b.cos(), b.sin()].map(|x| x * allowed);
+                let (from, to) = (at(p), at([p[0] + d[0], p[1] + d[1], p[2] + d[2]]));
+                let moved = (to[0] - from[0]).hypot(to[1] - from[1]);
+                assert!(moved <= 0.5, "{moved} pixels at {distance} m");
+                closest = closest.max(moved);
+            }
+        }
+        // Not so careful that it allows nothing: fx is not fy here.
+        assert!(closest > 0.35, "{closest}");
+    }
+
+    #[test]
+    fn partly_behind() {
+        let view = View::look_at([64, 64], 0.9, [0.; 3], [0., 0., 1.], [0., 1., 0.]).expect("a good view");
+        let projection = Projection::from(&view);
+        let bounds = [[-0.1; 3], [0.1; 3]];
+        let at = |z: f32| tolerance(&projection, &PoseF32::from_translation([0., 0., z]), bounds);
+        assert!(at(0.0) == 0.0 && at(-1.0) == 0.0 && at(0.11) == 0.0 && at(f32::NAN) == 0.0);
+        assert!(at(0.12) > 0.0 && at(0.12) < at(0.2) && at(100.0) == DISTANCE);
+    }
+}

@@ -90,7 +90,7 @@ pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut 
 mod tests {
     use super::super::Bounds;
     use super::*;
-    use crate::lanes::Scalar;
+    use crate::lanes::{Scalar, at_level, levels};
 
     /// Cost of leaves: the tests of those that are met.
     fn cost(things: &[Item], ends: impl IntoIterator<Item = usize>) -> f32 {
@@ -138,6 +138,16 @@ mod tests {
             // Both are sums of up to eight numbers: they may be rounded otherwise.
             let ours = cost(&things, chosen);
             assert!(ours <= least * (1.0 + 16.0 * f32::EPSILON), "{ours}, not {least}, of {count}");
+        }
+    }
+
+    #[test]
+    fn huge_boxes() {
+        let huge = [[-3e38f32; 3], [3e38; 3]];
+        let things: Vec<Item> = (0..GROUP as u32).map(|k| Item::item(huge[0], huge[1], k, 1)).collect();
+        for level in levels() {
+            let (ends, leaves) = at_level!(level, s => ends(s, &things, &mut Costs::default()));
+            assert_eq!(ends[..leaves], [4, 8, 12, 16, 20, 24]);
         }
     }
 }

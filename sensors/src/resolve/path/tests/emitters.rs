@@ -185,13 +185,14 @@ fn far_from_own_frame() {
     let factor = form_factor(3.0, 3.0);
     let expected = albedo(0.7) * 2.0 * albedo(0.5) * factor;
     let floor = Instance::new(panel(4.0, aside, true), matt(0.7), 1);
-    let scene = dark(vec![floor, Instance::new(panel(0.3, aside, false), glow(2.0), 2)]);
+    let mut scene = dark(vec![floor, Instance::new(panel(0.3, aside, false), glow(2.0), 2)]);
     for angles in [[0.3, -0.8, 2.1], [1.1, 0.4, -0.7], [-2.3, 1.2, 0.2], [0.7, 0.7, 0.7], [2.9, -0.2, 1.3]] {
         let turned = PoseF32::from(&scene::pose::from_xyz_rpy([0.0; 3], angles));
         let there = |local: [f32; 3]| turned.rotation.map(|r| r[0] * local[0] + r[1] * local[1] + r[2] * local[2]);
         let place = |local: [f32; 3]| PoseF32 { translation: there(local), ..turned };
         let poses = [place([-aside, 0.0, 0.0]), place([-aside, 0.0, height])];
         let view = looking(there([0.9, 0.2, 0.05]), [0.0; 3]);
+        scene.lights.clear();
         let studio = Studio::new(&scene, &poses, &view);
         for ways in [Ways::Both, Ways::Looking] {
             let light = studio.seen(&Paths { ways, ..studio.paths(256, 0, 0) }, 128);
@@ -202,6 +203,26 @@ fn far_from_own_frame() {
             assert_number(&format!("{angles:?} {ways:?}"), light.0, expected, far);
             assert!(light.1 < 0.01 * expected, "it can tell a twentieth: {light:?}");
         }
+        // A light without a size lights the floor wherever the floor's frame is; the panel is not between.
+        let normal = there([0.0, 0.0, 1.0]);
+        let shine = scale(to_f64(there([0.8, 0.0, 0.6])), -1.0);
+        scene.lights = vec![lamp(LightKind::Directional, [0.; 3], shine.map(|x| x as f32))];
+        let beside = there([2.0, 0.3, 0.0]);
+        let view = looking([0, 1, 2].map(|k| beside[k] + there([0.9, 0.2, 0.5])[k]), beside);
+        let light = |scene: &RenderScene, count| {
+            let studio = Studio::new(scene, &poses, &view);
+            studio.seen(&Paths { ways: Ways::Looking, ..studio.paths(1, 0, 0) }, count).0
+        };
+        let cosine = -dot(to_f64(normal), shine);
+        let sun = albedo(0.7) * f64::from(0.9f32) * cosine;
+        // The same without the emission of the panel.
+        let mut instances = scene.instances().to_vec();
+        instances[1].material.emission = 0.0;
+        let mut alone = dark(instances);
+        alone.lights.clone_from(&scene.lights);
+        let [lit, without] = [light(&scene, 1024), light(&alone, 16)];
+        assert_number(&format!("{angles:?}"), without, sun, Tolerance::relative(1e-5, SINGLE.derivation));
+        assert!(lit > without, "{angles:?}: {lit}, of which {without} is the light's");
     }
 }
 

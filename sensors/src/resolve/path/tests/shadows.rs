@@ -87,6 +87,33 @@ fn directional_lights() {
     assert!(between >= 4, "the control: {between} places tell a fiftieth");
 }
 
+/// A glowing rectangle behind the edge of a board: the form factor of the part that is seen. Source: Howell, B-3, of which parts
+/// on either side of the middle are halves.
+#[test]
+fn emissive_rectangle() {
+    const BOARD: f64 = 0.4;
+    const THIN: f64 = 1e-4;
+    let emitter = Material { emission: 2.0, ..matt(0.5) };
+    let half = [0.6f32, 0.4];
+    let board = Instance::new(Box { half: [1.0, 1.0, THIN as f32] }, matt(0.0), 3);
+    let scene = on_floor(matt(0.7), [Instance::new(Plane { half }, emitter, 2), board]);
+    // Face down, 0.8 m up.
+    let rotation = [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]];
+    let view = looking([2.0, 0.5, 0.4], [0.0; 3]);
+    let whole = |side: f64| form_factor(side / 0.8, f64::from(half[1]) / 0.8);
+    for edge in [-0.2, -0.1, 0.05, 0.1, 0.2] {
+        let board = PoseF32::from_translation([(edge - 1.0) as f32, 0.0, BOARD as f32]);
+        let poses = [PoseF32::IDENTITY, PoseF32 { rotation, translation: [0., 0., 0.8] }, board];
+        // Seen from the origin, by the edge that covers more of it.
+        let cut = edge * 0.8 / (BOARD - THIN * f64::signum(edge));
+        let factor = 0.5 * (whole(f64::from(half[0])) - f64::signum(cut) * whole(cut.abs()));
+        let expected = albedo(0.7) * 2.0 * albedo(0.5) * factor;
+        let light = seen(&scene, &poses, &view, 1024, 0);
+        assert!(agrees(light, expected), "{edge}: {light:?}, not {expected}");
+        assert!(!agrees(light, 1.1 * expected), "it can tell a tenth: {light:?}");
+    }
+}
+
 /// Surfaces below a point light exactly on a ceiling, which takes nothing of its light: a floor in closed form, and a smooth
 /// ball of triangles to the bit. The control: a millimetre inside the ceiling the light is gone.
 ///
