@@ -109,17 +109,17 @@ fn pendulum() {
     let file = folder.pendulum(&["<link name=\"tool\"/>", &weld]);
     let (code, json) = report(&[&file, "--qpos", &format!("swing={Q}")]);
     assert_eq!(code, 0, "{:?}", warnings(&json));
-    assert_close("mass matrix", &numbers(&json["mass_matrix"][0]), &[I + M * L * L], ROUNDING);
-    assert_close("gravity torque", &numbers(&json["gravity_torque"]), &[-M * 9.81 * L * Q.cos()], ROUNDING * 10.0);
-    assert_close("centre of mass", &numbers(&json["com"]), &[L * Q.cos(), 0.0, -L * Q.sin()], ROUNDING);
+    assert_close("mass matrix", numbers(&json["mass_matrix"][0]), [I + M * L * L], ROUNDING);
+    assert_close("gravity torque", numbers(&json["gravity_torque"]), [-M * 9.81 * L * Q.cos()], ROUNDING * 10.0);
+    assert_close("centre of mass", numbers(&json["com"]), [L * Q.cos(), 0.0, -L * Q.sin()], ROUNDING);
     let tool = &json["links"][2];
     assert_eq!((tool["name"].as_str(), tool["parent"].as_str()), (Some("tool"), Some("arm")));
     assert_eq!((&tool["mass"], &tool["com"], &tool["inertia"]), (&Value::from(0.0), &Value::Null, &Value::Null));
     let half = Q / 2.0;
     assert_close(
         "pose of the tool",
-        &numbers(&tool["pose"]),
-        &[Q.cos(), 0.0, -Q.sin(), half.cos(), 0.0, half.sin(), 0.0],
+        numbers(&tool["pose"]),
+        [Q.cos(), 0.0, -Q.sin(), half.cos(), 0.0, half.sin(), 0.0],
         ROUNDING,
     );
     assert_eq!(numbers(&json["links"][1]["inertia"][2]), [0.0, 0.0, I]);
@@ -417,22 +417,22 @@ fn mjcf_file() {
     assert_eq!(code, 1, "the equality that is no mimic is said");
     assert_eq!(names(&json["joint_names"]), ["turn", "swing", "line", "curve"]);
     let qpos = [0.4, 30f64.to_radians(), 0.1 + 2.0 * 0.4, 0.1 + 3.0 * 0.16];
-    assert_close("positions", &numbers(&json["qpos"]), &qpos, MUJOCO);
+    assert_close("positions", numbers(&json["qpos"]), qpos, MUJOCO);
     assert!(json["files"][0].as_str().unwrap().ends_with("robot.xml"));
     let mut data = Data::new(&compile(MJCF, &[]).unwrap().into_model()).unwrap();
     data.qpos_mut().copy_from_slice(&qpos);
     data.forward().unwrap();
     let matrix = data.mass_matrix().unwrap();
     for (row, theirs) in json["mass_matrix"].as_array().unwrap().iter().zip(matrix.chunks(4)) {
-        assert_close("row of the mass matrix", &numbers(row), theirs, MUJOCO);
+        assert_close("row of the mass matrix", numbers(row), theirs, MUJOCO);
     }
-    assert_close("gravity torque", &numbers(&json["gravity_torque"]), data.qfrc_bias(), MUJOCO);
+    assert_close("gravity torque", numbers(&json["gravity_torque"]), data.qfrc_bias(), MUJOCO);
     assert!(data.qfrc_bias()[1].abs() > 10.0 && json["total_mass"].as_f64().unwrap() == 6.0);
     // The control: the rotor of the swing is about as heavy as what it swings, 0.02 + 3 · 0.5².
     assert!((matrix[5] - (0.3 + 0.02 + 0.75)).abs() < 1e-12, "{matrix:?}");
     // Followers cannot be put elsewhere.
     let (_, json) = report(&[&file, "--qpos", "turn=0.4,curve=0.2"]);
-    assert_close("positions", &numbers(&json["qpos"]), &qpos, MUJOCO);
+    assert_close("positions", numbers(&json["qpos"]), qpos, MUJOCO);
     assert!(warnings(&json).iter().any(|w| w.ends_with("mimic-position-ignored")), "{:?}", warnings(&json));
     // The bundled quadruped, floating, and what cannot be.
     let (_, json) = report(&["quadruped/quadruped.xml", "--floating-base"]);

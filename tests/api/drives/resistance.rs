@@ -42,7 +42,7 @@ fn set_all(world: &mut World, [friction, damping, armature]: &[Array2<f64>; 3], 
 
 /// Speeds by environment and joint.
 fn assert_speeds(world: &World, expected: impl Fn((usize, usize)) -> f64) {
-    assert_close("speeds", &world.view().get_qvel(), &Array2::from_shape_fn((ENVS, 2), expected), EXACT);
+    assert_close("speeds", world.view().get_qvel(), Array2::from_shape_fn((ENVS, 2), expected), EXACT);
 }
 
 fn zeros() -> Array2<f64> {

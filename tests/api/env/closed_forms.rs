@@ -27,7 +27,7 @@ fn pushed_cart() {
         let step = env.step(&forces).unwrap();
         for (e, sign) in [1.0, 0.0, -1.0].into_iter().enumerate() {
             let seen = [step.final_observations[(e, 0)], step.rewards[e]];
-            assert_close(&format!("step {k}"), &seen, &[sign * place(k), -sign * place(k)], ROUNDING);
+            assert_close(&format!("step {k}"), seen, [sign * place(k), -sign * place(k)], ROUNDING);
             assert_eq!(step.rewards[e], step.info.reward_terms[(e, 0)]);
             sums[e] -= sign * place(k);
         }
@@ -69,7 +69,7 @@ fn decimation() {
     // x_k = 0.0004 k (k + 1) / 2 is above 0.005 from k = 5 on (0.006): five physics steps with the force, or all ten.
     let ((each, time), (once, _)) = (run(true), run(false));
     let expected = [5.0 * DT * FORCE, 10.0 * DT * FORCE, 0.1];
-    assert_close("each step, the first alone, time", &[each, once, time], &expected, ROUNDING);
+    assert_close("each step, the first alone, time", [each, once, time], expected, ROUNDING);
 }
 
 #[test]

@@ -220,13 +220,13 @@ fn root_state() {
         [(0, 1, [0.3, 0.2, -fall]), (1, 1, [0.3, -fall, -0.2]), (0, 7, [0.0, 0.0, -1.0]), (1, 7, [0.0, -1.0, 0.0])]
     {
         let found = [0, 1, 2].map(|k| seen[(env, first + k)]);
-        assert_close(&format!("environment {env}, column {first}"), &found, &expected, lever);
+        assert_close(&format!("environment {env}, column {first}"), found, expected, lever);
     }
     // 1 of being there, then the two; what is off is 0.2 m/s of 0.5 for the first and what it falls for the second.
     let rewards = &step.info.reward_terms;
     let expected = [0.2, fall].map(|off: f64| 2.0 * (-(off / 0.5).powi(2)).exp());
-    assert_close("being there", rewards.column(1), &[0.0, 1.0], lever);
-    assert_close("speed", rewards.column(2), &expected, lever);
+    assert_close("being there", rewards.column(1), [0.0, 1.0], lever);
+    assert_close("speed", rewards.column(2), expected, lever);
     let (sim, robot) = floater(2, false);
     let wrong = terms::track_lin_vel("fast", 2.0, robot, "nothing", 0.5);
     let mut env = begin(task(sim, robot).command(speed()).reward(wrong));

@@ -163,7 +163,7 @@ fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&s
         let fk = robot.compute_fk(&qpos, Tip::of_link(link), None).unwrap();
         for ours in [fk, links.index_axis(Axis(1), k).to_owned()] {
             let (far, turned) = apart(&ours, &robot.link_pose(link).unwrap());
-            assert_close(&format!("{name}, {link}"), &[far, turned], &[0.0; 2], BOUND);
+            assert_close(&format!("{name}, {link}"), [far, turned], [0.0; 2], BOUND);
         }
     }
     assert_eq!(robot.jacobian(tip, None, None).unwrap(), jacobian, "{name}: where the joints are");
@@ -186,7 +186,7 @@ fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&s
         for (k, link) in names.iter().enumerate() {
             let theirs = base * reader.pose(reader.body(link, names[0]));
             let (far, turned) = errors(&pose(links.index_axis(Axis(0), env).row(k)), &theirs);
-            assert_close(&format!("{name}, {link}, MuJoCo's reader"), &[far, turned], &[0.0; 2], BOUND);
+            assert_close(&format!("{name}, {link}, MuJoCo's reader"), [far, turned], [0.0; 2], BOUND);
         }
         let frame = reader.pose(body);
         moved = moved.max(errors(&frame, &start).0);
@@ -292,7 +292,7 @@ fn tips() {
     let of_part = |ids: &[JointIndex]| qpos.select(Axis(1), &ids.iter().map(|id| id.0).collect::<Vec<_>>());
     let near = |what: &str, ours: &Array2<f64>, judge: &Array2<f64>| {
         let (far, turned) = apart(ours, judge);
-        assert_close(what, &[far, turned], &[0.0; 2], BOUND);
+        assert_close(what, [far, turned], [0.0; 2], BOUND);
     };
     // The arm ends in the link on its flange, by a name that may be a part or a link.
     for tip in [Tip::of_part("arm"), Tip::of_part("arm").at("ee_link"), "arm".into()] {
@@ -318,6 +318,6 @@ fn tips() {
     assert_eq!(tool.dim(), (2, 7));
     for row in tool.rows() {
         let (far, turned) = errors(&pose(row), &(pose_in(&judge, 1) * tcp));
-        assert_close("tool", &[far, turned], &[0.0; 2], BOUND);
+        assert_close("tool", [far, turned], [0.0; 2], BOUND);
     }
 }

@@ -45,7 +45,7 @@ fn copies() {
     for body in ["block", "body1", "body2"] {
         let [first, second] = [first, second].map(|part| pose_in(&sim.mjcf_part(part).body_pose(body).unwrap(), 0));
         let (far, angle) = errors(&(turn * first), &second);
-        assert_close(body, &[far, angle], &[0.0; 2], rounding);
+        assert_close(body, [far, angle], [0.0; 2], rounding);
     }
     assert!((a[0] - model.qpos0()[0]).abs() > 0.05, "it swings");
 }

@@ -104,7 +104,7 @@ fn links() {
             for env in 0..ENVS {
                 let expected = by_jacobian(&sim, env, &body, [0, 1, 2].map(|k| pose[(env, k)]));
                 let what = format!("{name} in environment {env}, round {round}");
-                assert_close(&what, velocity.row(env), &expected, EXACT);
+                assert_close(&what, velocity.row(env), expected, EXACT);
             }
         }
         // The tool is at its mount on the arm.
@@ -190,17 +190,17 @@ fn written_root() {
     assert_eq!(pose.row(1).to_vec(), [0.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0], "environment 1 was not chosen");
     for env in [0, 2] {
         let limit = Tolerance::absolute(1e-15, "normalization: one rounding of numbers below 3");
-        assert_close("pose", pose.row(env), &[1.0, 2.0, 3.0, half, half, 0.0, 0.0], limit);
+        assert_close("pose", pose.row(env), [1.0, 2.0, 3.0, half, half, 0.0, 0.0], limit);
     }
     for env in 0..ENVS {
         let limit = Tolerance::absolute(1e-15, "normalization: one rounding of numbers below 3");
-        assert_close("velocity", sim.robot(id).get_root_velocity().row(env), &moving, limit);
+        assert_close("velocity", sim.robot(id).get_root_velocity().row(env), moving, limit);
     }
     sim.update(100);
     // One second later: 2 rad about the world's z. Semi-implicit steps of a ball are exact up to rounding.
     for env in 0..ENVS {
         let limit = Tolerance::absolute(1e-9, "semi-implicit steps of a ball are exact up to rounding");
-        assert_close("velocity after a second", sim.robot(id).get_root_velocity().row(env), &moving, limit);
+        assert_close("velocity after a second", sim.robot(id).get_root_velocity().row(env), moving, limit);
     }
     let turned = UnitQuaternion::from_euler_angles(0.0, 0.0, 2.0)
         * UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0);

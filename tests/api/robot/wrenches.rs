@@ -64,10 +64,10 @@ fn force_until_it_changes() {
         }
         sim.update(steps);
         let (v, spin, x) = (sim.robot(id).get_root_velocity(), sim.robot(id).get_qvel(), share * t / 4.0);
-        assert_close("environment 2", v.row(2), &[6.0 * x, -2.0 * x, x, 0.0, 0.0, 0.0], EXACT);
-        assert_close("environment 0", v.row(0), &[0.0, 0.0, 8.0 * x, 0.0, 0.0, 0.0], EXACT);
+        assert_close("environment 2", v.row(2), [6.0 * x, -2.0 * x, x, 0.0, 0.0, 0.0], EXACT);
+        assert_close("environment 0", v.row(0), [0.0, 0.0, 8.0 * x, 0.0, 0.0, 0.0], EXACT);
         let turned = t * 0.5 / 0.02;
-        assert_close("spin", spin.column(0), &[turned, 0.0, turned], EXACT);
+        assert_close("spin", spin.column(0), [turned, 0.0, turned], EXACT);
         assert_eq!(v.row(1).to_vec(), [0.0; 6], "environment 1 was not chosen");
     }
     assert_eq!(sim.robot(id).get_external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
@@ -95,12 +95,12 @@ fn force_in_axes_of_a_link() {
             *x += H * 5.0 / 4.0 * angle.cos();
             *y += H * 5.0 / 4.0 * angle.sin();
             // No torque comes of it: the force acts in the center of mass, wherever the grip is.
-            assert_close(&format!("environment {env}, step {k}"), v.row(env), &[*x, *y, 0.0, 0.0, 0.0, w], EXACT);
+            assert_close(&format!("environment {env}, step {k}"), v.row(env), [*x, *y, 0.0, 0.0, 0.0, w], EXACT);
         }
     }
     let in_world = pose_in(&sim.robot(id).link_pose("grip").unwrap(), 1).rotation * Vector3::new(5.0, 0.0, 0.0);
     let read = sim.robot(id).get_external_wrenches();
-    assert_close("what is read is in world axes", &[0, 1, 2].map(|k| read[(1, grip.0, k)]), &in_world, EXACT);
+    assert_close("what is read is in world axes", [0, 1, 2].map(|k| read[(1, grip.0, k)]), &in_world, EXACT);
 }
 
 /// Two levers on one another under gravity, without drives: compensated, they stay where they are; with one of them
@@ -137,7 +137,7 @@ fn gravity_compensation() {
     };
     sim.update(1);
     let speeds = sim.robot(id).get_qvel();
-    assert_close("nothing has weight", speeds.row(0), &[0.0; 2], EXACT);
+    assert_close("nothing has weight", speeds.row(0), [0.0; 2], EXACT);
     for (env, weight) in [(1, [0.0, 1.0]), (2, [3.0, 1.0])] {
         // From rest M v' = h load, with MuJoCo's own M.
         let mass = sim.batch().read(2, |env| env.data().mass_matrix().unwrap());
@@ -150,7 +150,7 @@ fn gravity_compensation() {
     }
     sim.update(100);
     let q = sim.robot(id).get_qpos();
-    assert_close("it stays for a second", q.row(0), &start, EXACT);
+    assert_close("it stays for a second", q.row(0), start, EXACT);
     assert!((q[(2, 0)] - 0.3).abs() > 0.5, "the control falls: {q}");
     // Off again: it falls as the control did, from the start.
     sim.robot_mut(id).set_gravity_compensation(false, Some(&[a, b]), None).unwrap();
@@ -173,12 +173,12 @@ fn changes_of_the_world() {
     add_ball(&mut sim, "ball", [9.0, 0.0, 0.0]);
     sim.update(10);
     let (t, v) = (20.0 * H, sim.robot(id).get_root_velocity());
-    assert_close("through the change", v.row(1), &[t * 2.0 / 4.0, 0.0, -t * G / 2.0, 0.0, 0.0, 0.0], EXACT);
+    assert_close("through the change", v.row(1), [t * 2.0 / 4.0, 0.0, -t * G / 2.0, 0.0, 0.0, 0.0], EXACT);
     sim.reset(None).unwrap();
     assert_eq!(sim.robot(id).get_external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
     sim.update(10);
     let v = sim.robot(id).get_root_velocity();
-    assert_close("after the reset", v.row(1), &[0.0, 0.0, -10.0 * H * G / 2.0, 0.0, 0.0, 0.0], EXACT);
+    assert_close("after the reset", v.row(1), [0.0, 0.0, -10.0 * H * G / 2.0, 0.0, 0.0, 0.0], EXACT);
     // Parts that are fixed to the outer ball form one body with it.
     sim.robot_mut(id).set_gravity_compensation(true, Some(&[grip]), Some(&[EnvId(0)])).unwrap();
     let on = sim.robot(id).get_gravity_compensation();

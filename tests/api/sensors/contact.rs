@@ -56,7 +56,7 @@ fn newtons_second_law() {
     }
     assert!(touched > 300 && flying > 10, "{touched} steps with contact, {flying} without");
     // The remaining motion after two seconds is far below a thousandth of gravity.
-    assert_close("weight at rest", sim.sensor(id).unwrap().net_forces_w(), &[0.0, 0.0, mass * G], STILL * (mass * G));
+    assert_close("weight at rest", sim.sensor(id).unwrap().net_forces_w(), [0.0, 0.0, mass * G], STILL * (mass * G));
 }
 
 fn pairs(bodies: &str, filters: &[&str]) -> ContactSensorCfg {
@@ -96,7 +96,7 @@ fn leaning_plank() {
             });
         let weight = 1.5 * G;
         if degrees == 0.0 {
-            assert_close("normal force", &normal_force, &[0.0, 0.0, weight], REST * weight);
+            assert_close("normal force", &normal_force, [0.0, 0.0, weight], REST * weight);
             assert_number("friction", friction.norm(), 0.0, REST * weight);
             continue;
         }
@@ -184,19 +184,19 @@ fn forces_after_a_write() {
     let id = sim.add_sensor("contact", ContactSensorCfg::of("box")).unwrap();
     let stamps = |sim: &SimulationManager| sim.sensor(id).unwrap().force_stamps().to_owned();
     sim.update(10);
-    assert_close("stamps of the steps", &stamps(&sim), &[0.045, 0.045], STAMP);
+    assert_close("stamps of the steps", stamps(&sim), [0.045, 0.045], STAMP);
     let down = array![[0.0, 0.0, 0.0995, 1.0, 0.0, 0.0, 0.0]];
     sim.rigid_object_mut(box_).write_pose(&down, Some(&[EnvId(1)])).unwrap();
     let written = sim.sensor(id).unwrap().net_forces_w().to_owned();
     assert!(written[(1, 0, 2)] > 1.0 && written[(0, 0, 2)] == 0.0, "{written}");
-    assert_close("stamps after the write", &stamps(&sim), &[0.045, 0.05], STAMP);
+    assert_close("stamps after the write", stamps(&sim), [0.045, 0.05], STAMP);
     // The next step solves the same state.
     sim.update(1);
     assert_eq!(sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)], written[(1, 0, 2)]);
-    assert_close("stamps after the step", &stamps(&sim), &[0.05, 0.05], STAMP);
+    assert_close("stamps after the step", stamps(&sim), [0.05, 0.05], STAMP);
     sim.reset(Some(&[EnvId(1)])).unwrap();
     assert_eq!(sim.sensor(id).unwrap().net_forces_w()[(1, 0, 2)], 0.0, "up again");
-    assert_close("stamps after the reset", &stamps(&sim), &[0.05, 0.0], STAMP);
+    assert_close("stamps after the reset", stamps(&sim), [0.05, 0.0], STAMP);
 }
 
 /// RK4 solves its steps in the middle of them; sensors get forces solved for the beginning, as with Euler.

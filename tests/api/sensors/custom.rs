@@ -150,5 +150,5 @@ fn sampler() {
     sim.update(101);
     // The newest capture that is 4 steps old is that of step 96.
     let limit = Tolerance::absolute(1e-12, "rounding of 96 sums of numbers up to 5");
-    assert_close("speed", sim.sensor(id).unwrap().sampler.values("speed"), &[9.81 * 96.0 * 0.005; 2], limit);
+    assert_close("speed", sim.sensor(id).unwrap().sampler.values("speed"), [9.81 * 96.0 * 0.005; 2], limit);
 }

@@ -23,7 +23,7 @@ fn free_fall_and_rest() {
     let up = tilt.inverse() * Vector3::new(0.0, 0.0, G);
     for _ in 0..20 {
         for (id, expected) in ids.iter().zip([[0.0; 3], [0.0, 0.0, -G], up.into()]) {
-            assert_close("linear acceleration", sim.sensor(*id).unwrap().lin_acc_b(), &expected, EXACT);
+            assert_close("linear acceleration", sim.sensor(*id).unwrap().lin_acc_b(), expected, EXACT);
         }
         sim.update(1);
     }
@@ -67,7 +67,7 @@ fn period_and_reset() {
     let slow = ImuCfg { sampling: SamplingCfg::every(0.1), ..ImuCfg::on("box") };
     let id = sim.add_sensor("imu", slow).unwrap();
     let falls = |sim: &SimulationManager| {
-        assert_close("acceleration in free fall", sim.sensor(id).unwrap().lin_acc_b(), &[0.0; 3], EXACT)
+        assert_close("acceleration in free fall", sim.sensor(id).unwrap().lin_acc_b(), [0.0; 3], EXACT)
     };
     for _ in 0..3 {
         sim.update(33);
@@ -77,6 +77,6 @@ fn period_and_reset() {
         assert_eq!(sim.sensor(id).unwrap().quat_w().row(0).to_vec(), [1.0, 0.0, 0.0, 0.0]);
         sim.rigid_object_mut(object).write_velocity(&array![[9.0, 0.0, 0.0, 0.0, 0.0, 0.0]], None).unwrap();
         falls(&sim);
-        assert_close("velocity", sim.sensor(id).unwrap().lin_vel_b(), &[9.0, 0.0, 0.0], EXACT);
+        assert_close("velocity", sim.sensor(id).unwrap().lin_vel_b(), [9.0, 0.0, 0.0], EXACT);
     }
 }
