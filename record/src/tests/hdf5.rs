@@ -3,6 +3,9 @@
 use super::episodes::{Expected, Row};
 use super::*;
 
+/// Some numbers of a row.
+type Values = fn(&Row) -> Vec<f64>;
+
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
 fn frames() {
@@ -18,7 +21,7 @@ fn frames() {
         let table = |path: &str| episode["numbers"][path].clone();
         let all = |of: &dyn Fn(&[&Row; 2]) -> Vec<f64>| bits(frames.iter().map(of).collect());
         for (at, of) in [(0, "obs"), (1, "next_obs")] {
-            let columns: [(&str, fn(&Row) -> Vec<f64>); 5] = [
+            let columns: [(&str, Values); 5] = [
                 ("joint_pos", |row| row.positions.clone()),
                 ("joint_vel", |row| row.velocities.clone()),
                 ("joint_effort", |row| row.efforts.clone()),

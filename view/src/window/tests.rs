@@ -125,7 +125,8 @@ fn keys_and_repeats() {
 /// Each key of an overlay turns that one, and no other, and back again.
 #[test]
 fn overlay_keys() {
-    let turns: [(&str, fn(&mut Overlays) -> &mut bool); 9] = [
+    type Overlay = fn(&mut Overlays) -> &mut bool;
+    let turns: [(&str, Overlay); 9] = [
         ("o", |all| &mut all.sensors),
         ("c", |all| &mut all.contacts),
         ("f", |all| &mut all.frames),
