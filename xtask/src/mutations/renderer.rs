@@ -48,48 +48,6 @@ pub(super) const RENDERER: &[Mutation] = &[
         ["self.last_row.saturating_sub(row) as f64 * self.row", "row as f64 * self.row"],
         &["camera::tests::shutter::shear"],
     ),
-    unit(
-        "horizontal edges belong to no triangle",
-        "sensors/src/visibility/raster/triangle.rs",
-        ["let owns_edge = dy < 0 || (dy == 0 && dx > 0);", "let owns_edge = dy < 0;"],
-        &["camera::tests::reference::watertight_edges"],
-    ),
-    unit(
-        "cosine of the light forgotten in path tracing",
-        "sensors/src/resolve/path/lobe.rs",
-        ["(1.0 - out[k]) * i[2] / PI)", "(1.0 - out[k]) / PI)"],
-        &["resolve::path::lobe::tests::energy"],
-    ),
-    unit(
-        "boxes of a BVH left on the near side",
-        "sensors/src/ray/bvh/mod.rs",
-        ["smaller((fx[k] - ox) * ix, (fy[k] - oy) * iy)", "smaller((nx[k] - ox) * ix, (fy[k] - oy) * iy)"],
-        &["ray::tests::trees::brute_force"],
-    ),
-    unit(
-        "linear and quadratic attenuation of lights exchanged",
-        "sensors/src/resolve/shade.rs",
-        ["square * quadratic + distance * linear + constant", "square * linear + distance * quadratic + constant"],
-        &["camera::tests::light::attenuation"],
-    ),
-    unit(
-        "depth noise that ignores its offset",
-        "sensors/src/camera/imperfection/depth_noise.rs",
-        ["(z - self.offset).powi(2)", "z.powi(2)"],
-        &["camera::imperfection::tests::depth_noise"],
-    ),
-    unit(
-        "shadow of a projector on the other side",
-        "sensors/src/camera/imperfection/holes.rs",
-        ["let pixel = if reach > 0.0 {", "let pixel = if reach < 0.0 {"],
-        &["camera::imperfection::tests::projector_shadow"],
-    ),
-    unit(
-        "points of pixels at their corners",
-        "sensors/src/camera/point_cloud.rs",
-        ["(x as f64 + 0.5, y as f64 + 0.5)", "(x as f64, y as f64)"],
-        &["camera::tests::sensor::points"],
-    ),
     scene(
         "negative index of an OBJ one vertex too far",
         "scene/src/mesh/obj.rs",

@@ -11,15 +11,6 @@ const fn unit(
     Mutation { name, file, search, replacement, tests: ("kinetoscope-sensors", tests) }
 }
 
-const fn api(
-    name: &'static str,
-    file: &'static str,
-    [search, replacement]: [&'static str; 2],
-    tests: &'static [&'static str],
-) -> Mutation {
-    Mutation { name, file, search, replacement, tests: ("api", tests) }
-}
-
 pub(super) const SENSORS: &[Mutation] = &[
     unit(
         "measurements due by the step of the world, not since the reset",
@@ -101,11 +92,5 @@ pub(super) const SENSORS: &[Mutation] = &[
         "sensors/src/ray/caster/alignment.rs",
         ["2.0 * (q.w * q.k + q.i * q.j)", "2.0 * (q.w * q.k - q.i * q.j)"],
         &["ray::caster::tests::alignments"],
-    ),
-    api(
-        "target frame seen in the wrong order",
-        "sensors/src/frame_transformer.rs",
-        ["source_from_world * world_from_target", "world_from_target * source_from_world"],
-        &["sensors::frames::targets_from_the_source"],
     ),
 ];
