@@ -2,7 +2,7 @@
 
 use std::fmt::{Debug, Display};
 
-/// What is wrong with the answer to a mistake: it was accepted, or its error is another.
+/// Report on one row: the mistake was accepted, or the error differs from the expected one.
 fn finding<T, E: Debug + Display>(result: Result<T, E>, variant: &str, parts: &[&str]) -> Option<String> {
     let Err(error) = result else { return Some(format!("accepted, expected {variant} {parts:?}")) };
     let (shown, text) = (format!("{error:?}"), error.to_string());

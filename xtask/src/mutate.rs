@@ -89,7 +89,7 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
     no_findings("mutations that no test noticed", &findings)
 }
 
-/// Where the results are written to.
+/// The page of the results.
 const PAGE: &str = "docs/mutations.md";
 
 /// The page with a new row; those of other mutations are taken from the page as it was.

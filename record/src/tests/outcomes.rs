@@ -171,7 +171,7 @@ fn archive_and_messages() {
     }
 }
 
-/// A task that is no `Env` reports its outcomes itself; without a task there are none.
+/// A program with a task of its own reports the outcomes itself; a recording without a task has no outcomes.
 #[test]
 fn own_task() {
     let (_folder, path) = scratch("run.npz");

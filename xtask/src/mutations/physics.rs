@@ -2,17 +2,9 @@
 
 use super::Mutation;
 
-const fn physics(
-    name: &'static str,
-    file: &'static str,
-    [search, replacement]: [&'static str; 2],
-    laws: &'static [&'static str],
-) -> Mutation {
-    Mutation { name, file, search, replacement, tests: ("physics", laws) }
-}
-
 pub(super) const PHYSICS: &[Mutation] = &[
-    physics(
+    Mutation::of(
+        "physics",
         "inertia turned the wrong way",
         "sim/src/inertia.rs",
         [
@@ -21,19 +13,22 @@ pub(super) const PHYSICS: &[Mutation] = &[
         ],
         &["tilted_inertia", "parallel_axis", "mass_matrix"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "parallel-axis term dropped",
         "sim/src/inertia.rs",
         ["let reduced_mass = self.mass * other.mass / mass;", "let reduced_mass = 0.0 * other.mass / mass;"],
         &["parallel_axis", "mass_matrix"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "centre of mass of fused links not moved",
         "sim/src/inertia.rs",
         ["com: self.com + d * (other.mass / mass),", "com: self.com + d * (0.5 * other.mass / mass),"],
         &["parallel_axis", "gravity_torques"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "turn of the inertial frame ignored",
         "sim/src/inertia.rs",
         [
@@ -42,13 +37,15 @@ pub(super) const PHYSICS: &[Mutation] = &[
         ],
         &["tilted_inertia", "equations_of_motion"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "quaternion order swapped in the MJCF",
         "sim/src/mjcf/write.rs",
         ["out.numbers(\"quat\", &[q.w, q.i, q.j, q.k])", "out.numbers(\"quat\", &[q.i, q.j, q.k, q.w])"],
         &["mass_matrix", "gravity_torques", "rolling_cylinder"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "quaternion order swapped in poses that are read",
         "scene/src/pose.rs",
         [
@@ -57,7 +54,8 @@ pub(super) const PHYSICS: &[Mutation] = &[
         ],
         &["tilted_inertia", "asymmetric_top", "internal_momentum"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "roll and yaw exchanged",
         "scene/src/pose.rs",
         [
@@ -66,7 +64,8 @@ pub(super) const PHYSICS: &[Mutation] = &[
         ],
         &["mass_matrix", "rolling_cylinder"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "frame of a link behind a fixed joint not moved",
         "sim/src/mjcf/robot.rs",
         [
@@ -75,7 +74,8 @@ pub(super) const PHYSICS: &[Mutation] = &[
         ],
         &["centre_of_percussion", "falling_rod"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "joint frame in the wrong order",
         "sim/src/mjcf/robot.rs",
         [
@@ -84,19 +84,22 @@ pub(super) const PHYSICS: &[Mutation] = &[
         ],
         &["mass_matrix", "gravity_torques"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "Jacobian with the arm of the wrong sign",
         "sim/src/kinematics/jacobian.rs",
         ["&pose.translation.vector.cross(&axis)", "&axis.cross(&pose.translation.vector)"],
         &["jacobian", "virtual_work"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "Jacobian of a joint that moved already",
         "sim/src/kinematics/jacobian.rs",
         ["pose *= joint.before;", "pose *= joint.before * joint.moved(positions);"],
         &["jacobian", "virtual_work"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "velocity at a point with the arm of the wrong sign",
         "sim/src/capture/motion.rs",
         [
@@ -140,7 +143,8 @@ pub(super) const PHYSICS: &[Mutation] = &[
         replacement: "let stiffness = h * gains.kd;",
         tests: ("api", &["drives::law"]),
     },
-    physics(
+    Mutation::of(
+        "physics",
         "drive pushes the wrong way",
         "sim/src/drive/implicit.rs",
         ["gains.kp * (target.position - q)", "gains.kp * (q - target.position)"],
@@ -160,43 +164,50 @@ pub(super) const PHYSICS: &[Mutation] = &[
         replacement: "effort / stiffness",
         tests: ("api", &["drives::law"]),
     },
-    physics(
+    Mutation::of(
+        "physics",
         "damping of joints that drives",
         "sim/src/drive/implicit.rs",
         ["data.qfrc_applied_mut()[dof] -= damping * v;", "data.qfrc_applied_mut()[dof] += damping * v;"],
         &["viscous_joint"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "mimic ratio and offset exchanged",
         "sim/src/mjcf/write.rs",
         ["&[e.offset, e.multiplier, 0.0, 0.0, 0.0]", "&[e.multiplier, e.offset, 0.0, 0.0, 0.0]"],
         &["atwood_machine", "geared_inertia"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "friction cone always a pyramid",
         "sim/src/mjcf/write.rs",
         ["if o.cone == Cone::Elliptic { \"elliptic\" }", "if o.cone == Cone::Elliptic { \"pyramidal\" }"],
         &["rest_depth", "stick_creep"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "impratio forgotten",
         "sim/src/simulation_cfg.rs",
         ["impratio: self.impratio,", "impratio: 1.0,"],
         &["stick_creep"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "substeps as long as updates",
         "sim/src/simulation_cfg.rs",
         ["timestep: self.physics_dt / f64::from(self.substeps),", "timestep: self.physics_dt,"],
         &["substeps"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "Runge-Kutta stepped as Euler",
         "sim/src/env.rs",
         ["if self.data.model().integrator() == mj::mjINT_RK4 {", "if self.data.model().integrator() == u32::MAX {"],
         &["order_of_runge_kutta", "free_fall", "asymmetric_top"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "an update is a step too short",
         "sim/src/manager.rs",
         [
@@ -205,68 +216,79 @@ pub(super) const PHYSICS: &[Mutation] = &[
         ],
         &["free_fall", "parts_of_an_update"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "restitution with half of its damping",
         "sim/src/objects/restitution.rs",
         ["(2.0 * ratio * frequency).max(1e-9)", "(ratio * frequency).max(1e-9)"],
         &["elastic_bounce"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "friction of an object forgotten",
         "sim/src/mjcf/scene.rs",
         ["        role,\n        friction: cfg.friction,\n", "        role,\n        friction: None,\n"],
         &["conveyor"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "mass of an object from its density only",
         "sim/src/objects/mass_properties.rs",
         ["let mass = cfg.mass.unwrap_or(cfg.density * volume);", "let mass = cfg.density * volume;"],
         &["drag", "conveyor"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "weld anchored at the inverse pose",
         "sim/src/objects/weld.rs",
         ["to_row(&(first.inverse() * second))", "to_row(&(second.inverse() * first))"],
         // Not the slider and crank: at its weld both bodies are turned alike, and where they are the same the inverse is too.
         &["four_bar"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "velocity of the centre of mass with the arm of the wrong sign",
         "sim/src/objects/robot_state.rs",
         ["body_pose(data, body).translation.vector - com", "com - body_pose(data, body).translation.vector"],
         &["tumbling_projectile"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "angular velocity written in the axes of the world",
         "sim/src/objects/free_body.rs",
         ["let angular = rotation.inverse() * turning;", "let angular = turning;"],
         &["tumbling_projectile"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "force and torque exchanged",
         "sim/src/wrenches.rs",
         ["force.iter().chain(torque)", "torque.iter().chain(force)"],
         &["tilted_inertia", "centre_of_percussion", "parallel_axis"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "limits of joints twice as wide",
         "sim/src/mjcf/write.rs",
         [".numbers(\"range\", &range)", ".numbers(\"range\", &range.map(|x| 2.0 * x))"],
         &["joint_limit"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "limits of motors twice as large",
         "sim/src/mjcf/write.rs",
         ["\"forcerange\", &[-limit, limit]", "\"forcerange\", &[-2.0 * limit, 2.0 * limit]"],
         &["force_limit"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "armature forgotten",
         "sim/src/mjcf/robot.rs",
         ["armature: plan.armature,", "armature: 0.0 * plan.armature,"],
         &["armature"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "dry friction forgotten",
         "sim/src/mjcf/robot.rs",
         [
@@ -275,13 +297,15 @@ pub(super) const PHYSICS: &[Mutation] = &[
         ],
         &["dry_friction"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "IMU at rest feels nothing",
         "sensors/src/imu.rs",
         ["acceleration + self.gravity_bias, spin_up", "acceleration, spin_up"],
         &["imu_turntable", "imu_pendulum"],
     ),
-    physics(
+    Mutation::of(
+        "physics",
         "pixels half a percent too wide",
         "sensors/src/visibility/projection.rs",
         ["inverse_f: [1.0 / self.fx, 1.0 / self.fy],", "inverse_f: [1.005 / self.fx, 1.0 / self.fy],"],

@@ -2,53 +2,51 @@
 
 use super::Mutation;
 
-const fn unit(
-    name: &'static str,
-    file: &'static str,
-    [search, replacement]: [&'static str; 2],
-    tests: &'static [&'static str],
-) -> Mutation {
-    Mutation { name, file, search, replacement, tests: ("kinetoscope-record", tests) }
-}
-
 pub(super) const RECORDING: &[Mutation] = &[
-    unit(
+    Mutation::of(
+        "kinetoscope-record",
         "shape of an array of one axis a number",
         "record/src/npy.rs",
         ["if shape.len() == 1 {", "if shape.len() == 2 {"],
         &["npy::tests::"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-record",
         "sizes before and after packing exchanged",
         "record/src/zip.rs",
         ["(before, 8), (*size, 8), (*offset, 8)", "(*size, 8), (before, 8), (*offset, 8)"],
         &["zip::tests::"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-record",
         "time that an environment is set to ignored",
         "record/src/clock.rs",
         ["self.offsets[env] = now - times[env];", "self.offsets[env] = now;"],
         &["clock::tests::"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-record",
         "count forgotten where deviations are joined",
         "record/src/lerobot/statistics.rs",
         ["apart * apart * self.count * other.count / count", "apart * apart * other.count / count"],
         &["lerobot::statistics::tests::"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-record",
         "actions of the row before repeated",
         "record/src/replay.rs",
         ["self.act(sim, row)?;", "self.act(sim, row.saturating_sub(1))?;"],
         &["replay::tests::"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-record",
         "numbers of messages aligned from the header on",
         "record/src/ros/cdr.rs",
         ["(self.0.len() - HEADER.len()).next_multiple_of(size) + HEADER.len()", "self.0.len().next_multiple_of(size)"],
         &["ros::cdr::tests::"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-record",
         "red and blue of a video exchanged",
         "record/src/animation/h264.rs",
         [
@@ -57,7 +55,8 @@ pub(super) const RECORDING: &[Mutation] = &[
         ],
         &["animation::h264::tests::"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-record",
         "what a damaged recording left behind removed",
         "record/src/recover.rs",
         ["if recovered.damage.is_none() {", "if recovered.messages > 0 {"],

@@ -2,26 +2,9 @@
 
 use super::Mutation;
 
-const fn unit(
-    name: &'static str,
-    file: &'static str,
-    [search, replacement]: [&'static str; 2],
-    tests: &'static [&'static str],
-) -> Mutation {
-    Mutation { name, file, search, replacement, tests: ("kinetoscope-sensors", tests) }
-}
-
-const fn scene(
-    name: &'static str,
-    file: &'static str,
-    [search, replacement]: [&'static str; 2],
-    tests: &'static [&'static str],
-) -> Mutation {
-    Mutation { name, file, search, replacement, tests: ("kinetoscope-scene", tests) }
-}
-
 pub(super) const RENDERER: &[Mutation] = &[
-    unit(
+    Mutation::of(
+        "kinetoscope-sensors",
         "tangential coefficients of a lens exchanged",
         "sensors/src/camera/lens/open_cv.rs",
         [
@@ -30,37 +13,43 @@ pub(super) const RENDERER: &[Mutation] = &[
         ],
         &["camera::tests::lenses::opencv_numbers"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-sensors",
         "optical flow to the left, not to the right",
         "sensors/src/resolve/moves.rs",
         ["let right = u - (there.x * nearness * fx + cx);", "let right = (there.x * nearness * fx + cx) - u;"],
         &["camera::tests::flow::homography", "camera::tests::flow::random_scenes"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-sensors",
         "right eye of a pair on the left",
         "sensors/src/camera/stereo/rectify.rs",
         ["projection[(0, 3)] = 0.0 - pixels.fx * beside;", "projection[(0, 3)] = pixels.fx * beside;"],
         &["camera::tests::stereo::opencv_pairs"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-sensors",
         "rolling shutter from the bottom up",
         "sensors/src/camera/shutter.rs",
         ["self.last_row.saturating_sub(row) as f64 * self.row", "row as f64 * self.row"],
         &["camera::tests::shutter::shear"],
     ),
-    scene(
+    Mutation::of(
+        "kinetoscope-scene",
         "negative index of an OBJ one vertex too far",
         "scene/src/mesh/obj.rs",
         [".checked_add(index).filter", ".checked_add(index + 1).filter"],
         &["mesh::obj::tests::faces"],
     ),
-    scene(
+    Mutation::of(
+        "kinetoscope-scene",
         "every second triangle of a strip inside out",
         "scene/src/mesh/glb.rs",
         ["5 => [t + 1, t, t + 2],", "5 => [t, t + 1, t + 2],"],
         &["mesh::glb::tests::square"],
     ),
-    scene(
+    Mutation::of(
+        "kinetoscope-scene",
         "transforms of a COLLADA node in the wrong order",
         "scene/src/mesh/dae.rs",
         ["here = product(&here, &step);", "here = product(&step, &here);"],

@@ -2,17 +2,9 @@
 
 use super::Mutation;
 
-const fn input(
-    name: &'static str,
-    file: &'static str,
-    [search, replacement]: [&'static str; 2],
-    tests: &'static [&'static str],
-) -> Mutation {
-    Mutation { name, file, search, replacement, tests: ("input", tests) }
-}
-
 pub(super) const ROBOTS: &[Mutation] = &[
-    input(
+    Mutation::of(
+        "input",
         "prefixes of left and right exchanged",
         "sim/src/urdf/merge.rs",
         [
@@ -21,37 +13,43 @@ pub(super) const ROBOTS: &[Mutation] = &[
         ],
         &["urdf::assembly::two_arms_and_hands"],
     ),
-    input(
+    Mutation::of(
+        "input",
         "the one on the chassis hangs from its tip",
         "sim/src/urdf/merge.rs",
         ["if parent_cfg.name == \"chassis\" {", "if component.name == \"chassis\" {"],
         &["urdf::assembly::usual_parents"],
     ),
-    input(
+    Mutation::of(
+        "input",
         "links of the files before forgotten where a link is named",
         "sim/src/urdf/merge.rs",
         ["Some(link) => Ok(Some(first + link)),", "Some(link) => Ok(Some(link)),"],
         &["urdf::assembly::links_by_name"],
     ),
-    input(
+    Mutation::of(
+        "input",
         "joints of the files before forgotten by a mimic",
         "sim/src/urdf/merge.rs",
         ["joint: JointId(first_joint + followed),", "joint: JointId(followed),"],
         &["urdf::assembly::hand_on_arm"],
     ),
-    input(
+    Mutation::of(
+        "input",
         "connector of two components the wrong way round",
         "sim/src/urdf/merge.rs",
         ["parent_from_joint: component.transform,", "parent_from_joint: component.transform.inverse(),"],
         &["urdf::assembly::one_component", "urdf::assembly::hand_on_arm"],
     ),
-    input(
+    Mutation::of(
+        "input",
         "case of a name with its component forgotten",
         "sim/src/urdf/names.rs",
         ["unique = self.case.apply(&format!(\"{component}_{name}\"));", "unique = format!(\"{component}_{name}\");"],
         &["urdf::assembly::one_component"],
     ),
-    input(
+    Mutation::of(
+        "input",
         "speed limit of a joint read from its effort limit",
         "sim/src/urdf/merge.rs",
         ["given.velocity.then_some(model.limit.velocity)", "given.velocity.then_some(model.limit.effort)"],

@@ -2,47 +2,44 @@
 
 use super::Mutation;
 
-const fn unit(
-    name: &'static str,
-    file: &'static str,
-    [search, replacement]: [&'static str; 2],
-    tests: &'static [&'static str],
-) -> Mutation {
-    Mutation { name, file, search, replacement, tests: ("kinetoscope-view", tests) }
-}
-
 pub(super) const VIEWS: &[Mutation] = &[
-    unit(
+    Mutation::of(
+        "kinetoscope-view",
         "slow motion is fast",
         "view/src/control/pace.rs",
         ["* self.dt / factor);", "* self.dt * factor);"],
         &["control::pace::tests::waits"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-view",
         "spring of the mouse drives instead of damping",
         "view/src/control/spring.rs",
         ["- 2.0 * FREQUENCY * velocity;", "+ 2.0 * FREQUENCY * velocity;"],
         &["control::tests::spring_in_closed_form"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-view",
         "view moves with the mouse, not against it",
         "view/src/stage/eye.rs",
         ["self.shift((up * dy - right * dx) * scale);", "self.shift((up * dy + right * dx) * scale);"],
         &["stage::eye::tests::drags"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-view",
         "contact force on the selected body with the wrong sign",
         "view/src/stage/pick.rs",
         ["contact.bodies.iter().zip([-1.0, 1.0])", "contact.bodies.iter().zip([1.0, -1.0])"],
         &["stage::tests::selected_cube"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-view",
         "time line begins at zero",
         "view/src/window/timeline.rs",
         ["Some(start + share * (end - start))", "Some(share * (end - start))"],
         &["window::timeline::tests::mark", "window::timeline::tests::seek"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-view",
         "film shows the frame after the time",
         "view/src/control/conductor/playback.rs",
         [
@@ -51,13 +48,15 @@ pub(super) const VIEWS: &[Mutation] = &[
         ],
         &["playback::tests::seek_step_and_play"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-view",
         "first letters of a token are enough",
         "view/src/serve/token.rs",
         ["own.len() == given.len()", "own.len() >= given.len()"],
         &["serve::token::tests::equality"],
     ),
-    unit(
+    Mutation::of(
+        "kinetoscope-view",
         "body pulled to its place in the grid of environments",
         "view/src/stage/pull.rs",
         ["f64::from(place[k]) - origin[k]", "f64::from(place[k])"],

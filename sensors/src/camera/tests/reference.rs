@@ -75,7 +75,7 @@ impl<'a> Caster<'a> {
     }
 }
 
-/// Both solutions of a t² + 2 b t + c = 0; not a number where there are none.
+/// Both solutions of a t² + 2 b t + c = 0, NaN without a real solution.
 fn quadratic(a: f64, b: f64, c: f64) -> [f64; 2] {
     let root = (b * b - a * c).sqrt();
     if a == 0.0 { [f64::NAN; 2] } else { [(-b - root) / a, (-b + root) / a] }
@@ -176,7 +176,7 @@ fn blocks(mesh: &TriMesh) -> Vec<Block> {
 }
 
 impl Block {
-    /// Where a ray enters the box, infinity if it misses it: no triangle is nearer.
+    /// Distance at which a ray enters the box, infinity if it misses the box. All triangles are farther.
     fn enters(&self, o: V, d: V) -> f64 {
         let (mut from, mut to) = (0.0f64, f64::INFINITY);
         for k in 0..3 {
