@@ -68,6 +68,8 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     };
     let mut sim = args.model.scene(cfg)?;
     let warned = excerpt::print_warnings(sim.diagnostics());
+    // First of all: a Ctrl+C while the recording begins or the page opens also ends it well.
+    let interrupted = on_ctrl_c(&mut sim);
     let files = Arc::new(Mutex::new(args.recording()));
     if args.record.is_some() {
         files
@@ -77,7 +79,6 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
             .map_err(|error| format!("--record {error}"))?;
     }
     let window = args.show(&mut sim, RecordButton::shared(Arc::clone(&files)))?;
-    let interrupted = on_ctrl_c(&mut sim);
     let closed = || window.as_ref().and_then(Window::closed);
     let mut step = 0;
     while !interrupted.load(Ordering::SeqCst) && args.steps.is_none_or(|steps| step < steps) && closed().is_none() {
