@@ -57,6 +57,8 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.write_dump(&sim)?;
 
     println!("Starting simulation...");
+    println!("Robot will move through different poses");
+    println!("Press Ctrl+C to stop");
     let phases = phases(&sim, robot, args.swap_hand)?;
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
@@ -131,8 +133,8 @@ fn phases(sim: &SimulationManager, robot: RobotId, swap_hand: bool) -> launcher:
     let (close, open) = if swap_hand { (1, 0) } else { (0, 1) };
     let phase = |name, message, joints: &[JointIndex], target| Phase { name, message, joints: joints.to_vec(), target };
     Ok(vec![
-        phase("arm position 1", "Moving to arm position 1", &arm, arm_target(&[0.0, 0.5, -1.5, 0.3, -0.5, 0.0])),
-        phase("arm position 2", "Moving to arm position 2", &arm, arm_target(&[0.0, 0.5, -1.5, -0.3, -0.5, 0.0])),
+        phase("arm position 1", "Moving to arm position 1", &arm, arm_target(&[0.0, -0.5, 0.5, -1.0, 0.5, 0.0])),
+        phase("arm position 2", "Moving to arm position 2", &arm, arm_target(&[0.5, 0.0, -0.5, 0.5, -0.5, 0.5])),
         phase("close hand", "Closing hand", &hand, hand_target(close)),
         phase("open hand", "Opening hand", &hand, hand_target(open)),
     ])

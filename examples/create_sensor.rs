@@ -8,13 +8,15 @@
 
 mod launcher;
 
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use kinetoscope::ndarray::{ArrayView1, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
+use kinetoscope::sensors::camera::RenderProgress;
 use launcher::arm::ArmWithHand;
-use launcher::panel::{Views, grid, tile};
-use launcher::{Launcher, PathFlags, Progress, Renderer, picture};
+use launcher::panel::{self, Views, grid, tile};
+use launcher::views::SensorWindow;
+use launcher::{End, Launcher, PathFlags, Progress, Renderer, picture, waiting};
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -41,6 +43,12 @@ struct Args {
     /// Rows
     #[arg(long, default_value_t = 480)]
     height: usize,
+    /// What has a color of its own in the mask's image: every link, or every robot and object
+    #[arg(long, value_enum, default_value_t = MaskLevel::Link)]
+    mask: MaskLevel,
+    /// Write images also when they are shown in a window; without a window they are always written
+    #[arg(long)]
+    save: bool,
     /// Also write depth, mask and normals as .npy, shape (N, H, W, ...)
     #[arg(long)]
     raw: bool,
@@ -49,6 +57,15 @@ struct Args {
     enable_rt: bool,
     #[command(flatten)]
     paths: PathFlags,
+}
+
+/// What has an id of its own in the mask's image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MaskLevel {
+    /// Each link
+    Link,
+    /// Each robot and each object
+    Instance,
 }
 
 /// The tutorial sets targets at multiples of these steps.
@@ -92,9 +109,10 @@ fn run(args: &Args) -> launcher::Result {
         eprintln!("warning: {diagnostic}");
     }
     args.launcher.write_dump(&sim)?;
-    let out = args.launcher.out_folder(true)?;
 
     println!("Starting simulation...");
+    println!("Robot will move through different poses");
+    println!("Press Ctrl+C to stop");
     let arm = sim.robot(robot).get_joint_ids("arm")?;
     let position = |wrist: f64| {
         // The tutorial's positions are for six joints; a longer arm keeps its others at zero.
@@ -108,9 +126,23 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
     let progress = Progress::new(&args.launcher, POSITION_2_EVERY);
-    let mut album = Album { out, raw: args.raw, files: Vec::new(), drawing: Duration::ZERO, images: 0 };
+    let size = panel::tiled_size([args.width, args.height], sim.num_envs());
+    let window = args.launcher.open_sensor_window("Sensor Views (Color / Depth / Mask / Normals)", size);
+    let saved = args.save || args.raw || window.is_none();
+    let mut album = Album {
+        out: saved.then(|| args.launcher.out_folder(true)).transpose()?,
+        raw: args.raw,
+        instances: (args.mask == MaskLevel::Instance)
+            .then(|| sim.segmentation(&SegmentationCfg::default()))
+            .transpose()?,
+        window,
+        end: progress.end(),
+        files: Vec::new(),
+        drawing: Duration::ZERO,
+        images: 0,
+    };
     let mut step = 0;
-    while !progress.stop(step) {
+    'steps: while !progress.stop(step) {
         for (every, wrist, message) in
             [(POSITION_1_EVERY, 0.3, "Moving to arm position 1"), (POSITION_2_EVERY, -0.3, "Moving to arm position 2")]
         {
@@ -118,7 +150,9 @@ fn run(args: &Args) -> launcher::Result {
                 progress.say(message);
                 let target = position(wrist);
                 sim.robot_mut(robot).set_qpos(ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
-                album.add(sim.sensor(camera)?, step)?;
+                if !album.add(sim.sensor(camera)?, step)? {
+                    break 'steps;
+                }
             }
         }
         let next = [POSITION_1_EVERY, POSITION_2_EVERY].map(|every| (step / every + 1) * every);
@@ -205,31 +239,58 @@ fn tutorial_rotation() -> UnitQuaternion<f64> {
     from_xyz_rpy([0.0; 3], [(-35f64).to_radians(), 135f64.to_radians(), 0.0]).rotation
 }
 
-/// Pictures that were taken, and how long that took.
+/// Images that were taken, where they go, and how long they took.
 struct Album {
-    out: PathBuf,
+    /// Folder of the files; `None` where images are only shown.
+    out: Option<PathBuf>,
     raw: bool,
+    /// Turns mask ids of links into those of instances, where `--mask instance` asks for it.
+    instances: Option<Segmentation>,
+    window: Option<SensorWindow>,
+    end: End,
     files: Vec<Value>,
     drawing: Duration,
     images: u64,
 }
 
 impl Album {
-    /// Draws what the camera sees now and writes it to files.
-    fn add(&mut self, camera: &Camera, step: u64) -> launcher::Result {
-        let name = format!("sensor_views_{step}.png");
-        // Two targets at step 0 are one picture.
-        if self.files.iter().any(|f| f["file"] == name.as_str()) {
-            return Ok(());
+    /// Draws what the camera sees now, shows it and writes it to files. False if the user ended the example meanwhile.
+    fn add(&mut self, camera: &Camera, step: u64) -> launcher::Result<bool> {
+        // Two targets at step 0 are one image.
+        if self.files.iter().any(|f| f["step"] == step) {
+            return Ok(true);
         }
         let start = Instant::now();
-        camera.pictures()?;
+        let look = |progress: &RenderProgress| {
+            if self.end.has_come() {
+                progress.cancel();
+            }
+            if let (Some(window), Some(share)) = (&self.window, progress.fraction()) {
+                window.announce(&format!("Ray tracing: {:.0} %", 100.0 * share));
+            }
+        };
+        match waiting::draw(camera.progress(), None, look, || camera.pictures().map(|_| ())) {
+            Err(_) if self.end.has_come() => return Ok(false),
+            drawn => drawn?,
+        }
         self.drawing += start.elapsed();
         self.images += camera.env_ids().len() as u64;
+        let name = self.out.is_some().then(|| format!("sensor_views_{step}.png"));
         let mut panels = Vec::new();
         for (row, &env) in camera.env_ids().iter().enumerate() {
             let views = Views::of(camera, row)?;
-            panels.push(grid(&views));
+            panels.push(match &self.instances {
+                None => grid(&views),
+                Some(of) => {
+                    let mask: Vec<i32> = of
+                        .segment(SegmentLevel::Instance, camera.mask()?)
+                        .index_axis(Axis(0), row)
+                        .iter()
+                        .copied()
+                        .collect();
+                    grid(&Views { mask: &mask, ..views })
+                }
+            });
             let depth = picture::finite_range(views.depth.iter().copied());
             let mut ids: Vec<i32> = views.mask.to_vec();
             ids.sort_unstable();
@@ -244,19 +305,25 @@ impl Album {
                 "ids": ids,
             }));
         }
-        picture::write_png(&self.out.join(&name), &tile(&panels))?;
-        if self.raw {
-            let file = |channel: &str| self.out.join(format!("{channel}_{step}.npy"));
-            picture::write_npy(&file("depth"), &camera.depth()?)?;
-            picture::write_npy(&file("mask"), &camera.mask()?)?;
-            picture::write_npy(&file("normal"), &camera.normal()?)?;
+        let image = tile(&panels);
+        if let (Some(out), Some(name)) = (&self.out, &name) {
+            picture::write_png(&out.join(name), &image)?;
+            if self.raw {
+                let file = |channel: &str| out.join(format!("{channel}_{step}.npy"));
+                picture::write_npy(&file("depth"), &camera.depth()?)?;
+                picture::write_npy(&file("mask"), &camera.mask()?)?;
+                picture::write_npy(&file("normal"), &camera.normal()?)?;
+            }
         }
-        Ok(())
+        if let Some(window) = &mut self.window {
+            window.show(&image);
+        }
+        Ok(true)
     }
 }
 
 fn print_table(album: &Album, sim: &SimulationManager) {
-    println!("\n{:<28} {:>6} {:>5} {:>18}  seen", "picture", "step", "env", "depth [m]");
+    println!("\n{:<28} {:>6} {:>5} {:>18}  seen", "image", "step", "env", "depth [m]");
     for file in &album.files {
         let number = |key: &str| file[key].as_f64().unwrap_or(f64::NAN);
         let ids: Vec<i64> = file["ids"].as_array().into_iter().flatten().filter_map(Value::as_i64).collect();
@@ -265,7 +332,7 @@ fn print_table(album: &Album, sim: &SimulationManager) {
         objects.dedup();
         println!(
             "{:<28} {:>6} {:>5} {:>8.3} - {:>7.3}  {}",
-            file["file"].as_str().unwrap_or_default(),
+            file["file"].as_str().unwrap_or("(shown only)"),
             file["step"],
             file["env"],
             number("depth_min"),

@@ -80,7 +80,7 @@ fn run(args: &Args) -> launcher::Result {
     let recording = args.launcher.start_recording(&mut sim)?;
     // Pictures are what it is for: it ends with them, unless somebody watches.
     let mut launcher = args.launcher.clone();
-    launcher.steps = launcher.steps.or((launcher.headless && launcher.serve.is_none()).then_some(100));
+    launcher.steps = launcher.steps.or((launcher.headless && launcher.serve_address().is_none()).then_some(100));
     let progress = Progress::new(&launcher, 100);
     let mut step = 0;
     while !progress.stop(step) {

@@ -73,9 +73,9 @@ const GRIP: [f64; 3] = [0.0707, -0.02, -0.087];
 /// away. The thumb holds its place against both with up to 2 N m.
 const FINGER_EFFORT: f64 = 1.0;
 /// Hand open, thumb up.
-const OPEN: [(&str, f64); 3] = [("LEFT_HAND_THUMB1", 0.0), ("LEFT_HAND_INDEX", 0.35), ("LEFT_HAND_MIDDLE", 0.35)];
+const OPEN: [(&str, f64); 3] = [("LEFT_HAND_THUMB1", 0.0), ("LEFT_HAND_INDEX", -0.35), ("LEFT_HAND_MIDDLE", -0.35)];
 /// The thumb at the cube, the fingers as far as they get.
-const CLOSED: [(&str, f64); 3] = [("LEFT_HAND_THUMB1", 0.18), ("LEFT_HAND_INDEX", 1.2), ("LEFT_HAND_MIDDLE", 1.2)];
+const CLOSED: [(&str, f64); 3] = [("LEFT_HAND_THUMB1", -0.18), ("LEFT_HAND_INDEX", -1.2), ("LEFT_HAND_MIDDLE", -1.2)];
 
 fn main() -> ExitCode {
     trial::run("grasp", || run(&trial::parse()))

@@ -58,18 +58,18 @@ const FINGER_EFFORT: f64 = 2.0;
 /// Fingers bent, so that they fit between handle and drawer.
 const BENT: [(&str, f64); 5] = [
     ("LEFT_HAND_THUMB1", 0.0),
-    ("LEFT_HAND_INDEX", 0.6),
-    ("LEFT_HAND_MIDDLE", 0.6),
-    ("LEFT_HAND_RING", 0.6),
-    ("LEFT_HAND_PINKY", 0.6),
+    ("LEFT_HAND_INDEX", -0.6),
+    ("LEFT_HAND_MIDDLE", -0.6),
+    ("LEFT_HAND_RING", -0.6),
+    ("LEFT_HAND_PINKY", -0.6),
 ];
 /// Fingers and thumb around the handle.
 const HOOKED: [(&str, f64); 5] = [
-    ("LEFT_HAND_THUMB1", 0.5),
-    ("LEFT_HAND_INDEX", 1.1),
-    ("LEFT_HAND_MIDDLE", 1.1),
-    ("LEFT_HAND_RING", 1.1),
-    ("LEFT_HAND_PINKY", 1.1),
+    ("LEFT_HAND_THUMB1", -0.5),
+    ("LEFT_HAND_INDEX", -1.1),
+    ("LEFT_HAND_MIDDLE", -1.1),
+    ("LEFT_HAND_RING", -1.1),
+    ("LEFT_HAND_PINKY", -1.1),
 ];
 
 fn main() -> ExitCode {

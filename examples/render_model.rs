@@ -145,14 +145,19 @@ fn run(args: &Args) -> launcher::Result {
         args.time_limit.map(Duration::try_from_secs_f64).transpose().map_err(|e| format!("--time-limit: {e}"))?;
     let (start, mut images) = (Instant::now(), 0u32);
     let progress = rasterizer.progress().clone();
-    waiting::draw(&progress, limit, || {
-        while images == 0 || start.elapsed() < seconds {
-            let mut job = [(still.shot(&view), frame.as_mut())];
-            rasterizer.render(&mut job).map_err(|(_, error)| error)?;
-            images += 1;
-        }
-        launcher::Result::Ok(())
-    })?;
+    waiting::draw(
+        &progress,
+        limit,
+        |_| (),
+        || {
+            while images == 0 || start.elapsed() < seconds {
+                let mut job = [(still.shot(&view), frame.as_mut())];
+                rasterizer.render(&mut job).map_err(|(_, error)| error)?;
+                images += 1;
+            }
+            launcher::Result::Ok(())
+        },
+    )?;
     let rate = f64::from(images) / start.elapsed().as_secs_f64();
 
     launcher::make_folder(&args.out)?;

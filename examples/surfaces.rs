@@ -102,7 +102,7 @@ fn run(args: &Args) -> launcher::Result {
     let recording = args.launcher.start_recording(&mut sim)?;
     // The picture is what it is for: it ends with it, unless somebody watches.
     let mut launcher = args.launcher.clone();
-    launcher.steps = launcher.steps.or((launcher.headless && launcher.serve.is_none()).then_some(1));
+    launcher.steps = launcher.steps.or((launcher.headless && launcher.serve_address().is_none()).then_some(1));
     let progress = Progress::new(&launcher, 1);
     let mut step = 0;
     while !progress.stop(step) {

@@ -210,7 +210,7 @@ fn camera_cfg() -> CameraCfg {
         height: PIXELS,
         intrinsics: Intrinsics::Fovy { radians: FOVY },
         extrinsics: Extrinsics {
-            parent: Some("sr5/ee_link".into()),
+            parent: Some("sr5_with_brainco/ee_link".into()),
             placement: Placement::LookAt { eye: EYE, target: LOOKS_AT, up: [0.0, 1.0, 0.0] },
             ..Default::default()
         },

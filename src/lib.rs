@@ -64,7 +64,7 @@ pub mod prelude {
     };
     #[cfg(feature = "view")]
     pub use view::{
-        OpenWindow, RecordButton, Screenshot, ScreenshotCfg, ScreenshotError, Serve, ServeCfg, ServeError, Served,
-        Viewing, Window, WindowCfg, WindowError,
+        ImageWindow, ImageWindowCfg, OpenWindow, RecordButton, Screenshot, ScreenshotCfg, ScreenshotError, Serve,
+        ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError,
     };
 }

@@ -67,7 +67,7 @@ fn merged(arm_urdf: &Path, hand_urdf: &Path, arm_joints: &str, hand_joints: &str
 /// The parts `arm` and `hand` with the tutorial's gains.
 fn driven(arm_joints: &str, hand_joints: &str) -> RobotCfg {
     RobotCfg {
-        uid: "sr5".into(),
+        uid: "sr5_with_brainco".into(),
         control_parts: vec![("arm".into(), vec![arm_joints.into()]), ("hand".into(), vec![hand_joints.into()])],
         drive: DriveCfg {
             stiffness: [(arm_joints, 1e4), (hand_joints, 1e3)].into(),

@@ -30,7 +30,7 @@ pub(crate) fn robot_cfg(hand: &[(&str, f64)], finger_effort: f64) -> Result<Robo
     let cfg = arm::bundled()?;
     // Away from where the axes of JOINT4 and JOINT6 are the same.
     let elbow = [("JOINT2", 0.3), ("JOINT3", -2.2), ("JOINT5", 0.6), ("JOINT6", FRAC_PI_2)];
-    let thumb = [("LEFT_HAND_THUMB2", FRAC_PI_2)];
+    let thumb = [("LEFT_HAND_THUMB2", -FRAC_PI_2)];
     let init_qpos = elbow.iter().chain(&thumb).chain(hand).map(|&(joint, q)| (joint.to_string(), q)).collect();
     let max_effort = Some([("LEFT_HAND_(INDEX|MIDDLE|RING|PINKY)", finger_effort)].into());
     Ok(RobotCfg { init_qpos, drive: DriveCfg { max_effort, ..cfg.drive }, ..cfg })

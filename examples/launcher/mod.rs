@@ -13,7 +13,7 @@ mod recording;
 pub(crate) mod stage;
 pub(crate) mod still;
 pub(crate) mod trial;
-mod views;
+pub(crate) mod views;
 pub(crate) mod waiting;
 
 use clap::{Args, ValueEnum};
@@ -44,11 +44,13 @@ pub(crate) struct Launcher {
     pub(crate) headless: bool,
     /// Show the simulation in browsers, in real time until a viewer says otherwise; at 127.0.0.1:8080 where no address is
     /// given. An address that other machines reach (0.0.0.0:8080) needs the token that is printed
-    #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = SERVE)]
     pub(crate) serve: Option<String>,
-    /// Where physics runs
-    #[arg(long, value_enum, default_value_t = Device::Cpu)]
+    /// Where physics runs: cpu (cuda and cuda:N are named in the answer, and refused)
+    #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
     pub(crate) device: Device,
+    #[command(flatten)]
+    elsewhere: FlagsFromElsewhere,
     /// How images are drawn
     #[arg(long, value_enum, default_value_t = Renderer::Auto)]
     pub(crate) renderer: Renderer,
@@ -92,6 +94,9 @@ pub(crate) struct Launcher {
     #[cfg(all(feature = "record", feature = "view"))]
     #[arg(skip)]
     files: std::sync::OnceLock<Arc<std::sync::Mutex<kinetoscope::FileRecording>>>,
+    /// The window, once it is open; clones share it.
+    #[arg(skip)]
+    window: views::Shown,
 }
 
 fn rate(text: &str) -> std::result::Result<(String, u64), String> {
@@ -101,12 +106,53 @@ fn rate(text: &str) -> std::result::Result<(String, u64), String> {
 }
 
 /// Where physics runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Device {
-    /// This machine's processor
+    /// This machine's processor.
     Cpu,
-    /// A graphics card (not supported)
-    Cuda,
+    /// A graphics card, by the name that was given (not supported).
+    Cuda(String),
+}
+
+fn device(text: &str) -> std::result::Result<Device, String> {
+    let is_card =
+        |number: &str| number.is_empty() || number.strip_prefix(':').is_some_and(|n| n.parse::<u32>().is_ok());
+    match text {
+        "cpu" => Ok(Device::Cpu),
+        _ if text.strip_prefix("cuda").is_some_and(is_card) => Ok(Device::Cuda(text.into())),
+        _ => Err("the devices are cpu, cuda and cuda:N, and physics runs on cpu only".into()),
+    }
+}
+
+/// Flags of EmbodiChain's and Isaac Lab's launchers, so that their command lines run here.
+#[derive(Clone, Debug, Args)]
+struct FlagsFromElsewhere {
+    /// Number of a graphics card; without effect here
+    #[arg(long = "gpu-id", alias = "gpu_id", value_name = "N", hide = true)]
+    gpu_id: Option<u32>,
+    /// Isaac Lab's streaming: 1 and 2 are --serve here, 0 is none
+    #[arg(long, value_name = "MODE", hide = true, value_parser = clap::value_parser!(u8).range(0..=2), conflicts_with = "serve")]
+    livestream: Option<u8>,
+    /// Isaac Lab's switch for cameras; without effect here
+    #[arg(long = "enable-cameras", alias = "enable_cameras", hide = true)]
+    enable_cameras: bool,
+    /// Isaac Lab's switch for cameras without a window; without effect here
+    #[arg(long = "offscreen-render", alias = "offscreen_render", hide = true)]
+    offscreen_render: bool,
+}
+
+impl FlagsFromElsewhere {
+    /// One line for each flag that was given and has no effect here, with the reason.
+    fn notes(&self) -> Vec<String> {
+        let cameras = "cameras draw on the CPU, with or without a window";
+        let flags = [
+            (self.gpu_id.is_some(), "--gpu-id", "physics and cameras run on the CPU; --threads chooses how many cores"),
+            (self.enable_cameras, "--enable-cameras", cameras),
+            (self.offscreen_render, "--offscreen-render", cameras),
+        ];
+        let given = flags.iter().filter(|(given, ..)| *given);
+        given.map(|(_, flag, reason)| format!("note: {flag} has no effect here: {reason}")).collect()
+    }
 }
 
 /// How images are drawn; examples without a camera accept the names so that scripts run, and those whose cameras draw in one way
@@ -173,7 +219,16 @@ impl Renderer {
     }
 }
 
+/// Address of `--serve` without a value, and of `--livestream`.
+const SERVE: &str = "127.0.0.1:8080";
+
 impl Launcher {
+    /// Address at which browsers see the simulation, where `--serve` or `--livestream` asks for it.
+    pub(crate) fn serve_address(&self) -> Option<&str> {
+        let streamed = self.elsewhere.livestream.is_some_and(|mode| mode > 0).then_some(SERVE);
+        self.serve.as_deref().or(streamed)
+    }
+
     /// The simulation these flags ask for, of an example that draws with the rasterizer or not with a camera.
     ///
     /// # Errors
@@ -195,11 +250,14 @@ impl Launcher {
     /// # Errors
     /// The device is not supported.
     pub(crate) fn simulation_drawn_anyhow(&self) -> Result<SimulationManagerCfg> {
-        if self.device == Device::Cuda {
-            return Err("--device cuda is not supported: Kinetoscope simulates on the CPU; use --device cpu, \
-                        and --threads to choose how many cores"
-                .into());
+        if let Device::Cuda(name) = &self.device {
+            return Err(format!(
+                "--device {name} is not supported: Kinetoscope simulates on the CPU; use --device cpu, and --threads to choose \
+                 how many cores"
+            )
+            .into());
         }
+        self.elsewhere.notes().iter().for_each(|note| println!("{note}"));
         Ok(SimulationManagerCfg {
             num_envs: self.num_envs,
             seed: self.seed,
@@ -291,12 +349,26 @@ pub(crate) fn run(name: &str, example: impl FnOnce() -> Result) -> ExitCode {
     }
 }
 
-/// The loop's clock: progress bar, Ctrl+C, number of steps.
+/// The end of an example by its user: Ctrl+C, or the window closed.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct End {
+    interrupted: Arc<AtomicBool>,
+    window: views::Shown,
+}
+
+impl End {
+    /// True when Ctrl+C was pressed or the window was closed.
+    pub(crate) fn has_come(&self) -> bool {
+        self.interrupted.load(Ordering::SeqCst) || self.window.is_closed()
+    }
+}
+
+/// The loop's clock: progress bar, Ctrl+C and the window's end, number of steps.
 #[derive(Debug)]
 pub(crate) struct Progress {
     bar: ProgressBar,
     steps: Option<u64>,
-    interrupted: Arc<AtomicBool>,
+    end: End,
     start: Instant,
     /// When it was said last how far it is, where there is no terminal.
     said: Cell<Instant>,
@@ -328,12 +400,18 @@ impl Progress {
             bar.set_style(style);
         }
         let start = Instant::now();
-        Self { bar, steps: launcher.steps, interrupted, start, said: Cell::new(start) }
+        let end = End { interrupted, window: launcher.window.clone() };
+        Self { bar, steps: launcher.steps, end, start, said: Cell::new(start) }
     }
 
-    /// Ctrl+C was pressed or all steps are done.
+    /// True when Ctrl+C was pressed, the window was closed or all steps are done.
     pub(crate) fn stop(&self, step: u64) -> bool {
-        self.interrupted.load(Ordering::SeqCst) || self.steps.is_some_and(|steps| step >= steps)
+        self.end.has_come() || self.steps.is_some_and(|steps| step >= steps)
+    }
+
+    /// The user's end of the example, for other threads.
+    pub(crate) fn end(&self) -> End {
+        self.end.clone()
     }
 
     /// Where a block of at most `length` steps ends.

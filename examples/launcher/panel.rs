@@ -80,6 +80,13 @@ pub(crate) fn grid(views: &Views<'_>) -> RgbImage {
     out.0
 }
 
+/// Size of the tiled [`grid`]s of `num_envs` environments, of channels of `size` (pixels per row, rows).
+pub(crate) fn tiled_size(size: [usize; 2], num_envs: usize) -> [usize; 2] {
+    let (gap, title) = (2 * GAP as usize, (TITLE + SCALE) as usize);
+    let columns = (1..).find(|c| c * c >= num_envs).unwrap_or(1);
+    [2 * columns * (size[0] + gap), 2 * num_envs.div_ceil(columns) * (size[1] + title)]
+}
+
 /// Pictures of the same size in a grid as square as can be, row by row.
 pub(crate) fn tile(pictures: &[RgbImage]) -> RgbImage {
     let Some(first) = pictures.first() else { return RgbImage::default() };

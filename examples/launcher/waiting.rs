@@ -9,8 +9,14 @@ use std::time::{Duration, Instant};
 /// Between two looks.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Does some work, and shows meanwhile how far its paths are, where there is a terminal. After `limit` it is broken off.
-pub(crate) fn draw<T>(progress: &RenderProgress, limit: Option<Duration>, work: impl FnOnce() -> T) -> T {
+/// Does `work`, which draws by paths, and meanwhile shows the progress on the terminal. After `limit` the work is cancelled.
+/// `look` is called every tenth of a second from another thread; it may cancel, too.
+pub(crate) fn draw<T>(
+    progress: &RenderProgress,
+    limit: Option<Duration>,
+    mut look: impl FnMut(&RenderProgress) + Send,
+    work: impl FnOnce() -> T,
+) -> T {
     let (done, until_done) = channel::<()>();
     let start = Instant::now();
     std::thread::scope(|scope| {
@@ -24,6 +30,7 @@ pub(crate) fn draw<T>(progress: &RenderProgress, limit: Option<Duration>, work: 
                 if limit.is_some_and(|limit| start.elapsed() > limit) {
                     progress.cancel();
                 }
+                look(progress);
                 if progress.total() == 0 {
                     continue;
                 }

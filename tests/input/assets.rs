@@ -1,7 +1,9 @@
 //! Bundled files: the folders that are searched.
 
+use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use testkit::process;
+use testkit::worlds::urdf_robot;
 
 #[test]
 fn missing_file() {
@@ -17,5 +19,25 @@ fn missing_file() {
 fn scenario_elsewhere() {
     if process::is_child() {
         println!("{}", assets::path("no/such.urdf").unwrap_err());
+    }
+}
+
+/// EmbodiChain's tutorial closes a hand at its lower limits and opens it at the upper ones; our hand bent the other way.
+#[test]
+fn hand_closes_at_its_lower_limits() {
+    let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
+    let id = sim.add_robot(urdf_robot("hand", assets::path("revo1_left/revo1_left.urdf").unwrap())).unwrap();
+    let robot = sim.robot(id);
+    let limits = robot.qpos_limits();
+    // Frames of the outer segments in the palm's frame [m]: fingers along +y, the palm faces +z.
+    let place = |link: &str, end: usize| {
+        let qpos: Array2<f64> = limits.index_axis(Axis(2), end).to_owned();
+        let pose = robot.compute_fk(&qpos, link, None).unwrap();
+        [0, 1, 2].map(|k| pose[(0, k)])
+    };
+    for finger in ["index", "middle", "ring", "pinky"] {
+        let [closed, open] = [0, 1].map(|end| place(&format!("left_{finger}_dist"), end));
+        assert!(closed[1] < open[1] - 0.02 && closed[2] > open[2] + 0.02, "{finger}: {closed:?} {open:?}");
+        assert!((closed[0] - open[0]).abs() < 1e-3, "{finger}: {closed:?} {open:?}");
     }
 }

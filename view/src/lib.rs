@@ -27,4 +27,4 @@ pub use control::{
 pub use screenshot::{Screenshot, ScreenshotCfg, ScreenshotError};
 pub use serve::{Serve, ServeCfg, ServeError, Served};
 pub use stage::{Canvas, Eye, Overlays, Painter, Shown, Snapshot};
-pub use window::{Closed, OpenWindow, Window, WindowCfg, WindowError};
+pub use window::{Closed, ImageWindow, ImageWindowCfg, OpenWindow, Window, WindowCfg, WindowError};

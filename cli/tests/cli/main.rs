@@ -8,6 +8,7 @@ mod recording_page;
 mod replays;
 mod serve;
 mod support;
+mod tutorials;
 mod view;
 
 // Modules of the command with unit tests of their own: they run here, so that the command needs no second test binary.

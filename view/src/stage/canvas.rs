@@ -21,6 +21,19 @@ impl Canvas {
         canvas
     }
 
+    /// An image of `width` by `height` pixels from its bytes: red, green, blue and opacity (ignored) of each pixel, row by row from
+    /// the top left, such as one environment of a camera's color. `None` if there are not 4 * width * height bytes.
+    pub fn from_rgba(width: usize, height: usize, rgba: &[u8]) -> Option<Self> {
+        let mut canvas = Self::new(width, height);
+        if rgba.len() != canvas.bytes.len() {
+            return None;
+        }
+        for (to, from) in canvas.bytes.chunks_exact_mut(4).zip(rgba.chunks_exact(4)) {
+            to[..3].copy_from_slice(&from[..3]);
+        }
+        Some(canvas)
+    }
+
     /// Another size; what is on it is lost where that changes anything.
     pub fn resize(&mut self, width: usize, height: usize) {
         if self.size != [width, height] {
@@ -177,6 +190,11 @@ mod tests {
 
     #[test]
     fn letters_and_smallest_images() {
+        let rgba = [1, 2, 3, 0, 4, 5, 6, 9];
+        let pair = Canvas::from_rgba(2, 1, &rgba).unwrap();
+        assert_eq!([pair.pixel(0, 0), pair.pixel(1, 0)], [Some([1, 2, 3]), Some([4, 5, 6])]);
+        assert_eq!(pair.bytes()[3], 255);
+        assert_eq!(Canvas::from_rgba(1, 1, &rgba), None);
         let mut canvas = Canvas::new(40, 14);
         canvas.text("H", [4, 2], &FONT_6X10, [255; 3]);
         let places = (0..14).flat_map(|y| (0..40).map(move |x| (x, y)));

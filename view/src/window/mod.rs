@@ -5,6 +5,7 @@ mod desks;
 mod enlarge;
 mod fineness;
 mod hud;
+mod images;
 mod keys;
 #[cfg(test)]
 mod tests;
@@ -13,6 +14,7 @@ mod watch;
 mod x11;
 
 pub use app::{App, Input, Modifiers};
+pub use images::{ImageWindow, ImageWindowCfg};
 pub use keys::Key;
 
 use crate::control::{Command, RecordButton, Speed, Viewer, Viewing, Wants};
@@ -192,45 +194,62 @@ pub trait OpenWindow {
 impl OpenWindow for SimulationManager {
     fn open_window_with(&mut self, mut cfg: WindowCfg) -> Result<Window, WindowError> {
         let button = cfg.recording.take();
-        let (opened, result) = mpsc::channel();
-        let shared = Arc::new(Shared::default());
-        let window = Window { shared: Arc::clone(&shared) };
+        let (title, size, display) = (cfg.title.clone(), cfg.size, cfg.display.clone());
         let viewer = self.viewer(Wants::default());
-        let run = move || {
-            let ending = Ending(Arc::clone(&shared));
-            // Dropped before the ending: the simulation is free before anybody hears of the end.
-            let viewer = viewer;
-            let screen = match Screened::open(&cfg.title, cfg.size, cfg.display.as_deref()) {
-                Ok(screen) => screen,
-                Err(failure) => return drop(opened.send(Err(no_display(&failure)))),
-            };
-            shared.number.store(screen.number(), Ordering::Release);
-            if let Some(speed) = cfg.speed {
+        let speed = cfg.speed;
+        let begin = move |viewer: &Viewer| {
+            if let Some(speed) = speed {
                 viewer.send(Command::SetSpeed(speed));
             }
-            // Whoever opened it waits for this; where the display took too long nobody does any more.
-            if opened.send(Ok(())).is_err() {
-                return;
-            }
-            let closed = match show(screen, &viewer, &cfg, &shared) {
-                Ok(closed) => closed,
-                Err(failure) => Closed::DisplayLost(failure.to_string()),
-            };
-            drop(viewer);
-            ending.tell(closed);
         };
-        let thread = std::thread::Builder::new().name("kinetoscope-window".into());
-        thread.spawn(run).map_err(|error| WindowError::Thread(error.to_string()))?;
-        match result.recv_timeout(watch::PATIENCE) {
-            Ok(Ok(())) => {
-                button.into_iter().for_each(|button| self.record_button(button));
-                Ok(window)
-            }
-            Ok(Err(error)) => Err(error),
-            Err(mpsc::RecvTimeoutError::Timeout) => Err(no_display(&Failure::Frozen)),
-            Err(mpsc::RecvTimeoutError::Disconnected) => {
-                Err(WindowError::Thread("it ended before the window was there".into()))
-            }
+        let run = move |screen: Screened, viewer: Viewer, shared: &Shared| show(screen, &viewer, &cfg, shared);
+        let window = on_thread(title, size, display, viewer, begin, run)?;
+        button.into_iter().for_each(|button| self.record_button(button));
+        Ok(window)
+    }
+}
+
+/// Opens a window and calls `run` with it and with `state` on a thread of its own; `begin` is called before the window's handle
+/// is returned. `state` is dropped before the end of the window is seen through the handle.
+///
+/// # Errors
+/// [`WindowError::NoDisplay`] if there is no display or it does not answer.
+fn on_thread<T: Send + 'static>(
+    title: String,
+    size: [usize; 2],
+    display: Option<String>,
+    state: T,
+    begin: impl FnOnce(&T) + Send + 'static,
+    run: impl FnOnce(Screened, T, &Shared) -> Result<Closed, Failure> + Send + 'static,
+) -> Result<Window, WindowError> {
+    let (opened, result) = mpsc::channel();
+    let shared = Arc::new(Shared::default());
+    let window = Window { shared: Arc::clone(&shared) };
+    let thread_main = move || {
+        let ending = Ending(Arc::clone(&shared));
+        // Declared after the ending, so dropped before it when the thread panics.
+        let state = state;
+        let screen = match Screened::open(&title, size, display.as_deref()) {
+            Ok(screen) => screen,
+            Err(failure) => return drop(opened.send(Err(no_display(&failure)))),
+        };
+        shared.number.store(screen.number(), Ordering::Release);
+        begin(&state);
+        // The caller has given up if the display took too long.
+        if opened.send(Ok(())).is_err() {
+            return;
+        }
+        let closed = run(screen, state, &shared).unwrap_or_else(|failure| Closed::DisplayLost(failure.to_string()));
+        ending.tell(closed);
+    };
+    let thread = std::thread::Builder::new().name("kinetoscope-window".into());
+    thread.spawn(thread_main).map_err(|error| WindowError::Thread(error.to_string()))?;
+    match result.recv_timeout(watch::PATIENCE) {
+        Ok(Ok(())) => Ok(window),
+        Ok(Err(error)) => Err(error),
+        Err(mpsc::RecvTimeoutError::Timeout) => Err(no_display(&Failure::Frozen)),
+        Err(mpsc::RecvTimeoutError::Disconnected) => {
+            Err(WindowError::Thread("it ended before the window was there".into()))
         }
     }
 }

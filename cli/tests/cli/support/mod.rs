@@ -1,7 +1,7 @@
 //! The command in a shell of its own folder, and images that it makes.
 
-use std::io::{BufRead, BufReader};
-use std::path::PathBuf;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use testkit::urdf::Files;
 use testkit::wait;
@@ -40,6 +40,10 @@ impl Shell {
 
     pub(crate) fn write(&self, name: &str, content: &str) {
         self.0.write(name, content);
+    }
+
+    pub(crate) fn folder(&self) -> &Path {
+        self.0.folder()
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {
@@ -107,6 +111,13 @@ impl Running {
         let mut line = String::new();
         BufReader::new(self.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
         line
+    }
+
+    /// Everything that it prints from here on.
+    pub(crate) fn rest(&mut self) -> String {
+        let mut rest = String::new();
+        self.0.stdout.as_mut().unwrap().read_to_string(&mut rest).unwrap();
+        rest
     }
 
     /// Ctrl+C in a terminal.

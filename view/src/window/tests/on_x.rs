@@ -4,7 +4,10 @@
 use super::display::{SIZE, Target, cfg_on, is_red, simulation};
 use crate::sample::Running;
 use crate::window::App;
-use crate::{Canvas, Closed, Command, Eye, OpenWindow, Speed, Viewer, Viewing, Wants, Window, WindowError};
+use crate::{
+    Canvas, Closed, Command, Eye, ImageWindow, ImageWindowCfg, OpenWindow, Speed, Viewer, Viewing, Wants, Window,
+    WindowError,
+};
 use sim::SimulationManager;
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -130,6 +133,49 @@ fn keys() {
     drop(viewer);
     drop(run.end());
     assert_eq!(ended(&window), Closed::WithSimulation);
+}
+
+#[test]
+#[ignore = "needs Xvfb: cargo xtask test"]
+fn images() {
+    let mut display = Display::start("640x480");
+    let connection = display.connect();
+    let open = |title: &str| {
+        let cfg = ImageWindowCfg { title: title.into(), size: [40, 30], display: Some(display.name.clone()) };
+        ImageWindow::open(cfg).unwrap()
+    };
+    let shown = || screenshot(&connection, [0, 0], [40, 30]);
+    let filled = |color: [u8; 3]| {
+        let mut image = Canvas::new(40, 30);
+        image.fill([0, 0], [40, 30], color, 255);
+        image.set(3, 2, [250, 251, 252]);
+        image
+    };
+    let images = open("images");
+    for color in [[200, 10, 20], [10, 200, 20]] {
+        let image = filled(color);
+        images.show(image.clone());
+        wait::until("the image is on the screen", || shown() == pixels(&image));
+    }
+    // A larger window shows the image larger.
+    Target::on(&connection, images.window().number()).resize([80, 60]);
+    wait::until("the image is scaled", || screenshot(&connection, [6, 4], [2, 2]) == [[250, 251, 252]; 4]);
+    close(&connection, images.window().number());
+    assert_eq!(ended(images.window()), Closed::ByUser);
+    // The program goes on: an image for a closed window is dropped.
+    images.show(filled([1, 2, 3]));
+    // The end of the value ends the window.
+    let images = open("dropped");
+    let window = images.window().clone();
+    drop(images);
+    assert_eq!(ended(&window), Closed::ByUser);
+    let images = open("lost");
+    display.server.kill().unwrap();
+    wait::until("the end of the display", || {
+        images.show(filled([9, 9, 9]));
+        !images.window().is_open()
+    });
+    assert!(matches!(images.window().closed(), Some(Closed::DisplayLost(_))), "{:?}", images.window().closed());
 }
 
 /// A simulation that a window on `display` has paused, and that a thread steps.

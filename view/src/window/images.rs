@@ -1,0 +1,163 @@
+//! A window for images that a program makes, such as the channels of a camera.
+
+use super::x11::{Failure, Happened, Screened};
+use super::{Closed, LOOK, Shared, Window, WindowError, on_thread};
+use crate::stage::Canvas;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+
+/// Settings of an [`ImageWindow`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ImageWindowCfg {
+    /// Text of the title bar.
+    pub title: String,
+    /// Pixels per row and rows of the window when it opens.
+    pub size: [usize; 2],
+    /// X display, for example `:0`; `None` takes the variable `DISPLAY`.
+    pub display: Option<String>,
+}
+
+impl Default for ImageWindowCfg {
+    fn default() -> Self {
+        Self { title: "Kinetoscope".into(), size: [640, 480], display: None }
+    }
+}
+
+/// A window that shows the newest image it was given, as `imshow` of OpenCV does.
+///
+/// A thread of its own answers the display, so a program that computes for minutes still has a window that moves and closes.
+/// Dropping the value closes the window.
+#[derive(Debug)]
+pub struct ImageWindow {
+    window: Window,
+    latest: Arc<Latest>,
+}
+
+/// The newest image.
+#[derive(Debug, Default)]
+struct Latest {
+    image: Mutex<(u64, Arc<Canvas>)>,
+    changed: Condvar,
+}
+
+impl ImageWindow {
+    /// Opens an empty (black) window.
+    ///
+    /// # Errors
+    /// [`WindowError::NoDisplay`] if there is no display.
+    pub fn open(cfg: ImageWindowCfg) -> Result<Self, WindowError> {
+        let latest = Arc::new(Latest::default());
+        let own = Arc::clone(&latest);
+        let run = move |screen: Screened, own: Arc<Latest>, shared: &Shared| show(screen, &own, shared);
+        let window = on_thread(cfg.title, cfg.size, cfg.display, own, |_| (), run)?;
+        Ok(Self { window, latest })
+    }
+
+    /// Replaces the image on the window and returns at once. An image of another size than the window is scaled to fit, with
+    /// black bars where the proportions differ.
+    pub fn show(&self, image: Canvas) {
+        let mut latest = self.latest.image.lock().unwrap_or_else(PoisonError::into_inner);
+        *latest = (latest.0 + 1, Arc::new(image));
+        self.latest.changed.notify_all();
+    }
+
+    /// The handle of the window: it tells whether the window is open, closes it, and counts its images.
+    pub fn window(&self) -> &Window {
+        &self.window
+    }
+}
+
+impl Drop for ImageWindow {
+    fn drop(&mut self) {
+        self.window.close();
+    }
+}
+
+impl Latest {
+    /// The newest image and its number, as soon as it is newer than `last`, or after [`LOOK`].
+    fn newer_than(&self, last: u64) -> (u64, Arc<Canvas>) {
+        let latest = self.image.lock().unwrap_or_else(PoisonError::into_inner);
+        let waited = self.changed.wait_timeout_while(latest, LOOK, |(number, _)| *number == last);
+        let latest = waited.unwrap_or_else(PoisonError::into_inner).0;
+        (latest.0, Arc::clone(&latest.1))
+    }
+}
+
+/// Shows images until the window closes.
+fn show(mut screen: Screened, latest: &Latest, shared: &Shared) -> Result<Closed, Failure> {
+    let mut last = 0;
+    let mut outdated = true;
+    loop {
+        for happened in screen.poll()? {
+            match happened {
+                Happened::Close => return Ok(Closed::ByUser),
+                Happened::Exposed | Happened::Input(super::Input::Resize(_)) => outdated = true,
+                Happened::Input(_) => {}
+            }
+        }
+        if shared.close.load(Ordering::Acquire) {
+            return Ok(Closed::ByUser);
+        }
+        let (number, image) = latest.newer_than(last);
+        if number != last || outdated {
+            screen.present(&letterboxed(&image, screen.picture_size()))?;
+            shared.pictures.fetch_add(1, Ordering::AcqRel);
+            (last, outdated) = (number, false);
+        }
+    }
+}
+
+/// The image scaled to fit into `size` (pixels per row, rows), by the nearest pixel, in the middle of black.
+fn letterboxed(image: &Canvas, size: [usize; 2]) -> Canvas {
+    let [columns, rows] = image.dimensions();
+    let mut out = Canvas::new(size[0], size[1]);
+    if columns == 0 || rows == 0 {
+        return out;
+    }
+    // The side that limits the scale is filled; integers keep an image of the window's own size as it is.
+    let fitted = if size[0] * rows <= size[1] * columns {
+        [size[0], (size[0] * rows / columns).max(1)]
+    } else {
+        [(size[1] * columns / rows).max(1), size[1]]
+    };
+    let corner = [0, 1].map(|k| (size[k] - fitted[k].min(size[k])) / 2);
+    for y in 0..fitted[1].min(size[1]) {
+        let from = y * rows / fitted[1] * columns;
+        for x in 0..fitted[0].min(size[0]) {
+            let at = 4 * (from + x * columns / fitted[0]);
+            let to = 4 * ((corner[1] + y) * size[0] + corner[0] + x);
+            out.bytes_mut()[to..to + 4].copy_from_slice(&image.bytes()[at..at + 4]);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image whose pixel (x, y) has the colour (x, y, 7).
+    fn numbered(width: usize, height: usize) -> Canvas {
+        let mut image = Canvas::new(width, height);
+        (0..height).for_each(|y| (0..width).for_each(|x| image.set(x as i32, y as i32, [x as u8, y as u8, 7])));
+        image
+    }
+
+    #[test]
+    fn letterbox() {
+        let image = numbered(4, 2);
+        assert_eq!(letterboxed(&image, [4, 2]), image);
+        // Twice the size, with bars above and below of one row each.
+        let large = letterboxed(&image, [8, 6]);
+        for (x, y, color) in [(0, 0, [0; 3]), (0, 1, [0, 0, 7]), (7, 4, [3, 1, 7]), (3, 2, [1, 0, 7]), (7, 5, [0; 3])] {
+            assert_eq!(large.pixel(x, y), Some(color), "{x} {y}");
+        }
+        // Bars at the sides.
+        let wide = letterboxed(&image, [9, 2]);
+        assert_eq!([0, 1, 2, 5, 6].map(|x| wide.pixel(x, 0).map(|c| c[2])), [0, 0, 7, 7, 0].map(Some));
+        for size in [[1, 1], [1, 900], [900, 1], [3, 3]] {
+            assert_eq!(letterboxed(&image, size).dimensions(), size);
+            assert_eq!(letterboxed(&Canvas::default(), size), Canvas::new(size[0], size[1]));
+        }
+    }
+}
