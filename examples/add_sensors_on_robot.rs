@@ -12,8 +12,6 @@ use clap::Parser;
 use kinetoscope::ndarray::{Array2, ArrayView3, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
-use kinetoscope::scene::pose::from_wxyz;
-use kinetoscope::sensors::ray::pattern::Grid;
 use launcher::{Launcher, Progress, picture, stage};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -25,9 +23,12 @@ use std::process::ExitCode;
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// URDF or MJCF (.xml) of a quadruped with ANYmal's joint names; in an MJCF file it starts as high as the file says
-    #[arg(long, default_value = "quadruped/quadruped.urdf")]
-    robot: PathBuf,
+    /// URDF or MJCF (.xml) of a quadruped with ANYmal's joint names, instead of the bundled one; an MJCF file says how high it starts
+    #[arg(long)]
+    robot: Option<PathBuf>,
+    /// Steps between summaries of the sensors; 0 for none
+    #[arg(long, alias = "print_every", default_value_t = 1)]
+    print_every: u64,
     /// Steps between resets with other joint angles; 0 for none
     #[arg(long, alias = "reset_every", default_value_t = 500)]
     reset_every: u64,
@@ -46,168 +47,114 @@ fn main() -> ExitCode {
     launcher::run("add_sensors_on_robot", || run(&Args::parse()))
 }
 
-/// Steps from one line on the sensors to the next.
-const REPORT_EVERY: u64 = 200;
 /// Steps in a second.
 const SECOND: u64 = 200;
 
 fn run(args: &Args) -> launcher::Result {
-    let legged = SimulationManagerCfg::legged();
-    let mut cfg = SimulationManagerCfg {
-        physics_dt: 1.0 / SECOND as f64,
-        cone: legged.cone,
-        impratio: legged.impratio,
-        arena_space: args.launcher.arena_space.unwrap_or(2.0),
-        ..args.launcher.simulation()?
-    };
-    // A dome of even light, as in the tutorial: most of it is the sky's; the lamp from above casts soft shadows.
-    cfg.lights = vec![LightCfg { direction: [0.1, 0.2, -1.0].into(), color: [0.75; 3], ..LightCfg::default() }];
-    let dt = cfg.physics_dt;
-    let mut sim = SimulationManager::new(cfg)?;
-    let robot = sim.add_robot(robot_cfg(args)?)?;
-    let camera = sim.add_sensor("camera", camera_cfg())?;
-    let scanner = sim.add_sensor("height_scanner", scanner_cfg())?;
-    let contacts = sim.add_sensor("contact_forces", contacts_cfg())?;
-    for diagnostic in sim.diagnostics() {
+    let cfg = scene_cfg(args)?;
+    let dt = cfg.simulation.physics_dt;
+    let mut scene = InteractiveScene::new(cfg)?;
+    for diagnostic in scene.sim().diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
-    args.launcher.write_dump(&sim)?;
+    args.launcher.write_dump(scene.sim())?;
     println!("[INFO]: Setup complete...");
-    println!("{}\n{}\n{}", sim.sensor(camera)?, sim.sensor(scanner)?, sim.sensor(contacts)?);
 
-    args.launcher.serve(&mut sim)?;
-    args.launcher.open_window(&mut sim);
-    let recording = args.launcher.start_recording(&mut sim)?;
+    args.launcher.serve(scene.sim_mut())?;
+    args.launcher.open_window(scene.sim_mut());
+    let recording = args.launcher.start_recording(scene.sim_mut())?;
     let progress = Progress::new(&args.launcher, 1000);
     let mut noise: Vec<Random> =
-        (0..sim.num_envs()).map(|env| Random::keyed(args.launcher.seed, env as u64, "reset")).collect();
-    let mut heights: Vec<Vec<f64>> = vec![Vec::new(); sim.num_envs()];
+        (0..scene.num_envs()).map(|env| Random::keyed(args.launcher.seed, env as u64, "reset")).collect();
+    let mut heights: Vec<Vec<f64>> = vec![Vec::new(); scene.num_envs()];
     let mut totals = Totals::default();
-    let standing = sim.robot(robot).get_default_qpos();
     let mut step = 0;
     while !progress.stop(step) {
         if args.reset_every > 0 && step % args.reset_every == 0 {
-            sim.reset(None)?;
+            // Poses are in the environments: origins are not added.
+            let mut robot = scene.robot_mut("robot")?;
+            let (root, standing) = (robot.read().get_default_root_state(), robot.read().get_default_qpos());
+            robot.write_root_state(&root, None)?;
+            let start = Array2::from_shape_fn(standing.dim(), |at| standing[at] + 0.1 * noise[at.0].uniform());
+            let still = robot.read().get_default_qvel();
+            robot.write_joint_state(&start, &still, None, None)?;
+            robot.set_qpos(&standing, None, None)?;
+            // What was written stays: this clears the buffers of sensors.
+            scene.reset(None)?;
             totals.seen = [0; 3];
-            let offset = Array2::from_shape_fn(standing.dim(), |(env, _)| 0.1 * noise[env].uniform());
-            let mut legs = sim.robot_mut(robot);
-            legs.write_qpos(&(&standing + &offset), None, None)?;
-            legs.set_qpos(&standing, None, None)?;
             progress.say("[INFO]: Resetting robot state...");
         }
-        sim.update(1);
+        scene.update(1);
         step += 1;
-        totals.count(&sim, camera, scanner, contacts)?;
+        totals.count(&scene)?;
         if step % SECOND == 0 {
-            let base = sim.robot(robot).get_root_pose();
+            let base = scene.robot("robot")?.get_root_pose();
             heights.iter_mut().enumerate().for_each(|(env, heights)| heights.push(base[(env, 2)]));
         }
-        if step % REPORT_EVERY == 0 {
-            progress.say(&summary(&sim, camera, scanner, contacts)?);
+        if args.print_every > 0 && step % args.print_every == 0 {
+            progress.say(&summary(&scene)?);
         }
         progress.advance(step);
     }
-    let rate = progress.env_steps_per_second(step, sim.num_envs());
-    println!("{}", summary(&sim, camera, scanner, contacts)?);
-    println!("\n{step} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
+    let rate = progress.env_steps_per_second(step, scene.num_envs());
+    println!("\n{step} steps x {} environments: {rate:.0} environment steps per second", scene.num_envs());
     if let Some(out) = &args.launcher.out {
         launcher::make_folder(out)?;
-        write_pictures(&mut sim, camera, out)?;
+        write_pictures(&mut scene, out)?;
         println!("Pictures written to {}", out.display());
     }
-    recording.finish(&mut sim)?;
-    args.launcher.write_report(&report(
-        &sim,
-        robot,
-        (camera, scanner, contacts),
-        &totals,
-        &heights,
-        (step, dt, rate),
-    )?)?;
+    recording.finish(scene.sim_mut())?;
+    args.launcher.write_report(&report(&scene, &totals, &heights, (step, dt, rate))?)?;
+    println!("Cleaning up...");
     Ok(())
 }
 
-/// ANYmal's start: 0.6 m up, knees bent.
-fn robot_cfg(args: &Args) -> launcher::Result<RobotCfg> {
-    let file = launcher::user_or_asset(&args.robot)?;
-    // An MJCF file says how high its robot stands.
-    let described = if file.extension().is_some_and(|extension| extension == "xml") {
-        RobotCfg { mjcf: Some(MjcfFile::new(file)), ..Default::default() }
-    } else {
-        let init_pose = Pose::translation(0.0, 0.0, 0.6);
-        RobotCfg { urdf: UrdfCfg::single(file), init_pose, ..Default::default() }
+/// The bundled scene, with what the flags say.
+fn scene_cfg(args: &Args) -> launcher::Result<SceneCfg> {
+    let mut cfg = SceneCfg::from_file(assets::path("scenes/quadruped.toml")?)?;
+    let from_flags = args.launcher.simulation()?;
+    cfg.simulation = SimulationManagerCfg {
+        num_envs: from_flags.num_envs,
+        seed: from_flags.seed,
+        threads: from_flags.threads,
+        arena_space: args.launcher.arena_space.unwrap_or(cfg.simulation.arena_space),
+        ..cfg.simulation
     };
-    let pose = [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
-    Ok(RobotCfg {
-        uid: "robot".into(),
-        fix_base: false,
-        init_qpos: pose.map(|(joints, angle)| (joints.to_string(), angle)).to_vec(),
-        drive: DriveCfg { stiffness: args.stiffness.into(), damping: args.damping.into(), ..Default::default() },
-        payload: vec![("base".into(), args.payload)],
-        ..described
-    })
-}
-
-/// In front of the base, looking forward, 10 pictures per second.
-fn camera_cfg() -> CameraCfg {
-    CameraCfg {
-        width: 640,
-        height: 480,
-        intrinsics: Intrinsics::ISAAC,
-        near: 0.1,
-        far: 1e5,
-        extrinsics: Extrinsics {
-            parent: Some("robot/base".into()),
-            placement: Placement::Pose { pos: [0.510, 0.0, 0.015], rotation: from_wxyz([0.5, -0.5, 0.5, -0.5]) },
-            convention: CameraConvention::Ros,
-        },
-        channels: Channels { color: true, depth: true, ..Default::default() },
-        update_period: 0.1,
-        ..Default::default()
+    for (_, entity) in &mut cfg.entities {
+        let EntityCfg::Robot(robot) = entity else { continue };
+        if let Some(file) = &args.robot {
+            let file = launcher::user_or_asset(file)?;
+            // An MJCF file says how high its robot stands.
+            if file.extension().is_some_and(|extension| extension == "xml") {
+                (robot.mjcf, robot.urdf, robot.init_pose) =
+                    (Some(MjcfFile::new(file)), UrdfCfg::default(), Pose::identity());
+            } else {
+                robot.urdf = UrdfCfg::single(file);
+            }
+        }
+        robot.drive = DriveCfg { stiffness: args.stiffness.into(), damping: args.damping.into(), ..Default::default() };
+        robot.payload = vec![("base".into(), args.payload)];
     }
+    Ok(cfg)
 }
 
-/// 187 rays from 20 m above, 50 times per second, that turn with the robot's heading and see the ground only.
-fn scanner_cfg() -> RayCasterCfg {
-    RayCasterCfg {
-        parent: Some("robot/base".into()),
-        offset: Pose::translation(0.0, 0.0, 20.0),
-        alignment: RayAlignment::Yaw,
-        pattern: Grid { resolution: 0.1, size: [1.6, 1.0], ..Grid::default() }.into(),
-        targets: HitTargets::Named(vec!["ground".into()]),
-        sampling: SamplingCfg::every(0.02),
-        debug_vis: true,
-        ..Default::default()
-    }
+/// The three sensors.
+fn sensors(scene: &InteractiveScene) -> launcher::Result<(&Camera, &RayCaster, &ContactSensor)> {
+    Ok((scene.sensor("camera")?, scene.sensor("height_scanner")?, scene.sensor("contact_forces")?))
 }
 
-/// Forces on the feet in every step, and in the five before.
-fn contacts_cfg() -> ContactSensorCfg {
-    ContactSensorCfg {
-        sampling: SamplingCfg { history_length: 6, ..Default::default() },
-        debug_vis: true,
-        ..ContactSensorCfg::of(".*_FOOT")
-    }
-}
-
-type Ids = (SensorId<Camera>, SensorId<RayCaster>, SensorId<ContactSensor>);
-
-/// What the tutorial prints in every step.
-fn summary(
-    sim: &SimulationManager,
-    camera: SensorId<Camera>,
-    scanner: SensorId<RayCaster>,
-    contacts: SensorId<ContactSensor>,
-) -> launcher::Result<String> {
-    let (camera, scanner, contacts) = (sim.sensor(camera)?, sim.sensor(scanner)?, sim.sensor(contacts)?);
+/// What the tutorial prints after every step.
+fn summary(scene: &InteractiveScene) -> launcher::Result<String> {
+    const LINE: &str = "-------------------------------";
+    let (camera, scanner, contacts) = sensors(scene)?;
     Ok(format!(
-        "-------------------------------\n\
-         Received shape of rgb   image: {:?}\n\
-         Received shape of depth image: {:?}\n\
-         -------------------------------\n\
-         Received max height value: {:.4}\n\
-         -------------------------------\n\
-         Received max contact force of: {:.3}",
+        "{LINE}\n{camera}\n\
+         Received shape of rgb   image:  {:?}\n\
+         Received shape of depth image:  {:?}\n\
+         {LINE}\n{scanner}\n\
+         Received max height value:  {:.4}\n\
+         {LINE}\n{contacts}\n\
+         Received max contact force of:  {:.3}",
         camera.color()?.shape(),
         camera.depth()?.shape(),
         max_height(scanner).unwrap_or(f64::NAN),
@@ -236,19 +183,9 @@ struct Totals {
 }
 
 impl Totals {
-    fn count(
-        &mut self,
-        sim: &SimulationManager,
-        camera: SensorId<Camera>,
-        scanner: SensorId<RayCaster>,
-        contacts: SensorId<ContactSensor>,
-    ) -> launcher::Result {
-        let contacts = sim.sensor(contacts)?;
-        let now = [
-            sim.sensor(camera)?.frame_counts()[0],
-            sim.sensor(scanner)?.sample_counts()[0],
-            contacts.sample_counts()[0],
-        ];
+    fn count(&mut self, scene: &InteractiveScene) -> launcher::Result {
+        let (camera, scanner, contacts) = sensors(scene)?;
+        let now = [camera.frame_counts()[0], scanner.sample_counts()[0], contacts.sample_counts()[0]];
         for ((updates, seen), now) in self.updates.iter_mut().zip(self.seen).zip(now) {
             *updates += now.checked_sub(seen).unwrap_or(now);
         }
@@ -259,14 +196,12 @@ impl Totals {
 }
 
 fn report(
-    sim: &SimulationManager,
-    robot: RobotId,
-    (camera, scanner, contacts): Ids,
+    scene: &InteractiveScene,
     totals: &Totals,
     heights: &[Vec<f64>],
     (steps, dt, rate): (u64, f64, f64),
 ) -> launcher::Result<Value> {
-    let (camera, scanner, contacts) = (sim.sensor(camera)?, sim.sensor(scanner)?, sim.sensor(contacts)?);
+    let (sim, (camera, scanner, contacts)) = (scene.sim(), sensors(scene)?);
     let depth = picture::finite_range(camera.depth()?.iter().copied());
     let hit = scanner.hit_mask();
     let forces = contacts.net_forces_w();
@@ -300,21 +235,22 @@ fn report(
             "max_force": totals.max_force,
         },
         "base_height": heights,
-        "total_mass": sim.robot(robot).total_mass(),
+        "total_mass": scene.robot("robot")?.total_mass(),
         "env_steps_per_second": rate,
         "warnings": sim.warning_counts(),
     }))
 }
 
 /// What the camera of each robot sees, and the stage with all robots and what their sensors show.
-fn write_pictures(sim: &mut SimulationManager, camera: SensorId<Camera>, out: &Path) -> launcher::Result {
-    let front = sim.sensor(camera)?;
+fn write_pictures(scene: &mut InteractiveScene, out: &Path) -> launcher::Result {
+    let front = scene.sensor::<Camera>("camera")?;
     let (color, [width, height]) = (front.color()?, [640, 480]);
     for (row, env) in front.env_ids().iter().enumerate() {
         let pixels: Vec<u8> = color.index_axis(Axis(0), row).iter().copied().collect();
         let file = out.join(format!("front_camera_env{env}.png"));
         picture::write_png(&file, &picture::color_picture([width, height], &pixels))?;
     }
+    let sim = scene.sim_mut();
     let markers = sim.markers();
     stage::write(sim, &markers, [3.5; 3], [0.0; 3], &out.join("stage.png"))
 }

@@ -1,5 +1,18 @@
-//! Where asset files are: robots that come with the crate, or a folder of yours.
+//! Bundled robots: their files, and configurations that are ready to be added to a simulation.
+//!
+//! ```
+//! use kinetoscope::prelude::*;
+//!
+//! let mut sim = SimulationManager::new(SimulationManagerCfg::legged())?;
+//! let robot = sim.add_robot(RobotCfg { uid: "scout".into(), ..assets::quadruped()? })?;
+//! assert_eq!(sim.robot(robot).dof(), 12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+use scene::Pose;
+use scene::pose::from_xyz_rpy;
+use sim::{ComponentCfg, DriveCfg, RobotCfg, UrdfCfg};
+use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
 /// An asset was not found.
@@ -32,6 +45,83 @@ impl std::error::Error for AssetMissing {}
 pub fn path(asset: impl AsRef<Path>) -> Result<PathBuf, AssetMissing> {
     resolve(asset.as_ref(), std::env::var_os("KINETOSCOPE_ASSETS").map(PathBuf::from))
 }
+
+/// The quadruped, which stands with bent knees 0.6 m up; drives of 80 N m/rad and 5 N m s/rad. Uid `quadruped`.
+///
+/// Start pose: Isaac Lab's `ANYMAL_C_CFG`.
+///
+/// # Errors
+/// The asset is missing.
+pub fn quadruped() -> Result<RobotCfg, AssetMissing> {
+    let standing = [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
+    Ok(RobotCfg {
+        uid: "quadruped".into(),
+        urdf: UrdfCfg::single(path("quadruped/quadruped.urdf")?),
+        fix_base: false,
+        init_pose: Pose::translation(0.0, 0.0, 0.6),
+        init_qpos: standing.map(|(joints, angle)| (joints.to_string(), angle)).to_vec(),
+        drive: DriveCfg { stiffness: 80.0.into(), damping: 5.0.into(), ..Default::default() },
+        ..Default::default()
+    })
+}
+
+/// The SR5 arm with the control part `arm`; drives of 10⁴ N m/rad and 10³ N m s/rad. Uid `sr5`.
+///
+/// # Errors
+/// The asset is missing.
+pub fn sr5() -> Result<RobotCfg, AssetMissing> {
+    Ok(RobotCfg {
+        uid: "sr5".into(),
+        urdf: UrdfCfg::single(path("sr5/SR5.urdf")?),
+        control_parts: vec![("arm".into(), vec![ARM.into()])],
+        drive: DriveCfg { stiffness: [(ARM, 1e4)].into(), damping: [(ARM, 1e3)].into(), ..Default::default() },
+        ..Default::default()
+    })
+}
+
+/// The left hand with the control part `hand`; drives of 10³ N m/rad and 10² N m s/rad. Uid `revo1_left`.
+///
+/// # Errors
+/// The asset is missing.
+pub fn revo1_left() -> Result<RobotCfg, AssetMissing> {
+    Ok(RobotCfg {
+        uid: "revo1_left".into(),
+        urdf: UrdfCfg::single(path("revo1_left/revo1_left.urdf")?),
+        control_parts: vec![("hand".into(), vec![HAND.into()])],
+        drive: DriveCfg { stiffness: [(HAND, 1e3)].into(), damping: [(HAND, 1e2)].into(), ..Default::default() },
+        ..Default::default()
+    })
+}
+
+/// The arm with the hand on its flange, control parts and drives of both: the robot of EmbodiChain's tutorials. Uid
+/// `sr5_with_brainco`.
+///
+/// # Errors
+/// An asset is missing.
+pub fn sr5_with_hand() -> Result<RobotCfg, AssetMissing> {
+    let (arm, hand) = (sr5()?, revo1_left()?);
+    let on_flange = from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]);
+    let components = vec![
+        ComponentCfg::new("arm", path("sr5/SR5.urdf")?),
+        ComponentCfg { transform: on_flange, ..ComponentCfg::new("hand", path("revo1_left/revo1_left.urdf")?) },
+    ];
+    Ok(RobotCfg {
+        uid: "sr5_with_brainco".into(),
+        urdf: UrdfCfg { components, ..Default::default() },
+        control_parts: arm.control_parts.into_iter().chain(hand.control_parts).collect(),
+        drive: DriveCfg {
+            stiffness: [(ARM, 1e4), (HAND, 1e3)].into(),
+            damping: [(ARM, 1e3), (HAND, 1e2)].into(),
+            ..Default::default()
+        },
+        ..Default::default()
+    })
+}
+
+/// Pattern of the arm's joints.
+const ARM: &str = "JOINT[1-6]";
+/// Pattern of the hand's joints.
+const HAND: &str = "LEFT_.*";
 
 fn resolve(asset: &Path, own: Option<PathBuf>) -> Result<PathBuf, AssetMissing> {
     let tried: Vec<PathBuf> = if asset.is_absolute() {

@@ -89,7 +89,7 @@ impl Sensor for ActuatorState {
 /// A summary of several lines.
 impl fmt::Display for ActuatorState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        summary::write(f, "Actuator state", &self.sampler, &[("actuators", &summary::list(&self.names))])
+        summary::write_sampled(f, "Actuator state", &self.sampler, &[("actuators", &summary::list(&self.names))])
     }
 }
 

@@ -189,7 +189,7 @@ impl Sensor for FrameTransformer {
 /// A summary of several lines.
 impl fmt::Display for FrameTransformer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        summary::write(
+        summary::write_sampled(
             f,
             "Frame transformer",
             &self.sampler,

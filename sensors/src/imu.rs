@@ -168,7 +168,7 @@ impl Sensor for Imu {
 /// A summary of several lines.
 impl fmt::Display for Imu {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        summary::write(f, "Imu", &self.sampler, &[("body", &self.body)])
+        summary::write_sampled(f, "Imu", &self.sampler, &[("body", &self.body)])
     }
 }
 

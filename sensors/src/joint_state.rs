@@ -94,7 +94,7 @@ impl Sensor for JointState {
 /// A summary of several lines.
 impl fmt::Display for JointState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        summary::write(f, "Joint state", &self.sampler, &[("joints", &summary::list(&self.names))])
+        summary::write_sampled(f, "Joint state", &self.sampler, &[("joints", &summary::list(&self.names))])
     }
 }
 

@@ -166,7 +166,7 @@ impl Sensor for JointWrench {
 /// A summary of several lines.
 impl fmt::Display for JointWrench {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        summary::write(f, "Joint wrench", &self.sampler, &[("links", &summary::list(&self.names))])
+        summary::write_sampled(f, "Joint wrench", &self.sampler, &[("links", &summary::list(&self.names))])
     }
 }
 

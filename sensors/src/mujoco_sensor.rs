@@ -110,7 +110,7 @@ impl Sensor for MujocoSensor {
 /// A summary of several lines.
 impl fmt::Display for MujocoSensor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        summary::write(f, "MuJoCo's own sensors", &self.sampler, &[("sensors", &summary::list(&self.names))])
+        summary::write_sampled(f, "MuJoCo's own sensors", &self.sampler, &[("sensors", &summary::list(&self.names))])
     }
 }
 

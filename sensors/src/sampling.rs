@@ -14,6 +14,7 @@ use ndarray::{Array1, Array2, ArrayView, ArrayView1, ArrayView2, ArrayView3, Axi
 use scene::SceneState;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// When a sensor measures, what it remembers, and what goes wrong on the way. `Default` is a perfect sensor: every step,
 /// nothing late, lost or noisy.
@@ -89,6 +90,7 @@ impl Channel {
 /// The measurements of a sensor in all environments: current ones, past ones, and those on their way.
 #[derive(Clone, Debug)]
 pub struct Sampler {
+    name: Arc<str>,
     expected: Expected,
     phases: Phases,
     period: f64,
@@ -158,6 +160,7 @@ impl Sampler {
             arrived: History::new(n, late, channel.width),
         };
         Ok(Self {
+            name: Arc::clone(&context.name),
             expected: Expected::new(sensor, requires, context),
             phases: schedule.phases(n),
             period: seconds,
@@ -172,6 +175,11 @@ impl Sampler {
             delay: (latency > 0).then(|| Delay::new(n, width, latency, period)),
             row: vec![0.0; width],
         })
+    }
+
+    /// Name of the sensor.
+    pub fn name(&self) -> &str {
+        &self.name
     }
 
     /// Checks that a state has what the sensor requires, of the scene that it was built for.

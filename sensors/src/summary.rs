@@ -1,28 +1,43 @@
-//! What a sensor is, in a few lines: the same for all that have a [`Sampler`].
+//! Summaries of sensors, in the form of Isaac Lab: a title with the sensor's path, and one property per line.
 
 use crate::sampling::Sampler;
+use crate::sensor::SensorContext;
 use std::fmt;
 
-/// Writes a title, what all of them have, and lines of a label and what it says.
-pub(crate) fn write(
+/// Properties of a sensor: labels and values.
+type Lines<'a> = [(&'a str, &'a dyn fmt::Display)];
+
+/// Writes `title @ "path":` and the properties.
+pub(crate) fn write(f: &mut fmt::Formatter<'_>, title: &str, path: &str, lines: &Lines<'_>) -> fmt::Result {
+    write!(f, "{title} @ {path:?}:")?;
+    lines.iter().try_for_each(|(label, value)| write!(f, "\n\t{label:<21}: {value}"))
+}
+
+/// Writes the summary of a sensor that has a sampler; its path is its name.
+pub(crate) fn write_sampled(
     f: &mut fmt::Formatter<'_>,
     title: &str,
     sampler: &Sampler,
-    lines: &[(&str, &dyn fmt::Display)],
+    lines: &Lines<'_>,
 ) -> fmt::Result {
     let shared: [(&str, &dyn fmt::Display); 3] = [
-        ("environments", &sampler.num_envs()),
         ("update period (s)", &sampler.period()),
         ("history length", &sampler.history_length()),
+        ("number of sensors", &sampler.num_envs()),
     ];
-    f.write_str(title)?;
-    for (label, value) in shared.iter().chain(lines) {
-        write!(f, "\n  {label:<17}: {value}")?;
-    }
-    Ok(())
+    let lines: Vec<_> = shared.into_iter().chain(lines.iter().copied()).collect();
+    write(f, title, sampler.name(), &lines)
 }
 
-/// Names beside each other.
+/// Path of a sensor: `uid/link/name` on a body, its name without one.
+pub(crate) fn path(context: &SensorContext, parent: Option<usize>) -> String {
+    match parent.and_then(|body| context.bodies.get(body)) {
+        Some(body) => format!("{body}/{}", context.name),
+        None => context.name.to_string(),
+    }
+}
+
+/// Names, separated by commas; `none` if there are none.
 pub(crate) fn list(names: &[String]) -> String {
     if names.is_empty() { "none".into() } else { names.join(", ") }
 }
@@ -39,18 +54,30 @@ mod tests {
             bodies: ["arm/base".to_string(), "arm/tip".to_string()].into(),
             carriers: [0, 1].into(),
             joints: ["arm/elbow".to_string()].into(),
+            name: "mine".into(),
             ..SensorContext::default()
         };
         let sampling = SamplingCfg { update_period: 0.02, history_length: 4, ..SamplingCfg::default() };
         let imu = ImuCfg { sampling: sampling.clone(), ..ImuCfg::on("tip") };
         let imu = imu.build(&context).expect("good").to_string();
-        let expected = ["Imu", "  environments     : 3", "  update period (s): 0.02", "  history length   : 4"];
+        let expected = [
+            "Imu @ \"mine\":",
+            "\tupdate period (s)    : 0.02",
+            "\thistory length       : 4",
+            "\tnumber of sensors    : 3",
+        ];
         assert_eq!(imu.lines().take(4).collect::<Vec<_>>(), expected);
-        assert_eq!(imu.lines().last(), Some("  body             : arm/tip"));
+        assert_eq!(imu.lines().last(), Some("\tbody                 : arm/tip"));
         let wrench = JointWrenchCfg { links: vec!["tip".into()], sampling: sampling.clone(), ..Default::default() };
         let wrench = wrench.build(&context).expect("good").to_string();
-        assert!(wrench.starts_with("Joint wrench\n") && wrench.ends_with("links            : arm/tip"), "{wrench}");
+        assert!(
+            wrench.starts_with("Joint wrench @ \"mine\":\n") && wrench.ends_with("links                : arm/tip"),
+            "{wrench}"
+        );
         let joints = JointStateCfg { sampling, ..JointStateCfg::default() }.build(&context).expect("good").to_string();
-        assert!(joints.starts_with("Joint state\n") && joints.ends_with("joints           : arm/elbow"), "{joints}");
+        assert!(
+            joints.starts_with("Joint state @ \"mine\":\n") && joints.ends_with("joints               : arm/elbow"),
+            "{joints}"
+        );
     }
 }

@@ -246,6 +246,12 @@ impl Env {
         self.refresh(&initial);
     }
 
+    /// Ends external wrenches, and lets actuator models forget their past (delays, motor states); the state stays.
+    pub(crate) fn reset_buffers(&mut self) {
+        self.set_wrenches(|wrenches| wrenches.list.clear());
+        self.drives.start();
+    }
+
     /// The state that is in `data`.
     fn saved(&self) -> Motion {
         let mut motion = Motion::default();

@@ -4,7 +4,7 @@ use crate::batch::Batch;
 use crate::compile::{Simulation, compile};
 use crate::contents::Contents;
 use crate::diagnostic::{Diagnostic, count_by_name};
-use crate::env::EnvStatus;
+use crate::env::{Env, EnvStatus};
 use crate::error::{Error, Result};
 use crate::mj;
 use crate::mjcf::document::Integrator;
@@ -557,6 +557,22 @@ impl SimulationManager {
         }
         let env_ids = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| EnvId(i)).collect();
         self.tell_all(&Moment::Reset { env_ids });
+        Ok(())
+    }
+
+    /// Clears what environments remember beside their state, all of them where `env_ids` is `None`: sensors start anew from the
+    /// present state, external wrenches end, and actuator models forget their past (delays, motor states). Positions,
+    /// velocities, targets and time stay; a diverged environment stays put aside.
+    ///
+    /// # Errors
+    /// An environment does not exist; then none is cleared.
+    pub fn reset_buffers(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
+        let chosen = env_mask(env_ids, self.num_envs())?;
+        let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
+        envs.iter().for_each(|&env| self.simulation.batch.write(env, Env::reset_buffers));
+        if !self.sensors.is_empty() {
+            self.sensors.reset(&envs, &mut self.simulation);
+        }
         Ok(())
     }
 

@@ -32,6 +32,7 @@ pub mod segmentation;
 pub mod sensor;
 pub mod shutter;
 pub mod stereo;
+mod summary;
 pub(crate) mod ticket;
 
 #[cfg(test)]

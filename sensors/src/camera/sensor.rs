@@ -23,11 +23,11 @@ use super::ticket::Ticket;
 use crate::error::SensorError;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::{Requires, Sensor, SensorContext};
+use crate::summary;
 use crate::visibility::{RenderError, View};
 use ndarray::{Array1, Array2, Array3, ArrayView1};
 use scene::pose::to_row;
 use scene::{Marker, Pose, PoseF32, RenderScene, SceneState, VisibleState};
-use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -54,6 +54,7 @@ pub struct Camera {
     /// Which row belongs to an environment; the inverse of `env_ids`.
     row_of_env: Vec<Option<usize>>,
     num_bodies: usize,
+    path: String,
     /// Index of the body it hangs on.
     parent: Option<usize>,
     pub(super) mounts: Mounts,
@@ -265,6 +266,7 @@ impl Camera {
             scene,
             row_of_env,
             num_bodies: context.bodies.len(),
+            path: summary::path(context, parent),
             parent,
             mounts: Mounts::new(mount, rows),
             rays,
@@ -303,6 +305,11 @@ impl Camera {
         &self.env_ids
     }
 
+    /// Path: `uid/link/name` on a body, the camera's name without one.
+    pub fn path(&self) -> &str {
+        &self.path
+    }
+
     /// What it measures.
     pub fn channels(&self) -> Channels {
         self.channels
@@ -311,6 +318,11 @@ impl Camera {
     /// When it measures.
     pub fn schedule(&self) -> Schedule {
         self.phases.schedule()
+    }
+
+    /// Time between images \[s\].
+    pub fn update_period(&self) -> f64 {
+        self.schedule().period_steps() as f64 * self.dt
     }
 
     /// Rows and pixels per row: (H, W).
@@ -771,29 +783,5 @@ impl Camera {
     pub(super) fn view_of(&self, row: usize) -> View {
         let pose = self.world_from_camera(row).unwrap_or_else(Pose::identity);
         self.lens.view(&self.mounts.row(row).pixels, PoseF32::from(&pose))
-    }
-}
-
-/// Short: a scene and pictures are long.
-impl fmt::Debug for Camera {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Camera")
-            .field("width", &self.lens.width)
-            .field("height", &self.lens.height)
-            .field("channels", &self.channels.names())
-            .field("environments", &self.env_ids.len())
-            .field("parent", &self.parent)
-            .finish_non_exhaustive()
-    }
-}
-
-impl fmt::Display for Camera {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "Camera")?;
-        writeln!(f, "  environments       : {}", self.env_ids.len())?;
-        let period = self.phases.schedule().period_steps() as f64 * self.dt;
-        writeln!(f, "  update period (s)  : {period}")?;
-        writeln!(f, "  pictures           : {} x {}", self.lens.width, self.lens.height)?;
-        write!(f, "  channels           : {}", self.channels.names().join(", "))
     }
 }

@@ -280,7 +280,7 @@ impl ContactSensor {
 /// A summary of several lines.
 impl fmt::Display for ContactSensor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        summary::write(
+        summary::write_sampled(
             f,
             "Contact sensor",
             &self.sampler,

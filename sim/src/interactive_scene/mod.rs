@@ -175,12 +175,22 @@ impl InteractiveScene {
         self.sim.env_origins()
     }
 
-    /// Puts environments back to their initial state, all of them where `env_ids` is `None`: robots and objects move, which
-    /// Isaac Lab's `reset` leaves to the caller, and sensors start anew.
+    /// Clears the buffers of environments, all of them where `env_ids` is `None`, as Isaac Lab's `reset` does: see
+    /// [`SimulationManager::reset_buffers`]. What was written to robots and objects stays;
+    /// [`reset_to_default`](Self::reset_to_default) puts them back.
     ///
     /// # Errors
     /// An environment does not exist; then none is reset.
     pub fn reset(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
+        self.sim.reset_buffers(env_ids)
+    }
+
+    /// Puts environments back to their initial state, all of them where `env_ids` is `None`, and revives diverged ones: see
+    /// [`SimulationManager::reset`].
+    ///
+    /// # Errors
+    /// An environment does not exist; then none is reset.
+    pub fn reset_to_default(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.sim.reset(env_ids)
     }
 

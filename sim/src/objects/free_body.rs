@@ -225,6 +225,24 @@ impl FreeBodyMut<'_> {
         place.ok_or_else(|| Error::FixedBody(self.owner.into()))
     }
 
+    /// Checks the shape and the numbers of an argument that holds poses and velocities.
+    pub(super) fn check_columns(
+        &self,
+        argument: &'static str,
+        columns: usize,
+        meaning: &'static str,
+        values: ArrayView2<'_, f64>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
+        self.check(argument, columns, meaning, values, env_ids).map(drop)
+    }
+
+    /// Lets sensors measure anew in the environments of poses that were written.
+    pub(super) fn refresh(&mut self, poses: &Poses) {
+        let envs: Vec<usize> = poses.rows.iter().map(|(env, _)| *env).collect();
+        self.sensors.refresh(&envs, self.simulation);
+    }
+
     fn check<'v>(
         &self,
         argument: &'static str,

@@ -20,6 +20,7 @@ mod robot_joints;
 mod robot_limits;
 pub mod robot_part;
 mod robot_state;
+mod robot_states;
 mod robot_wrenches;
 mod rows;
 pub mod shape;

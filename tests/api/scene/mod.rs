@@ -5,5 +5,6 @@ mod look_up;
 mod mistakes;
 mod parts;
 mod quadruped;
+mod reset;
 mod round_trip;
 mod terrain;

@@ -77,7 +77,7 @@ pub(crate) fn says(scene: &mut InteractiveScene, steps: u32) -> Vec<Vec<u64>> {
     state.iter().map(bits).chain(images).chain(others).collect()
 }
 
-fn bundled() -> SceneCfg {
+pub(crate) fn bundled() -> SceneCfg {
     SceneCfg::from_file(assets::path("scenes/quadruped.toml").unwrap()).unwrap()
 }
 

@@ -34,6 +34,7 @@ use std::fmt;
 /// late these come.
 #[derive(Clone, Debug)]
 pub struct RayCasterCamera {
+    path: String,
     parent: Option<usize>,
     pub(super) mounts: Mounts,
     /// What depth and distance say of a miss.
@@ -78,8 +79,13 @@ impl fmt::Display for RayCasterCamera {
         summary::write(
             f,
             "Ray-caster camera",
-            &self.sampler,
-            &[("pictures", &format!("{width} x {height}")), ("targets", &targets)],
+            &self.path,
+            &[
+                ("update period (s)", &self.sampler.period()),
+                ("shape", &format!("({height}, {width})")),
+                ("number of targets", &targets),
+                ("number of sensors", &self.sampler.num_envs()),
+            ],
         )
     }
 }
@@ -107,6 +113,7 @@ impl RayCasterCamera {
         };
         let taken: Vec<Taken> = (0..n).map(mount).collect();
         Self {
+            path: summary::path(context, parent),
             parent,
             mounts,
             miss,

@@ -9,6 +9,7 @@ use crate::ray::{Ray, RayTargets};
 use crate::sampling::{Sampled, Sampler};
 use crate::schedule::Phases;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use crate::summary;
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
 use scene::pose::{from_row, to_row};
 use scene::{Marker, Pose, PoseF64, Random, SceneState};
@@ -19,7 +20,7 @@ use scene::{Marker, Pose, PoseF64, Random, SceneState};
 /// (+inf, +inf, +inf), the normal 0 and the id 0; nothing is ever NaN.
 #[derive(Clone, Debug)]
 pub struct RayCaster {
-    name: String,
+    path: String,
     /// The kind of pattern.
     pattern: &'static str,
     parent: Option<usize>,
@@ -68,7 +69,7 @@ impl RayCaster {
         let random =
             |env| Random::keyed(context.seed, (context.first_env + env) as u64, &format!("{}/drift", context.name));
         Self {
-            name: context.name.to_string(),
+            path: summary::path(context, parent),
             pattern: cfg.pattern.name(),
             expected: Expected::new("ray caster", cfg.requires(), context),
             due: Vec::with_capacity(n),
@@ -346,6 +347,6 @@ impl RayCaster {
     }
 
     pub(super) fn parts(&self) -> (&str, &str, RayAlignment, &RayTargets) {
-        (&self.name, self.pattern, self.alignment, self.scan.targets())
+        (&self.path, self.pattern, self.alignment, self.scan.targets())
     }
 }

@@ -1,0 +1,49 @@
+//! Resets of a scene: Isaac Lab's, which clears buffers and keeps what was written, and the one to the start.
+
+use super::quadruped::bundled;
+use kinetoscope::ndarray::{Array2, Array3};
+use kinetoscope::prelude::*;
+
+/// `scene.reset()` undid what was written: the tutorial's noise on joint positions was lost.
+#[test]
+fn written_state_stays() {
+    let mut scene = InteractiveScene::new(bundled()).unwrap();
+    scene.update(20);
+    let mut robot = scene.robot_mut("robot").unwrap();
+    let (mut root, mut joints) = (robot.read().get_default_root_state(), robot.read().get_default_qpos());
+    root.row_mut(1)[2] += 0.25;
+    root.row_mut(1)[7] = 0.5;
+    joints.iter_mut().enumerate().for_each(|(k, q)| *q += 0.004 * k as f64);
+    let speeds = Array2::from_elem(joints.dim(), 0.1);
+    robot.write_root_state(&root, None).unwrap();
+    robot.write_joint_state(&joints, &speeds, None, None).unwrap();
+    let base = [robot.read().link_id("base").unwrap()];
+    let forces = Array3::from_elem((2, 1, 3), 3.0);
+    robot.set_external_wrench(&forces, &Array3::zeros((2, 1, 3)), WrenchFrame::World, Some(&base), None).unwrap();
+    scene.reset(Some(&[EnvId(1)])).unwrap();
+
+    let robot = scene.robot("robot").unwrap();
+    let same = |found: &Array2<f64>, written: &Array2<f64>| (found - written).iter().all(|off| off.abs() < 1e-15);
+    assert!(same(&robot.get_qpos(), &joints) && same(&robot.get_qvel(), &speeds));
+    assert!(same(&robot.get_root_state(), &root), "{:?}", robot.get_root_state());
+    // Only the named environment's buffers are cleared; its sensors see the written state: 0.25 m higher.
+    let pushed: Vec<f64> = (0..2).map(|env| robot.get_external_wrenches()[(env, 0, 0)]).collect();
+    assert_eq!(pushed, [3.0, 0.0]);
+    let counts =
+        |scene: &InteractiveScene| scene.sensor::<ContactSensor>("contact_forces").unwrap().sample_counts().to_vec();
+    assert!(counts(&scene)[0] > counts(&scene)[1], "{:?}", counts(&scene));
+    let scanner = scene.sensor::<RayCaster>("height_scanner").unwrap();
+    let height = |env: usize| scanner.pos_w()[(env, 2)];
+    assert!((height(1) - height(0) - 0.25).abs() < 1e-12, "{} {}", height(0), height(1));
+    assert!(scene.sim().time().iter().all(|time| *time > 0.0), "time goes on");
+
+    // The other reset puts everything back.
+    scene.reset_to_default(None).unwrap();
+    let robot = scene.robot("robot").unwrap();
+    assert!(
+        same(&robot.get_qpos(), &robot.get_default_qpos())
+            && same(&robot.get_root_state(), &robot.get_default_root_state())
+    );
+    assert_eq!(scene.sim().time(), [0.0; 2]);
+    assert!(scene.reset(Some(&[EnvId(2)])).is_err() && scene.reset_to_default(Some(&[EnvId(2)])).is_err());
+}
