@@ -60,7 +60,7 @@ fn run(args: &Args) -> launcher::Result {
     let renderer = renderer.of_cameras(args.paths)?;
     let views = views(args)?;
     let mut sim = SimulationManager::new(args.launcher.simulation_drawn_anyhow()?)?;
-    let robot = sim.add_robot(launcher::arm::bundled()?)?;
+    let robot = sim.add_robot(assets::sr5_with_hand()?)?;
     add_objects(&mut sim)?;
     let cameras = views
         .iter()

@@ -55,7 +55,7 @@ fn run(args: &Args) -> launcher::Result {
         ..args.launcher.simulation_drawn_anyhow()?
     })?;
     launcher::check_camera_id(args.camera_id, &sim)?;
-    sim.add_robot(launcher::arm::bundled()?)?;
+    sim.add_robot(assets::sr5_with_hand()?)?;
     let things = [
         ("cube", ObjectShape::cube(0.12), [0.55, -0.25, 0.3], [0.85, 0.2, 0.15, 1.0]),
         ("ball", ObjectShape::Sphere { radius: 0.09 }, [0.45, 0.3, 0.3], [0.2, 0.45, 0.85, 1.0]),

@@ -21,7 +21,7 @@ use kinetoscope::sensors::camera::PixelIntrinsics;
 use launcher::motion::Motion;
 use launcher::panel::{self, Views};
 use launcher::trial::{self, Album, Count};
-use launcher::{Launcher, Progress, arm, grip, picture};
+use launcher::{Launcher, Progress, grip, picture};
 use nalgebra::{Point3, Vector3};
 use serde_json::json;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -90,7 +90,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     // The tool points down: the pitches of JOINT2, -JOINT3 and -JOINT5 add up to half a turn.
     let down = [("JOINT2", 0.0), ("JOINT3", -1.6), ("JOINT5", -1.54), ("JOINT6", -FRAC_PI_2)];
     let init_qpos = down.map(|(joint, q)| (joint.to_string(), q)).to_vec();
-    let robot = sim.add_robot(RobotCfg { init_qpos, ..arm::bundled()? })?;
+    let robot = sim.add_robot(RobotCfg { init_qpos, ..assets::sr5_with_hand()? })?;
     let cube = add_things(&mut sim)?;
     let camera = sim.add_sensor("hand_camera", camera_cfg())?;
     let out = args.launcher.out.clone();

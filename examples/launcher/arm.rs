@@ -47,14 +47,6 @@ impl ArmWithHand {
     }
 }
 
-/// The bundled arm and hand, with the tutorial's gains.
-///
-/// # Errors
-/// The assets are not there.
-pub(crate) fn bundled() -> Result<RobotCfg> {
-    merged(Path::new("sr5/SR5.urdf"), Path::new("revo1_left/revo1_left.urdf"), "JOINT[1-6]", "LEFT_.*")
-}
-
 fn merged(arm_urdf: &Path, hand_urdf: &Path, arm_joints: &str, hand_joints: &str) -> Result<RobotCfg> {
     let hand = ComponentCfg {
         transform: from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]),

@@ -1,6 +1,6 @@
 //! The bundled hand as a gripper: fingers down, closing on what is between their tips and the thumb's.
 
-use super::{Result, arm};
+use super::Result;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -27,7 +27,7 @@ pub(crate) fn palm_from_grip(place: [f64; 3]) -> Pose {
 /// The bundled arm and hand, bent so that the hand can be level in front of it, the thumb opposite the fingers; `hand` are
 /// more start positions, `finger_effort` is the largest of each joint at the root of a finger \[N m\].
 pub(crate) fn robot_cfg(hand: &[(&str, f64)], finger_effort: f64) -> Result<RobotCfg> {
-    let cfg = arm::bundled()?;
+    let cfg = assets::sr5_with_hand()?;
     // Away from where the axes of JOINT4 and JOINT6 are the same.
     let elbow = [("JOINT2", 0.3), ("JOINT3", -2.2), ("JOINT5", 0.6), ("JOINT6", FRAC_PI_2)];
     let thumb = [("LEFT_HAND_THUMB2", -FRAC_PI_2)];

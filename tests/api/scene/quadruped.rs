@@ -6,16 +6,7 @@ use kinetoscope::sim::GroundCfg;
 use testkit::bits::bits;
 
 pub(crate) fn declared() -> SceneCfg {
-    let robot = RobotCfg {
-        urdf: UrdfCfg::single(assets::path("quadruped/quadruped.urdf").unwrap()),
-        fix_base: false,
-        init_pose: Pose::translation(0.0, 0.0, 0.6),
-        init_qpos: [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)]
-            .map(|(joints, angle)| (joints.to_string(), angle))
-            .to_vec(),
-        drive: DriveCfg { stiffness: 80.0.into(), damping: 5.0.into(), ..Default::default() },
-        ..Default::default()
-    };
+    let robot = assets::quadruped().unwrap();
     let camera = CameraCfg {
         width: 640,
         height: 480,
