@@ -9,7 +9,7 @@ use kinetoscope::sim::RobotMut;
 const ENVS: usize = 3;
 const POSE: &[f64] = &[0.1, 0.2, 1.0, 0.0, 0.0, 0.6, 0.8];
 const HALF: &[f64] = &[0.5; 6];
-const STATE: &[f64] = &[0.1, 0.2, 1.0, 0.0, 0.0, 0.6, 0.8, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5];
+const STATE: &[f64] = &[0.3, 0.2, 1.0, 0.0, 0.0, 0.6, 0.8, 0.25, 0.5, 0.5, 0.5, 0.5, 0.5];
 
 #[derive(Clone, Copy)]
 struct Ids {
@@ -72,7 +72,7 @@ const OF_JOINTS: &[OfJoints] = &[
     ("set_qf", false, |r, v, j, e| r.set_qf(v, j, e)),
     ("write_qpos", false, |r, v, j, e| r.write_qpos(v, j, e)),
     ("write_qvel", false, |r, v, j, e| r.write_qvel(v, j, e)),
-    ("write_joint_state", false, |r, v, j, e| r.write_joint_state(v, v, j, e)),
+    ("write_joint_state", false, |r, v, j, e| r.write_joint_state(&v.mapv(|x| 0.5 * x), v, j, e)),
     ("write_qacc", false, |r, v, j, e| r.write_qacc(v, j, e)),
     ("set_stiffness", false, |r, v, j, e| r.set_stiffness(v, j, e)),
     ("set_damping", false, |r, v, j, e| r.set_damping(v, j, e)),

@@ -124,7 +124,7 @@ fn height_scan() {
     assert!(caster.hits().iter().chain(caster.distances().iter()).all(|x| x.is_finite()));
     let caster = built_in(&scanner(), &context(2, 1), &state(&[0, 0]));
     let text = caster.to_string();
-    assert!(text.starts_with("Ray-caster @ \"scanner\":\n"), "{text}");
+    assert!(text.starts_with("Ray-caster @ \"dog/base/scanner\":\n"), "{text}");
     assert!(text.contains("\tupdate period (s)    : 0.005\n"), "{text}");
     assert!(text.contains("number of rays/sensor: 187\n") && text.ends_with("total number of rays : 374"), "{text}");
 }
