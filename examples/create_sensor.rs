@@ -169,7 +169,7 @@ fn run(args: &Args) -> launcher::Result {
         album.images,
         args.width,
         args.height,
-        sim.threads()
+        sim.sensor_threads()
     );
     println!(
         "{step} steps x {} environments, pictures included: {rate:.0} environment steps per second\n",

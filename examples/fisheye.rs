@@ -94,7 +94,7 @@ fn run(args: &Args) -> launcher::Result {
     let (mut pictures, mut lenses) = (Vec::new(), Vec::new());
     for ((name, _), camera) in views.iter().zip(cameras) {
         let (picture, report) = show(sim.sensor(camera)?, name, &out)?;
-        println!("{name}: {report}");
+        println!("{name}: {}", line(&report));
         pictures.push(picture);
         lenses.push(report);
     }
@@ -192,6 +192,26 @@ fn fitting(lens: &Lens, width: usize, height: usize) -> launcher::Result<Intrins
             Intrinsics::Pixels { fx: f, fy: f, cx: 0.5 * w, cy: 0.5 * h }
         }
     })
+}
+
+/// The report of a lens as a line of text.
+fn line(report: &Value) -> String {
+    let number = |name: &str| report[name].as_f64().unwrap_or(f64::NAN);
+    let files: Vec<&str> = report["files"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+    format!(
+        "{}, {} x {} pixels, f = {:.1} x {:.1} pixels, up to {:.1} deg off the axis, {} pixels hit something, round trip \
+         within {:.1e} pixels, {:.2} s; {}",
+        report["lens"].as_str().unwrap_or_default(),
+        report["width"],
+        report["height"],
+        number("fx"),
+        number("fy"),
+        number("largest_angle_deg"),
+        report["pixels_that_hit"],
+        number("round_trip_error_pixels"),
+        number("seconds"),
+        files.join(", ")
+    )
 }
 
 /// Writes what a camera sees, and its calibration where ROS has a model for it; what there is to say about it.

@@ -238,7 +238,7 @@ fn load(args: &Args) -> launcher::Result<Still> {
 
 /// The view, the pose of its optical frame, and its vertical field of view \[rad\].
 fn view(args: &Args, still: &Still) -> launcher::Result<(View, Pose, f64)> {
-    let free = still.free_camera();
+    let free = still.first_view([args.width, args.height]);
     let (pose, own_fovy) = match (&args.camera, args.eye, args.target) {
         (Some(name), ..) => {
             let camera = still.camera(name)?;

@@ -129,6 +129,9 @@ fn run(args: &Args) -> launcher::Result {
         })
         .collect();
     println!("Written to {}", out.join("surfaces.png").display());
+    if !matches!(renderer, Renderer::RayTraced { .. }) {
+        println!("This renderer draws glass and water opaque: --renderer rt follows light through them.");
+    }
     args.launcher.write_report(&json!({
         "mujoco_version": kinetoscope::sim::mj::version_string(),
         "num_envs": sim.num_envs(),

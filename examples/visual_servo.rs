@@ -165,11 +165,12 @@ fn run(args: &Args) -> launcher::Result<bool> {
             "height": height, "diverged": diverged[env], "success": success,
         }));
         println!(
-            "environment {env:>2}: cube found: {}, way planned: {}, {:.2} mm beside it, {:.2} mm too high: {}",
+            "environment {env:>2}: cube found: {}, way planned: {}, {:.2} mm beside it, {:.2} mm too {}: {}",
             trial::word(found[env]),
             trial::word(planned[env]),
             1e3 * beside,
-            1e3 * (height - END_HEIGHT),
+            1e3 * (height - END_HEIGHT).abs(),
+            if height < END_HEIGHT { "low" } else { "high" },
             if is_above { "above" } else { "not above" },
         );
     }

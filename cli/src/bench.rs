@@ -1,9 +1,10 @@
 //! `kinetoscope bench`: how fast a model runs and is drawn on this machine.
 
-use crate::model::ModelArgs;
+use crate::model::{Model, ModelArgs, Setup, SpawnArgs};
 use crate::render::{Look, rate};
-use crate::{Ending, Result, excerpt, progress};
+use crate::{Ending, Result, progress};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::env::EnvStatus;
 use std::time::Instant;
 
 /// Steps per second and pictures per second of a robot on this machine, on every core
@@ -15,9 +16,11 @@ use std::time::Instant;
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
-    /// Environments
-    #[arg(long, alias = "num_envs", default_value_t = 64)]
-    num_envs: usize,
+    #[command(flatten)]
+    spawn: SpawnArgs,
+    /// Environments [default: those of a scene file, else 64]
+    #[arg(long, alias = "num_envs")]
+    num_envs: Option<usize>,
     /// Threads that step [default: every core]
     #[arg(long)]
     threads: Option<usize>,
@@ -32,45 +35,87 @@ const HELP: &str = "\
 Examples:
   kinetoscope bench arm.urdf
   kinetoscope bench humanoid.xml --floating-base --num-envs 1024 --seconds 10
+  kinetoscope bench scene.toml
   kinetoscope bench arm.urdf --renderer fast-rt --width 320 --height 240
 
-Exit codes: 0 done; 1 done, with warnings (something was repaired or ignored, an environment diverged); 2 refused.";
+Exit codes: 0 done; 1 done, with warnings (something was repaired or ignored, an environment diverged); 2 refused, or every
+environment diverged.";
 
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     if !(args.seconds > 0.0 && args.seconds <= 3600.0) {
         return Err(format!("--seconds {}: give more than 0 and at most 3600", args.seconds).into());
     }
-    let cfg = SimulationManagerCfg { num_envs: args.num_envs, threads: args.threads, ..Default::default() };
-    let dt = cfg.physics_dt;
-    let (mut sim, id) = args.model.simulation(cfg)?;
-    let warned = excerpt::print_warnings(sim.diagnostics());
-    let still = Still::of_env(&mut sim, EnvId(0))?;
+    let mut model = args.model.build(&Setup {
+        num_envs: args.num_envs,
+        default_envs: 64,
+        threads: args.threads,
+        ground: !args.spawn.no_ground,
+        spawn_height: args.spawn.spawn_height,
+        ..Setup::STILL
+    })?;
+    let warned = model.print_warnings();
+    let (num_envs, dt) = (model.sim.num_envs(), model.sim.cfg().physics_dt);
+    let still = Still::of_env(&mut model.sim, EnvId(0))?;
     let view = args.look.view(&still)?;
     let mut rasterizer = args.look.rasterizer()?;
     let (start, mut steps) = (Instant::now(), 0u64);
     let step = || loop {
-        sim.update(8);
+        model.sim.update(8);
         steps += 8;
-        // Who trains reads the state after each step.
-        let _ = sim.robot(id).get_qpos();
+        read_state(&model);
         let elapsed = start.elapsed().as_secs_f64();
-        if elapsed >= args.seconds {
+        if elapsed >= args.seconds || done_by_each(&model.sim).into_iter().all(|done| done.is_some()) {
             return elapsed;
         }
     };
     let share = || Some(start.elapsed().as_secs_f64() / args.seconds);
     let elapsed = progress::during("steps", share, step);
+    // An environment that diverged stands still: its later steps are not counted.
+    let done = done_by_each(&model.sim);
+    let (diverged, stopped) = (model.sim.diverged(), done.iter().flatten().count());
+    if let Some((env, reason)) = diverged.first().filter(|_| stopped == num_envs) {
+        return Err(format!(
+            "the simulation diverged in all {num_envs} environments, in environment {} in {reason}: there is no rate of \
+             steps. Contacts that overlap at the start, light links on stiff drives or a long time step are the usual causes",
+            env.0
+        )
+        .into());
+    }
+    let all = done.iter().map(|done| done.unwrap_or(steps)).sum::<u64>() as f64 / elapsed;
     let each = steps as f64 / elapsed;
-    let all = each * args.num_envs as f64;
-    println!("{} environments on {} threads, steps of {dt} s", args.num_envs, sim.threads());
+    println!("{num_envs} environments on {} threads, steps of {dt} s", model.sim.threads());
     println!("  {all:>12.0} environment steps per second, {:.0} x real time in all", all * dt);
     println!("  {each:>12.0} steps of all environments per second");
-    let diverged = sim.diverged();
+    if stopped > 0 {
+        println!(
+            "  {stopped} of {num_envs} environments diverged and stood still from then on: the rates are too high"
+        );
+    }
     for (env, reason) in &diverged {
-        eprintln!("warning: environment {}: {reason}", env.0);
+        eprintln!("warning: environment {} diverged: {reason}", env.0);
     }
     let pictures = rate(&mut rasterizer, still.shot(&view), args.seconds)?;
     println!("pictures of {} x {} with color, depth, mask and normals", view.width, view.height);
     println!("  {pictures:>12.1} per second");
     Ok(if warned || !diverged.is_empty() { Ending::Warned } else { Ending::Done })
+}
+
+/// Reads the state, as a program that trains does after each step.
+fn read_state(model: &Model) {
+    match model.robot {
+        Some(robot) => drop(model.sim.robot(robot).get_qpos()),
+        None => drop(model.sim.engine_states()),
+    }
+}
+
+/// Steps that each environment did until it diverged; `None` where it did not.
+fn done_by_each(sim: &SimulationManager) -> Vec<Option<u64>> {
+    let mut done = Vec::with_capacity(sim.num_envs());
+    sim.batch().for_each(|_, env| {
+        done.push(match env.status() {
+            EnvStatus::Diverged { step, .. } => Some(*step),
+            EnvStatus::Running => None,
+        });
+    });
+    done
 }

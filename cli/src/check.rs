@@ -1,11 +1,12 @@
 //! `kinetoscope check`: what is in a robot's files, and everything odd in them.
 
-use crate::model::{Files, ModelArgs};
-use crate::{Ending, Result, excerpt};
+use crate::model::{Files, ModelArgs, Setup, is_scene};
+use crate::scene_report::{MjcfReport, SceneReport};
+use crate::{Ending, Result};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::inspect::{InspectCfg, inspect};
+use kinetoscope::sim::inspect::{InspectCfg, InspectError, inspect};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Tree, joints, masses, dynamics and warnings of a robot, with the lines that they are about
 #[derive(Debug, clap::Args)]
@@ -26,28 +27,74 @@ Examples:
   kinetoscope check arm.urdf hand.urdf            the hand hangs from the tip of the arm
   kinetoscope check arm.urdf --qpos hinge=0.5     inertia and torques at another position
   kinetoscope check humanoid.xml --floating-base --json humanoid.json
+  kinetoscope check scene.toml                    each robot of a scene, and what else there is
 
 Exit codes: 0 nothing is odd; 1 with warnings; 2 refused.";
 
 pub(crate) fn run(args: &Args) -> Result<Ending> {
-    let mut out = std::io::stdout().lock();
     let mut cfg = InspectCfg { floating_base: args.model.floating_base, qpos: args.qpos.clone(), ..Default::default() };
     match args.model.files()? {
         Files::Urdf(urdf) => cfg.urdf = urdf,
         Files::Mjcf(path) => cfg.mjcf = Some(MjcfFile::new(path)),
+        Files::Scene(path) => return scene(args, &path),
     }
-    let report = inspect(&cfg)?;
-    if let Some(path) = &args.json {
-        let text = serde_json::to_string_pretty(&report)? + "\n";
-        std::fs::write(path, text).map_err(|e| format!("--json {}: {e}", path.display()))?;
-    }
-    // A closed pipe, as behind `| head`, is no error of ours.
-    let _ = write!(out, "{}", report.without_warnings());
-    let _ = out.flush();
+    let report = match inspect(&cfg) {
+        Ok(report) => report,
+        Err(InspectError::Load(error)) if matches!(&*error, Error::RobotFile { error, .. } if is_scene(error)) => {
+            return mjcf_scene(args);
+        }
+        Err(error) => return Err(error.into()),
+    };
+    args.write_json(|| serde_json::to_string_pretty(&report))?;
+    print(&report.without_warnings());
     // MuJoCo has a say too: it compiles what the report describes.
-    let (sim, _) = args.model.simulation(SimulationManagerCfg { num_envs: 1, ..Default::default() })?;
-    let warned = excerpt::print_warnings(sim.diagnostics());
+    let warned = args.model.build(&Setup::STILL)?.print_warnings();
     Ok(if warned || !report.warnings.is_empty() { Ending::Warned } else { Ending::Done })
+}
+
+/// Checks an MJCF file that is a scene.
+fn mjcf_scene(args: &Args) -> Result<Ending> {
+    args.refuse_positions()?;
+    let model = args.model.build(&Setup::STILL)?;
+    let Some(part) = model.part else { return Err("the file is no scene".into()) };
+    let report = MjcfReport::of(&args.model.names(), &model.sim.mjcf_part(part));
+    args.write_json(|| serde_json::to_string_pretty(&report.json()))?;
+    print(&report);
+    Ok(if model.print_warnings() { Ending::Warned } else { Ending::Done })
+}
+
+/// Checks a scene file: each robot in it, and what else there is.
+fn scene(args: &Args, path: &Path) -> Result<Ending> {
+    args.refuse_positions()?;
+    // The whole scene is built first: its errors name the lines of the scene file.
+    let model = args.model.build(&Setup::STILL)?;
+    let report = SceneReport::of(&args.model.names(), &SceneCfg::from_file(path)?)?;
+    let json = report.json()?;
+    args.write_json(|| serde_json::to_string_pretty(&json))?;
+    print(&report);
+    let warned = model.print_warnings();
+    Ok(if warned || report.has_warnings() { Ending::Warned } else { Ending::Done })
+}
+
+impl Args {
+    fn refuse_positions(&self) -> Result<()> {
+        let Some((name, _)) = self.qpos.first() else { return Ok(()) };
+        Err(format!("--qpos {name}: {} is a scene, which starts as the file says; leave it out", self.model.names())
+            .into())
+    }
+
+    fn write_json(&self, text: impl FnOnce() -> serde_json::Result<String>) -> Result<()> {
+        let Some(path) = &self.json else { return Ok(()) };
+        let text = text()? + "\n";
+        std::fs::write(path, text).map_err(|e| format!("--json {}: {e}", path.display()).into())
+    }
+}
+
+fn print(report: &dyn std::fmt::Display) {
+    let mut out = std::io::stdout().lock();
+    // A closed pipe, as behind `| head`, is no error of ours.
+    let _ = write!(out, "{report}");
+    let _ = out.flush();
 }
 
 fn position(text: &str) -> std::result::Result<(String, f64), String> {

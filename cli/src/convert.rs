@@ -1,8 +1,7 @@
 //! `kinetoscope convert`: a robot as MJCF, for both lines of MuJoCo, with its meshes.
 
-use crate::model::ModelArgs;
+use crate::model::{ModelArgs, Setup};
 use crate::{Ending, Result, excerpt};
-use kinetoscope::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// The robot as MJCF that plain MuJoCo loads, one file for 2.2.2 and one for 4.x, with meshes and textures beside them
@@ -30,13 +29,12 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     if !args.force && !is_empty(&args.out)? {
         return Err(format!("{}: is not empty; name another folder, or add --force", args.out.display()).into());
     }
-    let cfg = SimulationManagerCfg { num_envs: 1, ground: None, ..Default::default() };
-    let (sim, _) = args.model.simulation(cfg)?;
-    let left_out = sim.dump(&args.out)?;
+    let model = args.model.build(&Setup::STILL)?;
+    let left_out = model.sim.dump(&args.out)?;
     for file in written(&args.out)? {
         println!("{}", file.display());
     }
-    let warned = [sim.diagnostics(), &left_out].map(excerpt::print_warnings);
+    let warned = [model.print_warnings(), excerpt::print_warnings(&left_out)];
     Ok(if warned.contains(&true) { Ending::Warned } else { Ending::Done })
 }
 

@@ -4,6 +4,7 @@ mod bench;
 mod check;
 mod convert;
 mod excerpt;
+mod file_kind;
 mod interrupt;
 mod model;
 mod names;
@@ -13,6 +14,7 @@ mod progress;
 mod recover;
 mod render;
 mod replay;
+mod scene_report;
 mod view;
 
 use clap::{Parser, Subcommand};
@@ -33,13 +35,15 @@ Examples:
   kinetoscope render humanoid.xml -o out.png    a picture
   kinetoscope view arm.urdf                     a window in which it moves; --serve for a browser
   kinetoscope view humanoid.xml --floating-base a robot that is not bolted to the world
+  kinetoscope view scene.toml                   a scene of robots, objects and sensors
   kinetoscope bench arm.urdf --num-envs 64      steps and pictures per second on this machine
   kinetoscope plot run.mcap                     what was recorded; --topic, --field and --out plot it
   kinetoscope replay run.mcap                   the recording in a window; --serve: in a browser; --verify: run again
   kinetoscope recover run.mcap                  a whole file of what a recording has left that was killed
 
 Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or missing); 2 refused, or broken off.
-A relative FILE that does not exist is looked for among the bundled assets (sr5/SR5.urdf, ...).";
+FILE: URDF files, an MJCF file, or a scene file (TOML, YAML, JSON). One that is relative and does not exist is looked for
+among the bundled assets (sr5/SR5.urdf, ...).";
 
 /// One line per command; what it does is in the file of its name.
 #[derive(Debug, Subcommand)]

@@ -1,6 +1,7 @@
-//! Which model is meant: URDF files, or one MJCF file.
+//! Models that commands take: URDF files, an MJCF file, or a scene file.
 
-use crate::Result;
+use crate::file_kind::FileKind;
+use crate::{Result, excerpt};
 use kinetoscope::assets;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mjcf::robot_file::RobotFileError;
@@ -9,8 +10,9 @@ use std::path::{Path, PathBuf};
 /// The files of a model.
 #[derive(Debug, clap::Args)]
 pub(crate) struct ModelArgs {
-    /// URDF files, of which each further one hangs from the tip of the one before; or one MJCF file
-    #[arg(required = true, value_name = "FILE.urdf|FILE.xml")]
+    /// URDF files, of which each further one hangs from the tip of the one before; or one MJCF file; or one scene file (TOML,
+    /// YAML, JSON)
+    #[arg(required = true, value_name = "FILE.urdf|FILE.xml|SCENE.toml")]
     files: Vec<PathBuf>,
     /// Let the root of a robot move freely
     #[arg(long, alias = "floating_base")]
@@ -20,73 +22,235 @@ pub(crate) struct ModelArgs {
     package: Vec<(String, PathBuf)>,
 }
 
-/// What the files are.
+/// Where a robot starts.
+#[derive(Debug, Default, clap::Args)]
+pub(crate) struct SpawnArgs {
+    /// Height of the lowest collision point of the robot above the ground at the start [default: 0 with --floating-base; else
+    /// the root link starts at height 0]
+    #[arg(long, alias = "spawn_height", value_name = "METRES", allow_negative_numbers = true)]
+    pub(crate) spawn_height: Option<f64>,
+    /// Leave out the ground
+    #[arg(long, alias = "no_ground")]
+    pub(crate) no_ground: bool,
+}
+
+/// Files by their kind.
+#[derive(Clone, Debug)]
 pub(crate) enum Files {
     Urdf(UrdfCfg),
     Mjcf(PathBuf),
+    Scene(PathBuf),
+}
+
+/// The simulation that a command wants.
+#[derive(Clone, Debug)]
+pub(crate) struct Setup {
+    /// Environments; where `None`, those of a scene file, else `default_envs`.
+    pub(crate) num_envs: Option<usize>,
+    pub(crate) default_envs: usize,
+    /// Distance of environments \[m\]; where `None`, that of a scene file, else the default of the command.
+    pub(crate) arena_space: Option<f64>,
+    pub(crate) default_arena_space: f64,
+    /// Threads that step; where `None`, those of a scene file, else every core.
+    pub(crate) threads: Option<usize>,
+    /// Whether there is a ground under a robot.
+    pub(crate) ground: bool,
+    pub(crate) spawn_height: Option<f64>,
+}
+
+impl Setup {
+    /// One environment without a ground: a model to look at.
+    pub(crate) const STILL: Self = Self {
+        num_envs: Some(1),
+        default_envs: 1,
+        arena_space: None,
+        default_arena_space: 2.0,
+        threads: None,
+        ground: false,
+        spawn_height: None,
+    };
+
+    /// The configuration of a simulation of one robot.
+    fn cfg(&self) -> SimulationManagerCfg {
+        let defaults = SimulationManagerCfg::default();
+        SimulationManagerCfg {
+            num_envs: self.num_envs.unwrap_or(self.default_envs),
+            arena_space: self.arena_space.unwrap_or(self.default_arena_space),
+            threads: self.threads,
+            ground: defaults.ground.filter(|_| self.ground),
+            ..defaults
+        }
+    }
+}
+
+/// A model in a simulation.
+#[derive(Debug)]
+pub(crate) struct Model {
+    pub(crate) sim: SimulationManager,
+    /// The robot that the files are; `None` where they are a scene.
+    pub(crate) robot: Option<RobotId>,
+    /// The MJCF file that is a scene.
+    pub(crate) part: Option<MjcfId>,
+    /// Warnings of the command itself.
+    warnings: Vec<String>,
+}
+
+impl Model {
+    fn of(sim: SimulationManager) -> Self {
+        Self { sim, robot: None, part: None, warnings: Vec::new() }
+    }
+
+    /// Prints all warnings; returns whether there were any.
+    pub(crate) fn print_warnings(&self) -> bool {
+        self.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        excerpt::print_warnings(self.sim.diagnostics()) || !self.warnings.is_empty()
+    }
+
+    /// A warning about a robot on a fixed base that reaches into the ground.
+    fn warn_if_in_ground(&mut self, id: RobotId) -> Result<()> {
+        /// Less is rounding of the files' numbers \[m\].
+        const SLACK: f64 = 1e-3;
+        let robot = self.sim.robot(id);
+        let (names, heights) = (robot.link_names(), robot.get_link_lowest_heights());
+        let mut lowest = (-SLACK, None);
+        for (link, &height) in heights.row(0).iter().enumerate() {
+            // Links that never move do not collide with the ground.
+            if height < lowest.0 && !robot.is_link_fixed(LinkId(link))? {
+                lowest = (height, Some(link));
+            }
+        }
+        if let (height, Some(link)) = lowest {
+            let (uid, name, depth) = (robot.uid(), names[link], -height);
+            let warning = format!(
+                "{uid}: link {name:?} starts {depth:.3} m below the ground, and the base is fixed: lift the robot with \
+                 --spawn-height 0, let it stand with --floating-base, or leave the ground out with --no-ground"
+            );
+            self.warnings.push(warning);
+        }
+        Ok(())
+    }
 }
 
 impl ModelArgs {
-    /// What the files are, by their names.
+    /// The files by their kind.
     ///
     /// # Errors
-    /// An MJCF file is not alone, or packages are named for one.
+    /// A file of another kind, an MJCF or scene file that is not alone, or flags of another kind of file.
     pub(crate) fn files(&self) -> Result<Files> {
         let files: Vec<PathBuf> = self.files.iter().map(|file| user_or_asset(file)).collect();
-        match files.iter().position(|file| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("xml"))) {
-            None => {
-                let packages = self.package.iter().cloned().collect();
-                Ok(Files::Urdf(UrdfCfg { packages, ..UrdfCfg::chain(&files) }))
+        let kinds: Vec<FileKind> = files.iter().map(|file| FileKind::of(file)).collect();
+        for (file, kind) in files.iter().zip(&kinds) {
+            if let FileKind::Other(what, hint) = kind {
+                let file = file.display();
+                return Err(format!(
+                    "{file} is {what}; this command takes URDF files (.urdf), an MJCF file (.xml) or a scene file (.toml, \
+                     .yaml, .json){hint}"
+                )
+                .into());
             }
-            Some(0) if files.len() == 1 && !self.package.is_empty() => {
-                let (file, name) = (files[0].display(), &self.package[0].0);
+        }
+        let Some(at) = kinds.iter().position(|kind| *kind != FileKind::Urdf) else {
+            let packages = self.package.iter().cloned().collect();
+            return Ok(Files::Urdf(UrdfCfg { packages, ..UrdfCfg::chain(&files) }));
+        };
+        let file = files[at].display();
+        let (what, whole) = match kinds[at] {
+            FileKind::Scene => ("a scene file", "a scene"),
+            _ => ("an MJCF file", "a model"),
+        };
+        if files.len() > 1 {
+            return Err(format!("{file}: {what} is {whole} of its own: give it alone, or URDF files only").into());
+        }
+        if let Some((name, _)) = self.package.first() {
+            return Err(
+                format!("--package {name}: {file} is {what}, where the flag has no meaning; leave it out").into()
+            );
+        }
+        let path = files[at].clone();
+        Ok(if kinds[at] == FileKind::Scene { Files::Scene(path) } else { Files::Mjcf(path) })
+    }
+
+    /// The model in a simulation. URDF files are a robot, and so is an MJCF file that can be one; another MJCF file (several
+    /// bodies, balls, nothing that turns or slides) is a scene with what stands in its world, and no ground beside its own.
+    ///
+    /// # Errors
+    /// Whatever is wrong in the files; flags that a scene has no use for.
+    pub(crate) fn build(&self, setup: &Setup) -> Result<Model> {
+        if let Some(height) = setup.spawn_height.filter(|height| !height.is_finite()) {
+            return Err(format!("--spawn-height {height}: give a height in metres, such as 0.1").into());
+        }
+        match self.files()? {
+            Files::Urdf(urdf) => {
+                let clearance = setup.spawn_height.or(self.floating_base.then_some(0.0));
+                self.robot(setup, RobotCfg { urdf, ..Default::default() }, clearance)
+            }
+            Files::Mjcf(path) => self.mjcf(setup, &path),
+            Files::Scene(path) => self.scene(setup, &path),
+        }
+    }
+
+    /// A robot, with its lowest collision point at `clearance` above the ground.
+    fn robot(&self, setup: &Setup, robot: RobotCfg, clearance: Option<f64>) -> Result<Model> {
+        let mut model = Model::of(SimulationManager::new(setup.cfg())?);
+        let (uid, fix_base) = ("robot".into(), !self.floating_base);
+        let id = model.sim.add_robot(RobotCfg { uid, fix_base, ground_clearance: clearance, ..robot })?;
+        model.robot = Some(id);
+        if fix_base && setup.ground {
+            model.warn_if_in_ground(id)?;
+        }
+        Ok(model)
+    }
+
+    /// A robot, or a scene. A robot on a free base starts where the file puts it, but never in the ground.
+    fn mjcf(&self, setup: &Setup, path: &Path) -> Result<Model> {
+        /// Less is rounding \[m\].
+        const SLACK: f64 = 1e-6;
+        let robot = || RobotCfg { mjcf: Some(MjcfFile::new(path)), ..Default::default() };
+        let refused = match self.robot(setup, robot(), setup.spawn_height) {
+            Ok(model) => {
+                let free = self.floating_base && setup.ground && setup.spawn_height.is_none();
+                let in_ground = |id| model.sim.robot(id).get_lowest_heights()[0] < -SLACK;
+                return if free && model.robot.is_some_and(in_ground) {
+                    self.robot(setup, robot(), Some(0.0))
+                } else {
+                    Ok(model)
+                };
+            }
+            Err(refused) => refused,
+        };
+        let Some(Error::RobotFile { error, .. }) = refused.downcast_ref::<Error>() else { return Err(refused) };
+        if !is_scene(error) {
+            return Err(refused);
+        }
+        self.refuse_robot_flags(setup, path)?;
+        let mut model = Model::of(SimulationManager::new(SimulationManagerCfg { ground: None, ..setup.cfg() })?);
+        model.part = Some(model.sim.add_mjcf(MjcfCfg::file("scene", path))?);
+        Ok(model)
+    }
+
+    /// What a scene file declares.
+    fn scene(&self, setup: &Setup, path: &Path) -> Result<Model> {
+        self.refuse_robot_flags(setup, path)?;
+        let mut cfg = SceneCfg::from_file(path)?;
+        let simulation = &mut cfg.simulation;
+        simulation.num_envs = setup.num_envs.unwrap_or(simulation.num_envs);
+        simulation.arena_space = setup.arena_space.unwrap_or(simulation.arena_space);
+        simulation.threads = setup.threads.or(simulation.threads);
+        Ok(Model::of(InteractiveScene::new(cfg)?.into_sim()))
+    }
+
+    /// An error where flags of a robot are given for a scene.
+    fn refuse_robot_flags(&self, setup: &Setup, path: &Path) -> Result<()> {
+        let flags = [("--floating-base", self.floating_base), ("--spawn-height", setup.spawn_height.is_some())];
+        match flags.iter().find(|(_, given)| *given) {
+            Some((flag, _)) => {
+                let path = path.display();
                 Err(format!(
-                    "--package {name}: {file} is an MJCF file, which has no package:// addresses; leave it out"
+                    "{flag}: {path} is a scene, not one robot: everything starts as the file says; leave the flag out"
                 )
                 .into())
             }
-            Some(0) if files.len() == 1 => Ok(Files::Mjcf(files[0].clone())),
-            Some(at) => {
-                let file = files[at].display();
-                Err(format!("{file}: an MJCF file is a model of its own: give it alone, or URDF files only").into())
-            }
-        }
-    }
-
-    /// A simulation of the model as a robot, in each of some environments.
-    ///
-    /// # Errors
-    /// Whatever is wrong in the files.
-    pub(crate) fn simulation(&self, cfg: SimulationManagerCfg) -> Result<(SimulationManager, RobotId)> {
-        let mut sim = SimulationManager::new(cfg)?;
-        let mut robot = RobotCfg { uid: "robot".into(), fix_base: !self.floating_base, ..Default::default() };
-        match self.files()? {
-            Files::Urdf(urdf) => robot.urdf = urdf,
-            Files::Mjcf(path) => robot.mjcf = Some(MjcfFile::new(path)),
-        }
-        let id = sim.add_robot(robot)?;
-        Ok((sim, id))
-    }
-
-    /// A simulation of the model to be looked at: as [`simulation`](Self::simulation), but an MJCF file that is no robot
-    /// (several bodies, balls, nothing that turns or slides) is there as it is, with what stands in its world, and no ground
-    /// beside its own.
-    ///
-    /// # Errors
-    /// Whatever is wrong in the files.
-    pub(crate) fn scene(&self, cfg: SimulationManagerCfg) -> Result<SimulationManager> {
-        let refused = match self.simulation(cfg.clone()) {
-            Ok((sim, _)) => return Ok(sim),
-            Err(refused) => refused,
-        };
-        let is_scene = matches!(refused.downcast_ref(), Some(Error::RobotFile { error, .. }) if is_scene(error));
-        match self.files()? {
-            Files::Mjcf(path) if is_scene => {
-                let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg })?;
-                sim.add_mjcf(MjcfCfg::file("scene", path))?;
-                Ok(sim)
-            }
-            _ => Err(refused),
+            None => Ok(()),
         }
     }
 
@@ -97,8 +261,8 @@ impl ModelArgs {
     }
 }
 
-/// Whether what is no robot may be a scene.
-fn is_scene(error: &RobotFileError) -> bool {
+/// Whether an MJCF file that is no robot may be a scene.
+pub(crate) fn is_scene(error: &RobotFileError) -> bool {
     use RobotFileError::{Actuator, BallJoint, MocapBody, NeedsWorld, NoBody, NoJoint, SeveralRoots};
     matches!(
         error,

@@ -1,8 +1,8 @@
 //! `kinetoscope render`: a picture of a model at its initial state.
 
-use crate::model::{Files, ModelArgs};
+use crate::model::{Files, ModelArgs, Setup};
 use crate::picture::{self, Channel};
-use crate::{Ending, Result, excerpt, progress};
+use crate::{Ending, Result, progress};
 use clap::ValueEnum;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
@@ -92,11 +92,9 @@ Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or mi
 pub(crate) fn run(args: &Args) -> Result<Ending> {
     let (still, mut warned) = match args.model.files()? {
         Files::Mjcf(path) => (of_mjcf(&path)?, false),
-        Files::Urdf(_) => {
-            let cfg = SimulationManagerCfg { num_envs: 1, ground: None, ..Default::default() };
-            let (mut sim, _) = args.model.simulation(cfg)?;
-            let still = Still::of_env(&mut sim, EnvId(0))?;
-            (still, excerpt::print_warnings(sim.diagnostics()))
+        Files::Urdf(_) | Files::Scene(_) => {
+            let mut model = args.model.build(&Setup::STILL)?;
+            (Still::of_env(&mut model.sim, EnvId(0))?, model.print_warnings())
         }
     };
     for left_out in still.visible().left_out() {
@@ -136,7 +134,7 @@ impl Look {
     /// # Errors
     /// The file has no such camera; sizes or angles that cannot be.
     pub(crate) fn view(&self, still: &Still) -> Result<View> {
-        let free = still.free_camera();
+        let free = still.first_view([self.width, self.height]);
         let (pose, fovy) = match (&self.camera, self.eye, self.target) {
             (Some(name), ..) => {
                 let camera = still.camera(name)?;

@@ -4,8 +4,8 @@ use crate::{Ending, Result, excerpt, interrupt};
 use kinetoscope::RecordedFilm;
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Film, Recording, replay};
-use kinetoscope::view::Closed;
 use kinetoscope::view::control::{Play, Speed};
+use kinetoscope::view::{Closed, Eye};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
@@ -102,10 +102,14 @@ fn draw(args: &Args, mut film: Film, mut sim: SimulationManager, folder: &Path) 
         return Err(format!("--at {time}: the recording is from {first} s to {last} s").into());
     }
     std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    // From the same place in all of them.
-    let cfg = ScreenshotCfg { size: [args.width, args.height], ..ScreenshotCfg::default() };
-    film.show(&mut sim, 0)?;
-    let cfg = ScreenshotCfg { eye: Some(sim.overview_eye()), ..cfg };
+    // From the same place in all of them, with what moves in the image at all of these times.
+    let mut stills = Vec::new();
+    for time in &args.at {
+        film.show(&mut sim, film.frame_at(*time))?;
+        stills.push(Still::overview(&mut sim, None, &[])?);
+    }
+    let (size, placed) = ([args.width, args.height], stills.iter().map(Still::placed).collect::<Vec<_>>());
+    let cfg = ScreenshotCfg { size, eye: Some(Eye::framing(&placed, size)), ..ScreenshotCfg::default() };
     for time in &args.at {
         film.show(&mut sim, film.frame_at(*time))?;
         let path = folder.join(format!("replay_{time:.3}s.png"));

@@ -1,7 +1,7 @@
 //! `kinetoscope view`: a model as it moves, in a window or in a browser.
 
-use crate::model::ModelArgs;
-use crate::{Ending, Result, excerpt, interrupt};
+use crate::model::{ModelArgs, Setup, SpawnArgs};
+use crate::{Ending, Result, interrupt};
 use kinetoscope::prelude::*;
 use kinetoscope::view::{Closed, Command, Speed, Viewer, Wants};
 use std::path::PathBuf;
@@ -17,16 +17,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
+    #[command(flatten)]
+    spawn: SpawnArgs,
     /// Show it in browsers and open no window; at 127.0.0.1:8080 where no address is given. An address that other machines
     /// reach (0.0.0.0:8080) needs the token that is printed
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
     serve: Option<String>,
-    /// Environments, side by side
-    #[arg(long, alias = "num_envs", default_value_t = 1)]
-    num_envs: usize,
-    /// Distance of environments, in metres
-    #[arg(long, alias = "arena_space", default_value_t = 2.0)]
-    arena_space: f64,
+    /// Environments, side by side [default: those of a scene file, else 1]
+    #[arg(long, alias = "num_envs")]
+    num_envs: Option<usize>,
+    /// Distance of environments, in metres [default: that of a scene file, else 2]
+    #[arg(long, alias = "arena_space")]
+    arena_space: Option<f64>,
     /// Threads that step [default: every core]
     #[arg(long)]
     threads: Option<usize>,
@@ -49,6 +51,8 @@ const HELP: &str = "\
 Examples:
   kinetoscope view arm.urdf
   kinetoscope view humanoid.xml --floating-base --num-envs 16 --speed 0.5
+  kinetoscope view go2.urdf --floating-base       it stands on the ground; --spawn-height 0.2 drops it
+  kinetoscope view scene.toml                     a scene file
   kinetoscope view arm.urdf --serve               in a browser, at http://127.0.0.1:8080
   kinetoscope view arm.urdf --record run.mcap
 
@@ -60,14 +64,16 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     if !(slow..=fast).contains(&args.speed) {
         return Err(format!("--speed {}: give {slow} to {fast}; 1 is real time", args.speed).into());
     }
-    let cfg = SimulationManagerCfg {
+    let model = args.model.build(&Setup {
         num_envs: args.num_envs,
         arena_space: args.arena_space,
         threads: args.threads,
-        ..Default::default()
-    };
-    let mut sim = args.model.scene(cfg)?;
-    let warned = excerpt::print_warnings(sim.diagnostics());
+        ground: !args.spawn.no_ground,
+        spawn_height: args.spawn.spawn_height,
+        ..Setup::STILL
+    })?;
+    let warned = model.print_warnings();
+    let mut sim = model.sim;
     // First of all: a Ctrl+C while the recording begins or the page opens also ends it well.
     let interrupted = on_ctrl_c(&mut sim);
     let files = Arc::new(Mutex::new(args.recording()));

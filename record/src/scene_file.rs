@@ -8,7 +8,7 @@ use crate::error::{RecordError, Result};
 use crate::zip;
 use serde_json::{Value, json};
 use sim::mj::{TARGET, Target};
-use sim::{MjcfCfg, MjcfId, SimulationManager, SimulationManagerCfg};
+use sim::{Diagnostic, DiagnosticKind, GroundCfg, MjcfCfg, MjcfId, SimulationManager, SimulationManagerCfg};
 use std::fs;
 use std::io::{self, Cursor};
 use std::path::{Component, Path, PathBuf};
@@ -26,9 +26,12 @@ const MJCF: [&str; 2] = ["robot.mjcf2.xml", "robot.mjcf4.xml"];
 pub(crate) fn pack(sim: &SimulationManager) -> Result<(Vec<u8>, Vec<String>)> {
     let failed = |error: io::Error| RecordError::file(Path::new(SCENE), error);
     let folder = tempfile::tempdir().map_err(failed)?;
-    let left_out = sim.dump(folder.path())?.iter().map(|diagnostic| diagnostic.message.clone()).collect();
+    // A scene that is only shown has no need of its drives.
+    let shows = |diagnostic: &&Diagnostic| diagnostic.kind != DiagnosticKind::ExportHeavier;
+    let left_out = sim.dump(folder.path())?.iter().filter(shows).map(|diagnostic| diagnostic.message.clone()).collect();
     let mut archive = zip::Archive::new(Cursor::new(Vec::new()));
-    let stage = json!({ "num_envs": sim.num_envs(), "arena_space": sim.cfg().arena_space });
+    let SimulationManagerCfg { arena_space, ground, .. } = sim.cfg();
+    let stage = json!({ "num_envs": sim.num_envs(), "arena_space": arena_space, "ground": ground });
     archive.add(STAGE, b"", &mut stage.to_string().as_bytes()).map_err(failed)?;
     for file in files(folder.path()).map_err(failed)? {
         let name = file.strip_prefix(folder.path()).unwrap_or(&file).to_string_lossy().replace('\\', "/");
@@ -84,9 +87,21 @@ pub(crate) fn unpack(bytes: &[u8], path: &Path) -> Result<(SimulationManager, Mj
     let number = |name: &str| stage[name].as_u64().and_then(|number| usize::try_from(number).ok());
     let num_envs = number("num_envs").ok_or_else(|| malformed("it does not say how many environments there are"))?;
     let arena_space = stage["arena_space"].as_f64().unwrap_or(SimulationManagerCfg::default().arena_space);
-    let cfg = SimulationManagerCfg { num_envs, arena_space, ground: None, lights: Vec::new(), ..Default::default() };
+    let mjcf = folder.path().join(MJCF[usize::from(TARGET == Target::V4)]);
+    // Older recordings do not say how their ground is drawn: then it is the plane of the MJCF.
+    let ground: Option<GroundCfg> = serde_json::from_value(stage["ground"].clone()).unwrap_or_default();
+    let ground = ground.filter(|_| remove_ground(&mjcf));
+    let cfg = SimulationManagerCfg { num_envs, arena_space, ground, lights: Vec::new(), ..Default::default() };
     let mut sim = SimulationManager::new(cfg)?;
-    let mjcf = MJCF[usize::from(TARGET == Target::V4)];
-    let part = sim.add_mjcf(MjcfCfg::file(PART, folder.path().join(mjcf)))?;
+    let part = sim.add_mjcf(MjcfCfg::file(PART, mjcf))?;
     Ok((sim, part))
+}
+
+/// Takes the ground out of a packed MJCF file, so that the simulation can have its own; returns whether it was there.
+fn remove_ground(mjcf: &Path) -> bool {
+    let Ok(text) = fs::read_to_string(mjcf) else { return false };
+    let Some(from) = text.find("<geom name=\"ground\" ") else { return false };
+    let Some(length) = text[from..].find("/>") else { return false };
+    let without = format!("{}{}", &text[..from], &text[from + length + 2..]);
+    fs::write(mjcf, without).is_ok()
 }

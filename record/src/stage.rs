@@ -2,9 +2,10 @@
 
 use crate::error::{RecordError, Result};
 use scene::PoseF32;
+use scene::framing::Framing;
 use sensors::camera::{Channels, Frame, Intrinsics, ParallelRasterizer, RasterCfg, look_at_pose};
 use sensors::visibility::View;
-use sim::{EnvId, SimulationManager, Still};
+use sim::{SimulationManager, Still};
 
 /// How the stage is drawn.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,10 +14,10 @@ pub struct StageCfg {
     pub size: [usize; 2],
     /// Pictures in a second of simulation \[Hz\]; the nearest whole number of physics steps lies between two.
     pub rate: f64,
-    /// From where \[m\], as environments stand side by side ([`SimulationManager::env_origins`]); `None` for a place from which all
-    /// that moves is in the picture when the recording begins.
+    /// From where \[m\], as environments stand side by side ([`SimulationManager::env_origins`]); `None` for a place from which
+    /// everything but the ground fills two thirds of the image when the recording begins: there is room to move.
     pub eye: Option<[f64; 3]>,
-    /// What is in the middle of the picture \[m\]; `None` for the middle of all that moves when the recording begins.
+    /// What is in the middle of the picture \[m\]; `None` for the middle of everything but the ground when the recording begins.
     pub target: Option<[f64; 3]>,
 }
 
@@ -37,11 +38,8 @@ impl StageCfg {
 const FOVY: f64 = std::f64::consts::FRAC_PI_4;
 /// Nearest and farthest that is seen \[m\].
 const CLIP: [f32; 2] = [0.05, 500.0];
-/// The way it looks where nobody says from where: along azimuth 2.4 rad and 0.45 rad down, as windows first do.
-const WAY: [f64; 2] = [2.4, -0.45];
-/// What is farther from its environment has flown away \[m\].
-const FAR: f64 = 20.0;
-
+/// Share of the image that is filled at the beginning.
+const FILL: f64 = 0.66;
 /// Draws the stage.
 #[derive(Debug)]
 pub(crate) struct Painter {
@@ -61,11 +59,15 @@ impl Painter {
         if !(1..=View::MAX_SIDE).contains(&width) || !(1..=View::MAX_SIDE).contains(&height) {
             return Err(wrong(format!("{width} x {height} pixels; both sides are 1 to {}", View::MAX_SIDE)));
         }
-        let (middle, radius) = extent(sim)?;
-        let target = cfg.target.unwrap_or(middle);
-        let ([azimuth, elevation], distance) = (WAY, radius / (0.5 * FOVY).sin());
-        let forward = [elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin()];
-        let eye = cfg.eye.unwrap_or([0, 1, 2].map(|k| target[k] - distance * forward[k]));
+        let still = Still::overview(sim, None, &[])?;
+        let first = still.first_view(cfg.size);
+        let forward = [0, 1, 2].map(|k| first.target[k] - first.eye[k]);
+        let framing = Framing { forward, fovy: FOVY, aspect: width as f64 / height as f64, fill: FILL };
+        // Without anything to see: as a model without anything.
+        let place = framing.place(&[still.placed()]).map(|place| (place.eye, place.target));
+        let (first_eye, first_target) = place.unwrap_or((first.eye, first.target));
+        let (way, target) = ([0, 1, 2].map(|k| first_eye[k] - first_target[k]), cfg.target.unwrap_or(first_target));
+        let eye = cfg.eye.unwrap_or([0, 1, 2].map(|k| target[k] + way[k]));
         let pose = look_at_pose(eye, target, [0.0, 0.0, 1.0])
             .map_err(|error| wrong(format!("from {eye:?} to {target:?}: {error}")))?;
         let pixels =
@@ -90,24 +92,4 @@ impl Painter {
         pixels.extend(frame.color.unwrap_or_default());
         Ok(())
     }
-}
-
-/// The middle of all that moves, with the origins of environments, and the radius of a ball around it \[m\].
-fn extent(sim: &mut SimulationManager) -> Result<([f64; 3], f64)> {
-    let origins = sim.env_origins();
-    let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-    let mut look = sim::Look::default();
-    for env in 0..sim.num_envs() {
-        sim.look(EnvId(env), &mut look)?;
-        let is_near = |at: &[f64; 3]| at.iter().all(|x| x.abs() < FAR);
-        let moving = look.masses.iter().map(|(at, _)| *at).filter(is_near);
-        for at in moving.chain([[0.0; 3]]) {
-            for k in 0..3 {
-                let x = at[k] + origins[(env, k)];
-                (low[k], high[k]) = (low[k].min(x), high[k].max(x));
-            }
-        }
-    }
-    let diagonal = (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt();
-    Ok(([0, 1, 2].map(|k| 0.5 * (low[k] + high[k])), 0.5 * diagonal + 0.5))
 }

@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod file_format;
+pub mod framing;
 pub mod light;
 pub mod marker;
 pub mod material;

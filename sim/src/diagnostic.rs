@@ -38,6 +38,8 @@ pub enum DiagnosticKind {
     ActuatorUnstable,
     /// Two geoms overlap in the initial pose and were excluded from self-collision.
     InitialOverlap,
+    /// A clearance above the ground was asked for of a robot without collision shapes.
+    ClearanceIgnored,
     /// The initial position was outside the joint's limits and was moved to the nearest one.
     InitialPositionClamped,
     /// A joint that follows others starts where they put it, beyond its own limits.
@@ -58,6 +60,8 @@ pub enum DiagnosticKind {
     CoarsePieces,
     /// Something of an MJCF part is left out of an export, because the line of MuJoCo it is for does not know it.
     ExportReduced,
+    /// Drives of an export have an armature that the robot has not, so that plain MuJoCo is stable with them.
+    ExportHeavier,
 }
 
 impl DiagnosticKind {
@@ -79,6 +83,7 @@ impl DiagnosticKind {
             Self::ReferenceUnknown => "reference-unknown",
             Self::ActuatorUnstable => "actuator-unstable",
             Self::InitialOverlap => "initial-overlap",
+            Self::ClearanceIgnored => "clearance-ignored",
             Self::InitialPositionClamped => "initial-position-clamped",
             Self::FollowerStartsBeyondLimits => "follower-starts-beyond-limits",
             Self::MimicPositionIgnored => "mimic-position-ignored",
@@ -88,6 +93,7 @@ impl DiagnosticKind {
             Self::OpenMesh => "open-mesh",
             Self::CoarsePieces => "coarse-pieces",
             Self::ExportReduced => "export-reduced",
+            Self::ExportHeavier => "export-heavier",
         }
     }
 }

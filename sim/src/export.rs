@@ -4,6 +4,7 @@ use crate::compile::{Simulation, document};
 use crate::contents::Contents;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::drive::actuator::{Scheme, stable_timestep_of};
+use crate::drive::plan::JointPlan;
 use crate::error::{Error, Result};
 use crate::mj::Target;
 use crate::mjcf::document::{Integrator, Keyframe, MaterialAsset, MeshAsset, MeshContent, Mjcf, TextureAsset};
@@ -54,7 +55,9 @@ pub(crate) fn dump(
     for (target, file) in [(Target::V2, "robot.mjcf2.xml"), (Target::V4, "robot.mjcf4.xml")] {
         let purpose = Purpose::Export(&assets);
         let (mut mjcf, _, _) = document(cfg, contents, &simulation.excluded, &purpose, empty.clone())?;
-        prepare_for_plain_mujoco(&mut mjcf, robots, target, simulation);
+        let heavier = prepare_for_plain_mujoco(&mut mjcf, robots, target, simulation);
+        // The same in both files.
+        left_out.extend(heavier.filter(|_| target == Target::V2));
         let reduced = reduced(&mjcf, target, file);
         mjcf.comments.extend(reduced.iter().map(|diagnostic| diagnostic.message.clone()));
         left_out.extend(reduced);
@@ -88,18 +91,55 @@ fn write_file(path: &Path, text: &str) -> Result<()> {
     std::fs::write(path, text).map_err(at(path))
 }
 
-/// What a viewer without our drives needs to know and to have.
-fn prepare_for_plain_mujoco(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], target: Target, simulation: &Simulation) {
+/// The time step of an export whose drives have armatures of their own \[s\]: MuJoCo's default.
+const ARMATURE_STEP: f64 = 0.002;
+
+/// Gives the drives of robots with followers an armature of `step` times their damping, where plain MuJoCo needs it: explicit
+/// drives are then as stable as those with implicit damping, `(M + h kd) a = -kp (q - q*) - kd v`, and couplings are solved with
+/// the same inertia. Returns the plans with these armatures, and the uids of the robots that have them.
+fn add_armatures(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], step: f64) -> (Vec<Vec<JointPlan>>, Vec<String>) {
+    let mut heavier = Vec::new();
+    let mut of_robot = |robot: &Arc<RobotData>| {
+        let mut plans = robot.plans().to_vec();
+        let bound = stable_timestep_of(Scheme::Explicit, robot.description(), &plans, !robot.cfg().fix_base);
+        if !plans.iter().any(|plan| plan.mimic.is_some()) || bound.is_none_or(|bound| step <= 0.9 * bound) {
+            return plans;
+        }
+        for plan in &mut plans {
+            let Some(actuator) = plan.actuator else { continue };
+            let name = format!("{}/{}", robot.uid(), robot.description().joint(plan.joint).name);
+            let joints = mjcf.bodies.iter_mut().flat_map(|body| &mut body.joints);
+            // Joints of MJCF files are written as they are.
+            let Some(joint) = joints.into_iter().find(|joint| joint.name == name) else { continue };
+            joint.armature += step * actuator.kd;
+            plan.armature += step * actuator.kd;
+            if heavier.last().is_none_or(|last| last != robot.uid()) {
+                heavier.push(robot.uid().to_owned());
+            }
+        }
+        plans
+    };
+    let plans = robots.iter().map(&mut of_robot).collect();
+    (plans, heavier)
+}
+
+/// What a viewer without our drives needs to know and to have. Returns what was given up for it.
+fn prepare_for_plain_mujoco(
+    mjcf: &mut Mjcf,
+    robots: &[Arc<RobotData>],
+    target: Target,
+    simulation: &Simulation,
+) -> Option<Diagnostic> {
+    let followers = robots.iter().flat_map(|r| r.plans()).any(|plan| plan.mimic.is_some());
+    let step = mjcf.option.timestep.min(ARMATURE_STEP);
+    let (plans, heavier) = add_armatures(mjcf, robots, step);
     let bound = |scheme| {
-        robots
-            .iter()
-            .filter_map(|r| stable_timestep_of(scheme, r.description(), r.plans(), !r.cfg().fix_base))
+        let each = robots.iter().zip(&plans);
+        each.filter_map(|(r, plans)| stable_timestep_of(scheme, r.description(), plans, !r.cfg().fix_base))
             .fold(f64::INFINITY, f64::min)
     };
     let (explicit, implicit) = (bound(Scheme::Explicit), bound(Scheme::ImplicitDamping));
-    let plans = || robots.iter().flat_map(|r| r.plans());
-    let followers = plans().any(|plan| plan.mimic.is_some());
-    let limited = plans().any(|plan| plan.actuator.is_some() && plan.max_effort.is_finite());
+    let limited = plans.iter().flatten().any(|plan| plan.actuator.is_some() && plan.max_effort.is_finite());
     let (version, integrator) = match target {
         Target::V2 => ("2.2.2", Integrator::Implicit),
         Target::V4 => ("4.x", Integrator::ImplicitFast),
@@ -109,10 +149,8 @@ fn prepare_for_plain_mujoco(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], target: 
     // Why each bound holds, and how it was measured: docs/decisions/0004.
     let (largest, why) = if followers && explicit.is_finite() {
         // MuJoCo solves couplings before its implicit damping slows the drivers: followers run away from them. Its
-        // explicit integrator (2.2.2) and saturated drives of implicitfast (4.x) do not have that.
-        if target == Target::V2 {
-            mjcf.option.integrator = Integrator::Euler;
-        }
+        // explicit integrator does not have that.
+        mjcf.option.integrator = Integrator::Euler;
         (explicit, ": joints that follow others (mimic) and stiff drives do not go together in implicit integrators.")
     } else if target == Target::V2 {
         (implicit, "; saturated drives are sluggish.")
@@ -128,6 +166,17 @@ fn prepare_for_plain_mujoco(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], target: 
     });
     if target == Target::V4 && limited && !followers && implicit.is_finite() {
         mjcf.comments.push(format!("While no drive saturates, up to {implicit:.3e} s."));
+    }
+    let given_up = (!heavier.is_empty()).then(|| {
+        format!(
+            "{}: its drives have an armature of {step} s times their damping in the export, so that plain MuJoCo is stable with \
+             followers (mimic) at a time step of {step} s; a drive at its effort limit accelerates more slowly for that",
+            heavier.join(", ")
+        )
+    });
+    mjcf.comments.extend(given_up.clone());
+    if !heavier.is_empty() {
+        mjcf.option.timestep = step;
     }
     // Whoever opens the file finds a robot that holds its start, however slowly its time passes.
     let holds_up_to = if followers { explicit } else { implicit };
@@ -155,6 +204,7 @@ fn prepare_for_plain_mujoco(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], target: 
     if !qpos.is_empty() {
         mjcf.keyframes.push(Keyframe { name: "start".into(), qpos, ctrl });
     }
+    given_up.map(|message| Diagnostic::new(DiagnosticKind::ExportHeavier, None, message))
 }
 
 /// A number that reads well: two digits, at most 5 % off.

@@ -132,6 +132,11 @@ impl SimulationManager {
         self.simulation.batch.threads()
     }
 
+    /// Number of threads that draw and cast rays for sensors. It does not depend on the number of environments.
+    pub fn sensor_threads(&self) -> usize {
+        self.cfg.threads.unwrap_or_else(crate::compile::all_cores)
+    }
+
     /// Adds a robot to every environment. The model is compiled here, so that whatever is wrong is said here; on an
     /// error the simulation is as it was. What exists already keeps its state, to the last bit.
     ///
@@ -158,6 +163,7 @@ impl SimulationManager {
         let mut diagnostics = Vec::new();
         let so_far = (self.contents.robots.len(), self.simulation.batch.model());
         let robot = RobotData::load(cfg, role, &self.cfg, so_far, self.contents.next_mask_id(), &mut diagnostics)?;
+        let robot = robot.with_clearance(&self.cfg, &self.contents, &mut diagnostics)?;
         let mut contents = self.contents.clone();
         contents.robots.push(Arc::new(robot));
         self.replace_contents(contents, diagnostics)?;
@@ -354,7 +360,7 @@ impl SimulationManager {
             own_scenes,
             rebuilt: false,
             ray_assets: self.ray_assets.clone(),
-            threads: self.cfg.threads.unwrap_or_else(crate::compile::all_cores),
+            threads: self.sensor_threads(),
             crew: self.crew.clone(),
         }
     }

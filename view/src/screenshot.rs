@@ -108,8 +108,8 @@ pub trait Screenshot {
     /// that do not exist. What was there before is there then.
     fn screenshot_with(&mut self, path: impl AsRef<Path>, cfg: &ScreenshotCfg) -> Result<(), ScreenshotError>;
 
-    /// From where all environments are in the picture, as they are now.
-    fn overview_eye(&mut self) -> Eye;
+    /// From where all environments fill an image of `size` pixels, as they are now.
+    fn overview_eye(&mut self, size: [usize; 2]) -> Eye;
 
     /// The picture itself, four bytes per pixel.
     ///
@@ -134,9 +134,9 @@ impl Screenshot for SimulationManager {
         written.map_err(|error| ScreenshotError::File { path: path.into(), error: Arc::new(error) })
     }
 
-    fn overview_eye(&mut self) -> Eye {
+    fn overview_eye(&mut self, size: [usize; 2]) -> Eye {
         let snapshot = Pool::default().take(self, 1, &Wants::NOTHING, Run::default());
-        snapshot.map_or_else(Eye::default, |snapshot| Eye::overview(&snapshot))
+        snapshot.map_or_else(Eye::default, |snapshot| Eye::overview(&snapshot, size))
     }
 
     fn picture_of_stage(&mut self, cfg: &ScreenshotCfg) -> Result<Canvas, ScreenshotError> {
@@ -156,7 +156,7 @@ impl Screenshot for SimulationManager {
         let mut canvas = Canvas::default();
         // A pool of one has one to give.
         let Some(snapshot) = Pool::default().take(self, 1, &wants, run) else { return Ok(canvas) };
-        let view = cfg.eye.unwrap_or_else(|| everything(&snapshot, cfg.shown)).view(width, height);
+        let view = cfg.eye.unwrap_or_else(|| everything(&snapshot, cfg.shown, cfg.size)).view(width, height);
         let look = Look { shown: cfg.shown, overlays: cfg.overlays, ..Look::default() };
         let cores = || std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
         let mut painter = Painter::new(cfg.threads.unwrap_or_else(cores).max(1));
@@ -165,14 +165,11 @@ impl Screenshot for SimulationManager {
     }
 }
 
-/// From where all that is shown is in the picture.
-fn everything(snapshot: &Snapshot, shown: Shown) -> Eye {
+/// From where all that is shown fills the image.
+fn everything(snapshot: &Snapshot, shown: Shown, size: [usize; 2]) -> Eye {
     match shown {
-        Shown::All => Eye::overview(snapshot),
-        Shown::One(env) => {
-            let envs = snapshot.envs.get(env).into_iter().cloned().collect();
-            Eye::overview(&Snapshot { envs, ..Snapshot::default() })
-        }
+        Shown::All => Eye::overview(snapshot, size),
+        Shown::One(env) => Eye::overview(&snapshot.only(env), size),
     }
 }
 
@@ -204,7 +201,7 @@ mod tests {
         let image = written(&mut sim);
         assert_eq!(state(&sim), before);
         let snapshot = sim.viewer(Wants::default()).newest().unwrap();
-        let (mut canvas, eye) = (Canvas::default(), Eye::overview(&snapshot));
+        let (mut canvas, eye) = (Canvas::default(), Eye::overview(&snapshot, [960, 540]));
         Painter::new(1).draw(&snapshot, &eye.view(960, 540), &Look::default(), &mut canvas).unwrap();
         assert_eq!((image.dimensions(), image.as_raw().as_slice()), ((960, 540), canvas.bytes()));
         assert!(red(&image) > 100, "the cubes are red: {}", red(&image));

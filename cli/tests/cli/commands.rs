@@ -1,6 +1,7 @@
 //! `check`, `convert`, `render`, `bench` and the help: what they print and write, and their exit codes.
 
 use super::support::{ARM, Shell};
+use super::view::SCENE;
 
 const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="0 0 1">
   <joint name="pin" type="hinge" axis="0 1 0" range="-90 90" limited="true"/>
@@ -52,9 +53,10 @@ fn line_of_error() {
     let hinge = "type=\"hinge\" axis=\"0 1 0\" range=\"-90 90\" limited=\"true\"";
     let shell = Shell::with(&[
         ("unknown.xml", &PENDULUM.replace("size=", "sise=")),
-        // A mass that the compiler refuses; a joint that robots do not have.
+        // A mass that the compiler refuses.
         ("mass.xml", &PENDULUM.replace("mass=\"1\"", "mass=\"-1\"")),
-        ("ball.xml", &PENDULUM.replace(hinge, "type=\"ball\"")),
+        // An attribute of a ball joint that nobody knows.
+        ("ball.xml", &PENDULUM.replace(hinge, "type=\"ball\" no_such=\"1\"")),
         ("arm.urdf", &ARM.replace("xyz=\"0 1 0\"", "xyz=\"0 x 0\"")),
     ]);
     for line in ["check", "view", "bench", "render -o a.png", "convert -o a.png"] {
@@ -121,11 +123,29 @@ fn bench() {
 
 #[test]
 fn refusals() {
-    let shell = Shell::with(&[("arm.urdf", ARM), ("pendulum.xml", PENDULUM)]);
+    let shell = Shell::with(&[
+        ("arm.urdf", ARM),
+        ("pendulum.xml", PENDULUM),
+        ("scene.toml", "[entities.arm]\ntype = \"robot\"\nurdf = \"arm.urdf\"\n"),
+        ("broken.toml", "[entities.arm]\ntype = \"robott\"\n"),
+        ("image.png", "\u{89}PNG"),
+        ("mesh.stl", "solid"),
+        ("run.mcap", ""),
+    ]);
     shell.assert_refused(&[
         ("unknown", "unknown"),
         ("check no_such.urdf", "no such file"),
-        ("check arm.urdf pendulum.xml", "MJCF file is a model of its own"),
+        ("check arm.urdf pendulum.xml", "an MJCF file is a model of its own"),
+        ("check arm.urdf scene.toml", "a scene file is a scene of its own"),
+        ("check scene.toml --qpos hinge=1", "--qpos hinge"),
+        ("check scene.toml --package a=.", "--package a"),
+        ("bench scene.toml --floating-base", "--floating-base"),
+        ("bench scene.toml --spawn-height 1", "--spawn-height"),
+        ("bench arm.urdf --spawn-height nan", "--spawn-height NaN"),
+        ("view image.png", "image.png is an image; this command takes URDF files"),
+        ("render mesh.stl -o a.png", "mesh.stl is a mesh; this command takes URDF files"),
+        ("bench run.mcap", "run.mcap is a recording; this command takes URDF files"),
+        ("render broken.toml -o a.png", "broken.toml:2"),
         ("check arm.urdf --qpos hing=1", "hinge"),
         ("check pendulum.xml --qpos pi=1", "pin"),
         ("render arm.urdf -o a.gif", ".png"),
@@ -162,4 +182,142 @@ fn help() {
             assert!(out.contains("Exit codes: 0"), "{command} {flag}: {out}");
         }
     }
+}
+
+/// A box of 1 kg with its origin in the middle, and a leg below.
+const BOX: &str = r#"<robot name="box"><link name="body">
+  <inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  <visual><geometry><box size="0.4 0.4 0.2"/></geometry></visual>
+  <collision><geometry><box size="0.4 0.4 0.2"/></geometry></collision></link>
+  <link name="leg"><inertial><mass value="0.1"/><inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0 0 -0.25"/><geometry><cylinder radius="0.05" length="0.5"/></geometry></collision></link>
+  <joint name="hip" type="revolute"><parent link="body"/><child link="leg"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="50" velocity="1"/></joint></robot>"#;
+
+/// A robot on a free base starts on the ground; one that is bolted in the ground is reported with depth and flags.
+///
+/// Cause: the root link was put at height 0 whatever hung below it, so that robots on legs started inside of the ground.
+#[test]
+fn starts_on_the_ground() {
+    let shell = Shell::with(&[("box.urdf", BOX)]);
+    // The leg ends 0.5 m below the root link.
+    let start = |flags: &str| -> f64 {
+        let line =
+            format!("view box.urdf {flags} --serve 127.0.0.1:0 --speed 1000 --steps 1 --record a.mcap --overwrite");
+        let (out, err, code) = shell.run(&line);
+        assert_eq!(code, 0, "{line}: {out}{err}");
+        let scene = kinetoscope::record::Recording::open(shell.path("a.mcap")).unwrap();
+        let (mut film, mut sim) = kinetoscope::record::Film::of(&scene, None).unwrap();
+        film.show(&mut sim, 0).unwrap();
+        // A recorded scene is one part.
+        let part = sim.mjcf_part(sim.mjcf_id("scene").unwrap());
+        part.body_pose("robot/body").unwrap()[(0, 2)]
+    };
+    for (flags, height) in
+        [("--floating-base", 0.5), ("--floating-base --spawn-height 0.25", 0.75), ("--spawn-height 1", 1.5)]
+    {
+        let found = start(flags);
+        assert!((found - height).abs() < 1e-9, "{flags}: {found}");
+    }
+    let bench = "bench box.urdf --num-envs 1 --seconds 0.01 --width 64";
+    let (_, err, code) = shell.run(bench);
+    assert_eq!(code, 1, "{err}");
+    for words in ["\"leg\"", "0.500 m below the ground", "--spawn-height 0", "--floating-base", "--no-ground"] {
+        assert!(err.contains(words), "{words}: {err}");
+    }
+    for flag in ["--spawn-height 0", "--no-ground", "--floating-base"] {
+        shell.ok(&format!("{bench} {flag}"));
+    }
+}
+
+/// A simulation that diverges has no rate.
+///
+/// Cause: steps were counted whether environments did them or stood still after they diverged.
+#[test]
+fn bench_of_a_diverged_simulation() {
+    // 1e-9 kg m² under 1e8 N m: MuJoCo calls it unstable in the first steps.
+    let wild = r#"<mujoco><worldbody><body name="a" pos="0 0 1"><joint name="j" axis="0 1 0" stiffness="-1e15"/>
+      <geom size="0.01" pos="0.1 0 0" mass="0.001"/></body></worldbody></mujoco>"#;
+    let shell = Shell::with(&[("wild.xml", wild)]);
+    let (out, err, code) = shell.run("bench wild.xml --num-envs 2 --seconds 0.2 --width 64");
+    assert_eq!((out.as_str(), code), ("", 2), "{err}");
+    assert!(err.contains("diverged in all 2 environments") && err.contains("step "), "{err}");
+    assert!(!err.contains("environment steps per second"), "{err}");
+}
+
+/// Scene files, and MJCF files that are no robot, are taken by every command.
+///
+/// Cause: only `view` and `render` took MJCF files that are no robot, and no command took scene files.
+#[test]
+fn scenes() {
+    let toml = "[simulation]\nnum_envs = 3\n[entities.arm]\ntype = \"robot\"\nurdf = \"arm.urdf\"\n\
+                [entities.cube]\ntype = \"rigid_object\"\nshape.box.size = [0.1, 0.1, 0.1]\ninit_pose.pos = [1, 0, 0.05]\n";
+    let yaml = "simulation: {num_envs: 3}\nentities:\n  arm: {type: robot, urdf: arm.urdf}\n  \
+                cube: {type: rigid_object, shape: {box: {size: [0.1, 0.1, 0.1]}}, init_pose: {pos: [1, 0, 0.05]}}\n";
+    let json = r#"{"simulation": {"num_envs": 3}, "entities": {"arm": {"type": "robot", "urdf": "arm.urdf"},
+      "cube": {"type": "rigid_object", "shape": {"box": {"size": [0.1, 0.1, 0.1]}}, "init_pose": {"pos": [1, 0, 0.05]}}}}"#;
+    let mocap = SCENE.replace("<freejoint/>", "").replace("pos=\"1 0 1\"", "pos=\"1 0 1\" mocap=\"true\"");
+    let still = "<mujoco><option timestep=\"0.01\"/><worldbody><geom size=\"1\"/></worldbody></mujoco>";
+    let files = [
+        ("arm.urdf", ARM),
+        ("s.toml", toml),
+        ("s.yaml", yaml),
+        ("s.json", json),
+        ("b.xml", SCENE),
+        ("m.xml", &mocap),
+        ("n.xml", still),
+    ];
+    let shell = Shell::with(&files);
+    for (file, _) in &files[1..] {
+        let out = shell.ok(&format!("bench {file} --seconds 0.01 --width 64"));
+        let envs = if file.ends_with(".xml") { "64 environments" } else { "3 environments" };
+        assert!(out.starts_with(envs), "{file}: {out}");
+        shell.ok(&format!("view {file} --serve 127.0.0.1:0 --speed 1000 --steps 2"));
+        shell.ok(&format!("render {file} -o {file}.png --width 64"));
+        assert_eq!(shell.image(&format!("{file}.png")).width(), 64);
+        shell.ok(&format!("convert {file} -o {file}.d"));
+        let out = shell.ok(&format!("check {file} --json {file}.json"));
+        assert!(out.contains("a scene"), "{file}: {out}");
+        let report = std::fs::read_to_string(shell.path(&format!("{file}.json"))).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        if file.ends_with(".xml") {
+            let mass = if *file == "n.xml" { 0.0 } else { 2.0 };
+            assert_eq!(report["total_mass"].as_f64().unwrap(), mass, "{file}");
+        } else {
+            assert_eq!(report["robots"]["arm"]["total_mass"].as_f64().unwrap(), 2.0, "{file}");
+            assert!(out.contains("hinge") && out.contains("cube") && out.contains("rigid object"), "{file}: {out}");
+        }
+    }
+}
+
+/// MuJoCo 2.2.2 says of a newer file what it needs, with the line, also of an included file; MuJoCo 4 takes the file.
+///
+/// Cause: its words alone ("Schema violation") do not tell an old program from a wrong file, and for defaults and included
+/// files it names line 0 or a line of a file that it does not name.
+#[test]
+fn newer_mjcf() {
+    let with = |joint: &str| PENDULUM.replace("<joint ", &format!("<joint {joint} "));
+    let included = "<mujocoinclude>\n <default>\n  <joint actuatorfrcrange=\"-1 1\"/></default></mujocoinclude>";
+    let main = PENDULUM.replace("<worldbody>", "\n<include file=\"part.xml\"/><worldbody>");
+    let shell = Shell::with(&[
+        ("force.xml", &with("actuatorfrcrange=\"-1 1\"")),
+        ("main.xml", &main),
+        ("part.xml", included),
+        ("wrong.xml", &with("actuatorfrcrang=\"-1 1\"")),
+    ]);
+    let is_old = kinetoscope::sim::mj::TARGET == kinetoscope::sim::mj::Target::V2;
+    for (file, place, since) in [("force.xml", "force.xml:2", "2.3.7"), ("main.xml", "part.xml:3", "2.3.7")] {
+        if is_old {
+            let err = shell.refused(&format!("render {file} -o a.png"));
+            for words in [place, "actuatorfrcrange", since, "MUJOCO_DIR"] {
+                assert!(err.contains(words), "{file}: {words}: {err}");
+            }
+            assert!(!err.contains("; ;"), "{err}");
+        } else {
+            shell.ok(&format!("render {file} -o a.png --width 64"));
+        }
+    }
+    // The control: a word that no known version has.
+    let err = shell.refused("render wrong.xml -o a.png");
+    assert!(err.contains("wrong.xml:2") && err.contains("If it is no mistake") == is_old, "{err}");
 }

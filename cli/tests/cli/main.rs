@@ -16,6 +16,9 @@ mod view;
 #[path = "../../src/excerpt.rs"]
 mod excerpt;
 #[allow(dead_code, reason = "only its tests are run")]
+#[path = "../../src/file_kind.rs"]
+mod file_kind;
+#[allow(dead_code, reason = "only its tests are run")]
 #[path = "../../src/names.rs"]
 mod names;
 #[allow(dead_code, reason = "only its tests are run")]

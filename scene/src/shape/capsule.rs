@@ -1,7 +1,7 @@
 //! A cylinder with round ends.
 
 use super::grid::{arc, revolve};
-use super::ShapeImpl;
+use super::{ShapeImpl, norm};
 use crate::mesh::TriMesh;
 
 /// A cylinder along z with half a ball on each end.
@@ -25,6 +25,10 @@ impl ShapeImpl for Capsule {
     fn aabb(&self) -> [[f32; 3]; 2] {
         let (r, z) = (self.radius, self.radius + self.half_length);
         [[-r, -r, -z], [r, r, z]]
+    }
+
+    fn support(&self, direction: [f64; 3]) -> f64 {
+        f64::from(self.radius) * norm(direction) + f64::from(self.half_length) * direction[2].abs()
     }
 
     fn sizes(&self) -> Vec<f32> {

@@ -46,14 +46,13 @@ fn angles(mesh: &TriMesh, t: &[u32; 3]) -> [f32; 3] {
 }
 
 /// Normals of the three corners of every triangle: the mean, weighted by angle, over the triangles around the corner that
-/// are within `crease` \[rad\] of this one.
-pub(super) fn corner_normals(mesh: &TriMesh, crease: f32) -> Vec<[[f32; 3]; 3]> {
+/// are within `crease` \[rad\] of this one. `welded` has for each vertex the first one at the same place.
+pub(super) fn corner_normals(mesh: &TriMesh, welded: &[u32], crease: f32) -> Vec<[[f32; 3]; 3]> {
     let faces = face_normals(mesh);
     if let Some(normals) = &mesh.normals {
         let of = |(t, face): (&[u32; 3], &[f32; 3])| t.map(|i| unit(normals[i as usize]).unwrap_or(*face));
         return mesh.triangles.iter().zip(&faces).map(of).collect();
     }
-    let welded = weld(&mesh.positions);
     let weights: Vec<_> = mesh.triangles.iter().map(|t| angles(mesh, t)).collect();
     // Corners around each vertex, in one array: `corners[start[v]..start[v + 1]]`.
     let mut start = vec![0u32; mesh.positions.len() + 1];

@@ -1,7 +1,7 @@
 //! A cylinder.
 
-use super::grid::revolve;
 use super::ShapeImpl;
+use super::grid::revolve;
 use crate::mesh::TriMesh;
 
 /// A cylinder along z with flat ends.
@@ -22,6 +22,11 @@ impl ShapeImpl for Cylinder {
     fn aabb(&self) -> [[f32; 3]; 2] {
         let (r, h) = (self.radius, self.half_length);
         [[-r, -r, -h], [r, r, h]]
+    }
+
+    fn support(&self, direction: [f64; 3]) -> f64 {
+        let [x, y, z] = direction;
+        f64::from(self.radius) * x.hypot(y) + f64::from(self.half_length) * z.abs()
     }
 
     fn sizes(&self) -> Vec<f32> {

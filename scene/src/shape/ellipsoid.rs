@@ -1,7 +1,7 @@
 //! A stretched ball.
 
 use super::sphere::Sphere;
-use super::ShapeImpl;
+use super::{ShapeImpl, norm};
 use crate::mesh::TriMesh;
 
 /// A ball stretched along its axes.
@@ -18,6 +18,10 @@ impl ShapeImpl for Ellipsoid {
 
     fn aabb(&self) -> [[f32; 3]; 2] {
         [self.radii.map(|r| -r), self.radii]
+    }
+
+    fn support(&self, direction: [f64; 3]) -> f64 {
+        norm([0, 1, 2].map(|k| f64::from(self.radii[k]) * direction[k]))
     }
 
     fn sizes(&self) -> Vec<f32> {

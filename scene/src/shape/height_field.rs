@@ -1,6 +1,6 @@
 //! Terrain.
 
-use super::{RenderMesh, ShapeImpl};
+use super::{RenderMesh, ShapeImpl, largest};
 use crate::mesh::TriMesh;
 use std::sync::Arc;
 
@@ -57,7 +57,9 @@ impl HeightField {
             }
         }
         let mesh = TriMesh::from_triangles(positions, triangles);
-        let mesh = Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE));
+        // Its rim is below all heights where there is a floor: the surface is closed.
+        let prepare = if bottom > 0.0 { RenderMesh::of_closed } else { RenderMesh::new };
+        let mesh = Arc::new(prepare(&mesh, RenderMesh::CREASE));
         Some(Self { size, rows, columns, elevation: elevation.into(), mesh })
     }
 
@@ -94,6 +96,10 @@ impl ShapeImpl for HeightField {
 
     fn aabb(&self) -> [[f32; 3]; 2] {
         self.mesh.bounds()
+    }
+
+    fn support(&self, direction: [f64; 3]) -> f64 {
+        largest(self.mesh.positions(), direction)
     }
 
     fn sizes(&self) -> Vec<f32> {

@@ -1,6 +1,6 @@
 //! Triangles as a shape.
 
-use super::{RenderMesh, ShapeImpl};
+use super::{RenderMesh, ShapeImpl, largest};
 use crate::mesh::TriMesh;
 use std::sync::Arc;
 
@@ -18,6 +18,10 @@ impl ShapeImpl for Mesh {
 
     fn aabb(&self) -> [[f32; 3]; 2] {
         self.mesh.bounds()
+    }
+
+    fn support(&self, direction: [f64; 3]) -> f64 {
+        largest(self.mesh.positions(), direction)
     }
 
     fn sizes(&self) -> Vec<f32> {

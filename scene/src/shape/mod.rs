@@ -20,8 +20,22 @@ trait ShapeImpl {
     /// Smallest and largest coordinates \[m\]; infinite where the shape is.
     fn aabb(&self) -> [[f32; 3]; 2];
 
+    /// The largest coordinate along a direction, times the length of the direction \[m\].
+    fn support(&self, direction: [f64; 3]) -> f64;
+
     /// The sizes that must be positive and finite.
     fn sizes(&self) -> Vec<f32>;
+}
+
+fn norm(a: [f64; 3]) -> f64 {
+    a.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// The largest coordinate of points along a direction, times its length; negative infinity without points.
+fn largest(points: &[[f32; 3]], direction: [f64; 3]) -> f64 {
+    let [x, y, z] = direction;
+    let along = |p: &[f32; 3]| x * f64::from(p[0]) + y * f64::from(p[1]) + z * f64::from(p[2]);
+    points.iter().map(along).fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Declares the shapes: a module with a type of its own each.
@@ -53,6 +67,11 @@ macro_rules! shapes {
             /// Smallest and largest coordinates \[m\]; infinite where the shape is.
             pub fn aabb(&self) -> [[f32; 3]; 2] {
                 match self { $(Self::$Name(shape) => ShapeImpl::aabb(shape),)* }
+            }
+
+            /// The largest coordinate along a direction, times the length of the direction \[m\]; infinite where the shape is.
+            pub fn support(&self, direction: [f64; 3]) -> f64 {
+                match self { $(Self::$Name(shape) => ShapeImpl::support(shape, direction),)* }
             }
 
             /// The first size that is not a positive finite number.

@@ -27,6 +27,15 @@ impl ShapeImpl for Plane {
         [[-x, -y, 0.], [x, y, 0.]]
     }
 
+    fn support(&self, direction: [f64; 3]) -> f64 {
+        let along = |k: usize| match (f64::from(self.half[k]), direction[k].abs()) {
+            (_, 0.0) => 0.0,
+            (0.0, _) => f64::INFINITY,
+            (half, along) => half * along,
+        };
+        along(0) + along(1)
+    }
+
     fn sizes(&self) -> Vec<f32> {
         self.half.iter().copied().filter(|&h| h != 0.0).collect()
     }

@@ -4,6 +4,7 @@ use super::crease::{corner_normals, cross, dot, sub, unit, weld};
 use super::lod::{self, Level};
 use crate::mesh::{MeshPart, TriMesh};
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::OnceLock;
 
 /// A mesh prepared for drawing, once per asset and shared by all environments.
@@ -59,32 +60,67 @@ impl RenderMesh {
     ///
     /// Where `mesh` breaks the promises of [`TriMesh`].
     pub fn new(mesh: &TriMesh, crease: f32) -> Self {
-        let corner_normals = corner_normals(mesh, crease);
-        let closed = closed_triangles(mesh);
+        let welded = weld(&mesh.positions);
+        let closed = closed_triangles(mesh, &welded);
+        Self::prepare(mesh, crease, &welded, &closed)
+    }
+
+    /// The same of a closed surface whose vertices are all at different places, such as that of a height field: it takes a
+    /// fraction of the time, since nothing is searched for.
+    pub(super) fn of_closed(mesh: &TriMesh, crease: f32) -> Self {
+        let welded: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+        Self::prepare(mesh, crease, &welded, &vec![true; mesh.triangles.len()])
+    }
+
+    /// `welded` has for each vertex the first one at the same place, `closed` for each triangle whether its surface is closed.
+    fn prepare(mesh: &TriMesh, crease: f32, welded: &[u32], closed: &[bool]) -> Self {
+        /// No vertex.
+        const NONE: u32 = u32::MAX;
+        let corner_normals = corner_normals(mesh, welded, crease);
         let mut order: Vec<(u32, u32)> = curve(mesh).into_iter().zip(0..).collect();
         order.sort_unstable();
         let mut out = Self { uvs: mesh.uvs.as_ref().map(|_| Vec::new()), ..Self::default() };
         out.bounds = mesh.bounds().map_or([[0.; 3]; 2], |(lo, hi)| [lo, hi]);
-        let mut seen = HashMap::new();
+        // The vertices that were made of each vertex of `mesh`, one for each normal, as lists: the last one, and for each the
+        // one before.
+        let (mut last, mut before) = (vec![NONE; mesh.positions.len()], Vec::new());
+        let mut places = Vec::new();
         for &(_, k) in &order {
             let (t, normals) = (mesh.triangles[k as usize], corner_normals[k as usize]);
             let triangle = [0, 1, 2].map(|c| {
                 let (i, n) = (t[c] as usize, normals[c]);
-                *seen.entry((t[c], n.map(f32::to_bits))).or_insert_with(|| {
-                    out.positions.push(mesh.positions[i]);
-                    out.normals.push(n);
-                    if let (Some(to), Some(from)) = (&mut out.uvs, &mesh.uvs) {
-                        to.push(from[i]);
-                    }
-                    out.positions.len() as u32 - 1
-                })
+                let mut at = last[i];
+                while at != NONE && out.normals[at as usize].map(f32::to_bits) != n.map(f32::to_bits) {
+                    at = before[at as usize];
+                }
+                if at != NONE {
+                    return at;
+                }
+                out.positions.push(mesh.positions[i]);
+                out.normals.push(n);
+                if let (Some(to), Some(from)) = (&mut out.uvs, &mesh.uvs) {
+                    to.push(from[i]);
+                }
+                places.push(welded[i]);
+                before.push(last[i]);
+                last[i] = out.positions.len() as u32 - 1;
+                last[i]
             });
             out.triangles.push(triangle);
         }
-        for first in (0..order.len()).step_by(Self::CLUSTER) {
+        // For each place the last cluster that has it, and the number of its vertex there.
+        let mut known = vec![(NONE, 0u8); mesh.positions.len()];
+        for (cluster, first) in (0..).zip((0..order.len()).step_by(Self::CLUSTER)) {
             let end = (first + Self::CLUSTER).min(order.len());
             let all_closed = order[first..end].iter().all(|&(_, k)| closed[k as usize]);
-            out.push_cluster(first, end, all_closed);
+            out.push_cluster(first..end, all_closed, |vertex, next| {
+                let known = &mut known[places[vertex as usize] as usize];
+                let is_new = known.0 != cluster;
+                if is_new {
+                    *known = (cluster, next);
+                }
+                (known.1, is_new)
+            });
         }
         out
     }
@@ -113,23 +149,31 @@ impl RenderMesh {
         Self::new(&out, crease)
     }
 
-    fn push_cluster(&mut self, first: usize, end: usize, closed: bool) {
+    /// Adds a cluster of triangles. `number` gives the number of a vertex in the cluster, which is the number given where it is
+    /// new, and whether it is.
+    fn push_cluster(
+        &mut self,
+        Range { start: first, end }: Range<usize>,
+        closed: bool,
+        mut number: impl FnMut(u32, u8) -> (u8, bool),
+    ) {
         let first_lane = self.lanes[0].len();
-        let mut local: HashMap<[u32; 3], u8> = HashMap::new();
         let (mut lo, mut hi) = ([f32::MAX; 3], [f32::MIN; 3]);
         let mut axis = [0.0f32; 3];
         let mut faces = Vec::new();
         for k in first..end {
-            let p = self.triangles[k].map(|i| self.positions[i as usize]);
-            let corner = p.map(|p| {
+            let triangle = self.triangles[k];
+            let p = triangle.map(|i| self.positions[i as usize]);
+            let corner = [0, 1, 2].map(|c| {
                 let next = (self.lanes[0].len() - first_lane) as u8;
-                *local.entry(p.map(f32::to_bits)).or_insert_with(|| {
+                let (number, is_new) = number(triangle[c], next);
+                if is_new {
                     for a in 0..3 {
-                        self.lanes[a].push(p[a]);
-                        (lo[a], hi[a]) = (lo[a].min(p[a]), hi[a].max(p[a]));
+                        self.lanes[a].push(p[c][a]);
+                        (lo[a], hi[a]) = (lo[a].min(p[c][a]), hi[a].max(p[c][a]));
                     }
-                    next
-                })
+                }
+                number
             });
             self.corners.push(corner);
             if let Some(n) = unit(cross(sub(p[1], p[0]), sub(p[2], p[0]))) {
@@ -255,8 +299,7 @@ fn curve(mesh: &TriMesh) -> Vec<u32> {
 
 /// Which triangles belong to a connected surface where every edge has exactly one neighbour with the opposite direction,
 /// and that encloses a positive volume.
-fn closed_triangles(mesh: &TriMesh) -> Vec<bool> {
-    let welded = weld(&mesh.positions);
+fn closed_triangles(mesh: &TriMesh, welded: &[u32]) -> Vec<bool> {
     let mut edges: HashMap<(u32, u32), u32> = HashMap::with_capacity(mesh.triangles.len() * 3);
     let corners = |t: &[u32; 3]| t.map(|i| welded[i as usize]);
     for t in &mesh.triangles {

@@ -1,7 +1,7 @@
 //! A ball.
 
 use super::grid::{arc, revolve};
-use super::ShapeImpl;
+use super::{ShapeImpl, norm};
 use crate::mesh::TriMesh;
 
 /// A ball.
@@ -19,6 +19,10 @@ impl ShapeImpl for Sphere {
 
     fn aabb(&self) -> [[f32; 3]; 2] {
         [[-self.radius; 3], [self.radius; 3]]
+    }
+
+    fn support(&self, direction: [f64; 3]) -> f64 {
+        f64::from(self.radius) * norm(direction)
     }
 
     fn sizes(&self) -> Vec<f32> {

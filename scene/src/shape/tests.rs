@@ -37,6 +37,27 @@ fn tessellations() {
     }
 }
 
+/// A closed surface without vertices at equal places is prepared without a search for them, to the same bits.
+///
+/// Cause: a height field of 1024 x 1024 took 14.7 s, most of it in tables of edges and places that its grid does not need.
+#[test]
+fn closed_surfaces() {
+    let boxed = Box { half: [0.1, 0.2, 0.3] };
+    for mesh in [
+        Sphere { radius: 1.0 }.tessellate(64),
+        boxed.tessellate(1),
+        Cylinder { radius: 0.2, half_length: 0.4 }.tessellate(40),
+    ] {
+        let [all, closed] = [RenderMesh::new, RenderMesh::of_closed].map(|prepare| prepare(&mesh, RenderMesh::CREASE));
+        assert_eq!(format!("{all:?}"), format!("{closed:?}"));
+    }
+    // The control: an open surface is not closed.
+    let plane = Plane { half: [1.0, 2.0] }.tessellate(1);
+    assert!(
+        !RenderMesh::new(&plane, 0.5).clusters()[0].closed && RenderMesh::of_closed(&plane, 0.5).clusters()[0].closed
+    );
+}
+
 #[test]
 fn clusters() {
     let mesh = Sphere { radius: 1.0 }.tessellate(64);

@@ -35,7 +35,8 @@ const PRESETS: [(&str, Preset); 3] = [
 ];
 
 impl SceneCfg {
-    /// Reads a scene file with the built-in kinds of entities: YAML where its name ends in `.yaml` or `.yml`, TOML otherwise.
+    /// Reads a scene file with the built-in kinds of entities: YAML where its name ends in `.yaml` or `.yml`, JSON, which is
+    /// YAML too, where it ends in `.json`, TOML otherwise.
     ///
     /// # Errors
     /// As [`from_toml`](Self::from_toml) and [`from_yaml`](Self::from_yaml), and where the file cannot be read.
@@ -50,8 +51,8 @@ impl SceneCfg {
     pub fn from_file_with(path: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
         let path = path.as_ref();
         let text = std::fs::read_to_string(path).map_err(|error| Error::File { path: path.into(), error })?;
-        let is_yaml =
-            path.extension().is_some_and(|end| end.eq_ignore_ascii_case("yaml") || end.eq_ignore_ascii_case("yml"));
+        let yaml = ["yaml", "yml", "json"];
+        let is_yaml = path.extension().is_some_and(|end| yaml.iter().any(|yaml| end.eq_ignore_ascii_case(yaml)));
         if is_yaml { Self::from_yaml(&text, path, types) } else { Self::from_toml(&text, path, types) }
     }
 

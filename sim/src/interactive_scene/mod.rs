@@ -165,6 +165,11 @@ impl InteractiveScene {
         &mut self.sim
     }
 
+    /// The simulation alone; names of entities stay those of robots, objects and sensors in it.
+    pub fn into_sim(self) -> SimulationManager {
+        self.sim
+    }
+
     /// Number of environments.
     pub fn num_envs(&self) -> usize {
         self.sim.num_envs()

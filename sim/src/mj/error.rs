@@ -1,5 +1,7 @@
 //! What MuJoCo can say no to.
 
+use super::newer::Unknown;
+use super::version::{TARGET, Target, version_string};
 use crate::source::Source;
 
 /// MuJoCo's engine stopped a call (`mju_error`). The data it was called on is to be reset or dropped.
@@ -31,7 +33,18 @@ pub struct CompileError {
 
 impl CompileError {
     pub(crate) fn new(message: &str) -> Self {
-        Self { line: line_named_in(message), message: message.trim().replace('\n', "; "), source_line: None }
+        let lines: Vec<&str> = message.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+        Self { line: line_named_in(message), message: lines.join("; ") + &newer(message), source_line: None }
+    }
+
+    /// The same error with the place of the word that MuJoCo does not know, where it names no line of `file` itself.
+    pub(crate) fn placed_in(self, file: &std::path::Path) -> Self {
+        // Of a line, MuJoCo does not say whether it is of the file or of one that it includes.
+        if self.line.is_some() && !includes(file) {
+            return self;
+        }
+        let source_line = Unknown::of_message(&self.message).and_then(|unknown| unknown.find_in(file));
+        Self { source_line: source_line.or(self.source_line.clone()), ..self }
     }
 }
 
@@ -44,6 +57,29 @@ impl std::fmt::Display for CompileError {
     }
 }
 
+fn includes(file: &std::path::Path) -> bool {
+    std::fs::read_to_string(file).is_ok_and(|text| text.contains("<include"))
+}
+
+/// What follows a complaint of a word that 2.2.2 does not know: that a newer MuJoCo may know it.
+fn newer(message: &str) -> String {
+    if TARGET != Target::V2 {
+        return String::new();
+    }
+    let Some(unknown) = Unknown::of_message(message) else { return String::new() };
+    let version = version_string();
+    match unknown.since() {
+        Some(since) => format!(
+            ". MuJoCo {since} was the first that knows it; this program was built for {version}: build it with MUJOCO_DIR set \
+             to the folder of MuJoCo 4"
+        ),
+        None => format!(
+            ". If it is no mistake, the file is for a newer MuJoCo than {version}, for which this program was built: build it \
+             with MUJOCO_DIR set to the folder of MuJoCo 4"
+        ),
+    }
+}
+
 /// MuJoCo writes `line 12`, `line = 12` (2.2.2 and 4.x, reader and compiler); of text that is no XML the parser writes
 /// `Line number=12`.
 fn line_named_in(message: &str) -> Option<u32> {
@@ -51,7 +87,8 @@ fn line_named_in(message: &str) -> Option<u32> {
         let after = &message[message.rfind(word)? + word.len()..];
         let after = after.trim_start_matches([' ', '=', ':']);
         let digits = after.find(|c: char| !c.is_ascii_digit()).map_or(after, |end| &after[..end]);
-        digits.parse().ok()
+        // Line 0 is none.
+        digits.parse().ok().filter(|&line: &u32| line > 0)
     };
     ["line", "Line number"].into_iter().find_map(number_after)
 }
@@ -69,5 +106,6 @@ mod tests {
         let mismatched = "Error=XML_ERROR_MISMATCHED_ELEMENT ErrorID=14 (0xe) Line number=3: XMLElement name=outline";
         assert_eq!(line_named_in(mismatched), Some(3));
         assert_eq!(line_named_in("Error: something else"), None);
+        assert_eq!(line_named_in("Element 'joint', line 0\n"), None);
     }
 }

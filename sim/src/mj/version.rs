@@ -46,6 +46,7 @@ pub fn check_version() -> Result<(), VersionError> {
                 return Err(VersionError { headers: dotted(mj::mjVERSION_HEADER), library: dotted(library) });
             }
             super::guard::install_handlers();
+            super::plugins::load();
             Ok(())
         })
         .clone()

@@ -123,7 +123,10 @@ pub fn compile_file(path: &Path) -> Result<Compiled, LoadError> {
     check_version()?;
     let name = CString::new(path.to_string_lossy().as_bytes())
         .map_err(|_| CompileError::new(&format!("{path:?} contains a NUL character")))?;
-    load(&name, std::ptr::null())
+    load(&name, std::ptr::null()).map_err(|error| match error {
+        LoadError::Compile(error) => error.placed_in(path).into(),
+        other => other,
+    })
 }
 
 fn load(name: &CStr, vfs: *const mj::mjVFS) -> Result<Compiled, LoadError> {

@@ -264,8 +264,8 @@ pub(crate) fn read(
 
 /// With the line of the file that MuJoCo names; of a file that includes others it does not say whose line that is.
 fn located(error: CompileError, path: &Path, text: &str) -> CompileError {
-    let source_line = error.line.filter(|_| !text.contains("<include")).map(|line| Source::new(path, line));
-    CompileError { source_line, ..error }
+    let line = error.line.filter(|_| !text.contains("<include")).map(|line| Source::new(path, line));
+    CompileError { source_line: error.source_line.clone().or(line), ..error }
 }
 
 /// Bodies and sites as frames. A site that is called as a body gets `.site` behind its name.

@@ -18,6 +18,7 @@ mod robot_drives;
 pub mod robot_file;
 mod robot_joints;
 mod robot_limits;
+mod robot_lowest;
 pub mod robot_part;
 mod robot_state;
 mod robot_states;

@@ -35,7 +35,7 @@ use std::sync::Arc;
 pub struct JointIndex(pub usize);
 
 /// A loaded robot: everything about it that does not change while the simulation runs.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct RobotData {
     cfg: RobotCfg,
     description: RobotDescription,
@@ -83,6 +83,10 @@ impl RobotData {
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Self> {
         check_pose("init_pose", &cfg.init_pose)?;
+        if let Some(clearance) = cfg.ground_clearance.filter(|clearance| !clearance.is_finite()) {
+            let (value, expected) = (clearance.to_string(), "it must be a finite height in metres, such as 0");
+            return Err(Error::Config { field: "ground_clearance", value, expected });
+        }
         if !(0.0..=1.0).contains(&cfg.soft_limit_factor) {
             let (value, expected) = (cfg.soft_limit_factor.to_string(), "the share of a joint's range must be 0 to 1");
             return Err(Error::Config { field: "soft_limit_factor", value, expected });
@@ -186,6 +190,11 @@ impl RobotData {
     /// Pose of the root link at the start.
     pub(crate) fn root_pose(&self) -> Pose {
         self.file.as_ref().map_or(self.cfg.init_pose, |file| self.cfg.init_pose * file.root_pose())
+    }
+
+    /// Moves the start along z \[m\].
+    pub(super) fn raise(&mut self, by: f64) {
+        self.cfg.init_pose.translation.z += by;
     }
 
     pub(crate) fn hulls(&self) -> &BTreeMap<MeshKey, TriMesh> {

@@ -81,6 +81,9 @@ pub struct RobotCfg {
     /// as the file says.
     #[serde(with = "scene::file_format::pose")]
     pub init_pose: Pose,
+    /// Height of the lowest collision point of the robot above the ground at z = 0 at the start \[m\]; then the z of
+    /// [`init_pose`](Self::init_pose) is not used. `None` leaves the robot where `init_pose` puts it.
+    pub ground_clearance: Option<f64>,
     /// Start positions by joint pattern or control part \[rad or m\]; where none matches 0, or an MJCF file's `ref`.
     #[serde(with = "scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
@@ -110,6 +113,7 @@ impl Default for RobotCfg {
             drive: DriveCfg::default(),
             fix_base: true,
             init_pose: Pose::identity(),
+            ground_clearance: None,
             init_qpos: Vec::new(),
             payload: Vec::new(),
             surfaces: Vec::new(),

@@ -38,14 +38,18 @@ impl<'a> Shapes<'a> {
     }
 
     fn height_field(&mut self, field: usize) -> Option<HeightField> {
-        let model = self.model;
-        self.fields
-            .entry(field)
-            .or_insert_with(|| {
-                let arrays = model.height_field(field);
-                HeightField::new(arrays.size, arrays.rows, arrays.columns, arrays.elevation)
-            })
-            .clone()
+        if !self.fields.contains_key(&field) {
+            let arrays = self.model.height_field(field);
+            // Several assets may be of one file.
+            let is_same = |known: &&HeightField| {
+                let size = (known.size(), known.rows(), known.columns());
+                size == (arrays.size, arrays.rows, arrays.columns) && **known.elevation() == *arrays.elevation
+            };
+            let known = self.fields.values().flatten().find(is_same).cloned();
+            let new = || HeightField::new(arrays.size, arrays.rows, arrays.columns, arrays.elevation);
+            self.fields.insert(field, known.or_else(new));
+        }
+        self.fields.get(&field)?.clone()
     }
 }
 

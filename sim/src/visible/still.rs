@@ -6,6 +6,7 @@ use crate::manager::{EnvId, SimulationManager, env_list, env_mask};
 use crate::mj::{self, Data, Model, ObjectKind};
 use crate::pattern;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use scene::framing::{FILL, Framing, Placed};
 use scene::{Light, Marker, Pose, PoseF32};
 use sensors::camera::Shot;
 use sensors::visibility::View;
@@ -20,6 +21,8 @@ pub struct Still {
     lights: Vec<Light>,
     cameras: Vec<ModelCamera>,
     free_camera: FreeCamera,
+    /// Direction of first views.
+    forward: [f64; 3],
 }
 
 /// A camera that a model file describes.
@@ -46,6 +49,9 @@ pub struct FreeCamera {
     pub clip: [f64; 2],
 }
 
+/// Direction of first views of simulations, that of windows: from the front, the side and above.
+const ASIDE: [f64; 3] = [-0.664, 0.608, -0.435];
+
 impl Still {
     /// The model of an MJCF file, at the positions `qpos` (those of the file where `None`).
     ///
@@ -70,7 +76,10 @@ impl Still {
             data.qpos_mut().copy_from_slice(qpos);
         }
         data.step1()?;
-        Ok(Self::of_data(&Arc::new(Visible::of_model(&model)), &data))
+        let still = Self::of_data(&Arc::new(Visible::of_model(&model)), &data);
+        let FreeCamera { eye, target, .. } = still.free_camera;
+        // The author of the file chose the angles.
+        Ok(Self { forward: [0, 1, 2].map(|k| target[k] - eye[k]), ..still })
     }
 
     /// One environment of a simulation as it is now.
@@ -126,6 +135,7 @@ impl Still {
             lights,
             cameras: (0..model.ncam()).map(|camera| model_camera(data, camera)).collect(),
             free_camera: free_camera(model),
+            forward: ASIDE,
         }
     }
 
@@ -162,6 +172,28 @@ impl Still {
     /// Where MuJoCo's viewers look from when they open the model.
     pub fn free_camera(&self) -> FreeCamera {
         self.free_camera
+    }
+
+    /// From where everything that is drawn, but the ground and what surrounds the rest, fills an image of `size` pixels: in the
+    /// direction of [`free_camera`](Self::free_camera) for an MJCF file, from the front, the side and above for a simulation. The
+    /// clipping planes leave room to look from elsewhere.
+    pub fn first_view(&self, size: [usize; 2]) -> FreeCamera {
+        let FreeCamera { eye, target, fovy, clip: [near, far] } = self.free_camera;
+        let [width, height] = size.map(|n| n.max(1) as f64);
+        let framing = Framing { forward: self.forward, fovy, aspect: width / height, fill: FILL };
+        let Some(placement) = framing.place(&[self.placed()]) else {
+            return FreeCamera { eye, target, fovy, clip: [near, far] };
+        };
+        let distance = Vector3::from(placement.eye).metric_distance(&Vector3::from(placement.target));
+        let extent = placement.extent.max(distance);
+        // What is drawn may be larger and smaller than what MuJoCo's model knows of it.
+        let clip = [near.min(0.01 * placement.extent).max(1e-6), far.max(100.0 * extent)];
+        FreeCamera { eye: placement.eye, target: placement.target, fovy, clip }
+    }
+
+    /// What is drawn, and where it is.
+    pub fn placed(&self) -> Placed<'_> {
+        Placed { scene: self.visible.scene(), poses: &self.poses, origin: [0.0; 3] }
     }
 
     /// What a rasterizer needs to draw it.

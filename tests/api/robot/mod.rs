@@ -1,5 +1,6 @@
 //! Robots as a whole: state, forces on links, root link, joints, the bundled quadruped.
 
+mod lowest;
 mod quadruped;
 mod state;
 mod wrenches;

@@ -1,6 +1,7 @@
 //! Cameras in a simulation, against MuJoCo's own rays and against the poses of the simulation.
 
 mod files;
+mod first_views;
 mod markers;
 mod models;
 mod mujoco_renderer;

@@ -43,9 +43,34 @@ pub(super) struct Curve {
     pub(super) pieces: Vec<Vec<[f64; 2]>>,
 }
 
-/// Colours that people with any eyes tell apart. Source: Okabe and Ito, Color Universal Design.
-const COLORS: [[u8; 3]; 7] =
-    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233], [0, 0, 0]];
+/// Colors of curves: seven that are distinct in any color vision, then others that differ from these and from each other in
+/// hue or lightness. Source of the seven: Okabe and Ito, Color Universal Design.
+const COLORS: [[u8; 3]; 24] = [
+    [0, 114, 178],
+    [213, 94, 0],
+    [0, 158, 115],
+    [204, 121, 167],
+    [230, 159, 0],
+    [86, 180, 233],
+    [0, 0, 0],
+    [140, 20, 20],
+    [120, 60, 200],
+    [120, 120, 120],
+    [100, 140, 0],
+    [255, 110, 130],
+    [0, 60, 80],
+    [150, 90, 40],
+    [220, 0, 150],
+    [0, 200, 190],
+    [60, 90, 255],
+    [20, 90, 20],
+    [170, 150, 230],
+    [190, 190, 90],
+    [90, 0, 90],
+    [255, 60, 40],
+    [110, 200, 90],
+    [190, 170, 160],
+];
 /// Width and height of a letter \[pixels\].
 pub(super) const LETTER: [f64; 2] = [7.0, 13.0];
 /// A stroke of the legend, and the gaps around it \[pixels\].

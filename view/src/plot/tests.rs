@@ -26,6 +26,21 @@ fn closed_form() {
     assert!(off > 10.0 * angle, "{off}");
 }
 
+/// Cause: 17 curves had 7 colors.
+#[test]
+fn colors_of_many_curves() {
+    let wave = |k: u32| Series::new(format!("joint {k}"), [[0.0, f64::from(k)], [1.0, f64::from(k) + 1.0]]);
+    let plot = (0..24).fold(Plot::over_time("joints", "angle [rad]"), |plot, k| plot.with(wave(k)));
+    let colors: Vec<[u8; 3]> = plot.drawing().unwrap().curves.iter().map(|curve| curve.color).collect();
+    let apart =
+        |a: [u8; 3], b: [u8; 3]| (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt();
+    for (k, color) in colors.iter().enumerate() {
+        assert!(apart(*color, [255; 3]) > 80.0, "{color:?} is seen on white");
+        assert!(colors[..k].iter().all(|other| apart(*color, *other) > 40.0), "{color:?} is like another");
+    }
+    assert_eq!(colors.len(), 24);
+}
+
 #[test]
 fn ink() {
     let plot = sine(300);

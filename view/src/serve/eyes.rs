@@ -147,11 +147,8 @@ impl OwnEyes {
 
     fn home(&self, snapshot: &Snapshot) -> Eye {
         match self.shown {
-            Shown::All => Eye::overview(snapshot),
-            Shown::One(env) => {
-                let envs = snapshot.envs.get(env).into_iter().cloned().collect();
-                Eye::overview(&Snapshot { envs, ..Snapshot::default() })
-            }
+            Shown::All => Eye::overview(snapshot, self.size),
+            Shown::One(env) => Eye::overview(&snapshot.only(env), self.size),
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::snapshot::Snapshot;
 use nalgebra::Vector3;
+use scene::framing::{FILL, Framing, Placed};
 use sensors::visibility::View;
 
 /// A viewer's camera: it turns about a point, moves with its picture, comes nearer, and flies. Up in the picture is up in the
@@ -50,28 +51,30 @@ impl Eye {
         })
     }
 
-    /// So that all environments of a snapshot are in the picture, seen from the front, the side and above.
-    pub fn overview(snapshot: &Snapshot) -> Self {
-        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-        for env in &snapshot.envs {
-            let moving = env.look.masses.iter().map(|(at, _)| *at);
-            for at in moving.chain([[0.0, 0.0, 0.0]]) {
-                for k in 0..3 {
-                    let x = at[k] + env.origin[k];
-                    // What has flown away is not in the overview.
-                    if x.is_finite() && at[k].abs() < 20.0 {
-                        (low[k], high[k]) = (low[k].min(x), high[k].max(x));
-                    }
-                }
-            }
-        }
-        if low[0] > high[0] {
-            return Self::default();
-        }
-        let target = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
-        let radius = Vector3::from(high).metric_distance(&Vector3::from(low)) / 2.0 + 0.5;
+    /// So that everything of a snapshot but the ground fills an image of `size` pixels, seen from the front, the side and
+    /// above.
+    pub fn overview(snapshot: &Snapshot, [width, height]: [usize; 2]) -> Self {
+        let scenes: Vec<_> = snapshot.envs.iter().map(|env| snapshot.scene_of(env)).collect();
+        let placed: Vec<Placed<'_>> = snapshot
+            .envs
+            .iter()
+            .zip(&scenes)
+            .filter_map(|(env, scene)| {
+                Some(Placed { scene: scene.as_deref()?, poses: &env.look.instances, origin: env.origin })
+            })
+            .collect();
+        Self::framing(&placed, [width, height])
+    }
+
+    /// So that everything that is drawn of some scenes but the ground fills an image of `size` pixels, seen from the front, the
+    /// side and above. The scenes may be one scene at several moments.
+    pub fn framing(placed: &[Placed<'_>], [width, height]: [usize; 2]) -> Self {
         let eye = Self::default();
-        Self { target, distance: radius / (0.5 * eye.fovy).sin(), ..eye }
+        let (forward, aspect) = (eye.forward(), width.max(1) as f64 / height.max(1) as f64);
+        let framing = Framing { forward, fovy: eye.fovy, aspect, fill: FILL };
+        let Some(placement) = framing.place(placed) else { return eye };
+        let distance = Vector3::from(placement.eye).metric_distance(&Vector3::from(placement.target));
+        Self { target: placement.target, distance: distance.clamp(DISTANCES[0], DISTANCES[1]), ..eye }
     }
 
     /// The way it looks.

@@ -215,6 +215,11 @@ impl Snapshot {
         }
     }
 
+    /// The same moment with one environment alone; with none where there is no such environment.
+    pub(crate) fn only(&self, env: usize) -> Self {
+        Self { envs: self.envs.get(env).into_iter().cloned().collect(), ..self.clone() }
+    }
+
     /// What an environment looks like: its own scene, or that of all.
     pub(crate) fn scene_of(&self, env: &EnvStage) -> Option<Arc<RenderScene>> {
         env.look.own_scene.0.as_ref().or(self.scene.as_ref()).map(Arc::clone)

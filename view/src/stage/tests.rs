@@ -104,7 +104,7 @@ fn selected_cube() {
 fn environments() {
     let (_, snapshot) = stage(4);
     let mut painter = Painter::new(2);
-    let view = Eye::overview(&snapshot).view(160, 120);
+    let view = Eye::overview(&snapshot, [160, 120]).view(160, 120);
     let red =
         |canvas: &Canvas| canvas.bytes().chunks(4).filter(|p| p[0] > 100 && p[1] < p[0] / 2 && p[2] < p[0] / 2).count();
     let all = painted(&mut painter, &snapshot, &view, &Look::default());

@@ -171,7 +171,7 @@ impl App {
     pub fn show(&mut self, snapshot: Arc<Snapshot>) {
         self.env = self.env.min(snapshot.envs.len().saturating_sub(1));
         if self.eye.is_none() {
-            self.eye = Some(Eye::overview(&snapshot));
+            self.eye = Some(Eye::overview(&snapshot, self.size));
         }
         self.picked.iter_mut().for_each(|picked| picked.renumber(&snapshot.names));
         if let Some(Held { grip: Grip::Spring(pull), .. }) = &mut self.grip {
@@ -302,7 +302,9 @@ impl App {
             Action::AllEnvs => self.shown = Shown::All,
             Action::NextCamera => self.through = next(self.through),
             Action::FreeView => self.through = None,
-            Action::Overview => (self.eye, self.follow, self.through) = (Some(Eye::overview(&snapshot)), None, None),
+            Action::Overview => {
+                (self.eye, self.follow, self.through) = (Some(Eye::overview(&snapshot, self.size)), None, None)
+            }
             Action::Follow => {
                 let point = self.picked.as_ref().map(|picked| picked.point_now(&snapshot));
                 self.follow = point.filter(|_| self.follow.is_none());
@@ -332,7 +334,7 @@ impl App {
         if let (Some(to), Some(eye)) = (to, &mut self.eye) {
             match from {
                 Some(from) => (0..3).for_each(|k| eye.target[k] += to[k] - from[k]),
-                None => *eye = Eye { target: [to[0], to[1], to[2] + 0.3], ..Eye::default() },
+                None => *eye = Eye::overview(&snapshot.only(env), self.size),
             }
         }
         (self.env, self.shown) = (env, Shown::One(env));

@@ -4,8 +4,8 @@ use crate::mj::CompileError;
 use crate::mjcf::part::PartError;
 use crate::source::Source;
 
-/// What [`add_mjcf`](crate::SimulationManager::add_mjcf) is for.
-const AS_A_PART: &str = "such a file is a part of a scene (add_mjcf)";
+/// The other use of a file: [`add_mjcf`](crate::SimulationManager::add_mjcf).
+const AS_A_PART: &str = "such a file is a scene, or a part of one";
 
 /// Why an MJCF file is no robot.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -21,7 +21,7 @@ pub enum RobotFileError {
     #[error("the file has no body; a robot is one body in the file's world and what hangs on it")]
     NoBody,
     /// Several bodies stand in the file's world.
-    #[error("the file has {} bodies in its world ({}); a robot is one and what hangs on it: give each a file, or {AS_A_PART}", .roots.len(), .roots.join(", "))]
+    #[error("the file has {} bodies in its world ({}); a robot is one and what hangs on it: give each a file, or {AS_A_PART}", .roots.len(), few(.roots))]
     SeveralRoots {
         /// Their names.
         roots: Vec<String>,
@@ -85,4 +85,14 @@ pub enum RobotFileError {
         /// What it needs.
         needs: String,
     },
+}
+
+/// The first of some names, and how many more there are.
+fn few(names: &[String]) -> String {
+    const SHOWN: usize = 5;
+    let first = names[..names.len().min(SHOWN)].join(", ");
+    match names.len().saturating_sub(SHOWN) {
+        0 => first,
+        more => format!("{first} and {more} more"),
+    }
 }

@@ -35,7 +35,7 @@ use std::sync::Arc;
 use tree::{Described, Describing, Root};
 
 /// An MJCF file that is a robot, as MuJoCo compiled it alone.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct RobotFile {
     source: Source,
     model: Model,

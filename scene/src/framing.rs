@@ -1,0 +1,217 @@
+//! Camera placement from which everything that is drawn fills an image.
+
+use crate::{Instance, PoseF32, RenderScene, Shape};
+
+/// Instances of a scene at their poses, moved by an offset.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed<'a> {
+    /// What is drawn.
+    pub scene: &'a RenderScene,
+    /// World from instance, one for each instance of the scene.
+    pub poses: &'a [PoseF32],
+    /// Added to all positions \[m\].
+    pub origin: [f64; 3],
+}
+
+/// The image that is to be filled.
+#[derive(Clone, Copy, Debug)]
+pub struct Framing {
+    /// Direction that the camera looks in, of any length; not straight up or down.
+    pub forward: [f64; 3],
+    /// Vertical field of view \[rad\].
+    pub fovy: f64,
+    /// Width of the image over its height.
+    pub aspect: f64,
+    /// Share of the image that is filled in the direction that limits the distance, above 0 and at most 1.
+    pub fill: f64,
+}
+
+/// A camera placement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Position of the camera \[m\].
+    pub eye: [f64; 3],
+    /// Point on its optical axis, in the middle of the depths of what is drawn \[m\].
+    pub target: [f64; 3],
+    /// Longest side of the box around what is drawn \[m\].
+    pub extent: f64,
+}
+
+/// Share of the image that first views fill.
+pub const FILL: f64 = 0.9;
+/// Movable instances farther than this from the origin of their environment have flown away \[m\].
+const AWAY: f32 = 20.0;
+/// What stands in the world and is larger than the moving things by this factor is a room or terrain around them.
+const SURROUNDINGS: f64 = 2.0;
+/// Groups that are drawn, as in MuJoCo's viewers.
+const GROUPS: std::ops::Range<u8> = 0..3;
+
+impl Framing {
+    /// The nearest placement with everything in the image; `None` where nothing of a finite size is drawn.
+    ///
+    /// The smallest distance follows from four supporting planes of the instances, so it is exact. Planes are left out, and so
+    /// is what stands in the world and is much larger than robots and objects: terrain, walls of a room.
+    pub fn place(&self, placed: &[Placed<'_>]) -> Option<Placement> {
+        let forward = unit(self.forward)?;
+        let right = unit([forward[1], -forward[0], 0.0])?;
+        let up = cross(right, forward);
+        let framed = framed(placed);
+        let support = |direction: [f64; 3]| support(&framed, direction);
+        let [low, high] = bounds(&framed)?;
+        let half = (0.5 * self.fovy).tan() * self.fill;
+        // Of the points (x, y, z) in the axes of the image, x - slope z and -x - slope z are at most these.
+        let limits = |across: [f64; 3], slope: f64| {
+            let along = |sign: f64| support([0, 1, 2].map(|k| sign * across[k] - slope * forward[k]));
+            (along(1.0), along(-1.0))
+        };
+        let slopes = [half * self.aspect, half];
+        let ((right_of, left_of), (above, below)) = (limits(right, slopes[0]), limits(up, slopes[1]));
+        let nearest = -support(forward.map(|x| -x));
+        let farthest = support(forward);
+        let depth = (-(right_of + left_of) / (2.0 * slopes[0])).min(-(above + below) / (2.0 * slopes[1]));
+        // Not inside of a flat thing that is seen edge on.
+        let extent = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+        let depth = depth.min(nearest - 1e-3 * extent.max(1e-6));
+        let (x, y) = (0.5 * (right_of - left_of), 0.5 * (above - below));
+        let at = |z: f64| [0, 1, 2].map(|k| x * right[k] + y * up[k] + z * forward[k]);
+        let placement = Placement { eye: at(depth), target: at(0.5 * (nearest + farthest)), extent };
+        placement.eye.iter().chain(&placement.target).all(|x| x.is_finite()).then_some(placement)
+    }
+}
+
+/// An instance where it is drawn.
+type Framed<'a> = (&'a Instance, &'a PoseF32, [f64; 3]);
+
+/// The instances that a first view shows.
+fn framed<'a>(placed: &[Placed<'a>]) -> Vec<Framed<'a>> {
+    let all: Vec<Framed<'a>> = placed
+        .iter()
+        .flat_map(|placed| placed.scene.instances().iter().zip(placed.poses).map(|(i, pose)| (i, pose, placed.origin)))
+        .filter(|(instance, pose, _)| is_drawn(instance) && is_here(instance, pose))
+        .collect();
+    let of_bodies: Vec<Framed<'a>> = all.iter().copied().filter(|(instance, ..)| instance.body.is_some()).collect();
+    let Some(size) = bounds(&of_bodies).map(diagonal) else { return all };
+    let fits = |framed: &Framed<'a>| bounds(&[*framed]).is_some_and(|box_| diagonal(box_) <= SURROUNDINGS * size);
+    all.into_iter().filter(|framed| framed.0.body.is_some() || fits(framed)).collect()
+}
+
+fn is_drawn(instance: &Instance) -> bool {
+    let seen = instance.visible && instance.material.rgba[3] > 0.0 && GROUPS.contains(&instance.group);
+    seen && !matches!(instance.shape, Shape::Plane(_))
+}
+
+/// Whether an instance is where it can be looked for.
+fn is_here(instance: &Instance, pose: &PoseF32) -> bool {
+    let near = |x: &f32| x.is_finite() && (instance.fixed || x.abs() < AWAY);
+    pose.translation.iter().all(near) && pose.rotation.iter().flatten().all(|x| x.is_finite())
+}
+
+/// The largest coordinate along a direction.
+fn support(framed: &[Framed<'_>], direction: [f64; 3]) -> f64 {
+    let of = |(instance, pose, origin): &Framed<'_>| {
+        let rotation = pose.rotation.map(|row| row.map(f64::from));
+        let own = [0, 1, 2].map(|j| (0..3).map(|i| rotation[i][j] * direction[i]).sum::<f64>());
+        let place = (0..3).map(|k| direction[k] * (f64::from(pose.translation[k]) + origin[k])).sum::<f64>();
+        place + instance.shape.support(own)
+    };
+    framed.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// The box around instances \[m\]; `None` without any.
+fn bounds(framed: &[Framed<'_>]) -> Option<[[f64; 3]; 2]> {
+    if framed.is_empty() {
+        return None;
+    }
+    let axis = |k: usize, sign: f64| std::array::from_fn(|i| if i == k { sign } else { 0.0 });
+    let high = [0, 1, 2].map(|k| support(framed, axis(k, 1.0)));
+    let low = [0, 1, 2].map(|k| -support(framed, axis(k, -1.0)));
+    (0..3).all(|k| low[k].is_finite() && high[k].is_finite()).then_some([low, high])
+}
+
+fn diagonal([low, high]: [[f64; 3]; 2]) -> f64 {
+    (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
+    let length = a.iter().map(|x| x * x).sum::<f64>().sqrt();
+    (length > 1e-9 && length.is_finite()).then(|| a.map(|x| x / length))
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+    use crate::Material;
+    use crate::shape::{Box, Capsule, Plane, Sphere};
+
+    fn framing(aspect: f64) -> Framing {
+        Framing { forward: [1.0, 0.0, 0.0], fovy: 45f64.to_radians(), aspect, fill: FILL }
+    }
+
+    /// A ball of radius r is seen under the half angle asin(r / d): from `r / sin(atan(fill tan(fovy / 2)))` it fills the image.
+    #[test]
+    fn distance_of_a_ball() {
+        let ball = Instance::new(Sphere { radius: 0.5 }, Material::default(), 1).of_body(0);
+        let ground = Instance::new(Plane::INFINITE, Material::default(), 2);
+        let wall = Instance::new(Box { half: [0.1, 50.0, 50.0] }, Material::default(), 3).fixed();
+        let scene = RenderScene::new(vec![ball, ground, wall]).unwrap();
+        let at = PoseF32::from_translation([1.0, 2.0, 3.0]);
+        let poses = [at, PoseF32::IDENTITY, PoseF32::from_translation([60.0, 0.0, 0.0])];
+        let placed = Placed { scene: &scene, poses: &poses, origin: [10.0, 0.0, 0.0] };
+        for aspect in [2.0, 1.0, 0.25] {
+            let narrow = (FILL * 22.5f64.to_radians().tan() * f64::min(aspect, 1.0)).atan();
+            let found = framing(aspect).place(&[placed]).unwrap();
+            let expected = [11.0 - 0.5 / narrow.sin(), 2.0, 3.0];
+            assert!((0..3).all(|k| (found.eye[k] - expected[k]).abs() < 1e-6), "{aspect}: {found:?} {expected:?}");
+            assert!((found.target[0] - 11.0).abs() < 1e-6 && (found.extent - 1.0).abs() < 1e-6, "{found:?}");
+        }
+        // The control: a wall alone is what is drawn.
+        let alone = RenderScene::new(vec![scene.instances()[2].clone()]).unwrap();
+        let wall = Placed { scene: &alone, poses: &poses[2..], origin: [0.0; 3] };
+        assert!((framing(1.0).place(&[wall]).unwrap().extent - 100.0).abs() < 1e-3);
+    }
+
+    /// The support of every shape is that of its triangles.
+    #[test]
+    fn supports() {
+        let shapes: [Shape; 3] = [
+            Box { half: [0.1, 0.2, 0.3] }.into(),
+            Capsule { radius: 0.1, half_length: 0.4 }.into(),
+            crate::shape::Cylinder { radius: 0.3, half_length: 0.2 }.into(),
+        ];
+        let more: [Shape; 2] =
+            [Sphere { radius: 0.7 }.into(), crate::shape::Ellipsoid { radii: [0.1, 0.5, 0.3] }.into()];
+        for shape in shapes.iter().chain(&more) {
+            let mesh = shape.tessellate(512);
+            for direction in [[1.0, 0.0, 0.0], [-0.3, 0.8, 0.5], [0.2, -0.1, -0.9]] {
+                let along = |p: &[f32; 3]| (0..3).map(|k| direction[k] * f64::from(p[k])).sum::<f64>();
+                let of_triangles = mesh.positions.iter().map(along).fold(f64::MIN, f64::max);
+                let found = shape.support(direction);
+                // A polygon of 512 sides is within 1 - cos(pi / 512) of its circle.
+                assert!(found >= of_triangles - 1e-6 && found <= of_triangles + 1e-4, "{}: {found}", shape.name());
+            }
+        }
+    }
+
+    /// Nothing to see: no placement.
+    #[test]
+    fn nothing() {
+        let plane = RenderScene::new(vec![Instance::new(Plane::INFINITE, Material::default(), 1)]).unwrap();
+        let ball = Instance::new(Sphere { radius: 0.5 }, Material::default(), 1);
+        let hidden = RenderScene::new(vec![Instance { group: 3, ..ball.clone() }]).unwrap();
+        let ball = RenderScene::new(vec![ball]).unwrap();
+        let lost = PoseF32::from_translation([f32::NAN, 0.0, 0.0]);
+        let far = PoseF32::from_translation([0.0, 30.0, 0.0]);
+        let rows = [(&plane, PoseF32::IDENTITY), (&hidden, PoseF32::IDENTITY), (&ball, lost), (&ball, far)];
+        for (scene, pose) in rows {
+            assert_eq!(framing(1.0).place(&[Placed { scene, poses: &[pose], origin: [0.0; 3] }]), None);
+        }
+        let down = Framing { forward: [0.0, 0.0, -1.0], ..framing(1.0) };
+        assert_eq!(down.place(&[Placed { scene: &ball, poses: &[PoseF32::IDENTITY], origin: [0.0; 3] }]), None);
+        assert_eq!(framing(1.0).place(&[]), None);
+    }
+}

@@ -1,0 +1,94 @@
+//! First views: what is drawn fills the image, and nothing of it is cut off. The judge is the mask channel, pixel by pixel.
+
+use super::view;
+use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
+use kinetoscope::sensors::visibility::View;
+use kinetoscope::sim::visible::FreeCamera;
+use testkit::urdf::Files;
+use testkit::worlds::{sr5, text_robot, urdf_robot};
+
+/// Share of the width and of the height of the image that the box around everything but the ground has, and whether the box
+/// touches the border.
+fn filled(still: &Still, view: &View) -> ([f64; 2], bool) {
+    let [width, height] = [view.width, view.height];
+    let mut frame = Frame::new(width, height, Channels { mask: true, ..Channels::NONE });
+    Rasterizer::new(RasterCfg::default()).render_shot(&still.shot(view), &mut frame.as_mut()).unwrap();
+    let ground = still.mask_ids().iter().find(|id| id.class == "ground").map_or(0, |id| id.id);
+    let mask = frame.mask.unwrap();
+    let seen =
+        mask.iter().enumerate().filter(|(_, id)| **id != 0 && **id != ground).map(|(k, _)| [k % width, k / width]);
+    let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+    for at in seen {
+        (0..2).for_each(|k| (low[k], high[k]) = (low[k].min(at[k]), high[k].max(at[k])));
+    }
+    if low[0] > high[0] {
+        return ([0.0; 2], false);
+    }
+    let size = [width, height];
+    let cut = (0..2).any(|k| low[k] == 0 || high[k] + 1 == size[k]);
+    ([0, 1].map(|k| (high[k] + 1 - low[k]) as f64 / size[k] as f64), cut)
+}
+
+fn of_free(size: [usize; 2], free: FreeCamera) -> View {
+    view(size, free.fovy, &look_at_pose(free.eye, free.target, [0.0, 0.0, 1.0]).unwrap(), free.clip)
+}
+
+/// A body that is drawn as a mesh and collides with nothing: MuJoCo's model has a ball of a millimetre in its place.
+fn mesh_alone(files: &Files) -> RobotCfg {
+    files.write("mesh.obj", "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+    let text = r#"<robot name="r"><link name="a"><visual><geometry><mesh filename="mesh.obj"/></geometry></visual></link></robot>"#;
+    text_robot(files, "robot", text)
+}
+
+/// Cause: the first view was that of MuJoCo's extent, which knows neither the visual meshes of a URDF nor the shape of the image,
+/// and that of windows was made for centers of mass: an arm had a quarter of the height, and robots in front were cut off.
+#[test]
+fn fill_the_image() {
+    let files = Files::default();
+    let asset = |file| urdf_robot("robot", assets::path(file).unwrap());
+    let robots = [
+        ("arm", sr5("robot"), 1),
+        ("quadruped", RobotCfg { fix_base: false, ..asset("quadruped/quadruped.urdf") }, 1),
+        ("hand", asset("revo1_left/revo1_left.urdf"), 1),
+        ("mesh", mesh_alone(&files), 1),
+        ("16 arms", sr5("robot"), 16),
+    ];
+    for (name, robot, num_envs) in robots {
+        for ground in [None, Some(GroundCfg::default())] {
+            let cfg = SimulationManagerCfg { num_envs, ground, ..Default::default() };
+            let mut sim = testkit::worlds::sim(cfg);
+            sim.add_robot(robot.clone()).unwrap();
+            let still = Still::overview(&mut sim, None, &[]).unwrap();
+            for size in [[320, 180], [120, 160], [200, 50]] {
+                let views = [of_free(size, still.first_view(size)), sim.overview_eye(size).view(size[0], size[1])];
+                for view in views {
+                    let (shares, cut) = filled(&still, &view);
+                    let share = f64::max(shares[0], shares[1]);
+                    assert!((0.6..=0.95).contains(&share) && !cut, "{name} at {size:?}: {shares:?}, cut off: {cut}");
+                }
+            }
+            // The control: where MuJoCo's viewers look from, one arm has a small part of the image, and the mesh none of it.
+            let (shares, _) = filled(&still, &of_free([320, 180], still.free_camera()));
+            let small = f64::max(shares[0], shares[1]) < 0.6;
+            assert!(small || num_envs > 1 || name == "hand" || name == "quadruped", "{name}: {shares:?}");
+        }
+    }
+}
+
+/// An MJCF file is seen in the direction that its author chose, without the floor and the walls around.
+#[test]
+fn of_mjcf() {
+    let files = Files::default();
+    let text = r#"<mujoco><visual><global azimuth="30" elevation="-20"/></visual><worldbody>
+      <geom type="plane" size="0 0 1"/><geom type="box" size="20 0.1 5" pos="0 30 5"/>
+      <geom type="box" size="0.5 0.5 0.2" pos="0 0 0.2"/>
+      <body pos="0 0 0.7"><joint axis="0 1 0"/><geom type="box" size="0.5 0.2 0.3" mass="1"/></body></worldbody></mujoco>"#;
+    let still = Still::of_mjcf(files.write("room.xml", text), None).unwrap();
+    let free = still.first_view([160, 120]);
+    let way: Vec<f64> = (0..3).map(|k| free.target[k] - free.eye[k]).collect();
+    let (azimuth, elevation) = (way[1].atan2(way[0]).to_degrees(), way[2].atan2(way[0].hypot(way[1])).to_degrees());
+    assert!((azimuth - 30.0).abs() < 1e-6 && (elevation + 20.0).abs() < 1e-6, "{azimuth} {elevation}");
+    let distance = way.iter().map(|x| x * x).sum::<f64>().sqrt();
+    assert!((1.5..5.0).contains(&distance), "{distance} m from a table of a metre");
+}
