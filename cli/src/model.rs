@@ -4,6 +4,7 @@ use crate::Result;
 use kinetoscope::assets;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mjcf::robot_file::RobotFileError;
+use kinetoscope::sim::urdf::Strictness;
 use std::path::{Path, PathBuf};
 
 /// The files of a model.
@@ -18,6 +19,12 @@ pub(crate) struct ModelArgs {
     /// Folder of a package of package:// addresses; may be repeated
     #[arg(long, value_name = "NAME=DIR", value_parser = package)]
     package: Vec<(String, PathBuf)>,
+    /// Folder in which meshes and packages are searched that are not found from the URDF, as Isaac Gym's asset root
+    #[arg(long, value_name = "DIR", value_parser = folder)]
+    asset_root: Option<PathBuf>,
+    /// Refuse URDF files with departures from the format that are otherwise warnings
+    #[arg(long)]
+    strict: bool,
 }
 
 /// What the files are.
@@ -36,7 +43,9 @@ impl ModelArgs {
         match files.iter().position(|file| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("xml"))) {
             None => {
                 let packages = self.package.iter().cloned().collect();
-                Ok(Files::Urdf(UrdfCfg { packages, ..UrdfCfg::chain(&files) }))
+                let strictness = if self.strict { Strictness::Strict } else { Strictness::Lenient };
+                let asset_root = self.asset_root.clone();
+                Ok(Files::Urdf(UrdfCfg { packages, asset_root, strictness, ..UrdfCfg::chain(&files) }))
             }
             Some(0) if files.len() == 1 && !self.package.is_empty() => {
                 let (file, name) = (files[0].display(), &self.package[0].0);
@@ -44,6 +53,11 @@ impl ModelArgs {
                     "--package {name}: {file} is an MJCF file, which has no package:// addresses; leave it out"
                 )
                 .into())
+            }
+            Some(0) if files.len() == 1 && (self.strict || self.asset_root.is_some()) => {
+                let flag = if self.strict { "--strict" } else { "--asset-root" };
+                Err(format!("{flag}: {} is an MJCF file, the flag is for URDF files; leave it out", files[0].display())
+                    .into())
             }
             Some(0) if files.len() == 1 => Ok(Files::Mjcf(files[0].clone())),
             Some(at) => {
@@ -122,6 +136,10 @@ fn package(text: &str) -> std::result::Result<(String, PathBuf), String> {
     if name.is_empty() {
         return Err("the package has no name; write NAME=DIR".to_owned());
     }
-    let folder = PathBuf::from(folder);
-    if folder.is_dir() { Ok((name.to_owned(), folder)) } else { Err(format!("{} is no folder", folder.display())) }
+    Ok((name.to_owned(), self::folder(folder)?))
+}
+
+fn folder(text: &str) -> std::result::Result<PathBuf, String> {
+    let folder = PathBuf::from(text);
+    if folder.is_dir() { Ok(folder) } else { Err(format!("{text} is no folder")) }
 }

@@ -43,6 +43,7 @@ mod outcome;
 pub mod randomization;
 pub mod rollout;
 mod sensor_list;
+mod shape_inertia;
 mod shard;
 mod simulation_cfg;
 pub mod snapshot;

@@ -31,7 +31,10 @@ pub struct CompileError {
 
 impl CompileError {
     pub(crate) fn new(message: &str) -> Self {
-        Self { line: line_named_in(message), message: message.trim().replace('\n', "; "), source_line: None }
+        // 2.2.2 ends lines with a semicolon and puts empty ones between.
+        let lines = message.lines().map(|line| line.trim().trim_end_matches(';')).filter(|line| !line.is_empty());
+        let message_on_one_line = lines.collect::<Vec<_>>().join("; ");
+        Self { line: line_named_in(message), message: message_on_one_line, source_line: None }
     }
 }
 
@@ -69,5 +72,14 @@ mod tests {
         let mismatched = "Error=XML_ERROR_MISMATCHED_ELEMENT ErrorID=14 (0xe) Line number=3: XMLElement name=outline";
         assert_eq!(line_named_in(mismatched), Some(3));
         assert_eq!(line_named_in("Error: something else"), None);
+    }
+
+    /// 2.2.2's words were shown as `...'actuatorfrcrange'; ; Element 'joint', line 77`.
+    #[test]
+    fn one_line() {
+        let error = CompileError::new("XML Error: Schema violation: 'a'\n\nElement 'joint', line 77\n");
+        assert_eq!(error.message, "XML Error: Schema violation: 'a'; Element 'joint', line 77");
+        assert_eq!(CompileError::new("a;\n;\n b;").message, "a; b");
+        assert_eq!(CompileError::new("").message, "");
     }
 }

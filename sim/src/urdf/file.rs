@@ -1,6 +1,7 @@
 //! `UrdfFile`: one URDF file, checked, with the place of everything and what was absent.
 
 use super::tree::Tree;
+use crate::description::PartialInertial;
 use crate::diagnostic::Diagnostic;
 use crate::source::Source;
 use std::path::PathBuf;
@@ -35,6 +36,8 @@ pub struct LinkNotes {
     pub source: Source,
     /// The inertial element; `None` where the file has none (the model then says mass 0).
     pub inertial: Option<Source>,
+    /// What an inertial element gives that is not complete; `inertial` is `None` then.
+    pub partial_inertial: Option<PartialInertial>,
     /// One per visual.
     pub visuals: Vec<VisualNotes>,
     /// One per collision.
