@@ -57,8 +57,10 @@ pub enum DiagnosticKind {
     DeclarationMisplaced,
     /// An `<inertial>` lacks its mass or its inertia: the rest is computed from the shapes of the link.
     InertialIncomplete,
-    /// Mass properties that the file does not give, or that no body of this shape can have, were computed from the shapes.
+    /// Mass properties that the file does not give, or that no rigid body has, were computed from the shapes.
     InertiaFromShapes,
+    /// An inertia is that of a rigid body far larger than the shapes of the link: it is kept.
+    InertiaImplausible,
     /// A mesh has one number for its scale: it holds for all three axes.
     ScaleUniform,
     /// The address of a mesh or texture is not a valid one, and what is meant is clear.
@@ -110,6 +112,7 @@ impl DiagnosticKind {
             Self::DeclarationMisplaced => "declaration-misplaced",
             Self::InertialIncomplete => "inertial-incomplete",
             Self::InertiaFromShapes => "inertia-from-shapes",
+            Self::InertiaImplausible => "inertia-implausible",
             Self::ScaleUniform => "scale-uniform",
             Self::AddressRepaired => "address-repaired",
             Self::NothingToDraw => "nothing-to-draw",

@@ -1,4 +1,4 @@
-//! Mass properties of links from their shapes: where the files give none, a part of them, or what no such body can have.
+//! Mass properties of links from their shapes, for files that give none, a part of them, or impossible ones.
 
 use crate::body_inertia::{RigidBody, rigid_bodies};
 use crate::description::{Geometry, Inertial, Link, RobotDescription};
@@ -17,7 +17,10 @@ use std::f64::consts::PI;
 const WATER: f64 = 1000.0;
 /// A radius of gyration this many times the reach of the shapes is an error of the file. The mass of a body is not outside of
 /// it, so that 1 is the physical bound; rotors behind gears are often a part of an inertia, and take it to a few.
-const ABSURD_RATIO: f64 = 10.0;
+const FAR: f64 = 10.0;
+/// Shapes in which the mass would have more than this density \[kg/m³\] are placeholders, such as boxes of 1 mm: osmium has
+/// 22 600.
+const DENSEST: f64 = 25_000.0;
 
 /// Convex hulls of mesh files, each computed once.
 #[derive(Debug)]
@@ -119,7 +122,7 @@ fn fill(link: &mut Link, density: f64, hulls: &mut Hulls<'_>, diagnostics: &mut 
     diagnostics.push(Diagnostic::new(DiagnosticKind::InertiaFromShapes, link.source.clone(), message));
 }
 
-/// What an `<inertial>` leaves open.
+/// Completes an `<inertial>` that lacks its mass or its inertia.
 fn complete_partial(
     link: &mut Link,
     missing: MissingInertia,
@@ -161,7 +164,8 @@ fn complete_partial(
     link.inertial = Some(inertial);
 }
 
-/// Replaces inertias that no body of such a shape has: see [`ABSURD_RATIO`].
+/// Replaces inertias that no rigid body has by those of the shapes, where the smallest repair would leave a body that cannot be
+/// simulated: see [`FAR`]. Inertias that rigid bodies have, but none of such a shape, are warned about.
 fn replace_absurd(
     description: &mut RobotDescription,
     body: &RigidBody,
@@ -179,14 +183,29 @@ fn replace_absurd(
         let link = &description.links[id.0];
         let Some(inertial) = link.inertial.as_ref().filter(|inertial| inertial.mass > 0.0) else { continue };
         let own = RigidInertia::from_inertial(inertial);
-        let Some(shapes) = Shapes::of(link, hulls) else { continue };
-        let largest = own.principal().0[0];
-        let gyration = (largest / own.mass).sqrt();
-        let reach = shapes.reach(&own.com);
-        let fault = match own.check() {
-            Err(fault @ InertiaFault::NotPositiveDefinite { .. }) if is_faulty => fault.to_string(),
-            _ if gyration.is_finite() && gyration > ABSURD_RATIO * reach => {
-                format!("its radius of gyration is {} m and its shapes reach {} m", short(gyration), short(reach))
+        let fault = own.check().err().filter(|_| is_faulty);
+        // Reading visual meshes takes time: they are asked only where an inertia has to be repaired.
+        if fault.is_none() && link.collisions.is_empty() {
+            continue;
+        }
+        let Some(shapes) = Shapes::of(link, hulls).filter(|shapes| own.mass < DENSEST * shapes.unit.mass) else {
+            continue;
+        };
+        let gyration = (own.principal().0[0] / own.mass).sqrt();
+        let is_far =
+            gyration > FAR * shapes.reach(&own.com) && gyration > FAR * shapes.reach_of_all(link, &own.com, hulls);
+        let far = || {
+            let (gyration, reach) = (short(gyration), short(shapes.reach(&own.com)));
+            format!("its radius of gyration is {gyration} m, and its shapes reach {reach} m from its centre of mass")
+        };
+        let why = match fault {
+            Some(fault @ InertiaFault::NotPositiveDefinite { .. }) => fault.to_string(),
+            Some(InertiaFault::Triangle { .. }) if is_far => far(),
+            _ if is_far => {
+                let message = format!("link {:?}: {}; no such body has this inertia, which was kept", link.name, far());
+                let (kind, source) = (DiagnosticKind::InertiaImplausible, inertial.source.clone());
+                diagnostics.push(Diagnostic::new(kind, source, message));
+                continue;
             }
             _ => continue,
         };
@@ -197,7 +216,7 @@ fn replace_absurd(
         };
         let (moments, _) = RigidInertia::from_inertial(&replaced).principal();
         let message = format!(
-            "link {:?}: {fault}; its inertia was replaced by that of its {} shapes with its mass of {} kg: principal moments \
+            "link {:?}: {why}; the inertia was replaced by that of its {} shapes with its mass of {} kg: principal moments \
              {}, {}, {} kg m²",
             link.name,
             shapes.kind,
@@ -236,12 +255,9 @@ impl Shapes {
         let visuals = link.visuals.iter().map(|shape| (&shape.geometry, &shape.link_from_shape));
         let mut shapes = Self { kind, unit: RigidInertia::ZERO, corners: Vec::new() };
         for (geometry, pose) in collisions.chain(visuals.filter(|_| kind == "visual")) {
-            let Some((inertia, [low, high])) = solid(geometry, hulls) else { continue };
+            let Some((inertia, bounds)) = solid(geometry, hulls) else { continue };
             shapes.unit = shapes.unit.combine(&inertia.transformed(pose));
-            shapes.corners.extend((0..8).map(|corner| {
-                let end = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
-                (pose * nalgebra::Point3::new(end(0), end(1), end(2))).coords
-            }));
+            shapes.corners.extend(corners(bounds, pose));
         }
         let volume = shapes.unit.mass;
         let is_usable = volume > 0.0 && volume.is_finite() && shapes.unit.inertia.iter().all(|x| x.is_finite());
@@ -255,10 +271,28 @@ impl Shapes {
         Inertial { source: link.source.clone(), link_from_com, mass, inertia }
     }
 
+    /// The farthest corner of all shapes of the link, visual ones too, from a centre of mass \[m\].
+    fn reach_of_all(&self, link: &Link, com: &Vector3<f64>, hulls: &mut Hulls<'_>) -> f64 {
+        let shapes = link.visuals.iter().map(|shape| (&shape.geometry, &shape.link_from_shape));
+        shapes
+            .filter_map(|(geometry, pose)| solid(geometry, hulls).map(|(_, bounds)| corners(bounds, pose)))
+            .flatten()
+            .map(|corner| (corner - com).norm())
+            .fold(self.reach(com), f64::max)
+    }
+
     /// The farthest corner from a centre of mass \[m\].
     fn reach(&self, com: &Vector3<f64>) -> f64 {
         self.corners.iter().map(|corner| (corner - com).norm()).fold(0.0, f64::max)
     }
+}
+
+/// Corners of a box from its lowest and highest one, at a pose.
+fn corners([low, high]: [Vector3<f64>; 2], pose: &Pose) -> [Vector3<f64>; 8] {
+    std::array::from_fn(|corner| {
+        let end = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
+        (pose * nalgebra::Point3::new(end(0), end(1), end(2))).coords
+    })
 }
 
 /// Mass properties of a shape of 1 kg/m³ and its bounding box, in its own frame. Sources of the closed forms: volumes and

@@ -63,7 +63,7 @@ fn strict_and_packages() {
     let (_, err, code) = shell.run("check arm.urdf");
     assert!(code == 1 && err.contains("warning[element-repeated]") && err.contains("5 |"), "{code} {err}");
     shell.assert_refused(&[
-        ("check arm.urdf --strict", "arm.urdf:5: link \"rod\": a second <material>"),
+        ("check arm.urdf --strict", "error: link \"rod\": a second <material>, the first is at arm.urdf:5"),
         ("render arm.urdf -o a.png --strict", "a second <material>"),
         ("check root.urdf", "does not exist"),
         ("check none.urdf --asset-root assets", "give its folder by --package NAME=DIR or ROS_PACKAGE_PATH"),

@@ -36,7 +36,7 @@ pub struct LinkNotes {
     pub source: Source,
     /// The inertial element; `None` where the file has none (the model then says mass 0).
     pub inertial: Option<Source>,
-    /// What an inertial element gives that is not complete; `inertial` is `None` then.
+    /// The values of an incomplete inertial element; `inertial` is `None` then.
     pub partial_inertial: Option<PartialInertial>,
     /// One per visual.
     pub visuals: Vec<VisualNotes>,

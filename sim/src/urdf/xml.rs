@@ -57,7 +57,7 @@ pub(super) fn repair(
     Err(if is_shifted { check(text).unwrap_or(error) } else { error })
 }
 
-/// What stands before the root element.
+/// The text before the root element.
 struct Prolog {
     /// XML declarations that are not at the beginning.
     misplaced: Vec<(usize, usize)>,

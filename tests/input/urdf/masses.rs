@@ -253,7 +253,7 @@ fn absurd_inertias() {
     // m (y² + z²) / 12 of the box.
     let of_box = |mass: f64| Matrix3::from_diagonal(&(Vector3::new(0.0125, 0.0125, 0.02) * mass / 12.0));
     for (what, mass, moments) in
-        [("(1, 1, 0)", 0.1, [1.0, 1.0, 0.0]), ("zero", 0.1, [0.0; 3]), ("ball of 1.6 m", 1.0, [1.0; 3])]
+        [("(1, 1, 0)", 0.1, [1.0, 1.0, 0.0]), ("zero", 0.1, [0.0; 3]), ("no triangle", 0.1, [1.0, 0.1, 0.1])]
     {
         let (mut sim, id) = load(&object(mass, moments));
         let found = in_link_frame(&inertial_of(&sim, id, "l").unwrap());
@@ -265,15 +265,22 @@ fn absurd_inertias() {
         assert!((height - 0.025).abs() < 1e-3, "{what} lies at {height} m");
         assert!(speed.iter().all(|v| v.abs() < 1e-2), "{what} moves: {speed}");
     }
-    // Controls: these are possible, or nearly; the reach is 0.075 m, so that 10 times that is 0.5625 kg m² for 1 kg.
-    for (what, moments, kinds) in
-        [("below the bound", [0.55; 3], vec![]), ("no triangle", [0.1, 0.1, 0.3], vec!["inertia-repaired"])]
-    {
-        let (sim, id) = load(&object(1.0, moments));
-        let expected = (1.0, Vector3::zeros(), Matrix3::from_diagonal(&Vector3::from(moments)));
+    // Controls, which are kept: the reach is 0.075 m, so that 10 times that is 0.5625 kg m² for 1 kg. A box of 1 kg and
+    // 500 cm³ has 2000 kg/m³; one of 15 kg would be denser than osmium, so that the box is a placeholder.
+    for (what, mass, moments, kinds) in [
+        ("below the bound", 1.0, [0.55; 3], vec![]),
+        ("above the bound", 1.0, [0.57; 3], vec!["inertia-implausible"]),
+        ("no triangle, within the bound", 1.0, [0.1, 0.1, 0.3], vec!["inertia-repaired"]),
+        ("placeholder", 15.0, [100.0, 100.0, 0.0], vec!["inertia-repaired"]),
+    ] {
+        let (sim, id) = load(&object(mass, moments));
+        let expected = (mass, Vector3::zeros(), Matrix3::from_diagonal(&Vector3::from(moments)));
         assert_near(what, &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
         assert_eq!(warnings(&sim), kinds, "{what}");
     }
+    // A visual shape that is large enough makes an inertia plausible.
+    let large = "<visual><geometry><sphere radius=\"0.5\"/></geometry></visual></link>";
+    assert_eq!(warnings(&load(&object(1.0, [0.57; 3]).replace("</link>", large)).0), [""; 0]);
 }
 
 /// A URDF of which cameras see nothing gave an empty picture without a word.
