@@ -10,7 +10,6 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
-use kinetoscope::sim::urdf::Strictness;
 use launcher::still::StillFlags;
 use std::ffi::OsString;
 use std::io::Write;

@@ -4,7 +4,6 @@ use crate::Result;
 use kinetoscope::assets;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mjcf::robot_file::RobotFileError;
-use kinetoscope::sim::urdf::Strictness;
 use std::path::{Path, PathBuf};
 
 /// The files of a model.

@@ -89,6 +89,6 @@ pub use simulation_cfg::{GroundCfg, SimulationManagerCfg};
 pub use snapshot::{Snapshot, SnapshotError};
 pub use source::Source;
 pub use surface_cfg::SurfaceCfg;
-pub use urdf::{ComponentCfg, NameCase, NameCaseCfg, UrdfCfg};
+pub use urdf::{ComponentCfg, MissingInertia, NameCase, NameCaseCfg, Strictness, UrdfCfg};
 pub use visible::{MaskId, Still, Visible};
 pub use wrenches::WrenchFrame;

@@ -7,7 +7,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::DiagnosticKind;
 use kinetoscope::sim::description::Inertial;
 use kinetoscope::sim::mj::compile;
-use kinetoscope::sim::urdf::{MissingInertia, write_urdf};
+use kinetoscope::sim::urdf::write_urdf;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use testkit::refusal::assert_refused;
 use testkit::urdf::{Files, collision, joint, limit, robot};
