@@ -16,7 +16,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Prints tree, joints, masses, dynamics and warnings of a robot, as its files describe it: nothing is repaired.
+/// Prints tree, joints, masses, dynamics and warnings of a robot, as its files describe it, with mass properties that they lack from the shapes.
 #[derive(Debug, Parser)]
 #[command(name = "inspect_robot", after_help = HELP)]
 struct Args {
@@ -29,6 +29,12 @@ struct Args {
     /// Folder of a package of package:// addresses; may be repeated
     #[arg(long, value_name = "NAME=DIR", value_parser = package)]
     package: Vec<(String, PathBuf)>,
+    /// Folder in which meshes and packages are searched that are not found from the URDF, as Isaac Gym's asset root
+    #[arg(long, value_name = "DIR", value_parser = folder)]
+    asset_root: Option<PathBuf>,
+    /// Refuse URDF files with departures from the format that are otherwise warnings
+    #[arg(long)]
+    strict: bool,
     /// Joint positions [rad or m], where not given 0 or an MJCF file's own; mimic joints follow their driver
     #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', value_parser = position)]
     qpos: Vec<(String, f64)>,
@@ -140,10 +146,19 @@ fn cfg(args: &Args) -> Result<InspectCfg, String> {
                 "--package {name}: {file} is an MJCF file, which has no package:// addresses; leave it out"
             ));
         }
+        if args.strict || args.asset_root.is_some() {
+            let flag = if args.strict { "--strict" } else { "--asset-root" };
+            return Err(format!(
+                "{flag}: {} is an MJCF file, the flag is for URDF files; leave it out",
+                mjcf.display()
+            ));
+        }
         let mjcf = Some(MjcfFile::new(mjcf));
         return Ok(InspectCfg { mjcf, floating_base, qpos, ..Default::default() });
     }
-    let urdf = UrdfCfg { packages: args.package.iter().cloned().collect(), ..UrdfCfg::chain(files) };
+    let strictness = if args.strict { Strictness::Strict } else { Strictness::Lenient };
+    let (packages, asset_root) = (args.package.iter().cloned().collect(), args.asset_root.clone());
+    let urdf = UrdfCfg { packages, asset_root, strictness, ..UrdfCfg::chain(files) };
     Ok(InspectCfg { urdf, floating_base, qpos, ..Default::default() })
 }
 
@@ -161,8 +176,12 @@ fn package(text: &str) -> Result<(String, PathBuf), String> {
     if name.is_empty() {
         return Err("the package has no name; write NAME=DIR".to_owned());
     }
-    let folder = PathBuf::from(folder);
-    if folder.is_dir() { Ok((name.to_owned(), folder)) } else { Err(format!("{} is no folder", folder.display())) }
+    Ok((name.to_owned(), self::folder(folder)?))
+}
+
+fn folder(text: &str) -> Result<PathBuf, String> {
+    let folder = PathBuf::from(text);
+    if folder.is_dir() { Ok(folder) } else { Err(format!("{text} is no folder")) }
 }
 
 fn position(text: &str) -> Result<(String, f64), String> {

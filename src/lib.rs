@@ -56,11 +56,11 @@ pub mod prelude {
         ActuatorIndex, ActuatorModel, ArticulationCfg, ArticulationId, BodyType, ComponentCfg, DcMotor, DelayedPd,
         Diagnostic, Draw, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error, ExclusionCfg,
         GroundCfg, GroupId, IdealPd, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LampKind,
-        LightCfg, LinkId, MaskId, MeshCollision, MjcfCfg, MjcfFile, MjcfId, Moment, NameCase, NameCaseCfg, ObjectId,
-        ObjectShape, Observer, ObserverId, PerJoint, Posture, Properties, Property, Randomization, RandomizationError,
-        Result, RigidObjectCfg, RigidObjectGroupCfg, RobotCfg, RobotId, Rollout, SceneCfg, SensorId, Shard, ShardError,
-        SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still, SurfaceCfg, TerrainCfg, TerrainId,
-        Tip, UrdfCfg, WeldCfg, WeldId, WrenchFrame,
+        LightCfg, LinkId, MaskId, MeshCollision, MissingInertia, MjcfCfg, MjcfFile, MjcfId, Moment, NameCase,
+        NameCaseCfg, ObjectId, ObjectShape, Observer, ObserverId, PerJoint, Posture, Properties, Property,
+        Randomization, RandomizationError, Result, RigidObjectCfg, RigidObjectGroupCfg, RobotCfg, RobotId, Rollout,
+        SceneCfg, SensorId, Shard, ShardError, SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still,
+        Strictness, SurfaceCfg, TerrainCfg, TerrainId, Tip, UrdfCfg, WeldCfg, WeldId, WrenchFrame,
     };
     #[cfg(feature = "view")]
     pub use view::{

@@ -92,7 +92,8 @@ fn main() -> ExitCode {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::Warned) => ExitCode::from(1),
         Err(error) => {
-            excerpt::print_error(&error.to_string());
+            // Fields of a configuration are flags here.
+            excerpt::print_error(&error.to_string().replace("UrdfCfg::packages", "--package NAME=DIR"));
             ExitCode::from(2)
         }
     }

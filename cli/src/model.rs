@@ -20,6 +20,12 @@ pub(crate) struct ModelArgs {
     /// Folder of a package of package:// addresses; may be repeated
     #[arg(long, value_name = "NAME=DIR", value_parser = package)]
     package: Vec<(String, PathBuf)>,
+    /// Folder in which meshes and packages are searched that are not found from the URDF, as Isaac Gym's asset root
+    #[arg(long, value_name = "DIR", value_parser = folder)]
+    asset_root: Option<PathBuf>,
+    /// Refuse URDF files with departures from the format that are otherwise warnings
+    #[arg(long)]
+    strict: bool,
 }
 
 /// Where a robot starts.
@@ -151,7 +157,9 @@ impl ModelArgs {
         }
         let Some(at) = kinds.iter().position(|kind| *kind != FileKind::Urdf) else {
             let packages = self.package.iter().cloned().collect();
-            return Ok(Files::Urdf(UrdfCfg { packages, ..UrdfCfg::chain(&files) }));
+            let strictness = if self.strict { Strictness::Strict } else { Strictness::Lenient };
+            let asset_root = self.asset_root.clone();
+            return Ok(Files::Urdf(UrdfCfg { packages, asset_root, strictness, ..UrdfCfg::chain(&files) }));
         };
         let file = files[at].display();
         let (what, whole) = match kinds[at] {
@@ -161,10 +169,11 @@ impl ModelArgs {
         if files.len() > 1 {
             return Err(format!("{file}: {what} is {whole} of its own: give it alone, or URDF files only").into());
         }
-        if let Some((name, _)) = self.package.first() {
-            return Err(
-                format!("--package {name}: {file} is {what}, where the flag has no meaning; leave it out").into()
-            );
+        let package = self.package.first().map(|(name, _)| format!("--package {name}"));
+        let strict = self.strict.then(|| "--strict".to_string());
+        let asset_root = self.asset_root.is_some().then(|| "--asset-root".to_string());
+        if let Some(flag) = package.or(strict).or(asset_root) {
+            return Err(format!("{flag}: {file} is {what}, the flag is for URDF files; leave it out").into());
         }
         let path = files[at].clone();
         Ok(if kinds[at] == FileKind::Scene { Files::Scene(path) } else { Files::Mjcf(path) })
@@ -286,6 +295,10 @@ fn package(text: &str) -> std::result::Result<(String, PathBuf), String> {
     if name.is_empty() {
         return Err("the package has no name; write NAME=DIR".to_owned());
     }
-    let folder = PathBuf::from(folder);
-    if folder.is_dir() { Ok((name.to_owned(), folder)) } else { Err(format!("{} is no folder", folder.display())) }
+    Ok((name.to_owned(), self::folder(folder)?))
+}
+
+fn folder(text: &str) -> std::result::Result<PathBuf, String> {
+    let folder = PathBuf::from(text);
+    if folder.is_dir() { Ok(folder) } else { Err(format!("{text} is no folder")) }
 }

@@ -577,6 +577,7 @@ impl Simulation {
             replacements.insert(geom, vec![visible::ground(cfg)]);
         }
         for (data, index) in contents.robots.iter().zip(&self.robots) {
+            cache.check_robot(data);
             for geom in &index.geoms {
                 let link = &data.description().links[geom.link];
                 if let Some(visual) = geom.visual.and_then(|v| link.visuals.get(v)) {

@@ -41,6 +41,8 @@ pub struct Link {
     pub component: String,
     /// Mass properties; `None` where the file has no `<inertial>`.
     pub inertial: Option<Inertial>,
+    /// Mass properties of an `<inertial>` that is not complete; `inertial` is `None` until the rest is computed from the shapes.
+    pub partial_inertial: Option<PartialInertial>,
     /// What is seen.
     pub visuals: Vec<Visual>,
     /// What collides.
@@ -65,6 +67,21 @@ pub struct Inertial {
     pub mass: f64,
     /// Inertia tensor \[kg m²\] about the centre of mass, in the axes of the centre-of-mass frame.
     pub inertia: Matrix3<f64>,
+}
+
+/// Mass properties that a file gives in part. Several are `None`; a complete set is an [`Inertial`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PartialInertial {
+    /// Where they are given.
+    pub source: Source,
+    /// Pose of the centre-of-mass frame in the link frame.
+    pub link_from_com: Option<Pose>,
+    /// Mass \[kg\].
+    pub mass: Option<f64>,
+    /// Density \[kg/m³\], an extension of Isaac Gym.
+    pub density: Option<f64>,
+    /// Inertia tensor \[kg m²\] about the centre of mass, in the axes of the centre-of-mass frame.
+    pub inertia: Option<Matrix3<f64>>,
 }
 
 /// A shape that is seen.
@@ -294,6 +311,7 @@ impl Link {
             source,
             component,
             inertial: None,
+            partial_inertial: None,
             visuals: Vec::new(),
             collisions: Vec::new(),
             parent_joint: None,

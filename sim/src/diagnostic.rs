@@ -10,13 +10,14 @@ use std::fmt;
 pub enum DiagnosticKind {
     /// An inertia tensor that no rigid body can have was repaired in the MJCF (the description keeps what the file says).
     InertiaRepaired,
-    /// A movable link without mass got minimal values, so that MuJoCo accepts it; they stay out of `total_mass`.
+    /// A movable body without mass and shapes got minimal values, so that MuJoCo accepts it; they stay out of `total_mass`.
     MasslessLink,
     /// Lower limit above upper limit: the limit is ignored.
     LimitIgnored,
     /// Effort 0 or absent: the joint's effort is not limited.
     EffortUnlimited,
-    /// A mimic joint's implied range exceeds its own limits: the driver's usable range is the intersection.
+    /// A mimic joint's implied range exceeds its own limits: the driver's usable range is the intersection, or where that is
+    /// less than 1 % of the driver's range, the limits of the mimic joint are ignored.
     MimicRangeClipped,
     /// A file named by a visual does not exist: the visual is left out.
     VisualMeshMissing,
@@ -46,6 +47,28 @@ pub enum DiagnosticKind {
     FollowerStartsBeyondLimits,
     /// A position was given for a joint that follows another one elsewhere.
     MimicPositionIgnored,
+    /// An element that may be there once is there again: the first is used.
+    ElementRepeated,
+    /// A shape has a size of 0: it is left out.
+    ShapeEmpty,
+    /// An XML prefix is bound to no namespace: its elements and attributes are ignored.
+    NamespaceUnbound,
+    /// A xacro element was left in a URDF: it is ignored.
+    XacroLeftover,
+    /// An XML declaration is not at the beginning of its file: it is ignored.
+    DeclarationMisplaced,
+    /// An `<inertial>` lacks its mass or its inertia: the rest is computed from the shapes of the link.
+    InertialIncomplete,
+    /// Mass properties that the file does not give, or that no rigid body has, were computed from the shapes.
+    InertiaFromShapes,
+    /// An inertia is that of a rigid body far larger than the shapes of the link: it is kept.
+    InertiaImplausible,
+    /// A mesh has one number for its scale: it holds for all three axes.
+    ScaleUniform,
+    /// The address of a mesh or texture is not a valid one, and what is meant is clear.
+    AddressRepaired,
+    /// A robot has no visual shape: pictures do not show it.
+    NothingToDraw,
     /// A unit axis was expected; the axis was normalised.
     AxisNormalized,
     /// A colour was outside 0..1 and was clamped.
@@ -87,6 +110,17 @@ impl DiagnosticKind {
             Self::InitialPositionClamped => "initial-position-clamped",
             Self::FollowerStartsBeyondLimits => "follower-starts-beyond-limits",
             Self::MimicPositionIgnored => "mimic-position-ignored",
+            Self::ElementRepeated => "element-repeated",
+            Self::ShapeEmpty => "shape-empty",
+            Self::NamespaceUnbound => "namespace-unbound",
+            Self::XacroLeftover => "xacro-leftover",
+            Self::DeclarationMisplaced => "declaration-misplaced",
+            Self::InertialIncomplete => "inertial-incomplete",
+            Self::InertiaFromShapes => "inertia-from-shapes",
+            Self::InertiaImplausible => "inertia-implausible",
+            Self::ScaleUniform => "scale-uniform",
+            Self::AddressRepaired => "address-repaired",
+            Self::NothingToDraw => "nothing-to-draw",
             Self::AxisNormalized => "axis-normalized",
             Self::ColorClamped => "color-clamped",
             Self::SettingIgnored => "setting-ignored",

@@ -140,8 +140,8 @@ fn rows() -> Vec<Row> {
         ("mesh a point", mesh("m.stl", point), &["m.stl", "1 points; a hull needs at least 4"]),
         ("mesh of nonsense", mesh("m.obj", "v 1 2\nf 1 2 3\n"), &["m.obj", "line 1"]),
         ("mesh of no known kind", mesh("m.xyz", "?"), &["m.xyz", "unknown mesh format"]),
-        ("sphere of nothing", collides("<sphere radius=\"0\"/>"), &["robot.urdf:3", "link \"arm\"", "radius"]),
-        ("box of nothing", collides("<box size=\"1 0 1\"/>"), &["robot.urdf:3", "link \"arm\"", "size"]),
+        ("sphere of negative size", collides("<sphere radius=\"-1\"/>"), &["robot.urdf:3", "link \"arm\"", "radius"]),
+        ("box of negative size", collides("<box size=\"1 -1 1\"/>"), &["robot.urdf:3", "link \"arm\"", "size"]),
         (
             "too deep",
             text(chain(600, "continuous", "")),

@@ -69,11 +69,11 @@ fn overlaps_beyond_the_contact_buffer() {
 #[test]
 fn diagnostics_once() {
     let (dir, mut sim) = (tempfile::tempdir().unwrap(), sim(1));
-    let massless = star(3, 1).replace(INERTIAL, "");
+    let unweighed = star(3, 1).replace(INERTIAL, "");
     for (i, n) in [3, 6, 9].into_iter().enumerate() {
-        let cfg = RobotCfg { self_collision: true, ..robot(dir.path(), &format!("s{i}"), &massless) };
+        let cfg = RobotCfg { self_collision: true, ..robot(dir.path(), &format!("s{i}"), &unweighed) };
         sim.add_robot(cfg).unwrap();
-        for kind in [DiagnosticKind::MasslessLink, DiagnosticKind::InitialOverlap] {
+        for kind in [DiagnosticKind::InertiaFromShapes, DiagnosticKind::InitialOverlap] {
             let found = sim.diagnostics().iter().filter(|d| d.kind == kind).count();
             assert_eq!(found, n, "{kind:?}: {:#?}", sim.diagnostics());
         }

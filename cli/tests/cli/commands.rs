@@ -47,6 +47,36 @@ fn check_warnings() {
     }
 }
 
+/// Departures from URDF are warnings with their lines, and errors with --strict; flags are called by their names.
+#[test]
+fn strict_and_packages() {
+    let twice = "<material name=\"\"/><material name=\"\"/></visual>";
+    let mesh = |uri: &str| ARM.replace("<box size=\"0.1 0.1 1\"/>", &format!("<mesh filename=\"{uri}\"/>"));
+    let collides = |uri: &str| mesh(uri).replace("visual>", "collision>");
+    let shell = Shell::with(&[
+        ("arm.urdf", &ARM.replace("</visual>", twice)),
+        ("pendulum.xml", PENDULUM),
+        ("assets/cube/a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"),
+        ("root.urdf", &collides("cube/a.obj")),
+        ("package.urdf", &collides("package://cube/a.obj")),
+        ("none.urdf", &collides("package://none/a.obj")),
+    ]);
+    let (_, err, code) = shell.run("check arm.urdf");
+    assert!(code == 1 && err.contains("warning[element-repeated]") && err.contains("5 |"), "{code} {err}");
+    shell.assert_refused(&[
+        ("check arm.urdf --strict", "error: link \"rod\": a second <material>, the first is at arm.urdf:5"),
+        ("render arm.urdf -o a.png --strict", "a second <material>"),
+        ("check root.urdf", "does not exist"),
+        ("check none.urdf --asset-root assets", "give its folder by --package NAME=DIR or ROS_PACKAGE_PATH"),
+        ("check root.urdf --asset-root none", "none is no folder"),
+        ("check pendulum.xml --strict", "--strict: pendulum.xml is an MJCF file"),
+        ("check pendulum.xml --asset-root assets", "--asset-root: pendulum.xml is an MJCF file"),
+    ]);
+    for file in ["root.urdf", "package.urdf"] {
+        shell.ok(&format!("check {file} --asset-root assets"));
+    }
+}
+
 /// An error of a file is shown with its line, by every command that reads one.
 #[test]
 fn line_of_error() {

@@ -79,6 +79,10 @@ impl Reader {
                 normal: vn.map(|i| look_up(ctx, number, i, &self.vn, "vn")).transpose()?,
             });
         }
+        // A line: it has no area, as a triangle whose corners are in a line has none, and is left out as that.
+        if corners.len() == 2 {
+            return Ok(());
+        }
         if corners.len() < 3 {
             let what = format!("face with {} corners; expected 3 or more", corners.len());
             return Err(ctx.invalid(format!("line {number}"), what));

@@ -24,6 +24,8 @@ fn faces() {
     // No library: both materials are unknown, which makes one part without any.
     assert_eq!((mesh.parts.len(), mesh.materials.len()), (1, 0));
     mesh.validate().unwrap();
+    // A face of two corners is a line: pybullet's monastery has some, and was refused.
+    assert_eq!(parse(&format!("{SQUARE}f 1 2\n")).unwrap(), mesh);
 }
 
 #[test]
@@ -44,7 +46,9 @@ fn errors() {
     for (text, expected) in [
         ("v 0 0\n", "line 1: expected 3 numbers"),
         ("v 0 0 x\n", "line 1: \"x\" is not a number"),
-        ("v 0 0 0\nv 1 0 0\nf 1 2\n", "line 3: face with 2 corners; expected 3 or more"),
+        ("v 0 0 0\nv 1 0 0\nf 1\n", "line 3: face with 1 corners; expected 3 or more"),
+        ("v 0 0 0\nv 1 0 0\nf 1 2\n", "no triangles; a mesh needs at least one"),
+        ("v 0 0 0\nv 1 0 0\nf 1 3\n", "line 3, v index: index 3 is out of range, there are 2"),
         ("v 0 0 0\nf 1 1 2\n", "line 2, v index: index 2 is out of range, there are 1"),
         ("v 0 0 0\nf 1 1 0\n", "line 2, v index: index 0 is out of range, there are 1"),
         ("v 0 0 0\nf 1 1 -2\n", "line 2, v index: index -2 is out of range, there are 1"),

@@ -178,8 +178,13 @@ pub(crate) fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
 /// Limits are written with few digits: a hair's breadth is not worth a warning \[rad or m\].
 const SLACK: f64 = 1e-6;
 
-/// A driver may only go where every joint that mimics it may follow.
+/// A driver keeps at least this share of its range where followers narrow it; a follower that leaves less is let go.
+const LEAST_RANGE: f64 = 0.01;
+
+/// A driver may only go where every joint that mimics it may follow. A follower whose limits leave no range goes where its
+/// driver takes it: its limits are those of the driver's range.
 fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], diagnostics: &mut Vec<Diagnostic>) {
+    let mut released = Vec::new();
     for i in 0..plans.len() {
         let (Some((driver, multiplier, offset)), Some(limit)) = (plans[i].mimic, plans[i].limit) else { continue };
         if multiplier == 0.0 {
@@ -193,12 +198,15 @@ fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], dia
             continue;
         }
         let (joint, driver_joint) = (description.joint(plans[i].joint), description.joint(driver));
-        let narrowed = [old_low.max(low), old_high.min(high)];
-        let outcome = if narrowed[0] <= narrowed[1] {
+        // Positive zeros: a range of -0 reads like a mistake.
+        let narrowed = [old_low.max(low) + 0.0, old_high.min(high) + 0.0];
+        let own_extent = plans[d].limit.map_or(0.0, |[low, high]| high - low);
+        let outcome = if narrowed[1] - narrowed[0] > (LEAST_RANGE * own_extent).max(SLACK) {
             plans[d].usable = narrowed;
             format!("the usable range of {:?} is {:.4} .. {:.4}", driver_joint.name, narrowed[0], narrowed[1])
         } else {
-            format!("the two ranges do not meet, so {:?} keeps its own", driver_joint.name)
+            released.push((i, d));
+            format!("they leave no range for {:?}, so they were ignored", driver_joint.name)
         };
         diagnostics.push(Diagnostic::new(
             DiagnosticKind::MimicRangeClipped,
@@ -208,6 +216,13 @@ fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], dia
                 joint.name, driver_joint.name, limit[0], limit[1]
             ),
         ));
+    }
+    for (i, d) in released {
+        let Some((_, multiplier, offset)) = plans[i].mimic else { continue };
+        let ends = plans[d].usable.map(|end| multiplier * end + offset);
+        let limit = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        plans[i].limit = Some(limit).filter(|limit| limit.iter().all(|end| end.is_finite()));
+        plans[i].usable = plans[i].limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
     }
 }
 

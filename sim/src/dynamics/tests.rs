@@ -90,6 +90,7 @@ fn link(name: String, inertial: Option<Inertial>, parent_joint: Option<JointId>)
         source: source(),
         component: "arm".to_owned(),
         inertial,
+        partial_inertial: None,
         visuals: Vec::new(),
         collisions: Vec::new(),
         parent_joint,

@@ -2,8 +2,9 @@
 //!
 //! [`inspect`] reads the files as [`SimulationManager::add_robot`](crate::SimulationManager::add_robot) does, meshes and
 //! convex hulls included, and finds the same warnings but those of where a simulation starts; of an MJCF file, those that
-//! compiling the scene gives are not among them. Masses and dynamics are those of the files, computed by
-//! [`dynamics`](crate::dynamics): nothing is repaired. MuJoCo is used for MJCF files only, which it compiles alone.
+//! compiling the scene gives are not among them. Masses and dynamics are those of the files, completed
+//! from shapes where [`MissingInertia`](crate::urdf::MissingInertia) says so and computed by [`dynamics`](crate::dynamics):
+//! nothing else is repaired. MuJoCo is used for MJCF files only, which it compiles alone.
 
 mod report;
 mod text;
@@ -17,13 +18,14 @@ use crate::drive::DriveCfg;
 use crate::drive::plan::{curve, followed, plan};
 use crate::dynamics::{Configuration, DynamicsError, Kinematics};
 use crate::error::Error;
-use crate::objects::robot::{RobotCfg, collision_hulls, described};
+use crate::objects::robot::{RobotCfg, described};
 use crate::objects::robot_file::MjcfFile;
 use crate::pattern::{closest, list};
+use crate::shape_inertia::Hulls;
 use crate::source::Source;
 use crate::urdf::UrdfCfg;
 use nalgebra::Vector3;
-use scene::mesh::{HullCfg, load};
+use scene::mesh::load;
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
@@ -121,9 +123,10 @@ pub fn inspect(cfg: &InspectCfg) -> Result<Report, InspectError> {
         fix_base: !cfg.floating_base,
         ..RobotCfg::default()
     };
-    let (file, description, mut diagnostics) = described(&robot, &(&robot.uid).into(), 0, None)?;
+    let mut hulls = Hulls::new(&robot.hull);
+    let (file, description, mut diagnostics) = described(&robot, &(&robot.uid).into(), 0, None, &mut hulls)?;
     let configuration = configuration(&description, cfg, &mut diagnostics)?;
-    collision_hulls(&description, &HullCfg::default())?;
+    hulls.of_collisions(&description)?;
     check_visual_meshes(&description, &mut diagnostics);
     // Inertias of an MJCF file are those that MuJoCo accepted.
     if file.is_none() {

@@ -255,7 +255,7 @@ impl<'a> Reader<'a> {
     /// Makes the paths of URDF files relative to the file.
     fn place_urdf(&self, urdf: &mut UrdfCfg) {
         let components = urdf.components.iter_mut().map(|component| &mut component.urdf);
-        for path in components.chain(urdf.packages.values_mut()) {
+        for path in components.chain(urdf.packages.values_mut()).chain(urdf.asset_root.as_mut()) {
             *path = self.beside(path);
         }
     }

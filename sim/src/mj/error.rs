@@ -33,7 +33,9 @@ pub struct CompileError {
 
 impl CompileError {
     pub(crate) fn new(message: &str) -> Self {
-        let lines: Vec<&str> = message.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+        // 2.2.2 ends lines with a semicolon and puts empty ones between.
+        let lines = message.lines().map(|line| line.trim().trim_end_matches(';').trim()).filter(|line| !line.is_empty());
+        let lines: Vec<&str> = lines.collect();
         Self { line: line_named_in(message), message: lines.join("; ") + &newer(message), source_line: None }
     }
 
@@ -107,5 +109,14 @@ mod tests {
         assert_eq!(line_named_in(mismatched), Some(3));
         assert_eq!(line_named_in("Error: something else"), None);
         assert_eq!(line_named_in("Element 'joint', line 0\n"), None);
+    }
+
+    /// 2.2.2's words were shown as `...'actuatorfrcrange'; ; Element 'joint', line 77`.
+    #[test]
+    fn one_line() {
+        let error = CompileError::new("XML Error: Schema violation: 'a'\n\nElement 'joint', line 77\n");
+        assert_eq!(error.message, "XML Error: Schema violation: 'a'; Element 'joint', line 77");
+        assert_eq!(CompileError::new("a;\n;\n b;").message, "a; b");
+        assert_eq!(CompileError::new("").message, "");
     }
 }

@@ -3,7 +3,7 @@
 pub use super::robot_cfg::RobotCfg;
 
 use crate::compile::{JointIndexing, RobotIndex, Simulation};
-use crate::description::{Inertial, LinkId, RobotDescription};
+use crate::description::{LinkId, RobotDescription};
 use crate::diagnostic::Diagnostic;
 use crate::drive::plan::{JointPlan, plan};
 use crate::drive::table::{DriveState, Gains};
@@ -19,13 +19,13 @@ use crate::objects::free_body::{FreeBody, FreeBodyMut, body_pose};
 use crate::objects::rows::{Numbers, Rows, Table, check_named_once, distinct_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
+use crate::shape_inertia::{Hulls, ball, complete};
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::surface_cfg::SurfaceCfg;
-use crate::urdf::assemble;
+use crate::urdf::{Assembly, assemble};
 use ::scene::Pose;
-use ::scene::mesh::{HullCache, HullCfg, TriMesh};
+use ::scene::mesh::TriMesh;
 use ::scene::pose::to_row;
-use nalgebra::Matrix3;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -94,7 +94,9 @@ impl RobotData {
         for component in &cfg.urdf.components {
             check_pose("component transform", &component.transform)?;
         }
-        let (file, mut description, mut found) = described(&cfg, &role.named(&cfg.uid), index, Some(scene))?;
+        let mut hulls = Hulls::new(&cfg.hull);
+        let (file, mut description, mut found) =
+            described(&cfg, &role.named(&cfg.uid), index, Some(scene), &mut hulls)?;
         load_up(&mut description, &cfg)?;
         let surfaces = surfaces(&description, &cfg, &role)?;
         let joint_names: Vec<String> = description.drivable_joints().map(|(_, j)| j.name.clone()).collect();
@@ -119,7 +121,7 @@ impl RobotData {
             let dt = manager.physics_option().timestep;
             found.extend(crate::drive::actuator::warn_if_unstable(&description, &explicit, !cfg.fix_base, dt));
         }
-        let hulls = collision_hulls(&description, &cfg.hull)?;
+        let hulls = hulls.of_collisions(&description)?;
         diagnostics.append(&mut found);
         Ok(Self { cfg, description, plans, joint_names, parts, hulls, file, first_mask_id, role, surfaces })
     }
@@ -214,10 +216,12 @@ pub(crate) fn described(
     named: &Named,
     index: usize,
     scene: Option<&mj::Model>,
+    hulls: &mut Hulls<'_>,
 ) -> Result<(Option<RobotFile>, RobotDescription, Vec<Diagnostic>)> {
     let Some(file) = &cfg.mjcf else {
-        let assembly = assemble(&cfg.urdf)?;
-        return Ok((None, assembly.description, assembly.diagnostics));
+        let Assembly { mut description, mut diagnostics } = assemble(&cfg.urdf)?;
+        complete(&mut description, cfg.urdf.missing_inertia, !cfg.fix_base, hulls, &mut diagnostics)?;
+        return Ok((None, description, diagnostics));
     };
     if !cfg.urdf.components.is_empty() {
         let expected = "a robot is one MJCF file, or made of URDF files; leave out mjcf or the components of urdf";
@@ -262,12 +266,7 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
         match &mut link.inertial {
             // A point in the centre of mass: neither the centre nor the inertia about it change.
             Some(inertial) => inertial.mass += payload,
-            None => {
-                let (source, link_from_com) = (link.source.clone(), Pose::identity());
-                let radius = (payload / 1000.0 * 0.75 / std::f64::consts::PI).cbrt();
-                let inertia = Matrix3::from_diagonal_element(0.4 * payload * radius * radius);
-                link.inertial = Some(Inertial { source, link_from_com, mass: payload, inertia });
-            }
+            None => link.inertial = Some(ball(link, payload, 1000.0)),
         }
     }
     Ok(())
@@ -314,28 +313,6 @@ fn check_integrator(cfg: &RobotCfg, role: &Role, plans: &[JointPlan], integrator
         return Err(Error::Integrator { robot: role.named(&cfg.uid), integrator: integrator.name(), also });
     }
     Ok(())
-}
-
-/// The convex hull of every collision mesh, one per file and scale, from the cache where it is there.
-pub(crate) fn collision_hulls(description: &RobotDescription, cfg: &HullCfg) -> Result<BTreeMap<MeshKey, TriMesh>> {
-    let cache = HullCache::default_location();
-    let mut hulls = BTreeMap::new();
-    for link in &description.links {
-        for collision in &link.collisions {
-            let crate::description::Geometry::Mesh { path, scale, .. } = &collision.geometry else { continue };
-            let key = MeshKey::new(path, scale);
-            if hulls.contains_key(&key) {
-                continue;
-            }
-            let hull = cache.hull_of_file(path, (*scale).into(), cfg).map_err(|error| Error::CollisionMesh {
-                at: collision.source.clone(),
-                link: link.name.clone(),
-                error: Box::new(error),
-            })?;
-            hulls.insert(key, hull);
-        }
-    }
-    Ok(hulls)
 }
 
 /// A robot, to read. Arrays have one row per environment and one column per joint, in the order of

@@ -25,6 +25,13 @@ pub struct UrdfCfg {
     pub name_case: NameCaseCfg,
     /// Folders of `package://` and `model://` packages by name; these win over every search.
     pub packages: BTreeMap<String, PathBuf>,
+    /// Folder in which mesh and texture paths and packages are searched that are not found from the URDF, as Isaac Gym's
+    /// `asset_root`.
+    pub asset_root: Option<PathBuf>,
+    /// Handling of departures from URDF whose meaning is clear.
+    pub strictness: Strictness,
+    /// Mass properties of links whose file gives none.
+    pub missing_inertia: MissingInertia,
     /// Name of the robot; by default the names of the files' robots, joined by `_`.
     pub name: Option<String>,
     /// Name of the massless link added below components where one is needed.
@@ -37,6 +44,9 @@ impl Default for UrdfCfg {
             components: Vec::new(),
             name_case: NameCaseCfg::default(),
             packages: BTreeMap::new(),
+            asset_root: None,
+            strictness: Strictness::default(),
+            missing_inertia: MissingInertia::default(),
             name: None,
             base_link_name: "base_link".to_owned(),
         }
@@ -72,6 +82,50 @@ impl UrdfCfg {
             components.push(ComponentCfg { parent, ..ComponentCfg::new(name, urdf) });
         }
         Self { components, ..Self::default() }
+    }
+}
+
+/// Handling of departures from URDF whose meaning is clear, such as a second `<material>` in one `<visual>`.
+///
+/// | departure | lenient reading |
+/// |---|---|
+/// | a second `<material>`, `<inertial>` or `<axis>`, a second element in `<geometry>` | the first is used |
+/// | a box, sphere, cylinder or capsule with a size of 0 | the shape is left out |
+/// | an XML prefix without `xmlns:` | its elements and attributes are ignored |
+/// | xacro elements below the top level | they are ignored |
+/// | an XML declaration that is not at the beginning | it is ignored |
+/// | an `<inertial>` without `<mass>` or without `<inertia>` | the rest is computed from the shapes of the link |
+/// | `<axis/>` without `xyz` on a fixed or floating joint | it is ignored |
+/// | one number in the `scale` of a mesh | it holds for all three axes |
+/// | `package:///path` | an absolute path, else a package with one slash too many |
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Strictness {
+    /// Each is a warning that says what was done.
+    #[default]
+    Lenient,
+    /// Each is an error.
+    Strict,
+}
+
+/// Mass properties of bodies that move and have no `<inertial>` in any of their links.
+///
+/// A body is a link with all links that fixed joints join to it. Links without `<inertial>` that are fixed to a link with mass
+/// keep no mass of their own: their mass is part of the other's.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum MissingInertia {
+    /// Every link of the body has the mass, centre of mass and inertia of its collision shapes filled with this density
+    /// \[kg/m³\]; of its visual shapes where it has no collision shapes. Meshes count as their convex hulls; shapes that overlap
+    /// count twice. Bodies without shapes are as with [`Minimal`](Self::Minimal).
+    Density(f64),
+    /// The body has 1e-6 kg and 1e-9 kg m², which are not part of the total mass.
+    Minimal,
+}
+
+impl Default for MissingInertia {
+    fn default() -> Self {
+        Self::Density(1000.0)
     }
 }
 

@@ -149,6 +149,20 @@ pub enum UrdfError {
         /// The first one.
         first: Source,
     },
+    /// A `<geometry>` has more than its shape.
+    #[error(
+        "{at}: {owner}: <geometry> holds one shape, and <{found}> is its second element, the first is at {first}; keep one"
+    )]
+    GeometryRepeated {
+        /// The second element.
+        at: Source,
+        /// The link.
+        owner: String,
+        /// The second element.
+        found: String,
+        /// The first one.
+        first: Source,
+    },
     /// A revolute or prismatic joint has no `<limit>`.
     #[error(
         "{at}: joint \"{joint}\" is {kind} and has no <limit>; add <limit lower=\"-1.5\" upper=\"1.5\" effort=\"10\" \
@@ -315,7 +329,7 @@ pub enum UrdfError {
     },
     /// The package of a collision mesh was found nowhere.
     #[error(
-        "{at}: link \"{link}\": package \"{package}\" of \"{uri}\" was found nowhere; name its folder in \
+        "{at}: link \"{link}\": package \"{package}\" of \"{uri}\" was found nowhere; give its folder by \
          UrdfCfg::packages or ROS_PACKAGE_PATH; looked at:{}", lines(.tried)
     )]
     PackageUnknown {

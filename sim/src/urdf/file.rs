@@ -1,6 +1,7 @@
 //! `UrdfFile`: one URDF file, checked, with the place of everything and what was absent.
 
 use super::tree::Tree;
+use crate::description::PartialInertial;
 use crate::diagnostic::Diagnostic;
 use crate::source::Source;
 use std::path::PathBuf;
@@ -35,6 +36,8 @@ pub struct LinkNotes {
     pub source: Source,
     /// The inertial element; `None` where the file has none (the model then says mass 0).
     pub inertial: Option<Source>,
+    /// The values of an incomplete inertial element; `inertial` is `None` then.
+    pub partial_inertial: Option<PartialInertial>,
     /// One per visual.
     pub visuals: Vec<VisualNotes>,
     /// One per collision.

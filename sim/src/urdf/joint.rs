@@ -116,17 +116,24 @@ fn read_axis(
     owner: &str,
     xml: &mut String,
 ) -> Result<(), UrdfError> {
-    let Some(axis) = reader.child(node, "axis", owner)? else { return Ok(()) };
+    let Some(axis) = reader.first_child(node, "axis", owner)? else { return Ok(()) };
+    let has_axis = !matches!(kind, JointKind::Fixed | JointKind::Floating);
     let Some(xyz) = reader.numbers::<3>(axis, "xyz")? else {
-        return Err(UrdfError::AttributeMissing {
-            at: reader.source(axis),
+        let at = reader.source(axis);
+        let error = UrdfError::AttributeMissing {
+            at: at.clone(),
             owner: owner.to_owned(),
             element: "axis".to_owned(),
             attribute: "xyz",
             example: "xyz=\"0 0 1\"",
-        });
+        };
+        if has_axis {
+            return Err(error);
+        }
+        let done = format!("a {} joint needs no axis, so it was ignored", kind.name());
+        return reader.tolerate(DiagnosticKind::ElementIgnored, at, error, &done);
     };
-    if matches!(kind, JointKind::Fixed | JointKind::Floating) {
+    if !has_axis {
         return Ok(());
     }
     // Scaled by the largest component first: squares of huge or tiny components would overflow or vanish.

@@ -2,6 +2,7 @@
 
 use super::error::UrdfError;
 use super::file::{LinkNotes, VisualNotes};
+use super::inertial::read_inertial;
 use super::number::{Reader, attribute, element, row, shortest};
 use super::rotation::rpy_of;
 use super::tree::owned;
@@ -159,38 +160,45 @@ pub(super) fn read_link(
     xml.push_str("<link");
     attribute(xml, "name", name);
     xml.push('>');
-    let inertial = match reader.child(node, "inertial", &owner)? {
-        Some(inertial) => {
-            read_inertial(reader, inertial, &owner, xml)?;
-            Some(reader.source(inertial))
-        }
-        None => None,
-    };
+    let (mut inertial, mut partial_inertial) = (None, None);
+    if let Some(element) = reader.first_child(node, "inertial", &owner)? {
+        partial_inertial = read_inertial(reader, element, &owner, xml)?;
+        inertial = partial_inertial.is_none().then(|| reader.source(element));
+    }
     let (mut visuals, mut collisions) = (Vec::new(), Vec::new());
     for visual in reader.named(node, "visual") {
+        let before = xml.len();
         xml.push_str("<visual>");
         read_origin(reader, visual, &owner, xml)?;
-        read_geometry(reader, visual, name, &owner, xml)?;
-        let material = reader.child(visual, "material", &owner)?;
+        let has_shape = read_geometry(reader, visual, name, &owner, xml)?;
+        let material = reader.first_child(visual, "material", &owner)?;
         if let Some(material) = material {
             let look = materials.read_visual(reader, material, &owner)?;
             write_material(xml, material.attribute("name").unwrap_or_default(), &look);
         }
         xml.push_str("</visual>");
+        if !has_shape {
+            xml.truncate(before);
+            continue;
+        }
         visuals.push(VisualNotes {
             source: reader.source(visual),
             material: material.map(|material| reader.source(material)),
         });
     }
     for collision in reader.named(node, "collision") {
+        let before = xml.len();
         xml.push_str("<collision>");
         read_origin(reader, collision, &owner, xml)?;
-        read_geometry(reader, collision, name, &owner, xml)?;
+        if !read_geometry(reader, collision, name, &owner, xml)? {
+            xml.truncate(before);
+            continue;
+        }
         xml.push_str("</collision>");
         collisions.push(reader.source(collision));
     }
     xml.push_str("</link>");
-    Ok(LinkNotes { source: reader.source(node), inertial, visuals, collisions })
+    Ok(LinkNotes { source: reader.source(node), inertial, partial_inertial, visuals, collisions })
 }
 
 /// Warns of child elements that nobody reads: most are typing errors, such as `<colision>`.
@@ -205,36 +213,29 @@ pub(super) fn warn_unknown(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &
     }
 }
 
-fn read_inertial(reader: &Reader<'_>, node: Node<'_, '_>, owner: &str, xml: &mut String) -> Result<(), UrdfError> {
-    let example = "an <inertial> needs <mass value=\"1\"/> and <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" \
-                   iyz=\"0\" izz=\"0.01\"/>; without mass properties leave the whole <inertial> out";
-    let mass = reader.required_child(node, "mass", owner, example)?;
-    let value = reader.required_number(mass, "value", owner, "<mass value=\"1\"/>")?;
-    if value < 0.0 {
-        return Err(reader.value(mass, "value", owner, "is negative, a mass is at least 0"));
-    }
-    let inertia = reader.required_child(node, "inertia", owner, example)?;
-    xml.push_str("<inertial>");
-    read_origin(reader, node, owner, xml)?;
-    xml.push_str("<mass");
-    attribute(xml, "value", &shortest(value));
-    xml.push_str("/><inertia");
-    for name in ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"] {
-        let value = reader.required_number(inertia, name, owner, "all six of ixx ixy ixz iyy iyz izz")?;
-        attribute(xml, name, &shortest(value));
-    }
-    xml.push_str("/></inertial>");
-    Ok(())
-}
-
-/// Reads the origin of `node`; a quaternion (URDF 1.1) becomes roll, pitch, yaw.
+/// Reads the origin of `node` and appends it to `xml`.
 pub(super) fn read_origin(
     reader: &Reader<'_>,
     node: Node<'_, '_>,
     owner: &str,
     xml: &mut String,
 ) -> Result<(), UrdfError> {
-    let Some(origin) = reader.child(node, "origin", owner)? else { return Ok(()) };
+    if let Some([xyz, rpy]) = read_pose(reader, node, owner)? {
+        xml.push_str("<origin");
+        attribute(xml, "xyz", &row(&xyz));
+        attribute(xml, "rpy", &row(&rpy));
+        xml.push_str("/>");
+    }
+    Ok(())
+}
+
+/// Position, and roll, pitch, yaw of the origin of `node`; a quaternion (URDF 1.1) becomes roll, pitch, yaw.
+pub(super) fn read_pose(
+    reader: &Reader<'_>,
+    node: Node<'_, '_>,
+    owner: &str,
+) -> Result<Option<[[f64; 3]; 2]>, UrdfError> {
+    let Some(origin) = reader.child(node, "origin", owner)? else { return Ok(None) };
     let xyz = reader.numbers::<3>(origin, "xyz")?;
     let mut rpy = reader.numbers::<3>(origin, "rpy")?;
     if let Some(quaternion) = reader.numbers::<4>(origin, "quat_xyzw")? {
@@ -247,20 +248,17 @@ pub(super) fn read_origin(
         }
         rpy = Some(rpy_of(&scene::pose::from_xyzw(quaternion.map(|c| c / largest))));
     }
-    xml.push_str("<origin");
-    attribute(xml, "xyz", &row(&xyz.unwrap_or_default()));
-    attribute(xml, "rpy", &row(&rpy.unwrap_or_default()));
-    xml.push_str("/>");
-    Ok(())
+    Ok(Some([xyz.unwrap_or_default(), rpy.unwrap_or_default()]))
 }
 
+/// Reads the shape of `node`; `false` where it has a size of 0 and is left out.
 fn read_geometry(
-    reader: &Reader<'_>,
+    reader: &mut Reader<'_>,
     node: Node<'_, '_>,
     link: &str,
     owner: &str,
     xml: &mut String,
-) -> Result<(), UrdfError> {
+) -> Result<bool, UrdfError> {
     let example = "write <geometry><box size=\"0.1 0.1 0.1\"/></geometry>";
     let geometry = reader.required_child(node, "geometry", owner, example)?;
     let mut shapes = reader.elements(geometry);
@@ -274,12 +272,11 @@ fn read_geometry(
         });
     };
     if let Some(second) = shapes.next() {
-        return Err(UrdfError::ElementRepeated {
-            at: reader.source(second),
-            owner: owner.to_owned(),
-            element: format!("{} in one <geometry>", second.tag_name().name()),
-            first: reader.source(shape),
-        });
+        let at = reader.source(second);
+        let found = second.tag_name().name().to_owned();
+        let error =
+            UrdfError::GeometryRepeated { at: at.clone(), owner: owner.to_owned(), found, first: reader.source(shape) };
+        reader.tolerate(DiagnosticKind::ElementRepeated, at, error, "the first is used")?;
     }
     let name = shape.tag_name().name();
     if !SHAPES.contains(&name) {
@@ -292,25 +289,31 @@ fn read_geometry(
     }
     xml.push_str("<geometry><");
     xml.push_str(name);
-    match name {
-        "box" => match reader.numbers::<3>(shape, "size")? {
-            Some(size) if size.iter().all(|&s| s > 0.0) => attribute(xml, "size", &row(&size)),
-            Some(_) => return Err(reader.value(shape, "size", owner, "must be positive, full edge lengths in metres")),
-            None => return Err(missing(reader, shape, owner, "size", "size=\"0.1 0.1 0.1\"")),
-        },
-        "mesh" => read_mesh(reader, shape, link, owner, xml)?,
-        "sphere" => positive(reader, shape, owner, "radius", xml)?,
-        _ => {
-            positive(reader, shape, owner, "radius", xml)?;
-            positive(reader, shape, owner, "length", xml)?;
+    let has_size = match name {
+        "box" => read_box(reader, shape, owner, xml)?,
+        "mesh" => {
+            read_mesh(reader, shape, link, owner, xml)?;
+            true
         }
-    }
+        "sphere" => read_size(reader, shape, owner, "radius", xml)?,
+        // Both are read, so that a wrong length is found behind a radius of 0.
+        _ => read_size(reader, shape, owner, "radius", xml)? & read_size(reader, shape, owner, "length", xml)?,
+    };
     xml.push_str("/></geometry>");
-    Ok(())
+    Ok(has_size)
+}
+
+/// The edges of a box; `false` where one is 0.
+fn read_box(reader: &mut Reader<'_>, shape: Node<'_, '_>, owner: &str, xml: &mut String) -> Result<bool, UrdfError> {
+    let Some(size) = reader.numbers::<3>(shape, "size")? else {
+        return Err(missing(reader, shape, owner, "size", "size=\"0.1 0.1 0.1\""));
+    };
+    attribute(xml, "size", &row(&size));
+    check_size(reader, shape, owner, "size", &size, "must be positive, full edge lengths in metres")
 }
 
 fn read_mesh(
-    reader: &Reader<'_>,
+    reader: &mut Reader<'_>,
     mesh: Node<'_, '_>,
     link: &str,
     owner: &str,
@@ -323,7 +326,7 @@ fn read_mesh(
         return Err(UrdfError::MeshUnnamed { at: reader.source(mesh), link: link.to_owned() });
     }
     attribute(xml, "filename", uri.trim());
-    if let Some(scale) = reader.numbers::<3>(mesh, "scale")? {
+    if let Some(scale) = read_scale(reader, mesh)? {
         if scale.contains(&0.0) {
             return Err(reader.value(mesh, "scale", owner, "must not be zero along any axis; negative values mirror"));
         }
@@ -332,19 +335,52 @@ fn read_mesh(
     Ok(())
 }
 
-fn positive(
-    reader: &Reader<'_>,
+/// The scale of a mesh; a single number holds for all axes.
+fn read_scale(reader: &mut Reader<'_>, mesh: Node<'_, '_>) -> Result<Option<[f64; 3]>, UrdfError> {
+    let error = match reader.numbers::<3>(mesh, "scale") {
+        Ok(scale) => return Ok(scale),
+        Err(error) => error,
+    };
+    let Ok(Some(scale)) = reader.number(mesh, "scale") else { return Err(error) };
+    let at = reader.attribute_source(mesh, "scale");
+    reader.tolerate(DiagnosticKind::ScaleUniform, at, error, "it holds for all three axes")?;
+    Ok(Some([scale; 3]))
+}
+
+/// A size of a shape; `false` where it is 0.
+fn read_size(
+    reader: &mut Reader<'_>,
     shape: Node<'_, '_>,
     owner: &str,
     name: &'static str,
     xml: &mut String,
-) -> Result<(), UrdfError> {
-    match reader.number(shape, name)? {
-        Some(value) if value > 0.0 => attribute(xml, name, &shortest(value)),
-        Some(_) => return Err(reader.value(shape, name, owner, "must be positive, in metres")),
-        None => return Err(missing(reader, shape, owner, name, "a positive number of metres, such as \"0.1\"")),
+) -> Result<bool, UrdfError> {
+    let Some(size) = reader.number(shape, name)? else {
+        return Err(missing(reader, shape, owner, name, "a positive number of metres, such as \"0.1\""));
+    };
+    attribute(xml, name, &shortest(size));
+    check_size(reader, shape, owner, name, &[size], "must be positive, in metres")
+}
+
+/// Negative sizes are errors; `false` for sizes of 0.
+fn check_size(
+    reader: &mut Reader<'_>,
+    shape: Node<'_, '_>,
+    owner: &str,
+    name: &str,
+    sizes: &[f64],
+    rule: &str,
+) -> Result<bool, UrdfError> {
+    if sizes.iter().all(|&size| size > 0.0) {
+        return Ok(true);
     }
-    Ok(())
+    let error = reader.value(shape, name, owner, rule);
+    if sizes.iter().any(|&size| size < 0.0) {
+        return Err(error);
+    }
+    let at = reader.attribute_source(shape, name);
+    reader.tolerate(DiagnosticKind::ShapeEmpty, at, error, "the shape is left out")?;
+    Ok(false)
 }
 
 fn missing(

@@ -10,7 +10,7 @@ use super::config::{ComponentCfg, UrdfCfg};
 use super::error::UrdfError;
 use super::file::UrdfFile;
 use super::names::Names;
-use super::parse::parse_file;
+use super::parse::parse_file_with;
 use super::shapes::Shapes;
 use super::tree::owned;
 use crate::description::{Inertial, Joint, JointId, JointKind, JointLimit, Link, LinkId, Mimic, RobotDescription};
@@ -32,6 +32,9 @@ pub struct Assembly {
 
 /// Reads and merges the files of a robot.
 ///
+/// Mass properties are those of the files: [`MissingInertia`](super::MissingInertia) holds for robots that are added to a
+/// simulation, whose [`description`](crate::Robot::description) is complete.
+///
 /// The order of links and joints is that of the components (parents first, else as given) and, within one, that of its
 /// file.
 ///
@@ -41,7 +44,7 @@ pub fn assemble(cfg: &UrdfCfg) -> Result<Assembly, UrdfError> {
     let components = Components::arrange(cfg)?;
     let mut files = Vec::with_capacity(cfg.components.len());
     for component in &cfg.components {
-        files.push(parse_file(&component.urdf)?);
+        files.push(parse_file_with(&component.urdf, cfg.strictness)?);
     }
     let root = components.order[0];
     let mut merge = Merge {
@@ -153,17 +156,18 @@ impl Merge<'_> {
     }
 
     fn add_links(&mut self, component: &ComponentCfg, file: &UrdfFile, prefix: &str) -> Result<(), UrdfError> {
-        let mut shapes = Shapes::new(file, &self.cfg.packages);
+        let mut shapes = Shapes::new(file, self.cfg);
         for (model, notes) in file.robot.links.iter().zip(&file.links) {
             let names = &mut self.link_names;
             let name = names.claim(&model.name, prefix, &component.name, &notes.source, &mut self.diagnostics);
             let mut link = Link::new(name, notes.source.clone(), component.name.clone());
             link.inertial = notes.inertial.as_ref().map(|source| inertial(&model.inertial, source.clone()));
+            link.partial_inertial = notes.partial_inertial.clone();
             for (visual, notes) in model.visual.iter().zip(&notes.visuals) {
                 link.visuals.push(shapes.visual(visual, notes, &model.name, &mut self.diagnostics)?);
             }
             for (collision, source) in model.collision.iter().zip(&notes.collisions) {
-                link.collisions.push(shapes.collision(collision, source, &model.name)?);
+                link.collisions.push(shapes.collision(collision, source, &model.name, &mut self.diagnostics)?);
             }
             self.links.push(link);
         }

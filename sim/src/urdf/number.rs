@@ -1,8 +1,9 @@
-//! Reading attributes strictly: every number parses, is finite, and there are exactly as many as needed.
+//! Reading attributes: every number parses, is finite, and there are exactly as many as needed.
 
 use super::error::UrdfError;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::source::Source;
+use crate::urdf::config::Strictness;
 use roxmltree::Node;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -15,6 +16,7 @@ pub(super) struct Reader<'i> {
     line_starts: Vec<usize>,
     /// The namespace of the root element: elements of it, or of none, are URDF.
     namespace: Option<&'i str>,
+    strictness: Strictness,
     pub(super) diagnostics: Vec<Diagnostic>,
 }
 
@@ -22,10 +24,10 @@ pub(super) struct Reader<'i> {
 const COUNTS: [&str; 7] = ["no", "one", "two", "three", "four", "five", "six"];
 
 impl<'i> Reader<'i> {
-    pub(super) fn new(file: Arc<PathBuf>, text: &str, namespace: Option<&'i str>) -> Self {
+    pub(super) fn new(file: Arc<PathBuf>, text: &str, namespace: Option<&'i str>, strictness: Strictness) -> Self {
         let ends = text.bytes().enumerate().filter(|&(_, b)| b == b'\n').map(|(i, _)| i + 1);
         let line_starts = std::iter::once(0).chain(ends).collect();
-        Self { file, line_starts, namespace, diagnostics: Vec::new() }
+        Self { file, line_starts, namespace, strictness, diagnostics: Vec::new() }
     }
 
     /// The place of a byte of the text.
@@ -46,6 +48,40 @@ impl<'i> Reader<'i> {
 
     pub(super) fn warn(&mut self, kind: DiagnosticKind, at: Source, message: String) {
         self.diagnostics.push(Diagnostic::new(kind, at, message));
+    }
+
+    /// Handles a departure from URDF with a clear meaning: a warning with the words of `error` and what was `done`, or in
+    /// strict reading the error.
+    pub(super) fn tolerate(
+        &mut self,
+        kind: DiagnosticKind,
+        at: Source,
+        error: UrdfError,
+        done: &str,
+    ) -> Result<(), UrdfError> {
+        if self.strictness == Strictness::Strict {
+            return Err(error);
+        }
+        let text = error.to_string();
+        let text = text.strip_prefix(&format!("{at}: ")).unwrap_or(&text);
+        self.warn(kind, at, format!("{text}; {done}"));
+        Ok(())
+    }
+
+    /// The first child called `name`; further ones are ignored with a warning, or an error in strict reading.
+    pub(super) fn first_child<'a, 'input>(
+        &mut self,
+        node: Node<'a, 'input>,
+        name: &'static str,
+        owner: &str,
+    ) -> Result<Option<Node<'a, 'input>>, UrdfError> {
+        let mut found = self.named(node, name);
+        let Some(first) = found.next() else { return Ok(None) };
+        for further in found {
+            let error = self.repeated(further, first, name, owner);
+            self.tolerate(DiagnosticKind::ElementRepeated, self.source(further), error, "the first is used")?;
+        }
+        Ok(Some(first))
     }
 
     /// The URDF elements directly below.
@@ -76,13 +112,17 @@ impl<'i> Reader<'i> {
         let mut found = self.elements(node).filter(|n| n.tag_name().name() == name);
         let first = found.next();
         match (first, found.next()) {
-            (Some(first), Some(second)) => Err(UrdfError::ElementRepeated {
-                at: self.source(second),
-                owner: owner.to_owned(),
-                element: name.to_owned(),
-                first: self.source(first),
-            }),
+            (Some(first), Some(second)) => Err(self.repeated(second, first, name, owner)),
             _ => Ok(first),
+        }
+    }
+
+    fn repeated(&self, second: Node<'_, '_>, first: Node<'_, '_>, name: &str, owner: &str) -> UrdfError {
+        UrdfError::ElementRepeated {
+            at: self.source(second),
+            owner: owner.to_owned(),
+            element: name.to_owned(),
+            first: self.source(first),
         }
     }
 

@@ -1,15 +1,17 @@
-//! One URDF file, read strictly.
+//! One URDF file, read and checked.
 //!
 //! Our own pass over the document checks everything and keeps places; what it accepts is then handed to `urdf-rs` in a
 //! normalised form (absent numbers filled in, nothing it would misread), and `urdf-rs` supplies the model values. The
 //! first error ends the reading.
 
+use super::config::Strictness;
 use super::error::UrdfError;
 use super::file::{JointNotes, LinkNotes, UrdfFile};
 use super::joint::read_joint;
 use super::link::{Materials, read_link};
 use super::number::{Reader, attribute, element};
 use super::tree::{Edge, Named, Tree};
+use super::xml::repair;
 use crate::diagnostic::DiagnosticKind;
 use crate::source::Source;
 use roxmltree::{Document, Node};
@@ -25,11 +27,19 @@ const LARGEST_FILE: u64 = 256 << 20;
 const SKIPPED: [&str; 8] =
     ["gazebo", "plugin", "ros2_control", "drake", "safety_controller", "sensor", "group", "verbose"];
 
-/// Reads a URDF file.
+/// Reads a URDF file with the default [`Strictness`].
 ///
 /// # Errors
 /// Any [`UrdfError`] up to the tree checks; meshes are not looked at.
 pub fn parse_file(path: &Path) -> Result<UrdfFile, UrdfError> {
+    parse_file_with(path, Strictness::default())
+}
+
+/// Reads a URDF file.
+///
+/// # Errors
+/// As [`parse_file`]; in strict reading also departures from URDF whose meaning is clear.
+pub fn parse_file_with(path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
     let owned = || path.to_path_buf();
     if path.is_dir() {
         return Err(UrdfError::FileIsFolder { path: owned(), urdfs: urdfs_in(path) });
@@ -45,7 +55,7 @@ pub fn parse_file(path: &Path) -> Result<UrdfFile, UrdfError> {
         return Err(UrdfError::FileTooLarge { path: owned(), limit: LARGEST_FILE });
     }
     match std::str::from_utf8(&bytes) {
-        Ok(text) => parse_str(text, path),
+        Ok(text) => parse_str_with(text, path, strictness),
         Err(error) => Err(encoding(&bytes, error.valid_up_to(), path)),
     }
 }
@@ -68,19 +78,39 @@ fn encoding(bytes: &[u8], wrong: usize, path: &Path) -> UrdfError {
     UrdfError::Encoding { at: Source::new(path, u32::try_from(line).unwrap_or(u32::MAX)), problem }
 }
 
-/// Reads a URDF from memory; `path` names it in messages and is where relative mesh paths start.
+/// Reads a URDF from memory with the default [`Strictness`]; `path` names it in messages and is where relative mesh paths
+/// start.
 ///
 /// # Errors
 /// As [`parse_file`].
 pub fn parse_str(text: &str, path: &Path) -> Result<UrdfFile, UrdfError> {
+    parse_str_with(text, path, Strictness::default())
+}
+
+/// Reads a URDF from memory; `path` names it in messages and is where relative mesh paths start.
+///
+/// # Errors
+/// As [`parse_file_with`].
+pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     if text.trim().is_empty() {
         return Err(UrdfError::FileEmpty { path: path.to_path_buf() });
     }
-    let document = Document::parse(text).map_err(|e| malformed(e, text, path))?;
+    let mut diagnostics = Vec::new();
+    let repaired;
+    let document = match Document::parse(text) {
+        Err(error) if strictness == Strictness::Lenient => {
+            repaired = repair(text, error, path, &mut diagnostics).map_err(|e| malformed(e, text, path))?;
+            Document::parse(&repaired)
+        }
+        parsed => parsed,
+    };
+    let document = document.map_err(|e| malformed(e, text, path))?;
     let root = document.root_element();
-    let mut reader = Reader::new(Arc::new(path.to_path_buf()), text, root.tag_name().namespace());
-    check_root(&reader, root)?;
+    let mut reader =
+        Reader::new(Arc::new(path.to_path_buf()), document.input_text(), root.tag_name().namespace(), strictness);
+    reader.diagnostics = diagnostics;
+    check_root(&mut reader, root)?;
 
     let mut materials = Materials::default();
     materials.define(&mut reader, root)?;
@@ -197,7 +227,7 @@ fn malformed(error: roxmltree::Error, text: &str, path: &Path) -> UrdfError {
     }
 }
 
-fn check_root(reader: &Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfError> {
+fn check_root(reader: &mut Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfError> {
     let found = root.tag_name().name();
     if found != "robot" {
         let advice = match found {
@@ -211,13 +241,22 @@ fn check_root(reader: &Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfError> 
         return Err(UrdfError::WrongRoot { at: reader.source(root), found: found.to_owned(), advice });
     }
     let is_xacro = |n: &Node<'_, '_>| n.tag_name().namespace().is_some_and(|s| s.contains("xacro"));
-    match root.descendants().filter(Node::is_element).find(is_xacro) {
-        Some(node) => {
-            let found = format!("<xacro:{}>", node.tag_name().name());
-            Err(UrdfError::Xacro { at: reader.source(node), found })
+    for node in root.descendants().filter(Node::is_element).filter(is_xacro) {
+        let Some(parent) = node.parent_element() else { continue };
+        // Those inside another one are ignored with it.
+        if is_xacro(&parent) {
+            continue;
         }
-        None => Ok(()),
+        let (at, found) = (reader.source(node), format!("<xacro:{}>", node.tag_name().name()));
+        let error = UrdfError::Xacro { at: at.clone(), found };
+        // At the top level links and joints may come of it.
+        if parent == root {
+            return Err(error);
+        }
+        let done = format!("here it is inside <{}> and was ignored", parent.tag_name().name());
+        reader.tolerate(DiagnosticKind::XacroLeftover, at, error, &done)?;
     }
+    Ok(())
 }
 
 /// `meshdir` of `<mujoco><compiler>`.

@@ -5,7 +5,10 @@
 //! | `package://pkg/rest`, `model://pkg/rest` | the folder given for `pkg` in the configuration, and only there; else `ROS_PACKAGE_PATH`, `AMENT_PREFIX_PATH` (`share/pkg`), then every folder above the URDF: itself, its `pkg`, and its children, where the name or the `<name>` of `package.xml` is `pkg` |
 //! | `file://...` | the absolute path; a relative one starts at the URDF |
 //! | absolute path | there |
-//! | relative path | the folder of the URDF |
+//! | relative path | the folder of the URDF, then the asset root of the configuration |
+//!
+//! The asset root is also the last folder in which packages are searched. `package:///path` has no package: in lenient reading
+//! it is an absolute path, or where that does not exist `package://path`.
 //!
 //! What is not found there is looked for in `meshdir` of `<mujoco><compiler>`: the whole path, then only its last part,
 //! as MuJoCo does. `%20` and the like are decoded in URIs, and in plain paths if the path as written does not exist.
@@ -14,6 +17,7 @@
 //! it does not, the error shows the path with `..` worked out. Nothing is written, so climbing has no danger beyond
 //! reading a file that the user can read anyway.
 
+use super::config::Strictness;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Component, Path, PathBuf};
 
@@ -59,6 +63,8 @@ pub struct Resolver<'c> {
     packages: &'c BTreeMap<String, PathBuf>,
     folder: PathBuf,
     meshdir: Option<String>,
+    asset_root: Option<PathBuf>,
+    strictness: Strictness,
     /// Entries of `ROS_PACKAGE_PATH`.
     ros_package_path: Vec<PathBuf>,
     /// Entries of `AMENT_PREFIX_PATH`.
@@ -99,11 +105,26 @@ impl<'c> Resolver<'c> {
             packages,
             folder: absolute.parent().map(Path::to_path_buf).unwrap_or_default(),
             meshdir: meshdir.map(str::to_owned),
+            asset_root: None,
+            strictness: Strictness::default(),
             ros_package_path,
             ament_prefix_path,
             resolved: HashMap::new(),
             searched: HashMap::new(),
         }
+    }
+
+    /// The same resolver with the folder in which it searches what is not found from the URDF.
+    #[must_use]
+    pub fn with_asset_root(self, asset_root: Option<&Path>) -> Self {
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+        Self { asset_root: asset_root.map(absolute), ..self }
+    }
+
+    /// The same resolver with another handling of addresses that are not valid.
+    #[must_use]
+    pub fn with_strictness(self, strictness: Strictness) -> Self {
+        Self { strictness, ..self }
     }
 
     /// The file of a URI.
@@ -122,7 +143,22 @@ impl<'c> Resolver<'c> {
         }
         let Some((scheme, rest)) = uri.split_once("://") else { return self.plain(uri) };
         match scheme.to_ascii_lowercase().as_str() {
-            "package" | "model" => self.package(&decode(rest)),
+            "package" | "model" => {
+                let rest = decode(rest);
+                match rest.strip_prefix('/').filter(|_| self.strictness == Strictness::Lenient) {
+                    Some(_) if Path::new(&rest).is_file() => Resolved::Found(PathBuf::from(rest)),
+                    Some(package) => match self.package(package) {
+                        Resolved::Missing { guess, tried, hint } => {
+                            Resolved::Missing { guess, tried: [vec![rest], tried].concat(), hint }
+                        }
+                        Resolved::PackageUnknown { package, guess, tried } => {
+                            Resolved::PackageUnknown { package, guess, tried: [vec![rest], tried].concat() }
+                        }
+                        other => other,
+                    },
+                    None => self.package(&rest),
+                }
+            }
             "file" => self.plain(&decode(rest.strip_prefix("localhost/").map_or(rest, |_| &rest["localhost".len()..]))),
             _ => Resolved::Unsupported {
                 problem: format!("{scheme}:// is not supported; use package://, file:// or a path"),
@@ -130,13 +166,11 @@ impl<'c> Resolver<'c> {
         }
     }
 
-    /// A path, absolute or from the folder of the URDF.
+    /// A path, absolute or from the folder of the URDF or the asset root.
     fn plain(&self, path: &str) -> Resolved {
-        let mut candidates = vec![self.folder.join(path)];
         let decoded = decode(path);
-        if decoded != path {
-            candidates.push(self.folder.join(decoded));
-        }
+        let folders = [Some(&self.folder), self.asset_root.as_ref()];
+        let candidates = folders.into_iter().flatten().flat_map(|f| [f.join(path), f.join(&decoded)]).collect();
         self.first_file(candidates, path)
     }
 
@@ -171,7 +205,12 @@ impl<'c> Resolver<'c> {
             return Resolved::Found(found);
         }
         let in_meshdir = self.meshdir_candidates(path);
-        let tried = candidates.iter().chain(&in_meshdir).map(|c| work_out(c).display().to_string()).collect();
+        let mut tried: Vec<String> = Vec::new();
+        for place in candidates.iter().chain(&in_meshdir).map(|c| work_out(c).display().to_string()) {
+            if !tried.contains(&place) {
+                tried.push(place);
+            }
+        }
         let guess = candidates.into_iter().next().unwrap_or_default();
         Resolved::Missing { hint: remark(&guess), guess, tried }
     }
@@ -209,6 +248,9 @@ impl<'c> Resolver<'c> {
             }
             for folder in self.folder.ancestors() {
                 search.around(folder, package, "above the URDF");
+            }
+            if let Some(folder) = &self.asset_root {
+                search.around(folder, package, "asset root");
             }
         }
         self.searched.insert(package.to_owned(), search.clone());
@@ -332,6 +374,9 @@ mod tests {
         ] {
             files.write(&format!("ws/{path}"), text);
         }
+        for path in ["cubes/meshes/cube.stl", "local.stl"] {
+            files.write(&format!("assets/{path}"), "");
+        }
         files
     }
 
@@ -339,7 +384,8 @@ mod tests {
         let packages = BTreeMap::from([("mapped".to_owned(), dir.join("ws/other folder"))]);
         let urdf = dir.join("ws/robot_description/urdf/robot.urdf");
         let (ros, ament) = (vec![dir.join("ws/ros")], vec![dir.join("ws/install")]);
-        Resolver::with_paths(&urdf, &packages, Some("mj"), ros, ament).resolve(uri)
+        let resolver = Resolver::with_paths(&urdf, &packages, Some("mj"), ros, ament);
+        resolver.with_asset_root(Some(&dir.join("assets"))).resolve(uri)
     }
 
     #[test]
@@ -367,6 +413,14 @@ mod tests {
             ("100%25.stl", "100%25.stl"),
             ("only_here.stl", "only_here.stl"),
             ("some/folder/only_here.stl", "only_here.stl"),
+            // Isaac Gym: paths and packages from the asset root.
+            ("cubes/meshes/cube.stl", "assets/cubes/meshes/cube.stl"),
+            ("package://cubes/meshes/cube.stl", "assets/cubes/meshes/cube.stl"),
+            // The folder of the URDF comes first.
+            ("local.stl", "urdf/local.stl"),
+            // One slash too many, with a package and with an absolute path.
+            ("package:///rospkg/c.stl", "c.stl"),
+            (&format!("package://{absolute}"), "c.stl"),
         ] {
             match resolve(dir.folder(), uri) {
                 Resolved::Found(path) => assert!(path.is_file() && path.ends_with(file), "{uri}: {path:?}"),
@@ -388,6 +442,14 @@ mod tests {
         }
         let Resolved::Missing { tried, .. } = resolve(dir.folder(), "package://mapped/c.stl") else { panic!() };
         assert!(tried[0].ends_with("ws/other folder/c.stl"));
+        // Roots that are one folder: each place is listed once.
+        let same = dir.folder().join("ws/robot_description/urdf");
+        let packages = BTreeMap::new();
+        let resolver = Resolver::with_paths(&same.join("robot.urdf"), &packages, Some("."), vec![], vec![]);
+        let Resolved::Missing { tried, .. } = resolver.with_asset_root(Some(&same)).resolve("none.stl") else {
+            panic!()
+        };
+        assert_eq!(tried, [same.join("none.stl").display().to_string()]);
         let unknown = resolve(dir.folder(), "package://nope/x.stl");
         let Resolved::PackageUnknown { package, tried, .. } = unknown else { panic!() };
         assert_eq!(package, "nope");
@@ -401,6 +463,13 @@ mod tests {
         let dir = workspace();
         assert_eq!(resolve(dir.folder(), ""), Resolved::Empty);
         assert_eq!(resolve(dir.folder(), "  "), Resolved::Empty);
+        let urdf = dir.folder().join("ws/robot_description/urdf/robot.urdf");
+        let packages = BTreeMap::new();
+        let unknown = resolve(dir.folder(), "package:///none/a.stl");
+        assert!(matches!(&unknown, Resolved::PackageUnknown { tried, .. } if tried[0] == "/none/a.stl"), "{unknown:?}");
+        let strict = Resolver::with_paths(&urdf, &packages, None, vec![dir.folder().join("ws/ros")], vec![]);
+        let strict = strict.with_strictness(Strictness::Strict).resolve("package:///rospkg/c.stl");
+        assert!(matches!(strict, Resolved::Unsupported { .. }), "{strict:?}");
         for uri in ["http://example.com/a.stl", "package://", "package://pkg", "package://pkg/", "package:///a.stl"] {
             assert!(matches!(resolve(dir.folder(), uri), Resolved::Unsupported { .. }), "{uri}");
         }

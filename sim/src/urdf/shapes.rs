@@ -1,5 +1,6 @@
 //! Visuals and collisions of a file, with meshes, textures and materials resolved.
 
+use super::config::UrdfCfg;
 use super::error::UrdfError;
 use super::file::{UrdfFile, VisualNotes};
 use super::merge::pose_of;
@@ -8,7 +9,7 @@ use crate::description::{Collision, Geometry, Material, Visual};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::source::Source;
 use nalgebra::Vector3;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 /// Turns the shapes of one file into those of the description.
@@ -17,15 +18,37 @@ pub(super) struct Shapes<'f> {
     resolver: Resolver<'f>,
     /// The materials of this file: a name never reaches into another component.
     materials: HashMap<&'f str, &'f urdf_rs::Material>,
+    /// A warning about `package:///` was given: the others of the file are alike.
+    warned_of_slash: bool,
 }
 
 impl<'f> Shapes<'f> {
-    pub(super) fn new(file: &'f UrdfFile, packages: &'f BTreeMap<String, PathBuf>) -> Self {
+    pub(super) fn new(file: &'f UrdfFile, cfg: &'f UrdfCfg) -> Self {
         let mut materials = HashMap::new();
         for material in &file.robot.materials {
             materials.entry(material.name.as_str()).or_insert(material);
         }
-        Self { resolver: Resolver::new(&file.path, packages, file.meshdir.as_deref()), materials }
+        let resolver = Resolver::new(&file.path, &cfg.packages, file.meshdir.as_deref())
+            .with_asset_root(cfg.asset_root.as_deref())
+            .with_strictness(cfg.strictness);
+        Self { resolver, materials, warned_of_slash: false }
+    }
+
+    /// The file of an address, with a warning about the first that is `package:///`.
+    fn resolve(&mut self, uri: &str, at: &Source, diagnostics: &mut Vec<Diagnostic>) -> Resolved {
+        let resolved = self.resolver.resolve(uri);
+        if let Resolved::Found(path) = &resolved
+            && ["package:///", "model:///"].iter().any(|start| uri.trim().starts_with(start))
+            && !std::mem::replace(&mut self.warned_of_slash, true)
+        {
+            let message = format!(
+                "\"{uri}\" has no package, it was read as {}; write package://name_of_package/.. or file:///path (further \
+                 such addresses of this file are read alike)",
+                path.display()
+            );
+            diagnostics.push(Diagnostic::new(DiagnosticKind::AddressRepaired, at.clone(), message));
+        }
+        resolved
     }
 
     /// A visual. A mesh that does not exist is reported and keeps its most likely path.
@@ -38,7 +61,7 @@ impl<'f> Shapes<'f> {
     ) -> Result<Visual, UrdfError> {
         let geometry = match &model.geometry {
             urdf_rs::Geometry::Mesh { filename, scale } => {
-                let path = match self.resolver.resolve(filename) {
+                let path = match self.resolve(filename, &notes.source, diagnostics) {
                     Resolved::Found(path) => path,
                     Resolved::Empty => {
                         return Err(UrdfError::MeshUnnamed { at: notes.source.clone(), link: link.to_owned() });
@@ -69,11 +92,12 @@ impl<'f> Shapes<'f> {
         model: &urdf_rs::Collision,
         source: &Source,
         link: &str,
+        diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Collision, UrdfError> {
         let geometry = match &model.geometry {
             urdf_rs::Geometry::Mesh { filename, scale } => {
                 let (at, link, uri) = (source.clone(), link.to_owned(), filename.clone());
-                let path = match self.resolver.resolve(filename) {
+                let path = match self.resolve(filename, source, diagnostics) {
                     Resolved::Found(path) => path,
                     Resolved::Empty => return Err(UrdfError::MeshUnnamed { at, link }),
                     Resolved::Missing { tried, hint, .. } => {
@@ -106,7 +130,7 @@ impl<'f> Shapes<'f> {
         let look = named.unwrap_or(model);
         let mut texture = None;
         if let Some(urdf_rs::Texture { filename }) = &look.texture {
-            match self.resolver.resolve(filename) {
+            match self.resolve(filename, source, diagnostics) {
                 Resolved::Found(path) => texture = Some(path),
                 missing => {
                     let (_, why) = describe(missing, filename);

@@ -5,7 +5,8 @@
 
 use super::number::{attribute, row, shortest};
 use super::rotation::rpy_of;
-use crate::description::{Geometry, Inertial, Joint, JointKind, Material, RobotDescription};
+use crate::description::{Geometry, Inertial, Joint, JointKind, Material, PartialInertial, RobotDescription};
+use nalgebra::Matrix3;
 use scene::Pose;
 use std::path::Path;
 
@@ -22,13 +23,17 @@ pub fn write_urdf_with(robot: &RobotDescription, file_name: impl Fn(&Path) -> St
     writer.open("robot", &[("name", robot.name.clone())]);
     for link in &robot.links {
         let name = [("name", link.name.clone())];
-        if link.inertial.is_none() && link.visuals.is_empty() && link.collisions.is_empty() {
+        let has_mass = link.inertial.is_some() || link.partial_inertial.is_some();
+        if !has_mass && link.visuals.is_empty() && link.collisions.is_empty() {
             writer.empty("link", &name);
             continue;
         }
         writer.open("link", &name);
         if let Some(inertial) = &link.inertial {
             writer.inertial(inertial);
+        }
+        if let Some(partial) = link.partial_inertial.as_ref().filter(|_| link.inertial.is_none()) {
+            writer.partial_inertial(partial);
         }
         for visual in &link.visuals {
             writer.open("visual", &[]);
@@ -98,15 +103,35 @@ impl Writer {
     }
 
     fn inertial(&mut self, inertial: &Inertial) {
-        let i = &inertial.inertia;
         self.open("inertial", &[]);
         self.origin(&inertial.link_from_com);
         self.empty("mass", &[("value", shortest(inertial.mass))]);
+        self.moments(&inertial.inertia);
+        self.close("inertial");
+    }
+
+    fn partial_inertial(&mut self, partial: &PartialInertial) {
+        self.open("inertial", &[]);
+        if let Some(pose) = &partial.link_from_com {
+            let xyz = row(pose.translation.vector.as_slice());
+            self.empty("origin", &[("xyz", xyz), ("rpy", row(&rpy_of(&pose.rotation)))]);
+        }
+        for (name, value) in [("mass", partial.mass), ("density", partial.density)] {
+            if let Some(value) = value {
+                self.empty(name, &[("value", shortest(value))]);
+            }
+        }
+        if let Some(inertia) = &partial.inertia {
+            self.moments(inertia);
+        }
+        self.close("inertial");
+    }
+
+    fn moments(&mut self, i: &Matrix3<f64>) {
         let names = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
         let values = [i[(0, 0)], i[(0, 1)], i[(0, 2)], i[(1, 1)], i[(1, 2)], i[(2, 2)]];
         let attributes: Vec<_> = names.into_iter().zip(values.map(shortest)).collect();
         self.empty("inertia", &attributes);
-        self.close("inertial");
     }
 
     fn geometry(&mut self, geometry: &Geometry, file_name: &impl Fn(&Path) -> String) {

@@ -5,6 +5,7 @@ use crate::description::{Geometry, Visual};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::mjcf::robot::MeshKey;
 use crate::objects::rigid_object::RigidObjectData;
+use crate::objects::robot::RobotData;
 use crate::source::Source;
 use scene::mesh::{MeshMaterial, TextureSource, TriMesh};
 use scene::shape::{Box as Cuboid, Capsule, Cylinder, Mesh, Sphere};
@@ -53,6 +54,21 @@ impl VisualCache {
     pub(crate) fn say_look(&mut self, env: usize, error: &scene::RenderSceneError) {
         let message = format!("environment {env} is drawn with nominal sizes and colours: its own cannot be: {error}");
         self.diagnostics.push(Diagnostic::new(DiagnosticKind::LookInvalid, None, message));
+    }
+
+    /// Warns of a robot from URDF files that cameras do not see.
+    pub(crate) fn check_robot(&mut self, robot: &RobotData) {
+        let description = robot.description();
+        if robot.file().is_some() || description.links.iter().any(|link| !link.visuals.is_empty()) {
+            return;
+        }
+        let message = format!(
+            "robot {:?} has no <visual> that can be drawn: pictures do not show it; give its links some, or write their \
+             <collision> shapes as <visual> too",
+            description.name
+        );
+        let source = description.link(description.root).source.clone();
+        self.diagnostics.push(Diagnostic::new(DiagnosticKind::NothingToDraw, source, message));
     }
 
     /// What is drawn for a visual.
@@ -122,6 +138,8 @@ impl VisualCache {
     fn load(&mut self, of: &Of, path: &Path, scale: [f64; 3]) -> Vec<MeshPart> {
         match scene::mesh::load(path) {
             Ok(mesh) => self.mesh_parts(of, &mesh.scaled(scale)),
+            // A warning about it was given when the robot was read.
+            Err(_) if !path.exists() => Vec::new(),
             Err(error) => {
                 self.diagnostics.push(Diagnostic::new(
                     DiagnosticKind::VisualMeshInvalid,

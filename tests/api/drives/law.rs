@@ -437,4 +437,25 @@ fn target_range() {
         assert_number("driver", world.q()[0], 0.4, limit);
         assert_number("follower", world.q()[1], 0.6, Tolerance::mixed(1e-5, "as for the driver"));
     }
+    // PR2's gripper: the follower turns against its driver and its own range is on the wrong side of 0. It left the driver no
+    // range, which was then frozen. Now the driver has its own range, and the follower goes with it.
+    let driver = Joint::wheel("d", 0.1).range(0.0, 0.548).effort(50.0);
+    for (what, range) in
+        [("one point is left", [0.0, 0.548]), ("nothing is left", [0.2, 0.5]), ("a hair", [-1e-4, 0.5])]
+    {
+        let follower = Joint::wheel("f", 0.01).range(range[0], range[1]).effort(0.0).following("d", -1.0);
+        let mut world = self::world(&[driver.clone(), follower], gains(100.0, 10.0), weightless());
+        let clipped = world.sim.diagnostics().iter().filter(|d| d.kind == DiagnosticKind::MimicRangeClipped);
+        let message = clipped.map(|d| d.message.clone()).collect::<String>();
+        assert!(message.contains("leave no range for \"d\", so they were ignored"), "{what}: {message}");
+        let limits = world.view().qpos_limits();
+        let ends = [0, 1].map(|joint| [0, 1].map(|end| limits[(0, joint, end)]));
+        assert_eq!(ends, [[0.0, 0.548], [-0.548, 0.0]], "{what}");
+        world.aim(&[0.5, 0.0]);
+        world.step(300);
+        world.assert_well();
+        let limit = Tolerance::mixed(1e-5, "of the way 1.1^-300 is left, and the yield of the coupling");
+        assert_number("driver", world.q()[0], 0.5, limit);
+        assert_number("follower", world.q()[1], -0.5, Tolerance::mixed(1e-5, "as for the driver"));
+    }
 }

@@ -5,6 +5,7 @@ use kinetoscope::sim::description::{Geometry, Joint, RobotDescription};
 
 mod assembly;
 mod bad_input;
+mod masses;
 mod robots;
 mod robustness;
 

@@ -1,0 +1,104 @@
+//! Reading an `<inertial>`, complete or in part.
+
+use super::error::UrdfError;
+use super::link::{read_origin, read_pose};
+use super::number::{Reader, attribute, shortest};
+use crate::description::PartialInertial;
+use crate::diagnostic::DiagnosticKind;
+use nalgebra::Matrix3;
+use roxmltree::Node;
+use scene::pose::from_xyz_rpy;
+
+const EXAMPLE: &str = "an <inertial> needs <mass value=\"1\"/> and <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" \
+                       iyz=\"0\" izz=\"0.01\"/>; without mass properties leave the whole <inertial> out";
+
+/// Reads mass properties. Complete ones are appended to `xml`; of others, those that are given are returned.
+pub(super) fn read_inertial(
+    reader: &mut Reader<'_>,
+    node: Node<'_, '_>,
+    owner: &str,
+    xml: &mut String,
+) -> Result<Option<PartialInertial>, UrdfError> {
+    let mut missing = None;
+    let mass = match part(reader.required_child(node, "mass", owner, EXAMPLE), &mut missing)? {
+        Some(mass) => Some(reader.required_number(mass, "value", owner, "<mass value=\"1\"/>").and_then(|value| {
+            let negative = || reader.value(mass, "value", owner, "is negative, a mass is at least 0");
+            if value < 0.0 { Err(negative()) } else { Ok(value) }
+        })?),
+        None => None,
+    };
+    let moments = match part(reader.required_child(node, "inertia", owner, EXAMPLE), &mut missing)? {
+        Some(inertia) => Some(read_moments(reader, inertia, owner)?),
+        None => None,
+    };
+    let (Some(mass), Some(moments)) = (mass, moments) else {
+        let at = reader.source(node);
+        let done = match (mass, moments) {
+            (Some(_), _) => "the inertia is that of the link's shapes",
+            (None, Some(_)) => "the mass is that of the link's shapes",
+            (None, None) => "mass and inertia are those of the link's shapes",
+        };
+        if let Some(error) = missing {
+            reader.tolerate(DiagnosticKind::InertialIncomplete, at, error, done)?;
+        }
+        return read_partial(reader, node, owner, mass, moments).map(Some);
+    };
+    xml.push_str("<inertial>");
+    read_origin(reader, node, owner, xml)?;
+    xml.push_str("<mass");
+    attribute(xml, "value", &shortest(mass));
+    xml.push_str("/><inertia");
+    for (name, value) in MOMENTS.into_iter().zip(moments) {
+        attribute(xml, name, &shortest(value));
+    }
+    xml.push_str("/></inertial>");
+    Ok(None)
+}
+
+/// An element that may be missing: the first of the errors about that is kept.
+fn part<T>(found: Result<T, UrdfError>, missing: &mut Option<UrdfError>) -> Result<Option<T>, UrdfError> {
+    match found {
+        Ok(element) => Ok(Some(element)),
+        Err(error @ UrdfError::ElementMissing { .. }) => {
+            missing.get_or_insert(error);
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn read_partial(
+    reader: &Reader<'_>,
+    node: Node<'_, '_>,
+    owner: &str,
+    mass: Option<f64>,
+    moments: Option<[f64; 6]>,
+) -> Result<PartialInertial, UrdfError> {
+    let mut density = None;
+    if mass.is_none()
+        && let Some(element) = reader.child(node, "density", owner)?
+    {
+        let value = reader.required_number(element, "value", owner, "<density value=\"1000\"/>")?;
+        if value <= 0.0 {
+            return Err(reader.value(element, "value", owner, "must be positive, in kg/m³"));
+        }
+        density = Some(value);
+    }
+    Ok(PartialInertial {
+        source: reader.source(node),
+        link_from_com: read_pose(reader, node, owner)?.map(|[xyz, rpy]| from_xyz_rpy(xyz, rpy)),
+        mass,
+        density,
+        inertia: moments.map(|[xx, xy, xz, yy, yz, zz]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)),
+    })
+}
+
+const MOMENTS: [&str; 6] = ["ixx", "ixy", "ixz", "iyy", "iyz", "izz"];
+
+fn read_moments(reader: &Reader<'_>, inertia: Node<'_, '_>, owner: &str) -> Result<[f64; 6], UrdfError> {
+    let mut moments = [0.0; 6];
+    for (name, moment) in MOMENTS.into_iter().zip(&mut moments) {
+        *moment = reader.required_number(inertia, name, owner, "all six of ixx ixy ixz iyy iyz izz")?;
+    }
+    Ok(moments)
+}
