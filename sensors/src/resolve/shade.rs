@@ -306,11 +306,6 @@ pub(crate) fn shade<S: Simd>(
     } else {
         plain(gloss)
     };
-    if material.reflectance > 0.0 {
-        let mirrored = view.sub(n.scale(n.dot(view) * 2.0));
-        let k = splat(s, material.reflectance.clamp(0.0, 1.0));
-        color = color.scale(1.0 - k).add(sky(s, lighting, mirrored).scale(k));
-    }
     if let Some(haze) = scene.haze {
         let k = (distance - haze.start) / (haze.end - haze.start).max(1e-6);
         let k = min(max(k, zero), splat(s, 1.0));

@@ -1,6 +1,6 @@
 //! Materials and textures of MuJoCo models.
 
-use crate::mj::{Model, TextureType};
+use crate::mj::{self, Model, TextureType};
 use scene::{Material, Texture, TextureKind};
 use std::sync::Arc;
 
@@ -48,7 +48,12 @@ impl<'a> Surfaces<'a> {
         let rgba = color_of(self.model, geom);
         match usize::try_from(self.model.geom_matid()[geom]).ok().and_then(|m| self.materials.get(m)) {
             None => Material::from_rgba(rgba),
-            Some(material) => Material { rgba, ..material.clone() },
+            Some(material) => {
+                // MuJoCo mirrors the scene in planes and in the upper face of boxes only.
+                let mirrors = matches!(self.model.geom_type()[geom] as u32, mj::mjGEOM_PLANE | mj::mjGEOM_BOX);
+                let reflectance = if mirrors { material.reflectance } else { 0.0 };
+                Material { rgba, reflectance, ..material.clone() }
+            }
         }
     }
 

@@ -184,6 +184,29 @@ fn cube_faces() {
     }
 }
 
+/// Renderers that follow no paths draw surfaces with `reflectance` as if they had none. Root cause once: they mixed in the sky,
+/// and an object that reflects all light had no colour of its own.
+#[test]
+fn reflectance_is_for_paths() {
+    let still = |reflectance| {
+        let material = |color| Material { reflectance, ..matt(color) };
+        Still::new(
+            things([
+                (Shape::from(Sphere { radius: 0.4 }), material([0.8, 0.1, 0.1]), at(0.0, -0.5, 0.4)),
+                (Box { half: [0.3; 3] }.into(), material([0.1, 0.8, 0.1]), at(0.0, 0.5, 0.3)),
+                (Plane { half: [2.0; 2] }.into(), material([0.1, 0.1, 0.8]), PoseF32::IDENTITY),
+            ]),
+            look([96, 72], 0.7, [2.5, 0.4, 1.6], [0.0, 0.0, 0.2]),
+        )
+    };
+    for renderer in [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced] {
+        assert!(still(1.0).by(renderer).same_bits(&still(0.0).by(renderer)), "{renderer:?}");
+    }
+    // The control: paths are mirrored.
+    let paths = Renderer::RayTraced { samples: 1, max_bounces: 1, denoise: false, seed: 0 };
+    assert!(!still(1.0).by(paths).same_bits(&still(0.0).by(paths)));
+}
+
 /// A mat and an endless ground at the same height: the mat is drawn first, and the ground, which is as near, must not shine
 /// through. Root cause once: the two were rounded in different ways.
 #[test]
