@@ -345,7 +345,8 @@ pub(crate) fn albedo<S: Simd>(
         let (uv, density) = if has_uvs {
             (at.uv, at.uv_density)
         } else {
-            let uv = [at.local.x * scale[0], at.local.y * scale[1]];
+            let offset = source.texture_offset;
+            let uv = [at.local.x * scale[0] + offset[0], at.local.y * scale[1] + offset[1]];
             (uv, splat(s, scale[0].abs().max(scale[1].abs())))
         };
         texture::sample(s, image, uv[0], uv[1], width * density, lanes)

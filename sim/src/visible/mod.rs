@@ -77,7 +77,7 @@ pub(crate) fn ground(cfg: &GroundCfg) -> Part {
     let shade = |k: f32| [r, g, b].map(|c| ((c * k).clamp(0.0, 1.0) * 255.0).round() as u8);
     // Two by two squares of half a metre repeat once per metre. The texture brings the colour.
     let texture = Some(Arc::new(Texture::checker(256, shade(0.94), shade(1.08))));
-    let material = Material { rgba: [1.0; 4], texture, tex_uniform: true, ..material };
+    let material = Material { rgba: [1.0; 4], texture, tex_repeat: [2.0; 2], tex_uniform: true, ..material };
     Part { shape, material: cfg.surface.over(material) }
 }
 
