@@ -93,8 +93,7 @@ impl ShadowMap {
         side: usize,
     ) -> bool {
         let solid = |instance: &Instance| {
-            let solid = matches!(Layer::of(instance, cfg.groups), Layer::Opaque | Layer::Veil);
-            solid && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
+            Layer::casts_shadows(instance, cfg.groups) && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
         };
         let Some((projection, planes)) = lamp.fit(scene, poses, receivers, side, solid) else { return false };
         let rotation = lamp.rotation;
