@@ -1,7 +1,7 @@
 //! Everything that can be seen, without the poses.
 
 use crate::Pose;
-use crate::light::{Haze, Headlight, Hemisphere, Light, Sky};
+use crate::light::{Haze, Headlight, Hemisphere, Light, LightSum, Sky};
 use crate::material::{Material, TextureKind};
 use crate::shape::Shape;
 use std::sync::Arc;
@@ -110,6 +110,8 @@ pub struct RenderScene {
     pub headlight: Headlight,
     /// Light from all around.
     pub ambient: Hemisphere,
+    /// How the light of lamps is added up.
+    pub light_sum: LightSum,
     /// What is behind everything.
     pub sky: Sky,
     /// Far things fade.
@@ -189,8 +191,8 @@ impl RenderScene {
     ///
     /// As [`new`](Self::new).
     pub fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, RenderSceneError> {
-        let Self { headlight, ambient, sky, haze, .. } = *self;
-        Ok(Self { lights: self.lights.clone(), headlight, ambient, sky, haze, ..Self::new(instances)? })
+        let Self { headlight, ambient, light_sum, sky, haze, .. } = *self;
+        Ok(Self { lights: self.lights.clone(), headlight, ambient, light_sum, sky, haze, ..Self::new(instances)? })
     }
 
     /// Nothing but sky.
@@ -204,6 +206,7 @@ impl RenderScene {
             lights: vec![Light::default()],
             headlight: Headlight::default(),
             ambient: Hemisphere::default(),
+            light_sum: LightSum::default(),
             sky: Sky::default(),
             haze: None,
         }

@@ -70,7 +70,7 @@ impl Still {
             data.qpos_mut().copy_from_slice(qpos);
         }
         data.step1()?;
-        Ok(Self::of_data(&Arc::new(Visible::of_model(&model)), &data))
+        Ok(Self::of_data(&Arc::new(Visible::with_sites(&model)), &data))
     }
 
     /// One environment of a simulation as it is now.

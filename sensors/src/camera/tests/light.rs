@@ -6,7 +6,7 @@ use super::harness::{Image, Still, at, linear, look, matt, srgb, things, unlit};
 use super::scenes::EXACT;
 use nalgebra::Vector3;
 use scene::shape::{Box, Plane, Sphere};
-use scene::{Headlight, Hemisphere, Light, LightKind, Material, PoseF32, RenderScene, Shape, Sky};
+use scene::{Headlight, Hemisphere, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Shape, Sky};
 
 /// sRGB number of the gray that floors have here.
 const GRAY: f32 = 0.7;
@@ -389,5 +389,34 @@ fn camera_exposure() {
             changed += usize::from(found.abs_diff(*before) > 8);
         }
         assert!(changed > plain.len() * 3 / 16, "{changed} of {}", plain.len());
+    }
+}
+
+/// Light that is added up as MuJoCo's renderer does: the byte of a matt plane is 255 times its sRGB colour times the sum of
+/// the lights, each times its cosine; the sum ends at white. Root cause once: lamps were added in linear light, and four of
+/// them were darker than in MuJoCo.
+#[test]
+fn display_sum() {
+    let directions = [[0.0, 0.0, -1.0], [0.6, 0.0, -0.8], [0.0, -0.6, -0.8], [-0.8, 0.0, -0.6]];
+    let cosines: f32 = [1.0, 0.8, 0.8, 0.6].iter().sum();
+    for (base, light) in [(0.5f32, 0.2f32), (0.7, 0.1), (1.0, 0.25), (0.9, 0.6)] {
+        let (scene, poses) = things([(Plane::INFINITE, matt([base, 0.5 * base, 0.25 * base]), PoseF32::IDENTITY)]);
+        let mut scene = unlit(scene);
+        scene.light_sum = LightSum::Display;
+        let lamp = |direction| Light { direction, diffuse: [light; 3], cast_shadow: false, ..Light::default() };
+        scene.lights = directions.map(lamp).to_vec();
+        let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+        let still = Still::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
+        for renderer in [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced] {
+            let found = still.by(renderer).color()[16 * 33 + 16];
+            for (c, part) in [1.0, 0.5, 0.25].into_iter().enumerate() {
+                let expected = 255.0 * (part * base * light * cosines).min(1.0);
+                let off = (f32::from(found[c]) - expected).abs();
+                assert!(off <= 1.5, "{renderer:?}, {base} {light}: {found:?}, {expected} in channel {c}");
+            }
+        }
+        // The control: a linear sum is another one.
+        let linear = still.with(|still| still.scene.light_sum = LightSum::Linear).draw().color()[16 * 33 + 16];
+        assert!((f32::from(linear[1]) - 255.0 * 0.5 * base * light * cosines).abs() > 5.0, "{linear:?}");
     }
 }
