@@ -164,7 +164,15 @@ fn terrain_cfg(args: &Args) -> launcher::Result<TerrainCfg> {
         step: 0.02,
         seed: args.launcher.seed,
     };
-    Ok(TerrainCfg { heights: rough.heights()?, size: rough.size, ..Default::default() })
+    let mut heights = rough.heights()?;
+    // Environments stand side by side: where their terrains meet, both have the lowest height. Otherwise the walls of the
+    // higher one show as a dark seam.
+    for axis in [Axis(0), Axis(1)] {
+        for edge in [0, heights.len_of(axis) - 1] {
+            heights.index_axis_mut(axis, edge).fill(rough.range[0]);
+        }
+    }
+    Ok(TerrainCfg { heights, size: rough.size, ..Default::default() })
 }
 
 /// Isaac's: a square of 2 m around the ball, of which only the heading turns it.

@@ -63,6 +63,18 @@ impl Default for Light {
     }
 }
 
+/// How the light of several lamps is added up, and multiplied by the colour of a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightSum {
+    /// As physics does it: light is linear, and colours are taken from sRGB to linear.
+    #[default]
+    Linear,
+    /// As OpenGL and MuJoCo's renderer do it: sRGB numbers of light and surfaces are added and multiplied as they are, and the
+    /// sum ends at 1. Colours of lamps are sRGB numbers, and metals are no different. Path-traced frames take colours of lamps
+    /// to linear light and add that.
+    Display,
+}
+
 /// The lamp on every camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Headlight {

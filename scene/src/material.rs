@@ -10,9 +10,9 @@ pub struct Material {
     pub rgba: [f32; 4],
     /// Image on the surface.
     pub texture: Option<Arc<Texture>>,
-    /// How often a 2D texture repeats over the shape, or per metre with `tex_uniform`.
+    /// How often a 2D texture repeats over the shape, or over 2 m with `tex_uniform`, as MuJoCo's renderer draws it.
     pub tex_repeat: [f32; 2],
-    /// Whether `tex_repeat` is per metre.
+    /// Whether `tex_repeat` is per 2 m instead of per shape.
     pub tex_uniform: bool,
     /// Own light, as a multiple of the colour.
     pub emission: f32,
@@ -20,7 +20,8 @@ pub struct Material {
     pub specular: f32,
     /// Sharpness of highlights in 0..=1: the exponent is 128 times this.
     pub shininess: f32,
-    /// How much of the sky the surface mirrors, in 0..=1.
+    /// How much of the light a perfect mirror on the surface takes, in 0..=1. Of path-traced frames only: other renderers draw
+    /// the surface without it.
     pub reflectance: f32,
     /// How much of the surface is metal, in 0..=1: light does not get below it, and what it mirrors has its colour.
     pub metallic: f32,

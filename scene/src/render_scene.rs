@@ -1,7 +1,7 @@
 //! Everything that can be seen, without the poses.
 
 use crate::Pose;
-use crate::light::{Haze, Headlight, Hemisphere, Light, Sky};
+use crate::light::{Haze, Headlight, Hemisphere, Light, LightSum, Sky};
 use crate::material::{Material, TextureKind};
 use crate::shape::Shape;
 use std::sync::Arc;
@@ -59,20 +59,33 @@ impl Instance {
         Self { body: Some(body), ..self }
     }
 
-    /// Texture coordinates per metre along the axes of its frame, for a shape without its own: a cube texture is on a box
-    /// around the shape, others are projected along z as MuJoCo projects 2D textures, once over the shape's size or once a
-    /// metre.
-    fn texture_scale(&self) -> [f32; 3] {
+    /// Scale \[1/m\] and offset of texture coordinates along the axes of its frame, for a shape without its own. A cube texture
+    /// is on a box around the shape. Others are projected along z, as MuJoCo's renderer does it: `tex_repeat` images over the
+    /// shape's size, or over 2 m with `tex_uniform` and on endless planes. An image begins at the corner of a finite plane,
+    /// and has its middle in the middle of other shapes.
+    fn texture_map(&self) -> ([f32; 3], [f32; 2]) {
         let material = &self.material;
         let [lo, hi] = self.shape.aabb();
-        let size = [0, 1, 2].map(|k| hi[k] - lo[k]);
+        let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
         if material.texture.as_deref().is_some_and(|t| t.kind() == TextureKind::Cube) {
-            return size.map(|x| if x > 0.0 && x.is_finite() { 2.0 / x } else { 1.0 });
+            return (half.map(|x| if x > 0.0 && x.is_finite() { 1.0 / x } else { 1.0 }), [0.0; 2]);
         }
-        let endless = matches!(&self.shape, Shape::Plane(plane) if plane.half[0] == 0.0 || plane.half[1] == 0.0);
-        let per_metre = |k: usize| material.tex_uniform || endless || !size[k].is_finite();
-        let along = |k: usize| material.tex_repeat[k] / if per_metre(k) { 1.0 } else { size[k] };
-        [along(0), along(1), 0.0]
+        let repeat = material.tex_repeat.map(|r| if r > 0.0 { r } else { 1.0 });
+        let endless = |k: usize| !(half[k] > 0.0 && half[k].is_finite());
+        let per_metre = |k: usize| material.tex_uniform || endless(k);
+        let along = |k: usize| 0.5 * repeat[k] / if per_metre(k) { 1.0 } else { half[k] };
+        let scale = [along(0), along(1), 0.0];
+        let middle = [-0.5, 0.5];
+        let offset = match &self.shape {
+            // Source: `makePlane` and `settexture` of MuJoCo 4. Whole numbers are left out: images repeat.
+            Shape::Plane(_) => {
+                let begin = if endless(0) || endless(1) { middle } else { [0.0; 2] };
+                let corner = |k: usize, sign: f32| if endless(k) { 0.0 } else { sign * (scale[k] * half[k]).fract() };
+                [begin[0] + corner(0, 1.0), begin[1] + corner(1, -1.0)]
+            }
+            _ => middle,
+        };
+        (scale, offset)
     }
 
     /// The same instance, welded to the world.
@@ -90,12 +103,15 @@ pub struct RenderScene {
     first_ids: Vec<u32>,
     linear_colors: Vec<[f32; 3]>,
     texture_scales: Vec<[f32; 3]>,
+    texture_offsets: Vec<[f32; 2]>,
     /// The lamps.
     pub lights: Vec<Light>,
     /// The lamp on every camera.
     pub headlight: Headlight,
     /// Light from all around.
     pub ambient: Hemisphere,
+    /// How the light of lamps is added up.
+    pub light_sum: LightSum,
     /// What is behind everything.
     pub sky: Sky,
     /// Far things fade.
@@ -165,8 +181,8 @@ impl RenderScene {
             [r, g, b].map(crate::material::decode_srgb)
         };
         let linear_colors = instances.iter().map(linear).collect();
-        let texture_scales = instances.iter().map(Instance::texture_scale).collect();
-        Ok(Self { linear_colors, texture_scales, instances, first_ids, ..Self::empty() })
+        let (texture_scales, texture_offsets) = instances.iter().map(Instance::texture_map).unzip();
+        Ok(Self { linear_colors, texture_scales, texture_offsets, instances, first_ids, ..Self::empty() })
     }
 
     /// Other things in the same light.
@@ -175,8 +191,8 @@ impl RenderScene {
     ///
     /// As [`new`](Self::new).
     pub fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, RenderSceneError> {
-        let Self { headlight, ambient, sky, haze, .. } = *self;
-        Ok(Self { lights: self.lights.clone(), headlight, ambient, sky, haze, ..Self::new(instances)? })
+        let Self { headlight, ambient, light_sum, sky, haze, .. } = *self;
+        Ok(Self { lights: self.lights.clone(), headlight, ambient, light_sum, sky, haze, ..Self::new(instances)? })
     }
 
     /// Nothing but sky.
@@ -184,11 +200,13 @@ impl RenderScene {
         Self {
             linear_colors: Vec::new(),
             texture_scales: Vec::new(),
+            texture_offsets: Vec::new(),
             instances: Vec::new(),
             first_ids: vec![0],
             lights: vec![Light::default()],
             headlight: Headlight::default(),
             ambient: Hemisphere::default(),
+            light_sum: LightSum::default(),
             sky: Sky::default(),
             haze: None,
         }
@@ -213,6 +231,11 @@ impl RenderScene {
     /// texture, those of a cube of half length 1; of others, u and v.
     pub fn texture_scales(&self) -> &[[f32; 3]] {
         &self.texture_scales
+    }
+
+    /// Texture coordinates u and v at the origin of each instance's frame, for shapes without their own.
+    pub fn texture_offsets(&self) -> &[[f32; 2]] {
+        &self.texture_offsets
     }
 
     /// Number of triangles of all meshes.
@@ -274,7 +297,7 @@ mod tests {
 
     /// A box has an id for each face and room for 8, as a sphere; a mesh one for each triangle. A colour of the screen is
     /// linear light by the law of sRGB: c / 12.92 up to 0.04045, ((c + 0.055) / 1.055)^2.4 above. A cube texture is on a cube
-    /// of half length 1 around the shape; another one repeats so often over the shape's size, or a metre.
+    /// of half length 1 around the shape; another one repeats so often over the shape's size, or over 2 m.
     #[test]
     fn instances() {
         let half = [0.5, 0.25, 2.0];
@@ -296,8 +319,41 @@ mod tests {
         let far = scene.linear_colors()[0].iter().zip(linear).map(|(found, expected)| (found - expected).abs());
         // Single precision, and the eight bits of a screen are not asked for.
         assert!(far.fold(0.0, f32::max) < 1e-6, "{:?}", scene.linear_colors()[0]);
-        let expected = [[2.0, 4.0, 0.5], [3.0, 5.0, 0.0], [3.0, 10.0, 0.0], [3.0, 5.0, 0.0]];
+        let expected = [[2.0, 4.0, 0.5], [1.5, 2.5, 0.0], [3.0, 10.0, 0.0], [1.5, 1.25, 0.0]];
         assert_eq!(scene.texture_scales()[1..], expected);
         assert_eq!((RenderScene::empty().first_ids(), RenderScene::empty().linear_colors().len()), (&[0][..], 0));
+    }
+
+    /// Texture coordinates of planes by the formulas of MuJoCo 4's renderer: `makePlane` gives each corner a coordinate,
+    /// `settexture` scales it by the repeats, by the half size too with `texuniform`, and moves that of an endless plane.
+    /// The image's rows run down there, and up here.
+    ///
+    /// Root cause once: with `tex_uniform` an image repeated once a metre, where MuJoCo repeats it once in 2 m.
+    #[test]
+    fn planes_are_textured_as_by_mujoco() {
+        for (half, uniform) in
+            [[0.0f32; 2], [0.0, 2.0], [0.7, 1.3], [4.0, 4.0]].into_iter().flat_map(|half| [(half, true), (half, false)])
+        {
+            let material = textured(TextureKind::TwoD, uniform);
+            let scene = RenderScene::new(vec![Instance::new(Plane { half }, material.clone(), 1)]).unwrap();
+            let (scale, offset) = (scene.texture_scales()[0], scene.texture_offsets()[0]);
+            let endless = half.contains(&0.0);
+            for (x, y) in [(0.0f32, 0.0f32), (0.3, -0.4), (-0.65, 1.2)] {
+                let (mut theirs, mut ours) = ([0.0f32; 2], [0.0f32; 2]);
+                for (k, p) in [x, y].into_iter().enumerate() {
+                    let corner = match (half[k] > 0.0, k) {
+                        (true, 0) => (p + half[k]) / (2.0 * half[k]),
+                        (true, _) => 1.0 - (p + half[k]) / (2.0 * half[k]),
+                        (false, 0) => 0.5 * p,
+                        (false, _) => -0.5 * p,
+                    };
+                    let scl = material.tex_repeat[k] * if uniform && half[k] > 0.0 { half[k] } else { 1.0 };
+                    theirs[k] = scl * corner - if endless { 0.5 } else { 0.0 };
+                    ours[k] = p * scale[k] + offset[k];
+                }
+                let off = [theirs[0] - ours[0], theirs[1] - (1.0 - ours[1])];
+                assert!(off.iter().all(|x| (x - x.round()).abs() < 1e-5), "{half:?} {uniform}: {ours:?}, {theirs:?}");
+            }
+        }
     }
 }

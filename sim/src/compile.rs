@@ -19,7 +19,7 @@ use crate::objects::weld::{WeldCfg, WeldIndex};
 use crate::randomization::{Maker, OwnValues, Tables};
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::snapshot::Layout;
-use crate::visible::{self, Identities, MaskId, Owner, Replacements, Visible, VisualCache};
+use crate::visible::{self, Identities, Look, MaskId, Owner, Replacements, Visible, VisualCache};
 use crate::wrenches::Wrenches;
 use ::scene::{OwnScene, Pose};
 use std::collections::BTreeSet;
@@ -593,9 +593,9 @@ impl Simulation {
         }
         let model = self.batch.model();
         let surfaces = contents.surfaces();
-        let visible = Visible::extract(model, &self.identities, &replacements, self.plan.bodies(), &surfaces)
-            .with_own_headlight()
-            .with_lamps_of(model, &cfg.lights);
+        let visible =
+            Visible::extract(model, &self.identities, &replacements, self.plan.bodies(), &surfaces, Look::Own)
+                .with_lamps_of(model, &cfg.lights);
         let visible = Arc::new(visible);
         self.visible = Some(Arc::clone(&visible));
         for (env, error) in self.look_anew() {

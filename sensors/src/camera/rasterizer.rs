@@ -108,7 +108,7 @@ pub struct Before<'a> {
 ///
 /// Transparency: things with 0 < alpha < 1 are blended into the colour, back to front by the depth of their origins, each
 /// with its nearest surface only; they are not seen by things behind them twice. All other channels see the nearest
-/// surface with alpha of at least 0.5. Opacity of textures is not used.
+/// surface whatever its alpha, unless that is 0, as in MuJoCo. Opacity of textures is not used.
 #[derive(Debug)]
 pub struct Rasterizer {
     /// How frames are drawn.

@@ -11,7 +11,7 @@ use crate::lanes::{LANES, Level, Simd, at_level, first, load, splat_i};
 use crate::ray::bvh::Stack;
 use crate::visibility::Projection;
 use crate::visibility::raster::tile::{BLOCK, Tile};
-use crate::visibility::raster::{Item, Layer, Painter};
+use crate::visibility::raster::{Item, Painter};
 use scene::RenderScene;
 use std::cell::RefCell;
 use std::ops::Range;
@@ -111,10 +111,10 @@ impl Brush {
         // A pixel's rays need it where only shared things are at hand.
         let shade_stack = RefCell::new(shade_stack);
         let context = plan.context(shot, projection, &shade_stack, wanted);
-        let veils = list.blended.iter().any(|(layer, _)| *layer == Layer::Veil);
+        let veils = !list.blended.is_empty();
         if veils {
             veiled.copy(tile);
-            for (_, item) in list.blended.iter().filter(|(layer, _)| *layer == Layer::Veil) {
+            for (_, item) in &list.blended {
                 draw(veiled, item);
             }
         }

@@ -59,6 +59,7 @@ impl<'a> Context<'a> {
             first_id: self.scene.first_ids()[index],
             color: self.scene.linear_colors()[index],
             texture_scale: self.scene.texture_scales()[index],
+            texture_offset: self.scene.texture_offsets()[index],
         }
     }
 }

@@ -10,6 +10,7 @@ pub(crate) mod path;
 pub(crate) mod plan;
 pub(crate) mod shade;
 pub(crate) mod shadow;
+mod shadow_fit;
 pub(crate) mod shadow_rays;
 pub(crate) mod surface;
 pub(crate) mod texture;

@@ -4,6 +4,7 @@ use super::group::Context;
 use super::moves::Moves;
 use super::shade::{Lighting, MAX_LIGHTS};
 use super::shadow::{ShadowBand, ShadowMap};
+use super::shadow_fit::{self, LampView};
 use super::shadow_rays::ShadowRays;
 use super::tone::ToneCurve;
 use crate::camera::channel::{FrameMut, Stage};
@@ -164,20 +165,34 @@ impl Plan {
 
     /// Prepares lamps and their shadows.
     fn light(&mut self, cfg: RasterCfg, shot: &Shot<'_>) {
-        let Shot { scene, poses, view, lights, .. } = *shot;
+        let Shot { scene, poses, view, lights, lens, .. } = *shot;
         let lights = lights.unwrap_or(&scene.lights);
         let mut maps = [None; 256];
         if cfg.shadows {
             let side = shadow_side(cfg, view);
             let lamps = lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS);
-            for (k, light) in lamps.filter(|(k, l)| l.cast_shadow && *k < 256) {
+            let mut views = [None; MAX_LIGHTS];
+            let mut casting = [0; MAX_LIGHTS];
+            let lamps = lamps.filter(|(k, l)| l.cast_shadow && *k < maps.len());
+            let lamps = lamps.filter_map(|(k, light)| Some((k, LampView::of(light)?)));
+            for ((k, lamp), (view, of)) in lamps.zip(views.iter_mut().zip(&mut casting)) {
+                (*view, *of) = (Some(lamp), k);
+            }
+            let receivers = match lens {
+                None => {
+                    let shown = |i: &Instance| Layer::of(i, cfg.groups) != Layer::Hidden;
+                    shadow_fit::seen(&Projection::from(view), scene, poses, shown, &views)
+                }
+                Some(_) => shadow_fit::everything(),
+            };
+            for ((lamp, receivers), k) in views.iter().flatten().zip(&receivers).zip(casting) {
                 if self.maps == MAX_SHADOWS {
                     break;
                 }
                 if self.shadows.len() == self.maps {
                     self.shadows.push(ShadowMap::empty());
                 }
-                if self.shadows[self.maps].prepare(light, scene, poses, cfg, side) {
+                if self.shadows[self.maps].prepare((lamp, receivers), scene, poses, cfg, side) {
                     maps[k] = Some(self.maps);
                     self.maps += 1;
                 }

@@ -5,7 +5,7 @@ use super::shadow_rays::ShadowRays;
 use super::surface::{Source, Surface};
 use super::{texture, tone};
 use crate::lanes::{F, M, Simd, V3, abs, max, min, root, select, splat};
-use scene::{Light, LightKind, Material, RenderScene};
+use scene::{Light, LightKind, LightSum, Material, RenderScene};
 
 /// The largest number of lamps that are drawn.
 pub(crate) const MAX_LIGHTS: usize = 16;
@@ -156,9 +156,9 @@ struct Gloss {
 
 impl Gloss {
     /// A metal mirrors lamps as it does everything, whatever `specular` says of what is not metal.
-    fn of(material: &Material) -> Self {
+    fn of(material: &Material, display: bool) -> Self {
         let exponent = (material.exponent() + 0.5) as u32;
-        let strength = if material.metallic > 0.0 { 1.0 } else { material.specular };
+        let strength = if material.metallic > 0.0 && !display { 1.0 } else { material.specular };
         Self { strength, exponent, faint: FAINT_ROOT[exponent as usize] }
     }
 
@@ -214,7 +214,12 @@ pub(crate) fn shade<S: Simd>(
     lanes: M<S>,
 ) -> V3<S> {
     let material = &source.instance.material;
-    let base = albedo(s, source, at, view, pixel, lanes);
+    let display = scene.light_sum == LightSum::Display;
+    let base = if display {
+        display_albedo(s, source, at, view, pixel, lanes)
+    } else {
+        albedo(s, source, at, view, pixel, lanes)
+    };
     let zero = splat(s, 0.0);
     let n = at.shading;
     // Ambient: between ground and sky by the normal's height.
@@ -234,7 +239,7 @@ pub(crate) fn shade<S: Simd>(
         }
     }
     let mut gloss = [zero, zero, zero];
-    let shiny = Gloss::of(material);
+    let shiny = Gloss::of(material, display);
     let headlight = &scene.headlight;
     if headlight.active {
         let facing = max(-n.dot(view), zero);
@@ -293,7 +298,11 @@ pub(crate) fn shade<S: Simd>(
             z: base.z * diffuse[2] + gloss[2],
         }
     };
-    let mut color = if material.metallic > 0.0 {
+    let mut color = if display {
+        // OpenGL's sum ends at 1.
+        let sum = plain(gloss);
+        V3 { x: display_light(s, sum.x), y: display_light(s, sum.y), z: display_light(s, sum.z) }
+    } else if material.metallic > 0.0 {
         // What it mirrors, in its colour, and its own light; of a scene without a mirror, the sky.
         let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)));
         let metal = V3 {
@@ -306,11 +315,6 @@ pub(crate) fn shade<S: Simd>(
     } else {
         plain(gloss)
     };
-    if material.reflectance > 0.0 {
-        let mirrored = view.sub(n.scale(n.dot(view) * 2.0));
-        let k = splat(s, material.reflectance.clamp(0.0, 1.0));
-        color = color.scale(1.0 - k).add(sky(s, lighting, mirrored).scale(k));
-    }
     if let Some(haze) = scene.haze {
         let k = (distance - haze.start) / (haze.end - haze.start).max(1e-6);
         let k = min(max(k, zero), splat(s, 1.0));
@@ -324,6 +328,12 @@ pub(crate) fn shade<S: Simd>(
     color
 }
 
+/// Linear light of an sRGB number, cut to 0..=1.
+#[inline(always)]
+fn display_light<S: Simd>(s: S, x: F<S>) -> F<S> {
+    tone::decode_bytes(min(max(x, splat(s, 0.0)), splat(s, 1.0)) * 255.0)
+}
+
 /// The colour of the surface itself, linear.
 #[inline(always)]
 pub(crate) fn albedo<S: Simd>(
@@ -334,14 +344,41 @@ pub(crate) fn albedo<S: Simd>(
     pixel: f32,
     lanes: M<S>,
 ) -> V3<S> {
-    let (instance, flat) = (source.instance, source.color);
-    let material = &instance.material;
-    let Some(image) = material.texture.as_deref() else { return V3::splat(s, flat) };
+    let flat = source.color;
+    let Some(bytes) = texels(s, source, at, view, pixel, lanes) else { return V3::splat(s, flat) };
+    // Spelled out: a closure is compiled without the instruction set where the compiler does not inline it.
+    V3 {
+        x: tone::decode_bytes(bytes[0]) * flat[0],
+        y: tone::decode_bytes(bytes[1]) * flat[1],
+        z: tone::decode_bytes(bytes[2]) * flat[2],
+    }
+}
+
+/// The colour of the surface itself, as numbers of the screen (sRGB, 0..=1).
+#[inline(always)]
+fn display_albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixel: f32, lanes: M<S>) -> V3<S> {
+    let [r, g, b, _] = source.instance.material.rgba;
+    let Some(bytes) = texels(s, source, at, view, pixel, lanes) else { return V3::splat(s, [r, g, b]) };
+    V3 { x: bytes[0] * (r / 255.0), y: bytes[1] * (g / 255.0), z: bytes[2] * (b / 255.0) }
+}
+
+/// The texture's bytes (0..=255) at the surface; `None` without a texture.
+#[inline(always)]
+fn texels<S: Simd>(
+    s: S,
+    source: &Source<'_>,
+    at: &Surface<S>,
+    view: V3<S>,
+    pixel: f32,
+    lanes: M<S>,
+) -> Option<[F<S>; 3]> {
+    let instance = source.instance;
+    let image = instance.material.texture.as_deref()?;
     // The width of a pixel on the surface: between its narrow and its wide side where it is seen at a slant.
     let slant = max(-at.normal.dot(view), splat(s, 0.02));
     let width = at.along * pixel / root(s, slant);
     let scale = source.texture_scale;
-    let bytes = if texture::is_cube(image) {
+    Some(if texture::is_cube(image) {
         let direction = V3 { x: at.local.x * scale[0], y: at.local.y * scale[1], z: at.local.z * scale[2] };
         let largest = scale.iter().copied().fold(0.0, f32::max);
         texture::sample_cube(s, image, direction, width * largest, lanes)
@@ -350,15 +387,10 @@ pub(crate) fn albedo<S: Simd>(
         let (uv, density) = if has_uvs {
             (at.uv, at.uv_density)
         } else {
-            let uv = [at.local.x * scale[0], at.local.y * scale[1]];
+            let offset = source.texture_offset;
+            let uv = [at.local.x * scale[0] + offset[0], at.local.y * scale[1] + offset[1]];
             (uv, splat(s, scale[0].abs().max(scale[1].abs())))
         };
         texture::sample(s, image, uv[0], uv[1], width * density, lanes)
-    };
-    // Spelled out: a closure is compiled without the instruction set where the compiler does not inline it.
-    V3 {
-        x: tone::decode_bytes(bytes[0]) * flat[0],
-        y: tone::decode_bytes(bytes[1]) * flat[1],
-        z: tone::decode_bytes(bytes[2]) * flat[2],
-    }
+    })
 }

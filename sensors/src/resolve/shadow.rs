@@ -1,13 +1,14 @@
 //! Shadow maps: what a lamp sees.
 
 use super::plan::BAND;
+use super::shadow_fit::{Extent, LampView};
 use crate::camera::RasterCfg;
 use crate::lanes::{F, Level};
 use crate::lanes::{LANES, M, Simd, V3, at_level, load, max, min, select, splat};
 use crate::visibility::Projection;
 use crate::visibility::raster::tile::{AREA, BLOCK, Tile};
 use crate::visibility::raster::{DrawList, Layer, Painter, Parts};
-use scene::{Instance, Light, LightKind, PoseF32, RenderScene};
+use scene::{Instance, PoseF32, RenderScene, Shape};
 
 /// Depths from a lamp.
 #[derive(Clone, Debug)]
@@ -51,21 +52,6 @@ fn most_of_bands(side: usize) -> usize {
     if side == 0 { 0 } else { rows_of_bands([side, side]) * BLOCK * side }
 }
 
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// A frame with its z axis along a direction. Source: Duff et al., Building an Orthonormal Basis, Revisited, JCGT 2017.
-fn frame_along(z: [f32; 3]) -> [[f32; 3]; 3] {
-    let sign = if z[2] < 0.0 { -1.0 } else { 1.0 };
-    let a = -1.0 / (sign + z[2]);
-    let b = z[0] * z[1] * a;
-    let x = [1.0 + sign * z[0] * z[0] * a, sign * b, -sign * z[0]];
-    let y = [b, sign + z[1] * z[1] * a, -z[1]];
-    // Columns are the axes.
-    [0, 1, 2].map(|k| [x[k], y[k], z[k]])
-}
-
 impl ShadowMap {
     /// A map without memory.
     pub(crate) fn empty() -> Self {
@@ -96,29 +82,22 @@ impl ShadowMap {
         self.list.bytes() + size_of::<f32>() * (self.nearness.capacity() + 2 * self.range.capacity())
     }
 
-    /// Finds what the lamp sees, on the part of `side` by `side` texels that it covers, without drawing it. `false` where it
-    /// casts no shadow.
-    pub(crate) fn prepare(
+    /// Finds the casters that a lamp sees before `receivers`, on a map of up to `side` by `side` texels, without drawing them.
+    /// `false` where none of them is shaded.
+    pub(super) fn prepare(
         &mut self,
-        light: &Light,
+        (lamp, receivers): (&LampView, &Extent),
         scene: &RenderScene,
         poses: &[PoseF32],
         cfg: RasterCfg,
         side: usize,
     ) -> bool {
         let solid = |instance: &Instance| {
-            let solid = matches!(Layer::of(instance, cfg.groups), Layer::Opaque | Layer::Veil);
-            solid && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
+            Layer::casts_shadows(instance, cfg.groups) && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
         };
-        let along = super::shade::unit(light.direction);
-        let rotation = frame_along(along);
-        let Some(projection) = (match light.kind {
-            LightKind::Directional => fit(scene, poses, rotation, side, solid),
-            LightKind::Spot { cutoff_deg, .. } => spot(light, rotation, cutoff_deg, side),
-            LightKind::Point => None,
-        }) else {
-            return false;
-        };
+        let Some((projection, planes)) = lamp.fit(scene, poses, receivers, side, solid) else { return false };
+        let rotation = lamp.rotation;
+        let casts = |i: &Instance| solid(i) && (planes || !matches!(i.shape, Shape::Plane(_)));
         self.texel = 1.0 / projection.fx;
         self.lamp_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
         self.projection = projection;
@@ -129,7 +108,7 @@ impl ShadowMap {
             scene,
             poses,
             parts,
-            |i| if solid(i) { Layer::Opaque } else { Layer::Hidden },
+            |i| if casts(i) { Layer::Opaque } else { Layer::Hidden },
         );
         // Room for the whole map from the beginning: what casts shadows moves, and memory must not grow with it.
         self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
@@ -320,72 +299,4 @@ fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2
             }
         }
     }
-}
-
-/// A parallel view along a direction that holds everything that casts a shadow.
-fn fit(
-    scene: &RenderScene,
-    poses: &[PoseF32],
-    rotation: [[f32; 3]; 3],
-    side: usize,
-    casts: impl Fn(&Instance) -> bool,
-) -> Option<Projection> {
-    let (mut lo, mut hi) = ([f32::MAX; 3], [f32::MIN; 3]);
-    for (instance, pose) in scene.instances().iter().zip(poses).filter(|(instance, _)| casts(instance)) {
-        let [a, b] = instance.shape.aabb();
-        let middle = pose.apply([0, 1, 2].map(|k| 0.5 * (a[k] + b[k])));
-        for k in 0..3 {
-            let axis = [rotation[0][k], rotation[1][k], rotation[2][k]];
-            let local = pose.rotate_inverse(axis);
-            let reach: f32 = (0..3).map(|i| local[i].abs() * 0.5 * (b[i] - a[i])).sum();
-            let at = dot(axis, middle);
-            (lo[k], hi[k]) = (lo[k].min(at - reach), hi[k].max(at + reach));
-        }
-    }
-    if lo[0] > hi[0] {
-        return None;
-    }
-    // Room for the taps on each side, and in front.
-    let room = 4.0;
-    let extent = (hi[0] - lo[0]).max(hi[1] - lo[1]).max(1e-3);
-    let scale = (side as f32 - 2.0 * room) / extent;
-    let depth = (hi[2] - lo[2]).max(1e-3);
-    let start = lo[2] - 0.01 * depth - 1e-3;
-    let middle = [0.5 * (lo[0] + hi[0]), 0.5 * (lo[1] + hi[1]), start];
-    let translation = [0, 1, 2].map(|k| dot(rotation[k], middle));
-    Some(Projection {
-        parallel: true,
-        width: side,
-        height: side,
-        fx: scale,
-        fy: scale,
-        cx: 0.5 * side as f32,
-        cy: 0.5 * side as f32,
-        near: 0.0,
-        // Receivers behind everything that casts are still compared.
-        far: 1.1 * depth + 2e-3,
-        world_from_camera: PoseF32 { rotation, translation },
-    })
-}
-
-/// What a spot lights.
-fn spot(light: &Light, rotation: [[f32; 3]; 3], cutoff_deg: f32, side: usize) -> Option<Projection> {
-    if !light.position.iter().all(|x| x.is_finite()) || cutoff_deg.is_nan() || cutoff_deg <= 0.0 {
-        return None;
-    }
-    // Wider cones than 75 degrees would leave no texels for the middle.
-    let half = f64::from(cutoff_deg.min(75.0) + 1.0).to_radians();
-    let f = ((0.5 * side as f64 - 3.0) / half.tan()) as f32;
-    Some(Projection {
-        parallel: false,
-        width: side,
-        height: side,
-        fx: f,
-        fy: f,
-        cx: 0.5 * side as f32,
-        cy: 0.5 * side as f32,
-        near: 0.02,
-        far: 1000.0,
-        world_from_camera: PoseF32 { rotation, translation: light.position },
-    })
 }

@@ -34,6 +34,8 @@ pub(crate) struct Source<'a> {
     pub(crate) color: [f32; 3],
     /// Texture coordinates per metre, see [`scene::RenderScene::texture_scales`].
     pub(crate) texture_scale: [f32; 3],
+    /// Texture coordinates at the origin, see [`scene::RenderScene::texture_offsets`].
+    pub(crate) texture_offset: [f32; 2],
 }
 
 /// Sixteen rays that a lens has bent.

@@ -34,7 +34,8 @@ pub struct CompileError {
 impl CompileError {
     pub(crate) fn new(message: &str) -> Self {
         // 2.2.2 ends lines with a semicolon and puts empty ones between.
-        let lines = message.lines().map(|line| line.trim().trim_end_matches(';').trim()).filter(|line| !line.is_empty());
+        let lines =
+            message.lines().map(|line| line.trim().trim_end_matches(';').trim()).filter(|line| !line.is_empty());
         let lines: Vec<&str> = lines.collect();
         Self { line: line_named_in(message), message: lines.join("; ") + &newer(message), source_line: None }
     }

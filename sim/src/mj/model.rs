@@ -312,6 +312,14 @@ impl Model {
         self.header().na as usize
     }
 
+    /// Number of flexes; 0 on 2.2.2, which has none.
+    pub fn nflex(&self) -> usize {
+        #[cfg(mj4)]
+        return self.header().nflex as usize;
+        #[cfg(not(mj4))]
+        0
+    }
+
     /// Number of sites.
     pub fn nsite(&self) -> usize {
         self.header().nsite as usize

@@ -1,9 +1,11 @@
 //! Shapes of MuJoCo's geoms.
 
+use super::identity::GeomIdentity;
 use crate::mj::{self, Model};
 use scene::mesh::TriMesh;
+use scene::pose::from_row;
 use scene::shape::{Box as Cuboid, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
-use scene::{RenderMesh, Shape};
+use scene::{Instance, Material, RenderMesh, Shape};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -19,15 +21,23 @@ impl<'a> Shapes<'a> {
         Self { model, meshes: HashMap::new(), fields: HashMap::new() }
     }
 
-    /// The shape of a geom; `None` for kinds that are not drawn (signed distance fields), or a mesh without triangles.
-    pub(super) fn get(&mut self, geom: usize) -> Option<Shape> {
+    /// The shape of a geom.
+    ///
+    /// # Errors
+    /// The reason why it cannot be drawn: a signed distance field, a mesh without triangles, a height field with an elevation
+    /// that is negative or not finite.
+    pub(super) fn get(&mut self, geom: usize) -> Result<Shape, &'static str> {
         let size = &self.model.geom_size()[3 * geom..3 * geom + 3];
         let data = usize::try_from(self.model.geom_dataid()[geom]).ok();
-        Some(match self.model.geom_type()[geom] as u32 {
+        Ok(match self.model.geom_type()[geom] as u32 {
             mj::mjGEOM_PLANE => Plane { half: [(size[0] as f32).max(0.0), (size[1] as f32).max(0.0)] }.into(),
-            mj::mjGEOM_MESH => Mesh { mesh: self.mesh(data?)? }.into(),
-            mj::mjGEOM_HFIELD => self.height_field(data?)?.into(),
-            kind => return sized(kind, size),
+            mj::mjGEOM_MESH => {
+                Mesh { mesh: data.and_then(|data| self.mesh(data)).ok_or("its mesh has no triangles")? }.into()
+            }
+            mj::mjGEOM_HFIELD => {
+                data.and_then(|data| self.height_field(data)).ok_or("its height field cannot be drawn")?.into()
+            }
+            kind => return sized(kind, size).ok_or("cameras do not draw signed distance fields"),
         })
     }
 
@@ -63,6 +73,27 @@ pub(super) fn sized(kind: u32, size: &[f64]) -> Option<Shape> {
         mj::mjGEOM_CYLINDER => Cylinder { radius: x, half_length: y }.into(),
         mj::mjGEOM_BOX => Cuboid { half: [x, y, z] }.into(),
         _ => return None,
+    })
+}
+
+/// The instance of a site; `None` for a kind of shape that sites do not have.
+pub(super) fn of_site(model: &Model, site: usize, identity: &GeomIdentity, material: Material) -> Option<Instance> {
+    let shape = sized(model.site_type()[site] as u32, &model.site_size()[3 * site..3 * site + 3])?;
+    let body = model.site_bodyid()[site] as usize;
+    let [x, y, z] = [0, 1, 2].map(|k| model.site_pos()[3 * site + k]);
+    let [qw, qx, qy, qz] = [0, 1, 2, 3].map(|k| model.site_quat()[4 * site + k]);
+    let frame_from_instance = if body > 0 { from_row(&[x, y, z, qw, qx, qy, qz]) } else { scene::Pose::identity() };
+    let GeomIdentity { mask_id, name, body: of } = identity.clone();
+    Some(Instance {
+        shape,
+        material,
+        mask_id,
+        group: u8::try_from(model.site_group()[site].clamp(0, 31)).unwrap_or(0),
+        visible: true,
+        name,
+        body: of,
+        fixed: model.is_fixed(body),
+        frame_from_instance,
     })
 }
 

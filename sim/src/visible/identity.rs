@@ -1,5 +1,6 @@
 //! Mask ids: which number stands for what.
 
+use super::{missing, surface};
 use crate::mj::{Model, ObjectKind};
 use sensors::camera::Thing;
 use std::collections::BTreeMap;
@@ -41,6 +42,8 @@ impl From<&MaskId> for Thing {
 pub(crate) struct Identities {
     table: Arc<[MaskId]>,
     of_geom: Vec<GeomIdentity>,
+    /// Sites that are drawn.
+    of_site: Vec<(usize, GeomIdentity)>,
 }
 
 /// Who owns a geom.
@@ -57,6 +60,11 @@ impl Identities {
     /// Who owns a geom.
     pub(super) fn of(&self, geom: usize) -> &GeomIdentity {
         &self.of_geom[geom]
+    }
+
+    /// Sites that are drawn.
+    pub(super) fn sites(&self) -> impl Iterator<Item = (usize, &GeomIdentity)> {
+        self.of_site.iter().map(|(site, identity)| (*site, identity))
     }
 
     /// What each mask id is, in order.
@@ -79,8 +87,9 @@ fn body_name(model: &Model, body: usize) -> String {
     model.name(ObjectKind::Body, body).unwrap_or_else(|| format!("body {body}"))
 }
 
-/// Each body has a number of its own, and each geom of the world.
-pub(super) fn by_body(model: &Model) -> Identities {
+/// Each body has a number of its own, and each geom of the world; with `sites`, so have bodies with nothing but sites, and
+/// each site of the world.
+pub(super) fn by_body(model: &Model, sites: bool) -> Identities {
     let mut table: Vec<MaskId> = Vec::new();
     let mut of_body = vec![0; model.nbody()];
     let of_geom = (0..model.ngeom())
@@ -108,7 +117,29 @@ pub(super) fn by_body(model: &Model) -> Identities {
             identity(id)
         })
         .collect();
-    Identities { table: table.into(), of_geom }
+    let shown = (0..if sites { model.nsite() } else { 0 })
+        .filter(|&site| missing::is_shown(model.site_group()[site], &surface::color_of_site(model, site)));
+    let of_site = shown
+        .map(|site| {
+            let body = model.site_bodyid()[site] as usize;
+            let own = model.name(ObjectKind::Site, site).unwrap_or_else(|| format!("site {site}"));
+            let name = if body > 0 { body_name(model, body) } else { own.clone() };
+            if body == 0 || of_body[body] == 0 {
+                let id = table.len() as i32 + 1;
+                of_body[body] = id;
+                table.push(MaskId {
+                    id,
+                    object: if body > 0 { body_name(model, model.body_rootid()[body] as usize) } else { own },
+                    link: (body > 0).then(|| name.clone()),
+                    class: if body == 0 { "world" } else { "body" }.into(),
+                    body: body_name(model, body),
+                    geoms: Vec::new(),
+                });
+            }
+            (site, GeomIdentity { mask_id: of_body[body], name: name.into(), body: None })
+        })
+        .collect();
+    Identities { table: table.into(), of_geom, of_site }
 }
 
 /// Who a geom of a simulation belongs to.
@@ -143,5 +174,9 @@ pub(crate) fn of_simulation(model: &Model, owners: &[Owner]) -> Identities {
         };
         GeomIdentity { mask_id: owner.id, name, body: owner.body }
     };
-    Identities { table: table.into_values().collect(), of_geom: owners.iter().map(identity).collect() }
+    Identities {
+        table: table.into_values().collect(),
+        of_geom: owners.iter().map(identity).collect(),
+        of_site: Vec::new(),
+    }
 }

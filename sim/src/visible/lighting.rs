@@ -2,10 +2,22 @@
 
 use crate::mj::{Data, LightType, Model, TextureArrays, TextureType};
 use scene::material::decode_srgb;
-use scene::{Headlight, Light, LightKind, RenderScene, Sky};
+use scene::{Headlight, Hemisphere, Light, LightKind, LightSum, RenderScene, Sky};
 
-/// Sets the lamps, the headlight and the sky of `scene` to the model's.
-pub(super) fn light(model: &Model, scene: &mut RenderScene) {
+/// The light of a scene besides its lamps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Look {
+    /// That of simulations: our headlight, ambient light and sky, unless a model has a skybox. Light is added up in linear
+    /// light.
+    Own,
+    /// That of MuJoCo's renderer, for models that are drawn alone: nothing but the lamps and the headlight of the file, a black
+    /// background without a skybox. Light is added up as numbers of the screen.
+    Mujoco,
+}
+
+/// Sets the lamps, the headlight, the ambient light and the sky of `scene` to the model's.
+pub(super) fn light(model: &Model, look: Look, scene: &mut RenderScene) {
+    let linear = |color: [f32; 3]| if look == Look::Mujoco { color } else { linear(color) };
     scene.lights = (0..model.nlight())
         .map(|index| {
             let light = model.light(index);
@@ -33,13 +45,22 @@ pub(super) fn light(model: &Model, scene: &mut RenderScene) {
             }
         })
         .collect();
-    let headlight = model.headlight();
-    scene.headlight = Headlight {
-        ambient: linear(headlight.ambient),
-        diffuse: linear(headlight.diffuse),
-        specular: linear(headlight.specular),
-        active: headlight.active,
-    };
+    match look {
+        // Not the headlight that MuJoCo gives to models that ask for none: ours goes with our ambient light.
+        Look::Own => scene.headlight = Headlight::default(),
+        Look::Mujoco => {
+            let headlight = model.headlight();
+            scene.headlight = Headlight {
+                ambient: headlight.ambient,
+                diffuse: headlight.diffuse,
+                specular: headlight.specular,
+                active: headlight.active,
+            };
+            scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
+            scene.sky = Sky::uniform([0.0; 3]);
+            scene.light_sum = LightSum::Display;
+        }
+    }
     let skybox = (0..model.ntex()).filter_map(|t| model.texture(t)).find(|t| t.kind == TextureType::Skybox);
     if let Some(sky) = skybox.and_then(|texture| gradient(&texture)) {
         scene.sky = sky;
@@ -59,6 +80,22 @@ pub(super) fn read(data: &Data, lamps: &[Light], out: &mut [Light]) {
         let position = positions[index].map(|x| x as f32);
         *to = Light { position, direction: directions[index].map(|x| x as f32), ..*lamp };
     }
+}
+
+/// True if a skybox is drawn as it is, up to the shape of its gradient: each row of a side has one colour, and all sides are
+/// alike.
+pub(super) fn is_gradient(texture: &TextureArrays<'_>) -> bool {
+    let (side, channels) = (texture.width, texture.channels);
+    if channels < 3 || texture.height < 6 * side {
+        let first = texture.pixels.get(..channels);
+        return texture.pixels.chunks_exact(channels.max(1)).all(|pixel| Some(pixel) == first);
+    }
+    let row = |face: usize, row: usize| texture.pixels[(face * side + row) * side * channels..].get(..side * channels);
+    (0..side).all(|k| {
+        let first = row(0, k);
+        let one = first.is_some_and(|first| first.chunks_exact(channels).all(|pixel| pixel == &first[..channels]));
+        one && [1, 4, 5].iter().all(|face| row(*face, k) == first)
+    })
 }
 
 /// The gradient nearest to a skybox: the middle of its upper face, the horizon of its sides, the middle of its lower face.

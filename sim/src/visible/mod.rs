@@ -7,6 +7,7 @@
 mod geom;
 mod identity;
 mod lighting;
+mod missing;
 mod overview;
 mod own;
 mod still;
@@ -16,6 +17,7 @@ mod urdf_visual;
 use identity::GeomIdentity;
 pub use identity::MaskId;
 pub(crate) use identity::{Identities, Owner, of_simulation};
+pub(crate) use lighting::Look;
 pub use still::{FreeCamera, ModelCamera, Still};
 pub(crate) use surface::color_of;
 pub(crate) use urdf_visual::{Replacements, VisualCache};
@@ -27,7 +29,7 @@ use crate::simulation_cfg::GroundCfg;
 use crate::surface_cfg::SurfaceCfg;
 use scene::pose::from_row;
 use scene::shape::Plane;
-use scene::{Headlight, Instance, Light, Material, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture};
+use scene::{Instance, Light, Material, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -38,10 +40,17 @@ pub(crate) type Surfaces = BTreeMap<String, SurfaceCfg>;
 #[derive(Clone, Debug)]
 pub struct Visible {
     scene: Arc<RenderScene>,
-    /// The geom that each instance moves with.
-    geoms: Vec<usize>,
+    /// The element of the model that each instance moves with.
+    anchors: Vec<Anchor>,
     ids: Arc<[MaskId]>,
     left_out: Vec<String>,
+}
+
+/// The element of a model that an instance moves with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Anchor {
+    Geom(usize),
+    Site(usize),
 }
 
 /// One thing that is drawn for a geom.
@@ -77,36 +86,62 @@ pub(crate) fn ground(cfg: &GroundCfg) -> Part {
     let shade = |k: f32| [r, g, b].map(|c| ((c * k).clamp(0.0, 1.0) * 255.0).round() as u8);
     // Two by two squares of half a metre repeat once per metre. The texture brings the colour.
     let texture = Some(Arc::new(Texture::checker(256, shade(0.94), shade(1.08))));
-    let material = Material { rgba: [1.0; 4], texture, tex_uniform: true, ..material };
+    let material = Material { rgba: [1.0; 4], texture, tex_repeat: [2.0; 2], tex_uniform: true, ..material };
     Part { shape, material: cfg.surface.over(material) }
 }
 
+/// Position \[m\] and rotation matrix of elements in `data`.
+fn places(data: &Data) -> impl Fn(Anchor) -> ([f64; 3], [f64; 9]) + '_ {
+    let (positions, rotations) = (data.geom_xpos().as_chunks::<3>().0, data.geom_xmat().as_chunks::<9>().0);
+    let sites = (data.site_xpos().as_chunks::<3>().0, data.site_xmat().as_chunks::<9>().0);
+    move |anchor| match anchor {
+        Anchor::Geom(geom) => (positions[geom], rotations[geom]),
+        Anchor::Site(site) => (sites.0[site], sites.1[site]),
+    }
+}
+
 impl Visible {
-    /// What can be seen of `model`, as it is: each body one mask id, each geom of the world its own.
+    /// The geoms of `model` in the light of MuJoCo's renderer: each body has one mask id, each geom of the world its own.
     pub fn of_model(model: &Model) -> Self {
-        Self::extract(model, &identity::by_body(model), &Replacements::new(), &[], &Surfaces::new())
+        Self::in_mujoco_look(model, &identity::by_body(model, false))
+    }
+
+    /// The geoms and sites of `model`, as MuJoCo's viewers draw them. Mask ids are those of [`of_model`](Self::of_model);
+    /// bodies with nothing but sites and sites of the world have further ones.
+    pub fn with_sites(model: &Model) -> Self {
+        Self::in_mujoco_look(model, &identity::by_body(model, true))
+    }
+
+    fn in_mujoco_look(model: &Model, identities: &Identities) -> Self {
+        Self::extract(model, identities, &Replacements::new(), &[], &Surfaces::new(), Look::Mujoco)
     }
 
     /// What can be seen of `model`, with the geoms in `replacements` drawn as these parts. `frames` are MuJoCo's body of
-    /// everything on the body axis of sensors, and the frame of the link in it; `painted` is what is known of surfaces besides.
+    /// everything on the body axis of sensors, and the frame of the link in it; `painted` is what is known of surfaces besides, `look` the light.
     pub(crate) fn extract(
         model: &Model,
         identities: &Identities,
         replacements: &Replacements,
         frames: &[(usize, Pose)],
         painted: &Surfaces,
+        look: Look,
     ) -> Self {
         let surfaces = surface::Surfaces::of(model);
         let mut shapes = geom::Shapes::of(model);
         let mut left_out = surfaces.left_out().to_vec();
-        let (mut instances, mut geoms) = (Vec::new(), Vec::new());
+        left_out.extend(missing::of_model(model));
+        let (mut instances, mut anchors) = (Vec::new(), Vec::new());
         for geom in 0..model.ngeom() {
             let parts = match replacements.get(&geom) {
                 Some(parts) => parts.clone(),
-                None => shapes
-                    .get(geom)
-                    .map(|shape| vec![Part { shape, material: surfaces.of_geom(geom) }])
-                    .unwrap_or_default(),
+                None => match shapes.get(geom) {
+                    Ok(shape) => vec![Part { shape, material: surfaces.of_geom(geom) }],
+                    Err(reason) => {
+                        let name = model.name(ObjectKind::Geom, geom).unwrap_or_else(|| geom.to_string());
+                        left_out.push(format!("geom {name} is not drawn: {reason}"));
+                        Vec::new()
+                    }
+                },
             };
             for Part { shape, material } in parts {
                 let group = u8::try_from(model.geom_group()[geom].clamp(0, 31)).unwrap_or(0);
@@ -123,29 +158,32 @@ impl Visible {
                     continue;
                 }
                 instances.push(instance);
-                geoms.push(geom);
+                anchors.push(Anchor::Geom(geom));
             }
+        }
+        for (site, identity) in identities.sites() {
+            let Some(instance) = geom::of_site(model, site, identity, surfaces.of_site(site)) else { continue };
+            if let Err(reason) = instance.validate() {
+                left_out.push(format!("site {site} is not drawn: {reason}"));
+                continue;
+            }
+            instances.push(instance);
+            anchors.push(Anchor::Site(site));
         }
         // Every instance was checked; there may still be too many triangles for 31 bits.
         let mut scene = RenderScene::new(instances).unwrap_or_else(|error| {
             left_out.push(format!("nothing is drawn: {error}"));
-            geoms.clear();
+            anchors.clear();
             RenderScene::empty()
         });
-        lighting::light(model, &mut scene);
-        Self { scene: Arc::new(scene), geoms, ids: identities.shared_table(), left_out }
+        lighting::light(model, look, &mut scene);
+        Self { scene: Arc::new(scene), anchors, ids: identities.shared_table(), left_out }
     }
 
     /// This, with other instances in the place of its own, each moving with no geom. The lamps stay.
     fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, scene::RenderSceneError> {
         let scene = Arc::new(self.scene.with_instances(instances)?);
-        Ok(Self { scene, geoms: Vec::new(), ids: Arc::clone(&self.ids), left_out: self.left_out.clone() })
-    }
-
-    /// The headlight that goes with our ambient light, instead of the one MuJoCo gives to models that ask for none.
-    pub(crate) fn with_own_headlight(mut self) -> Self {
-        Arc::make_mut(&mut self.scene).headlight = Headlight::default();
-        self
+        Ok(Self { scene, anchors: Vec::new(), ids: Arc::clone(&self.ids), left_out: self.left_out.clone() })
     }
 
     /// With the sizes of lamps, by name, which not every MuJoCo knows.
@@ -170,7 +208,8 @@ impl Visible {
         &self.ids
     }
 
-    /// What is not drawn, and why: textures or meshes that cannot be read.
+    /// Elements that are not drawn, and why: textures or meshes that cannot be read; spatial tendons, skins, flexes, signed
+    /// distance fields and images of skyboxes, which cameras do not draw.
     pub fn left_out(&self) -> &[String] {
         &self.left_out
     }
@@ -181,11 +220,11 @@ impl Visible {
     /// The slice has another length than the scene's instances.
     #[track_caller]
     pub fn read_exact(&self, data: &Data, poses: &mut [PoseF64]) {
-        assert_eq!(poses.len(), self.geoms.len(), "a slice of another scene");
-        let (positions, rotations) = (data.geom_xpos().as_chunks::<3>().0, data.geom_xmat().as_chunks::<9>().0);
-        for (pose, &geom) in poses.iter_mut().zip(&self.geoms) {
-            let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = rotations[geom];
-            *pose = PoseF64 { rotation: [[r0, r1, r2], [r3, r4, r5], [r6, r7, r8]], translation: positions[geom] };
+        assert_eq!(poses.len(), self.anchors.len(), "a slice of another scene");
+        let place = places(data);
+        for (pose, &anchor) in poses.iter_mut().zip(&self.anchors) {
+            let (translation, [r0, r1, r2, r3, r4, r5, r6, r7, r8]) = place(anchor);
+            *pose = PoseF64 { rotation: [[r0, r1, r2], [r3, r4, r5], [r6, r7, r8]], translation };
         }
     }
 
@@ -195,14 +234,17 @@ impl Visible {
     /// The slices have other lengths than the scene's instances and lights.
     #[track_caller]
     pub fn read(&self, data: &Data, poses: &mut [PoseF32], lights: &mut [Light]) {
-        assert!(poses.len() == self.geoms.len() && lights.len() == self.scene.lights.len(), "slices of another scene");
-        let (positions, rotations) = (data.geom_xpos().as_chunks::<3>().0, data.geom_xmat().as_chunks::<9>().0);
-        for (pose, &geom) in poses.iter_mut().zip(&self.geoms) {
-            let rotation = rotations[geom].map(|x| x as f32);
-            let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = rotation;
+        assert!(
+            poses.len() == self.anchors.len() && lights.len() == self.scene.lights.len(),
+            "slices of another scene"
+        );
+        let place = places(data);
+        for (pose, &anchor) in poses.iter_mut().zip(&self.anchors) {
+            let (translation, rotation) = place(anchor);
+            let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = rotation.map(|x| x as f32);
             *pose = PoseF32 {
                 rotation: [[r0, r1, r2], [r3, r4, r5], [r6, r7, r8]],
-                translation: positions[geom].map(|x| x as f32),
+                translation: translation.map(|x| x as f32),
             };
         }
         lighting::read(data, &self.scene.lights, lights);

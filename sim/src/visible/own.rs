@@ -1,6 +1,6 @@
 //! What an environment looks like whose sizes or colours are its own.
 
-use super::{Visible, geom};
+use super::{Anchor, Visible, geom};
 use crate::mj::Model;
 use scene::{Material, OwnScene, RenderSceneError};
 use std::collections::BTreeMap;
@@ -18,7 +18,8 @@ impl Visible {
         colors: &BTreeMap<usize, &[f64]>,
     ) -> Result<OwnScene, RenderSceneError> {
         let mut instances = self.scene.instances().to_vec();
-        for (instance, geom) in instances.iter_mut().zip(&self.geoms) {
+        for (instance, anchor) in instances.iter_mut().zip(&self.anchors) {
+            let Anchor::Geom(geom) = anchor else { continue };
             let size = sizes.get(geom).and_then(|size| geom::sized(model.geom_type()[*geom] as u32, size));
             if let Some(shape) = size {
                 instance.shape = shape;

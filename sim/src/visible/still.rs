@@ -76,7 +76,7 @@ impl Still {
             data.qpos_mut().copy_from_slice(qpos);
         }
         data.step1()?;
-        let still = Self::of_data(&Arc::new(Visible::of_model(&model)), &data);
+        let still = Self::of_data(&Arc::new(Visible::with_sites(&model)), &data);
         let FreeCamera { eye, target, .. } = still.free_camera;
         // The author of the file chose the angles.
         Ok(Self { forward: [0, 1, 2].map(|k| target[k] - eye[k]), ..still })

@@ -1,6 +1,6 @@
 //! Materials and textures of MuJoCo models.
 
-use crate::mj::{Model, TextureType};
+use crate::mj::{self, Model, TextureType};
 use scene::{Material, Texture, TextureKind};
 use std::sync::Arc;
 
@@ -48,7 +48,21 @@ impl<'a> Surfaces<'a> {
         let rgba = color_of(self.model, geom);
         match usize::try_from(self.model.geom_matid()[geom]).ok().and_then(|m| self.materials.get(m)) {
             None => Material::from_rgba(rgba),
-            Some(material) => Material { rgba, ..material.clone() },
+            Some(material) => {
+                // MuJoCo mirrors the scene in planes and in the upper face of boxes only.
+                let mirrors = matches!(self.model.geom_type()[geom] as u32, mj::mjGEOM_PLANE | mj::mjGEOM_BOX);
+                let reflectance = if mirrors { material.reflectance } else { 0.0 };
+                Material { rgba, reflectance, ..material.clone() }
+            }
+        }
+    }
+
+    /// The look of a site.
+    pub(super) fn of_site(&self, site: usize) -> Material {
+        let rgba = color_of_site(self.model, site);
+        match usize::try_from(self.model.site_matid()[site]).ok().and_then(|m| self.materials.get(m)) {
+            None => Material::from_rgba(rgba),
+            Some(material) => Material { rgba, reflectance: 0.0, ..material.clone() },
         }
     }
 
@@ -60,11 +74,19 @@ impl<'a> Surfaces<'a> {
 
 /// Colour and opacity of a geom. A colour of the geom's own goes over its material's, as in MuJoCo's viewer.
 pub(crate) fn color_of(model: &Model, geom: usize) -> [f32; 4] {
+    color(model, &model.geom_rgba()[4 * geom..4 * geom + 4], model.geom_matid()[geom])
+}
+
+/// Colour and opacity of a site, as those of a geom.
+pub(super) fn color_of_site(model: &Model, site: usize) -> [f32; 4] {
+    color(model, &model.site_rgba()[4 * site..4 * site + 4], model.site_matid()[site])
+}
+
+fn color(model: &Model, own: &[f32], material: i32) -> [f32; 4] {
     /// MuJoCo's grey of geoms that say nothing.
     const UNSET: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
-    let own = &model.geom_rgba()[4 * geom..4 * geom + 4];
     let own = [own[0], own[1], own[2], own[3]].map(|c| c.clamp(0.0, 1.0));
-    match usize::try_from(model.geom_matid()[geom]) {
+    match usize::try_from(material) {
         Ok(material) if own == UNSET && material < model.nmat() => {
             model.material(material).rgba.map(|c| c.clamp(0.0, 1.0))
         }

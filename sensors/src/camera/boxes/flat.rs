@@ -68,7 +68,7 @@ impl Segmentation {
         }
         camera.shot_of(row, |rasterizer, shot, _| {
             for (instance, pose) in shot.scene.instances().iter().zip(shot.poses) {
-                if matches!(Layer::of(instance, rasterizer.groups()), Layer::Opaque | Layer::Veil)
+                if Layer::of(instance, rasterizer.groups()) != Layer::Hidden
                     && let Some(extent) = outline(shot.view, instance, pose)
                 {
                     boxes.reach(instance.mask_id, extent);

@@ -57,8 +57,7 @@ impl Segmentation {
         let row = camera.row(env)?;
         camera.must_have_captured(row)?;
         camera.shot_of(row, |rasterizer, shot, _| {
-            let drawn =
-                |instance: &Instance| matches!(Layer::of(instance, rasterizer.groups()), Layer::Opaque | Layer::Veil);
+            let drawn = |instance: &Instance| Layer::of(instance, rasterizer.groups()) != Layer::Hidden;
             let all = shot.scene.instances().iter().zip(shot.poses).filter(|(instance, _)| drawn(instance));
             let of = |id: i32| -> Option<Box3d> {
                 let parts = all.clone().filter(|(instance, _)| self.segment_of(level, instance.mask_id) == id);

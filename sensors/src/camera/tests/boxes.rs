@@ -250,7 +250,7 @@ fn class_beside_image() {
 
 #[test]
 fn without_box() {
-    let glass = Material::from_rgba([1.0, 1.0, 1.0, 0.3]);
+    let glass = Material::from_rgba([1.0, 1.0, 1.0, 0.0]);
     let places = [[2.0, 0.0], [-2.0, 0.0], [2.0, 9.0], [1.0, 0.0], [2.0, 0.3]];
     let (scene, poses) = things(places.map(|[x, y]| ball(0.2, at(x, y, 0.0))));
     let mut instances = scene.instances().to_vec();

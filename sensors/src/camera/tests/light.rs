@@ -6,7 +6,7 @@ use super::harness::{Image, Still, at, linear, look, matt, srgb, things, unlit};
 use super::scenes::EXACT;
 use nalgebra::Vector3;
 use scene::shape::{Box, Plane, Sphere};
-use scene::{Headlight, Hemisphere, Light, LightKind, Material, PoseF32, RenderScene, Shape, Sky};
+use scene::{Headlight, Hemisphere, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Shape, Sky};
 
 /// sRGB number of the gray that floors have here.
 const GRAY: f32 = 0.7;
@@ -187,6 +187,88 @@ fn shadow_maps() {
     }
 }
 
+/// A cube of 5 cm and an arm of boxes on a plane of half size `ground`, in the light of a simulation, from a camera above.
+fn tabletop(ground: f32, view: crate::visibility::View) -> Still {
+    let gray = || matt([GRAY; 3]);
+    let cuboid = |half: [f32; 3], pose| (Shape::from(Box { half }), gray(), pose);
+    // The cube sinks in by what a contact does.
+    let (mut scene, poses) = things([
+        (Plane { half: [ground; 2] }.into(), gray(), PoseF32::IDENTITY),
+        cuboid([0.025; 3], at(1.0, -0.2, 0.0249)),
+        cuboid([0.08, 0.08, 0.5], at(0.0, 0.0, 0.5)),
+        cuboid([0.4, 0.05, 0.05], at(0.4, 0.0, 0.9)),
+    ]);
+    scene.lights = vec![Light { direction: [-0.3, 0.4, -1.0], ..Light::default() }];
+    Still::new((scene, poses), view)
+}
+
+/// Shadow maps against rays, on a ground of 100 m as on one of 6 m, near and far, and below a light with a cone.
+///
+/// Root cause once: the map was stretched over all casters, and the ground, which shades nothing above it, was one. A texel
+/// of the default ground was 10 cm wide, and a cube of 5 cm had no shadow.
+#[test]
+fn shadows_on_wide_ground() {
+    let views = [
+        ("above", look([320, 240], 0.76, [1.2, -0.2, 0.8], [1.05, -0.2, 0.0])),
+        ("slanted", look([320, 240], 0.8, [2.2, -1.6, 1.2], [0.6, -0.1, 0.3])),
+        ("close", look([320, 240], 0.5, [1.2, -0.5, 0.25], [0.98, -0.19, 0.0])),
+        ("horizon", look([320, 240], 0.9, [1.8, -1.5, 0.6], [0.5, 0.3, 0.6])),
+    ];
+    let spot = LightKind::Spot { cutoff_deg: 60.0, exponent: 0.0 };
+    for ((name, view), kind) in views.into_iter().flat_map(|view| [(view, LightKind::Directional), (view, spot)]) {
+        let lit = |ground: f32| {
+            let still = tabletop(ground, view);
+            still.with(|still| (still.scene.lights[0].kind, still.scene.lights[0].position) = (kind, [0.9, -1.8, 2.2]))
+        };
+        let (wide, small) = (lit(50.0), lit(3.0));
+        let [image, other] = [wide.draw(), small.draw()];
+        let rays = wide.by(Renderer::Hybrid);
+        let bright = wide.with(|still| still.cfg.shadows = false).draw();
+        // Pixels of the ground whose neighbours are of the ground: elsewhere it is the coverage that differs.
+        let ground: Vec<usize> = image.inner().filter(|k| image.mask()[*k] == 1 && image.alone(*k)).collect();
+        let dark = |image: &Image, k: usize| i32::from(image.color()[k][0]) + 20 < i32::from(bright.color()[k][0]);
+        let count = |f: &dyn Fn(usize) -> bool| ground.iter().filter(|k| f(**k)).count();
+        let [shaded, both] = [count(&|k| dark(&rays, k)), count(&|k| dark(&rays, k) && dark(&image, k))];
+        let wrong = count(&|k| dark(&rays, k) != dark(&image, k));
+        // A shadow's edge is a texel or two wide: of the pixels in shadow, one of eight is beside an edge at most.
+        assert!(shaded > 200, "{name}, {kind:?}: {shaded} pixels in shadow");
+        assert!(wrong * 8 <= shaded, "{name}, {kind:?}: {wrong} wrong, {both} of {shaded} in shadow");
+        // The size of the ground changes nothing where there is ground.
+        let [mut differ, mut same] = [0, 0];
+        for &k in ground.iter().filter(|k| other.mask()[**k] == 1 && other.alone(**k)) {
+            let far = (0..3).any(|c| image.color()[k][c].abs_diff(other.color()[k][c]) > 2);
+            (differ, same) = (differ + usize::from(far), same + usize::from(!far));
+        }
+        assert!(differ * 1000 <= same, "{name}, {kind:?}: {differ} of {same} depend on the size of the ground");
+        // The control: without shadows everything in shadow is wrong.
+        assert_eq!(count(&|k| dark(&rays, k) != dark(&bright, k)), shaded);
+    }
+}
+
+/// A plane shades what is below it, in its own light alone.
+#[test]
+fn plane_above() {
+    let view = look([160, 120], 0.8, [3.0, 0.0, 1.5], [0.0, 0.0, 0.2]);
+    let gray = || matt([GRAY; 3]);
+    let roof = (Shape::from(Plane { half: [0.5; 2] }), gray(), at(0.0, 0.0, 1.0));
+    let ground = (Shape::from(Plane { half: [50.0; 2] }), gray(), PoseF32::IDENTITY);
+    let (mut scene, poses) = things([ground, roof]);
+    scene.lights = vec![Light { direction: [0.0, 0.0, -1.0], ..Light::default() }];
+    let still = Still::new((scene, poses), view);
+    let [image, bright] = [still.draw(), still.with(|still| still.cfg.shadows = false).draw()];
+    let (mut dark, mut lit) = (0, 0);
+    for k in (0..160 * 120).filter(|k| image.mask()[*k] == 1) {
+        let [x, y, _] = image.position()[k];
+        let off = x.abs().max(y.abs()) - 0.5;
+        let shaded = i32::from(image.color()[k][0]) + 20 < i32::from(bright.color()[k][0]);
+        if off.abs() > 0.05 {
+            assert_eq!(shaded, off < 0.0, "at {x}, {y}");
+            (dark, lit) = (dark + usize::from(shaded), lit + usize::from(!shaded));
+        }
+    }
+    assert!(dark > 100 && lit > 1000, "{dark} dark, {lit} lit");
+}
+
 const PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: false, seed: 1 };
 const DARK: Headlight = Headlight { ambient: [0.0; 3], diffuse: [0.0; 3], specular: [0.0; 3], active: false };
 
@@ -307,5 +389,34 @@ fn camera_exposure() {
             changed += usize::from(found.abs_diff(*before) > 8);
         }
         assert!(changed > plain.len() * 3 / 16, "{changed} of {}", plain.len());
+    }
+}
+
+/// Light that is added up as MuJoCo's renderer does: the byte of a matt plane is 255 times its sRGB colour times the sum of
+/// the lights, each times its cosine; the sum ends at white. Root cause once: lamps were added in linear light, and four of
+/// them were darker than in MuJoCo.
+#[test]
+fn display_sum() {
+    let directions = [[0.0, 0.0, -1.0], [0.6, 0.0, -0.8], [0.0, -0.6, -0.8], [-0.8, 0.0, -0.6]];
+    let cosines: f32 = [1.0, 0.8, 0.8, 0.6].iter().sum();
+    for (base, light) in [(0.5f32, 0.2f32), (0.7, 0.1), (1.0, 0.25), (0.9, 0.6)] {
+        let (scene, poses) = things([(Plane::INFINITE, matt([base, 0.5 * base, 0.25 * base]), PoseF32::IDENTITY)]);
+        let mut scene = unlit(scene);
+        scene.light_sum = LightSum::Display;
+        let lamp = |direction| Light { direction, diffuse: [light; 3], cast_shadow: false, ..Light::default() };
+        scene.lights = directions.map(lamp).to_vec();
+        let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+        let still = Still::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
+        for renderer in [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced] {
+            let found = still.by(renderer).color()[16 * 33 + 16];
+            for (c, part) in [1.0, 0.5, 0.25].into_iter().enumerate() {
+                let expected = 255.0 * (part * base * light * cosines).min(1.0);
+                let off = (f32::from(found[c]) - expected).abs();
+                assert!(off <= 1.5, "{renderer:?}, {base} {light}: {found:?}, {expected} in channel {c}");
+            }
+        }
+        // The control: a linear sum is another one.
+        let linear = still.with(|still| still.scene.light_sum = LightSum::Linear).draw().color()[16 * 33 + 16];
+        assert!((f32::from(linear[1]) - 255.0 * 0.5 * base * light * cosines).abs() > 5.0, "{linear:?}");
     }
 }

@@ -71,7 +71,7 @@ pub(super) fn checker_plane() -> Instance {
     let material = Material {
         rgba: [1.0; 4],
         texture: Some(Arc::new(checker)),
-        tex_repeat: [1.0, 1.0],
+        tex_repeat: [2.0, 2.0],
         tex_uniform: true,
         specular: 0.1,
         ..Material::default()

@@ -34,7 +34,7 @@ use eye::Eye;
 use lamp::Lamp;
 use lobe::Basis;
 use point::Point;
-use scene::{Light, PoseF64, RenderScene};
+use scene::{Light, LightSum, PoseF64, RenderScene};
 use sobol::{Sample, Sequence};
 
 /// Lamps that are asked, at most; the camera's comes besides.
@@ -152,6 +152,11 @@ impl Lamps {
             lamps.push(Lamp::of_camera(&scene.headlight, view, forward));
         }
         for lamp in lamps {
+            if scene.light_sum == LightSum::Display {
+                for color in [&mut lamp.ambient, &mut lamp.diffuse, &mut lamp.specular] {
+                    *color = linear(color.map(|x| x as f32));
+                }
+            }
             lamp.cast_shadow &= shadows;
         }
     }

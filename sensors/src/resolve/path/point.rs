@@ -85,7 +85,8 @@ fn texture(
         let largest = by.iter().fold(0.0f64, |m, &x| m.max(x));
         return texel::at_cube(image, [0, 1, 2].map(|k| local[k] * by[k]), width * largest);
     }
-    let projected = ([local[0] * by[0], local[1] * by[1]], by[0].abs().max(by[1].abs()));
+    let offset = scene.texture_offsets()[index].map(f64::from);
+    let projected = ([0, 1].map(|k| local[k] * by[k] + offset[k]), by[0].abs().max(by[1].abs()));
     let (at, density) = uv.unwrap_or(projected);
     texel::at(image, at, width * density)
 }

@@ -158,14 +158,11 @@ fn gradient(projection: &Projection, p: [[f32; 3]; 3], at: [f32; 2], polygon: &[
 #[inline(never)]
 fn clipped<S: Simd>(s: S, tile: &mut Tile, v: &Vertices, corners: [usize; 3], pass: &Pass<'_>, id: u32) {
     let projection = pass.projection;
-    if projection.parallel {
-        return;
-    }
     let original = corners.map(|i| [v.camera[0][i], v.camera[1][i], v.camera[2][i]]);
     let Some((polygon, count)) = clip(projection, original) else { return };
     let polygon = &polygon[..count];
     let screen = |c: [f32; 3]| {
-        let inverse = 1.0 / c[2];
+        let inverse = if projection.parallel { 1.0 } else { 1.0 / c[2] };
         let k = GUARD + 1.0;
         [
             (c[0] * inverse * projection.fx + projection.cx).clamp(-k, k),
@@ -204,13 +201,17 @@ fn rarely<S: Simd>(s: S, tile: &mut Tile, p: [[i32; 2]; 3], g: &Gradient, neares
 /// The part of a triangle in front of the camera and inside the guard band.
 fn clip(projection: &Projection, triangle: [[f32; 3]; 3]) -> Option<([[f32; 3]; 9], usize)> {
     let p = projection;
-    // Signed distances: positive inside. The screen coordinate is fx x / z + cx.
+    // Signed distances: positive inside. The screen coordinate is fx x / z + cx, of parallel rays fx x + cx.
+    let side = |fx: f32, fy: f32, guard: f32| {
+        let [by_depth, alone] = if p.parallel { [0.0, guard] } else { [guard, 0.0] };
+        [fx, fy, by_depth, alone]
+    };
     let planes = [
         [0.0, 0.0, 1.0, -0.5 * p.near],
-        [-p.fx, 0.0, GUARD - p.cx, 0.0],
-        [p.fx, 0.0, GUARD + p.cx, 0.0],
-        [0.0, -p.fy, GUARD - p.cy, 0.0],
-        [0.0, p.fy, GUARD + p.cy, 0.0],
+        side(-p.fx, 0.0, GUARD - p.cx),
+        side(p.fx, 0.0, GUARD + p.cx),
+        side(0.0, -p.fy, GUARD - p.cy),
+        side(0.0, p.fy, GUARD + p.cy),
     ];
     let mut from = ([[0.0f32; 3]; 9], 3);
     from.0[..3].copy_from_slice(&triangle);

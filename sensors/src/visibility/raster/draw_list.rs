@@ -51,10 +51,8 @@ pub(crate) enum Layer {
     Hidden,
     /// Seen by all channels.
     Opaque,
-    /// Blended into the colour; seen by the other channels as well.
+    /// Blended into the colour, and seen by the other channels.
     Veil,
-    /// Blended into the colour only.
-    Glass,
 }
 
 impl Layer {
@@ -64,11 +62,14 @@ impl Layer {
             Self::Hidden
         } else if alpha >= 1.0 {
             Self::Opaque
-        } else if alpha >= 0.5 {
-            Self::Veil
         } else {
-            Self::Glass
+            Self::Veil
         }
+    }
+
+    /// True if an instance casts shadows into shadow maps: it is drawn, and its alpha is at least 0.5.
+    pub(crate) fn casts_shadows(instance: &Instance, groups: u32) -> bool {
+        Self::of(instance, groups) != Self::Hidden && instance.material.rgba[3] >= 0.5
     }
 }
 

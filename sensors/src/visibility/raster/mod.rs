@@ -142,18 +142,19 @@ fn draw_floor<S: Simd>(
     }
 }
 
-/// Keeps the samples that are hit nearer than what is there. Whether there are any.
+/// Keeps the samples that are hit nearer than what is there, or as near by a later instance. True if there are any.
 #[inline(always)]
 fn keep<S: Simd>(s: S, tile: &mut Tile, at: usize, hit: M<S>, nearness: F<S>, id: U<S>) -> bool {
     let old = load(s, &tile.nearness[at..]);
-    let nearer = hit & nearness.simd_gt(old);
-    if !nearer.any_true() {
+    let near = hit & nearness.simd_ge(old);
+    if !near.any_true() {
         return false;
     }
+    let old_id = load_u(s, &tile.id[at..]);
+    let nearer = near & (nearness.simd_gt(old) | old_id.simd_lt(id));
     store(select(nearer, nearness, old), &mut tile.nearness[at..]);
-    let old = load_u(s, &tile.id[at..]);
-    store_u(select_u(nearer, id, old), &mut tile.id[at..]);
-    true
+    store_u(select_u(nearer, id, old_id), &mut tile.id[at..]);
+    nearer.any_true()
 }
 
 /// Casts the rays of all samples in an area of blocks.

@@ -110,11 +110,13 @@ pub(crate) fn draw<S: Simd>(
                     let q = min(max(q, low), high);
                     let here = samples + row * 16;
                     let old = load(s, &tile.nearness[here..]);
-                    let m = inside & q.simd_gt(old) & q.simd_le(nearest);
+                    let m = inside & q.simd_ge(old) & q.simd_le(nearest);
                     if m.any_true() {
+                        // Of surfaces at the same depth the last one counts. Nothing has the largest id.
+                        let old_ids = load_u(s, &tile.id[here..]);
+                        let m = m & (q.simd_gt(old) | old_ids.simd_lt(ids));
                         store(select(m, q, old), &mut tile.nearness[here..]);
-                        let old = load_u(s, &tile.id[here..]);
-                        store_u(select_u(m, ids, old), &mut tile.id[here..]);
+                        store_u(select_u(m, ids, old_ids), &mut tile.id[here..]);
                         drawn = true;
                     }
                 }
@@ -162,7 +164,8 @@ fn few_pixels(
                 let block = tile.block(bx as usize / BLOCK, by as usize / BLOCK);
                 let here = tile.samples(block, plane) + (row * 8 + column) as usize;
                 tile.open(block);
-                if q > tile.nearness[here] && q <= nearest {
+                let old = tile.nearness[here];
+                if (q > old || q == old && id > tile.id[here]) && q <= nearest {
                     tile.nearness[here] = q;
                     tile.id[here] = id;
                     tile.touch(block);

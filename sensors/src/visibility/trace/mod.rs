@@ -181,7 +181,7 @@ impl Tracer {
                     |thing: u32, limit: f64| {
                         let Some(found) = self.meet(thing, ray, limit, time, stack) else { return limit };
                         if best.is_none_or(|b| {
-                            found.distance < b.distance || found.distance == b.distance && self.hides(thing, b.thing)
+                            found.distance < b.distance || found.distance == b.distance && thing > b.thing
                         }) {
                             best = Some(found);
                         }
@@ -195,14 +195,6 @@ impl Tracer {
                 self.hit(best?, time)
             },
         )
-    }
-
-    /// Which of two things that are as near counts: a mat, not the endless ground that it lies on, as in the rasterizer; else the
-    /// first in the scene.
-    #[cold]
-    fn hides(&self, thing: u32, other: u32) -> bool {
-        let order = |thing: u32| (self.endless.contains(&thing), thing);
-        order(thing) < order(other)
     }
 
     /// The part of the light that gets along a ray from distance 0 to `limit` \[m\], at a time: nothing past something opaque,
@@ -468,8 +460,9 @@ impl Lens {
         for k in 0..WIDTH {
             let Some((t, number)) = found[k] else { continue };
             let q = (1.0 / (self.near + t / length[k])) as f32;
-            if q > nearness[at[k]] {
-                (nearness[at[k]], ids[at[k]]) = (q, first_id + number as u32);
+            let (old, id) = (nearness[at[k]], first_id + number as u32);
+            if q > old || q == old && id > ids[at[k]] {
+                (nearness[at[k]], ids[at[k]]) = (q, id);
                 drawn = true;
             }
         }
