@@ -23,6 +23,12 @@ pub enum LampKind {
         /// 128.
         exponent: f64,
     },
+    /// Even light from all directions, as of an overcast sky; of the other fields only the color counts, and it casts no sharp
+    /// shadow. Domes take the place of the light that simulations have from all sides without one.
+    Dome {
+        /// Brightness: a white surface under a white dome of intensity 1 alone is as bright as an image can show, 0 to 1000.
+        intensity: f64,
+    },
 }
 
 /// A lamp. `Default` is white light from above, a little from the side.
@@ -64,6 +70,11 @@ impl Default for LightCfg {
 }
 
 impl LightCfg {
+    /// A dome: even light from all directions ([`LampKind::Dome`]).
+    pub fn dome(intensity: f64, color: [f64; 3]) -> Self {
+        Self { kind: LampKind::Dome { intensity }, color, ..Self::default() }
+    }
+
     /// Checks every number.
     ///
     /// # Errors
@@ -78,6 +89,13 @@ impl LightCfg {
             if !(0.0..=128.0).contains(&exponent) || exponent.fract() != 0.0 {
                 return fail("lights.kind.spot.exponent", &exponent, "it must be a whole number, 0 to 128, such as 10");
             }
+        }
+        if let LampKind::Dome { intensity } = self.kind
+            && !(0.0..=1000.0).contains(&intensity)
+        {
+            let expected =
+                "it must be 0 to 1000, where 1 shows a white surface as white (Isaac Lab's 3000 is about 1 here)";
+            return fail("lights.kind.dome.intensity", &intensity, expected);
         }
         if !self.position.iter().all(|x| x.abs() <= 1e6) {
             let expected = "each coordinate must be within 1e6 metres";

@@ -5,7 +5,7 @@ use super::document::{
     Surface,
 };
 use super::robot::Purpose;
-use crate::light_cfg::LightCfg;
+use crate::light_cfg::{LampKind, LightCfg};
 use crate::objects::mass_properties::MassProperties;
 use crate::objects::restitution;
 use crate::objects::rigid_object::{BodyType, RigidObjectData};
@@ -169,8 +169,11 @@ pub(crate) fn light_name(index: usize) -> String {
     format!("light{index}")
 }
 
-/// Adds a lamp.
+/// Adds a lamp. MuJoCo has no dome: that is of our renderers alone.
 pub(crate) fn add_light(mjcf: &mut Mjcf, index: usize, cfg: &LightCfg) {
+    if matches!(cfg.kind, LampKind::Dome { .. }) {
+        return;
+    }
     mjcf.lights.push(Light {
         name: light_name(index),
         position: cfg.position,

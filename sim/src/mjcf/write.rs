@@ -317,8 +317,10 @@ impl Writer {
                     element.attr("directional", "false").attr("cutoff", cutoff_deg).attr("exponent", exponent)
                 }
                 (LampKind::Point, Target::V4) => element.attr("type", "point"),
-                // As OpenGL's: a cone all around.
-                (LampKind::Point, _) => element.attr("directional", "false").attr("cutoff", 180).attr("exponent", 0),
+                // As OpenGL's: a cone all around. Domes are not among the lights of a document.
+                (LampKind::Point | LampKind::Dome { .. }, _) => {
+                    element.attr("directional", "false").attr("cutoff", 180).attr("exponent", 0)
+                }
             };
             // What is as MuJoCo has it anyway is not said. A directional lamp has an angle, not a radius.
             let attenuation = light.attenuation.map(|x| x.to_string()).join(" ");

@@ -1,5 +1,6 @@
 //! Lamps, headlight and sky of MuJoCo models.
 
+use crate::light_cfg::{LampKind, LightCfg};
 use crate::mj::{Data, LightType, Model, TextureArrays, TextureType};
 use scene::material::decode_srgb;
 use scene::{Headlight, Hemisphere, Light, LightKind, LightSum, RenderScene, Sky};
@@ -71,6 +72,15 @@ pub(super) fn light(model: &Model, look: Look, scene: &mut RenderScene) {
 /// the same up to the small linear part of sRGB: (c l)^2.2 = c^2.2 l^2.2.
 fn linear(color: [f32; 3]) -> [f32; 3] {
     color.map(decode_srgb)
+}
+
+/// Light of all domes together, linear; `None` without one.
+pub(super) fn domes(lamps: &[LightCfg]) -> Option<[f32; 3]> {
+    let domes = lamps.iter().filter_map(|lamp| match lamp.kind {
+        LampKind::Dome { intensity } => Some(linear(lamp.color.map(|c| c as f32)).map(|c| c * intensity as f32)),
+        _ => None,
+    });
+    domes.reduce(|sum, dome| std::array::from_fn(|k| sum[k] + dome[k]))
 }
 
 /// Where the lamps are in `data`.

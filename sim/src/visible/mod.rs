@@ -29,7 +29,7 @@ use crate::simulation_cfg::GroundCfg;
 use crate::surface_cfg::SurfaceCfg;
 use scene::pose::from_row;
 use scene::shape::Plane;
-use scene::{Instance, Light, Material, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture};
+use scene::{Hemisphere, Instance, Light, Material, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -186,9 +186,12 @@ impl Visible {
         Ok(Self { scene, anchors: Vec::new(), ids: Arc::clone(&self.ids), left_out: self.left_out.clone() })
     }
 
-    /// With the sizes of lamps, by name, which not every MuJoCo knows.
+    /// With what MuJoCo does not know of lamps: their sizes, by name, and domes.
     pub(crate) fn with_lamps_of(mut self, model: &Model, lamps: &[LightCfg]) -> Self {
         let scene = Arc::make_mut(&mut self.scene);
+        if let Some(light) = lighting::domes(lamps) {
+            scene.ambient = Hemisphere { sky: light, ground: light };
+        }
         for (index, lamp) in lamps.iter().enumerate() {
             let light = model.id(ObjectKind::Light, &light_name(index)).and_then(|light| scene.lights.get_mut(light));
             if let Some(light) = light {

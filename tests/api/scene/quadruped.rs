@@ -39,6 +39,7 @@ pub(crate) fn declared() -> SceneCfg {
         ..ContactSensorCfg::of("robot/.*_FOOT")
     };
     let simulation = SimulationManagerCfg {
+        lights: vec![LightCfg::dome(1.0, [0.75; 3])],
         num_envs: 2,
         arena_space: 2.0,
         ground: Some(GroundCfg { color: [0.1; 3], ..Default::default() }),

@@ -3,6 +3,7 @@
 use kinetoscope::prelude::*;
 use kinetoscope::scene::material::decode_srgb;
 use kinetoscope::scene::{LightKind, Material};
+use std::sync::Arc;
 use testkit::worlds::{cfg, object, sim, sr5};
 
 const PART: &str = r#"<mujoco><asset><material name="brass" specular="0.9" emission="0.25"/></asset><worldbody>
@@ -162,6 +163,26 @@ fn lights() {
     }
 }
 
+/// A dome lights all sides of everything, in place of the light that simulations have by themselves, and is no light of MuJoCo.
+#[test]
+fn dome() {
+    let ambient = |lights: Vec<LightCfg>| {
+        let mut sim = SimulationManager::new(SimulationManagerCfg { lights, ..cfg(1, 1) }).unwrap();
+        let scene = Arc::clone(sim.visible().scene());
+        (scene.ambient, scene.lights.len())
+    };
+    let (first, second) = (LightCfg::dome(0.5, [1.0, 0.75, 0.0]), LightCfg::dome(2.0, [0.25; 3]));
+    let expected = |c: [f32; 3]| [0, 1, 2].map(|k| 0.5 * decode_srgb([1.0, 0.75, 0.0][k]) + 2.0 * decode_srgb(c[k]));
+    let (found, lamps) = ambient(vec![first.clone(), LightCfg::default(), second]);
+    assert_eq!((found.sky, found.ground, lamps), (expected([0.25; 3]), expected([0.25; 3]), 1));
+    let (own, _) = ambient(vec![LightCfg::default()]);
+    assert!(own.sky[2] > own.sky[0] && own.ground != own.sky, "the control: {own:?}");
+    // In a file.
+    let text = "[simulation]\nlights = [{ kind = { dome = { intensity = 0.5 } }, color = [1, 0.75, 0] }]";
+    let read = SceneCfg::from_toml(text, "scene.toml", &EntityTypes::default()).unwrap();
+    assert_eq!(read.simulation.lights, [first]);
+}
+
 #[test]
 fn refused_lights() {
     let spot = |cutoff_deg, exponent| LightCfg { kind: LampKind::Spot { cutoff_deg, exponent }, ..Default::default() };
@@ -172,6 +193,8 @@ fn refused_lights() {
         ("lights.kind.spot.exponent", spot(45.0, -1.0)),
         ("lights.kind.spot.exponent", spot(45.0, 129.0)),
         ("lights.kind.spot.exponent", spot(45.0, 2.5)),
+        ("lights.kind.dome.intensity", LightCfg::dome(-1.0, [1.0; 3])),
+        ("lights.kind.dome.intensity", LightCfg::dome(f64::NAN, [1.0; 3])),
         ("lights.position", LightCfg { position: [0.0, f64::NAN, 0.0].into(), ..Default::default() }),
         ("lights.attenuation", LightCfg { attenuation: [0.0; 3], ..Default::default() }),
         ("lights.attenuation", LightCfg { attenuation: [1.0, -1.0, 0.0], ..Default::default() }),
