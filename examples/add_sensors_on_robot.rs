@@ -54,6 +54,7 @@ fn run(args: &Args) -> launcher::Result {
     let cfg = scene_cfg(args)?;
     let dt = cfg.simulation.physics_dt;
     let mut scene = InteractiveScene::new(cfg)?;
+    scene.sim_mut().set_camera_view([3.5; 3], [0.0; 3])?;
     for diagnostic in scene.sim().diagnostics() {
         eprintln!("warning: {diagnostic}");
     }

@@ -50,6 +50,7 @@ pub mod snapshot;
 pub mod source;
 mod surface_cfg;
 pub mod urdf;
+mod viewpoint;
 pub mod visible;
 mod wrenches;
 
@@ -90,5 +91,6 @@ pub use snapshot::{Snapshot, SnapshotError};
 pub use source::Source;
 pub use surface_cfg::SurfaceCfg;
 pub use urdf::{ComponentCfg, MissingInertia, NameCase, NameCaseCfg, Strictness, UrdfCfg};
+pub use viewpoint::Viewpoint;
 pub use visible::{MaskId, Still, Visible};
 pub use wrenches::WrenchFrame;

@@ -17,6 +17,7 @@ use crate::observer::{Moment, Observers};
 use crate::outcome::Outcome;
 use crate::sensor_list::{SensorId, SensorList};
 use crate::simulation_cfg::SimulationManagerCfg;
+use crate::viewpoint::Viewpoint;
 use crate::visible::{MaskId, Visible, VisualCache};
 use ::scene::{Marker, OwnScene};
 use ndarray::Array2;
@@ -81,6 +82,8 @@ pub struct SimulationManager {
     pub(crate) draws: Vec<u64>,
     /// What came of the last step of the task that runs here.
     pub(crate) outcome: Option<Outcome>,
+    /// Point of view of windows, browser views and screenshots, where the program set one.
+    pub(crate) viewpoint: Option<Viewpoint>,
 }
 
 impl SimulationManager {
@@ -114,6 +117,7 @@ impl SimulationManager {
             observers: Observers::default(),
             draws,
             outcome: None,
+            viewpoint: None,
         })
     }
 

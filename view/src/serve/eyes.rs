@@ -77,6 +77,8 @@ struct OwnEyes {
     wants: Wants,
     shared: Arc<Shared>,
     eye: Option<Eye>,
+    /// Number of the program's point of view that was taken over.
+    view_changes: u64,
     shown: Shown,
     overlays: Overlays,
     trails: Trails,
@@ -111,6 +113,7 @@ impl OwnEyes {
             wants,
             shared,
             eye: None,
+            view_changes: 0,
             shown: Shown::All,
             overlays: Overlays::default(),
             trails: Trails::default(),
@@ -296,6 +299,10 @@ impl OwnEyes {
             let _ = self.send_pull();
         }
         self.drawn = key;
+        let changes = snapshot.viewpoint.map_or(0, |view| view.changes);
+        if std::mem::replace(&mut self.view_changes, changes) != changes && self.shown == Shown::All {
+            self.eye = None;
+        }
         let eye = self.eye.unwrap_or_else(|| self.home(snapshot));
         self.eye = Some(eye);
         let view = eye.view(self.size[0], self.size[1]);

@@ -51,9 +51,13 @@ impl Eye {
         })
     }
 
-    /// So that everything of a snapshot but the ground fills an image of `size` pixels, seen from the front, the side and
-    /// above.
+    /// The point of view that the program set ([`SimulationManager::set_camera_view`](sim::SimulationManager::set_camera_view)),
+    /// else one from which everything of a snapshot but the ground fills an image of `size` pixels, seen from the front, the
+    /// side and above.
     pub fn overview(snapshot: &Snapshot, [width, height]: [usize; 2]) -> Self {
+        if let Some(eye) = snapshot.viewpoint.and_then(|view| Self::looking(view.eye, view.target)) {
+            return eye;
+        }
         let scenes: Vec<_> = snapshot.envs.iter().map(|env| snapshot.scene_of(env)).collect();
         let placed: Vec<Placed<'_>> = snapshot
             .envs

@@ -5,7 +5,7 @@ use crate::control::{RecordingState, Speed, Wants};
 use scene::state::Contact;
 use scene::{Marker, RenderScene};
 use sim::description::{Joint, JointKind};
-use sim::{EnvId, JointIndex, Look, MaskId, RobotId, SimulationManager};
+use sim::{EnvId, JointIndex, Look, MaskId, RobotId, SimulationManager, Viewpoint};
 use std::sync::Arc;
 
 /// Which environments.
@@ -46,6 +46,8 @@ pub struct Snapshot {
     pub ids: Arc<[MaskId]>,
     /// What things are called.
     pub names: Arc<Names>,
+    /// Point of view that the program set; `None` where it set none.
+    pub viewpoint: Option<Viewpoint>,
     /// The environments.
     pub envs: Vec<EnvStage>,
     /// Which of them have their contacts in it.
@@ -166,6 +168,7 @@ impl Snapshot {
         self.scene = Some(Arc::clone(sim.visible().scene()));
         self.ids = Arc::clone(sim.visible().ids());
         self.names = Arc::clone(names);
+        self.viewpoint = sim.viewpoint();
         self.envs.resize_with(sim.num_envs(), EnvStage::default);
         let origins = sim.env_origins();
         for (k, env) in self.envs.iter_mut().enumerate() {
@@ -217,7 +220,7 @@ impl Snapshot {
 
     /// The same moment with one environment alone; with none where there is no such environment.
     pub(crate) fn only(&self, env: usize) -> Self {
-        Self { envs: self.envs.get(env).into_iter().cloned().collect(), ..self.clone() }
+        Self { viewpoint: None, envs: self.envs.get(env).into_iter().cloned().collect(), ..self.clone() }
     }
 
     /// What an environment looks like: its own scene, or that of all.

@@ -89,6 +89,8 @@ pub struct App {
     snapshot: Option<Arc<Snapshot>>,
     size: [usize; 2],
     eye: Option<Eye>,
+    /// Number of the program's point of view that was taken over.
+    view_changes: u64,
     shown: Shown,
     /// The environment that panels and sliders are of.
     env: usize,
@@ -145,6 +147,7 @@ impl App {
             snapshot: None,
             size,
             eye: None,
+            view_changes: 0,
             shown: Shown::All,
             env: 0,
             through: None,
@@ -170,7 +173,9 @@ impl App {
     /// A newer snapshot.
     pub fn show(&mut self, snapshot: Arc<Snapshot>) {
         self.env = self.env.min(snapshot.envs.len().saturating_sub(1));
-        if self.eye.is_none() {
+        let changes = snapshot.viewpoint.map_or(0, |view| view.changes);
+        let is_set_anew = std::mem::replace(&mut self.view_changes, changes) != changes;
+        if is_set_anew || self.eye.is_none() {
             self.eye = Some(Eye::overview(&snapshot, self.size));
         }
         self.picked.iter_mut().for_each(|picked| picked.renumber(&snapshot.names));

@@ -7,6 +7,7 @@ mod on_x;
 
 use super::keys::{Action, TABLE};
 use super::*;
+use crate::Screenshot;
 use crate::control::{Recording, RecordingState};
 use crate::sample::{HALF, Sample, sample, unlike};
 use crate::stage::{Eye, Look, Overlays, Painter, Panel, Shown, Snapshot};
@@ -569,4 +570,34 @@ fn coarse_while_moving() {
         let (mut small, fine) = app([320, 200]);
         assert_eq!(coarse(&mut small, &held, &fine, &moving, handing), expected, "{handing:?}");
     }
+}
+
+/// The program's point of view is that of open windows and of screenshots; the user moves on from there.
+#[test]
+fn viewpoint() {
+    let mut shows = shows(2);
+    let set = |shows: &mut Shows, eye: [f64; 3]| {
+        shows.sample.sim.set_camera_view(eye, [0.0; 3]).unwrap();
+        shows.sample.sim.update(1);
+        let held = shows.viewer.newest().unwrap();
+        let mut next = (*held).clone();
+        next.viewpoint = shows.sample.sim.viewpoint();
+        shows.app.show(Arc::new(next));
+    };
+    let expected = |eye: [f64; 3]| Eye::looking(eye, [0.0; 3]).unwrap();
+    assert_ne!(shows.app.eye(), expected([3.5; 3]), "the control");
+    set(&mut shows, [3.5; 3]);
+    assert_eq!(shows.app.eye(), expected([3.5; 3]));
+    assert_eq!(shows.sample.sim.overview_eye([64, 48]), expected([3.5; 3]));
+    // The user's own view stays until the program sets another.
+    let own = expected([1.0, 2.0, 1.0]);
+    shows.app.look_from(own);
+    shows.app.show(shows.viewer.newest().unwrap());
+    assert_eq!(shows.app.eye(), own);
+    set(&mut shows, [0.0, 2.0, 0.5]);
+    assert_eq!(shows.app.eye(), expected([0.0, 2.0, 0.5]));
+    for (eye, target) in [([1.0; 3], [1.0; 3]), ([f64::NAN, 0.0, 0.0], [0.0; 3]), ([0.0; 3], [f64::INFINITY; 3])] {
+        assert!(shows.sample.sim.set_camera_view(eye, target).unwrap_err().to_string().contains("apart"));
+    }
+    assert_eq!(shows.sample.sim.viewpoint().unwrap().changes, 2);
 }
