@@ -11,6 +11,8 @@ pub struct Placed<'a> {
     pub poses: &'a [PoseF32],
     /// Added to all positions \[m\].
     pub origin: [f64; 3],
+    /// Movable instances with a coordinate beyond this have flown away, and are left out \[m\].
+    pub reach: f32,
 }
 
 /// The image that is to be filled.
@@ -39,8 +41,8 @@ pub struct Placement {
 
 /// Share of the image that first views fill.
 pub const FILL: f64 = 0.9;
-/// Movable instances farther than this from the origin of their environment have flown away \[m\].
-const AWAY: f32 = 20.0;
+/// Reach of an environment \[m\]: what is farther from its origin has flown away.
+pub const REACH: f32 = 20.0;
 /// What stands in the world and is larger than the moving things by this factor is a room or terrain around them.
 const SURROUNDINGS: f64 = 2.0;
 /// Groups that are drawn, as in MuJoCo's viewers.
@@ -84,15 +86,17 @@ type Framed<'a> = (&'a Instance, &'a PoseF32, [f64; 3]);
 
 /// The instances that a first view shows.
 fn framed<'a>(placed: &[Placed<'a>]) -> Vec<Framed<'a>> {
-    let all: Vec<Framed<'a>> = placed
-        .iter()
-        .flat_map(|placed| placed.scene.instances().iter().zip(placed.poses).map(|(i, pose)| (i, pose, placed.origin)))
-        .filter(|(instance, pose, _)| is_drawn(instance) && is_here(instance, pose))
-        .collect();
-    let of_bodies: Vec<Framed<'a>> = all.iter().copied().filter(|(instance, ..)| instance.body.is_some()).collect();
+    let each = |placed: &Placed<'a>| {
+        let Placed { scene, poses, origin, reach } = *placed;
+        let shown = scene.instances().iter().zip(poses).filter(move |(i, pose)| is_drawn(i) && is_here(i, pose, reach));
+        shown.map(move |(instance, pose)| (instance, pose, origin))
+    };
+    let all: Vec<Framed<'a>> = placed.iter().flat_map(each).collect();
+    let of_body = |instance: &Instance| instance.body.is_some() || !instance.fixed;
+    let of_bodies: Vec<Framed<'a>> = all.iter().copied().filter(|(instance, ..)| of_body(instance)).collect();
     let Some(size) = bounds(&of_bodies).map(diagonal) else { return all };
     let fits = |framed: &Framed<'a>| bounds(&[*framed]).is_some_and(|box_| diagonal(box_) <= SURROUNDINGS * size);
-    all.into_iter().filter(|framed| framed.0.body.is_some() || fits(framed)).collect()
+    all.into_iter().filter(|framed| of_body(framed.0) || fits(framed)).collect()
 }
 
 fn is_drawn(instance: &Instance) -> bool {
@@ -101,8 +105,8 @@ fn is_drawn(instance: &Instance) -> bool {
 }
 
 /// Whether an instance is where it can be looked for.
-fn is_here(instance: &Instance, pose: &PoseF32) -> bool {
-    let near = |x: &f32| x.is_finite() && (instance.fixed || x.abs() < AWAY);
+fn is_here(instance: &Instance, pose: &PoseF32, reach: f32) -> bool {
+    let near = |x: &f32| x.is_finite() && (instance.fixed || x.abs() < reach);
     pose.translation.iter().all(near) && pose.rotation.iter().flatten().all(|x| x.is_finite())
 }
 
@@ -161,7 +165,7 @@ mod tests {
         let scene = RenderScene::new(vec![ball, ground, wall]).unwrap();
         let at = PoseF32::from_translation([1.0, 2.0, 3.0]);
         let poses = [at, PoseF32::IDENTITY, PoseF32::from_translation([60.0, 0.0, 0.0])];
-        let placed = Placed { scene: &scene, poses: &poses, origin: [10.0, 0.0, 0.0] };
+        let placed = Placed { scene: &scene, poses: &poses, origin: [10.0, 0.0, 0.0], reach: REACH };
         for aspect in [2.0, 1.0, 0.25] {
             let narrow = (FILL * 22.5f64.to_radians().tan() * f64::min(aspect, 1.0)).atan();
             let found = framing(aspect).place(&[placed]).unwrap();
@@ -171,7 +175,7 @@ mod tests {
         }
         // The control: a wall alone is what is drawn.
         let alone = RenderScene::new(vec![scene.instances()[2].clone()]).unwrap();
-        let wall = Placed { scene: &alone, poses: &poses[2..], origin: [0.0; 3] };
+        let wall = Placed { scene: &alone, poses: &poses[2..], origin: [0.0; 3], reach: REACH };
         assert!((framing(1.0).place(&[wall]).unwrap().extent - 100.0).abs() < 1e-3);
     }
 
@@ -208,10 +212,13 @@ mod tests {
         let far = PoseF32::from_translation([0.0, 30.0, 0.0]);
         let rows = [(&plane, PoseF32::IDENTITY), (&hidden, PoseF32::IDENTITY), (&ball, lost), (&ball, far)];
         for (scene, pose) in rows {
-            assert_eq!(framing(1.0).place(&[Placed { scene, poses: &[pose], origin: [0.0; 3] }]), None);
+            assert_eq!(framing(1.0).place(&[Placed { scene, poses: &[pose], origin: [0.0; 3], reach: REACH }]), None);
         }
         let down = Framing { forward: [0.0, 0.0, -1.0], ..framing(1.0) };
-        assert_eq!(down.place(&[Placed { scene: &ball, poses: &[PoseF32::IDENTITY], origin: [0.0; 3] }]), None);
+        assert_eq!(
+            down.place(&[Placed { scene: &ball, poses: &[PoseF32::IDENTITY], origin: [0.0; 3], reach: REACH }]),
+            None
+        );
         assert_eq!(framing(1.0).place(&[]), None);
     }
 }

@@ -193,7 +193,7 @@ impl Still {
 
     /// What is drawn, and where it is.
     pub fn placed(&self) -> Placed<'_> {
-        Placed { scene: self.visible.scene(), poses: &self.poses, origin: [0.0; 3] }
+        Placed { scene: self.visible.scene(), poses: &self.poses, origin: [0.0; 3], reach: f32::INFINITY }
     }
 
     /// What a rasterizer needs to draw it.

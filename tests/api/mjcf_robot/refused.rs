@@ -58,8 +58,8 @@ fn no_robots() {
     for (inside, kind, says) in [
         ("<geom size='1'/>", "NoBody", ""),
         (several, "SeveralRoots", "3 bodies in its world (\"a\", \"b\", \"body3\")"),
-        ("<body><geom size='1'/></body>", "NoJoint", "add_mjcf"),
-        ("<body><freejoint/><geom size='1'/></body>", "NoJoint", "add_mjcf"),
+        ("<body><geom size='1'/></body>", "NoJoint", "such a file is a scene"),
+        ("<body><freejoint/><geom size='1'/></body>", "NoJoint", "such a file is a scene"),
         ("<body mocap='true' name='m'><body><joint/><geom size='1'/></body></body>", "MocapBody", "\"m\""),
     ] {
         let (error, said) = reason(&format!("<mujoco><worldbody>{inside}</worldbody></mujoco>"));
@@ -76,7 +76,7 @@ fn named_elements() {
                 <site name='s'/>%</body></body><site name='w'/></worldbody>";
     let string = |to: &str| format!("<tendon><spatial name='t'><site site='s'/><site site='{to}'/></spatial></tendon>");
     let site = "<body><site name='s2' pos='0 0 1'/></body>";
-    let acts = ["robot.xml:4: robot \"robot\": actuator \"m\" acts on ", "add_mjcf"];
+    let acts = ["robot.xml:4: robot \"robot\": actuator \"m\" acts on ", "such a file is a scene"];
     let actuator = |of: &str| format!("{}\n<actuator>{of}</actuator>", string("s2"));
     let rows = [
         (

@@ -13,12 +13,15 @@ const SINGLE: Tolerance = Tolerance::absolute(1e-7, "vertices of meshes are in s
 /// A tetrahedron with its middle in the origin of its geom.
 const CORNERS: [[f64; 3]; 4] = [[0.3, 0.0, -0.1], [-0.15, 0.26, -0.1], [-0.15, -0.26, -0.1], [0.0, 0.0, 0.3]];
 
+/// A wheel without a collision shape: a robot has a joint.
+const WHEEL: &str = "<body name=\"wheel\"><joint name=\"spin\"/><geom size=\"0.01\" contype=\"0\" conaffinity=\"0\" mass=\"0.01\"/></body>";
+
 /// A free body with a collision shape, and beside it a larger visual that is not counted.
 fn body(geom: &str) -> String {
     let vertices: Vec<String> = CORNERS.iter().flatten().map(f64::to_string).collect();
     format!(
         "<mujoco><asset><mesh name=\"tetrahedron\" vertex=\"{}\"/></asset><worldbody><body name=\"body\">\
-         <geom {geom} mass=\"1\"/><geom size=\"2\" contype=\"0\" conaffinity=\"0\" mass=\"0\"/></body></worldbody></mujoco>",
+         <geom {geom} mass=\"1\"/><geom size=\"2\" contype=\"0\" conaffinity=\"0\" mass=\"0\"/>{WHEEL}</body></worldbody></mujoco>",
         vertices.join(" ")
     )
 }
@@ -35,9 +38,9 @@ fn closed_forms_and_contacts() {
     let shapes: [(&str, Depth, Tolerance); 6] = [
         ("type=\"sphere\" size=\"0.2\"", |_| 0.2, EXACT),
         ("type=\"capsule\" size=\"0.1 0.3\"", |d| 0.1 + 0.3 * d.z.abs(), EXACT),
-        ("type=\"ellipsoid\" size=\"0.1 0.2 0.4\"", |d| d.component_mul(&[0.1, 0.2, 0.4].into()).norm(), EXACT),
+        ("type=\"ellipsoid\" size=\"0.1 0.2 0.4\"", |d| d.component_mul(&Vector3::new(0.1, 0.2, 0.4)).norm(), EXACT),
         ("type=\"cylinder\" size=\"0.2 0.3\"", |d| 0.2 * (1.0 - d.z * d.z).sqrt() + 0.3 * d.z.abs(), EXACT),
-        ("type=\"box\" size=\"0.1 0.2 0.3\"", |d| d.abs().dot(&[0.1, 0.2, 0.3].into()), EXACT),
+        ("type=\"box\" size=\"0.1 0.2 0.3\"", |d| d.abs().dot(&Vector3::new(0.1, 0.2, 0.3)), EXACT),
         (
             "type=\"mesh\" mesh=\"tetrahedron\"",
             |d| CORNERS.iter().map(|corner| -d.dot(&Vector3::from(*corner))).fold(f64::MIN, f64::max),
@@ -106,8 +109,11 @@ fn links() {
 /// A clearance that cannot be had.
 #[test]
 fn no_clearance() {
-    let visual = "<mujoco><worldbody><body name=\"ghost\"><geom size=\"0.1\" contype=\"0\" conaffinity=\"0\"/></body></worldbody></mujoco>";
-    let ghost = || RobotCfg { fix_base: false, ..mjcf_robot("ghost", visual) };
+    let visual = format!(
+        "<mujoco><worldbody><body name=\"ghost\"><geom size=\"0.1\" contype=\"0\" conaffinity=\"0\"/>{WHEEL}</body>\
+         </worldbody></mujoco>"
+    );
+    let ghost = || RobotCfg { fix_base: false, ..mjcf_robot("ghost", &visual) };
     let mut sim = sim(empty_cfg(1));
     let id = sim.add_robot(RobotCfg { ground_clearance: Some(0.1), ..ghost() }).unwrap();
     assert_eq!(sim.robot(id).get_lowest_heights()[0], f64::INFINITY);

@@ -2,7 +2,7 @@
 
 use super::snapshot::Snapshot;
 use nalgebra::Vector3;
-use scene::framing::{FILL, Framing, Placed};
+use scene::framing::{FILL, Framing, Placed, REACH};
 use sensors::visibility::View;
 
 /// A viewer's camera: it turns about a point, moves with its picture, comes nearer, and flies. Up in the picture is up in the
@@ -64,7 +64,7 @@ impl Eye {
             .iter()
             .zip(&scenes)
             .filter_map(|(env, scene)| {
-                Some(Placed { scene: scene.as_deref()?, poses: &env.look.instances, origin: env.origin })
+                Some(Placed { scene: scene.as_deref()?, poses: &env.look.instances, origin: env.origin, reach: REACH })
             })
             .collect();
         Self::framing(&placed, [width, height])
