@@ -300,9 +300,10 @@ impl OwnEyes {
         }
         self.drawn = key;
         let changes = snapshot.viewpoint.map_or(0, |view| view.changes);
-        if std::mem::replace(&mut self.view_changes, changes) != changes && self.shown == Shown::All {
+        if changes > self.view_changes && self.shown == Shown::All {
             self.eye = None;
         }
+        self.view_changes = changes.max(self.view_changes);
         let eye = self.eye.unwrap_or_else(|| self.home(snapshot));
         self.eye = Some(eye);
         let view = eye.view(self.size[0], self.size[1]);

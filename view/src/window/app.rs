@@ -174,7 +174,8 @@ impl App {
     pub fn show(&mut self, snapshot: Arc<Snapshot>) {
         self.env = self.env.min(snapshot.envs.len().saturating_sub(1));
         let changes = snapshot.viewpoint.map_or(0, |view| view.changes);
-        let is_set_anew = std::mem::replace(&mut self.view_changes, changes) != changes;
+        let is_set_anew = changes > self.view_changes;
+        self.view_changes = changes.max(self.view_changes);
         if is_set_anew || self.eye.is_none() {
             self.eye = Some(Eye::overview(&snapshot, self.size));
         }
