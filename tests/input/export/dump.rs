@@ -94,8 +94,12 @@ fn same_bytes(cfg: RobotCfg) {
 fn diagnostics(cfg: RobotCfg) {
     let least = if cfg.uid == "anymal" { 6 } else { 0 };
     let (sim, _) = simulation(cfg);
-    let text = std::fs::read_to_string(dump(&sim).path().join("diagnostics.txt")).unwrap();
-    let expected: String = sim.diagnostics().iter().map(|d| format!("{d}\n")).collect();
+    let dir = dump(&sim);
+    let text = std::fs::read_to_string(dir.path().join("diagnostics.txt")).unwrap();
+    let of_export = sim.dump(dir.path()).unwrap();
+    // All that an export of a robot gives up: its drives are heavier where joints follow others.
+    assert!(of_export.iter().all(|d| d.kind == DiagnosticKind::ExportHeavier), "{of_export:?}");
+    let expected: String = sim.diagnostics().iter().chain(&of_export).map(|d| format!("{d}\n")).collect();
     assert_eq!(text, expected);
     assert!(sim.diagnostics().len() >= least);
 }
