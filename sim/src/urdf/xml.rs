@@ -23,7 +23,8 @@ pub(super) fn repair(
     let mut found = Vec::new();
     let prolog = Prolog::of(text);
     for &(start, end) in &prolog.misplaced {
-        let blank = repaired[start..end].chars().map(|c| if c == '\n' { '\n' } else { ' ' }).collect::<String>();
+        // As many bytes as before, so that the places of further declarations stay.
+        let blank = text[start..end].bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }).collect::<String>();
         repaired.replace_range(start..end, &blank);
         let message = "the XML declaration <?xml ..?> is not at the very beginning of the file; it was ignored";
         let at = Source::new(path, line_of(text, start));
@@ -36,8 +37,7 @@ pub(super) fn repair(
         };
         error = next;
     }
-    // Blanks may be shorter than what they replace.
-    let Some(insert_at) = Prolog::of(&repaired).end_of_root_name(&repaired) else { return Err(error) };
+    let Some(insert_at) = prolog.end_of_root_name(&repaired) else { return Err(error) };
     for _ in 0..MOST_PREFIXES {
         let Error::UnknownNamespace(prefix, position) = &error else { break };
         let message = format!(

@@ -400,6 +400,13 @@ fn lenient_reading() {
             .to_string()
             .starts_with("robot.urdf:1: column")
     );
+    // Several declarations, with characters of several bytes.
+    let file =
+        read("\n<?xml é?>\n<!-- ü --><?xml üü?>\n<?xml é?><robot a:b=\"c\"><link name=\"l\"/></robot>".to_owned());
+    let places = |d: &kinetoscope::sim::Diagnostic| (d.kind, d.source.as_ref().unwrap().line);
+    let expected =
+        [(DeclarationMisplaced, 2), (DeclarationMisplaced, 3), (DeclarationMisplaced, 4), (NamespaceUnbound, 4)];
+    assert_eq!(file.diagnostics.iter().map(places).collect::<Vec<_>>(), expected);
     // Controls: the meaning of these is not clear.
     let rows = [
         ("negative size", shape("<box size=\"0 -1 1\"/>"), "Value", "positive"),
