@@ -92,19 +92,25 @@ pub(super) fn read(data: &Data, lamps: &[Light], out: &mut [Light]) {
     }
 }
 
-/// True if a skybox is drawn as it is, up to the shape of its gradient: each row of a side has one colour, and all sides are
-/// alike.
+/// True if a skybox has no more in it than a gradient over the elevation: all sides are alike, and each is its own mirror image.
 pub(super) fn is_gradient(texture: &TextureArrays<'_>) -> bool {
     let (side, channels) = (texture.width, texture.channels);
     if channels < 3 || texture.height < 6 * side {
         let first = texture.pixels.get(..channels);
         return texture.pixels.chunks_exact(channels.max(1)).all(|pixel| Some(pixel) == first);
     }
-    let row = |face: usize, row: usize| texture.pixels[(face * side + row) * side * channels..].get(..side * channels);
-    (0..side).all(|k| {
-        let first = row(0, k);
-        let one = first.is_some_and(|first| first.chunks_exact(channels).all(|pixel| pixel == &first[..channels]));
-        one && [1, 4, 5].iter().all(|face| row(*face, k) == first)
+    let pixel = |face: usize, row: usize, column: usize| {
+        let at = ((face * side + row) * side + column) * channels;
+        texture.pixels.get(at..at + channels)
+    };
+    // The numbers of builtin gradients are rounded in different ways on both sides.
+    let alike = |a: Option<&[u8]>, b: Option<&[u8]>| {
+        a.zip(b).is_some_and(|(a, b)| a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= 2))
+    };
+    (0..side * side).all(|k| {
+        let (row, column) = (k / side, k % side);
+        let one = pixel(0, row, column);
+        alike(one, pixel(0, row, side - 1 - column)) && [1, 4, 5].iter().all(|f| alike(one, pixel(*f, row, column)))
     })
 }
 

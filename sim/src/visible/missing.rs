@@ -22,11 +22,11 @@ pub(super) fn of_model(model: &Model) -> Vec<String> {
     });
     let named = |kind, index: usize| model.name(kind, index).unwrap_or_else(|| index.to_string());
     let tendons: Vec<String> = tendons.map(|tendon| named(ObjectKind::Tendon, tendon)).collect();
-    out.extend(message("spatial tendon", &tendons));
+    out.extend(message(["spatial tendon", "spatial tendons"], &tendons));
     let skins: Vec<String> = (0..model.nskin()).map(|skin| skin.to_string()).collect();
-    out.extend(message("skin", &skins));
+    out.extend(message(["skin", "skins"], &skins));
     let flexes: Vec<String> = (0..model.nflex()).map(|flex| flex.to_string()).collect();
-    out.extend(message("flex", &flexes));
+    out.extend(message(["flex", "flexes"], &flexes));
     let images = (0..model.ntex()).filter(|&texture| {
         model.texture(texture).is_some_and(|t| t.kind == TextureType::Skybox && !super::lighting::is_gradient(&t))
     });
@@ -37,16 +37,16 @@ pub(super) fn of_model(model: &Model) -> Vec<String> {
     out
 }
 
-/// The message about elements of one kind.
-fn message(kind: &str, names: &[String]) -> Option<String> {
+/// The message about elements of a kind, which is named for one and for many.
+fn message([one, many]: [&str; 2], names: &[String]) -> Option<String> {
     let mut list = names.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
     if names.len() > NAMED {
         list += &format!(" and {} more", names.len() - NAMED);
     }
     match names.len() {
         0 => None,
-        1 => Some(format!("the {kind} {list} is not drawn: cameras do not draw {kind}s")),
-        count => Some(format!("{count} {kind}s are not drawn: {list}: cameras do not draw {kind}s")),
+        1 => Some(format!("the {one} {list} is not drawn: cameras do not draw {many}")),
+        count => Some(format!("{count} {many} are not drawn ({list}): cameras do not draw {many}")),
     }
 }
 
@@ -90,6 +90,22 @@ mod tests {
         assert_eq!(places(&geoms), [plane, ball]);
         assert_eq!(places(&all), [plane, ball, (3, [0.5, 0.0, 0.2]), (2, [0.1, 0.0, 1.0])]);
         assert_eq!((all.ids()[2].name().as_str(), all.ids()[2].class.as_str()), ("goal", "world"));
+    }
+
+    /// The gradient of a skybox is drawn, stars on it are not.
+    #[test]
+    fn skyboxes() {
+        let left_out = |stars: &str| {
+            let text = format!(
+                r#"<mujoco><asset><texture name="sky" type="skybox" builtin="gradient" rgb1="0.3 0.5 0.7" rgb2="0 0 0"
+                width="32" height="192" {stars}/></asset><worldbody><geom size="0.1"/></worldbody></mujoco>"#
+            );
+            let model = mj::compile(&text, &[]).expect("compiles").into_model();
+            Visible::of_model(&model).left_out().to_vec()
+        };
+        assert_eq!(left_out(""), [""; 0]);
+        let message = "the image of the skybox sky is not drawn: the sky is a gradient of its colours";
+        assert_eq!(left_out(r#"mark="random" markrgb="1 1 1" random="0.05""#), [message]);
     }
 
     /// A model alone is drawn in its own light, before a black background.
