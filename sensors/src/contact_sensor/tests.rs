@@ -162,6 +162,6 @@ fn mistakes() {
     let mut sensor = ContactSensorCfg::of("cube").build(&context(2)).unwrap();
     assert!(matches!(sensor.update(&SceneState::new(2)), Err(SensorError::MissingFields { sensor: "contact", .. })));
     let text = ContactSensorCfg { sampling: SamplingCfg::every(1.0), ..cfg() }.build(&context(2)).unwrap().to_string();
-    let parts = ["dog/LF_FOOT, dog/RF_FOOT", "(s): 1\n", "ground"];
+    let parts = ["dog/LF_FOOT, dog/RF_FOOT", "(s)    : 1\n", "ground"];
     assert!(parts.iter().all(|part| text.contains(part)), "{text}");
 }

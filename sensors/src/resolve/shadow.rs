@@ -95,13 +95,18 @@ impl ShadowMap {
         let solid = |instance: &Instance| {
             Layer::casts_shadows(instance, cfg.groups) && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
         };
+        // Room for the whole map and all casters from the beginning: what casts shadows moves, and memory must not grow with it.
+        let parts = if cfg.lod { Parts::Levels } else { Parts::Clusters };
+        self.list.reserve(scene, parts, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
+        self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
+        self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));
+        self.side = side;
         let Some((projection, planes)) = lamp.fit(scene, poses, receivers, side, solid) else { return false };
         let rotation = lamp.rotation;
         let casts = |i: &Instance| solid(i) && (planes || !matches!(i.shape, Shape::Plane(_)));
         self.texel = 1.0 / projection.fx;
         self.lamp_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
         self.projection = projection;
-        let parts = if cfg.lod { Parts::Levels } else { Parts::Clusters };
         self.list.build(
             &projection,
             None,
@@ -110,10 +115,6 @@ impl ShadowMap {
             parts,
             |i| if casts(i) { Layer::Opaque } else { Layer::Hidden },
         );
-        // Room for the whole map from the beginning: what casts shadows moves, and memory must not grow with it.
-        self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
-        self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));
-        self.side = side;
         if !self.crop() {
             return false;
         }

@@ -74,8 +74,8 @@ fn is_whole(frame: &Frame, [x, y]: [usize; 2]) -> bool {
 
 /// Compares masks, depths to 1e-4 and normals to half a degree with the rasterizer's, off the silhouettes of each image by
 /// itself: a pixel that shows something else in the other is compared. Centres of pixels on edges between triangles may have
-/// the normal of either of them. Colours must differ, or it would be the same renderer.
-fn assert_alike(what: &str, renderer: Renderer, raster: &Frame, other: &Frame) {
+/// the normal of either of them. True if colors differ, as of another renderer they do somewhere.
+fn assert_alike(what: &str, renderer: Renderer, raster: &Frame, other: &Frame) -> bool {
     let (a, b) = (raster, other);
     let (mut compared, mut different, mut turned, mut hits) = (0, 0, 0, 0);
     for (y, x) in (1..SIZE[1] - 1).flat_map(|y| (1..SIZE[0] - 1).map(move |x| (y, x))) {
@@ -97,7 +97,17 @@ fn assert_alike(what: &str, renderer: Renderer, raster: &Frame, other: &Frame) {
     let what = format!("{what}, {renderer:?}");
     assert!(compared > SIZE[0] * SIZE[1] * 8 / 10 && hits > SIZE[0] * SIZE[1] / 20, "{what}: {compared} {hits}");
     assert!(different == 0 && turned * 1000 <= compared, "{what}: {different}, {turned} of {compared}");
-    assert!(raster.color != b.color || renderer == Renderer::FastRayTraced, "{what} is another renderer");
+    raster.color != b.color
+}
+
+/// Asserts that each renderer that draws light in another way than the rasterizer made another image somewhere.
+fn assert_other_renderers(differs: &[(Renderer, bool)]) {
+    for (renderer, _) in differs.iter().filter(|(renderer, _)| *renderer != Renderer::FastRayTraced) {
+        assert!(
+            differs.iter().any(|(other, differs)| other == renderer && *differs),
+            "{renderer:?} is another renderer"
+        );
+    }
 }
 
 /// Images are about as bright, too: the same lights, the same light from all around.
@@ -105,15 +115,17 @@ fn assert_alike(what: &str, renderer: Renderer, raster: &Frame, other: &Frame) {
 fn example_create_sensor() {
     let paths = Renderer::RayTraced { samples: 1, max_bounces: 1, denoise: true, seed: 0 };
     let renderers = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced, paths];
+    let mut differs = Vec::new();
     for (what, extrinsics) in places() {
         let frames = images(&extrinsics, renderers);
         let sum = |frame: &Frame| frame.color.as_ref().unwrap().iter().map(|&x| f64::from(x)).sum::<f64>();
         for (renderer, frame) in renderers.into_iter().zip(&frames).skip(1) {
-            assert_alike(what, renderer, &frames[0], frame);
+            differs.push((renderer, assert_alike(what, renderer, &frames[0], frame)));
             let ratio = sum(frame) / sum(&frames[0]);
             assert!((0.8..1.25).contains(&ratio), "{what}, {renderer:?}: {ratio}");
         }
     }
+    assert_other_renderers(&differs);
 }
 
 /// Files with glass, mirrors and lights of a size, and a robot.
@@ -129,6 +141,7 @@ fn example_render_model() {
     // From as near as half the angle makes it: MuJoCo's viewers begin far away.
     let near = 0.5 * free.fovy;
     let all = [("still life", &still_life, front.world_from_camera, front.fovy), ("robot", &robot, aside, near)];
+    let mut differs = Vec::new();
     for (name, still, pose, radians) in all {
         let view = view(SIZE, radians, &pose, still.free_camera().clip);
         let draw = |renderer| {
@@ -142,7 +155,8 @@ fn example_render_model() {
         let raster = draw(Renderer::Raster);
         let paths = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 0 };
         for renderer in [Renderer::Hybrid, Renderer::FastRayTraced, paths] {
-            assert_alike(name, renderer, &raster, &draw(renderer));
+            differs.push((renderer, assert_alike(name, renderer, &raster, &draw(renderer))));
         }
     }
+    assert_other_renderers(&differs);
 }

@@ -158,8 +158,8 @@ fn simulation() {
     }
     let of_two = tab.number("look().red");
     tab.choose("environment", "1");
-    // One alone is looked at from nearer.
-    tab.wait_until("one environment", &format!("look().red > 1.2 * {of_two}"));
+    // One alone is looked at from nearer: one cube of two, each larger by a fifth at least.
+    tab.wait_until("one environment", &format!("hash() !== {all} && look().red > 0.5 * 1.2 * {of_two}"));
     tab.choose("environment", "all");
     tab.wait_until("both", &format!("hash() === {all}"));
 
@@ -250,6 +250,10 @@ fn time_line() {
                 [&format!("parseFloat({text})"), "$('timeline').valueAsNumber", "parseFloat($('time').textContent)"]
             {
                 tab.wait_until(time, &format!("Math.abs({time} - {}) < 0.006 + 2 * 0.5 / {width}", 0.5 * share));
+            }
+            // The first view fits the moment that is shown: from here on the whole fall is in it.
+            if share == 0.0 {
+                tab.click("$('home')");
             }
             // Images come a moment later: two equal ones are of one time.
             let mut height = f64::NAN;

@@ -6,7 +6,7 @@ use crate::camera::LensRays;
 use crate::visibility::Projection;
 use crate::visibility::projection::LocalCamera;
 use scene::shape::Cluster;
-use scene::{Instance, PoseF32, RenderMesh, RenderScene};
+use scene::{Instance, Marker, PoseF32, RenderMesh, RenderScene};
 
 /// A primitive or a cluster that may be seen.
 #[derive(Clone, Copy, Debug)]
@@ -67,9 +67,12 @@ impl Layer {
         }
     }
 
-    /// True if an instance casts shadows into shadow maps: it is drawn, and its alpha is at least 0.5.
+    /// True if an instance casts shadows into shadow maps: it is drawn, its alpha is at least 0.5, and it is no marker, which
+    /// shows a measurement and is no thing of the scene.
     pub(crate) fn casts_shadows(instance: &Instance, groups: u32) -> bool {
-        Self::of(instance, groups) != Self::Hidden && instance.material.rgba[3] >= 0.5
+        Self::of(instance, groups) != Self::Hidden
+            && instance.material.rgba[3] >= 0.5
+            && instance.group != Marker::GROUP
     }
 }
 
@@ -103,6 +106,27 @@ impl DrawList {
             + self.blended.capacity() * size_of::<(Layer, Item)>()
     }
 
+    /// Empties the list, with room for everything that is kept: what is seen changes from frame to frame, and memory must not
+    /// grow with it.
+    pub(crate) fn reserve(&mut self, scene: &RenderScene, parts: Parts, keep: impl Fn(&Instance) -> Layer) {
+        self.placed.clear();
+        self.opaque.clear();
+        self.blended.clear();
+        let (mut opaque, mut blended) = (0, 0);
+        for instance in scene.instances() {
+            let mesh = instance.mesh().filter(|_| parts != Parts::Whole);
+            let items = mesh.map_or(1, |mesh| mesh.clusters().len());
+            match keep(instance) {
+                Layer::Hidden => {}
+                Layer::Opaque => opaque += items,
+                _ => blended += items,
+            }
+        }
+        self.placed.reserve_exact(scene.instances().len());
+        self.opaque.reserve_exact(opaque);
+        self.blended.reserve_exact(blended);
+    }
+
     /// Finds what may be seen. `keep` tells instances apart. Behind a lens anything may be anywhere in the picture.
     pub(crate) fn build(
         &mut self,
@@ -114,22 +138,7 @@ impl DrawList {
         keep: impl Fn(&Instance) -> Layer,
     ) {
         self.error = 0.0;
-        self.placed.clear();
-        self.opaque.clear();
-        self.blended.clear();
-        // Room for all of it: what is seen changes from frame to frame, and memory must not grow with it.
-        let (mut opaque, mut blended) = (0, 0);
-        for instance in scene.instances() {
-            let mesh = instance.mesh().filter(|_| parts != Parts::Whole);
-            let items = mesh.map_or(1, |mesh| mesh.clusters().len());
-            match keep(instance) {
-                Layer::Hidden => {}
-                Layer::Opaque => opaque += items,
-                _ => blended += items,
-            }
-        }
-        self.opaque.reserve_exact(opaque);
-        self.blended.reserve_exact(blended);
+        self.reserve(scene, parts, &keep);
         for (index, (instance, pose)) in scene.instances().iter().zip(poses).enumerate() {
             let [lo, hi] = instance.shape.aabb();
             let local = projection.local(pose);

@@ -26,7 +26,7 @@ use crate::ray::triangle::ShearPacket;
 use crate::ray::vector::{V3, along, dot, scale};
 use crate::ray::{Assets, Ray, RayAssets};
 use motion::{Motion, rigid, wide};
-use scene::{Instance, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
+use scene::{Instance, Marker, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
 use std::sync::Arc;
 use tree::Tree;
 
@@ -60,6 +60,8 @@ struct Thing {
     motion: Option<Motion>,
     /// Opacity.
     alpha: f64,
+    /// False for markers, which show measurements and are no things of the scene.
+    casts_shadow: bool,
 }
 
 /// Where a ray meets a surface.
@@ -153,7 +155,8 @@ impl Tracer {
             let thing = things.len() as u32;
             let alpha = f64::from(scene.instances()[k].material.rgba[3].min(1.0));
             let motion = before.and_then(|before| Motion::between(before.get(k)?, &poses[k]));
-            things.push(Thing { instance: k as u32, world_from_instance, motion, alpha });
+            let casts_shadow = scene.instances()[k].group != Marker::GROUP;
+            things.push(Thing { instance: k as u32, world_from_instance, motion, alpha, casts_shadow });
             match (body.bounds(), motion) {
                 (Some(bounds), None) => tree.add(thing, &world_from_instance, bounds),
                 (Some(bounds), Some(motion)) => tree.add_moving(thing, &motion, bounds),
@@ -208,7 +211,10 @@ impl Tracer {
                 let mut meet = {
                     #[inline(always)]
                     |thing: u32, limit: f64| {
-                        let placed @ Thing { instance, alpha, .. } = &self.things[thing as usize];
+                        let placed @ Thing { instance, alpha, casts_shadow, .. } = &self.things[thing as usize];
+                        if !casts_shadow {
+                            return limit;
+                        }
                         if *alpha < 1.0 {
                             left *= (1.0 - alpha).powi(self.fronts(thing, ray, limit, time, stack));
                             return limit;

@@ -343,11 +343,15 @@ fn huge() {
     assert_sent(coarse, 8192);
     // The display shows that image, each pixel 6 by 6 times: around the cube that is most to the left.
     let mut app = App::new(coarse, 2);
-    app.show(sim.viewer(Wants::default()).newest().unwrap());
+    let snapshot = sim.viewer(Wants::default()).newest().unwrap();
+    // The view is that of the window's first size.
+    app.look_from(Eye::overview(&snapshot, SIZE));
+    app.show(snapshot);
     let expected = drawn(&mut app);
     let red = (0..expected.len()).filter(|&k| is_red(&expected[k])).map(|k| [k % coarse[0], k / coarse[0]]);
     let cube = red.min_by_key(|place| place[0]).unwrap();
-    let (corner, size) = ([6 * cube[0] - 301, 6 * cube[1] - 302], [800, 600]);
+    let size = [800, 600];
+    let corner = [0, 1].map(|k| (6 * cube[k]).saturating_sub(301 + k).min([5400, 4200][k] - size[k] - 1));
     let place = |k: usize| [corner[0] + k % size[0], corner[1] + k / size[0]];
     let enlarged: Vec<_> =
         (0..size[0] * size[1]).map(place).map(|[x, y]| expected[y / 6 * coarse[0] + x / 6]).collect();
