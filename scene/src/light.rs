@@ -88,6 +88,23 @@ pub struct Headlight {
     pub active: bool,
 }
 
+impl Headlight {
+    /// The headlight as a directional light along the camera's viewing direction `forward`, as MuJoCo's renderer has it; `None`
+    /// where it is off, or shines from the camera's position: in our own light, and of cameras that look everywhere.
+    pub fn along(&self, sum: LightSum, forward: Option<[f32; 3]>) -> Option<Light> {
+        let direction = forward.filter(|_| self.active && sum == LightSum::Display)?;
+        Some(Light {
+            kind: LightKind::Directional,
+            direction,
+            ambient: self.ambient,
+            diffuse: self.diffuse,
+            specular: self.specular,
+            cast_shadow: false,
+            ..Light::default()
+        })
+    }
+}
+
 impl Default for Headlight {
     /// Dimmer than MuJoCo's (0.1, 0.4, 0.5), because [`Hemisphere`] fills the shadows.
     fn default() -> Self {

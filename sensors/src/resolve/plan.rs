@@ -198,7 +198,8 @@ impl Plan {
                 }
             }
         }
-        self.lighting.prepare(scene, lights, |k| maps.get(k).copied().flatten());
+        let forward = lens.is_none_or(LensRays::is_forward).then(|| view.world_from_camera.rotation.map(|row| row[2]));
+        self.lighting.prepare(scene, lights, forward, |k| maps.get(k).copied().flatten());
     }
 
     /// Whether there are shadow maps to draw.

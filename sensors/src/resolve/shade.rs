@@ -29,6 +29,8 @@ pub(crate) struct Lighting {
     horizon: [f32; 3],
     nadir: [f32; 3],
     haze: Option<[f32; 3]>,
+    /// True if the headlight is one of the lamps: of MuJoCo's light it is directional.
+    headlight_is_lamp: bool,
 }
 
 pub(crate) fn unit(v: [f32; 3]) -> [f32; 3] {
@@ -87,7 +89,14 @@ impl Lamp {
 }
 
 impl Lighting {
-    pub(crate) fn prepare(&mut self, scene: &RenderScene, lights: &[Light], shadow: impl Fn(usize) -> Option<usize>) {
+    /// `forward` is the camera's viewing direction, of a camera that has one.
+    pub(crate) fn prepare(
+        &mut self,
+        scene: &RenderScene,
+        lights: &[Light],
+        forward: Option<[f32; 3]>,
+        shadow: impl Fn(usize) -> Option<usize>,
+    ) {
         let sky = scene.sky;
         (self.zenith, self.horizon, self.nadir) =
             (tone::decode(sky.zenith), tone::decode(sky.horizon), tone::decode(sky.nadir));
@@ -106,6 +115,15 @@ impl Lighting {
                 shadow: shadow(k),
             });
         }
+        let headlight = scene.headlight.along(scene.light_sum, forward);
+        self.headlight_is_lamp = headlight.is_some();
+        self.lamps.extend(headlight.map(|light| Lamp {
+            light,
+            along: unit(light.direction),
+            cutoff_cos: -2.0,
+            exponent: 0,
+            shadow: None,
+        }));
     }
 }
 
@@ -241,7 +259,7 @@ pub(crate) fn shade<S: Simd>(
     let mut gloss = [zero, zero, zero];
     let shiny = Gloss::of(material, display);
     let headlight = &scene.headlight;
-    if headlight.active {
+    if headlight.active && !lighting.headlight_is_lamp {
         let facing = max(-n.dot(view), zero);
         for (k, diffuse) in diffuse.iter_mut().enumerate() {
             *diffuse += facing * headlight.diffuse[k] + headlight.ambient[k];

@@ -420,3 +420,25 @@ fn display_sum() {
         assert!((f32::from(linear[1]) - 255.0 * 0.5 * base * light * cosines).abs() > 5.0, "{linear:?}");
     }
 }
+
+/// MuJoCo's headlight is directional: a plane that faces the camera is equally bright from corner to corner.
+///
+/// Root cause once: it shone from the camera's position, and the ground of a model file grew darker with the distance.
+#[test]
+fn display_headlight() {
+    let (scene, poses) = things([(Plane::INFINITE, matt([0.8; 3]), PoseF32::IDENTITY)]);
+    let mut scene = unlit(scene);
+    scene.light_sum = LightSum::Display;
+    scene.headlight = Headlight { ambient: [0.1; 3], diffuse: [0.5; 3], specular: [0.0; 3], active: true };
+    let view = crate::visibility::View::look_at([33, 33], 1.2, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+    let still = Still::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
+    let expected = 255.0 * 0.8 * (0.1 + 0.5);
+    let corners = |image: &Image| [0, 32, 16 * 33 + 16].map(|k| f32::from(image.color()[k][0]));
+    for renderer in [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced] {
+        let found = corners(&still.by(renderer));
+        assert!(found.iter().all(|x| (x - expected).abs() <= 1.5), "{renderer:?}: {found:?}, {expected}");
+    }
+    // The control: from the camera's position the corners are darker.
+    let [corner, _, middle] = corners(&still.with(|still| still.scene.light_sum = LightSum::Linear).draw());
+    assert!(corner + 10.0 < middle, "{corner} {middle}");
+}

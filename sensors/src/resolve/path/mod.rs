@@ -149,7 +149,11 @@ impl Lamps {
         lamps.extend(lights.iter().filter(|l| l.active).take(MAX_LAMPS).map(Lamp::new));
         // After the others, of which it takes no place: it is a point, and needs no numbers of its own.
         if scene.headlight.active {
-            lamps.push(Lamp::of_camera(&scene.headlight, view, forward));
+            let axis = forward.then(|| view.world_from_camera.rotation.map(|row| row[2]));
+            lamps.push(match scene.headlight.along(scene.light_sum, axis) {
+                Some(light) => Lamp::new(&light),
+                None => Lamp::of_camera(&scene.headlight, view, forward),
+            });
         }
         for lamp in lamps {
             if scene.light_sum == LightSum::Display {
