@@ -212,13 +212,13 @@ impl Model {
     /// The light on every camera.
     pub fn headlight(&self) -> HeadlightValues {
         let light = &self.header().vis.headlight;
-        let active = match light.active {
-            0 => false,
-            // 4.x: 2 is "auto".
-            2 => self.nlight() == 0,
-            _ => true,
-        };
-        HeadlightValues { active, ambient: light.ambient, diffuse: light.diffuse, specular: light.specular }
+        // 4.x has 2 for "auto", which MuJoCo's OpenGL renderer takes for on, also in models with lights.
+        HeadlightValues {
+            active: light.active != 0,
+            ambient: light.ambient,
+            diffuse: light.diffuse,
+            specular: light.specular,
+        }
     }
 
     /// A mesh.

@@ -149,7 +149,7 @@ fn compare(theirs: &Images, ours: &Images, mask_of: &[i32]) -> Agreement {
         (0..3).map(|i| (t[i] - o[i]).powi(2)).sum::<f64>().sqrt()
     });
     let hues: Vec<f64> = hues.collect();
-    assert!(2 * hues.len() > pairs.len(), "most pixels are not black: {} of {}", hues.len(), pairs.len());
+    assert!(4 * hues.len() > pairs.len(), "a quarter of the pixels is not black: {} of {}", hues.len(), pairs.len());
     let hue = hues.iter().sum::<f64>() / hues.len() as f64;
     Agreement { seen, compared, same: same as f64 / compared as f64, brightness: covariance / (va * vb).sqrt(), hue }
 }
