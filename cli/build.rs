@@ -19,7 +19,7 @@ fn main() {
     }
 }
 
-/// Whether MuJoCo's library is in a folder.
+/// True if MuJoCo's library is in a folder.
 fn has_library(folder: &Path) -> bool {
     let Ok(entries) = fs::read_dir(folder) else { return false };
     entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("libmujoco.so"))

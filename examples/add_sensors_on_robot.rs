@@ -80,7 +80,7 @@ fn run(args: &Args) -> launcher::Result {
             let still = robot.read().get_default_qvel();
             robot.write_joint_state(&start, &still, None, None)?;
             robot.set_qpos(&standing, None, None)?;
-            // What was written stays: this clears the buffers of sensors.
+            // The written state stays: this clears the buffers of sensors.
             scene.reset(None)?;
             totals.seen = [0; 3];
             progress.say("[INFO]: Resetting robot state...");
@@ -144,7 +144,7 @@ fn sensors(scene: &InteractiveScene) -> launcher::Result<(&Camera, &RayCaster, &
     Ok((scene.sensor("camera")?, scene.sensor("height_scanner")?, scene.sensor("contact_forces")?))
 }
 
-/// What the tutorial prints after every step.
+/// Text that the tutorial prints after every step.
 fn summary(scene: &InteractiveScene) -> launcher::Result<String> {
     const LINE: &str = "-------------------------------";
     let (camera, scanner, contacts) = sensors(scene)?;

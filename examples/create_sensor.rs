@@ -43,7 +43,7 @@ struct Args {
     /// Rows
     #[arg(long, default_value_t = 480)]
     height: usize,
-    /// What has a color of its own in the mask's image: every link, or every robot and object
+    /// Unit with a color of its own in the mask's image: every link, or every robot and object
     #[arg(long, value_enum, default_value_t = MaskLevel::Link)]
     mask: MaskLevel,
     /// Write images also when they are shown in a window; without a window they are always written
@@ -59,7 +59,7 @@ struct Args {
     paths: PathFlags,
 }
 
-/// What has an id of its own in the mask's image.
+/// Unit with an id of its own in the mask's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum MaskLevel {
     /// Each link

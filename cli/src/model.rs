@@ -28,7 +28,7 @@ pub(crate) struct ModelArgs {
     strict: bool,
 }
 
-/// Where a robot starts.
+/// Start of a robot: its height and the ground.
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct SpawnArgs {
     /// Height of the lowest collision point of the robot above the ground at the start [default: 0 with --floating-base; else
@@ -59,7 +59,7 @@ pub(crate) struct Setup {
     pub(crate) default_arena_space: f64,
     /// Threads that step; where `None`, those of a scene file, else every core.
     pub(crate) threads: Option<usize>,
-    /// Whether there is a ground under a robot.
+    /// True if there is a ground under a robot.
     pub(crate) ground: bool,
     pub(crate) spawn_height: Option<f64>,
 }
@@ -237,7 +237,7 @@ impl ModelArgs {
         Ok(model)
     }
 
-    /// What a scene file declares.
+    /// Builds the scene that a scene file declares.
     fn scene(&self, setup: &Setup, path: &Path) -> Result<Model> {
         self.refuse_robot_flags(setup, path)?;
         let mut cfg = SceneCfg::from_file(path)?;
@@ -270,7 +270,7 @@ impl ModelArgs {
     }
 }
 
-/// Whether an MJCF file that is no robot may be a scene.
+/// True if an MJCF file that is no robot may be a scene.
 pub(crate) fn is_scene(error: &RobotFileError) -> bool {
     use RobotFileError::{Actuator, BallJoint, MocapBody, NeedsWorld, NoBody, NoJoint, SeveralRoots};
     matches!(

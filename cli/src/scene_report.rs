@@ -150,7 +150,7 @@ impl SceneReport {
         Ok(Self { file: file.to_owned(), num_envs: simulation.num_envs, dt: simulation.physics_dt, robots, others })
     }
 
-    /// Whether a robot has warnings.
+    /// True if a robot has warnings.
     pub(crate) fn has_warnings(&self) -> bool {
         self.robots.iter().any(|(_, report)| !report.warnings.is_empty())
     }

@@ -46,7 +46,7 @@ pub(crate) struct Launcher {
     /// given. An address that other machines reach (0.0.0.0:8080) needs the token that is printed
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = SERVE)]
     pub(crate) serve: Option<String>,
-    /// Where physics runs: cpu (cuda and cuda:N are named in the answer, and refused)
+    /// Device of the physics: cpu (cuda and cuda:N are named in the answer, and refused)
     #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
     pub(crate) device: Device,
     #[command(flatten)]
@@ -130,7 +130,7 @@ struct FlagsFromElsewhere {
     /// Number of a graphics card; without effect here
     #[arg(long = "gpu-id", alias = "gpu_id", value_name = "N", hide = true)]
     gpu_id: Option<u32>,
-    /// Isaac Lab's streaming: 1 and 2 are --serve here, 0 is none
+    /// Isaac Lab's streaming: 1 and 2 are --serve here, 0 turns it off
     #[arg(long, value_name = "MODE", hide = true, value_parser = clap::value_parser!(u8).range(0..=2), conflicts_with = "serve")]
     livestream: Option<u8>,
     /// Isaac Lab's switch for cameras; without effect here

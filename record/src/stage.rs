@@ -17,7 +17,7 @@ pub struct StageCfg {
     /// From where \[m\], as environments stand side by side ([`SimulationManager::env_origins`]); `None` for a place from which
     /// everything but the ground fills two thirds of the image when the recording begins: there is room to move.
     pub eye: Option<[f64; 3]>,
-    /// What is in the middle of the picture \[m\]; `None` for the middle of everything but the ground when the recording begins.
+    /// Point in the middle of the image \[m\]; `None` for the middle of everything but the ground when the recording begins.
     pub target: Option<[f64; 3]>,
 }
 

@@ -5,7 +5,7 @@ use crate::{Instance, PoseF32, RenderScene, Shape};
 /// Instances of a scene at their poses, moved by an offset.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
-    /// What is drawn.
+    /// Scene that is drawn.
     pub scene: &'a RenderScene,
     /// World from instance, one for each instance of the scene.
     pub poses: &'a [PoseF32],
@@ -43,7 +43,7 @@ pub struct Placement {
 pub const FILL: f64 = 0.9;
 /// Reach of an environment \[m\]: what is farther from its origin has flown away.
 pub const REACH: f32 = 20.0;
-/// What stands in the world and is larger than the moving things by this factor is a room or terrain around them.
+/// Static things that are larger than the moving ones by this factor are a room or terrain around them.
 const SURROUNDINGS: f64 = 2.0;
 /// Groups that are drawn, as in MuJoCo's viewers.
 const GROUPS: std::ops::Range<u8> = 0..3;
@@ -104,7 +104,7 @@ fn is_drawn(instance: &Instance) -> bool {
     seen && !matches!(instance.shape, Shape::Plane(_))
 }
 
-/// Whether an instance is where it can be looked for.
+/// True if an instance has a finite position, and is fixed or within `reach` of the origin.
 fn is_here(instance: &Instance, pose: &PoseF32, reach: f32) -> bool {
     let near = |x: &f32| x.is_finite() && (instance.fixed || x.abs() < reach);
     pose.translation.iter().all(near) && pose.rotation.iter().flatten().all(|x| x.is_finite())

@@ -12,7 +12,7 @@ pub struct Material {
     pub texture: Option<Arc<Texture>>,
     /// How often a 2D texture repeats over the shape, or over 2 m with `tex_uniform`, as MuJoCo's renderer draws it.
     pub tex_repeat: [f32; 2],
-    /// Whether `tex_repeat` is per 2 m instead of per shape.
+    /// True if `tex_repeat` is per 2 m instead of per shape.
     pub tex_uniform: bool,
     /// Own light, as a multiple of the colour.
     pub emission: f32,

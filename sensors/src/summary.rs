@@ -37,7 +37,7 @@ pub(crate) fn path(context: &SensorContext, parent: Option<usize>) -> String {
     }
 }
 
-/// Names, separated by commas; `none` if there are none.
+/// Names, separated by commas; `none` for an empty list.
 pub(crate) fn list(names: &[String]) -> String {
     if names.is_empty() { "none".into() } else { names.join(", ") }
 }

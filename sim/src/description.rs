@@ -59,7 +59,7 @@ pub struct Link {
 /// Mass properties of a link as the file gives them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inertial {
-    /// Where they are given.
+    /// Place of the declaration.
     pub source: Source,
     /// Pose of the centre-of-mass frame in the link frame.
     pub link_from_com: Pose,
@@ -72,7 +72,7 @@ pub struct Inertial {
 /// Mass properties that a file gives in part. Several are `None`; a complete set is an [`Inertial`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartialInertial {
-    /// Where they are given.
+    /// Place of the declaration.
     pub source: Source,
     /// Pose of the centre-of-mass frame in the link frame.
     pub link_from_com: Option<Pose>,
@@ -278,7 +278,7 @@ impl JointKind {
 /// Limits of a joint as the file gives them: absent is not zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimit {
-    /// Where they are given.
+    /// Place of the declaration.
     pub source: Source,
     /// Lower position \[rad or m\].
     pub lower: Option<f64>,

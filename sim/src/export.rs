@@ -123,7 +123,7 @@ fn add_armatures(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], step: f64) -> (Vec<
     (plans, heavier)
 }
 
-/// What a viewer without our drives needs to know and to have. Returns what was given up for it.
+/// Adapts an export to viewers without our drives. Returns what was given up for it.
 fn prepare_for_plain_mujoco(
     mjcf: &mut Mjcf,
     robots: &[Arc<RobotData>],

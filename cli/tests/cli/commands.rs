@@ -85,7 +85,7 @@ fn line_of_error() {
         ("unknown.xml", &PENDULUM.replace("size=", "sise=")),
         // A mass that the compiler refuses.
         ("mass.xml", &PENDULUM.replace("mass=\"1\"", "mass=\"-1\"")),
-        // An attribute of a ball joint that nobody knows.
+        // An attribute that ball joints do not have.
         ("ball.xml", &PENDULUM.replace(hinge, "type=\"ball\" no_such=\"1\"")),
         ("arm.urdf", &ARM.replace("xyz=\"0 1 0\"", "xyz=\"0 x 0\"")),
     ]);

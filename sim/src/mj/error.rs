@@ -64,7 +64,7 @@ fn includes(file: &std::path::Path) -> bool {
     std::fs::read_to_string(file).is_ok_and(|text| text.contains("<include"))
 }
 
-/// What follows a complaint of a word that 2.2.2 does not know: that a newer MuJoCo may know it.
+/// Hint after an error about a word that 2.2.2 does not know: a newer MuJoCo may know it.
 fn newer(message: &str) -> String {
     if TARGET != Target::V2 {
         return String::new();
@@ -90,7 +90,7 @@ fn line_named_in(message: &str) -> Option<u32> {
         let after = &message[message.rfind(word)? + word.len()..];
         let after = after.trim_start_matches([' ', '=', ':']);
         let digits = after.find(|c: char| !c.is_ascii_digit()).map_or(after, |end| &after[..end]);
-        // Line 0 is none.
+        // Line 0 means that MuJoCo names no line.
         digits.parse().ok().filter(|&line: &u32| line > 0)
     };
     ["line", "Line number"].into_iter().find_map(number_after)

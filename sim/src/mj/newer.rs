@@ -10,7 +10,7 @@ pub(super) struct Unknown<'m> {
     pub(super) element: &'m str,
     /// Its attribute, or the value of one; `None` where the element itself is unknown.
     pub(super) word: Option<&'m str>,
-    /// Whether the word is a value.
+    /// True if the word is a value.
     is_value: bool,
 }
 

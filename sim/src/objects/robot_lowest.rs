@@ -31,7 +31,7 @@ impl Robot<'_> {
         heights.index_axis(Axis(1), 0).to_owned()
     }
 
-    /// Whether a link is a part of the world: the robot's base is fixed, and no joint moves the link. Such links do not collide
+    /// True if a link is a part of the world: the robot's base is fixed, and no joint moves the link. Such links do not collide
     /// with the ground.
     ///
     /// # Errors

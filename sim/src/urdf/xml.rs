@@ -88,7 +88,7 @@ impl Prolog {
         }
     }
 
-    /// The end of the name in the first tag; `None` where there is none.
+    /// The end of the name in the first tag; `None` in a text without a tag.
     fn end_of_root_name(&self, text: &str) -> Option<usize> {
         let name = text[self.end..].strip_prefix('<')?;
         let length = name.find(|c: char| c.is_whitespace() || matches!(c, '/' | '>'))?;

@@ -186,12 +186,12 @@ impl Still {
         };
         let distance = Vector3::from(placement.eye).metric_distance(&Vector3::from(placement.target));
         let extent = placement.extent.max(distance);
-        // What is drawn may be larger and smaller than what MuJoCo's model knows of it.
+        // The drawn shapes may be larger or smaller than the geoms of MuJoCo's model.
         let clip = [near.min(0.01 * placement.extent).max(1e-6), far.max(100.0 * extent)];
         FreeCamera { eye: placement.eye, target: placement.target, fovy, clip }
     }
 
-    /// What is drawn, and where it is.
+    /// Drawn instances with their poses.
     pub fn placed(&self) -> Placed<'_> {
         Placed { scene: self.visible.scene(), poses: &self.poses, origin: [0.0; 3], reach: f32::INFINITY }
     }

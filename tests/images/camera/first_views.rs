@@ -58,7 +58,7 @@ fn fill_the_image() {
         for ground in [None, Some(GroundCfg::default())] {
             let cfg = SimulationManagerCfg { num_envs, ground, ..Default::default() };
             let mut sim = testkit::worlds::sim(cfg);
-            // What is in the ground is not seen.
+            // Parts below the ground are not seen.
             sim.add_robot(RobotCfg { ground_clearance: Some(0.0), ..robot.clone() }).unwrap();
             let still = Still::overview(&mut sim, None, &[]).unwrap();
             for size in [[320, 180], [120, 160], [200, 50]] {

@@ -212,7 +212,7 @@ fn partial_inertials() {
         let (sim, id) = loaded(&urdf, DENSITY);
         assert_near(&what, &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
         assert_eq!(warnings(&sim), ["inertial-incomplete"], "{what}");
-        // What is open is still open in a URDF that is written of the file alone.
+        // A URDF written from the assembled file leaves the missing values out, too.
         let cfg = testkit::worlds::text_robot(&files, "r", &urdf);
         let written = write_urdf(&kinetoscope::sim::urdf::assemble(&cfg.urdf).unwrap().description);
         let (sim, id) = loaded(&written, DENSITY);
