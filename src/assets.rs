@@ -9,9 +9,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use scene::Pose;
-use scene::pose::from_xyz_rpy;
-use sim::{ComponentCfg, DriveCfg, RobotCfg, UrdfCfg};
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::from_xyz_rpy;
+use kinetoscope_sim::{ComponentCfg, DriveCfg, RobotCfg, UrdfCfg};
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 

@@ -17,19 +17,19 @@ mod record_button;
 #[cfg(all(feature = "record", feature = "view"))]
 mod recorded_film;
 
-pub use env;
-pub use ndarray;
+pub use kinetoscope_env as env;
 #[cfg(feature = "record")]
-pub use record;
+pub use kinetoscope_record as record;
+pub use kinetoscope_scene as scene;
+pub use kinetoscope_sensors as sensors;
+pub use kinetoscope_sim as sim;
+#[cfg(feature = "view")]
+pub use kinetoscope_view as view;
+pub use ndarray;
 #[cfg(all(feature = "record", feature = "view"))]
 pub use record_button::FileRecording;
 #[cfg(all(feature = "record", feature = "view"))]
 pub use recorded_film::RecordedFilm;
-pub use scene;
-pub use sensors;
-pub use sim;
-#[cfg(feature = "view")]
-pub use view;
 
 /// What most programs need: `use kinetoscope::prelude::*;`.
 pub mod prelude {
@@ -37,22 +37,22 @@ pub mod prelude {
     pub use crate::FileRecording;
     pub use crate::assets;
     #[cfg(feature = "record")]
-    pub use record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId, Topic};
-    pub use scene::Pose;
-    pub use sensors::camera::{
+    pub use kinetoscope_record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId, Topic};
+    pub use kinetoscope_scene::Pose;
+    pub use kinetoscope_sensors::camera::{
         Aperture, Camera, CameraCfg, CameraConvention, CameraInfo, Channels, DepthMiss, Extrinsics, Imperfections,
         Intrinsics, Lens, Placement, RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg, Shutter,
         StereoCamera, StereoCameraCfg, StereoOrigin, ToneCurve,
     };
-    pub use sensors::ray::{
+    pub use kinetoscope_sensors::ray::{
         HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg, RayPattern,
     };
-    pub use sensors::{
+    pub use kinetoscope_sensors::{
         ActuatorState, ActuatorStateCfg, ContactSensor, ContactSensorCfg, FrameTransformer, FrameTransformerCfg, Imu,
         ImuCfg, JointState, JointStateCfg, JointWrench, JointWrenchCfg, MujocoSensor, MujocoSensorCfg, NoiseCfg,
         Sampled, SamplingCfg, TargetFrameCfg,
     };
-    pub use sim::{
+    pub use kinetoscope_sim::{
         ActuatorIndex, ActuatorModel, ArticulationCfg, ArticulationId, BodyType, ComponentCfg, DcMotor, DelayedPd,
         Diagnostic, Draw, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error, ExclusionCfg,
         GroundCfg, GroupId, IdealPd, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LampKind,
@@ -63,7 +63,7 @@ pub mod prelude {
         Strictness, SurfaceCfg, TerrainCfg, TerrainId, Tip, UrdfCfg, WeldCfg, WeldId, WrenchFrame,
     };
     #[cfg(feature = "view")]
-    pub use view::{
+    pub use kinetoscope_view::{
         ImageWindow, ImageWindowCfg, OpenWindow, RecordButton, Screenshot, ScreenshotCfg, ScreenshotError, Serve,
         ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError,
     };

@@ -1,9 +1,9 @@
 //! The record button of windows and browser views, joined to recordings.
 
-use record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId};
-use sim::SimulationManager;
+use kinetoscope_record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId};
+use kinetoscope_sim::SimulationManager;
+use kinetoscope_view::{Recording, RecordingState};
 use std::path::{Path, PathBuf};
-use view::{Recording, RecordingState};
 
 /// What a record button does in most programs: it records to a file, and to a new one each time it is pressed again.
 ///
@@ -51,7 +51,7 @@ impl FileRecording {
     ///
     /// # Errors
     /// As [`Record::record`].
-    pub fn begin(&mut self, sim: &mut SimulationManager) -> record::Result<()> {
+    pub fn begin(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<()> {
         self.begin_at(sim, self.cfg.path.clone())
     }
 
@@ -59,7 +59,7 @@ impl FileRecording {
     ///
     /// # Errors
     /// As [`Record::finish_recording`], also of one that the button has ended. Asked again, this gives those that are whole.
-    pub fn end(&mut self, sim: &mut SimulationManager) -> record::Result<Vec<Recorded>> {
+    pub fn end(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<Vec<Recorded>> {
         self.finish(sim)?;
         self.failed.take().map_or_else(|| Ok(std::mem::take(&mut self.done)), Err)
     }
@@ -70,14 +70,14 @@ impl FileRecording {
         self.recorder(sim).and_then(|(recorder, _)| recorder.failure())
     }
 
-    fn begin_at(&mut self, sim: &mut SimulationManager, path: PathBuf) -> record::Result<()> {
+    fn begin_at(&mut self, sim: &mut SimulationManager, path: PathBuf) -> kinetoscope_record::Result<()> {
         let recorder = sim.record(RecorderCfg { path: path.clone(), ..self.cfg.clone() })?;
         self.begun += 1;
         self.now = Some((recorder, path));
         Ok(())
     }
 
-    fn finish(&mut self, sim: &mut SimulationManager) -> record::Result<()> {
+    fn finish(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<()> {
         let Some((recorder, path)) = self.now.take() else { return Ok(()) };
         if !sim.has_observer(recorder) {
             // Somebody else has ended it.

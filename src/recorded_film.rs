@@ -1,9 +1,9 @@
 //! Recordings as what viewers show.
 
-use record::Film;
-use sim::SimulationManager;
+use kinetoscope_record::Film;
+use kinetoscope_sim::SimulationManager;
 
-/// A recording for the viewers of a simulation: what [`Play::play`](view::control::Play::play) takes.
+/// A recording for the viewers of a simulation: what [`Play::play`](kinetoscope_view::control::Play::play) takes.
 ///
 /// ```no_run
 /// use kinetoscope::RecordedFilm;
@@ -19,7 +19,7 @@ use sim::SimulationManager;
 #[derive(Debug)]
 pub struct RecordedFilm(pub Film);
 
-impl view::control::Film for RecordedFilm {
+impl kinetoscope_view::control::Film for RecordedFilm {
     fn times(&self) -> &[f64] {
         self.0.times()
     }

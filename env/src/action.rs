@@ -2,8 +2,8 @@
 
 use crate::error::TermResult;
 use crate::space::Space;
+use kinetoscope_sim::SimulationManager;
 use ndarray::ArrayView2;
-use sim::SimulationManager;
 use std::fmt;
 
 type Apply = Box<dyn Fn(&mut SimulationManager, ArrayView2<'_, f64>) -> TermResult + Send>;

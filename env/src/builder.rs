@@ -10,7 +10,7 @@ use crate::observation::ObservationTerm;
 use crate::reward::RewardTerm;
 use crate::space::Space;
 use crate::termination::TerminationTerm;
-use sim::SimulationManager;
+use kinetoscope_sim::SimulationManager;
 
 /// A task in the making. Terms act in the order in which they are added.
 #[derive(Debug)]

@@ -3,8 +3,8 @@
 use crate::space::Space;
 use crate::step::Step;
 use crate::vector::VectorEnv;
+use kinetoscope_scene::Random;
 use ndarray::{Array1, Array2};
-use scene::Random;
 use std::fmt;
 
 /// Steps of a run: ends of episodes are looked at as far as they come within these.

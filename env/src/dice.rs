@@ -1,7 +1,7 @@
 //! Random numbers of a task.
 
-use scene::Random;
-use sim::EnvId;
+use kinetoscope_scene::Random;
+use kinetoscope_sim::EnvId;
 
 /// Random numbers of one environment in one episode, for one term.
 ///

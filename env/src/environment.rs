@@ -9,9 +9,9 @@ use crate::now::{Now, Present};
 use crate::space::Space;
 use crate::step::{EndReason, Ended, Info, Step};
 use crate::watch::Watch;
+use kinetoscope_scene::Random;
+use kinetoscope_sim::{EnvId, ObserverId, Outcome, SimulationManager};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
-use scene::Random;
-use sim::{EnvId, ObserverId, Outcome, SimulationManager};
 
 /// Environments with a task: reset, then stepped.
 ///

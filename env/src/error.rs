@@ -55,7 +55,7 @@ impl fmt::Display for TermKind {
 pub enum EnvError {
     /// The simulation refused something.
     #[error(transparent)]
-    Sim(#[from] sim::Error),
+    Sim(#[from] kinetoscope_sim::Error),
     /// A number of the configuration or of a term is out of range.
     #[error("{field} is {value}; {expected}")]
     Config {
@@ -168,7 +168,7 @@ impl EnvError {
     /// There is no such name.
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub(crate) fn unknown<'n>(what: &'static str, name: &str, names: impl IntoIterator<Item = &'n str>) -> Self {
-        let candidates = sim::pattern::closest(name, names).into_iter().map(str::to_string).collect();
+        let candidates = kinetoscope_sim::pattern::closest(name, names).into_iter().map(str::to_string).collect();
         Self::UnknownName { what, name: name.into(), candidates }
     }
 }

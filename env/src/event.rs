@@ -2,7 +2,7 @@
 
 use crate::dice::Dice;
 use crate::error::{EnvError, Result, TermResult};
-use sim::SimulationManager;
+use kinetoscope_sim::SimulationManager;
 use std::fmt;
 
 type Act = Box<dyn Fn(&mut SimulationManager, &mut [Dice]) -> TermResult + Send>;

@@ -1,8 +1,8 @@
 //! What terms see.
 
 use crate::error::{EnvError, Result, TermKind, TermResult};
+use kinetoscope_sim::SimulationManager;
 use ndarray::{Array1, Array2, ArrayView2};
-use sim::SimulationManager;
 
 /// The present of all environments: what functions of terms look at.
 #[derive(Clone, Copy, Debug)]

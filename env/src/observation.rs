@@ -3,8 +3,8 @@
 use crate::error::{EnvError, Result, TermKind, TermResult};
 use crate::now::Now;
 use crate::space::Space;
+use kinetoscope_scene::Random;
 use ndarray::Array2;
-use scene::Random;
 use std::fmt;
 
 type Observe = Box<dyn Fn(&Now<'_>) -> TermResult<Array2<f64>> + Send>;

@@ -1,7 +1,7 @@
 //! What comes of a step.
 
+use kinetoscope_sim::EnvId;
 use ndarray::{Array1, Array2};
-use sim::EnvId;
 use std::fmt;
 
 /// What comes of a step of all environments of a [`VectorEnv`](crate::VectorEnv).

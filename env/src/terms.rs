@@ -28,8 +28,8 @@ use crate::now::Now;
 use crate::observation::ObservationTerm;
 use crate::reward::RewardTerm;
 use crate::space::Space;
+use kinetoscope_sim::{JointIndex, Robot, RobotId, SimulationManager};
 use ndarray::{Array1, Array2, Axis};
-use sim::{JointIndex, Robot, RobotId, SimulationManager};
 
 /// Names and columns of the joints of a robot that match `patterns`.
 fn joints(sim: &SimulationManager, robot: RobotId, patterns: &[&str]) -> Result<(Vec<String>, Vec<JointIndex>)> {
@@ -101,7 +101,7 @@ pub fn commanded<N: Into<String>>(
     ObservationTerm::new(name, names, move |now| Ok(now.command(&command)?.to_owned()))
 }
 
-/// Efforts of joints \[N m or N\], from minus `bound` to `bound`, as [`set_qf`](sim::RobotMut::set_qf) takes them.
+/// Efforts of joints \[N m or N\], from minus `bound` to `bound`, as [`set_qf`](kinetoscope_sim::RobotMut::set_qf) takes them.
 ///
 /// # Errors
 /// A pattern that matches nothing, or a bound that is negative or not a number.

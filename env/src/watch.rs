@@ -1,6 +1,6 @@
 //! Resets that a task has not asked for: viewers reset environments, and programs do.
 
-use sim::{Moment, Observer, SimulationManager};
+use kinetoscope_sim::{Moment, Observer, SimulationManager};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -3,7 +3,7 @@
 use crate::format::Format;
 use crate::stage::StageCfg;
 use crate::topic::Topic;
-use sim::EnvId;
+use kinetoscope_sim::EnvId;
 use std::path::PathBuf;
 
 /// Configuration of a recorder: plain data.

@@ -255,7 +255,7 @@ pub enum RecordError {
     },
     /// The simulation said no.
     #[error("{0}")]
-    Sim(Arc<sim::Error>),
+    Sim(Arc<kinetoscope_sim::Error>),
     /// What is read is not a recording of this program, or not whole.
     #[error("{path}: {what}")]
     Malformed {
@@ -266,8 +266,8 @@ pub enum RecordError {
     },
 }
 
-impl From<sim::Error> for RecordError {
-    fn from(error: sim::Error) -> Self {
+impl From<kinetoscope_sim::Error> for RecordError {
+    fn from(error: kinetoscope_sim::Error) -> Self {
         Self::Sim(Arc::new(error))
     }
 }

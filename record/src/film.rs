@@ -3,8 +3,8 @@
 use crate::error::{RecordError, Result};
 use crate::read::{Recording, Samples, Wanted};
 use crate::scene_file::{self, SCENE};
+use kinetoscope_sim::{MjcfId, MjcfPart, SimulationManager};
 use ndarray::Array2;
-use sim::{MjcfId, MjcfPart, SimulationManager};
 
 /// Recorded motion in its scene: [`show`](Self::show) puts the simulation where it was.
 ///
@@ -81,7 +81,7 @@ impl Film {
         let envs: Vec<usize> = recording.env_ids().into_iter().filter(|env| *env < sim.num_envs()).collect();
         let by_hand = bodies_by_hand(&view);
         let start = |body: &String| view.body_pose(body).map(|poses| Hand { body: body.clone(), poses, known: false });
-        let mut hands: Vec<Hand> = by_hand.iter().map(start).collect::<sim::Result<_>>()?;
+        let mut hands: Vec<Hand> = by_hand.iter().map(start).collect::<kinetoscope_sim::Result<_>>()?;
         let (mut wanted, mut places, mut unmoved) = (Vec::new(), Vec::new(), Vec::new());
         let mut want = |topic: String, field: String, env: usize, column: Column| {
             let known = recording.topics().iter().find(|known| known.name == topic);

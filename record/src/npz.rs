@@ -26,8 +26,8 @@ use crate::scene_file::SCENE;
 use crate::stream::{Element, Kind, Part, Stream};
 use crate::writer::{Fault, Sink, Written};
 use crate::zip::Archive;
+use kinetoscope_sim::{MaskId, Snapshot};
 use serde_json::{Value, json};
-use sim::{MaskId, Snapshot};
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
@@ -125,7 +125,7 @@ pub(crate) fn about(streams: &[Stream], masks: &[MaskId], dt: f64) -> Value {
     json!({
         "recording": 1,
         "physics_dt": dt,
-        "mujoco_version": sim::mj::version_string(),
+        "mujoco_version": kinetoscope_sim::mj::version_string(),
         "mask_ids": masks.iter().map(mask).collect::<Vec<_>>(),
         "streams": streams.iter().map(stream).collect::<Vec<_>>(),
     })

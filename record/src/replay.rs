@@ -16,8 +16,8 @@ use crate::archive::Archive;
 use crate::error::{RecordError, Result};
 use crate::packet::{Block, Packet};
 use crate::source::Source;
+use kinetoscope_sim::{EnvId, SimulationManager};
 use serde_json::Value;
-use sim::{EnvId, SimulationManager};
 use std::fmt;
 use std::path::Path;
 

@@ -6,9 +6,11 @@
 
 use crate::error::{RecordError, Result};
 use crate::zip;
+use kinetoscope_sim::mj::{TARGET, Target};
+use kinetoscope_sim::{
+    Diagnostic, DiagnosticKind, GroundCfg, MjcfCfg, MjcfId, SimulationManager, SimulationManagerCfg,
+};
 use serde_json::{Value, json};
-use sim::mj::{TARGET, Target};
-use sim::{Diagnostic, DiagnosticKind, GroundCfg, MjcfCfg, MjcfId, SimulationManager, SimulationManagerCfg};
 use std::fs;
 use std::io::{self, Cursor};
 use std::path::{Component, Path, PathBuf};

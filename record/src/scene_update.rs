@@ -2,11 +2,11 @@
 
 use crate::error::Result;
 use crate::stream::{Kind, Stream};
-use scene::mesh::TriMesh;
-use scene::shape::RenderMesh;
-use scene::{Instance, Pose, RenderScene, Shape, Texture};
-use sensors::camera::RasterCfg;
-use sim::{EnvId, Look, SimulationManager};
+use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::shape::RenderMesh;
+use kinetoscope_scene::{Instance, Pose, RenderScene, Shape, Texture};
+use kinetoscope_sensors::camera::RasterCfg;
+use kinetoscope_sim::{EnvId, Look, SimulationManager};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 

@@ -7,12 +7,12 @@ use crate::packet::{Block, Values};
 use crate::stage::{Painter, StageCfg};
 use crate::stream::{Element, Kind, Part, Stream};
 use camera::{DISPARITY, Eye, timed};
-use ndarray::{Array2, ArrayBase, ArrayView2, Axis, Data, Dimension};
-use sensors::{
+use kinetoscope_sensors::{
     ActuatorState, ContactSensor, FrameTransformer, Imu, JointState, JointWrench, MujocoSensor, RayCaster, Sampled,
     Sensor, StereoCamera,
 };
-use sim::{MjcfId, ObjectId, RobotId, SimulationManager};
+use kinetoscope_sim::{MjcfId, ObjectId, RobotId, SimulationManager};
+use ndarray::{Array2, ArrayBase, ArrayView2, Axis, Data, Dimension};
 use std::any::Any;
 
 /// One stream and where it comes from.
@@ -220,7 +220,8 @@ impl Source {
             return Self::of_eye(sim, uid, Eye::Left, DISPARITY, envs);
         }
         // Aliases are the cameras' own.
-        let own = sensors::camera::Channels::from_names(&[asked]).map(|one| one.names()).unwrap_or_default();
+        let own =
+            kinetoscope_sensors::camera::Channels::from_names(&[asked]).map(|one| one.names()).unwrap_or_default();
         let known = eye.channels(any);
         match known.iter().find(|(name, ..)| own.contains(name)) {
             Some((name, ..)) => Self::of_eye(sim, uid, eye, name, envs),
@@ -385,8 +386,11 @@ impl Source {
             }
             What::BodyPoses(id) => {
                 let part = sim.mjcf_part(*id);
-                let poses: Vec<Array2<f64>> =
-                    part.body_names().iter().map(|body| part.body_pose(body)).collect::<sim::Result<_>>()?;
+                let poses: Vec<Array2<f64>> = part
+                    .body_names()
+                    .iter()
+                    .map(|body| part.body_pose(body))
+                    .collect::<kinetoscope_sim::Result<_>>()?;
                 self.join(values, &poses.iter().map(|poses| poses.view()).collect::<Vec<_>>());
             }
             What::EngineStates => {
@@ -513,7 +517,7 @@ impl Stamps {
     }
 }
 
-/// Whether a sensor measures a channel at [`scene::SceneState::force_time`], as its documentation says.
+/// Whether a sensor measures a channel at [`kinetoscope_scene::SceneState::force_time`], as its documentation says.
 fn of_forces(sensor: &dyn Any, channel: &str) -> bool {
     if let Some(engine) = sensor.downcast_ref::<MujocoSensor>() {
         // All values are one channel: of both kinds, positions have the word.
@@ -541,9 +545,9 @@ fn named(sensor: &dyn Any) -> Kind {
     Kind::Numbers { rows: rows.unwrap_or_default().to_vec(), filters: filters.unwrap_or_default().to_vec() }
 }
 
-fn sim_error(source: &Source) -> impl Fn(sensors::SensorError) -> RecordError + '_ {
+fn sim_error(source: &Source) -> impl Fn(kinetoscope_sensors::SensorError) -> RecordError + '_ {
     move |error| {
         let sensor = source.sensor.clone().unwrap_or_default();
-        RecordError::from(sim::Error::Sensor { sensor, error: Box::new(error) })
+        RecordError::from(kinetoscope_sim::Error::Sensor { sensor, error: Box::new(error) })
     }
 }

@@ -1,11 +1,11 @@
 //! Pictures of all environments side by side, as a viewer that stands still sees them.
 
 use crate::error::{RecordError, Result};
-use scene::PoseF32;
-use scene::framing::Framing;
-use sensors::camera::{Channels, Frame, Intrinsics, ParallelRasterizer, RasterCfg, look_at_pose};
-use sensors::visibility::View;
-use sim::{SimulationManager, Still};
+use kinetoscope_scene::PoseF32;
+use kinetoscope_scene::framing::Framing;
+use kinetoscope_sensors::camera::{Channels, Frame, Intrinsics, ParallelRasterizer, RasterCfg, look_at_pose};
+use kinetoscope_sensors::visibility::View;
+use kinetoscope_sim::{SimulationManager, Still};
 
 /// How the stage is drawn.
 #[derive(Clone, Debug, PartialEq)]

@@ -41,7 +41,7 @@ pub struct Part {
     pub name: String,
     /// Its shape in one environment.
     pub shape: Vec<usize>,
-    /// Whether a sensor measures it at [`scene::SceneState::force_time`]: forces, efforts and accelerations, which the engine
+    /// Whether a sensor measures it at [`kinetoscope_scene::SceneState::force_time`]: forces, efforts and accelerations, which the engine
     /// solves for at the beginning of the step that leads to positions and velocities.
     pub of_forces: bool,
 }
@@ -105,7 +105,7 @@ pub enum Kind {
         width: usize,
     },
     /// The intrinsic matrix of a camera \[pixels\] and its pose in the environment, Ros axes. Of an eye of a pair also what rectifies
-    /// its pictures: `rectification` and `projection`, see [`Rectification`](sensors::camera::Rectification).
+    /// its pictures: `rectification` and `projection`, see [`Rectification`](kinetoscope_sensors::camera::Rectification).
     Lens {
         /// The camera.
         camera: String,

@@ -19,11 +19,11 @@ pub enum Topic {
     /// Poses of the bodies of the MJCF part of this name.
     BodyPoses(String),
     /// Simulation time, positions and velocities of all joints of the scene as MuJoCo has them
-    /// ([`SimulationManager::engine_states`](sim::SimulationManager::engine_states)), called `clock`, `qpos` and `qvel`.
+    /// ([`SimulationManager::engine_states`](kinetoscope_sim::SimulationManager::engine_states)), called `clock`, `qpos` and `qvel`.
     /// [`Everything`](Self::Everything) has them in HDF5 files only.
     EngineStates,
     /// Rewards and ends of the task that runs in the simulation, told after each of its steps
-    /// ([`SimulationManager::outcome`](sim::SimulationManager::outcome)): those of an `Env`, which tells them by itself.
+    /// ([`SimulationManager::outcome`](kinetoscope_sim::SimulationManager::outcome)): those of an `Env`, which tells them by itself.
     Outcomes,
     /// All environments in one picture, as `RecorderCfg::stage` says; it is called as a camera `stage` of the first environment that is
     /// recorded. [`Everything`](Self::Everything) has it only where the file shows pictures and there is no camera.

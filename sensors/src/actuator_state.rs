@@ -6,8 +6,8 @@ use crate::schedule::Schedule;
 use crate::select::{at_least_one, read_columns, select_or_all};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::SceneState;
 use ndarray::{ArrayView2, ArrayView3};
-use scene::SceneState;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

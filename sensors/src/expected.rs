@@ -2,8 +2,8 @@
 
 use crate::error::SensorError;
 use crate::sensor::{Requires, SensorContext};
+use kinetoscope_scene::SceneState;
 use ndarray::{Array2, Array3};
-use scene::SceneState;
 
 /// What a sensor was built for.
 #[derive(Clone, Debug)]

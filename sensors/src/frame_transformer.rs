@@ -7,9 +7,9 @@ use crate::schedule::Schedule;
 use crate::select::{at_least_one, matching};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::pose::{from_row, to_wxyz};
+use kinetoscope_scene::{Marker, Pose, SceneState};
 use ndarray::{ArrayView2, ArrayView3};
-use scene::pose::{from_row, to_wxyz};
-use scene::{Marker, Pose, SceneState};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -20,7 +20,7 @@ pub struct FrameTransformerCfg {
     /// The body of the source frame: `uid/link`, a link's name alone where only one body is called so, or an object's uid.
     pub source: String,
     /// The source frame in that of its body.
-    #[serde(default, with = "scene::file_format::pose")]
+    #[serde(default, with = "kinetoscope_scene::file_format::pose")]
     pub source_offset: Pose,
     /// The target frames, in the order they are reported.
     pub targets: Vec<TargetFrameCfg>,
@@ -42,7 +42,7 @@ pub struct TargetFrameCfg {
     /// What the frame is called; the full name of its body where `None`. With several bodies, `name/body`.
     pub name: Option<String>,
     /// The frame in that of its body.
-    #[serde(default, with = "scene::file_format::pose")]
+    #[serde(default, with = "kinetoscope_scene::file_format::pose")]
     pub offset: Pose,
 }
 

@@ -1,10 +1,10 @@
 //! Poses and vectors in the rows of a state, and offsets that are poses.
 
 use crate::error::SensorError;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::from_row;
 use nalgebra::Vector3;
 use ndarray::Array3;
-use scene::Pose;
-use scene::pose::from_row;
 
 /// The pose of a body.
 pub(crate) fn pose(poses: &Array3<f64>, env: usize, body: usize) -> Pose {

@@ -6,10 +6,10 @@ use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::pose::{from_row, to_wxyz};
+use kinetoscope_scene::{Marker, Pose, SceneState};
 use nalgebra::Vector3;
 use ndarray::ArrayView2;
-use scene::pose::{from_row, to_wxyz};
-use scene::{Marker, Pose, SceneState};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -20,10 +20,10 @@ pub struct ImuCfg {
     /// The body that it is fixed to: `uid/link`, a link's name alone where only one body is called so, or an object's uid.
     pub body: String,
     /// Its frame in that of the body.
-    #[serde(with = "scene::file_format::pose")]
+    #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub offset: Pose,
     /// What it reads at rest beside its own acceleration \[m/s²\], in world axes; `None` for minus gravity, as a real one.
-    #[serde(with = "scene::file_format::optional_vector")]
+    #[serde(with = "kinetoscope_scene::file_format::optional_vector")]
     pub gravity_bias: Option<Vector3<f64>>,
     /// Rate, history, latency and noise; channels that can have noise: `pos_w`, `lin_vel_b`, `ang_vel_b`, `lin_acc_b`,
     /// `ang_acc_b`.

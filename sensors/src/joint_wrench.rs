@@ -7,9 +7,9 @@ use crate::schedule::Schedule;
 use crate::select::{at_least_one, select};
 use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::{Marker, Pose, SceneState};
 use nalgebra::Vector3;
 use ndarray::ArrayView3;
-use scene::{Marker, Pose, SceneState};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

@@ -3,9 +3,9 @@
 use crate::error::SensorError;
 use crate::sampling::{Channel, SamplingCfg};
 use crate::sensor::SensorContext;
+use kinetoscope_scene::Random;
+use kinetoscope_scene::pattern::closest;
 use ndarray::{Array2, Axis};
-use scene::Random;
-use scene::pattern::closest;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 

@@ -3,7 +3,7 @@
 //! Who measures when somebody looks, on any thread and in any order, cannot draw from a sequence: what it got would depend on
 //! what was drawn before. Here a number is a function of its key and its place.
 
-use scene::Random;
+use kinetoscope_scene::Random;
 use std::f64::consts::TAU;
 
 /// Philox 4x32-10: a cipher-like function of a key and a counter of 128 bits. Source: Salmon, Moraes, Dror and Shaw 2011,

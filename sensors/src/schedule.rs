@@ -82,7 +82,7 @@ impl Phases {
     /// Whether environment `env`, which is at physics step `step`, measures now: at whole periods after its reset, not
     /// at the reset itself, and once per step however often it is asked.
     ///
-    /// `step` is [`scene::SceneState::step`]. An environment that stands still (it was quarantined) measures nothing.
+    /// `step` is [`kinetoscope_scene::SceneState::step`]. An environment that stands still (it was quarantined) measures nothing.
     ///
     /// # Panics
     ///

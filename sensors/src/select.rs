@@ -1,12 +1,12 @@
 //! Bodies and joints by name patterns.
 
 use crate::error::SensorError;
+use kinetoscope_scene::pattern::{MAX_CANDIDATES, Pattern, PatternError, closest, in_every_env};
 use ndarray::Array2;
-use scene::pattern::{MAX_CANDIDATES, Pattern, PatternError, closest, in_every_env};
 
 /// Indices of the names that the patterns match, names in their order within a pattern, patterns one after the other.
 ///
-/// A pattern is a regular expression that must match the whole name (see [`scene::pattern`]): the full one (`uid/link`), or
+/// A pattern is a regular expression that must match the whole name (see [`kinetoscope_scene::pattern`]): the full one (`uid/link`), or
 /// the part behind the first slash. `{ENV}/` and `{ENV_REGEX_NS}/` before it change nothing. `what` says what the names are, such as `body`.
 ///
 /// # Errors

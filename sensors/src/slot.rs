@@ -3,7 +3,7 @@
 use crate::error::SensorError;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::{Requires, Sensor};
-use scene::SceneState;
+use kinetoscope_scene::SceneState;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Mutex, OnceLock, PoisonError};
 

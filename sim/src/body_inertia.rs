@@ -4,8 +4,8 @@ use crate::description::{JointKind, LinkId, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::inertia::RigidInertia;
 use crate::source::Source;
+use kinetoscope_scene::Pose;
 use nalgebra::Matrix3;
-use scene::Pose;
 
 /// Stand-in mass of a moving body without any \[kg\]: a milligram disturbs no robot, and is far above MuJoCo's minimum.
 const MASSLESS_MASS: f64 = 1e-6;

@@ -21,7 +21,7 @@ use crate::simulation_cfg::SimulationManagerCfg;
 use crate::snapshot::Layout;
 use crate::visible::{self, Identities, Look, MaskId, Owner, Replacements, Visible, VisualCache};
 use crate::wrenches::Wrenches;
-use ::scene::{OwnScene, Pose};
+use kinetoscope_scene::{OwnScene, Pose};
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 

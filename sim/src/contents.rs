@@ -13,7 +13,7 @@ use crate::objects::terrain::Terrain;
 use crate::objects::weld::WeldData;
 use crate::pattern;
 use crate::visible::Surfaces;
-use sensors::EngineSensor;
+use kinetoscope_sensors::EngineSensor;
 use std::sync::Arc;
 
 /// Robots (and articulations that are none), objects, terrains, MJCF files, and what holds and what passes through each other.

@@ -4,8 +4,8 @@
 //! unique, order is the order of the files, every element knows its [`Source`].
 
 use crate::source::Source;
+use kinetoscope_scene::Pose;
 use nalgebra::{Matrix3, Unit, Vector3};
-use scene::Pose;
 use std::path::PathBuf;
 
 /// Index of a link in [`RobotDescription::links`].

@@ -16,7 +16,7 @@ use crate::mj::{
     self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts, Weld,
 };
 use crate::wrenches::Wrenches;
-use ::scene::state::Contact;
+use kinetoscope_scene::state::Contact;
 use std::cell::Cell;
 use std::sync::Arc;
 

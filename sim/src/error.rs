@@ -38,7 +38,7 @@ pub enum Error {
         link: String,
         /// What is wrong with the file.
         #[source]
-        error: Box<scene::mesh::MeshError>,
+        error: Box<kinetoscope_scene::mesh::MeshError>,
     },
     /// The mesh of a rigid object cannot be used.
     #[error("object {object:?}: {error}")]
@@ -47,7 +47,7 @@ pub enum Error {
         object: String,
         /// What is wrong with the file.
         #[source]
-        error: Box<scene::mesh::MeshError>,
+        error: Box<kinetoscope_scene::mesh::MeshError>,
     },
     /// A drive property or a start position is wrong.
     #[error("{robot}: {error}")]
@@ -98,7 +98,7 @@ pub enum Error {
     },
     /// Heights of a terrain cannot be made.
     #[error(transparent)]
-    Terrain(#[from] scene::terrain::TerrainError),
+    Terrain(#[from] kinetoscope_scene::terrain::TerrainError),
     /// Two control parts have the same name.
     #[error("{robot}: control part {part:?} is given twice; join its patterns in one list")]
     ControlPartRepeated {
@@ -416,11 +416,11 @@ pub enum Error {
         sensor: String,
         /// What is wrong.
         #[source]
-        error: Box<sensors::SensorError>,
+        error: Box<kinetoscope_sensors::SensorError>,
     },
     /// Labels of a segmentation name what is not there, or one thing twice.
     #[error("labels: {0}")]
-    Labels(#[source] Box<sensors::SensorError>),
+    Labels(#[source] Box<kinetoscope_sensors::SensorError>),
     /// A sensor needs a quantity that is not gathered.
     #[error("sensor {sensor:?} needs {missing}, which this simulation does not gather")]
     SensorRequires {

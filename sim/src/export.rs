@@ -15,7 +15,7 @@ use crate::objects::robot::RobotData;
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::source::Source;
 use crate::urdf::write_urdf;
-use scene::mesh::{MeshMaterial, TextureSource, TriMesh};
+use kinetoscope_scene::mesh::{MeshMaterial, TextureSource, TriMesh};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufWriter;
 use std::path::Path;
@@ -227,7 +227,7 @@ fn export_meshes(
             return Ok(());
         }
         let mut say = |kind, message: String| left_out.push(Diagnostic::new(kind, source.cloned(), message));
-        let mesh = match scene::mesh::load(&key.path) {
+        let mesh = match kinetoscope_scene::mesh::load(&key.path) {
             Ok(mesh) => mesh,
             Err(error) => {
                 assets.parts.insert(key, Vec::new());
@@ -284,7 +284,7 @@ fn export_parts(
         let file = format!("meshes/{name}.obj");
         let path = dir.join(&file);
         let out = BufWriter::new(std::fs::File::create(&path).map_err(at(&path))?);
-        scene::mesh::write_obj(mesh, part.triangles.clone(), out).map_err(at(&path))?;
+        kinetoscope_scene::mesh::write_obj(mesh, part.triangles.clone(), out).map_err(at(&path))?;
         let material = match part.material.map(|m| &mesh.materials[m]) {
             Some(material) => Some(export_material(material, &name, mjcf, textures, dir)?),
             None => None,

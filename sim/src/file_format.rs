@@ -3,7 +3,7 @@
 use crate::drive::PerJoint;
 use crate::objects::robot_file::MjcfFile;
 use crate::urdf::UrdfCfg;
-use scene::file_format::pairs;
+use kinetoscope_scene::file_format::pairs;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 use serde::ser::{Serialize, Serializer};

@@ -10,8 +10,8 @@
 //! Parameter Identification", IEEE Robotics and Automation Letters 3(1), 2018, section III.
 
 use crate::description::Inertial;
+use kinetoscope_scene::Pose;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use scene::Pose;
 
 /// Smallest mass of a moving body that MuJoCo accepts \[kg\]. Source: `mjMINVAL`.
 const MUJOCO_MIN_MASS: f64 = 1e-15;

@@ -54,7 +54,6 @@ mod viewpoint;
 pub mod visible;
 mod wrenches;
 
-pub use ::scene::pattern;
 pub use description::{LinkId, RobotDescription};
 pub use diagnostic::{Diagnostic, DiagnosticKind};
 pub use drive::{ActuatorModel, DcMotor, DelayedPd, DriveCfg, DriveModel, DriveType, IdealPd, PerJoint};
@@ -62,6 +61,7 @@ pub use error::{Error, Result};
 pub use inertia::{InertiaFault, RigidInertia};
 pub use interactive_scene::{EntityCfg, EntityTypes, ExclusionCfg, InteractiveScene, SceneCfg};
 pub use kinematics::{IkCfg, IkTask, KinematicsError, Posture, Tip};
+pub use kinetoscope_scene::pattern;
 pub use light_cfg::{LampKind, LightCfg};
 pub use look::{BodyMotion, JointAxis, Look};
 pub use manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};

@@ -38,10 +38,10 @@ pub struct LightCfg {
     /// What kind of lamp it is.
     pub kind: LampKind,
     /// Where it is in the environment \[m\]; directional lamps are everywhere.
-    #[serde(with = "scene::file_format::vector")]
+    #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub position: Vector3<f64>,
     /// Direction in which it shines.
-    #[serde(with = "scene::file_format::vector")]
+    #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub direction: Vector3<f64>,
     /// Colour, 0..=1.
     pub color: [f64; 3],

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::manager::{RobotId, SimulationManager};
 use crate::objects::robot::RobotData;
-use sensors::Sensor;
+use kinetoscope_sensors::Sensor;
 
 impl SimulationManager {
     /// Names of all robots, then of all articulations that are none, each in the order in which they were added.

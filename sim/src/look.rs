@@ -5,11 +5,11 @@ use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::manager::{EnvId, SimulationManager, env_list, env_mask};
 use crate::mj::{self, Data};
-use ::scene::state::Contact;
-use ::scene::{Light, OwnScene, Pose, PoseF32, RenderScene};
+use kinetoscope_scene::state::Contact;
+use kinetoscope_scene::{Light, OwnScene, Pose, PoseF32, RenderScene};
+use kinetoscope_sensors::Requires;
 use nalgebra::Vector3;
 use ndarray::Array2;
-use sensors::Requires;
 use std::sync::Arc;
 
 /// One environment as it is now; see [`SimulationManager::look`]. Everything is in the frame of the environment.

@@ -7,8 +7,8 @@ use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::gather;
 use crate::manager::EnvId;
-use scene::{Marker, Pose, SceneState};
-use sensors::{Requires, Schedule, Sensor, SensorCfg, SensorContext, SensorError, SensorSlot};
+use kinetoscope_scene::{Marker, Pose, SceneState};
+use kinetoscope_sensors::{Requires, Schedule, Sensor, SensorCfg, SensorContext, SensorError, SensorSlot};
 use std::any::Any;
 use std::collections::BTreeSet;
 use std::marker::PhantomData;
@@ -89,7 +89,7 @@ pub(crate) struct SensorList {
     state: SceneState,
     /// Which of them the current steps make due.
     due: Vec<bool>,
-    /// The step of every environment, [`sensors::Phases::STANDS`] for one that is put aside.
+    /// The step of every environment, [`kinetoscope_sensors::Phases::STANDS`] for one that is put aside.
     clocks: Vec<u64>,
     /// Environments whose state was written to since somebody asked.
     written: BTreeSet<usize>,

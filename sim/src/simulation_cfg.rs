@@ -19,7 +19,7 @@ pub struct SimulationManagerCfg {
     /// MuJoCo steps in one `physics_dt`.
     pub substeps: u32,
     /// Gravity \[m/s²\].
-    #[serde(with = "scene::file_format::vector")]
+    #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub gravity: Vector3<f64>,
     /// Integrator.
     pub integrator: Integrator,
@@ -41,7 +41,7 @@ pub struct SimulationManagerCfg {
     /// Which part of the environments this process has, where several simulate together.
     pub shard: Shard,
     /// Ground plane at z = 0; `None` for none.
-    #[serde(with = "scene::file_format::or_false")]
+    #[serde(with = "kinetoscope_scene::file_format::or_false")]
     pub ground: Option<GroundCfg>,
     /// Lights.
     pub lights: Vec<LightCfg>,

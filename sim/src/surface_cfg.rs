@@ -1,7 +1,7 @@
 //! What surfaces look like besides their colour: gloss, metal, glass, light of their own.
 
 use crate::error::{Error, Result};
-use ::scene::Material;
+use kinetoscope_scene::Material;
 use serde::{Deserialize, Serialize};
 
 /// What a surface looks like besides its colour and its texture. What is `None` is as the file or the model says, MuJoCo's

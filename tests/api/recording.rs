@@ -3,10 +3,10 @@
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Recording, Wanted};
 use kinetoscope::view::{Command, Recording as _, Viewer, Wants};
+use kinetoscope_testkit::worlds::{RecordedWorld, sr5};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard};
-use testkit::worlds::{RecordedWorld, sr5};
 
 /// A world with a button, and a viewer that presses it.
 struct Watched {

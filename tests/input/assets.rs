@@ -2,8 +2,8 @@
 
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use testkit::process;
-use testkit::worlds::urdf_robot;
+use kinetoscope_testkit::process;
+use kinetoscope_testkit::worlds::urdf_robot;
 
 #[test]
 fn missing_file() {

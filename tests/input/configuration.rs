@@ -3,7 +3,7 @@
 use super::support::{ball, cfg, hinge, robot};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{GroundCfg, LightCfg};
-use testkit::refusal::assert_refused;
+use kinetoscope_testkit::refusal::assert_refused;
 
 type Change = fn(&mut SimulationManagerCfg);
 

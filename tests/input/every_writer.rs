@@ -28,7 +28,7 @@ fn world() -> (SimulationManager, Ids) {
     let mut sim = super::support::sim(ENVS);
     let init_pose = Pose::translation(0.0, 0.0, 3.0);
     let base = RobotCfg { fix_base: false, init_pose, ..robot(dir.path(), "r", &urdf) };
-    let cube = testkit::worlds::object("o", ObjectShape::cube(0.1), [0.0; 3]);
+    let cube = kinetoscope_testkit::worlds::object("o", ObjectShape::cube(0.1), [0.0; 3]);
     let ids = Ids {
         robot: sim.add_robot(base).unwrap(),
         object: sim.add_rigid_object(cube).unwrap(),

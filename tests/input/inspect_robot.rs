@@ -5,12 +5,13 @@ use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::inspect::{InspectCfg, inspect};
 use kinetoscope::sim::mj::{Data, ObjectKind, compile};
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
+use kinetoscope_testkit::urdf;
+use kinetoscope_testkit::urdf::Files;
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
-use testkit::tolerance::{Tolerance, assert_close};
-use testkit::urdf::{self, Files};
 
 #[allow(dead_code, reason = "main is what cargo runs")]
 #[path = "../../examples/inspect_robot.rs"]
@@ -262,7 +263,7 @@ fn dynamics() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn dynamics_of_anymal() {
-    let anymal = testkit::needs::robot(ANYMAL);
+    let anymal = kinetoscope_testkit::needs::robot(ANYMAL);
     let anymal = anymal.to_str().unwrap();
     compare_with_mujoco(&[anymal], components(&[anymal]), true);
 }
@@ -296,7 +297,7 @@ fn warnings_of_the_simulation() {
     assert_eq!(json["total_mass"], 2.0);
 
     let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
-    sim.add_robot(testkit::worlds::urdf_robot("robot", &file)).unwrap();
+    sim.add_robot(kinetoscope_testkit::worlds::urdf_robot("robot", &file)).unwrap();
     let mut simulated: Vec<&str> = sim.diagnostics().iter().map(|d| d.message.as_str()).collect();
     let found = json["warnings"].as_array().unwrap();
     let mut reported: Vec<&str> = found.iter().map(|w| w["message"].as_str().unwrap()).collect();

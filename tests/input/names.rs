@@ -83,7 +83,7 @@ fn generated_names() {
                  link=\"{parent}\"/><child link=\"{name}\"/></joint>"
             );
         }
-        let mut sim = testkit::worlds::sim(SimulationManagerCfg { ground: None, ..cfg(1) });
+        let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { ground: None, ..cfg(1) });
         let urdf = format!("<robot name=\"r\">{elements}</robot>");
         let id = sim.add_robot(robot(dir.path(), "r", &urdf)).unwrap();
         sim.robot_mut(id).write_qpos(&array![[0.1, 0.2, 0.3, 0.4]], None, None).unwrap();

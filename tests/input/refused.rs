@@ -212,7 +212,8 @@ fn more_than_thirty_robots() {
 #[test]
 fn deepest_chain() {
     let dir = tempfile::tempdir().unwrap();
-    let mut sim = testkit::worlds::sim(SimulationManagerCfg { gravity: nalgebra::Vector3::zeros(), ..cfg(1) });
+    let mut sim =
+        kinetoscope_testkit::worlds::sim(SimulationManagerCfg { gravity: nalgebra::Vector3::zeros(), ..cfg(1) });
     let id = sim.add_robot(robot(dir.path(), "chain", &chain(MAX_BODY_DEPTH, "continuous", ""))).unwrap();
     sim.update(2);
     assert_eq!(sim.robot(id).dof(), MAX_BODY_DEPTH - 1);

@@ -4,7 +4,7 @@ use super::support::{INERTIAL, robot, sim};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::DiagnosticKind;
-use testkit::urdf::collision;
+use kinetoscope_testkit::urdf::collision;
 
 /// A star of arms around a hub, with spheres of 0.05 m at 0.1 m from it; only neighbours overlap.
 fn star(arms: usize, spheres: usize) -> String {

@@ -2,9 +2,9 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{Model, TARGET, Target, compile_file};
+use kinetoscope_testkit::urdf;
+pub(crate) use kinetoscope_testkit::worlds::all_bits as bits;
 use std::path::Path;
-use testkit::urdf;
-pub(crate) use testkit::worlds::all_bits as bits;
 
 pub(crate) const INERTIAL: &str =
     r#"<inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>"#;
@@ -18,18 +18,18 @@ pub(crate) const TETRAHEDRON: &str = "solid t\n\
     facet normal 0 0 0\nouter loop\nvertex 0.1 0 0\nvertex 0 0.1 0\nvertex 0 0 0.1\nendloop\nendfacet\nendsolid t\n";
 
 pub(crate) fn cfg(num_envs: usize) -> SimulationManagerCfg {
-    testkit::worlds::cfg(num_envs, 2)
+    kinetoscope_testkit::worlds::cfg(num_envs, 2)
 }
 
 pub(crate) fn sim(num_envs: usize) -> SimulationManager {
-    testkit::worlds::sim(cfg(num_envs))
+    kinetoscope_testkit::worlds::sim(cfg(num_envs))
 }
 
 /// Writes `robot.urdf` into `dir`.
 pub(crate) fn robot(dir: &Path, uid: &str, urdf: &str) -> RobotCfg {
     let path = dir.join("robot.urdf");
     std::fs::write(&path, urdf).unwrap();
-    testkit::worlds::urdf_robot(uid, path)
+    kinetoscope_testkit::worlds::urdf_robot(uid, path)
 }
 
 /// Two links and a hinge with this content; the moving link is in line 3.

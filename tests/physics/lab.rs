@@ -7,11 +7,11 @@ use kinetoscope::ndarray::{Array2, Array3};
 pub(crate) use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_row, to_row};
 use kinetoscope::sim::{self, Cone};
+use kinetoscope_testkit::urdf::Files;
+/// The default drive, evaluated at the end of the step, and none: joints move freely.
+pub(crate) use kinetoscope_testkit::worlds::{gains as implicit, no_drive as passive};
 use nalgebra::UnitQuaternion;
 pub(crate) use nalgebra::Vector3;
-use testkit::urdf::Files;
-/// The default drive, evaluated at the end of the step, and none: joints move freely.
-pub(crate) use testkit::worlds::{gains as implicit, no_drive as passive};
 
 /// Gravity on earth \[m/s²\].
 pub(crate) const G: f64 = 9.81;

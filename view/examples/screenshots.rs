@@ -5,13 +5,15 @@
 //! ```
 #![allow(clippy::unwrap_used, reason = "a program for the maintainers")]
 
-use scene::Pose;
-use sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
-use sim::{DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg};
+use kinetoscope_scene::Pose;
+use kinetoscope_sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
+use kinetoscope_sim::{
+    DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg,
+};
+use kinetoscope_view::window::{App, Input, Key, Modifiers};
+use kinetoscope_view::{Canvas, Eye, Shown, Viewing, Wants};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use view::window::{App, Input, Key, Modifiers};
-use view::{Canvas, Eye, Shown, Viewing, Wants};
 
 const SIZE: [usize; 2] = [960, 540];
 

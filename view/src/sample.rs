@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use crate::stage::Canvas;
-use scene::Pose;
-use sensors::camera::{Camera, CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
-use sim::{
+use kinetoscope_scene::Pose;
+use kinetoscope_sensors::camera::{Camera, CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
+use kinetoscope_sim::{
     DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, RobotId, SensorId, SimulationManager, SimulationManagerCfg,
     UrdfCfg,
 };
@@ -106,7 +106,7 @@ impl Running {
     /// Waits until it has done more than `steps` steps.
     #[track_caller]
     pub(crate) fn goes_on_beyond(&self, steps: u64) {
-        testkit::wait::until("it goes on", || self.steps() > steps);
+        kinetoscope_testkit::wait::until("it goes on", || self.steps() > steps);
     }
 
     /// The simulation, stopped; nothing may hold it any more.

@@ -3,8 +3,8 @@
 use crate::control::Wants;
 use crate::stage::{Canvas, Eye, Look, Overlays, Painter, Pool, Run, Shown, Snapshot};
 use crate::whole_file;
-use sensors::visibility::{RenderError, View};
-use sim::SimulationManager;
+use kinetoscope_sensors::visibility::{RenderError, View};
+use kinetoscope_sim::SimulationManager;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -247,7 +247,7 @@ mod tests {
             ("taken.png", "File", ""),
         ];
         let rows = rows.map(|(name, kind, part)| (name, sim.screenshot(folder.path().join(name)), kind, [part]));
-        testkit::refusal::assert_refused(rows);
+        kinetoscope_testkit::refusal::assert_refused(rows);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

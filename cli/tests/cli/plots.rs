@@ -3,9 +3,9 @@
 use super::support::Shell;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::svg::curves;
+use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use std::path::Path;
-use testkit::svg::curves;
-use testkit::worlds::{mjcf_robot, passive};
 
 /// A mass of 1 kg that slides on a spring of 40 N/m, without friction.
 const SPRING: &str = r#"<mujoco><worldbody><body name="cart" pos="0 0 1">

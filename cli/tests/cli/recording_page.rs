@@ -2,9 +2,9 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::record::Format;
+use kinetoscope_testkit::worlds::RecordedWorld;
 use std::path::Path;
 use std::process::{Command, Output};
-use testkit::worlds::RecordedWorld;
 
 const PAGE: &str = include_str!("../../../docs/recording.md");
 
@@ -74,7 +74,7 @@ fn commands() {
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
 fn programs() {
-    let python = testkit::needs::python_readers();
+    let python = kinetoscope_testkit::needs::python_readers();
     let folder = folder();
     // LeRobot brings some gigabytes: read_lerobot.py asks it where it is installed.
     let absent =

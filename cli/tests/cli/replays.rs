@@ -4,8 +4,8 @@ use super::support::{Running, Shell, colors, red, window_of};
 use kinetoscope::ndarray::{Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::view::Eye;
-use testkit::wait;
-use testkit::x_server::{Display, close, screenshot};
+use kinetoscope_testkit::wait;
+use kinetoscope_testkit::x_server::{Display, close, screenshot};
 
 const SCENE: &str = r#"
 [simulation]

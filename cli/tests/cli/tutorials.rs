@@ -1,12 +1,12 @@
 //! The examples of EmbodiChain's tutorials: their lines and poses, their windows, and how they end.
 
 use super::support::{Running, Shell, window_of};
+use kinetoscope_testkit::wait;
+use kinetoscope_testkit::x_server::{Display, close, screenshot};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
-use testkit::wait;
-use testkit::x_server::{Display, close, screenshot};
 
 /// The title of the tutorial's window of images.
 const IMAGES: &str = "Sensor Views (Color / Depth / Mask / Normals)";

@@ -2,9 +2,9 @@
 
 use super::serve::visitor::say;
 use super::support::{Running, Shell, colors, window_of};
+use kinetoscope_testkit::wait;
+use kinetoscope_testkit::x_server::{Display, close, screenshot};
 use std::time::Instant;
-use testkit::wait;
-use testkit::x_server::{Display, close, screenshot};
 
 /// Two bodies in the world, one of them on a ball joint: no robot.
 pub(crate) const SCENE: &str = r#"<mujoco><option timestep="0.01"/><worldbody><geom type="plane" size="2 2 0.1"/>

@@ -1,7 +1,7 @@
 //! Robots that lie down.
 
 use crate::termination::TerminationTerm;
-use sim::RobotId;
+use kinetoscope_sim::RobotId;
 
 /// Ends where the upward axis of the root link of a robot is farther than an angle from the world's \[rad\].
 pub fn bad_orientation(name: &str, robot: RobotId, angle: f64) -> TerminationTerm {

@@ -1,7 +1,7 @@
 //! Robots that fall.
 
 use crate::termination::TerminationTerm;
-use sim::RobotId;
+use kinetoscope_sim::RobotId;
 
 /// Ends where the root link of a robot is below a height in its environment \[m\].
 pub fn base_below(name: &str, robot: RobotId, height: f64) -> TerminationTerm {

@@ -1,7 +1,7 @@
 //! How the root of a robot moves and stands, in its own axes.
 
 use crate::observation::ObservationTerm;
-use sim::RobotId;
+use kinetoscope_sim::RobotId;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 

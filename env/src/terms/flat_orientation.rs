@@ -1,7 +1,7 @@
 //! Standing upright, as a reward.
 
 use crate::reward::RewardTerm;
-use sim::RobotId;
+use kinetoscope_sim::RobotId;
 
 /// The square of the sine of the angle between the upward axis of the root link and the world's: 0 where it stands upright.
 pub fn flat_orientation(name: &str, weight: f64, robot: RobotId) -> RewardTerm {

@@ -2,8 +2,8 @@
 
 use crate::termination::TerminationTerm;
 use ndarray::{Array1, Axis};
-use sensors::ContactSensor;
-use sim::SensorId;
+use kinetoscope_sensors::ContactSensor;
+use kinetoscope_sim::SensorId;
 
 /// Ends where the normal forces on one of a sensor's bodies sum up to more than a force \[N\].
 pub fn illegal_contact(name: &str, sensor: SensorId<ContactSensor>, force: f64) -> TerminationTerm {

@@ -4,7 +4,7 @@ use super::{columns, joints};
 use crate::error::Result;
 use crate::reward::RewardTerm;
 use ndarray::Axis;
-use sim::{RobotId, SimulationManager};
+use kinetoscope_sim::{RobotId, SimulationManager};
 
 /// Sum of the squares of the efforts of the drives of joints that match one of `patterns` (whole names) in the last physics step
 /// \[N² m² or N²\].

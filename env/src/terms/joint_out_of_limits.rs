@@ -4,9 +4,9 @@ use super::joints;
 use crate::error::Result;
 use crate::termination::TerminationTerm;
 use ndarray::{Array1, Axis};
-use sim::{RobotId, SimulationManager};
+use kinetoscope_sim::{RobotId, SimulationManager};
 
-/// Ends where a joint that matches one of `patterns` (whole names) is beyond its [soft limits](sim::Robot::soft_qpos_limits); joints
+/// Ends where a joint that matches one of `patterns` (whole names) is beyond its [soft limits](kinetoscope_sim::Robot::soft_qpos_limits); joints
 /// without limits never are.
 ///
 /// # Errors

@@ -4,7 +4,7 @@ use super::joints;
 use crate::error::Result;
 use crate::event::EventTerm;
 use ndarray::Array2;
-use sim::{RobotId, SimulationManager};
+use kinetoscope_sim::{RobotId, SimulationManager};
 
 /// Puts joints that match one of `patterns` (whole names) beside their start when an episode begins: the start and a number drawn
 /// uniformly from `positions` \[rad or m\], within their limits, with a velocity drawn from `velocities` \[rad/s or m/s\].

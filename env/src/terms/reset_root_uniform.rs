@@ -3,8 +3,8 @@
 use crate::dice::Dice;
 use crate::event::EventTerm;
 use ndarray::Array2;
-use scene::pose::{from_row, from_xyz_rpy, to_row};
-use sim::RobotId;
+use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
+use kinetoscope_sim::RobotId;
 
 /// By how much roots begin beside their start: each number is drawn uniformly between two bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

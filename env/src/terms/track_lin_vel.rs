@@ -1,7 +1,7 @@
 //! Going as fast as wanted, as a reward.
 
 use crate::reward::RewardTerm;
-use sim::RobotId;
+use kinetoscope_sim::RobotId;
 
 /// exp(-d² / std²), where d is how far the velocity of the root link, x and y in its own axes, is from the first two columns of a
 /// command \[m/s\]: 1 where it is what was wanted.

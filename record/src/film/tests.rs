@@ -1,7 +1,7 @@
 use super::*;
 use crate::tests::*;
-use sim::{BodyType, RigidObjectCfg, RobotCfg};
-use testkit::worlds::{object, sr5};
+use kinetoscope_sim::{BodyType, RigidObjectCfg, RobotCfg};
+use kinetoscope_testkit::worlds::{object, sr5};
 
 const STEPS: usize = 30;
 

@@ -19,7 +19,7 @@ pub(crate) use rows::{Rows, rows};
 use crate::archive::Archive;
 use crate::error::{RecordError, Result};
 use crate::format::Format;
-use scene::pattern::closest;
+use kinetoscope_scene::pattern::closest;
 use std::path::{Path, PathBuf};
 
 /// A recording that was opened: an MCAP file of ROS 2 messages, of this program or another, or a NumPy archive of a recorder.

@@ -1,7 +1,7 @@
 use super::*;
 use crate::tests::*;
-use testkit::refusal::assert_error;
-use testkit::worlds::{mjcf_robot, passive};
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 
 /// A mass of 1 kg that slides on a spring of 40 N/m, without friction.
 const SPRING: &str = r#"<mujoco><worldbody><body name="cart" pos="0 0 1">

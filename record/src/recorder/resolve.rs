@@ -14,7 +14,7 @@ use crate::source::Source;
 use crate::stream::{Kind, Stream};
 use crate::topic::Topic;
 use crate::writer::Sink;
-use sim::SimulationManager;
+use kinetoscope_sim::SimulationManager;
 
 /// What the topics of a configuration mean in a simulation, and the sensors that were left out.
 pub(super) fn resolve(

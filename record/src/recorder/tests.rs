@@ -6,14 +6,14 @@ use crate::packet::Values;
 use crate::recover::recover;
 use crate::tests::{falling, logs, names, numbers_of, record, rows, scratch};
 use crate::writer::Written;
-use scene::{Pose, SceneState};
-use sensors::camera::{Camera, CameraCfg, Channels, Intrinsics};
-use sensors::ray::pattern::Grid;
-use sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
-use sensors::{
+use kinetoscope_scene::{Pose, SceneState};
+use kinetoscope_sensors::camera::{Camera, CameraCfg, Channels, Intrinsics};
+use kinetoscope_sensors::ray::pattern::Grid;
+use kinetoscope_sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
+use kinetoscope_sensors::{
     Channel, ImuCfg, Requires, Sampled, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError,
 };
-use sim::{MjcfCfg, SensorId};
+use kinetoscope_sim::{MjcfCfg, SensorId};
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -116,7 +116,7 @@ fn full_disk_images() {
         sim.add_sensor("camera", camera).unwrap();
         sim
     };
-    let images = |folder: &Path| testkit::needs::files_below(folder, "png");
+    let images = |folder: &Path| kinetoscope_testkit::needs::files_below(folder, "png");
     let whole = folder.path().join("whole");
     let bytes = record_to_a_full_disk(&mut simulation(), &whole, usize::MAX).unwrap().bytes;
     assert!(images(&whole).len() > 20 && bytes > 5000, "{bytes} bytes in {}", images(&whole).len());
@@ -256,7 +256,7 @@ fn panic_of_the_thread() {
     });
     sim.update(20);
     sim.observer_mut(recorder).unwrap().catch_up();
-    testkit::refusal::assert_error(sim.finish_recording(recorder), "", &["panicked"]);
+    kinetoscope_testkit::refusal::assert_error(sim.finish_recording(recorder), "", &["panicked"]);
 }
 
 /// Root cause: arrivals were counted, and the shown values were copied. They differ where the state is written while
@@ -270,7 +270,7 @@ fn late_sensors() {
     let channels = Channels { color: true, depth: true, mask: true, ..Channels::default() };
     let camera = CameraCfg {
         intrinsics: Intrinsics::Fovy { radians: 1.2 },
-        ..testkit::worlds::camera([16, 12], [1.0, 0.5, 1.2], [0.0, 0.0, 0.8], channels)
+        ..kinetoscope_testkit::worlds::camera([16, 12], [1.0, 0.5, 1.2], [0.0, 0.0, 0.8], channels)
     };
     let rays = RayCasterCfg {
         offset: Pose::translation(0.0, 0.0, 2.0),
@@ -340,7 +340,7 @@ fn absurd_numbers() {
     let (_folder, path) = scratch("run.npz");
     let mut sim = falling(1);
     let refused = sim.record(RecorderCfg { packets: usize::MAX, ..RecorderCfg::new(&path) });
-    testkit::refusal::assert_error(refused, &format!("TooLarge {{ packets: {}", usize::MAX), &[]);
+    kinetoscope_testkit::refusal::assert_error(refused, &format!("TooLarge {{ packets: {}", usize::MAX), &[]);
     let cfg = RecorderCfg { every: u64::MAX, ..RecorderCfg::new(&path) };
     assert_eq!(record(&mut sim, cfg, |sim| sim.update(5)).packets, 1);
     assert_eq!(numbers_of(&path, "ball/state/step"), [0.0]);

@@ -1,9 +1,9 @@
 use super::*;
 use crate::tests::*;
-use sim::{LinkId, SimulationManagerCfg, WrenchFrame};
+use kinetoscope_sim::{LinkId, SimulationManagerCfg, WrenchFrame};
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::worlds::sr5;
 use std::fs::File;
-use testkit::refusal::assert_error;
-use testkit::worlds::sr5;
 
 const STEPS: u32 = 40;
 

@@ -2,7 +2,7 @@
 
 use super::cdr::Cdr;
 use crate::stream::Distortion;
-use sensors::camera::CameraInfo;
+use kinetoscope_sensors::camera::CameraInfo;
 
 /// When and where something was measured.
 #[derive(Clone, Copy, Debug)]

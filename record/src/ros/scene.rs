@@ -4,8 +4,8 @@
 use super::cdr::Cdr;
 use super::message::{Stamp, time};
 use crate::scene_update::{Drawn, Entity, Form, SceneUpdate};
-use scene::Pose;
-use scene::pose::to_row;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::to_row;
 
 /// Whatever a viewer has of the topic goes away.
 const ALL: u8 = 1;

@@ -4,11 +4,15 @@ use super::{Number, Source, What, sim_error};
 use crate::error::Result;
 use crate::packet::Values;
 use crate::stream::{Distortion, Element, Kind};
+use kinetoscope_sensors::camera::channel::{
+    Albedo, Color, Depth, Distance, Flow, Mask, Normal, Position, ShadingNormal,
+};
+use kinetoscope_sensors::camera::{
+    CameraConvention, CameraError, Channel, DistortionModel, PixelIntrinsics, Rectification,
+};
+use kinetoscope_sensors::{Camera, RayCasterCamera, StereoCamera};
+use kinetoscope_sim::SimulationManager;
 use ndarray::{Array2, Array3, Axis};
-use sensors::camera::channel::{Albedo, Color, Depth, Distance, Flow, Mask, Normal, Position, ShadingNormal};
-use sensors::camera::{CameraConvention, CameraError, Channel, DistortionModel, PixelIntrinsics, Rectification};
-use sensors::{Camera, RayCasterCamera, StereoCamera};
-use sim::SimulationManager;
 use std::any::Any;
 
 /// The channel that both eyes of a pair tell together.
@@ -204,7 +208,7 @@ impl Source {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sensors::camera::Channels;
+    use kinetoscope_sensors::camera::Channels;
 
     /// Root cause: the list was written by hand beside that of the cameras, and lacked two of its channels.
     #[test]

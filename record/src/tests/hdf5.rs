@@ -155,7 +155,7 @@ fn full_disk() {
     // A limit in blocks of 512 bytes, whose signal is ignored, so that writing is an error.
     let said = |blocks: u64| {
         let (folder, path) = scratch("run.hdf5");
-        let child = testkit::process::command(module_path!(), "scenario_full_disk");
+        let child = kinetoscope_testkit::process::command(module_path!(), "scenario_full_disk");
         let output = std::process::Command::new("sh")
             .args(["-c", "trap '' XFSZ; ulimit -f \"$1\"; shift; exec \"$@\"", "sh", &blocks.to_string()])
             .arg(child.get_program())
@@ -164,7 +164,7 @@ fn full_disk() {
             .env("TMPDIR", folder.path())
             .output()
             .unwrap();
-        let [text, error] = [&output.stdout, &output.stderr].map(|bytes| testkit::process::text(bytes));
+        let [text, error] = [&output.stdout, &output.stderr].map(|bytes| kinetoscope_testkit::process::text(bytes));
         assert!(output.status.success(), "{text}{error}");
         (text, names(&folder))
     };

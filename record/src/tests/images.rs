@@ -246,7 +246,7 @@ fn stage_by_camera() {
 fn stage_alone() {
     let folder = tempfile::tempdir().unwrap();
     let mut sim = simulation(2);
-    sim.add_rigid_object(testkit::worlds::object("cube", ObjectShape::cube(0.2), [0.0; 3])).unwrap();
+    sim.add_rigid_object(kinetoscope_testkit::worlds::object("cube", ObjectShape::cube(0.2), [0.0; 3])).unwrap();
     for name in ["run.gif", "images"] {
         let recorded = record(&mut sim, RecorderCfg::new(folder.path().join(name)), |sim| sim.update(10));
         assert!(recorded.packets > 1, "{name}");
@@ -258,6 +258,6 @@ fn stage_alone() {
         (StageCfg { eye: Some([1.0; 3]), target: Some([1.0; 3]), ..StageCfg::default() }, "from"),
     ] {
         let cfg = RecorderCfg { stage, ..RecorderCfg::new(folder.path().join("wrong.gif")) };
-        testkit::refusal::assert_error(sim.record(cfg), "Stage", &[wrong]);
+        kinetoscope_testkit::refusal::assert_error(sim.record(cfg), "Stage", &[wrong]);
     }
 }

@@ -36,7 +36,7 @@ fn scenario_endless() {
 /// Kills a process `life` after its first step (`begun`), or after a time before there is a file. Returns the steps that it had
 /// done one second before.
 fn kill_after(path: &Path, life: Duration, begun: bool) -> u64 {
-    let mut child = testkit::process::command(module_path!(), "scenario_endless")
+    let mut child = kinetoscope_testkit::process::command(module_path!(), "scenario_endless")
         .env(FILE, path)
         .stdout(Stdio::piped())
         .spawn()

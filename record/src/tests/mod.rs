@@ -17,23 +17,23 @@ pub(crate) use crate::{
     Format, Record, RecordError, Recorded, RecorderCfg, Recording, StageCfg, Topic, Wanted, recover, recover_to,
 };
 pub(crate) use crate::{npy, zip};
-pub(crate) use ndarray::{Array2, Axis, array};
-pub(crate) use scene::Pose;
-pub(crate) use sensors::camera::{
+pub(crate) use kinetoscope_scene::Pose;
+pub(crate) use kinetoscope_sensors::camera::{
     Camera, CameraCfg, CameraConvention, Channels, Intrinsics, RasterCfg, Renderer, StereoCameraCfg,
 };
-pub(crate) use sensors::ray::RayCasterCfg;
-pub(crate) use sensors::ray::pattern::Grid;
-pub(crate) use sensors::{ContactSensorCfg, ImuCfg, JointStateCfg, Sampled};
+pub(crate) use kinetoscope_sensors::ray::RayCasterCfg;
+pub(crate) use kinetoscope_sensors::ray::pattern::Grid;
+pub(crate) use kinetoscope_sensors::{ContactSensorCfg, ImuCfg, JointStateCfg, Sampled};
+pub(crate) use kinetoscope_sim::{EnvId, MjcfCfg, ObjectShape, SimulationManager};
+pub(crate) use kinetoscope_testkit::worlds::{RecordedWorld as World, look_at};
+pub(crate) use ndarray::{Array2, Axis, array};
 pub(crate) use serde_json::{Value, json};
-pub(crate) use sim::{EnvId, MjcfCfg, ObjectShape, SimulationManager};
 pub(crate) use std::path::{Path, PathBuf};
-pub(crate) use testkit::worlds::{RecordedWorld as World, look_at};
 
 pub(crate) use archives::{falling, member, numbers_of, rows};
+use kinetoscope_testkit::needs::{python_readers, read_json};
 use std::borrow::Borrow;
 use tempfile::TempDir;
-use testkit::needs::{python_readers, read_json};
 
 /// Steps between two images, and between two measurements of the IMU, of [`World`].
 pub(crate) const IMAGE_EVERY: u32 = World::IMAGE_EVERY;
@@ -57,7 +57,7 @@ pub(crate) fn names(folder: impl AsRef<Path>) -> Vec<String> {
 
 /// A simulation without objects.
 pub(crate) fn simulation(num_envs: usize) -> SimulationManager {
-    testkit::worlds::sim(testkit::worlds::cfg(num_envs, 2))
+    kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(num_envs, 2))
 }
 
 /// Records what `run` does.

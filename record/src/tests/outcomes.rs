@@ -1,10 +1,10 @@
 //! Rewards and ends of a task in datasets and other recordings.
 
 use super::*;
-use env::{ActionTerm, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, TerminationTerm};
+use kinetoscope_env::{ActionTerm, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, TerminationTerm};
+use kinetoscope_sim::{JointIndex, Outcome};
+use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use ndarray::Array1;
-use sim::{JointIndex, Outcome};
-use testkit::worlds::{mjcf_robot, passive};
 
 const ENVS: usize = 3;
 /// Physics steps in a step of the task.
@@ -19,7 +19,7 @@ fn task() -> Env {
         <joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1" mass="2"/></body></body></worldbody></mujoco>"#;
     let mut sim = simulation(ENVS);
     let cart = sim.add_robot(passive(mjcf_robot("cart", cart))).unwrap();
-    let push = env::Space::uniform(["slide"], [-1e5, 1e5]).unwrap();
+    let push = kinetoscope_env::Space::uniform(["slide"], [-1e5, 1e5]).unwrap();
     EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE) })
         .action(ActionTerm::new("push", push, move |sim, forces| Ok(sim.robot_mut(cart).set_qf(forces, None, None)?)))
         .observation(ObservationTerm::new("place", ["slide"], move |now| Ok(now.sim().robot(cart).get_qpos())))
@@ -177,7 +177,7 @@ fn own_task() {
     let (_folder, path) = scratch("run.npz");
     let mut sim = task().into_sim();
     let cfg = RecorderCfg::new(&path).with_topics([Topic::Outcomes]);
-    testkit::refusal::assert_error(sim.record(cfg.clone()), "NoTask", &["Env"]);
+    kinetoscope_testkit::refusal::assert_error(sim.record(cfg.clone()), "NoTask", &["Env"]);
     record(&mut sim, RecorderCfg::new(&path), |sim| sim.update(3));
     assert!(Recording::open(&path).unwrap().topic("task", None).is_err());
 

@@ -1,8 +1,8 @@
 //! Independent readers: NumPy, the `mcap` package with its decoder of ROS 2 messages, Pillow, PyAV with FFmpeg.
 
 use super::*;
-use sensors::camera::Lens;
-use sensors::camera::lens::{OpenCvFisheye, Panorama};
+use kinetoscope_sensors::camera::Lens;
+use kinetoscope_sensors::camera::lens::{OpenCvFisheye, Panorama};
 
 const STEPS: u32 = 4 * IMAGE_EVERY;
 
@@ -88,7 +88,7 @@ fn recovered_file() {
 /// A cube that stands, rays from above, cameras: the expected content of messages of points, forces and normals.
 fn sensed(path: &Path) -> Value {
     let mut sim = simulation(2);
-    sim.add_rigid_object(testkit::worlds::cube("cube", 0.4, 2.0, [0.1, 0.05, 0.2])).unwrap();
+    sim.add_rigid_object(kinetoscope_testkit::worlds::cube("cube", 0.4, 2.0, [0.1, 0.05, 0.2])).unwrap();
     let touch = sim.add_sensor("touch", ContactSensorCfg::of("cube")).unwrap();
     let pattern = Grid { resolution: 0.2, size: [0.6, 0.4], ..Grid::default() };
     let offset = Pose::translation(0.03, 0.0, 2.0);

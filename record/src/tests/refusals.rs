@@ -1,8 +1,8 @@
 //! Recordings that cannot be begun, and their errors.
 
 use super::*;
+use kinetoscope_testkit::refusal::assert_error;
 use std::fs;
-use testkit::refusal::assert_error;
 
 /// A name for each format that is a file.
 fn files() -> impl Iterator<Item = String> {
@@ -131,11 +131,11 @@ fn changed_scene() {
         let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
         world.step(0);
         // Another object changes nothing that is recorded.
-        testkit::worlds::add_ball(&mut world.sim, "ball", [0.0; 3]);
+        kinetoscope_testkit::worlds::add_ball(&mut world.sim, "ball", [0.0; 3]);
         world.step(1);
         assert!(!world.sim.observer(recorder).unwrap().has_failed());
         // A second robot has joints, which the sensor of all joints now measures.
-        world.sim.add_robot(testkit::worlds::sr5("other")).unwrap();
+        world.sim.add_robot(kinetoscope_testkit::worlds::sr5("other")).unwrap();
         world.step(2);
         let observer = world.sim.observer_mut(recorder).unwrap();
         assert!(observer.has_failed());

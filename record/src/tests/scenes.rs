@@ -1,9 +1,9 @@
 //! Scenes for viewers in recordings, read by the package `mcap` and held against MuJoCo's geoms.
 
 use super::*;
-use scene::{PoseF32, Shape};
-use sim::{Look, Property};
-use testkit::worlds::{fixed, object};
+use kinetoscope_scene::{PoseF32, Shape};
+use kinetoscope_sim::{Look, Property};
+use kinetoscope_testkit::worlds::{fixed, object};
 
 const STEPS: u32 = 30;
 

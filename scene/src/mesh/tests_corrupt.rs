@@ -65,7 +65,7 @@ fn feed(folder: &Path, name: &str, bytes: &[u8]) -> bool {
 
 #[test]
 fn truncated() {
-    let folder = testkit::urdf::Files::default();
+    let folder = kinetoscope_testkit::urdf::Files::default();
     folder.write("beside.mtl", "newmtl a\nKd 1 0 0\n");
     for (name, bytes) in small_files() {
         assert!(feed(folder.folder(), name, &bytes), "{name} itself must load");

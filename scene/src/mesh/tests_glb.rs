@@ -1,7 +1,7 @@
 //! glTF by small files with known answers.
 
+use kinetoscope_testkit::urdf::Files;
 use std::path::Path;
-use testkit::urdf::Files;
 
 use super::*;
 use crate::mesh::tests_robots::faces_up;

@@ -1,7 +1,7 @@
 //! OBJ and MTL, and what is written by [`crate::mesh::write_obj`].
 
+use kinetoscope_testkit::urdf::Files;
 use std::path::Path;
-use testkit::urdf::Files;
 
 use super::*;
 use crate::mesh::{MeshOptions, TextureSource, load, load_bytes, write_binary_stl, write_obj};

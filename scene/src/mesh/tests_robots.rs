@@ -1,8 +1,8 @@
 //! The vendors' meshes against numbers from an independent reader.
 #![allow(clippy::excessive_precision, reason = "numbers as the other reader printed them")]
 
+use kinetoscope_testkit::needs::{files_below, robots_dir};
 use std::path::PathBuf;
-use testkit::needs::{files_below, robots_dir};
 
 use super::builder::{cross, dot, sub};
 use super::{MeshMaterial, TextureSource, TriMesh, load};

@@ -12,9 +12,9 @@ use super::mounts::Mount;
 use super::sensor::Camera;
 use super::ticket::Ticket;
 use crate::error::SensorError;
+use kinetoscope_scene::RenderScene;
+use kinetoscope_scene::pose::to_row;
 use ndarray::{Array1, Array2, Array3};
-use scene::RenderScene;
-use scene::pose::to_row;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// What arrived last, in each row. All memory but that of pictures that are not shown is taken at construction.

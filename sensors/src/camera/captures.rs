@@ -2,8 +2,8 @@
 
 use super::opening::{Opening, parent_pose};
 use super::ticket::Ticket;
+use kinetoscope_scene::{Light, Marker, OwnScene, Pose, PoseF32, RenderScene, SceneState};
 use ndarray::{Array1, Array2, Axis};
-use scene::{Light, Marker, OwnScene, Pose, PoseF32, RenderScene, SceneState};
 
 /// What there was to see.
 #[derive(Clone, Debug)]

@@ -21,7 +21,7 @@ use crate::resolve::plan::{check_light, check_occlusion};
 use crate::schedule::Schedule;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
 use crate::visibility::RenderError;
-use scene::{Light, PoseF32};
+use kinetoscope_scene::{Light, PoseF32};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

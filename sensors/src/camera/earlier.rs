@@ -2,8 +2,8 @@
 
 use super::rasterizer::Before;
 use crate::visibility::View;
+use kinetoscope_scene::PoseF32;
 use ndarray::{Array2, Axis};
-use scene::PoseF32;
 
 /// What each row showed in the picture before the present one.
 #[derive(Clone, Debug)]

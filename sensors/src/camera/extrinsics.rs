@@ -1,10 +1,10 @@
 //! Where a camera is, and what its axes mean.
 
 use super::error::CameraError;
+use kinetoscope_scene::pose::to_row;
+use kinetoscope_scene::{Pose, PoseF32};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use ndarray::{Array2, ArrayView2, Axis};
-use scene::pose::to_row;
-use scene::{Pose, PoseF32};
 use serde::{Deserialize, Serialize};
 
 /// Which way the axes of a camera point.
@@ -68,7 +68,7 @@ pub enum Placement {
         #[serde(default)]
         pos: [f64; 3],
         /// How the camera's axes are turned in that frame.
-        #[serde(default, with = "scene::file_format::rotation")]
+        #[serde(default, with = "kinetoscope_scene::file_format::rotation")]
         rotation: UnitQuaternion<f64>,
     },
     /// By what it looks at: see [`look_at_pose`].
@@ -205,8 +205,8 @@ fn rigid_row(row: usize, numbers: [f64; 7]) -> Result<Pose, CameraError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use kinetoscope_scene::pose::{from_row, from_wxyz};
     use ndarray::array;
-    use scene::pose::{from_row, from_wxyz};
 
     fn same_rotation(a: &UnitQuaternion<f64>, b: &UnitQuaternion<f64>) -> bool {
         a.angle_to(b) < 1e-6

@@ -1,8 +1,8 @@
 //! What a camera shows of itself.
 
 use super::Optics;
+use kinetoscope_scene::{Marker, Pose};
 use nalgebra::Vector3;
-use scene::{Marker, Pose};
 
 /// Depth at which the arrows along the edges end \[m\].
 const DEPTH: f64 = 0.3;

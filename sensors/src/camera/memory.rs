@@ -9,8 +9,8 @@ use super::mounts::Mount;
 use super::ticket::{Stream, Ticket};
 use crate::delay::Queues;
 use crate::schedule::{Phases, Schedule};
+use kinetoscope_scene::RenderScene;
 use ndarray::Array2;
-use scene::RenderScene;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Captures on their way, and the last ones that have arrived. There is none of it for a camera without latency, history and

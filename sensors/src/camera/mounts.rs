@@ -5,9 +5,9 @@ use super::error::CameraError;
 use super::extrinsics::{CameraConvention, Poses, look_at_pose};
 use super::intrinsics::{Intrinsics, PixelIntrinsics};
 use crate::error::SensorError;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::to_row;
 use ndarray::Array2;
-use scene::Pose;
-use scene::pose::to_row;
 
 /// How one camera is placed, and its lens.
 #[derive(Clone, Copy, Debug)]

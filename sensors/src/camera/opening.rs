@@ -4,9 +4,9 @@ use super::cfg::CameraCfg;
 use super::error::CameraError;
 use super::shutter::Shutter;
 use crate::schedule::{Phases, Schedule};
+use kinetoscope_scene::pose::from_row;
+use kinetoscope_scene::{Pose, PoseF32, RenderScene, SceneState};
 use ndarray::{Array2, ArrayView1, Axis};
-use scene::pose::from_row;
-use scene::{Pose, PoseF32, RenderScene, SceneState};
 
 /// Steps may be a little shorter than the shutter's span, which is a sum: this part of one.
 const ROUNDING: f64 = 1e-6;

@@ -272,8 +272,8 @@ mod tests {
     use super::*;
     use crate::camera::{Channels, Frame};
     use crate::visibility::View;
-    use scene::shape::Sphere;
-    use scene::{Instance, Material, PoseF32, RenderScene};
+    use kinetoscope_scene::shape::Sphere;
+    use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene};
 
     /// A small image of many paths takes seconds, one of few is drawn before a thread has woken.
     #[test]

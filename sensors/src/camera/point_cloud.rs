@@ -4,8 +4,8 @@ use super::channel::{Depth, Distance};
 use super::intrinsics::PixelIntrinsics;
 use super::sensor::Camera;
 use crate::error::SensorError;
+use kinetoscope_scene::Pose;
 use ndarray::{Array2, Array3, ArrayView3, Axis};
-use scene::Pose;
 
 /// The frame that points are given in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -4,7 +4,7 @@ use super::channel::FrameMut;
 use super::rasterizer::{RasterCfg, Shot};
 use crate::error::SensorError;
 use crate::visibility::RenderError;
-use scene::pattern::closest;
+use kinetoscope_scene::pattern::closest;
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
@@ -35,14 +35,14 @@ pub enum Renderer {
     /// show the scene. All other channels as [`FastRayTraced`](Self::FastRayTraced) has them.
     ///
     /// - **Lamps** are as bright as the rasterizer draws them: a white matt surface that faces a lamp of colour L has the
-    ///   radiance L. A lamp with a [`radius`](scene::Light::radius) is a disc that faces what it lights: half of one on a
+    ///   radiance L. A lamp with a [`radius`](kinetoscope_scene::Light::radius) is a disc that faces what it lights: half of one on a
     ///   ceiling would be behind the ceiling, so keep it the radius below. Ambient light of lamps and of the headlight reaches
     ///   everything, as in the rasterizer. The headlight is shaded by nothing that is before the near plane. 16 lamps count,
     ///   the first, and the headlight.
-    /// - **The dome** is [`RenderScene::ambient`](scene::RenderScene::ambient): its sky's radiance from above the horizon, its
+    /// - **The dome** is [`RenderScene::ambient`](kinetoscope_scene::RenderScene::ambient): its sky's radiance from above the horizon, its
     ///   ground's from below. Where nothing is in the way a matt surface (specular 0) gets what the rasterizer gives it; below a glossy
     ///   layer it gets what the layer leaves. Cameras and mirrors see
-    ///   [`RenderScene::sky`](scene::RenderScene::sky) there instead.
+    ///   [`RenderScene::sky`](kinetoscope_scene::RenderScene::sky) there instead.
     /// - **Emission** of a material lights other things, with `max_bounces` 0 too. Points of what glows are looked for at every
     ///   surface: of finite planes (area lamps), boxes, spheres, cylinders and meshes. Capsules, ellipsoids, height fields and
     ///   infinite planes light as much, with more noise: paths meet them by chance.

@@ -9,7 +9,7 @@ use crate::resolve::plan::{Plan, Style};
 use crate::visibility::raster::tile::BLOCK;
 use crate::visibility::trace::motion::Motion;
 use crate::visibility::{RenderError, View};
-use scene::PoseF32;
+use kinetoscope_scene::PoseF32;
 
 /// What is needed for it; keeps its memory.
 #[derive(Clone, Debug, Default)]

@@ -25,9 +25,9 @@ use crate::schedule::{Phases, Schedule};
 use crate::sensor::{Requires, Sensor, SensorContext};
 use crate::summary;
 use crate::visibility::{RenderError, View};
+use kinetoscope_scene::pose::to_row;
+use kinetoscope_scene::{Marker, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use ndarray::{Array1, Array2, Array3, ArrayView1};
-use scene::pose::to_row;
-use scene::{Marker, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 

@@ -2,7 +2,7 @@
 
 use super::rasterizer::Shot;
 use crate::visibility::RenderError;
-use scene::PoseF32;
+use kinetoscope_scene::PoseF32;
 use serde::{Deserialize, Serialize};
 
 /// A shutter that takes time: each row of pixels is read `row_time` after the one above it, and each collects light for

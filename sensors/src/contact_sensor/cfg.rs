@@ -88,7 +88,7 @@ impl SensorCfg for ContactSensorCfg {
     fn build(&self, context: &SensorContext) -> Result<ContactSensor, SensorError> {
         let bodies = select(&self.bodies, &context.bodies, "body")?;
         if bodies.is_empty() {
-            let candidates = context.bodies.iter().take(scene::pattern::MAX_CANDIDATES).cloned().collect();
+            let candidates = context.bodies.iter().take(kinetoscope_scene::pattern::MAX_CANDIDATES).cloned().collect();
             return Err(SensorError::NoBodies { candidates });
         }
         if !(self.force_threshold >= 0.0 && self.force_threshold.is_finite()) {

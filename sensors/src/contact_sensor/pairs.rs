@@ -1,8 +1,8 @@
 //! From the list of contacts to forces per body and per pair.
 
+use kinetoscope_scene::SceneState;
+use kinetoscope_scene::state::Contact;
 use ndarray::Axis;
-use scene::SceneState;
-use scene::state::Contact;
 
 /// Which numbers a measurement has.
 #[derive(Clone, Copy, Debug)]

@@ -7,8 +7,8 @@ use crate::sampling::{Sampled, Sampler};
 use crate::select::matching;
 use crate::sensor::Sensor;
 use crate::summary;
+use kinetoscope_scene::{Marker, Pose, SceneState};
 use ndarray::{Array2, ArrayView2, ArrayView3, ArrayView4, ArrayView5};
-use scene::{Marker, Pose, SceneState};
 use std::fmt;
 
 /// Contact forces on bodies in all environments, world axes; [`Sampled`] has their stamps and counts.

@@ -4,9 +4,9 @@ use super::*;
 use crate::error::SensorError;
 use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use kinetoscope_scene::SceneState;
+use kinetoscope_scene::state::{Contact, Contacts};
 use ndarray::{Array3, array};
-use scene::SceneState;
-use scene::state::{Contact, Contacts};
 
 const NAMES: [&str; 4] = ["dog/base", "dog/LF_FOOT", "dog/RF_FOOT", "cube"];
 

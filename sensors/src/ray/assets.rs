@@ -2,8 +2,8 @@
 
 use super::shape::height_field::Field;
 use super::shape::mesh::{MeshBuilder, MeshTree};
-use scene::RenderMesh;
-use scene::shape::HeightField;
+use kinetoscope_scene::RenderMesh;
+use kinetoscope_scene::shape::HeightField;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// What ray casters have built, shared by all of a simulation: a second one over the same terrain builds nothing. What
@@ -59,11 +59,11 @@ fn find<T>(entries: &mut Vec<Entry<T>>, mesh: &Arc<RenderMesh>, build: impl FnOn
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scene::shape::Sphere;
+    use kinetoscope_scene::shape::Sphere;
 
     #[test]
     fn shared_assets() {
-        let ball = scene::Shape::from(Sphere { radius: 1.0 }).tessellate(8);
+        let ball = kinetoscope_scene::Shape::from(Sphere { radius: 1.0 }).tessellate(8);
         let [a, b] = [0, 1].map(|_| Arc::new(RenderMesh::new(&ball, RenderMesh::CREASE)));
         let assets = RayAssets::default();
         let tree = |mesh| assets.clone().with(|assets| assets.mesh(mesh));

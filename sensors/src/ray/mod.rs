@@ -51,12 +51,12 @@ impl Ray {
     /// The ray in the frame that `pose` maps from.
     #[inline(always)]
     #[cfg(test)]
-    fn seen_from(&self, pose: &scene::PoseF64) -> Self {
+    fn seen_from(&self, pose: &kinetoscope_scene::PoseF64) -> Self {
         Self { origin: pose.apply_inverse(self.origin), direction: pose.rotate_inverse(self.direction) }
     }
 
     /// The ray of this frame in the frame that `pose` maps to.
-    pub(crate) fn mapped_by(&self, pose: &scene::PoseF64) -> Self {
+    pub(crate) fn mapped_by(&self, pose: &kinetoscope_scene::PoseF64) -> Self {
         Self { origin: pose.apply(self.origin), direction: pose.rotate(self.direction) }
     }
 

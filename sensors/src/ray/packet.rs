@@ -3,7 +3,7 @@
 use super::Ray;
 use super::vector::V3;
 use crate::lanes::{D, D3, DOUBLES, Simd, axes, dot_3, load_3};
-use scene::PoseF64;
+use kinetoscope_scene::PoseF64;
 
 /// Rays of a packet.
 pub(crate) const WIDTH: usize = DOUBLES;

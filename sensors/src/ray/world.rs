@@ -7,7 +7,7 @@ use super::triangle::ShearPacket;
 use super::vector::{V3, dot};
 use super::{Ray, RayAssets};
 use crate::lanes::{D, Level, Simd, at_level};
-use scene::{PoseF64, RenderScene};
+use kinetoscope_scene::{PoseF64, RenderScene};
 use std::ops::Range;
 use std::sync::Arc;
 

@@ -12,7 +12,7 @@ use crate::ray::bvh::Stack;
 use crate::visibility::Projection;
 use crate::visibility::raster::tile::{BLOCK, Tile};
 use crate::visibility::raster::{Item, Painter};
-use scene::RenderScene;
+use kinetoscope_scene::RenderScene;
 use std::cell::RefCell;
 use std::ops::Range;
 

@@ -14,7 +14,7 @@ use crate::lanes::{
 use crate::visibility::Projection;
 use crate::visibility::raster::Placed;
 use crate::visibility::raster::tile::NOTHING;
-use scene::{PoseF32, RenderScene};
+use kinetoscope_scene::{PoseF32, RenderScene};
 
 /// What the pixels of a frame have in common.
 #[derive(Clone, Copy, Debug)]

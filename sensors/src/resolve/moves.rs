@@ -4,7 +4,7 @@ use crate::camera::rasterizer::{Before, Shot};
 use crate::camera::{LensRays, Optics, PixelIntrinsics};
 use crate::lanes::{F, LANES, M, Simd, V3, load, select, splat};
 use crate::visibility::{RenderError, View};
-use scene::PoseF32;
+use kinetoscope_scene::PoseF32;
 
 /// How instances moved against the camera; keeps its memory.
 #[derive(Clone, Debug, Default)]

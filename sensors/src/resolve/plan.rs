@@ -16,7 +16,7 @@ use crate::visibility::raster::tile::{BLOCK, SAMPLES};
 use crate::visibility::raster::{DrawList, Layer, Parts, level};
 use crate::visibility::trace::Tracer;
 use crate::visibility::{Projection, RenderError, View};
-use scene::{Instance, PoseF32};
+use kinetoscope_scene::{Instance, PoseF32};
 use std::cell::RefCell;
 
 /// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).

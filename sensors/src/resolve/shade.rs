@@ -5,7 +5,7 @@ use super::shadow_rays::ShadowRays;
 use super::surface::{Source, Surface};
 use super::{texture, tone};
 use crate::lanes::{F, M, Simd, V3, abs, max, min, root, select, splat};
-use scene::{Light, LightKind, LightSum, Material, RenderScene};
+use kinetoscope_scene::{Light, LightKind, LightSum, Material, RenderScene};
 
 /// The largest number of lamps that are drawn.
 pub(crate) const MAX_LIGHTS: usize = 16;

@@ -8,7 +8,7 @@ use crate::lanes::{LANES, M, Simd, V3, at_level, load, max, min, select, splat};
 use crate::visibility::Projection;
 use crate::visibility::raster::tile::{AREA, BLOCK, Tile};
 use crate::visibility::raster::{DrawList, Layer, Painter, Parts};
-use scene::{Instance, PoseF32, RenderScene, Shape};
+use kinetoscope_scene::{Instance, PoseF32, RenderScene, Shape};
 
 /// Depths from a lamp.
 #[derive(Clone, Debug)]

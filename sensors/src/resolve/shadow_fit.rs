@@ -2,7 +2,7 @@
 
 use super::shade::unit;
 use crate::visibility::Projection;
-use scene::{Instance, Light, LightKind, PoseF32, RenderScene, Shape};
+use kinetoscope_scene::{Instance, Light, LightKind, PoseF32, RenderScene, Shape};
 
 /// Texels around the covered part: for the taps around a point and for its offset along the normal.
 const ROOM: f32 = 6.0;

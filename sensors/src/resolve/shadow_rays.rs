@@ -9,7 +9,7 @@ use crate::ray::bvh::Stack;
 use crate::ray::vector::{along, dot, scale, sub, to_f64};
 use crate::visibility::trace::Tracer;
 use crate::visibility::trace::motion::NOW;
-use scene::{Light, LightKind};
+use kinetoscope_scene::{Light, LightKind};
 use std::cell::RefCell;
 
 /// Rays begin this part of the numbers that their origins are made of above the surface: positions are single precision.
@@ -140,8 +140,8 @@ mod tests {
     use crate::lanes::{Level, at_level};
     use crate::ray::RayAssets;
     use crate::visibility::raster::Layer;
-    use scene::shape::{Box, Plane, Sphere};
-    use scene::{Instance, Material, PoseF32, RenderScene, Shape};
+    use kinetoscope_scene::shape::{Box, Plane, Sphere};
+    use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, Shape};
 
     const UP: [f32; 3] = [0.0, 0.0, 1.0];
 

@@ -3,7 +3,7 @@
 use crate::lanes::{F, LANES, M, Simd, U, V3, load, max, min, select, splat};
 use crate::visibility::raster::Placed;
 use crate::visibility::{Projection, primitive};
-use scene::{Instance, PoseF32, RenderMesh, Shape};
+use kinetoscope_scene::{Instance, PoseF32, RenderMesh, Shape};
 
 /// The surface at sixteen samples.
 #[derive(Clone, Copy)]
@@ -32,9 +32,9 @@ pub(crate) struct Source<'a> {
     pub(crate) first_id: u32,
     /// Linear colour of the material.
     pub(crate) color: [f32; 3],
-    /// Texture coordinates per metre, see [`scene::RenderScene::texture_scales`].
+    /// Texture coordinates per metre, see [`kinetoscope_scene::RenderScene::texture_scales`].
     pub(crate) texture_scale: [f32; 3],
-    /// Texture coordinates at the origin, see [`scene::RenderScene::texture_offsets`].
+    /// Texture coordinates at the origin, see [`kinetoscope_scene::RenderScene::texture_offsets`].
     pub(crate) texture_offset: [f32; 2],
 }
 

@@ -4,8 +4,8 @@
 //! averaged in linear light.
 
 use crate::lanes::{F, LANES, M, Simd, V3, abs, halves, max, min, select, select_i, splat, splat_i};
-use scene::material::Level;
-use scene::{Texture, TextureKind};
+use kinetoscope_scene::material::Level;
+use kinetoscope_scene::{Texture, TextureKind};
 
 /// Adding and subtracting this rounds to an integer (of less than 2^22).
 const ROUND: f32 = 12_582_912.0;

@@ -76,7 +76,7 @@ pub(crate) fn decode_bytes<S: Simd>(x: F<S>) -> F<S> {
 
 /// A screen colour as linear light.
 pub(crate) fn decode(c: [f32; 3]) -> [f32; 3] {
-    c.map(scene::material::decode_srgb)
+    c.map(kinetoscope_scene::material::decode_srgb)
 }
 
 #[cfg(test)]

@@ -50,7 +50,7 @@ pub enum RenderError {
     #[error("the camera's pose is not a rigid transform: {pose:?}")]
     CameraPose {
         /// The pose.
-        pose: scene::PoseF32,
+        pose: kinetoscope_scene::PoseF32,
     },
     /// An instance's pose is not finite, or no rotation.
     #[error("the pose of instance {instance} is not a rigid transform: {pose:?}")]
@@ -58,7 +58,7 @@ pub enum RenderError {
         /// Which instance.
         instance: usize,
         /// The pose.
-        pose: scene::PoseF32,
+        pose: kinetoscope_scene::PoseF32,
     },
     /// There are not as many poses as instances.
     #[error("{found} poses for {expected} instances")]

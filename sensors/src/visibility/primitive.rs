@@ -4,7 +4,7 @@
 //! interval begins, or where it ends if the camera is inside.
 
 use crate::lanes::{F, M, Simd, U, V3, abs, max, min, select, select_u, splat, splat_u};
-use scene::Shape;
+use kinetoscope_scene::Shape;
 
 /// Where sixteen rays hit a shape.
 #[derive(Clone, Copy)]
@@ -14,7 +14,7 @@ pub(crate) struct PrimitiveHit<S: Simd> {
     pub(crate) t: F<S>,
     /// Outward normal, of any length.
     pub(crate) normal: V3<S>,
-    /// Which smooth part of the surface, smaller than [`scene::RenderScene::IDS_OF_PRIMITIVE`].
+    /// Which smooth part of the surface, smaller than [`kinetoscope_scene::RenderScene::IDS_OF_PRIMITIVE`].
     pub(crate) face: U<S>,
 }
 

@@ -2,7 +2,7 @@
 
 use super::View;
 use crate::lanes::{F, Simd, V3, splat};
-use scene::PoseF32;
+use kinetoscope_scene::PoseF32;
 
 /// A view with pinhole or parallel rays.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! A pinhole camera at a place.
 
 use super::RenderError;
-use scene::PoseF32;
+use kinetoscope_scene::PoseF32;
 
 /// A pinhole camera at a place, without distortion.
 ///

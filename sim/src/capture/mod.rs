@@ -9,9 +9,9 @@ mod motion;
 
 use crate::compile::{FreeIndex, PartIndex, RobotIndex};
 use crate::mj::{Data, EngineError, Model};
-use ::scene::Pose;
-use ::scene::state::Contact;
-use sensors::Requires;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::state::Contact;
+use kinetoscope_sensors::Requires;
 use std::sync::Arc;
 
 pub(crate) use motion::{body_velocity, link_pose};
@@ -51,7 +51,7 @@ pub(crate) struct Solved {
 }
 
 impl Plan {
-    /// The plan of a compiled scene; `carriers` is as in [`sensors::SensorContext`].
+    /// The plan of a compiled scene; `carriers` is as in [`kinetoscope_sensors::SensorContext`].
     pub(crate) fn new(
         model: &Model,
         robots: &[RobotIndex],

@@ -8,8 +8,8 @@
 use super::{Plan, Solved};
 use crate::mj::Data;
 use crate::objects::free_body::body_pose;
-use ::scene::Pose;
-use ::scene::pose::to_row;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;
 
 /// Pose of a link in the environment.

@@ -45,7 +45,7 @@ pub struct DriveCfg {
     /// Explicit actuator models by joint pattern or control part; joints that none matches are driven by `model`. They use
     /// the gains and limits below; a joint that the drive type leaves passive has none. Exports have MuJoCo's actuators with
     /// the same gains in their place.
-    #[serde(with = "scene::file_format::pairs")]
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub actuators: Vec<(String, ActuatorModel)>,
     /// Stiffness \[N m/rad or N/m\] (drive type `force`). Where unset, that of the position actuators in the file of an
     /// [MJCF robot](crate::RobotCfg::mjcf) (drive type `force` only), or else 10⁴.

@@ -2,8 +2,8 @@
 
 use super::DynamicsError;
 use crate::description::{JointKind, RobotDescription};
+use kinetoscope_scene::Pose;
 use nalgebra::{DVector, Translation3, Unit, UnitQuaternion, Vector3};
-use scene::Pose;
 
 /// What the positions of mimic joints are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

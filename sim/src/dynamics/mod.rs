@@ -28,8 +28,8 @@ pub use configuration::{Configuration, MimicPositions, planar_axes};
 use crate::description::{JointId, JointKind, LinkId, RobotDescription};
 use crate::inertia::RigidInertia;
 use configuration::{check_length, is_free};
+use kinetoscope_scene::Pose;
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion, Vector3};
-use scene::Pose;
 use spatial::{Force, Inertia, Motion};
 use std::ops::Range;
 

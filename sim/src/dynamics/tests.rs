@@ -4,20 +4,20 @@
 use super::*;
 use crate::description::{Inertial, Joint, Link, Mimic};
 use crate::source::Source;
+use kinetoscope_scene::pose::from_xyz_rpy;
+use kinetoscope_testkit::tolerance::{Tolerance, assert_vector};
 use nalgebra::{Matrix3, Unit};
-use scene::pose::from_xyz_rpy;
 use std::f64::consts::FRAC_PI_2;
-use testkit::tolerance::{Tolerance, assert_vector};
 
 const EARTH: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 const NO_GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
 
 /// Numbers, vectors and poses of one seed.
-struct Random(scene::Random);
+struct Random(kinetoscope_scene::Random);
 
 impl Random {
     fn new(seed: u64) -> Self {
-        Self(scene::Random::keyed(seed, 0, "robots"))
+        Self(kinetoscope_scene::Random::keyed(seed, 0, "robots"))
     }
 
     fn range(&mut self, low: f64, high: f64) -> f64 {

@@ -2,7 +2,7 @@
 
 use crate::compile::Simulation;
 use crate::env::Env;
-use scene::SceneState;
+use kinetoscope_scene::SceneState;
 
 /// The drives of all robots.
 fn drives(simulation: &Simulation) -> impl Iterator<Item = usize> {

@@ -7,10 +7,10 @@ mod solved;
 
 use crate::compile::{JointIndexing, Simulation};
 use crate::env::EnvStatus;
+use kinetoscope_scene::state::Contacts;
+use kinetoscope_scene::{Light, PoseF32, PoseF64, SceneState, VisibleState};
+use kinetoscope_sensors::{Phases, Requires};
 use ndarray::{Array2, Array3};
-use scene::state::Contacts;
-use scene::{Light, PoseF32, PoseF64, SceneState, VisibleState};
-use sensors::{Phases, Requires};
 
 /// What [`gather`] can fill so far.
 pub(crate) const AVAILABLE: Requires = Requires::POSES

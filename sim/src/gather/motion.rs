@@ -2,9 +2,9 @@
 
 use crate::capture::{body_velocity, link_pose};
 use crate::mj::Data;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::to_row;
 use ndarray::Array3;
-use scene::Pose;
-use scene::pose::to_row;
 
 /// Fills the poses of an environment.
 pub(super) fn poses(bodies: &[(usize, Pose)], data: &Data, env: usize, array: &mut Option<Array3<f64>>) {

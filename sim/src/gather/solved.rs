@@ -1,8 +1,8 @@
 //! What was captured inside the step: see [`crate::capture`].
 
 use crate::capture::Solved;
+use kinetoscope_scene::state::Contacts;
 use ndarray::{Array3, Axis};
-use scene::state::Contacts;
 
 /// Appends the contacts of environment `env`; those of the environments before it are there.
 pub(super) fn contacts(solved: &Solved, env: usize, contacts: &mut Option<Contacts>) {

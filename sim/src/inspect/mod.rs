@@ -24,8 +24,8 @@ use crate::pattern::{closest, list};
 use crate::shape_inertia::Hulls;
 use crate::source::Source;
 use crate::urdf::UrdfCfg;
+use kinetoscope_scene::mesh::load;
 use nalgebra::Vector3;
-use scene::mesh::load;
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 

@@ -6,9 +6,9 @@ use crate::diagnostic::Diagnostic;
 use crate::drive::plan::own_limit;
 use crate::dynamics::Kinematics;
 use crate::inertia::RigidInertia;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;
-use scene::Pose;
-use scene::pose::to_row;
 use serde::Serialize;
 
 /// A robot in one position.

@@ -12,7 +12,7 @@ use crate::objects::terrain::TerrainCfg;
 use crate::objects::weld::{WeldCfg, WeldId};
 use crate::pattern::in_every_env;
 use crate::sensor_list::SensorId;
-use sensors::{Sensor, SensorCfg};
+use kinetoscope_sensors::{Sensor, SensorCfg};
 use std::any::Any;
 use std::fmt::Debug;
 
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn names_of_types() {
-        assert_eq!(short_name::<sensors::Camera>(), "Camera");
+        assert_eq!(short_name::<kinetoscope_sensors::Camera>(), "Camera");
         assert_eq!(short_name::<Vec<std::cell::Cell<u8>>>(), "Vec<core::cell::Cell<u8>>");
     }
 }

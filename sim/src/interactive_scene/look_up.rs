@@ -13,7 +13,7 @@ use crate::objects::terrain::Terrain;
 use crate::objects::weld::{Weld, WeldId, WeldMut};
 use crate::pattern::{closest, in_every_env};
 use crate::sensor_list::SensorId;
-use sensors::Sensor;
+use kinetoscope_sensors::Sensor;
 
 impl InteractiveScene {
     fn find(&self, name: &str) -> Result<&Handle> {

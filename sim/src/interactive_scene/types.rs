@@ -9,7 +9,7 @@ use crate::objects::rigid_object::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
 use crate::objects::weld::WeldCfg;
-use sensors::{
+use kinetoscope_sensors::{
     ActuatorStateCfg, CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg,
     MujocoSensorCfg, RayCasterCameraCfg, RayCasterCfg, StereoCameraCfg,
 };

@@ -1,7 +1,7 @@
 //! What is to be reached, by which joints, and how hard to try.
 
 use super::KinematicsError;
-use scene::Pose;
+use kinetoscope_scene::Pose;
 use serde::{Deserialize, Serialize};
 
 /// A frame of a robot, and the joints that are there to move it.

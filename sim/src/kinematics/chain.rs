@@ -2,8 +2,8 @@
 
 use super::KinematicsError;
 use crate::description::{JointId, JointKind, LinkId, RobotDescription};
+use kinetoscope_scene::Pose;
 use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
-use scene::Pose;
 
 /// The joints between a base link and a frame, in a form that is quick to evaluate: fixed joints are folded into the
 /// poses between the others, and joints that mimic have become further places where the joint acts that they follow.

@@ -2,7 +2,7 @@
 
 use super::chain::{Chain, Follows, follows, moved};
 use crate::description::{JointKind, LinkId, RobotDescription};
-use scene::Pose;
+use kinetoscope_scene::Pose;
 
 impl Chain {
     /// Pose of the frame in the base link at `positions` \[rad or m\], one for each variable.

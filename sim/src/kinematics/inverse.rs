@@ -4,7 +4,7 @@ use super::cfg::IkCfg;
 use super::chain::Chain;
 use super::error::KinematicsError;
 use super::least_squares::{Descent, Point, Problem, Stop};
-use scene::{Pose, Random};
+use kinetoscope_scene::{Pose, Random};
 use std::f64::consts::{PI, TAU};
 
 /// Solves the inverse kinematics of a [`Chain`] again and again; a solve allocates nothing.
@@ -103,7 +103,7 @@ impl IkSolver {
             return Err(KinematicsError::NotFinite { what: "the target" });
         }
         if (target.rotation.norm() - 1.0).abs() > 1e-6 {
-            let value = format!("{:?}", scene::pose::to_wxyz(&target.rotation));
+            let value = format!("{:?}", kinetoscope_scene::pose::to_wxyz(&target.rotation));
             let expected = "it must be a quaternion of length 1";
             return Err(KinematicsError::OutOfRange { field: "the rotation of the target", value, expected });
         }

@@ -1,8 +1,8 @@
 //! How joints move frames.
 
 use super::chain::Chain;
+use kinetoscope_scene::Pose;
 use nalgebra::{Vector3, Vector6};
-use scene::Pose;
 
 impl Chain {
     /// The geometric Jacobian at `positions` \[rad or m\]: for each variable the velocity of the origin of the frame

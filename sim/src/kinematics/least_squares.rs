@@ -2,8 +2,8 @@
 
 use super::cfg::IkTask;
 use super::chain::Chain;
+use kinetoscope_scene::Pose;
 use nalgebra::{Matrix6, Vector6};
-use scene::Pose;
 
 /// What is to be reached.
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,7 @@
 //! picture. To lend to threads that stay, the compiler has to be told that the loan ends in time. It is here because no
 //! other folder may do that; it calls nothing of MuJoCo's.
 
-use sensors::{Crew, Threads};
+use kinetoscope_sensors::{Crew, Threads};
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -34,7 +34,7 @@ struct Shared {
 /// ```
 /// use sensors::camera::{ParallelRasterizer, RasterCfg};
 ///
-/// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 2).with_crew(sim::staying_crew());
+/// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 2).with_crew(crate::staying_crew());
 /// # assert_eq!(rasterizer.threads(), 2);
 /// ```
 pub fn staying_crew() -> Crew {

@@ -5,8 +5,8 @@
 use super::part::MjcfPart;
 use crate::light_cfg::LampKind;
 use crate::source::Source;
+use kinetoscope_scene::Pose;
 use nalgebra::{UnitQuaternion, Vector3};
-use scene::Pose;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

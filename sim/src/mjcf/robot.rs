@@ -9,9 +9,9 @@ use crate::description::{Geometry, JointId, JointKind, LinkId, RobotDescription}
 use crate::diagnostic::Diagnostic;
 use crate::drive::plan::JointPlan;
 use crate::source::Source;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::mesh::TriMesh;
 use nalgebra::Vector3;
-use scene::Pose;
-use scene::mesh::TriMesh;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -10,7 +10,7 @@ use crate::objects::mass_properties::MassProperties;
 use crate::objects::restitution;
 use crate::objects::rigid_object::{BodyType, RigidObjectData};
 use crate::objects::terrain::Terrain;
-use scene::Pose;
+use kinetoscope_scene::Pose;
 
 /// Contact bit of the ground and of objects.
 pub(crate) const WORLD_BIT: i32 = 1;

@@ -10,7 +10,7 @@ use super::part::PartLines;
 use crate::light_cfg::LampKind;
 use crate::mj::{CompileError, Target};
 use crate::source::Source;
-use scene::Pose;
+use kinetoscope_scene::Pose;
 use std::fmt::Write as _;
 
 /// Text and the source of each of its lines.

@@ -7,8 +7,8 @@ use crate::objects::robot::{Robot, RobotCfg, RobotMut, Role};
 use crate::objects::robot_file::MjcfFile;
 use crate::surface_cfg::SurfaceCfg;
 use crate::urdf::UrdfCfg;
-use ::scene::Pose;
-use ::scene::mesh::HullCfg;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::mesh::HullCfg;
 use serde::{Deserialize, Serialize};
 
 /// Configuration of an articulation.
@@ -30,10 +30,10 @@ pub struct ArticulationCfg {
     /// Whether the root link stands fixed in the environment. One that stands free can be put elsewhere in each environment.
     pub fix_base: bool,
     /// Pose of the root link in the environment; of an MJCF file that of the file's world.
-    #[serde(with = "scene::file_format::pose")]
+    #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
     /// Start positions by joint pattern \[rad or m\]; where none matches 0, or an MJCF file's `ref`.
-    #[serde(with = "scene::file_format::pairs")]
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
     /// Drives, such as the spring of a door that closes by itself (a stiffness, and a target at 0); `None` is passive. One
     /// that is given has the stiffness and damping of [`DriveCfg::default`], a robot's, where it names no others.
@@ -44,7 +44,7 @@ pub struct ArticulationCfg {
     /// MJCF file's own. It leaves joints passive.
     pub armature: Option<PerJoint>,
     /// What surfaces of links look like besides their colours, by link pattern. No link may be matched twice.
-    #[serde(with = "scene::file_format::pairs")]
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
     /// Whether its links collide with each other.
     pub self_collision: bool,

@@ -9,8 +9,8 @@ use crate::mj;
 use crate::objects::rows::{Rows, Table, distinct_envs};
 use crate::randomization::Property;
 use crate::sensor_list::SensorList;
-use ::scene::Pose;
-use ::scene::pose::{from_row, to_row};
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::{from_row, to_row};
 use nalgebra::Vector3;
 use ndarray::{Array2, ArrayView2};
 

@@ -8,11 +8,11 @@ use crate::manager::{EnvId, env_list};
 use crate::objects::free_body::body_pose;
 use crate::objects::robot::{Robot, check_pose, unknown};
 use crate::objects::rows::{Rows, Table};
-use ::scene::Pose;
-use ::scene::pose::to_row;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::to_row;
+use kinetoscope_sensors::camera::{CameraError, Poses};
 use nalgebra::Vector6;
 use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, AsArray, Ix2};
-use sensors::camera::{CameraError, Poses};
 
 /// What [`Robot::compute_ik`] found: one entry per environment that was asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -193,7 +193,7 @@ impl Robot<'_> {
     ///     ..Default::default()
     /// })?;
     /// # std::fs::remove_file(&urdf)?;
-    /// let hand = Tip::of_part("arm").with_tcp(scene::Pose::translation(0.3, 0.0, 0.0));
+    /// let hand = Tip::of_part("arm").with_tcp(kinetoscope_scene::Pose::translation(0.3, 0.0, 0.0));
     /// let robot = sim.robot(arm);
     /// let targets = robot.compute_fk(&array![[0.4, 0.9]], hand, None)?;
     /// let found = robot.compute_ik(&targets, hand, &IkCfg::default(), None, None)?;

@@ -4,7 +4,7 @@ use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::error::{Error, Result};
 use crate::objects::rigid_object::{BodyType, RigidObjectCfg};
 use crate::objects::shape::ObjectShape;
-use ::scene::mesh::{HullCache, HullCfg, MeshError, PiecesCfg, TriMesh, prisms};
+use kinetoscope_scene::mesh::{HullCache, HullCfg, MeshError, PiecesCfg, TriMesh, prisms};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;

@@ -15,10 +15,10 @@ use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::source::Source;
 use crate::surface_cfg::SurfaceCfg;
-use ::scene::Pose;
-use ::scene::pose::{from_row, to_row};
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::{from_row, to_row};
+use kinetoscope_sensors::EngineSensor;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
-use sensors::EngineSensor;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -55,11 +55,11 @@ pub struct MjcfCfg {
     /// The MJCF itself, which names no files; the file's content where `None`.
     pub text: Option<String>,
     /// Pose of the file's world in the environment.
-    #[serde(with = "scene::file_format::pose")]
+    #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
     /// What surfaces of bodies look like besides what the file says, by pattern of their names; `world` is what stands in the
     /// file's world. No body may be matched twice.
-    #[serde(with = "scene::file_format::pairs")]
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
     /// What kind of thing it is, for the table of mask ids; `mjcf` where `None`.
     pub semantic_class: Option<String>,

@@ -5,7 +5,7 @@ use super::shape::{ObjectShape, cone};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::error::{Error, Result};
 use crate::inertia::RigidInertia;
-use ::scene::mesh::{HullCache, Solid, TriMesh};
+use kinetoscope_scene::mesh::{HullCache, Solid, TriMesh};
 use nalgebra::Matrix3;
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ impl ObjectMesh {
             _ => return Ok(None),
         };
         let failed = |error| Error::ObjectMesh { object: uid.clone(), error: Box::new(error) };
-        let seen = ::scene::mesh::load(path).map_err(failed)?.scaled(scale);
+        let seen = kinetoscope_scene::mesh::load(path).map_err(failed)?.scaled(scale);
         let hull = HullCache::default_location().hull_of_file(path, scale, cfg).map_err(failed)?;
         let shapes = collision.shapes((uid.as_str(), path.as_path()), &seen, scale, cfg, diagnostics)?;
         let solid = match seen.solid() {

@@ -14,7 +14,7 @@ use crate::objects::free_body::{FreeBody, FreeBodyMut};
 use crate::objects::robot::check_pose;
 use crate::sensor_list::SensorList;
 use crate::surface_cfg::SurfaceCfg;
-use ::scene::Pose;
+use kinetoscope_scene::Pose;
 use ndarray::{Array2, AsArray, Ix2};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -78,7 +78,7 @@ pub struct RigidObjectCfg {
     /// counts on MuJoCo 2.2.2, their sum on 4.x.
     pub contact_margin: f64,
     /// Pose at the start, in the environment.
-    #[serde(with = "scene::file_format::pose")]
+    #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
     /// Colour and opacity, 0..=1; of a mesh, where its file gives none.
     pub rgba: [f64; 4],

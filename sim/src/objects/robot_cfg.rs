@@ -4,8 +4,8 @@ use super::robot_file::MjcfFile;
 use crate::drive::DriveCfg;
 use crate::surface_cfg::SurfaceCfg;
 use crate::urdf::UrdfCfg;
-use ::scene::Pose;
-use ::scene::mesh::HullCfg;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::mesh::HullCfg;
 use serde::{Deserialize, Serialize};
 
 /// Configuration of a robot.
@@ -71,7 +71,7 @@ pub struct RobotCfg {
     #[serde(default, deserialize_with = "crate::file_format::mjcf_file")]
     pub mjcf: Option<MjcfFile>,
     /// Named groups of joints: patterns that each match whole joint names.
-    #[serde(with = "scene::file_format::pairs")]
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub control_parts: Vec<(String, Vec<String>)>,
     /// Drive properties.
     pub drive: DriveCfg,
@@ -79,20 +79,20 @@ pub struct RobotCfg {
     pub fix_base: bool,
     /// Pose of the root link in the environment; of an MJCF file the pose of the file's world, in which the root link stands
     /// as the file says.
-    #[serde(with = "scene::file_format::pose")]
+    #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
     /// Height of the lowest collision point of the robot above the ground at z = 0 at the start \[m\]; then the z of
     /// [`init_pose`](Self::init_pose) is not used. `None` leaves the robot where `init_pose` puts it.
     pub ground_clearance: Option<f64>,
     /// Start positions by joint pattern or control part \[rad or m\]; where none matches 0, or an MJCF file's `ref`.
-    #[serde(with = "scene::file_format::pairs")]
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
     /// Masses that links carry besides their own, by link pattern \[kg\]: a point in the link's centre of mass; a ball of
     /// the density of water in the origin of a link without mass.
-    #[serde(with = "scene::file_format::pairs")]
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub payload: Vec<(String, f64)>,
     /// What surfaces of links look like besides their colours, by link pattern. No link may be matched twice.
-    #[serde(with = "scene::file_format::pairs")]
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
     /// Share of the range of each joint that is left between its soft limits, 0 to 1: see
     /// [`Robot::soft_qpos_limits`](crate::Robot::soft_qpos_limits).

@@ -10,8 +10,8 @@ use crate::objects::free_body::body_pose;
 use crate::objects::robot::{JointIndex, Robot, RobotMut};
 use crate::objects::rows::Numbers;
 use crate::pattern::{self, PatternError};
-use ::scene::Pose;
-use ::scene::pose::to_row;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;
 use ndarray::{Array1, Array2, Array3, AsArray, Axis, Ix2, concatenate};
 

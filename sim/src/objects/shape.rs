@@ -1,7 +1,7 @@
 //! Shapes of rigid objects: what they weigh and how they turn.
 
 use crate::mjcf::document::Shape;
-use ::scene::mesh::{HullCfg, TriMesh};
+use kinetoscope_scene::mesh::{HullCfg, TriMesh};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};

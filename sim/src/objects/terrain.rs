@@ -4,14 +4,14 @@ use crate::error::{Error, Result};
 use crate::objects::robot::check_pose;
 use crate::objects::terrain_file::{TerrainFile, rows};
 use crate::surface_cfg::SurfaceCfg;
-use ::scene::Pose;
-use ::scene::terrain::{MAX_POINTS, TerrainGenerator};
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::terrain::{MAX_POINTS, TerrainGenerator};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 /// Configuration of a terrain: a height field that stands fixed in every environment.
 ///
-/// Contact sensors count it as part of the `world`. [`scene::terrain`] has generators of heights. The ground plane at z = 0 hides what is below it: leave it out
+/// Contact sensors count it as part of the `world`. [`kinetoscope_scene::terrain`] has generators of heights. The ground plane at z = 0 hides what is below it: leave it out
 /// (`ground: None`) or lay the terrain over it.
 ///
 /// ```
@@ -45,7 +45,7 @@ pub struct TerrainCfg {
     /// How far the ground reaches below its lowest point \[m\]: what falls fast must not fall through.
     pub thickness: f64,
     /// Pose of the frame in the environment: in the middle of the field, at height 0.
-    #[serde(with = "scene::file_format::pose")]
+    #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
     /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three); the simulation's where `None`.
     pub friction: Option<[f64; 3]>,

@@ -2,8 +2,8 @@
 
 use super::terrain::TerrainCfg;
 use crate::surface_cfg::SurfaceCfg;
-use ::scene::Pose;
-use ::scene::terrain::TerrainGenerator;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::terrain::TerrainGenerator;
 use ndarray::Array2;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
@@ -18,7 +18,7 @@ pub(super) struct TerrainFile {
     heights: Heights,
     size: Option<[f64; 2]>,
     thickness: f64,
-    #[serde(with = "scene::file_format::pose")]
+    #[serde(with = "kinetoscope_scene::file_format::pose")]
     init_pose: Pose,
     friction: Option<[f64; 3]>,
     rgba: [f64; 4],

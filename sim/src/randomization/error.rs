@@ -1,7 +1,7 @@
 //! What can be wrong with properties of environments.
 
 use crate::pattern::PatternError;
-use scene::RenderSceneError;
+use kinetoscope_scene::RenderSceneError;
 
 /// A property cannot be drawn or set.
 #[derive(Debug, thiserror::Error)]

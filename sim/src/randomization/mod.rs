@@ -39,7 +39,7 @@ use crate::compile::Simulation;
 use crate::env::Env;
 use crate::error::Result;
 use crate::manager::{EnvId, SimulationManager, env_mask};
-use scene::{OwnScene, Random, RenderSceneError};
+use kinetoscope_scene::{OwnScene, Random, RenderSceneError};
 use std::sync::Arc;
 
 impl Simulation {

@@ -31,7 +31,7 @@ pub enum Property {
     /// Dry friction of a joint \[N m or N\], 1 number. A joint whose implicit drive takes the place of it has some only where
     /// [`DriveCfg::friction`](crate::DriveCfg::friction) or its file said so: 0 there makes room for more.
     DryFriction,
-    /// Gravity \[m/s²\], 3 numbers; the name is `gravity`. An [`Imu`](sensors::Imu) still adds the nominal one, unless its
+    /// Gravity \[m/s²\], 3 numbers; the name is `gravity`. An [`Imu`](kinetoscope_sensors::Imu) still adds the nominal one, unless its
     /// `gravity_bias` says otherwise.
     Gravity,
     /// Proportional gain of an implicit drive \[N m/rad or N/m\], 1 number; the name is the joint's.

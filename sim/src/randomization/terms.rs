@@ -4,7 +4,7 @@ use super::Property;
 use super::error::RandomizationError;
 use super::properties::Properties;
 use crate::pattern;
-use scene::Random;
+use kinetoscope_scene::Random;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -54,7 +54,7 @@ pub struct Term {
 ///     .with(Property::Friction, "cube|ground", Draw::Set([0.4, 1.0]))
 ///     .with(Property::Gravity, "gravity", Draw::Add([-0.1, 0.1]));
 /// sim.randomize(&randomization, None)?;
-/// let mass = sim.properties(sim::EnvId(3))?.get(Property::Mass, "cube")?[0];
+/// let mass = sim.properties(crate::EnvId(3))?.get(Property::Mass, "cube")?[0];
 /// assert!((1.6..2.4).contains(&mass));
 /// # Ok::<(), sim::Error>(())
 /// ```

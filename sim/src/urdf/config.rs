@@ -1,6 +1,6 @@
 //! Which URDF files make a robot, and how they are joined.
 
-use scene::Pose;
+use kinetoscope_scene::Pose;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -174,7 +174,7 @@ pub struct ComponentCfg {
     pub urdf: PathBuf,
     /// Pose of the root link in the frame of the link it is attached to; for a component without a parent, in the frame
     /// of the robot.
-    #[serde(default, with = "scene::file_format::pose")]
+    #[serde(default, with = "kinetoscope_scene::file_format::pose")]
     pub transform: Pose,
     /// The component it is attached to; by default the usual parent, if present.
     pub parent: Option<String>,

@@ -5,9 +5,9 @@ use super::link::{read_origin, read_pose};
 use super::number::{Reader, attribute, shortest};
 use crate::description::PartialInertial;
 use crate::diagnostic::DiagnosticKind;
+use kinetoscope_scene::pose::from_xyz_rpy;
 use nalgebra::Matrix3;
 use roxmltree::Node;
-use scene::pose::from_xyz_rpy;
 
 const EXAMPLE: &str = "an <inertial> needs <mass value=\"1\"/> and <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" \
                        iyz=\"0\" izz=\"0.01\"/>; without mass properties leave the whole <inertial> out";

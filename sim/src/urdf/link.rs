@@ -246,7 +246,7 @@ pub(super) fn read_pose(
         if largest < 1e-9 {
             return Err(reader.value(origin, "quat_xyzw", owner, "is zero, no rotation is \"0 0 0 1\""));
         }
-        rpy = Some(rpy_of(&scene::pose::from_xyzw(quaternion.map(|c| c / largest))));
+        rpy = Some(rpy_of(&kinetoscope_scene::pose::from_xyzw(quaternion.map(|c| c / largest))));
     }
     Ok(Some([xyz.unwrap_or_default(), rpy.unwrap_or_default()]))
 }

@@ -17,9 +17,9 @@ use crate::description::{Inertial, Joint, JointId, JointKind, JointLimit, Link, 
 use crate::diagnostic::Diagnostic;
 use crate::pattern::{MAX_CANDIDATES, closest};
 use crate::source::Source;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::from_xyz_rpy;
 use nalgebra::{Matrix3, Unit, Vector3};
-use scene::Pose;
-use scene::pose::from_xyz_rpy;
 
 /// A merged robot and what was repaired or unusual on the way.
 #[derive(Clone, Debug, PartialEq)]

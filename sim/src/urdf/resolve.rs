@@ -352,7 +352,7 @@ fn remark(path: &Path) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use testkit::urdf::Files;
+    use kinetoscope_testkit::urdf::Files;
 
     /// `ws/robot_description/{package.xml,urdf/robot.urdf,meshes/part one.stl}`, `ws/other folder` with the package
     /// `meshes_pkg`, `ws/install/share/installed`, `ws/ros/rospkg`.

@@ -6,8 +6,8 @@
 use super::number::{attribute, row, shortest};
 use super::rotation::rpy_of;
 use crate::description::{Geometry, Inertial, Joint, JointKind, Material, PartialInertial, RobotDescription};
+use kinetoscope_scene::Pose;
 use nalgebra::Matrix3;
-use scene::Pose;
 use std::path::Path;
 
 /// The robot as URDF, with absolute paths of meshes and textures.

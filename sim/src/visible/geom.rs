@@ -2,10 +2,10 @@
 
 use super::identity::GeomIdentity;
 use crate::mj::{self, Model};
-use scene::mesh::TriMesh;
-use scene::pose::from_row;
-use scene::shape::{Box as Cuboid, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
-use scene::{Instance, Material, RenderMesh, Shape};
+use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::pose::from_row;
+use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
+use kinetoscope_scene::{Instance, Material, RenderMesh, Shape};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -82,7 +82,8 @@ pub(super) fn of_site(model: &Model, site: usize, identity: &GeomIdentity, mater
     let body = model.site_bodyid()[site] as usize;
     let [x, y, z] = [0, 1, 2].map(|k| model.site_pos()[3 * site + k]);
     let [qw, qx, qy, qz] = [0, 1, 2, 3].map(|k| model.site_quat()[4 * site + k]);
-    let frame_from_instance = if body > 0 { from_row(&[x, y, z, qw, qx, qy, qz]) } else { scene::Pose::identity() };
+    let frame_from_instance =
+        if body > 0 { from_row(&[x, y, z, qw, qx, qy, qz]) } else { kinetoscope_scene::Pose::identity() };
     let GeomIdentity { mask_id, name, body: of } = identity.clone();
     Some(Instance {
         shape,

@@ -2,7 +2,7 @@
 
 use super::{missing, surface};
 use crate::mj::{Model, ObjectKind};
-use sensors::camera::Thing;
+use kinetoscope_sensors::camera::Thing;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -2,8 +2,8 @@
 
 use crate::light_cfg::{LampKind, LightCfg};
 use crate::mj::{Data, LightType, Model, TextureArrays, TextureType};
-use scene::material::decode_srgb;
-use scene::{Headlight, Hemisphere, Light, LightKind, LightSum, RenderScene, Sky};
+use kinetoscope_scene::material::decode_srgb;
+use kinetoscope_scene::{Headlight, Hemisphere, Light, LightKind, LightSum, RenderScene, Sky};
 
 /// The light of a scene besides its lamps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

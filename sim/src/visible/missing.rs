@@ -54,7 +54,7 @@ fn message([one, many]: [&str; 2], names: &[String]) -> Option<String> {
 mod tests {
     use super::super::Visible;
     use crate::mj::{self, Data};
-    use scene::{Hemisphere, LightSum, PoseF32, Sky};
+    use kinetoscope_scene::{Hemisphere, LightSum, PoseF32, Sky};
 
     const SCENE: &str = r#"<mujoco><worldbody>
         <light pos="0 0 3"/>

@@ -27,9 +27,9 @@ use crate::mj::{Data, Model, ObjectKind};
 use crate::mjcf::scene::light_name;
 use crate::simulation_cfg::GroundCfg;
 use crate::surface_cfg::SurfaceCfg;
-use scene::pose::from_row;
-use scene::shape::Plane;
-use scene::{Hemisphere, Instance, Light, Material, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture};
+use kinetoscope_scene::pose::from_row;
+use kinetoscope_scene::shape::Plane;
+use kinetoscope_scene::{Hemisphere, Instance, Light, Material, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -181,7 +181,7 @@ impl Visible {
     }
 
     /// This, with other instances in the place of its own, each moving with no geom. The lamps stay.
-    fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, scene::RenderSceneError> {
+    fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, kinetoscope_scene::RenderSceneError> {
         let scene = Arc::new(self.scene.with_instances(instances)?);
         Ok(Self { scene, anchors: Vec::new(), ids: Arc::clone(&self.ids), left_out: self.left_out.clone() })
     }

@@ -3,7 +3,7 @@
 use super::Visible;
 use crate::contents::GROUND_MASK_ID;
 use crate::error::{Error, Result};
-use scene::{Marker, PoseF32, RenderScene};
+use kinetoscope_scene::{Marker, PoseF32, RenderScene};
 
 /// An environment in the overview.
 pub(super) struct Place<'a> {

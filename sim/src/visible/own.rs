@@ -2,7 +2,7 @@
 
 use super::{Anchor, Visible, geom};
 use crate::mj::Model;
-use scene::{Material, OwnScene, RenderSceneError};
+use kinetoscope_scene::{Material, OwnScene, RenderSceneError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

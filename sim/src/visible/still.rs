@@ -5,11 +5,11 @@ use crate::error::{Error, Result};
 use crate::manager::{EnvId, SimulationManager, env_list, env_mask};
 use crate::mj::{self, Data, Model, ObjectKind};
 use crate::pattern;
+use kinetoscope_scene::framing::{FILL, Framing, Placed};
+use kinetoscope_scene::{Light, Marker, Pose, PoseF32};
+use kinetoscope_sensors::camera::Shot;
+use kinetoscope_sensors::visibility::View;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use scene::framing::{FILL, Framing, Placed};
-use scene::{Light, Marker, Pose, PoseF32};
-use sensors::camera::Shot;
-use sensors::visibility::View;
 use std::path::Path;
 use std::sync::Arc;
 

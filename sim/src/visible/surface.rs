@@ -1,7 +1,7 @@
 //! Materials and textures of MuJoCo models.
 
 use crate::mj::{self, Model, TextureType};
-use scene::{Material, Texture, TextureKind};
+use kinetoscope_scene::{Material, Texture, TextureKind};
 use std::sync::Arc;
 
 /// The materials of a model.

@@ -7,9 +7,9 @@ use crate::mjcf::robot::MeshKey;
 use crate::objects::rigid_object::RigidObjectData;
 use crate::objects::robot::RobotData;
 use crate::source::Source;
-use scene::mesh::{MeshMaterial, TextureSource, TriMesh};
-use scene::shape::{Box as Cuboid, Capsule, Cylinder, Mesh, Sphere};
-use scene::{Material, RenderMesh, Texture, TextureKind};
+use kinetoscope_scene::mesh::{MeshMaterial, TextureSource, TriMesh};
+use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Mesh, Sphere};
+use kinetoscope_scene::{Material, RenderMesh, Texture, TextureKind};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub(crate) struct VisualCache {
 /// A part of a mesh file, and its material where the file has one.
 #[derive(Clone, Debug)]
 struct MeshPart {
-    shape: scene::Shape,
+    shape: kinetoscope_scene::Shape,
     material: Option<Material>,
 }
 
@@ -51,7 +51,7 @@ impl VisualCache {
     }
 
     /// An environment does not look as its properties say.
-    pub(crate) fn say_look(&mut self, env: usize, error: &scene::RenderSceneError) {
+    pub(crate) fn say_look(&mut self, env: usize, error: &kinetoscope_scene::RenderSceneError) {
         let message = format!("environment {env} is drawn with nominal sizes and colours: its own cannot be: {error}");
         self.diagnostics.push(Diagnostic::new(DiagnosticKind::LookInvalid, None, message));
     }
@@ -84,7 +84,7 @@ impl VisualCache {
             let base = Material::default();
             Material { rgba: rgba.unwrap_or(base.rgba), texture, ..base }
         };
-        let one = |shape: scene::Shape| vec![Part { shape, material: plain() }];
+        let one = |shape: kinetoscope_scene::Shape| vec![Part { shape, material: plain() }];
         match &visual.geometry {
             Geometry::Box { size } => one(Cuboid { half: [0, 1, 2].map(|i| (size[i] / 2.0) as f32) }.into()),
             Geometry::Cylinder { radius, length } => {
@@ -136,7 +136,7 @@ impl VisualCache {
 
     /// The parts of a mesh file, one for each material.
     fn load(&mut self, of: &Of, path: &Path, scale: [f64; 3]) -> Vec<MeshPart> {
-        match scene::mesh::load(path) {
+        match kinetoscope_scene::mesh::load(path) {
             Ok(mesh) => self.mesh_parts(of, &mesh.scaled(scale)),
             // A warning about it was given when the robot was read.
             Err(_) if !path.exists() => Vec::new(),
@@ -153,7 +153,7 @@ impl VisualCache {
 
     fn mesh_parts(&mut self, of: &Of, mesh: &TriMesh) -> Vec<MeshPart> {
         let whole = mesh.parts.len() == 1;
-        let part = |part: &scene::mesh::MeshPart| {
+        let part = |part: &kinetoscope_scene::mesh::MeshPart| {
             let material = part.material.and_then(|m| mesh.materials.get(m));
             let triangles = if whole {
                 RenderMesh::new(mesh, RenderMesh::CREASE)

@@ -1,8 +1,8 @@
 //! A solve allocates nothing.
 
-use scene::{Pose, Random};
-use sim::kinematics::{Chain, IkCfg, IkSolver, Posture};
-use sim::urdf::{UrdfCfg, assemble};
+use kinetoscope_scene::{Pose, Random};
+use kinetoscope_sim::kinematics::{Chain, IkCfg, IkSolver, Posture};
+use kinetoscope_sim::urdf::{UrdfCfg, assemble};
 
 #[test]
 fn solve() {

@@ -6,7 +6,7 @@ mod measuring;
 mod rendering;
 mod update;
 
-use sensors::{ScopedThreads, Threads};
+use kinetoscope_sensors::{ScopedThreads, Threads};
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -1,19 +1,19 @@
 //! Sensors allocate nothing after they were built, whatever is configured.
 
 use crate::{Counting, allocations, assert_settles};
-use ndarray::{Array2, Array3};
-use scene::shape::{Plane, Sphere};
-use scene::state::{Contact, Contacts};
-use scene::{Instance, Light, Material, PoseF32, PoseF64, RenderScene, SceneState, VisibleState};
-use sensors::camera::channel::{Color, Depth};
-use sensors::camera::{Channels, Extrinsics, Imperfections, Intrinsics, Placement};
-use sensors::ray::HitTargets;
-use sensors::ray::pattern::Lidar;
-use sensors::{
+use kinetoscope_scene::shape::{Plane, Sphere};
+use kinetoscope_scene::state::{Contact, Contacts};
+use kinetoscope_scene::{Instance, Light, Material, PoseF32, PoseF64, RenderScene, SceneState, VisibleState};
+use kinetoscope_sensors::camera::channel::{Color, Depth};
+use kinetoscope_sensors::camera::{Channels, Extrinsics, Imperfections, Intrinsics, Placement};
+use kinetoscope_sensors::ray::HitTargets;
+use kinetoscope_sensors::ray::pattern::Lidar;
+use kinetoscope_sensors::{
     CameraCfg, ContactSensorCfg, Crew, EngineSensor, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg,
     NoiseCfg, RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, Schedule, Sensor, SensorCfg, SensorContext,
     SensorError, SensorSlot, TargetFrameCfg,
 };
+use ndarray::{Array2, Array3};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -234,7 +234,7 @@ fn rays() {
     let (context, states) = balls(6, 20);
     let lidar = Lidar { channels: 16, ..Lidar::default() };
     let everything = HitTargets::Everything { exclude_parent: false };
-    let offset = scene::Pose::translation(0.0, 0.0, 1.0);
+    let offset = kinetoscope_scene::Pose::translation(0.0, 0.0, 1.0);
     let caster =
         RayCasterCfg { pattern: lidar.into(), targets: everything, offset, max_distance: 50.0, ..Default::default() };
     let intrinsics = Intrinsics::Pixels { fx: 50.0, fy: 60.0, cx: 60.0, cy: 40.0 };

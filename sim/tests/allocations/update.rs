@@ -1,13 +1,13 @@
 //! After the first steps, stepping and measuring allocates nothing on the calling thread.
 
 use crate::{allocations, assert_settles};
-use sensors::camera::{CameraCfg, Extrinsics, Placement};
-use sensors::ray::pattern::Grid;
-use sensors::{
+use kinetoscope_sensors::camera::{CameraCfg, Extrinsics, Placement};
+use kinetoscope_sensors::ray::pattern::Grid;
+use kinetoscope_sensors::{
     ActuatorStateCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
     RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, SensorCfg, TargetFrameCfg,
 };
-use sim::{MjcfCfg, ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+use kinetoscope_sim::{MjcfCfg, ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
 
 /// A pendulum with sensors of its own.
 const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8"><joint name="hinge" axis="0 1 0"/>
@@ -19,7 +19,7 @@ fn world(threads: usize) -> SimulationManager {
     let mut sim =
         SimulationManager::new(SimulationManagerCfg { num_envs: 4, threads: Some(threads), ..Default::default() })
             .unwrap();
-    let at = |x: f64, z: f64| scene::Pose::translation(x, 0.0, z);
+    let at = |x: f64, z: f64| kinetoscope_scene::Pose::translation(x, 0.0, z);
     let box_ = RigidObjectCfg { uid: "box".into(), init_pose: at(0.0, 0.05), ..Default::default() };
     let shape = ObjectShape::Sphere { radius: 0.1 };
     let ball = RigidObjectCfg { uid: "ball".into(), init_pose: at(0.5, 0.1), shape, ..Default::default() };
@@ -47,7 +47,7 @@ fn steps() {
         assert_eq!(of_steps(&mut sim), 0, "{threads} threads, sensors of numbers");
         // 10201 rays in each environment, and a camera of 3072: enough for all threads.
         let grid = Grid { resolution: 0.02, size: [2.0; 2], ..Grid::default() };
-        let offset = scene::Pose::translation(0.0, 0.0, 2.0);
+        let offset = kinetoscope_scene::Pose::translation(0.0, 0.0, 2.0);
         let scanner = RayCasterCfg { offset, pattern: grid.into(), ..RayCasterCfg::default() };
         assert!(scanner.requires().contains(Requires::INSTANCES));
         sim.add_sensor("scanner", scanner).unwrap();
@@ -104,19 +104,21 @@ fn images() {
 #[test]
 fn actuator_models() {
     let (mut urdf, mut actuators) = (String::from("<link name=\"base\"/>"), Vec::new());
-    for (i, model) in sim::ActuatorModel::examples().into_iter().enumerate() {
+    for (i, model) in kinetoscope_sim::ActuatorModel::examples().into_iter().enumerate() {
         let (link, joint) = (format!("l{i}"), format!("j{i}"));
-        urdf += &testkit::urdf::link(&link, 1.0, 0.1, [0.0; 3], "");
-        urdf += &testkit::urdf::joint(&joint, "continuous", ["base", &link], [0.0; 3], "0 1 0", "");
+        urdf += &kinetoscope_testkit::urdf::link(&link, 1.0, 0.1, [0.0; 3], "");
+        urdf += &kinetoscope_testkit::urdf::joint(&joint, "continuous", ["base", &link], [0.0; 3], "0 1 0", "");
         let model = match model {
-            sim::ActuatorModel::DelayedPd(_) => sim::DelayedPd { delay: 3, max_delay: 0 }.into(),
+            kinetoscope_sim::ActuatorModel::DelayedPd(_) => {
+                kinetoscope_sim::DelayedPd { delay: 3, max_delay: 0 }.into()
+            }
             other => other,
         };
         actuators.push((joint, model));
     }
-    let files = testkit::urdf::Files::default();
-    let path = files.write("robot.urdf", testkit::urdf::robot("r", &urdf));
-    let drive = sim::DriveCfg {
+    let files = kinetoscope_testkit::urdf::Files::default();
+    let path = files.write("robot.urdf", kinetoscope_testkit::urdf::robot("r", &urdf));
+    let drive = kinetoscope_sim::DriveCfg {
         actuators,
         stiffness: 10.0.into(),
         damping: 1.0.into(),
@@ -125,6 +127,11 @@ fn actuator_models() {
         ..Default::default()
     };
     let mut sim = world(1);
-    sim.add_robot(sim::RobotCfg { urdf: sim::UrdfCfg::single(&path), drive, ..Default::default() }).unwrap();
+    sim.add_robot(kinetoscope_sim::RobotCfg {
+        urdf: kinetoscope_sim::UrdfCfg::single(&path),
+        drive,
+        ..Default::default()
+    })
+    .unwrap();
     assert_eq!(of_steps(&mut sim), 0);
 }

@@ -3,8 +3,8 @@
 use super::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
-use testkit::refusal::{assert_error, assert_refused_unchanged};
-use testkit::worlds::{add_ball, errors, object, pose_in};
+use kinetoscope_testkit::refusal::{assert_error, assert_refused_unchanged};
+use kinetoscope_testkit::worlds::{add_ball, errors, object, pose_in};
 
 #[test]
 fn free_base() {

@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use testkit::refusal::assert_error;
+use kinetoscope_testkit::refusal::assert_error;
 
 /// [`door`] as MJCF, with an actuator that says how it could be driven; its limits are in radians.
 const LEAF: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="frame">

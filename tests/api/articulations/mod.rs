@@ -5,8 +5,8 @@ mod mjcf;
 mod motion;
 
 use kinetoscope::prelude::*;
-use testkit::urdf::Files;
-use testkit::worlds::text_robot;
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::text_robot;
 
 /// Short steps: closed forms in continuous time are compared with them.
 const DT: f64 = 1e-3;
@@ -21,7 +21,7 @@ fn cabinet() -> ArticulationCfg {
 }
 
 fn sim(num_envs: usize) -> SimulationManager {
-    testkit::worlds::sim(SimulationManagerCfg { num_envs, physics_dt: DT, ..Default::default() })
+    kinetoscope_testkit::worlds::sim(SimulationManagerCfg { num_envs, physics_dt: DT, ..Default::default() })
 }
 
 /// A simulation with one articulation.

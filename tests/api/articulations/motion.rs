@@ -4,8 +4,8 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use testkit::tolerance::{Tolerance, assert_number};
-use testkit::worlds::no_drive;
+use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
+use kinetoscope_testkit::worlds::no_drive;
 
 const MASS: f64 = 2.0;
 const DAMPING: f64 = 8.0;
@@ -100,7 +100,8 @@ fn targets_and_states() {
 #[test]
 fn sprung_door() {
     let files = Files::default();
-    let (mut sim, id) = with(2, ArticulationCfg { drive: Some(testkit::worlds::gains(5.0, 8.0)), ..door(&files) });
+    let (mut sim, id) =
+        with(2, ArticulationCfg { drive: Some(kinetoscope_testkit::worlds::gains(5.0, 8.0)), ..door(&files) });
     sim.articulation_mut(id).write_qpos(&array![[1.0], [1.0]], None, None).unwrap();
     sim.articulation_mut(id).set_qpos(&array![[0.0], [0.0]], None, None).unwrap();
     sim.articulation_mut(id).set_qf(&array![[0.0], [2.5]], None, None).unwrap();

@@ -5,8 +5,8 @@ use super::support::{add_ball, add_walker, all_bits, cfg, most_contacts, row, si
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{Data, compile};
-use testkit::urdf::{Files, joint, limit, link, robot};
-use testkit::worlds::{arm_and_hand, text_robot};
+use kinetoscope_testkit::urdf::{Files, joint, limit, link, robot};
+use kinetoscope_testkit::worlds::{arm_and_hand, text_robot};
 
 /// The arm reaches into the ground, the walker falls on it and kicks, each environment with targets of its own.
 fn scene(num_envs: usize, threads: usize) -> SimulationManager {

@@ -7,11 +7,11 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::drive::table::DriveTable;
 use kinetoscope::sim::env::{Env, EnvStatus};
 use kinetoscope::sim::mj::{Asset, Data, Model, TARGET, Target, compile, compile_file};
+use kinetoscope_testkit::process::{is_child, run, text};
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::arm_and_hand;
 use std::path::Path;
 use std::sync::Arc;
-use testkit::process::{is_child, run, text};
-use testkit::urdf::Files;
-use testkit::worlds::arm_and_hand;
 
 /// Boxes in a heap, with next to no memory for the solver: MuJoCo stops in the middle of a step, with `mju_error`.
 fn starved() -> Model {

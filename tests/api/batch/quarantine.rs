@@ -6,8 +6,8 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::env::{Divergence, EnvStatus, with_small_buffers};
 use kinetoscope::sim::mj::{Data, Warning};
+use kinetoscope_testkit::urdf::Files;
 use std::sync::Arc;
-use testkit::urdf::Files;
 
 type BlowUp = (&'static str, fn(&mut Data), Warning);
 

@@ -5,8 +5,8 @@ use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::env::Env;
 use kinetoscope::sim::mj::ObjectKind;
-use testkit::urdf::Files;
-use testkit::worlds::{arm_and_hand, fixed, gains, no_drive, object};
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::{arm_and_hand, fixed, gains, no_drive, object};
 
 /// Bits of the time and of position, velocity, warm start of all joints whose name starts with `prefix`, in order.
 fn bits_of_robot(env: &Env, prefix: &str) -> Vec<u64> {

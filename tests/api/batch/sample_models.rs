@@ -3,8 +3,8 @@
 use kinetoscope::sim::drive::table::DriveTable;
 use kinetoscope::sim::env::{Env, EnvStatus};
 use kinetoscope::sim::mj::compile_file;
+use kinetoscope_testkit::needs::{files_below, sample_model};
 use std::sync::Arc;
-use testkit::needs::{files_below, sample_model};
 
 #[test]
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]

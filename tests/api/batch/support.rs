@@ -5,13 +5,13 @@ use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::env::Env;
 use kinetoscope::sim::mj::Model;
-use testkit::urdf::{Files, collision, joint, limit, link, robot};
-pub(crate) use testkit::worlds::{all_bits, bits_of, cfg, row, sim};
+use kinetoscope_testkit::urdf::{Files, collision, joint, limit, link, robot};
+pub(crate) use kinetoscope_testkit::worlds::{all_bits, bits_of, cfg, row, sim};
 
 /// Adds a robot of URDF elements, with a base that moves.
 pub(crate) fn add_free(sim: &mut SimulationManager, uid: &str, elements: &str, at: [f64; 3], rpy: [f64; 3]) -> RobotId {
     let (files, init_pose) = (Files::default(), from_xyz_rpy(at, rpy));
-    let cfg = testkit::worlds::text_robot(&files, uid, &robot(uid, elements));
+    let cfg = kinetoscope_testkit::worlds::text_robot(&files, uid, &robot(uid, elements));
     sim.add_robot(RobotCfg { fix_base: false, init_pose, ..cfg }).unwrap()
 }
 
@@ -62,7 +62,11 @@ pub(crate) fn wheel(files: &Files) -> RobotCfg {
     let spin = joint("spin", "continuous", ["post", "disc"], [0.0; 3], "0 1 0", "");
     let urdf = robot("wheel", &format!("<link name=\"post\"/>{spin}{}", link("disc", 1.0, 0.01, [0.1, 0.0, 0.0], "")));
     let init_pose = from_xyz_rpy([1.0; 3], [0.3, 0.2, 0.1]);
-    RobotCfg { init_pose, init_qpos: vec![("spin".into(), 0.7)], ..testkit::worlds::text_robot(files, "wheel", &urdf) }
+    RobotCfg {
+        init_pose,
+        init_qpos: vec![("spin".into(), 0.7)],
+        ..kinetoscope_testkit::worlds::text_robot(files, "wheel", &urdf)
+    }
 }
 
 /// The largest number of contacts of any environment.

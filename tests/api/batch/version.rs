@@ -1,9 +1,9 @@
 //! A library of another version than the headers is a clear error: tried with a library that is nothing but a version.
 
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::process::{is_child, run, text};
 use std::path::Path;
 use std::process::Command;
-use testkit::process::{is_child, run, text};
 
 /// Output of a program that must be there and succeed.
 fn tool(program: &str, args: &[&str]) -> String {

@@ -13,10 +13,10 @@ use kinetoscope::sim::drive::actuator::{Scheme, stable_timestep_of, warn_if_unst
 use kinetoscope::sim::drive::plan::{PlanError, effective_inertias, plan};
 use kinetoscope::sim::env::Env;
 use kinetoscope::sim::mj::Buffers;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::worlds::add_ball;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use testkit::refusal::assert_error;
-use testkit::worlds::add_ball;
 
 const M: f64 = 0.2;
 

@@ -8,8 +8,8 @@
 use crate::drives::worlds::*;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj;
-use testkit::urdf::Files;
-use testkit::worlds;
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds;
 
 struct Export {
     files: Files,

@@ -7,7 +7,7 @@
 //! twice that is its tolerance. Control: MuJoCo's default d = 0.9 and b = 105 / s creep out of the band within a second.
 //!
 //! A soft drive (kp 40, kd 5) under gravity sags by exactly tau_g / kp: at rest the law reads kp (q* - q) = tau_g(q), with
-//! tau_g from `sim::dynamics`, which has no drives. The slowest mode decays with kd / kp = 0.125 s: after 10 s, exp(-80) of
+//! tau_g from `kinetoscope_sim::dynamics`, which has no drives. The slowest mode decays with kd / kp = 0.125 s: after 10 s, exp(-80) of
 //! it is left. Tolerance 1e-9 rad: rounding of positions through kp. A 1 % change of kp would move the joints by 2 mrad.
 //! Control: the same row with MuJoCo's own stiffness (only its reference acceleration rewritten) is a rigid drive that hangs
 //! less than a tenth as low.
@@ -118,8 +118,9 @@ fn rows_of_one_list() {
         Joint::wheel("d", M).rough(0.5).effort(1.5),
     ];
     let mut world = world(&joints, gains(kp, kd), weightless());
-    let files = testkit::urdf::Files::default();
-    let second = testkit::worlds::text_robot(&files, "second", &urdf(&[Joint::wheel("free", M).rough(0.3)]));
+    let files = kinetoscope_testkit::urdf::Files::default();
+    let second =
+        kinetoscope_testkit::worlds::text_robot(&files, "second", &urdf(&[Joint::wheel("free", M).rough(0.3)]));
     world.sim.add_robot(RobotCfg { drive: no_drive(), ..second }).unwrap_or_else(|e| panic!("{e}"));
     let mut env = world.env();
     let last = env.data().qvel().len() - 1;

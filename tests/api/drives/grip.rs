@@ -13,7 +13,7 @@ use crate::drives::worlds::*;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::{Cone, mj};
-use testkit::urdf::{Files, collision, robot};
+use kinetoscope_testkit::urdf::{Files, collision, robot};
 
 const KP: f64 = 1e3;
 const KD: f64 = 1e2;
@@ -37,7 +37,7 @@ fn scene(drive: DriveCfg, cone: Cone) -> World {
     let shape = collision("<box size=\"0.1 0.04 0.1\"/>", [0.0; 3]);
     let block = robot("block", &format!("<link name=\"block\">{shape}</link>"));
     let (files, init_pose) = (Files::default(), from_xyz_rpy([0.0, -0.0556, 0.0846], [FACE, 0.0, 0.0]));
-    let block = RobotCfg { init_pose, ..testkit::worlds::text_robot(&files, "block", &block) };
+    let block = RobotCfg { init_pose, ..kinetoscope_testkit::worlds::text_robot(&files, "block", &block) };
     world.sim.add_robot(block).unwrap_or_else(|e| panic!("{e}"));
     world
 }

@@ -8,8 +8,8 @@
 use crate::drives::worlds::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
-use testkit::refusal::assert_error;
-use testkit::tolerance::assert_close;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::tolerance::assert_close;
 
 const EXACT: Tolerance = Tolerance::mixed(1e-12, "a handful of operations");
 const M: [f64; 2] = [2.0, 0.5];

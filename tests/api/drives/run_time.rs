@@ -9,8 +9,8 @@ use crate::drives::worlds::*;
 use kinetoscope::ndarray::{Array2, Array3, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::RobotMut;
-use testkit::urdf::Files;
-use testkit::worlds::{add_ball, text_robot};
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::{add_ball, text_robot};
 
 const M: [f64; 2] = [0.2, 0.5];
 const AIM: f64 = 0.4;
@@ -179,7 +179,7 @@ fn soft_limits() {
     let whole = load(cfg(1.0), weightless());
     assert_eq!(whole.view().soft_qpos_limits(), whole.view().qpos_limits());
     for bad in [-0.1, 1.1, f64::NAN] {
-        let error = testkit::worlds::sim(weightless()).add_robot(cfg(bad)).unwrap_err();
+        let error = kinetoscope_testkit::worlds::sim(weightless()).add_robot(cfg(bad)).unwrap_err();
         assert!(matches!(error, Error::Config { field: "soft_limit_factor", .. }), "{error}");
     }
 }

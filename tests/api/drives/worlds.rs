@@ -7,12 +7,12 @@ use kinetoscope::sim;
 use kinetoscope::sim::dynamics::{Configuration, Kinematics, MimicPositions};
 use kinetoscope::sim::env::{Env, EnvStatus};
 use kinetoscope::sim::mj;
+pub(crate) use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
+use kinetoscope_testkit::urdf::{Files, joint, robot};
+pub(crate) use kinetoscope_testkit::worlds::{gains, no_drive};
+use kinetoscope_testkit::worlds::{text_robot, weightless_cfg};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::sync::Arc;
-pub(crate) use testkit::tolerance::{Tolerance, assert_number};
-use testkit::urdf::{Files, joint, robot};
-pub(crate) use testkit::worlds::{gains, no_drive};
-use testkit::worlds::{text_robot, weightless_cfg};
 
 pub(crate) const EARTH: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 /// Time step \[s\].
@@ -187,7 +187,7 @@ pub(crate) fn try_world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManage
 /// A robot of any configuration.
 #[track_caller]
 pub(crate) fn load(cfg: RobotCfg, manager: SimulationManagerCfg) -> World {
-    let mut sim = testkit::worlds::sim(manager);
+    let mut sim = kinetoscope_testkit::worlds::sim(manager);
     let robot = sim.add_robot(cfg).unwrap_or_else(|e| panic!("{e}"));
     World { sim, robot }
 }

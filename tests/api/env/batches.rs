@@ -4,7 +4,7 @@ use super::tasks::{cfg, everything, policy};
 use kinetoscope::env::Ended;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
-use testkit::bits::bits;
+use kinetoscope_testkit::bits::bits;
 
 /// All bits of 150 steps, by environment, and the reasons of all ends.
 fn run(settings: SimulationManagerCfg) -> (Vec<Vec<u64>>, Vec<Vec<String>>) {

@@ -7,7 +7,7 @@ use kinetoscope::env::{
 use kinetoscope::ndarray::{Array1, Array2, Axis, array, concatenate};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
-use testkit::bits::bits;
+use kinetoscope_testkit::bits::bits;
 
 const LIMIT: u64 = 60;
 const DECIMATION: u32 = 2;

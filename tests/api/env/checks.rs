@@ -1,4 +1,4 @@
-//! `env::check` finds nothing in good tasks, and the fault of broken ones.
+//! `kinetoscope_env::check` finds nothing in good tasks, and the fault of broken ones.
 
 use super::tasks::{cart_env, cart_task, cfg, everything, world};
 use super::vector_env::Carts;

@@ -3,7 +3,7 @@
 use super::tasks::{cart_env, cart_task, cfg, world};
 use kinetoscope::env::{ActionTerm, EnvBuilder, EnvCfg, ObservationTerm, Space};
 use kinetoscope::ndarray::{Array2, array};
-use testkit::tolerance::{Tolerance, assert_close, assert_number};
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 
 const DT: f64 = 0.01;
 const FORCE: f64 = 4.0;

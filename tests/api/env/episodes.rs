@@ -8,8 +8,8 @@ use kinetoscope::env::{
 use kinetoscope::ndarray::{Array1, Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::view::{Command, Viewing, Wants};
+use kinetoscope_testkit::bits::bits;
 use std::sync::{Arc, Mutex};
-use testkit::bits::bits;
 
 #[test]
 fn time_limit() {

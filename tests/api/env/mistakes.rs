@@ -6,7 +6,7 @@ use kinetoscope::env::{
     TermKind, TerminationTerm, When, terms,
 };
 use kinetoscope::ndarray::{Array1, Array2, array};
-use testkit::refusal::assert_refused;
+use kinetoscope_testkit::refusal::assert_refused;
 
 fn empty() -> EnvBuilder {
     EnvBuilder::new(world(cfg(2, 1), false).0, EnvCfg::default())

@@ -6,7 +6,7 @@ use kinetoscope::env::{
 };
 use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array};
 use kinetoscope::prelude::*;
-use testkit::worlds::{mjcf_robot, passive};
+use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 
 /// A cart of 1 kg on a rail and, where it is wanted, a pole of 0.1 kg and 0.5 m on it.
 pub(crate) fn cart(with_pole: bool) -> String {
@@ -21,7 +21,7 @@ pub(crate) fn cart(with_pole: bool) -> String {
 }
 
 pub(crate) fn cfg(num_envs: usize, threads: usize) -> SimulationManagerCfg {
-    SimulationManagerCfg { ground: None, seed: 3, ..testkit::worlds::cfg(num_envs, threads) }
+    SimulationManagerCfg { ground: None, seed: 3, ..kinetoscope_testkit::worlds::cfg(num_envs, threads) }
 }
 
 /// A world with a cart whose joints are passive.

@@ -6,10 +6,10 @@ use kinetoscope::env::{CommandTerm, EndReason, Env, EnvBuilder, EnvCfg, EventTer
 use kinetoscope::ndarray::{Array2, ArrayView1, Axis, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_row;
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
+use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use nalgebra::Vector3;
 use std::f64::consts::FRAC_PI_2;
-use testkit::tolerance::{Tolerance, assert_close};
-use testkit::worlds::{mjcf_robot, passive};
 
 /// A box of 2 kg that floats, with a lever on a hinge from -1 to 2 rad.
 const FLOATER: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="trunk" pos="0 0 1"><freejoint name="float"/>

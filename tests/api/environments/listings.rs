@@ -1,8 +1,8 @@
 //! Contents of a simulation by name and by handle: for programs that did not build it, such as views and recorders.
 
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::worlds::{ball, cube, row, sr5};
 use std::any::Any;
-use testkit::worlds::{ball, cube, row, sr5};
 
 struct World {
     sim: SimulationManager,

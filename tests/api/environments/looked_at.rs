@@ -5,8 +5,8 @@ use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sim::Look;
+use kinetoscope_testkit::worlds::pose_in;
 use nalgebra::Vector3;
-use testkit::worlds::pose_in;
 
 const G: f64 = 9.81;
 
@@ -144,5 +144,5 @@ fn bad_configurations() {
         ("lights.color", SimulationManagerCfg { lights, ..good() }),
     ];
     let variant = |field| format!("Config {{ field: {field:?}");
-    testkit::refusal::assert_refused(rows.map(|(field, cfg)| (field, cfg.validate(), variant(field), [])));
+    kinetoscope_testkit::refusal::assert_refused(rows.map(|(field, cfg)| (field, cfg.validate(), variant(field), [])));
 }

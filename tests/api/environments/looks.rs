@@ -10,20 +10,24 @@ use kinetoscope::scene::Shape;
 use kinetoscope::scene::pose::from_wxyz;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sim::mj::{ObjectKind, TARGET, Target};
-use testkit::refusal::assert_refused;
-use testkit::urdf::Files;
-use testkit::worlds::{sr5, text_robot};
+use kinetoscope_testkit::refusal::assert_refused;
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::{sr5, text_robot};
 
 /// The camera, above everything and looking straight down.
 const EYE: [f64; 3] = [0.1, -0.05, 2.0];
 
 fn cfg() -> SimulationManagerCfg {
-    testkit::worlds::cfg(3, 2)
+    kinetoscope_testkit::worlds::cfg(3, 2)
 }
 
 /// An object whose mass and moments do not follow from its size.
 fn object(uid: &str, shape: ObjectShape, at: [f64; 3]) -> RigidObjectCfg {
-    RigidObjectCfg { inertia: Some([0.01, 0.012, 0.014]), mass: Some(1.0), ..testkit::worlds::object(uid, shape, at) }
+    RigidObjectCfg {
+        inertia: Some([0.01, 0.012, 0.014]),
+        mass: Some(1.0),
+        ..kinetoscope_testkit::worlds::object(uid, shape, at)
+    }
 }
 
 /// Sizes and colors, the same in all environments but those that get their own.
@@ -50,7 +54,7 @@ fn world(look: Look) -> SimulationManager {
     for object in [
         RigidObjectCfg { rgba: look.color, ..cube },
         object("ball", ObjectShape::Sphere { radius: look.ball }, [0.5, 0.0, 0.4]),
-        testkit::worlds::fixed(object("post", post, [0.0, 0.5, 0.0])),
+        kinetoscope_testkit::worlds::fixed(object("post", post, [0.0, 0.5, 0.0])),
         object("pill", pill, [-0.5, 0.0, 0.5]),
         object("cone", ObjectShape::Cone { radius: 0.1, height: 0.2 }, [0.5, 0.5, 0.2]),
     ] {

@@ -1,8 +1,8 @@
 //! Observers are called where they asked to be, are told of what others do, and change no number.
 
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::worlds::{add_ball, object, row};
 use std::sync::{Arc, Mutex};
-use testkit::worlds::{add_ball, object, row};
 
 /// The moments that were told, with the step of the first environment.
 type Diary = Arc<Mutex<Vec<(u64, Moment)>>>;

@@ -5,10 +5,11 @@ use kinetoscope::ndarray::{Array2, Array3, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::Cone;
 use kinetoscope::sim::mj::{ObjectKind, TARGET, Target};
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::urdf;
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::{gains, passive, text_robot};
 use std::f64::consts::TAU;
-use testkit::refusal::assert_error;
-use testkit::urdf::{self, Files};
-use testkit::worlds::{gains, passive, text_robot};
 
 const G: f64 = 9.81;
 

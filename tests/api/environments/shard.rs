@@ -2,7 +2,7 @@
 
 use super::worlds::{Ids, all_bits, cfg, world};
 use kinetoscope::prelude::*;
-use testkit::bits::bits;
+use kinetoscope_testkit::bits::bits;
 
 /// Bits of states and of what a noisy sensor says, after draws, steps and resets. `first` is the global index of the
 /// manager's first environment.
@@ -70,7 +70,7 @@ fn refused() {
 #[test]
 fn variables_of_launchers() {
     let ask = |variables: &[(&str, &str)]| {
-        let mut child = testkit::process::command(module_path!(), "child");
+        let mut child = kinetoscope_testkit::process::command(module_path!(), "child");
         let all =
             ["RANK", "WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE", "SLURM_PROCID", "SLURM_NTASKS"];
         for name in all.into_iter().chain(["SLURM_STEP_ID"]) {
@@ -89,7 +89,7 @@ fn variables_of_launchers() {
 #[test]
 #[ignore = "runs in a process of its own"]
 fn child() {
-    if testkit::process::is_child() {
+    if kinetoscope_testkit::process::is_child() {
         println!("{:?}", Shard::from_env());
     }
 }

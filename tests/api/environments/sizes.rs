@@ -4,7 +4,7 @@ use super::worlds::{cfg, cube};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::ObjectKind;
-use testkit::worlds::object;
+use kinetoscope_testkit::worlds::object;
 
 /// Two cones of one mesh, a small plane, a ball far beside it, and a body of a box and a mesh.
 const PART: &str = r#"<mujoco><asset><mesh name="spike" vertex="0 0 0  0.2 0 0  0 0.2 0  0 0 0.2"/></asset><worldbody>

@@ -4,9 +4,10 @@ use super::worlds::{ALL, all_bits, all_properties, all_values, arm, bits_of, cfg
 use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{Cone, Integrator};
-use testkit::refusal::assert_error;
-use testkit::urdf::{self, Files};
-use testkit::worlds::text_robot;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::urdf;
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::text_robot;
 
 /// A snapshot after 500 steps, and the bits there and 300 steps later.
 fn run(settings: SimulationManagerCfg) -> (SimulationManager, Snapshot, Vec<Vec<u64>>, Vec<Vec<u64>>) {
@@ -223,7 +224,8 @@ fn sensors() {
 #[test]
 fn drives_and_wrenches() {
     let delayed = DelayedPd { delay: 4, max_delay: 9 }.into();
-    let drive = DriveCfg { actuators: vec![("JOINT[12]".into(), delayed)], ..testkit::worlds::gains(200.0, 20.0) };
+    let drive =
+        DriveCfg { actuators: vec![("JOINT[12]".into(), delayed)], ..kinetoscope_testkit::worlds::gains(200.0, 20.0) };
     let build = || {
         let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
         let id = sim.add_robot(RobotCfg { drive: drive.clone(), ..arm() }).unwrap();

@@ -3,15 +3,15 @@
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::env::Env;
-use testkit::bits::bits;
-pub(crate) use testkit::worlds::cfg;
+use kinetoscope_testkit::bits::bits;
+pub(crate) use kinetoscope_testkit::worlds::cfg;
 
 pub(crate) fn arm() -> RobotCfg {
-    testkit::worlds::sr5("arm")
+    kinetoscope_testkit::worlds::sr5("arm")
 }
 
 pub(crate) fn cube(uid: &str, mass: f64, at: [f64; 3]) -> RigidObjectCfg {
-    testkit::worlds::cube(uid, 0.1, mass, at)
+    kinetoscope_testkit::worlds::cube(uid, 0.1, mass, at)
 }
 
 /// A pendulum with a filtered motor, which has an activation, and a hand that is moved.

@@ -3,9 +3,9 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
+use kinetoscope_testkit::urdf::joint;
 use nalgebra::DMatrix;
 use std::f64::consts::{PI, TAU};
-use testkit::urdf::joint;
 
 /// Targets are where MuJoCo puts `link` at random positions, or at positions that have one, two or three joints at their
 /// limits; each search starts from the default positions. What it finds is within the limits; what it says of it, success
@@ -57,7 +57,7 @@ fn reachable_poses() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn vendors_robot() {
-    let urdf = testkit::needs::robot("rokae_description/urdf/SR5.urdf");
+    let urdf = kinetoscope_testkit::needs::robot("rokae_description/urdf/SR5.urdf");
     check("the vendor's SR5", arm(urdf), "xMateSR5_link6", false);
 }
 

@@ -7,9 +7,9 @@
 use super::*;
 use kinetoscope::ndarray::{Array3, s};
 use kinetoscope::sim::mj::{self, Data, ObjectKind};
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
+use kinetoscope_testkit::urdf::joint;
 use nalgebra::Vector3;
-use testkit::tolerance::{Tolerance, assert_close, assert_number};
-use testkit::urdf::joint;
 
 const BOUND: Tolerance =
     Tolerance::absolute(1e-12, "a dozen transforms of size 1, some units of 2e-16, in another order");
@@ -230,7 +230,7 @@ fn fixed_roots() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn vendors_robot() {
-    let (mut sim, id) = simulation(3, arm(testkit::needs::robot("rokae_description/urdf/SR5.urdf")));
+    let (mut sim, id) = simulation(3, arm(kinetoscope_testkit::needs::robot("rokae_description/urdf/SR5.urdf")));
     check("the vendor's SR5", &mut sim, id, ["xMateSR5_link6"; 2], None);
 }
 

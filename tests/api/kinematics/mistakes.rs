@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use testkit::refusal::assert_error;
+use kinetoscope_testkit::refusal::assert_error;
 
 #[track_caller]
 fn says(result: Result<impl std::fmt::Debug>, parts: &[&str]) {

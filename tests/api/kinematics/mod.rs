@@ -9,12 +9,15 @@ mod singular;
 use kinetoscope::ndarray::{Array2, ArrayView1, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
+use kinetoscope_testkit::urdf::{Files, limit, link};
+use kinetoscope_testkit::worlds::{errors, pose_in};
 use std::path::{Path, PathBuf};
-use testkit::urdf::{Files, limit, link};
-use testkit::worlds::{errors, pose_in};
 
 fn simulation(num_envs: usize, robot: RobotCfg) -> (SimulationManager, RobotId) {
-    let mut sim = testkit::worlds::sim(SimulationManagerCfg { ground: None, ..testkit::worlds::cfg(num_envs, 1) });
+    let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg {
+        ground: None,
+        ..kinetoscope_testkit::worlds::cfg(num_envs, 1)
+    });
     let id = sim.add_robot(robot).unwrap();
     (sim, id)
 }
@@ -27,7 +30,7 @@ fn file(name: &str) -> PathBuf {
 fn arm(urdf: impl AsRef<Path>) -> RobotCfg {
     RobotCfg {
         control_parts: vec![("arm".into(), vec![".*".into()])],
-        ..testkit::worlds::urdf_robot("robot", urdf.as_ref())
+        ..kinetoscope_testkit::worlds::urdf_robot("robot", urdf.as_ref())
     }
 }
 
@@ -45,7 +48,7 @@ fn six_axes() -> RobotCfg {
 
 /// The bundled arm and hand, as the tutorials put them together.
 fn arm_and_hand() -> RobotCfg {
-    let mut robot = testkit::worlds::arm_and_hand("robot");
+    let mut robot = kinetoscope_testkit::worlds::arm_and_hand("robot");
     robot.urdf.components[1].transform = kinetoscope::scene::pose::from_xyz_rpy([0.0, 0.0, 0.02], [1.5, 0.1, 0.0]);
     robot.control_parts = vec![("arm".into(), vec!["JOINT[1-6]".into()]), ("hand".into(), vec!["LEFT_.*".into()])];
     robot
@@ -55,7 +58,7 @@ fn arm_and_hand() -> RobotCfg {
 fn built(num_envs: usize, links: &[&str], joints: &[String]) -> (SimulationManager, RobotId) {
     let files = Files::default();
     let links: String = links.iter().map(|name| link(name, 1.0, 0.01, [0.0; 3], "")).collect();
-    simulation(num_envs, arm(files.write("r.urdf", testkit::urdf::robot("r", &(links + &joints.concat())))))
+    simulation(num_envs, arm(files.write("r.urdf", kinetoscope_testkit::urdf::robot("r", &(links + &joints.concat())))))
 }
 
 fn wide(range: [f64; 2]) -> String {

@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::sim::kinematics::{Chain, IkSolver};
-use testkit::urdf::joint;
+use kinetoscope_testkit::urdf::joint;
 
 const L1: f64 = 0.5;
 const L2: f64 = 0.3;

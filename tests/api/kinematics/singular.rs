@@ -43,7 +43,14 @@ fn spherical_wrist() -> (SimulationManager, RobotId) {
     for (k, (z, axis)) in [0.3, 0.0, 0.4, 0.2, 0.2, 0.0].into_iter().zip(["z", "y", "y", "z", "y", "z"]).enumerate() {
         let axis = if axis == "z" { "0 0 1" } else { "0 1 0" };
         let between = [links[k], links[k + 1]];
-        joints.push(testkit::urdf::joint(&format!("j{}", k + 1), "continuous", between, [0.0, 0.0, z], axis, ""));
+        joints.push(kinetoscope_testkit::urdf::joint(
+            &format!("j{}", k + 1),
+            "continuous",
+            between,
+            [0.0, 0.0, z],
+            axis,
+            "",
+        ));
     }
     built(1, &links, &joints)
 }

@@ -4,9 +4,9 @@ use super::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::sim::DiagnosticKind;
 use kinetoscope::sim::mj::{TARGET, Target, compile_file};
-use testkit::refusal::assert_error;
-use testkit::urdf::Files;
-use testkit::worlds::count_diagnostics;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::count_diagnostics;
 
 /// The error of adding a part, which changes nothing.
 fn refused(cfg: MjcfCfg) -> String {

@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::ndarray::{Array2, Axis, array};
 use kinetoscope::sim::mj::ObjectKind;
-use testkit::refusal::assert_error;
+use kinetoscope_testkit::refusal::assert_error;
 
 #[test]
 fn reads_and_writes() {
@@ -81,7 +81,7 @@ fn mocap_bodies() {
         assert!((ball[0] - x).abs() < 1e-3 && (ball[1] - y).abs() < 1e-3, "{env}: {ball:?}");
     }
     // More in the scene does not move it.
-    sim.add_rigid_object(testkit::worlds::object("cube", ObjectShape::cube(0.1), [5.0, 0.0, 1.0])).unwrap();
+    sim.add_rigid_object(kinetoscope_testkit::worlds::object("cube", ObjectShape::cube(0.1), [5.0, 0.0, 1.0])).unwrap();
     assert_eq!(at(&sim, "target", 1), [0.6, 0.4, 0.5, 1.0]);
     assert_error(sim.mjcf_part_mut(part).write_mocap_pose("ball", &place, None), "", &["\"target\"", "mocap"]);
     sim.reset(None).unwrap();

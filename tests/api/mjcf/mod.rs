@@ -9,7 +9,7 @@ mod visible;
 
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::{self, Data, Model};
-use testkit::worlds::{empty_cfg, sim};
+use kinetoscope_testkit::worlds::{empty_cfg, sim};
 
 /// 500 steps a second, an empty scene.
 pub(crate) fn empty(num_envs: usize) -> SimulationManager {

@@ -4,9 +4,9 @@ use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::mj::{ObjectKind, compile_file};
-use testkit::tolerance::{Tolerance, assert_close, assert_number};
-use testkit::urdf::Files;
-use testkit::worlds::{errors, pose_in, row, sr5};
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::{errors, pose_in, row, sr5};
 
 /// A double pendulum that hangs in the world, and a block that flies: nothing touches.
 const SWING: &str = r#"<mujoco><worldbody>

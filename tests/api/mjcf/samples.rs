@@ -3,8 +3,8 @@
 use super::*;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::sim::mj::{TARGET, Target, words};
+use kinetoscope_testkit::needs::{files_below, sample_model};
 use std::path::Path;
-use testkit::needs::{files_below, sample_model};
 
 /// The file with the options of [`empty`] behind its own, by MuJoCo alone.
 fn plainly(file: &Path) -> Model {

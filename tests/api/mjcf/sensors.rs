@@ -4,11 +4,11 @@ use super::*;
 use kinetoscope::ndarray::{Array2, ArrayView3, Axis, array};
 use kinetoscope::scene::pose::{from_row, from_xyz_rpy};
 use kinetoscope::sim::mj::{ObjectKind, Overflow};
+use kinetoscope_testkit::bits::bits;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
+use kinetoscope_testkit::worlds::{count_diagnostics, pose_in, sr5};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use testkit::bits::bits;
-use testkit::refusal::assert_error;
-use testkit::tolerance::{Tolerance, assert_close};
-use testkit::worlds::{count_diagnostics, pose_in, sr5};
 
 /// A machine with all of MuJoCo's sensors.
 fn sensing(num_envs: usize) -> (SimulationManager, MjcfId, SensorId<MujocoSensor>) {

@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::scene::pose::from_wxyz;
 use kinetoscope::sim::Visible;
-use testkit::worlds::{cube, sr5};
+use kinetoscope_testkit::worlds::{cube, sr5};
 
 /// A textured, lit world with a mesh, a height field and a cube texture.
 const LOOKS: &str = include_str!("../../data/mjcf/looks.xml");

@@ -3,8 +3,8 @@
 use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::sim::DiagnosticKind;
+use kinetoscope_testkit::refusal::assert_error;
 use std::f64::consts::FRAC_PI_2;
-use testkit::refusal::assert_error;
 
 /// A cart with a wheel; `%` is the joint of the cart.
 const CART: &str = r#"<mujoco><worldbody><body name="cart" pos="0.5 0 1" euler="0 0 90">%

@@ -3,8 +3,8 @@
 use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::sim::{DiagnosticKind, KinematicsError};
-use testkit::refusal::assert_error;
-use testkit::worlds::count_diagnostics;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::worlds::count_diagnostics;
 
 /// A drive, a finger on either side, and a third joint; `%` are the equalities.
 const HAND: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="palm"><geom size="0.03" mass="1"/>

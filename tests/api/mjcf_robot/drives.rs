@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use testkit::worlds::{count_diagnostics, empty_cfg, gains};
+use kinetoscope_testkit::worlds::{count_diagnostics, empty_cfg, gains};
 
 /// Five joints: a servo with a gear, a motor, a servo of velocity, two on a tendon, and one that nothing acts on; the last
 /// two actuators are of one joint.
@@ -108,7 +108,7 @@ fn gripper() {
     let text = GRIPPER.replace('%', "1");
     let [same, half] = [1.0, 0.5].map(|scale| {
         let cfg = SimulationManagerCfg { physics_dt: 1e-4, gravity: [0.0; 3].into(), ..empty_cfg(1) };
-        let mut sim = testkit::worlds::sim(cfg);
+        let mut sim = kinetoscope_testkit::worlds::sim(cfg);
         let id = sim.add_robot(robot("r", &text)).unwrap();
         let mut data = Data::new(&mj::compile(&text, &[]).unwrap().into_model()).unwrap();
         let of = sim.robot(id);

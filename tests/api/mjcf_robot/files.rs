@@ -4,9 +4,9 @@ use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::sim::DiagnosticKind;
 use kinetoscope::sim::mj::{TARGET, Target, compile_file};
-use testkit::refusal::assert_error;
-use testkit::urdf::Files;
-use testkit::worlds::{errors, gains, pose_in, urdf_robot};
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::{errors, gains, pose_in, urdf_robot};
 
 /// Elements without a name are called by their number.
 #[test]
@@ -87,8 +87,10 @@ fn dumps() {
 #[test]
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
 fn humanoid() {
-    let of_file =
-        |name: &str| RobotCfg { mjcf: Some(MjcfFile::new(testkit::needs::sample_model(name))), ..Default::default() };
+    let of_file = |name: &str| RobotCfg {
+        mjcf: Some(MjcfFile::new(kinetoscope_testkit::needs::sample_model(name))),
+        ..Default::default()
+    };
     assert_error(empty(1).add_robot(of_file("humanoid/22_humanoids.xml")), "", &["bodies in its world"]);
     let (mut sim, id) = with(2, of_file("humanoid/humanoid.xml"));
     let of = sim.robot(id);
@@ -122,7 +124,7 @@ fn humanoid() {
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
 fn other_samples() {
     let (mut robots, mut refused) = (0, 0);
-    for folder in std::fs::read_dir(testkit::needs::sample_model("")).unwrap().flatten() {
+    for folder in std::fs::read_dir(kinetoscope_testkit::needs::sample_model("")).unwrap().flatten() {
         for file in std::fs::read_dir(folder.path()).into_iter().flatten().flatten().map(|file| file.path()) {
             for fix_base in [true, false] {
                 if file.extension().is_none_or(|extension| extension != "xml") {

@@ -4,7 +4,7 @@ use super::*;
 use kinetoscope::ndarray::{Axis, s};
 use kinetoscope::scene::pose::{from_row, from_xyz_rpy, to_row};
 use kinetoscope::sim::mj::ObjectKind;
-use testkit::worlds::{errors, pose_in};
+use kinetoscope_testkit::worlds::{errors, pose_in};
 
 /// A body or a site, as MuJoCo has it.
 fn place(data: &Data, name: &str) -> [f64; 7] {

@@ -15,7 +15,7 @@ use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
 use kinetoscope::sim::mj::{self, Data, Model};
-use testkit::worlds::{mjcf_robot as robot, passive, row};
+use kinetoscope_testkit::worlds::{mjcf_robot as robot, passive, row};
 
 /// A robot in an empty scene.
 fn with(num_envs: usize, cfg: RobotCfg) -> (SimulationManager, RobotId) {

@@ -3,8 +3,8 @@
 use super::*;
 use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::sim::mj::ObjectKind;
-use testkit::urdf::Files;
-use testkit::worlds::{gains, text_robot, urdf_robot};
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::{gains, text_robot, urdf_robot};
 
 /// Names, masses, limits and the start are those of the file.
 #[test]
@@ -147,7 +147,7 @@ fn arm() -> [String; 2] {
            <default><joint solreffriction="0.004 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"/></default>
            <worldbody><body name="l">{base}{bodies}{ends}</body></worldbody><actuator>{actuators}</actuator></mujoco>"#
     );
-    [mjcf, testkit::urdf::robot("arm", &urdf)]
+    [mjcf, kinetoscope_testkit::urdf::robot("arm", &urdf)]
 }
 
 /// Positions and efforts.
@@ -214,7 +214,8 @@ fn quadrupeds() -> [(SimulationManager, RobotId); 2] {
     let of_urdf = RobotCfg { init_pose: Pose::translation(0.0, 0.0, 0.6), ..of_urdf };
     let mjcf = Some(MjcfFile::new(file("quadruped/quadruped.xml")));
     [of_urdf, RobotCfg { mjcf, ..Default::default() }].map(|cfg| {
-        let mut sim = testkit::worlds::sim(SimulationManagerCfg { num_envs: 1, ..SimulationManagerCfg::legged() });
+        let mut sim =
+            kinetoscope_testkit::worlds::sim(SimulationManagerCfg { num_envs: 1, ..SimulationManagerCfg::legged() });
         let posture = [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
         let init_qpos = posture.map(|(joints, angle)| (joints.to_string(), angle)).to_vec();
         let id = sim.add_robot(RobotCfg { fix_base: false, init_qpos, drive: gains(80.0, 5.0), ..cfg }).unwrap();

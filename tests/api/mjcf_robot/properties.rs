@@ -4,7 +4,7 @@
 use super::drives::{CHAIN, GRIPPER};
 use super::*;
 use kinetoscope::ndarray::array;
-use testkit::worlds::gains;
+use kinetoscope_testkit::worlds::gains;
 
 /// A sled that slides on the ground, with an arm, a finger that follows it, a foot that may be larger, and a servo on a
 /// tendon over arm and finger. All masses are said, so that no size and no geom changes them.
@@ -12,7 +12,10 @@ const SLED: &str = include_str!("../../data/mjcf/sled.xml");
 
 /// A scene on ground that is nearly without friction, which MuJoCo takes the larger of; the sled moves.
 fn sledding(text: &str, envs: usize) -> (SimulationManager, RobotId) {
-    let mut sim = testkit::worlds::sim(SimulationManagerCfg { physics_dt: 0.002, ..testkit::worlds::cfg(envs, 1) });
+    let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg {
+        physics_dt: 0.002,
+        ..kinetoscope_testkit::worlds::cfg(envs, 1)
+    });
     let id = sim.add_robot(RobotCfg { fix_base: false, ..robot("r", text) }).unwrap();
     sim.randomize_with(None, |_, _, p| p.set(Property::Friction, "ground", &[0.01])).unwrap();
     (sim, id)

@@ -4,10 +4,10 @@
 use super::*;
 use kinetoscope::sim::mj::{TARGET, Target};
 use kinetoscope::sim::mjcf::robot_file::RobotFileError;
+use kinetoscope_testkit::refusal::assert_refused;
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::count_diagnostics;
 use std::path::PathBuf;
-use testkit::refusal::assert_refused;
-use testkit::urdf::Files;
-use testkit::worlds::count_diagnostics;
 
 /// The error of adding a robot.
 fn refused(cfg: RobotCfg) -> Error {

@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::sensors::ray::pattern::Grid;
-use testkit::worlds::gains;
+use kinetoscope_testkit::worlds::gains;
 
 /// Gravity compensation of all links holds an arm that nothing else holds.
 #[test]
@@ -44,7 +44,8 @@ const LEG: &str = include_str!("../../data/mjcf/leg.xml");
 #[test]
 fn sensors() {
     for with_part in [false, true] {
-        let mut sim = testkit::worlds::sim(SimulationManagerCfg { num_envs: 2, ..SimulationManagerCfg::legged() });
+        let mut sim =
+            kinetoscope_testkit::worlds::sim(SimulationManagerCfg { num_envs: 2, ..SimulationManagerCfg::legged() });
         if with_part {
             let part = r#"<mujoco><worldbody><body pos="3 0 1"><joint name="j"/><geom size="0.1"/></body></worldbody>
                 <sensor><clock name="clock"/><jointvel name="v" joint="j"/></sensor></mujoco>"#;

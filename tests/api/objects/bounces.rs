@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::sim::Cone;
-use testkit::refusal::assert_error;
+use kinetoscope_testkit::refusal::assert_error;
 
 fn bouncy(uid: &str, mass: f64, restitution: Option<f64>) -> RigidObjectCfg {
     RigidObjectCfg { restitution, ..ball(uid, 0.1, mass, [0.0; 3]) }
@@ -134,7 +134,7 @@ fn excluded_objects() {
 fn excluded_links() {
     let build = |name: Option<&str>| {
         let mut sim = sim(weightless_cfg(2));
-        let arm = sim.add_robot(testkit::worlds::sr5("arm")).unwrap();
+        let arm = sim.add_robot(kinetoscope_testkit::worlds::sr5("arm")).unwrap();
         let tip = sim.robot(arm).link_names().last().unwrap().to_string();
         let place = sim.robot(arm).link_pose(&tip).unwrap();
         sim.add_rigid_object(object("fog", ObjectShape::cube(0.1), [0, 1, 2].map(|k| place[(1, k)]))).unwrap();

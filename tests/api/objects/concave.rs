@@ -3,9 +3,9 @@
 use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::scene::mesh::PiecesCfg;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::worlds::count_diagnostics;
 use std::f32::consts::{FRAC_PI_2, TAU};
-use testkit::refusal::assert_error;
-use testkit::worlds::count_diagnostics;
 
 const R: f64 = 0.05;
 

@@ -4,7 +4,7 @@
 use super::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::sim::mj::{TARGET, Target};
-use testkit::refusal::assert_error;
+use kinetoscope_testkit::refusal::assert_error;
 
 /// F t / m in each environment; with the mass go the moments, T t / I, of a cube m a²/6.
 #[test]

@@ -11,10 +11,10 @@ mod welds;
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::mesh::{TriMesh, write_obj};
+use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::{ball, cube, empty_cfg, fixed, object, row, sim, weightless_cfg};
 use std::path::PathBuf;
-use testkit::tolerance::{Tolerance, assert_number};
-use testkit::urdf::Files;
-use testkit::worlds::{ball, cube, empty_cfg, fixed, object, row, sim, weightless_cfg};
 
 const SECOND: &[EnvId] = &[EnvId(1)];
 /// MuJoCo's contacts are soft: with the default reference a body sinks in by (1 - d) g / (d k) = 0.1 g / (0.9 · 2770 /s²) =

@@ -5,7 +5,7 @@ use super::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::mesh::HullCfg;
 use kinetoscope::sim::mj::ObjectKind;
-use testkit::refusal::{assert_error, assert_refused, assert_refused_unchanged};
+use kinetoscope_testkit::refusal::{assert_error, assert_refused, assert_refused_unchanged};
 
 #[test]
 fn configurations() {

@@ -2,8 +2,8 @@
 
 use super::*;
 use kinetoscope::ndarray::{Array2, Array3, Axis, array};
-use testkit::refusal::assert_error;
-use testkit::worlds::{errors, pose_in, sr5};
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::worlds::{errors, pose_in, sr5};
 
 fn weld(first: &str, second: &str) -> WeldCfg {
     WeldCfg { uid: "weld".into(), first: first.into(), second: second.into() }

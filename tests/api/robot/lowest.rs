@@ -2,10 +2,10 @@
 
 use super::ENVS;
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
+use kinetoscope_testkit::worlds::{cfg, count_diagnostics, empty_cfg, mjcf_robot, pose_in, sim};
 use nalgebra::{UnitQuaternion, Vector3};
-use testkit::refusal::assert_error;
-use testkit::tolerance::{Tolerance, assert_number};
-use testkit::worlds::{cfg, count_diagnostics, empty_cfg, mjcf_robot, pose_in, sim};
 
 const EXACT: Tolerance = Tolerance::absolute(1e-12, "a thousand times the rounding of a few numbers of size 1");
 const SINGLE: Tolerance = Tolerance::absolute(1e-7, "vertices of meshes are in single precision");

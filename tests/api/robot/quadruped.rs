@@ -2,9 +2,9 @@
 
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
-use testkit::needs;
-use testkit::refusal::assert_error;
-use testkit::worlds::{gains, pose_in, sim, urdf_robot};
+use kinetoscope_testkit::needs;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::worlds::{gains, pose_in, sim, urdf_robot};
 
 const LEGS: [&str; 4] = ["LF", "RF", "LH", "RH"];
 

@@ -9,11 +9,11 @@ use super::ENVS;
 use kinetoscope::ndarray::{Array2, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mj::ObjectKind;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
+use kinetoscope_testkit::urdf::{Files, joint, link, robot};
+use kinetoscope_testkit::worlds::{empty_cfg, errors, gains, no_drive, pose_in, text_robot};
 use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion, Vector3};
-use testkit::refusal::assert_error;
-use testkit::tolerance::{Tolerance, assert_close, assert_number};
-use testkit::urdf::{Files, joint, link, robot};
-use testkit::worlds::{empty_cfg, errors, gains, no_drive, pose_in, text_robot};
 
 const EXACT: Tolerance = Tolerance::absolute(1e-12, "a thousand times the rounding of a few numbers of size 1 to 10");
 const G: f64 = 9.81;
@@ -36,7 +36,7 @@ const ROBOT: &str = r#"<robot name="r">
 </robot>"#;
 
 fn sim(gravity: f64) -> SimulationManager {
-    testkit::worlds::sim(SimulationManagerCfg { gravity: [0.0, 0.0, -gravity].into(), ..empty_cfg(ENVS) })
+    kinetoscope_testkit::worlds::sim(SimulationManagerCfg { gravity: [0.0, 0.0, -gravity].into(), ..empty_cfg(ENVS) })
 }
 
 fn sim_with(gravity: f64, fix_base: bool) -> (SimulationManager, RobotId) {
@@ -386,9 +386,9 @@ fn names_and_patterns() {
 /// Targets by the name of a part: its joints in the order of its patterns, and no other joint.
 #[test]
 fn parts() {
-    let mut sim = testkit::worlds::sim(empty_cfg(2));
+    let mut sim = kinetoscope_testkit::worlds::sim(empty_cfg(2));
     let control_parts = vec![("wrist".into(), vec!["JOINT6".into(), "JOINT4".into()])];
-    let arm = sim.add_robot(RobotCfg { control_parts, ..testkit::worlds::sr5("arm") }).unwrap();
+    let arm = sim.add_robot(RobotCfg { control_parts, ..kinetoscope_testkit::worlds::sr5("arm") }).unwrap();
     let [six, four] = ["JOINT6", "JOINT4"].map(|name| sim.robot(arm).joint_id(name).unwrap());
     let before = sim.robot(arm).get_target_qpos();
     let mut wrist = sim.robot_mut(arm).into_part("wrist").unwrap();

@@ -6,11 +6,11 @@
 use super::ENVS;
 use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
+use kinetoscope_testkit::urdf::{Files, joint, link, robot};
+use kinetoscope_testkit::worlds::{add_ball, empty_cfg, no_drive, pose_in, text_robot};
 use nalgebra::Vector3;
-use testkit::refusal::assert_error;
-use testkit::tolerance::{Tolerance, assert_close};
-use testkit::urdf::{Files, joint, link, robot};
-use testkit::worlds::{add_ball, empty_cfg, no_drive, pose_in, text_robot};
 
 const EXACT: Tolerance =
     Tolerance::absolute(1e-9, "rounding of 200 steps, and of the solve of inertias that differ by a factor of 100");
@@ -19,7 +19,7 @@ const G: f64 = 9.81;
 
 fn sim_of(urdf: &str, gravity: f64, fix_base: bool) -> (SimulationManager, RobotId) {
     let (files, gravity) = (Files::default(), [0.0, 0.0, -gravity].into());
-    let mut sim = testkit::worlds::sim(SimulationManagerCfg { gravity, ..empty_cfg(ENVS) });
+    let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { gravity, ..empty_cfg(ENVS) });
     let robot = RobotCfg { fix_base, drive: no_drive(), ..text_robot(&files, "robot", &robot("r", urdf)) };
     let id = sim.add_robot(robot).unwrap();
     (sim, id)

@@ -169,7 +169,7 @@ fn cameras() {
         raster: RasterCfg { samples: 1, ..CameraCfg::default().raster },
         extrinsics: Extrinsics {
             convention: CameraConvention::OpenGl,
-            ..testkit::worlds::look_at([1.0, 0.0, 1.0], [0.0; 3])
+            ..kinetoscope_testkit::worlds::look_at([1.0, 0.0, 1.0], [0.0; 3])
         },
         ..Default::default()
     };

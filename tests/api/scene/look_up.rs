@@ -1,7 +1,7 @@
 //! Entities by name and type, and the errors where either is wrong.
 
 use kinetoscope::prelude::*;
-use testkit::worlds::row;
+use kinetoscope_testkit::worlds::row;
 
 fn cube(x: f64) -> RigidObjectCfg {
     RigidObjectCfg { shape: ObjectShape::cube(0.2), init_pose: Pose::translation(x, 0.0, 0.1), ..Default::default() }

@@ -3,7 +3,7 @@
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sim::GroundCfg;
-use testkit::bits::bits;
+use kinetoscope_testkit::bits::bits;
 
 pub(crate) fn declared() -> SceneCfg {
     let robot = assets::quadruped().unwrap();

@@ -4,7 +4,7 @@ use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::terrain::{PyramidStairs, RoughTerrain, Slope, TerrainGenerator};
 use kinetoscope::sensors::ray::pattern::Grid;
-use testkit::worlds::{look_at, object};
+use kinetoscope_testkit::worlds::{look_at, object};
 
 const FILE: &str = r#"
 [simulation]

@@ -4,9 +4,9 @@ use super::worlds::{G, ball, cfg, cube, fixed, pose_in, row, sim};
 use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
+use kinetoscope_testkit::worlds;
 use nalgebra::Vector3;
-use testkit::tolerance::{Tolerance, assert_close, assert_number};
-use testkit::worlds;
 
 const EXACT: Tolerance =
     Tolerance::absolute(1e-9, "rounding of tens of newtons, from velocities divided by the step of 5 ms");
@@ -249,7 +249,7 @@ fn diverged_environment() {
             assert!(last.iter().all(|value| value.is_finite()));
             // Nor does a write to a diverged environment change what is read of it.
             sim.rigid_object_mut(box_).write_velocity(&array![[0.0; 6]], Some(&[EnvId(1)])).unwrap();
-            testkit::bits::assert_same_bits("the last measurement", &values(&sim), &last);
+            kinetoscope_testkit::bits::assert_same_bits("the last measurement", &values(&sim), &last);
             let late = sim.add_sensor("late", ImuCfg::on("box")).unwrap();
             assert!(sim.sensor(late).unwrap().quat_w().iter().all(|q| q.is_finite()), "a sensor that comes later");
             let sensor = sim.sensor(id).unwrap();

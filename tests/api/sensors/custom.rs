@@ -5,10 +5,10 @@ use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::SceneState;
 use kinetoscope::sensors::{Channel, Requires, Sampler, Schedule, Sensor, SensorCfg, SensorContext, SensorError};
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use testkit::tolerance::{Tolerance, assert_close};
 
 /// Height of the last body, at every step, or lazily every 0.03 s; counts its measurements.
 #[derive(Clone, Default)]
@@ -57,7 +57,7 @@ impl Sensor for Height {
 /// A lazy sensor holds what it would have measured when it was due, and measures once for all readers.
 #[test]
 fn eager_and_lazy() {
-    let mut sim = testkit::worlds::sim(testkit::worlds::cfg(3, 2));
+    let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(3, 2));
     let robot = sim.add_robot(sr5("robot")).unwrap();
     sim.robot_mut(robot).set_qpos(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
     let cfg = HeightCfg { lazy: true, ..Default::default() };

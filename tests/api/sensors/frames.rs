@@ -4,8 +4,8 @@ use super::worlds::{cube, pose_in, sim, sr5};
 use kinetoscope::ndarray::{ArrayView3, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::to_wxyz;
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use nalgebra::UnitQuaternion;
-use testkit::tolerance::{Tolerance, assert_close};
 
 const EXACT: Tolerance = Tolerance::absolute(1e-12, "rounding of a product of a few transforms of size 1");
 

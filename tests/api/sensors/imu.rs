@@ -4,8 +4,8 @@
 use super::worlds::{G, cube, fixed, pose_in, row, sim};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use nalgebra::{UnitQuaternion, Vector3};
-use testkit::tolerance::{Tolerance, assert_close};
 
 const EXACT: Tolerance = Tolerance::absolute(1e-9, "rounding of velocities divided by the step of 5 ms");
 

@@ -291,7 +291,7 @@ fn samplings() {
     let mut other = world();
     let [asked, other] = [sim, &mut other].map(|sim| {
         sim.update(50);
-        testkit::worlds::all_bits(sim)
+        kinetoscope_testkit::worlds::all_bits(sim)
     });
     assert_eq!(asked, other);
 }

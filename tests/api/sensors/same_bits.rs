@@ -8,8 +8,8 @@ use kinetoscope::sensors::SensorCfg;
 use kinetoscope::sensors::camera::channel::Depth;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sim::mj;
+use kinetoscope_testkit::bits::Bits;
 use std::collections::BTreeMap;
-use testkit::bits::Bits;
 
 /// A pendulum with sensors of its own.
 const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8"><joint name="hinge" axis="0 1 0.3"/>
@@ -35,7 +35,7 @@ fn spin(num_envs: usize) -> Array2<f64> {
 /// contacts than buffers have room for at first: steps are repeated while they are captured.
 fn world(settings: SimulationManagerCfg, with_arm: bool) -> (SimulationManager, Option<RobotId>) {
     let n = settings.num_envs;
-    let mut sim = testkit::worlds::sim(settings);
+    let mut sim = kinetoscope_testkit::worlds::sim(settings);
     let arm = with_arm.then(|| sim.add_robot(sr5("arm")).unwrap());
     for k in 0..4 {
         let at = [0.8 + 0.05 * f64::from(k), 0.1, 0.15 + 0.25 * f64::from(k)];
@@ -319,7 +319,7 @@ fn states(settings: SimulationManagerCfg, with_arm: bool, with_sensors: bool) ->
             _ => {}
         }
         sim.update(7);
-        states.extend(testkit::worlds::all_bits(&sim));
+        states.extend(kinetoscope_testkit::worlds::all_bits(&sim));
     }
     assert!(sim.buffer_growths() > 0 || mj::TARGET == mj::Target::V4, "the arena of 4.x is large enough");
     states

@@ -24,7 +24,7 @@ fn assert_newest_first(name: &str, read: &[ArrayD<f64>], history: &ArrayViewD<'_
 /// environment only.
 #[test]
 fn joint_state() {
-    let mut sim = testkit::worlds::sim(testkit::worlds::cfg(2, 2));
+    let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(2, 2));
     let robot = sim.add_robot(sr5("robot")).unwrap();
     sim.robot_mut(robot).set_qpos(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
     let slow = JointStateCfg { sampling: remembering(SamplingCfg::every(0.05)), ..Default::default() };
@@ -60,8 +60,8 @@ fn joint_state() {
 /// Forces of a cube that falls onto an edge, so that it tumbles: forces of all directions.
 #[test]
 fn contact_history() {
-    let mut sim = testkit::worlds::sim(testkit::worlds::cfg(2, 2));
-    let cube = testkit::worlds::object("cube", ObjectShape::cube(0.2), [0.0; 3]);
+    let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(2, 2));
+    let cube = kinetoscope_testkit::worlds::object("cube", ObjectShape::cube(0.2), [0.0; 3]);
     let cube = sim.add_rigid_object(cube).unwrap();
     let pose = [0.2_f64, 0.5].map(|half| [0.0, 0.0, 0.16, half.cos(), half.sin(), 0.0, 0.0]);
     sim.rigid_object_mut(cube).write_pose(&Array2::from(pose.to_vec()), None).unwrap();
@@ -93,7 +93,7 @@ const RATES: [(u64, u32); 4] = [(1, 0), (3, 0), (20, 0), (20, 7)];
 #[test]
 fn million_steps() {
     let empty = SimulationManagerCfg { ground: None, gravity: [0.0; 3].into(), threads: Some(1), ..cfg(1) };
-    let mut sim = testkit::worlds::sim(empty);
+    let mut sim = kinetoscope_testkit::worlds::sim(empty);
     let dt = sim.cfg().physics_dt;
     let object = sim.add_rigid_object(cube("cube", 0.1, 1.0, [0.0; 3])).unwrap();
     sim.rigid_object_mut(object).write_velocity(&array![[1e-3, 0.0, 0.0, 0.0, 0.0, 0.0]], None).unwrap();

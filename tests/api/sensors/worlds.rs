@@ -2,10 +2,11 @@
 
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::urdf;
+use kinetoscope_testkit::urdf::Files;
+pub(crate) use kinetoscope_testkit::urdf::link;
+pub(crate) use kinetoscope_testkit::worlds::{ball, cube, fixed, look_at, pose_in, sr5};
 use nalgebra::Vector3;
-pub(crate) use testkit::urdf::link;
-use testkit::urdf::{self, Files};
-pub(crate) use testkit::worlds::{ball, cube, fixed, look_at, pose_in, sr5};
 
 pub(crate) const G: f64 = 9.81;
 
@@ -15,7 +16,7 @@ pub(crate) fn cfg(num_envs: usize) -> SimulationManagerCfg {
 }
 
 pub(crate) fn sim(num_envs: usize) -> SimulationManager {
-    testkit::worlds::sim(cfg(num_envs))
+    kinetoscope_testkit::worlds::sim(cfg(num_envs))
 }
 
 /// Adds a robot of these links and joints: fixed and without drives, but for what `change` does.
@@ -26,7 +27,11 @@ pub(crate) fn add_robot(
     change: impl FnOnce(&mut RobotCfg),
 ) -> RobotId {
     let files = Files::default();
-    let mut robot = testkit::worlds::passive(testkit::worlds::text_robot(&files, uid, &urdf::robot(uid, content)));
+    let mut robot = kinetoscope_testkit::worlds::passive(kinetoscope_testkit::worlds::text_robot(
+        &files,
+        uid,
+        &urdf::robot(uid, content),
+    ));
     robot.fix_base = true;
     change(&mut robot);
     sim.add_robot(robot).unwrap()

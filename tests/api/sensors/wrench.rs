@@ -5,8 +5,8 @@ use super::worlds::{G, add_robot, joint, link, sim, sr5};
 use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
+use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use nalgebra::{UnitQuaternion, Vector3};
-use testkit::tolerance::{Tolerance, assert_close};
 
 const EXACT: Tolerance =
     Tolerance::absolute(1e-7, "rounding of accelerations, velocities / 5 ms, times a few kilograms");

@@ -7,9 +7,9 @@ use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
 use kinetoscope::sim::mj::{TARGET, Target, compile_file};
+use kinetoscope_testkit::refusal::assert_refused;
+use kinetoscope_testkit::worlds::{ball, cfg, sim};
 use nalgebra::Point3;
-use testkit::refusal::assert_refused;
-use testkit::worlds::{ball, cfg, sim};
 
 const RADIUS: f64 = 0.25;
 

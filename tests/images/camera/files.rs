@@ -1,7 +1,7 @@
 //! Files that examples write, byte by byte as their formats say.
 
 use kinetoscope::ndarray::{Array, Dimension, arr1, arr2, arr3};
-use testkit::urdf::Files;
+use kinetoscope_testkit::urdf::Files;
 
 #[path = "../../../examples/launcher/npy.rs"]
 mod npy;

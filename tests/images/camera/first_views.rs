@@ -5,8 +5,8 @@ use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
 use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::visible::FreeCamera;
-use testkit::urdf::Files;
-use testkit::worlds::{sr5, text_robot, urdf_robot};
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::worlds::{sr5, text_robot, urdf_robot};
 
 /// Share of the width and of the height of the image that the box around everything but the ground has, and whether the box
 /// touches the border.
@@ -57,7 +57,7 @@ fn fill_the_image() {
     for (name, robot, num_envs) in robots {
         for ground in [None, Some(GroundCfg::default())] {
             let cfg = SimulationManagerCfg { num_envs, ground, ..Default::default() };
-            let mut sim = testkit::worlds::sim(cfg);
+            let mut sim = kinetoscope_testkit::worlds::sim(cfg);
             // Parts below the ground are not seen.
             sim.add_robot(RobotCfg { ground_clearance: Some(0.0), ..robot.clone() }).unwrap();
             let still = Still::overview(&mut sim, None, &[]).unwrap();

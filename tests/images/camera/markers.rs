@@ -4,7 +4,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, SceneState};
 use kinetoscope::sensors::camera::{Channels, RasterCfg, Renderer, Shutter};
 use kinetoscope::sensors::{Requires, Sensor, SensorCfg, SensorContext, SensorError};
-use testkit::worlds::{cfg, fixed, look_at, object};
+use kinetoscope_testkit::worlds::{cfg, fixed, look_at, object};
 
 const SIDE: usize = 64;
 /// Focal length \[pixels\].
@@ -79,7 +79,7 @@ fn camera(renderer: Renderer, draw_markers: bool) -> CameraCfg {
 
 /// Two environments with a box on the ground behind the ball.
 fn world() -> SimulationManager {
-    let mut sim = testkit::worlds::sim(cfg(2, 2));
+    let mut sim = kinetoscope_testkit::worlds::sim(cfg(2, 2));
     sim.add_rigid_object(fixed(object("cube", ObjectShape::Box { size: [0.4, 0.4, 0.8] }, [-1.0, 0.3, 0.4]))).unwrap();
     sim
 }

@@ -4,8 +4,8 @@ use super::view;
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
 use kinetoscope::sim::mj;
-use testkit::needs::{files_below, sample_model};
-use testkit::urdf::Files;
+use kinetoscope_testkit::needs::{files_below, sample_model};
+use kinetoscope_testkit::urdf::Files;
 
 /// Draws a still from the place of MuJoCo's viewers, and returns the share of pixels that see something.
 fn seen(still: &Still) -> f64 {
@@ -51,8 +51,9 @@ fn vendor_robots() {
         ("rokae_description/urdf/SR5.urdf", 0),
         ("inspire_hand/DFQ_left_hand.urdf", 0),
     ] {
-        let mut sim = testkit::worlds::sim(SimulationManagerCfg { ground: None, ..Default::default() });
-        sim.add_robot(testkit::worlds::urdf_robot("robot", testkit::needs::robot(file))).unwrap();
+        let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { ground: None, ..Default::default() });
+        sim.add_robot(kinetoscope_testkit::worlds::urdf_robot("robot", kinetoscope_testkit::needs::robot(file)))
+            .unwrap();
         let still = Still::of_env(&mut sim, EnvId(0)).unwrap();
         let scene = still.visible().scene();
         let textures_of = scene.instances().iter().filter_map(|i| i.material.texture.as_ref());

@@ -11,11 +11,11 @@ use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, Shot, look_at_pose};
 use kinetoscope::sim::Visible;
 use kinetoscope::sim::mj::{self, ObjectKind};
+use kinetoscope_testkit::needs::{python_renderer, robot, sample_model};
+use kinetoscope_testkit::urdf::Files;
 use nalgebra::Vector3;
 use std::path::Path;
 use std::process::Command;
-use testkit::needs::{python_renderer, robot, sample_model};
-use testkit::urdf::Files;
 
 const SIZE: [usize; 2] = [640, 480];
 const FOVY_DEG: f64 = 45.0;
@@ -185,8 +185,8 @@ fn humanoid() {
 #[test]
 #[ignore = "needs MuJoCo's own renderer: cargo xtask test --mujoco 4"]
 fn arm() {
-    let mut sim = testkit::worlds::sim(SimulationManagerCfg::default());
-    sim.add_robot(testkit::worlds::urdf_robot("robot", robot("rokae_description/urdf/SR5.urdf"))).unwrap();
+    let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg::default());
+    sim.add_robot(kinetoscope_testkit::worlds::urdf_robot("robot", robot("rokae_description/urdf/SR5.urdf"))).unwrap();
     let files = Files::default();
     sim.dump(files.folder()).unwrap();
     let mjcf = std::fs::read_to_string(files.folder().join("robot.mjcf4.xml")).unwrap();

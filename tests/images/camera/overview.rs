@@ -5,13 +5,13 @@ use kinetoscope::scene::{Marker, PoseF32};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, RasterCfg, Rasterizer, look_at_pose};
 use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::staying_crew;
-use testkit::worlds::{cfg, fixed, mask_id, object};
+use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object};
 
 const SIZE: [usize; 2] = [400, 400];
 
 /// A ball of 10 cm beside the middle of every environment, environments 3 m apart.
 fn balls(num_envs: usize) -> SimulationManager {
-    let mut sim = testkit::worlds::sim(SimulationManagerCfg { arena_space: 3.0, ..cfg(num_envs, 2) });
+    let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { arena_space: 3.0, ..cfg(num_envs, 2) });
     sim.add_rigid_object(fixed(object("ball", ObjectShape::Sphere { radius: 0.1 }, [0.4, -0.2, 0.1]))).unwrap();
     sim
 }

@@ -3,10 +3,10 @@
 use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
-use testkit::worlds::{cfg, cube, pose_in, sr5, urdf_robot};
+use kinetoscope_testkit::worlds::{cfg, cube, pose_in, sr5, urdf_robot};
 
 fn sim(num_envs: usize, threads: usize) -> (SimulationManager, RobotId, ObjectId) {
-    let mut sim = testkit::worlds::sim(cfg(num_envs, threads));
+    let mut sim = kinetoscope_testkit::worlds::sim(cfg(num_envs, threads));
     let robot = sim.add_robot(sr5("sr5")).unwrap();
     let cube = sim.add_rigid_object(cube("cube", 0.05, 1.0, [1.2, -0.2, 0.025])).unwrap();
     (sim, robot, cube)

@@ -148,7 +148,7 @@ fn random_scenes() {
 fn sample_models() {
     for name in ["humanoid/humanoid.xml", "slider_crank/slider_crank.xml", "tendon_arm/arm26.xml", "mug/mug.xml"] {
         // The samples are of 2.2.2; later versions have dropped some elements.
-        let Ok(compiled) = mj::compile_file(&testkit::needs::sample_model(name)) else {
+        let Ok(compiled) = mj::compile_file(&kinetoscope_testkit::needs::sample_model(name)) else {
             assert!(mj::TARGET == mj::Target::V4, "{name}");
             continue;
         };

@@ -5,8 +5,8 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
 use kinetoscope::sim::Still;
+use kinetoscope_testkit::worlds::{cfg, look_at, object, sr5};
 use std::f64::consts::FRAC_PI_2;
-use testkit::worlds::{cfg, look_at, object, sr5};
 
 const SIZE: [usize; 2] = [320, 240];
 
@@ -25,7 +25,7 @@ fn places() -> [(&'static str, Extrinsics); 3] {
 
 /// Images of the arm, the hand and the cube by each renderer.
 fn images(extrinsics: &Extrinsics, renderers: [Renderer; 4]) -> [Frame; 4] {
-    let mut sim = testkit::worlds::sim(SimulationManagerCfg { physics_dt: 0.01, ..cfg(1, 2) });
+    let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { physics_dt: 0.01, ..cfg(1, 2) });
     let hand = ComponentCfg {
         transform: from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]),
         ..ComponentCfg::new("hand", assets::path("revo1_left/revo1_left.urdf").unwrap())
@@ -132,7 +132,7 @@ fn example_create_sensor() {
 #[test]
 fn example_render_model() {
     let still_life = Still::of_mjcf(assets::path("scenes/still_life.xml").unwrap(), None).unwrap();
-    let mut sim = testkit::worlds::sim(SimulationManagerCfg { ground: None, ..Default::default() });
+    let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { ground: None, ..Default::default() });
     sim.add_robot(sr5("robot")).unwrap();
     let robot = Still::of_env(&mut sim, EnvId(0)).unwrap();
     let front = still_life.camera("front").unwrap();

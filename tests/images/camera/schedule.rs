@@ -3,11 +3,11 @@
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::channel::Depth;
 use kinetoscope::sensors::camera::imperfection::DepthNoise;
-use testkit::worlds::{cfg, look_at, object};
+use kinetoscope_testkit::worlds::{cfg, look_at, object};
 
 /// A camera on the ground, below a ball that falls.
 fn world(num_envs: usize, camera: CameraCfg) -> (SimulationManager, SensorId<Camera>) {
-    let mut sim = testkit::worlds::sim(cfg(num_envs, 2));
+    let mut sim = kinetoscope_testkit::worlds::sim(cfg(num_envs, 2));
     sim.add_rigid_object(object("ball", ObjectShape::Sphere { radius: 0.1 }, [0.0, 0.0, 3.0])).unwrap();
     let id = sim.add_sensor("camera", camera).unwrap();
     (sim, id)

@@ -3,11 +3,11 @@
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::{Box3d, Thing};
+use kinetoscope_testkit::worlds::{cfg, look_at, object, pose_in, sr5};
 use nalgebra::Point3;
-use testkit::worlds::{cfg, look_at, object, pose_in, sr5};
 
 fn world() -> (SimulationManager, RobotId, SensorId<Camera>) {
-    let mut sim = testkit::worlds::sim(cfg(2, 2));
+    let mut sim = kinetoscope_testkit::worlds::sim(cfg(2, 2));
     let robot = sim.add_robot(sr5("sr5")).unwrap();
     for (uid, x, class) in [("table", 0.8, None), ("shelf", -0.8, None), ("cup", 0.5, Some("toy".to_string()))] {
         let cfg = object(uid, ObjectShape::Box { size: [0.2, 0.3, 0.4] }, [x, 0.6, 0.2]);

@@ -2,8 +2,8 @@
 
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::worlds::{cfg, pose_in, sr5};
 use nalgebra::Point3;
-use testkit::worlds::{cfg, pose_in, sr5};
 
 const SCENE: &str = r#"
     [entities.eyes]
@@ -70,7 +70,7 @@ fn disparity() {
 /// On a robot, both cameras move with the link.
 #[test]
 fn on_a_link() {
-    let mut sim = testkit::worlds::sim(cfg(2, 2));
+    let mut sim = kinetoscope_testkit::worlds::sim(cfg(2, 2));
     let robot = sim.add_robot(sr5("sr5")).unwrap();
     let extrinsics = Extrinsics { parent: Some("ee_link".into()), ..Default::default() };
     let camera = CameraCfg { width: 32, height: 24, extrinsics, ..Default::default() };

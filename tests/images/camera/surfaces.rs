@@ -3,8 +3,8 @@
 use kinetoscope::prelude::*;
 use kinetoscope::scene::material::decode_srgb;
 use kinetoscope::scene::{LightKind, Material};
+use kinetoscope_testkit::worlds::{cfg, object, sim, sr5};
 use std::sync::Arc;
-use testkit::worlds::{cfg, object, sim, sr5};
 
 const PART: &str = r#"<mujoco><asset><material name="brass" specular="0.9" emission="0.25"/></asset><worldbody>
     <geom name="plate" type="box" size="1 1 0.01"/>

@@ -5,11 +5,11 @@ use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope::sensors::ray::pattern::{Grid, Lidar};
-use testkit::worlds::{cfg, fixed, mask_id, object, pose_in, sr5};
+use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object, pose_in, sr5};
 
 /// A box that tumbles over a static wall and a ball, at another pose in every environment.
 pub(crate) fn tumbling(num_envs: usize, threads: usize) -> (SimulationManager, ObjectId) {
-    let mut sim = testkit::worlds::sim(cfg(num_envs, threads));
+    let mut sim = kinetoscope_testkit::worlds::sim(cfg(num_envs, threads));
     let trunk = sim.add_rigid_object(object("trunk", ObjectShape::cube(0.3), [0.0, 0.0, 1.0])).unwrap();
     let wall = fixed(object("wall", ObjectShape::cube(0.4), [0.0; 3]));
     let init_pose = from_xyz_rpy([0.7, 0.1, 0.2], [0.1, 0.2, 0.3]);
@@ -108,7 +108,7 @@ fn lidar() {
 /// A lidar on a link that is fused to another does not see the body that carries it, but the rest of the robot.
 #[test]
 fn carrier() {
-    let mut sim = testkit::worlds::sim(cfg(1, 1));
+    let mut sim = kinetoscope_testkit::worlds::sim(cfg(1, 1));
     sim.add_robot(sr5("sr5")).unwrap();
     let [all, others] = [false, true].map(|exclude_parent| {
         let vertical_fov_deg = [-90.0, 90.0];

@@ -2,10 +2,10 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
+use kinetoscope_testkit::needs::robot;
+use kinetoscope_testkit::worlds::urdf_robot;
 use std::f64::consts::FRAC_PI_2;
 use std::path::PathBuf;
-use testkit::needs::robot;
-use testkit::worlds::urdf_robot;
 
 fn arm_and_hand(uid: &str, arm: PathBuf, hand: PathBuf) -> RobotCfg {
     let transform = from_xyz_rpy([0.0, 0.0, 0.02], [FRAC_PI_2, 0.0, 0.0]);
@@ -45,7 +45,7 @@ pub(crate) fn vendors_robots() -> [RobotCfg; 2] {
 
 /// A simulation of one robot.
 pub(crate) fn simulation(robot: RobotCfg) -> (SimulationManager, RobotId) {
-    let mut sim = testkit::worlds::sim(testkit::worlds::cfg(1, 1));
+    let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(1, 1));
     let id = sim.add_robot(robot).unwrap();
     (sim, id)
 }

@@ -3,10 +3,10 @@
 use kinetoscope::prelude::*;
 use kinetoscope::sim::urdf::{NameCase, NameCaseCfg, UrdfError, assemble, parse_str, write_urdf, write_urdf_with};
 use kinetoscope::sim::{Diagnostic, DiagnosticKind, RobotDescription};
+use kinetoscope_testkit::refusal::assert_error;
+use kinetoscope_testkit::urdf::{Files, joint, limit};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};
-use testkit::refusal::assert_error;
-use testkit::urdf::{Files, joint, limit};
 
 /// Writes a URDF of `parent joint child` triples; joints that start with `r` are revolute. The first link is the first
 /// parent.

@@ -4,9 +4,9 @@ use kinetoscope::sim::DiagnosticKind;
 use kinetoscope::sim::urdf::{
     Strictness, UrdfCfg, UrdfError, UrdfFile, assemble, parse_file, parse_str, parse_str_with,
 };
+use kinetoscope_testkit::refusal::assert_refused;
+use kinetoscope_testkit::urdf::Files;
 use std::path::Path;
-use testkit::refusal::assert_refused;
-use testkit::urdf::Files;
 
 fn parse(text: &str) -> Result<UrdfFile, UrdfError> {
     parse_str(text, Path::new("robot.urdf"))

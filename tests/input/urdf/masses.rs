@@ -8,9 +8,9 @@ use kinetoscope::sim::DiagnosticKind;
 use kinetoscope::sim::description::Inertial;
 use kinetoscope::sim::mj::compile;
 use kinetoscope::sim::urdf::write_urdf;
+use kinetoscope_testkit::refusal::assert_refused;
+use kinetoscope_testkit::urdf::{Files, collision, joint, limit, robot};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
-use testkit::refusal::assert_refused;
-use testkit::urdf::{Files, collision, joint, limit, robot};
 
 /// A fixed base with a link of this content on a hinge; the link is in line 3.
 fn hinged(link: &str) -> String {
@@ -21,9 +21,9 @@ fn hinged(link: &str) -> String {
 fn loaded(urdf: &str, missing_inertia: MissingInertia) -> (SimulationManager, RobotId) {
     let files = Files::default();
     files.write("brick.obj", BRICK);
-    let mut cfg = testkit::worlds::text_robot(&files, "r", urdf);
+    let mut cfg = kinetoscope_testkit::worlds::text_robot(&files, "r", urdf);
     cfg.urdf.missing_inertia = missing_inertia;
-    let mut sim = testkit::worlds::sim(testkit::worlds::empty_cfg(1));
+    let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::empty_cfg(1));
     let id = sim.add_robot(cfg).unwrap_or_else(|e| panic!("{e}\n{urdf}"));
     (sim, id)
 }
@@ -166,7 +166,7 @@ fn links_without_inertial() {
     let (sim, _) = loaded(&hinged(""), DENSITY);
     assert_eq!(warnings(&sim), ["massless-link"]);
     let shape = collision("<sphere radius=\"0.1\"/>", [0.0; 3]);
-    let heavy = testkit::urdf::link("heavy", 1.0, 0.01, [0.0; 3], "");
+    let heavy = kinetoscope_testkit::urdf::link("heavy", 1.0, 0.01, [0.0; 3], "");
     let weld = joint("weld", "fixed", ["l", "heavy"], [0.0; 3], "0 0 1", "");
     let base = format!("<link name=\"base\">{shape}</link>");
     let urdf =
@@ -177,10 +177,10 @@ fn links_without_inertial() {
     let (sim, id) = loaded(&urdf.replace(&heavy, "<link name=\"heavy\"/>"), DENSITY);
     assert!(sim.robot(id).description().total_mass() > 4.0);
 
-    let mut sim = testkit::worlds::sim(testkit::worlds::empty_cfg(1));
+    let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::empty_cfg(1));
     let files = Files::default();
     let rows = [0.0, -1.0, f64::NAN, f64::INFINITY].map(|density| {
-        let mut cfg = testkit::worlds::text_robot(&files, "r", &hinged(&shape));
+        let mut cfg = kinetoscope_testkit::worlds::text_robot(&files, "r", &hinged(&shape));
         cfg.urdf.missing_inertia = MissingInertia::Density(density);
         (density, sim.add_robot(cfg), "Config { field: \"missing_inertia\"", ["positive and finite"])
     });
@@ -213,7 +213,7 @@ fn partial_inertials() {
         assert_near(&what, &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
         assert_eq!(warnings(&sim), ["inertial-incomplete"], "{what}");
         // A URDF written from the assembled file leaves the missing values out, too.
-        let cfg = testkit::worlds::text_robot(&files, "r", &urdf);
+        let cfg = kinetoscope_testkit::worlds::text_robot(&files, "r", &urdf);
         let written = write_urdf(&kinetoscope::sim::urdf::assemble(&cfg.urdf).unwrap().description);
         let (sim, id) = loaded(&written, DENSITY);
         assert_near(&what, &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
@@ -243,10 +243,10 @@ fn absurd_inertias() {
     };
     let load = |urdf: &str| {
         let files = Files::default();
-        let cfg = testkit::worlds::text_robot(&files, "r", urdf);
+        let cfg = kinetoscope_testkit::worlds::text_robot(&files, "r", urdf);
         let turned = kinetoscope::scene::pose::from_xyz_rpy([0.0, 0.0, 0.3], [0.4, 0.3, 0.0]);
         let cfg = RobotCfg { fix_base: false, init_pose: turned, ..cfg };
-        let mut sim = testkit::worlds::sim(testkit::worlds::cfg(1, 1));
+        let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(1, 1));
         let id = sim.add_robot(cfg).unwrap();
         (sim, id)
     };
@@ -286,7 +286,7 @@ fn absurd_inertias() {
 /// A URDF of which cameras see nothing gave an empty picture without a word.
 #[test]
 fn nothing_to_draw() {
-    let link = testkit::urdf::link("l", 1.0, 0.01, [0.0; 3], "");
+    let link = kinetoscope_testkit::urdf::link("l", 1.0, 0.01, [0.0; 3], "");
     let empty = "<visual><geometry><sphere radius=\"0\"/></geometry></visual></link>";
     let ball = "<visual><geometry><sphere radius=\"1\"/></geometry></visual></link>";
     for (content, kinds) in [
@@ -308,7 +308,7 @@ fn nothing_to_draw() {
 #[test]
 fn missing_visual_mesh() {
     let mesh = |name: &str| format!("<visual><geometry><mesh filename=\"{name}\"/></geometry></visual></link>");
-    let link = testkit::urdf::link("l", 1.0, 0.01, [0.0; 3], "");
+    let link = kinetoscope_testkit::urdf::link("l", 1.0, 0.01, [0.0; 3], "");
     let (mut sim, _) = loaded(&robot("r", &link.replace("</link>", &mesh("none.obj"))), DENSITY);
     Still::of_env(&mut sim, EnvId(0)).unwrap();
     assert_eq!(warnings(&sim), ["visual-mesh-missing"]);

@@ -5,8 +5,8 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::description::{Geometry, JointKind, Material};
 use kinetoscope::sim::urdf::{Assembly, assemble, parse_file, write_urdf};
 use kinetoscope::sim::{DiagnosticKind, RobotDescription};
-use testkit::needs::{files_below, robot, robots_dir};
-use testkit::worlds::{cfg, sim, urdf_robot};
+use kinetoscope_testkit::needs::{files_below, robot, robots_dir};
+use kinetoscope_testkit::worlds::{cfg, sim, urdf_robot};
 
 const SR5: &str = "rokae_description/urdf/SR5.urdf";
 const HAND: &str = "inspire_hand/DFQ_left_hand.urdf";
@@ -60,8 +60,8 @@ fn vendors() {
     mesh_scales(fingers);
 
     let components = vec![
-        ComponentCfg::new("arm", testkit::needs::robot(SR5)),
-        ComponentCfg::new("hand", testkit::needs::robot(HAND)),
+        ComponentCfg::new("arm", kinetoscope_testkit::needs::robot(SR5)),
+        ComponentCfg::new("hand", kinetoscope_testkit::needs::robot(HAND)),
     ];
     let both = assemble(&UrdfCfg { components, ..Default::default() }).unwrap().description;
     let connector = both.joint(both.joint_id("arm_TO_hand_CONNECTOR").unwrap());
@@ -88,7 +88,7 @@ fn looks(robot: &RobotDescription) -> Vec<(Option<Material>, Geometry)> {
 fn vendor_written_and_read() {
     for name in [SR5, HAND, ANYMAL] {
         let Assembly { description: robot, diagnostics } = load(name);
-        let files = testkit::urdf::Files::default();
+        let files = kinetoscope_testkit::urdf::Files::default();
         let text = write_urdf(&robot);
         assert_eq!(text, write_urdf(&robot));
         let again = assemble(&UrdfCfg::single(files.write("written.urdf", text)));

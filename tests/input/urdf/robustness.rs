@@ -2,10 +2,10 @@
 
 use kinetoscope::sim::description::JointId;
 use kinetoscope::sim::urdf::{UrdfCfg, UrdfError, assemble, parse_file, parse_str, write_urdf};
+use kinetoscope_testkit::urdf::Files;
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use testkit::urdf::Files;
 
 const SMALL: &str = r#"<?xml version="1.0"?>
 <robot name="small">

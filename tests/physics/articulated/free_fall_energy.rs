@@ -153,7 +153,7 @@ fn holds() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn holds_for_anymal() {
-    let path = testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf");
+    let path = kinetoscope_testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf");
     let fall = |cfg| fallen(path.clone(), cfg, 2.0, 0.0, [0.0; 3]);
     let (euler, exact) = (fall(earth()), fall(rk4(earth())));
     assert!((euler.mass - 52.13485).abs() < 1e-5, "{}", euler.mass);

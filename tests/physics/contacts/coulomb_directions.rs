@@ -11,8 +11,8 @@
 
 use crate::lab::*;
 use kinetoscope::sim::Cone;
+use kinetoscope_testkit::worlds::ball;
 use nalgebra::{Rotation2, Vector2};
-use testkit::worlds::ball;
 
 const FRICTION: f64 = 0.3;
 const SPEED: f64 = 4.0;

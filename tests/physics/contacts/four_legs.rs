@@ -7,7 +7,7 @@
 //! of what is asymmetric.
 
 use crate::lab::*;
-use testkit::worlds::cube;
+use kinetoscope_testkit::worlds::cube;
 
 const TABLE: f64 = 6.0;
 const LEG: f64 = 0.5;

@@ -5,7 +5,7 @@
 //! weight.
 
 use crate::lab::*;
-use testkit::worlds::cube;
+use kinetoscope_testkit::worlds::cube;
 
 const PLATE: f64 = 2.0;
 const MASS: f64 = 3.0;

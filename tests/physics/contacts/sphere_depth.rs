@@ -12,7 +12,7 @@
 use super::ball_in_picture::{FOCAL, MIDDLE, SIZE, Seen, expected, found};
 use crate::lab::*;
 use kinetoscope::ndarray::Axis;
-use testkit::worlds::{fixed, object};
+use kinetoscope_testkit::worlds::{fixed, object};
 
 const RADIUS: f64 = 0.3;
 

@@ -7,7 +7,7 @@
 
 use crate::bounce::off;
 use crate::lab::*;
-use testkit::worlds::ball;
+use kinetoscope_testkit::worlds::ball;
 
 /// Step \[s\].
 const H: f64 = 2e-4;

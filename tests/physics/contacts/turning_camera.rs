@@ -9,8 +9,8 @@
 use super::ball_in_picture::{FOCAL, MIDDLE, SIZE, Seen, expected, found};
 use crate::lab::*;
 use kinetoscope::sim::MaskId;
+use kinetoscope_testkit::worlds::{fixed, object};
 use std::f64::consts::{PI, TAU};
-use testkit::worlds::{fixed, object};
 
 const RIM: f64 = 1.2;
 const EYE: f64 = 0.3;

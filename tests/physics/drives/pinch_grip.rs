@@ -20,7 +20,7 @@
 use crate::lab::*;
 use crate::rigid_body::soft_contact::{LARGEST, TIME, depth, impedance};
 use kinetoscope::sim::mj::{TARGET, Target};
-use testkit::worlds::cube;
+use kinetoscope_testkit::worlds::cube;
 
 const LIMIT: f64 = 5.0;
 const MASS: f64 = 0.2;

@@ -5,7 +5,7 @@
 //! of 1e5/s² over ten steps: 1e-10.
 
 use crate::lab::*;
-use testkit::worlds::object;
+use kinetoscope_testkit::worlds::object;
 
 /// Velocities after half a second, less what both had from the start.
 fn parted(along: [f64; 3], faster: f64) -> [Vector3<f64>; 2] {

@@ -7,7 +7,7 @@
 //! 2r: 0.5 %; twice, as they come and go: 1 %.
 
 use crate::lab::*;
-use testkit::worlds::ball;
+use kinetoscope_testkit::worlds::ball;
 
 const RADIUS: f64 = 0.1;
 

@@ -14,7 +14,7 @@
 use super::sliding_block::SOLVER;
 use super::soft_contact::depth;
 use crate::lab::*;
-use testkit::worlds::ball;
+use kinetoscope_testkit::worlds::ball;
 
 const BOARD: f64 = 10.0;
 const BALL: f64 = 1.0;

@@ -27,8 +27,8 @@
 
 use super::soft_contact::{LARGEST, TIME};
 use crate::lab::*;
+use kinetoscope_testkit::worlds::{ball, object};
 use nalgebra::{Vector2, Vector3};
-use testkit::worlds::{ball, object};
 
 const BOX: f64 = 10.0;
 const BALL: f64 = 1.0;

@@ -6,7 +6,7 @@
 
 use crate::bounce::{apex, apex_off, apex_rest};
 use crate::lab::*;
-use testkit::worlds::ball;
+use kinetoscope_testkit::worlds::ball;
 
 /// Step \[s\].
 const H: f64 = 1e-4;

@@ -7,7 +7,7 @@
 
 use crate::bounce::off;
 use crate::lab::*;
-use testkit::worlds::ball;
+use kinetoscope_testkit::worlds::ball;
 
 const RADIUS: f64 = 0.1;
 

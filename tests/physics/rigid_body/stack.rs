@@ -10,7 +10,7 @@
 use super::soft_contact::depth;
 use crate::lab::*;
 use kinetoscope::sim::mj::{TARGET, Target};
-use testkit::worlds::object;
+use kinetoscope_testkit::worlds::object;
 
 const EDGE: f64 = 0.1;
 

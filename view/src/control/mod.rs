@@ -14,7 +14,7 @@ pub use hub::Viewer;
 pub use recording::{RecordButton, Recording, RecordingState};
 
 use crate::stage::Shown;
-use sim::{EnvId, JointIndex, RobotId, SimulationManager};
+use kinetoscope_sim::{EnvId, JointIndex, RobotId, SimulationManager};
 
 /// What a viewer asks a simulation to do. It is done between two steps, on the simulation's thread.
 #[derive(Clone, Copy, Debug, PartialEq)]

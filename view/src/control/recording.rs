@@ -1,6 +1,6 @@
 //! The record button: views show it, and what it does is the program's.
 
-use sim::SimulationManager;
+use kinetoscope_sim::SimulationManager;
 use std::fmt;
 use std::sync::{Arc, Mutex};
 

@@ -1,7 +1,7 @@
 //! The spring by which a viewer drags a body.
 
+use kinetoscope_sim::{BodyMotion, EnvId, SimulationManager};
 use nalgebra::{Point3, Vector3};
-use sim::{BodyMotion, EnvId, SimulationManager};
 
 /// Angular frequency of a free body on the spring \[rad/s\]: it comes within 2 % of where it is pulled in 0.7 s.
 const FREQUENCY: f64 = 8.0;
@@ -37,7 +37,7 @@ impl Spring {
     ///
     /// # Errors
     /// There is no such environment or body.
-    pub(super) fn force_now(&self, sim: &SimulationManager) -> sim::Result<Option<([f64; 3], [f64; 3])>> {
+    pub(super) fn force_now(&self, sim: &SimulationManager) -> kinetoscope_sim::Result<Option<([f64; 3], [f64; 3])>> {
         let motion = sim.body_motion(self.env, self.body)?;
         Ok((!motion.is_fixed).then(|| self.force(&motion)))
     }
@@ -46,7 +46,7 @@ impl Spring {
     ///
     /// # Errors
     /// There is nothing to pull at, or a number is not finite.
-    pub(super) fn apply(&self, sim: &mut SimulationManager) -> sim::Result<()> {
+    pub(super) fn apply(&self, sim: &mut SimulationManager) -> kinetoscope_sim::Result<()> {
         let force = self.force_now(sim)?;
         sim.pull(self.env, self.body, force.as_slice())
     }

@@ -4,11 +4,11 @@ use super::spring::Spring;
 use super::*;
 use crate::sample::{MASS, Running, Sample, sample};
 use crate::stage::{Run, Snapshot};
-use scene::Pose;
-use sim::{BodyMotion, ObjectId, ObjectShape, RigidObjectCfg, SimulationManagerCfg};
+use kinetoscope_scene::Pose;
+use kinetoscope_sim::{BodyMotion, ObjectId, ObjectShape, RigidObjectCfg, SimulationManagerCfg};
+use kinetoscope_testkit::wait::PATIENCE;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use testkit::wait::PATIENCE;
 
 /// The first snapshot from now on that is as it should be.
 #[track_caller]

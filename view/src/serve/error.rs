@@ -42,7 +42,7 @@ pub enum ServeError {
     System(String),
     /// The simulation cannot be looked at.
     #[error("cannot serve: {0}")]
-    Simulation(#[from] sim::Error),
+    Simulation(#[from] kinetoscope_sim::Error),
 }
 
 fn hint(candidates: &[String]) -> String {

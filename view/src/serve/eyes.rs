@@ -10,9 +10,9 @@ use crate::stage::{
 };
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
-use sensors::visibility::View;
+use kinetoscope_sensors::visibility::View;
+use kinetoscope_sim::EnvId;
 use serde_json::{Value, json};
-use sim::EnvId;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};

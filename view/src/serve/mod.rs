@@ -40,8 +40,8 @@ pub use error::ServeError;
 use crate::control::{RecordButton, Speed, Viewing, Wants};
 use door::Door;
 use eyes::Theatre;
+use kinetoscope_sim::{Moment, Observer, ObserverId, SimulationManager};
 use server::{House, Server};
-use sim::{Moment, Observer, ObserverId, SimulationManager};
 use std::net::SocketAddr;
 use std::sync::{Arc, Weak};
 use token::Token;
@@ -100,7 +100,7 @@ impl Served {
     ///
     /// # Panics
     /// It is served by another simulation.
-    pub fn close(&self, sim: &mut SimulationManager) -> sim::Result<()> {
+    pub fn close(&self, sim: &mut SimulationManager) -> kinetoscope_sim::Result<()> {
         sim.remove_observer(self.host).map(drop)
     }
 }
@@ -174,7 +174,7 @@ mod tests {
         let window = sim.viewer(Wants { rate: 1000.0, ..Wants::default() });
         window.send(Command::SetSpeed(Speed::REAL));
         let until = |sim: &mut SimulationManager, speed: Speed| {
-            testkit::wait::until(&format!("{speed:?}"), || {
+            kinetoscope_testkit::wait::until(&format!("{speed:?}"), || {
                 sim.update(1);
                 window.newest().unwrap().run.speed == speed
             });

@@ -1,7 +1,7 @@
 //! Environments side by side with markers among them, as one scene.
 
 use super::snapshot::{EnvStage, Shown, Snapshot};
-use scene::{Instance, Marker, PoseF32, RenderScene};
+use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 use std::sync::Arc;
 
 /// The geom group of markers: MuJoCo's are 0 to 5.

@@ -1,9 +1,9 @@
 //! Where a viewer looks from.
 
 use super::snapshot::Snapshot;
+use kinetoscope_scene::framing::{FILL, Framing, Placed, REACH};
+use kinetoscope_sensors::visibility::View;
 use nalgebra::Vector3;
-use scene::framing::{FILL, Framing, Placed, REACH};
-use sensors::visibility::View;
 
 /// A viewer's camera: it turns about a point, moves with its picture, comes nearer, and flies. Up in the picture is up in the
 /// world.
@@ -51,7 +51,7 @@ impl Eye {
         })
     }
 
-    /// The point of view that the program set ([`SimulationManager::set_camera_view`](sim::SimulationManager::set_camera_view)),
+    /// The point of view that the program set ([`SimulationManager::set_camera_view`](kinetoscope_sim::SimulationManager::set_camera_view)),
     /// else one from which everything of a snapshot but the ground fills an image of `size` pixels, seen from the front, the
     /// side and above.
     pub fn overview(snapshot: &Snapshot, [width, height]: [usize; 2]) -> Self {
@@ -152,7 +152,7 @@ impl Eye {
 /// A camera in the origin.
 fn plain([width, height]: [usize; 2]) -> View {
     let [cx, cy] = [0.5 * width as f32, 0.5 * height as f32];
-    let world_from_camera = scene::PoseF32::IDENTITY;
+    let world_from_camera = kinetoscope_scene::PoseF32::IDENTITY;
     View { width, height, fx: cy.max(1.0), fy: cy.max(1.0), cx, cy, near: 0.01, far: 100.0, world_from_camera }
 }
 

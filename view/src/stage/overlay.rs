@@ -8,11 +8,11 @@ use super::color;
 use super::eye::project;
 use super::snapshot::{EnvStage, Shown, Snapshot};
 use embedded_graphics::mono_font::ascii::FONT_6X10;
+use kinetoscope_scene::Marker;
+use kinetoscope_scene::state::Contact;
+use kinetoscope_sensors::visibility::View;
+use kinetoscope_sim::JointAxis;
 use nalgebra::Vector3;
-use scene::Marker;
-use scene::state::Contact;
-use sensors::visibility::View;
-use sim::JointAxis;
 
 /// What is drawn over the scene, and which of its shapes are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -189,7 +189,7 @@ mod tests {
     use super::*;
     use crate::control::{Viewing, Wants};
     use crate::stage::Eye;
-    use scene::MarkerKind;
+    use kinetoscope_scene::MarkerKind;
 
     #[test]
     fn force_arrows() {

@@ -2,8 +2,8 @@
 
 use super::overlay::Overlays;
 use super::snapshot::{Names, Shown, Snapshot};
+use kinetoscope_scene::Pose;
 use nalgebra::{Point3, Vector3};
-use scene::Pose;
 
 /// A point of something that was clicked on.
 #[derive(Clone, Debug, PartialEq)]

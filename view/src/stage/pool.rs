@@ -2,7 +2,7 @@
 
 use super::snapshot::{Names, Run, Snapshot};
 use crate::control::Wants;
-use sim::SimulationManager;
+use kinetoscope_sim::SimulationManager;
 use std::sync::Arc;
 
 /// A fixed number of snapshots, of which those that nobody holds are filled again.

@@ -2,10 +2,10 @@
 
 use super::camera::{self, CameraId, CameraView};
 use crate::control::{RecordingState, Speed, Wants};
-use scene::state::Contact;
-use scene::{Marker, RenderScene};
-use sim::description::{Joint, JointKind};
-use sim::{EnvId, JointIndex, Look, MaskId, RobotId, SimulationManager, Viewpoint};
+use kinetoscope_scene::state::Contact;
+use kinetoscope_scene::{Marker, RenderScene};
+use kinetoscope_sim::description::{Joint, JointKind};
+use kinetoscope_sim::{EnvId, JointIndex, Look, MaskId, RobotId, SimulationManager, Viewpoint};
 use std::sync::Arc;
 
 /// Which environments.

@@ -3,12 +3,12 @@
 use super::*;
 use crate::control::{Viewing, Wants};
 use crate::sample::{HALF, MASS, Sample, sample, unlike};
+use kinetoscope_sensors::camera::colormap::{depth_color, mask_color, normal_color};
+use kinetoscope_sensors::camera::lens::Equidistant;
+use kinetoscope_sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement, Renderer, StereoCameraCfg};
+use kinetoscope_sensors::ray::RayCasterCameraCfg;
+use kinetoscope_sensors::visibility::View;
 use nalgebra::{Point3, Vector3};
-use sensors::camera::colormap::{depth_color, mask_color, normal_color};
-use sensors::camera::lens::Equidistant;
-use sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement, Renderer, StereoCameraCfg};
-use sensors::ray::RayCasterCameraCfg;
-use sensors::visibility::View;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 

@@ -8,9 +8,9 @@ use crate::control::{Command, Speed, TAKES_NONE, Wants};
 use crate::stage::{
     Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Trails, contacts_wanted, describe,
 };
+use kinetoscope_sensors::visibility::View;
+use kinetoscope_sim::EnvId;
 use nalgebra::Vector3;
-use sensors::visibility::View;
-use sim::EnvId;
 use std::collections::HashSet;
 use std::fmt;
 use std::sync::Arc;

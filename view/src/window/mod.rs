@@ -19,7 +19,7 @@ pub use keys::Key;
 
 use crate::control::{Command, RecordButton, Speed, Viewer, Viewing, Wants};
 use crate::stage::Canvas;
-use sim::SimulationManager;
+use kinetoscope_sim::SimulationManager;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};

@@ -11,9 +11,9 @@ use crate::Screenshot;
 use crate::control::{Recording, RecordingState};
 use crate::sample::{HALF, Sample, sample, unlike};
 use crate::stage::{Eye, Look, Overlays, Painter, Panel, Shown, Snapshot};
+use kinetoscope_sensors::visibility::View;
+use kinetoscope_sim::EnvId;
 use nalgebra::Vector3;
-use sensors::visibility::View;
-use sim::EnvId;
 
 const SIZE: [usize; 2] = [640, 360];
 /// The middle of the image.

@@ -1,5 +1,6 @@
 //! Chromium without a screen, driven over its DevTools protocol: one WebSocket, and JSON.
 
+use kinetoscope_testkit::wait;
 use serde_json::{Value, json};
 use std::net::TcpStream;
 use std::path::Path;
@@ -7,7 +8,6 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use testkit::wait;
 use tungstenite::{Message, WebSocket};
 
 /// The longest wait on a busy machine.

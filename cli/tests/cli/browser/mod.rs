@@ -5,17 +5,17 @@ mod chromium;
 use super::serve::running::{Running, play_fall};
 use chromium::{Chromium, Tab};
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::wait;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use testkit::wait;
 
 /// Names the folder to which screenshots of the page are written, for the documentation.
 const SCREENSHOTS: &str = "KINETOSCOPE_SCREENSHOTS";
 
 fn browser() -> Chromium {
-    Chromium::start(&testkit::needs::chromium())
+    Chromium::start(&kinetoscope_testkit::needs::chromium())
 }
 
 /// The page at an address, when it is connected.

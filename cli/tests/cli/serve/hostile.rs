@@ -3,11 +3,12 @@
 use super::running::Running;
 use super::visitor::{Visitor, say, status, status_of};
 use kinetoscope::prelude::*;
+use kinetoscope_testkit::process;
+use kinetoscope_testkit::wait;
+use kinetoscope_testkit::wait::threads_and_files;
+use kinetoscope_testkit::worlds::{cfg, cube};
 use std::io::Write;
 use std::net::TcpStream;
-use testkit::process;
-use testkit::wait::{self, threads_and_files};
-use testkit::worlds::{cfg, cube};
 use tungstenite::Message;
 
 #[test]

@@ -4,9 +4,9 @@ use super::running::Running;
 use super::visitor::{Came, Visitor};
 use crate::support::{colors, red};
 use image::RgbImage;
+use kinetoscope_testkit::wait::PATIENCE;
 use serde_json::json;
 use std::time::Duration;
-use testkit::wait::PATIENCE;
 
 /// Share of red pixels.
 fn share(image: &RgbImage) -> f64 {

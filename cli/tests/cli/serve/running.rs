@@ -6,13 +6,13 @@ use kinetoscope::prelude::*;
 use kinetoscope::record::{Film, Recording};
 use kinetoscope::view::control::{Play, Speed};
 use kinetoscope::view::{Command, Viewer, Viewing, Wants};
+use kinetoscope_testkit::wait;
+use kinetoscope_testkit::worlds::{camera, cfg, cube, gains, sr5};
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use testkit::wait;
-use testkit::worlds::{camera, cfg, cube, gains, sr5};
 
 /// The state of the simulation, as the program that steps it has it.
 #[derive(Clone, Debug, Default)]

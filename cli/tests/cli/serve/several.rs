@@ -4,10 +4,10 @@ use super::running::Running;
 use super::visitor::{Visitor, connect, say, status_of};
 use kinetoscope::prelude::*;
 use kinetoscope::view::{Command, Speed};
+use kinetoscope_testkit::wait;
 use serde_json::json;
 use std::io::{Read, Write};
 use std::time::{Duration, Instant};
-use testkit::wait;
 use tungstenite::Message;
 
 /// A step of this scene takes less than a millisecond; a viewer that does not read is given up after five seconds. A

@@ -1,11 +1,11 @@
 //! A viewer without a browser.
 
 use image::RgbImage;
+use kinetoscope_testkit::wait::PATIENCE;
 use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Instant;
-use testkit::wait::PATIENCE;
 use tungstenite::{Message, WebSocket};
 
 /// A message of the server.

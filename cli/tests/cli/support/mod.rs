@@ -1,10 +1,10 @@
 //! The command in a shell of its own folder, and images that it makes.
 
+use kinetoscope_testkit::urdf::Files;
+use kinetoscope_testkit::wait;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
-use testkit::urdf::Files;
-use testkit::wait;
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{AtomEnum, ConnectionExt as _};
 use x11rb::rust_connection::RustConnection;

@@ -1,8 +1,8 @@
 //! Events, notes and rates.
 
 use super::*;
+use kinetoscope_sim::mj;
 use serde_json::json;
-use sim::mj;
 
 /// The lines of `notes.jsonl` of a NumPy archive.
 fn notes(path: &Path) -> Vec<serde_json::Value> {

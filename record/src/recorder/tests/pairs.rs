@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::{Recording, Wanted};
-use sensors::StereoCameraCfg;
-use sensors::camera::StereoCamera;
+use kinetoscope_sensors::StereoCameraCfg;
+use kinetoscope_sensors::camera::StereoCamera;
 
 /// A pair of small eyes, the right one turned and askew.
 fn toed_in(left_to_right_pos: [f64; 3]) -> StereoCameraCfg {
@@ -14,7 +14,7 @@ fn toed_in(left_to_right_pos: [f64; 3]) -> StereoCameraCfg {
         channels: Channels { depth: true, ..Channels::default() },
         ..CameraCfg::default()
     };
-    let left_to_right_rot = scene::pose::from_xyz_rpy([0.0; 3], [0.02, -0.1, 0.03]).rotation;
+    let left_to_right_rot = kinetoscope_scene::pose::from_xyz_rpy([0.0; 3], [0.02, -0.1, 0.03]).rotation;
     StereoCameraCfg { camera, left_to_right_pos, left_to_right_rot, ..StereoCameraCfg::default() }
 }
 

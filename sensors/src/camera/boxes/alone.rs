@@ -7,7 +7,7 @@ use crate::camera::channel::{Channels, Frame};
 use crate::camera::error::CameraError;
 use crate::camera::segmentation::Segment;
 use crate::camera::sensor::Camera;
-use scene::RenderScene;
+use kinetoscope_scene::RenderScene;
 
 /// Draws segments alone, by the camera's own renderer and through its lens.
 pub(super) struct Alone<'a> {

@@ -2,8 +2,8 @@
 
 use super::support::reach;
 use crate::visibility::View;
-use scene::shape::Plane;
-use scene::{Instance, PoseF32, Shape};
+use kinetoscope_scene::shape::Plane;
+use kinetoscope_scene::{Instance, PoseF32, Shape};
 
 /// Edges around a circle of what is cut by a side of the frustum and has no corners of its own: the polygon is inside of
 /// the circle by 1 - cos(pi / 256) of its radius at most, 7.5e-5.
@@ -234,8 +234,8 @@ fn horizon(view: &View, seen: &Seen, far: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scene::Material;
-    use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Sphere};
+    use kinetoscope_scene::Material;
+    use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Sphere};
 
     /// An image so wide that only the infinite plane reaches its edges.
     fn view() -> View {
@@ -258,7 +258,7 @@ mod tests {
 
     /// A rotation of some angles and a place.
     fn pose(rpy: [f64; 3], at: [f64; 3]) -> PoseF32 {
-        PoseF32::from(&scene::pose::from_xyz_rpy(at, rpy))
+        PoseF32::from(&kinetoscope_scene::pose::from_xyz_rpy(at, rpy))
     }
 
     /// The rays to a ball fill a cone of half the angle asin(r / d) about the direction of its centre, in the plane of y = 0

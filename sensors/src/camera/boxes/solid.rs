@@ -6,8 +6,8 @@ use crate::camera::segmentation::{SegmentLevel, Segmentation};
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;
 use crate::visibility::raster::Layer;
+use kinetoscope_scene::{Instance, Pose, PoseF32};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
-use scene::{Instance, Pose, PoseF32};
 
 /// A box around a segment, along the axes of the segment's own frame: that of the link; of an object with several links that
 /// of its first one; of a class that of its first object.

@@ -1,6 +1,6 @@
 //! How far shapes reach.
 
-use scene::Shape;
+use kinetoscope_scene::Shape;
 
 /// Smallest and largest n · p over the points p of a shape, in its own frame; infinite where the shape is.
 pub(super) fn reach(shape: &Shape, n: [f64; 3]) -> [f64; 2] {

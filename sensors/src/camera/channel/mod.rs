@@ -3,8 +3,8 @@
 use super::sensor::Camera;
 use crate::error::SensorError;
 use crate::visibility::RenderError;
+use kinetoscope_scene::pattern::closest;
 use ndarray::{Array, ArrayView, Dimension, Ix3, Ix4};
-use scene::pattern::closest;
 use std::ops::Range;
 
 /// Lanes of a [`PixelGroup`].

@@ -3,7 +3,7 @@
 use super::*;
 use crate::camera::lens::{Equidistant, FTheta, OpenCv};
 use crate::camera::{Frame, Lens, Optics, PixelIntrinsics};
-use scene::PoseF32;
+use kinetoscope_scene::PoseF32;
 use std::f64::consts::FRAC_PI_2;
 
 const SIDE: usize = 200;

@@ -13,12 +13,12 @@ mod rows;
 
 use super::error::CameraError;
 use crate::error::SensorError;
+use kinetoscope_scene::pattern::closest;
 pub use optics::Optics;
 use poles::Poles;
 pub use rays::LensRays;
 pub(crate) use rays::Sight;
 pub(crate) use rows::RaysOfRows;
-use scene::pattern::closest;
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;

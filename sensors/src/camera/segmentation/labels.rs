@@ -3,7 +3,7 @@
 use crate::camera::error::CameraError;
 use crate::error::SensorError;
 use crate::select::matching;
-use scene::pattern::{PatternError, closest};
+use kinetoscope_scene::pattern::{PatternError, closest};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -57,7 +57,7 @@ pub enum SegmentLevel {
 pub struct SegmentationCfg {
     /// Patterns and classes. A pattern is a regular expression that must match the whole name of an object (`arm`, which
     /// means all its links), `object/link`, or the link alone. What none matches keeps its own class.
-    #[serde(with = "scene::file_format::pairs")]
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub labels: Vec<(String, String)>,
 }
 

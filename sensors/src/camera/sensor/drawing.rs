@@ -12,8 +12,8 @@ use crate::camera::rasterizer::Shot;
 use crate::camera::shutter::{Opened, Take};
 use crate::camera::ticket::Stream;
 use crate::visibility::RenderError;
+use kinetoscope_scene::{Instance, Marker, Pose, PoseF32, RenderScene};
 use ndarray::Array2;
-use scene::{Instance, Marker, Pose, PoseF32, RenderScene};
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 

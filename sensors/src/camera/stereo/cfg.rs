@@ -13,8 +13,8 @@ use crate::camera::renderer::Renderer;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
+use kinetoscope_scene::Pose;
 use nalgebra::{Translation3, UnitQuaternion};
-use scene::Pose;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -63,7 +63,7 @@ pub struct StereoCameraCfg {
     /// the extrinsics \[m\].
     pub left_to_right_pos: [f64; 3],
     /// How the right eye is turned against the left one: axes of its optical frame in that of the left eye.
-    #[serde(with = "scene::file_format::rotation")]
+    #[serde(with = "kinetoscope_scene::file_format::rotation")]
     pub left_to_right_rot: UnitQuaternion<f64>,
     /// What the extrinsics place.
     pub origin: StereoOrigin,

@@ -6,8 +6,8 @@ use crate::camera::error::CameraError;
 use crate::camera::extrinsics::Poses;
 use crate::camera::intrinsics::{Intrinsics, PixelIntrinsics};
 use crate::error::SensorError;
+use kinetoscope_scene::Pose;
 use nalgebra::{Matrix3, Matrix3x4, Unit, UnitQuaternion, Vector3};
-use scene::Pose;
 
 /// An optical axis is turned by this at most \[rad\], 80 degrees. Beyond it nothing of a usual picture is left: what was in its
 /// middle is 5.7 focal lengths aside.

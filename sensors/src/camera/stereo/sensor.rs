@@ -9,9 +9,9 @@ use crate::camera::mounts::chosen_rows;
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;
 use crate::sensor::Sensor;
+use kinetoscope_scene::pose::{from_row, to_row};
+use kinetoscope_scene::{Marker, Pose, SceneState};
 use ndarray::Array2;
-use scene::pose::{from_row, to_row};
-use scene::{Marker, Pose, SceneState};
 use std::fmt;
 use std::sync::{Mutex, OnceLock, PoisonError};
 

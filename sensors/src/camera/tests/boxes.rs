@@ -7,11 +7,11 @@ use super::super::{
 use super::harness::{Still, at, point, things};
 use super::scenes::{Random, every_shape, random};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use kinetoscope_scene::pose::from_xyz_rpy;
+use kinetoscope_scene::shape::{Box, Capsule, Ellipsoid, Plane, Sphere};
+use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderScene, SceneState, Shape, VisibleState};
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 use ndarray::Array2;
-use scene::pose::from_xyz_rpy;
-use scene::shape::{Box, Capsule, Ellipsoid, Plane, Sphere};
-use scene::{Instance, Material, Pose, PoseF32, RenderScene, SceneState, Shape, VisibleState};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -9,7 +9,7 @@ use super::super::{
 };
 use super::harness::{opencv, point};
 use super::stage::{built, cfg, context, pose_of};
-use testkit::urdf::Files;
+use kinetoscope_testkit::urdf::Files;
 
 /// As `cameracalibrator` writes it, with what some drivers add.
 const FILE: &str = "\

@@ -4,9 +4,9 @@ use super::super::{FrameMut, RasterCfg, Rasterizer, Renderer};
 use super::harness::{Still, at, look, things};
 use super::scenes::every_shape;
 use crate::visibility::{RenderError, View};
-use scene::mesh::TriMesh;
-use scene::shape::{Box, Mesh, Plane, Sphere};
-use scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, RenderSceneError, Shape};
+use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::shape::{Box, Mesh, Plane, Sphere};
+use kinetoscope_scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, RenderSceneError, Shape};
 use std::sync::Arc;
 
 fn view() -> View {

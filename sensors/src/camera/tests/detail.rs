@@ -5,10 +5,10 @@ use super::harness::{Image, Still, look};
 use super::robots::{sr5, sr5_view};
 use super::scenes::{EXACT, checker_plane};
 use crate::visibility::View;
+use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::shape::{Cylinder, Mesh, Sphere};
+use kinetoscope_scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
 use nalgebra::Vector3;
-use scene::mesh::TriMesh;
-use scene::shape::{Cylinder, Mesh, Sphere};
-use scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
 use std::sync::{Arc, LazyLock};
 
 /// Rows and columns of fine pixels in a pixel.
@@ -53,7 +53,7 @@ fn scene_of(meshes: &[Mesh; 3]) -> (RenderScene, Vec<PoseF32>) {
     let mut poses = vec![PoseF32::from_translation([0., 0., -0.3])];
     for (k, mesh) in meshes.iter().enumerate() {
         instances.push(Instance::new(mesh.clone(), Material::from_rgba([0.8, 0.6, 0.3, 1.0]), k as i32 + 1));
-        let pose = scene::pose::from_xyz_rpy([0.0, 0.4 * k as f64 - 0.4, 0.0], [0.3 * k as f64, 0.2, 0.1]);
+        let pose = kinetoscope_scene::pose::from_xyz_rpy([0.0, 0.4 * k as f64 - 0.4, 0.0], [0.3 * k as f64, 0.2, 0.1]);
         poses.push(PoseF32::from(&pose));
     }
     let mut scene = RenderScene::new(instances).unwrap();

@@ -8,7 +8,7 @@ use super::scenes::{EXACT, Random, figure, random};
 use super::shutter::{bar, bar_at};
 use crate::lanes::levels;
 use crate::visibility::View;
-use scene::{Haze, Light, LightKind, PoseF32, RenderScene};
+use kinetoscope_scene::{Haze, Light, LightKind, PoseF32, RenderScene};
 
 const RENDERERS: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS];
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };

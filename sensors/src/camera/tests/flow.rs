@@ -12,10 +12,10 @@ use super::scenes::{Random, random};
 use super::stage::{BALL, GROUND, SIZE, ball, built, cfg, context, state, tip};
 use crate::sensor::Sensor;
 use crate::visibility::{RenderError, View};
+use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
+use kinetoscope_scene::{Pose, PoseF32};
 use nalgebra::{Matrix3, Point3, Vector3};
 use ndarray::{Array2, Axis};
-use scene::pose::{from_row, from_xyz_rpy, to_row};
-use scene::{Pose, PoseF32};
 
 const WANTED: Channels = Channels { flow: true, mask: true, position: true, depth: true, ..Channels::NONE };
 
@@ -235,7 +235,7 @@ fn moving_ball() {
     let mut balls = 0;
     for row in 0..2 {
         let flow = flow_of(&lazy, row);
-        testkit::bits::assert_same_bits("lazy", flow.as_flattened(), flow_of(&eager, row).as_flattened());
+        kinetoscope_testkit::bits::assert_same_bits("lazy", flow.as_flattened(), flow_of(&eager, row).as_flattened());
         for (found, id) in flow.iter().zip(lazy.mask().unwrap().index_axis(Axis(0), row)) {
             let expected = if *id == 0 { [f32::INFINITY; 2] } else { [0.0; 2] };
             assert!(*id == BALL || [0, GROUND].contains(id) && *found == expected, "{id}: {found:?}");

@@ -4,8 +4,8 @@ use super::super::{Channels, Renderer};
 use super::harness::{Image, Still, at, look, matt, things, unlit};
 use super::scenes::{checker_plane, every_shape, figure};
 use image::RgbaImage;
-use scene::shape::{Box, Plane};
-use scene::{Instance, Material, PoseF32, RenderScene, Shape, Sky};
+use kinetoscope_scene::shape::{Box, Plane};
+use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, Shape, Sky};
 use std::path::{Path, PathBuf};
 
 fn file(name: &str) -> PathBuf {

@@ -6,9 +6,9 @@ use super::super::{
 };
 use crate::lanes::{Level, levels};
 use crate::visibility::{RenderError, View};
+use kinetoscope_scene::{Hemisphere, Instance, Material, Pose, PoseF32, RenderScene, Shape};
+use kinetoscope_testkit::image_check::ImageCheck;
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
-use scene::{Hemisphere, Instance, Material, Pose, PoseF32, RenderScene, Shape};
-use testkit::image_check::ImageCheck;
 
 /// Everything that an image depends on.
 #[derive(Clone, Debug)]

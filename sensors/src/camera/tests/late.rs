@@ -280,7 +280,7 @@ fn lazy_and_eager() {
                 9 => camera.refresh(&[0], &there).unwrap(),
                 13 => camera.set_intrinsics(&[Intrinsics::Fovy { radians: 0.7 }], Some(&[0])).unwrap(),
                 17 => {
-                    let pose = scene::pose::from_xyz_rpy([-1.4, 0.1, 0.8], [0.0, 0.1, 0.0]);
+                    let pose = kinetoscope_scene::pose::from_xyz_rpy([-1.4, 0.1, 0.8], [0.0, 0.1, 0.0]);
                     camera.set_local_pose(&pose, None, CameraConvention::World).unwrap();
                 }
                 _ => {}

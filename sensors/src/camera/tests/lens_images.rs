@@ -15,9 +15,9 @@ use crate::lanes::Level;
 use crate::sensor::{Sensor, SensorCfg};
 use crate::visibility::raster::tile::SAMPLES;
 use crate::visibility::{RenderError, View};
+use kinetoscope_scene::shape::{Plane, Sphere};
+use kinetoscope_scene::{Material, Pose, PoseF32, Sky};
 use nalgebra::{Point3, Vector3};
-use scene::shape::{Plane, Sphere};
-use scene::{Material, Pose, PoseF32, Sky};
 use std::f64::consts::FRAC_PI_2;
 
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 1, denoise: false, seed: 3 };

@@ -4,9 +4,11 @@ use super::super::imperfection::Exposure;
 use super::super::{CameraCfg, Imperfections, RasterCfg, Renderer, ToneCurve};
 use super::harness::{Image, Still, at, linear, look, matt, srgb, things, unlit};
 use super::scenes::EXACT;
+use kinetoscope_scene::shape::{Box, Plane, Sphere};
+use kinetoscope_scene::{
+    Headlight, Hemisphere, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Shape, Sky,
+};
 use nalgebra::Vector3;
-use scene::shape::{Box, Plane, Sphere};
-use scene::{Headlight, Hemisphere, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Shape, Sky};
 
 /// sRGB number of the gray that floors have here.
 const GRAY: f32 = 0.7;

@@ -7,7 +7,7 @@ use super::stage::{built, cfg, context, state};
 use crate::camera::{CameraCfg, CameraError};
 use crate::sensor::{Sensor, SensorCfg};
 use crate::visibility::{RenderError, View};
-use scene::{Marker, PoseF32};
+use kinetoscope_scene::{Marker, PoseF32};
 use std::time::{Duration, Instant};
 
 fn paths(samples: u32) -> Renderer {

@@ -3,9 +3,9 @@
 use super::harness::{Still, look};
 use super::scenes::checker_plane;
 use crate::visibility::View;
-use scene::mesh::{TextureSource, load};
-use scene::shape::Mesh;
-use scene::{Instance, Material, Pose, PoseF32, RenderMesh, RenderScene, Texture, TextureKind};
+use kinetoscope_scene::mesh::{TextureSource, load};
+use kinetoscope_scene::shape::Mesh;
+use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderMesh, RenderScene, Texture, TextureKind};
 use std::sync::{Arc, LazyLock};
 
 /// The joint frames of the vendor's SR5 at rest, bent a little: (mesh, translation and rotation about an axis from the link before).
@@ -21,7 +21,8 @@ const SR5: [(&str, [f64; 3], [f64; 3]); 7] = [
 
 /// The meshes of its links, which all tests share.
 static SR5_MESHES: LazyLock<[Mesh; 7]> = LazyLock::new(|| {
-    let folder = testkit::needs::robot("rokae_description/urdf/SR5.urdf").with_file_name("../meshes/xMateSR5/visual");
+    let folder = kinetoscope_testkit::needs::robot("rokae_description/urdf/SR5.urdf")
+        .with_file_name("../meshes/xMateSR5/visual");
     SR5.map(|(name, ..)| {
         let mesh = load(&folder.join(format!("xMateSR5_{name}.stl"))).unwrap().scaled([0.001; 3]);
         Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) }
@@ -35,17 +36,17 @@ pub(super) fn sr5(copies: usize) -> (RenderScene, Vec<PoseF32>) {
     let mut poses = vec![PoseF32::IDENTITY];
     let mut world = Pose::identity();
     for (k, ((_, xyz, rpy), mesh)) in SR5.into_iter().zip(&*SR5_MESHES).enumerate() {
-        world *= scene::pose::from_xyz_rpy(xyz, rpy);
+        world *= kinetoscope_scene::pose::from_xyz_rpy(xyz, rpy);
         for copy in 0..copies {
             let id = (7 * copy + k) as i32 + 1;
             instances.push(Instance::new(mesh.clone(), white.clone(), id));
-            let beside = scene::pose::from_xyz_rpy([0.1 * copy as f64, 0.45 * copy as f64, 0.], [0.; 3]);
+            let beside = kinetoscope_scene::pose::from_xyz_rpy([0.1 * copy as f64, 0.45 * copy as f64, 0.], [0.; 3]);
             poses.push(PoseF32::from(&(beside * world)));
         }
     }
     let mut scene = RenderScene::new(instances).unwrap();
     scene.lights[0].direction = [0.1, 0.8, -1.0];
-    scene.haze = Some(scene::Haze { color: None, start: 4.0, end: 40.0 });
+    scene.haze = Some(kinetoscope_scene::Haze { color: None, start: 4.0, end: 40.0 });
     (scene, poses)
 }
 
@@ -68,7 +69,8 @@ fn vendor_sr5_links() {
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn textures_of_anymal() {
-    let meshes = testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf").with_file_name("../meshes");
+    let meshes =
+        kinetoscope_testkit::needs::robot("anymal_c_simple_description/urdf/anymal.urdf").with_file_name("../meshes");
     let mut instances = vec![checker_plane()];
     let mut poses = vec![PoseF32::IDENTITY];
     let [base, top, bottom, face] =
@@ -89,7 +91,7 @@ fn textures_of_anymal() {
             }
             let mesh = Arc::new(RenderMesh::of_part(mesh, part, RenderMesh::CREASE));
             instances.push(Instance::new(Mesh { mesh }, material, k as i32 + 1));
-            poses.push(PoseF32::from(&scene::pose::from_xyz_rpy([x, 0., 0.3], [0., 0., yaw])));
+            poses.push(PoseF32::from(&kinetoscope_scene::pose::from_xyz_rpy([x, 0., 0.3], [0., 0., yaw])));
         }
     }
     assert!(instances.iter().any(|instance| instance.material.texture.is_some() && instance.mask_id < 100));

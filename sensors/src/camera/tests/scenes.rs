@@ -1,8 +1,8 @@
 //! Scenes for tests, the same on every run.
 
 use super::super::{RasterCfg, ToneCurve};
-use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
-use scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture};
+use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
+use kinetoscope_scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture};
 use std::sync::Arc;
 
 /// A small generator (xorshift64*) so that every run tests the same.
@@ -33,7 +33,7 @@ impl Random {
             self.within(-1., 1.),
         );
         let t = self.vector(-reach, reach);
-        let pose = scene::Pose::from_parts(
+        let pose = kinetoscope_scene::Pose::from_parts(
             nalgebra::Translation3::new(t[0], t[1], t[2]),
             nalgebra::UnitQuaternion::from_quaternion(q),
         );
@@ -116,7 +116,7 @@ pub(super) fn figure() -> (RenderScene, Vec<PoseF32>) {
             .unwrap_or_else(nalgebra::UnitQuaternion::identity);
         let middle = (a + b) / 2.0;
         instances.push(Instance::new(shape, skin.clone(), instances.len() as i32));
-        poses.push(PoseF32::from(&scene::Pose::from_parts(middle.into(), rotation)));
+        poses.push(PoseF32::from(&kinetoscope_scene::Pose::from_parts(middle.into(), rotation)));
     };
     let limb = |r: f32, a: [f64; 3], b: [f64; 3]| -> Shape {
         let length = (nalgebra::Vector3::from(b) - nalgebra::Vector3::from(a)).norm();

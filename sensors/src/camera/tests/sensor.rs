@@ -6,10 +6,10 @@ use super::stage::{BALL, DT, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg,
 use crate::error::SensorError;
 use crate::sensor::{Requires, Sensor, SensorCfg};
 use crate::visibility::RenderError;
+use kinetoscope_scene::pose::{from_row, from_wxyz, from_xyz_rpy, to_row};
+use kinetoscope_scene::{Pose, PoseF32, SceneState};
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use ndarray::{Array2, Axis, array};
-use scene::pose::{from_row, from_wxyz, from_xyz_rpy, to_row};
-use scene::{Pose, PoseF32, SceneState};
 
 const CONVENTIONS: [CameraConvention; 3] = [CameraConvention::Ros, CameraConvention::OpenGl, CameraConvention::World];
 const ROS: CameraConvention = CameraConvention::Ros;
@@ -150,7 +150,7 @@ fn hidden_groups() {
     let mut context = context(1);
     let mut instances = context.scene.as_ref().unwrap().instances().to_vec();
     instances[1].group = 3;
-    context.scene = Some(scene::RenderScene::new(instances).unwrap().into());
+    context.scene = Some(kinetoscope_scene::RenderScene::new(instances).unwrap().into());
     let sees_ball = |cfg: &CameraCfg| built(cfg, &context).mask().unwrap().iter().any(|&id| id == BALL);
     let mut everything = cfg();
     everything.raster.groups = u32::MAX;

@@ -9,9 +9,9 @@ use super::stage::{DT, SIZE, ball, bits, built, cfg, context, state};
 use crate::error::SensorError;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::visibility::{RenderError, View};
+use kinetoscope_scene::shape::Box;
+use kinetoscope_scene::{Material, PoseF32, RenderScene, Sky};
 use ndarray::Axis;
-use scene::shape::Box;
-use scene::{Material, PoseF32, RenderScene, Sky};
 
 const HEIGHT: usize = 40;
 const WIDTH: usize = 64;

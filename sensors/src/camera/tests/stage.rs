@@ -2,10 +2,10 @@
 
 use super::super::{Camera, CameraCfg, CameraConvention, Channels, Extrinsics, Intrinsics, Placement};
 use crate::sensor::{SensorCfg, SensorContext};
+use kinetoscope_scene::pose::{from_row, to_row};
+use kinetoscope_scene::shape::{Plane, Sphere};
+use kinetoscope_scene::{Instance, Light, Material, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use ndarray::{Array2, Array3};
-use scene::pose::{from_row, to_row};
-use scene::shape::{Plane, Sphere};
-use scene::{Instance, Light, Material, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use std::sync::Arc;
 
 pub(super) const DT: f64 = 0.005;
@@ -40,7 +40,7 @@ pub(super) fn ball(env: usize, step: u64) -> [f64; 3] {
 /// Where the link `arm/tip` is in environment `env` at step `step`.
 pub(super) fn tip(env: usize, step: u64) -> Pose {
     let (k, s) = (env as f64, step as f64);
-    scene::pose::from_xyz_rpy([-1.0 - 0.1 * k, 0.05 * s, 0.8], [0.1 * k, 0.2 - 0.03 * s, 0.15])
+    kinetoscope_scene::pose::from_xyz_rpy([-1.0 - 0.1 * k, 0.05 * s, 0.8], [0.1 * k, 0.2 - 0.03 * s, 0.15])
 }
 
 /// Every environment at a step of its own.

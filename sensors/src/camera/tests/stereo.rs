@@ -12,10 +12,10 @@ use crate::camera::imperfection::{DepthNoise, Holes, ReadNoise};
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::{from_row, to_row};
 use nalgebra::{Matrix3, Matrix3x4, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use ndarray::{Axis, array};
-use scene::Pose;
-use scene::pose::{from_row, to_row};
 use std::collections::BTreeMap;
 
 const BASELINE: f64 = 0.2;

@@ -3,8 +3,8 @@
 use super::super::{Channels, RasterCfg, Renderer};
 use super::harness::{Still, at, linear, look, matt, srgb, things, unlit};
 use crate::visibility::View;
-use scene::shape::{Box, Mesh, Plane, Sphere};
-use scene::{Hemisphere, Light, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture, TextureKind};
+use kinetoscope_scene::shape::{Box, Mesh, Plane, Sphere};
+use kinetoscope_scene::{Hemisphere, Light, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture, TextureKind};
 use std::sync::Arc;
 
 const ALBEDO: Channels = Channels { albedo: true, mask: true, ..Channels::NONE };

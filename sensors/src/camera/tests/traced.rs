@@ -4,9 +4,9 @@ use super::super::{Channels, RasterCfg, Renderer, ToneCurve};
 use super::harness::{Image, Still, at, far_apart, look, matt, srgb, things, unlit};
 use super::scenes::{EXACT, Random, random};
 use crate::visibility::View;
+use kinetoscope_scene::shape::{Box, Cylinder, Ellipsoid, Plane, Sphere};
+use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderScene, Shape, Sky};
 use nalgebra::Vector3;
-use scene::shape::{Box, Cylinder, Ellipsoid, Plane, Sphere};
-use scene::{Hemisphere, Instance, Material, PoseF32, RenderScene, Shape, Sky};
 
 /// Differences of two images off silhouettes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -91,7 +91,7 @@ fn mask_of_paths() {
     let color_of = |k: usize| [k % 6, k / 6 % 6, k / 36 % 6].map(|x| 51 * x as u8);
     // Of what glows a hundred times as bright as its colour, only a hundredth more is the others' light.
     let glowing = |k: usize| {
-        let light = |x: u8| 0.01 * f64::from(scene::material::decode_srgb(f32::from(x) / 255.0));
+        let light = |x: u8| 0.01 * f64::from(kinetoscope_scene::material::decode_srgb(f32::from(x) / 255.0));
         Material { emission: 100.0, ..matt(color_of(k).map(|x| (srgb(light(x)) / 255.0) as f32)) }
     };
     let mut numbers = Random(23);

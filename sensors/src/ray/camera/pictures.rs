@@ -3,8 +3,8 @@
 use super::pixels::Pixels;
 use super::sensor::Taken;
 use crate::camera::{CameraConvention, PixelIntrinsics};
+use kinetoscope_scene::pose::{from_row, to_row};
 use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, ArrayView4};
-use scene::pose::{from_row, to_row};
 
 /// The pictures of one measurement in all environments.
 #[derive(Clone, Debug)]

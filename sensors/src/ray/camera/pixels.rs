@@ -3,8 +3,8 @@
 use crate::camera::PixelIntrinsics;
 use crate::ray::Ray;
 use crate::ray::caster::scan::Rays;
+use kinetoscope_scene::PoseF64;
 use nalgebra::Vector3;
-use scene::PoseF64;
 
 /// The pixels of a picture, row by row. Rays are made when they are cast: every environment may have a lens of its own.
 #[derive(Clone, Copy, Debug)]

@@ -4,8 +4,8 @@ use super::sensor::RayCasterCamera;
 use crate::camera::PointFrame;
 use crate::camera::point_cloud::{seen, unproject};
 use crate::error::SensorError;
+use kinetoscope_scene::Pose;
 use ndarray::{Array2, Array3};
-use scene::Pose;
 
 impl RayCasterCamera {
     /// The points of all pixels \[m\], shape (N, H * W, 3), row by row from the top left: the depth along the ray through the

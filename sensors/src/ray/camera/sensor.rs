@@ -13,9 +13,9 @@ use crate::sampling::{Sampled, Sampler};
 use crate::schedule::Phases;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::pose::{from_row, to_row};
+use kinetoscope_scene::{Marker, Pose, PoseF64, SceneState};
 use ndarray::{Array2, Array3, Array4, ArrayView1, ArrayView3, ArrayView4, Axis};
-use scene::pose::{from_row, to_row};
-use scene::{Marker, Pose, PoseF64, SceneState};
 use std::borrow::Cow;
 use std::fmt;
 

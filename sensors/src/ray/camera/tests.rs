@@ -6,11 +6,11 @@ use crate::noise::NoiseCfg;
 use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::{CameraError, SensorError};
+use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
+use kinetoscope_scene::shape::{Plane, Sphere};
+use kinetoscope_scene::{Instance, Material, Pose, PoseF64, RenderScene, SceneState};
 use nalgebra::{Point3, Vector3};
 use ndarray::{Array2, Array3, array};
-use scene::pose::{from_row, from_xyz_rpy, to_row};
-use scene::shape::{Plane, Sphere};
-use scene::{Instance, Material, Pose, PoseF64, RenderScene, SceneState};
 use std::sync::Arc;
 
 const FLOOR: i32 = 4;

@@ -1,6 +1,6 @@
 //! How rays turn with the body they hang on.
 
-use scene::{Pose, PoseF64};
+use kinetoscope_scene::{Pose, PoseF64};
 use serde::{Deserialize, Serialize};
 
 /// How rays turn with the body they hang on.

@@ -9,7 +9,7 @@ use crate::ray::{Ray, RayError, RayPattern, RayTargets};
 use crate::sampling::{Channel, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
-use scene::{Pose, PoseF64};
+use kinetoscope_scene::{Pose, PoseF64};
 use serde::{Deserialize, Serialize};
 
 /// The most memory that the rays of a ray caster may take \[bytes\].
@@ -48,7 +48,7 @@ pub struct RayCasterCfg {
     /// into another count too. `None` is the environment's frame.
     pub parent: Option<String>,
     /// Where the pattern is on the body: starts and directions are both turned by its rotation.
-    #[serde(with = "scene::file_format::pose")]
+    #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub offset: Pose,
     /// How the rays turn with the body.
     pub alignment: RayAlignment,

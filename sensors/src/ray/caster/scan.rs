@@ -5,8 +5,8 @@ use crate::crew::Crew;
 use crate::ray::world::FixedWorld;
 use crate::ray::{Ray, RayAssets, RayHit, RayTargets, RayWorld};
 use crate::sensor::SensorContext;
+use kinetoscope_scene::{OwnScene, PoseF64};
 use ndarray::Array2;
-use scene::{OwnScene, PoseF64};
 use std::fmt;
 use std::sync::Arc;
 

@@ -10,9 +10,9 @@ use crate::sampling::{Sampled, Sampler};
 use crate::schedule::Phases;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::pose::{from_row, to_row};
+use kinetoscope_scene::{Marker, Pose, PoseF64, Random, SceneState};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
-use scene::pose::{from_row, to_row};
-use scene::{Marker, Pose, PoseF64, Random, SceneState};
 
 /// Distances along rays that move with a body, in all environments; [`Sampled`] has their stamps and counts.
 ///

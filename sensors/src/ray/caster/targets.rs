@@ -3,7 +3,7 @@
 use crate::error::SensorError;
 use crate::select::{at_least_one, matching};
 use crate::sensor::SensorContext;
-use scene::RenderScene;
+use kinetoscope_scene::RenderScene;
 use serde::{Deserialize, Serialize};
 
 /// What rays hit: always what cameras see (the visuals of robots, not their collision shapes), of some geom groups.
@@ -42,14 +42,15 @@ impl HitTargets {
         parent: Option<usize>,
         context: &SensorContext,
     ) -> Result<Vec<usize>, SensorError> {
-        let in_groups =
-            |instance: &scene::Instance| 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0);
+        let in_groups = |instance: &kinetoscope_scene::Instance| {
+            1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0)
+        };
         let named = match self {
             Self::Named(patterns) => Some(names(scene, patterns, context, in_groups)?),
             _ => None,
         };
         let carrier = |body: usize| context.carriers.get(body).copied().unwrap_or(body);
-        let wanted = |(index, instance): &(usize, &scene::Instance)| {
+        let wanted = |(index, instance): &(usize, &kinetoscope_scene::Instance)| {
             // Not only what is nominally visible: it may be in an environment of its own looks.
             in_groups(instance)
                 && match self {
@@ -73,7 +74,7 @@ fn names(
     scene: &RenderScene,
     patterns: &[String],
     context: &SensorContext,
-    in_groups: impl Fn(&scene::Instance) -> bool,
+    in_groups: impl Fn(&kinetoscope_scene::Instance) -> bool,
 ) -> Result<Vec<bool>, SensorError> {
     let names_of = |may_be_hit: &dyn Fn(usize) -> bool| {
         let instances = scene.instances().iter().enumerate().filter(|(index, i)| in_groups(i) && may_be_hit(*index));

@@ -5,10 +5,10 @@ use crate::ray::pattern::{Custom, Grid, Lidar};
 use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::{NoiseCfg, SensorError};
+use kinetoscope_scene::pose::{from_xyz_rpy, to_row};
+use kinetoscope_scene::shape::{Box, Plane, Sphere};
+use kinetoscope_scene::{Instance, Material, OwnScene, Pose, PoseF64, RenderScene, SceneState};
 use ndarray::{Array2, Array3, Axis};
-use scene::pose::{from_xyz_rpy, to_row};
-use scene::shape::{Box, Plane, Sphere};
-use scene::{Instance, Material, OwnScene, Pose, PoseF64, RenderScene, SceneState};
 use std::sync::Arc;
 
 const DT: f64 = 0.005;
@@ -20,7 +20,8 @@ const BALL: i32 = 5;
 
 /// Ground at z = 0, a block 0.25 m high for x > 1, a robot's base (a box) with a foot fused to it, a ball.
 fn context(num_envs: usize, threads: usize) -> SensorContext {
-    let instance = |shape: scene::Shape, id, name: &str| Instance::new(shape, Material::default(), id).named(name);
+    let instance =
+        |shape: kinetoscope_scene::Shape, id, name: &str| Instance::new(shape, Material::default(), id).named(name);
     let instances = vec![
         instance(Plane::INFINITE.into(), GROUND, "ground").fixed(),
         instance(Box { half: [5.0, 5.0, 0.125] }.into(), STEP, "step").fixed(),
@@ -214,7 +215,7 @@ fn environments_and_threads() {
     let steps = [3, 4, 5, 6];
     let bits = |caster: &RayCaster, env: usize| -> Vec<u64> {
         let all = [caster.hits().into_dyn(), caster.normals().into_dyn(), caster.distances().into_dyn()];
-        all.iter().flat_map(|a| testkit::bits::bits(a.index_axis(Axis(0), env).iter())).collect()
+        all.iter().flat_map(|a| kinetoscope_testkit::bits::bits(a.index_axis(Axis(0), env).iter())).collect()
     };
     let one = built_in(&cfg, &context(4, 1), &state(&steps));
     // 36000 rays in 4 environments are worth four threads.

@@ -13,7 +13,7 @@ pub(crate) struct Box {
 }
 
 impl Box {
-    pub(super) fn of(shape: &scene::shape::Box, _assets: &mut Assets) -> Self {
+    pub(super) fn of(shape: &kinetoscope_scene::shape::Box, _assets: &mut Assets) -> Self {
         Self { half: shape.half.map(f64::from) }
     }
 }

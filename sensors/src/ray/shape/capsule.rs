@@ -14,7 +14,7 @@ pub(crate) struct Capsule {
 }
 
 impl Capsule {
-    pub(super) fn of(shape: &scene::shape::Capsule, _assets: &mut Assets) -> Self {
+    pub(super) fn of(shape: &kinetoscope_scene::shape::Capsule, _assets: &mut Assets) -> Self {
         Self { radius: shape.radius.into(), half_length: shape.half_length.into() }
     }
 }

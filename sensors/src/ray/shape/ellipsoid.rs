@@ -13,7 +13,7 @@ pub(crate) struct Ellipsoid {
 }
 
 impl Ellipsoid {
-    pub(super) fn of(shape: &scene::shape::Ellipsoid, _assets: &mut Assets) -> Self {
+    pub(super) fn of(shape: &kinetoscope_scene::shape::Ellipsoid, _assets: &mut Assets) -> Self {
         Self { radii: shape.radii.map(f64::from) }
     }
 }

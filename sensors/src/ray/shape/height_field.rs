@@ -67,7 +67,7 @@ struct Walk {
 }
 
 impl Field {
-    pub(crate) fn new(shape: &scene::shape::HeightField) -> Self {
+    pub(crate) fn new(shape: &kinetoscope_scene::shape::HeightField) -> Self {
         let [x, y, scale, bottom] = shape.size();
         let (rows, columns) = (shape.rows(), shape.columns());
         let heights: Vec<f64> = shape.elevation().iter().map(|&e| f64::from(e) * scale).collect();
@@ -126,7 +126,7 @@ impl Field {
     }
 
     /// Height and slopes (per cell) of the surface in a cell: of the triangle on the right of its diagonal, or on the left.
-    /// The triangles are those of [`scene::shape::HeightField`].
+    /// The triangles are those of [`kinetoscope_scene::shape::HeightField`].
     #[inline(always)]
     fn plane(corners: [f64; 4], right: bool) -> [f64; 3] {
         let [a, b, d, e] = corners;
@@ -311,7 +311,7 @@ impl Field {
 }
 
 impl HeightField {
-    pub(super) fn of(shape: &scene::shape::HeightField, assets: &mut Assets) -> Self {
+    pub(super) fn of(shape: &kinetoscope_scene::shape::HeightField, assets: &mut Assets) -> Self {
         Self { field: assets.height_field(shape) }
     }
 }

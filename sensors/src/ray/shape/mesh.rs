@@ -10,7 +10,7 @@ use crate::ray::triangle::{Shear, ShearPacket, Triangle, has_area, normal};
 use crate::ray::vector::{V3, to_f64};
 use crate::ray::{Assets, Ray};
 use columns::Columns;
-use scene::RenderMesh;
+use kinetoscope_scene::RenderMesh;
 use std::sync::{Arc, OnceLock};
 
 /// Triangles that a packet tests against all of its rays; where there are more in its way, rays go on one by one. That costs
@@ -89,7 +89,7 @@ impl MeshBuilder {
 }
 
 impl Mesh {
-    pub(super) fn of(shape: &scene::shape::Mesh, assets: &mut Assets) -> Self {
+    pub(super) fn of(shape: &kinetoscope_scene::shape::Mesh, assets: &mut Assets) -> Self {
         Self { tree: assets.mesh(&shape.mesh) }
     }
 

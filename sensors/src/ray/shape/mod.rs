@@ -1,6 +1,6 @@
 //! What rays hit: one shape per file, all of them in one list.
 //!
-//! The shapes are those of [`scene::Shape`], in their own frames. Planes are seen from the front, solids from both sides: a
+//! The shapes are those of [`kinetoscope_scene::Shape`], in their own frames. Planes are seen from the front, solids from both sides: a
 //! ray that begins inside hits the way out. The rasterizer and MuJoCo's `mj_ray` see the same.
 
 mod interval;
@@ -10,7 +10,7 @@ use super::packet::{Packet, WIDTH};
 use super::vector::V3;
 use super::{Assets, Ray};
 use crate::lanes::Simd;
-use scene::Shape;
+use kinetoscope_scene::Shape;
 
 /// Where a ray touches a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

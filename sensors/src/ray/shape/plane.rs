@@ -12,7 +12,7 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    pub(super) fn of(shape: &scene::shape::Plane, _assets: &mut Assets) -> Self {
+    pub(super) fn of(shape: &kinetoscope_scene::shape::Plane, _assets: &mut Assets) -> Self {
         // 0 is MuJoCo's way to say that it has no end.
         Self { half: shape.half.map(|h| if h == 0.0 { f64::INFINITY } else { h.into() }) }
     }

@@ -13,7 +13,7 @@ pub(crate) struct Sphere {
 }
 
 impl Sphere {
-    pub(super) fn of(shape: &scene::shape::Sphere, _assets: &mut Assets) -> Self {
+    pub(super) fn of(shape: &kinetoscope_scene::shape::Sphere, _assets: &mut Assets) -> Self {
         Self { radius: shape.radius.into() }
     }
 }

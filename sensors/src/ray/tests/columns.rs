@@ -13,8 +13,8 @@ use crate::ray::shape::{ForShape, RayShape, Touches};
 use crate::ray::triangle::{Shear, ShearPacket, Triangle};
 use crate::ray::vector::{along, cross, dot, scale, sub, to_f64, unit};
 use crate::ray::{Ray, RayHit, RayPattern, RayWorld};
-use scene::mesh::TriMesh;
-use scene::{PoseF64, RenderMesh, Shape, pose};
+use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::{PoseF64, RenderMesh, Shape, pose};
 use std::sync::Arc;
 
 /// The axes of columns along z.
@@ -297,7 +297,7 @@ fn scans() {
         let positions = triangles.iter().flatten().copied().collect();
         let triangles = (0..triangles.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
         let mesh = TriMesh { positions, triangles, ..TriMesh::default() };
-        Shape::from(scene::shape::Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) })
+        Shape::from(kinetoscope_scene::shape::Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) })
     };
     let (ground, heap) = (mesh(&sheet(&mut dice, 40, 0.0)), mesh(&soup(&mut dice, 400, [0.0; 3])));
     let targets = targets(&[ground.clone(), ground, heap.clone(), heap], 4, |k| k < 2);

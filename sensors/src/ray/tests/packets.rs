@@ -10,8 +10,8 @@ use crate::ray::shape::{ForShape, RayShape, Solid, Touch};
 use crate::ray::triangle::{ShearPacket, Triangle};
 use crate::ray::vector::{along, unit};
 use crate::ray::{Assets, Ray, RayAssets, RayHit, RayTargets, RayWorld};
-use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Plane, Sphere};
-use scene::{Instance, Material, PoseF64, RenderScene, Shape};
+use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Plane, Sphere};
+use kinetoscope_scene::{Instance, Material, PoseF64, RenderScene, Shape};
 use std::sync::Arc;
 
 /// Casts every packet of the rays together, at every level, and each ray alone; counts hits.
@@ -204,7 +204,7 @@ fn shapes(dice: &mut Dice) -> Vec<Shape> {
         Ellipsoid { radii: [0.1, 0.2, 0.3] }.into(),
         Cylinder { radius: 0.15, half_length: 0.2 }.into(),
         Box { half: [0.125, 0.25, 0.375] }.into(),
-        scene::shape::Mesh { mesh: Arc::clone(field.mesh()) }.into(),
+        kinetoscope_scene::shape::Mesh { mesh: Arc::clone(field.mesh()) }.into(),
         field.into(),
     ]
 }
@@ -235,7 +235,7 @@ fn world() {
         .map(|k| match k / shapes.len() {
             // Two of each at the same place, where surfaces are at the same distances.
             0 | 1 => PoseF64::IDENTITY,
-            _ => PoseF64::from(&scene::pose::from_xyz_rpy(dice.point(1.5), dice.point(3.0))),
+            _ => PoseF64::from(&kinetoscope_scene::pose::from_xyz_rpy(dice.point(1.5), dice.point(3.0))),
         })
         .collect();
     let rays = packets(&mut dice, [0.0; 3]);
@@ -291,7 +291,9 @@ fn placing() {
     let fixed = targets(&shapes, 16, |_| true);
     assert_eq!((fixed.len(), fixed.fixed_count()), (16, 16));
     let mut poses = || -> Vec<PoseF64> {
-        (0..16).map(|_| PoseF64::from(&scene::pose::from_xyz_rpy(dice.point(2.0), dice.point(3.0)))).collect()
+        (0..16)
+            .map(|_| PoseF64::from(&kinetoscope_scene::pose::from_xyz_rpy(dice.point(2.0), dice.point(3.0))))
+            .collect()
     };
     let (a, b) = (poses(), poses());
     let rays: Vec<Ray> = (0..200).map(|_| dice.ray(5.0, 2.0)).collect();

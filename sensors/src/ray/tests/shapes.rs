@@ -5,8 +5,8 @@ use crate::ray::bvh::Stack;
 use crate::ray::shape::Solid;
 use crate::ray::vector::{along, dot};
 use crate::ray::{Assets, Ray};
-use scene::Shape;
-use scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
+use kinetoscope_scene::Shape;
+use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
 
 fn touch(shape: impl Into<Shape>, origin: [f64; 3], direction: [f64; 3]) -> Option<(f64, [f64; 3])> {
     let direction = crate::ray::vector::unit(direction).unwrap();

@@ -8,8 +8,8 @@ use crate::ray::shape::height_field::Field;
 use crate::ray::triangle::Triangle;
 use crate::ray::vector::unit;
 use crate::ray::{Assets, shape::Solid};
-use scene::Shape;
-use scene::shape::HeightField;
+use kinetoscope_scene::Shape;
+use kinetoscope_scene::shape::HeightField;
 
 /// The field's triangles. Points are a quarter of a metre apart; where single precision has missed that, it is put right.
 fn triangles(field: &HeightField) -> Vec<Triangle> {

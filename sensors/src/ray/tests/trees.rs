@@ -8,8 +8,8 @@ use crate::ray::shape::RayShape;
 use crate::ray::shape::mesh::{Mesh, MeshBuilder, MeshTree};
 use crate::ray::triangle::{Shear, Triangle, normal};
 use crate::ray::vector::{V3, cross, dot, sub, to_f64, unit};
-use scene::mesh::TriMesh;
-use scene::{RenderMesh, Shape};
+use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::{RenderMesh, Shape};
 use std::sync::Arc;
 
 /// Distance of a triangle along a ray, from either side. Source: Möller, Trumbore: Fast, minimum storage ray/triangle
@@ -216,7 +216,7 @@ fn same_tree() {
 /// A mesh of a shape is hit where the shape is, up to the flatness of its triangles.
 #[test]
 fn tessellated_ball() {
-    let ball = Shape::from(scene::shape::Sphere { radius: 0.5 }).tessellate(256);
+    let ball = Shape::from(kinetoscope_scene::shape::Sphere { radius: 0.5 }).tessellate(256);
     let mesh = Mesh::of_tree(Arc::new(MeshBuilder::default().build(&RenderMesh::new(&ball, RenderMesh::CREASE))));
     // The sagitta of 1/256 of a turn.
     let flat = 0.5 * (1.0 - (std::f64::consts::PI / 256.0).cos()) * 2.0;

@@ -9,7 +9,7 @@ use super::lobe::{Basis, on_disc, turn};
 use crate::ray::vector::{V3, along, cross, dot, scale, sub, to_f64, unit};
 use crate::visibility::trace::Tracer;
 use crate::visibility::trace::motion::NOW;
-use scene::{Instance, RenderMesh, RenderScene, Shape};
+use kinetoscope_scene::{Instance, RenderMesh, RenderScene, Shape};
 use std::f64::consts::PI;
 use std::sync::Arc;
 

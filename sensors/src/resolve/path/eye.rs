@@ -5,7 +5,7 @@ use crate::camera::{Aperture, LensRays};
 use crate::ray::Ray;
 use crate::ray::vector::{along, dot, scale, sub};
 use crate::visibility::Projection;
-use scene::PoseF64;
+use kinetoscope_scene::PoseF64;
 
 /// A camera, as paths see it.
 #[derive(Clone, Copy, Debug)]

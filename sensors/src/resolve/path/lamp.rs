@@ -4,7 +4,7 @@ use super::lobe::{Basis, on_disc};
 use crate::ray::vector::{V3, along, dot, scale, sub, to_f64, unit};
 use crate::resolve::shade::{cos_deg, whole_exponent};
 use crate::visibility::Projection;
-use scene::{Light, LightKind};
+use kinetoscope_scene::{Light, LightKind};
 
 /// A lamp of a frame.
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +74,7 @@ impl Lamp {
     }
 
     /// A lamp at a camera.
-    pub(super) fn of_camera(headlight: &scene::Headlight, view: &Projection, along_axis: bool) -> Self {
+    pub(super) fn of_camera(headlight: &kinetoscope_scene::Headlight, view: &Projection, along_axis: bool) -> Self {
         let light = Light {
             kind: LightKind::Point,
             ambient: headlight.ambient,

@@ -6,7 +6,7 @@
 
 use super::brightness;
 use crate::ray::vector::{V3, dot, scale};
-use scene::Material;
+use kinetoscope_scene::Material;
 use std::f64::consts::PI;
 
 /// How a point scatters.

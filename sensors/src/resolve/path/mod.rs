@@ -31,10 +31,10 @@ use crate::visibility::trace::motion::{Motion, NOW, wide};
 use crate::visibility::trace::{Hit, Tracer};
 use emitter::{Emitters, power_heuristic};
 use eye::Eye;
+use kinetoscope_scene::{Light, LightSum, PoseF64, RenderScene};
 use lamp::Lamp;
 use lobe::Basis;
 use point::Point;
-use scene::{Light, LightSum, PoseF64, RenderScene};
 use sobol::{Sample, Sequence};
 
 /// Lamps that are asked, at most; the camera's comes besides.

@@ -5,7 +5,7 @@ use super::texel;
 use crate::ray::Ray;
 use crate::ray::vector::{V3, along, cross, dot, scale, sub, to_f64, unit};
 use crate::visibility::trace::Hit;
-use scene::{Instance, RenderMesh, RenderScene, TextureKind};
+use kinetoscope_scene::{Instance, RenderMesh, RenderScene, TextureKind};
 
 /// Points are lifted by this part of the size of their triangle, at most: those of a ball of eight sides are.
 const LIFT: f64 = 0.15;

@@ -1,8 +1,8 @@
 //! Colours of textures at one point: bilinear within the level that is as fine as asked.
 
 use crate::ray::vector::V3;
-use scene::Texture;
-use scene::material::Level;
+use kinetoscope_scene::Texture;
+use kinetoscope_scene::material::Level;
 
 /// Linear colour at (u, v), v upward, where `footprint` texture coordinates are seen together.
 pub(super) fn at(texture: &Texture, [u, v]: [f64; 2], footprint: f64) -> V3 {
@@ -76,7 +76,7 @@ fn linear(x: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::lanes::{at_level, levels, splat};
-    use scene::TextureKind;
+    use kinetoscope_scene::TextureKind;
 
     /// Within 0.0005 of the standard, and equal to the rasterizer to single precision.
     #[test]
@@ -84,7 +84,7 @@ mod tests {
         for byte in 0..=255u8 {
             let texture = Texture::new(TextureKind::TwoD, 1, 1, 3, &[byte; 3]).unwrap();
             let [light, ..] = at(&texture, [0.3, 0.7], 0.0);
-            let standard = f64::from(scene::material::decode_srgb(f32::from(byte) / 255.0));
+            let standard = f64::from(kinetoscope_scene::material::decode_srgb(f32::from(byte) / 255.0));
             assert!((light - standard).abs() < 5e-4, "{byte}: {light}, not {standard}");
             for level in levels() {
                 let raster = at_level!(level, s => {

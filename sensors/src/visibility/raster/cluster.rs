@@ -4,8 +4,8 @@ use super::tile::Tile;
 use super::triangle::{self, GUARD, Gradient, SUB};
 use crate::lanes::{LANES, Simd, abs, load, select, splat, store, store_i};
 use crate::visibility::Projection;
-use scene::shape::Cluster;
-use scene::{PoseF32, RenderMesh};
+use kinetoscope_scene::shape::Cluster;
+use kinetoscope_scene::{PoseF32, RenderMesh};
 
 const MAX_VERTICES: usize = 3 * RenderMesh::CLUSTER;
 /// Adding and subtracting this rounds to an integer (of less than 2^22). `round()` would be a library call.

@@ -5,8 +5,8 @@ use super::tile::BLOCK;
 use crate::camera::LensRays;
 use crate::visibility::Projection;
 use crate::visibility::projection::LocalCamera;
-use scene::shape::Cluster;
-use scene::{Instance, Marker, PoseF32, RenderMesh, RenderScene};
+use kinetoscope_scene::shape::Cluster;
+use kinetoscope_scene::{Instance, Marker, PoseF32, RenderMesh, RenderScene};
 
 /// A primitive or a cluster that may be seen.
 #[derive(Clone, Copy, Debug)]

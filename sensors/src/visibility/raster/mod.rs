@@ -16,7 +16,7 @@ use crate::lanes::{load, load_u, select, select_u, splat, splat_u, store, store_
 use cluster::{Pass, Vertices};
 pub(crate) use detail::level;
 pub(crate) use draw_list::{DrawList, Item, Layer, Parts, Placed};
-use scene::{RenderScene, Shape};
+use kinetoscope_scene::{RenderScene, Shape};
 use tile::{BLOCK, NOTHING, SAMPLES, Tile};
 
 /// Draws things into a visibility buffer.

@@ -25,8 +25,8 @@ use crate::ray::shape::mesh::MeshTree;
 use crate::ray::triangle::ShearPacket;
 use crate::ray::vector::{V3, along, dot, scale};
 use crate::ray::{Assets, Ray, RayAssets};
+use kinetoscope_scene::{Instance, Marker, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
 use motion::{Motion, rigid, wide};
-use scene::{Instance, Marker, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
 use std::sync::Arc;
 use tree::Tree;
 

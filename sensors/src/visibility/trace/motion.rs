@@ -1,7 +1,7 @@
 //! Where something is at times between two poses.
 
 use crate::ray::vector::{V3, along, sub};
-use scene::{PoseF32, PoseF64};
+use kinetoscope_scene::{PoseF32, PoseF64};
 
 /// The time of the second pose; that of the first is 0.
 pub(crate) const NOW: f64 = 1.0;
@@ -122,8 +122,8 @@ fn matrix(q: [f64; 4]) -> [V3; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use kinetoscope_scene::Pose;
     use nalgebra::{UnitQuaternion, Vector3};
-    use scene::Pose;
 
     fn pose(at: [f64; 3], axis: [f64; 3]) -> Pose {
         Pose::from_parts(at.into(), UnitQuaternion::from_scaled_axis(Vector3::from(axis)))

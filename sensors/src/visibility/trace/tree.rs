@@ -6,7 +6,7 @@
 use super::motion::Motion;
 use crate::ray::Ray;
 use crate::ray::vector::{V3, scale};
-use scene::PoseF64;
+use kinetoscope_scene::PoseF64;
 
 /// How much larger boxes are: more than the rounding of the test.
 const LARGER: f64 = 1.0 + 1e-6;

@@ -3,8 +3,8 @@
 use super::super::write::{Element, number};
 use super::{Base, PartError, Passive, Writing, row, row_of, singles, some};
 use crate::mj::{LightType, Target, words};
-use scene::Pose;
-use scene::pose::{from_row, to_row};
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::{from_row, to_row};
 
 /// MuJoCo's grey of geoms that say nothing: a material's colour shows through.
 const UNSET: [f32; 4] = [0.5, 0.5, 0.5, 1.0];

@@ -21,7 +21,7 @@ pub(crate) use settings::compare;
 
 use crate::mj::{Asset, Model, Target};
 use crate::source::Source;
-use scene::Pose;
+use kinetoscope_scene::Pose;
 use std::cell::RefCell;
 use std::fmt;
 

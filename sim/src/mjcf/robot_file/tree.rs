@@ -17,9 +17,9 @@ use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::mj::{Model, words};
 use crate::mjcf::part::PartNames;
 use crate::source::Source;
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::from_row;
 use nalgebra::{Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
-use scene::Pose;
-use scene::pose::from_row;
 use std::collections::BTreeSet;
 
 /// What holds the tree of a file.

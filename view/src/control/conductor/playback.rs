@@ -4,7 +4,7 @@ use super::{Conductor, Kind, PATIENCE};
 use crate::control::hub::Mail;
 use crate::control::{Command, Speed};
 use crate::stage::{Run, Timeline};
-use sim::SimulationManager;
+use kinetoscope_sim::SimulationManager;
 use std::time::{Duration, Instant};
 
 /// Something that is known at each of some times, such as a recording.
@@ -340,7 +340,10 @@ mod tests {
             for (command, words) in [
                 (Command::Seek(f64::NAN), "no time"),
                 (Command::SetSpeed(Speed::Times(0.0)), "factor"),
-                (Command::Drag { env: sim::EnvId(0), body: 0, hold: [0.0; 3], target: [0.0; 3] }, "recording"),
+                (
+                    Command::Drag { env: kinetoscope_sim::EnvId(0), body: 0, hold: [0.0; 3], target: [0.0; 3] },
+                    "recording",
+                ),
             ] {
                 let refused = watched(viewer, &[Command::Pause, command]).run.refused.unwrap();
                 assert!(refused.contains(words), "{refused}");

@@ -1,8 +1,8 @@
 //! Events that a program sends to a window on an X server.
 
 use crate::window::WindowCfg;
-use scene::Pose;
-use sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+use kinetoscope_scene::Pose;
+use kinetoscope_sim::{ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
     BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ConfigureWindowAux, ConnectionExt as _, EventMask, KEY_PRESS_EVENT,

@@ -8,16 +8,17 @@ use crate::{
     Canvas, Closed, Command, Eye, ImageWindow, ImageWindowCfg, OpenWindow, Speed, Viewer, Viewing, Wants, Window,
     WindowError,
 };
-use sim::SimulationManager;
+use kinetoscope_sim::SimulationManager;
+use kinetoscope_testkit::process;
+use kinetoscope_testkit::wait;
+use kinetoscope_testkit::wait::{PATIENCE, threads_and_files};
+use kinetoscope_testkit::x_server::{Display, close, screenshot};
 use std::io::{Read, Write};
 use std::net::TcpListener;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
-use testkit::process;
-use testkit::wait::{self, PATIENCE, threads_and_files};
-use testkit::x_server::{Display, close, screenshot};
 use x11rb::protocol::xproto::{BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, MOTION_NOTIFY_EVENT};
 
 /// Below the status, which counts images per second \[pixels\].

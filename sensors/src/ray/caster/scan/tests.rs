@@ -1,8 +1,8 @@
 //! Scans on several threads, of some environments, and of environments with scenes of their own.
 
 use super::*;
-use scene::shape::{Plane, Sphere};
-use scene::{Instance, Material, RenderScene};
+use kinetoscope_scene::shape::{Plane, Sphere};
+use kinetoscope_scene::{Instance, Material, RenderScene};
 
 const ENVS: usize = 6;
 /// Not a whole number of parts.

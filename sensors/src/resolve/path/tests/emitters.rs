@@ -23,7 +23,7 @@ fn shiny() -> Material {
 /// A box as a mesh.
 fn brick(half: [f32; 3]) -> Shape {
     let mesh = Shape::from(Box { half }).tessellate(8);
-    scene::shape::Mesh { mesh: std::sync::Arc::new(scene::RenderMesh::new(&mesh, 0.1)) }.into()
+    kinetoscope_scene::shape::Mesh { mesh: std::sync::Arc::new(kinetoscope_scene::RenderMesh::new(&mesh, 0.1)) }.into()
 }
 
 /// The light found by both ways together and by each alone: mean and standard deviation.
@@ -187,7 +187,7 @@ fn far_from_own_frame() {
     let floor = Instance::new(panel(4.0, aside, true), matt(0.7), 1);
     let mut scene = dark(vec![floor, Instance::new(panel(0.3, aside, false), glow(2.0), 2)]);
     for angles in [[0.3, -0.8, 2.1], [1.1, 0.4, -0.7], [-2.3, 1.2, 0.2], [0.7, 0.7, 0.7], [2.9, -0.2, 1.3]] {
-        let turned = PoseF32::from(&scene::pose::from_xyz_rpy([0.0; 3], angles));
+        let turned = PoseF32::from(&kinetoscope_scene::pose::from_xyz_rpy([0.0; 3], angles));
         let there = |local: [f32; 3]| turned.rotation.map(|r| r[0] * local[0] + r[1] * local[1] + r[2] * local[2]);
         let place = |local: [f32; 3]| PoseF32 { translation: there(local), ..turned };
         let poses = [place([-aside, 0.0, 0.0]), place([-aside, 0.0, height])];
