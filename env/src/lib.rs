@@ -11,9 +11,9 @@
 //! threads and of processes, nor on what other environments do.
 //!
 //! ```
-//! use env::{ActionTerm, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, Space, TerminationTerm};
+//! use kinetoscope_env::{ActionTerm, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, Space, TerminationTerm};
 //! use ndarray::{Array2, array};
-//! use sim::{DriveCfg, DriveType, JointIndex, MjcfFile, RobotCfg, SimulationManager, SimulationManagerCfg};
+//! use kinetoscope_sim::{DriveCfg, DriveType, JointIndex, MjcfFile, RobotCfg, SimulationManager, SimulationManagerCfg};
 //!
 //! let cart = r#"<mujoco><worldbody><body name="rail"><geom size="0.01"/><body name="cart">
 //!     <joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1" mass="2"/></body></body></worldbody></mujoco>"#;

@@ -10,8 +10,8 @@
 //! and how long. [`Recording`] reads the numbers again, [`replay`] does the actions again.
 //!
 //! ```no_run
-//! use record::{Record, RecorderCfg, Topic};
-//! use sim::{SimulationManager, SimulationManagerCfg};
+//! use kinetoscope_record::{Record, RecorderCfg, Topic};
+//! use kinetoscope_sim::{SimulationManager, SimulationManagerCfg};
 //!
 //! let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
 //! let recorder = sim.record(RecorderCfg::new("run.mcap"))?;

@@ -1,14 +1,14 @@
 //! Recorded actions run again: do they give the recorded states, bit for bit?
 //!
 //! ```no_run
-//! use record::{Record, RecorderCfg};
-//! use sim::{SimulationManager, SimulationManagerCfg};
+//! use kinetoscope_record::{Record, RecorderCfg};
+//! use kinetoscope_sim::{SimulationManager, SimulationManagerCfg};
 //!
 //! let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
 //! let recorder = sim.record(RecorderCfg::new("run.npz"))?;
 //! sim.update(100);
 //! sim.finish_recording(recorder)?;
-//! println!("{}", record::replay::verify(&mut sim, "run.npz")?);
+//! println!("{}", kinetoscope_record::replay::verify(&mut sim, "run.npz")?);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

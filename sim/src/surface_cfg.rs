@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 /// defaults where those say nothing. Nothing of it changes how things move.
 ///
 /// ```
-/// use sim::{RigidObjectCfg, SimulationManager, SimulationManagerCfg, SurfaceCfg};
+/// use kinetoscope_sim::{RigidObjectCfg, SimulationManager, SimulationManagerCfg, SurfaceCfg};
 ///
 /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
 /// let ball = RigidObjectCfg { uid: "ball".into(), surface: SurfaceCfg::glass(), ..Default::default() };
 /// sim.add_rigid_object(ball)?;
-/// # Ok::<(), sim::Error>(())
+/// # Ok::<(), kinetoscope_sim::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

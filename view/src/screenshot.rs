@@ -86,8 +86,8 @@ pub trait Screenshot {
     /// opens, 960 by 540 pixels. A file of that name is replaced, when the new one is whole. Nothing of the simulation changes.
     ///
     /// ```no_run
-    /// use sim::{SimulationManager, SimulationManagerCfg};
-    /// use view::Screenshot;
+    /// use kinetoscope_sim::{SimulationManager, SimulationManagerCfg};
+    /// use kinetoscope_view::Screenshot;
     ///
     /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
     /// sim.update(100);

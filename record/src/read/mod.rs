@@ -1,13 +1,13 @@
 //! Recordings read again: what is in them, and the numbers of it over time.
 //!
 //! ```no_run
-//! use record::{Recording, Wanted};
+//! use kinetoscope_record::{Recording, Wanted};
 //!
 //! let recording = Recording::open("run.mcap")?;
 //! let topic = recording.topic("arm/joint_states", None)?;
 //! let samples = recording.samples(&[Wanted::new(&topic.name, "position[J1]")])?;
 //! println!("{} numbers", samples[0].values.len());
-//! # Ok::<(), record::RecordError>(())
+//! # Ok::<(), kinetoscope_record::RecordError>(())
 //! ```
 
 mod mcap;

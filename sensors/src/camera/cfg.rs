@@ -48,7 +48,7 @@ pub enum DepthMiss {
 /// Configuration of a [`Camera`].
 ///
 /// ```
-/// use sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
+/// use kinetoscope_sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
 ///
 /// let cfg = CameraCfg {
 ///     width: 320,
@@ -62,7 +62,7 @@ pub enum DepthMiss {
 ///     ..CameraCfg::default()
 /// };
 /// assert!(cfg.channels.color && cfg.channels.depth);
-/// # Ok::<(), sensors::SensorError>(())
+/// # Ok::<(), kinetoscope_sensors::SensorError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

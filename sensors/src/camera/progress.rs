@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// [`RenderError::Cancelled`](crate::visibility::RenderError::Cancelled).
 ///
 /// ```
-/// use sensors::camera::{ParallelRasterizer, RasterCfg};
+/// use kinetoscope_sensors::camera::{ParallelRasterizer, RasterCfg};
 ///
 /// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 1);
 /// let progress = rasterizer.progress().clone();

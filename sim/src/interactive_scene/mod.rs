@@ -28,8 +28,8 @@ use std::path::Path;
 /// What a scene holds, in the order of its declaration.
 ///
 /// ```
-/// use sim::{ObjectShape, RigidObjectCfg, SceneCfg, SimulationManagerCfg};
-/// use sensors::ContactSensorCfg;
+/// use kinetoscope_sim::{ObjectShape, RigidObjectCfg, SceneCfg, SimulationManagerCfg};
+/// use kinetoscope_sensors::ContactSensorCfg;
 ///
 /// let cfg = SceneCfg::new(SimulationManagerCfg { num_envs: 2, ..Default::default() })
 ///     .with("cube", RigidObjectCfg { shape: ObjectShape::cube(0.2), ..Default::default() })

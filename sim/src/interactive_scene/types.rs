@@ -20,12 +20,12 @@ use std::any::Any;
 /// The kinds of entities that a scene file can name by `type`: the built-in ones, and those of your crates.
 ///
 /// ```
-/// use sim::EntityTypes;
+/// use kinetoscope_sim::EntityTypes;
 ///
 /// let types = EntityTypes::default();
 /// assert!(types.names().any(|name| name == "ray_caster"));
 /// // Any SensorCfg with serde's two traits; here a built-in one under another name.
-/// let types = types.with_sensor::<sensors::ImuCfg>("accelerometer");
+/// let types = types.with_sensor::<kinetoscope_sensors::ImuCfg>("accelerometer");
 /// ```
 #[derive(Clone, Debug)]
 pub struct EntityTypes {

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 /// Where one is wanted a name does too: `"arm"` is the control part of that name, or else the link.
 ///
 /// ```
-/// use scene::Pose;
-/// use sim::kinematics::Tip;
+/// use kinetoscope_scene::Pose;
+/// use kinetoscope_sim::kinematics::Tip;
 ///
 /// // 0.12 m in front of the flange, moved by the arm.
 /// let tip = Tip::of_part("arm").at("ee_link").with_tcp(Pose::translation(0.0, 0.0, 0.12));

@@ -11,9 +11,9 @@
 //!
 //! ```
 //! use nalgebra::Vector3;
-//! use scene::Pose;
-//! use sim::kinematics::{Chain, IkCfg, IkSolver};
-//! # use sim::urdf::{UrdfCfg, assemble};
+//! use kinetoscope_scene::Pose;
+//! use kinetoscope_sim::kinematics::{Chain, IkCfg, IkSolver};
+//! # use kinetoscope_sim::urdf::{UrdfCfg, assemble};
 //! # let urdf = std::env::temp_dir().join(format!("kinetoscope-slide-{}.urdf", std::process::id()));
 //! # std::fs::write(&urdf, "<robot name='r'><link name='rail'/><link name='cart'/><joint name='slide' type='prismatic'>
 //! #   <parent link='rail'/><child link='cart'/><axis xyz='0 0 1'/><limit lower='0' upper='2' effort='1' velocity='1'/>

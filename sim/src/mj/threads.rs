@@ -32,7 +32,7 @@ struct Shared {
 /// without a simulation.
 ///
 /// ```
-/// use sensors::camera::{ParallelRasterizer, RasterCfg};
+/// use kinetoscope_sensors::camera::{ParallelRasterizer, RasterCfg};
 ///
 /// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 2).with_crew(crate::staying_crew());
 /// # assert_eq!(rasterizer.threads(), 2);

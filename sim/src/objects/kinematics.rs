@@ -177,7 +177,7 @@ impl Robot<'_> {
     ///
     /// ```
     /// use ndarray::array;
-    /// use sim::{IkCfg, RobotCfg, SimulationManager, SimulationManagerCfg, Tip, UrdfCfg};
+    /// use kinetoscope_sim::{IkCfg, RobotCfg, SimulationManager, SimulationManagerCfg, Tip, UrdfCfg};
     /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-arm-{}.urdf", std::process::id()));
     /// # let link = |name: &str| format!("<link name='{name}'><inertial><mass value='1'/>
     /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link>");

@@ -32,7 +32,7 @@ use std::sync::Arc;
 /// scene's: what differs is a diagnostic.
 ///
 /// ```
-/// use sim::{MjcfCfg, SimulationManager, SimulationManagerCfg};
+/// use kinetoscope_sim::{MjcfCfg, SimulationManager, SimulationManagerCfg};
 ///
 /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
 /// let pendulum = r#"<mujoco><worldbody><body name="rod" pos="0 0 1">
@@ -43,7 +43,7 @@ use std::sync::Arc;
 /// sim.mjcf_part_mut(part).set_ctrl(&ndarray::array![[0.1]], Some(&motor), None)?;
 /// sim.update(10);
 /// assert!(sim.mjcf_part(part).get_qpos()[(0, 0)] > 0.0, "it falls");
-/// # Ok::<(), sim::Error>(())
+/// # Ok::<(), kinetoscope_sim::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

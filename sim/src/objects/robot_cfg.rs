@@ -53,8 +53,8 @@ pub struct RobotCfg {
     ///   keyframes. [`diagnostics`](crate::SimulationManager::diagnostics) names all that is left out.
     ///
     /// ```
-    /// use sim::{RobotCfg, SimulationManager, SimulationManagerCfg};
-    /// use sim::objects::robot_file::MjcfFile;
+    /// use kinetoscope_sim::{RobotCfg, SimulationManager, SimulationManagerCfg};
+    /// use kinetoscope_sim::objects::robot_file::MjcfFile;
     ///
     /// let arm = r#"<mujoco><worldbody><body name="base"><geom size="0.1"/>
     ///     <body name="arm" pos="0 0 0.1"><joint name="elbow" axis="0 1 0" range="-90 90" limited="true"/>
@@ -66,7 +66,7 @@ pub struct RobotCfg {
     /// let robot = sim.robot(robot);
     /// assert_eq!((robot.joint_names(), robot.link_names()), (&["elbow".into()][..], vec!["base", "arm", "tip"]));
     /// assert_eq!(robot.get_stiffness()[(0, 0)], 200.0);
-    /// # Ok::<(), sim::Error>(())
+    /// # Ok::<(), kinetoscope_sim::Error>(())
     /// ```
     #[serde(default, deserialize_with = "crate::file_format::mjcf_file")]
     pub mjcf: Option<MjcfFile>,

@@ -15,8 +15,8 @@ use serde::{Deserialize, Serialize};
 /// (`ground: None`) or lay the terrain over it.
 ///
 /// ```
-/// use scene::terrain::RoughTerrain;
-/// use sim::{SimulationManager, SimulationManagerCfg, TerrainCfg};
+/// use kinetoscope_scene::terrain::RoughTerrain;
+/// use kinetoscope_sim::{SimulationManager, SimulationManagerCfg, TerrainCfg};
 ///
 /// let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() })?;
 /// let rough = RoughTerrain { seed: 7, ..RoughTerrain::default() };
@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 /// // Points are 0.2 m apart; the middle of 41 is number 20.
 /// let height = sim.terrain(terrain).height_at([0.2, -0.4]).unwrap_or(f64::NAN);
 /// assert!((height - heights[(18, 21)]).abs() < 1e-9);
-/// # Ok::<(), sim::Error>(())
+/// # Ok::<(), kinetoscope_sim::Error>(())
 /// ```
 ///
 /// In a file, `heights` is a list of rows with `size` beside it, or a generator: `heights.rough = { seed = 7 }`. What is

@@ -44,7 +44,7 @@ pub struct Term {
 /// Properties to draw for an environment.
 ///
 /// ```
-/// use sim::{Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+/// use kinetoscope_sim::{Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
 ///
 /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 4, ..Default::default() })?;
 /// let shape = ObjectShape::cube(0.1);
@@ -56,7 +56,7 @@ pub struct Term {
 /// sim.randomize(&randomization, None)?;
 /// let mass = sim.properties(crate::EnvId(3))?.get(Property::Mass, "cube")?[0];
 /// assert!((1.6..2.4).contains(&mass));
-/// # Ok::<(), sim::Error>(())
+/// # Ok::<(), kinetoscope_sim::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

@@ -60,7 +60,7 @@ impl SimulationManager {
     /// alike, and whatever was drawn or set in between.
     ///
     /// ```
-    /// use sim::{Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+    /// use kinetoscope_sim::{Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
     ///
     /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 4, ..Default::default() })?;
     /// sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), shape: ObjectShape::cube(0.1), ..Default::default() })?;
@@ -70,7 +70,7 @@ impl SimulationManager {
     /// sim.randomize(&draw, None)?;
     /// sim.restore_with_properties(&snapshot, None)?;
     /// assert_eq!(sim.properties(crate::EnvId(2))?.get(Property::Mass, "cube")?, mass);
-    /// # Ok::<(), sim::Error>(())
+    /// # Ok::<(), kinetoscope_sim::Error>(())
     /// ```
     ///
     /// # Errors

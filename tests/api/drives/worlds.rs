@@ -282,7 +282,7 @@ impl World {
         load
     }
 
-    /// Mass matrix and bias force at a state, computed by `sim::dynamics` from the URDF.
+    /// Mass matrix and bias force at a state, computed by `kinetoscope_sim::dynamics` from the URDF.
     pub(crate) fn dynamics(&self, q: &[f64], v: &[f64], gravity: &Vector3<f64>) -> (DMatrix<f64>, DVector<f64>) {
         let view = self.view();
         let mut at = Configuration::zero(view.description());

@@ -1,8 +1,8 @@
 //! The simulation in a browser: one page, with pictures drawn here, sliders, plots and buttons.
 //!
 //! ```no_run
-//! use sim::{SimulationManager, SimulationManagerCfg};
-//! use view::Serve;
+//! use kinetoscope_sim::{SimulationManager, SimulationManagerCfg};
+//! use kinetoscope_view::Serve;
 //!
 //! let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
 //! let served = sim.serve("127.0.0.1:8080")?;

@@ -103,7 +103,7 @@ impl DistortionModel {
 /// [`intrinsics`](Self::intrinsics) and [`apply_to`](Self::apply_to) go from one to the other.
 ///
 /// ```
-/// use sensors::camera::{CameraCfg, CameraInfo};
+/// use kinetoscope_sensors::camera::{CameraCfg, CameraInfo};
 ///
 /// let text = "
 /// image_width: 640

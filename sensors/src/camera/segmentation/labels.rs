@@ -43,14 +43,14 @@ pub enum SegmentLevel {
 /// Which things belong to which class.
 ///
 /// ```
-/// use sensors::camera::{SegmentLevel, Segmentation, SegmentationCfg, Thing};
+/// use kinetoscope_sensors::camera::{SegmentLevel, Segmentation, SegmentationCfg, Thing};
 ///
 /// let thing = |id, object: &str| Thing { id, object: object.into(), link: None, class: "object".into() };
 /// let cfg = SegmentationCfg::labeled(&[("table|shelf", "furniture")]);
 /// let all = Segmentation::new([thing(1, "table"), thing(2, "shelf"), thing(3, "cube")], &cfg)?;
 /// assert_eq!(all.segments(SegmentLevel::Semantic)[0].name, "furniture");
 /// assert_eq!(all.segment_of(SegmentLevel::Semantic, 2), 1);
-/// # Ok::<(), sensors::SensorError>(())
+/// # Ok::<(), kinetoscope_sensors::SensorError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

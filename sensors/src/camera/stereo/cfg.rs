@@ -32,14 +32,14 @@ pub enum StereoOrigin {
 /// Configuration of a [`StereoCamera`]: a camera, and how its right eye differs from its left one.
 ///
 /// ```
-/// use sensors::camera::{CameraCfg, Channels, StereoCameraCfg};
+/// use kinetoscope_sensors::camera::{CameraCfg, Channels, StereoCameraCfg};
 ///
 /// let cfg = StereoCameraCfg {
 ///     camera: CameraCfg { channels: Channels::from_names(&["rgb", "depth"])?, ..CameraCfg::default() },
 ///     left_to_right_pos: [0.12, 0.0, 0.0],
 ///     ..StereoCameraCfg::default()
 /// };
-/// # Ok::<(), sensors::SensorError>(())
+/// # Ok::<(), kinetoscope_sensors::SensorError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

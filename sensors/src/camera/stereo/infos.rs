@@ -27,7 +27,7 @@ impl StereoCameraCfg {
     /// Source: ROS, message `sensor_msgs/CameraInfo`.
     ///
     /// ```
-    /// use sensors::camera::{CameraInfo, StereoCameraCfg};
+    /// use kinetoscope_sensors::camera::{CameraInfo, StereoCameraCfg};
     ///
     /// # let eye = |name: &str, cx: f64, tx: f64| format!("
     /// # image_width: 640

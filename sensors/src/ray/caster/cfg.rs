@@ -20,10 +20,10 @@ const MAX_BYTES: u64 = 64 << 30;
 /// The height scanner of Isaac's tutorials, 20 m over its robot so that it looks at the ground from above:
 ///
 /// ```
-/// use scene::Pose;
-/// use sensors::ray::pattern::Grid;
-/// use sensors::ray::{HitTargets, RayAlignment, RayCasterCfg};
-/// use sensors::SamplingCfg;
+/// use kinetoscope_scene::Pose;
+/// use kinetoscope_sensors::ray::pattern::Grid;
+/// use kinetoscope_sensors::ray::{HitTargets, RayAlignment, RayCasterCfg};
+/// use kinetoscope_sensors::SamplingCfg;
 ///
 /// let scanner = RayCasterCfg {
 ///     parent: Some("anymal/base".into()),
@@ -35,7 +35,7 @@ const MAX_BYTES: u64 = 64 << 30;
 ///     ..RayCasterCfg::default()
 /// };
 /// assert_eq!(scanner.pattern.rays()?.len(), 187);
-/// # Ok::<(), sensors::SensorError>(())
+/// # Ok::<(), kinetoscope_sensors::SensorError>(())
 /// ```
 ///
 /// When rays first run side by side within about 7° of an axis of a mesh, lists of what is seen along that axis are made, once
