@@ -18,12 +18,12 @@
 mod launcher;
 
 use clap::Parser;
-use kinetoscope::env::{
-    CommandTerm, Env, EnvBuilder, EnvCfg, Now, ObservationTerm, RewardTerm, TermResult, VectorEnv, terms,
-};
 use kinetoscope::ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, Random};
+use kinetoscope::tasks::{
+    CommandTerm, Env, EnvBuilder, EnvCfg, Now, ObservationTerm, RewardTerm, TermResult, VectorEnv, terms,
+};
 use launcher::{Launcher, Progress, curve, picture, stage, trial};
 use serde_json::json;
 use std::path::Path;

@@ -12,28 +12,28 @@ struct PageOfRecordings;
 struct PageOfCameras;
 
 pub mod assets;
-#[cfg(all(feature = "record", feature = "view"))]
+#[cfg(all(feature = "record", feature = "viewer"))]
 mod record_button;
-#[cfg(all(feature = "record", feature = "view"))]
+#[cfg(all(feature = "record", feature = "viewer"))]
 mod recorded_film;
 
-pub use kinetoscope_env as env;
 #[cfg(feature = "record")]
 pub use kinetoscope_record as record;
 pub use kinetoscope_scene as scene;
 pub use kinetoscope_sensors as sensors;
 pub use kinetoscope_sim as sim;
-#[cfg(feature = "view")]
-pub use kinetoscope_view as view;
+pub use kinetoscope_tasks as tasks;
+#[cfg(feature = "viewer")]
+pub use kinetoscope_viewer as viewer;
 pub use ndarray;
-#[cfg(all(feature = "record", feature = "view"))]
+#[cfg(all(feature = "record", feature = "viewer"))]
 pub use record_button::FileRecording;
-#[cfg(all(feature = "record", feature = "view"))]
+#[cfg(all(feature = "record", feature = "viewer"))]
 pub use recorded_film::RecordedFilm;
 
 /// What most programs need: `use kinetoscope::prelude::*;`.
 pub mod prelude {
-    #[cfg(all(feature = "record", feature = "view"))]
+    #[cfg(all(feature = "record", feature = "viewer"))]
     pub use crate::FileRecording;
     pub use crate::assets;
     #[cfg(feature = "record")]
@@ -62,8 +62,8 @@ pub mod prelude {
         SceneCfg, SensorId, Shard, ShardError, SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still,
         Strictness, SurfaceCfg, TerrainCfg, TerrainId, Tip, UrdfCfg, WeldCfg, WeldId, WrenchFrame,
     };
-    #[cfg(feature = "view")]
-    pub use kinetoscope_view::{
+    #[cfg(feature = "viewer")]
+    pub use kinetoscope_viewer::{
         ImageWindow, ImageWindowCfg, OpenWindow, RecordButton, Screenshot, ScreenshotCfg, ScreenshotError, Serve,
         ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError,
     };

@@ -2,7 +2,7 @@
 
 use kinetoscope_record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId};
 use kinetoscope_sim::SimulationManager;
-use kinetoscope_view::{Recording, RecordingState};
+use kinetoscope_viewer::{Recording, RecordingState};
 use std::path::{Path, PathBuf};
 
 /// What a record button does in most programs: it records to a file, and to a new one each time it is pressed again.

@@ -10,7 +10,7 @@ use crate::row::Row;
 use crate::startup::robots;
 use crate::{Outcome, Settings};
 use kinetoscope::prelude::*;
-use kinetoscope::view::Wants;
+use kinetoscope::viewer::Wants;
 use std::io::{BufRead as _, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Stdio};

@@ -3,7 +3,7 @@
 use crate::names::{fits, grouped};
 use crate::{Ending, Result};
 use kinetoscope::record::{RecordedTopic, Recording, Wanted};
-use kinetoscope::view::plot::{Plot, Series};
+use kinetoscope::viewer::plot::{Plot, Series};
 use std::io::Write;
 use std::path::PathBuf;
 

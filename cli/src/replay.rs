@@ -4,8 +4,8 @@ use crate::{Ending, Result, excerpt, interrupt};
 use kinetoscope::RecordedFilm;
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Film, Recording, replay};
-use kinetoscope::view::control::{Play, Speed};
-use kinetoscope::view::{Closed, Eye};
+use kinetoscope::viewer::control::{Play, Speed};
+use kinetoscope::viewer::{Closed, Eye};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 

@@ -3,7 +3,7 @@
 use crate::model::{ModelArgs, Setup, SpawnArgs};
 use crate::{Ending, Result, interrupt};
 use kinetoscope::prelude::*;
-use kinetoscope::view::{Closed, Command, Speed, Viewer, Wants};
+use kinetoscope::viewer::{Closed, Command, Speed, Viewer, Wants};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -91,7 +91,7 @@ pub(crate) struct Launcher {
     #[arg(long, value_name = "NAME=STEPS,...", value_delimiter = ',', value_parser = rate)]
     pub(crate) record_rate: Vec<(String, u64)>,
     /// What records: made when somebody first asks.
-    #[cfg(all(feature = "record", feature = "view"))]
+    #[cfg(all(feature = "record", feature = "viewer"))]
     #[arg(skip)]
     files: std::sync::OnceLock<Arc<std::sync::Mutex<kinetoscope::FileRecording>>>,
     /// The window, once it is open; clones share it.

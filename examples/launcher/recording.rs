@@ -3,7 +3,7 @@
 use super::{Launcher, Result};
 use kinetoscope::prelude::*;
 
-#[cfg(all(feature = "record", feature = "view"))]
+#[cfg(all(feature = "record", feature = "viewer"))]
 mod recorded {
     use super::*;
     use kinetoscope::record::Format;
@@ -105,11 +105,11 @@ mod recorded {
 }
 
 /// Nothing: this build does not record.
-#[cfg(not(all(feature = "record", feature = "view")))]
+#[cfg(not(all(feature = "record", feature = "viewer")))]
 #[derive(Debug)]
 pub(crate) struct Recording;
 
-#[cfg(not(all(feature = "record", feature = "view")))]
+#[cfg(not(all(feature = "record", feature = "viewer")))]
 impl Launcher {
     /// This build records nothing.
     ///
@@ -126,7 +126,7 @@ impl Launcher {
     }
 }
 
-#[cfg(not(all(feature = "record", feature = "view")))]
+#[cfg(not(all(feature = "record", feature = "viewer")))]
 impl Recording {
     /// There is nothing to end.
     ///

@@ -3,16 +3,16 @@
 use super::{Launcher, Result};
 use kinetoscope::prelude::*;
 
-#[cfg(feature = "view")]
+#[cfg(feature = "viewer")]
 pub(crate) use shown::*;
 
-#[cfg(feature = "view")]
+#[cfg(feature = "viewer")]
 mod shown {
     use super::*;
     use embedded_graphics::mono_font::ascii::FONT_10X20;
     use image::RgbImage;
-    use kinetoscope::view::Canvas;
-    use kinetoscope::view::{Command, Speed, Viewer, Viewing, Wants};
+    use kinetoscope::viewer::Canvas;
+    use kinetoscope::viewer::{Command, Speed, Viewer, Viewing, Wants};
     use std::sync::{Arc, OnceLock};
 
     /// The window of an example, once it is open.
@@ -151,11 +151,11 @@ mod shown {
 }
 
 /// Without the feature `view`, there is no window of a sensor.
-#[cfg(not(feature = "view"))]
+#[cfg(not(feature = "viewer"))]
 #[derive(Debug)]
 pub(crate) enum SensorWindow {}
 
-#[cfg(not(feature = "view"))]
+#[cfg(not(feature = "viewer"))]
 impl SensorWindow {
     /// Never called.
     pub(crate) fn show(&mut self, _: &image::RgbImage) {
@@ -169,15 +169,15 @@ impl SensorWindow {
 }
 
 /// Without the feature `view`, no viewer holds a simulation.
-#[cfg(not(feature = "view"))]
+#[cfg(not(feature = "viewer"))]
 pub(crate) fn let_go() {}
 
 /// Without the feature `view`, there is no window to close.
-#[cfg(not(feature = "view"))]
+#[cfg(not(feature = "viewer"))]
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shown;
 
-#[cfg(not(feature = "view"))]
+#[cfg(not(feature = "viewer"))]
 impl Shown {
     /// Always false: there is no window.
     pub(crate) fn is_closed(&self) -> bool {
@@ -185,7 +185,7 @@ impl Shown {
     }
 }
 
-#[cfg(not(feature = "view"))]
+#[cfg(not(feature = "viewer"))]
 impl Launcher {
     /// This build serves nothing.
     ///

@@ -2,7 +2,7 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Recording, Wanted};
-use kinetoscope::view::{Command, Recording as _, Viewer, Wants};
+use kinetoscope::viewer::{Command, Recording as _, Viewer, Wants};
 use kinetoscope_testkit::worlds::{RecordedWorld, sr5};
 use std::collections::BTreeMap;
 use std::path::Path;

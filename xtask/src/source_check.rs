@@ -7,7 +7,7 @@ use std::path::Path;
 const UNSAFE_MAY_STAND_IN: [&str; 2] = ["mujoco-sys/src/lib.rs", "sim/src/mj/"];
 /// Crates that forbid unsafe code as a whole.
 const FORBID_UNSAFE: [&str; 5] =
-    ["scene/src/lib.rs", "sensors/src/lib.rs", "env/src/lib.rs", "record/src/lib.rs", "view/src/lib.rs"];
+    ["scene/src/lib.rs", "sensors/src/lib.rs", "tasks/src/lib.rs", "record/src/lib.rs", "viewer/src/lib.rs"];
 const MAX_LINES: usize = 800;
 /// First folders of absolute paths that exist on one machine only.
 const FOREIGN_FOLDERS: [&str; 3] = ["home", "root", "work"];
@@ -338,7 +338,7 @@ mod tests {
         assert_eq!(missing_forbid(&[]).len(), FORBID_UNSAFE.len());
         let mut files = file("scene/src/lib.rs", "//! Doc.\n#![forbid(unsafe_code)]\n");
         files.extend(file("sensors/src/lib.rs", "// #![forbid(unsafe_code)]\n"));
-        for path in ["env/src/lib.rs", "record/src/lib.rs", "view/src/lib.rs"] {
+        for path in ["tasks/src/lib.rs", "record/src/lib.rs", "viewer/src/lib.rs"] {
             files.extend(file(path, "#![forbid(unsafe_code)]\n"));
         }
         assert_eq!(missing_forbid(&files), ["sensors/src/lib.rs: must say #![forbid(unsafe_code)]"]);

@@ -3,7 +3,7 @@
 use super::support::{Running, Shell, colors, red, window_of};
 use kinetoscope::ndarray::{Array3, array};
 use kinetoscope::prelude::*;
-use kinetoscope::view::Eye;
+use kinetoscope::viewer::Eye;
 use kinetoscope_testkit::wait;
 use kinetoscope_testkit::x_server::{Display, close, screenshot};
 

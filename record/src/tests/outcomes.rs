@@ -1,8 +1,8 @@
 //! Rewards and ends of a task in datasets and other recordings.
 
 use super::*;
-use kinetoscope_env::{ActionTerm, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, TerminationTerm};
 use kinetoscope_sim::{JointIndex, Outcome};
+use kinetoscope_tasks::{ActionTerm, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, TerminationTerm};
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use ndarray::Array1;
 
@@ -19,7 +19,7 @@ fn task() -> Env {
         <joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1" mass="2"/></body></body></worldbody></mujoco>"#;
     let mut sim = simulation(ENVS);
     let cart = sim.add_robot(passive(mjcf_robot("cart", cart))).unwrap();
-    let push = kinetoscope_env::Space::uniform(["slide"], [-1e5, 1e5]).unwrap();
+    let push = kinetoscope_tasks::Space::uniform(["slide"], [-1e5, 1e5]).unwrap();
     EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE) })
         .action(ActionTerm::new("push", push, move |sim, forces| Ok(sim.robot_mut(cart).set_qf(forces, None, None)?)))
         .observation(ObservationTerm::new("place", ["slide"], move |now| Ok(now.sim().robot(cart).get_qpos())))

@@ -1,9 +1,9 @@
 //! The same bits for any number of threads, environments and processes.
 
 use super::tasks::{cfg, everything, policy};
-use kinetoscope::env::Ended;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
+use kinetoscope::tasks::Ended;
 use kinetoscope_testkit::bits::bits;
 
 /// All bits of 150 steps, by environment, and the reasons of all ends.

@@ -1,12 +1,12 @@
 //! A task is, bit for bit, a hand-written loop over the plain API.
 
 use super::tasks::{cfg, world};
-use kinetoscope::env::{
-    ActionTerm, EndReason, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, Space, TerminationTerm,
-};
 use kinetoscope::ndarray::{Array1, Array2, Axis, array, concatenate};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
+use kinetoscope::tasks::{
+    ActionTerm, EndReason, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, Space, TerminationTerm,
+};
 use kinetoscope_testkit::bits::bits;
 
 const LIMIT: u64 = 60;

@@ -1,9 +1,9 @@
-//! `kinetoscope_env::check` finds nothing in good tasks, and the fault of broken ones.
+//! `kinetoscope_tasks::check` finds nothing in good tasks, and the fault of broken ones.
 
 use super::tasks::{cart_env, cart_task, cfg, everything, world};
 use super::vector_env::Carts;
-use kinetoscope::env::{Env, EnvCfg, EnvError, Finding, Info, Space, Step, VectorEnv, check};
 use kinetoscope::ndarray::{Array2, ArrayView2, s};
+use kinetoscope::tasks::{Env, EnvCfg, EnvError, Finding, Info, Space, Step, VectorEnv, check};
 
 #[test]
 fn good_tasks() {

@@ -1,8 +1,8 @@
 //! Rewards and observations against Newton's law.
 
 use super::tasks::{cart_env, cart_task, cfg, world};
-use kinetoscope::env::{ActionTerm, EnvBuilder, EnvCfg, ObservationTerm, Space};
 use kinetoscope::ndarray::{Array2, array};
+use kinetoscope::tasks::{ActionTerm, EnvBuilder, EnvCfg, ObservationTerm, Space};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 
 const DT: f64 = 0.01;

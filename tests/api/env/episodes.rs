@@ -1,13 +1,13 @@
 //! Starts and ends of episodes, and the observations there.
 
 use super::tasks::{cart_env, cart_task, cfg, everything, idle, policy, world};
-use kinetoscope::env::{
+use kinetoscope::ndarray::{Array1, Array2, array};
+use kinetoscope::prelude::*;
+use kinetoscope::tasks::{
     ActionTerm, EndReason, Env, EnvBuilder, EnvCfg, EventTerm, Now, ObservationTerm, RewardTerm, Space, TermResult,
     TerminationTerm, When,
 };
-use kinetoscope::ndarray::{Array1, Array2, array};
-use kinetoscope::prelude::*;
-use kinetoscope::view::{Command, Viewing, Wants};
+use kinetoscope::viewer::{Command, Viewing, Wants};
 use kinetoscope_testkit::bits::bits;
 use std::sync::{Arc, Mutex};
 

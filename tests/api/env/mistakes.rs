@@ -1,11 +1,11 @@
 //! Mistakes of users give typed errors, and a reset goes on after them.
 
 use super::tasks::{cart_task, cfg, idle, world};
-use kinetoscope::env::{
+use kinetoscope::ndarray::{Array1, Array2, array};
+use kinetoscope::tasks::{
     ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EnvError, EventTerm, Noise, ObservationTerm, RewardTerm, Space,
     TermKind, TerminationTerm, When, terms,
 };
-use kinetoscope::ndarray::{Array1, Array2, array};
 use kinetoscope_testkit::refusal::assert_refused;
 
 fn empty() -> EnvBuilder {

@@ -1,9 +1,9 @@
 //! Observations: spaces, names, noise, clips, scales, and sensors of the simulation.
 
 use super::tasks::{cart_task, cfg, idle, world};
-use kinetoscope::env::{Env, EnvBuilder, EnvCfg, EnvError, Noise, ObservationTerm, Space};
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
+use kinetoscope::tasks::{Env, EnvBuilder, EnvCfg, EnvError, Noise, ObservationTerm, Space};
 
 /// Gravity of the default world \[m/s²\].
 const G: f64 = 9.81;

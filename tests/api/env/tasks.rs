@@ -1,11 +1,11 @@
 //! The worlds and tasks of these tests.
 
-use kinetoscope::env::{
+use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array};
+use kinetoscope::prelude::*;
+use kinetoscope::tasks::{
     ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EventTerm, Noise, ObservationTerm, RewardTerm, Space,
     TerminationTerm, When, terms,
 };
-use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array};
-use kinetoscope::prelude::*;
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 
 /// A cart of 1 kg on a rail and, where it is wanted, a pole of 0.1 kg and 0.5 m on it.

@@ -1,11 +1,13 @@
 //! Terms of the library: what they say of states that are known.
 
 use super::tasks::{cfg, idle};
-use kinetoscope::env::terms::{self, RootRanges};
-use kinetoscope::env::{CommandTerm, EndReason, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, TerminationTerm};
 use kinetoscope::ndarray::{Array2, ArrayView1, Axis, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_row;
+use kinetoscope::tasks::terms::{self, RootRanges};
+use kinetoscope::tasks::{
+    CommandTerm, EndReason, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, TerminationTerm,
+};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use nalgebra::Vector3;

@@ -7,7 +7,7 @@ mod example;
 use super::checks::{Broken, Fault};
 use clap::Parser;
 use example::{Args, TARGETS, task};
-use kinetoscope::env::{Finding, check};
+use kinetoscope::tasks::{Finding, check};
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 

@@ -1,8 +1,8 @@
 //! One loop over batches of environments that are made in different ways.
 
 use super::tasks::{cart_env, cart_task, cfg, world};
-use kinetoscope::env::{EnvCfg, EnvError, Info, Space, Step, VectorEnv};
 use kinetoscope::ndarray::{Array1, Array2, ArrayView2, Axis, array};
+use kinetoscope::tasks::{EnvCfg, EnvError, Info, Space, Step, VectorEnv};
 
 /// The time step of the tests' worlds \[s\].
 const DT: f64 = 0.01;

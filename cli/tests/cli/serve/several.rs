@@ -3,7 +3,7 @@
 use super::running::Running;
 use super::visitor::{Visitor, connect, say, status_of};
 use kinetoscope::prelude::*;
-use kinetoscope::view::{Command, Speed};
+use kinetoscope::viewer::{Command, Speed};
 use kinetoscope_testkit::wait;
 use serde_json::json;
 use std::io::{Read, Write};

@@ -1,13 +1,13 @@
 //! Plots of numbers over time: joints that follow their targets, forces, whatever a sensor has seen.
 //!
 //! ```no_run
-//! use kinetoscope_view::plot::{Plot, Series};
+//! use kinetoscope_viewer::plot::{Plot, Series};
 //!
 //! let swing = (0..200).map(|k| 0.01 * f64::from(k)).map(|t| [t, (3.0 * t).sin()]);
 //! let plot = Plot::over_time("pendulum", "angle [rad]").with(Series::new("hinge", swing));
 //! plot.write("pendulum.svg")?;
 //! plot.write("pendulum.png")?;
-//! # Ok::<(), kinetoscope_view::plot::PlotError>(())
+//! # Ok::<(), kinetoscope_viewer::plot::PlotError>(())
 //! ```
 //!
 //! Both files show the same lines at the same places. Letters are drawn from a table in the program or named by their family:

@@ -87,7 +87,7 @@ pub trait Screenshot {
     ///
     /// ```no_run
     /// use kinetoscope_sim::{SimulationManager, SimulationManagerCfg};
-    /// use kinetoscope_view::Screenshot;
+    /// use kinetoscope_viewer::Screenshot;
     ///
     /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
     /// sim.update(100);

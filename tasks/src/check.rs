@@ -148,10 +148,10 @@ impl fmt::Display for Finding {
 /// and actions of another shape and for actions that are no numbers. Reset the environments before they are used again.
 ///
 /// ```
-/// # use kinetoscope_env::{Space, Step, VectorEnv};
+/// # use kinetoscope_tasks::{Space, Step, VectorEnv};
 /// # use ndarray::{Array1, Array2, ArrayView2};
 /// # fn all_is_well<E: VectorEnv>(environments: &mut E) {
-/// let findings = kinetoscope_env::check(environments, 7);
+/// let findings = kinetoscope_tasks::check(environments, 7);
 /// assert!(findings.is_empty(), "{}", findings.iter().map(|finding| format!("{finding}\n")).collect::<String>());
 /// # }
 /// ```

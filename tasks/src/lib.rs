@@ -11,7 +11,7 @@
 //! threads and of processes, nor on what other environments do.
 //!
 //! ```
-//! use kinetoscope_env::{ActionTerm, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, Space, TerminationTerm};
+//! use kinetoscope_tasks::{ActionTerm, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, Space, TerminationTerm};
 //! use ndarray::{Array2, array};
 //! use kinetoscope_sim::{DriveCfg, DriveType, JointIndex, MjcfFile, RobotCfg, SimulationManager, SimulationManagerCfg};
 //!

@@ -2,7 +2,7 @@
 //!
 //! ```no_run
 //! use kinetoscope_sim::{SimulationManager, SimulationManagerCfg};
-//! use kinetoscope_view::Serve;
+//! use kinetoscope_viewer::Serve;
 //!
 //! let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
 //! let served = sim.serve("127.0.0.1:8080")?;

@@ -1,7 +1,7 @@
 //! Images of the window for the documentation, as a window draws them:
 //!
 //! ```sh
-//! cargo run --release -p kinetoscope-view --example screenshots docs/pictures
+//! cargo run --release -p kinetoscope-viewer --example screenshots docs/pictures
 //! ```
 #![allow(clippy::unwrap_used, reason = "a program for the maintainers")]
 
@@ -10,8 +10,8 @@ use kinetoscope_sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, P
 use kinetoscope_sim::{
     DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg,
 };
-use kinetoscope_view::window::{App, Input, Key, Modifiers};
-use kinetoscope_view::{Canvas, Eye, Shown, Viewing, Wants};
+use kinetoscope_viewer::window::{App, Input, Key, Modifiers};
+use kinetoscope_viewer::{Canvas, Eye, Shown, Viewing, Wants};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

@@ -12,7 +12,7 @@ use ndarray::{Array2, ArrayView2};
 /// around an `Env` that filters observations), and write what learns for any of them:
 ///
 /// ```
-/// use kinetoscope_env::VectorEnv;
+/// use kinetoscope_tasks::VectorEnv;
 /// use ndarray::{Array1, Array2};
 ///
 /// /// Mean reward of `steps` steps with actions in the middle of their bounds.
