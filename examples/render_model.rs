@@ -136,7 +136,7 @@ fn run(args: &Args) -> launcher::Result {
         Some(threads) => return Err(format!("--threads {threads}: it must be 1 to 1024").into()),
         None => std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get),
     };
-    let mut rasterizer = ParallelRasterizer::new(cfg, threads).with_crew(kinetoscope::sim::staying_crew());
+    let mut rasterizer = ParallelRasterizer::new(cfg, threads).with_pool(kinetoscope::exec::ThreadPool::new());
     rasterizer.set_renderer(renderer);
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(view.width, view.height, channels);

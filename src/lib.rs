@@ -17,6 +17,7 @@ mod record_button;
 #[cfg(all(feature = "record", feature = "viewer"))]
 mod recorded_film;
 
+pub use kinetoscope_exec as exec;
 #[cfg(feature = "record")]
 pub use kinetoscope_record as record;
 pub use kinetoscope_scene as scene;

@@ -4,11 +4,11 @@ use crate::model::{Files, ModelArgs, Setup};
 use crate::picture::{self, Channel};
 use crate::{Ending, Result, progress};
 use clap::ValueEnum;
+use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot, look_at_pose};
 use kinetoscope::sensors::visibility::View;
-use kinetoscope::sim::staying_crew;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -172,7 +172,7 @@ impl Look {
         renderer.validate()?;
         let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
         let cfg = RasterCfg { samples: 4, ..RasterCfg::default() };
-        let mut rasterizer = ParallelRasterizer::new(cfg, threads).with_crew(staying_crew());
+        let mut rasterizer = ParallelRasterizer::new(cfg, threads).with_pool(ThreadPool::new());
         rasterizer.set_renderer(renderer);
         Ok(rasterizer)
     }

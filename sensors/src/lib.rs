@@ -12,7 +12,6 @@
 pub mod actuator_state;
 pub mod camera;
 pub mod contact_sensor;
-pub mod crew;
 mod delay;
 pub mod error;
 pub mod expected;
@@ -40,7 +39,6 @@ pub mod visibility;
 pub use actuator_state::{ActuatorState, ActuatorStateCfg};
 pub use camera::{Camera, CameraCfg, CameraError, StereoCamera, StereoCameraCfg};
 pub use contact_sensor::{ContactSensor, ContactSensorCfg};
-pub use crew::{Crew, ScopedThreads, Threads};
 pub use error::SensorError;
 pub use expected::Expected;
 pub use frame_transformer::{FrameTransformer, FrameTransformerCfg, TargetFrameCfg};

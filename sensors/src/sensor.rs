@@ -1,10 +1,10 @@
 //! The contract of every sensor.
 
-use crate::crew::Crew;
 use crate::error::SensorError;
 use crate::ray::RayAssets;
 use crate::sampling::Sampled;
 use crate::schedule::Schedule;
+use kinetoscope_exec::ThreadPool;
 use kinetoscope_scene::pattern::{MAX_CANDIDATES, closest, in_every_env};
 use kinetoscope_scene::{Marker, OwnScene, Pose, RenderScene, SceneState};
 use nalgebra::Vector3;
@@ -147,7 +147,7 @@ pub struct SensorContext {
     /// How many threads a sensor may use; 0 counts as 1.
     pub threads: usize,
     /// The threads that sensors share.
-    pub crew: Crew,
+    pub pool: ThreadPool,
 }
 
 impl SensorContext {

@@ -65,7 +65,6 @@ pub use kinetoscope_scene::pattern;
 pub use light_cfg::{LampKind, LightCfg};
 pub use look::{BodyMotion, JointAxis, Look};
 pub use manager::{EnvId, MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
-pub use mj::staying_crew;
 pub use mjcf::document::{Cone, Integrator};
 pub use named::Named;
 pub use objects::articulation::{Articulation, ArticulationCfg, ArticulationId, ArticulationMut};

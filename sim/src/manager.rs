@@ -19,10 +19,11 @@ use crate::sensor_list::{SensorId, SensorList};
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::viewpoint::Viewpoint;
 use crate::visible::{MaskId, Visible, VisualCache};
+use kinetoscope_exec::ThreadPool;
 use kinetoscope_scene::{Marker, OwnScene};
 use kinetoscope_sensors::camera::{Segmentation, SegmentationCfg, Thing};
 use kinetoscope_sensors::ray::RayAssets;
-use kinetoscope_sensors::{Crew, Requires, Sensor, SensorCfg, SensorContext};
+use kinetoscope_sensors::{Requires, Sensor, SensorCfg, SensorContext};
 use ndarray::Array2;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -73,7 +74,7 @@ pub struct SimulationManager {
     /// What ray casters have built.
     ray_assets: RayAssets,
     /// Threads of the sensors.
-    crew: Crew,
+    pool: ThreadPool,
     diagnostics: Vec<Diagnostic>,
     pub(crate) simulation: Simulation,
     pub(crate) sensors: SensorList,
@@ -110,7 +111,7 @@ impl SimulationManager {
             contents,
             visuals,
             ray_assets: RayAssets::default(),
-            crew: mj::staying_crew(),
+            pool: ThreadPool::new(),
             diagnostics: Vec::new(),
             simulation,
             sensors,
@@ -365,7 +366,7 @@ impl SimulationManager {
             rebuilt: false,
             ray_assets: self.ray_assets.clone(),
             threads: self.sensor_threads(),
-            crew: self.crew.clone(),
+            pool: self.pool.clone(),
         }
     }
 

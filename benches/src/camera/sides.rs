@@ -4,12 +4,12 @@ use super::scene::{GROUPS, Scene};
 use crate::Outcome;
 use crate::interleave::Side;
 use crate::rival::Process;
+use kinetoscope::exec::ThreadPool;
 use kinetoscope::scene::{Light, PoseF32};
 use kinetoscope::sensors::camera::{self, Channels, Frame, ParallelRasterizer, RasterCfg, Shot};
 use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::drive::table::DriveTable;
-use kinetoscope::sim::staying_crew;
 use serde_json::json;
 use std::ffi::OsString;
 use std::sync::Arc;
@@ -71,7 +71,7 @@ impl<'s> Ours<'s> {
         let mut ours = Self {
             scene,
             batch: Batch::new(&scene.model, &Arc::new(DriveTable::default()), work.envs, threads)?,
-            rasterizer: ParallelRasterizer::new(cfg, threads).with_crew(staying_crew()),
+            rasterizer: ParallelRasterizer::new(cfg, threads).with_pool(ThreadPool::new()),
             view: scene.view(work.size)?,
             physics: work.physics,
             poses: vec![PoseF32::IDENTITY; work.envs * seen.instances().len()],

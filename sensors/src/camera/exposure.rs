@@ -5,7 +5,6 @@ use super::lens::LensRays;
 use super::rasterizer::{Rasterizer, Shot};
 use super::renderer::Renderer;
 use super::shutter::{Clock, Take};
-use crate::crew::Crew;
 use crate::resolve::path::eye::{Eye, Pupil};
 use crate::resolve::path::film::{Film, develop};
 use crate::resolve::path::smooth;
@@ -14,6 +13,7 @@ use crate::resolve::plan::Plan;
 use crate::visibility::RenderError;
 use crate::visibility::raster::tile::BLOCK;
 use crate::visibility::trace::motion::Motion;
+use kinetoscope_exec::ThreadPool;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -22,7 +22,7 @@ const ROWS: usize = BLOCK;
 
 /// Draws a shot with the threads of some rasterizers. The bits do not depend on their number.
 pub(super) fn expose(
-    crew: &Crew,
+    pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
     (shot, take): (&Shot<'_>, &Take<'_>),
     frame: &mut FrameMut<'_>,
@@ -35,9 +35,9 @@ pub(super) fn expose(
         if let Some(opened) = opened.filter(|_| frame.color.is_some()) {
             plan.tracer.place(shot.scene, shot.poses, Some(opened.poses));
         }
-        draw_colors(crew, rasterizers, (&plan, clock.as_ref()), &mut film, (shot, take), frame)?;
-        draw_others(crew, rasterizers, (&plan, clock.as_ref()), (shot, take), frame)?;
-        show(crew, rasterizers, &plan, &film, frame);
+        draw_colors(pool, rasterizers, (&plan, clock.as_ref()), &mut film, (shot, take), frame)?;
+        draw_others(pool, rasterizers, (&plan, clock.as_ref()), (shot, take), frame)?;
+        show(pool, rasterizers, &plan, &film, frame);
         Ok(())
     });
     if let Some(first) = rasterizers.first_mut() {
@@ -48,7 +48,7 @@ pub(super) fn expose(
 
 /// Follows the paths of a prepared shot; writes nothing into the frame.
 fn draw_colors(
-    crew: &Crew,
+    pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
     (plan, clock): (&Plan, Option<&Clock>),
     film: &mut Film,
@@ -79,7 +79,7 @@ fn draw_colors(
     let paths = Paths { scene, tracer, eye, moving, samples, max_bounces, seed, lamps, ways: Ways::Both };
     // Not what the progress says afterwards: it may have been resumed meanwhile, and rows be missing.
     let broken_off = AtomicBool::new(false);
-    crew.share(rasterizers, rows, |rasterizer, mut rows| {
+    pool.for_each(rasterizers, rows, |rasterizer, mut rows| {
         let level = rasterizer.level;
         if !rows.expose(level, &paths, denoise, rasterizer.brush.stack(), &progress) {
             broken_off.store(true, Ordering::Relaxed);
@@ -92,7 +92,7 @@ fn draw_colors(
     if denoise && samples == 1 {
         let Film { pixels, next, guides, .. } = &mut *film;
         let (pixels, guides) = (&*pixels, &*guides);
-        crew.share(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
+        pool.for_each(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
             smooth::guess([width, k * ROWS], pixels, guides, to);
         });
         std::mem::swap(&mut film.pixels, &mut film.next);
@@ -100,7 +100,7 @@ fn draw_colors(
     for pass in (0..smooth::PASSES).filter(|_| denoise) {
         let Film { pixels, next, guides, .. } = &mut *film;
         let (pixels, guides) = (&*pixels, &*guides);
-        crew.share(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
+        pool.for_each(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
             smooth::pass([width, k * ROWS], (pass, plan.exposure), pixels, guides, to);
         });
         std::mem::swap(&mut film.pixels, &mut film.next);
@@ -110,7 +110,7 @@ fn draw_colors(
 
 /// Draws all channels but the colour: what the pixels' centres see.
 fn draw_others(
-    crew: &Crew,
+    pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
     (plan, clock): (&Plan, Option<&Clock>),
     (shot, take): (&Shot<'_>, &Take<'_>),
@@ -125,7 +125,7 @@ fn draw_others(
         if let Some((clock, opened)) = clock.zip(take.opened) {
             let first = Mutex::new(&mut failure);
             let rows = (0..height).map(move |y| (y, rest.split_off_first(width)));
-            crew.share(rasterizers, rows, |rasterizer, (y, mut row)| {
+            pool.for_each(rasterizers, rows, |rasterizer, (y, mut row)| {
                 if let Err(error) = rasterizer.draw_row(shot, (&opened, clock), y, &mut row) {
                     **first.lock().unwrap_or_else(PoisonError::into_inner) = Err(error);
                 }
@@ -135,7 +135,7 @@ fn draw_others(
                 let rows = ROWS.min(height - row);
                 (row / BLOCK, rest.split_off_first(width * rows))
             });
-            crew.share(rasterizers, bands, |rasterizer, (block, mut frame)| {
+            pool.for_each(rasterizers, bands, |rasterizer, (block, mut frame)| {
                 rasterizer.brush.paint(rasterizer.level, plan, shot, &mut frame, block..block + 1);
             });
         }
@@ -145,12 +145,12 @@ fn draw_others(
 }
 
 /// Makes bytes of what the paths found.
-fn show(crew: &Crew, rasterizers: &mut [Rasterizer], plan: &Plan, film: &Film, frame: &mut FrameMut<'_>) {
+fn show(pool: &ThreadPool, rasterizers: &mut [Rasterizer], plan: &Plan, film: &Film, frame: &mut FrameMut<'_>) {
     let Renderer::RayTraced { denoise, .. } = plan.renderer else { return };
     let Some(color) = frame.color.as_deref_mut() else { return };
     let size = film.width * ROWS;
     let parts = film.pixels.chunks(size).zip(color.chunks_mut(4 * size)).enumerate();
-    crew.share(rasterizers, parts, |rasterizer, (k, (pixels, out))| {
+    pool.for_each(rasterizers, parts, |rasterizer, (k, (pixels, out))| {
         let guides = if denoise { &film.guides[k * size..k * size + pixels.len()] } else { &[] };
         develop(rasterizer.level, (plan.exposure, plan.tone), pixels, guides, out);
     });

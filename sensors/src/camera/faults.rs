@@ -5,10 +5,10 @@ use super::imperfection::{Imperfections, Picture};
 use super::parallel::Job;
 use super::picture_noise::PictureNoise;
 use super::ticket::Ticket;
-use crate::crew::Crew;
 use crate::error::SensorError;
 use crate::resolve::tone::ToneCurve;
 use crate::sensor::SensorContext;
+use kinetoscope_exec::ThreadPool;
 
 /// What happens to pictures after they were drawn. There is none of it for a perfect camera.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ pub(super) struct Faults {
     noise: Option<PictureNoise>,
     /// As many as threads.
     workers: Vec<()>,
-    crew: Crew,
+    pool: ThreadPool,
 }
 
 impl Faults {
@@ -32,15 +32,15 @@ impl Faults {
             tone: cfg.raster.tone,
             noise,
             workers: vec![(); context.threads.max(1)],
-            crew: context.crew.clone(),
+            pool: context.pool.clone(),
         }))
     }
 
     /// Spoils pictures in which misses are infinite; each is spoilt by one thread.
     pub(super) fn spoil(&mut self, jobs: &mut [Job<'_>], tickets: &[Ticket]) {
-        let Self { imperfections, tone, noise, workers, crew } = self;
+        let Self { imperfections, tone, noise, workers, pool } = self;
         let noise = noise.as_ref();
-        crew.share(workers, jobs.iter_mut().zip(tickets), |(), ((shot, frame), ticket)| {
+        pool.for_each(workers, jobs.iter_mut().zip(tickets), |(), ((shot, frame), ticket)| {
             imperfections.spoil(frame, *tone, Picture { view: shot.view, rays: shot.lens, ticket });
             if let Some(noise) = noise {
                 noise.disturb(frame, ticket);

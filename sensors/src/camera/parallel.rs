@@ -7,11 +7,11 @@ use super::progress::RenderProgress;
 use super::rasterizer::{RasterCfg, Rasterizer, Shot};
 use super::renderer::Renderer;
 use super::shutter::{Shutter, Take};
-use crate::crew::Crew;
 use crate::ray::RayAssets;
 use crate::resolve::plan::{Plan, estimate};
 use crate::visibility::RenderError;
 use crate::visibility::raster::tile::BLOCK;
+use kinetoscope_exec::ThreadPool;
 use std::sync::{Mutex, PoisonError};
 
 /// Less work than this is drawn on the calling thread: waking or starting another takes up to 0.05 ms \[ns\].
@@ -33,7 +33,7 @@ pub struct ParallelRasterizer {
     /// How many of them work.
     working: usize,
     plans: Vec<Plan>,
-    crew: Crew,
+    pool: ThreadPool,
     progress: RenderProgress,
 }
 
@@ -44,7 +44,7 @@ impl Clone for ParallelRasterizer {
             rasterizers: self.rasterizers.clone(),
             working: self.working,
             plans: self.plans.clone(),
-            crew: self.crew.clone(),
+            pool: self.pool.clone(),
             progress: RenderProgress::default(),
         };
         clone.share_progress();
@@ -54,11 +54,11 @@ impl Clone for ParallelRasterizer {
 
 impl ParallelRasterizer {
     /// A rasterizer for each of `threads` threads, the calling one included; 0 counts as 1. The others start with each
-    /// batch and end with it: see [`with_crew`](Self::with_crew).
+    /// batch and end with it: see [`with_pool`](Self::with_pool).
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
         let (working, rasterizers) = (threads.max(1), vec![Rasterizer::new(cfg); threads.max(1)]);
-        let (crew, progress) = (Crew::default(), RenderProgress::default());
-        let mut all = Self { rasterizers, working, plans: Vec::new(), crew, progress };
+        let (pool, progress) = (ThreadPool::new(), RenderProgress::default());
+        let mut all = Self { rasterizers, working, plans: Vec::new(), pool, progress };
         all.share_progress();
         all
     }
@@ -70,9 +70,9 @@ impl ParallelRasterizer {
         }
     }
 
-    /// Draws on the threads of `crew`. With those of a simulation nothing is allocated after the first batches.
-    pub fn with_crew(mut self, crew: Crew) -> Self {
-        self.crew = crew;
+    /// Draws on the threads of `pool`. With those of a simulation nothing is allocated after the first batches.
+    pub fn with_pool(mut self, pool: ThreadPool) -> Self {
+        self.pool = pool;
         self
     }
 
@@ -153,7 +153,7 @@ impl ParallelRasterizer {
     ///
     /// As [`render`](Self::render).
     pub fn render_takes(&mut self, jobs: &mut [Job<'_>], takes: &[Take<'_>]) -> Result<(), (usize, RenderError)> {
-        let Self { rasterizers, working, plans, crew, progress } = self;
+        let Self { rasterizers, working, plans, pool, progress } = self;
         let Some((cfg, renderer)) = rasterizers.first().map(|r| (r.cfg, r.renderer)) else { return Ok(()) };
         let threads = worth(cfg, renderer, jobs).min(*working);
         let rasterizers = &mut rasterizers[..threads];
@@ -163,7 +163,7 @@ impl ParallelRasterizer {
             for (index, (shot, frame)) in jobs.iter_mut().enumerate() {
                 let take = takes.get(index).copied().unwrap_or_default();
                 let (before, paths) = (progress.samples(), renderer.paths(shot, frame));
-                let result = expose(crew, rasterizers, (shot, &take), frame);
+                let result = expose(pool, rasterizers, (shot, &take), frame);
                 if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Cancelled { .. })) {
                     progress.refuse(paths.saturating_sub(progress.samples().saturating_sub(before)));
                 }
@@ -181,12 +181,12 @@ impl ParallelRasterizer {
         };
         let (alone, together) = jobs.split_at_mut(count - together);
         let first = alone.len();
-        crew.share(rasterizers, alone.iter_mut().enumerate(), |rasterizer, (index, (shot, frame))| {
+        pool.for_each(rasterizers, alone.iter_mut().enumerate(), |rasterizer, (index, (shot, frame))| {
             failure.note(index, rasterizer.render_shot(shot, frame));
         });
         if !together.is_empty() {
             plans.resize_with(plans.len().max(together.len()), Plan::default);
-            draw_together(crew, rasterizers, &mut plans[..together.len()], together, |index, result| {
+            draw_together(pool, rasterizers, &mut plans[..together.len()], together, |index, result| {
                 failure.note(first + index, result);
             });
         }
@@ -221,20 +221,24 @@ impl Failure {
 
 /// Draws a few shots, each by all threads.
 fn draw_together(
-    crew: &Crew,
+    pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
     plans: &mut [Plan],
     jobs: &mut [Job<'_>],
     note: impl Fn(usize, Result<(), RenderError>) + Sync,
 ) {
     let parts = (PARTS * rasterizers.len()).div_ceil(jobs.len());
-    crew.share(rasterizers, plans.iter_mut().zip(&*jobs).enumerate(), |rasterizer, (index, (plan, (shot, frame)))| {
-        note(index, plan.prepare(rasterizer.style(), shot, frame));
-    });
+    pool.for_each(
+        rasterizers,
+        plans.iter_mut().zip(&*jobs).enumerate(),
+        |rasterizer, (index, (plan, (shot, frame)))| {
+            note(index, plan.prepare(rasterizer.style(), shot, frame));
+        },
+    );
     if plans.iter().any(Plan::has_shadows) {
         let maps = plans.iter_mut().zip(&*jobs);
         let bands = maps.flat_map(|(plan, (shot, _))| plan.shadow_bands().map(move |band| (shot.scene, band)));
-        crew.share(rasterizers, bands, |rasterizer, (scene, band)| {
+        pool.for_each(rasterizers, bands, |rasterizer, (scene, band)| {
             rasterizer.brush.shadow(rasterizer.level, scene, band);
         });
     }
@@ -243,7 +247,7 @@ fn draw_together(
         let bands = bands(plan, &shot, frame, parts);
         bands.map(move |band| (plan, shot, band))
     });
-    crew.share(rasterizers, bands, |rasterizer, (plan, shot, (first, rows, mut frame))| {
+    pool.for_each(rasterizers, bands, |rasterizer, (plan, shot, (first, rows, mut frame))| {
         rasterizer.brush.paint(rasterizer.level, plan, &shot, &mut frame, first..first + rows);
     });
 }

@@ -8,7 +8,6 @@ use super::progress::RenderProgress;
 use super::renderer::Renderer;
 use super::rolling::Roll;
 use super::shutter::{Clock, Opened, Shutter, Take};
-use crate::crew::Crew;
 use crate::lanes::Level;
 use crate::ray::RayAssets;
 use crate::resolve::band::Brush;
@@ -17,6 +16,7 @@ use crate::resolve::plan::{Plan, Style};
 use crate::resolve::tone::ToneCurve;
 use crate::visibility::raster::tile::BLOCK;
 use crate::visibility::{RenderError, View};
+use kinetoscope_exec::ThreadPool;
 use kinetoscope_scene::{Light, PoseF32, RenderScene};
 use serde::{Deserialize, Serialize};
 
@@ -240,7 +240,7 @@ impl Rasterizer {
         let paths = self.renderer.paths(shot, frame);
         self.progress.begin(paths);
         if self.renderer.follows_paths() {
-            let result = expose(&Crew::default(), std::slice::from_mut(self), (shot, take), frame);
+            let result = expose(&ThreadPool::serial(), std::slice::from_mut(self), (shot, take), frame);
             if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Cancelled { .. })) {
                 self.progress.refuse(paths.saturating_sub(self.progress.samples()));
             }

@@ -254,7 +254,7 @@ impl Camera {
         let earlier = cfg.channels.flow.then(|| Earlier::new(rows, scene.instances().len()));
         let marked = u32::from(cfg.draw_markers) << Marker::GROUP;
         let raster = RasterCfg { groups: cfg.raster.groups | marked, ..cfg.raster };
-        let mut rasterizer = ParallelRasterizer::new(raster, context.threads).with_crew(context.crew.clone());
+        let mut rasterizer = ParallelRasterizer::new(raster, context.threads).with_pool(context.pool.clone());
         rasterizer.set_renderer(cfg.renderer);
         rasterizer.set_light(cfg.aperture, cfg.shutter);
         rasterizer.set_stops(cfg.imperfections.exposure.map_or(0.0, |exposure| exposure.stops));

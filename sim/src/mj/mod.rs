@@ -31,7 +31,6 @@ mod ray;
 mod state;
 #[cfg(test)]
 mod tests;
-mod threads;
 mod version;
 mod vfs;
 mod weld;
@@ -51,7 +50,6 @@ pub use options::OptionDifference;
 pub(crate) use prefetch::prefetch;
 pub use ray::RayHit;
 pub use state::{Inputs, Motion, RawQuats};
-pub use threads::staying_crew;
 pub use version::{TARGET, Target, VersionError, check_version, version_string};
 pub use vfs::{Asset, LoadError, compile, compile_file};
 pub use weld::Weld;

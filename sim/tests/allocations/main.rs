@@ -6,9 +6,9 @@ mod measuring;
 mod rendering;
 mod update;
 
-use kinetoscope_sensors::{ScopedThreads, Threads};
-use std::sync::Barrier;
+use kinetoscope_exec::ThreadPool;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Barrier};
 
 /// Allocations of this thread.
 fn allocations(work: impl FnOnce()) -> u64 {
@@ -29,22 +29,27 @@ fn assert_settles(what: &str, mut allocations: impl FnMut() -> u64) {
     panic!("{what}: no 20 in a row without an allocation");
 }
 
-/// Threads that count allocations and visits of all workers.
+/// Allocations of all slots of a pool, and the number of slots that worked.
 #[derive(Debug, Default)]
 struct Counting {
     allocations: AtomicU64,
     visits: AtomicU64,
 }
 
-impl Threads for Counting {
-    fn run(&self, workers: usize, work: &(dyn Fn(usize) + Sync)) {
-        // All start together: the first one would otherwise do it all.
-        let start = Barrier::new(workers);
-        ScopedThreads.run(workers, &|worker| {
-            start.wait();
-            self.allocations.fetch_add(allocations(|| work(worker)), Ordering::Relaxed);
-            self.visits.fetch_add(1, Ordering::Relaxed);
+impl Counting {
+    /// A pool for jobs of `slots` slots that counts here.
+    fn pool(self: &Arc<Self>, slots: usize) -> ThreadPool {
+        let (counting, start) = (Arc::clone(self), Barrier::new(slots));
+        let pool = ThreadPool::new().with_hook(move |slot, of, work| {
+            // All start together: the first one would otherwise do it all.
+            if of == slots {
+                start.wait();
+            }
+            counting.allocations.fetch_add(allocations(|| work(slot)), Ordering::Relaxed);
+            counting.visits.fetch_add(1, Ordering::Relaxed);
         });
+        pool.start(slots).unwrap();
+        pool
     }
 }
 

@@ -9,9 +9,9 @@ use kinetoscope_sensors::camera::{Channels, Extrinsics, Imperfections, Intrinsic
 use kinetoscope_sensors::ray::HitTargets;
 use kinetoscope_sensors::ray::pattern::Lidar;
 use kinetoscope_sensors::{
-    CameraCfg, ContactSensorCfg, Crew, EngineSensor, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg,
-    NoiseCfg, RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, Schedule, Sensor, SensorCfg, SensorContext,
-    SensorError, SensorSlot, TargetFrameCfg,
+    CameraCfg, ContactSensorCfg, EngineSensor, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg, NoiseCfg,
+    RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, Schedule, Sensor, SensorCfg, SensorContext, SensorError,
+    SensorSlot, TargetFrameCfg,
 };
 use ndarray::{Array2, Array3};
 use std::sync::Arc;
@@ -243,8 +243,7 @@ fn rays() {
     let camera = RayCasterCameraCfg { width: 120, height: 80, intrinsics, extrinsics, ..Default::default() };
     for threads in [1, 4] {
         let counting = Arc::new(Counting::default());
-        let crew = Crew::new(Arc::<Counting>::clone(&counting));
-        let context = SensorContext { threads, crew, ..context.clone() };
+        let context = SensorContext { threads, pool: counting.pool(threads), ..context.clone() };
         let sensors: [(&str, Box<dyn Sensor>); 2] = [
             ("caster", Box::new(caster.build(&context).unwrap())),
             ("camera", Box::new(camera.build(&context).unwrap())),

@@ -4,7 +4,6 @@ use crate::{Counting, allocations, assert_settles};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Capsule, Mesh, Plane, Sphere};
 use kinetoscope_scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
-use kinetoscope_sensors::Crew;
 use kinetoscope_sensors::camera::lens::Equidistant;
 use kinetoscope_sensors::camera::{
     Aperture, Before, Channels, Frame, LensRays, Opened, Optics, ParallelRasterizer, RasterCfg, Rasterizer, Renderer,
@@ -150,8 +149,7 @@ fn batches() {
     for (size, frames) in [([320, 240], 1), ([160, 120], 3), ([160, 120], 37)] {
         let view = view(size);
         let counting = Arc::new(Counting::default());
-        let crew = Crew::new(Arc::<Counting>::clone(&counting));
-        let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 3).with_crew(crew);
+        let mut rasterizer = ParallelRasterizer::new(RasterCfg::default(), 3).with_pool(counting.pool(3));
         let mut images = vec![Frame::new(view.width, view.height, FOUR); frames];
         let shot = Shot { scene: &scene, poses: &poses, view: &view, lights: None, lens: None, before: None };
         let mut jobs: Vec<_> = images.iter_mut().map(|frame| (shot, frame.as_mut())).collect();

@@ -1,10 +1,10 @@
 //! All environments in one image, with markers.
 
+use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, PoseF32};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, RasterCfg, Rasterizer, look_at_pose};
 use kinetoscope::sensors::visibility::View;
-use kinetoscope::sim::staying_crew;
 use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object};
 
 const SIZE: [usize; 2] = [400, 400];
@@ -98,9 +98,9 @@ fn persistent_threads() {
     let alone = draw(&mut ParallelRasterizer::new(RasterCfg::default(), 1));
     let ball = mask_id(&sim, "ball");
     assert!(alone.iter().all(|frame| frame.mask.as_ref().unwrap().contains(&ball)));
-    let mut staying = ParallelRasterizer::new(RasterCfg::default(), 3).with_crew(staying_crew());
+    let mut staying = ParallelRasterizer::new(RasterCfg::default(), 3).with_pool(ThreadPool::new());
     assert_eq!(draw(&mut staying), alone);
-    let mut other = ParallelRasterizer::new(RasterCfg::default(), 2).with_crew(staying_crew());
+    let mut other = ParallelRasterizer::new(RasterCfg::default(), 2).with_pool(ThreadPool::new());
     assert_eq!(draw(&mut other), alone);
     drop(other);
     assert_eq!(draw(&mut staying), alone);

@@ -1,10 +1,10 @@
 //! Rays of many environments at once, on several threads.
 
 use super::order::neighbours_together;
-use crate::crew::Crew;
 use crate::ray::world::FixedWorld;
 use crate::ray::{Ray, RayAssets, RayHit, RayTargets, RayWorld};
 use crate::sensor::SensorContext;
+use kinetoscope_exec::ThreadPool;
 use kinetoscope_scene::{OwnScene, PoseF64};
 use ndarray::Array2;
 use std::fmt;
@@ -55,7 +55,7 @@ impl Rays for Vec<Ray> {
 /// allocated after the first times.
 #[derive(Clone)]
 pub(crate) struct Scan<R: Rays> {
-    crew: Crew,
+    pool: ThreadPool,
     targets: Arc<RayTargets>,
     /// Where trees over meshes are, for targets of environments that look otherwise.
     assets: RayAssets,
@@ -111,7 +111,7 @@ impl<R: Rays> Scan<R> {
         let of_view = || (0..count).step_by(PART).map(|first| vec![RayHit::MISS; PART.min(count - first)]);
         let look = Look { scene: OwnScene::default(), targets: Arc::clone(&targets) };
         Self {
-            crew: context.crew.clone(),
+            pool: context.pool.clone(),
             assets: context.ray_assets.clone(),
             looks: vec![look; n],
             order: rays.order(),
@@ -173,14 +173,14 @@ impl<R: Rays> Scan<R> {
             }
         }
         let (per_view, moving) = (self.per_view(), self.targets.moving_count());
-        let Self { crew, rays, order, looks, fixed, max_distance, task, desks, parts, .. } = self;
+        let Self { pool, rays, order, looks, fixed, max_distance, task, desks, parts, .. } = self;
         let threads = (task.views.len() * rays.count() / WORTH_A_THREAD).clamp(1, desks.len());
         let desks = &mut desks[..threads];
         desks.iter_mut().for_each(|desk| desk.placed = NOWHERE);
         let parts = parts[..per_view * task.views.len()].iter_mut().enumerate();
         let (rays, order, looks, fixed) = (&*rays, order.as_deref(), &*looks, &*fixed);
         let (task, max_distance) = (&*task, *max_distance);
-        crew.share(desks, parts, |desk, (part, hits)| {
+        pool.for_each(desks, parts, |desk, (part, hits)| {
             let (at, first) = (part / per_view, part % per_view * PART);
             let (env, view) = &task.views[at];
             if desk.placed != at {

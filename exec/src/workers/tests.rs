@@ -7,20 +7,20 @@ fn me() -> ThreadId {
     std::thread::current().id()
 }
 
-/// The work that was done: number, desk, thread.
+/// The work that was done: number, slot, thread.
 type Taken = Vec<(usize, usize, ThreadId)>;
 
 /// Takes numbers up to `count`, slowly; fails at `fail`.
-fn numbers(threads: &StayingThreads, desks: usize, count: usize, fail: Option<usize>) -> Taken {
+fn numbers(threads: &Workers, slots: usize, count: usize, fail: Option<usize>) -> Taken {
     let (next, taken) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    threads.run(desks, &|desk| {
+    threads.run(slots, &|slot| {
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             if number >= count {
                 return;
             }
-            assert!(fail != Some(number), "told to fail");
-            lock(&taken).push((number, desk, me()));
+            assert!(fail != Some(number), "fails on purpose");
+            lock(&taken).push((number, slot, me()));
             std::thread::sleep(std::time::Duration::from_millis(2));
         }
     });
@@ -29,34 +29,34 @@ fn numbers(threads: &StayingThreads, desks: usize, count: usize, fail: Option<us
 
 #[test]
 fn reused_threads() {
-    let threads = StayingThreads::default();
+    let threads = Workers::default();
     let mut seen = BTreeSet::new();
     for round in 0..20 {
         let taken = numbers(&threads, 3, 10, None);
         let mut numbers: Vec<usize> = taken.iter().map(|(number, ..)| *number).collect();
         numbers.sort_unstable();
         assert!(numbers.iter().copied().eq(0..10), "round {round}: {numbers:?}");
-        assert!(taken.iter().all(|(_, desk, thread)| *desk < 3 && (*desk == 0) == (*thread == me())));
+        assert!(taken.iter().all(|(_, slot, thread)| *slot < 3 && (*slot == 0) == (*thread == me())));
         seen.extend(taken.iter().map(|(_, _, thread)| format!("{thread:?}")));
     }
     assert!((2..=3).contains(&seen.len()), "{seen:?}");
-    assert_eq!(format!("{threads:?}"), "StayingThreads { started: 2 }");
+    assert_eq!(threads.started(), 2);
 }
 
 /// Borrowed data are written by other threads, and belong to the caller again afterwards.
 #[test]
 fn borrowed_data() {
-    let threads = StayingThreads::default();
+    let threads = Workers::default();
     let mut helped = 0;
     for round in 1..=200 {
         let mut parts = vec![[0usize; 64]; 32];
         let hands: Vec<_> = parts.iter_mut().map(Mutex::new).collect();
         let next = AtomicUsize::new(0);
         let others = AtomicUsize::new(0);
-        threads.run(4, &|desk| {
+        threads.run(4, &|slot| {
             while let Some(part) = hands.get(next.fetch_add(1, Ordering::Relaxed)) {
                 lock(part).fill(round);
-                others.fetch_add(desk.min(1), Ordering::Relaxed);
+                others.fetch_add(slot.min(1), Ordering::Relaxed);
                 std::thread::yield_now();
             }
         });
@@ -69,9 +69,9 @@ fn borrowed_data() {
 
 #[test]
 fn alone() {
-    let threads = StayingThreads::default();
+    let threads = Workers::default();
     assert_eq!(numbers(&threads, 1, 5, None).len(), 5);
-    assert_eq!(format!("{threads:?}"), "StayingThreads { started: 0 }");
+    assert_eq!(threads.started(), 0);
     // A second caller while they are busy.
     let (there, over) = (AtomicBool::new(false), AtomicBool::new(false));
     std::thread::scope(|scope| {
@@ -88,14 +88,14 @@ fn alone() {
         }
         let taken = numbers(&threads, 2, 5, None);
         over.store(true, Ordering::Relaxed);
-        assert!(taken.iter().all(|(_, desk, thread)| *desk == 0 && *thread == me()));
+        assert!(taken.iter().all(|(_, slot, thread)| *slot == 0 && *thread == me()));
         assert_eq!(taken.len(), 5);
     });
 }
 
 #[test]
 fn end_of_threads() {
-    let threads = StayingThreads::default();
+    let threads = Workers::default();
     numbers(&threads, 3, 5, None);
     let shared = Arc::downgrade(&threads.shared);
     assert_eq!(shared.strong_count(), 3, "its owner and two threads");
@@ -106,7 +106,7 @@ fn end_of_threads() {
 /// A panic reaches the caller, whichever thread it was on, and the threads go on.
 #[test]
 fn panics() {
-    let threads = StayingThreads::default();
+    let threads = Workers::default();
     for fail in 0..6 {
         let run = || numbers(&threads, 3, 10, Some(fail));
         assert!(catch_unwind(AssertUnwindSafe(run)).is_err(), "{fail}");
@@ -114,16 +114,16 @@ fn panics() {
     assert_eq!(numbers(&threads, 3, 10, None).len(), 10);
 }
 
-/// Root cause: a caller that waited for its helper had already taken its work from the board, so another caller could put
-/// up its own before the first one woke, and took the panic. The board stays with one caller until all helpers are done.
+/// Root cause: a caller that waited for its helper had already withdrawn its work, so another caller could put
+/// up its own before the first one woke, and took the panic. The pool stays with one caller until all helpers are done.
 #[test]
 fn panics_of_two_callers() {
-    let threads = StayingThreads::default();
+    let threads = Workers::default();
     for round in 0..300 {
         let (there, now) = (AtomicBool::new(false), AtomicBool::new(false));
-        // Fails at any desk but the first, when told.
-        let fails_late = |desk| {
-            if desk == 0 {
+        // Fails at any slot but the first, when told.
+        let fails_late = |slot| {
+            if slot == 0 {
                 // Until a helper came: late helpers are not waited for.
                 while !there.load(Ordering::Relaxed) {
                     std::thread::yield_now();
@@ -135,12 +135,12 @@ fn panics_of_two_callers() {
                 std::thread::yield_now();
             }
             // Without the words that a panic hook prints 300 times.
-            resume_unwind(Box::new("told to fail"));
+            resume_unwind(Box::new("fails on purpose"));
         };
         std::thread::scope(|scope| {
             let first = scope.spawn(|| catch_unwind(AssertUnwindSafe(|| threads.run(2, &fails_late))).is_err());
-            // The helper is at its desk, and its caller waits for it.
-            while !there.load(Ordering::Relaxed) || lock(&threads.shared.board).work.is_some() {
+            // The helper is at its slot, and its caller waits for it.
+            while !there.load(Ordering::Relaxed) || lock(&threads.shared.job).work.is_some() {
                 std::thread::yield_now();
             }
             now.store(true, Ordering::Relaxed);

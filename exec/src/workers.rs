@@ -1,0 +1,187 @@
+//! The threads of a pool. They are lent borrowed work, which needs the one unsafe operation of this crate.
+//!
+//! Scoped threads of the standard library may borrow, too, but start and end with each job: some 0.05 ms and a few
+//! allocations, several times an image.
+#![allow(unsafe_code, reason = "workers that outlive a job are lent what its caller borrows")]
+
+use crate::patience::Patience;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+
+/// The work of a caller that waits until no worker runs it.
+type Lent = &'static (dyn Fn(usize) + Sync);
+
+/// Number of times a caller polls for its last worker before it yields its core, and then how often it yields before it
+/// sleeps.
+const SPINS_BEFORE_YIELD: u32 = 1_000;
+const YIELDS_BEFORE_SLEEP: u32 = 1_000;
+
+/// The worker threads of a pool. They start when first needed, sleep when idle, and end with their owner.
+#[derive(Default)]
+pub(crate) struct Workers {
+    shared: Arc<Shared>,
+    threads: Mutex<Vec<JoinHandle<()>>>,
+}
+
+#[derive(Default)]
+struct Shared {
+    job: Mutex<JobState>,
+    wake: Condvar,
+    done: Condvar,
+    /// Number of jobs so far; polled by idle workers, written under the lock of `job`.
+    epoch: AtomicU64,
+    /// Workers that run the work now; polled by the caller, written under the lock of `job`.
+    active: AtomicUsize,
+}
+
+/// The current job. It belongs to one caller from `post` until its `finish` has returned.
+#[derive(Default)]
+struct JobState {
+    /// Whether a job is in flight.
+    taken: bool,
+    work: Option<Lent>,
+    /// The next slot to take, and the number of slots.
+    slot: usize,
+    slots: usize,
+    /// Workers that sleep, and whether the caller does.
+    sleeping: usize,
+    caller_sleeps: bool,
+    panicked: bool,
+    stop: bool,
+}
+
+/// A panic of a job is raised again by its caller, after which the data under the lock are as good as before.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Workers {
+    /// Runs a job: see [`ThreadPool::run`](crate::ThreadPool::run). Where the workers are busy with another job, or there
+    /// are none, the calling thread works alone.
+    pub(crate) fn run(&self, slots: usize, work: &(dyn Fn(usize) + Sync)) {
+        if !self.post(slots, work) {
+            return work(0);
+        }
+        let own = catch_unwind(AssertUnwindSafe(|| work(0)));
+        let panicked = self.shared.finish();
+        if let Err(panic) = own {
+            resume_unwind(panic);
+        }
+        assert!(!panicked, "work panicked on another thread of the pool");
+    }
+
+    /// Posts a job; `false` where no worker can help. A caller that gets `true` must call `finish` before `work` ends.
+    fn post(&self, slots: usize, work: &(dyn Fn(usize) + Sync)) -> bool {
+        // A pool that cannot have all its threads works with those it has.
+        let _ = self.start(slots - 1);
+        let helpers = self.started().min(slots - 1);
+        let mut job = lock(&self.shared.job);
+        if helpers == 0 || job.taken {
+            return false;
+        }
+        // SAFETY: the reference is not used after the borrow ends. It stays in `job.work` until `finish` removes it, and a
+        // worker that has read it counts in `active`, which `finish` waits for. `run`, the only caller, reaches `finish` on
+        // every path: its own share of the work cannot unwind past it, and nothing in between can panic.
+        let lent = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), Lent>(work) };
+        job.taken = true;
+        (job.work, job.slot, job.slots) = (Some(lent), 1, 1 + helpers);
+        self.shared.epoch.fetch_add(1, Ordering::Release);
+        let sleeping = job.sleeping;
+        drop(job);
+        if sleeping > helpers {
+            (0..helpers).for_each(|_| self.shared.wake.notify_one());
+        } else if sleeping > 0 {
+            self.shared.wake.notify_all();
+        }
+        true
+    }
+
+    /// Starts threads until there are `wanted`.
+    pub(crate) fn start(&self, wanted: usize) -> std::io::Result<()> {
+        let mut threads = lock(&self.threads);
+        while threads.len() < wanted {
+            let shared = Arc::clone(&self.shared);
+            let name = format!("kinetoscope-{}", threads.len() + 1);
+            threads.push(std::thread::Builder::new().name(name).spawn(move || shared.work())?);
+        }
+        Ok(())
+    }
+
+    /// Number of threads.
+    pub(crate) fn started(&self) -> usize {
+        lock(&self.threads).len()
+    }
+}
+
+impl Drop for Workers {
+    fn drop(&mut self) {
+        lock(&self.shared.job).stop = true;
+        // Workers that poll stop polling.
+        self.shared.epoch.fetch_add(1, Ordering::Release);
+        self.shared.wake.notify_all();
+        for thread in lock(&self.threads).drain(..) {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Shared {
+    /// Withdraws the work, waits for the workers that run it, and frees the pool for other callers; returns whether a worker
+    /// panicked. Workers that have not taken a slot by now are not waited for.
+    fn finish(&self) -> bool {
+        lock(&self.job).work = None;
+        let mut waited = 0;
+        while self.active.load(Ordering::Acquire) > 0 && waited < SPINS_BEFORE_YIELD + YIELDS_BEFORE_SLEEP {
+            waited += 1;
+            if waited < SPINS_BEFORE_YIELD { std::hint::spin_loop() } else { std::thread::yield_now() }
+        }
+        let mut job = lock(&self.job);
+        while self.active.load(Ordering::Acquire) > 0 {
+            job.caller_sleeps = true;
+            job = self.done.wait(job).unwrap_or_else(PoisonError::into_inner);
+        }
+        (job.taken, job.caller_sleeps) = (false, false);
+        std::mem::take(&mut job.panicked)
+    }
+
+    /// The loop of a worker thread.
+    fn work(&self) {
+        let mut patience = Patience::LONGEST;
+        let mut job = lock(&self.job);
+        while !job.stop {
+            let free = job.slot < job.slots;
+            if let Some(work) = job.work.filter(|_| free) {
+                let slot = job.slot;
+                job.slot += 1;
+                self.active.fetch_add(1, Ordering::Relaxed);
+                drop(job);
+                let result = catch_unwind(AssertUnwindSafe(|| work(slot)));
+                job = lock(&self.job);
+                job.panicked |= result.is_err();
+                // Release: what the worker wrote is seen by a caller that polls.
+                if self.active.fetch_sub(1, Ordering::Release) == 1 && job.caller_sleeps {
+                    self.done.notify_all();
+                }
+                continue;
+            }
+            let seen = self.epoch.load(Ordering::Acquire);
+            drop(job);
+            let came = (0..patience.spins()).any(|_| {
+                std::hint::spin_loop();
+                self.epoch.load(Ordering::Acquire) != seen
+            });
+            patience = patience.after(came);
+            job = lock(&self.job);
+            while self.epoch.load(Ordering::Acquire) == seen && !job.stop {
+                job.sleeping += 1;
+                job = self.wake.wait(job).unwrap_or_else(PoisonError::into_inner);
+                job.sleeping -= 1;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
