@@ -6,6 +6,7 @@ use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{State, drive_sr5, sr5};
 use crate::row::Row;
 use crate::{Outcome, Settings};
+use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::drive::table::DriveTable;
@@ -106,7 +107,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
             Ok(Driven { sim, robot, states, steps: 0, closed: false, qpos, qvel })
         };
         let undriven = || {
-            let batch = Batch::new(&model, &Arc::new(DriveTable::default()), ENVS, 1)?;
+            let batch = Batch::new(&model, &Arc::new(DriveTable::default()), ENVS, 1, ThreadPool::new())?;
             Ok(Undriven { batch, states: Rc::clone(&states), qpos: qpos.clone(), qvel: qvel.clone() })
         };
         let (mut driven, mut undriven) = order.create(driven, undriven)?;

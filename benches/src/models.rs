@@ -1,6 +1,7 @@
 //! What is stepped: Debian's humanoid and the bundled arm with its hand, from many different states.
 
 use crate::Outcome;
+use kinetoscope::exec::ThreadPool;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
@@ -102,7 +103,7 @@ impl Case {
 
     /// Environments at their starts, without drives.
     pub(crate) fn batch(&self, envs: usize, threads: usize) -> Outcome<Batch> {
-        let mut batch = Batch::new(&self.model, &Arc::new(DriveTable::default()), envs, threads)?;
+        let mut batch = Batch::new(&self.model, &Arc::new(DriveTable::default()), envs, threads, ThreadPool::new())?;
         self.restart(&mut batch);
         Ok(batch)
     }
@@ -110,7 +111,7 @@ impl Case {
     /// Puts all environments to their starts.
     pub(crate) fn restart(&self, batch: &mut Batch) {
         let case = self.clone();
-        batch.run(Arc::new(move |i, env| env.reset(|data, _| case.write(i, data))));
+        batch.run(|i, env| env.reset(|data, _| case.write(i, data)));
     }
 
     /// The start of environment `index`.
@@ -133,7 +134,7 @@ impl Case {
 
 /// Every second state of one environment from the initial state on.
 fn trajectory(model: &Model) -> Outcome<Vec<State>> {
-    let mut batch = Batch::new(model, &Arc::new(DriveTable::default()), 1, 1)?;
+    let mut batch = Batch::new(model, &Arc::new(DriveTable::default()), 1, 1, ThreadPool::new())?;
     let mut states = Vec::new();
     for _ in 0..STARTS {
         batch.step(2);

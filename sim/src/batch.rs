@@ -8,29 +8,11 @@ use crate::capture::Capture;
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::Env;
 use crate::mj::{EngineError, Model};
+use kinetoscope_exec::ThreadPool;
 use ndarray::{Array2, Array3, Axis, aview1};
 use std::ops::Range;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
-
-/// What is done with an environment, given its index.
-pub type EnvJob = Arc<dyn Fn(usize, &mut Env) + Send + Sync>;
-
-/// What is done with a chunk.
-type ChunkJob = Arc<dyn Fn(&mut Taken) + Send + Sync>;
-
-/// What is done with a chunk. Steps are plain data: stepping allocates nothing.
-#[derive(Clone)]
-enum Job {
-    /// Steps, and what of the last one is kept in the environments.
-    Step(u32, Option<Capture>),
-    /// Anything else with every environment.
-    Envs(EnvJob),
-    /// Anything else with every chunk.
-    Chunks(ChunkJob),
-}
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Environments that one thread takes together.
 struct Chunk {
@@ -54,31 +36,6 @@ struct Taken<'a> {
 /// to 1024 humanoids and arms on 2 MiB of cache for each core: to ask for all arrays of the next one makes a step 5 %
 /// slower at 3 MB and 7 % faster at 11 MB.
 const CACHE: usize = 8 << 20;
-
-/// How long a thread that waits for others spins before it lets others have its core, each time.
-const SPINS_BEFORE_YIELD: u32 = 1_000;
-
-/// How long an idle worker spins before it sleeps: a loop of `update(1)` finds it awake, while what paces its steps leaves its
-/// core to others, to a window that draws for one. Whoever spun in vain spins half as long the next time, and a 64th longer
-/// where that was enough: gaps that are short all the time are met awake, a pause after every few steps is slept through.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Patience(u32);
-
-impl Patience {
-    /// A millisecond where a pause of the processor takes 140 cycles, less on others.
-    const LONGEST: Self = Self(20_000);
-    /// The gaps between the jobs of one step.
-    const SHORTEST: Self = Self(500);
-
-    fn spins(self) -> u32 {
-        self.0
-    }
-
-    fn after(self, in_vain: bool) -> Self {
-        let next = if in_vain { self.0 / 2 } else { self.0 + self.0 / 64 + 1 };
-        Self(next.clamp(Self::SHORTEST.0, Self::LONGEST.0))
-    }
-}
 
 /// An error of [`Batch::new`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -107,26 +64,20 @@ pub enum BatchError {
 /// N environments of one model.
 #[derive(Debug)]
 pub struct Batch {
-    shared: Arc<Shared>,
-    workers: Vec<JoinHandle<()>>,
+    chunks: Chunks,
+    pool: ThreadPool,
     model: Model,
     num_envs: usize,
 }
 
-struct Shared {
+/// The environments, and how threads share them.
+struct Chunks {
     chunks: Vec<Mutex<Chunk>>,
     chunk_size: usize,
     /// Whether environments leave the cache between their steps.
     cold: bool,
     /// One share of the chunks for each thread.
     shares: Vec<Share>,
-    /// Workers that have finished the current job.
-    finished: AtomicUsize,
-    /// Counts jobs; a worker waits for the next number.
-    epoch: AtomicU64,
-    job: Mutex<JobSlot>,
-    wake: Condvar,
-    panicked: AtomicBool,
 }
 
 /// A range of chunks. Each is alone in its cache lines: threads count up their own without slowing down each other.
@@ -137,30 +88,30 @@ struct Share {
     chunks: Range<usize>,
 }
 
-impl std::fmt::Debug for Shared {
+impl std::fmt::Debug for Chunks {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Shared").field("chunks", &self.chunks.len()).finish_non_exhaustive()
+        f.debug_struct("Chunks").field("chunks", &self.chunks.len()).finish_non_exhaustive()
     }
 }
 
-#[derive(Default)]
-struct JobSlot {
-    epoch: u64,
-    job: Option<Job>,
-    stop: bool,
-}
-
-/// A mutex of ours is poisoned only when a job panicked, and then `run` has raised that panic already.
+/// A mutex here is poisoned only when a job panicked, and then the pool has raised that panic already.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Batch {
-    /// `num_envs` environments of `model` in its initial state; `threads` threads step them, this one included.
+    /// `num_envs` environments of `model` in its initial state. `threads` threads step them, the calling one included; the
+    /// others are those of `pool`.
     ///
     /// # Errors
     /// A number is zero, or memory or threads are not to be had.
-    pub fn new(model: &Model, drives: &Arc<DriveTable>, num_envs: usize, threads: usize) -> Result<Self, BatchError> {
+    pub fn new(
+        model: &Model,
+        drives: &Arc<DriveTable>,
+        num_envs: usize,
+        threads: usize,
+        pool: ThreadPool,
+    ) -> Result<Self, BatchError> {
         if num_envs == 0 {
             return Err(BatchError::NoEnvironments);
         }
@@ -186,28 +137,10 @@ impl Batch {
         let count = chunks.len();
         let threads = threads.min(count);
         let share = |t: usize| t * count / threads..(t + 1) * count / threads;
-        let shared = Arc::new(Shared {
-            chunks,
-            chunk_size,
-            cold: bytes > CACHE,
-            shares: (0..threads).map(|t| Share { next: AtomicUsize::new(0), chunks: share(t) }).collect(),
-            finished: AtomicUsize::new(0),
-            epoch: AtomicU64::new(0),
-            job: Mutex::default(),
-            wake: Condvar::new(),
-            panicked: AtomicBool::new(false),
-        });
-        // Made before its workers: should one not start, dropping it ends those that did.
-        let mut batch = Self { shared, workers: Vec::with_capacity(threads - 1), model: model.clone(), num_envs };
-        for thread in 1..threads {
-            let shared = Arc::clone(&batch.shared);
-            let worker = std::thread::Builder::new()
-                .name(format!("kinetoscope-{thread}"))
-                .spawn(move || work(&shared, thread))
-                .map_err(|e| BatchError::Thread(e.to_string()))?;
-            batch.workers.push(worker);
-        }
-        Ok(batch)
+        pool.start(threads).map_err(|error| BatchError::Thread(error.to_string()))?;
+        let shares = (0..threads).map(|t| Share { next: AtomicUsize::new(0), chunks: share(t) }).collect();
+        let chunks = Chunks { chunks, chunk_size, cold: bytes > CACHE, shares };
+        Ok(Self { chunks, pool, model: model.clone(), num_envs })
     }
 
     /// The model all environments were made from.
@@ -222,28 +155,28 @@ impl Batch {
 
     /// Number of threads that step, the calling one included.
     pub fn threads(&self) -> usize {
-        self.workers.len() + 1
+        self.chunks.shares.len()
     }
 
     /// Does `count` steps in every environment.
     pub fn step(&mut self, count: u32) {
-        self.run_chunks(&Job::Step(count, None));
+        self.run_chunks(|taken| taken.each(|_, env, _| env.step(count)));
     }
 
     /// As [`step`](Self::step); of the last step, `capture` is kept in the environments.
     pub(crate) fn step_and_capture(&mut self, count: u32, capture: Capture) {
-        self.run_chunks(&Job::Step(count, Some(capture)));
+        self.run_chunks(|taken| taken.each(|_, env, _| env.step_and_capture(count, Some(&capture))));
     }
 
     /// Captures in the environments `chosen` what MuJoCo solves for their present state.
     pub(crate) fn capture_present(&mut self, chosen: &[usize], capture: Capture) {
         let mut mask = vec![false; self.num_envs];
         chosen.iter().for_each(|&env| mask[env] = true);
-        self.run(Arc::new(move |i, env: &mut Env| {
+        self.run(|i, env| {
             if mask[i] {
                 env.capture_present(&capture);
             }
-        }));
+        });
     }
 
     /// Does `count` steps in every environment and copies what `read` picks to `outs`, which have one row for each
@@ -258,24 +191,24 @@ impl Batch {
     pub fn step_and_read<const K: usize>(
         &mut self,
         count: u32,
-        read: impl for<'e> Fn(&'e Env) -> [&'e [f64]; K] + Send + Sync + 'static,
+        read: impl for<'e> Fn(&'e Env) -> [&'e [f64]; K] + Sync,
         mut outs: [&mut [f64]; K],
     ) {
         let widths = self.read(0, |env| read(env).map(<[f64]>::len));
         for (out, width) in outs.iter().zip(widths) {
             assert!(out.len() == self.num_envs * width, "{} numbers for {} x {width}", out.len(), self.num_envs);
         }
-        let step = move |env: &mut Env, take: &mut dyn FnMut(usize, &[f64])| {
+        let step = |env: &mut Env, take: &mut dyn FnMut(usize, &[f64])| {
             env.step(count);
             for (k, (values, width)) in read(env).into_iter().zip(widths).enumerate() {
                 assert!(values.len() == width, "{} numbers from one environment, {width} from another", values.len());
                 take(k, values);
             }
         };
-        if self.workers.is_empty() {
+        if self.threads() == 1 {
             // No other thread: straight to where the numbers go.
-            for c in 0..self.shared.chunks.len() {
-                self.shared.take(c).each(|index, env, _| {
+            for c in 0..self.chunks.chunks.len() {
+                self.chunks.take(c).each(|index, env, _| {
                     step(env, &mut |k, values| {
                         outs[k][index * widths[k]..(index + 1) * widths[k]].copy_from_slice(values);
                     });
@@ -283,11 +216,11 @@ impl Batch {
             }
             return;
         }
-        let job = Job::Chunks(Arc::new(move |taken: &mut Taken| {
+        let job = |taken: &mut Taken| {
             taken.chunk.read.clear();
             taken.each(|_, env, read| step(env, &mut |_, values| read.extend_from_slice(values)));
-        }));
-        let mut copied = vec![false; self.shared.chunks.len()];
+        };
+        let mut copied = vec![false; self.chunks.chunks.len()];
         let mut copy = |first: usize, chunk: &Chunk| {
             let mut values = &chunk.read[..];
             for index in first..first + chunk.envs.len() {
@@ -298,13 +231,13 @@ impl Batch {
                 }
             }
         };
-        let chunk_size = self.shared.chunk_size;
+        let chunk_size = self.chunks.chunk_size;
         // What this thread read is copied while the others still step.
-        self.run_chunks_then(&job, |taken| {
+        self.run_chunks_then(job, |taken| {
             copy(taken.first, &taken.chunk);
             copied[taken.first / chunk_size] = true;
         });
-        for (c, chunk) in self.shared.chunks.iter().enumerate().filter(|(c, _)| !copied[*c]) {
+        for (c, chunk) in self.chunks.chunks.iter().enumerate().filter(|(c, _)| !copied[*c]) {
             copy(c * chunk_size, &lock(chunk));
         }
     }
@@ -313,47 +246,33 @@ impl Batch {
     ///
     /// # Panics
     /// `job` panicked.
-    pub fn run(&mut self, job: EnvJob) {
-        self.run_chunks(&Job::Envs(job));
+    pub fn run(&mut self, job: impl Fn(usize, &mut Env) + Sync) {
+        self.run_chunks(|taken| taken.each(|i, env, _| job(i, env)));
     }
 
-    fn run_chunks(&mut self, job: &Job) {
+    fn run_chunks(&mut self, job: impl Fn(&mut Taken) + Sync) {
         self.run_chunks_then(job, |_| {});
     }
 
     /// As [`run_chunks`](Self::run_chunks); `then` sees the chunks that this thread did, right after them.
-    fn run_chunks_then(&mut self, job: &Job, mut then: impl FnMut(&Taken)) {
-        let shared = &*self.shared;
-        for share in &shared.shares {
+    fn run_chunks_then(&mut self, job: impl Fn(&mut Taken) + Sync, then: impl FnMut(&Taken) + Send) {
+        let chunks = &self.chunks;
+        for share in &chunks.shares {
             share.next.store(share.chunks.start, Ordering::Relaxed);
         }
-        shared.finished.store(0, Ordering::Relaxed);
-        if !self.workers.is_empty() {
-            let mut slot = lock(&shared.job);
-            slot.epoch += 1;
-            slot.job = Some(job.clone());
-            shared.epoch.store(slot.epoch, Ordering::Release);
-            drop(slot);
-            shared.wake.notify_all();
-        }
-        let mut mine = |taken: &mut Taken| {
-            job.act(taken);
-            then(taken);
-        };
-        let mine = catch_unwind(AssertUnwindSafe(|| shared.take_chunks(0, &mut mine)));
-        let mut spins = 0_u32;
-        while shared.finished.load(Ordering::Acquire) < self.workers.len() {
-            spins += 1;
-            if spins < SPINS_BEFORE_YIELD { std::hint::spin_loop() } else { std::thread::yield_now() }
-        }
-        if !self.workers.is_empty() {
-            lock(&shared.job).job = None;
-        }
-        let theirs = shared.panicked.swap(false, Ordering::Relaxed);
-        if let Err(panic) = mine {
-            resume_unwind(panic);
-        }
-        assert!(!theirs, "a batch job panicked on a worker thread");
+        // Slot 0 alone takes the lock: the calling thread.
+        let then = Mutex::new(then);
+        self.pool.run(chunks.shares.len(), |slot| {
+            if slot == 0 {
+                let then = &mut *lock(&then);
+                chunks.take_chunks(slot, |taken| {
+                    job(taken);
+                    then(taken);
+                });
+            } else {
+                chunks.take_chunks(slot, &job);
+            }
+        });
     }
 
     /// Reads environment `index`.
@@ -370,10 +289,10 @@ impl Batch {
 
     /// Reads all environments in order.
     pub fn for_each(&self, mut read: impl FnMut(usize, &Env)) {
-        for (c, chunk) in self.shared.chunks.iter().enumerate() {
+        for (c, chunk) in self.chunks.chunks.iter().enumerate() {
             for (i, env) in lock(chunk).envs.iter_mut().enumerate() {
                 env.freshen();
-                read(c * self.shared.chunk_size + i, env);
+                read(c * self.chunks.chunk_size + i, env);
             }
         }
     }
@@ -433,19 +352,8 @@ impl Batch {
     #[track_caller]
     pub(crate) fn edit<T>(&self, index: usize, edit: impl FnOnce(&mut Env) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
-        let mut chunk = lock(&self.shared.chunks[index / self.shared.chunk_size]);
-        edit(&mut chunk.envs[index % self.shared.chunk_size])
-    }
-}
-
-impl Job {
-    /// Does it with a chunk.
-    fn act(&self, taken: &mut Taken) {
-        match self {
-            Self::Step(count, capture) => taken.each(|_, env, _| env.step_and_capture(*count, capture.as_ref())),
-            Self::Envs(job) => taken.each(|i, env, _| job(i, env)),
-            Self::Chunks(job) => job(taken),
-        }
+        let mut chunk = lock(&self.chunks.chunks[index / self.chunks.chunk_size]);
+        edit(&mut chunk.envs[index % self.chunks.chunk_size])
     }
 }
 
@@ -466,7 +374,7 @@ impl Taken<'_> {
     }
 }
 
-impl Shared {
+impl Chunks {
     /// Takes chunk `c`.
     fn take(&self, c: usize) -> Taken<'_> {
         Taken {
@@ -478,7 +386,7 @@ impl Shared {
     }
 
     /// Does the share of `thread`, then what is left of the shares after it.
-    fn take_chunks(&self, thread: usize, job: &mut dyn FnMut(&mut Taken)) {
+    fn take_chunks(&self, thread: usize, mut job: impl FnMut(&mut Taken)) {
         let (before, from) = self.shares.split_at(thread);
         for share in from.iter().chain(before) {
             loop {
@@ -488,44 +396,6 @@ impl Shared {
                 }
                 job(&mut self.take(c));
             }
-        }
-    }
-
-    /// Waits for a job newer than `seen`: spins first, then sleeps.
-    fn wait_for_job(&self, seen: u64, patience: &mut Patience) -> Option<(u64, Job)> {
-        let came = (0..patience.spins()).any(|_| {
-            std::hint::spin_loop();
-            self.epoch.load(Ordering::Acquire) != seen
-        });
-        *patience = patience.after(!came);
-        let mut slot = lock(&self.job);
-        while slot.epoch == seen && !slot.stop {
-            slot = self.wake.wait(slot).unwrap_or_else(PoisonError::into_inner);
-        }
-        if slot.stop { None } else { slot.job.clone().map(|job| (slot.epoch, job)) }
-    }
-}
-
-fn work(shared: &Shared, thread: usize) {
-    let (mut seen, mut patience) = (0, Patience::LONGEST);
-    while let Some((epoch, job)) = shared.wait_for_job(seen, &mut patience) {
-        seen = epoch;
-        if catch_unwind(AssertUnwindSafe(|| shared.take_chunks(thread, &mut |taken| job.act(taken)))).is_err() {
-            shared.panicked.store(true, Ordering::Relaxed);
-        }
-        drop(job);
-        shared.finished.fetch_add(1, Ordering::Release);
-    }
-}
-
-impl Drop for Batch {
-    fn drop(&mut self) {
-        lock(&self.shared.job).stop = true;
-        // Counts as a job for workers that spin.
-        self.shared.epoch.fetch_add(1, Ordering::Release);
-        self.shared.wake.notify_all();
-        for worker in self.workers.drain(..) {
-            let _ = worker.join();
         }
     }
 }
@@ -540,22 +410,9 @@ mod tests {
 
     fn pendulums(envs: usize, threads: usize) -> Batch {
         let model = mj::compile(PENDULUM, &[]).expect("compiles").into_model();
-        let mut batch = Batch::new(&model, &Arc::default(), envs, threads).expect("small");
-        batch.run(Arc::new(|i, env| env.write(|data| data.qvel_mut()[0] = i as f64)));
+        let mut batch = Batch::new(&model, &Arc::default(), envs, threads, ThreadPool::new()).expect("small");
+        batch.run(|i, env| env.write(|data| data.qvel_mut()[0] = i as f64));
         batch
-    }
-
-    #[test]
-    fn patience() {
-        let after = |gaps: &[bool]| gaps.iter().fold(Patience::LONGEST, |patience, &in_vain| patience.after(in_vain));
-        assert_eq!(after(&[false; 100]), Patience::LONGEST);
-        for jobs in [0, 1, 3, 8, 32] {
-            // Some jobs, then a pause, again and again.
-            let paced = [vec![false; jobs], vec![true]].concat().repeat(100);
-            assert!(after(&paced).spins() < 2 * Patience::SHORTEST.spins(), "{jobs}: {:?}", after(&paced));
-            // Back at full speed.
-            assert_eq!(after(&[paced, vec![false; 300]].concat()), Patience::LONGEST);
-        }
     }
 
     #[test]
@@ -586,7 +443,7 @@ mod tests {
     #[test]
     fn beyond_the_cache() {
         let (mut many, mut few) = (pendulums(1000, 3), pendulums(10, 1));
-        assert!(many.shared.cold && !few.shared.cold);
+        assert!(many.chunks.cold && !few.chunks.cold);
         many.step(7);
         few.step(7);
         let mut expected = Vec::new();

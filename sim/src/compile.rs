@@ -21,6 +21,7 @@ use crate::simulation_cfg::SimulationManagerCfg;
 use crate::snapshot::Layout;
 use crate::visible::{self, Identities, Look, MaskId, Owner, Replacements, Visible, VisualCache};
 use crate::wrenches::Wrenches;
+use kinetoscope_exec::ThreadPool;
 use kinetoscope_scene::{OwnScene, Pose};
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
@@ -142,16 +143,16 @@ pub(crate) struct Start {
 }
 
 /// Compiles a scene. Self-collision pairs that overlap in the initial pose are excluded and reported.
-pub(crate) fn compile(cfg: &SimulationManagerCfg, contents: &Contents) -> Result<Simulation> {
+pub(crate) fn compile(cfg: &SimulationManagerCfg, contents: &Contents, pool: &ThreadPool) -> Result<Simulation> {
     let first = build(cfg, contents, &[])?;
     if !contents.robots.iter().any(|r| r.cfg().self_collision) {
-        return first.into_simulation(cfg, Vec::new());
+        return first.into_simulation(cfg, pool, Vec::new());
     }
     let excluded = overlapping_pairs(&first, contents)?;
     if excluded.is_empty() {
-        return first.into_simulation(cfg, excluded);
+        return first.into_simulation(cfg, pool, excluded);
     }
-    build(cfg, contents, &excluded)?.into_simulation(cfg, excluded)
+    build(cfg, contents, &excluded)?.into_simulation(cfg, pool, excluded)
 }
 
 /// The document of a scene, for running or for an export.
@@ -519,7 +520,12 @@ fn set_up_drives(
 }
 
 impl Built {
-    fn into_simulation(self, cfg: &SimulationManagerCfg, excluded: Vec<(String, String)>) -> Result<Simulation> {
+    fn into_simulation(
+        self,
+        cfg: &SimulationManagerCfg,
+        pool: &ThreadPool,
+        excluded: Vec<(String, String)>,
+    ) -> Result<Simulation> {
         let mut diagnostics = self.diagnostics;
         for (a, b) in &excluded {
             diagnostics.push(Diagnostic::new(
@@ -529,7 +535,7 @@ impl Built {
             ));
         }
         let threads = cfg.threads.unwrap_or_else(all_cores);
-        let batch = Batch::new(&with_small_buffers(&self.model), &self.table, cfg.num_envs, threads)?;
+        let batch = Batch::new(&with_small_buffers(&self.model), &self.table, cfg.num_envs, threads, pool.clone())?;
         let mut simulation = Simulation {
             batch,
             robots: self.robots,
@@ -611,10 +617,9 @@ impl Simulation {
 
     /// Puts the chosen environments in the initial state.
     pub(crate) fn reset(&mut self, chosen: &[bool]) {
-        let start = Arc::clone(&self.start);
-        let chosen = chosen.to_vec();
+        let start = &self.start;
         (0..chosen.len()).filter(|&i| chosen[i]).for_each(|i| self.batch.edit(i, Env::expect_reset));
-        self.batch.run(Arc::new(move |i, env| {
+        self.batch.run(|i, env| {
             if chosen[i] {
                 env.reset(|data, drives| {
                     for &(address, position) in &start.qpos {
@@ -626,7 +631,7 @@ impl Simulation {
                     }
                 });
             }
-        }));
+        });
     }
 
     /// Takes over, by name, the state of everything that `old` has too: positions, velocities, warm start, targets,

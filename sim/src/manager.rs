@@ -100,7 +100,8 @@ impl SimulationManager {
             return Err(Error::IntegratorUnknown { integrator: cfg.integrator.name(), version });
         }
         let contents = Contents::default();
-        let simulation = compile(&cfg, &contents)?;
+        let pool = ThreadPool::new();
+        let simulation = compile(&cfg, &contents, &pool)?;
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
         let sensors = SensorList::new(serial, cfg.substeps);
         let visuals = VisualCache::default();
@@ -111,7 +112,7 @@ impl SimulationManager {
             contents,
             visuals,
             ray_assets: RayAssets::default(),
-            pool: ThreadPool::new(),
+            pool,
             diagnostics: Vec::new(),
             simulation,
             sensors,
@@ -236,7 +237,7 @@ impl SimulationManager {
 
     /// Compiles `contents` and goes on with them; on an error nothing has changed.
     pub(crate) fn replace_contents(&mut self, contents: Contents, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
-        let mut simulation = compile(&self.cfg, &contents)?;
+        let mut simulation = compile(&self.cfg, &contents, &self.pool)?;
         // Compiling says again what it said of the robots before.
         let mut known = self.simulation.diagnostics.clone();
         for diagnostic in &simulation.diagnostics {

@@ -70,7 +70,7 @@ impl<'s> Ours<'s> {
         let seen = scene.visible.scene();
         let mut ours = Self {
             scene,
-            batch: Batch::new(&scene.model, &Arc::new(DriveTable::default()), work.envs, threads)?,
+            batch: Batch::new(&scene.model, &Arc::new(DriveTable::default()), work.envs, threads, ThreadPool::new())?,
             rasterizer: ParallelRasterizer::new(cfg, threads).with_pool(ThreadPool::new()),
             view: scene.view(work.size)?,
             physics: work.physics,

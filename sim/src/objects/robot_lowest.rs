@@ -58,7 +58,7 @@ impl RobotData {
         let one = SimulationManagerCfg { num_envs: 1, threads: Some(1), ground: None, ..manager.clone() };
         let (mut contents, index) = (others.clone(), others.robots.len());
         contents.robots.push(Arc::new(self));
-        let trial = compile(&one, &contents)?;
+        let trial = compile(&one, &contents, &kinetoscope_exec::ThreadPool::serial())?;
         let height = Robot::new(&contents.robots[index], &trial, index).get_lowest_heights()[0];
         let mut robot = Arc::unwrap_or_clone(contents.robots.swap_remove(index));
         if height.is_finite() {

@@ -127,12 +127,11 @@ impl SimulationManager {
     pub fn restore(&mut self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<()> {
         let sources = self.sources(snapshot, env_ids)?;
         let chosen: Vec<usize> = (0..sources.len()).filter(|&env| sources[env].is_some()).collect();
-        let entries = Arc::clone(snapshot.entries());
-        self.simulation.batch.run(Arc::new(move |i, env| {
+        self.simulation.batch.run(|i, env| {
             if let Some(source) = sources[i] {
-                env.recall(&entries[source].state);
+                env.recall(&snapshot.entries()[source].state);
             }
-        }));
+        });
         self.sensors.note_written(&chosen);
         if !self.sensors.is_empty() {
             self.sensors.reset(&chosen, &mut self.simulation);

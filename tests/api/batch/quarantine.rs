@@ -1,6 +1,7 @@
 //! A diverged environment is taken out, reported and revived; the others do not notice.
 
 use super::support::{add_walker, all_bits, bits_of, cfg, sim, wheel};
+use kinetoscope::exec::ThreadPool;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::batch::Batch;
@@ -27,7 +28,7 @@ fn one_of_64() {
     add_walker(&mut sim, "walker", 0.3);
     let table = sim.batch().read(0, |env| Arc::clone(env.drives.table()));
     let model = with_small_buffers(sim.batch().model());
-    let batch_of = |num_envs| Batch::new(&model, &table, num_envs, 2).unwrap();
+    let batch_of = |num_envs| Batch::new(&model, &table, num_envs, 2, ThreadPool::new()).unwrap();
     for (what, blow_up, warning) in BLOW_UPS {
         let (mut batch, mut calm) = (batch_of(64), batch_of(64));
         batch.step(50);
