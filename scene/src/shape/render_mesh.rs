@@ -1,6 +1,6 @@
 //! Triangles prepared for drawing: normals, clusters, bounds.
 
-use super::crease::{corner_normals, cross, dot, sub, unit, weld};
+use super::crease::{corner_normals, dot, face_normals, sub, unit, weld};
 use super::lod::{self, Level};
 use crate::mesh::{MeshPart, TriMesh};
 use std::collections::HashMap;
@@ -76,10 +76,15 @@ impl RenderMesh {
     fn prepare(mesh: &TriMesh, crease: f32, welded: &[u32], closed: &[bool]) -> Self {
         /// No vertex.
         const NONE: u32 = u32::MAX;
-        let corner_normals = corner_normals(mesh, welded, crease);
+        let faces = face_normals(mesh);
+        let corner_normals = corner_normals(mesh, welded, &faces, crease);
         let mut order: Vec<(u32, u32)> = curve(mesh).into_iter().zip(0..).collect();
         order.sort_unstable();
         let mut out = Self { uvs: mesh.uvs.as_ref().map(|_| Vec::new()), ..Self::default() };
+        out.positions.reserve(mesh.positions.len());
+        out.normals.reserve(mesh.positions.len());
+        out.triangles.reserve(order.len());
+        out.corners.reserve(order.len());
         out.bounds = mesh.bounds().map_or([[0.; 3]; 2], |(lo, hi)| [lo, hi]);
         // The vertices that were made of each vertex of `mesh`, one for each normal, as lists: the last one, and for each the
         // one before.
@@ -113,7 +118,8 @@ impl RenderMesh {
         for (cluster, first) in (0..).zip((0..order.len()).step_by(Self::CLUSTER)) {
             let end = (first + Self::CLUSTER).min(order.len());
             let all_closed = order[first..end].iter().all(|&(_, k)| closed[k as usize]);
-            out.push_cluster(first..end, all_closed, |vertex, next| {
+            let faces = order[first..end].iter().map(|&(_, k)| faces[k as usize]);
+            out.push_cluster(first..end, all_closed, faces, |vertex, next| {
                 let known = &mut known[places[vertex as usize] as usize];
                 let is_new = known.0 != cluster;
                 if is_new {
@@ -149,18 +155,19 @@ impl RenderMesh {
         Self::new(&out, crease)
     }
 
-    /// Adds a cluster of triangles. `number` gives the number of a vertex in the cluster, which is the number given where it is
+    /// Adds a cluster of triangles with their unit normals, zero where a triangle has no area. `number` gives the number of a vertex in the cluster, which is the number given where it is
     /// new, and whether it is.
     fn push_cluster(
         &mut self,
         Range { start: first, end }: Range<usize>,
         closed: bool,
+        faces: impl Iterator<Item = [f32; 3]> + Clone,
         mut number: impl FnMut(u32, u8) -> (u8, bool),
     ) {
         let first_lane = self.lanes[0].len();
         let (mut lo, mut hi) = ([f32::MAX; 3], [f32::MIN; 3]);
-        let mut axis = [0.0f32; 3];
-        let mut faces = Vec::new();
+        let faces = faces.filter(|&n| n != [0.0; 3]);
+        let axis = faces.clone().fold([0.0f32; 3], |axis, n| [0, 1, 2].map(|a| axis[a] + n[a]));
         for k in first..end {
             let triangle = self.triangles[k];
             let p = triangle.map(|i| self.positions[i as usize]);
@@ -176,10 +183,6 @@ impl RenderMesh {
                 number
             });
             self.corners.push(corner);
-            if let Some(n) = unit(cross(sub(p[1], p[0]), sub(p[2], p[0]))) {
-                axis = [0, 1, 2].map(|a| axis[a] + n[a]);
-                faces.push(n);
-            }
         }
         let lane_count = (self.lanes[0].len() - first_lane).next_multiple_of(16);
         for lane in &mut self.lanes {
@@ -191,7 +194,7 @@ impl RenderMesh {
             .map(|i| sub([0, 1, 2].map(|a| self.lanes[a][i]), center))
             .fold(0.0f32, |m, d| m.max(dot(d, d).sqrt()));
         let cone_axis = unit(axis).unwrap_or([0., 0., 1.]);
-        let cone_cos = faces.iter().map(|&n| dot(n, cone_axis)).fold(1.0, f32::min);
+        let cone_cos = faces.map(|n| dot(n, cone_axis)).fold(1.0, f32::min);
         self.clusters.push(Cluster {
             first: first as u32,
             count: (end - first) as u32,
