@@ -39,10 +39,9 @@ pub(super) fn face_normals(mesh: &TriMesh) -> Vec<[f32; 3]> {
 /// The interior angle of a triangle at each corner \[rad\].
 pub(super) fn angles(mesh: &TriMesh, t: &[u32; 3]) -> [f32; 3] {
     let p = t.map(|i| mesh.positions[i as usize]);
-    [0, 1, 2].map(|k| {
-        let (a, b) = (unit(sub(p[(k + 1) % 3], p[k])), unit(sub(p[(k + 2) % 3], p[k])));
-        a.zip(b).map_or(0.0, |(a, b)| dot(a, b).clamp(-1.0, 1.0).acos())
-    })
+    let edges = [0, 1, 2].map(|k| unit(sub(p[(k + 1) % 3], p[k])));
+    // The other edge of a corner comes towards it.
+    [0, 1, 2].map(|k| edges[k].zip(edges[(k + 2) % 3]).map_or(0.0, |(a, b)| (-dot(a, b)).clamp(-1.0, 1.0).acos()))
 }
 
 /// Normals of the three corners of every triangle: the mean, weighted by angle, over the triangles around the corner that
@@ -54,45 +53,47 @@ pub(super) fn corner_normals(mesh: &TriMesh, welded: &[u32], faces: &[[f32; 3]],
         return mesh.triangles.iter().zip(faces).map(of).collect();
     }
     let weights: Vec<_> = mesh.triangles.iter().map(|t| angles(mesh, t)).collect();
+    let weights = weights.as_flattened();
     let Corners { start, corners } = Corners::new(mesh, welded);
     let limit = crease.cos();
-    let mean = |around: &[(u32, u8)], face: Option<[f32; 3]>| {
+    let mean = |around: &[u32], face: Option<[f32; 3]>| {
         let mut sum = [0.0f32; 3];
-        for &(other, c) in around {
-            let n = faces[other as usize];
+        for &corner in around {
+            let n = faces[corner as usize / 3];
             if face.is_none_or(|face| dot(n, face) >= limit) {
-                let w = weights[other as usize][c as usize];
+                let w = weights[corner as usize];
                 sum = [0, 1, 2].map(|a| sum[a] + w * n[a]);
             }
         }
         unit(sum)
     };
     let mut normals = vec![[[0.0f32; 3]; 3]; mesh.triangles.len()];
+    let flat = normals.as_flattened_mut();
     for v in 1..start.len() {
         let around = &corners[start[v - 1] as usize..start[v] as usize];
         // No crease: one sum, in the same order, is that of every corner here.
         let smooth = smooth(around, faces, limit).then(|| mean(around, None)).flatten();
-        for &(k, c) in around {
-            let face = faces[k as usize];
+        for &corner in around {
+            let face = faces[corner as usize / 3];
             let normal = smooth.or_else(|| mean(around, Some(face)));
-            normals[k as usize][c as usize] = normal.unwrap_or(face);
+            flat[corner as usize] = normal.unwrap_or(face);
         }
     }
     normals
 }
 
 /// True when each two of the triangles around a vertex are within the crease angle, whose cosine is `limit`.
-fn smooth(around: &[(u32, u8)], faces: &[[f32; 3]], limit: f32) -> bool {
-    around.iter().enumerate().all(|(i, &(k, _))| {
-        let face = faces[k as usize];
-        around[..=i].iter().all(|&(other, _)| dot(faces[other as usize], face) >= limit)
+fn smooth(around: &[u32], faces: &[[f32; 3]], limit: f32) -> bool {
+    around.iter().enumerate().all(|(i, &corner)| {
+        let face = faces[corner as usize / 3];
+        around[..=i].iter().all(|&other| dot(faces[other as usize / 3], face) >= limit)
     })
 }
 
-/// Triangles around each vertex `v`, and which of their corners it is: `corners[start[v]..start[v + 1]]`.
+/// Corners of triangles at each vertex `v`: `corners[start[v]..start[v + 1]]`. Corner c of triangle k has the number 3 k + c.
 struct Corners {
     start: Vec<u32>,
-    corners: Vec<(u32, u8)>,
+    corners: Vec<u32>,
 }
 
 impl Corners {
@@ -105,13 +106,11 @@ impl Corners {
             start[v] += start[v - 1];
         }
         let mut fill = start.clone();
-        let mut corners = vec![(0u32, 0u8); mesh.triangles.len() * 3];
-        for (k, t) in mesh.triangles.iter().enumerate() {
-            for (c, &i) in t.iter().enumerate() {
-                let slot = &mut fill[welded[i as usize] as usize];
-                corners[*slot as usize] = (k as u32, c as u8);
-                *slot += 1;
-            }
+        let mut corners = vec![0u32; mesh.triangles.len() * 3];
+        for (corner, &i) in (0..).zip(mesh.triangles.as_flattened()) {
+            let slot = &mut fill[welded[i as usize] as usize];
+            corners[*slot as usize] = corner;
+            *slot += 1;
         }
         Self { start, corners }
     }

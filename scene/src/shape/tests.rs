@@ -136,6 +136,14 @@ fn corner_normals() {
     assert!(creases.iter().all(|&count| count > 1000), "with and without creases: {creases:?}");
 }
 
+/// Codes of a space-filling curve take each bit to its place.
+#[test]
+fn curve() {
+    for v in 0..1024u32 {
+        assert_eq!(render_mesh::spread(v), (0..10).fold(0, |out, bit| out | (v >> bit & 1) << (3 * bit)), "{v}");
+    }
+}
+
 #[test]
 fn sizes() {
     assert_eq!(Shape::from(Sphere { radius: -1.0 }).bad_size(), Some(-1.0));
