@@ -3,7 +3,7 @@
 //! ```text
 //! cargo run --release --example add_sensors_on_robot -- --headless --num-envs 2 --steps 1000 --out pictures
 //! cargo run --release --example add_sensors_on_robot -- --headless --steps 12000 --reset-every 0 --payload 5
-//! cargo run --release --example add_sensors_on_robot -- --headless --robot quadruped/quadruped.xml
+//! cargo run --release --example add_sensors_on_robot -- --headless --robot quadruped/quadruped.xml --spawn-height 0
 //! ```
 
 mod launcher;
@@ -12,8 +12,10 @@ use clap::Parser;
 use kinetoscope::ndarray::{Array2, ArrayView3, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
+use launcher::spawn::SpawnFlags;
 use launcher::{Launcher, Progress, picture, stage};
 use serde_json::{Value, json};
+use std::any::Any;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -26,6 +28,8 @@ struct Args {
     /// URDF or MJCF (.xml) of a quadruped with ANYmal's joint names, instead of the bundled one; an MJCF file says how high it starts
     #[arg(long)]
     robot: Option<PathBuf>,
+    #[command(flatten)]
+    spawn: SpawnFlags,
     /// Steps between summaries of the sensors; 0 for none
     #[arg(long, alias = "print_every", default_value_t = 1)]
     print_every: u64,
@@ -122,6 +126,13 @@ fn scene_cfg(args: &Args) -> launcher::Result<SceneCfg> {
         ..cfg.simulation
     };
     for (_, entity) in &mut cfg.entities {
+        if let EntityCfg::Sensor(sensor) = entity {
+            let sensor: &mut dyn Any = &mut **sensor;
+            if let Some(scanner) = sensor.downcast_mut::<RayCasterCfg>().filter(|_| args.spawn.no_ground) {
+                // A pattern that names nothing is refused; of what stands still there is nothing, and all rays miss.
+                scanner.targets = HitTargets::StaticOnly;
+            }
+        }
         let EntityCfg::Robot(robot) = entity else { continue };
         if let Some(file) = &args.robot {
             let file = launcher::user_or_asset(file)?;
@@ -135,6 +146,7 @@ fn scene_cfg(args: &Args) -> launcher::Result<SceneCfg> {
         }
         robot.drive = DriveCfg { stiffness: args.stiffness.into(), damping: args.damping.into(), ..Default::default() };
         robot.payload = vec![("base".into(), args.payload)];
+        args.spawn.apply(&mut cfg.simulation, robot)?;
     }
     Ok(cfg)
 }

@@ -10,6 +10,7 @@ use clap::Parser;
 use kinetoscope::ndarray::{ArrayView3, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
+use launcher::spawn::SpawnFlags;
 use launcher::{Launcher, Progress, stage};
 use serde_json::{Value, json};
 use std::f64::consts::FRAC_PI_2;
@@ -25,6 +26,8 @@ struct Args {
     /// URDF of a robot with the links of ANYmal
     #[arg(long, default_value = "quadruped/quadruped.urdf")]
     robot: PathBuf,
+    #[command(flatten)]
+    spawn: SpawnFlags,
     /// The link of the source frame
     #[arg(long, default_value = "base")]
     source: String,
@@ -44,14 +47,17 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> launcher::Result {
     let legged = SimulationManagerCfg::legged();
-    let mut sim = SimulationManager::new(SimulationManagerCfg {
+    let mut cfg = SimulationManagerCfg {
         physics_dt: legged.physics_dt,
         cone: legged.cone,
         impratio: legged.impratio,
         arena_space: args.launcher.arena_space.unwrap_or(2.0),
         ..args.launcher.simulation()?
-    })?;
-    let robot = sim.add_robot(robot_cfg(args)?)?;
+    };
+    let mut robot = robot_cfg(args)?;
+    args.spawn.apply(&mut cfg, &mut robot)?;
+    let mut sim = SimulationManager::new(cfg)?;
+    let robot = sim.add_robot(robot)?;
     let frames = sim.add_sensor("frames", frames_cfg(args))?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
@@ -105,18 +111,10 @@ fn run(args: &Args) -> launcher::Result {
     }))
 }
 
-/// ANYmal's start: 0.6 m up, knees bent.
+/// A robot with ANYmal's start and drives.
 fn robot_cfg(args: &Args) -> launcher::Result<RobotCfg> {
-    let angles = [(".*HAA", 0.0), (".*F_HFE", 0.4), (".*H_HFE", -0.4), (".*F_KFE", -0.8), (".*H_KFE", 0.8)];
-    Ok(RobotCfg {
-        uid: "robot".into(),
-        urdf: UrdfCfg::single(launcher::user_or_asset(&args.robot)?),
-        fix_base: false,
-        init_pose: Pose::translation(0.0, 0.0, 0.6),
-        init_qpos: angles.map(|(joints, angle)| (joints.to_string(), angle)).to_vec(),
-        drive: DriveCfg { stiffness: 80.0.into(), damping: 5.0.into(), ..Default::default() },
-        ..Default::default()
-    })
+    let urdf = UrdfCfg::single(launcher::user_or_asset(&args.robot)?);
+    Ok(RobotCfg { uid: "robot".into(), urdf, ..assets::quadruped()? })
 }
 
 /// All links; the tutorial's frame on the left front shank, a quarter turn about z against its foot; and the foot itself, as

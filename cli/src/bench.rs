@@ -45,14 +45,8 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     if !(args.seconds > 0.0 && args.seconds <= 3600.0) {
         return Err(format!("--seconds {}: give more than 0 and at most 3600", args.seconds).into());
     }
-    let mut model = args.model.build(&Setup {
-        num_envs: args.num_envs,
-        default_envs: 64,
-        threads: args.threads,
-        ground: !args.spawn.no_ground,
-        spawn_height: args.spawn.spawn_height,
-        ..Setup::STILL
-    })?;
+    let setup = Setup { default_envs: 64, ..Setup::moving(args.num_envs, args.threads, &args.spawn) };
+    let mut model = args.model.build(&setup)?;
     let warned = model.print_warnings();
     let (num_envs, dt) = (model.sim.num_envs(), model.sim.cfg().physics_dt);
     let still = Still::of_env(&mut model.sim, EnvId(0))?;

@@ -76,6 +76,12 @@ impl Setup {
         spawn_height: None,
     };
 
+    /// A model that moves, as flags of the command say.
+    pub(crate) fn moving(num_envs: Option<usize>, threads: Option<usize>, spawn: &SpawnArgs) -> Self {
+        let SpawnArgs { spawn_height, no_ground } = *spawn;
+        Self { num_envs, threads, ground: !no_ground, spawn_height, ..Self::STILL }
+    }
+
     /// The configuration of a simulation of one robot.
     fn cfg(&self) -> SimulationManagerCfg {
         let defaults = SimulationManagerCfg::default();

@@ -64,14 +64,8 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     if !(slow..=fast).contains(&args.speed) {
         return Err(format!("--speed {}: give {slow} to {fast}; 1 is real time", args.speed).into());
     }
-    let model = args.model.build(&Setup {
-        num_envs: args.num_envs,
-        arena_space: args.arena_space,
-        threads: args.threads,
-        ground: !args.spawn.no_ground,
-        spawn_height: args.spawn.spawn_height,
-        ..Setup::STILL
-    })?;
+    let setup = Setup { arena_space: args.arena_space, ..Setup::moving(args.num_envs, args.threads, &args.spawn) };
+    let model = args.model.build(&setup)?;
     let warned = model.print_warnings();
     let mut sim = model.sim;
     // First of all: a Ctrl+C while the recording begins or the page opens also ends it well.

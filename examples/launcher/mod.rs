@@ -10,6 +10,7 @@ pub(crate) mod npy;
 pub(crate) mod panel;
 pub(crate) mod picture;
 mod recording;
+pub(crate) mod spawn;
 pub(crate) mod stage;
 pub(crate) mod still;
 pub(crate) mod trial;

@@ -59,9 +59,9 @@ pub enum DiagnosticKind {
     DeclarationMisplaced,
     /// An `<inertial>` lacks its mass or its inertia: the rest is computed from the shapes of the link.
     InertialIncomplete,
-    /// Mass properties that the file does not give, or that no rigid body has, were computed from the shapes.
+    /// Mass properties that the file does not give, or that no body of these shapes has, were computed from the shapes.
     InertiaFromShapes,
-    /// An inertia is that of a rigid body far larger than the shapes of the link: it is kept.
+    /// An inertia behind a joint is that of a rigid body far larger than the shapes of the link: it is kept.
     InertiaImplausible,
     /// A mesh has one number for its scale: it holds for all three axes.
     ScaleUniform,

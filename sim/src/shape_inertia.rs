@@ -1,7 +1,7 @@
 //! Mass properties of links from their shapes, for files that give none, a part of them, or impossible ones.
 
 use crate::body_inertia::{RigidBody, rigid_bodies};
-use crate::description::{Geometry, Inertial, Link, RobotDescription};
+use crate::description::{Geometry, Inertial, JointKind, Link, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::error::{Error, Result};
 use crate::inertia::{InertiaFault, RigidInertia};
@@ -102,7 +102,7 @@ pub(crate) fn complete(
                     fill(&mut description.links[link.0], density, hulls, diagnostics);
                 }
             }
-            _ => replace_absurd(description, body, hulls, diagnostics),
+            _ => replace_absurd(description, body, floating_base, hulls, diagnostics),
         }
     }
     Ok(())
@@ -164,11 +164,13 @@ fn complete_partial(
     link.inertial = Some(inertial);
 }
 
-/// Replaces inertias that no rigid body has by those of the shapes, where the smallest repair would leave a body that cannot be
-/// simulated: see [`FAR`]. Inertias that rigid bodies have, but none of such a shape, are warned about.
+/// Replaces inertias by those of the shapes: those that no rigid body has, where the smallest repair would leave a body that
+/// cannot be simulated (see [`FAR`]), and on a body that moves freely those that no body of its shapes has. On a body that a joint
+/// moves the latter are kept, with a warning: they may hold the rotor of a gear.
 fn replace_absurd(
     description: &mut RobotDescription,
     body: &RigidBody,
+    floating_base: bool,
     hulls: &mut Hulls<'_>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
@@ -179,6 +181,10 @@ fn replace_absurd(
         }
     }
     let is_faulty = fused.check().is_err();
+    let is_free = match description.link(body.links[0].0).parent_joint {
+        Some(joint) => description.joint(joint).kind == JointKind::Floating,
+        None => floating_base,
+    };
     for (id, _) in &body.links {
         let link = &description.links[id.0];
         let Some(inertial) = link.inertial.as_ref().filter(|inertial| inertial.mass > 0.0) else { continue };
@@ -201,6 +207,7 @@ fn replace_absurd(
         let why = match fault {
             Some(fault @ InertiaFault::NotPositiveDefinite { .. }) => fault.to_string(),
             Some(InertiaFault::Triangle { .. }) if is_far => far(),
+            None if is_far && is_free => far(),
             _ if is_far => {
                 let message = format!("link {:?}: {}; no such body has this inertia, which was kept", link.name, far());
                 let (kind, source) = (DiagnosticKind::InertiaImplausible, inertial.source.clone());
@@ -214,16 +221,17 @@ fn replace_absurd(
             link_from_com: inertial.link_from_com.translation.into(),
             ..shapes.inertial(link, inertial.mass)
         };
-        let (moments, _) = RigidInertia::from_inertial(&replaced).principal();
+        let moments = |of: &RigidInertia| {
+            let (moments, _) = of.principal();
+            format!("({}) kg m²", [moments[0], moments[1], moments[2]].map(short).join(", "))
+        };
         let message = format!(
-            "link {:?}: {why}; the inertia was replaced by that of its {} shapes with its mass of {} kg: principal moments \
-             {}, {}, {} kg m²",
+            "link {:?}: {why}; its principal moments {} were replaced by {}, those of its {} shapes with its mass of {} kg",
             link.name,
+            moments(&own),
+            moments(&RigidInertia::from_inertial(&replaced)),
             shapes.kind,
-            short(inertial.mass),
-            short(moments[0]),
-            short(moments[1]),
-            short(moments[2])
+            short(inertial.mass)
         );
         diagnostics.push(Diagnostic::new(DiagnosticKind::InertiaFromShapes, replaced.source.clone(), message));
         description.links[id.0].inertial = Some(replaced);
@@ -339,7 +347,9 @@ fn solid(geometry: &Geometry, hulls: &mut Hulls<'_>) -> Option<(RigidInertia, [V
 
 /// A number with four digits, for messages.
 fn short(number: f64) -> String {
-    if (1e-3..1e4).contains(&number.abs()) {
+    if number == 0.0 {
+        "0".to_owned()
+    } else if (1e-3..1e4).contains(&number.abs()) {
         let decimals = (3 - number.abs().log10().floor() as i32).clamp(0, 6) as usize;
         let text = format!("{number:.decimals$}");
         if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }

@@ -37,55 +37,81 @@ pub(super) fn face_normals(mesh: &TriMesh) -> Vec<[f32; 3]> {
 }
 
 /// The interior angle of a triangle at each corner \[rad\].
-fn angles(mesh: &TriMesh, t: &[u32; 3]) -> [f32; 3] {
+pub(super) fn angles(mesh: &TriMesh, t: &[u32; 3]) -> [f32; 3] {
     let p = t.map(|i| mesh.positions[i as usize]);
-    [0, 1, 2].map(|k| {
-        let (a, b) = (unit(sub(p[(k + 1) % 3], p[k])), unit(sub(p[(k + 2) % 3], p[k])));
-        a.zip(b).map_or(0.0, |(a, b)| dot(a, b).clamp(-1.0, 1.0).acos())
-    })
+    let edges = [0, 1, 2].map(|k| unit(sub(p[(k + 1) % 3], p[k])));
+    // The other edge of a corner comes towards it.
+    [0, 1, 2].map(|k| edges[k].zip(edges[(k + 2) % 3]).map_or(0.0, |(a, b)| (-dot(a, b)).clamp(-1.0, 1.0).acos()))
 }
 
 /// Normals of the three corners of every triangle: the mean, weighted by angle, over the triangles around the corner that
-/// are within `crease` \[rad\] of this one. `welded` has for each vertex the first one at the same place.
-pub(super) fn corner_normals(mesh: &TriMesh, welded: &[u32], crease: f32) -> Vec<[[f32; 3]; 3]> {
-    let faces = face_normals(mesh);
+/// are within `crease` \[rad\] of this one. `welded` has for each vertex the first one at the same place, `faces` the unit
+/// normal of each triangle ([`face_normals`]).
+pub(super) fn corner_normals(mesh: &TriMesh, welded: &[u32], faces: &[[f32; 3]], crease: f32) -> Vec<[[f32; 3]; 3]> {
     if let Some(normals) = &mesh.normals {
         let of = |(t, face): (&[u32; 3], &[f32; 3])| t.map(|i| unit(normals[i as usize]).unwrap_or(*face));
-        return mesh.triangles.iter().zip(&faces).map(of).collect();
+        return mesh.triangles.iter().zip(faces).map(of).collect();
     }
     let weights: Vec<_> = mesh.triangles.iter().map(|t| angles(mesh, t)).collect();
-    // Corners around each vertex, in one array: `corners[start[v]..start[v + 1]]`.
-    let mut start = vec![0u32; mesh.positions.len() + 1];
-    for t in &mesh.triangles {
-        t.iter().for_each(|&i| start[welded[i as usize] as usize + 1] += 1);
-    }
+    let weights = weights.as_flattened();
+    let Corners { start, corners } = Corners::new(mesh, welded);
+    let limit = crease.cos();
+    let mean = |around: &[u32], face: Option<[f32; 3]>| {
+        let mut sum = [0.0f32; 3];
+        for &corner in around {
+            let n = faces[corner as usize / 3];
+            if face.is_none_or(|face| dot(n, face) >= limit) {
+                let w = weights[corner as usize];
+                sum = [0, 1, 2].map(|a| sum[a] + w * n[a]);
+            }
+        }
+        unit(sum)
+    };
+    let mut normals = vec![[[0.0f32; 3]; 3]; mesh.triangles.len()];
+    let flat = normals.as_flattened_mut();
     for v in 1..start.len() {
-        start[v] += start[v - 1];
-    }
-    let mut fill = start.clone();
-    let mut corners = vec![(0u32, 0u8); mesh.triangles.len() * 3];
-    for (k, t) in mesh.triangles.iter().enumerate() {
-        for (c, &i) in t.iter().enumerate() {
-            let slot = &mut fill[welded[i as usize] as usize];
-            corners[*slot as usize] = (k as u32, c as u8);
-            *slot += 1;
+        let around = &corners[start[v - 1] as usize..start[v] as usize];
+        // No crease: one sum, in the same order, is that of every corner here.
+        let smooth = smooth(around, faces, limit).then(|| mean(around, None)).flatten();
+        for &corner in around {
+            let face = faces[corner as usize / 3];
+            let normal = smooth.or_else(|| mean(around, Some(face)));
+            flat[corner as usize] = normal.unwrap_or(face);
         }
     }
-    let limit = crease.cos();
-    let of = |(k, t): (usize, &[u32; 3])| {
-        t.map(|i| {
-            let v = welded[i as usize] as usize;
-            let around = &corners[start[v] as usize..start[v + 1] as usize];
-            let mut sum = [0.0f32; 3];
-            for &(other, c) in around {
-                let n = faces[other as usize];
-                if dot(n, faces[k]) >= limit {
-                    let w = weights[other as usize][c as usize];
-                    sum = [0, 1, 2].map(|a| sum[a] + w * n[a]);
-                }
-            }
-            unit(sum).unwrap_or(faces[k])
-        })
-    };
-    mesh.triangles.iter().enumerate().map(of).collect()
+    normals
+}
+
+/// True when each two of the triangles around a vertex are within the crease angle, whose cosine is `limit`.
+fn smooth(around: &[u32], faces: &[[f32; 3]], limit: f32) -> bool {
+    around.iter().enumerate().all(|(i, &corner)| {
+        let face = faces[corner as usize / 3];
+        around[..=i].iter().all(|&other| dot(faces[other as usize / 3], face) >= limit)
+    })
+}
+
+/// Corners of triangles at each vertex `v`: `corners[start[v]..start[v + 1]]`. Corner c of triangle k has the number 3 k + c.
+struct Corners {
+    start: Vec<u32>,
+    corners: Vec<u32>,
+}
+
+impl Corners {
+    fn new(mesh: &TriMesh, welded: &[u32]) -> Self {
+        let mut start = vec![0u32; mesh.positions.len() + 1];
+        for t in &mesh.triangles {
+            t.iter().for_each(|&i| start[welded[i as usize] as usize + 1] += 1);
+        }
+        for v in 1..start.len() {
+            start[v] += start[v - 1];
+        }
+        let mut fill = start.clone();
+        let mut corners = vec![0u32; mesh.triangles.len() * 3];
+        for (corner, &i) in (0..).zip(mesh.triangles.as_flattened()) {
+            let slot = &mut fill[welded[i as usize] as usize];
+            corners[*slot as usize] = corner;
+            *slot += 1;
+        }
+        Self { start, corners }
+    }
 }

@@ -29,11 +29,12 @@ impl HeightField {
             [x * (2.0 * c as f32 / (columns - 1) as f32 - 1.0), y * (2.0 * r as f32 / (rows - 1) as f32 - 1.0), z]
         };
         let index = |r: usize, c: usize| (r * columns + c) as u32;
-        let mut positions: Vec<_> = (0..rows)
-            .flat_map(|r| (0..columns).map(move |c| (r, c)))
-            .map(|(r, c)| at(r, c, top * elevation[r * columns + c]))
-            .collect();
-        let mut triangles = Vec::new();
+        let around = 2 * (rows + columns - 2);
+        let mut positions = Vec::with_capacity(elevation.len() + around);
+        for r in 0..rows {
+            positions.extend((0..columns).map(|c| at(r, c, top * elevation[r * columns + c])));
+        }
+        let mut triangles = Vec::with_capacity(2 * (rows - 1) * (columns - 1) + 3 * around);
         for r in 0..rows - 1 {
             for c in 0..columns - 1 {
                 let (a, b, d, e) = (index(r, c), index(r, c + 1), index(r + 1, c), index(r + 1, c + 1));

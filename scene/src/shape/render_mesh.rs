@@ -1,6 +1,6 @@
 //! Triangles prepared for drawing: normals, clusters, bounds.
 
-use super::crease::{corner_normals, cross, dot, sub, unit, weld};
+use super::crease::{corner_normals, dot, face_normals, sub, unit, weld};
 use super::lod::{self, Level};
 use crate::mesh::{MeshPart, TriMesh};
 use std::collections::HashMap;
@@ -76,16 +76,25 @@ impl RenderMesh {
     fn prepare(mesh: &TriMesh, crease: f32, welded: &[u32], closed: &[bool]) -> Self {
         /// No vertex.
         const NONE: u32 = u32::MAX;
-        let corner_normals = corner_normals(mesh, welded, crease);
-        let mut order: Vec<(u32, u32)> = curve(mesh).into_iter().zip(0..).collect();
+        let faces = face_normals(mesh);
+        let corner_normals = corner_normals(mesh, welded, &faces, crease);
+        let mut order: Vec<u64> = curve(mesh).into_iter().zip(0..).map(|(code, k)| u64::from(code) << 32 | k).collect();
         order.sort_unstable();
+        let order: Vec<u32> = order.into_iter().map(|place| place as u32).collect();
         let mut out = Self { uvs: mesh.uvs.as_ref().map(|_| Vec::new()), ..Self::default() };
+        let vertices = mesh.positions.len();
+        out.positions.reserve(vertices);
+        out.normals.reserve(vertices);
+        out.triangles.reserve(order.len());
+        out.corners.reserve(order.len());
+        out.clusters.reserve(order.len().div_ceil(Self::CLUSTER));
+        out.lanes.iter_mut().for_each(|lane| lane.reserve(order.len() * 3 / 4));
         out.bounds = mesh.bounds().map_or([[0.; 3]; 2], |(lo, hi)| [lo, hi]);
         // The vertices that were made of each vertex of `mesh`, one for each normal, as lists: the last one, and for each the
         // one before.
-        let (mut last, mut before) = (vec![NONE; mesh.positions.len()], Vec::new());
-        let mut places = Vec::new();
-        for &(_, k) in &order {
+        let (mut last, mut before) = (vec![NONE; vertices], Vec::with_capacity(vertices));
+        let mut places = Vec::with_capacity(vertices);
+        for &k in &order {
             let (t, normals) = (mesh.triangles[k as usize], corner_normals[k as usize]);
             let triangle = [0, 1, 2].map(|c| {
                 let (i, n) = (t[c] as usize, normals[c]);
@@ -112,8 +121,9 @@ impl RenderMesh {
         let mut known = vec![(NONE, 0u8); mesh.positions.len()];
         for (cluster, first) in (0..).zip((0..order.len()).step_by(Self::CLUSTER)) {
             let end = (first + Self::CLUSTER).min(order.len());
-            let all_closed = order[first..end].iter().all(|&(_, k)| closed[k as usize]);
-            out.push_cluster(first..end, all_closed, |vertex, next| {
+            let all_closed = order[first..end].iter().all(|&k| closed[k as usize]);
+            let faces = order[first..end].iter().map(|&k| faces[k as usize]);
+            out.push_cluster(first..end, all_closed, faces, |vertex, next| {
                 let known = &mut known[places[vertex as usize] as usize];
                 let is_new = known.0 != cluster;
                 if is_new {
@@ -149,18 +159,19 @@ impl RenderMesh {
         Self::new(&out, crease)
     }
 
-    /// Adds a cluster of triangles. `number` gives the number of a vertex in the cluster, which is the number given where it is
+    /// Adds a cluster of triangles with their unit normals, zero where a triangle has no area. `number` gives the number of a vertex in the cluster, which is the number given where it is
     /// new, and whether it is.
     fn push_cluster(
         &mut self,
         Range { start: first, end }: Range<usize>,
         closed: bool,
+        faces: impl Iterator<Item = [f32; 3]> + Clone,
         mut number: impl FnMut(u32, u8) -> (u8, bool),
     ) {
         let first_lane = self.lanes[0].len();
         let (mut lo, mut hi) = ([f32::MAX; 3], [f32::MIN; 3]);
-        let mut axis = [0.0f32; 3];
-        let mut faces = Vec::new();
+        let faces = faces.filter(|&n| n != [0.0; 3]);
+        let axis = faces.clone().fold([0.0f32; 3], |axis, n| [0, 1, 2].map(|a| axis[a] + n[a]));
         for k in first..end {
             let triangle = self.triangles[k];
             let p = triangle.map(|i| self.positions[i as usize]);
@@ -176,10 +187,6 @@ impl RenderMesh {
                 number
             });
             self.corners.push(corner);
-            if let Some(n) = unit(cross(sub(p[1], p[0]), sub(p[2], p[0]))) {
-                axis = [0, 1, 2].map(|a| axis[a] + n[a]);
-                faces.push(n);
-            }
         }
         let lane_count = (self.lanes[0].len() - first_lane).next_multiple_of(16);
         for lane in &mut self.lanes {
@@ -191,7 +198,7 @@ impl RenderMesh {
             .map(|i| sub([0, 1, 2].map(|a| self.lanes[a][i]), center))
             .fold(0.0f32, |m, d| m.max(dot(d, d).sqrt()));
         let cone_axis = unit(axis).unwrap_or([0., 0., 1.]);
-        let cone_cos = faces.iter().map(|&n| dot(n, cone_axis)).fold(1.0, f32::min);
+        let cone_cos = faces.map(|n| dot(n, cone_axis)).fold(1.0, f32::min);
         self.clusters.push(Cluster {
             first: first as u32,
             count: (end - first) as u32,
@@ -287,7 +294,6 @@ impl RenderMesh {
 fn curve(mesh: &TriMesh) -> Vec<u32> {
     let (lo, hi) = mesh.bounds().unwrap_or_default();
     let extent = (0..3).map(|a| hi[a] - lo[a]).fold(1e-30, f32::max);
-    let spread = |v: u32| (0..10).fold(0u32, |out, bit| out | (v >> bit & 1) << (3 * bit));
     let code = |t: &[u32; 3]| {
         (0..3).fold(0, |code, a| {
             let middle = t.iter().map(|&i| mesh.positions[i as usize][a]).sum::<f32>() / 3.0;
@@ -295,6 +301,14 @@ fn curve(mesh: &TriMesh) -> Vec<u32> {
         })
     };
     mesh.triangles.iter().map(code).collect()
+}
+
+/// Moves the lowest 10 bits of a number apart: bit n becomes bit 3 n.
+pub(super) fn spread(mut v: u32) -> u32 {
+    for (shift, kept) in [(16, 0x0300_00ff), (8, 0x0300_f00f), (4, 0x030c_30c3), (2, 0x0924_9249)] {
+        v = (v | v << shift) & kept;
+    }
+    v
 }
 
 /// Which triangles belong to a connected surface where every edge has exactly one neighbour with the opposite direction,

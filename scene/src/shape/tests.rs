@@ -85,6 +85,65 @@ fn clusters() {
     assert!(RenderMesh::new(&TriMesh::default(), 0.5).clusters().is_empty());
 }
 
+/// Normals of corners have the bits of their definition: each corner sums the triangles around it, by itself.
+///
+/// Cause: a height field of 1024 x 1024 took 3 s before its first picture, most of it in three sums for every triangle where
+/// one for each vertex is enough.
+#[test]
+fn corner_normals() {
+    let height = |k: usize| (k.wrapping_mul(2_654_435_761) >> 7 & 1023) as f32 / 1023.0;
+    let terrain = |size| {
+        let elevation: Vec<f32> = (0..14 * 17).map(height).collect();
+        HeightField::new(size, 14, 17, &elevation).unwrap().tessellate(0)
+    };
+    let mut flat = Sphere { radius: 1.0 }.tessellate(16);
+    flat.positions[7] = flat.positions[8];
+    let meshes = [
+        terrain([1.0, 1.0, 1.0, 0.1]),
+        terrain([1.0, 1.0, 0.01, 0.1]),
+        terrain([1.0, 1.0, 0.03, 0.1]),
+        Box { half: [0.1, 0.2, 0.3] }.tessellate(1),
+        Cylinder { radius: 0.2, half_length: 0.4 }.tessellate(10),
+        flat,
+    ];
+    let mut creases = [0; 2];
+    for mut mesh in meshes {
+        mesh.normals = None;
+        let (welded, faces) = (crease::weld(&mesh.positions), crease::face_normals(&mesh));
+        for angle in [0.0, 0.1, RenderMesh::CREASE, 1.7, 3.2] {
+            let normals = crease::corner_normals(&mesh, &welded, &faces, angle);
+            let limit = f32::cos(angle);
+            for (k, t) in mesh.triangles.iter().enumerate() {
+                for (c, &i) in t.iter().enumerate() {
+                    let (mut sum, mut left_out) = ([0.0f32; 3], false);
+                    for (other, around) in mesh.triangles.iter().enumerate() {
+                        for corner in (0..3).filter(|&corner| welded[around[corner] as usize] == welded[i as usize]) {
+                            if crease::dot(faces[other], faces[k]) >= limit {
+                                let w = crease::angles(&mesh, around)[corner];
+                                sum = [0, 1, 2].map(|a| sum[a] + w * faces[other][a]);
+                            } else {
+                                left_out = true;
+                            }
+                        }
+                    }
+                    creases[usize::from(left_out)] += 1;
+                    let normal = crease::unit(sum).unwrap_or(faces[k]);
+                    assert_eq!(normals[k][c].map(f32::to_bits), normal.map(f32::to_bits), "{k} {c} at {angle}");
+                }
+            }
+        }
+    }
+    assert!(creases.iter().all(|&count| count > 1000), "with and without creases: {creases:?}");
+}
+
+/// Codes of a space-filling curve take each bit to its place.
+#[test]
+fn curve() {
+    for v in 0..1024u32 {
+        assert_eq!(render_mesh::spread(v), (0..10).fold(0, |out, bit| out | (v >> bit & 1) << (3 * bit)), "{v}");
+    }
+}
+
 #[test]
 fn sizes() {
     assert_eq!(Shape::from(Sphere { radius: -1.0 }).bad_size(), Some(-1.0));

@@ -232,7 +232,8 @@ fn partial_inertials() {
 }
 
 /// pybullet's random objects have moments (1, 1, 0) for 0.1 kg. Repaired to (1, 1, 1.7e-8) they were needles of 3 m, which
-/// diverged on the ground. With what a box of this mass has they fall and lie still.
+/// diverged on the ground. With what a box of this mass has they fall and lie still. So do objects with the inertia of a body
+/// many times their size, which were kept: they took seconds to tip over.
 #[test]
 fn absurd_inertias() {
     let object = |mass: f64, [a, b, c]: [f64; 3]| {
@@ -252,13 +253,23 @@ fn absurd_inertias() {
     };
     // m (y² + z²) / 12 of the box.
     let of_box = |mass: f64| Matrix3::from_diagonal(&(Vector3::new(0.0125, 0.0125, 0.02) * mass / 12.0));
-    for (what, mass, moments) in
-        [("(1, 1, 0)", 0.1, [1.0, 1.0, 0.0]), ("zero", 0.1, [0.0; 3]), ("no triangle", 0.1, [1.0, 0.1, 0.1])]
-    {
+    for (what, mass, moments, said) in [
+        ("(1, 1, 0)", 0.1, [1.0, 1.0, 0.0], "(1, 1, 0)"),
+        ("zero", 0.1, [0.0; 3], "(0, 0, 0)"),
+        ("no triangle", 0.1, [1.0, 0.1, 0.1], "(1, 0.1, 0.1)"),
+        // A rigid body has these, but none of this size; no motor moves this one, so that no rotor is in it.
+        ("a ball of 5 m", 0.1, [1.0; 3], "(1, 1, 1)"),
+        ("above the bound", 1.0, [0.57; 3], "(0.57, 0.57, 0.57)"),
+    ] {
         let (mut sim, id) = load(&object(mass, moments));
         let found = in_link_frame(&inertial_of(&sim, id, "l").unwrap());
         assert_near(what, &found, &(mass, Vector3::zeros(), of_box(mass)), 1e-12);
         assert_eq!(warnings(&sim), ["inertia-from-shapes"], "{what}");
+        let warning = sim.diagnostics()[0].to_string();
+        let new = if mass < 1.0 { "(1.667e-4, 1.042e-4, 1.042e-4)" } else { "(0.001667, 0.001042, 0.001042)" };
+        for part in [&format!("{said} kg m² were replaced by {new} kg m²"), "r.urdf:2"] {
+            assert!(warning.contains(part), "{what}: {warning}");
+        }
         sim.update(1000);
         assert_eq!(sim.diverged(), [], "{what}");
         let (height, speed) = (sim.robot(id).get_root_pose()[(0, 2)], sim.robot(id).get_root_velocity());
@@ -269,7 +280,6 @@ fn absurd_inertias() {
     // 500 cm³ has 2000 kg/m³; one of 15 kg would be denser than osmium, so that the box is a placeholder.
     for (what, mass, moments, kinds) in [
         ("below the bound", 1.0, [0.55; 3], vec![]),
-        ("above the bound", 1.0, [0.57; 3], vec!["inertia-implausible"]),
         ("no triangle, within the bound", 1.0, [0.1, 0.1, 0.3], vec!["inertia-repaired"]),
         ("placeholder", 15.0, [100.0, 100.0, 0.0], vec!["inertia-repaired"]),
     ] {
@@ -278,6 +288,13 @@ fn absurd_inertias() {
         assert_near(what, &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
         assert_eq!(warnings(&sim), kinds, "{what}");
     }
+    // Behind a joint, an inertia may hold the rotor of a motor with gears: it is kept, and warned about.
+    let shape = collision("<box size=\"0.1 0.1 0.05\"/>", [0.0; 3]);
+    let inertia = "<inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/>";
+    let (sim, id) = loaded(&hinged(&format!("<inertial><mass value=\"1\"/>{inertia}</inertial>{shape}")), DENSITY);
+    let expected = (1.0, Vector3::zeros(), Matrix3::identity());
+    assert_near("behind a joint", &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
+    assert_eq!(warnings(&sim), ["inertia-implausible"]);
     // A visual shape that is large enough makes an inertia plausible.
     let large = "<visual><geometry><sphere radius=\"0.5\"/></geometry></visual></link>";
     assert_eq!(warnings(&load(&object(1.0, [0.57; 3]).replace("</link>", large)).0), [""; 0]);
