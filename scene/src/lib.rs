@@ -19,7 +19,7 @@ pub mod shape;
 pub mod state;
 pub mod terrain;
 
-pub use light::{Haze, Headlight, Hemisphere, Light, LightKind, LightSum, Sky};
+pub use light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightSum, Sky};
 pub use marker::{Marker, MarkerKind};
 pub use material::{Material, Texture, TextureKind};
 pub use pose::Pose;

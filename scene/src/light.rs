@@ -161,3 +161,15 @@ pub struct Haze {
     /// Distance where only haze is left \[m\].
     pub end: f32,
 }
+
+/// Haze where an endless ground ends, as MuJoCo's renderer draws it: the ground fades into a colour, and the colour into what
+/// is behind, up to the height of the camera. It acts on the first endless plane, of cameras above it, and on colours only.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HorizonHaze {
+    /// Colour (sRGB, 0..=1).
+    pub color: [f32; 3],
+    /// Distance along the ground, from below the camera, where nothing of the ground is left \[m\].
+    pub radius: f32,
+    /// Part of the radius over which the ground fades, 0..=1.
+    pub width: f32,
+}

@@ -20,8 +20,8 @@ pub struct Material {
     pub specular: f32,
     /// Sharpness of highlights in 0..=1: the exponent is 128 times this.
     pub shininess: f32,
-    /// How much of the light a perfect mirror on the surface takes, in 0..=1. Of path-traced frames only: other renderers draw
-    /// the surface without it.
+    /// Share that is mirrored perfectly, in 0..=1: by opaque planes and by the +z face of boxes, in all renderers; by other
+    /// shapes in path-traced frames only.
     pub reflectance: f32,
     /// How much of the surface is metal, in 0..=1: light does not get below it, and what it mirrors has its colour.
     pub metallic: f32,

@@ -1,8 +1,8 @@
 //! Everything that can be seen, without the poses.
 
 use crate::Pose;
-use crate::light::{Haze, Headlight, Hemisphere, Light, LightSum, Sky};
-use crate::material::{Material, TextureKind};
+use crate::light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightSum, Sky};
+use crate::material::{Material, Texture, TextureKind};
 use crate::shape::Shape;
 use std::sync::Arc;
 
@@ -114,8 +114,13 @@ pub struct RenderScene {
     pub light_sum: LightSum,
     /// What is behind everything.
     pub sky: Sky,
+    /// Image behind everything instead of `sky`, a [cube](TextureKind::Cube) around the camera in MuJoCo's axes: its faces are
+    /// those towards +x, -x, +z, -z, -y, +y.
+    pub skybox: Option<Arc<Texture>>,
     /// Far things fade.
     pub haze: Option<Haze>,
+    /// The end of an endless ground fades.
+    pub horizon: Option<HorizonHaze>,
 }
 
 /// What is wrong with a scene.
@@ -191,8 +196,9 @@ impl RenderScene {
     ///
     /// As [`new`](Self::new).
     pub fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, RenderSceneError> {
-        let Self { headlight, ambient, light_sum, sky, haze, .. } = *self;
-        Ok(Self { lights: self.lights.clone(), headlight, ambient, light_sum, sky, haze, ..Self::new(instances)? })
+        let Self { headlight, ambient, light_sum, sky, haze, horizon, .. } = *self;
+        let (lights, skybox) = (self.lights.clone(), self.skybox.clone());
+        Ok(Self { lights, headlight, ambient, light_sum, sky, skybox, haze, horizon, ..Self::new(instances)? })
     }
 
     /// Nothing but sky.
@@ -208,7 +214,9 @@ impl RenderScene {
             ambient: Hemisphere::default(),
             light_sum: LightSum::default(),
             sky: Sky::default(),
+            skybox: None,
             haze: None,
+            horizon: None,
         }
     }
 

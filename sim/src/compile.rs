@@ -598,10 +598,9 @@ impl Simulation {
             }
         }
         let model = self.batch.model();
-        let surfaces = contents.surfaces();
-        let visible =
-            Visible::extract(model, &self.identities, &replacements, self.plan.bodies(), &surfaces, Look::Own)
-                .with_lamps_of(model, &cfg.lights);
+        let (surfaces, look) = (contents.surfaces(), Look::of(cfg, contents));
+        let visible = Visible::extract(model, &self.identities, &replacements, self.plan.bodies(), &surfaces, &look)
+            .with_lamps_of(model, &cfg.lights);
         let visible = Arc::new(visible);
         self.visible = Some(Arc::clone(&visible));
         for (env, error) in self.look_anew() {

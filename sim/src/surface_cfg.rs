@@ -24,8 +24,8 @@ pub struct SurfaceCfg {
     pub specular: Option<f64>,
     /// Sharpness of highlights, 0..=1: the exponent is 128 times this.
     pub shininess: Option<f64>,
-    /// How much of the light it mirrors perfectly, 0..=1. In path-traced frames only: other renderers draw the surface without
-    /// it.
+    /// Share of the light that is mirrored perfectly, 0..=1: by opaque planes and by the +z face of boxes, in all renderers; by
+    /// other shapes in path-traced frames only.
     pub reflectance: Option<f64>,
     /// How much of it is metal, 0..=1: light does not get below it, and what it mirrors has its colour.
     pub metallic: Option<f64>,

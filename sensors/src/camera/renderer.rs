@@ -50,7 +50,7 @@ pub enum Renderer {
     ///   F90 = min(1, 50 F0) at grazing, of roughness alpha² = 2 / (e + 2) with MuJoCo's exponent e = 128 shininess (at least
     ///   1), or its roughness to the fourth power. The layer mirrors a lamp's `specular` colour and everything else's only
     ///   colour. Of a metal F0 is its colour, F90 is 1, and nothing is below. `reflectance` of the light is
-    ///   mirrored perfectly. Of what is left, `transmission` meets smooth glass: it is mirrored by Fresnel's equations or goes
+    ///   mirrored perfectly, of boxes by the +z face alone. Of what is left, `transmission` meets smooth glass: it is mirrored by Fresnel's equations or goes
     ///   through by Snell's law, and takes the colour where it enters. Each surface of glass is a bounce; lamps cast its shadow,
     ///   and are not seen through it. `alpha` is the part of the light that the front of a surface takes; the rest goes on straight; their
     ///   backs are not seen. Paths end, black, after 64 such surfaces, and where a smooth normal mirrors them below the surface

@@ -1,5 +1,6 @@
 //! Sixteen samples: which instances they see, and what each channel makes of it.
 
+use super::mirror::Mirrors;
 use super::moves::Moves;
 use super::shade::{Lighting, albedo, shade, sky};
 use super::shadow::ShadowMap;
@@ -29,6 +30,8 @@ pub(crate) struct Context<'a> {
     pub(crate) shadows: &'a [ShadowMap],
     /// Instead of maps.
     pub(crate) shadow_rays: Option<ShadowRays<'a>>,
+    /// Surfaces that mirror, where there are some.
+    pub(crate) mirrors: Option<Mirrors<'a>>,
     /// Width of a pixel at depth 1 (behind lenses whose rays go aside, at distance 1).
     pub(crate) pixel: f32,
     /// Whether channels of [`Stage::Detail`](crate::camera::channel::Stage::Detail) are wanted.
@@ -144,7 +147,10 @@ fn resolve_lanes<S: Simd>(
     let mut color = none;
     let mut mask = splat_i(s, 0);
     if colors.is_some() && missed.any_true() {
-        color = sky(s, context.lighting, view);
+        color = sky(s, context.lighting, view, context.pixel);
+        if let Some(horizon) = &context.lighting.ground_haze {
+            color = horizon.over_sky(s, view, color);
+        }
     }
     // Kept in memory, where they are wanted: registers are for what everybody wants.
     if let Some(pixels) = pixels.as_mut().filter(|_| context.albedo) {
@@ -187,7 +193,14 @@ fn resolve_lanes<S: Simd>(
             let Context { scene, lighting, pixel, .. } = *context;
             let shadows = (context.shadows, context.shadow_rays);
             let distance = at.along * length;
-            let seen = shade(s, scene, lighting, shadows, &source, &at, view, distance, pixel, here);
+            let mut seen = shade(s, scene, lighting, shadows, &source, &at, view, distance, (pixel, 1.0), here);
+            if let Some(mirrors) = context.mirrors.filter(|mirrors| mirrors.has(last, source.instance)) {
+                let from = (at.position, at.normal, at.along);
+                seen = mirrors.reflect(s, context, &source, from, (view, length), (seen, here));
+            }
+            if let Some(horizon) = lighting.ground_haze.as_ref().filter(|horizon| horizon.ground == last) {
+                seen = horizon.over_ground(s, view, seen, || sky(s, lighting, view, pixel));
+            }
             color = V3::select(here, seen, color);
         }
     }

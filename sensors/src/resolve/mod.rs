@@ -4,6 +4,8 @@
 
 pub(crate) mod band;
 pub(crate) mod group;
+pub(crate) mod horizon;
+pub(crate) mod mirror;
 pub(crate) mod moves;
 pub(crate) mod multisample;
 pub(crate) mod path;

@@ -1,6 +1,8 @@
 //! What the parts of a picture have in common: what is drawn where, the lamps and their shadows.
 
 use super::group::Context;
+use super::horizon::Horizon;
+use super::mirror::{self, Mirrors};
 use super::moves::Moves;
 use super::shade::{Lighting, MAX_LIGHTS};
 use super::shadow::{ShadowBand, ShadowMap};
@@ -16,7 +18,7 @@ use crate::visibility::raster::tile::{BLOCK, SAMPLES};
 use crate::visibility::raster::{DrawList, Layer, Parts, level};
 use crate::visibility::trace::Tracer;
 use crate::visibility::{Projection, RenderError, View};
-use kinetoscope_scene::{Instance, PoseF32};
+use kinetoscope_scene::{Instance, LightSum, PoseF32};
 use std::cell::RefCell;
 
 /// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
@@ -46,6 +48,8 @@ pub(crate) struct Plan {
     shadow_rays: bool,
     /// Rays for ambient occlusion.
     occlusion_rays: u16,
+    /// The first instance that mirrors, of pictures with colours that are shaded without paths.
+    first_mirror: Option<usize>,
     pub(crate) tone: ToneCurve,
     /// What light is multiplied by before the tone curve.
     pub(crate) exposure: f32,
@@ -135,12 +139,18 @@ impl Plan {
         if let Some(lens) = shot.lens {
             check_lens(lens, renderer, view, if multisampled { 4 } else { 1 })?;
         }
+        let shaded = wants_color && !renderer.follows_paths();
         let hybrid = wants_color && renderer == Renderer::Hybrid;
         self.shadow_rays = hybrid && cfg.shadows;
         self.occlusion_rays = if hybrid { cfg.occlusion_rays } else { 0 };
         (self.tone, self.exposure) = (cfg.tone, stops.exp2() as f32);
-        let casts_rays = self.shadow_rays || self.occlusion_rays > 0;
-        if wants_color && !renderer.follows_paths() {
+        if shaded && scene.light_sum == LightSum::Display && cfg.tone == ToneCurve::Soft {
+            self.tone = ToneCurve::Clip;
+        }
+        let shown = |i: &Instance| Layer::of(i, cfg.groups) != Layer::Hidden && mirror::reflectance(i) > 0.0;
+        self.first_mirror = scene.instances().iter().position(shown).filter(|_| shaded);
+        let casts_rays = self.shadow_rays || self.occlusion_rays > 0 || self.first_mirror.is_some();
+        if shaded {
             self.light(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);
         }
         self.planes = if multisampled { SAMPLES.len() } else { 1 };
@@ -200,6 +210,8 @@ impl Plan {
         }
         let forward = lens.is_none_or(LensRays::is_forward).then(|| view.world_from_camera.rotation.map(|row| row[2]));
         self.lighting.prepare(scene, lights, forward, |k| maps.get(k).copied().flatten());
+        let shown = |i: &Instance| Layer::of(i, cfg.groups) != Layer::Hidden;
+        self.lighting.ground_haze = Horizon::of(scene, poses, view.world_from_camera.translation, shown);
     }
 
     /// Whether there are shadow maps to draw.
@@ -236,8 +248,11 @@ impl Plan {
     ) -> Context<'a> {
         let (shadows, occlusion_rays) = (self.shadow_rays, self.occlusion_rays);
         let rays = ShadowRays { tracer: &self.tracer, stack, shadows, occlusion_rays };
+        let only_first = shot.scene.light_sum == LightSum::Display;
+        let mirrors = self.first_mirror.map(|first| Mirrors { tracer: &self.tracer, stack, first, only_first });
         Context {
             shadow_rays: (shadows || occlusion_rays > 0).then_some(rays),
+            mirrors,
             projection,
             scene: shot.scene,
             poses: shot.poses,

@@ -1,11 +1,13 @@
 //! How much light of which colour a surface sends to the camera.
 
+use super::horizon::Horizon;
 use super::shadow::ShadowMap;
 use super::shadow_rays::ShadowRays;
 use super::surface::{Source, Surface};
 use super::{texture, tone};
 use crate::lanes::{F, M, Simd, V3, abs, max, min, root, select, splat};
-use kinetoscope_scene::{Light, LightKind, LightSum, Material, RenderScene};
+use kinetoscope_scene::{Light, LightKind, LightSum, Material, RenderScene, Texture};
+use std::sync::Arc;
 
 /// The largest number of lamps that are drawn.
 pub(crate) const MAX_LIGHTS: usize = 16;
@@ -28,7 +30,10 @@ pub(crate) struct Lighting {
     zenith: [f32; 3],
     horizon: [f32; 3],
     nadir: [f32; 3],
+    skybox: Option<Arc<Texture>>,
     haze: Option<[f32; 3]>,
+    /// Haze at the end of the ground, where there is some.
+    pub(crate) ground_haze: Option<Horizon>,
     /// True if the headlight is one of the lamps: of MuJoCo's light it is directional.
     headlight_is_lamp: bool,
 }
@@ -100,6 +105,7 @@ impl Lighting {
         let sky = scene.sky;
         (self.zenith, self.horizon, self.nadir) =
             (tone::decode(sky.zenith), tone::decode(sky.horizon), tone::decode(sky.nadir));
+        self.skybox.clone_from(&scene.skybox);
         self.haze = scene.haze.and_then(|h| h.color).map(tone::decode);
         self.lamps.clear();
         for (k, light) in lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS) {
@@ -200,9 +206,12 @@ fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
     result
 }
 
-/// The sky in a direction (unit).
+/// The sky in a direction (unit). `pixel` is the width of a pixel at depth 1.
 #[inline(always)]
-pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>) -> V3<S> {
+pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>, pixel: f32) -> V3<S> {
+    if let Some(image) = &lighting.skybox {
+        return skybox(s, image, direction, pixel);
+    }
     let k = root(s, min(abs(direction.z), splat(s, 1.0)));
     let up = direction.z.simd_gt(splat(s, 0.0));
     let mix = {
@@ -215,8 +224,22 @@ pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>) -> V3<S>
     V3 { x: mix(0), y: mix(1), z: mix(2) }
 }
 
+/// The image around everything in a direction: a cube map whose y is up.
+#[inline(never)]
+fn skybox<S: Simd>(s: S, image: &Texture, direction: V3<S>, pixel: f32) -> V3<S> {
+    s.vectorize(
+        #[inline(always)]
+        || {
+            let all = direction.z.simd_eq(direction.z);
+            let turned = V3 { x: direction.x, y: direction.z, z: -direction.y };
+            let [r, g, b] = texture::sample_cube(s, image, turned, splat(s, pixel), all);
+            V3 { x: tone::decode_bytes(r), y: tone::decode_bytes(g), z: tone::decode_bytes(b) }
+        },
+    )
+}
+
 /// The colour of a surface, linear, seen along `view` (unit, away from the camera) from a distance. `pixel` is the width of
-/// a pixel at depth 1.
+/// a pixel at depth 1; `tint` multiplies the colour of the surface, but not its highlights.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "inlined into its few callers")]
 pub(crate) fn shade<S: Simd>(
@@ -228,7 +251,7 @@ pub(crate) fn shade<S: Simd>(
     at: &Surface<S>,
     view: V3<S>,
     distance: F<S>,
-    pixel: f32,
+    (pixel, tint): (f32, f32),
     lanes: M<S>,
 ) -> V3<S> {
     let material = &source.instance.material;
@@ -238,6 +261,7 @@ pub(crate) fn shade<S: Simd>(
     } else {
         albedo(s, source, at, view, pixel, lanes)
     };
+    let base = if tint == 1.0 { base } else { base.scale(splat(s, tint)) };
     let zero = splat(s, 0.0);
     let n = at.shading;
     // Ambient: between ground and sky by the normal's height.
@@ -322,7 +346,7 @@ pub(crate) fn shade<S: Simd>(
         V3 { x: display_light(s, sum.x), y: display_light(s, sum.y), z: display_light(s, sum.z) }
     } else if material.metallic > 0.0 {
         // What it mirrors, in its colour, and its own light; of a scene without a mirror, the sky.
-        let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)));
+        let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)), pixel);
         let metal = V3 {
             x: base.x * (mirrored.x + gloss[0] + material.emission),
             y: base.y * (mirrored.y + gloss[1] + material.emission),
@@ -339,7 +363,7 @@ pub(crate) fn shade<S: Simd>(
         let k = k * k * (3.0 - k * 2.0);
         let behind = match lighting.haze {
             Some(c) => V3::splat(s, c),
-            None => sky(s, lighting, V3 { x: view.x, y: view.y, z: max(view.z, zero) }),
+            None => sky(s, lighting, V3 { x: view.x, y: view.y, z: max(view.z, zero) }, pixel),
         };
         color = color.scale(1.0 - k).add(behind.scale(k));
     }

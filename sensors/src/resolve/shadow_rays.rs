@@ -27,7 +27,7 @@ pub(crate) struct ShadowRays<'a> {
 }
 
 /// Some points, one by one.
-struct Points {
+pub(super) struct Points {
     positions: [[f32; LANES]; 3],
     normals: [[f32; LANES]; 3],
     depths: [f32; LANES],
@@ -35,16 +35,16 @@ struct Points {
 
 impl Points {
     #[inline(always)]
-    fn new<S: Simd>(position: V3<S>, normal: V3<S>, depth: F<S>) -> Self {
+    pub(super) fn new<S: Simd>(position: V3<S>, normal: V3<S>, depth: F<S>) -> Self {
         Self { positions: arrays(position), normals: arrays(normal), depths: depth.array() }
     }
 
-    fn normal(&self, k: usize) -> [f64; 3] {
+    pub(super) fn normal(&self, k: usize) -> [f64; 3] {
         self.normals.map(|axis| f64::from(axis[k]))
     }
 
     /// Just above a point.
-    fn above(&self, k: usize) -> [f64; 3] {
+    pub(super) fn above(&self, k: usize) -> [f64; 3] {
         let at = self.positions.map(|axis| axis[k]);
         let far = ABOVE * (self.depths[k] + at.iter().map(|x| x.abs()).sum::<f32>());
         along(to_f64(at), f64::from(far), self.normal(k))
@@ -52,12 +52,12 @@ impl Points {
 }
 
 #[inline(always)]
-fn arrays<S: Simd>(v: V3<S>) -> [[f32; LANES]; 3] {
+pub(super) fn arrays<S: Simd>(v: V3<S>) -> [[f32; LANES]; 3] {
     [v.x.array(), v.y.array(), v.z.array()]
 }
 
 /// The lanes of a mask.
-fn lanes_of(mut bits: u64) -> impl Iterator<Item = usize> {
+pub(super) fn lanes_of(mut bits: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let k = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
         bits &= bits - 1;

@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 pub enum ToneCurve {
     /// x up to 0.7; above it bends smoothly towards 1, so that highlights on white things do not clip:
-    /// 0.7 + 0.3 k / (k + 0.3) with k = x - 0.7.
+    /// 0.7 + 0.3 k / (k + 0.3) with k = x - 0.7. Of [`LightSum::Display`](kinetoscope_scene::LightSum::Display), whose sums end at 1, it is
+    /// [`Clip`](Self::Clip), but for path-traced frames.
     #[default]
     Soft,
     /// x up to 1, and 1 above: the measure of light where nothing is too bright.
@@ -72,6 +73,12 @@ pub(crate) fn to_srgb<S: Simd>(s: S, x: F<S>) -> F<S> {
 pub(crate) fn decode_bytes<S: Simd>(x: F<S>) -> F<S> {
     let x = x * (1.0 / 255.0);
     (((x * -0.156_114_5 + 0.615_823_9) * x + 0.494_052_83) * x + 0.045_749_872) * x
+}
+
+/// Linear light as numbers of the screen, 0..=255, not rounded: the inverse of [`decode_bytes`].
+#[inline(always)]
+pub(crate) fn to_bytes<S: Simd>(s: S, x: F<S>) -> F<S> {
+    to_srgb(s, min(max(x, splat(s, 0.0)), splat(s, 1.0))) - 0.5
 }
 
 /// A screen colour as linear light.

@@ -221,6 +221,13 @@ impl Model {
         }
     }
 
+    /// Colour of the haze at the end of endless planes, 0..=1, and the part of their radius over which they fade.
+    pub fn haze(&self) -> ([f32; 3], f32) {
+        let visual = &self.header().vis;
+        let [r, g, b, _] = visual.rgba.haze;
+        ([r, g, b], visual.map.haze)
+    }
+
     /// A mesh.
     ///
     /// # Panics

@@ -1,24 +1,56 @@
 //! Lamps, headlight and sky of MuJoCo models.
 
+use super::surface;
+use crate::contents::Contents;
 use crate::light_cfg::{LampKind, LightCfg};
-use crate::mj::{Data, LightType, Model, TextureArrays, TextureType};
+use crate::mj::{Data, LightType, Model, ObjectKind, TextureType};
+use crate::mjcf::scene::light_name;
+use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_scene::material::decode_srgb;
-use kinetoscope_scene::{Headlight, Hemisphere, Light, LightKind, LightSum, RenderScene, Sky};
+use kinetoscope_scene::{Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightSum, RenderScene, Sky};
 
 /// The light of a scene besides its lamps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Look {
-    /// That of simulations: our headlight, ambient light and sky, unless a model has a skybox. Light is added up in linear
-    /// light.
-    Own,
-    /// That of MuJoCo's renderer, for models that are drawn alone: nothing but the lamps and the headlight of the file, a black
-    /// background without a skybox. Light is added up as numbers of the screen.
-    Mujoco,
+#[derive(Clone, Debug)]
+pub(crate) enum Look<'a> {
+    /// That of simulations: our headlight, ambient light and sky, or the first skybox of these models. Light is added up in
+    /// linear light.
+    Own {
+        /// Models of MJCF files, of which lamps are in the scene's model already.
+        files: Vec<&'a Model>,
+    },
+    /// That of MuJoCo's renderer: the lamps, the headlight, the skybox and the haze of one file, before a black background
+    /// without a skybox. Light is added up as numbers of the screen.
+    Mujoco {
+        /// The model of the file.
+        file: &'a Model,
+    },
 }
 
-/// Sets the lamps, the headlight, the ambient light and the sky of `scene` to the model's.
-pub(super) fn light(model: &Model, look: Look, scene: &mut RenderScene) {
-    let linear = |color: [f32; 3]| if look == Look::Mujoco { color } else { linear(color) };
+impl<'a> Look<'a> {
+    /// The look of a simulation. One that shows nothing but an MJCF file and the ground, in the lamp that simulations have by
+    /// default, has MuJoCo's look without that lamp; every other has ours.
+    pub(crate) fn of(cfg: &SimulationManagerCfg, contents: &'a Contents) -> Self {
+        let Contents { robots, objects, terrains, parts, .. } = contents;
+        let by_default = cfg.lights.is_empty() || cfg.lights == SimulationManagerCfg::default().lights;
+        match &parts[..] {
+            [part] if robots.is_empty() && objects.is_empty() && terrains.is_empty() && by_default => {
+                Self::Mujoco { file: part.model() }
+            }
+            _ => Self::Own { files: parts.iter().map(|part| part.model()).collect() },
+        }
+    }
+
+    fn is_mujoco(&self) -> bool {
+        matches!(self, Self::Mujoco { .. })
+    }
+}
+
+/// Distance of a skybox in MuJoCo's renderer, as a part of that of the far clipping plane, by its pictures.
+const SKYBOX_RADIUS: f64 = 0.99 * std::f64::consts::FRAC_1_SQRT_2;
+
+/// Sets the lamps, the headlight, the ambient light and the sky of `scene` to the model's. Returns what cannot be drawn.
+pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> Option<String> {
+    let linear = |color: [f32; 3]| if look.is_mujoco() { color } else { linear(color) };
     scene.lights = (0..model.nlight())
         .map(|index| {
             let light = model.light(index);
@@ -46,11 +78,14 @@ pub(super) fn light(model: &Model, look: Look, scene: &mut RenderScene) {
             }
         })
         .collect();
-    match look {
+    let files = match look {
         // Not the headlight that MuJoCo gives to models that ask for none: ours goes with our ambient light.
-        Look::Own => scene.headlight = Headlight::default(),
-        Look::Mujoco => {
-            let headlight = model.headlight();
+        Look::Own { files } => {
+            scene.headlight = Headlight::default();
+            &files[..]
+        }
+        Look::Mujoco { file } => {
+            let headlight = file.headlight();
             scene.headlight = Headlight {
                 ambient: headlight.ambient,
                 diffuse: headlight.diffuse,
@@ -60,12 +95,34 @@ pub(super) fn light(model: &Model, look: Look, scene: &mut RenderScene) {
             scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
             scene.sky = Sky::uniform([0.0; 3]);
             scene.light_sum = LightSum::Display;
+            // The lamp of a simulation: files of parts have no such name, for theirs begin with that of the part.
+            if !std::ptr::eq(*file, model)
+                && let Some(own) = model.id(ObjectKind::Light, &light_name(0)).and_then(|k| scene.lights.get_mut(k))
+            {
+                own.active = false;
+            }
+            std::slice::from_ref(file)
+        }
+    };
+    let is_sky = |(file, texture): &(&Model, usize)| {
+        file.texture(*texture).is_some_and(|texture| texture.kind == TextureType::Skybox)
+    };
+    let textures = files.iter().flat_map(|file| (0..file.ntex()).map(|texture| (*file, texture)));
+    let (file, texture) = textures.into_iter().find(is_sky)?;
+    match surface::skybox(file, texture) {
+        Ok(image) => scene.skybox = Some(image),
+        Err(reason) => {
+            let name = file.name(ObjectKind::Texture, texture).unwrap_or_else(|| texture.to_string());
+            return Some(format!("the skybox {name} is not drawn: {reason}"));
         }
     }
-    let skybox = (0..model.ntex()).filter_map(|t| model.texture(t)).find(|t| t.kind == TextureType::Skybox);
-    if let Some(sky) = skybox.and_then(|texture| gradient(&texture)) {
-        scene.sky = sky;
+    if look.is_mujoco() {
+        let (color, width) = file.haze();
+        // Where there is a skybox, endless planes of MuJoCo's renderer end at it.
+        let radius = (SKYBOX_RADIUS * file.clip()[1]) as f32;
+        scene.horizon = Some(HorizonHaze { color, radius, width });
     }
+    None
 }
 
 /// MuJoCo multiplies colours as they are on the screen; ours are multiplied in linear light. For one light the result is
@@ -92,54 +149,82 @@ pub(super) fn read(data: &Data, lamps: &[Light], out: &mut [Light]) {
     }
 }
 
-/// True if a skybox has no more in it than a gradient over the elevation: all sides are alike, and each is its own mirror image.
-pub(super) fn is_gradient(texture: &TextureArrays<'_>) -> bool {
-    let (side, channels) = (texture.width, texture.channels);
-    if channels < 3 || texture.height < 6 * side {
-        let first = texture.pixels.get(..channels);
-        return texture.pixels.chunks_exact(channels.max(1)).all(|pixel| Some(pixel) == first);
-    }
-    let pixel = |face: usize, row: usize, column: usize| {
-        let at = ((face * side + row) * side + column) * channels;
-        texture.pixels.get(at..at + channels)
-    };
-    // The numbers of builtin gradients are rounded in different ways on both sides.
-    let alike = |a: Option<&[u8]>, b: Option<&[u8]>| {
-        a.zip(b).is_some_and(|(a, b)| a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= 2))
-    };
-    (0..side * side).all(|k| {
-        let (row, column) = (k / side, k % side);
-        let one = pixel(0, row, column);
-        alike(one, pixel(0, row, side - 1 - column)) && [1, 4, 5].iter().all(|f| alike(one, pixel(*f, row, column)))
-    })
-}
+#[cfg(test)]
+mod tests {
+    use super::super::Visible;
+    use super::*;
+    use crate::mj;
+    use crate::objects::mjcf_part::MjcfCfg;
+    use crate::objects::rigid_object::RigidObjectCfg;
+    use crate::simulation_cfg::GroundCfg;
+    use crate::{LightCfg, SimulationManager};
 
-/// The gradient nearest to a skybox: the middle of its upper face, the horizon of its sides, the middle of its lower face.
-/// (The image itself, clouds for instance, is not drawn.)
-fn gradient(texture: &TextureArrays<'_>) -> Option<Sky> {
-    let side = texture.width;
-    // Faces one below the other: right, left, up, down, front, back.
-    if side == 0 || texture.channels < 3 || texture.height < side {
-        return None;
-    }
-    // A square is the same on all faces.
-    let one = texture.height < 6 * side;
-    let mean = |face: usize, rows: std::ops::Range<usize>, columns: std::ops::Range<usize>| {
-        let mut sum = [0.0f32; 3];
-        let count = (rows.len() * columns.len()) as f32;
-        for row in rows {
-            for column in columns.clone() {
-                let face = if one { 0 } else { face };
-                let at = ((face * side + row) * side + column) * texture.channels;
-                for (sum, byte) in sum.iter_mut().zip(&texture.pixels[at..at + 3]) {
-                    *sum += f32::from(*byte) / 255.0;
-                }
-            }
+    const STARS: &str = r#"<mujoco><statistic extent="2"/>
+        <visual><headlight diffuse="0.1 0.2 0.3"/><map zfar="30" haze="0.4"/><rgba haze="0.1 0.2 0.3 1"/></visual>
+        <asset><texture name="sky" type="skybox" builtin="gradient" rgb1="0.3 0.5 0.7" rgb2="0 0 0" width="32" height="192"
+            mark="random" markrgb="1 1 1" random="0.05"/></asset>
+        <worldbody><light name="lamp" pos="0 0 3"/><geom type="plane" size="0 0 1"/>
+            <body pos="0 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
+
+    /// The image of a skybox is MuJoCo's, texel for texel, and haze is where its renderer has it: endless planes end at
+    /// 0.99 zfar extent / sqrt(2).
+    ///
+    /// Root cause once: every skybox was a gradient of three colours, and there was no haze.
+    #[test]
+    fn skybox_and_haze() {
+        let model = mj::compile(STARS, &[]).expect("compiles").into_model();
+        let visible = Visible::of_model(&model);
+        assert_eq!(visible.left_out(), [""; 0]);
+        let scene = visible.scene();
+        let (image, arrays) = (scene.skybox.as_ref().expect("an image"), model.texture(0).expect("a texture"));
+        let level = &image.levels()[0];
+        assert_eq!([level.width() as usize, level.height() as usize], [arrays.width, arrays.height]);
+        for (k, pixel) in arrays.pixels.chunks_exact(arrays.channels).enumerate() {
+            let found = level.pixel((k % arrays.width) as u32, (k / arrays.width) as u32);
+            assert_eq!(found[..3], pixel[..3], "texel {k}");
         }
-        sum.map(|s| s / count)
-    };
-    let middle = side / 2..side / 2 + 1;
-    let horizon = [0, 1, 4, 5].map(|face| mean(face, middle.clone(), 0..side));
-    let horizon = [0, 1, 2].map(|c| horizon.iter().map(|h| h[c]).sum::<f32>() / 4.0);
-    Some(Sky { zenith: mean(2, middle.clone(), middle.clone()), horizon, nadir: mean(3, middle.clone(), middle) })
+        let haze = scene.horizon.expect("haze");
+        assert_eq!((haze.color, haze.width), ([0.1, 0.2, 0.3], 0.4));
+        assert!((haze.radius - 59.4 / 2.0f32.sqrt()).abs() < 1e-4, "{haze:?}");
+        // Without a skybox MuJoCo draws no haze.
+        let plain = mj::compile("<mujoco><worldbody><geom type='plane' size='0 0 1'/></worldbody></mujoco>", &[]);
+        let plain = Visible::of_model(&plain.expect("compiles").into_model());
+        assert!(plain.scene().horizon.is_none() && plain.scene().skybox.is_none());
+    }
+
+    /// A simulation that shows one MJCF file has the look of that file alone: its lamps, headlight, skybox and haze. With
+    /// anything else it has our light and the file's lamps and skybox.
+    ///
+    /// Root cause once: the headlight of files and their skyboxes were left out of simulations.
+    #[test]
+    fn look_of_simulations() {
+        let scene = |change: &dyn Fn(&mut SimulationManagerCfg), ball: bool| {
+            let mut cfg = SimulationManagerCfg { ground: None, ..Default::default() };
+            change(&mut cfg);
+            let mut sim = SimulationManager::new(cfg).expect("a simulation");
+            sim.add_mjcf(MjcfCfg::text("stars", STARS)).expect("a part");
+            if ball {
+                sim.add_rigid_object(RigidObjectCfg::default()).expect("an object");
+            }
+            let visible = sim.visible();
+            (**visible.scene()).clone()
+        };
+        let active = |scene: &RenderScene| scene.lights.iter().filter(|light| light.active).count();
+        let alone = Visible::of_model(&mj::compile(STARS, &[]).expect("compiles").into_model());
+        let alone = alone.scene();
+        let grounds: [&dyn Fn(&mut SimulationManagerCfg); 3] =
+            [&|_| {}, &|cfg| cfg.ground = Some(GroundCfg::default()), &|cfg| cfg.lights = Vec::new()];
+        for change in grounds {
+            let shown = scene(change, false);
+            assert_eq!((shown.headlight, shown.ambient, shown.sky), (alone.headlight, alone.ambient, alone.sky));
+            assert_eq!((shown.light_sum, shown.horizon), (LightSum::Display, alone.horizon));
+            assert_eq!((shown.skybox.as_ref(), active(&shown)), (alone.skybox.as_ref(), 1), "the file's lamp");
+        }
+        let two: &dyn Fn(&mut SimulationManagerCfg) = &|cfg| cfg.lights.push(LightCfg::default());
+        for (change, ball, lamps) in [(grounds[0], true, 2), (two, false, 3)] {
+            let shown = scene(change, ball);
+            assert_eq!((shown.headlight, shown.light_sum), (Headlight::default(), LightSum::Linear));
+            assert_eq!((shown.skybox.as_ref(), shown.horizon, active(&shown)), (alone.skybox.as_ref(), None, lamps));
+        }
+    }
 }

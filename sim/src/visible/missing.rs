@@ -1,6 +1,6 @@
 //! Elements of a model that cameras do not draw.
 
-use crate::mj::{self, Model, ObjectKind, TextureType};
+use crate::mj::{self, Model, ObjectKind};
 
 /// The largest geom group that is drawn by default, as in MuJoCo's viewers.
 const LAST_SHOWN_GROUP: i32 = 2;
@@ -27,13 +27,6 @@ pub(super) fn of_model(model: &Model) -> Vec<String> {
     out.extend(message(["skin", "skins"], &skins));
     let flexes: Vec<String> = (0..model.nflex()).map(|flex| flex.to_string()).collect();
     out.extend(message(["flex", "flexes"], &flexes));
-    let images = (0..model.ntex()).filter(|&texture| {
-        model.texture(texture).is_some_and(|t| t.kind == TextureType::Skybox && !super::lighting::is_gradient(&t))
-    });
-    let images: Vec<String> = images.map(|texture| named(ObjectKind::Texture, texture)).collect();
-    if let Some(first) = images.first() {
-        out.push(format!("the image of the skybox {first} is not drawn: the sky is a gradient of its colours"));
-    }
     out
 }
 
@@ -90,22 +83,6 @@ mod tests {
         assert_eq!(places(&geoms), [plane, ball]);
         assert_eq!(places(&all), [plane, ball, (3, [0.5, 0.0, 0.2]), (2, [0.1, 0.0, 1.0])]);
         assert_eq!((all.ids()[2].name().as_str(), all.ids()[2].class.as_str()), ("goal", "world"));
-    }
-
-    /// The gradient of a skybox is drawn, stars on it are not.
-    #[test]
-    fn skyboxes() {
-        let left_out = |stars: &str| {
-            let text = format!(
-                r#"<mujoco><asset><texture name="sky" type="skybox" builtin="gradient" rgb1="0.3 0.5 0.7" rgb2="0 0 0"
-                width="32" height="192" {stars}/></asset><worldbody><geom size="0.1"/></worldbody></mujoco>"#
-            );
-            let model = mj::compile(&text, &[]).expect("compiles").into_model();
-            Visible::of_model(&model).left_out().to_vec()
-        };
-        assert_eq!(left_out(""), [""; 0]);
-        let message = "the image of the skybox sky is not drawn: the sky is a gradient of its colours";
-        assert_eq!(left_out(r#"mark="random" markrgb="1 1 1" random="0.05""#), [message]);
     }
 
     /// A model alone is drawn in its own light, before a black background.

@@ -113,7 +113,7 @@ impl Visible {
     }
 
     fn in_mujoco_look(model: &Model, identities: &Identities) -> Self {
-        Self::extract(model, identities, &Replacements::new(), &[], &Surfaces::new(), Look::Mujoco)
+        Self::extract(model, identities, &Replacements::new(), &[], &Surfaces::new(), &Look::Mujoco { file: model })
     }
 
     /// What can be seen of `model`, with the geoms in `replacements` drawn as these parts. `frames` are MuJoCo's body of
@@ -124,7 +124,7 @@ impl Visible {
         replacements: &Replacements,
         frames: &[(usize, Pose)],
         painted: &Surfaces,
-        look: Look,
+        look: &Look<'_>,
     ) -> Self {
         let surfaces = surface::Surfaces::of(model);
         let mut shapes = geom::Shapes::of(model);
@@ -176,7 +176,7 @@ impl Visible {
             anchors.clear();
             RenderScene::empty()
         });
-        lighting::light(model, look, &mut scene);
+        left_out.extend(lighting::light(model, look, &mut scene));
         Self { scene: Arc::new(scene), anchors, ids: identities.shared_table(), left_out }
     }
 
@@ -211,8 +211,8 @@ impl Visible {
         &self.ids
     }
 
-    /// Elements that are not drawn, and why: textures or meshes that cannot be read; spatial tendons, skins, flexes, signed
-    /// distance fields and images of skyboxes, which cameras do not draw.
+    /// Elements that are not drawn, and why: textures or meshes that cannot be read; spatial tendons, skins, flexes and signed
+    /// distance fields, which cameras do not draw.
     pub fn left_out(&self) -> &[String] {
         &self.left_out
     }

@@ -96,12 +96,21 @@ fn color(model: &Model, own: &[f32], material: i32) -> [f32; 4] {
 
 /// A texture of surfaces; `None` for a skybox.
 fn texture(model: &Model, index: usize) -> Result<Option<Arc<Texture>>, String> {
-    let Some(arrays) = model.texture(index) else { return Err("its pixels are not in the model".into()) };
-    let kind = match arrays.kind {
-        TextureType::TwoD => TextureKind::TwoD,
-        TextureType::Cube => TextureKind::Cube,
-        TextureType::Skybox => return Ok(None),
+    let kind = match model.texture(index).map(|arrays| arrays.kind) {
+        Some(TextureType::Skybox) => return Ok(None),
+        Some(TextureType::Cube) => TextureKind::Cube,
+        Some(TextureType::TwoD) | None => TextureKind::TwoD,
     };
+    image(model, index, kind).map(Some)
+}
+
+/// The image of a skybox.
+pub(super) fn skybox(model: &Model, index: usize) -> Result<Arc<Texture>, String> {
+    image(model, index, TextureKind::Cube)
+}
+
+fn image(model: &Model, index: usize, kind: TextureKind) -> Result<Arc<Texture>, String> {
+    let Some(arrays) = model.texture(index) else { return Err("its pixels are not in the model".into()) };
     let size = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     // Grey images have one channel, or two with opacity.
     let colors: Vec<u8> = match arrays.channels {
@@ -110,13 +119,10 @@ fn texture(model: &Model, index: usize) -> Result<Option<Arc<Texture>>, String> 
     };
     let (channels, pixels) = if colors.is_empty() { (arrays.channels, arrays.pixels) } else { (3, &colors[..]) };
     // A square is the same on all faces of the cube.
-    if kind == TextureKind::Cube && arrays.height == arrays.width {
-        let pixels = pixels.repeat(6);
-        return Texture::new(kind, size(arrays.width), size(6 * arrays.height), size(channels), &pixels)
-            .map(|texture| Some(Arc::new(texture)))
-            .map_err(|error| error.to_string());
-    }
-    Texture::new(kind, size(arrays.width), size(arrays.height), size(channels), pixels)
-        .map(|texture| Some(Arc::new(texture)))
+    let is_square = kind == TextureKind::Cube && arrays.height == arrays.width;
+    let (faces, repeated) = if is_square { (6, pixels.repeat(6)) } else { (1, Vec::new()) };
+    let pixels = if is_square { &repeated[..] } else { pixels };
+    Texture::new(kind, size(arrays.width), size(faces * arrays.height), size(channels), pixels)
+        .map(Arc::new)
         .map_err(|error| error.to_string())
 }

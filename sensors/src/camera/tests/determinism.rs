@@ -13,12 +13,13 @@ use kinetoscope_scene::{Haze, Light, LightKind, PoseF32, RenderScene};
 const RENDERERS: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS];
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };
 
-/// Everything that colours are made of: veils, a mirror, all kinds of lights, haze.
+/// Everything that colours are made of: veils, mirrors, all kinds of lights, haze.
 fn rich(seed: u64, [width, height]: [usize; 2], zoom: f32) -> Still {
     let (scene, poses) = random(&mut Random(seed), 1.0);
     let mut instances = scene.instances().to_vec();
     (instances[1].material.rgba[3], instances[2].material.rgba[3]) = (0.4, 0.7);
-    instances[3].material.reflectance = 0.5;
+    // An ellipsoid, a box and the ground.
+    [3, 5, 16].into_iter().for_each(|k| instances[k].material.reflectance = 0.5);
     let mut scene = RenderScene::new(instances).unwrap();
     let kind = LightKind::Spot { cutoff_deg: 40.0, exponent: 10.0 };
     let spot = Light { kind, position: [2., 1., 3.], direction: [-2., -1., -3.], ..Light::default() };

@@ -3,7 +3,7 @@
 use super::super::{Channels, RasterCfg, Renderer};
 use super::harness::{Still, at, linear, look, matt, srgb, things, unlit};
 use crate::visibility::View;
-use kinetoscope_scene::shape::{Box, Mesh, Plane, Sphere};
+use kinetoscope_scene::shape::{Box, Cylinder, Mesh, Plane, Sphere};
 use kinetoscope_scene::{Hemisphere, Light, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture, TextureKind};
 use std::sync::Arc;
 
@@ -214,17 +214,17 @@ fn coincident_surfaces() {
     }
 }
 
-/// Renderers that follow no paths draw surfaces with `reflectance` as if they had none. Root cause once: they mixed in the sky,
-/// and an object that reflects all light had no colour of its own.
+/// Renderers that follow no paths draw surfaces with `reflectance` that are no planar mirrors as if they had none. Root cause
+/// once: they mixed in the sky, and an object that reflects all light had no colour of its own.
 #[test]
-fn reflectance_is_for_paths() {
+fn curved_mirrors_are_for_paths() {
     let still = |reflectance| {
         let material = |color| Material { reflectance, ..matt(color) };
         Still::new(
             things([
                 (Shape::from(Sphere { radius: 0.4 }), material([0.8, 0.1, 0.1]), at(0.0, -0.5, 0.4)),
-                (Box { half: [0.3; 3] }.into(), material([0.1, 0.8, 0.1]), at(0.0, 0.5, 0.3)),
-                (Plane { half: [2.0; 2] }.into(), material([0.1, 0.1, 0.8]), PoseF32::IDENTITY),
+                (Cylinder { radius: 0.3, half_length: 0.3 }.into(), material([0.1, 0.8, 0.1]), at(0.0, 0.5, 0.3)),
+                (Plane { half: [2.0; 2] }.into(), matt([0.1, 0.1, 0.8]), PoseF32::IDENTITY),
             ]),
             look([96, 72], 0.7, [2.5, 0.4, 1.6], [0.0, 0.0, 0.2]),
         )

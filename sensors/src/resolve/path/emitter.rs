@@ -265,7 +265,9 @@ impl Emitters {
 fn strength(instance: &Instance) -> f64 {
     let material = &instance.material;
     let part = |x: f32| f64::from(x.clamp(0.0, 1.0));
-    f64::from(material.emission.max(0.0)) * (1.0 - part(material.reflectance)) * part(material.rgba[3])
+    // Boxes mirror on one face of six.
+    let mirrored = if matches!(instance.shape, Shape::Box(_)) { 0.0 } else { part(material.reflectance) };
+    f64::from(material.emission.max(0.0)) * (1.0 - mirrored) * part(material.rgba[3])
 }
 
 /// The share of light that was found in a way of density `own`, where another way finds it with density `other`.

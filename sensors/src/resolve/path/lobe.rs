@@ -101,8 +101,8 @@ pub(super) fn on_disc([a, b]: [f64; 2]) -> [f64; 2] {
 }
 
 impl Lobe {
-    /// `front` is whether light comes from outside of the body.
-    pub(super) fn new(material: &Material, albedo: V3, front: bool) -> Self {
+    /// `reflectance` is that of the material where it mirrors, `front` is true if light comes from outside of the body.
+    pub(super) fn new(material: &Material, reflectance: f32, albedo: V3, front: bool) -> Self {
         let part = |x: f32| f64::from(x.clamp(0.0, 1.0));
         let (layer, metal) = (0.08 * part(material.specular), part(material.metallic));
         let f0 = albedo.map(|color| layer + metal * (color - layer));
@@ -111,7 +111,7 @@ impl Lobe {
             Some(roughness) => part(roughness).powi(4).max(SMOOTHEST),
             None => 2.0 / (f64::from(material.exponent()) + 2.0),
         };
-        let mirror = part(material.reflectance);
+        let mirror = part(reflectance);
         let glass = (1.0 - mirror) * part(material.transmission);
         let index = f64::from(material.refractive_index);
         let ratio = if front { 1.0 / index } else { index };
@@ -283,7 +283,7 @@ mod tests {
     use super::*;
 
     fn lobe(specular: f32, shininess: f32, albedo: f64) -> Lobe {
-        Lobe::new(&Material { specular, shininess, ..Material::default() }, [albedo; 3], true)
+        Lobe::new(&Material { specular, shininess, ..Material::default() }, 0.0, [albedo; 3], true)
     }
 
     /// The mean of a function over 2^`log` chosen directions.
@@ -354,7 +354,7 @@ mod tests {
         let gold = [1.0, 0.77, 0.34];
         let returned = |metallic: f32| {
             let material = Material { metallic, specular: 0.5, roughness: Some(0.2), ..Material::default() };
-            let lobe = Lobe::new(&material, gold, true);
+            let lobe = Lobe::new(&material, 0.0, gold, true);
             [0, 1, 2].map(|c| mean(&lobe, [0.0, 0.0, 1.0], ([4, 2], 1), 14, |next| next.weight[c]))
         };
         let metal = returned(1.0);
@@ -375,7 +375,7 @@ mod tests {
     fn glass() {
         let n = 1.5f64;
         let glass = Material { transmission: 1.0, refractive_index: 1.5, ..Material::default() };
-        let [outside, inside] = [true, false].map(|front| Lobe::new(&glass, [0.8; 3], front));
+        let [outside, inside] = [true, false].map(|front| Lobe::new(&glass, 0.0, [0.8; 3], front));
         let along = ((n - 1.0) / (n + 1.0)).powi(2);
         let brewster = 0.5 * ((n * n - 1.0) / (n * n + 1.0)).powi(2);
         let tilt = n.atan();
@@ -400,11 +400,11 @@ mod tests {
             }
         }
         // The control: an index of 1 is nothing at all.
-        let air = Lobe::new(&Material { refractive_index: 1.0, ..glass.clone() }, [1.0; 3], true);
+        let air = Lobe::new(&Material { refractive_index: 1.0, ..glass.clone() }, 0.0, [1.0; 3], true);
         let straight = air.choose([0.6, 0.0, 0.8], 1e-9, [0.5; 2]).unwrap().direction;
         assert!((straight[0] + 0.6).abs() < 1e-15 && (straight[2] + 0.8).abs() < 1e-15, "{straight:?}");
         // But for its colour.
-        let coloured = Lobe::new(&Material { refractive_index: 1.0, ..glass }, [0.3; 3], true);
+        let coloured = Lobe::new(&Material { refractive_index: 1.0, ..glass }, 0.0, [0.3; 3], true);
         assert_eq!(coloured.choose([0.6, 0.0, 0.8], 0.5, [0.5; 2]).unwrap().weight, [0.3; 3]);
     }
 
@@ -423,7 +423,7 @@ mod tests {
     #[test]
     fn grazing() {
         for (specular, reflectance) in [(1.0, 0.0), (0.0, 0.0), (0.5, 0.5)] {
-            let lobe = Lobe::new(&Material { specular, reflectance, ..Material::default() }, [0.5; 3], true);
+            let lobe = Lobe::new(&Material { specular, ..Material::default() }, reflectance, [0.5; 3], true);
             for chance in [0.0, 0.3, 0.6, 0.99] {
                 assert!(lobe.choose([1.0, 0.0, 0.0], chance, [0.3, 0.7]).is_none());
                 // A control: a little above, something is, and it is a number.
@@ -451,7 +451,7 @@ mod tests {
 
     #[test]
     fn mirrors() {
-        let lobe = Lobe::new(&Material { reflectance: 0.4, specular: 0.0, ..Material::default() }, [0.5; 3], true);
+        let lobe = Lobe::new(&Material { specular: 0.0, ..Material::default() }, 0.4, [0.5; 3], true);
         let o = toward(0.6);
         assert!(lobe.choose(o, 0.39, [0.5; 2]).unwrap().mirrored && !lobe.choose(o, 0.41, [0.5; 2]).unwrap().mirrored);
         assert_eq!(lobe.choose(o, 0.0, [0.5; 2]).unwrap().direction, [-o[0], 0.0, 0.6]);

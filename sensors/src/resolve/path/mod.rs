@@ -12,7 +12,7 @@ pub(crate) mod eye;
 pub(crate) mod film;
 mod lamp;
 pub(super) mod lobe;
-mod point;
+pub(super) mod point;
 pub(crate) mod smooth;
 pub(super) mod sobol;
 mod texel;
@@ -31,11 +31,12 @@ use crate::visibility::trace::motion::{Motion, NOW, wide};
 use crate::visibility::trace::{Hit, Tracer};
 use emitter::{Emitters, power_heuristic};
 use eye::Eye;
-use kinetoscope_scene::{Light, LightSum, PoseF64, RenderScene};
+use kinetoscope_scene::{Light, LightSum, PoseF64, RenderScene, Texture};
 use lamp::Lamp;
 use lobe::Basis;
 use point::Point;
 use sobol::{Sample, Sequence};
+use std::sync::Arc;
 
 /// Lamps that are asked, at most; the camera's comes besides.
 const MAX_LAMPS: usize = crate::resolve::shade::MAX_LIGHTS;
@@ -126,6 +127,8 @@ pub(crate) struct Lamps {
     dome: [V3; 2],
     /// What cameras and mirrors see there: straight up, at the horizon, straight down.
     sky: [V3; 3],
+    /// An image instead.
+    skybox: Option<Arc<Texture>>,
     haze: Option<(Option<V3>, f64, f64)>,
 }
 
@@ -140,7 +143,8 @@ impl Lamps {
         (view, forward): (&Projection, bool),
     ) {
         let linear = |c: [f32; 3]| to_f64(tone::decode(c));
-        let Self { lamps, emitters, dome, sky, haze } = self;
+        let Self { lamps, emitters, dome, sky, skybox, haze } = self;
+        skybox.clone_from(&scene.skybox);
         emitters.prepare(scene, tracer);
         *dome = [to_f64(scene.ambient.sky), to_f64(scene.ambient.ground)];
         *sky = [linear(scene.sky.zenith), linear(scene.sky.horizon), linear(scene.sky.nadir)];
@@ -171,6 +175,10 @@ impl Lamps {
 
     /// The sky as cameras see it.
     fn sky(&self, direction: V3) -> V3 {
+        if let Some(image) = &self.skybox {
+            let [x, y, z] = direction;
+            return texel::at_cube(image, [x, z, -y], 0.0);
+        }
         let k = direction[2].abs().min(1.0).sqrt();
         let [zenith, horizon, nadir] = self.sky;
         let to = if direction[2] > 0.0 { zenith } else { nadir };

@@ -5,7 +5,7 @@ use super::texel;
 use crate::ray::Ray;
 use crate::ray::vector::{V3, along, cross, dot, scale, sub, to_f64, unit};
 use crate::visibility::trace::Hit;
-use kinetoscope_scene::{Instance, RenderMesh, RenderScene, TextureKind};
+use kinetoscope_scene::{Instance, RenderMesh, RenderScene, Shape, TextureKind};
 
 /// Points are lifted by this part of the size of their triangle, at most: those of a ball of eight sides are.
 const LIFT: f64 = 0.15;
@@ -31,11 +31,11 @@ pub(super) struct Point {
 
 /// A point in a triangle.
 #[derive(Clone, Copy, Debug)]
-struct Corner {
-    normal: V3,
+pub(in crate::resolve) struct Corner {
+    pub(in crate::resolve) normal: V3,
     /// From the triangle to the surface that is meant.
     lift: V3,
-    uv: Option<([f64; 2], f64)>,
+    pub(in crate::resolve) uv: Option<([f64; 2], f64)>,
 }
 
 impl Point {
@@ -61,13 +61,21 @@ impl Point {
         let texel = texture(scene, index, instance, local, uv, footprint / slant);
         let albedo = [0, 1, 2].map(|k| f64::from(scene.linear_colors()[index][k]) * texel[k]);
         let material = &instance.material;
+        let reflectance = if mirrors(instance, hit) { material.reflectance } else { 0.0 };
         let emission = scale(albedo, f64::from(material.emission.max(0.0)));
         let alpha = f64::from(material.rgba[3].clamp(0.0, 1.0));
         let lift = corner.map_or([0.0; 3], |c| rotation.map(|row| dot(row, c.lift)));
         let lifted = along(position, 1.0, lift);
         let normal = normal.unwrap_or(flat);
-        Some(Self { position, lifted, flat, normal, front, lobe: Lobe::new(material, albedo, front), emission, alpha })
+        let lobe = Lobe::new(material, reflectance, albedo, front);
+        Some(Self { position, lifted, flat, normal, front, lobe, emission, alpha })
     }
+}
+
+/// True if the reflectance of a material acts where a ray meets an instance: of boxes, the +z face has it.
+fn mirrors(instance: &Instance, hit: &Hit) -> bool {
+    let up = hit.world_from_instance.rotation.map(|row| row[2]);
+    !matches!(instance.shape, Shape::Box(_)) || dot(hit.normal, up) > 0.5
 }
 
 /// Linear colour of an instance's texture.
@@ -93,7 +101,7 @@ fn texture(
 
 /// The smooth normal at a point of a triangle that is seen from a side (1 from outside), its texture coordinates and how many
 /// of them a metre has.
-fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64) -> Corner {
+pub(in crate::resolve) fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64) -> Corner {
     let corners = mesh.triangles()[triangle].map(|i| i as usize);
     let ends @ [a, b, c] = corners.map(|i| to_f64(mesh.positions()[i]));
     let (ab, ac, w) = (sub(b, a), sub(c, a), sub(at, a));

@@ -93,7 +93,7 @@ pub(crate) fn compare(
         ));
     }
     let left_out = [
-        ("visual", "how pictures look is the scene's to say"),
+        ("visual", "pictures have the scene's look, unless it shows this file alone"),
         ("statistic", "MuJoCo computes the scene's"),
         ("custom", "a scene has none"),
     ];
@@ -104,12 +104,9 @@ pub(crate) fn compare(
             diagnostics.push(Diagnostic::new(DiagnosticKind::ElementIgnored, stated.source.clone(), message));
         }
     }
-    let skies =
-        (0..model.ntex()).filter(|t| model.texture(*t).is_some_and(|t| t.kind == crate::mj::TextureType::Skybox));
     let counts = [
         ("keyframe", model.nkey(), "its numbers are of the file alone"),
         ("skin", model.nskin(), "bodies are drawn by their geoms"),
-        ("skybox texture", skies.count(), "what is behind everything is the scene's to say"),
     ];
     for (element, count, why) in counts {
         if count > 0 {
