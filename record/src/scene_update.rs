@@ -151,6 +151,8 @@ pub(crate) struct Scenes {
     left: u64,
     /// Things that move, and nobody records where.
     lost: BTreeSet<String>,
+    /// Things whose shape changes from frame to frame.
+    deforming: BTreeSet<String>,
     /// Environments that were not told of, because it would be too much.
     omitted: BTreeSet<usize>,
 }
@@ -163,7 +165,7 @@ impl Scenes {
         };
         let frames = streams.iter().flat_map(of).collect();
         let told = streams.iter().flat_map(|stream| stream.env_ids.iter().map(|env| (*env, None))).collect();
-        Self { frames, told, left: MOST, lost: BTreeSet::new(), omitted: BTreeSet::new() }
+        Self { frames, told, left: MOST, lost: BTreeSet::new(), deforming: BTreeSet::new(), omitted: BTreeSet::new() }
     }
 
     /// What those of `envs` look like that are recorded and look otherwise than when they were told of last.
@@ -185,7 +187,8 @@ impl Scenes {
             let drawn = match known.iter().find(|(other, _)| Arc::ptr_eq(other, &scene)) {
                 Some((_, drawn)) => Arc::clone(drawn),
                 None => {
-                    let is_drawn = |one: &&Instance| one.visible && groups >> one.group.min(31) & 1 == 1;
+                    let is_drawn =
+                        |one: &&Instance| one.visible && !one.deforms && groups >> one.group.min(31) & 1 == 1;
                     let of = |one: &Instance| Some(one).filter(is_drawn).map(Drawn::of);
                     let drawn: Looks = Arc::new(scene.instances().iter().map(of).collect());
                     known.push((Arc::clone(&scene), Arc::clone(&drawn)));
@@ -216,6 +219,8 @@ impl Scenes {
         let (mut look, bodies) = (Look::default(), sim.body_names());
         sim.look(EnvId(env), &mut look)?;
         let mut entities = Vec::new();
+        let deforming = scene.instances().iter().filter(|instance| instance.deforms);
+        self.deforming.extend(deforming.map(|instance| instance.name.to_string()));
         for (index, instance) in scene.instances().iter().enumerate().filter(|(index, _)| drawn[*index].is_some()) {
             let body = instance.body.and_then(|body| bodies.get(body as usize));
             let frame = body.filter(|body| self.frames.contains(*body)).cloned();
@@ -243,10 +248,14 @@ impl Scenes {
             let names = list(self.lost.iter().cloned().collect());
             format!("of the scene for viewers: {names} (poses that are not recorded)")
         });
+        let deforming = (!self.deforming.is_empty()).then(|| {
+            let names = list(self.deforming.iter().cloned().collect());
+            format!("of the scene for viewers: {names} (shapes that change from frame to frame)")
+        });
         let omitted = (!self.omitted.is_empty()).then(|| {
             let envs = list(self.omitted.iter().map(usize::to_string).collect());
             format!("how environments {envs} look, for viewers (more than {} MiB in all)", MOST >> 20)
         });
-        lost.into_iter().chain(omitted).collect()
+        lost.into_iter().chain(deforming).chain(omitted).collect()
     }
 }

@@ -26,6 +26,8 @@ pub struct Instance {
     pub body: Option<u32>,
     /// Whether it is welded to the world: it never moves but by a write to the state.
     pub fixed: bool,
+    /// True if its shape may differ in every frame, as those of tendons and skins. Cameras draw it, ray casters do not meet it.
+    pub deforms: bool,
     /// Where it is in the frame of what it belongs to: the link, the object; the identity for a geom of the world.
     pub frame_from_instance: Pose,
 }
@@ -43,6 +45,7 @@ impl Instance {
             name,
             body: None,
             fixed: false,
+            deforms: false,
             frame_from_instance: Pose::identity(),
         }
     }
@@ -218,6 +221,41 @@ impl RenderScene {
             haze: None,
             horizon: None,
         }
+    }
+
+    /// Replaces the shape of an instance by one of the same kind, for one frame, and shows or hides the instance.
+    ///
+    /// # Panics
+    ///
+    /// There is no such instance, its shape is of another kind, or a mesh has another number of triangles.
+    #[track_caller]
+    pub fn set_shape(&mut self, index: usize, shape: Shape, visible: bool) {
+        let instance = &mut self.instances[index];
+        let same_kind = std::mem::discriminant(&instance.shape) == std::mem::discriminant(&shape);
+        let triangles = instance.mesh().map(|mesh| mesh.triangles().len());
+        (instance.shape, instance.visible) = (shape, visible);
+        assert!(
+            same_kind && triangles == instance.mesh().map(|mesh| mesh.triangles().len()),
+            "instance {index} keeps its kind of shape and its number of triangles"
+        );
+        (self.texture_scales[index], self.texture_offsets[index]) = instance.texture_map();
+    }
+
+    /// Moves the vertices of an instance whose mesh is [deformable](crate::RenderMesh::deformable): `deform` changes the mesh,
+    /// which is copied first if something else holds it too. Returns false, and changes nothing, for other shapes.
+    ///
+    /// # Panics
+    ///
+    /// There is no such instance.
+    #[track_caller]
+    pub fn deform(&mut self, index: usize, deform: impl FnOnce(&mut crate::RenderMesh)) -> bool {
+        let Shape::Mesh(shape) = &mut self.instances[index].shape else { return false };
+        if !shape.mesh.is_deformable() {
+            return false;
+        }
+        deform(Arc::make_mut(&mut shape.mesh));
+        (self.texture_scales[index], self.texture_offsets[index]) = self.instances[index].texture_map();
+        true
     }
 
     /// The instances; poses come in the same order.

@@ -96,6 +96,9 @@ pub struct VisibleState {
     pub instance_poses: Array2<PoseF32>,
     /// The scene's lamps where they are now, shape \[num_envs, lamps\].
     pub lights: Array2<Light>,
+    /// The scenes with the shapes of this moment, sizes and colours of the environments' own included, shape \[num_envs\];
+    /// empty for a scene in which no shape [changes](crate::Instance::deforms).
+    pub scenes: Vec<OwnScene>,
 }
 
 /// Contacts of all environments in one list, environment after environment.
@@ -142,6 +145,12 @@ impl SceneState {
         self.own_scenes.get(env).unwrap_or(&AS_ALL)
     }
 
+    /// What cameras see in environment `env`, where that is not the scene of all: with the shapes of this moment.
+    pub fn seen_scene(&self, env: usize) -> &OwnScene {
+        let shaped = self.visible.as_ref().and_then(|visible| visible.scenes.get(env));
+        shaped.unwrap_or_else(|| self.own_scene(env))
+    }
+
     /// Takes over from `other` the environments where `chosen` is true: steps, times, and the fields that this state has.
     /// `false`, and nothing is taken over, where `other` is not of the same scene: it lacks a field of this one, or has
     /// another number of anything. Allocates only where the list of contacts has no room for those of before and those of after
@@ -168,6 +177,9 @@ impl SceneState {
             for env in envs() {
                 to.instance_poses.row_mut(env).assign(&from.instance_poses.row(env));
                 to.lights.row_mut(env).assign(&from.lights.row(env));
+                if let (Some(to), Some(from)) = (to.scenes.get_mut(env), from.scenes.get(env)) {
+                    to.clone_from(from);
+                }
             }
         }
         if let (Some(to), Some(from)) = (&mut self.contacts, &other.contacts) {
@@ -195,7 +207,11 @@ impl SceneState {
         let visible = match (&self.visible, &other.visible) {
             (None, _) => true,
             (Some(_), None) => false,
-            (Some(a), Some(b)) => a.instance_poses.dim() == b.instance_poses.dim() && a.lights.dim() == b.lights.dim(),
+            (Some(a), Some(b)) => {
+                a.instance_poses.dim() == b.instance_poses.dim()
+                    && a.lights.dim() == b.lights.dim()
+                    && a.scenes.len() == b.scenes.len()
+            }
         };
         let contacts = match (&self.contacts, &other.contacts) {
             (None, _) => true,
@@ -358,6 +374,7 @@ mod tests {
             visible: Some(VisibleState {
                 instance_poses: Array2::from_shape_fn((3, 2), |(env, _)| PoseF32::from_translation(at(env))),
                 lights: Array2::from_shape_fn((3, 1), |(env, _)| light(env)),
+                scenes: vec![OwnScene::default(); 3],
             }),
             instance_poses: Some(Array2::from_elem((3, 2), PoseF64::IDENTITY)),
             own_scenes: Vec::new(),

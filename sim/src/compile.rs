@@ -433,7 +433,7 @@ fn identify(
             owners[geom] = Owner { id, object, link: None, class: "terrain".into(), body: None };
         }
     }
-    visible::of_simulation(model, &owners)
+    visible::of_simulation(model, &owners, &visible::tendon_owners(model, contents))
 }
 
 /// Finds every joint and link in the compiled model, and moves implicit drives from actuators to rows.

@@ -73,8 +73,8 @@ impl Contents {
 
     /// The first mask id that is not used: ids stay what they are when more is added.
     pub(crate) fn next_mask_id(&self) -> i32 {
-        let links: usize = self.robots.iter().map(|r| r.description().links.len()).sum();
-        let bodies: usize = self.parts.iter().map(|p| p.model().nbody()).sum();
+        let links: usize = self.robots.iter().map(|r| r.description().links.len() + r.tendons().len()).sum();
+        let bodies: usize = self.parts.iter().map(|p| p.model().nbody() + p.model().ntendon()).sum();
         GROUND_MASK_ID + 1 + (links + self.objects.len() + self.terrains.len() + bodies) as i32
     }
 

@@ -19,7 +19,7 @@ pub struct Look {
     pub time: f64,
     /// Why the environment stands still, where it diverged.
     pub diverged: Option<String>,
-    /// What it looks like, where its sizes or colours are its own.
+    /// What it looks like, where its sizes or colours are its own or a shape [changes](kinetoscope_scene::Instance::deforms).
     pub own_scene: OwnScene,
     /// World from instance, in the order of the instances of [`Visible::scene`](crate::Visible::scene).
     pub instances: Vec<PoseF32>,
@@ -73,9 +73,10 @@ impl SimulationManager {
     pub fn look(&mut self, env: EnvId, look: &mut Look) -> Result<()> {
         env_mask(Some(&[env]), self.num_envs())?;
         let visible = self.visible();
-        look.own_scene.clone_from(self.own_scene(env));
+        let own = self.own_scene(env).clone();
         let plan = &self.simulation.plan;
-        self.simulation.batch.read(env.0, |env| {
+        let index = env.0;
+        self.simulation.batch.read(index, |env| {
             let data = env.data();
             look.time = data.time();
             look.diverged = match env.status() {
@@ -85,6 +86,7 @@ impl SimulationManager {
             look.instances.resize(visible.scene().instances().len(), PoseF32::IDENTITY);
             look.lights.clone_from(&visible.scene().lights);
             visible.read(data, &mut look.instances, &mut look.lights);
+            visible.shape(data, (index, &own), &mut look.own_scene);
             look.bodies.clear();
             look.bodies.extend(plan.bodies().iter().map(|place| link_pose(data, place)));
             look.masses.clear();
@@ -97,7 +99,7 @@ impl SimulationManager {
     }
 
     /// What is drawn of an environment, in the order of [`Look::instances`]: the same value for all whose sizes and colours are not
-    /// their own, until something is added.
+    /// their own, until something is added. Shapes that [change](kinetoscope_scene::Instance::deforms) are not those of now.
     ///
     /// # Errors
     /// There is no such environment.

@@ -3,11 +3,13 @@
 //! Sizes have MuJoCo's meaning: half lengths, the axis of round things along z, the centre at the origin.
 
 mod crease;
+mod deformation;
 mod grid;
 mod lod;
 pub mod render_mesh;
 
 use crate::mesh::TriMesh;
+pub use deformation::smooth_normals;
 pub(crate) use grid::revolve;
 pub use lod::Level;
 pub use render_mesh::{Cluster, RenderMesh};

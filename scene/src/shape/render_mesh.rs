@@ -1,11 +1,12 @@
 //! Triangles prepared for drawing: normals, clusters, bounds.
 
-use super::crease::{corner_normals, dot, face_normals, sub, unit, weld};
+use super::crease::{corner_normals, cross, dot, face_normals, sub, unit, weld};
+use super::deformation::Deformation;
 use super::lod::{self, Level};
 use crate::mesh::{MeshPart, TriMesh};
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// A mesh prepared for drawing, once per asset and shared by all environments.
 ///
@@ -22,6 +23,8 @@ pub struct RenderMesh {
     corners: Vec<[u8; 3]>,
     bounds: [[f32; 3]; 2],
     levels: OnceLock<Vec<Level>>,
+    /// Of a mesh whose vertices may be moved.
+    deformation: Option<Arc<Deformation>>,
 }
 
 /// A handful of neighbouring triangles.
@@ -78,9 +81,7 @@ impl RenderMesh {
         const NONE: u32 = u32::MAX;
         let faces = face_normals(mesh);
         let corner_normals = corner_normals(mesh, welded, &faces, crease);
-        let mut order: Vec<u64> = curve(mesh).into_iter().zip(0..).map(|(code, k)| u64::from(code) << 32 | k).collect();
-        order.sort_unstable();
-        let order: Vec<u32> = order.into_iter().map(|place| place as u32).collect();
+        let order = drawing_order(mesh);
         let mut out = Self { uvs: mesh.uvs.as_ref().map(|_| Vec::new()), ..Self::default() };
         let vertices = mesh.positions.len();
         out.positions.reserve(vertices);
@@ -133,6 +134,78 @@ impl RenderMesh {
             });
         }
         out
+    }
+
+    /// Prepares a mesh whose vertices will be moved by [`deform`](Self::deform): every vertex has one normal, that of `mesh`
+    /// or, where it has none, the mean of its triangles' normals, weighted by area. Both sides of the triangles are seen.
+    /// It has no coarser [levels](Self::levels).
+    ///
+    /// # Panics
+    ///
+    /// Where `mesh` breaks the promises of [`TriMesh`].
+    pub fn deformable(mesh: &TriMesh) -> Self {
+        let normals = mesh.normals.clone().unwrap_or_else(|| {
+            let mut normals = vec![[0.0; 3]; mesh.positions.len()];
+            super::smooth_normals(&mesh.positions, &mesh.triangles, &mut normals);
+            normals
+        });
+        // A vertex has one normal, so it stays one vertex; a vertex of degenerate triangles alone has some.
+        let some = |n: [f32; 3]| unit(n).unwrap_or([0.0, 0.0, 1.0]);
+        let mesh = &TriMesh { normals: Some(normals.into_iter().map(some).collect()), ..mesh.clone() };
+        // Vertices at the same place may part.
+        let welded: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+        let mut out = Self::prepare(mesh, Self::CREASE, &welded, &vec![false; mesh.triangles.len()]);
+        let mut sources = vec![0; out.positions.len()];
+        for (ours, k) in out.triangles.iter().zip(drawing_order(mesh)) {
+            let theirs = mesh.triangles[k as usize];
+            (0..3).for_each(|c| sources[ours[c] as usize] = theirs[c]);
+        }
+        out.deformation = Some(Arc::new(Deformation::new(sources, &out)));
+        out
+    }
+
+    /// Whether [`deform`](Self::deform) can move its vertices.
+    pub fn is_deformable(&self) -> bool {
+        self.deformation.is_some()
+    }
+
+    /// Moves the vertices: `positions` \[m\] and `normals`, of length 1 or 0, are in the order of the mesh that was prepared.
+    /// Allocates nothing.
+    ///
+    /// # Panics
+    ///
+    /// The mesh is not [deformable](Self::deformable), or there are fewer positions or normals than vertices.
+    #[track_caller]
+    pub fn deform(&mut self, positions: &[[f32; 3]], normals: &[[f32; 3]]) {
+        let Some(deformation) = self.deformation.clone() else { panic!("the mesh was not prepared to be deformed") };
+        for (k, &source) in deformation.sources.iter().enumerate() {
+            let normal = normals[source as usize];
+            self.positions[k] = positions[source as usize];
+            self.normals[k] = if normal == [0.0; 3] { [0.0, 0.0, 1.0] } else { normal };
+        }
+        for (lane, &vertex) in deformation.vertex_of_lane.iter().enumerate() {
+            (0..3).for_each(|a| self.lanes[a][lane] = self.positions[vertex as usize][a]);
+        }
+        let mut all = [[f32::MAX; 3], [f32::MIN; 3]];
+        for cluster in &mut self.clusters {
+            let lanes = cluster.first_lane as usize..(cluster.first_lane + cluster.lane_count) as usize;
+            let mut here = [[f32::MAX; 3], [f32::MIN; 3]];
+            for a in 0..3 {
+                for &x in &self.lanes[a][lanes.clone()] {
+                    (here[0][a], here[1][a]) = (here[0][a].min(x), here[1][a].max(x));
+                }
+                (all[0][a], all[1][a]) = (all[0][a].min(here[0][a]), all[1][a].max(here[1][a]));
+            }
+            cluster.center = [0, 1, 2].map(|a| (here[0][a] + here[1][a]) / 2.0);
+            let far = lanes
+                .map(|i| sub([0, 1, 2].map(|a| self.lanes[a][i]), cluster.center))
+                .fold(0.0f32, |m, d| m.max(dot(d, d).sqrt()));
+            // A little more than measured: rounding must never cull.
+            cluster.radius = far * 1.0001;
+            // Both sides are seen.
+            (cluster.cone_axis, cluster.cone_cos) = ([0.0, 0.0, 1.0], -1.0);
+        }
+        self.bounds = if self.clusters.is_empty() { [[0.0; 3]; 2] } else { all };
     }
 
     /// Prepares the triangles of one part (one material) of a mesh.
@@ -255,7 +328,7 @@ impl RenderMesh {
 
     /// Coarser versions of the mesh, the finest first: each with a bound on how far it is from the mesh, 1 mm at most. They
     /// are made when they are first asked for, which takes some time (about 2 µs for each triangle), and shared by everybody
-    /// who has the mesh. Meshes of fewer than 1000 triangles and meshes with texture coordinates have none.
+    /// who has the mesh. Meshes of fewer than 1000 triangles, with texture coordinates or with vertices that move have none.
     pub fn levels(&self) -> &[Level] {
         self.levels.get_or_init(|| lod::chain(self))
     }
@@ -263,7 +336,7 @@ impl RenderMesh {
     /// The number of the coarsest level whose [`Level::error`] is not larger than `error` \[m\]; 0 is the mesh itself. Makes
     /// the levels only where one of them could be that.
     pub fn level_within(&self, error: f32) -> usize {
-        let may = error >= lod::FINEST && self.triangles.len() >= lod::MIN_TRIANGLES && self.uvs.is_none();
+        let may = error >= lod::FINEST && lod::may_have_levels(self);
         if may { self.levels().iter().take_while(|level| level.error <= error).count() } else { 0 }
     }
 
@@ -288,6 +361,13 @@ impl RenderMesh {
         mesh.uvs.clone_from(&self.uvs);
         mesh
     }
+}
+
+/// The triangles in the order in which they are drawn.
+fn drawing_order(mesh: &TriMesh) -> Vec<u32> {
+    let mut order: Vec<u64> = curve(mesh).into_iter().zip(0..).map(|(code, k)| u64::from(code) << 32 | k).collect();
+    order.sort_unstable();
+    order.into_iter().map(|place| place as u32).collect()
 }
 
 /// The position of each triangle on a space-filling curve (Morton code of its middle, 10 bits per axis).

@@ -58,6 +58,52 @@ fn closed_surfaces() {
     );
 }
 
+/// A deformed mesh has the triangles of the prepared one, each vertex where it was moved, in clusters whose spheres hold
+/// them. The judge: the same triangles moved by the same formula, whatever their order.
+#[test]
+fn deformable_meshes() {
+    let bend = |[x, y, z]: [f32; 3]| [x + 0.3 * z * z, 2.0 * y - 0.1, z + 0.2 * x];
+    let mut mesh = Sphere { radius: 1.0 }.tessellate(64);
+    mesh.uvs = Some(mesh.positions.iter().map(|p| [p[0], p[1]]).collect());
+    let moved: Vec<_> = mesh.positions.iter().copied().map(bend).collect();
+    let mut normals = vec![[0.0; 3]; moved.len()];
+    smooth_normals(&moved, &mesh.triangles, &mut normals);
+    let before = RenderMesh::deformable(&mesh);
+    let mut drawn = before.clone();
+    drawn.deform(&moved, &normals);
+    let sorted = |mut list: Vec<[[u32; 3]; 3]>| {
+        list.sort_unstable();
+        list
+    };
+    let of = |positions: &[[f32; 3]], triangles: &[[u32; 3]]| {
+        let corners = |t: &[u32; 3]| t.map(|i| positions[i as usize].map(f32::to_bits));
+        sorted(triangles.iter().map(corners).collect())
+    };
+    let expected = of(&moved, &mesh.triangles);
+    assert_eq!(of(drawn.positions(), drawn.triangles()), expected);
+    assert_eq!(of(drawn.normals(), drawn.triangles()), of(&normals, &mesh.triangles));
+    assert_eq!(drawn.uvs(), before.uvs(), "textures move along");
+    assert_ne!(of(before.positions(), before.triangles()), expected, "the control: not deformed");
+    assert_eq!(of(before.positions(), before.triangles()), of(&mesh.positions, &mesh.triangles));
+    let distance = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>().sqrt();
+    for c in drawn.clusters() {
+        for k in c.first as usize..(c.first + c.count) as usize {
+            for (corner, vertex) in drawn.corners()[k].into_iter().zip(drawn.triangles()[k]) {
+                let p = drawn.positions()[vertex as usize];
+                let lane = c.first_lane as usize + usize::from(corner);
+                assert_eq!([0, 1, 2].map(|a| drawn.lanes()[a][lane]), p);
+                assert!(distance(p, c.center) <= c.radius && !c.closed);
+            }
+        }
+    }
+    let [lo, hi] = drawn.bounds();
+    for k in 0..3 {
+        let along = moved.iter().map(|p| p[k]);
+        assert_eq!((along.clone().fold(f32::MAX, f32::min), along.fold(f32::MIN, f32::max)), (lo[k], hi[k]));
+    }
+    assert!(!RenderMesh::new(&mesh, 0.5).is_deformable() && drawn.level_within(1.0) == 0 && drawn.levels().is_empty());
+}
+
 #[test]
 fn clusters() {
     let mesh = Sphere { radius: 1.0 }.tessellate(64);

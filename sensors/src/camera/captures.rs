@@ -63,7 +63,7 @@ impl Captures {
         let Some(visible) = &state.visible else { return };
         self.poses.index_axis_mut(Axis(0), row).assign(&visible.instance_poses.index_axis(Axis(0), env));
         self.lights.index_axis_mut(Axis(0), row).assign(&visible.lights.index_axis(Axis(0), env));
-        self.scenes[row].clone_from(state.own_scene(env));
+        self.scenes[row].clone_from(state.seen_scene(env));
         self.world_from_parent[row] = Some(parent_pose(state, env, parent));
         self.stamps[row] = state.time[env];
         self.tickets[row] = ticket;

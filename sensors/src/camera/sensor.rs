@@ -648,7 +648,7 @@ impl Camera {
     /// Whether the state is of the scene that the camera was built for.
     fn check(&self, state: &SceneState) -> Result<(), SensorError> {
         let missing = Self::requires(self.is_attached(), self.draws_markers).without(Requires::present_in(state));
-        let Some(VisibleState { instance_poses, lights }) = state.visible.as_ref().filter(|_| missing.is_empty())
+        let Some(VisibleState { instance_poses, lights, .. }) = state.visible.as_ref().filter(|_| missing.is_empty())
         else {
             return Err(SensorError::MissingFields { sensor: "camera", missing });
         };

@@ -8,7 +8,7 @@ mod solved;
 use crate::compile::{JointIndexing, Simulation};
 use crate::env::EnvStatus;
 use kinetoscope_scene::state::Contacts;
-use kinetoscope_scene::{Light, PoseF32, PoseF64, SceneState, VisibleState};
+use kinetoscope_scene::{Light, OwnScene, PoseF32, PoseF64, SceneState, VisibleState};
 use kinetoscope_sensors::{Phases, Requires};
 use ndarray::{Array2, Array3};
 
@@ -57,6 +57,7 @@ pub(crate) fn allocate(simulation: &Simulation, requires: Requires) -> SceneStat
         visible: visible.map(|visible| VisibleState {
             instance_poses: Array2::from_elem((n, visible.scene().instances().len()), PoseF32::IDENTITY),
             lights: Array2::from_elem((n, visible.scene().lights.len()), Light::default()),
+            scenes: if visible.deforms() { vec![OwnScene::default(); n] } else { Vec::new() },
         }),
         instance_poses: exact
             .map(|visible| Array2::from_elem((n, visible.scene().instances().len()), PoseF64::IDENTITY)),
@@ -84,6 +85,7 @@ pub(crate) fn gather_clocks(simulation: &Simulation, substeps: u32, clocks: &mut
 
 /// Fills the arrays that `requires` names, which must be there.
 pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires, state: &mut SceneState) {
+    static AS_ALL: OwnScene = OwnScene(None);
     gather_steps(simulation, substeps, state);
     if requires.is_empty() {
         return;
@@ -147,6 +149,9 @@ pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires,
                 (seen.instance_poses.row_mut(i).as_slice_mut(), seen.lights.row_mut(i).as_slice_mut())
         {
             visible.read(env.data(), poses, lights);
+            if let Some(scene) = seen.scenes.get_mut(i) {
+                visible.shape(env.data(), (i, simulation.own_scenes.get(i).unwrap_or(&AS_ALL)), scene);
+            }
         }
         if wants(Requires::INSTANCES)
             && let (Some(visible), Some(poses)) = (&simulation.visible, &mut state.instance_poses)

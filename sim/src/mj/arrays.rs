@@ -290,6 +290,11 @@ data_arrays! {
     mocap_pos: f64, "Positions of bodies moved by hand \\[m\\], (nmocap, 3).";
     mocap_quat: f64, "Orientations of bodies moved by hand, wxyz, (nmocap, 4).";
     sensordata: f64, "Readings of MuJoCo's own sensors, (nsensordata,).";
+    ten_wrapadr: i32, "First point of each tendon's path in `wrap_xpos`, (ntendon,).";
+    ten_wrapnum: i32, "Number of points of each tendon's path, (ntendon,).";
+    ten_length: f64, "Lengths of tendons \\[m\\], (ntendon,).";
+    wrap_obj: i32, "Geom that each point of a path lies on, -1 at a site, -2 at a pulley, (nwrap, 2).";
+    wrap_xpos: f64, "Points of paths \\[m\\], (nwrap, 6): two points in each row.";
 }
 
 data_arrays_mut! {

@@ -146,12 +146,12 @@ macro_rules! array {
 }
 
 /// Chunks of `N` numbers; arrays of the model are whole multiples.
-fn chunks<T, const N: usize>(values: &[T]) -> &[[T; N]] {
+pub(super) fn chunks<T, const N: usize>(values: &[T]) -> &[[T; N]] {
     values.as_chunks().0
 }
 
 /// `count` elements from `first`, both numbers of MuJoCo's; nothing where they do not fit.
-fn span<T>(values: &[T], first: i64, count: i64) -> &[T] {
+pub(super) fn span<T>(values: &[T], first: i64, count: i64) -> &[T] {
     let (Ok(first), Ok(count)) = (usize::try_from(first), usize::try_from(count)) else { return &[] };
     first.checked_add(count).and_then(|end| values.get(first..end)).unwrap_or(&[])
 }

@@ -15,6 +15,7 @@ mod arrays;
 mod beyond;
 mod control;
 mod data;
+mod deforming;
 mod editor;
 mod error;
 mod guard;
@@ -38,6 +39,7 @@ pub mod words;
 
 pub use beyond::Beyond;
 pub use data::{Data, Overflow, Warning, WarningCounts};
+pub use deforming::{Bone, FlexArrays, SkinArrays};
 pub use editor::{DiagonalInertia, Editor};
 pub use error::{CompileError, EngineError};
 pub use look::{

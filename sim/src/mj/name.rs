@@ -22,6 +22,8 @@ pub enum ObjectKind {
     Tendon,
     Actuator,
     Sensor,
+    Skin,
+    Flex,
 }
 
 impl ObjectKind {
@@ -41,6 +43,12 @@ impl ObjectKind {
             Self::Tendon => mj::mjOBJ_TENDON,
             Self::Actuator => mj::mjOBJ_ACTUATOR,
             Self::Sensor => mj::mjOBJ_SENSOR,
+            Self::Skin => mj::mjOBJ_SKIN,
+            #[cfg(mj4)]
+            Self::Flex => mj::mjOBJ_FLEX,
+            // Nothing of this kind has a name in 2.2.2.
+            #[cfg(not(mj4))]
+            Self::Flex => mj::mjOBJ_UNKNOWN,
         }) as i32
     }
 }

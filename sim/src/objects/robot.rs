@@ -179,6 +179,11 @@ impl RobotData {
         self.first_mask_id + link as i32
     }
 
+    /// Names of the tendons of its MJCF file. Their numbers in the mask channel follow those of its links.
+    pub(crate) fn tendons(&self) -> &[String] {
+        self.file.as_ref().map_or(&[], |file| file.tendon_names())
+    }
+
     /// The MJCF file that it is; `None` where it is made of URDF files.
     pub fn file(&self) -> Option<&RobotFile> {
         self.file.as_ref()

@@ -94,6 +94,7 @@ pub(super) fn of_site(model: &Model, site: usize, identity: &GeomIdentity, mater
         name,
         body: of,
         fixed: model.is_fixed(body),
+        deforms: false,
         frame_from_instance,
     })
 }

@@ -1,6 +1,7 @@
 //! Mask ids: which number stands for what.
 
-use super::{missing, surface};
+use super::{deforming, shown, surface};
+use crate::contents::Contents;
 use crate::mj::{Model, ObjectKind};
 use kinetoscope_sensors::camera::Thing;
 use std::collections::BTreeMap;
@@ -13,10 +14,10 @@ pub struct MaskId {
     pub id: i32,
     /// The robot, rigid object or geom of the world; in a model that was loaded as it is, the first body of the tree.
     pub object: String,
-    /// The link, for robots.
+    /// The link, for robots; the tendon, for tendons of robots and parts.
     pub link: Option<String>,
-    /// What kind of thing it is: `ground`, `terrain`, `robot`, `object` or the class that the object was given; `world` and
-    /// `body` in a model that was loaded as it is.
+    /// What kind of thing it is: `ground`, `terrain`, `robot`, `object` or the class that the object was given; `world`, `body`,
+    /// `tendon`, `skin` and `flex` in a model that was loaded as it is.
     pub class: String,
     /// MuJoCo's body.
     pub body: String,
@@ -44,6 +45,37 @@ pub(crate) struct Identities {
     of_geom: Vec<GeomIdentity>,
     /// Sites that are drawn.
     of_site: Vec<(usize, GeomIdentity)>,
+    /// What is drawn and changes its shape.
+    of_drawable: Vec<(Drawable, GeomIdentity)>,
+}
+
+/// An element of a model that is drawn and changes its shape, by its number in MuJoCo's arrays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Drawable {
+    Tendon(usize),
+    Skin(usize),
+    Flex(usize),
+}
+
+impl Drawable {
+    /// The kind of element, for a table of mask ids.
+    pub(crate) fn class(self) -> &'static str {
+        match self {
+            Self::Tendon(_) => "tendon",
+            Self::Skin(_) => "skin",
+            Self::Flex(_) => "flex",
+        }
+    }
+
+    /// The name of the element; of one without a name, its kind and number.
+    pub(crate) fn name(self, model: &Model) -> String {
+        let (kind, number) = match self {
+            Self::Tendon(tendon) => (ObjectKind::Tendon, tendon),
+            Self::Skin(skin) => (ObjectKind::Skin, skin),
+            Self::Flex(flex) => (ObjectKind::Flex, flex),
+        };
+        model.name(kind, number).unwrap_or_else(|| format!("{} {number}", self.class()))
+    }
 }
 
 /// Who owns a geom.
@@ -67,6 +99,11 @@ impl Identities {
         self.of_site.iter().map(|(site, identity)| (*site, identity))
     }
 
+    /// What is drawn and changes its shape.
+    pub(super) fn drawables(&self) -> impl Iterator<Item = (Drawable, &GeomIdentity)> {
+        self.of_drawable.iter().map(|(drawable, identity)| (*drawable, identity))
+    }
+
     /// What each mask id is, in order.
     pub(crate) fn table(&self) -> &[MaskId] {
         &self.table
@@ -87,7 +124,7 @@ fn body_name(model: &Model, body: usize) -> String {
     model.name(ObjectKind::Body, body).unwrap_or_else(|| format!("body {body}"))
 }
 
-/// Each body has a number of its own, and each geom of the world; with `sites`, so have bodies with nothing but sites, and
+/// Each body has a number of its own, and so has each geom of the world, tendon, skin and flex; with `sites`, so have bodies with nothing but sites, and
 /// each site of the world.
 pub(super) fn by_body(model: &Model, sites: bool) -> Identities {
     let mut table: Vec<MaskId> = Vec::new();
@@ -117,8 +154,23 @@ pub(super) fn by_body(model: &Model, sites: bool) -> Identities {
             identity(id)
         })
         .collect();
+    let of_drawable = deforming::shown(model)
+        .into_iter()
+        .map(|drawable| {
+            let (id, name) = (table.len() as i32 + 1, drawable.name(model));
+            table.push(MaskId {
+                id,
+                object: name.clone(),
+                link: None,
+                class: drawable.class().into(),
+                body: body_name(model, 0),
+                geoms: Vec::new(),
+            });
+            (drawable, GeomIdentity { mask_id: id, name: name.into(), body: None })
+        })
+        .collect();
     let shown = (0..if sites { model.nsite() } else { 0 })
-        .filter(|&site| missing::is_shown(model.site_group()[site], &surface::color_of_site(model, site)));
+        .filter(|&site| shown::is_shown(model.site_group()[site], &surface::color_of_site(model, site)));
     let of_site = shown
         .map(|site| {
             let body = model.site_bodyid()[site] as usize;
@@ -139,7 +191,7 @@ pub(super) fn by_body(model: &Model, sites: bool) -> Identities {
             (site, GeomIdentity { mask_id: of_body[body], name: name.into(), body: None })
         })
         .collect();
-    Identities { table: table.into(), of_geom, of_site }
+    Identities { table: table.into(), of_geom, of_site, of_drawable }
 }
 
 /// Who a geom of a simulation belongs to.
@@ -153,8 +205,8 @@ pub(crate) struct Owner {
     pub(crate) body: Option<u32>,
 }
 
-/// Identities of a simulation, given the owner of every geom.
-pub(crate) fn of_simulation(model: &Model, owners: &[Owner]) -> Identities {
+/// Identities of a simulation, given the owner of every geom, and of what is drawn and changes its shape.
+pub(crate) fn of_simulation(model: &Model, owners: &[Owner], of_drawables: &[(Drawable, Owner)]) -> Identities {
     let mut table: BTreeMap<i32, MaskId> = BTreeMap::new();
     for (geom, owner) in owners.iter().enumerate() {
         let entry = table.entry(owner.id).or_insert_with(|| MaskId {
@@ -167,6 +219,16 @@ pub(crate) fn of_simulation(model: &Model, owners: &[Owner]) -> Identities {
         });
         entry.geoms.push(geom_name(model, geom));
     }
+    for (_, owner) in of_drawables {
+        table.entry(owner.id).or_insert_with(|| MaskId {
+            id: owner.id,
+            object: owner.object.clone(),
+            link: owner.link.clone(),
+            class: owner.class.clone(),
+            body: body_name(model, 0),
+            geoms: Vec::new(),
+        });
+    }
     let identity = |owner: &Owner| {
         let name = match &owner.link {
             Some(link) => format!("{}/{link}", owner.object).into(),
@@ -178,5 +240,29 @@ pub(crate) fn of_simulation(model: &Model, owners: &[Owner]) -> Identities {
         table: table.into_values().collect(),
         of_geom: owners.iter().map(identity).collect(),
         of_site: Vec::new(),
+        of_drawable: of_drawables.iter().map(|(drawable, owner)| (*drawable, identity(owner))).collect(),
     }
+}
+
+/// The owners of spatial tendons that are drawn: robots and parts of MJCF files have some.
+pub(crate) fn tendon_owners(model: &Model, contents: &Contents) -> Vec<(Drawable, Owner)> {
+    let of_robots = contents.robots.iter().map(|robot| {
+        (robot.uid(), robot.tendons(), robot.mask_id(robot.description().links.len()), robot.semantic_class())
+    });
+    let of_parts = contents.parts.iter().map(|part| {
+        let class = part.cfg().semantic_class.as_deref().unwrap_or("mjcf");
+        (part.uid(), &part.names().tendons[..], part.mask_id(part.model().nbody()), class)
+    });
+    let mut owners = Vec::new();
+    for (uid, tendons, first_id, class) in of_robots.chain(of_parts) {
+        for (id, name) in (first_id..).zip(tendons) {
+            if let Some(tendon) = model.id(ObjectKind::Tendon, &format!("{uid}/{name}")) {
+                let owner = Owner { id, object: uid.into(), link: Some(name.clone()), class: class.into(), body: None };
+                owners.push((Drawable::Tendon(tendon), owner));
+            }
+        }
+    }
+    let shown = deforming::shown(model);
+    owners.retain(|(drawable, _)| shown.contains(drawable));
+    owners
 }

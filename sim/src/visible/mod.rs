@@ -1,22 +1,24 @@
 //! From MuJoCo's geoms to the scene that cameras draw: `mj::Model -> Visible -> (RenderScene, poses per environment)`.
 //!
-//! Every geom of the model is an instance, whatever file the model came from; geoms that stand for a visual of a URDF
+//! Every geom of the model is an instance, whatever file the model came from, and so are tendons, skins and flexes; geoms that stand for a visual of a URDF
 //! (see `mjcf::robot`) are replaced by its real shape. What does not change is extracted once; [`Visible::read`] copies
 //! the poses of one environment.
 
+mod deforming;
 mod geom;
 mod identity;
 mod lighting;
-mod missing;
 mod overview;
 mod own;
+mod shown;
 mod still;
 mod surface;
 mod urdf_visual;
 
+use deforming::{Buffers, Deforming};
 use identity::GeomIdentity;
 pub use identity::MaskId;
-pub(crate) use identity::{Identities, Owner, of_simulation};
+pub(crate) use identity::{Identities, Owner, of_simulation, tendon_owners};
 pub(crate) use lighting::Look;
 pub use still::{FreeCamera, ModelCamera, Still};
 pub(crate) use surface::color_of;
@@ -29,7 +31,9 @@ use crate::simulation_cfg::GroundCfg;
 use crate::surface_cfg::SurfaceCfg;
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::Plane;
-use kinetoscope_scene::{Hemisphere, Instance, Light, Material, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture};
+use kinetoscope_scene::{
+    Hemisphere, Instance, Light, Material, OwnScene, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture,
+};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -44,6 +48,8 @@ pub struct Visible {
     anchors: Vec<Anchor>,
     ids: Arc<[MaskId]>,
     left_out: Vec<String>,
+    deforming: Arc<Deforming>,
+    buffers: Arc<Buffers>,
 }
 
 /// The element of a model that an instance moves with.
@@ -51,6 +57,8 @@ pub struct Visible {
 pub(crate) enum Anchor {
     Geom(usize),
     Site(usize),
+    /// The world, for what changes its shape.
+    World,
 }
 
 /// One thing that is drawn for a geom.
@@ -97,6 +105,7 @@ fn places(data: &Data) -> impl Fn(Anchor) -> ([f64; 3], [f64; 9]) + '_ {
     move |anchor| match anchor {
         Anchor::Geom(geom) => (positions[geom], rotations[geom]),
         Anchor::Site(site) => (sites.0[site], sites.1[site]),
+        Anchor::World => ([0.0; 3], [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
     }
 }
 
@@ -129,7 +138,6 @@ impl Visible {
         let surfaces = surface::Surfaces::of(model);
         let mut shapes = geom::Shapes::of(model);
         let mut left_out = surfaces.left_out().to_vec();
-        left_out.extend(missing::of_model(model));
         let (mut instances, mut anchors) = (Vec::new(), Vec::new());
         for geom in 0..model.ngeom() {
             let parts = match replacements.get(&geom) {
@@ -151,8 +159,18 @@ impl Visible {
                     painted.get(&*name).map_or_else(|| material.clone(), |surface| surface.over(material.clone()));
                 let fixed = model.is_fixed(model.geom_bodyid()[geom] as usize);
                 let frame_from_instance = frame_from_geom(model, geom, body.and_then(|body| frames.get(body as usize)));
-                let instance =
-                    Instance { shape, material, mask_id, group, visible, name, body, fixed, frame_from_instance };
+                let instance = Instance {
+                    shape,
+                    material,
+                    mask_id,
+                    group,
+                    visible,
+                    name,
+                    body,
+                    fixed,
+                    deforms: false,
+                    frame_from_instance,
+                };
                 if let Err(reason) = instance.validate() {
                     left_out.push(format!("geom {geom} is not drawn: {reason}"));
                     continue;
@@ -160,6 +178,16 @@ impl Visible {
                 instances.push(instance);
                 anchors.push(Anchor::Geom(geom));
             }
+        }
+        let mut deforming = Deforming::default();
+        for (drawable, identity) in identities.drawables() {
+            let GeomIdentity { mask_id, ref name, body } = *identity;
+            let like = Instance { body, ..Instance::new(Plane { half: [1.0; 2] }, Material::default(), mask_id) };
+            let like = Instance { name: Arc::clone(name), ..like };
+            if let Err(reason) = deforming.add(model, &surfaces, drawable, &like, &mut instances) {
+                left_out.push(format!("{} {name} is not drawn: {reason}", drawable.class()));
+            }
+            anchors.resize(instances.len(), Anchor::World);
         }
         for (site, identity) in identities.sites() {
             let Some(instance) = geom::of_site(model, site, identity, surfaces.of_site(site)) else { continue };
@@ -174,16 +202,31 @@ impl Visible {
         let mut scene = RenderScene::new(instances).unwrap_or_else(|error| {
             left_out.push(format!("nothing is drawn: {error}"));
             anchors.clear();
+            deforming = Deforming::default();
             RenderScene::empty()
         });
         left_out.extend(lighting::light(model, look, &mut scene));
-        Self { scene: Arc::new(scene), anchors, ids: identities.shared_table(), left_out }
+        Self {
+            scene: Arc::new(scene),
+            anchors,
+            ids: identities.shared_table(),
+            left_out,
+            deforming: Arc::new(deforming),
+            buffers: Arc::default(),
+        }
     }
 
     /// This, with other instances in the place of its own, each moving with no geom. The lamps stay.
     fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, kinetoscope_scene::RenderSceneError> {
         let scene = Arc::new(self.scene.with_instances(instances)?);
-        Ok(Self { scene, anchors: Vec::new(), ids: Arc::clone(&self.ids), left_out: self.left_out.clone() })
+        Ok(Self {
+            scene,
+            anchors: Vec::new(),
+            ids: Arc::clone(&self.ids),
+            left_out: self.left_out.clone(),
+            deforming: Arc::default(),
+            buffers: Arc::default(),
+        })
     }
 
     /// With what MuJoCo does not know of lamps: their sizes, by name, and domes.
@@ -201,9 +244,33 @@ impl Visible {
         self
     }
 
-    /// What the renderer draws, the same for all environments.
+    /// What the renderer draws, the same for all environments. Where a shape [changes](Instance::deforms), the scene of a moment
+    /// is [`scene_at`](Self::scene_at).
     pub fn scene(&self) -> &Arc<RenderScene> {
         &self.scene
+    }
+
+    /// The scene with the shapes that tendons, skins and flexes have in `data`; [`scene`](Self::scene) if there are none.
+    pub fn scene_at(&self, data: &Data) -> Arc<RenderScene> {
+        let mut out = OwnScene(None);
+        self.shape(data, (0, &OwnScene(None)), &mut out);
+        out.0.unwrap_or_else(|| Arc::clone(&self.scene))
+    }
+
+    /// Whether some shapes change from frame to frame.
+    pub(crate) fn deforms(&self) -> bool {
+        !self.deforming.is_empty()
+    }
+
+    /// Puts the scene of environment `env`, whose own scene is `own`, into `out` with the shapes of `data`; `own` where no shape
+    /// changes. The memory of scenes that nothing holds any more is used again.
+    pub(crate) fn shape(&self, data: &Data, (env, own): (usize, &OwnScene), out: &mut OwnScene) {
+        if self.deforms() {
+            let scene = own.0.as_ref().unwrap_or(&self.scene);
+            self.buffers.fill(&self.deforming, (env, scene), data, out);
+        } else {
+            out.clone_from(own);
+        }
     }
 
     /// What each mask id is.
@@ -211,13 +278,14 @@ impl Visible {
         &self.ids
     }
 
-    /// Elements that are not drawn, and why: textures or meshes that cannot be read; spatial tendons, skins, flexes and signed
-    /// distance fields, which cameras do not draw.
+    /// Elements that are not drawn, and why: textures or meshes that cannot be read; signed distance fields, which cameras do
+    /// not draw.
     pub fn left_out(&self) -> &[String] {
         &self.left_out
     }
 
-    /// Copies where everything is in `data`, in double precision: a pose for each instance, world from instance.
+    /// Copies where everything is in `data`, in double precision: a pose for each instance, world from instance; the identity
+    /// for what [changes its shape](Instance::deforms).
     ///
     /// # Panics
     /// The slice has another length than the scene's instances.
@@ -250,6 +318,7 @@ impl Visible {
                 translation: translation.map(|x| x as f32),
             };
         }
+        self.deforming.place(data, poses);
         lighting::read(data, &self.scene.lights, lights);
     }
 }

@@ -1,7 +1,7 @@
 //! What an environment looks like whose sizes or colours are its own.
 
 use super::{Anchor, Visible, geom};
-use crate::mj::Model;
+use crate::mj::{Data, Model};
 use kinetoscope_scene::{Material, OwnScene, RenderSceneError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,6 +31,16 @@ impl Visible {
             }
         }
         Ok(OwnScene(Some(Arc::new(self.scene.with_instances(instances)?))))
+    }
+
+    /// This with the shapes of `data`, of which nothing else has a part.
+    pub(super) fn at(self: &Arc<Self>, data: &Data) -> Arc<Self> {
+        if !self.deforms() {
+            return Arc::clone(self);
+        }
+        let buffers = Arc::default();
+        let scene = Self { buffers, ..(**self).clone() }.scene_at(data);
+        Arc::new(Self { scene, buffers: Arc::default(), ..(**self).clone() })
     }
 
     /// This as it is in an environment whose scene is `own`.

@@ -124,6 +124,7 @@ impl Still {
     }
 
     fn of_data(visible: &Arc<Visible>, data: &Data) -> Self {
+        let visible = &visible.at(data);
         let scene = visible.scene();
         let mut poses = vec![PoseF32::IDENTITY; scene.instances().len()];
         let mut lights = scene.lights.clone();

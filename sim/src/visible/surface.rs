@@ -59,8 +59,13 @@ impl<'a> Surfaces<'a> {
 
     /// The look of a site.
     pub(super) fn of_site(&self, site: usize) -> Material {
-        let rgba = color_of_site(self.model, site);
-        match usize::try_from(self.model.site_matid()[site]).ok().and_then(|m| self.materials.get(m)) {
+        self.material(&self.model.site_rgba()[4 * site..4 * site + 4], self.model.site_matid()[site])
+    }
+
+    /// The look of an element with this colour and material.
+    pub(super) fn material(&self, rgba: &[f32], material: i32) -> Material {
+        let rgba = color(self.model, rgba, material);
+        match usize::try_from(material).ok().and_then(|m| self.materials.get(m)) {
             None => Material::from_rgba(rgba),
             Some(material) => Material { rgba, reflectance: 0.0, ..material.clone() },
         }
@@ -82,7 +87,7 @@ pub(super) fn color_of_site(model: &Model, site: usize) -> [f32; 4] {
     color(model, &model.site_rgba()[4 * site..4 * site + 4], model.site_matid()[site])
 }
 
-fn color(model: &Model, own: &[f32], material: i32) -> [f32; 4] {
+pub(super) fn color(model: &Model, own: &[f32], material: i32) -> [f32; 4] {
     /// MuJoCo's grey of geoms that say nothing.
     const UNSET: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
     let own = [own[0], own[1], own[2], own[3]].map(|c| c.clamp(0.0, 1.0));

@@ -167,7 +167,7 @@ fn balls(num_envs: usize, count: usize) -> (SensorContext, Vec<SceneState>) {
         SceneState {
             step: vec![step; num_envs],
             time: vec![0.01 * step as f64; num_envs],
-            visible: Some(VisibleState { instance_poses, lights }),
+            visible: Some(VisibleState { instance_poses, lights, scenes: Vec::new() }),
             body_poses: Some(Array3::from_shape_fn((num_envs, count, 7), body)),
             instance_poses: Some(Array2::from_shape_fn((num_envs, 1 + count), |(_, k)| {
                 PoseF64::from_translation(at(step, k))

@@ -14,6 +14,11 @@ const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8">
     <geom type="capsule" size="0.03" fromto="0 0 0 0.4 0 0"/><site name="tip" pos="0.4 0 0"/></body></worldbody>
   <actuator><motor joint="hinge"/></actuator><sensor><accelerometer site="tip"/><gyro site="tip"/><force site="tip"/></sensor></mujoco>"#;
 
+/// A weight that sinks on a string.
+const STRING: &str = r#"<mujoco><worldbody><site name="hook" pos="0 0.5 0.9"/><body name="weight" pos="0 0.5 0.5">
+    <joint type="slide" axis="0 0 1" damping="100"/><geom size="0.05"/><site name="eye"/></body></worldbody>
+  <tendon><spatial><site site="hook"/><site site="eye"/></spatial></tendon></mujoco>"#;
+
 /// Four environments with a box that lies and a ball that stands a little off the ground.
 fn world(threads: usize) -> SimulationManager {
     let mut sim =
@@ -85,6 +90,8 @@ fn steps() {
 fn images() {
     for (threads, width, height) in [(1, 64, 48), (3, 64, 48), (3, 320, 240)] {
         let mut sim = world(threads);
+        // Its shape changes in every step, and so does the scene that cameras see.
+        sim.add_mjcf(MjcfCfg::text("string", STRING)).unwrap();
         let base = CameraCfg { width, height, lazy: false, ..CameraCfg::default() };
         let extrinsics = |x: f64| {
             let placement = Placement::LookAt { eye: [x, -1.0, 0.8], target: [0.2, 0.0, 0.0], up: [0.0, 0.0, 1.0] };

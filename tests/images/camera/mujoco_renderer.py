@@ -1,7 +1,7 @@
 """Pictures by MuJoCo's own renderer on OSMesa, for mujoco_renderer.rs.
 
-MODEL.xml CAMERA WIDTH HEIGHT OUT: writes OUT/depth (32-bit floats, metres along the optical axis), OUT/geom (32-bit
-integers, -1 where nothing is) and OUT/color (bytes, red, green, blue), top row first. Geom groups 0 to 2 are drawn, with
+MODEL.xml CAMERA WIDTH HEIGHT OUT: writes OUT/depth (32-bit floats, metres along the optical axis), OUT/element (32-bit
+integers: the number of a geom, of a tendon, skin or flex that and a multiple of a million, -1 where nothing is) and OUT/color (bytes, red, green, blue), top row first. Geom groups 0 to 2 are drawn, with
 fine tessellation and one sample per pixel; shadows, reflections, fog and skybox are off.
 """
 
@@ -39,6 +39,9 @@ draw().astype("<f4").tofile(os.path.join(out, "depth"))
 renderer.disable_depth_rendering()
 renderer.enable_segmentation_rendering()
 segmentation = draw()
-is_geom = segmentation[:, :, 1] == int(mujoco.mjtObj.mjOBJ_GEOM)
 renderer.close()
-np.where(is_geom, segmentation[:, :, 0], -1).astype("<i4").tofile(os.path.join(out, "geom"))
+elements = np.full(segmentation.shape[:2], -1)
+for multiple, kind in enumerate(("GEOM", "TENDON", "SKIN", "FLEX")):
+    is_kind = segmentation[:, :, 1] == int(getattr(mujoco.mjtObj, "mjOBJ_" + kind))
+    elements[is_kind] = 1_000_000 * multiple + segmentation[:, :, 0][is_kind]
+elements.astype("<i4").tofile(os.path.join(out, "element"))

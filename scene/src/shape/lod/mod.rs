@@ -33,7 +33,7 @@ pub struct Level {
 }
 
 /// Meshes of fewer triangles have no coarser versions.
-pub(super) const MIN_TRIANGLES: usize = 1000;
+const MIN_TRIANGLES: usize = 1000;
 /// The bound that is aimed at before the first level, so that the cheaper collapses come first \[m\].
 const BEFORE: f64 = 0.0625e-3;
 /// The bounds of the levels \[m\]: 1/8 mm is half a pixel at a distance of 15 cm, where the focal length is 600 pixels.
@@ -46,11 +46,15 @@ const WORTH: f64 = 0.8;
 /// that are taken over bit by bit.
 const ROUNDING: f64 = 1e-7;
 
+/// False for a mesh that has no coarser versions: it is small, collapses would pull textures along, or its vertices move.
+pub(super) fn may_have_levels(mesh: &RenderMesh) -> bool {
+    mesh.triangles().len() >= MIN_TRIANGLES && mesh.uvs().is_none() && !mesh.is_deformable()
+}
+
 /// The coarser versions of a mesh, the finest first.
 pub(super) fn chain(mesh: &RenderMesh) -> Vec<Level> {
     let mut levels = Vec::new();
-    // Collapses would pull textures along.
-    if mesh.triangles().len() < MIN_TRIANGLES || mesh.uvs().is_some() {
+    if !may_have_levels(mesh) {
         return levels;
     }
     let [lo, hi] = mesh.bounds();

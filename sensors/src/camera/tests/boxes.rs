@@ -25,7 +25,7 @@ fn seen_by(cfg: &CameraCfg, scene: &RenderScene, poses: &dyn Fn(u64) -> Vec<Pose
     let state = |step: u64| {
         let instance_poses = Array2::from_shape_vec((1, scene.instances().len()), poses(step)).unwrap();
         let lights = Array2::from_shape_vec((1, scene.lights.len()), scene.lights.clone()).unwrap();
-        let visible = Some(VisibleState { instance_poses, lights });
+        let visible = Some(VisibleState { instance_poses, lights, scenes: Vec::new() });
         SceneState { step: vec![step], time: vec![step as f64 * DT], visible, ..SceneState::new(1) }
     };
     camera.reset(&[0], &state(0)).unwrap();

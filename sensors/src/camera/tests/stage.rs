@@ -63,7 +63,7 @@ pub(super) fn state(steps: &[u64]) -> SceneState {
         time: steps.iter().map(|&s| s as f64 * DT).collect(),
         force_time: steps.iter().map(|&s| s.saturating_sub(1) as f64 * DT).collect(),
         body_poses: Some(poses),
-        visible: Some(VisibleState { instance_poses: instances, lights }),
+        visible: Some(VisibleState { instance_poses: instances, lights, scenes: Vec::new() }),
         ..SceneState::default()
     }
 }

@@ -16,7 +16,7 @@ pub enum HitTargets {
     /// (`ground`). Regular expressions that must match the whole name. What is invisible is hit wherever an environment shows
     /// it; a pattern for nothing that some environment shows when the sensor is added is refused.
     Named(Vec<String>),
-    /// Everything that can be seen.
+    /// Everything that can be seen, but tendons, skins and flexes, whose shapes change.
     Everything {
         /// But not the body that the sensor hangs on, with all that is fused to it.
         exclude_parent: bool,
@@ -42,8 +42,9 @@ impl HitTargets {
         parent: Option<usize>,
         context: &SensorContext,
     ) -> Result<Vec<usize>, SensorError> {
+        // Rays of casters meet what stays as it is.
         let in_groups = |instance: &kinetoscope_scene::Instance| {
-            1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0)
+            !instance.deforms && 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0)
         };
         let named = match self {
             Self::Named(patterns) => Some(names(scene, patterns, context, in_groups)?),

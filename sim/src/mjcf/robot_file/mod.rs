@@ -186,6 +186,11 @@ impl RobotFile {
         })
     }
 
+    /// Names of its tendons.
+    pub(crate) fn tendon_names(&self) -> &[String] {
+        &self.names.tendons
+    }
+
     fn full(&self, cfg: &RobotCfg<'_>, name: &str) -> String {
         format!("{}/{name}", cfg.uid)
     }

@@ -1,0 +1,56 @@
+//! Meshes whose vertices move: which vertex is where.
+
+use super::RenderMesh;
+use super::crease::{cross, dot, sub};
+
+/// The places of a deformable mesh's vertices.
+#[derive(Debug, Default)]
+pub(super) struct Deformation {
+    /// The vertex of the mesh that was prepared, for each vertex.
+    pub(super) sources: Vec<u32>,
+    /// The vertex of each of [`RenderMesh::lanes`].
+    pub(super) vertex_of_lane: Vec<u32>,
+}
+
+impl Deformation {
+    pub(super) fn new(sources: Vec<u32>, mesh: &RenderMesh) -> Self {
+        let mut vertex_of_lane = vec![0; mesh.lanes()[0].len()];
+        for cluster in mesh.clusters() {
+            let triangles = cluster.first as usize..(cluster.first + cluster.count) as usize;
+            let lanes = &mut vertex_of_lane[cluster.first_lane as usize..][..cluster.lane_count as usize];
+            let mut count = 0;
+            for (corners, triangle) in mesh.corners()[triangles.clone()].iter().zip(&mesh.triangles()[triangles]) {
+                for (&corner, &vertex) in corners.iter().zip(triangle) {
+                    lanes[usize::from(corner)] = vertex;
+                    count = count.max(usize::from(corner) + 1);
+                }
+            }
+            // The last vertex is repeated.
+            let last = count.checked_sub(1).map_or(0, |last| lanes[last]);
+            lanes[count..].fill(last);
+        }
+        Self { sources, vertex_of_lane }
+    }
+}
+
+/// Fills `normals` with the unit normals of vertices: the means of the normals of the triangles around them, weighted by
+/// area; zero for a vertex without an area around it.
+///
+/// # Panics
+///
+/// There are more positions than normals, or a triangle has a vertex that does not exist.
+pub fn smooth_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]], normals: &mut [[f32; 3]]) {
+    normals.fill([0.0; 3]);
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|i| positions[i as usize]);
+        let doubled = cross(sub(b, a), sub(c, a));
+        for &i in triangle {
+            let sum = &mut normals[i as usize];
+            *sum = [0, 1, 2].map(|k| sum[k] + doubled[k]);
+        }
+    }
+    for normal in normals {
+        let length = dot(*normal, *normal).sqrt();
+        *normal = if length > 0.0 && length.is_finite() { normal.map(|x| x / length) } else { [0.0; 3] };
+    }
+}

@@ -1,0 +1,211 @@
+//! Elements of a model whose shape changes: skins on both MuJoCo lines, flexes on 4.x.
+
+use super::look::{chunks, span};
+use super::model::Model;
+use mujoco_sys::fields::model as fields;
+
+/// A mesh whose vertices are moved by bodies.
+#[derive(Clone, Copy, Debug)]
+pub struct SkinArrays<'a> {
+    /// Material, -1 for none.
+    pub material: i32,
+    /// Group; viewers show 0 to 2.
+    pub group: i32,
+    /// Colour and opacity, 0..=1.
+    pub rgba: &'a [f32],
+    /// Distance by which vertices are moved along their normals \[m\].
+    pub inflate: f32,
+    /// Vertices in the bind pose \[m\], in the world frame.
+    pub positions: &'a [[f32; 3]],
+    /// Texture coordinates of vertices, with v downward; empty where the skin has none.
+    pub texcoords: &'a [[f32; 2]],
+    /// Vertices of each triangle.
+    pub faces: &'a [[i32; 3]],
+    bones: [usize; 2],
+    first_vertices: &'a [i32],
+    vertex_counts: &'a [i32],
+    bind_positions: &'a [[f32; 3]],
+    bind_orientations: &'a [[f32; 4]],
+    bodies: &'a [i32],
+    vertices: &'a [i32],
+    weights: &'a [f32],
+}
+
+/// A body that moves vertices of a skin.
+#[derive(Clone, Copy, Debug)]
+pub struct Bone<'a> {
+    /// The body.
+    pub body: usize,
+    /// Position of the body in the bind pose \[m\].
+    pub position: [f32; 3],
+    /// Orientation of the body in the bind pose, wxyz.
+    pub orientation: [f32; 4],
+    /// The vertices that it moves.
+    pub vertices: &'a [i32],
+    /// The weight of the body for each of these vertices.
+    pub weights: &'a [f32],
+}
+
+impl<'a> SkinArrays<'a> {
+    /// The bodies that move its vertices.
+    pub fn bones(self) -> impl Iterator<Item = Bone<'a>> {
+        let [first, count] = self.bones;
+        (first..first + count).map(move |bone| {
+            let (vertex, vertices) = (i64::from(self.first_vertices[bone]), i64::from(self.vertex_counts[bone]));
+            Bone {
+                body: self.bodies[bone] as usize,
+                position: self.bind_positions[bone],
+                orientation: self.bind_orientations[bone],
+                vertices: span(self.vertices, vertex, vertices),
+                weights: span(self.weights, vertex, vertices),
+            }
+        })
+    }
+}
+
+/// A deformable body of points, triangles or tetrahedra (4.x).
+#[derive(Clone, Copy, Debug)]
+pub struct FlexArrays<'a> {
+    /// Number of dimensions: 1 for cables, 2 for cloth, 3 for solids.
+    pub dimensions: usize,
+    /// Material, -1 for none.
+    pub material: i32,
+    /// Group; viewers show 0 to 2.
+    pub group: i32,
+    /// Colour and opacity, 0..=1.
+    pub rgba: &'a [f32],
+    /// Radius around its elements \[m\].
+    pub radius: f64,
+    /// True if triangles are shaded flat.
+    pub flat: bool,
+    /// First vertex among those of all flexes.
+    pub first_vertex: usize,
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Vertices of each element: `dimensions` + 1 for each.
+    pub elements: &'a [i32],
+    /// Vertices of each piece of the boundary: `dimensions` for each.
+    pub shell: &'a [i32],
+    /// Texture coordinates, with v downward; empty where the flex has none.
+    pub texcoords: &'a [[f32; 2]],
+    /// Texture coordinates of the elements' vertices, as [`elements`](Self::elements).
+    pub element_texcoords: &'a [i32],
+    /// Vertices of each edge.
+    pub edges: &'a [[i32; 2]],
+}
+
+/// The model's array `name`.
+macro_rules! array {
+    ($model:expr, $name:ident) => {{
+        // SAFETY: the model is alive as long as the borrow that the caller holds, and nothing writes to a shared model.
+        unsafe { fields::$name($model.raw()) }
+    }};
+}
+
+impl Model {
+    /// A skin.
+    ///
+    /// # Panics
+    /// There is no such skin.
+    pub fn skin(&self, skin: usize) -> SkinArrays<'_> {
+        let pick = |values: &[i32]| i64::from(values[skin]);
+        let (vertex, vertices) = (pick(array!(self, skin_vertadr)), pick(array!(self, skin_vertnum)));
+        let (face, faces) = (pick(array!(self, skin_faceadr)), pick(array!(self, skin_facenum)));
+        let (bone, bones) = (pick(array!(self, skin_boneadr)), pick(array!(self, skin_bonenum)));
+        let texcoord = pick(array!(self, skin_texcoordadr));
+        SkinArrays {
+            material: array!(self, skin_matid)[skin],
+            group: array!(self, skin_group)[skin],
+            rgba: &array!(self, skin_rgba)[4 * skin..4 * skin + 4],
+            inflate: array!(self, skin_inflate)[skin],
+            positions: span(chunks(array!(self, skin_vert)), vertex, vertices),
+            texcoords: span(chunks(array!(self, skin_texcoord)), texcoord, vertices),
+            faces: span(chunks(array!(self, skin_face)), face, faces),
+            bones: [bone, bones].map(|n| usize::try_from(n).unwrap_or(0)),
+            first_vertices: array!(self, skin_bonevertadr),
+            vertex_counts: array!(self, skin_bonevertnum),
+            bind_positions: chunks(array!(self, skin_bonebindpos)),
+            bind_orientations: chunks(array!(self, skin_bonebindquat)),
+            bodies: array!(self, skin_bonebodyid),
+            vertices: array!(self, skin_bonevertid),
+            weights: array!(self, skin_bonevertweight),
+        }
+    }
+
+    /// True if a stiffness or a damping of a tendon is of higher order (4.x).
+    ///
+    /// # Panics
+    /// There is no such tendon.
+    #[cfg(mj4)]
+    pub fn tendon_has_curves(&self, tendon: usize) -> bool {
+        let order = mujoco_sys::mjNPOLY as usize;
+        let of = |values: &[f64]| values[order * tendon..order * (tendon + 1)].iter().any(|x| *x != 0.0);
+        of(array!(self, tendon_stiffnesspoly)) || of(array!(self, tendon_dampingpoly))
+    }
+
+    /// True if a stiffness or a damping of a tendon is of higher order (4.x).
+    #[cfg(not(mj4))]
+    pub fn tendon_has_curves(&self, _tendon: usize) -> bool {
+        false
+    }
+
+    /// True if there is gravity, and it is not disabled.
+    pub fn gravity_acts(&self) -> bool {
+        let disabled = self.header().opt.disableflags as u32 & mujoco_sys::mjDSBL_GRAVITY;
+        disabled == 0 && self.gravity().iter().map(|g| g * g).sum::<f64>().sqrt() > 1e-15
+    }
+
+    /// A flex; `None` on 2.2.2, which has none.
+    ///
+    /// # Panics
+    /// There is no such flex.
+    #[cfg(mj4)]
+    pub fn flex(&self, flex: usize) -> Option<FlexArrays<'_>> {
+        let pick = |values: &[i32]| i64::from(values[flex]);
+        let size = |n: i64| usize::try_from(n).unwrap_or(0);
+        let dimensions = pick(array!(self, flex_dim));
+        let (vertex, vertices) = (pick(array!(self, flex_vertadr)), pick(array!(self, flex_vertnum)));
+        let (edge, edges) = (pick(array!(self, flex_edgeadr)), pick(array!(self, flex_edgenum)));
+        let texcoord = pick(array!(self, flex_texcoordadr));
+        let data = (pick(array!(self, flex_elemdataadr)), pick(array!(self, flex_elemnum)) * (dimensions + 1));
+        let shell = (pick(array!(self, flex_shelldataadr)), pick(array!(self, flex_shellnum)) * dimensions);
+        let texcoords: &[[f32; 2]] = chunks(array!(self, flex_texcoord));
+        let begin = usize::try_from(texcoord).ok();
+        Some(FlexArrays {
+            dimensions: size(dimensions),
+            material: array!(self, flex_matid)[flex],
+            group: array!(self, flex_group)[flex],
+            rgba: &array!(self, flex_rgba)[4 * flex..4 * flex + 4],
+            radius: array!(self, flex_radius)[flex],
+            flat: super::arrays::is_set(array!(self, flex_flatskin)[flex]),
+            first_vertex: size(vertex),
+            vertices: size(vertices),
+            elements: span(array!(self, flex_elem), data.0, data.1),
+            shell: span(array!(self, flex_shell), shell.0, shell.1),
+            texcoords: begin.and_then(|begin| texcoords.get(begin..)).unwrap_or(&[]),
+            element_texcoords: span(array!(self, flex_elemtexcoord), data.0, data.1),
+            edges: span(chunks(array!(self, flex_edge)), edge, edges),
+        })
+    }
+
+    /// A flex; `None` on 2.2.2, which has none.
+    #[cfg(not(mj4))]
+    pub fn flex(&self, _flex: usize) -> Option<FlexArrays<'_>> {
+        None
+    }
+}
+
+impl super::Data {
+    /// Positions of all flexes' vertices \[m\], (nflexvert, 3); empty on 2.2.2.
+    #[cfg(mj4)]
+    pub fn flex_vertices(&self) -> &[[f64; 3]] {
+        // SAFETY: model and data are alive as long as `self`; only `&mut self` writes.
+        chunks(unsafe { mujoco_sys::fields::data::flexvert_xpos(self.model().raw(), self.raw()) })
+    }
+
+    /// Positions of all flexes' vertices \[m\], (nflexvert, 3); empty on 2.2.2.
+    #[cfg(not(mj4))]
+    pub fn flex_vertices(&self) -> &[[f64; 3]] {
+        &[]
+    }
+}

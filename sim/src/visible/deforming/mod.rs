@@ -1,0 +1,261 @@
+//! What changes its shape from frame to frame: spatial tendons, skins, flexes.
+//!
+//! Each is one or several instances of the scene: a tendon has a fixed number of capsules, of which it shows as many as its
+//! path has segments; a skin or a flex is a mesh whose vertices move. Every environment has a copy of the scene with the
+//! shapes of the moment, which is used again ([`buffers`]) as soon as no camera holds it any more.
+
+mod buffers;
+mod catenary;
+mod flex;
+mod skin;
+mod tendon;
+#[cfg(test)]
+mod tests;
+
+pub(super) use buffers::Buffers;
+
+use super::identity::Drawable;
+use super::shown::is_shown;
+use super::surface::{Surfaces, color};
+use crate::mj::{Data, Model};
+use kinetoscope_scene::shape::{Capsule, Mesh};
+use kinetoscope_scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, RenderSceneError};
+use std::sync::Arc;
+
+/// The instances of a model whose shapes change.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Deforming {
+    paths: Vec<Path>,
+    meshes: Vec<MovingMesh>,
+}
+
+/// Capsules along a line that changes.
+#[derive(Clone, Debug)]
+struct Path {
+    first: usize,
+    capsules: usize,
+    line: Line,
+}
+
+/// The line that capsules follow.
+#[derive(Clone, Debug)]
+enum Line {
+    Tendon(tendon::Tendon),
+    Cable(flex::Cable),
+}
+
+/// A mesh whose vertices move.
+#[derive(Clone, Debug)]
+struct MovingMesh {
+    instance: usize,
+    surface: Surface,
+}
+
+/// The law by which the vertices of a mesh move.
+#[derive(Clone, Debug)]
+enum Surface {
+    Skin(usize),
+    Flex(Arc<flex::Cloth>),
+}
+
+/// A piece of a path.
+struct Segment {
+    ends: [[f64; 3]; 2],
+    /// Radius \[m\].
+    width: f64,
+}
+
+/// Memory for the vertices of one mesh.
+#[derive(Debug, Default)]
+struct Scratch {
+    positions: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    /// Positions and normals of a flex's own vertices.
+    of_flex: [Vec<[f32; 3]>; 2],
+}
+
+impl Line {
+    fn segments(&self, data: &Data, each: &mut dyn FnMut(Segment)) {
+        match self {
+            Self::Tendon(tendon) => tendon.segments(data, each),
+            Self::Cable(cable) => cable.segments(data, each),
+        }
+    }
+}
+
+impl Surface {
+    fn vertices(&self, data: &Data, scratch: &mut Scratch) {
+        match self {
+            Self::Skin(skin) => skin::vertices(data, *skin, scratch),
+            Self::Flex(cloth) => cloth.vertices(data, scratch),
+        }
+    }
+}
+
+/// The elements of a model that are drawn and change their shape.
+pub(super) fn shown(model: &Model) -> Vec<Drawable> {
+    let tendons = (0..model.ntendon()).filter(|&t| {
+        let rgba = &model.tendon_rgba()[4 * t..4 * t + 4];
+        tendon::is_spatial(model, t)
+            && model.tendon_width()[t] > 0.0
+            && is_shown(model.tendon_group()[t], &color(model, rgba, model.tendon_matid()[t]))
+    });
+    let skins = (0..model.nskin()).filter(|&s| {
+        let skin = model.skin(s);
+        !skin.faces.is_empty() && is_shown(skin.group, &color(model, skin.rgba, skin.material))
+    });
+    let flexes = (0..model.nflex()).filter(|&f| {
+        let flex = model.flex(f);
+        flex.is_some_and(|flex| {
+            let drawn = flex.dimensions != 1 || flex.radius > 0.0;
+            drawn && is_shown(flex.group, &color(model, flex.rgba, flex.material))
+        })
+    });
+    tendons.map(Drawable::Tendon).chain(skins.map(Drawable::Skin)).chain(flexes.map(Drawable::Flex)).collect()
+}
+
+impl Deforming {
+    pub(super) fn is_empty(&self) -> bool {
+        self.paths.is_empty() && self.meshes.is_empty()
+    }
+
+    /// Adds the instances of an element to a scene's. `like` has all but the shape, the material and the group.
+    ///
+    /// # Errors
+    /// A size or a number of the material that cannot be drawn; nothing is added then.
+    pub(super) fn add(
+        &mut self,
+        model: &Model,
+        surfaces: &Surfaces<'_>,
+        drawable: Drawable,
+        like: &Instance,
+        instances: &mut Vec<Instance>,
+    ) -> Result<(), RenderSceneError> {
+        let instance = |shape: kinetoscope_scene::Shape, material: Material, group: i32| Instance {
+            shape,
+            material,
+            // A negative group counts as the first one, as in MuJoCo's viewers.
+            group: u8::try_from(group.clamp(0, 31)).unwrap_or(0),
+            deforms: true,
+            ..like.clone()
+        };
+        let mut path = |line: Line, capsules: usize, width: f64, material: Material, group: i32| {
+            let first = instances.len();
+            let unused = Capsule { radius: width as f32, half_length: width as f32 };
+            let hidden = Instance { visible: false, ..instance(unused.into(), material, group) };
+            hidden.validate()?;
+            instances.extend(std::iter::repeat_n(hidden, capsules));
+            self.paths.push(Path { first, capsules, line });
+            Ok(())
+        };
+        match drawable {
+            Drawable::Tendon(t) => {
+                let tendon = tendon::Tendon::of(model, t);
+                let material = surfaces.material(&model.tendon_rgba()[4 * t..4 * t + 4], model.tendon_matid()[t]);
+                let capsules = tendon.most_segments();
+                path(Line::Tendon(tendon), capsules, model.tendon_width()[t], material, model.tendon_group()[t])
+            }
+            Drawable::Skin(s) => {
+                let skin = model.skin(s);
+                let mesh = Arc::new(RenderMesh::deformable(&skin::bind_pose(&skin)));
+                let material = surfaces.material(skin.rgba, skin.material);
+                let skinned = instance(Mesh { mesh }.into(), material, skin.group);
+                skinned.validate()?;
+                self.meshes.push(MovingMesh { instance: instances.len(), surface: Surface::Skin(s) });
+                instances.push(skinned);
+                Ok(())
+            }
+            Drawable::Flex(f) => {
+                let Some(flex) = model.flex(f) else { return Ok(()) };
+                let material = surfaces.material(flex.rgba, flex.material);
+                if flex.dimensions == 1 {
+                    let cable = flex::Cable::of(f);
+                    return path(Line::Cable(cable), flex.edges.len(), flex.radius, material, flex.group);
+                }
+                let (cloth, mesh) = flex::Cloth::of(&flex);
+                let mesh = Arc::new(RenderMesh::deformable(&mesh));
+                let draped = instance(Mesh { mesh }.into(), material, flex.group);
+                draped.validate()?;
+                self.meshes.push(MovingMesh { instance: instances.len(), surface: Surface::Flex(Arc::new(cloth)) });
+                instances.push(draped);
+                Ok(())
+            }
+        }
+    }
+
+    /// Moves the capsules of paths to where they are in `data`. Meshes are in the world frame.
+    pub(super) fn place(&self, data: &Data, poses: &mut [PoseF32]) {
+        for path in &self.paths {
+            let poses = &mut poses[path.first..path.first + path.capsules];
+            let mut used = 0;
+            path.line.segments(data, &mut |segment| {
+                if let Some(pose) = poses.get_mut(used) {
+                    *pose = segment.pose();
+                }
+                used += 1;
+            });
+            // A capsule that comes back moves from the end of the path.
+            if let Some(last) = used.checked_sub(1).and_then(|last| poses.get(last)).copied() {
+                poses[used.min(path.capsules)..].fill(last);
+            }
+        }
+    }
+
+    /// Gives a scene the shapes of `data`.
+    fn shape(&self, data: &Data, scene: &mut RenderScene, scratch: &mut Scratch) {
+        for path in &self.paths {
+            let mut used = 0;
+            path.line.segments(data, &mut |segment| {
+                if used < path.capsules {
+                    scene.set_shape(path.first + used, segment.capsule().into(), true);
+                }
+                used += 1;
+            });
+            for unused in used..path.capsules {
+                let index = path.first + unused;
+                let shape = scene.instances()[index].shape.clone();
+                scene.set_shape(index, shape, false);
+            }
+        }
+        for MovingMesh { instance, surface } in &self.meshes {
+            surface.vertices(data, scratch);
+            let Scratch { positions, normals, .. } = scratch;
+            // An environment that diverged keeps its last shape; the poses of its bodies say that it cannot be drawn.
+            if positions.iter().flatten().all(|x| x.is_finite()) {
+                scene.deform(*instance, |mesh| mesh.deform(positions, normals));
+            }
+        }
+    }
+}
+
+impl Segment {
+    /// World from the capsule's frame: its axis is turned from z by the smallest angle.
+    fn pose(&self) -> PoseF32 {
+        let [from, to] = self.ends;
+        let along = [0, 1, 2].map(|k| to[k] - from[k]);
+        let length = along.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let [x, y, z] = if length > 0.0 { along.map(|a| a / length) } else { [0.0, 0.0, 1.0] };
+        let rotation = if z > -1.0 + 1e-12 {
+            let s = 1.0 / (1.0 + z);
+            [[1.0 - x * x * s, -x * y * s, x], [-x * y * s, 1.0 - y * y * s, y], [-x, -y, z]]
+        } else if z.is_nan() {
+            [[f64::NAN; 3]; 3]
+        } else {
+            [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
+        };
+        let middle = [0, 1, 2].map(|k| 0.5 * (from[k] + to[k]));
+        PoseF32 { rotation: rotation.map(|row| row.map(|x| x as f32)), translation: middle.map(|x| x as f32) }
+    }
+
+    /// The capsule in its own frame. One without a length is a ball, or nearly.
+    fn capsule(&self) -> Capsule {
+        let [from, to] = self.ends;
+        let length = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
+        let radius = self.width as f32;
+        let half = (0.5 * length) as f32;
+        let shortest = 1e-6 * radius;
+        // Where it is says that it cannot be drawn, if it cannot.
+        Capsule { radius, half_length: if half.is_finite() { half.max(shortest) } else { shortest } }
+    }
+}

@@ -1,0 +1,68 @@
+//! Segments of spatial tendons, as MuJoCo's viewers draw them.
+//!
+//! Source: `addSpatialTendonGeoms` of `engine_vis_visualize.c`. Two things of it are left out: a tendon without a material and
+//! a colour of its own stays grey at its limit, and no colour shows islands or activations.
+
+use super::{Segment, catenary};
+use crate::mj::{self, Data, Model};
+
+/// A tendon, and the most that its path can be.
+#[derive(Clone, Debug)]
+pub(super) struct Tendon {
+    tendon: usize,
+    /// Points of the longest path.
+    most_points: usize,
+    /// True if it hangs like a string where it is slack.
+    may_hang: bool,
+}
+
+/// True if a tendon has a path in space: others are sums of joint positions.
+pub(super) fn is_spatial(model: &Model, tendon: usize) -> bool {
+    let first = model.tendon_adr()[tendon] as usize;
+    model.wrap_type().get(first).is_some_and(|kind| *kind as u32 != mj::mjWRAP_JOINT)
+}
+
+/// The geom, site or pulley of a point: MuJoCo's numbers of those that are no geom.
+const PULLEY: i32 = -2;
+
+impl Tendon {
+    pub(super) fn of(model: &Model, tendon: usize) -> Self {
+        // Every element of a path gives two points at most: those where the path meets a geom.
+        Self {
+            tendon,
+            most_points: 2 * model.tendon_num()[tendon] as usize,
+            may_hang: catenary::may_hang(model, tendon),
+        }
+    }
+
+    /// Number of segments of the longest path.
+    pub(super) fn most_segments(&self) -> usize {
+        let hanging = if self.may_hang { catenary::SEGMENTS } else { 0 };
+        self.most_points.saturating_sub(1).max(hanging)
+    }
+
+    /// The segments of the path in `data`, in order.
+    pub(super) fn segments(&self, data: &Data, each: &mut dyn FnMut(Segment)) {
+        let model = data.model();
+        let width = model.tendon_width()[self.tendon];
+        let first = data.ten_wrapadr()[self.tendon];
+        let count = data.ten_wrapnum()[self.tendon];
+        let (Ok(first), Ok(count)) = (usize::try_from(first), usize::try_from(count)) else { return };
+        let points = data.wrap_xpos().as_chunks::<3>().0.get(first..first + count).unwrap_or(&[]);
+        let objects = data.wrap_obj().get(first..first + count).unwrap_or(&[]);
+        if self.may_hang
+            && let Some(length) = catenary::slack(data, self.tendon)
+            && let [from, to] = *points
+        {
+            return catenary::segments([from, to], model.gravity(), length, &mut |ends| each(Segment { ends, width }));
+        }
+        for (ends, objects) in points.array_windows::<2>().zip(objects.array_windows::<2>()) {
+            if objects.contains(&PULLEY) {
+                continue;
+            }
+            // Thinner inside of what the path is wrapped around.
+            let inside = objects.iter().all(|object| *object >= 0);
+            each(Segment { ends: *ends, width: if inside { 0.5 * width } else { width } });
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Tendons, skins and flexes against closed forms.
+
+use super::super::Visible;
+use crate::mj::{self, Data, Model};
+use kinetoscope_scene::{Instance, PoseF32, RenderScene, Shape};
+use std::sync::Arc;
+
+/// A model and its state, moved to `qpos`.
+fn state(mjcf: &str, qpos: &[f64]) -> (Model, Data) {
+    let model = mj::compile(mjcf, &[]).expect("compiles").into_model();
+    let mut data = Data::new(&model).expect("data");
+    data.qpos_mut().copy_from_slice(qpos);
+    data.forward().expect("forward");
+    (model, data)
+}
+
+/// The scene of a state, with its poses.
+fn seen(visible: &Visible, data: &Data) -> (Arc<RenderScene>, Vec<PoseF32>) {
+    let scene = visible.scene_at(data);
+    let (mut poses, mut lights) = (vec![PoseF32::IDENTITY; scene.instances().len()], scene.lights.clone());
+    visible.read(data, &mut poses, &mut lights);
+    (scene, poses)
+}
+
+fn is_shown(instance: &Instance) -> bool {
+    instance.deforms && instance.visible
+}
+
+/// Ends and radii of the capsules that are shown.
+fn capsules(visible: &Visible, data: &Data) -> Vec<([[f64; 3]; 2], f64)> {
+    let (scene, poses) = seen(visible, data);
+    let shown = scene.instances().iter().zip(&poses).filter(|(instance, _)| is_shown(instance));
+    shown
+        .map(|(instance, pose)| {
+            let Shape::Capsule(capsule) = &instance.shape else { panic!("{:?} is no capsule", instance.shape) };
+            let end = |z: f32| pose.apply([0.0, 0.0, z]).map(f64::from);
+            ([end(-capsule.half_length), end(capsule.half_length)], f64::from(capsule.radius))
+        })
+        .collect()
+}
+
+fn near(found: &[([[f64; 3]; 2], f64)], expected: &[([[f64; 3]; 2], f64)]) {
+    let numbers = |list: &[([[f64; 3]; 2], f64)]| -> Vec<f64> {
+        list.iter()
+            .flat_map(|(ends, radius)| ends.as_flattened().iter().copied().chain([*radius]).collect::<Vec<_>>())
+            .collect()
+    };
+    let (a, b) = (numbers(found), numbers(expected));
+    // Single precision, of lengths below 2 m.
+    assert!(a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}, not {expected:?}");
+}
+
+const PATHS: &str = r#"<mujoco><compiler autolimits="true"/><worldbody>
+    <site name="left" pos="-1 0 0"/><site name="right" pos="1 0 0"/>
+    <geom name="drum" type="cylinder" size="0.5 0.2" zaxis="0 1 0"/>
+    <site name="above" pos="0 0 1"/>
+    <body name="load"><joint name="lift" type="slide" axis="0 0 1"/><geom size="0.1" pos="0 0 -1"/>
+      <site name="hook" pos="0 0 -1"/></body>
+    <body name="free" pos="2 0 0"><joint name="up" type="slide" axis="0 0 1"/><geom size="0.01"/><site name="ball"/></body>
+  </worldbody><tendon>
+    <spatial name="over" width="0.02" rgba="1 0 0 1"><site site="left"/><geom geom="drum" sidesite="above"/>
+      <site site="right"/></spatial>
+    <spatial name="parts" width="0.01"><site site="left"/><site site="above"/><pulley divisor="2"/><site site="above"/>
+      <site site="hook"/></spatial>
+    <spatial name="unseen" group="3"><site site="left"/><site site="hook"/></spatial>
+    <spatial name="clear" rgba="1 0 0 0"><site site="left"/><site site="hook"/></spatial>
+    <spatial name="string" width="0.005" range="0 2"><site site="right"/><site site="ball"/></spatial>
+    <fixed name="sum"><joint joint="lift" coef="1"/></fixed></tendon></mujoco>"#;
+
+/// A tendon around a cylinder touches it where a tangent does: at 60 degrees from the axis to a point two radii away; between
+/// these points it is half as wide. A pulley has no segment. Tendons of group 3 and clear ones are not drawn, nor sums of
+/// joint positions. A taut string is straight.
+///
+/// Root cause once: cameras drew geoms only.
+#[test]
+fn tendons() {
+    // The string from x = 1 to x = 2 is 2 m long.
+    let rise = 3.0_f64.sqrt();
+    let (model, data) = state(PATHS, &[0.25, rise]);
+    let visible = Visible::of_model(&model);
+    // The point at 60 degrees from the x axis.
+    let tangent = |side: f64| [side * 0.25, 0.0, 0.25 * 3.0_f64.sqrt()];
+    let (left, right, above, hook) = ([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -0.75]);
+    let (on, off) = (tangent(-1.0), tangent(1.0));
+    let over = [([left, on], 0.02), ([on, off], 0.01), ([off, right], 0.02)];
+    let parts = [([left, above], 0.01), ([above, hook], 0.01)];
+    let string = [([right, [2.0, 0.0, rise]], 0.005)];
+    near(&capsules(&visible, &data), &[&over[..], &parts, &string].concat());
+    let (scene, _) = seen(&visible, &data);
+    let names = |scene: &RenderScene| {
+        let mut names: Vec<String> =
+            scene.instances().iter().filter(|i| i.deforms).map(|i| i.name.to_string()).collect();
+        names.dedup();
+        names
+    };
+    assert_eq!(names(&scene), ["over", "parts", "string"]);
+    let red = scene.instances().iter().find(|i| i.deforms).expect("a tendon").material.rgba;
+    assert_eq!(red, [1.0, 0.0, 0.0, 1.0]);
+    // The scene of all environments shows none.
+    assert!(!visible.scene().instances().iter().any(is_shown), "capsules without a place are hidden");
+}
+
+/// A string of 2 m between two points that are 1 m apart at the same height hangs as y = a cosh(x / a), where 2 a sinh(1 / 2a)
+/// is 2; one that is lifted on one side keeps its length; one between points above each other hangs straight down. Every
+/// segment's ends lie on the curve.
+#[test]
+fn slack_strings() {
+    let string = |qpos: f64| {
+        let (model, data) = state(PATHS, &[0.0, qpos]);
+        let all = capsules(&Visible::of_model(&model), &data);
+        all.into_iter().filter(|(_, radius)| (radius - 0.005).abs() < 1e-6).map(|(ends, _)| ends).collect::<Vec<_>>()
+    };
+    let level = string(0.0);
+    // By bisection.
+    let (mut low, mut high) = (0.1_f64, 10.0_f64);
+    for _ in 0..100 {
+        let a = 0.5 * (low + high);
+        if 2.0 * a * (0.5 / a).sinh() > 2.0 { low = a } else { high = a }
+    }
+    let height = |x: f64| low * (((x - 1.5) / low).cosh() - (0.5 / low).cosh());
+    assert_eq!(level.len(), super::catenary::SEGMENTS);
+    for [x, y, z] in level.iter().flatten() {
+        assert!(y.abs() < 1e-6 && (z - height(*x)).abs() < 2e-6, "({x}, {z}) is not on the curve: {}", height(*x));
+    }
+    let length = |pieces: &[[[f64; 3]; 2]]| -> f64 {
+        pieces.iter().map(|[a, b]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()).sum()
+    };
+    for (rise, pieces) in [0.0, 0.5, 1.5, -1.0].map(|rise| (rise, string(rise))) {
+        let ends = [pieces[0][0], pieces[pieces.len() - 1][1]];
+        near(&[(ends, 0.0)], &[([[1.0, 0.0, 0.0], [2.0, 0.0, rise]], 0.0)]);
+        // A polygon in the curve is a little shorter.
+        let length = length(&pieces);
+        assert!((1.99..2.0001).contains(&length), "{rise}: {length}");
+    }
+    let mut steep = Vec::new();
+    let ends = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+    super::catenary::segments(ends, [0.0, 0.0, -9.81], 3.0, &mut |ends| steep.push((ends, 0.0)));
+    near(&steep, &[([ends[0], [0.0, 0.0, -1.0]], 0.0), ([[0.0, 0.0, -1.0], ends[1]], 0.0)]);
+    // The control: a taut string is straight.
+    assert_eq!(string(3.0).len(), 1);
+}
+
+/// Two bodies, of which the second turns about -y at x = 1, and a strip over both.
+const STRIP: &str = r#"<mujoco><compiler angle="radian"/><worldbody>
+    <body name="first"><geom size="0.1"/>
+      <body name="second" pos="1 0 0"><joint type="hinge" axis="0 -1 0"/><geom size="0.1"/></body></body>
+  </worldbody><PLACE><skin name="strip" rgba="0 1 0 1" inflate="INFLATE"
+      vertex="0 -1 0  0 1 0  1 -1 0  1 1 0  2 -1 0  2 1 0"
+      face="0 2 1  1 2 3  2 4 3  3 4 5">
+    <bone body="first" bindpos="0 0 0" bindquat="1 0 0 0" vertid="0 1 2 3" vertweight="1 1 0.5 0.5"/>
+    <bone body="second" bindpos="1 0 0" bindquat="1 0 0 0" vertid="2 3 4 5" vertweight="0.5 0.5 1 1"/>
+  </skin></PLACE></mujoco>"#;
+
+/// A skin over two bones: vertices of one bone go with it; those in the joint stay, since both bones put them there. Inflated,
+/// the ends are moved along the normals of their triangles.
+///
+/// Root cause once: cameras drew geoms only.
+#[test]
+fn skin_of_two_bones() {
+    // Of each vertex at y = -1, x and z.
+    let line = |inflate: &str, angle: f64| {
+        let place = if mj::TARGET == mj::Target::V4 { "deformable" } else { "asset" };
+        let (model, data) = state(&STRIP.replace("PLACE", place).replace("INFLATE", inflate), &[angle]);
+        let (scene, poses) = seen(&Visible::of_model(&model), &data);
+        let index = scene.instances().iter().position(is_shown).expect("a skin");
+        assert_eq!((poses[index], &*scene.instances()[index].name), (PoseF32::IDENTITY, "strip"));
+        let mesh = scene.instances()[index].mesh().expect("a mesh");
+        assert_eq!(mesh.positions().len(), 6);
+        let mut list: Vec<_> = mesh.positions().iter().filter(|p| p[1] < 0.0).map(|p| [p[0], p[2]]).collect();
+        list.sort_by(|a, b| (a[0] + a[1]).total_cmp(&(b[0] + b[1])));
+        list
+    };
+    let close = |found: &[[f32; 2]], expected: &[[f32; 2]]| {
+        let far = found.iter().flatten().zip(expected.as_flattened()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(found.len() == expected.len() && far < 1e-6, "{found:?}, not {expected:?}");
+    };
+    let up = std::f64::consts::FRAC_PI_2;
+    close(&line("0", 0.0), &[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]);
+    // The second body turns its x axis to z.
+    close(&line("0", up), &[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+    let inflated = line("0.1", up);
+    close(&[inflated[0], inflated[2]], &[[0.0, 0.1], [0.9, 1.0]]);
+}
+
+/// Copies of a scene are used again when nothing holds them, and not before; those of environments with looks of their own
+/// have these.
+#[test]
+fn memory_of_scenes() {
+    use kinetoscope_scene::OwnScene;
+    let (model, mut data) = state(PATHS, &[0.0, 2.0]);
+    let visible = Visible::of_model(&model);
+    let none = OwnScene(None);
+    let mut shape = |z: f64, held: &mut OwnScene, own: &OwnScene| {
+        data.qpos_mut()[0] = z;
+        data.forward().expect("forward");
+        visible.shape(&data, (3, own), held);
+        held.0.clone().expect("a scene")
+    };
+    let mut now = OwnScene(None);
+    let first = Arc::as_ptr(&shape(0.0, &mut now, &none));
+    assert_eq!(Arc::as_ptr(&shape(0.1, &mut now, &none)), first, "used again");
+    let held = shape(0.2, &mut now, &none);
+    let second = shape(0.3, &mut now, &none);
+    assert!(!Arc::ptr_eq(&held, &second), "a camera still shows it");
+    let half_length = |scene: &RenderScene| {
+        let hook = scene.instances().iter().rfind(|i| is_shown(i) && &*i.name == "parts").expect("parts");
+        let Shape::Capsule(capsule) = &hook.shape else { panic!("no capsule") };
+        2.0 * capsule.half_length
+    };
+    // From z = 1 to the hook.
+    assert!((half_length(&held) - 1.8).abs() < 1e-6 && (half_length(&second) - 1.7).abs() < 1e-6);
+    let own = OwnScene(Some(Arc::new((**visible.scene()).clone())));
+    let own_copy = shape(0.4, &mut now, &own);
+    assert!(!Arc::ptr_eq(&own_copy, &second) && (half_length(&own_copy) - 1.6).abs() < 1e-6);
+}
