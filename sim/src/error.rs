@@ -11,6 +11,7 @@ use crate::named::Named;
 use crate::pattern::PatternError;
 use crate::randomization::RandomizationError;
 use crate::shard::ShardError;
+use crate::shape_inertia::ShapeInertiaError;
 use crate::snapshot::SnapshotError;
 use crate::source::Source;
 use crate::urdf::UrdfError;
@@ -493,4 +494,15 @@ fn candidates_sentence(candidates: &[String]) -> String {
     }
     let names: Vec<String> = candidates.iter().map(|c| format!("{c:?}")).collect();
     format!("known are {}", names.join(", "))
+}
+
+impl From<ShapeInertiaError> for Error {
+    fn from(error: ShapeInertiaError) -> Self {
+        match error {
+            ShapeInertiaError::Density { value, expected } => {
+                Self::Config { field: "missing_inertia", value: value.to_string(), expected }
+            }
+            ShapeInertiaError::Mesh { at, link, error } => Self::CollisionMesh { at, link, error },
+        }
+    }
 }

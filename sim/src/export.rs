@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::mj::Target;
 use crate::mjcf::document::{Integrator, Keyframe, MaterialAsset, MeshAsset, MeshContent, Mjcf, TextureAsset};
 use crate::mjcf::part::MjcfPart;
-use crate::mjcf::robot::{MeshKey, Purpose, VisualAssets};
+use crate::mjcf::robot::{Purpose, VisualAssets};
 use crate::mjcf::{scene as world, write};
 use crate::objects::robot::RobotData;
 use crate::simulation_cfg::SimulationManagerCfg;

@@ -34,6 +34,7 @@ mod light_cfg;
 mod listing;
 mod look;
 mod manager;
+pub mod mesh_key;
 pub mod mj;
 pub mod mjcf;
 mod named;

@@ -3,9 +3,9 @@
 use crate::body_inertia::{RigidBody, rigid_bodies};
 use crate::description::{Geometry, Inertial, JointKind, Link, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::error::{Error, Result};
 use crate::inertia::{InertiaFault, RigidInertia};
-use crate::mjcf::robot::MeshKey;
+use crate::mesh_key::MeshKey;
+use crate::source::Source;
 use crate::urdf::MissingInertia;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::mesh::{HullCache, HullCfg, Solid, TriMesh};
@@ -21,6 +21,31 @@ const FAR: f64 = 10.0;
 /// Shapes in which the mass would have more than this density \[kg/m³\] are placeholders, such as boxes of 1 mm: osmium has
 /// 22 600.
 const DENSEST: f64 = 25_000.0;
+
+/// An error of mass properties that are computed from shapes.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ShapeInertiaError {
+    /// The density of the configuration is not positive and finite.
+    #[error("missing_inertia is {value}; {expected}")]
+    Density {
+        /// The density \[kg/m³\].
+        value: f64,
+        /// Accepted values.
+        expected: &'static str,
+    },
+    /// A collision mesh cannot be read or has no hull.
+    #[error("{at}: link {link:?}: {error}")]
+    Mesh {
+        /// Place of the collision element.
+        at: Source,
+        /// Name of the link.
+        link: String,
+        /// Fault of the file.
+        #[source]
+        error: Box<kinetoscope_scene::mesh::MeshError>,
+    },
+}
 
 /// Convex hulls of mesh files, each computed once.
 #[derive(Debug)]
@@ -40,7 +65,7 @@ impl<'c> Hulls<'c> {
     ///
     /// # Errors
     /// A mesh cannot be read or has no hull.
-    pub(crate) fn of_collisions(mut self, description: &RobotDescription) -> Result<BTreeMap<MeshKey, TriMesh>> {
+    pub(crate) fn of_collisions(mut self, description: &RobotDescription) -> Result<BTreeMap<MeshKey, TriMesh>, ShapeInertiaError> {
         let mut hulls = BTreeMap::new();
         for link in &description.links {
             for collision in &link.collisions {
@@ -53,7 +78,7 @@ impl<'c> Hulls<'c> {
                     Some(hull) => hull,
                     None => self.cache.hull_of_file(path, (*scale).into(), self.cfg).map_err(|error| {
                         let (at, link) = (collision.source.clone(), link.name.clone());
-                        Error::CollisionMesh { at, link, error: Box::new(error) }
+                        ShapeInertiaError::Mesh { at, link, error: Box::new(error) }
                     })?,
                 };
                 hulls.insert(key, hull);
@@ -84,12 +109,12 @@ pub(crate) fn complete(
     floating_base: bool,
     hulls: &mut Hulls<'_>,
     diagnostics: &mut Vec<Diagnostic>,
-) -> Result<()> {
+) -> Result<(), ShapeInertiaError> {
     if let MissingInertia::Density(density) = missing
         && !(density.is_finite() && density > 0.0)
     {
         let expected = "a density must be positive and finite, in kg/m³; or take MissingInertia::Minimal";
-        return Err(Error::Config { field: "missing_inertia", value: density.to_string(), expected });
+        return Err(ShapeInertiaError::Density { value: density, expected });
     }
     for link in &mut description.links {
         complete_partial(link, missing, hulls, diagnostics);

@@ -1,5 +1,6 @@
 //! A robot as MJCF bodies: fixed joints fused, inertias in principal axes, one actuator per driven joint.
 
+use crate::mesh_key::MeshKey;
 use super::document::{
     Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Integrator, Joint, JointEquality, JointType,
     MaterialAsset, MeshAsset, MeshContent, Mjcf, Shape, Site,
@@ -50,27 +51,6 @@ pub(crate) struct VisualPart {
     pub mesh: String,
     /// Name of the material asset, where the mesh file gives one.
     pub material: Option<String>,
-}
-
-/// A mesh file at a scale.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct MeshKey {
-    /// The file.
-    pub path: PathBuf,
-    /// Bits of the scale.
-    scale: [u64; 3],
-}
-
-impl MeshKey {
-    /// The key of `path` at `scale`.
-    pub(crate) fn new(path: &Path, scale: &Vector3<f64>) -> Self {
-        Self { path: path.to_path_buf(), scale: [scale.x.to_bits(), scale.y.to_bits(), scale.z.to_bits()] }
-    }
-
-    /// The scale.
-    pub(crate) fn scale(&self) -> [f64; 3] {
-        self.scale.map(f64::from_bits)
-    }
 }
 
 /// How a robot enters the document.

@@ -9,7 +9,7 @@ use crate::compile::Simulation;
 use crate::diagnostic::Diagnostic;
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
-use crate::mjcf::robot::MeshKey;
+use crate::mesh_key::MeshKey;
 use crate::objects::free_body::{FreeBody, FreeBodyMut};
 use crate::objects::robot::check_pose;
 use crate::sensor_list::SensorList;

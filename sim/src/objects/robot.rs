@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::manager::EnvId;
 use crate::mj;
 use crate::mjcf::document::Integrator;
-use crate::mjcf::robot::MeshKey;
+use crate::mesh_key::MeshKey;
 use crate::mjcf::robot_file::{Loading, RobotFile, RobotFileError};
 use crate::named::Named;
 use crate::objects::free_body::{FreeBody, FreeBodyMut, body_pose};

@@ -3,7 +3,7 @@
 use super::Part;
 use crate::description::{Geometry, Visual};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::mjcf::robot::MeshKey;
+use crate::mesh_key::MeshKey;
 use crate::objects::rigid_object::RigidObjectData;
 use crate::objects::robot::RobotData;
 use crate::source::Source;
