@@ -223,7 +223,7 @@ fn report(
         contacts.body_names().iter().enumerate().map(|(b, name)| (name.clone(), json!(body(b)))).collect()
     };
     Ok(json!({
-        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": sim.num_envs(),
         "steps": steps,
         "dt": dt,

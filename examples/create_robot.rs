@@ -90,7 +90,7 @@ fn run(args: &Args) -> launcher::Result {
     recording.finish(&mut sim)?;
     args.launcher.screenshot(&mut sim, "create_robot.png")?;
     args.launcher.write_report(&json!({
-        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": sim.num_envs(),
         "dof": dof,
         "joint_names": sim.robot(robot).joint_names(),
@@ -182,6 +182,6 @@ fn print_table(phases: &[Value], sim: &SimulationManager, steps: u64, rate: f64)
         "\n{steps} steps x {} environments on {} threads with MuJoCo {}: {rate:.0} environment steps per second\n",
         sim.num_envs(),
         sim.threads(),
-        kinetoscope::sim::mj::version_string(),
+        kinetoscope::mujoco::version_string(),
     );
 }

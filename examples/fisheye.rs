@@ -102,7 +102,7 @@ fn run(args: &Args) -> launcher::Result {
     picture::write_png(&all, &tile(&pictures))?;
     println!("{} pictures, side by side in {}", pictures.len(), all.display());
     args.launcher.write_report(&json!({
-        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": sim.num_envs(),
         "threads": sim.threads(),
         "renderer": renderer,

@@ -117,7 +117,7 @@ fn run(args: &Args) -> launcher::Result {
     });
     recording.finish(&mut sim)?;
     args.launcher.write_report(&json!({
-        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": sim.num_envs(),
         "steps": step,
         "threads": sim.threads(),

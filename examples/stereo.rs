@@ -111,7 +111,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("pixels from the left one's, for 9 of 10 points at most");
     println!("Written to {}: {}", out.display(), files.join(", "));
     args.launcher.write_report(&json!({
-        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": sim.num_envs(),
         "steps": step,
         "threads": sim.threads(),

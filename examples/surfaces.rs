@@ -133,7 +133,7 @@ fn run(args: &Args) -> launcher::Result {
         println!("This renderer draws glass and water opaque: --renderer rt follows light through them.");
     }
     args.launcher.write_report(&json!({
-        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": sim.num_envs(),
         "threads": sim.threads(),
         "renderer": renderer,

@@ -143,7 +143,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         println!("Curve and picture written to {}", out.display());
     }
     args.launcher.write_report(&json!({
-        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": num_envs,
         "seed": args.launcher.seed,
         "iterations": rows.len(),

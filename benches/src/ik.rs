@@ -6,11 +6,11 @@
 use crate::interleave::{Plan, Side, measure, median};
 use crate::row::Row;
 use crate::{Outcome, Settings};
+use kinetoscope::mujoco::{Data, ObjectKind};
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
 use kinetoscope::scene::pose::from_row;
-use kinetoscope::sim::mj::{Data, ObjectKind};
 use nalgebra::{Matrix6, Vector6};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

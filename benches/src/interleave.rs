@@ -9,7 +9,7 @@
 //! therefore done [in both orders](in_both_orders).
 
 use crate::{Outcome, foreign};
-use kinetoscope::sim::mj::release_freed;
+use kinetoscope::mujoco::release_freed;
 use std::time::{Duration, Instant};
 
 /// One program that takes part. All sides do the same work.

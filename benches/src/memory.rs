@@ -4,7 +4,7 @@
 use crate::models::{Case, drive_sr5, sr5};
 use crate::row::Row;
 use crate::{Outcome, Settings};
-use kinetoscope::sim::mj::Data;
+use kinetoscope::mujoco::Data;
 use std::process::Command;
 
 const FEW: usize = 64;

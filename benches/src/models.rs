@@ -2,12 +2,14 @@
 
 use crate::Outcome;
 use kinetoscope::exec::ThreadPool;
+use kinetoscope::mujoco as mj;
+use kinetoscope::mujoco;
+use kinetoscope::mujoco::{Data, Model};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::drive::table::DriveTable;
-use kinetoscope::sim::mj::{self, Data, Model};
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 use std::sync::Arc;

@@ -7,9 +7,9 @@ use crate::interleave::{Plan, Side, measure};
 use crate::models::sr5;
 use crate::row::Row;
 use crate::{Outcome, Settings};
+use kinetoscope::mujoco::{Editor, Model};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
-use kinetoscope::sim::mj::{Editor, Model};
 use std::time::{Duration, Instant};
 
 const ENVS: usize = 64;

@@ -13,6 +13,9 @@
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::row::Row;
 use crate::{Outcome, Settings};
+use kinetoscope::mujoco as mj;
+use kinetoscope::mujoco;
+use kinetoscope::mujoco::{Data, TARGET, Target};
 use kinetoscope::ndarray::{Array2, Array3, Axis};
 use kinetoscope::scene::mesh::write_binary_stl;
 use kinetoscope::scene::shape::HeightField;
@@ -21,7 +24,6 @@ use kinetoscope::sensors::ray::pattern::{Custom, Grid};
 use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCfg, RayPattern};
 use kinetoscope::sensors::{Sensor, SensorCfg, SensorContext};
 use kinetoscope::sim::Visible;
-use kinetoscope::sim::mj::{self, Data, TARGET, Target};
 use std::time::{Duration, Instant};
 
 const ENVS: usize = 64;

@@ -1,7 +1,7 @@
 //! A rival in Python: a process that is told what to do over pipes (see `rivals/*.py`), one line each way.
 
 use crate::Outcome;
-use kinetoscope::sim::mj::{TARGET, Target};
+use kinetoscope::mujoco::{TARGET, Target};
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! One comparison: what is written as JSON and shown as a table.
 
-use kinetoscope::sim::mj;
+use kinetoscope::mujoco as mj;
 use serde::Serialize;
 use std::fmt::Write as _;
 

@@ -7,8 +7,8 @@ use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{Case, Loop, STEPS};
 use crate::row::Row;
 use crate::{Outcome, Settings};
+use kinetoscope::mujoco::Data;
 use kinetoscope::sim::batch::Batch;
-use kinetoscope::sim::mj::Data;
 use std::time::{Duration, Instant};
 
 const ENVS: [usize; 2] = [64, 1024];

@@ -9,13 +9,13 @@ use crate::camera::{Scene, by_rays};
 use crate::interleave::{Plan, Side, Times, measure};
 use crate::row::Row;
 use crate::{Outcome, Settings};
+use kinetoscope::mujoco::release_freed;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::shape::Plane;
 use kinetoscope::scene::{Instance, Light, LightKind, Material, PoseF32, RenderScene};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot};
 use kinetoscope::sensors::ray::{RayAssets, RayTargets};
 use kinetoscope::sensors::visibility::View;
-use kinetoscope::sim::mj::release_freed;
 use std::time::{Duration, Instant};
 
 const SIZE: [usize; 2] = [640, 480];

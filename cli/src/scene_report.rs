@@ -1,9 +1,9 @@
 //! Reports of `check` about scenes: MJCF files that are no robot, and scene files.
 
 use crate::Result;
+use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
-use kinetoscope::sim::mj;
 use kinetoscope::sim::objects::mjcf_part::MjcfPart;
 use serde_json::{Value, json};
 use std::fmt;

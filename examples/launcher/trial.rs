@@ -72,7 +72,7 @@ pub(crate) fn conclude(launcher: &Launcher, sim: &mut SimulationManager, count: 
         stage::write(sim, &[], eye, target, &out.join(name))?;
     }
     launcher.write_report(&json!({
-        "mujoco_version": kinetoscope::sim::mj::version_string(),
+        "mujoco_version": kinetoscope::mujoco::version_string(),
         "num_envs": sim.num_envs(),
         "steps": steps,
         (setting.0): setting.1,

@@ -125,7 +125,7 @@ pub(crate) fn about(streams: &[Stream], masks: &[MaskId], dt: f64) -> Value {
     json!({
         "recording": 1,
         "physics_dt": dt,
-        "mujoco_version": kinetoscope_sim::mj::version_string(),
+        "mujoco_version": kinetoscope_mujoco::version_string(),
         "mask_ids": masks.iter().map(mask).collect::<Vec<_>>(),
         "streams": streams.iter().map(stream).collect::<Vec<_>>(),
     })

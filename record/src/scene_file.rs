@@ -6,7 +6,7 @@
 
 use crate::error::{RecordError, Result};
 use crate::zip;
-use kinetoscope_sim::mj::{TARGET, Target};
+use kinetoscope_mujoco::{TARGET, Target};
 use kinetoscope_sim::{
     Diagnostic, DiagnosticKind, GroundCfg, MjcfCfg, MjcfId, SimulationManager, SimulationManagerCfg,
 };

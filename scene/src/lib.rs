@@ -16,6 +16,7 @@ pub mod pose_f64;
 pub mod random;
 pub mod render_scene;
 pub mod shape;
+pub mod source;
 pub mod state;
 pub mod terrain;
 

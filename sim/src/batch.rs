@@ -7,8 +7,8 @@
 use crate::capture::Capture;
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::Env;
-use crate::mj::{EngineError, Model};
 use kinetoscope_exec::ThreadPool;
+use kinetoscope_mujoco::{EngineError, Model};
 use ndarray::{Array2, Array3, Axis, aview1};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -403,7 +403,7 @@ impl Chunks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mj;
+    use kinetoscope_mujoco as mj;
 
     const PENDULUM: &str = r#"<mujoco><worldbody><body><joint name="j" type="hinge" axis="0 1 0"/>
         <geom type="capsule" fromto="0 0 0 1 0 0" size="0.1"/></body></worldbody></mujoco>"#;

@@ -1,8 +1,6 @@
 //! What was added to a simulation, in the order in which it was added.
 
-use crate::description::JointKind;
 use crate::error::{Error, Result};
-use crate::mj::Asset;
 use crate::mjcf::robot::RobotLayout;
 use crate::mjcf::robot_file::RobotFile;
 use crate::objects::mjcf_part::MjcfData;
@@ -13,6 +11,8 @@ use crate::objects::terrain::Terrain;
 use crate::objects::weld::WeldData;
 use crate::pattern;
 use crate::visible::Surfaces;
+use kinetoscope_mujoco::Asset;
+use kinetoscope_robot::description::JointKind;
 use kinetoscope_sensors::EngineSensor;
 use std::sync::Arc;
 

@@ -12,10 +12,12 @@
 
 use crate::capture::{Capture, Solved};
 use crate::drive::table::{DriveState, DriveTable};
-use crate::mj::{
-    self, Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts, Weld,
-};
 use crate::wrenches::Wrenches;
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco;
+use kinetoscope_mujoco::{
+    Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts, Weld,
+};
 use kinetoscope_scene::state::Contact;
 use std::cell::Cell;
 use std::sync::Arc;

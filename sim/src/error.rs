@@ -2,8 +2,6 @@
 
 use crate::batch::BatchError;
 use crate::drive::plan::PlanError;
-use crate::kinematics::KinematicsError;
-use crate::mj::{CompileError, EngineError, LoadError, VersionError};
 use crate::mjcf::part::PartError;
 use crate::mjcf::robot::EmitError;
 use crate::mjcf::robot_file::RobotFileError;
@@ -11,10 +9,12 @@ use crate::named::Named;
 use crate::pattern::PatternError;
 use crate::randomization::RandomizationError;
 use crate::shard::ShardError;
-use crate::shape_inertia::ShapeInertiaError;
 use crate::snapshot::SnapshotError;
-use crate::source::Source;
-use crate::urdf::UrdfError;
+use kinetoscope_mujoco::{CompileError, EngineError, LoadError, VersionError};
+use kinetoscope_robot::kinematics::KinematicsError;
+use kinetoscope_robot::shape_inertia::ShapeInertiaError;
+use kinetoscope_robot::urdf::UrdfError;
+use kinetoscope_scene::source::Source;
 use std::path::PathBuf;
 
 /// Result of the public API.

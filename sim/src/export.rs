@@ -2,20 +2,21 @@
 
 use crate::compile::{Simulation, document};
 use crate::contents::Contents;
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::drive::actuator::{Scheme, stable_timestep_of};
 use crate::drive::plan::JointPlan;
 use crate::error::{Error, Result};
-use crate::mj::Target;
 use crate::mjcf::document::{Integrator, Keyframe, MaterialAsset, MeshAsset, MeshContent, Mjcf, TextureAsset};
 use crate::mjcf::part::MjcfPart;
 use crate::mjcf::robot::{Purpose, VisualAssets};
 use crate::mjcf::{scene as world, write};
 use crate::objects::robot::RobotData;
 use crate::simulation_cfg::SimulationManagerCfg;
-use crate::source::Source;
-use crate::urdf::write_urdf;
+use kinetoscope_mujoco::Target;
+use kinetoscope_robot::mesh_key::MeshKey;
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_robot::urdf::write_urdf;
 use kinetoscope_scene::mesh::{MeshMaterial, TextureSource, TriMesh};
+use kinetoscope_scene::source::Source;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufWriter;
 use std::path::Path;
@@ -248,7 +249,7 @@ fn export_meshes(
     for robot in &contents.robots {
         for link in &robot.description().links {
             for visual in &link.visuals {
-                if let crate::description::Geometry::Mesh { path, scale, .. } = &visual.geometry {
+                if let kinetoscope_robot::description::Geometry::Mesh { path, scale, .. } = &visual.geometry {
                     let of = format!("link {:?}", link.name);
                     export(MeshKey::new(path, scale), &of, Some(&visual.source))?;
                 }

@@ -2,7 +2,7 @@
 
 use crate::drive::PerJoint;
 use crate::objects::robot_file::MjcfFile;
-use crate::urdf::UrdfCfg;
+use kinetoscope_robot::urdf::UrdfCfg;
 use kinetoscope_scene::file_format::pairs;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};

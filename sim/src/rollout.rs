@@ -9,8 +9,10 @@ use crate::drive::table::DriveState;
 use crate::env::{Env, EnvState, EnvStatus};
 use crate::error::{Error, Result};
 use crate::manager::{EnvId, SimulationManager, env_list};
-use crate::mj::{self, ObjectKind};
 use crate::snapshot::{Entry, Snapshot};
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco;
+use kinetoscope_mujoco::ObjectKind;
 use ndarray::{Array3, ArrayView2, ArrayView3, ArrayViewMut2, AsArray, Ix3};
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -5,8 +5,8 @@
 //! with it, so it is written anew for every step. Gravity is compensated by the force `-m g` in the same place, on both
 //! lines of MuJoCo: the model, which 4.x could tell to (`body_gravcomp`), is the same for all environments.
 
-use crate::mj::Data;
 use crate::mjcf::scene::MAX_ROBOTS;
+use kinetoscope_mujoco::Data;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 /// In whose axes a wrench is given.

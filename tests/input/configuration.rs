@@ -102,7 +102,7 @@ fn integrators() {
         sim.add_robot(RobotCfg { drive, ..robot.clone() }).unwrap();
         sim.update(3);
     }
-    if kinetoscope::sim::mj::TARGET == kinetoscope::sim::mj::Target::V2 {
+    if kinetoscope::mujoco::TARGET == kinetoscope::mujoco::Target::V2 {
         let cfg = SimulationManagerCfg { integrator: Integrator::ImplicitFast, ..cfg(1) };
         let message = SimulationManager::new(cfg).unwrap_err().to_string();
         assert!(message.contains("implicitfast") && message.contains("2.2.2"), "{message}");

@@ -1,10 +1,10 @@
 //! The example `inspect_robot`: what it reports agrees with closed forms and with MuJoCo, and its exit codes.
 
 use super::support::TETRAHEDRON;
+use kinetoscope::mujoco::{Data, ObjectKind, compile};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::inspect::{InspectCfg, inspect};
-use kinetoscope::sim::mj::{Data, ObjectKind, compile};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use kinetoscope_testkit::urdf;
 use kinetoscope_testkit::urdf::Files;

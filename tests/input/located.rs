@@ -1,13 +1,13 @@
 //! A refusal of a model by MuJoCo names the place in the user's file that caused the line of the MJCF.
 
 use super::support::{INERTIAL, TETRAHEDRON, hinge_with, robot, sim};
+use kinetoscope::mujoco::{LoadError, TARGET, compile};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj::{LoadError, TARGET, compile};
+use kinetoscope::scene::source::Source;
 use kinetoscope::sim::mjcf::document::{
     Body, Cone, Geom, GeomRole, Inertial, Joint, JointType, Mjcf, PhysicsOption, Shape,
 };
 use kinetoscope::sim::mjcf::write::write;
-use kinetoscope::sim::source::Source;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// A body with a hinge and a sphere; each element has a line of its own.

@@ -1,9 +1,9 @@
 //! Names of any kind go through the URDF, the MJCF and back.
 
 use super::support::{INERTIAL, LIMIT, TETRAHEDRON, cfg, exported, robot, sim};
+use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj::ObjectKind;
 use std::path::Path;
 
 fn escaped(name: &str) -> String {

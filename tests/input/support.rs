@@ -1,7 +1,7 @@
 //! Robots of these tests.
 
+use kinetoscope::mujoco::{Model, TARGET, Target, compile_file};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj::{Model, TARGET, Target, compile_file};
 use kinetoscope_testkit::urdf;
 pub(crate) use kinetoscope_testkit::worlds::all_bits as bits;
 use std::path::Path;

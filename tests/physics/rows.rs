@@ -1,7 +1,7 @@
 //! What laws measured, as files for the page of numbers.
 
 use crate::law::Measured;
-use kinetoscope::sim::mj;
+use kinetoscope::mujoco as mj;
 use serde_json::json;
 use std::path::PathBuf;
 

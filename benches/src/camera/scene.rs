@@ -4,11 +4,13 @@
 use crate::Outcome;
 use crate::models::{Case, HUMANOID, arm_with_hand, sr5};
 use crate::startup::robots;
+use kinetoscope::mujoco as mj;
+use kinetoscope::mujoco;
+use kinetoscope::mujoco::{Data, Model, TARGET, Target};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Instance, PoseF32, RenderScene, Shape};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot};
 use kinetoscope::sensors::visibility::View;
-use kinetoscope::sim::mj::{self, Data, Model, TARGET, Target};
 use kinetoscope::sim::visible::Visible;
 use std::path::{Path, PathBuf};
 

@@ -109,7 +109,7 @@ fn convert() {
     let out = shell.ok("convert arm.urdf -o out");
     assert!(out.lines().all(|file| shell.path(file).is_file()), "{out}");
     // MuJoCo reads what was written.
-    let version = if kinetoscope::sim::mj::TARGET == kinetoscope::sim::mj::Target::V2 { "2" } else { "4" };
+    let version = if kinetoscope::mujoco::TARGET == kinetoscope::mujoco::Target::V2 { "2" } else { "4" };
     let mjcf = format!("out/robot.mjcf{version}.xml");
     assert!(out.contains(&mjcf), "{out}");
     let (_, err, code) = shell.run(&format!("render {mjcf} -o a.png --width 64"));
@@ -335,7 +335,7 @@ fn newer_mjcf() {
         ("part.xml", included),
         ("wrong.xml", &with("actuatorfrcrang=\"-1 1\"")),
     ]);
-    let is_old = kinetoscope::sim::mj::TARGET == kinetoscope::sim::mj::Target::V2;
+    let is_old = kinetoscope::mujoco::TARGET == kinetoscope::mujoco::Target::V2;
     for (file, place, since) in [("force.xml", "force.xml:2", "2.3.7"), ("main.xml", "part.xml:3", "2.3.7")] {
         if is_old {
             let err = shell.refused(&format!("render {file} -o a.png"));

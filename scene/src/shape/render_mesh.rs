@@ -1,6 +1,6 @@
 //! Triangles prepared for drawing: normals, clusters, bounds.
 
-use super::crease::{corner_normals, cross, dot, face_normals, sub, unit, weld};
+use super::crease::{corner_normals, dot, face_normals, sub, unit, weld};
 use super::deformation::Deformation;
 use super::lod::{self, Level};
 use crate::mesh::{MeshPart, TriMesh};

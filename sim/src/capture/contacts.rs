@@ -1,6 +1,6 @@
 //! MuJoCo's contacts as pairs of links with forces in world axes.
 
-use crate::mj::Data;
+use kinetoscope_mujoco::Data;
 use kinetoscope_scene::state::Contact;
 use nalgebra::{Matrix3, Vector3};
 

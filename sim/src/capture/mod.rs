@@ -8,7 +8,7 @@ mod contacts;
 mod motion;
 
 use crate::compile::{FreeIndex, PartIndex, RobotIndex};
-use crate::mj::{Data, EngineError, Model};
+use kinetoscope_mujoco::{Data, EngineError, Model};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::state::Contact;
 use kinetoscope_sensors::Requires;

@@ -4,9 +4,9 @@
 
 use super::plan::{JointPlan, mass_matrix_at_start};
 use super::table::{Drive, Gains, Target};
-use crate::description::RobotDescription;
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::mj;
+use kinetoscope_mujoco as mj;
+use kinetoscope_robot::description::RobotDescription;
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use nalgebra::{DMatrix, DVector};
 
 /// Sets the control so that the actuator's force is the drive law: `ctrl = q* + (kd v* + tau_ff) / kp`.

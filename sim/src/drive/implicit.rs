@@ -17,7 +17,7 @@
 //! inside the solve.
 
 use super::table::{Drive, DriveTable, Gains, Target};
-use crate::mj;
+use kinetoscope_mujoco as mj;
 
 /// A limit that is never reached, for drives without one: MuJoCo's row needs a finite number.
 const UNLIMITED: f64 = 1e15;

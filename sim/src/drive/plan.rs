@@ -5,10 +5,10 @@ use super::cfg::{DEFAULT_DAMPING, DEFAULT_STIFFNESS, DriveCfg, DriveCfgError, Jo
 use super::models::ActuatorModel;
 use super::table::{Gains, Setting};
 use super::{ActuatorSpec, DriveType};
-use crate::description::{Curve, FileDrive, Joint, JointId, JointKind, RobotDescription};
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::dynamics::{Configuration, DynamicsError, Kinematics};
 use crate::pattern::{self, PatternError};
+use kinetoscope_robot::description::{Curve, FileDrive, Joint, JointId, JointKind, RobotDescription};
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_robot::dynamics::{Configuration, DynamicsError, Kinematics};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 

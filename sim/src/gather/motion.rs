@@ -1,7 +1,7 @@
 //! Poses and velocities of links and objects.
 
 use crate::capture::{body_velocity, link_pose};
-use crate::mj::Data;
+use kinetoscope_mujoco::Data;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 use ndarray::Array3;

@@ -3,7 +3,7 @@
 //! [`inspect`] reads the files as [`SimulationManager::add_robot`](crate::SimulationManager::add_robot) does, meshes and
 //! convex hulls included, and finds the same warnings but those of where a simulation starts; of an MJCF file, those that
 //! compiling the scene gives are not among them. Masses and dynamics are those of the files, completed
-//! from shapes where [`MissingInertia`](crate::urdf::MissingInertia) says so and computed by [`dynamics`](crate::dynamics):
+//! from shapes where [`MissingInertia`](kinetoscope_robot::urdf::MissingInertia) says so and computed by [`dynamics`](kinetoscope_robot::dynamics):
 //! nothing else is repaired. MuJoCo is used for MJCF files only, which it compiles alone.
 
 mod report;
@@ -11,20 +11,20 @@ mod text;
 
 pub use report::{JointReport, LinkReport, MimicReport, Report, Warning};
 
-use crate::body_inertia::{fuse, rigid_bodies};
-use crate::description::{Curve, Geometry, JointId, JointKind, RobotDescription};
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::drive::DriveCfg;
 use crate::drive::plan::{curve, followed, plan};
-use crate::dynamics::{Configuration, DynamicsError, Kinematics};
 use crate::error::Error;
 use crate::objects::robot::{RobotCfg, described};
 use crate::objects::robot_file::MjcfFile;
 use crate::pattern::{closest, list};
-use crate::shape_inertia::Hulls;
-use crate::source::Source;
-use crate::urdf::UrdfCfg;
+use kinetoscope_robot::body_inertia::{fuse, rigid_bodies};
+use kinetoscope_robot::description::{Curve, Geometry, JointId, JointKind, RobotDescription};
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_robot::dynamics::{Configuration, DynamicsError, Kinematics};
+use kinetoscope_robot::shape_inertia::Hulls;
+use kinetoscope_robot::urdf::UrdfCfg;
 use kinetoscope_scene::mesh::load;
+use kinetoscope_scene::source::Source;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
@@ -126,7 +126,7 @@ pub fn inspect(cfg: &InspectCfg) -> Result<Report, InspectError> {
     let mut hulls = Hulls::new(&robot.hull);
     let (file, description, mut diagnostics) = described(&robot, &(&robot.uid).into(), 0, None, &mut hulls)?;
     let configuration = configuration(&description, cfg, &mut diagnostics)?;
-    hulls.of_collisions(&description)?;
+    hulls.of_collisions(&description).map_err(Error::from)?;
     check_visual_meshes(&description, &mut diagnostics);
     // Inertias of an MJCF file are those that MuJoCo accepted.
     if file.is_none() {

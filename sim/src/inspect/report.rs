@@ -1,11 +1,11 @@
 //! The report: plain data, written as JSON by `serde`. Numbers are SI; quaternions are w, x, y, z; `None` is `null`.
 
 use super::{FREE_COLUMNS, InspectCfg, free_joint_columns};
-use crate::description::{Joint, JointKind, LinkId, RobotDescription};
-use crate::diagnostic::Diagnostic;
 use crate::drive::plan::own_limit;
-use crate::dynamics::Kinematics;
-use crate::inertia::RigidInertia;
+use kinetoscope_robot::description::{Joint, JointKind, LinkId, RobotDescription};
+use kinetoscope_robot::diagnostic::Diagnostic;
+use kinetoscope_robot::dynamics::Kinematics;
+use kinetoscope_robot::inertia::RigidInertia;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;

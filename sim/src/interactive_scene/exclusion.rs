@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::manager::SimulationManager;
 use crate::pattern::in_every_env;
-use crate::source::Source;
+use kinetoscope_scene::source::Source;
 
 /// Two things of a scene that pass through each other.
 #[derive(Clone, Debug, PartialEq, Eq)]

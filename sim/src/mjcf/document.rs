@@ -4,8 +4,8 @@
 
 use super::part::MjcfPart;
 use crate::light_cfg::LampKind;
-use crate::source::Source;
 use kinetoscope_scene::Pose;
+use kinetoscope_scene::source::Source;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -1,26 +1,26 @@
 //! A robot as MJCF bodies: fixed joints fused, inertias in principal axes, one actuator per driven joint.
 
-use crate::mesh_key::MeshKey;
 use super::document::{
     Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Integrator, Joint, JointEquality, JointType,
     MaterialAsset, MeshAsset, MeshContent, Mjcf, Shape, Site,
 };
-use crate::body_inertia::{BodyInertia, RigidBody, fuse};
-use crate::description::{Geometry, JointId, JointKind, LinkId, RobotDescription};
-use crate::diagnostic::Diagnostic;
 use crate::drive::plan::JointPlan;
-use crate::source::Source;
+use kinetoscope_robot::body_inertia::{BodyInertia, RigidBody, fuse};
+use kinetoscope_robot::description::{Geometry, JointId, JointKind, LinkId, RobotDescription};
+use kinetoscope_robot::diagnostic::Diagnostic;
+use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::source::Source;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The most moving bodies one below the other: MuJoCo's XML reader refuses documents nested deeper than 100 elements on 2.2.2
 /// and 500 on 4.x.
-pub const MAX_BODY_DEPTH: usize = match crate::mj::TARGET {
-    crate::mj::Target::V2 => 96,
-    crate::mj::Target::V4 => 480,
+pub const MAX_BODY_DEPTH: usize = match kinetoscope_mujoco::TARGET {
+    kinetoscope_mujoco::Target::V2 => 96,
+    kinetoscope_mujoco::Target::V4 => 480,
 };
 
 /// What the document is for.
@@ -396,7 +396,7 @@ impl Emitter<'_, '_> {
                 plain(".ball", JointType::Ball, Vector3::z()),
             ],
             JointKind::Planar => {
-                let [a, b] = crate::dynamics::planar_axes(&joint.axis);
+                let [a, b] = kinetoscope_robot::dynamics::planar_axes(&joint.axis);
                 vec![
                     plain(".x", JointType::Slide, a.into_inner()),
                     plain(".y", JointType::Slide, b.into_inner()),
@@ -500,7 +500,7 @@ pub(super) fn unused_joint(description: &RobotDescription, uid: &str, own: &str)
 pub(super) fn add_drive(
     mjcf: &mut Mjcf,
     uid: &str,
-    joint: &crate::description::Joint,
+    joint: &kinetoscope_robot::description::Joint,
     plan: &JointPlan,
     friction_tendon: bool,
 ) {

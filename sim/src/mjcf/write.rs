@@ -8,9 +8,9 @@ use super::document::{
 };
 use super::part::PartLines;
 use crate::light_cfg::LampKind;
-use crate::mj::{CompileError, Target};
-use crate::source::Source;
+use kinetoscope_mujoco::{CompileError, Target};
 use kinetoscope_scene::Pose;
+use kinetoscope_scene::source::Source;
 use std::fmt::Write as _;
 
 /// Text and the source of each of its lines.

@@ -6,7 +6,7 @@ use crate::manager::{RobotId, SimulationManager};
 use crate::objects::robot::{Robot, RobotCfg, RobotMut, Role};
 use crate::objects::robot_file::MjcfFile;
 use crate::surface_cfg::SurfaceCfg;
-use crate::urdf::UrdfCfg;
+use kinetoscope_robot::urdf::UrdfCfg;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::mesh::HullCfg;
 use serde::{Deserialize, Serialize};

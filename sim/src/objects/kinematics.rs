@@ -1,13 +1,13 @@
 //! Kinematics of robots in a simulation: where frames would be, how joints move them, and how to get them somewhere.
 
-use crate::description::{FileDrive, JointId, JointKind, LinkId};
 use crate::env::Env;
 use crate::error::{Error, Result};
-use crate::kinematics::{Chain, IkCfg, IkSolver, KinematicsError, Posture, Tip, TipName, link_poses};
 use crate::manager::{EnvId, env_list};
 use crate::objects::free_body::body_pose;
 use crate::objects::robot::{Robot, check_pose, unknown};
 use crate::objects::rows::{Rows, Table};
+use kinetoscope_robot::description::{FileDrive, JointId, JointKind, LinkId};
+use kinetoscope_robot::kinematics::{Chain, IkCfg, IkSolver, KinematicsError, Posture, Tip, TipName, link_poses};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 use kinetoscope_sensors::camera::{CameraError, Poses};

@@ -2,7 +2,7 @@
 
 use super::object_mesh::ObjectMesh;
 use super::rigid_object::RigidObjectCfg;
-use crate::inertia::RigidInertia;
+use kinetoscope_robot::inertia::RigidInertia;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Mass properties of an object, in its frame.

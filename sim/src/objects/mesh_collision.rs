@@ -1,9 +1,9 @@
 //! What collides of an object that is a mesh file.
 
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::error::{Error, Result};
 use crate::objects::rigid_object::{BodyType, RigidObjectCfg};
 use crate::objects::shape::ObjectShape;
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::mesh::{HullCache, HullCfg, MeshError, PiecesCfg, TriMesh, prisms};
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -2,21 +2,23 @@
 
 use crate::capture::link_pose;
 use crate::compile::{PartIndex, Simulation};
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
-use crate::mj::{self, CompileError, LoadError, Model, words};
 use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, PartOf, compare, sensors_left_out};
 use crate::named::Named;
 use crate::objects::robot::check_pose;
 use crate::objects::rows::{Rows, Table, check_distinct, distinct_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
-use crate::source::Source;
 use crate::surface_cfg::SurfaceCfg;
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco;
+use kinetoscope_mujoco::{CompileError, LoadError, Model, words};
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
+use kinetoscope_scene::source::Source;
 use kinetoscope_sensors::EngineSensor;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use serde::{Deserialize, Serialize};

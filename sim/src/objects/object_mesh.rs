@@ -2,9 +2,9 @@
 
 use super::rigid_object::RigidObjectCfg;
 use super::shape::{ObjectShape, cone};
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::error::{Error, Result};
-use crate::inertia::RigidInertia;
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_robot::inertia::RigidInertia;
 use kinetoscope_scene::mesh::{HullCache, Solid, TriMesh};
 use nalgebra::Matrix3;
 use std::sync::Arc;

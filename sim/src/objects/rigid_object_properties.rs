@@ -6,11 +6,11 @@
 use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
-use crate::mj::Model;
 use crate::objects::rigid_object::{BodyType, RigidObject, RigidObjectMut};
 use crate::objects::rows::{Rows, Table, distinct_envs};
 use crate::randomization::Property;
 use crate::wrenches::{Wrench, WrenchFrame};
+use kinetoscope_mujoco::Model;
 use nalgebra::{UnitQuaternion, Vector3};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix1, Ix2};
 

@@ -3,7 +3,7 @@
 use super::robot_file::MjcfFile;
 use crate::drive::DriveCfg;
 use crate::surface_cfg::SurfaceCfg;
-use crate::urdf::UrdfCfg;
+use kinetoscope_robot::urdf::UrdfCfg;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::mesh::HullCfg;
 use serde::{Deserialize, Serialize};
@@ -47,8 +47,8 @@ pub struct RobotCfg {
     /// - Dry friction of joints with implicit drives is as soft as that of all drives: the file's `solreffriction` and
     ///   `solimpfriction` hold for the others.
     /// - Named sites are links on fixed joints, which the end of a control part
-    ///   ([`Tip::of_part`](crate::kinematics::Tip::of_part)) follows where there is exactly one: to add a site to the last body,
-    ///   for a touch sensor say, moves that end. Name the link ([`Tip::at`](crate::kinematics::Tip::at)) where it matters.
+    ///   ([`Tip::of_part`](kinetoscope_robot::kinematics::Tip::of_part)) follows where there is exactly one: to add a site to the last body,
+    ///   for a touch sensor say, moves that end. Name the link ([`Tip::at`](kinetoscope_robot::kinematics::Tip::at)) where it matters.
     /// - What stands in the file's world (a floor, lights) is no part of the robot, nor are settings for the whole model and
     ///   keyframes. [`diagnostics`](crate::SimulationManager::diagnostics) names all that is left out.
     ///

@@ -2,12 +2,14 @@
 
 use crate::compile::{GeomIndex, compile};
 use crate::contents::Contents;
-use crate::description::LinkId;
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::error::{Error, Result};
-use crate::mj::{self, Data, Model};
 use crate::objects::robot::{Robot, RobotData};
 use crate::simulation_cfg::SimulationManagerCfg;
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco;
+use kinetoscope_mujoco::{Data, Model};
+use kinetoscope_robot::description::LinkId;
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use ndarray::{Array1, Array2, Axis};
 use std::sync::Arc;
 

@@ -2,7 +2,6 @@
 
 use crate::capture::{body_velocity, link_pose};
 use crate::compile::RobotIndex;
-use crate::description::LinkId;
 use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
@@ -10,6 +9,7 @@ use crate::objects::free_body::body_pose;
 use crate::objects::robot::{JointIndex, Robot, RobotMut};
 use crate::objects::rows::Numbers;
 use crate::pattern::{self, PatternError};
+use kinetoscope_robot::description::LinkId;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;

@@ -1,11 +1,11 @@
 //! Forces and torques on links of a robot, and gravity compensation, per environment.
 
-use crate::description::LinkId;
 use crate::error::{Error, Result};
 use crate::manager::EnvId;
 use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::rows::{Rows, Table, check_named_once, distinct_envs};
 use crate::wrenches::{Wrench, WrenchFrame};
+use kinetoscope_robot::description::LinkId;
 use nalgebra::Vector3;
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix3};
 

@@ -179,7 +179,7 @@ pub(crate) fn cone(radius: f64, height: f64) -> TriMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mj;
+    use kinetoscope_mujoco as mj;
 
     /// MuJoCo computes mass and moments of a geom by itself.
     #[test]

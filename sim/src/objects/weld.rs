@@ -3,10 +3,10 @@
 use crate::compile::Simulation;
 use crate::error::{Error, Result};
 use crate::manager::{EnvId, SimulationManager};
-use crate::mj;
 use crate::objects::free_body::body_pose;
 use crate::objects::rows::distinct_envs;
 use crate::sensor_list::SensorList;
+use kinetoscope_mujoco as mj;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 use ndarray::Array1;

@@ -7,7 +7,7 @@ use super::tables::{FrictionPlace, dofs_of, friction_place};
 use crate::drive::table::{DriveState, DriveTable, Gains};
 use crate::env::Env;
 use crate::error::Result;
-use crate::mj::{DiagonalInertia, Editor, Model};
+use kinetoscope_mujoco::{DiagonalInertia, Editor, Model};
 
 /// Makes models of environments of one compiled scene.
 #[derive(Debug)]

@@ -10,7 +10,7 @@ pub enum Property {
     /// Mass of a link or object \[kg\], 1 number. Setting it scales the moments of inertia in the same proportion, from
     /// their nominal ones, as another density would. What is computed from the files stays nominal: `mass` and `total_mass`,
     /// the inertias behind the gains of [`DriveType::Acceleration`](crate::DriveType), and
-    /// [`dynamics`](crate::dynamics) of a description.
+    /// [`dynamics`](kinetoscope_robot::dynamics) of a description.
     Mass,
     /// Centre of mass in the link's (object's) own frame \[m\], 3 numbers. With MuJoCo 4.x not of a body of an MJCF
     /// file that moves freely and is nominally centred: see [`RandomizationError::DiagonalInertia`](super::RandomizationError).
@@ -54,7 +54,7 @@ pub enum Property {
     /// Mass, centre of mass and moments stay: they are properties of their own. So do the sizes of sites: a touch sensor of an
     /// MJCF file feels contacts in its nominal volume. Frames of links and joints stay where they are, so that
     /// [`compute_fk`](crate::Robot::compute_fk) and [`compute_ik`](crate::Robot::compute_ik) are right in every environment;
-    /// the tip of a link that became longer is where [`Tip::with_tcp`](crate::kinematics::Tip::with_tcp) says.
+    /// the tip of a link that became longer is where [`Tip::with_tcp`](kinetoscope_robot::kinematics::Tip::with_tcp) says.
     Size,
     /// Colour and opacity of what is seen of a link, an object or a terrain, 4 numbers from 0 to 1 for the screen (sRGB);
     /// it multiplies a texture, and goes over what a material or a mesh file says, for all parts of a mesh. Nominally what

@@ -2,7 +2,9 @@
 
 use super::Property;
 use crate::drive::table::{Drive, DriveTable, Realization};
-use crate::mj::{self, Model, ObjectKind};
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco;
+use kinetoscope_mujoco::{Model, ObjectKind};
 use std::collections::BTreeMap;
 
 /// All that has one property.

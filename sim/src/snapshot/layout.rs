@@ -2,7 +2,7 @@
 //! another.
 
 use crate::drive::table::DriveTable;
-use crate::mj::{Model, ObjectKind, words};
+use kinetoscope_mujoco::{Model, ObjectKind, words};
 
 /// How a scene is stepped, then sizes and names of everything that has numbers in a state, one line each.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,7 +1,9 @@
 //! Shapes of MuJoCo's geoms.
 
 use super::identity::GeomIdentity;
-use crate::mj::{self, Model};
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco;
+use kinetoscope_mujoco::Model;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};

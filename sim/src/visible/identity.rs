@@ -2,7 +2,7 @@
 
 use super::{deforming, shown, surface};
 use crate::contents::Contents;
-use crate::mj::{Model, ObjectKind};
+use kinetoscope_mujoco::{Model, ObjectKind};
 use kinetoscope_sensors::camera::Thing;
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -3,9 +3,9 @@
 use super::surface;
 use crate::contents::Contents;
 use crate::light_cfg::{LampKind, LightCfg};
-use crate::mj::{Data, LightType, Model, ObjectKind, TextureType};
 use crate::mjcf::scene::light_name;
 use crate::simulation_cfg::SimulationManagerCfg;
+use kinetoscope_mujoco::{Data, LightType, Model, ObjectKind, TextureType};
 use kinetoscope_scene::material::decode_srgb;
 use kinetoscope_scene::{Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightSum, RenderScene, Sky};
 
@@ -153,11 +153,11 @@ pub(super) fn read(data: &Data, lamps: &[Light], out: &mut [Light]) {
 mod tests {
     use super::super::Visible;
     use super::*;
-    use crate::mj;
     use crate::objects::mjcf_part::MjcfCfg;
     use crate::objects::rigid_object::RigidObjectCfg;
     use crate::simulation_cfg::GroundCfg;
     use crate::{LightCfg, SimulationManager};
+    use kinetoscope_mujoco as mj;
 
     const STARS: &str = r#"<mujoco><statistic extent="2"/>
         <visual><headlight diffuse="0.1 0.2 0.3"/><map zfar="30" haze="0.4"/><rgba haze="0.1 0.2 0.3 1"/></visual>

@@ -25,10 +25,10 @@ pub(crate) use surface::color_of;
 pub(crate) use urdf_visual::{Replacements, VisualCache};
 
 use crate::light_cfg::LightCfg;
-use crate::mj::{Data, Model, ObjectKind};
 use crate::mjcf::scene::light_name;
 use crate::simulation_cfg::GroundCfg;
 use crate::surface_cfg::SurfaceCfg;
+use kinetoscope_mujoco::{Data, Model, ObjectKind};
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::Plane;
 use kinetoscope_scene::{

@@ -1,7 +1,7 @@
 //! What an environment looks like whose sizes or colours are its own.
 
 use super::{Anchor, Visible, geom};
-use crate::mj::{Data, Model};
+use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_scene::{Material, OwnScene, RenderSceneError};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -55,7 +55,7 @@ impl Visible {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mj;
+    use kinetoscope_mujoco as mj;
 
     /// A look that cannot be drawn is an error, not the nominal one.
     #[test]

@@ -3,8 +3,10 @@
 use super::{MaskId, Visible, overview};
 use crate::error::{Error, Result};
 use crate::manager::{EnvId, SimulationManager, env_list, env_mask};
-use crate::mj::{self, Data, Model, ObjectKind};
 use crate::pattern;
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco;
+use kinetoscope_mujoco::{Data, Model, ObjectKind};
 use kinetoscope_scene::framing::{FILL, Framing, Placed};
 use kinetoscope_scene::{Light, Marker, Pose, PoseF32};
 use kinetoscope_sensors::camera::Shot;

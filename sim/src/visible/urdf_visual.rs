@@ -1,14 +1,14 @@
 //! Visuals of URDF files and of objects that are meshes: what is drawn in place of their proxy geoms.
 
 use super::Part;
-use crate::description::{Geometry, Visual};
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::mesh_key::MeshKey;
 use crate::objects::rigid_object::RigidObjectData;
 use crate::objects::robot::RobotData;
-use crate::source::Source;
+use kinetoscope_robot::description::{Geometry, Visual};
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_scene::mesh::{MeshMaterial, TextureSource, TriMesh};
 use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Mesh, Sphere};
+use kinetoscope_scene::source::Source;
 use kinetoscope_scene::{Material, RenderMesh, Texture, TextureKind};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! A solve allocates nothing.
 
+use kinetoscope_robot::kinematics::{Chain, IkCfg, IkSolver, Posture};
+use kinetoscope_robot::urdf::{UrdfCfg, assemble};
 use kinetoscope_scene::{Pose, Random};
-use kinetoscope_sim::kinematics::{Chain, IkCfg, IkSolver, Posture};
-use kinetoscope_sim::urdf::{UrdfCfg, assemble};
 
 #[test]
 fn solve() {

@@ -2,9 +2,9 @@
 //! sparse Jacobians; efforts that contacts do not change.
 
 use super::support::{add_ball, add_walker, all_bits, cfg, most_contacts, row, sim};
+use kinetoscope::mujoco::{Data, compile};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj::{Data, compile};
 use kinetoscope_testkit::urdf::{Files, joint, limit, link, robot};
 use kinetoscope_testkit::worlds::{arm_and_hand, text_robot};
 

@@ -1,9 +1,9 @@
 //! Buffers that were too small never show: the step is done again with larger ones, to the same bits.
 
 use super::support::{add_ball, add_plate, all_bits, assert_quiet, bits_of, cfg, copy_of, most_contacts, row, sim};
+use kinetoscope::mujoco::{Buffers, Data, Model, TARGET, Target};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::env::Env;
-use kinetoscope::sim::mj::{Buffers, Data, Model, TARGET, Target};
 
 /// Room for everything in these tests.
 const HUGE: Buffers = Buffers { contacts: 1000, constraints: 3000, arena_bytes: 64 << 20 };

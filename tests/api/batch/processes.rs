@@ -2,11 +2,11 @@
 //! manager frees its memory and ends its threads: in processes of their own.
 
 use super::support::{add_plate, add_walker, bits_of, cfg, sim, wheel};
+use kinetoscope::mujoco::{Asset, Data, Model, TARGET, Target, compile, compile_file};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::drive::table::DriveTable;
 use kinetoscope::sim::env::{Env, EnvStatus};
-use kinetoscope::sim::mj::{Asset, Data, Model, TARGET, Target, compile, compile_file};
 use kinetoscope_testkit::process::{is_child, run, text};
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::arm_and_hand;

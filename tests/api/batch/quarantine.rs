@@ -2,11 +2,11 @@
 
 use super::support::{add_walker, all_bits, bits_of, cfg, sim, wheel};
 use kinetoscope::exec::ThreadPool;
+use kinetoscope::mujoco::{Data, Warning};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::env::{Divergence, EnvStatus, with_small_buffers};
-use kinetoscope::sim::mj::{Data, Warning};
 use kinetoscope_testkit::urdf::Files;
 use std::sync::Arc;
 

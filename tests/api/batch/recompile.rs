@@ -1,10 +1,10 @@
 //! What exists goes on as if nothing was added.
 
 use super::support::{add_plate, add_walker, assert_quiet, cfg, sim, wheel};
+use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::env::Env;
-use kinetoscope::sim::mj::ObjectKind;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{arm_and_hand, fixed, gains, no_drive, object};
 

@@ -1,8 +1,8 @@
 //! MuJoCo's own sample models, of the library's package.
 
+use kinetoscope::mujoco::compile_file;
 use kinetoscope::sim::drive::table::DriveTable;
 use kinetoscope::sim::env::{Env, EnvStatus};
-use kinetoscope::sim::mj::compile_file;
 use kinetoscope_testkit::needs::{files_below, sample_model};
 use std::sync::Arc;
 

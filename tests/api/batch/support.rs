@@ -1,10 +1,10 @@
 //! Robots of these tests, and copies of environments.
 
+use kinetoscope::mujoco::Model;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::env::Env;
-use kinetoscope::sim::mj::Model;
 use kinetoscope_testkit::urdf::{Files, collision, joint, limit, link, robot};
 pub(crate) use kinetoscope_testkit::worlds::{all_bits, bits_of, cfg, row, sim};
 

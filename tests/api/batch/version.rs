@@ -47,7 +47,7 @@ fn build_stub(dir: &Path, version: i32) {
 #[test]
 #[ignore = "needs readelf and cc: cargo xtask test"]
 fn another_version() {
-    let headers = kinetoscope::sim::mj::version_string();
+    let headers = kinetoscope::mujoco::version_string();
     // Written as 2.x and 3.x write it, and as 4.x does.
     for (version, name) in [(210, "2.1.0"), (3_005_001, "3.5.1"), (4_001_000, "4.1.0")] {
         let dir = tempfile::tempdir().unwrap();
@@ -73,7 +73,7 @@ fn scenario_start() {
     // Twice: the answer does not change.
     for _ in 0..2 {
         println!("manager: {}", SimulationManager::new(SimulationManagerCfg::default()).unwrap_err());
-        println!("compile: {}", kinetoscope::sim::mj::compile("<mujoco/>", &[]).unwrap_err());
-        println!("file: {}", kinetoscope::sim::mj::compile_file(Path::new("none.xml")).unwrap_err());
+        println!("compile: {}", kinetoscope::mujoco::compile("<mujoco/>", &[]).unwrap_err());
+        println!("file: {}", kinetoscope::mujoco::compile_file(Path::new("none.xml")).unwrap_err());
     }
 }

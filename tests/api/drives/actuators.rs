@@ -7,12 +7,12 @@
 
 use crate::drives::law::{EXACT, LAW, Law};
 use crate::drives::worlds::*;
+use kinetoscope::mujoco::Buffers;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::drive::actuator::{Scheme, stable_timestep_of, warn_if_unstable};
 use kinetoscope::sim::drive::plan::{PlanError, effective_inertias, plan};
 use kinetoscope::sim::env::Env;
-use kinetoscope::sim::mj::Buffers;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::worlds::add_ball;
 use std::collections::BTreeMap;

@@ -6,8 +6,8 @@
 //! Control: steps far above the one that is named diverge.
 
 use crate::drives::worlds::*;
+use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds;
 

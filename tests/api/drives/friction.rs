@@ -7,15 +7,15 @@
 //! twice that is its tolerance. Control: MuJoCo's default d = 0.9 and b = 105 / s creep out of the band within a second.
 //!
 //! A soft drive (kp 40, kd 5) under gravity sags by exactly tau_g / kp: at rest the law reads kp (q* - q) = tau_g(q), with
-//! tau_g from `kinetoscope_sim::dynamics`, which has no drives. The slowest mode decays with kd / kp = 0.125 s: after 10 s, exp(-80) of
+//! tau_g from `kinetoscope_robot::dynamics`, which has no drives. The slowest mode decays with kd / kp = 0.125 s: after 10 s, exp(-80) of
 //! it is left. Tolerance 1e-9 rad: rounding of positions through kp. A 1 % change of kp would move the joints by 2 mrad.
 //! Control: the same row with MuJoCo's own stiffness (only its reference acceleration rewritten) is a rigid drive that hangs
 //! less than a tenth as low.
 
 use crate::drives::law::EXACT;
 use crate::drives::worlds::*;
+use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj;
 
 const M: f64 = 0.1;
 const F: f64 = 2.0;

@@ -10,9 +10,10 @@
 //! from outside) holds with less than half of that.
 
 use crate::drives::worlds::*;
+use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
-use kinetoscope::sim::{Cone, mj};
+use kinetoscope::sim::Cone;
 use kinetoscope_testkit::urdf::{Files, collision, robot};
 
 const KP: f64 = 1e3;

@@ -20,8 +20,9 @@
 //! times more slowly.
 
 use crate::drives::worlds::*;
+use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{DiagnosticKind, mj};
+use kinetoscope::sim::DiagnosticKind;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 pub(crate) const EXACT: Tolerance =

@@ -7,8 +7,9 @@
 
 use crate::drives::law::EXACT;
 use crate::drives::worlds::*;
+use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{DiagnosticKind, mj};
+use kinetoscope::sim::DiagnosticKind;
 
 /// Largest speed after 3000 steps of plain MuJoCo from a slight motion, relative to it.
 fn growth(xml: &str, h: f64) -> f64 {

@@ -1,6 +1,6 @@
 //! Whole robots: the tutorial's gains and cycle on arms and hands, and mimic joints.
 //!
-//! **At rest** every drive that is not at its limit stands at q* - tau_g / kp. The judge is the torque that `kinetoscope_sim::dynamics`
+//! **At rest** every drive that is not at its limit stands at q* - tau_g / kp. The judge is the torque that `kinetoscope_robot::dynamics`
 //! computes from the URDF at the positions found (without drives and MuJoCo); a driver carries its own load and, times their
 //! ratio, those of its followers. Tolerance 0.2 mrad, two-sided: what motion is left after 4 s (kd / kp = 0.1 s) is exp(-40);
 //! the rest is for the couplings, whose 1e-4 of yield shares the load a little differently. Without the sag in it the arm

@@ -1,12 +1,12 @@
 //! Worlds for the drive laws: URDF chains written from a few numbers, loaded through the public API. Nothing here judges
 //! anything; the laws, derivations and tolerances stand at the top of each test file.
 
+use kinetoscope::mujoco as mj;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
+use kinetoscope::robot::dynamics::{Configuration, Kinematics, MimicPositions};
 use kinetoscope::sim;
-use kinetoscope::sim::dynamics::{Configuration, Kinematics, MimicPositions};
 use kinetoscope::sim::env::{Env, EnvStatus};
-use kinetoscope::sim::mj;
 pub(crate) use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
 use kinetoscope_testkit::urdf::{Files, joint, robot};
 pub(crate) use kinetoscope_testkit::worlds::{gains, no_drive};
@@ -282,7 +282,7 @@ impl World {
         load
     }
 
-    /// Mass matrix and bias force at a state, computed by `kinetoscope_sim::dynamics` from the URDF.
+    /// Mass matrix and bias force at a state, computed by `kinetoscope_robot::dynamics` from the URDF.
     pub(crate) fn dynamics(&self, q: &[f64], v: &[f64], gravity: &Vector3<f64>) -> (DMatrix<f64>, DVector<f64>) {
         let view = self.view();
         let mut at = Configuration::zero(view.description());

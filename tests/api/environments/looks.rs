@@ -4,12 +4,12 @@
 //! bits, in images and in motion.
 
 use super::worlds::{ALL, get, set};
+use kinetoscope::mujoco::{ObjectKind, TARGET, Target};
 use kinetoscope::ndarray::{Array3, Array4, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Shape;
 use kinetoscope::scene::pose::from_wxyz;
 use kinetoscope::sensors::ray::pattern::Grid;
-use kinetoscope::sim::mj::{ObjectKind, TARGET, Target};
 use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{sr5, text_robot};

@@ -1,10 +1,10 @@
 //! Properties of single environments: held against the laws of physics, shared where nothing differs, kept by name.
 
 use super::worlds::{ALL, all_bits, all_properties, all_values, arm, cfg, cube, get, set, values, world};
+use kinetoscope::mujoco::{ObjectKind, TARGET, Target};
 use kinetoscope::ndarray::{Array2, Array3, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::Cone;
-use kinetoscope::sim::mj::{ObjectKind, TARGET, Target};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf;
 use kinetoscope_testkit::urdf::Files;

@@ -1,9 +1,9 @@
 //! Sizes that are no property of an environment: meshes, planes and height fields say why, and what to do.
 
 use super::worlds::{cfg, cube};
+use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj::ObjectKind;
 use kinetoscope_testkit::worlds::object;
 
 /// Two cones of one mesh, a small plane, a ball far beside it, and a body of a box and a mesh.

@@ -5,8 +5,10 @@
 //! units of 2e-16. 1e-12 is the bound asked for.
 
 use super::*;
+use kinetoscope::mujoco as mj;
+use kinetoscope::mujoco;
+use kinetoscope::mujoco::{Data, ObjectKind};
 use kinetoscope::ndarray::{Array3, s};
-use kinetoscope::sim::mj::{self, Data, ObjectKind};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 use kinetoscope_testkit::urdf::joint;
 use nalgebra::Vector3;

@@ -1,7 +1,7 @@
 //! An arm of two links in a plane: everything has a closed form.
 
 use super::*;
-use kinetoscope::sim::kinematics::{Chain, IkSolver};
+use kinetoscope::robot::kinematics::{Chain, IkSolver};
 use kinetoscope_testkit::urdf::joint;
 
 const L1: f64 = 0.5;

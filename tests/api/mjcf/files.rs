@@ -1,9 +1,9 @@
 //! Files that cannot be parts, settings that are not taken over, scene files, and files that are written.
 
 use super::*;
+use kinetoscope::mujoco::{TARGET, Target, compile_file};
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::sim::DiagnosticKind;
-use kinetoscope::sim::mj::{TARGET, Target, compile_file};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::count_diagnostics;

@@ -1,8 +1,8 @@
 //! The handle of a part: names, reads and writes of each environment, bodies moved by hand.
 
 use super::*;
+use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, Axis, array};
-use kinetoscope::sim::mj::ObjectKind;
 use kinetoscope_testkit::refusal::assert_error;
 
 #[test]

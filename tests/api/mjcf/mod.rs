@@ -7,8 +7,10 @@ mod samples;
 mod sensors;
 mod visible;
 
+use kinetoscope::mujoco as mj;
+use kinetoscope::mujoco;
+use kinetoscope::mujoco::{Data, Model};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj::{self, Data, Model};
 use kinetoscope_testkit::worlds::{empty_cfg, sim};
 
 /// 500 steps a second, an empty scene.

@@ -1,9 +1,9 @@
 //! Parts move as their files do alone, also twice in a scene, beside robots and after more was added.
 
 use super::*;
+use kinetoscope::mujoco::{ObjectKind, compile_file};
 use kinetoscope::ndarray::array;
 use kinetoscope::scene::pose::from_xyz_rpy;
-use kinetoscope::sim::mj::{ObjectKind, compile_file};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{errors, pose_in, row, sr5};

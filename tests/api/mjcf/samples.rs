@@ -1,8 +1,9 @@
 //! MuJoCo's own sample models, each a part of a scene.
 
 use super::*;
+use kinetoscope::mujoco as mj;
+use kinetoscope::mujoco::{TARGET, Target, words};
 use kinetoscope::ndarray::Array2;
-use kinetoscope::sim::mj::{TARGET, Target, words};
 use kinetoscope_testkit::needs::{files_below, sample_model};
 use std::path::Path;
 

@@ -1,9 +1,9 @@
 //! Sensors of parts: MuJoCo's own, joints and actuators, wrenches and frames, against MuJoCo and closed forms.
 
 use super::*;
+use kinetoscope::mujoco::{ObjectKind, Overflow};
 use kinetoscope::ndarray::{Array2, ArrayView3, Axis, array};
 use kinetoscope::scene::pose::{from_row, from_xyz_rpy};
-use kinetoscope::sim::mj::{ObjectKind, Overflow};
 use kinetoscope_testkit::bits::bits;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};

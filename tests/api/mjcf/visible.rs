@@ -1,6 +1,7 @@
 //! Parts as cameras and contact sensors see them.
 
 use super::*;
+use kinetoscope::mujoco as mj;
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::scene::Pose;
 use kinetoscope::scene::pose::from_wxyz;

@@ -1,6 +1,7 @@
 //! Drives that a file's actuators say, of single joints, followers and tendons, and what the configuration changes of them.
 
 use super::*;
+use kinetoscope::mujoco as mj;
 use kinetoscope::ndarray::array;
 use kinetoscope_testkit::worlds::{count_diagnostics, empty_cfg, gains};
 

@@ -1,9 +1,9 @@
 //! Names and control parts, dumps, and MuJoCo's own sample models as robots.
 
 use super::*;
+use kinetoscope::mujoco::{TARGET, Target, compile_file};
 use kinetoscope::ndarray::array;
 use kinetoscope::sim::DiagnosticKind;
-use kinetoscope::sim::mj::{TARGET, Target, compile_file};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{errors, gains, pose_in, urdf_robot};

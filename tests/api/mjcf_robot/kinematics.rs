@@ -1,9 +1,10 @@
 //! Forward and inverse kinematics, judged by MuJoCo with the file alone: not by the scene that is written from it.
 
 use super::*;
+use kinetoscope::mujoco as mj;
+use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Axis, s};
 use kinetoscope::scene::pose::{from_row, from_xyz_rpy, to_row};
-use kinetoscope::sim::mj::ObjectKind;
 use kinetoscope_testkit::worlds::{errors, pose_in};
 
 /// A body or a site, as MuJoCo has it.

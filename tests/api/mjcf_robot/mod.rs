@@ -11,10 +11,12 @@ mod refused;
 mod scenes;
 
 use crate::mjcf::empty;
+use kinetoscope::mujoco as mj;
+use kinetoscope::mujoco;
+use kinetoscope::mujoco::{Data, Model};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
-use kinetoscope::sim::mj::{self, Data, Model};
 use kinetoscope_testkit::worlds::{mjcf_robot as robot, passive, row};
 
 /// A robot in an empty scene.

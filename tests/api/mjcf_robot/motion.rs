@@ -1,8 +1,8 @@
 //! A robot moves as MuJoCo with the file alone, and as the same robot from a URDF.
 
 use super::*;
+use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Axis, array};
-use kinetoscope::sim::mj::ObjectKind;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{gains, text_robot, urdf_robot};
 

@@ -2,7 +2,7 @@
 //! robot leaves out; and files that only MuJoCo 4.x reads.
 
 use super::*;
-use kinetoscope::sim::mj::{TARGET, Target};
+use kinetoscope::mujoco::{TARGET, Target};
 use kinetoscope::sim::mjcf::robot_file::RobotFileError;
 use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::urdf::Files;

@@ -186,7 +186,7 @@ fn moving_pieces() {
     sim.rigid_object_mut(id).set_friction(&array![[0.3, 0.01, 0.001]], None).unwrap();
     sim.batch().read(0, |env| {
         let model = env.data().model();
-        let body = model.id(kinetoscope::sim::mj::ObjectKind::Body, "ell").unwrap();
+        let body = model.id(kinetoscope::mujoco::ObjectKind::Body, "ell").unwrap();
         let of = |geom: &usize| model.geom_bodyid()[*geom] as usize == body && model.geom_contype()[*geom] != 0;
         let frictions: Vec<f64> = (0..model.ngeom()).filter(of).map(|geom| model.geom_friction()[3 * geom]).collect();
         assert_eq!(frictions, [0.3; 2]);

@@ -2,8 +2,8 @@
 //! objects move.
 
 use super::*;
+use kinetoscope::mujoco::{TARGET, Target};
 use kinetoscope::ndarray::{Array2, array};
-use kinetoscope::sim::mj::{TARGET, Target};
 use kinetoscope_testkit::refusal::assert_error;
 
 /// F t / m in each environment; with the mass go the moments, T t / I, of a cube m a²/6.

@@ -1,11 +1,11 @@
 //! Objects that are meshes, and cones: mass, sensors, collision and export.
 
 use super::*;
+use kinetoscope::mujoco::{ObjectKind, TARGET, Target, compile_file};
 use kinetoscope::ndarray::array;
 use kinetoscope::scene::mesh::write_binary_stl;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
-use kinetoscope::sim::mj::{ObjectKind, TARGET, Target, compile_file};
 use nalgebra::{Matrix3, Vector3};
 
 /// Mass, centre of mass and tensor about it, in the object's frame, as MuJoCo has them.

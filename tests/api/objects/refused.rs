@@ -2,9 +2,9 @@
 //! writer can make are in `tests/input/every_writer.rs`.
 
 use super::*;
+use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::mesh::HullCfg;
-use kinetoscope::sim::mj::ObjectKind;
 use kinetoscope_testkit::refusal::{assert_error, assert_refused, assert_refused_unchanged};
 
 #[test]

@@ -6,9 +6,9 @@
 //! arrays and indices of writers are in `tests/input/every_writer.rs`.
 
 use super::ENVS;
+use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, Axis, array};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj::ObjectKind;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 use kinetoscope_testkit::urdf::{Files, joint, link, robot};

@@ -2,12 +2,12 @@
 //! any kind of sensor, eager or lazy.
 
 use super::worlds::{cfg, cube, look_at, sr5};
+use kinetoscope::mujoco as mj;
 use kinetoscope::ndarray::{Array2, ArrayBase, Axis, Data, RemoveAxis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::SensorCfg;
 use kinetoscope::sensors::camera::channel::Depth;
 use kinetoscope::sensors::ray::pattern::Grid;
-use kinetoscope::sim::mj;
 use kinetoscope_testkit::bits::Bits;
 use std::collections::BTreeMap;
 

@@ -1,12 +1,12 @@
 //! Terrain in a simulation: heights that rays measure, against the array and against `mj_ray`; objects that lie
 //! on it; exports; and refused terrains.
 
+use kinetoscope::mujoco::{TARGET, Target, compile_file};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
-use kinetoscope::sim::mj::{TARGET, Target, compile_file};
 use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::worlds::{ball, cfg, sim};
 use nalgebra::Point3;

@@ -1,9 +1,9 @@
 //! Every sample model of MuJoCo and every vendor robot can be drawn; cameras of files.
 
 use super::view;
+use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
-use kinetoscope::sim::mj;
 use kinetoscope_testkit::needs::{files_below, sample_model};
 use kinetoscope_testkit::urdf::Files;
 

@@ -6,11 +6,13 @@
 //! pixels through a depth buffer.
 
 use super::view;
+use kinetoscope::mujoco as mj;
+use kinetoscope::mujoco;
+use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, Shot, look_at_pose};
 use kinetoscope::sim::Visible;
-use kinetoscope::sim::mj::{self, ObjectKind};
 use kinetoscope_testkit::needs::{python_renderer, robot, sample_model};
 use kinetoscope_testkit::urdf::Files;
 use nalgebra::Vector3;

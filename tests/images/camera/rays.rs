@@ -5,12 +5,14 @@
 
 use super::view;
 use crate::rays::judge::{Dice, FAN, GROUPS, at_rest, data_of, data_with, height_field, mask_of};
+use kinetoscope::mujoco as mj;
+use kinetoscope::mujoco;
+use kinetoscope::mujoco::Data;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
 use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::Visible;
-use kinetoscope::sim::mj::{self, Data};
 use nalgebra::Vector3;
 
 const SIZE: [usize; 2] = [160, 120];

@@ -2,10 +2,10 @@
 //! about the origin of the world, forward kinematics from the description, and nothing of the code under test.
 
 use super::robots::simulation;
+use kinetoscope::mujoco::Data;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::description::{JointKind, RobotDescription};
-use kinetoscope::sim::mj::Data;
+use kinetoscope::robot::description::{JointKind, RobotDescription};
 use nalgebra::{Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// Mass, first moment and inertia about the origin.

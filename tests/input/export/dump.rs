@@ -3,10 +3,10 @@
 use super::robots::{anymal, bundled, dump, simulation};
 use crate::support::exported;
 use crate::urdf::assert_same;
+use kinetoscope::mujoco::{Data, Model, ObjectKind};
 use kinetoscope::prelude::*;
+use kinetoscope::robot::urdf::assemble;
 use kinetoscope::sim::DiagnosticKind;
-use kinetoscope::sim::mj::{Data, Model, ObjectKind};
-use kinetoscope::sim::urdf::assemble;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 //! `KINETOSCOPE_BLESS=1` writes the files anew (`cargo xtask bless`).
 
 use super::robots::{bundled_robots, dump, simulation};
-use kinetoscope::sim::mj::{TARGET, Target};
+use kinetoscope::mujoco::{TARGET, Target};
 use std::path::Path;
 
 /// Compares with `tests/data/<name>`; where they differ, writes the found text beside it.

@@ -1,7 +1,7 @@
 //! Several URDF files become one robot: who hangs from whom, names, and refusals.
 
 use kinetoscope::prelude::*;
-use kinetoscope::sim::urdf::{NameCase, NameCaseCfg, UrdfError, assemble, parse_str, write_urdf, write_urdf_with};
+use kinetoscope::robot::urdf::{NameCase, NameCaseCfg, UrdfError, assemble, parse_str, write_urdf, write_urdf_with};
 use kinetoscope::sim::{Diagnostic, DiagnosticKind, RobotDescription};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf::{Files, joint, limit};

@@ -1,9 +1,9 @@
 //! Bad URDF files: each gives a typed error that names the place, the element, and what would be right.
 
-use kinetoscope::sim::DiagnosticKind;
-use kinetoscope::sim::urdf::{
+use kinetoscope::robot::urdf::{
     Strictness, UrdfCfg, UrdfError, UrdfFile, assemble, parse_file, parse_str, parse_str_with,
 };
+use kinetoscope::sim::DiagnosticKind;
 use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::urdf::Files;
 use std::path::Path;

@@ -3,11 +3,11 @@
 //! Judges: closed forms of solids, and MuJoCo's own mass properties of a body with the same geoms and density. Tolerance 1e-12
 //! of the value: both are a few operations on the same numbers. Meshes are read in single precision: 1e-6.
 
+use kinetoscope::mujoco::compile;
 use kinetoscope::prelude::*;
+use kinetoscope::robot::description::Inertial;
+use kinetoscope::robot::urdf::write_urdf;
 use kinetoscope::sim::DiagnosticKind;
-use kinetoscope::sim::description::Inertial;
-use kinetoscope::sim::mj::compile;
-use kinetoscope::sim::urdf::write_urdf;
 use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::urdf::{Files, collision, joint, limit, robot};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -214,7 +214,7 @@ fn partial_inertials() {
         assert_eq!(warnings(&sim), ["inertial-incomplete"], "{what}");
         // A URDF written from the assembled file leaves the missing values out, too.
         let cfg = kinetoscope_testkit::worlds::text_robot(&files, "r", &urdf);
-        let written = write_urdf(&kinetoscope::sim::urdf::assemble(&cfg.urdf).unwrap().description);
+        let written = write_urdf(&kinetoscope::robot::urdf::assemble(&cfg.urdf).unwrap().description);
         let (sim, id) = loaded(&written, DENSITY);
         assert_near(&what, &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
     }

@@ -1,7 +1,7 @@
 //! Reading URDF, alone and with the files it refers to.
 
 use kinetoscope::prelude::*;
-use kinetoscope::sim::description::{Geometry, Joint, RobotDescription};
+use kinetoscope::robot::description::{Geometry, Joint, RobotDescription};
 
 mod assembly;
 mod bad_input;

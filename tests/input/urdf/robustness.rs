@@ -1,7 +1,7 @@
 //! Hostile files: huge, deep, cut off or damaged. The answer is always a robot or an error, soon, and never a panic.
 
-use kinetoscope::sim::description::JointId;
-use kinetoscope::sim::urdf::{UrdfCfg, UrdfError, assemble, parse_file, parse_str, write_urdf};
+use kinetoscope::robot::description::JointId;
+use kinetoscope::robot::urdf::{UrdfCfg, UrdfError, assemble, parse_file, parse_str, write_urdf};
 use kinetoscope_testkit::urdf::Files;
 use std::fmt::Write as _;
 use std::path::Path;

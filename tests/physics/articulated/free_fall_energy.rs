@@ -21,7 +21,7 @@
 use super::newton_euler::{Motion, Tree, joints};
 use super::subjects::EARTH;
 use crate::lab::*;
-use kinetoscope::sim::mj::{TARGET, Target};
+use kinetoscope::mujoco::{TARGET, Target};
 use nalgebra::{Point3, Vector3};
 use std::path::PathBuf;
 

@@ -7,7 +7,7 @@
 use super::convergence::{errors, off, order};
 use super::free_rotation;
 use crate::lab::*;
-use kinetoscope::sim::mj::{TARGET, Target};
+use kinetoscope::mujoco::{TARGET, Target};
 
 const MOMENTS: [f64; 3] = [0.01, 0.02, 0.025];
 const SPIN: [f64; 3] = [4.0, 1.0, 5.5];

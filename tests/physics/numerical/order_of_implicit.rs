@@ -6,8 +6,8 @@
 use super::convergence::{double_pendulum, errors, off, order, reference};
 use super::double_pendulum::{self as written_out, Steps, rounding};
 use crate::law::law;
+use kinetoscope::mujoco::{TARGET, Target};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mj::{TARGET, Target};
 
 #[test]
 fn holds() {

@@ -6,7 +6,7 @@
 //! by ω h/2 per radian, percents.
 
 use crate::lab::*;
-use kinetoscope::sim::mj::{TARGET, Target};
+use kinetoscope::mujoco::{TARGET, Target};
 use nalgebra::{Matrix3, Vector3};
 
 const MOMENTS: [f64; 3] = [0.01, 0.02, 0.025];

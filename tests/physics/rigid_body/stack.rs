@@ -9,7 +9,7 @@
 
 use super::soft_contact::depth;
 use crate::lab::*;
-use kinetoscope::sim::mj::{TARGET, Target};
+use kinetoscope::mujoco::{TARGET, Target};
 use kinetoscope_testkit::worlds::object;
 
 const EDGE: f64 = 0.1;

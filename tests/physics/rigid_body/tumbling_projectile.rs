@@ -7,7 +7,7 @@
 //! (ω h)⁴ ω t/120, 3e-8 rad, times the offset of 0.1 m at most: 1e-8 m.
 
 use crate::lab::*;
-use kinetoscope::sim::mj::{TARGET, Target};
+use kinetoscope::mujoco::{TARGET, Target};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 /// The turn that it starts with: velocities are written in world axes, whatever it is.

@@ -1,7 +1,7 @@
 //! Events, notes and rates.
 
 use super::*;
-use kinetoscope_sim::mj;
+use kinetoscope_mujoco as mj;
 use serde_json::json;
 
 /// The lines of `notes.jsonl` of a NumPy archive.

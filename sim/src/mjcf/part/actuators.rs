@@ -2,7 +2,7 @@
 
 use super::super::write::{Element, number};
 use super::{PartError, Writing, row, row_of, some};
-use crate::mj::words;
+use kinetoscope_mujoco::words;
 
 impl Writing<'_> {
     /// Actuators without and with an activation; a robot has drives in their place.

@@ -2,8 +2,8 @@
 
 use super::super::write::Element;
 use super::{PartError, Writing, row, singles};
-use crate::mj::{Asset, MeshArrays, Target, TextureType, words};
 use image::{ExtendedColorType, ImageEncoder};
+use kinetoscope_mujoco::{Asset, MeshArrays, Target, TextureType, words};
 use std::collections::HashMap;
 
 /// Order in which MuJoCo stacks the squares of a cube.

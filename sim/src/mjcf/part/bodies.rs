@@ -2,7 +2,7 @@
 
 use super::super::write::{Element, number};
 use super::{Base, PartError, Passive, Writing, row, row_of, singles, some};
-use crate::mj::{LightType, Target, words};
+use kinetoscope_mujoco::{LightType, Target, words};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
 

@@ -2,8 +2,9 @@
 
 use super::super::write::{Element, number};
 use super::{PartError, Writing, row, row_of, singles, some};
-use crate::mj::Target;
-use crate::mj::words::{self, PathPoint};
+use kinetoscope_mujoco::Target;
+use kinetoscope_mujoco::words;
+use kinetoscope_mujoco::words::PathPoint;
 
 impl Writing<'_> {
     /// Pairs of geoms with parameters of their own, and pairs of bodies that never collide.

@@ -19,9 +19,9 @@ pub(crate) use rig::{Base, Passive, Rig};
 pub(crate) use sensors::left_out as sensors_left_out;
 pub(crate) use settings::compare;
 
-use crate::mj::{Asset, Model, Target};
-use crate::source::Source;
+use kinetoscope_mujoco::{Asset, Model, Target};
 use kinetoscope_scene::Pose;
+use kinetoscope_scene::source::Source;
 use std::cell::RefCell;
 use std::fmt;
 

@@ -1,6 +1,6 @@
 //! Names of everything in a file: its own, and made-up ones for what has none.
 
-use crate::mj::{Model, ObjectKind};
+use kinetoscope_mujoco::{Model, ObjectKind};
 use std::collections::BTreeSet;
 
 /// Names of a file's objects in MuJoCo's order, without the part's uid; no two of a kind are the same.

@@ -4,8 +4,9 @@
 
 use super::super::write::{Element, number};
 use super::{LeftOut, PartError, PartNames, Writing, some};
-use crate::mj::Model;
-use crate::mj::words::{self, SensorObjects};
+use kinetoscope_mujoco::Model;
+use kinetoscope_mujoco::words;
+use kinetoscope_mujoco::words::SensorObjects;
 
 /// Sensors that only 4.x knows.
 const NEWER: [&str; 4] = ["jointactuatorfrc", "tendonactuatorfrc", "e_potential", "e_kinetic"];

@@ -1,9 +1,9 @@
 //! What a file says of the whole model, which is the scene's to say: found again in the text, to name file and line.
 
 use super::LeftOut;
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::mj::Model;
-use crate::source::Source;
+use kinetoscope_mujoco::Model;
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_scene::source::Source;
 use std::path::Path;
 use std::sync::Arc;
 

@@ -4,8 +4,8 @@
 //! clamped. Where `b0 = 0` and `b1 < 0` it follows positions, with the stiffness `-b1` and the damping `-b2`; its gain is the
 //! scale of its control alone. One that follows velocities has no `b1` and `gain = -b2`.
 
-use crate::mj::Model;
-use crate::mj::words;
+use kinetoscope_mujoco::Model;
+use kinetoscope_mujoco::words;
 
 /// Row `index` of an array with `count` rows.
 fn row_of<T>(values: &[T], count: usize, index: usize) -> &[T] {

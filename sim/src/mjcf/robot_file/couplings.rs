@@ -4,10 +4,10 @@
 
 use super::drives::is_single;
 use super::places::Places;
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::mj::{Model, words};
 use crate::mjcf::part::PartNames;
-use crate::source::Source;
+use kinetoscope_mujoco::{Model, words};
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_scene::source::Source;
 
 /// How a joint follows another.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,11 +10,12 @@ use super::actuator::law;
 use super::couplings::{Coupling, followed};
 use super::error::RobotFileError;
 use super::places::Places;
-use crate::description::FileDrive;
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::mj::Model;
-use crate::mj::words::{self, PathPoint};
 use crate::mjcf::part::PartNames;
+use kinetoscope_mujoco::Model;
+use kinetoscope_mujoco::words;
+use kinetoscope_mujoco::words::PathPoint;
+use kinetoscope_robot::description::FileDrive;
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use std::collections::BTreeMap;
 
 /// What acts on a joint.

@@ -1,8 +1,8 @@
 //! Why an MJCF file is no robot.
 
-use crate::mj::CompileError;
 use crate::mjcf::part::PartError;
-use crate::source::Source;
+use kinetoscope_mujoco::CompileError;
+use kinetoscope_scene::source::Source;
 
 /// The other use of a file: [`add_mjcf`](crate::SimulationManager::add_mjcf).
 const AS_A_PART: &str = "such a file is a scene, or a part of one";

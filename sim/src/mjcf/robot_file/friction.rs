@@ -2,10 +2,10 @@
 
 use super::couplings::Coupling;
 use super::drives::is_single;
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::mj::Model;
 use crate::mjcf::part::PartNames;
-use crate::source::Source;
+use kinetoscope_mujoco::Model;
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_scene::source::Source;
 
 /// MuJoCo's `solref` and `solimp` where nothing is said.
 const DEFAULTS: ([f64; 2], [f64; 5]) = ([0.02, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0]);

@@ -1,6 +1,6 @@
 //! Lines of the named elements of a file and of the files it includes.
 
-use crate::source::Source;
+use kinetoscope_scene::source::Source;
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;

@@ -9,16 +9,16 @@ use super::couplings::{Coupling, Follows};
 use super::drives::{Acting, is_single};
 use super::error::RobotFileError;
 use super::places::Places;
-use crate::description::{
+use crate::mjcf::part::PartNames;
+use kinetoscope_mujoco::{Model, words};
+use kinetoscope_robot::description::{
     Curve, FileDrive, Inertial, Joint, JointDefaults, JointId, JointKind, JointLimit, Link, LinkId, Mimic,
     RobotDescription,
 };
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::mj::{Model, words};
-use crate::mjcf::part::PartNames;
-use crate::source::Source;
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::from_row;
+use kinetoscope_scene::source::Source;
 use nalgebra::{Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::collections::BTreeSet;
 

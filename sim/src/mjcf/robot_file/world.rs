@@ -2,11 +2,12 @@
 
 use super::error::RobotFileError;
 use super::places::Places;
-use crate::diagnostic::{Diagnostic, DiagnosticKind};
-use crate::mj::Model;
-use crate::mj::words::{self, PathPoint};
 use crate::mjcf::part::{LeftOut, PartNames, sensors_left_out};
-use crate::source::Source;
+use kinetoscope_mujoco::Model;
+use kinetoscope_mujoco::words;
+use kinetoscope_mujoco::words::PathPoint;
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_scene::source::Source;
 use std::collections::BTreeSet;
 
 /// An index of MuJoCo's, where -1 is none.

@@ -1,7 +1,7 @@
 //! Copies of the scene with the shapes of a moment, whose memory is used again.
 
 use super::{Deforming, Scratch};
-use crate::mj::Data;
+use kinetoscope_mujoco::Data;
 use kinetoscope_scene::{OwnScene, RenderScene};
 use std::sync::{Arc, Mutex, PoisonError};
 

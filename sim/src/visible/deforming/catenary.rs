@@ -4,7 +4,7 @@
 //! lengths from 0, or has a spring that acts beyond a length only, hangs between them; one with damping, friction or an
 //! actuator does not.
 
-use crate::mj::{Data, Model, words};
+use kinetoscope_mujoco::{Data, Model, words};
 
 /// Segments of a hanging tendon; MuJoCo has as many as its round shapes have slices, 28 by default.
 pub(super) const SEGMENTS: usize = 28;

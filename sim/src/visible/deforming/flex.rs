@@ -5,7 +5,7 @@
 //! boundary is drawn, a radius outside.
 
 use super::{Scratch, Segment};
-use crate::mj::{Data, FlexArrays};
+use kinetoscope_mujoco::{Data, FlexArrays};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::smooth_normals;
 use std::collections::HashMap;

@@ -17,7 +17,7 @@ pub(super) use buffers::Buffers;
 use super::identity::Drawable;
 use super::shown::is_shown;
 use super::surface::{Surfaces, color};
-use crate::mj::{Data, Model};
+use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_scene::shape::{Capsule, Mesh};
 use kinetoscope_scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, RenderSceneError};
 use std::sync::Arc;

@@ -4,7 +4,7 @@
 //! of single precision in MuJoCo's order.
 
 use super::Scratch;
-use crate::mj::{Data, SkinArrays};
+use kinetoscope_mujoco::{Data, SkinArrays};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::smooth_normals;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};

@@ -4,7 +4,9 @@
 //! a colour of its own stays grey at its limit, and no colour shows islands or activations.
 
 use super::{Segment, catenary};
-use crate::mj::{self, Data, Model};
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco;
+use kinetoscope_mujoco::{Data, Model};
 
 /// A tendon, and the most that its path can be.
 #[derive(Clone, Debug)]

@@ -1,7 +1,9 @@
 //! Tendons, skins and flexes against closed forms.
 
 use super::super::Visible;
-use crate::mj::{self, Data, Model};
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco;
+use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_scene::{Instance, PoseF32, RenderScene, Shape};
 use std::sync::Arc;
 

@@ -1,0 +1,332 @@
+//! The state and the work memory of one environment.
+
+use super::error::EngineError;
+use super::guard::guarded;
+use super::model::Model;
+use super::prefetch::Places;
+use mujoco_sys as mj;
+use std::ptr::NonNull;
+
+/// One `mjData`, made for its model, which it keeps alive.
+#[derive(Debug)]
+pub struct Data {
+    raw: NonNull<mj::mjData>,
+    model: Model,
+    places: Places,
+}
+
+// SAFETY: an mjData is plain memory without thread affinity; `Data` is its only owner. It is not `Sync`: engine
+// functions take it as const but write to its stack.
+unsafe impl Send for Data {}
+
+impl Drop for Data {
+    fn drop(&mut self) {
+        // SAFETY: made by mj_makeData, deleted once; deletion frees memory and cannot raise an engine error.
+        unsafe { mj::mj_deleteData(self.raw.as_ptr()) };
+    }
+}
+
+/// Kinds of MuJoCo warnings, the same on all versions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Warning {
+    /// The inertia matrix is close to singular.
+    Inertia,
+    /// The contact buffer is full: contacts were dropped.
+    ContactFull,
+    /// The constraint buffer is full: constraints were dropped.
+    ConstraintFull,
+    /// A position is not finite or huge.
+    BadPosition,
+    /// A velocity is not finite or huge.
+    BadVelocity,
+    /// An acceleration is not finite or huge.
+    BadAcceleration,
+    /// A control is not finite or huge: it was replaced by zero.
+    BadControl,
+}
+
+impl Warning {
+    /// All kinds.
+    pub const ALL: [Self; 7] = [
+        Self::Inertia,
+        Self::ContactFull,
+        Self::ConstraintFull,
+        Self::BadPosition,
+        Self::BadVelocity,
+        Self::BadAcceleration,
+        Self::BadControl,
+    ];
+
+    /// Stable kebab-case name, as counted in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Inertia => "mujoco-bad-inertia",
+            Self::ContactFull => "mujoco-contact-buffer-full",
+            Self::ConstraintFull => "mujoco-constraint-buffer-full",
+            Self::BadPosition => "mujoco-bad-position",
+            Self::BadVelocity => "mujoco-bad-velocity",
+            Self::BadAcceleration => "mujoco-bad-acceleration",
+            Self::BadControl => "mujoco-bad-control",
+        }
+    }
+
+    fn code(self) -> usize {
+        (match self {
+            Self::Inertia => mj::mjWARN_INERTIA,
+            Self::ContactFull => mj::mjWARN_CONTACTFULL,
+            Self::ConstraintFull => mj::mjWARN_CNSTRFULL,
+            Self::BadPosition => mj::mjWARN_BADQPOS,
+            Self::BadVelocity => mj::mjWARN_BADQVEL,
+            Self::BadAcceleration => mj::mjWARN_BADQACC,
+            Self::BadControl => mj::mjWARN_BADCTRL,
+        }) as usize
+    }
+}
+
+/// How often each [`Warning`] was raised, in the order of [`Warning::ALL`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WarningCounts(pub [u64; Warning::ALL.len()]);
+
+impl WarningCounts {
+    /// Count of one kind.
+    pub fn get(&self, warning: Warning) -> u64 {
+        Warning::ALL.iter().position(|&w| w == warning).map_or(0, |i| self.0[i])
+    }
+
+    /// Adds the counts of `other`.
+    pub fn add(&mut self, other: &Self) {
+        for (total, n) in self.0.iter_mut().zip(other.0) {
+            *total += n;
+        }
+    }
+
+    /// Any acceleration, position or velocity was bad: the first in the order of a step, which is the cause.
+    pub fn diverged(&self) -> Option<Warning> {
+        [Warning::BadAcceleration, Warning::BadPosition, Warning::BadVelocity].into_iter().find(|&w| self.get(w) > 0)
+    }
+
+    /// A buffer was too small.
+    pub fn overflow(&self) -> Option<Overflow> {
+        if self.get(Warning::ContactFull) > 0 {
+            Some(Overflow::Contacts)
+        } else if self.get(Warning::ConstraintFull) > 0 {
+            Some(Overflow::Constraints)
+        } else {
+            None
+        }
+    }
+}
+
+/// Which buffer was too small.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overflow {
+    /// Contacts.
+    Contacts,
+    /// Constraint rows.
+    Constraints,
+    /// The solver's stack.
+    Stack,
+}
+
+impl Data {
+    /// New data in the model's initial state, with the model's buffer sizes.
+    ///
+    /// # Errors
+    /// MuJoCo cannot allocate it.
+    pub fn new(model: &Model) -> Result<Self, EngineError> {
+        // SAFETY: the model is alive; mj_makeData is an engine function (guarded).
+        let raw = guarded(|| unsafe { mj::mj_makeData(model.raw()) })?;
+        let raw = NonNull::new(raw).ok_or_else(|| EngineError { message: "could not create mjData".into() })?;
+        // SAFETY: just made, and nothing else knows it yet.
+        let places = Places::of(unsafe { raw.as_ref() });
+        Ok(Self { raw, model: model.clone(), places })
+    }
+
+    /// The model this data was made for.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    pub(super) fn places(&self) -> &Places {
+        &self.places
+    }
+
+    /// Goes on with another model of the same sizes: one [edited](super::Editor) from what this one's model was compiled
+    /// as. What depends on the model is computed by the next forward pass.
+    ///
+    /// # Panics
+    /// The model is another one, or its buffers have other sizes.
+    pub fn set_model(&mut self, model: Model) {
+        assert!(model.fits(&self.model), "a model of other sizes");
+        self.model = model;
+    }
+
+    pub(super) fn raw(&self) -> *const mj::mjData {
+        self.raw.as_ptr()
+    }
+
+    pub(super) fn raw_mut(&mut self) -> *mut mj::mjData {
+        self.raw.as_ptr()
+    }
+
+    fn header(&self) -> &mj::mjData {
+        // SAFETY: the data is alive and only `&mut self` writes to it.
+        unsafe { self.raw.as_ref() }
+    }
+
+    fn header_mut(&mut self) -> &mut mj::mjData {
+        // SAFETY: the data is alive and borrowed mutably.
+        unsafe { self.raw.as_mut() }
+    }
+
+    /// Back to the model's initial state; also clears what an engine error left behind.
+    pub fn reset(&mut self) {
+        let (m, d) = (self.model.raw(), self.raw.as_ptr());
+        // SAFETY: model and data are alive and belong together.
+        let result = guarded(|| unsafe { mj::mj_resetData(m, d) });
+        // mj_resetData raises no engine error on a data of matching sizes, which is this type's invariant.
+        debug_assert!(result.is_ok(), "{result:?}");
+    }
+
+    /// Everything that depends on positions and velocities: kinematics, contacts, constraints, bias forces.
+    ///
+    /// # Errors
+    /// MuJoCo stopped (out of memory): reset or drop this data.
+    pub fn step1(&mut self) -> Result<(), EngineError> {
+        let (m, d) = (self.model.raw(), self.raw.as_ptr());
+        // SAFETY: model and data are alive and belong together; an engine function (guarded).
+        guarded(|| unsafe { mj::mj_step1(m, d) })
+    }
+
+    /// Actuation, accelerations, constraint forces, integration over one time step.
+    ///
+    /// # Errors
+    /// MuJoCo stopped (out of memory): reset or drop this data.
+    pub fn step2(&mut self) -> Result<(), EngineError> {
+        let (m, d) = (self.model.raw(), self.raw.as_ptr());
+        // SAFETY: model and data are alive and belong together; an engine function (guarded).
+        guarded(|| unsafe { mj::mj_step2(m, d) })
+    }
+
+    /// One whole step, `mj_step`.
+    ///
+    /// # Errors
+    /// MuJoCo stopped (out of memory): reset or drop this data.
+    pub fn step(&mut self) -> Result<(), EngineError> {
+        let (m, d) = (self.model.raw(), self.raw.as_ptr());
+        // SAFETY: model and data are alive and belong together; an engine function (guarded).
+        guarded(|| unsafe { mj::mj_step(m, d) })
+    }
+
+    /// `mj_forward`: all quantities at the current state, without integration.
+    ///
+    /// # Errors
+    /// MuJoCo stopped (out of memory): reset or drop this data.
+    pub fn forward(&mut self) -> Result<(), EngineError> {
+        let (m, d) = (self.model.raw(), self.raw.as_ptr());
+        // SAFETY: model and data are alive and belong together; an engine function (guarded).
+        guarded(|| unsafe { mj::mj_forward(m, d) })
+    }
+
+    /// Accelerations of bodies and forces between them (`cacc`, `cfrc_int`), from the accelerations and constraint forces of
+    /// the last solve, which was done for the velocities `qvel`: those before the integration, where it is done already.
+    /// Nothing that decides a later step changes. `spare` is room for `nv` numbers.
+    ///
+    /// # Errors
+    /// MuJoCo stopped (out of memory): reset or drop this data.
+    ///
+    /// # Panics
+    /// `qvel` does not have `nv` numbers.
+    pub fn solve_accelerations(&mut self, qvel: &[f64], spare: &mut Vec<f64>) -> Result<(), EngineError> {
+        spare.clear();
+        spare.extend_from_slice(self.qvel());
+        self.qvel_mut().copy_from_slice(qvel);
+        let (m, d) = (self.model.raw(), self.raw.as_ptr());
+        // SAFETY: model and data are alive and belong together; an engine function (guarded).
+        let done = guarded(|| unsafe { mj::mj_rnePostConstraint(m, d) });
+        self.qvel_mut().copy_from_slice(spare);
+        #[cfg(mj4)]
+        {
+            // MuJoCo's own sensors of the next step would take these for theirs.
+            self.header_mut().flg_rnepost = false;
+        }
+        done
+    }
+
+    /// The dense joint-space inertia matrix, row-major, (nv, nv), of the last forward pass.
+    ///
+    /// # Errors
+    /// MuJoCo stopped.
+    pub fn mass_matrix(&self) -> Result<Vec<f64>, EngineError> {
+        let nv = self.model.nv();
+        let mut dense = vec![0.0; nv * nv];
+        let (m, d, out) = (self.model.raw(), self.raw.as_ptr(), dense.as_mut_ptr());
+        #[cfg(mj4)]
+        // SAFETY: `out` has nv * nv elements; model and data belong together.
+        guarded(|| unsafe { mj::mj_fullM(m, d, out) })?;
+        #[cfg(not(mj4))]
+        {
+            // SAFETY: the data is alive; qM has the length that mj_fullM reads.
+            let packed = unsafe { (*d).qM };
+            // SAFETY: `out` has nv * nv elements; model and data belong together.
+            guarded(|| unsafe { mj::mj_fullM(m, out, packed) })?;
+        }
+        Ok(dense)
+    }
+
+    /// Force of contact `index` in the contact frame: normal, two tangents, three torques \[N, N m\].
+    ///
+    /// # Panics
+    /// `index` is not smaller than the number of contacts.
+    #[track_caller]
+    pub fn contact_force(&self, index: usize) -> [f64; 6] {
+        assert!(index < self.contact().len(), "contact {index} of {}", self.contact().len());
+        let mut force = [0.0; 6];
+        // SAFETY: the index is in range; the result has six elements; the function only reads.
+        unsafe { mj::mj_contactForce(self.model.raw(), self.raw(), index as i32, force.as_mut_ptr()) };
+        force
+    }
+
+    /// Simulation time \[s\].
+    pub fn time(&self) -> f64 {
+        self.header().time
+    }
+
+    /// Sets the simulation time \[s\].
+    pub fn set_time(&mut self, time: f64) {
+        self.header_mut().time = time;
+    }
+
+    /// Number of equality rows: they come first among the constraints.
+    pub fn ne(&self) -> usize {
+        self.header().ne.max(0) as usize
+    }
+
+    /// Number of friction rows: they follow the equality rows, degrees of freedom in order, then tendons.
+    pub fn nf(&self) -> usize {
+        self.header().nf.max(0) as usize
+    }
+
+    /// Size of the struct, its buffer, and (4.x) its arena \[bytes\].
+    pub fn bytes(&self) -> usize {
+        let d = self.header();
+        #[cfg(mj4)]
+        let extra = d.narena as usize;
+        #[cfg(not(mj4))]
+        let extra = d.nstack as usize * size_of::<f64>();
+        size_of::<mj::mjData>() + d.nbuffer as usize + extra
+    }
+
+    /// Takes the warnings raised since the last call.
+    pub fn take_warnings(&mut self) -> WarningCounts {
+        let mut counts = WarningCounts::default();
+        let warnings = &mut self.header_mut().warning;
+        for (count, kind) in counts.0.iter_mut().zip(Warning::ALL) {
+            let stat = &mut warnings[kind.code()];
+            *count = stat.number.max(0) as u64;
+            stat.number = 0;
+        }
+        counts
+    }
+}

@@ -1,0 +1,496 @@
+//! Models that differ from a compiled one in a few arrays, and share all others with it.
+//!
+//! MuJoCo's model is one allocation, and `mj_setConst`, which follows a change of masses, writes to arrays that differ
+//! between versions. So changes are made to a whole copy, to which MuJoCo may write whatever it likes; what then differs
+//! from the compiled model, byte by byte, becomes the own memory of a shallow model.
+
+use super::error::EngineError;
+use super::guard::guarded;
+use super::model::{Model, OwnArray, Storage, array_pointer, set_buffers};
+use mujoco_sys as mj;
+use mujoco_sys::fields::model as fields;
+use mujoco_sys::fields::model::ModelArray;
+use std::ptr::NonNull;
+use std::sync::Arc;
+
+/// Arrays of shapes, pictures and texts, which no property is in: not looked at, for they may be large.
+const NOT_LOOKED_AT: [&str; 12] =
+    ["mesh_", "skin_", "hfield_", "tex_", "mat_", "flex", "name", "text_", "numeric_", "tuple_", "key_", "oct_"];
+
+/// A whole copy of a model, to make models from that differ from it.
+///
+/// Nobody outside can write what says where things are in the other arrays:
+///
+/// ```
+/// # use kinetoscope_sim::mj::{self, Editor};
+/// # let model = mj::compile("<mujoco/>", &[]).unwrap().into_model();
+/// Editor::new(&model).unwrap().body_mass_mut();
+/// ```
+/// ```compile_fail,E0624
+/// # use kinetoscope_sim::mj::{self, Editor};
+/// # let model = mj::compile("<mujoco/>", &[]).unwrap().into_model();
+/// Editor::new(&model).unwrap().body_simple_mut();
+/// ```
+#[derive(Debug)]
+pub struct Editor {
+    base: Model,
+    copy: Storage,
+    scratch: Scratch,
+    fields: Vec<ModelArray>,
+}
+
+/// What `mj_setConst` works in.
+#[derive(Debug)]
+struct Scratch(NonNull<mj::mjData>);
+
+// SAFETY: an mjData is plain memory without thread affinity; `Scratch` is its only owner.
+unsafe impl Send for Scratch {}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // SAFETY: made by mj_makeData, deleted once; deletion frees memory and cannot raise an engine error.
+        unsafe { mj::mj_deleteData(self.0.as_ptr()) };
+    }
+}
+
+macro_rules! edited_arrays {
+    ($($visibility:vis $name:ident: $element:ty;)*) => {
+        impl Editor {
+            $(
+                #[doc = concat!("MuJoCo's array of the model that is being made, for writing: `", stringify!($name), "`.")]
+                $visibility fn $name(&mut self) -> &mut [$element] {
+                    // SAFETY: the copy is alive, and `Editor`, its only owner, is borrowed mutably.
+                    unsafe { fields::$name(self.copy.0.as_ptr()) }
+                }
+            )*
+        }
+    };
+}
+
+edited_arrays! {
+    pub body_mass_mut: f64;
+    pub body_inertia_mut: f64;
+    pub geom_friction_mut: f64;
+    pub geom_rgba_mut: f32;
+    pub body_pos_mut: f64;
+    pub body_quat_mut: f64;
+    pub dof_damping_mut: f64;
+    pub dof_armature_mut: f64;
+    pub dof_frictionloss_mut: f64;
+    pub tendon_frictionloss_mut: f64;
+    // What is around a shape follows from its size.
+    geom_size_mut: f64;
+    geom_rbound_mut: f64;
+    // MuJoCo takes short cuts by these, to rows that then must be there: only what is right as a whole is written.
+    body_ipos_mut: f64;
+    body_sameframe_mut: u8;
+    body_simple_mut: u8;
+    geom_sameframe_mut: u8;
+    site_sameframe_mut: u8;
+    dof_simplenum_mut: i32;
+}
+
+impl Editor {
+    /// An editor of what `model` was compiled as, which is the model it starts with.
+    ///
+    /// # Errors
+    /// MuJoCo cannot allocate a copy.
+    pub fn new(model: &Model) -> Result<Self, EngineError> {
+        let no_memory = || EngineError { message: "could not allocate memory for a copy of the model".into() };
+        // SAFETY: the compiled model is alive and one allocation, as mj_copyModel needs it; an engine function (guarded).
+        let copy = guarded(|| unsafe { mj::mj_copyModel(std::ptr::null_mut(), model.compiled()) })?;
+        let mut copy = Storage(NonNull::new(copy).ok_or_else(no_memory)?);
+        set_buffers(copy.header_mut(), model.small_buffers());
+        // SAFETY: the copy is alive; an engine function (guarded).
+        let data = guarded(|| unsafe { mj::mj_makeData(copy.0.as_ptr()) })?;
+        let scratch = Scratch(NonNull::new(data).ok_or_else(no_memory)?);
+        let mut fields = Vec::new();
+        let small = |name: &str| !NOT_LOOKED_AT.iter().any(|prefix| name.starts_with(prefix));
+        let keep = |field: ModelArray| fields.extend((field.bytes > 0 && small(field.name)).then_some(field));
+        // SAFETY: the compiled model is alive.
+        unsafe { fields::each(model.compiled(), keep) };
+        Ok(Self { base: model.clone(), copy, scratch, fields })
+    }
+
+    /// Goes on from `model`.
+    ///
+    /// # Panics
+    /// It was not compiled with the model of this editor.
+    pub fn load(&mut self, model: &Model) {
+        assert!(std::ptr::eq(model.compiled(), self.base.compiled()), "a model of another scene");
+        for field in &self.fields {
+            // SAFETY: a field of models of these sizes; nothing writes to a shared model.
+            let from = unsafe { bytes(model.header(), field) };
+            // SAFETY: the array of the copy has as many bytes, since both have the sizes of the compiled model; the copy is
+            // alive, and `self` is borrowed mutably.
+            let to = unsafe {
+                std::slice::from_raw_parts_mut(array_pointer(self.copy.header(), field).cast_mut(), field.bytes)
+            };
+            if *to != *from {
+                to.copy_from_slice(from);
+            }
+        }
+        let (header, copy) = (model.header(), self.copy.header_mut());
+        copy.opt.gravity = header.opt.gravity;
+        (copy.stat.meaninertia, copy.stat.meanmass) = (header.stat.meaninertia, header.stat.meanmass);
+    }
+
+    /// Puts the centre of mass of a body elsewhere \[m, in the body's frame\]; [`set_constants`](Self::set_constants) is to
+    /// follow. MuJoCo takes short cuts where frames are the same, which ends here.
+    ///
+    /// # Errors
+    /// The inertia matrix of the body is diagonal, and MuJoCo 4.x keeps no room for what would no longer be zero.
+    ///
+    /// # Panics
+    /// There is no such body.
+    pub fn set_center_of_mass(&mut self, body: usize, com: [f64; 3]) -> Result<(), DiagonalInertia> {
+        let is_simple = self.body_simple_mut()[body] != 0;
+        if is_simple && cfg!(mj4) {
+            return Err(DiagonalInertia);
+        }
+        self.body_ipos_mut()[3 * body..3 * body + 3].copy_from_slice(&com);
+        // 4.x finds out anew in mj_setConst.
+        self.body_sameframe_mut()[body] = 0;
+        let base = self.base.clone();
+        for geom in of_body(base.geom_bodyid(), body) {
+            clear_if_inertial(&mut self.geom_sameframe_mut()[geom]);
+        }
+        for site in of_body(base.site_bodyid(), body) {
+            clear_if_inertial(&mut self.site_sameframe_mut()[site]);
+        }
+        if is_simple {
+            self.body_simple_mut()[body] = 0;
+            let mut consecutive = 0;
+            for dof in (0..base.nv()).rev() {
+                let simple = self.body_simple_mut()[base.dof_bodyid()[dof] as usize] != 0;
+                consecutive = if simple { consecutive + 1 } else { 0 };
+                self.dof_simplenum_mut()[dof] = consecutive;
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives a geom that is a ball, a capsule, an ellipsoid, a cylinder or a box other sizes \[m\], MuJoCo's three numbers;
+    /// [`set_constants`](Self::set_constants) is to follow, which on 4.x finds the boxes around it anew. Others stay as they
+    /// are. Mass and moments do not follow.
+    ///
+    /// Source of the bounding radius, which 2.2.2 leaves alone: the farthest point of each shape from its middle.
+    ///
+    /// # Panics
+    /// There is no such geom.
+    pub fn set_geom_size(&mut self, geom: usize, size: [f64; 3]) {
+        let [x, y, z] = size;
+        let radius = match self.base.geom_type()[geom] as u32 {
+            mj::mjGEOM_SPHERE => x,
+            mj::mjGEOM_CAPSULE => x + y,
+            mj::mjGEOM_ELLIPSOID => x.max(y).max(z),
+            mj::mjGEOM_CYLINDER => (x * x + y * y).sqrt(),
+            mj::mjGEOM_BOX => (x * x + y * y + z * z).sqrt(),
+            _ => return,
+        };
+        self.geom_size_mut()[3 * geom..3 * geom + 3].copy_from_slice(&size);
+        self.geom_rbound_mut()[geom] = radius;
+    }
+
+    /// Sets gravity \[m/s²\].
+    pub fn set_gravity(&mut self, gravity: [f64; 3]) {
+        self.copy.header_mut().opt.gravity = gravity;
+    }
+
+    /// `mj_setConst`: what follows from masses, inertias, centres of mass and armatures, sizes and places.
+    ///
+    /// # Errors
+    /// MuJoCo stopped.
+    pub fn set_constants(&mut self) -> Result<(), EngineError> {
+        let (m, d) = (self.copy.0.as_ptr(), self.scratch.0.as_ptr());
+        // SAFETY: the copy and its data are alive, and `self` is borrowed mutably; an engine function (guarded).
+        let done = guarded(|| unsafe { mj::mj_setConst(m, d) });
+        if done.is_err() {
+            // What the error left on the stack. It sets the positions that it looks at by itself.
+            // SAFETY: as above.
+            guarded(|| unsafe { mj::mj_resetData(m, d) })?;
+        }
+        done?;
+        self.update_means();
+        Ok(())
+    }
+
+    /// 4.0 leaves `stat` as its compiler made it, where 2.2.2 computes it anew. The solver scales by the mean inertia.
+    fn update_means(&mut self) {
+        if cfg!(mj4) {
+            // SAFETY: the copy is alive, and only `&mut self` writes to it.
+            let inertias = unsafe { fields::dof_M0(self.copy.0.as_ptr()) };
+            let inertia = (!inertias.is_empty()).then(|| inertias.iter().sum::<f64>() / inertias.len() as f64);
+            let masses = self.body_mass_mut();
+            let bodies = masses.len().saturating_sub(1);
+            let mass = (bodies > 0).then(|| masses[1..].iter().sum::<f64>() / bodies as f64);
+            let stat = &mut self.copy.header_mut().stat;
+            stat.meaninertia = inertia.unwrap_or(stat.meaninertia);
+            stat.meanmass = mass.unwrap_or(stat.meanmass);
+        }
+    }
+
+    /// The model that was made, with the buffer sizes of `like`, which was compiled with the model of this editor.
+    ///
+    /// # Panics
+    /// `like` was compiled otherwise.
+    pub fn model(&self, like: &Model) -> Model {
+        assert!(std::ptr::eq(like.compiled(), self.base.compiled()), "a model of another scene");
+        let changed = |field: &&ModelArray| {
+            // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
+            let mine = unsafe { bytes(self.copy.header(), field) };
+            // SAFETY: as above; nothing writes to a shared model.
+            mine != unsafe { bytes(like.compiled(), field) }
+        };
+        let own: Arc<[OwnArray]> = self.fields.iter().filter(changed).map(|field| self.own(field)).collect();
+        let mut header = like.copy_header();
+        for field in &self.fields {
+            set_pointer(&mut header, field, array_pointer(like.compiled(), field));
+        }
+        for array in &*own {
+            set_pointer(&mut header, &array.field, array.memory.as_ptr().cast());
+        }
+        let copy = self.copy.header();
+        header.opt.gravity = copy.opt.gravity;
+        // mj_setConst computes the rest of `stat` anew, too, over what the file may have said of it.
+        (header.stat.meaninertia, header.stat.meanmass) = (copy.stat.meaninertia, copy.stat.meanmass);
+        // SAFETY: sizes are those of `like`; all pointers lead to the compiled model, which `like` keeps alive, but for those
+        // that were just set to `own`, each to memory of the size of its field.
+        unsafe { like.with_arrays(header, own) }
+    }
+
+    fn own(&self, field: &ModelArray) -> OwnArray {
+        // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
+        OwnArray::of_bytes(*field, unsafe { bytes(self.copy.header(), field) })
+    }
+}
+
+/// The centre of mass of a body cannot be moved: see [`Editor::set_center_of_mass`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DiagonalInertia;
+
+/// 1 says that a frame is the body's, 2 that it is that of the body's inertia (4.x: 4 that it has its axes).
+fn clear_if_inertial(sameframe: &mut u8) {
+    if matches!(*sameframe, 2 | 4) {
+        *sameframe = 0;
+    }
+}
+
+/// Indices of the things of a body, given the body of each thing.
+fn of_body(bodies: &[i32], body: usize) -> impl Iterator<Item = usize> + '_ {
+    bodies.iter().enumerate().filter(move |(_, of)| **of as usize == body).map(|(index, _)| index)
+}
+
+/// The bytes of an array, which are plain numbers without gaps.
+///
+/// # Safety
+/// `field` is one of `fields::model::each` of a model of the same sizes, and not empty; nothing writes to the array while the
+/// bytes are in use.
+unsafe fn bytes<'m>(model: &'m mj::mjModel, field: &ModelArray) -> &'m [u8] {
+    // SAFETY: the array has this size (contract), and lives as long as the model.
+    unsafe { std::slice::from_raw_parts(array_pointer(model, field), field.bytes) }
+}
+
+/// Lets an array begin elsewhere.
+pub(super) fn set_pointer(header: &mut mj::mjModel, field: &ModelArray, array: *const u8) {
+    // SAFETY: the offset is that of a pointer inside of the struct.
+    let pointer = unsafe { std::ptr::from_mut(header).byte_add(field.pointer) };
+    // SAFETY: a pointer stands there, and the struct is borrowed mutably.
+    unsafe { pointer.cast::<*const u8>().write(array) };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate as mj;
+    use crate::Data;
+
+    /// A chain with a tendon, a free body with a centre of mass of its own, and one whose inertia matrix is diagonal.
+    fn text(masses: [f64; 3], com: [f64; 3], moments: [f64; 3], armature: f64) -> String {
+        let [upper, lower, free] = masses;
+        let ([x, y, z], [a, b, c]) = (com, moments);
+        format!(
+            r#"<mujoco><worldbody><geom type="plane" size="5 5 1"/>
+            <camera name="eye" mode="targetbody" target="lower" pos="0 -2 1"/>
+            <body name="upper" pos="0 0 1"><joint name="shoulder" axis="0 1 0" damping="0.1" armature="0.01"/>
+              <inertial pos="0.1 0 0" mass="{upper}" diaginertia="0.01 0.02 0.02"/>
+              <geom type="capsule" fromto="0 0 0 0.2 0 0" size="0.03"/>
+              <body name="lower" pos="0.2 0 0" euler="20 0 0"><joint name="elbow" axis="0 1 0" armature="{armature}"/>
+                <inertial pos="{x} {y} {z}" euler="10 20 30" mass="{lower}" diaginertia="{a} {b} {c}"/>
+                <geom type="capsule" fromto="0 0 0 0.2 0 0" size="0.03"/><geom type="box" size="0.02 0.03 0.04" pos="0.1 0 0.1"/>
+                <site name="s" pos="0.1 0 0"/></body></body>
+            <body name="free" pos="1 0 1"><freejoint/>
+              <inertial pos="0.02 0.01 0" mass="{free}" diaginertia="0.1 0.1 0.1"/><geom type="box" size="0.1 0.1 0.1"/></body>
+            <body name="ball" pos="2 0 1"><freejoint/><geom size="0.1"/></body>
+            </worldbody>
+            <tendon><fixed name="t" frictionloss="0.1"><joint joint="shoulder" coef="1"/><joint joint="elbow" coef="-2"/></fixed></tendon>
+            <actuator><motor name="m" joint="elbow" gear="3"/></actuator></mujoco>"#
+        )
+    }
+
+    fn compile(text: &str) -> Model {
+        mj::compile(text, &[]).expect("compiles").into_model()
+    }
+
+    fn base_text() -> String {
+        text([1.0, 0.5, 2.0], [0.1, 0.0, 0.02], [0.01, 0.02, 0.025], 0.02)
+    }
+
+    fn base() -> Model {
+        compile(&base_text())
+    }
+
+    /// Names of arrays, of all there are, in which two models of the same sizes differ by more than rounding.
+    fn differences(a: &Model, b: &Model) -> Vec<String> {
+        let mut found = Vec::new();
+        let mut compare = |field: ModelArray| {
+            if field.bytes == 0 {
+                return;
+            }
+            // SAFETY: the models are of the same sizes, and nothing writes to them.
+            let left = unsafe { bytes(a.header(), &field) };
+            // SAFETY: as above.
+            let right = unsafe { bytes(b.header(), &field) };
+            let numbers = |bytes: &[u8]| -> Vec<f64> {
+                bytes.as_chunks::<8>().0.iter().map(|number| f64::from_ne_bytes(*number)).collect()
+            };
+            let equal = if matches!(field.kind, "mjtNum" | "f64") {
+                // Sums of some dozen products of numbers up to 100.
+                numbers(left).iter().zip(numbers(right)).all(|(x, y)| (x - y).abs() <= 1e-12 * (1.0 + x.abs()))
+            } else {
+                left == right
+            };
+            if !equal {
+                found.push(field.name.to_string());
+            }
+        };
+        // SAFETY: the model is alive.
+        unsafe { fields::each(a.raw(), &mut compare) };
+        let stat = |m: &Model| (m.header().stat.meaninertia, m.header().stat.meanmass);
+        let ((inertia, mass), (other_inertia, other_mass)) = (stat(a), stat(b));
+        if (inertia - other_inertia).abs() > 1e-12 || (mass - other_mass).abs() > 1e-12 {
+            found.push("stat".into());
+        }
+        found
+    }
+
+    #[test]
+    fn masses() {
+        let model = base();
+        let (com, moments) = ([0.13, -0.02, 0.05], [0.03, 0.035, 0.04]);
+        // The ball, whose rows MuJoCo takes a short cut through: 2.5 kg, and 2/5 m r² about any axis.
+        let heavy = r#"<freejoint/><geom size="0.1" mass="2.5"/>"#;
+        let fresh = text([1.7, 0.9, 3.1], com, moments, 0.07).replace(r#"<freejoint/><geom size="0.1"/>"#, heavy);
+        let fresh = compile(&fresh);
+        assert!(differences(&model, &fresh).len() > 6, "{:?}", differences(&model, &fresh));
+        let mut editor = Editor::new(&model).expect("small");
+        editor.body_mass_mut()[1..4].copy_from_slice(&[1.7, 0.9, 3.1]);
+        editor.body_inertia_mut()[6..9].copy_from_slice(&moments);
+        assert!(editor.body_simple_mut()[4] != 0 && editor.body_mass_mut()[4] != 2.5);
+        editor.body_mass_mut()[4] = 2.5;
+        editor.body_inertia_mut()[12..15].fill(0.01);
+        editor.dof_armature_mut()[1] = 0.07;
+        editor.set_center_of_mass(2, com).expect("not diagonal");
+        // Control: without the constants the model is another one.
+        assert!(!differences(&editor.model(&model), &fresh).is_empty());
+        editor.set_constants().expect("fits");
+        let edited = editor.model(&model);
+        // Principal axes that MuJoCo sorts are those of the fresh one, for moments are in order in both.
+        assert_eq!(differences(&edited, &fresh), Vec::<String>::new());
+        // Nothing is left over for the next one.
+        editor.load(&model);
+        assert_eq!(editor.model(&model).own_arrays().count(), 0);
+        editor.set_constants().expect("fits");
+        assert_eq!(editor.model(&model).own_arrays().count(), 0, "constants of an unchanged model are those it has");
+        editor.load(&edited);
+        assert_eq!(differences(&editor.model(&model), &edited), Vec::<String>::new());
+    }
+
+    /// One of each kind that has sizes, several of them in one body, which 4.x keeps boxes around.
+    fn shapes(sizes: [&str; 5], at: &str) -> Model {
+        let [ball, capsule, ellipsoid, cylinder, cuboid] = sizes;
+        compile(&format!(
+            r#"<mujoco><worldbody>
+            <body pos="0 0 1"><freejoint/><inertial pos="0.01 0 0.02" euler="10 0 0" mass="1" diaginertia="0.1 0.1 0.1"/>
+              <geom size="{ball}"/><geom type="capsule" size="{capsule}" pos="1 0 0" euler="0 30 20"/>
+              <geom type="ellipsoid" size="{ellipsoid}" pos="2 0 0"/><geom type="cylinder" size="{cylinder}" pos="3 0 0"/></body>
+            <body pos="{at}"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom type="box" size="{cuboid}"/></body>
+            </worldbody></mujoco>"#
+        ))
+    }
+
+    #[test]
+    fn sizes_and_places() {
+        let model = shapes(["0.1", "0.1 0.2", "0.1 0.2 0.3", "0.1 0.2", "0.1 0.2 0.3"], "0 5 0");
+        let fresh = shapes(["0.11", "0.12 0.22", "0.13 0.35 0.32", "0.14 0.21", "0.2 0.1 0.35"], "0 4 1");
+        assert!(!differences(&model, &fresh).is_empty());
+        let mut editor = Editor::new(&model).expect("small");
+        let sizes = [[0.11, 0., 0.], [0.12, 0.22, 0.], [0.13, 0.35, 0.32], [0.14, 0.21, 0.], [0.2, 0.1, 0.35]];
+        sizes.into_iter().enumerate().for_each(|(geom, size)| editor.set_geom_size(geom, size));
+        editor.body_pos_mut()[6..9].copy_from_slice(&[0.0, 4.0, 1.0]);
+        let unfinished = differences(&editor.model(&model), &fresh);
+        assert_eq!(unfinished.is_empty(), !cfg!(mj4), "{unfinished:?}");
+        editor.set_constants().expect("fits");
+        assert_eq!(differences(&editor.model(&model), &fresh), Vec::<String>::new());
+    }
+
+    #[test]
+    fn diagonal_inertia() {
+        let model = base();
+        let mut editor = Editor::new(&model).expect("small");
+        let with_com = |com: &str| {
+            let inertial = format!(r#"<inertial pos="{com}" mass="4.1887902" diaginertia="0.0167 0.0167 0.0167"/>"#);
+            let free = format!(r#"<freejoint/>{inertial}<geom size="0.1"/>"#);
+            compile(&base_text().replace(r#"<freejoint/><geom size="0.1"/>"#, &free))
+        };
+        let (centred, shifted) = (with_com("0 0 0"), with_com("0.03 0 0.01"));
+        if cfg!(mj4) {
+            assert_eq!(editor.set_center_of_mass(4, [0.03, 0.0, 0.01]), Err(DiagonalInertia));
+            #[cfg(mj4)]
+            assert_ne!(centred.header().nC, shifted.header().nC, "there is no room for it");
+        } else {
+            let mut editor = Editor::new(&centred).expect("small");
+            editor.set_center_of_mass(4, [0.03, 0.0, 0.01]).expect("room");
+            editor.set_constants().expect("fits");
+            assert_eq!(differences(&editor.model(&centred), &shifted), Vec::<String>::new());
+        }
+    }
+
+    #[test]
+    fn sharing() {
+        let model = base();
+        let mut editor = Editor::new(&model).expect("small");
+        editor.geom_friction_mut()[3] = 0.4;
+        editor.set_gravity([0.0, 0.0, -1.6]);
+        let edited = editor.model(&model);
+        assert_eq!(edited.arrays_apart(&model), ["geom_friction"]);
+        assert_eq!(edited.own_arrays().collect::<Vec<_>>(), [("geom_friction", 8 * 3 * model.ngeom())]);
+        assert_eq!((edited.gravity(), model.gravity()), ([0.0, 0.0, -1.6], [0.0, 0.0, -9.81]));
+        assert_eq!((edited.geom_friction()[3], model.geom_friction()[3]), (0.4, 1.0));
+        // Through other buffer sizes, and after the editor and the model it began with are gone.
+        let buffers = mj::Buffers { contacts: 9, constraints: 70, arena_bytes: 1 << 20 };
+        let larger = edited.with_buffers(buffers);
+        assert!(larger.arrays_apart(&edited).is_empty());
+        let again = editor.model(&larger);
+        assert!(again.fits(&larger) && !again.fits(&edited));
+        drop((editor, model, edited));
+        let mut data = Data::new(&larger).expect("small");
+        (0..100).for_each(|_| data.step().expect("steps"));
+        // Free fall: v = -g h k after k steps of semi-implicit Euler, for the ball.
+        assert!((data.qvel()[10] - -1.6 * 0.002 * 100.0).abs() < 1e-12, "{:?}", data.qvel());
+    }
+
+    #[test]
+    #[should_panic(expected = "another scene")]
+    fn another_scene() {
+        let _ = Editor::new(&base()).expect("small").model(&base());
+    }
+
+    #[test]
+    #[should_panic(expected = "other sizes")]
+    fn other_sizes() {
+        let model = base();
+        let mut data = Data::new(&model).expect("small");
+        data.set_model(model.with_buffers(mj::Buffers { contacts: 7, constraints: 7, arena_bytes: 1 << 20 }));
+    }
+}

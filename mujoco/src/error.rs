@@ -1,0 +1,123 @@
+//! What MuJoCo can say no to.
+
+use super::newer::Unknown;
+use super::version::{TARGET, Target, version_string};
+use kinetoscope_scene::source::Source;
+
+/// MuJoCo's engine stopped a call (`mju_error`). The data it was called on is to be reset or dropped.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("MuJoCo stopped: {message}")]
+pub struct EngineError {
+    /// MuJoCo's own words.
+    pub message: String,
+}
+
+impl EngineError {
+    /// More memory would help.
+    pub fn is_out_of_memory(&self) -> bool {
+        let text = self.message.to_ascii_lowercase();
+        ["stack", "arena", "memory"].iter().any(|word| text.contains(word))
+    }
+}
+
+/// MuJoCo refused a model.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub struct CompileError {
+    /// MuJoCo's own words.
+    pub message: String,
+    /// Line of the MJCF that MuJoCo names, counted from 1.
+    pub line: Option<u32>,
+    /// Where that line comes from: the element of the user's file.
+    pub source_line: Option<Source>,
+}
+
+impl CompileError {
+    pub(crate) fn new(message: &str) -> Self {
+        // 2.2.2 ends lines with a semicolon and puts empty ones between.
+        let lines =
+            message.lines().map(|line| line.trim().trim_end_matches(';').trim()).filter(|line| !line.is_empty());
+        let lines: Vec<&str> = lines.collect();
+        Self { line: line_named_in(message), message: lines.join("; ") + &newer(message), source_line: None }
+    }
+
+    /// The same error with the place of the word that MuJoCo does not know, where it names no line of `file` itself.
+    pub(crate) fn placed_in(self, file: &std::path::Path) -> Self {
+        // Of a line, MuJoCo does not say whether it is of the file or of one that it includes.
+        if self.line.is_some() && !includes(file) {
+            return self;
+        }
+        let source_line = Unknown::of_message(&self.message).and_then(|unknown| unknown.find_in(file));
+        Self { source_line: source_line.or(self.source_line.clone()), ..self }
+    }
+}
+
+impl std::fmt::Display for CompileError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(source) = &self.source_line {
+            write!(f, "{source}: ")?;
+        }
+        write!(f, "MuJoCo refuses the model: {}", self.message)
+    }
+}
+
+fn includes(file: &std::path::Path) -> bool {
+    std::fs::read_to_string(file).is_ok_and(|text| text.contains("<include"))
+}
+
+/// Hint after an error about a word that 2.2.2 does not know: a newer MuJoCo may know it.
+fn newer(message: &str) -> String {
+    if TARGET != Target::V2 {
+        return String::new();
+    }
+    let Some(unknown) = Unknown::of_message(message) else { return String::new() };
+    let version = version_string();
+    match unknown.since() {
+        Some(since) => format!(
+            ". MuJoCo {since} was the first that knows it; this program was built for {version}: build it with MUJOCO_DIR set \
+             to the folder of MuJoCo 4"
+        ),
+        None => format!(
+            ". If it is no mistake, the file is for a newer MuJoCo than {version}, for which this program was built: build it \
+             with MUJOCO_DIR set to the folder of MuJoCo 4"
+        ),
+    }
+}
+
+/// MuJoCo writes `line 12`, `line = 12` (2.2.2 and 4.x, reader and compiler); of text that is no XML the parser writes
+/// `Line number=12`.
+fn line_named_in(message: &str) -> Option<u32> {
+    let number_after = |word: &str| {
+        let after = &message[message.rfind(word)? + word.len()..];
+        let after = after.trim_start_matches([' ', '=', ':']);
+        let digits = after.find(|c: char| !c.is_ascii_digit()).map_or(after, |end| &after[..end]);
+        // Line 0 means that MuJoCo names no line.
+        digits.parse().ok().filter(|&line: &u32| line > 0)
+    };
+    ["line", "Line number"].into_iter().find_map(number_after)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines() {
+        assert_eq!(line_named_in("XML Error: bad\nElement 'geom', line 7\n"), Some(7));
+        assert_eq!(line_named_in("Error: mass\nObject name = a, id = 1, line = 12, column = 4"), Some(12));
+        let broken = "XML parse error 6:\nError=XML_ERROR_PARSING_ELEMENT ErrorID=6 (0x6) Line number=12\n";
+        assert_eq!(line_named_in(broken), Some(12));
+        let mismatched = "Error=XML_ERROR_MISMATCHED_ELEMENT ErrorID=14 (0xe) Line number=3: XMLElement name=outline";
+        assert_eq!(line_named_in(mismatched), Some(3));
+        assert_eq!(line_named_in("Error: something else"), None);
+        assert_eq!(line_named_in("Element 'joint', line 0\n"), None);
+    }
+
+    /// 2.2.2's words were shown as `...'actuatorfrcrange'; ; Element 'joint', line 77`.
+    #[test]
+    fn one_line() {
+        let error = CompileError::new("XML Error: Schema violation: 'a'\n\nElement 'joint', line 77\n");
+        assert_eq!(error.message, "XML Error: Schema violation: 'a'; Element 'joint', line 77");
+        assert_eq!(CompileError::new("a;\n;\n b;").message, "a; b");
+        assert_eq!(CompileError::new("").message, "");
+    }
+}

@@ -1,0 +1,192 @@
+//! Words of MJCF that an old MuJoCo refuses: since which version there are, and where a file has them.
+
+use kinetoscope_scene::source::Source;
+use std::path::{Path, PathBuf};
+
+/// A word that the schema of a MuJoCo has not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Unknown<'m> {
+    /// The element.
+    pub(super) element: &'m str,
+    /// Its attribute, or the value of one; `None` where the element itself is unknown.
+    pub(super) word: Option<&'m str>,
+    /// True if the word is a value.
+    is_value: bool,
+}
+
+/// Attributes and values (with their element) and elements that came after 2.2.2, with the version that had them first.
+/// Source: MuJoCo's changelog.
+const SINCE: &[(&str, &str, &str)] = &[
+    ("*", "gravcomp", "2.3.1"),
+    ("*", "actuatorfrcrange", "2.3.7"),
+    ("*", "actuatorfrclimited", "2.3.7"),
+    ("*", "actuatorgravcomp", "3.1.0"),
+    ("option", "implicitfast", "2.3.3"),
+    ("option", "sdf_iterations", "3.0.0"),
+    ("option", "sdf_initpoints", "3.0.0"),
+    ("option", "ls_iterations", "3.0.0"),
+    ("option", "ls_tolerance", "3.0.0"),
+    ("option", "o_friction", "3.0.0"),
+    ("option", "ccd_iterations", "3.2.0"),
+    ("option", "ccd_tolerance", "3.2.0"),
+    ("option", "actuatorgroupdisable", "3.1.0"),
+    ("flag", "nativeccd", "3.2.0"),
+    ("flag", "island", "3.0.0"),
+    ("flag", "midphase", "2.3.4"),
+    ("flag", "eulerdamp", "2.3.3"),
+    ("flag", "autoreset", "3.2.0"),
+    ("size", "memory", "2.3.0"),
+    ("compiler", "assetdir", "2.3.0"),
+    ("compiler", "alignfree", "3.2.0"),
+    ("compiler", "inertiagrouprange", "3.2.0"),
+    ("position", "kv", "3.1.0"),
+    ("position", "dampratio", "3.1.6"),
+    ("position", "inheritrange", "3.1.0"),
+    ("position", "timeconst", "3.1.6"),
+    ("intvelocity", "inheritrange", "3.1.0"),
+    ("*", "actdim", "2.3.0"),
+    ("*", "actearly", "3.0.0"),
+    ("general", "filterexact", "3.0.0"),
+    ("mesh", "inertia", "3.2.5"),
+    ("mesh", "maxhullvert", "3.2.0"),
+    ("mesh", "builtin", "3.3.5"),
+    ("*", "content_type", "2.3.7"),
+    ("texture", "nchannel", "3.2.1"),
+    ("texture", "colorspace", "3.3.3"),
+    ("material", "metallic", "3.1.5"),
+    ("material", "roughness", "3.1.5"),
+    ("camera", "resolution", "3.0.0"),
+    ("camera", "sensorsize", "3.0.0"),
+    ("camera", "focal", "3.0.0"),
+    ("camera", "focalpixel", "3.0.0"),
+    ("camera", "principal", "3.0.0"),
+    ("camera", "principalpixel", "3.0.0"),
+    ("light", "type", "3.3.3"),
+    ("light", "bulbradius", "3.1.5"),
+    ("connect", "site1", "3.2.3"),
+    ("connect", "site2", "3.2.3"),
+    ("weld", "site1", "3.2.3"),
+    ("weld", "site2", "3.2.3"),
+    ("hfield", "elevation", "3.1.1"),
+    ("extension", "", "2.3.3"),
+    ("plugin", "", "2.3.3"),
+    ("frame", "", "3.1.0"),
+    ("replicate", "", "3.1.5"),
+    ("attach", "", "3.2.0"),
+    ("model", "", "3.2.0"),
+    ("flexcomp", "", "3.0.0"),
+    ("deformable", "", "3.0.0"),
+    ("flex", "", "3.0.0"),
+    ("layer", "", "3.2.5"),
+    ("contact", "", "3.3.5"),
+    ("distance", "", "3.1.6"),
+    ("normal", "", "3.1.6"),
+    ("fromto", "", "3.1.6"),
+    ("jointactuatorfrc", "", "2.3.7"),
+    ("tendonactuatorfrc", "", "3.3.0"),
+    ("e_potential", "", "3.3.3"),
+    ("e_kinetic", "", "3.3.3"),
+    ("camprojection", "", "3.0.0"),
+    ("insidesite", "", "3.3.3"),
+    ("tactile", "", "3.3.5"),
+    ("dcmotor", "", "3.7.0"),
+];
+
+impl<'m> Unknown<'m> {
+    /// The word that a message of the reader complains of.
+    pub(super) fn of_message(message: &'m str) -> Option<Self> {
+        let quoted = |text: &'m str| text.split('\'').nth(1);
+        let element = quoted(&message[message.find("Element '")?..])?;
+        let after = |words: &str| message.find(words).and_then(|at| quoted(&message[at..]));
+        if let Some(word) = after("unrecognized attribute") {
+            return Some(Self { element, word: Some(word), is_value: false });
+        }
+        if let Some(word) = after("invalid keyword") {
+            return Some(Self { element, word: Some(word), is_value: true });
+        }
+        message.contains("unrecognized element").then_some(Self { element, word: None, is_value: false })
+    }
+
+    /// The first version of MuJoCo that has it, where that is known and later than 2.2.2.
+    pub(super) fn since(&self) -> Option<&'static str> {
+        let word = self.word.unwrap_or_default();
+        let is_it = |(element, known, _): &&(&str, &str, &str)| {
+            *known == word && (*element == self.element || *element == "*" && !word.is_empty())
+        };
+        SINCE.iter().find(is_it).map(|(.., since)| *since)
+    }
+
+    /// The first place of a file, or of those it includes, that has it.
+    pub(super) fn find_in(&self, file: &Path) -> Option<Source> {
+        self.search(file, file.parent().unwrap_or(Path::new("")), &mut Vec::new())
+    }
+
+    fn search(&self, file: &Path, folder: &Path, seen: &mut Vec<PathBuf>) -> Option<Source> {
+        if seen.iter().any(|known| known == file) {
+            return None;
+        }
+        seen.push(file.to_path_buf());
+        let text = std::fs::read_to_string(file).ok()?;
+        let document = roxmltree::Document::parse(&text).ok()?;
+        for node in document.descendants().filter(roxmltree::Node::is_element) {
+            let has_word = || match self.word {
+                None => true,
+                Some(word) if self.is_value => node.attributes().any(|attribute| attribute.value() == word),
+                Some(word) => node.has_attribute(word),
+            };
+            if node.has_tag_name(self.element) && has_word() {
+                let line = document.text_pos_at(node.range().start).row;
+                return Some(Source::new(file, line));
+            }
+            if let Some(included) = node.attribute("file").filter(|_| node.has_tag_name("include"))
+                && let Some(found) = self.search(&folder.join(included), folder, seen)
+            {
+                return Some(found);
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages() {
+        for (message, element, word, since) in [
+            ("unrecognized attribute: 'gravcomp'\n\nElement 'body', line 3", "body", Some("gravcomp"), Some("2.3.1")),
+            ("unrecognized attribute: 'sise'\n\nElement 'geom', line 3", "geom", Some("sise"), None),
+            ("unrecognized element\n\nElement 'frame', line 3\n", "frame", None, Some("3.1.0")),
+            (
+                "invalid keyword: 'implicitfast'\nElement 'option', line 2",
+                "option",
+                Some("implicitfast"),
+                Some("2.3.3"),
+            ),
+            ("unrecognized attribute: 'kv'\n\nElement 'motor', line 0", "motor", Some("kv"), None),
+        ] {
+            let unknown = Unknown::of_message(message).unwrap();
+            assert_eq!((unknown.element, unknown.word, unknown.since()), (element, word, since), "{message}");
+        }
+        assert_eq!(Unknown::of_message("Error: mass\nObject name = a, id = 1"), None);
+    }
+
+    /// The place is found in included files too, and a file that includes itself ends the search.
+    #[test]
+    fn places() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("a.xml"), "<mujoco>\n<include file=\"a.xml\"/><include file=\"b.xml\"/></mujoco>").unwrap();
+        std::fs::write(
+            path("b.xml"),
+            "<mujoco>\n<default>\n<joint damping='1'/>\n<joint\n actuatorfrcrange='0 1'/></default></mujoco>",
+        )
+        .unwrap();
+        let found = |word, is_value| Unknown { element: "joint", word: Some(word), is_value }.find_in(&path("a.xml"));
+        assert_eq!(found("actuatorfrcrange", false), Some(Source::new(path("b.xml"), 4)));
+        assert_eq!(found("1", true), Some(Source::new(path("b.xml"), 3)));
+        assert_eq!(found("gravcomp", false), None);
+    }
+}

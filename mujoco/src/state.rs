@@ -1,0 +1,239 @@
+//! What decides the next step, saved and restored: continuing from it is bit-identical.
+
+use super::data::Data;
+use super::model::Model;
+use mujoco_sys::fields::data as arrays;
+
+/// What a step changes: time, positions, velocities, activations and the solver's warm start.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Motion {
+    values: Vec<f64>,
+}
+
+/// Quaternions of `qpos` as they were before the last forward pass. The pass of 2.2.2 normalises those of free and ball
+/// joints in place, and a second one would change their last bits. 4.x leaves positions alone: there are none to keep.
+#[derive(Clone, Debug, Default)]
+pub struct RawQuats {
+    /// The first one is not on the heap: a robot has one, or none.
+    first: Option<RawQuat>,
+    others: Box<[RawQuat]>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct RawQuat {
+    /// Where it is in `qpos`.
+    address: usize,
+    value: [f64; 4],
+}
+
+/// What a user sets and a step only reads: controls, applied forces, mocap poses, user data.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Inputs {
+    values: Vec<f64>,
+    /// Active equalities: part of the data on 4.x, of the model on 2.2.2.
+    #[cfg(mj4)]
+    active: Vec<bool>,
+}
+
+/// Implements `save` and `restore` of a list of `mjData` arrays, in order.
+macro_rules! copied_arrays {
+    ($owner:ident: $($array:ident / $array_mut:ident),* $(,)?) => {
+        impl $owner {
+            fn save_arrays(&mut self, data: &Data) {
+                let (m, d) = (data.model().raw(), data.raw());
+                $(
+                    // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
+                    self.values.extend_from_slice(unsafe { arrays::$array(m, d) });
+                )*
+            }
+
+            fn restore_arrays(&self, data: &mut Data, mut values: &[f64]) {
+                let (m, d) = (data.model().raw(), data.raw_mut());
+                $(
+                    // SAFETY: model and data belong together and are alive; `data` is borrowed mutably.
+                    let array = unsafe { arrays::$array_mut(m, d) };
+                    let (mine, rest) = values.split_at(array.len());
+                    array.copy_from_slice(mine);
+                    values = rest;
+                )*
+                debug_assert!(values.is_empty());
+            }
+        }
+    };
+}
+
+copied_arrays!(Motion: qpos / qpos_mut, qvel / qvel_mut, act / act_mut, qacc_warmstart / qacc_warmstart_mut);
+copied_arrays!(
+    Inputs: ctrl / ctrl_mut,
+    qfrc_applied / qfrc_applied_mut,
+    xfrc_applied / xfrc_applied_mut,
+    mocap_pos / mocap_pos_mut,
+    mocap_quat / mocap_quat_mut,
+    userdata / userdata_mut,
+);
+
+impl Motion {
+    /// No state at all.
+    pub const EMPTY: Self = Self { values: Vec::new() };
+
+    /// Takes the values from `data`, reusing this memory.
+    pub fn save(&mut self, data: &Data) {
+        self.values.clear();
+        self.values.push(data.time());
+        self.save_arrays(data);
+    }
+
+    /// Puts the quaternions back to what they were before the forward pass of the data that was saved.
+    pub fn undo_normalization(&mut self, raw: &RawQuats) {
+        for quat in raw.iter() {
+            let first = 1 + quat.address;
+            self.values[first..first + 4].copy_from_slice(&quat.value);
+        }
+    }
+
+    /// The positions of what was saved from a data of `model`.
+    pub fn qpos(&self, model: &Model) -> &[f64] {
+        &self.values[1..1 + model.nq()]
+    }
+
+    /// The velocities of what was saved from a data of `model`.
+    pub fn qvel(&self, model: &Model) -> &[f64] {
+        &self.values[1 + model.nq()..1 + model.nq() + model.nv()]
+    }
+
+    /// All numbers, time first.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// What [`values`](Self::values) gave.
+    pub fn from_values(values: Vec<f64>) -> Self {
+        Self { values }
+    }
+
+    /// Puts the values into `data`, which is of the same model (its buffers may be larger).
+    pub fn restore(&self, data: &mut Data) {
+        if let Some((&time, values)) = self.values.split_first() {
+            data.set_time(time);
+            self.restore_arrays(data, values);
+        }
+    }
+}
+
+impl RawQuats {
+    /// Room for the quaternions that a forward pass over `model` normalises.
+    pub fn new(model: &Model) -> Self {
+        if cfg!(mj4) {
+            return Self::default();
+        }
+        let mut quats = model.jnt_type().iter().zip(model.jnt_qposadr()).filter_map(|(&kind, &address)| {
+            let offset = match kind as u32 {
+                mujoco_sys::mjJNT_FREE => 3,
+                mujoco_sys::mjJNT_BALL => 0,
+                _ => return None,
+            };
+            Some(RawQuat { address: address as usize + offset, ..RawQuat::default() })
+        });
+        Self { first: quats.next(), others: quats.collect() }
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &RawQuat> {
+        self.first.iter().chain(&self.others)
+    }
+
+    /// Takes the values from `data`, before its forward pass.
+    pub fn save(&mut self, data: &Data) {
+        let qpos = data.qpos();
+        for quat in self.first.iter_mut().chain(&mut self.others) {
+            quat.value.copy_from_slice(&qpos[quat.address..quat.address + 4]);
+        }
+    }
+
+    /// Puts the values into `data`, to do its forward pass again.
+    pub fn restore(&self, data: &mut Data) {
+        let qpos = data.qpos_mut();
+        for quat in self.iter() {
+            qpos[quat.address..quat.address + 4].copy_from_slice(&quat.value);
+        }
+    }
+}
+
+impl Inputs {
+    /// All numbers; and which equalities are active, where that is part of the data.
+    pub fn values(&self) -> (&[f64], &[bool]) {
+        #[cfg(mj4)]
+        let active = &self.active[..];
+        #[cfg(not(mj4))]
+        let active = &[];
+        (&self.values, active)
+    }
+
+    /// What [`values`](Self::values) gave.
+    pub fn from_values(values: Vec<f64>, active: Vec<bool>) -> Self {
+        #[cfg(not(mj4))]
+        let _ = active;
+        Self {
+            values,
+            #[cfg(mj4)]
+            active,
+        }
+    }
+
+    /// Takes the values from `data`, reusing this memory.
+    pub fn save(&mut self, data: &Data) {
+        self.values.clear();
+        self.save_arrays(data);
+        #[cfg(mj4)]
+        {
+            // SAFETY: model and data belong together and are alive; nothing writes meanwhile.
+            let active = unsafe { arrays::eq_active(data.model().raw(), data.raw()) };
+            self.active.clear();
+            self.active.extend_from_slice(active);
+        }
+    }
+
+    /// Puts the values into `data`, which is of the same model (its buffers may be larger).
+    pub fn restore(&self, data: &mut Data) {
+        self.restore_arrays(data, &self.values);
+        #[cfg(mj4)]
+        {
+            // SAFETY: model and data belong together and are alive; `data` is borrowed mutably.
+            let active = unsafe { arrays::eq_active_mut(data.model().raw(), data.raw_mut()) };
+            active.copy_from_slice(&self.active);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate as mj;
+
+    /// A forward pass changes no more than [`RawQuats`] keeps, on either line of MuJoCo.
+    #[test]
+    fn raw_quaternions() {
+        const JOINTS: &str = r#"<mujoco><worldbody>
+            <body><joint type="slide"/><joint type="ball"/><geom size="0.1"/></body>
+            <body pos="1 0 0"><freejoint/><geom size="0.1"/>
+                <body pos="0.3 0 0"><joint type="ball"/><geom size="0.1"/></body></body>
+            </worldbody></mujoco>"#;
+        let model = mj::compile(JOINTS, &[]).expect("compiles").into_model();
+        let mut data = Data::new(&model).expect("small");
+        for (i, q) in data.qpos_mut().iter_mut().enumerate() {
+            *q += 0.1 * (i + 1) as f64;
+        }
+        data.qvel_mut().fill(0.3);
+        data.qacc_warmstart_mut().fill(0.7);
+        let (mut before, mut after, mut raw) = (Motion::EMPTY, Motion::EMPTY, RawQuats::new(&model));
+        before.save(&data);
+        raw.save(&data);
+        data.step1().expect("fits");
+        after.save(&data);
+        assert_eq!(before == after, cfg!(mj4));
+        after.undo_normalization(&raw);
+        assert_eq!(before, after);
+        raw.restore(&mut data);
+        after.save(&data);
+        assert_eq!(before, after);
+    }
+}

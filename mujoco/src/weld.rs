@@ -1,0 +1,148 @@
+//! Welds of an environment: which of the model's hold, and how the bodies then lie.
+//!
+//! The pose that a weld keeps is in the model on both lines (`eq_data`), whether it holds in the model on 2.2.2 and in the
+//! data on 4.x. So an environment with welds gets a shallow model in which these arrays are its own.
+
+use super::data::Data;
+use super::editor::set_pointer;
+use super::model::{Model, OwnArray, array_pointer};
+use mujoco_sys as mj;
+use mujoco_sys::fields::model::{ModelArray, each};
+use std::sync::Arc;
+
+/// A weld that holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weld {
+    /// Which equality it is.
+    pub equality: usize,
+    /// Pose of the second body in the frame of the first: x, y, z \[m\], unit quaternion w, x, y, z.
+    pub pose: [f64; 7],
+}
+
+/// Numbers of an equality.
+const WIDTH: usize = mj::mjNEQDATA as usize;
+
+impl Model {
+    /// Whether equality `index` is there, and is a weld.
+    pub fn is_weld(&self, index: usize) -> bool {
+        self.eq_type().get(index).is_some_and(|&kind| kind as u32 == mj::mjEQ_WELD)
+    }
+
+    /// The same model in which these welds, and no others but those that hold from the start, hold: on 4.x that they do is to
+    /// be told to the data, too.
+    ///
+    /// # Panics
+    /// One of them is no weld of this model.
+    #[must_use]
+    pub fn with_welds(&self, welds: &[Weld]) -> Self {
+        let own_of = |field: &ModelArray| matches!(field.name, "eq_data" | "eq_active");
+        let mut own: Vec<OwnArray> = self.own().iter().filter(|array| !own_of(&array.field)).cloned().collect();
+        let compiled = self.compiled();
+        let mut header = self.copy_header();
+        let mut fields = Vec::new();
+        // SAFETY: the compiled model is alive.
+        unsafe { each(compiled, |field| fields.extend((own_of(&field) && field.bytes > 0).then_some(field))) };
+        for field in fields {
+            set_pointer(&mut header, &field, array_pointer(compiled, &field));
+            if welds.is_empty() {
+                continue;
+            }
+            // SAFETY: the array has this size and lives as long as the compiled model, to which nothing writes.
+            let values = unsafe { std::slice::from_raw_parts(array_pointer(compiled, &field), field.bytes) };
+            let mut values = values.to_vec();
+            for weld in welds {
+                assert!(self.is_weld(weld.equality), "equality {} is no weld", weld.equality);
+                if field.name == "eq_active" {
+                    values[weld.equality] = 1;
+                    continue;
+                }
+                let numbers = weld.pose.iter().flat_map(|number| number.to_ne_bytes());
+                // Anchor in the second body (its origin), then that body in the first.
+                let row = &mut values[8 * WIDTH * weld.equality..8 * WIDTH * (weld.equality + 1)];
+                row[..24].fill(0);
+                row[24..80].iter_mut().zip(numbers).for_each(|(to, byte)| *to = byte);
+            }
+            own.push(OwnArray::of_bytes(field, &values));
+        }
+        for array in &own {
+            set_pointer(&mut header, &array.field, array.memory.as_ptr().cast());
+        }
+        // SAFETY: sizes are those of `self`; pointers lead to the compiled model, which `self` keeps alive, but for those that
+        // were just set to `own`, each to memory of the size of its field: moving a box does not move what it points to.
+        unsafe { self.with_arrays(header, Arc::from(own)) }
+    }
+}
+
+impl Data {
+    /// Lets an equality hold, or not, where that is a thing of the data (4.x).
+    ///
+    /// # Panics
+    /// There is no such equality.
+    pub fn set_equality_active(&mut self, equality: usize, active: bool) {
+        #[cfg(mj4)]
+        {
+            let (m, d) = (self.model().raw(), self.raw_mut());
+            // SAFETY: model and data belong together and are alive; `self` is borrowed mutably.
+            let all = unsafe { mujoco_sys::fields::data::eq_active_mut(m, d) };
+            all[equality] = active;
+        }
+        #[cfg(not(mj4))]
+        {
+            let _ = active;
+            assert!(equality < self.model().neq(), "equality {equality} of {}", self.model().neq());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate as mj;
+
+    const TWO: &str = r#"<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody>
+        <body name="a"><freejoint/><geom size="0.1"/></body>
+        <body name="b" pos="0.5 0.2 0"><freejoint/><geom size="0.1"/></body></worldbody>
+        <equality><weld name="w" body1="a" body2="b" active="ACTIVE" relpose="0.1 0.2 0.3 0.8 0 0.6 0"/></equality></mujoco>"#;
+
+    fn model(active: &str) -> Model {
+        mj::compile(&TWO.replace("ACTIVE", active), &[]).expect("compiles").into_model()
+    }
+
+    /// The numbers stand where MuJoCo's compiler puts them, and nothing else differs.
+    #[test]
+    fn compiled() {
+        let (off, on) = (model("false"), model("true"));
+        let weld = Weld { equality: 0, pose: [0.1, 0.2, 0.3, 0.8, 0.0, 0.6, 0.0] };
+        let welded = off.with_welds(&[weld]);
+        let same = welded.eq_data().iter().zip(on.eq_data()).all(|(a, b)| (a - b).abs() < 1e-15);
+        assert!(same, "{:?}", welded.eq_data());
+        assert_eq!(welded.eq_data().len(), WIDTH);
+        let expected: &[&str] = if cfg!(mj4) { &["eq_data"] } else { &["eq_active", "eq_data"] };
+        let mut apart = welded.arrays_apart(&off);
+        apart.sort_unstable();
+        assert_eq!(apart, expected);
+        #[cfg(not(mj4))]
+        assert!(welded.equality_is_active(0) && !off.equality_is_active(0));
+        // Another one, and none.
+        let moved = welded.with_welds(&[Weld { equality: 0, pose: [9.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0] }]);
+        assert_eq!(moved.eq_data()[3..10], [9.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+        assert!(moved.with_welds(&[]).arrays_apart(&off).is_empty());
+        assert!(off.is_weld(0) && !off.is_weld(1));
+    }
+
+    /// Arrays that an environment has for something else stay.
+    #[test]
+    fn other_arrays() {
+        let off = model("false");
+        let mut editor = mj::Editor::new(&off).expect("small");
+        editor.geom_friction_mut()[0] = 0.3;
+        let edited = editor.model(&off);
+        let weld = Weld { equality: 0, pose: [0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0] };
+        let both = edited.with_welds(&[weld]);
+        drop((edited, editor));
+        assert_eq!((both.geom_friction()[0], both.eq_data()[5]), (0.3, 0.5));
+        let again = both.with_buffers(mj::Buffers { contacts: 20, constraints: 100, arena_bytes: 1 << 20 });
+        drop(both);
+        assert_eq!((again.geom_friction()[0], again.eq_data()[5]), (0.3, 0.5));
+    }
+}

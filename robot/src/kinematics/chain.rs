@@ -1,0 +1,184 @@
+//! The way from a base link to a frame.
+
+use super::KinematicsError;
+use crate::description::{JointId, JointKind, LinkId, RobotDescription};
+use kinetoscope_scene::Pose;
+use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
+
+/// The joints between a base link and a frame, in a form that is quick to evaluate: fixed joints are folded into the
+/// poses between the others, and joints that mimic have become further places where the joint acts that they follow.
+///
+/// The base is the root link, or the child of the last floating or planar joint above the frame: such joints have no
+/// column, and where their child is has to come from elsewhere.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain {
+    pub(super) base: LinkId,
+    pub(super) joints: Vec<ChainJoint>,
+    /// Pose of the frame behind the last joint; in the base where there is none.
+    pub(super) end: Pose,
+}
+
+/// A place where a variable moves everything behind it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ChainJoint {
+    /// Pose of the joint behind the joint before it; in the base for the first.
+    pub(super) before: Pose,
+    /// Axis in the joint's frame.
+    pub(super) axis: Unit<Vector3<f64>>,
+    /// Translation along the axis; otherwise a rotation about it.
+    pub(super) slides: bool,
+    /// The variable.
+    pub(super) variable: usize,
+    /// Position of the joint = ratio * variable + offset.
+    pub(super) ratio: f64,
+    pub(super) offset: f64,
+}
+
+impl ChainJoint {
+    /// Pose of what the joint moves, in the joint's frame.
+    pub(super) fn moved(&self, positions: &[f64]) -> Pose {
+        moved(self.slides, &self.axis, self.ratio * positions[self.variable] + self.offset)
+    }
+}
+
+/// Pose of a child in the frame of its joint.
+pub(super) fn moved(slides: bool, axis: &Unit<Vector3<f64>>, position: f64) -> Pose {
+    if slides {
+        Pose::from_parts(Translation3::from(axis.into_inner() * position), UnitQuaternion::identity())
+    } else {
+        Pose::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(axis, position))
+    }
+}
+
+/// What a joint's position is made of: `ratio * positions[column] + offset`; the offset alone without a column.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Follows {
+    pub(super) column: Option<usize>,
+    pub(super) ratio: f64,
+    pub(super) offset: f64,
+}
+
+/// The column of every joint, or that of the joint it follows; columns are those of
+/// [`RobotDescription::drivable_joints`].
+pub(super) fn follows(description: &RobotDescription) -> Vec<Follows> {
+    let mut column = vec![None; description.joints.len()];
+    for (k, (id, _)) in description.drivable_joints().enumerate() {
+        column[id.0] = Some(k);
+    }
+    let of = |index: usize| {
+        let (driver, ratio, offset) = description.mimic_driver(JointId(index));
+        // A joint that cannot move stays at zero.
+        Follows { column: column[driver.0], ratio, offset }
+    };
+    (0..description.joints.len()).map(of).collect()
+}
+
+impl Chain {
+    /// The chain to a frame that hangs on `link` at `link_from_frame`. Its variables are the columns of
+    /// [`RobotDescription::drivable_joints`]: positions are as many numbers, those of joints elsewhere count for nothing.
+    ///
+    /// # Errors
+    /// There is no such link, or it is not connected to the root.
+    pub fn new(description: &RobotDescription, link: LinkId, link_from_frame: &Pose) -> Result<Self, KinematicsError> {
+        let count = description.links.len();
+        if link.0 >= count {
+            return Err(KinematicsError::NoSuchLink { index: link.0, count });
+        }
+        let not_a_tree = || KinematicsError::NotATree { link: description.links[link.0].name.clone() };
+        let (mut base, mut path) = (link, Vec::new());
+        while let Some(id) = description.link(base).parent_joint {
+            let joint = description.joints.get(id.0).ok_or_else(not_a_tree)?;
+            if matches!(joint.kind, JointKind::Floating | JointKind::Planar) {
+                break;
+            }
+            if path.len() == count || joint.parent.0 >= count {
+                return Err(not_a_tree());
+            }
+            path.push(id);
+            base = joint.parent;
+        }
+        let follows = follows(description);
+        let (mut joints, mut before) = (Vec::new(), Pose::identity());
+        for &id in path.iter().rev() {
+            let joint = description.joint(id);
+            before *= joint.parent_from_joint;
+            if !joint.kind.is_drivable() {
+                continue;
+            }
+            let (slides, axis) = (joint.kind == JointKind::Prismatic, joint.axis);
+            let Follows { column, ratio, offset } = follows[id.0];
+            match column {
+                Some(variable) => {
+                    joints.push(ChainJoint { before, axis, slides, variable, ratio, offset });
+                    before = Pose::identity();
+                }
+                None => before *= moved(slides, &axis, offset),
+            }
+        }
+        Ok(Self { base, joints, end: before * link_from_frame })
+    }
+
+    /// The link that everything is relative to.
+    pub fn base(&self) -> LinkId {
+        self.base
+    }
+
+    /// One more than the largest variable: the least number of positions that [`pose`](Self::pose) needs.
+    pub fn variables(&self) -> usize {
+        self.joints.iter().map(|joint| joint.variable + 1).max().unwrap_or(0)
+    }
+
+    /// Whether a variable moves the frame.
+    pub fn is_moved_by(&self, variable: usize) -> bool {
+        self.joints.iter().any(|joint| joint.variable == variable && joint.ratio != 0.0)
+    }
+
+    /// Sum of the distances between its joints \[m\]: the frame is never farther from the base, slides at zero.
+    pub fn reach(&self) -> f64 {
+        let between = |pose: &Pose| pose.translation.vector.norm();
+        self.joints.iter().map(|joint| between(&joint.before)).sum::<f64>() + between(&self.end)
+    }
+
+    /// Whether a whole turn of the variable changes nothing: it only turns, and its followers turn in whole turns too.
+    pub(super) fn has_whole_turns(&self, variable: usize) -> bool {
+        self.joints.iter().filter(|joint| joint.variable == variable).all(|j| !j.slides && j.ratio.fract() == 0.0)
+    }
+
+    /// The same chain with the variables `free` only, in that order; all others stay at `positions` \[rad or m\].
+    ///
+    /// # Panics
+    /// If `positions` has not as many numbers as the chain has [`variables`](Self::variables).
+    #[must_use]
+    #[track_caller]
+    pub fn held(&self, free: &[usize], positions: &[f64]) -> Self {
+        let mut variable_of = vec![None; positions.len()];
+        for (k, &variable) in free.iter().enumerate() {
+            if let Some(entry) = variable_of.get_mut(variable) {
+                *entry = Some(k);
+            }
+        }
+        let mut held = Self { base: self.base, joints: Vec::new(), end: Pose::identity() };
+        self.hold_into(&variable_of, positions, &mut held);
+        held
+    }
+
+    /// As [`held`](Self::held), into a chain that is there; `variable_of` has the new variable of each old one that stays
+    /// free.
+    #[track_caller]
+    pub fn hold_into(&self, variable_of: &[Option<usize>], positions: &[f64], held: &mut Self) {
+        held.base = self.base;
+        held.joints.clear();
+        let mut before = Pose::identity();
+        for joint in &self.joints {
+            before *= joint.before;
+            match variable_of[joint.variable] {
+                Some(variable) => {
+                    held.joints.push(ChainJoint { before, variable, ..*joint });
+                    before = Pose::identity();
+                }
+                None => before *= joint.moved(positions),
+            }
+        }
+        held.end = before * self.end;
+    }
+}

@@ -1,0 +1,52 @@
+//! Where frames are.
+
+use super::chain::{Chain, Follows, follows, moved};
+use crate::description::{JointKind, LinkId, RobotDescription};
+use kinetoscope_scene::Pose;
+
+impl Chain {
+    /// Pose of the frame in the base link at `positions` \[rad or m\], one for each variable.
+    ///
+    /// Source: a product of transforms, one per joint (Siciliano et al., "Robotics", Springer 2009, section 2.8).
+    ///
+    /// # Panics
+    /// If there are fewer positions than [`variables`](Self::variables).
+    #[track_caller]
+    pub fn pose(&self, positions: &[f64]) -> Pose {
+        let mut pose = Pose::identity();
+        for joint in &self.joints {
+            pose = pose * joint.before * joint.moved(positions);
+        }
+        pose *= self.end;
+        // Rounding would add up along very long chains.
+        pose.rotation.renormalize();
+        pose
+    }
+}
+
+/// Poses of all links, indexed by [`LinkId`], at `positions` \[rad or m\] of the drivable joints; mimic joints follow.
+/// `standing` tells where the root link is, and the children of floating and planar joints; all poses are in its frame.
+pub fn link_poses(description: &RobotDescription, positions: &[f64], standing: impl Fn(LinkId) -> Pose) -> Vec<Pose> {
+    let follows = follows(description);
+    let mut poses = vec![Pose::identity(); description.links.len()];
+    poses[description.root.0] = standing(description.root);
+    let mut open = vec![description.root];
+    while let Some(parent) = open.pop() {
+        for &id in &description.link(parent).child_joints {
+            let joint = description.joint(id);
+            let Follows { column, ratio, offset } = follows[id.0];
+            let position = || column.map_or(0.0, |c| ratio * positions[c]) + offset;
+            let world_from_joint = poses[parent.0] * joint.parent_from_joint;
+            let mut pose = match joint.kind {
+                JointKind::Fixed => world_from_joint,
+                JointKind::Revolute | JointKind::Continuous => world_from_joint * moved(false, &joint.axis, position()),
+                JointKind::Prismatic => world_from_joint * moved(true, &joint.axis, position()),
+                JointKind::Floating | JointKind::Planar => standing(joint.child),
+            };
+            pose.rotation.renormalize();
+            poses[joint.child.0] = pose;
+            open.push(joint.child);
+        }
+    }
+    poses
+}

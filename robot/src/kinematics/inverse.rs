@@ -1,0 +1,195 @@
+//! Joint positions that put a frame somewhere.
+
+use super::cfg::IkCfg;
+use super::chain::Chain;
+use super::error::KinematicsError;
+use super::least_squares::{Descent, Point, Problem, Stop};
+use kinetoscope_scene::{Pose, Random};
+use std::f64::consts::{PI, TAU};
+
+/// Solves the inverse kinematics of a [`Chain`] again and again; a solve allocates nothing.
+///
+/// A solve goes down by damped least squares, within the limits, from the initial positions, and where that ends
+/// elsewhere than at the target from random ones, until one start leads there. Random starts are uniform within the
+/// limits, at most half a turn from their middle; without limits, from the initial position. The error is weighed as if
+/// the chain's [`reach`](Chain::reach) were two radians. Of positions that differ by whole turns, those are given that
+/// are nearest to the posture, or without one to the initial positions.
+///
+/// A solve takes at most `num_seeds * max_iterations` steps, and some more for the finish. One that is not solved takes
+/// them all.
+#[derive(Clone, Debug)]
+pub struct IkSolver {
+    chain: Chain,
+    limits: Vec<[f64; 2]>,
+    cfg: IkCfg,
+    /// Uniform in 0..1, one for each joint, start by start.
+    random: Vec<f64>,
+    descent: Descent,
+    best: Point,
+}
+
+/// What [`IkSolver::solve`] found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IkSolution<'s> {
+    /// Positions of the variables \[rad or m\], within the limits; the best that were found where `success` is false.
+    pub positions: &'s [f64],
+    /// Whether both errors are within the tolerances.
+    pub success: bool,
+    /// Distance of the frame from the target \[m\].
+    pub position_error: f64,
+    /// Angle between the frame and the target \[rad\]; also where only the position was to be reached.
+    pub rotation_error: f64,
+    /// Steps of all starts together.
+    pub iterations: u32,
+    /// The start that led there: 0 is that of the initial positions.
+    pub seed: u32,
+}
+
+impl IkSolver {
+    /// A solver for `chain`, whose variables are all to be found, each within its `limits` \[rad or m\], which may be
+    /// infinite.
+    ///
+    /// # Errors
+    /// A variable does not move the frame; limits or numbers of the configuration are wrong.
+    pub fn new(chain: Chain, limits: Vec<[f64; 2]>, cfg: IkCfg) -> Result<Self, KinematicsError> {
+        let joints = limits.len();
+        if chain.variables() > joints {
+            return Err(KinematicsError::WrongLength { what: "limits", expected: chain.variables(), found: joints });
+        }
+        if joints == 0 || (0..joints).any(|variable| !chain.is_moved_by(variable)) {
+            let value = match (0..joints).find(|&variable| !chain.is_moved_by(variable)) {
+                Some(variable) => format!("not moved by variable {variable}"),
+                None => "without joints".into(),
+            };
+            let expected = "every variable must move it: see Chain::held";
+            return Err(KinematicsError::OutOfRange { field: "the chain", value, expected });
+        }
+        cfg.validate(joints)?;
+        if let Some(limit) = limits.iter().find(|[low, high]| !(low <= high && *low < f64::MAX && *high > f64::MIN)) {
+            let expected = "the lower limit must not be above the upper one";
+            return Err(KinematicsError::OutOfRange { field: "limits", value: format!("{limit:?}"), expected });
+        }
+        let mut random = Random::keyed(cfg.seed, 0, "inverse kinematics");
+        let count = (cfg.num_seeds as usize - 1) * joints;
+        let random = (0..count).map(|_| random.uniform()).collect();
+        Ok(Self { chain, limits, cfg, random, descent: Descent::new(joints), best: Point::new(joints) })
+    }
+
+    /// The chain.
+    pub fn chain(&self) -> &Chain {
+        &self.chain
+    }
+
+    /// Another chain of the same variables.
+    pub fn chain_mut(&mut self) -> &mut Chain {
+        &mut self.chain
+    }
+
+    /// Positions that put the frame at `target`, a pose in the base link of the chain. `initial` \[rad or m\] has a
+    /// number for each variable, and is taken into the limits.
+    ///
+    /// # Errors
+    /// `initial` has the wrong length; a number is not finite; the rotation of the target is not of length 1. A target
+    /// that is not reached is no error: see [`IkSolution::success`].
+    pub fn solve(&mut self, target: &Pose, initial: &[f64]) -> Result<IkSolution<'_>, KinematicsError> {
+        if initial.len() != self.limits.len() {
+            let (expected, found) = (self.limits.len(), initial.len());
+            return Err(KinematicsError::WrongLength { what: "the initial positions", expected, found });
+        }
+        if initial.iter().any(|x| !x.is_finite()) {
+            return Err(KinematicsError::NotFinite { what: "the initial positions" });
+        }
+        if !target.translation.vector.iter().chain(target.rotation.coords.iter()).all(|x| x.is_finite()) {
+            return Err(KinematicsError::NotFinite { what: "the target" });
+        }
+        if (target.rotation.norm() - 1.0).abs() > 1e-6 {
+            let value = format!("{:?}", kinetoscope_scene::pose::to_wxyz(&target.rotation));
+            let expected = "it must be a quaternion of length 1";
+            return Err(KinematicsError::OutOfRange { field: "the rotation of the target", value, expected });
+        }
+        Ok(self.search(target, initial))
+    }
+
+    fn search(&mut self, target: &Pose, initial: &[f64]) -> IkSolution<'_> {
+        let Self { chain, limits, cfg, random, descent, best } = self;
+        let reach = Some(chain.reach()).filter(|&reach| reach > 0.0).unwrap_or(1.0);
+        let problem = Problem { chain, limits, target: *target, task: cfg.task, scale: 2.0 / reach };
+        let (position, rotation) = (cfg.position_tolerance, cfg.rotation_tolerance);
+        let near = Stop { position, rotation, iterations: cfg.max_iterations, impatient: true };
+
+        let (mut seed, mut iterations, mut reached) = (0, 0, false);
+        for start in 0..cfg.num_seeds {
+            let random = (start as usize).checked_sub(1).map(|row| &random[row * limits.len()..]);
+            place(&problem, initial, random, reach, &mut descent.at.positions);
+            descent.at.evaluate(&problem);
+            iterations += descent.descend(&problem, &near, cfg.damping);
+            reached = descent.at.is_within(&near, cfg.task);
+            if reached || start == 0 || descent.at.cost < best.cost {
+                best.copy_from(&descent.at);
+                seed = start;
+            }
+            if reached {
+                break;
+            }
+        }
+        descent.at.copy_from(best);
+        if reached {
+            // It converges fast here: some steps more leave little of the error.
+            let finish = Stop { position: 0.01 * position, rotation: 0.01 * rotation, iterations: 4, ..near };
+            iterations += descent.descend(&problem, &finish, cfg.damping);
+            if !descent.at.is_within(&near, cfg.task) {
+                descent.at.copy_from(best);
+            }
+        } else {
+            let finish = Stop { iterations: cfg.max_iterations.saturating_mul(8), impatient: false, ..near };
+            iterations += descent.descend(&problem, &finish, cfg.damping);
+        }
+        let posture = cfg.posture.as_ref();
+        turn_back(&problem, posture.map_or(initial, |p| &p.rest), &mut descent.at.positions);
+        descent.at.evaluate(&problem);
+        if let Some(posture) = posture.filter(|_| descent.at.is_within(&near, cfg.task)) {
+            iterations += descent.relax(&problem, &near, &posture.rest, posture.gain);
+        }
+        let at = &descent.at;
+        IkSolution {
+            positions: &at.positions,
+            success: at.is_within(&near, cfg.task),
+            position_error: at.position_error,
+            rotation_error: at.rotation_error,
+            iterations,
+            seed,
+        }
+    }
+}
+
+/// Where a start is: at the initial positions, or at `random` ones (uniform in 0..1).
+fn place(problem: &Problem<'_>, initial: &[f64], random: Option<&[f64]>, reach: f64, positions: &mut [f64]) {
+    for (i, position) in positions.iter_mut().enumerate() {
+        let [low, high] = problem.limits[i];
+        let chosen = match random {
+            None => initial[i],
+            Some(random) => {
+                let turns = problem.chain.has_whole_turns(i);
+                let (middle, half) = match (high - low).is_finite() {
+                    true if turns => (0.5 * (low + high), (0.5 * (high - low)).min(PI)),
+                    true => (0.5 * (low + high), 0.5 * (high - low)),
+                    false => (initial[i], if turns { PI } else { reach }),
+                };
+                middle + (2.0 * random[i] - 1.0) * half
+            }
+        };
+        *position = chosen.clamp(low, high);
+    }
+}
+
+/// Takes off whole turns, where that leads nearer to `reference` and stays within the limits.
+fn turn_back(problem: &Problem<'_>, reference: &[f64], positions: &mut [f64]) {
+    for (i, position) in positions.iter_mut().enumerate().filter(|(i, _)| problem.chain.has_whole_turns(*i)) {
+        let [low, high] = problem.limits[i];
+        let (fewest, most) = (((low - *position) / TAU).ceil(), ((high - *position) / TAU).floor());
+        let turns = ((reference[i] - *position) / TAU).round();
+        if fewest <= most {
+            *position = (*position + TAU * turns.clamp(fewest, most)).clamp(low, high);
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! The tree of components: who hangs from whom, and in which order they are merged.
+
+use super::config::{ComponentCfg, UrdfCfg};
+use super::error::UrdfError;
+use super::tree::owned;
+use kinetoscope_scene::pattern::closest;
+use std::collections::HashMap;
+
+/// The usual parents of a component, best first.
+///
+/// Source: EmbodiChain's assembly. A torso stands on legs only where the legs stand on a chassis.
+fn usual_parents(name: &str, present: impl Fn(&str) -> bool) -> &'static [&'static str] {
+    match name {
+        "legs" => &["chassis"],
+        "torso" if present("chassis") => &["legs", "chassis"],
+        "head" | "left_arm" | "right_arm" | "arm" => &["torso", "chassis"],
+        "left_hand" => &["left_arm"],
+        "right_hand" => &["right_arm"],
+        "hand" => &["arm"],
+        _ => &[],
+    }
+}
+
+/// Names with a place of their own: without their usual parent they are roots.
+const KNOWN: [&str; 10] =
+    ["chassis", "legs", "torso", "head", "left_arm", "right_arm", "left_hand", "right_hand", "arm", "hand"];
+
+/// The parent of each component, and an order in which parents come first.
+#[derive(Debug)]
+pub(super) struct Components {
+    /// Index of the parent of each component.
+    pub(super) parents: Vec<Option<usize>>,
+    /// All components, parents first, else in the order of the configuration.
+    pub(super) order: Vec<usize>,
+}
+
+impl Components {
+    /// Checks the configuration.
+    pub(super) fn arrange(cfg: &UrdfCfg) -> Result<Self, UrdfError> {
+        if cfg.components.is_empty() {
+            return Err(UrdfError::NoComponents);
+        }
+        let mut ids = HashMap::new();
+        for (id, component) in cfg.components.iter().enumerate() {
+            check(component)?;
+            if ids.insert(component.name.as_str(), id).is_some() {
+                return Err(UrdfError::ComponentRepeated { component: component.name.clone() });
+            }
+        }
+        let parents = (0..cfg.components.len()).map(|id| parent(cfg, id, &ids)).collect::<Result<Vec<_>, _>>()?;
+        let order = parents_first(cfg, &parents)?;
+        Ok(Self { parents, order })
+    }
+
+    /// Components without a parent.
+    pub(super) fn roots(&self) -> usize {
+        self.parents.iter().filter(|p| p.is_none()).count()
+    }
+}
+
+fn check(component: &ComponentCfg) -> Result<(), UrdfError> {
+    let invalid = |problem: &str| {
+        Err(UrdfError::ComponentInvalid { component: component.name.clone(), problem: problem.to_owned() })
+    };
+    let unusable = |text: &str| text.chars().any(char::is_control);
+    if component.name.trim().is_empty() || unusable(&component.name) {
+        return invalid("a component needs a visible name, such as \"arm\"");
+    }
+    if component.prefix.as_deref().is_some_and(unusable) {
+        return invalid("the prefix has a control character");
+    }
+    let (t, q) = (component.transform.translation.vector, component.transform.rotation);
+    if !t.iter().chain(q.coords.iter()).all(|c| c.is_finite()) {
+        return invalid("the transform is not finite");
+    }
+    if (q.norm() - 1.0).abs() > 1e-6 {
+        return invalid("the rotation of the transform is not a unit quaternion");
+    }
+    Ok(())
+}
+
+fn parent(cfg: &UrdfCfg, id: usize, ids: &HashMap<&str, usize>) -> Result<Option<usize>, UrdfError> {
+    let component = &cfg.components[id];
+    let others = |name: &str| {
+        owned(closest(name, cfg.components.iter().map(|c| c.name.as_str()).filter(|n| *n != component.name)))
+    };
+    if let Some(parent) = &component.parent {
+        return match ids.get(parent.as_str()) {
+            Some(&found) => Ok(Some(found)),
+            None => Err(UrdfError::ComponentUnknown {
+                component: component.name.clone(),
+                parent: parent.clone(),
+                candidates: others(parent),
+            }),
+        };
+    }
+    let usual = usual_parents(&component.name, |name| ids.contains_key(name));
+    let found = usual.iter().find_map(|name| ids.get(name).copied());
+    // A name of the user's own can only be a root if it plainly is the first.
+    if found.is_none() && id != 0 && !KNOWN.contains(&component.name.as_str()) {
+        return Err(UrdfError::ComponentParentRequired {
+            component: component.name.clone(),
+            candidates: others(&component.name),
+        });
+    }
+    Ok(found)
+}
+
+fn parents_first(cfg: &UrdfCfg, parents: &[Option<usize>]) -> Result<Vec<usize>, UrdfError> {
+    let mut order = Vec::new();
+    let mut placed = vec![false; parents.len()];
+    while order.len() < parents.len() {
+        let next = (0..parents.len()).find(|&c| !placed[c] && parents[c].is_none_or(|p| placed[p]));
+        let Some(next) = next else { return Err(circle(cfg, parents, &placed)) };
+        placed[next] = true;
+        order.push(next);
+    }
+    Ok(order)
+}
+
+fn circle(cfg: &UrdfCfg, parents: &[Option<usize>], placed: &[bool]) -> UrdfError {
+    let mut walk: Vec<usize> = Vec::new();
+    let mut next = placed.iter().position(|p| !p);
+    while let Some(component) = next {
+        if let Some(start) = walk.iter().position(|&c| c == component) {
+            walk.drain(..start);
+            break;
+        }
+        walk.push(component);
+        next = parents[component];
+    }
+    UrdfError::ComponentCycle { components: walk.into_iter().map(|c| cfg.components[c].name.clone()).collect() }
+}

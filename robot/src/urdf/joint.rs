@@ -1,0 +1,277 @@
+//! Reading a `<joint>`.
+
+use super::error::UrdfError;
+use super::file::{JointNotes, LimitNotes};
+use super::link::read_origin;
+use super::number::{Reader, attribute, row, shortest};
+use super::tree::{Edge, Named, owned};
+use crate::description::JointKind;
+use crate::diagnostic::DiagnosticKind;
+use kinetoscope_scene::pattern::closest;
+use roxmltree::Node;
+
+/// An axis this much longer or shorter than 1 is worth a word; less is rounding in the file.
+const AXIS_TOLERANCE: f64 = 1e-3;
+/// An axis shorter than this has no direction.
+const AXIS_SHORTEST: f64 = 1e-9;
+
+const KINDS: [JointKind; 6] = [
+    JointKind::Fixed,
+    JointKind::Revolute,
+    JointKind::Continuous,
+    JointKind::Prismatic,
+    JointKind::Floating,
+    JointKind::Planar,
+];
+
+/// Elements of a joint that are read or known to mean nothing here.
+const KNOWN: [&str; 12] = [
+    "origin",
+    "parent",
+    "child",
+    "axis",
+    "limit",
+    "dynamics",
+    "mimic",
+    "calibration",
+    "safety_controller",
+    "gazebo",
+    "plugin",
+    "transmission",
+];
+
+/// Reads a joint and appends its normalised form to `xml`.
+pub(super) fn read_joint(
+    reader: &mut Reader<'_>,
+    node: Node<'_, '_>,
+    name: &str,
+    xml: &mut String,
+) -> Result<(JointNotes, Edge), UrdfError> {
+    let owner = format!("joint \"{name}\"");
+    let kind = read_kind(reader, node, name, &owner)?;
+    super::link::warn_unknown(reader, node, &owner, &KNOWN);
+
+    xml.push_str("<joint");
+    attribute(xml, "name", name);
+    attribute(xml, "type", kind.name());
+    xml.push('>');
+    read_origin(reader, node, &owner, xml)?;
+    let parent = read_end(reader, node, "parent", &owner, xml)?;
+    let child = read_end(reader, node, "child", &owner, xml)?;
+    read_axis(reader, node, kind, &owner, xml)?;
+    let limit = read_limit(reader, node, kind, name, &owner, xml)?;
+    let (damping, friction) = read_dynamics(reader, node, &owner, xml)?;
+    read_calibration(reader, node, &owner, xml)?;
+    let mimic = read_mimic(reader, node, kind, &owner, xml)?;
+    xml.push_str("</joint>");
+
+    if kind.is_drivable() && mimic.is_none() {
+        warn_unlimited(reader, node, &owner)?;
+    }
+    let source = reader.source(node);
+    let notes = JointNotes {
+        source: source.clone(),
+        limit,
+        damping,
+        friction,
+        mimic: mimic.as_ref().map(|m| m.source.clone()),
+    };
+    let joint = Named { name: name.to_owned(), source };
+    Ok((notes, Edge { joint, parent, child, mimic, kind: kind.name(), movable: kind.is_drivable() }))
+}
+
+fn read_kind(reader: &Reader<'_>, node: Node<'_, '_>, name: &str, owner: &str) -> Result<JointKind, UrdfError> {
+    let found = reader.required_text(node, "type", owner, "type=\"revolute\"")?;
+    KINDS.into_iter().find(|k| k.name() == found).ok_or_else(|| UrdfError::JointTypeUnknown {
+        at: reader.attribute_source(node, "type"),
+        joint: name.to_owned(),
+        found: found.to_owned(),
+        candidates: owned(closest(found, KINDS.map(JointKind::name))),
+    })
+}
+
+/// The parent or child link.
+fn read_end(
+    reader: &Reader<'_>,
+    node: Node<'_, '_>,
+    role: &'static str,
+    owner: &str,
+    xml: &mut String,
+) -> Result<Named, UrdfError> {
+    let fix = "a joint connects <parent link=\"...\"/> and <child link=\"...\"/>";
+    let end = reader.required_child(node, role, owner, fix)?;
+    let name = reader.required_text(end, "link", owner, "link=\"name_of_a_link\"")?;
+    xml.push('<');
+    xml.push_str(role);
+    attribute(xml, "link", name);
+    xml.push_str("/>");
+    Ok(Named { name: name.to_owned(), source: reader.source(end) })
+}
+
+/// The axis, as a unit vector. Joints without an axis may carry any, exporters write `0 0 0` for fixed ones.
+fn read_axis(
+    reader: &mut Reader<'_>,
+    node: Node<'_, '_>,
+    kind: JointKind,
+    owner: &str,
+    xml: &mut String,
+) -> Result<(), UrdfError> {
+    let Some(axis) = reader.first_child(node, "axis", owner)? else { return Ok(()) };
+    let has_axis = !matches!(kind, JointKind::Fixed | JointKind::Floating);
+    let Some(xyz) = reader.numbers::<3>(axis, "xyz")? else {
+        let at = reader.source(axis);
+        let error = UrdfError::AttributeMissing {
+            at: at.clone(),
+            owner: owner.to_owned(),
+            element: "axis".to_owned(),
+            attribute: "xyz",
+            example: "xyz=\"0 0 1\"",
+        };
+        if has_axis {
+            return Err(error);
+        }
+        let done = format!("a {} joint needs no axis, so it was ignored", kind.name());
+        return reader.tolerate(DiagnosticKind::ElementIgnored, at, error, &done);
+    };
+    if !has_axis {
+        return Ok(());
+    }
+    // Scaled by the largest component first: squares of huge or tiny components would overflow or vanish.
+    let largest = xyz.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
+    let norm =
+        if largest > 0.0 { largest * xyz.map(|c| (c / largest).powi(2)).iter().sum::<f64>().sqrt() } else { 0.0 };
+    if norm < AXIS_SHORTEST {
+        return Err(reader.value(axis, "xyz", owner, "is zero, the axis needs a direction, such as \"0 0 1\""));
+    }
+    if (norm - 1.0).abs() > AXIS_TOLERANCE {
+        let at = reader.attribute_source(axis, "xyz");
+        let message = format!("{owner}: the axis {} has length {norm:.6}; it was normalised", row(&xyz));
+        reader.warn(DiagnosticKind::AxisNormalized, at, message);
+    }
+    let length = xyz.map(|c| (c / largest).powi(2)).iter().sum::<f64>().sqrt();
+    xml.push_str("<axis");
+    attribute(xml, "xyz", &row(&xyz.map(|c| c / largest / length)));
+    xml.push_str("/>");
+    Ok(())
+}
+
+fn read_limit(
+    reader: &mut Reader<'_>,
+    node: Node<'_, '_>,
+    kind: JointKind,
+    name: &str,
+    owner: &str,
+    xml: &mut String,
+) -> Result<Option<LimitNotes>, UrdfError> {
+    let Some(limit) = reader.child(node, "limit", owner)? else {
+        return match kind {
+            JointKind::Revolute | JointKind::Prismatic => {
+                Err(UrdfError::LimitMissing { at: reader.source(node), joint: name.to_owned(), kind: kind.name() })
+            }
+            _ => Ok(None),
+        };
+    };
+    let (mut lower, mut upper) = (reader.number(limit, "lower")?, reader.number(limit, "upper")?);
+    let (effort, velocity) =
+        (reader.non_negative(limit, "effort", owner)?, reader.non_negative(limit, "velocity", owner)?);
+    // An end that is absent is 0, URDF's default.
+    let (l, u) = (lower.unwrap_or(0.0), upper.unwrap_or(0.0));
+    if l > u {
+        let message = format!("{owner}: lower limit {l} is above upper limit {u}; both were ignored");
+        let at = reader.source(limit);
+        reader.warn(DiagnosticKind::LimitIgnored, at, message);
+        (lower, upper) = (None, None);
+    }
+    xml.push_str("<limit");
+    for (attribute_name, value) in [("lower", lower), ("upper", upper), ("effort", effort), ("velocity", velocity)] {
+        attribute(xml, attribute_name, &shortest(value.unwrap_or(0.0)));
+    }
+    xml.push_str("/>");
+    Ok(Some(LimitNotes {
+        source: reader.source(limit),
+        lower: lower.is_some(),
+        upper: upper.is_some(),
+        effort: effort.is_some(),
+        velocity: velocity.is_some(),
+    }))
+}
+
+/// Which of damping and friction the file gives.
+fn read_dynamics(
+    reader: &Reader<'_>,
+    node: Node<'_, '_>,
+    owner: &str,
+    xml: &mut String,
+) -> Result<(bool, bool), UrdfError> {
+    let Some(dynamics) = reader.child(node, "dynamics", owner)? else { return Ok((false, false)) };
+    let damping = reader.non_negative(dynamics, "damping", owner)?;
+    let friction = reader.non_negative(dynamics, "friction", owner)?;
+    xml.push_str("<dynamics");
+    attribute(xml, "damping", &shortest(damping.unwrap_or(0.0)));
+    attribute(xml, "friction", &shortest(friction.unwrap_or(0.0)));
+    xml.push_str("/>");
+    Ok((damping.is_some(), friction.is_some()))
+}
+
+/// Calibration and safety controller: the simulation has no use for them, the model keeps them.
+fn read_calibration(reader: &Reader<'_>, node: Node<'_, '_>, owner: &str, xml: &mut String) -> Result<(), UrdfError> {
+    if let Some(calibration) = reader.child(node, "calibration", owner)? {
+        xml.push_str("<calibration");
+        for name in ["rising", "falling"] {
+            if let Some(value) = reader.number(calibration, name)? {
+                attribute(xml, name, &shortest(value));
+            }
+        }
+        xml.push_str("/>");
+    }
+    if let Some(safety) = reader.child(node, "safety_controller", owner)? {
+        xml.push_str("<safety_controller");
+        for name in ["soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"] {
+            attribute(xml, name, &shortest(reader.number(safety, name)?.unwrap_or(0.0)));
+        }
+        xml.push_str("/>");
+    }
+    Ok(())
+}
+
+/// The followed joint. A mimic of a joint that cannot move on one axis has no meaning and is ignored.
+fn read_mimic(
+    reader: &mut Reader<'_>,
+    node: Node<'_, '_>,
+    kind: JointKind,
+    owner: &str,
+    xml: &mut String,
+) -> Result<Option<Named>, UrdfError> {
+    let Some(mimic) = reader.child(node, "mimic", owner)? else { return Ok(None) };
+    let joint = reader.required_text(mimic, "joint", owner, "joint=\"name_of_a_joint\"")?;
+    let multiplier = reader.number(mimic, "multiplier")?.unwrap_or(1.0);
+    let offset = reader.number(mimic, "offset")?.unwrap_or(0.0);
+    let source = reader.source(mimic);
+    if !kind.is_drivable() {
+        let message = format!("{owner}: is {} and cannot follow \"{joint}\"; its <mimic> was ignored", kind.name());
+        reader.warn(DiagnosticKind::ElementIgnored, source, message);
+        return Ok(None);
+    }
+    xml.push_str("<mimic");
+    attribute(xml, "joint", joint);
+    attribute(xml, "multiplier", &shortest(multiplier));
+    attribute(xml, "offset", &shortest(offset));
+    xml.push_str("/>");
+    Ok(Some(Named { name: joint.to_owned(), source }))
+}
+
+fn warn_unlimited(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str) -> Result<(), UrdfError> {
+    let limit = reader.child(node, "limit", owner)?;
+    let effort = match limit {
+        Some(limit) => reader.number(limit, "effort")?,
+        None => None,
+    };
+    let found = match effort {
+        None => "has no effort limit",
+        Some(0.0) => "has effort limit 0",
+        Some(_) => return Ok(()),
+    };
+    let at = reader.source(limit.unwrap_or(node));
+    reader.warn(DiagnosticKind::EffortUnlimited, at, format!("{owner} {found}; its effort is not limited"));
+    Ok(())
+}

@@ -1,0 +1,317 @@
+//! Reading attributes: every number parses, is finite, and there are exactly as many as needed.
+
+use super::error::UrdfError;
+use crate::diagnostic::{Diagnostic, DiagnosticKind};
+use crate::urdf::config::Strictness;
+use kinetoscope_scene::source::Source;
+use roxmltree::Node;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Reads a document with places. Holds the line starts, because asking the XML library for a line scans the whole text.
+#[derive(Debug)]
+pub(super) struct Reader<'i> {
+    pub(super) file: Arc<PathBuf>,
+    line_starts: Vec<usize>,
+    /// The namespace of the root element: elements of it, or of none, are URDF.
+    namespace: Option<&'i str>,
+    strictness: Strictness,
+    pub(super) diagnostics: Vec<Diagnostic>,
+}
+
+/// Counts in words, for messages.
+const COUNTS: [&str; 7] = ["no", "one", "two", "three", "four", "five", "six"];
+
+impl<'i> Reader<'i> {
+    pub(super) fn new(file: Arc<PathBuf>, text: &str, namespace: Option<&'i str>, strictness: Strictness) -> Self {
+        let ends = text.bytes().enumerate().filter(|&(_, b)| b == b'\n').map(|(i, _)| i + 1);
+        let line_starts = std::iter::once(0).chain(ends).collect();
+        Self { file, line_starts, namespace, strictness, diagnostics: Vec::new() }
+    }
+
+    /// The place of a byte of the text.
+    pub(super) fn source_at(&self, position: usize) -> Source {
+        let line = self.line_starts.partition_point(|&start| start <= position);
+        Source { file: self.file.clone(), line: u32::try_from(line).unwrap_or(u32::MAX) }
+    }
+
+    /// The place of an element.
+    pub(super) fn source(&self, node: Node<'_, '_>) -> Source {
+        self.source_at(node.range().start)
+    }
+
+    /// The place of an attribute, or of its element where it has none.
+    pub(super) fn attribute_source(&self, node: Node<'_, '_>, attribute: &str) -> Source {
+        self.source_at(node.attribute_node(attribute).map_or(node.range().start, |a| a.range().start))
+    }
+
+    pub(super) fn warn(&mut self, kind: DiagnosticKind, at: Source, message: String) {
+        self.diagnostics.push(Diagnostic::new(kind, at, message));
+    }
+
+    /// Handles a departure from URDF with a clear meaning: a warning with the words of `error` and what was `done`, or in
+    /// strict reading the error.
+    pub(super) fn tolerate(
+        &mut self,
+        kind: DiagnosticKind,
+        at: Source,
+        error: UrdfError,
+        done: &str,
+    ) -> Result<(), UrdfError> {
+        if self.strictness == Strictness::Strict {
+            return Err(error);
+        }
+        let text = error.to_string();
+        let text = text.strip_prefix(&format!("{at}: ")).unwrap_or(&text);
+        self.warn(kind, at, format!("{text}; {done}"));
+        Ok(())
+    }
+
+    /// The first child called `name`; further ones are ignored with a warning, or an error in strict reading.
+    pub(super) fn first_child<'a, 'input>(
+        &mut self,
+        node: Node<'a, 'input>,
+        name: &'static str,
+        owner: &str,
+    ) -> Result<Option<Node<'a, 'input>>, UrdfError> {
+        let mut found = self.named(node, name);
+        let Some(first) = found.next() else { return Ok(None) };
+        for further in found {
+            let error = self.repeated(further, first, name, owner);
+            self.tolerate(DiagnosticKind::ElementRepeated, self.source(further), error, "the first is used")?;
+        }
+        Ok(Some(first))
+    }
+
+    /// The URDF elements directly below.
+    pub(super) fn elements<'a, 'input>(
+        &self,
+        node: Node<'a, 'input>,
+    ) -> impl Iterator<Item = Node<'a, 'input>> + use<'a, 'input, 'i> {
+        let namespace = self.namespace;
+        node.children().filter(move |&n| is_urdf(n, namespace))
+    }
+
+    /// The URDF elements directly below that are called `name`.
+    pub(super) fn named<'a, 'input>(
+        &self,
+        node: Node<'a, 'input>,
+        name: &'static str,
+    ) -> impl Iterator<Item = Node<'a, 'input>> + use<'a, 'input, 'i> {
+        self.elements(node).filter(move |n| n.tag_name().name() == name)
+    }
+
+    /// The only child called `name`.
+    pub(super) fn child<'a, 'input>(
+        &self,
+        node: Node<'a, 'input>,
+        name: &str,
+        owner: &str,
+    ) -> Result<Option<Node<'a, 'input>>, UrdfError> {
+        let mut found = self.elements(node).filter(|n| n.tag_name().name() == name);
+        let first = found.next();
+        match (first, found.next()) {
+            (Some(first), Some(second)) => Err(self.repeated(second, first, name, owner)),
+            _ => Ok(first),
+        }
+    }
+
+    fn repeated(&self, second: Node<'_, '_>, first: Node<'_, '_>, name: &str, owner: &str) -> UrdfError {
+        UrdfError::ElementRepeated {
+            at: self.source(second),
+            owner: owner.to_owned(),
+            element: name.to_owned(),
+            first: self.source(first),
+        }
+    }
+
+    /// The only child called `name`, which must be there.
+    pub(super) fn required_child<'a, 'input>(
+        &self,
+        node: Node<'a, 'input>,
+        name: &'static str,
+        owner: &str,
+        fix: &'static str,
+    ) -> Result<Node<'a, 'input>, UrdfError> {
+        self.child(node, name, owner)?.ok_or_else(|| UrdfError::ElementMissing {
+            at: self.source(node),
+            owner: owner.to_owned(),
+            element: node.tag_name().name().to_owned(),
+            child: name,
+            fix,
+        })
+    }
+
+    /// The text of an attribute; xacro expressions and control characters are refused.
+    pub(super) fn text<'a>(&self, node: Node<'a, '_>, attribute: &str) -> Result<Option<&'a str>, UrdfError> {
+        let Some(text) = node.attribute(attribute) else { return Ok(None) };
+        if text.contains("${") || text.contains("$(") {
+            let found = element(node, Some((attribute, text)));
+            return Err(UrdfError::Xacro { at: self.attribute_source(node, attribute), found });
+        }
+        if text.chars().any(|c| c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}')) {
+            return Err(UrdfError::Value {
+                at: self.attribute_source(node, attribute),
+                owner: "robot".to_owned(),
+                element: element(node, Some((attribute, text))),
+                problem: format!("{attribute} has a control character; use visible characters only"),
+            });
+        }
+        Ok(Some(text))
+    }
+
+    /// The text of an attribute that must be there and not be empty.
+    pub(super) fn required_text<'a>(
+        &self,
+        node: Node<'a, '_>,
+        attribute: &'static str,
+        owner: &str,
+        example: &'static str,
+    ) -> Result<&'a str, UrdfError> {
+        match self.text(node, attribute)?.filter(|t| !t.trim().is_empty()) {
+            Some(text) => Ok(text),
+            None => Err(UrdfError::AttributeMissing {
+                at: self.source(node),
+                owner: owner.to_owned(),
+                element: node.tag_name().name().to_owned(),
+                attribute,
+                example,
+            }),
+        }
+    }
+
+    /// Exactly `N` finite numbers.
+    pub(super) fn numbers<const N: usize>(
+        &self,
+        node: Node<'_, '_>,
+        attribute: &str,
+    ) -> Result<Option<[f64; N]>, UrdfError> {
+        let Some(text) = self.text(node, attribute)? else { return Ok(None) };
+        let needs = || match N {
+            1 => format!("{attribute} needs one number, such as \"0.5\""),
+            3 if attribute == "scale" => "scale needs three numbers, such as \"0.001 0.001 0.001\"".to_owned(),
+            _ => format!("{attribute} needs {} numbers, such as \"{}0.1\"", COUNTS[N], "0 ".repeat(N - 1)),
+        };
+        let wrong = |problem: String| UrdfError::Number {
+            at: self.attribute_source(node, attribute),
+            element: element(node, Some((attribute, text))),
+            problem,
+        };
+        let mut numbers = [0.0; N];
+        let mut count = 0;
+        for word in text.split_whitespace() {
+            let Ok(number) = word.parse::<f64>() else {
+                let comma = if word.contains(',') { " (use a decimal point and spaces)" } else { "" };
+                return Err(wrong(format!("\"{}\" is not a number{comma}; {}", cut(word), needs())));
+            };
+            if !number.is_finite() {
+                return Err(wrong(format!("\"{}\" is not finite; {}", cut(word), needs())));
+            }
+            if let Some(slot) = numbers.get_mut(count) {
+                *slot = number;
+            }
+            count += 1;
+        }
+        if count != N {
+            let found = COUNTS.get(count).map_or_else(|| count.to_string(), |c| (*c).to_owned());
+            return Err(wrong(format!("there {} {found}; {}", if count == 1 { "is" } else { "are" }, needs())));
+        }
+        Ok(Some(numbers))
+    }
+
+    /// One finite number.
+    pub(super) fn number(&self, node: Node<'_, '_>, attribute: &str) -> Result<Option<f64>, UrdfError> {
+        Ok(self.numbers::<1>(node, attribute)?.map(|[n]| n))
+    }
+
+    /// One finite number that must be there.
+    pub(super) fn required_number(
+        &self,
+        node: Node<'_, '_>,
+        attribute: &'static str,
+        owner: &str,
+        example: &'static str,
+    ) -> Result<f64, UrdfError> {
+        self.number(node, attribute)?.ok_or_else(|| UrdfError::AttributeMissing {
+            at: self.source(node),
+            owner: owner.to_owned(),
+            element: node.tag_name().name().to_owned(),
+            attribute,
+            example,
+        })
+    }
+
+    /// One finite number that must not be negative.
+    pub(super) fn non_negative(
+        &self,
+        node: Node<'_, '_>,
+        attribute: &str,
+        owner: &str,
+    ) -> Result<Option<f64>, UrdfError> {
+        let number = self.number(node, attribute)?;
+        match number {
+            Some(n) if n < 0.0 => Err(self.value(node, attribute, owner, "must not be negative")),
+            _ => Ok(number),
+        }
+    }
+
+    /// A [`UrdfError::Value`] at an attribute: `{attribute} {rule}`.
+    pub(super) fn value(&self, node: Node<'_, '_>, attribute: &str, owner: &str, rule: &str) -> UrdfError {
+        UrdfError::Value {
+            at: self.attribute_source(node, attribute),
+            owner: owner.to_owned(),
+            element: element(node, node.attribute(attribute).map(|text| (attribute, text))),
+            problem: format!("{attribute} {rule}"),
+        }
+    }
+}
+
+/// Whether the element belongs to URDF and not to another namespace.
+fn is_urdf(node: Node<'_, '_>, namespace: Option<&str>) -> bool {
+    node.is_element() && (node.tag_name().namespace().is_none() || node.tag_name().namespace() == namespace)
+}
+
+/// `<origin xyz="1 x 2">`: an element as the user would recognise it.
+pub(super) fn element(node: Node<'_, '_>, attribute: Option<(&str, &str)>) -> String {
+    match attribute {
+        Some((name, text)) => format!("<{} {name}=\"{}\">", node.tag_name().name(), cut(text)),
+        None => format!("<{}>", node.tag_name().name()),
+    }
+}
+
+/// At most 60 characters of a text, on one line.
+fn cut(text: &str) -> String {
+    let mut short: String = text.chars().take(60).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if text.chars().nth(60).is_some() {
+        short.push_str("...");
+    }
+    short
+}
+
+/// A number in the fewest digits that read back to the same value.
+pub(super) fn shortest(number: f64) -> String {
+    let text = format!("{number:?}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
+/// Numbers in the fewest digits, with spaces between.
+pub(super) fn row(numbers: &[f64]) -> String {
+    numbers.iter().map(|&n| shortest(n)).collect::<Vec<_>>().join(" ")
+}
+
+/// ` name="text"` with the characters escaped that XML does not take.
+pub(super) fn attribute(out: &mut String, name: &str, text: &str) {
+    let _ = write!(out, " {name}=\"");
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&apos;"),
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+}

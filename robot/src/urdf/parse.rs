@@ -1,0 +1,287 @@
+//! One URDF file, read and checked.
+//!
+//! Our own pass over the document checks everything and keeps places; what it accepts is then handed to `urdf-rs` in a
+//! normalised form (absent numbers filled in, nothing it would misread), and `urdf-rs` supplies the model values. The
+//! first error ends the reading.
+
+use super::config::Strictness;
+use super::error::UrdfError;
+use super::file::{JointNotes, LinkNotes, UrdfFile};
+use super::joint::read_joint;
+use super::link::{Materials, read_link};
+use super::number::{Reader, attribute, element};
+use super::tree::{Edge, Named, Tree};
+use super::xml::repair;
+use crate::diagnostic::DiagnosticKind;
+use kinetoscope_scene::source::Source;
+use roxmltree::{Document, Node};
+use std::collections::HashSet;
+use std::io::Read;
+use std::path::Path;
+use std::sync::Arc;
+
+/// The largest file that is read \[bytes\]. A URDF holds no meshes; more than this is a wrong file or an endless device.
+const LARGEST_FILE: u64 = 256 << 20;
+
+/// Top-level elements that mean nothing to the simulation and are common enough to be skipped without a word.
+const SKIPPED: [&str; 8] =
+    ["gazebo", "plugin", "ros2_control", "drake", "safety_controller", "sensor", "group", "verbose"];
+
+/// Reads a URDF file with the default [`Strictness`].
+///
+/// # Errors
+/// Any [`UrdfError`] up to the tree checks; meshes are not looked at.
+pub fn parse_file(path: &Path) -> Result<UrdfFile, UrdfError> {
+    parse_file_with(path, Strictness::default())
+}
+
+/// Reads a URDF file.
+///
+/// # Errors
+/// As [`parse_file`]; in strict reading also departures from URDF whose meaning is clear.
+pub fn parse_file_with(path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
+    let owned = || path.to_path_buf();
+    if path.is_dir() {
+        return Err(UrdfError::FileIsFolder { path: owned(), urdfs: urdfs_in(path) });
+    }
+    let file = std::fs::File::open(path).map_err(|source| match source.kind() {
+        std::io::ErrorKind::NotFound => UrdfError::FileMissing { path: owned() },
+        _ => UrdfError::FileUnreadable { path: owned(), source },
+    })?;
+    let mut bytes = Vec::new();
+    let read = file.take(LARGEST_FILE + 1).read_to_end(&mut bytes);
+    read.map_err(|source| UrdfError::FileUnreadable { path: owned(), source })?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(UrdfError::FileTooLarge { path: owned(), limit: LARGEST_FILE });
+    }
+    match std::str::from_utf8(&bytes) {
+        Ok(text) => parse_str_with(text, path, strictness),
+        Err(error) => Err(encoding(&bytes, error.valid_up_to(), path)),
+    }
+}
+
+fn urdfs_in(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().take(4096).flatten();
+    let names = entries.map(|e| e.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.filter(|n| n.ends_with(".urdf")).collect();
+    names.sort();
+    names.truncate(3);
+    names
+}
+
+fn encoding(bytes: &[u8], wrong: usize, path: &Path) -> UrdfError {
+    let line = 1 + bytes[..wrong].iter().filter(|&&b| b == b'\n').count();
+    let problem = match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "the file is UTF-16".to_owned(),
+        _ => format!("byte 0x{:02x} is not UTF-8", bytes[wrong]),
+    };
+    UrdfError::Encoding { at: Source::new(path, u32::try_from(line).unwrap_or(u32::MAX)), problem }
+}
+
+/// Reads a URDF from memory with the default [`Strictness`]; `path` names it in messages and is where relative mesh paths
+/// start.
+///
+/// # Errors
+/// As [`parse_file`].
+pub fn parse_str(text: &str, path: &Path) -> Result<UrdfFile, UrdfError> {
+    parse_str_with(text, path, Strictness::default())
+}
+
+/// Reads a URDF from memory; `path` names it in messages and is where relative mesh paths start.
+///
+/// # Errors
+/// As [`parse_file_with`].
+pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    if text.trim().is_empty() {
+        return Err(UrdfError::FileEmpty { path: path.to_path_buf() });
+    }
+    let mut diagnostics = Vec::new();
+    let repaired;
+    let document = match Document::parse(text) {
+        Err(error) if strictness == Strictness::Lenient => {
+            repaired = repair(text, error, path, &mut diagnostics).map_err(|e| malformed(e, text, path))?;
+            Document::parse(&repaired)
+        }
+        parsed => parsed,
+    };
+    let document = document.map_err(|e| malformed(e, text, path))?;
+    let root = document.root_element();
+    let mut reader =
+        Reader::new(Arc::new(path.to_path_buf()), document.input_text(), root.tag_name().namespace(), strictness);
+    reader.diagnostics = diagnostics;
+    check_root(&mut reader, root)?;
+
+    let mut materials = Materials::default();
+    materials.define(&mut reader, root)?;
+    let mut pass = Pass::default();
+    for node in reader.elements(root) {
+        match node.tag_name().name() {
+            "link" => pass.link(&mut reader, node, &mut materials)?,
+            "joint" => pass.joint(&mut reader, node)?,
+            "material" | "transmission" => {}
+            "mujoco" => pass.meshdir = pass.meshdir.take().or(meshdir(&reader, node)?),
+            skipped if SKIPPED.contains(&skipped) => {}
+            other => {
+                let message = format!("<{other}> is no element of URDF and was ignored");
+                let at = reader.source(node);
+                reader.warn(DiagnosticKind::ElementIgnored, at, message);
+            }
+        }
+    }
+    let tree = Tree::build(&reader.source(root), &pass.link_names, &pass.edges)?;
+    check_transmissions(&mut reader, root, &pass.edges)?;
+    materials.check(&mut reader);
+
+    let name = reader.text(root, "name")?.unwrap_or_default();
+    let mut normalised = String::with_capacity(pass.xml.len() + materials.xml.len() + 64);
+    normalised.push_str("<robot");
+    attribute(&mut normalised, "name", name);
+    normalised.push('>');
+    normalised.push_str(&pass.xml);
+    normalised.push_str(&materials.xml);
+    normalised.push_str("</robot>");
+    let refused = |source| UrdfError::Model { path: path.to_path_buf(), source };
+    let robot = urdf_rs::read_from_string(&normalised).map_err(|e| refused(e.into()))?;
+    if !pass.agrees_with(&robot) {
+        return Err(refused("its model has other links or joints than the file".into()));
+    }
+    Ok(UrdfFile {
+        path: reader.file,
+        robot,
+        links: pass.links,
+        joints: pass.joints,
+        tree,
+        meshdir: pass.meshdir,
+        diagnostics: reader.diagnostics,
+    })
+}
+
+/// What the pass over the document collects.
+#[derive(Default)]
+struct Pass {
+    links: Vec<LinkNotes>,
+    joints: Vec<JointNotes>,
+    link_names: Vec<Named>,
+    edges: Vec<Edge>,
+    meshdir: Option<String>,
+    /// The normalised links and joints.
+    xml: String,
+}
+
+impl Pass {
+    fn link(
+        &mut self,
+        reader: &mut Reader<'_>,
+        node: Node<'_, '_>,
+        materials: &mut Materials,
+    ) -> Result<(), UrdfError> {
+        let name = reader.required_text(node, "name", "robot", "<link name=\"base\">")?;
+        self.links.push(read_link(reader, node, name, materials, &mut self.xml)?);
+        self.link_names.push(Named { name: name.to_owned(), source: reader.source(node) });
+        Ok(())
+    }
+
+    fn joint(&mut self, reader: &mut Reader<'_>, node: Node<'_, '_>) -> Result<(), UrdfError> {
+        let name = reader.required_text(node, "name", "robot", "<joint name=\"joint1\" type=\"revolute\">")?;
+        let (notes, edge) = read_joint(reader, node, name, &mut self.xml)?;
+        self.joints.push(notes);
+        self.edges.push(edge);
+        Ok(())
+    }
+
+    /// Whether the model has what we saw: the names and the numbers of shapes.
+    fn agrees_with(&self, robot: &urdf_rs::Robot) -> bool {
+        robot.links.len() == self.links.len()
+            && robot.joints.len() == self.joints.len()
+            && robot.links.iter().zip(&self.link_names).all(|(a, b)| a.name == b.name)
+            && robot.joints.iter().zip(&self.edges).all(|(a, b)| a.name == b.joint.name)
+            && robot
+                .links
+                .iter()
+                .zip(&self.links)
+                .all(|(a, b)| a.visual.len() == b.visuals.len() && a.collision.len() == b.collisions.len())
+    }
+}
+
+fn malformed(error: roxmltree::Error, text: &str, path: &Path) -> UrdfError {
+    let position = error.pos();
+    let at = Source::new(path, position.row);
+    match &error {
+        roxmltree::Error::DtdDetected => {
+            let before = text.split("<!DOCTYPE").next().unwrap_or_default();
+            let line = 1 + before.bytes().filter(|&b| b == b'\n').count();
+            UrdfError::Doctype { at: Source::new(path, u32::try_from(line).unwrap_or(u32::MAX)) }
+        }
+        roxmltree::Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
+            UrdfError::Xacro { at, found: "an element with prefix xacro:".to_owned() }
+        }
+        // The library points at the start, the user must look at the end.
+        roxmltree::Error::UnclosedRootNode => {
+            let line = text.lines().count();
+            let column = text.lines().last().map_or(1, |l| l.chars().count() + 1);
+            let at = Source::new(path, u32::try_from(line).unwrap_or(u32::MAX));
+            UrdfError::Xml { at, column: u32::try_from(column).unwrap_or(u32::MAX), source: error.into() }
+        }
+        _ => UrdfError::Xml { at, column: position.col, source: error.into() },
+    }
+}
+
+fn check_root(reader: &mut Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfError> {
+    let found = root.tag_name().name();
+    if found != "robot" {
+        let advice = match found {
+            "mujoco" => "this is MJCF, load it as MJCF",
+            "sdf" => "this is SDF, export the model as URDF",
+            "mujocoinclude" | "include" => "this is a part of another file",
+            "COLLADA" => "this is a mesh, a URDF names it in <mesh filename=\"...\"/>",
+            "robots" | "model" | "world" => "export one robot as URDF",
+            _ => "is this the right file?",
+        };
+        return Err(UrdfError::WrongRoot { at: reader.source(root), found: found.to_owned(), advice });
+    }
+    let is_xacro = |n: &Node<'_, '_>| n.tag_name().namespace().is_some_and(|s| s.contains("xacro"));
+    for node in root.descendants().filter(Node::is_element).filter(is_xacro) {
+        let Some(parent) = node.parent_element() else { continue };
+        // Those inside another one are ignored with it.
+        if is_xacro(&parent) {
+            continue;
+        }
+        let (at, found) = (reader.source(node), format!("<xacro:{}>", node.tag_name().name()));
+        let error = UrdfError::Xacro { at: at.clone(), found };
+        // At the top level links and joints may come of it.
+        if parent == root {
+            return Err(error);
+        }
+        let done = format!("here it is inside <{}> and was ignored", parent.tag_name().name());
+        reader.tolerate(DiagnosticKind::XacroLeftover, at, error, &done)?;
+    }
+    Ok(())
+}
+
+/// `meshdir` of `<mujoco><compiler>`.
+fn meshdir(reader: &Reader<'_>, node: Node<'_, '_>) -> Result<Option<String>, UrdfError> {
+    for compiler in reader.named(node, "compiler") {
+        if let Some(folder) = reader.text(compiler, "meshdir")? {
+            return Ok(Some(folder.to_owned()).filter(|f| !f.is_empty()));
+        }
+    }
+    Ok(None)
+}
+
+/// A transmission means nothing to the simulation, but one of an unknown joint is a sign of a broken file.
+fn check_transmissions(reader: &mut Reader<'_>, root: Node<'_, '_>, edges: &[Edge]) -> Result<(), UrdfError> {
+    let joints: HashSet<&str> = edges.iter().map(|e| e.joint.name.as_str()).collect();
+    for transmission in reader.named(root, "transmission") {
+        for joint in reader.named(transmission, "joint") {
+            let name = reader.text(joint, "name")?.unwrap_or_default();
+            if !joints.contains(name) {
+                let transmission = element(transmission, transmission.attribute("name").map(|n| ("name", n)));
+                let message = format!("{transmission} names joint \"{name}\", which does not exist; it was ignored");
+                let at = reader.source(joint);
+                reader.warn(DiagnosticKind::ReferenceUnknown, at, message);
+            }
+        }
+    }
+    Ok(())
+}
