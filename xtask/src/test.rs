@@ -33,8 +33,17 @@ const OF_VENDORS: LeftOut =
     LeftOut { name: "vendor", why: "these tests need robots that PyPI does not have; KINETOSCOPE_ROBOTS names others" };
 
 /// Packages with code that depends on MuJoCo's version, and the tests of the whole: what is tested on the second version.
-pub(crate) fn of_mujoco() -> [&'static str; 6] {
-    ["--package", "mujoco-sys", "--package", "kinetoscope-sim", "--package", "kinetoscope"]
+pub(crate) fn of_mujoco() -> [&'static str; 8] {
+    [
+        "--package",
+        "mujoco-sys",
+        "--package",
+        "kinetoscope-mujoco",
+        "--package",
+        "kinetoscope-sim",
+        "--package",
+        "kinetoscope",
+    ]
 }
 
 pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {

@@ -6,7 +6,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
     Mutation::of(
         "physics",
         "inertia turned the wrong way",
-        "sim/src/inertia.rs",
+        "robot/src/inertia.rs",
         [
             "inertia: rotation.matrix() * self.inertia * rotation.matrix().transpose(),",
             "inertia: rotation.matrix().transpose() * self.inertia * rotation.matrix(),",
@@ -16,21 +16,21 @@ pub(super) const PHYSICS: &[Mutation] = &[
     Mutation::of(
         "physics",
         "parallel-axis term dropped",
-        "sim/src/inertia.rs",
+        "robot/src/inertia.rs",
         ["let reduced_mass = self.mass * other.mass / mass;", "let reduced_mass = 0.0 * other.mass / mass;"],
         &["parallel_axis", "mass_matrix"],
     ),
     Mutation::of(
         "physics",
         "centre of mass of fused links not moved",
-        "sim/src/inertia.rs",
+        "robot/src/inertia.rs",
         ["com: self.com + d * (other.mass / mass),", "com: self.com + d * (0.5 * other.mass / mass),"],
         &["parallel_axis", "gravity_torques"],
     ),
     Mutation::of(
         "physics",
         "turn of the inertial frame ignored",
-        "sim/src/inertia.rs",
+        "robot/src/inertia.rs",
         [
             "in_com_axes.transformed(&inertial.link_from_com)",
             "in_com_axes.transformed(&Pose::from_parts(inertial.link_from_com.translation, UnitQuaternion::identity()))",
@@ -87,14 +87,14 @@ pub(super) const PHYSICS: &[Mutation] = &[
     Mutation::of(
         "physics",
         "Jacobian with the arm of the wrong sign",
-        "sim/src/kinematics/jacobian.rs",
+        "robot/src/kinematics/jacobian.rs",
         ["&pose.translation.vector.cross(&axis)", "&axis.cross(&pose.translation.vector)"],
         &["jacobian", "virtual_work"],
     ),
     Mutation::of(
         "physics",
         "Jacobian of a joint that moved already",
-        "sim/src/kinematics/jacobian.rs",
+        "robot/src/kinematics/jacobian.rs",
         ["pose *= joint.before;", "pose *= joint.before * joint.moved(positions);"],
         &["jacobian", "virtual_work"],
     ),
