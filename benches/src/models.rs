@@ -3,7 +3,6 @@
 use crate::Outcome;
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco;
 use kinetoscope::mujoco::{Data, Model};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;

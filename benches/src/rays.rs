@@ -14,7 +14,6 @@ use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::row::Row;
 use crate::{Outcome, Settings};
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco;
 use kinetoscope::mujoco::{Data, TARGET, Target};
 use kinetoscope::ndarray::{Array2, Array3, Axis};
 use kinetoscope::scene::mesh::write_binary_stl;

@@ -8,6 +8,23 @@ use regex::Regex;
 use std::collections::BTreeMap;
 use thiserror::Error;
 
+/// A name that is not in a list of known names.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("there is no {what} {name:?}; {}", known(.candidates))]
+pub struct UnknownName {
+    /// Kind of thing that was looked for.
+    pub what: &'static str,
+    /// The name given.
+    pub name: String,
+    /// Known names, the most similar first.
+    pub candidates: Vec<String>,
+}
+
+fn known(candidates: &[String]) -> String {
+    let quoted: Vec<String> = candidates.iter().map(|name| format!("{name:?}")).collect();
+    if quoted.is_empty() { "there are none".into() } else { format!("known are {}", quoted.join(", ")) }
+}
+
 /// Why a list of patterns could not be applied to a list of names.
 #[derive(Debug, Error)]
 #[non_exhaustive]

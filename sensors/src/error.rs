@@ -198,3 +198,15 @@ fn quoted(names: &[String]) -> String {
 fn known(candidates: &[String]) -> String {
     if candidates.is_empty() { "there are none".into() } else { format!("known are {}", quoted(candidates)) }
 }
+
+impl From<kinetoscope_scene::pattern::UnknownName> for SensorError {
+    fn from(error: kinetoscope_scene::pattern::UnknownName) -> Self {
+        Self::UnknownName { what: error.what, name: error.name, candidates: error.candidates }
+    }
+}
+
+impl From<crate::camera::OpticsError> for SensorError {
+    fn from(error: crate::camera::OpticsError) -> Self {
+        Self::Camera(error.into())
+    }
+}

@@ -5,7 +5,6 @@ use crate::Outcome;
 use crate::models::{Case, HUMANOID, arm_with_hand, sr5};
 use crate::startup::robots;
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco;
 use kinetoscope::mujoco::{Data, Model, TARGET, Target};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Instance, PoseF32, RenderScene, Shape};

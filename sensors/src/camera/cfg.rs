@@ -254,7 +254,7 @@ impl CameraCfg {
         }
         // Paths have rays of their own; only colours without them have more samples than a pixel's centre.
         let samples = if self.channels.color && !self.renderer.follows_paths() { self.raster.samples } else { 1 };
-        RaysOfRows::new(self.lens, pixels, [self.width, self.height], samples, rows)
+        Ok(RaysOfRows::new(self.lens, pixels, [self.width, self.height], samples, rows)?)
     }
 
     /// Refuses what would end the process: an allocation that fails.

@@ -1,6 +1,6 @@
 //! The lens: from focal lengths, apertures or angles to pixels.
 
-use super::error::CameraError;
+use super::optics_error::OpticsError;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -88,13 +88,13 @@ impl Intrinsics {
     ///
     /// # Errors
     ///
-    /// [`CameraError::IntrinsicMatrix`] for another form (skew, scale), [`CameraError::Lens`] for a bad number.
-    pub fn from_matrix(matrix: &Matrix3<f64>) -> Result<Self, CameraError> {
+    /// [`OpticsError::IntrinsicMatrix`] for another form (skew, scale), [`OpticsError::Lens`] for a bad number.
+    pub fn from_matrix(matrix: &Matrix3<f64>) -> Result<Self, OpticsError> {
         let fixed = [((0, 1), 0.0), ((1, 0), 0.0), ((2, 0), 0.0), ((2, 1), 0.0), ((2, 2), 1.0)];
         for ((row, column), wanted) in fixed {
             let value = matrix[(row, column)];
             if value != wanted {
-                return Err(CameraError::IntrinsicMatrix { row, column, value });
+                return Err(OpticsError::IntrinsicMatrix { row, column, value });
             }
         }
         let (fx, fy, cx, cy) = (matrix[(0, 0)], matrix[(1, 1)], matrix[(0, 2)], matrix[(1, 2)]);
@@ -107,8 +107,8 @@ impl Intrinsics {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Lens`]: a number is not finite, a length is not positive, an angle is not between 0 and pi.
-    pub fn to_pixels(&self, width: usize, height: usize) -> Result<PixelIntrinsics, CameraError> {
+    /// [`OpticsError::Lens`]: a number is not finite, a length is not positive, an angle is not between 0 and pi.
+    pub fn to_pixels(&self, width: usize, height: usize) -> Result<PixelIntrinsics, OpticsError> {
         let (w, h) = (width as f64, height as f64);
         let pixels = match *self {
             Self::Pixels { fx, fy, cx, cy } => PixelIntrinsics { fx, fy, cx, cy },
@@ -138,7 +138,7 @@ impl Intrinsics {
             Self::Fovy { radians } => {
                 if !(radians > 0.0 && radians < PI) {
                     let allowed = "between 0 and pi";
-                    return Err(CameraError::Lens { what: "the vertical angle", value: radians, allowed });
+                    return Err(OpticsError::Lens { what: "the vertical angle", value: radians, allowed });
                 }
                 let f = 0.5 * h / (0.5 * radians).tan();
                 PixelIntrinsics { fx: f, fy: f, cx: 0.5 * w, cy: 0.5 * h }
@@ -153,7 +153,7 @@ impl Intrinsics {
     /// # Errors
     ///
     /// As [`to_pixels`](Self::to_pixels).
-    pub fn matrix(&self, width: usize, height: usize) -> Result<Matrix3<f64>, CameraError> {
+    pub fn matrix(&self, width: usize, height: usize) -> Result<Matrix3<f64>, OpticsError> {
         self.to_pixels(width, height).map(|pixels| pixels.matrix())
     }
 }
@@ -171,7 +171,7 @@ impl PixelIntrinsics {
         Matrix3::new(self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
     }
 
-    fn validate(&self) -> Result<(), CameraError> {
+    fn validate(&self) -> Result<(), OpticsError> {
         positive("fx", self.fx)?;
         positive("fy", self.fy)?;
         finite("cx", self.cx)?;
@@ -179,15 +179,15 @@ impl PixelIntrinsics {
     }
 }
 
-fn positive(what: &'static str, value: f64) -> Result<f64, CameraError> {
+fn positive(what: &'static str, value: f64) -> Result<f64, OpticsError> {
     if value > 0.0 && value.is_finite() {
         return Ok(value);
     }
-    Err(CameraError::Lens { what, value, allowed: "positive and finite" })
+    Err(OpticsError::Lens { what, value, allowed: "positive and finite" })
 }
 
-fn finite(what: &'static str, value: f64) -> Result<f64, CameraError> {
-    if value.is_finite() { Ok(value) } else { Err(CameraError::Lens { what, value, allowed: "finite" }) }
+fn finite(what: &'static str, value: f64) -> Result<f64, OpticsError> {
+    if value.is_finite() { Ok(value) } else { Err(OpticsError::Lens { what, value, allowed: "finite" }) }
 }
 
 #[cfg(test)]
@@ -229,7 +229,7 @@ mod tests {
     fn mistakes() {
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let lens = Intrinsics::Pixels { fx: bad, fy: 1.0, cx: 0.0, cy: 0.0 };
-            assert!(matches!(lens.to_pixels(4, 4), Err(CameraError::Lens { what: "fx", .. })));
+            assert!(matches!(lens.to_pixels(4, 4), Err(OpticsError::Lens { what: "fx", .. })));
             let lens = Intrinsics::Aperture {
                 focal_length: 1.0,
                 horizontal_aperture: 1.0,
@@ -237,7 +237,7 @@ mod tests {
                 horizontal_offset: 0.0,
                 vertical_offset: 0.0,
             };
-            assert!(matches!(lens.to_pixels(4, 4), Err(CameraError::Lens { what: "vertical_aperture", .. })));
+            assert!(matches!(lens.to_pixels(4, 4), Err(OpticsError::Lens { what: "vertical_aperture", .. })));
             assert!(Intrinsics::Fovy { radians: bad }.to_pixels(4, 4).is_err());
         }
         assert!(Intrinsics::Fovy { radians: PI }.to_pixels(4, 4).is_err());
@@ -245,6 +245,6 @@ mod tests {
         assert_eq!(lens.to_pixels(4, 4).unwrap_err().to_string(), "cy of the lens is NaN; it must be finite");
         let skewed = Matrix3::new(1.0, 0.1, 2.0, 0.0, 1.0, 2.0, 0.0, 0.0, 1.0);
         let error = Intrinsics::from_matrix(&skewed).unwrap_err();
-        assert_eq!(error, CameraError::IntrinsicMatrix { row: 0, column: 1, value: 0.1 });
+        assert_eq!(error, OpticsError::IntrinsicMatrix { row: 0, column: 1, value: 0.1 });
     }
 }

@@ -1,5 +1,6 @@
 //! Cameras: the sensor, its configuration, channels, frames and the rasterizer that fills them.
 
+mod accessors;
 pub mod aperture;
 mod arrived;
 pub mod boxes;
@@ -20,6 +21,7 @@ pub mod lens;
 mod memory;
 pub(crate) mod mounts;
 mod opening;
+pub mod optics_error;
 pub mod parallel;
 mod past;
 mod picture_noise;
@@ -49,6 +51,7 @@ pub use extrinsics::{CameraConvention, Extrinsics, Placement, Poses, look_at_pos
 pub use imperfection::Imperfections;
 pub use intrinsics::{Intrinsics, PixelIntrinsics};
 pub use lens::{Lens, LensModel, LensRays, Optics};
+pub use optics_error::OpticsError;
 pub use parallel::ParallelRasterizer;
 pub use past::HistoryView;
 pub use point_cloud::PointFrame;

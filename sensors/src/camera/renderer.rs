@@ -2,9 +2,8 @@
 
 use super::channel::FrameMut;
 use super::rasterizer::{RasterCfg, Shot};
-use crate::error::SensorError;
 use crate::visibility::RenderError;
-use kinetoscope_scene::pattern::closest;
+use kinetoscope_scene::pattern::{UnknownName, closest};
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
@@ -99,13 +98,13 @@ impl Renderer {
     }
 
     /// The renderer of a name in files, EmbodiChain's too; paths are those of [`RAY_TRACED`](Self::RAY_TRACED).
-    fn from_name(name: &str) -> Result<Self, SensorError> {
+    fn from_name(name: &str) -> Result<Self, UnknownName> {
         const ALL: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, Renderer::RAY_TRACED];
         ALL.into_iter().find(|renderer| renderer.name() == name || renderer.aliases().contains(&name)).ok_or_else(
             || {
                 let all = ALL.iter().flat_map(|renderer| [&[renderer.name()], renderer.aliases()].concat());
                 let candidates = closest(name, all).into_iter().map(String::from).collect();
-                SensorError::UnknownName { what: "renderer", name: name.into(), candidates }
+                UnknownName { what: "renderer", name: name.into(), candidates }
             },
         )
     }

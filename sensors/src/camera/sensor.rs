@@ -535,9 +535,8 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Lens`], [`CameraError::View`], [`CameraError::Count`], an environment that the camera does not see
-    /// or that is named twice; of a camera with a lens also [`CameraError::LensFolds`], [`CameraError::LensBlind`] and
-    /// [`CameraError::LensMemory`]. Nothing is changed then.
+    /// [`CameraError::Optics`], [`CameraError::View`], [`CameraError::Count`], an environment that the camera does not see
+    /// or that is named twice; of a camera with a lens also [`CameraError::Optics`]. Nothing is changed then.
     pub fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
         let Self { mounts, lens, rays, .. } = self;

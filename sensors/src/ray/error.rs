@@ -1,6 +1,6 @@
 //! What can be wrong with a ray caster.
 
-use crate::camera::CameraError;
+use crate::camera::OpticsError;
 
 /// Why a ray caster cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -63,7 +63,7 @@ pub enum RayError {
     },
     /// Something is wrong with the lens of a pattern.
     #[error(transparent)]
-    Lens(#[from] CameraError),
+    Lens(#[from] OpticsError),
     /// There is no scene to cast rays into.
     #[error("the ray caster was built without a scene")]
     NoScene,

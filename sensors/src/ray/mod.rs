@@ -16,6 +16,7 @@ pub mod caster;
 mod error;
 pub(crate) mod packet;
 pub mod pattern;
+pub(crate) mod segment;
 pub(crate) mod shape;
 pub(crate) mod triangle;
 pub(crate) mod vector;
@@ -30,37 +31,5 @@ pub use camera::{RayCasterCamera, RayCasterCameraCfg, RayPictures};
 pub use caster::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
 pub use error::RayError;
 pub use pattern::RayPattern;
+pub use segment::Ray;
 pub use world::{RayHit, RayTargets, RayWorld};
-
-/// A ray: where it begins, and which way it goes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ray {
-    /// Where it begins \[m\].
-    pub origin: [f64; 3],
-    /// Which way it goes; of length 1.
-    pub direction: [f64; 3],
-}
-
-impl Ray {
-    /// The point at a distance \[m\].
-    #[inline]
-    pub fn at(&self, distance: f64) -> [f64; 3] {
-        vector::along(self.origin, distance, self.direction)
-    }
-
-    /// The ray in the frame that `pose` maps from.
-    #[inline(always)]
-    #[cfg(test)]
-    fn seen_from(&self, pose: &kinetoscope_scene::PoseF64) -> Self {
-        Self { origin: pose.apply_inverse(self.origin), direction: pose.rotate_inverse(self.direction) }
-    }
-
-    /// The ray of this frame in the frame that `pose` maps to.
-    pub(crate) fn mapped_by(&self, pose: &kinetoscope_scene::PoseF64) -> Self {
-        Self { origin: pose.apply(self.origin), direction: pose.rotate(self.direction) }
-    }
-
-    fn is_finite(&self) -> bool {
-        self.origin.iter().chain(&self.direction).all(|x| x.is_finite())
-    }
-}

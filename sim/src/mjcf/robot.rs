@@ -14,7 +14,7 @@ use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::source::Source;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The most moving bodies one below the other: MuJoCo's XML reader refuses documents nested deeper than 100 elements on 2.2.2
 /// and 500 on 4.x.

@@ -6,7 +6,6 @@
 
 use super::*;
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco;
 use kinetoscope::mujoco::{Data, ObjectKind};
 use kinetoscope::ndarray::{Array3, s};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};

@@ -8,7 +8,6 @@ mod sensors;
 mod visible;
 
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco;
 use kinetoscope::mujoco::{Data, Model};
 use kinetoscope::prelude::*;
 use kinetoscope_testkit::worlds::{empty_cfg, sim};

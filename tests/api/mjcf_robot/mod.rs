@@ -12,7 +12,6 @@ mod scenes;
 
 use crate::mjcf::empty;
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco;
 use kinetoscope::mujoco::{Data, Model};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;

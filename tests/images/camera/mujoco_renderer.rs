@@ -7,7 +7,6 @@
 
 use super::view;
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco;
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;

@@ -6,7 +6,6 @@
 use super::view;
 use crate::rays::judge::{Dice, FAN, GROUPS, at_rest, data_of, data_with, height_field, mask_of};
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco;
 use kinetoscope::mujoco::Data;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;

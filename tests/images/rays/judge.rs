@@ -1,7 +1,6 @@
 //! Our rays against `mj_ray`, on the same geoms at the same poses.
 
 use kinetoscope::mujoco as mj;
-use kinetoscope::mujoco;
 use kinetoscope::mujoco::Data;
 use kinetoscope::scene::PoseF64;
 use kinetoscope::sensors::ray::{Ray, RayAssets, RayHit, RayTargets, RayWorld};

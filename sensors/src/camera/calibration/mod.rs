@@ -7,6 +7,7 @@ mod write;
 mod yaml;
 
 use super::cfg::CameraCfg;
+use super::error::CameraError;
 use super::intrinsics::{Intrinsics, PixelIntrinsics};
 use super::lens::{Lens, LensModel, OpenCv, OpenCvFisheye};
 use super::renderer::Renderer;
@@ -235,7 +236,7 @@ impl CameraInfo {
         lens: &Lens,
     ) -> Result<Self, CalibrationError> {
         let (distortion_model, distortion_coefficients) = of_lens(lens)?;
-        let mut camera_matrix = Intrinsics::from(*pixels).matrix(width, height)?;
+        let mut camera_matrix = Intrinsics::from(*pixels).matrix(width, height).map_err(CameraError::from)?;
         (0..2).for_each(|axis| camera_matrix[(axis, 2)] -= Self::FIRST_CENTRE);
         let mut projection_matrix = Matrix3x4::zeros();
         projection_matrix.fixed_columns_mut::<3>(0).copy_from(&camera_matrix);

@@ -1,9 +1,7 @@
 //! What a camera measures: one channel per file, all of them in one list.
 
-use super::sensor::Camera;
-use crate::error::SensorError;
 use crate::visibility::RenderError;
-use kinetoscope_scene::pattern::closest;
+use kinetoscope_scene::pattern::{UnknownName, closest};
 use ndarray::{Array, ArrayView, Dimension, Ix3, Ix4};
 use std::ops::Range;
 
@@ -91,7 +89,7 @@ pub trait Channel {
         }
     }
 
-    /// Puts `value` where nothing was hit: see [`DepthMiss`](super::DepthMiss). Only for channels that measure how far
+    /// Puts `value` where nothing was hit: see `DepthMiss` of cameras. Only for channels that measure how far
     /// something is; the others have a value of their own for a miss.
     fn replace_misses(_numbers: &mut [Self::Number], _value: f32) {}
 }
@@ -152,8 +150,8 @@ macro_rules! channels {
             ///
             /// # Errors
             ///
-            /// [`SensorError::UnknownName`] with the names most like one that is not known.
-            pub fn from_names<S: AsRef<str>>(names: &[S]) -> Result<Self, SensorError> {
+            /// [`UnknownName`] with the names most like one that is not known.
+            pub fn from_names<S: AsRef<str>>(names: &[S]) -> Result<Self, UnknownName> {
                 let mut channels = Self::default();
                 for name in names.iter().map(AsRef::as_ref) {
                     match name {
@@ -261,19 +259,6 @@ macro_rules! channels {
             }
         })*
 
-        impl Camera {
-            $($(#[$doc])*
-            ///
-            /// The first axis is the camera's environments. Draws what was captured since the last reading.
-            ///
-            /// # Errors
-            ///
-            /// As [`channel`](Self::channel).
-            pub fn $field(&self) -> Result<PictureView<'_, $Name>, SensorError> {
-                self.channel::<$Name>()
-            })*
-        }
-
         /// Pictures of one view, row by row from the top left.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Frame {
@@ -360,10 +345,10 @@ macro_rules! channels {
 }
 
 /// The error for a name that is no channel, with the names and aliases most like it.
-fn unknown(name: &str, known: &[(&'static str, &[&'static str])]) -> SensorError {
+fn unknown(name: &str, known: &[(&'static str, &[&'static str])]) -> UnknownName {
     let all = known.iter().flat_map(|(own, aliases)| aliases.iter().chain([own]));
     let candidates = closest(name, all.copied()).into_iter().map(String::from).collect();
-    SensorError::UnknownName { what: "channel", name: name.into(), candidates }
+    UnknownName { what: "channel", name: name.into(), candidates }
 }
 
 /// The first pixels of one channel.

@@ -1,7 +1,7 @@
 //! NVIDIA's f-theta lens.
 
 use super::polynomial::{derivative, first_sign_change, solve, value};
-use super::{CameraError, Domain, LensModel, angle_up_to, finite, radial};
+use super::{OpticsError, Domain, LensModel, angle_up_to, finite, radial};
 use crate::camera::Intrinsics;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -58,19 +58,19 @@ impl LensModel for FTheta {
         Some(self.max_angle)
     }
 
-    fn validate(&self) -> Result<(), CameraError> {
+    fn validate(&self) -> Result<(), OpticsError> {
         let [a, b, c, d, e, f] = self.polynomial;
         finite(&[("a", a), ("b", b), ("c", c), ("d", d), ("e", e), ("f", f)])?;
         if a != 0.0 {
-            return Err(CameraError::Lens { what: "a", value: a, allowed: "0: the optical axis is at r = 0" });
+            return Err(OpticsError::Lens { what: "a", value: a, allowed: "0: the optical axis is at r = 0" });
         }
         if b <= 0.0 {
-            return Err(CameraError::Lens { what: "b", value: b, allowed: "positive" });
+            return Err(OpticsError::Lens { what: "b", value: b, allowed: "positive" });
         }
         let focal_length = self.focal_length;
         if !(focal_length > 0.0 && focal_length.is_finite()) {
             let allowed = "positive and finite";
-            return Err(CameraError::Lens { what: "focal_length", value: focal_length, allowed });
+            return Err(OpticsError::Lens { what: "focal_length", value: focal_length, allowed });
         }
         angle_up_to(self.max_angle, PI, "above 0, at most pi")
     }

@@ -11,9 +11,8 @@ mod radial;
 mod rays;
 mod rows;
 
-use super::error::CameraError;
-use crate::error::SensorError;
-use kinetoscope_scene::pattern::closest;
+use super::optics_error::OpticsError;
+use kinetoscope_scene::pattern::{UnknownName, closest};
 pub use optics::Optics;
 use poles::Poles;
 pub use rays::LensRays;
@@ -67,8 +66,8 @@ pub trait LensModel: Copy + Default {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Lens`].
-    fn validate(&self) -> Result<(), CameraError>;
+    /// [`OpticsError::Lens`].
+    fn validate(&self) -> Result<(), OpticsError>;
 
     /// How far it sees; the numbers are good.
     fn domain(&self) -> Domain;
@@ -113,14 +112,14 @@ macro_rules! lenses {
             ///
             /// # Errors
             ///
-            /// [`SensorError::UnknownName`] with the names most like it.
-            pub fn from_name(name: &str) -> Result<Self, SensorError> {
+            /// [`UnknownName`] with the names most like it.
+            pub fn from_name(name: &str) -> Result<Self, UnknownName> {
                 $(if name == $Name::NAME || $Name::ALIASES.contains(&name) {
                     return Ok(Self::$Name($Name::default()));
                 })*
                 let all = [$($Name::NAME),*].into_iter().chain([$($Name::ALIASES),*].into_iter().flatten().copied());
                 let candidates = closest(name, all).into_iter().map(String::from).collect();
-                Err(SensorError::UnknownName { what: "lens", name: name.into(), candidates })
+                Err(UnknownName { what: "lens", name: name.into(), candidates })
             }
 
             /// Its name.
@@ -148,15 +147,15 @@ macro_rules! lenses {
             ///
             /// # Errors
             ///
-            /// [`CameraError::Lens`]; [`CameraError::LensFolds`] where the mapping folds back before the angle that the lens
+            /// [`OpticsError::Lens`]; [`OpticsError::LensFolds`] where the mapping folds back before the angle that the lens
             /// is to see.
-            pub fn domain(&self) -> Result<Domain, CameraError> {
+            pub fn domain(&self) -> Result<Domain, OpticsError> {
                 let (domain, max_angle) = match self { $(Self::$Name(lens) => {
                     lens.validate()?;
                     (lens.domain(), lens.max_angle())
                 })* };
                 match max_angle {
-                    Some(wanted) if domain.folds => Err(CameraError::LensFolds {
+                    Some(wanted) if domain.folds => Err(OpticsError::LensFolds {
                         lens: self.name(),
                         angle: domain.angle,
                         radius: domain.radius,
@@ -247,17 +246,17 @@ impl Default for Lens {
 }
 
 /// Checks that numbers are finite.
-fn finite(numbers: &[(&'static str, f64)]) -> Result<(), CameraError> {
+fn finite(numbers: &[(&'static str, f64)]) -> Result<(), OpticsError> {
     match numbers.iter().find(|(_, value)| !value.is_finite()) {
-        Some(&(what, value)) => Err(CameraError::Lens { what, value, allowed: "finite" }),
+        Some(&(what, value)) => Err(OpticsError::Lens { what, value, allowed: "finite" }),
         None => Ok(()),
     }
 }
 
 /// Checks the angle at which a lens ends.
-fn angle_up_to(max_angle: f64, most: f64, allowed: &'static str) -> Result<(), CameraError> {
+fn angle_up_to(max_angle: f64, most: f64, allowed: &'static str) -> Result<(), OpticsError> {
     if max_angle > 0.0 && max_angle <= most {
         return Ok(());
     }
-    Err(CameraError::Lens { what: "max_angle", value: max_angle, allowed })
+    Err(OpticsError::Lens { what: "max_angle", value: max_angle, allowed })
 }

@@ -2,7 +2,7 @@
 
 use super::poles::{Fraction, Poles};
 use super::polynomial::bisect;
-use super::{CameraError, Domain, LensModel, angle_up_to, finite};
+use super::{OpticsError, Domain, LensModel, angle_up_to, finite};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -225,7 +225,7 @@ impl LensModel for OpenCv {
         self.max_angle
     }
 
-    fn validate(&self) -> Result<(), CameraError> {
+    fn validate(&self) -> Result<(), OpticsError> {
         const NAMES: [&str; 12] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4"];
         let all = self.coefficients();
         finite(&std::array::from_fn::<_, 12, _>(|k| (NAMES[k], all[k])))?;

@@ -1,7 +1,7 @@
 //! OpenCV's fisheye.
 
 use super::polynomial::{first_sign_change, solve, value};
-use super::{CameraError, Domain, LensModel, angle_up_to, finite, radial};
+use super::{OpticsError, Domain, LensModel, angle_up_to, finite, radial};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -45,7 +45,7 @@ impl LensModel for OpenCvFisheye {
         self.max_angle
     }
 
-    fn validate(&self) -> Result<(), CameraError> {
+    fn validate(&self) -> Result<(), OpticsError> {
         finite(&[("k1", self.k1), ("k2", self.k2), ("k3", self.k3), ("k4", self.k4)])?;
         self.max_angle.map_or(Ok(()), |angle| angle_up_to(angle, PI, "above 0, at most pi"))
     }

@@ -1,8 +1,8 @@
 //! A lens in front of pixels.
 
 use super::{Domain, Lens};
-use crate::camera::error::CameraError;
 use crate::camera::intrinsics::{Intrinsics, PixelIntrinsics};
+use crate::camera::optics_error::OpticsError;
 use nalgebra::Vector3;
 
 /// A lens in front of pixels, checked: from directions to pixels and back.
@@ -29,9 +29,9 @@ impl Optics {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Lens`] for a bad number, [`CameraError::LensFolds`] where the mapping folds back before
+    /// [`OpticsError::Lens`] for a bad number, [`OpticsError::LensFolds`] where the mapping folds back before
     /// the angle that the lens is to see.
-    pub fn new(lens: Lens, pixels: PixelIntrinsics) -> Result<Self, CameraError> {
+    pub fn new(lens: Lens, pixels: PixelIntrinsics) -> Result<Self, OpticsError> {
         let pixels = Intrinsics::from(pixels).to_pixels(1, 1)?;
         Ok(Self { lens, pixels, domain: lens.domain()? })
     }

@@ -1,6 +1,6 @@
 //! The panorama: all around.
 
-use super::{CameraError, Domain, LensModel};
+use super::{OpticsError, Domain, LensModel};
 use crate::camera::Intrinsics;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -30,7 +30,7 @@ impl LensModel for Panorama {
         None
     }
 
-    fn validate(&self) -> Result<(), CameraError> {
+    fn validate(&self) -> Result<(), OpticsError> {
         Ok(())
     }
 

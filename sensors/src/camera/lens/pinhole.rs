@@ -1,6 +1,6 @@
 //! No lens: straight lines stay straight.
 
-use super::{CameraError, Domain, LensModel};
+use super::{OpticsError, Domain, LensModel};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
@@ -22,7 +22,7 @@ impl LensModel for Pinhole {
         None
     }
 
-    fn validate(&self) -> Result<(), CameraError> {
+    fn validate(&self) -> Result<(), OpticsError> {
         Ok(())
     }
 

@@ -59,7 +59,7 @@ macro_rules! fisheye {
                 Some(self.max_angle)
             }
 
-            fn validate(&self) -> Result<(), super::CameraError> {
+            fn validate(&self) -> Result<(), super::OpticsError> {
                 super::angle_up_to(self.max_angle, $most, $allowed)
             }
 

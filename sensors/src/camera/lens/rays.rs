@@ -1,7 +1,7 @@
 //! The rays of all samples of a picture behind a lens: computed once, for all pictures of the same lens.
 
 use super::Optics;
-use crate::camera::error::CameraError;
+use crate::camera::optics_error::OpticsError;
 use crate::lanes::{F, LANES, Simd, V3, load};
 use crate::visibility::raster::tile::{BLOCK, SAMPLES};
 use std::fmt;
@@ -75,9 +75,9 @@ impl LensRays {
     ///
     /// # Errors
     ///
-    /// [`CameraError::LensFolds`] if pixels are where the mapping of the lens cannot be inverted, and
-    /// [`CameraError::LensBlind`] if no pixel sees anything.
-    pub fn new(optics: &Optics, [width, height]: [usize; 2], samples: u8) -> Result<Self, CameraError> {
+    /// [`OpticsError::LensFolds`] if pixels are where the mapping of the lens cannot be inverted, and
+    /// [`OpticsError::LensBlind`] if no pixel sees anything.
+    pub fn new(optics: &Optics, [width, height]: [usize; 2], samples: u8) -> Result<Self, OpticsError> {
         let planes = if samples == 4 { SAMPLES.len() } else { 1 };
         let blocks = [width.div_ceil(BLOCK), height.div_ceil(BLOCK)];
         let mut rays = Self {
@@ -107,7 +107,7 @@ impl LensRays {
                 rays.cones.push(cone);
             }
         }
-        rays.pixel = rays.spacing().ok_or_else(|| CameraError::LensBlind { lens: optics.lens().name() })?;
+        rays.pixel = rays.spacing().ok_or_else(|| OpticsError::LensBlind { lens: optics.lens().name() })?;
         Ok(rays)
     }
 
@@ -273,14 +273,14 @@ impl LensRays {
 }
 
 /// Says where the mapping folds back, if that is why there is no ray.
-fn not_folded(optics: &Optics, [u, v]: [f64; 2]) -> Result<(), CameraError> {
+fn not_folded(optics: &Optics, [u, v]: [f64; 2]) -> Result<(), OpticsError> {
     let (domain, f) = (optics.domain(), optics.pixels());
     if !domain.folds {
         return Ok(());
     }
     let reach = ((u - f.cx) / f.fx).hypot((v - f.cy) / f.fy);
     let wanted = format!("pixel ({u:.1}, {v:.1}) is at radius {reach:.4}");
-    Err(CameraError::LensFolds { lens: optics.lens().name(), angle: domain.angle, radius: domain.radius, wanted })
+    Err(OpticsError::LensFolds { lens: optics.lens().name(), angle: domain.angle, radius: domain.radius, wanted })
 }
 
 /// All else follows from these.

@@ -1,8 +1,8 @@
 //! The rays of all rows of a camera: rows of the same intrinsics share them.
 
 use super::{Lens, LensRays, Optics};
-use crate::camera::error::CameraError;
 use crate::camera::intrinsics::PixelIntrinsics;
+use crate::camera::optics_error::OpticsError;
 use std::sync::Arc;
 
 /// The most memory that the rays of a camera may take \[bytes\].
@@ -27,7 +27,7 @@ impl RaysOfRows {
         size: [usize; 2],
         samples: u8,
         rows: usize,
-    ) -> Result<Self, CameraError> {
+    ) -> Result<Self, OpticsError> {
         let mut all = Self { lens, size, samples, known: Vec::new(), rows: vec![None; rows] };
         all.known = all.make(std::slice::from_ref(pixels))?;
         let first = all.known.first().cloned();
@@ -51,7 +51,7 @@ impl RaysOfRows {
     }
 
     /// The rays of some pixels, those of the same ones once; none for a pinhole.
-    pub(crate) fn make(&self, pixels: &[PixelIntrinsics]) -> Result<Vec<Arc<LensRays>>, CameraError> {
+    pub(crate) fn make(&self, pixels: &[PixelIntrinsics]) -> Result<Vec<Arc<LensRays>>, OpticsError> {
         if self.lens.is_pinhole() {
             self.lens.domain()?;
             return Ok(Vec::new());
@@ -68,7 +68,7 @@ impl RaysOfRows {
             let bytes = LensRays::bytes_of(self.size, self.samples).saturating_mul(made.len() + 1);
             let granted = bytes <= MAX_BYTES && Vec::<u8>::new().try_reserve_exact(bytes).is_ok();
             if !granted {
-                return Err(CameraError::LensMemory { tables: made.len() + 1, bytes, limit: MAX_BYTES });
+                return Err(OpticsError::LensMemory { tables: made.len() + 1, bytes, limit: MAX_BYTES });
             }
             let optics = Optics::new(self.lens, *pixels)?;
             made.push(Arc::new(LensRays::new(&optics, self.size, self.samples)?));

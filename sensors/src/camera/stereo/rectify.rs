@@ -44,7 +44,7 @@ impl Rectification {
     /// # Errors
     ///
     /// [`CameraError::NotRectifiable`] where the right eye is not to the right of the left one, or an eye would turn by more than
-    /// 80 degrees; [`CameraError::Pose`] and [`CameraError::Lens`] for numbers that are none.
+    /// 80 degrees; [`CameraError::Pose`] and [`CameraError::Optics`] for numbers that are none.
     pub fn of(left_from_right: &Pose, [left, right]: [PixelIntrinsics; 2]) -> Result<Self, CameraError> {
         left_from_right.to_poses()?;
         [left, right].into_iter().try_for_each(|pixels| Intrinsics::from(pixels).to_pixels(1, 1).map(|_| ()))?;

@@ -11,6 +11,7 @@ use super::scenes::{Random, figure, random};
 use super::stage::{self, BALL, GROUND, RADIUS, built, context};
 use super::traced::{Comparison, compare};
 use crate::SensorError;
+use crate::camera::OpticsError;
 use crate::lanes::Level;
 use crate::sensor::{Sensor, SensorCfg};
 use crate::visibility::raster::tile::SAMPLES;
@@ -313,7 +314,7 @@ fn refused_rays() {
         }
     }
     let error = cfg_of(OpenCv { k1: -0.9, ..OpenCv::default() }, pixels).build(&context(1)).unwrap_err();
-    assert!(matches!(error, SensorError::Camera(CameraError::LensFolds { .. })), "{error}");
+    assert!(matches!(error, SensorError::Camera(CameraError::Optics(OpticsError::LensFolds { .. }))), "{error}");
 }
 
 /// Intrinsics of one environment behind a lens: the others keep theirs, and all come back.
@@ -337,7 +338,7 @@ fn own_intrinsics() {
     // A mistake changes nothing.
     let bad = Intrinsics::Pixels { fx: 25.0, fy: 22.0, cx: 3000.0, cy: 20.0 };
     let error = camera.set_intrinsics(&[bad], Some(&[0])).unwrap_err();
-    assert!(matches!(error, SensorError::Camera(CameraError::LensBlind { .. })), "{error}");
+    assert!(matches!(error, SensorError::Camera(CameraError::Optics(OpticsError::LensBlind { .. }))), "{error}");
     assert!(camera.set_intrinsics(&[other; 2], None).is_err());
     assert!(rows(&camera) == now);
     camera.restore(None).unwrap();

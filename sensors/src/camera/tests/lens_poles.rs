@@ -1,7 +1,7 @@
 //! Distortions of real calibrations that OpenCV itself cannot invert everywhere: with poles, and with folds.
 
 use super::super::lens::OpenCv;
-use super::super::{CameraError, Intrinsics, Lens, LensRays, Optics, PixelIntrinsics};
+use super::super::{Intrinsics, Lens, LensRays, Optics, OpticsError, PixelIntrinsics};
 use super::harness::opencv;
 
 /// A factory's calibration of an OAK-D's colour camera on a TurtleBot 4, 250 x 250 pixels, rounded to five digits. Its radial
@@ -149,7 +149,7 @@ fn wide_poles() {
     let optics = Optics::new(wide.into(), pixels).unwrap();
     let error = LensRays::new(&optics, [200, 200], 1).unwrap_err();
     assert!(
-        matches!(error, CameraError::LensFolds { angle, radius, .. } if (angle, radius) == (domain.angle, domain.radius))
+        matches!(error, OpticsError::LensFolds { angle, radius, .. } if (angle, radius) == (domain.angle, domain.radius))
     );
     assert!(error.to_string().contains("it folds back, or nears a pole, 36.03 degrees"), "{error}");
     // An image that ends before is good, and so is all of it for a lens that is said to end before the pole.

@@ -3,9 +3,9 @@
 use super::super::lens::{
     Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
 };
-use super::super::{CameraError, Intrinsics, Lens, LensRays, Optics, PixelIntrinsics};
+use super::super::{Intrinsics, Lens, LensRays, Optics, OpticsError, PixelIntrinsics};
 use super::harness::opencv;
-use crate::SensorError;
+use kinetoscope_scene::pattern::UnknownName;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 const PIXELS: PixelIntrinsics = PixelIntrinsics { fx: 610.0, fy: 605.0, cx: 322.0, cy: 243.0 };
@@ -185,18 +185,18 @@ fn folds() {
         let middle = Optics::new(lens, PixelIntrinsics { cx: 50.0, cy: 50.0, ..pixels }).unwrap();
         assert!(LensRays::new(&middle, [100, 100], 1).is_ok());
         let error = LensRays::new(&optics, [200, 200], 1).unwrap_err();
-        assert!(matches!(error, CameraError::LensFolds { radius, .. } if (radius - domain.radius).abs() < 1e-12));
+        assert!(matches!(error, OpticsError::LensFolds { radius, .. } if (radius - domain.radius).abs() < 1e-12));
         assert!(error.to_string().contains("at radius 0.8607 of the normalised picture"), "{error}");
     }
     // Where it is to see farther than that it is refused at once; where it ends before, the rest is dark.
     let short = |max_angle| Lens::from(OpenCv { k1: -0.2, max_angle: Some(max_angle), ..OpenCv::default() });
-    assert!(matches!(short(1.2).domain(), Err(CameraError::LensFolds { .. })));
+    assert!(matches!(short(1.2).domain(), Err(OpticsError::LensFolds { .. })));
     let rays = LensRays::new(&Optics::new(short(0.5), pixels).unwrap(), [200, 200], 1).unwrap();
     assert!(rays.direction(0, [0, 0]) == [0.0; 3] && rays.direction(0, [100, 100]) != [0.0; 3]);
     let theta = FTheta { polynomial: [0.0, 0.00245, 0.0, -3e-9, 0.0, 0.0], ..FTheta::default() };
     // b r + d r³ is largest at r² = b / (-3 d).
     let r = (0.00245f64 / 9e-9).sqrt();
-    let Err(CameraError::LensFolds { angle, radius, .. }) = Lens::from(theta).domain() else { panic!("it folds") };
+    let Err(OpticsError::LensFolds { angle, radius, .. }) = Lens::from(theta).domain() else { panic!("it folds") };
     assert!((radius * theta.focal_length - r).abs() < 1e-6 && (angle - 0.00245 * r * 2.0 / 3.0).abs() < 1e-12);
     // Distortions that are not the same all around are looked at all around: here only along +x.
     let prism = OpenCv { s1: -0.4, ..OpenCv::default() };
@@ -229,9 +229,9 @@ fn refusals() {
     ]);
     for (lens, expected) in rows {
         let error = lens.domain();
-        assert!(matches!(error, Err(CameraError::Lens { what, .. }) if what == expected), "{expected}: {error:?}");
+        assert!(matches!(error, Err(OpticsError::Lens { what, .. }) if what == expected), "{expected}: {error:?}");
     }
-    let Err(SensorError::UnknownName { what, candidates, .. }) = Lens::from_name("equidistent") else { panic!() };
+    let Err(UnknownName { what, candidates, .. }) = Lens::from_name("equidistent") else { panic!() };
     assert_eq!((what, candidates[0].as_str()), ("lens", "equidistant"));
     for name in Lens::NAMES {
         assert_eq!(Lens::from_name(name).unwrap().name(), *name);
@@ -240,7 +240,7 @@ fn refusals() {
     // Nothing but dark: the circle is far beside the image.
     let beside = Intrinsics::Pixels { fx: 1.0, fy: 1.0, cx: -50.0, cy: 0.0 }.to_pixels(8, 8).unwrap();
     let optics = Optics::new(Orthographic::default().into(), beside).unwrap();
-    assert_eq!(LensRays::new(&optics, [8, 8], 1), Err(CameraError::LensBlind { lens: "orthographic" }));
+    assert_eq!(LensRays::new(&optics, [8, 8], 1), Err(OpticsError::LensBlind { lens: "orthographic" }));
 }
 
 /// As scene files have them: a name, an alias, or a table with numbers; and back.

@@ -3,6 +3,7 @@
 use super::super::channel::Depth;
 use super::super::*;
 use super::stage::{BALL, DT, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
+use crate::camera::OpticsError;
 use crate::error::SensorError;
 use crate::sensor::{Requires, Sensor, SensorCfg};
 use crate::visibility::RenderError;
@@ -434,7 +435,7 @@ fn bad_configurations() {
     let lens = |fx| CameraCfg { intrinsics: Intrinsics::Pixels { fx, fy: 1.0, cx: 0.0, cy: 0.0 }, ..cfg() };
     for fx in [0.0, -5.0, f64::NAN, f64::INFINITY] {
         let error = refused(lens(fx));
-        assert!(matches!(error, Camera(CameraError::Lens { what: "fx", .. })), "{error}");
+        assert!(matches!(error, Camera(CameraError::Optics(OpticsError::Lens { what: "fx", .. }))), "{error}");
     }
     assert!(matches!(refused(lens(1e30)), Camera(CameraError::View(_))));
     let mut samples = cfg();

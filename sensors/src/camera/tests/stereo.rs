@@ -8,6 +8,7 @@ use super::super::{
 };
 use super::harness::{opencv, pinhole, point};
 use super::stage::{BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
+use crate::camera::OpticsError;
 use crate::camera::imperfection::{DepthNoise, Holes, ReadNoise};
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
@@ -386,7 +387,7 @@ fn without_disparity() {
     let error = lens(0.0, 1.0, 1.0).build(&context).unwrap_err();
     assert_eq!(error.to_string(), "the right eye: fx of the lens is 0; it must be positive and finite");
     let SensorError::Eye { eye: "right", error } = error else { panic!("{error}") };
-    assert!(matches!(*error, SensorError::Camera(CameraError::Lens { .. })), "{error}");
+    assert!(matches!(*error, SensorError::Camera(CameraError::Optics(OpticsError::Lens { .. }))), "{error}");
 }
 
 /// A fisheye lens, which needs rays.

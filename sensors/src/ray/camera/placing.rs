@@ -79,7 +79,7 @@ impl RayCasterCamera {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Lens`], [`CameraError::Count`], an environment that does not exist or that is named twice; nothing is
+    /// [`CameraError::Optics`], [`CameraError::Count`], an environment that does not exist or that is named twice; nothing is
     /// changed then.
     pub fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;

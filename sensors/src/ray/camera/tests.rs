@@ -1,6 +1,7 @@
 //! Images of a floor and a ball, against closed forms.
 
 use super::{RayCasterCamera, RayCasterCameraCfg};
+use crate::camera::OpticsError;
 use crate::camera::{CameraConvention, DepthMiss, Extrinsics, Intrinsics, Placement, PointFrame};
 use crate::noise::NoiseCfg;
 use crate::sampling::{Sampled, SamplingCfg};
@@ -159,7 +160,10 @@ fn mistakes() {
     let z = [[0.0, 0.0, 1.0]];
     assert!(matches!(camera.look_at(&z, &z, &z, None), Err(SensorError::Camera(CameraError::LookAt { .. }))));
     let flat = Intrinsics::Pixels { fx: 0.0, fy: 1.0, cx: 0.0, cy: 0.0 };
-    assert!(matches!(camera.set_intrinsics(&[flat], None), Err(SensorError::Camera(CameraError::Lens { .. }))));
+    assert!(matches!(
+        camera.set_intrinsics(&[flat], None),
+        Err(SensorError::Camera(CameraError::Optics(OpticsError::Lens { .. })))
+    ));
     assert!(camera.restore(Some(&[1])).is_err() && camera.point_map(1, PointFrame::World).is_err());
     // Before the first capture, the pose of the parent is not known.
     let mut attached = on("ball").build(&context(1)).unwrap();
