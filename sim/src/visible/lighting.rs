@@ -27,11 +27,11 @@ pub(crate) enum Look<'a> {
 }
 
 impl<'a> Look<'a> {
-    /// The look of a simulation. One that shows nothing but an MJCF file and the ground, in the lamp that simulations have by
-    /// default, has MuJoCo's look without that lamp; every other has ours.
+    /// The look of a simulation. One that shows nothing but an MJCF file and the ground, with the lights that simulations have by
+    /// default, has MuJoCo's look without those; every other has ours, such as a recorded scene with no lights of its own.
     pub(crate) fn of(cfg: &SimulationManagerCfg, contents: &'a Contents) -> Self {
         let Contents { robots, objects, terrains, parts, .. } = contents;
-        let by_default = cfg.lights.is_empty() || cfg.lights == SimulationManagerCfg::default().lights;
+        let by_default = cfg.lights == SimulationManagerCfg::default().lights;
         match &parts[..] {
             [part] if robots.is_empty() && objects.is_empty() && terrains.is_empty() && by_default => {
                 Self::Mujoco { file: part.model() }
