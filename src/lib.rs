@@ -21,6 +21,7 @@ pub use kinetoscope_exec as exec;
 pub use kinetoscope_mujoco as mujoco;
 #[cfg(feature = "record")]
 pub use kinetoscope_record as record;
+pub use kinetoscope_render as render;
 pub use kinetoscope_robot as robot;
 pub use kinetoscope_scene as scene;
 pub use kinetoscope_sensors as sensors;

@@ -11,11 +11,11 @@ use crate::row::Row;
 use crate::{Outcome, Settings};
 use kinetoscope::mujoco::release_freed;
 use kinetoscope::prelude::*;
+use kinetoscope::render::visibility::View;
 use kinetoscope::scene::shape::Plane;
 use kinetoscope::scene::{Instance, Light, LightKind, Material, PoseF32, RenderScene};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot};
 use kinetoscope::sensors::ray::{RayAssets, RayTargets};
-use kinetoscope::sensors::visibility::View;
 use std::time::{Duration, Instant};
 
 const SIZE: [usize; 2] = [640, 480];

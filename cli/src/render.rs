@@ -6,9 +6,9 @@ use crate::{Ending, Result, progress};
 use clap::ValueEnum;
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;
+use kinetoscope::render::visibility::View;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot, look_at_pose};
-use kinetoscope::sensors::visibility::View;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

@@ -2,9 +2,9 @@
 
 use super::{Result, picture};
 use kinetoscope::prelude::*;
+use kinetoscope::render::visibility::View;
 use kinetoscope::scene::{Marker, PoseF32};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
-use kinetoscope::sensors::visibility::View;
 use std::path::Path;
 
 /// Draws environments side by side, seen from `eye`, and writes them as PNG.

@@ -1,10 +1,10 @@
 //! Pictures of all environments side by side, as a viewer that stands still sees them.
 
 use crate::error::{RecordError, Result};
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::PoseF32;
 use kinetoscope_scene::framing::Framing;
 use kinetoscope_sensors::camera::{Channels, Frame, Intrinsics, ParallelRasterizer, RasterCfg, look_at_pose};
-use kinetoscope_sensors::visibility::View;
 use kinetoscope_sim::{SimulationManager, Still};
 
 /// How the stage is drawn.

@@ -3,7 +3,7 @@
 use crate::control::Wants;
 use crate::stage::{Canvas, Eye, Look, Overlays, Painter, Pool, Run, Shown, Snapshot};
 use crate::whole_file;
-use kinetoscope_sensors::visibility::{RenderError, View};
+use kinetoscope_render::visibility::{RenderError, View};
 use kinetoscope_sim::SimulationManager;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

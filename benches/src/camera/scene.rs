@@ -7,9 +7,9 @@ use crate::startup::robots;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{Data, Model, TARGET, Target};
 use kinetoscope::prelude::*;
+use kinetoscope::render::visibility::View;
 use kinetoscope::scene::{Instance, PoseF32, RenderScene, Shape};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot};
-use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::visible::Visible;
 use std::path::{Path, PathBuf};
 

@@ -4,9 +4,7 @@ use super::{Number, Source, What, sim_error};
 use crate::error::Result;
 use crate::packet::Values;
 use crate::stream::{Distortion, Element, Kind};
-use kinetoscope_sensors::camera::channel::{
-    Albedo, Color, Depth, Distance, Flow, Mask, Normal, Position, ShadingNormal,
-};
+use kinetoscope_render::frame::{Albedo, Color, Depth, Distance, Flow, Mask, Normal, Position, ShadingNormal};
 use kinetoscope_sensors::camera::{
     CameraConvention, CameraError, Channel, DistortionModel, PixelIntrinsics, Rectification,
 };

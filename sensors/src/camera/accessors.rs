@@ -1,8 +1,10 @@
 //! One method for each channel of a camera: `camera.depth()` is `camera.channel::<Depth>()`.
 
-use super::channel::{Albedo, Color, Depth, Distance, Flow, Mask, Normal, PictureView, Position, ShadingNormal};
 use super::sensor::Camera;
 use crate::error::SensorError;
+use kinetoscope_render::frame::{
+    Albedo, Color, Depth, Distance, Flow, Mask, Normal, PictureView, Position, ShadingNormal,
+};
 
 /// Declares the methods.
 macro_rules! accessors {

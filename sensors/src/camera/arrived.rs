@@ -4,14 +4,14 @@
 //! and are not shown: they are older. Who wants every picture that was taken, such as a recorder, reads them here.
 
 use super::captures::Captures;
-use super::channel::{Listed, PictureView, Pictures};
 use super::error::CameraError;
 use super::extrinsics::CameraConvention;
-use super::lens::LensRays;
 use super::mounts::Mount;
 use super::sensor::Camera;
-use super::ticket::Ticket;
 use crate::error::SensorError;
+use kinetoscope_render::frame::{Listed, PictureView, Pictures};
+use kinetoscope_render::lens::LensRays;
+use kinetoscope_render::ticket::Ticket;
 use kinetoscope_scene::RenderScene;
 use kinetoscope_scene::pose::to_row;
 use ndarray::{Array1, Array2, Array3};

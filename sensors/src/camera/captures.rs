@@ -1,7 +1,7 @@
 //! What there was to see when pictures were due.
 
 use super::opening::{Opening, parent_pose};
-use super::ticket::Ticket;
+use kinetoscope_render::ticket::Ticket;
 use kinetoscope_scene::{Light, Marker, OwnScene, Pose, PoseF32, RenderScene, SceneState};
 use ndarray::{Array1, Array2, Axis};
 

@@ -1,26 +1,27 @@
 //! What a camera is, before it exists.
 
-use super::aperture::Aperture;
-use super::channel::{Channels, Pictures};
 use super::error::CameraError;
 use super::extrinsics::Extrinsics;
 use super::faults::Faults;
 use super::imperfection::Imperfections;
-use super::intrinsics::{Intrinsics, PixelIntrinsics};
-use super::lens::{self, RaysOfRows};
 use super::memory::Memory;
 use super::opening::Opening;
-use super::rasterizer::RasterCfg;
-use super::renderer::Renderer;
 use super::sensor::{Camera, Lens};
-use super::shutter::Shutter;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
-use crate::resolve::path::film::Film;
-use crate::resolve::plan::{check_light, check_occlusion};
 use crate::schedule::Schedule;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
-use crate::visibility::RenderError;
+use kinetoscope_render::aperture::Aperture;
+use kinetoscope_render::frame::{Channels, Pictures};
+use kinetoscope_render::intrinsics::{Intrinsics, PixelIntrinsics};
+use kinetoscope_render::lens;
+use kinetoscope_render::lens::RaysOfRows;
+use kinetoscope_render::path::film::Film;
+use kinetoscope_render::rasterizer::RasterCfg;
+use kinetoscope_render::renderer::Renderer;
+use kinetoscope_render::shade::plan::{check_light, check_occlusion};
+use kinetoscope_render::shutter::Shutter;
+use kinetoscope_render::visibility::RenderError;
 use kinetoscope_scene::{Light, PoseF32};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! What cameras showed in the picture before: for optical flow.
 
-use super::rasterizer::Before;
-use crate::visibility::View;
+use kinetoscope_render::rasterizer::Before;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::PoseF32;
 use ndarray::{Array2, Axis};
 

@@ -1,7 +1,7 @@
 //! What can be wrong with a camera.
 
-use super::optics_error::OpticsError;
-use crate::visibility::RenderError;
+use kinetoscope_render::optics_error::OpticsError;
+use kinetoscope_render::visibility::RenderError;
 
 /// Why a camera cannot be built, placed or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -2,13 +2,13 @@
 
 use super::cfg::CameraCfg;
 use super::imperfection::{Imperfections, Picture};
-use super::parallel::Job;
 use super::picture_noise::PictureNoise;
-use super::ticket::Ticket;
 use crate::error::SensorError;
-use crate::resolve::tone::ToneCurve;
 use crate::sensor::SensorContext;
 use kinetoscope_exec::ThreadPool;
+use kinetoscope_render::parallel::Job;
+use kinetoscope_render::shade::tone::ToneCurve;
+use kinetoscope_render::ticket::Ticket;
 
 /// What happens to pictures after they were drawn. There is none of it for a perfect camera.
 #[derive(Clone, Debug)]

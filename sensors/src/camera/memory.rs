@@ -3,12 +3,12 @@
 use super::arrived::Landed;
 use super::captures::Captures;
 use super::cfg::CameraCfg;
-use super::channel::{Channels, Pictures};
-use super::lens::LensRays;
 use super::mounts::Mount;
-use super::ticket::{Stream, Ticket};
 use crate::delay::Queues;
 use crate::schedule::{Phases, Schedule};
+use kinetoscope_render::frame::{Channels, Pictures};
+use kinetoscope_render::lens::LensRays;
+use kinetoscope_render::ticket::{Stream, Ticket};
 use kinetoscope_scene::RenderScene;
 use ndarray::Array2;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};

@@ -3,8 +3,8 @@
 
 use super::error::CameraError;
 use super::extrinsics::{CameraConvention, Poses, look_at_pose};
-use super::intrinsics::{Intrinsics, PixelIntrinsics};
 use crate::error::SensorError;
+use kinetoscope_render::intrinsics::{Intrinsics, PixelIntrinsics};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 use ndarray::Array2;

@@ -2,8 +2,8 @@
 
 use super::cfg::CameraCfg;
 use super::error::CameraError;
-use super::shutter::Shutter;
 use crate::schedule::{Phases, Schedule};
+use kinetoscope_render::shutter::Shutter;
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::{Pose, PoseF32, RenderScene, SceneState};
 use ndarray::{Array2, ArrayView1, Axis};

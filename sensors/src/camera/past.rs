@@ -1,10 +1,10 @@
 //! Pictures of the past.
 
-use super::channel::{Channel, Layout, Listed};
 use super::error::CameraError;
 use super::memory::{Album, Past};
 use super::sensor::Camera;
 use crate::error::SensorError;
+use kinetoscope_render::frame::{Channel, Layout, Listed};
 use ndarray::{ArrayView, ArrayView2, Axis, Dimension};
 use std::sync::PoisonError;
 

@@ -1,11 +1,11 @@
 //! Noise of the numbers of pictures, channel by channel: [`NoiseCfg`] of other sensors, looked up instead of drawn.
 
 use super::cfg::CameraCfg;
-use super::channel::{Channel as _, Channels, Color, Depth, Distance, FrameMut};
-use super::ticket::{Stream, Ticket};
 use crate::error::SensorError;
 use crate::noise::{NoiseCfg, check};
 use crate::sampling::Channel;
+use kinetoscope_render::frame::{Channel as _, Channels, Color, Depth, Distance, FrameMut};
+use kinetoscope_render::ticket::{Stream, Ticket};
 use std::collections::BTreeMap;
 
 /// The noise of each channel that has some.

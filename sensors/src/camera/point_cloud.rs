@@ -1,9 +1,9 @@
 //! Depth pictures, turned back into points.
 
-use super::channel::{Depth, Distance};
-use super::intrinsics::PixelIntrinsics;
 use super::sensor::Camera;
 use crate::error::SensorError;
+use kinetoscope_render::frame::{Depth, Distance};
+use kinetoscope_render::intrinsics::PixelIntrinsics;
 use kinetoscope_scene::Pose;
 use ndarray::{Array2, Array3, ArrayView3, Axis};
 

@@ -1,35 +1,15 @@
-//! Rays: exact distances to what is in a scene, for ray casters and the cameras made of rays.
-//!
-//! Geometry is in double precision: a distance of 20 m is right to far less than a micrometre, up to the single precision
-//! sizes of shapes. [`RayTargets`] is what can be hit, prepared once; [`RayWorld`] is where it is in one environment.
-//!
-//! Rays are cast in packets of eight, a lane for each. A shape says what one ray touches; a shape that can do better for rays
-//! that run side by side does so by the same operations in the same order, so that a hit never depends on which other rays
-//! are cast with it, on the order of the rays or on the instruction set. Meshes have lists of what steep rays may meet
-//! (`shape/mesh/columns`); for others they walk their tree once for a packet (`bvh/beam`) and test triangles in all lanes;
-//! height fields look at the first cells in all lanes. Rays that run apart are cast one by one.
+//! Ray casters, and cameras made of rays. The geometry is in [`kinetoscope_render::geometry`].
 
-mod assets;
-pub(crate) mod bvh;
 pub mod camera;
 pub mod caster;
 mod error;
-pub(crate) mod packet;
 pub mod pattern;
-pub(crate) mod segment;
-pub(crate) mod shape;
-pub(crate) mod triangle;
-pub(crate) mod vector;
-mod world;
 
-#[cfg(test)]
-mod tests;
-
-pub(crate) use assets::Assets;
-pub use assets::RayAssets;
 pub use camera::{RayCasterCamera, RayCasterCameraCfg, RayPictures};
 pub use caster::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
 pub use error::RayError;
+pub use kinetoscope_render::geometry::assets::Assets;
+pub use kinetoscope_render::geometry::assets::RayAssets;
+pub use kinetoscope_render::geometry::ray::Ray;
+pub use kinetoscope_render::geometry::world::{RayHit, RayTargets, RayWorld};
 pub use pattern::RayPattern;
-pub use segment::Ray;
-pub use world::{RayHit, RayTargets, RayWorld};

@@ -66,10 +66,10 @@ impl SimulationManager {
     /// sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), shape: ObjectShape::cube(0.1), ..Default::default() })?;
     /// let draw = Randomization::new().with(Property::Mass, "cube", Draw::Scale([0.5, 2.0]));
     /// sim.randomize(&draw, None)?;
-    /// let (snapshot, mass) = (sim.snapshot(None)?, sim.properties(crate::EnvId(2))?.get(Property::Mass, "cube")?.to_vec());
+    /// let (snapshot, mass) = (sim.snapshot(None)?, sim.properties(kinetoscope_sim::EnvId(2))?.get(Property::Mass, "cube")?.to_vec());
     /// sim.randomize(&draw, None)?;
     /// sim.restore_with_properties(&snapshot, None)?;
-    /// assert_eq!(sim.properties(crate::EnvId(2))?.get(Property::Mass, "cube")?, mass);
+    /// assert_eq!(sim.properties(kinetoscope_sim::EnvId(2))?.get(Property::Mass, "cube")?, mass);
     /// # Ok::<(), kinetoscope_sim::Error>(())
     /// ```
     ///

@@ -1,10 +1,10 @@
 //! Sensors allocate nothing after they were built, whatever is configured.
 
 use crate::{Counting, allocations, assert_settles};
+use kinetoscope_render::frame::{Color, Depth};
 use kinetoscope_scene::shape::{Plane, Sphere};
 use kinetoscope_scene::state::{Contact, Contacts};
 use kinetoscope_scene::{Instance, Light, Material, PoseF32, PoseF64, RenderScene, SceneState, VisibleState};
-use kinetoscope_sensors::camera::channel::{Color, Depth};
 use kinetoscope_sensors::camera::{Channels, Extrinsics, Imperfections, Intrinsics, Placement};
 use kinetoscope_sensors::ray::HitTargets;
 use kinetoscope_sensors::ray::pattern::Lidar;

@@ -1,15 +1,15 @@
 //! After the first frame, drawing allocates nothing, and keeps little.
 
 use crate::{Counting, allocations, assert_settles};
+use kinetoscope_render::lens::Equidistant;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Capsule, Mesh, Plane, Sphere};
 use kinetoscope_scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
-use kinetoscope_sensors::camera::lens::Equidistant;
 use kinetoscope_sensors::camera::{
     Aperture, Before, Channels, Frame, LensRays, Opened, Optics, ParallelRasterizer, RasterCfg, Rasterizer, Renderer,
     Shot, Shutter, Take,
 };
-use kinetoscope_sensors::visibility::View;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 

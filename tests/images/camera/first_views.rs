@@ -2,8 +2,8 @@
 
 use super::view;
 use kinetoscope::prelude::*;
+use kinetoscope::render::visibility::View;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
-use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::visible::FreeCamera;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{sr5, text_robot, urdf_robot};

@@ -15,8 +15,8 @@ mod stereo;
 mod surfaces;
 
 use kinetoscope::prelude::*;
+use kinetoscope::render::visibility::View;
 use kinetoscope::scene::PoseF32;
-use kinetoscope::sensors::visibility::View;
 
 /// A view with this vertical field of view \[rad\] and near and far planes \[m\].
 fn view([width, height]: [usize; 2], radians: f64, pose: &Pose, clip: [f64; 2]) -> View {

@@ -2,9 +2,9 @@
 
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;
+use kinetoscope::render::visibility::View;
 use kinetoscope::scene::{Marker, PoseF32};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, RasterCfg, Rasterizer, look_at_pose};
-use kinetoscope::sensors::visibility::View;
 use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object};
 
 const SIZE: [usize; 2] = [400, 400];

@@ -8,9 +8,9 @@ use crate::rays::judge::{Dice, FAN, GROUPS, at_rest, data_of, data_with, height_
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::Data;
 use kinetoscope::prelude::*;
+use kinetoscope::render::visibility::View;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
-use kinetoscope::sensors::visibility::View;
 use kinetoscope::sim::Visible;
 use nalgebra::Vector3;
 

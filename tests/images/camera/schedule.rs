@@ -1,7 +1,7 @@
 //! The instants that cameras capture, and the images that they draw.
 
 use kinetoscope::prelude::*;
-use kinetoscope::sensors::camera::channel::Depth;
+use kinetoscope::render::frame::Depth;
 use kinetoscope::sensors::camera::imperfection::DepthNoise;
 use kinetoscope_testkit::worlds::{cfg, look_at, object};
 

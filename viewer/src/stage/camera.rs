@@ -1,10 +1,10 @@
 //! The camera sensors of a simulation, of every kind, and what they look at.
 
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::{Marker, PoseF32};
 use kinetoscope_sensors::camera::{Camera, CameraConvention, Lens, StereoCamera};
 use kinetoscope_sensors::ray::RayCasterCamera;
-use kinetoscope_sensors::visibility::View;
 use kinetoscope_sim::{EnvId, SensorId, SimulationManager};
 
 /// What a camera looks at in an environment.

@@ -1,8 +1,8 @@
 //! Where a viewer looks from.
 
 use super::snapshot::Snapshot;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::framing::{FILL, Framing, Placed, REACH};
-use kinetoscope_sensors::visibility::View;
 use nalgebra::Vector3;
 
 /// A viewer's camera: it turns about a point, moves with its picture, comes nearer, and flies. Up in the picture is up in the

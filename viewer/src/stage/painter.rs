@@ -7,9 +7,9 @@ use super::overlay::{Overlays, in_overview};
 use super::pick::Picked;
 use super::snapshot::{Shown, Snapshot};
 use super::trail::Trails;
+use kinetoscope_render::visibility::{RenderError, View};
 use kinetoscope_scene::Marker;
 use kinetoscope_sensors::camera::{FrameMut, ParallelRasterizer, RasterCfg, Shot};
-use kinetoscope_sensors::visibility::{RenderError, View};
 
 /// Radius of the ball where something was clicked on \[pixels\].
 const BALL: f32 = 4.0;

@@ -4,12 +4,12 @@ use super::assembly::MARKERS;
 use super::canvas::Canvas;
 use super::snapshot::Snapshot;
 use embedded_graphics::mono_font::ascii::FONT_6X10;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 use kinetoscope_sensors::camera::colormap::{depth_color, mask_color, normal_color};
 use kinetoscope_sensors::camera::{
     Channels, Frame, FrameMut, Lens, LensRays, Optics, ParallelRasterizer, PixelIntrinsics, RasterCfg, Renderer, Shot,
 };
-use kinetoscope_sensors::visibility::View;
 
 /// Draws what camera sensors see from snapshots, without asking the sensors for anything: with the pose and the lens of the
 /// camera at its last measurement, and everything else where it is now. Behind a lens that bends them, rays are followed; what

@@ -1,7 +1,7 @@
 //! Where in the picture a thing is, as if nothing else were there.
 
 use super::support::reach;
-use crate::visibility::View;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::shape::Plane;
 use kinetoscope_scene::{Instance, PoseF32, Shape};
 

@@ -8,12 +8,12 @@ mod yaml;
 
 use super::cfg::CameraCfg;
 use super::error::CameraError;
-use super::intrinsics::{Intrinsics, PixelIntrinsics};
-use super::lens::{Lens, LensModel, OpenCv, OpenCvFisheye};
-use super::renderer::Renderer;
 use super::sensor::Camera;
 use crate::error::SensorError;
 pub use error::CalibrationError;
+use kinetoscope_render::intrinsics::{Intrinsics, PixelIntrinsics};
+use kinetoscope_render::lens::{Lens, LensModel, OpenCv, OpenCvFisheye};
+use kinetoscope_render::renderer::Renderer;
 use kinetoscope_scene::pattern::closest;
 use nalgebra::{Matrix3, Matrix3x4};
 use std::fmt;
@@ -223,7 +223,7 @@ impl CameraInfo {
     /// The calibration of a simulated camera: R is the identity and P is K, as of a camera alone. Where a lens ends (`max_angle`) is
     /// not said: K and D are the same, some pixels are dark.
     ///
-    /// The lens [`Equidistant`](super::lens::Equidistant) is `equidistant` with four zeros. `cv::fisheye` takes that for what it is; ROS's `image_geometry` takes
+    /// The lens [`Equidistant`](kinetoscope_render::lens::Equidistant) is `equidistant` with four zeros. `cv::fisheye` takes that for what it is; ROS's `image_geometry` takes
     /// zeros of any model for no distortion at all, and does not rectify.
     ///
     /// # Errors

@@ -11,13 +11,13 @@
 
 mod tone;
 
-use super::channel::{Channel, Channels, Color, Depth, FrameMut};
 use super::error::CameraError;
-use super::lens::LensRays;
-use super::ticket::Ticket;
 use crate::error::SensorError;
-use crate::resolve::tone::ToneCurve;
-use crate::visibility::View;
+use kinetoscope_render::frame::{Channel, Channels, Color, Depth, FrameMut};
+use kinetoscope_render::lens::LensRays;
+use kinetoscope_render::shade::tone::ToneCurve;
+use kinetoscope_render::ticket::Ticket;
+use kinetoscope_render::visibility::View;
 use serde::{Deserialize, Serialize};
 use tone::Tone;
 

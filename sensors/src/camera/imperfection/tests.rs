@@ -1,8 +1,8 @@
 //! Every imperfection against its law.
 
 use super::*;
-use crate::camera::lens::{Equidistant, FTheta, OpenCv};
 use crate::camera::{Frame, Lens, Optics, PixelIntrinsics};
+use kinetoscope_render::lens::{Equidistant, FTheta, OpenCv};
 use kinetoscope_scene::PoseF32;
 use std::f64::consts::FRAC_PI_2;
 
@@ -489,7 +489,7 @@ fn focal_length_unit() {
 /// a right angle, however it spreads it: the sum over all pixels times the area of one.
 #[test]
 fn light_of_sky() {
-    use crate::camera::lens::{Equisolid, Orthographic, Stereographic};
+    use kinetoscope_render::lens::{Equisolid, Orthographic, Stereographic};
     use std::f64::consts::PI;
     let (size, f) = ([300, 300], 50.0);
     let pixels = PixelIntrinsics { fx: f, fy: f, cx: 150.0, cy: 150.0 };

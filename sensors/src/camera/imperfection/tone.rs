@@ -1,7 +1,6 @@
 //! Bytes of the screen as linear light, and back: the inverse of the renderers' own curve.
 
-use crate::lanes::{Scalar, splat};
-use crate::resolve::tone::{ToneCurve, encode};
+use kinetoscope_render::shade::tone::ToneCurve;
 use std::sync::LazyLock;
 
 /// The curves, read backwards once.
@@ -48,12 +47,12 @@ impl Tone {
 fn reach(curve: ToneCurve, value: f32) -> f32 {
     // Positive numbers are in the order of their bits; the curve never falls.
     let (mut below, mut above) = (0, 1000f32.to_bits());
-    if encode(Scalar, curve, splat(Scalar, 0.0)).array()[0] >= value {
+    if curve.encode(0.0) >= value {
         return 0.0;
     }
     while above - below > 1 {
         let middle = below.midpoint(above);
-        let byte = encode(Scalar, curve, splat(Scalar, f32::from_bits(middle))).array()[0];
+        let byte = curve.encode(f32::from_bits(middle));
         *(if byte >= value { &mut above } else { &mut below }) = middle;
     }
     f32::from_bits(above)

@@ -2,17 +2,17 @@
 
 use super::sensor::StereoCamera;
 use crate::camera::cfg::CameraCfg;
-use crate::camera::channel::Channels;
 use crate::camera::error::CameraError;
 use crate::camera::extrinsics::{CameraConvention, Extrinsics, Placement, Poses};
 use crate::camera::imperfection::Imperfections;
-use crate::camera::intrinsics::Intrinsics;
-use crate::camera::lens::Lens;
 use crate::camera::picture_noise::of_channels;
-use crate::camera::renderer::Renderer;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
 use crate::sensor::{Requires, SensorCfg, SensorContext};
+use kinetoscope_render::frame::Channels;
+use kinetoscope_render::intrinsics::Intrinsics;
+use kinetoscope_render::lens::Lens;
+use kinetoscope_render::renderer::Renderer;
 use kinetoscope_scene::Pose;
 use nalgebra::{Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};

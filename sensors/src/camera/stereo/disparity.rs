@@ -1,9 +1,9 @@
 //! How far apart the eyes of a pair see the same point.
 
 use super::sensor::StereoCamera;
-use crate::camera::channel::Depth;
 use crate::camera::error::CameraError;
 use crate::error::SensorError;
+use kinetoscope_render::frame::Depth;
 use ndarray::{Array1, Array3, ArrayView3, Axis};
 
 /// Lengths and angles smaller than this part of the baseline, or this many rad, are rounding.

@@ -4,8 +4,8 @@ use super::disparity::ROUNDING;
 use super::sensor::StereoCamera;
 use crate::camera::error::CameraError;
 use crate::camera::extrinsics::Poses;
-use crate::camera::intrinsics::{Intrinsics, PixelIntrinsics};
 use crate::error::SensorError;
+use kinetoscope_render::intrinsics::{Intrinsics, PixelIntrinsics};
 use kinetoscope_scene::Pose;
 use nalgebra::{Matrix3, Matrix3x4, Unit, UnitQuaternion, Vector3};
 

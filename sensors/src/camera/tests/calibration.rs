@@ -1,14 +1,14 @@
 //! Calibration files: real ones of each model, all the ways in which they are written, and errors of broken ones.
 
-use super::super::lens::{
-    Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
-};
 use super::super::{
     CalibrationError, CameraCfg, CameraInfo, DistortionModel, Intrinsics, Lens, LensRays, Optics, PixelIntrinsics,
     Renderer,
 };
 use super::harness::{opencv, point};
 use super::stage::{built, cfg, context, pose_of};
+use kinetoscope_render::lens::{
+    Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
+};
 use kinetoscope_testkit::urdf::Files;
 
 /// As `cameracalibrator` writes it, with what some drivers add.

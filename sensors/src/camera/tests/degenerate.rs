@@ -3,7 +3,7 @@
 use super::super::{FrameMut, RasterCfg, Rasterizer, Renderer};
 use super::harness::{Still, at, look, things};
 use super::scenes::every_shape;
-use crate::visibility::{RenderError, View};
+use kinetoscope_render::visibility::{RenderError, View};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Box, Mesh, Plane, Sphere};
 use kinetoscope_scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, RenderSceneError, Shape};

@@ -4,7 +4,7 @@ use super::super::{CameraCfg, Channels, RasterCfg};
 use super::harness::{Image, Still, look};
 use super::robots::{sr5, sr5_view};
 use super::scenes::{EXACT, checker_plane};
-use crate::visibility::View;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Cylinder, Mesh, Sphere};
 use kinetoscope_scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};

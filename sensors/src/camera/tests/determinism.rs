@@ -6,8 +6,8 @@ use super::harness::{Image, Still, assert_same_bits, look};
 use super::lenses;
 use super::scenes::{EXACT, Random, figure, random};
 use super::shutter::{bar, bar_at};
-use crate::lanes::levels;
-use crate::visibility::View;
+use kinetoscope_render::simd::levels;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::{Haze, Light, LightKind, PoseF32, RenderScene};
 
 const RENDERERS: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS];

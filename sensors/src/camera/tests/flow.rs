@@ -1,8 +1,6 @@
 //! Optical flow, against projections at both instants.
 
-use super::super::channel::Flow;
 use super::super::imperfection::{DepthNoise, Vignetting};
-use super::super::lens::Equidistant;
 use super::super::{
     Camera, CameraCfg, CameraConvention, Channels, Extrinsics, Intrinsics, LensRays, Optics, PixelIntrinsics,
     Placement, RasterCfg, Renderer,
@@ -11,7 +9,9 @@ use super::harness::{Image, Still, look, pinhole, point, wide};
 use super::scenes::{Random, random};
 use super::stage::{BALL, GROUND, SIZE, ball, built, cfg, context, state, tip};
 use crate::sensor::Sensor;
-use crate::visibility::{RenderError, View};
+use kinetoscope_render::frame::Flow;
+use kinetoscope_render::lens::Equidistant;
+use kinetoscope_render::visibility::{RenderError, View};
 use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
 use kinetoscope_scene::{Pose, PoseF32};
 use nalgebra::{Matrix3, Point3, Vector3};

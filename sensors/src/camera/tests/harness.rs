@@ -4,8 +4,8 @@ use super::super::{
     Aperture, Before, Camera, Channels, Frame, LensRays, Opened, ParallelRasterizer, RasterCfg, Rasterizer, Renderer,
     Shot, Shutter, Take,
 };
-use crate::lanes::{Level, levels};
-use crate::visibility::{RenderError, View};
+use kinetoscope_render::simd::{Level, levels};
+use kinetoscope_render::visibility::{RenderError, View};
 use kinetoscope_scene::{Hemisphere, Instance, Material, Pose, PoseF32, RenderScene, Shape};
 use kinetoscope_testkit::image_check::ImageCheck;
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};

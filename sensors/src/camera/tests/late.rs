@@ -1,6 +1,5 @@
 //! Images that come late, get lost or are kept in the history, against those of a perfect camera.
 
-use super::super::channel::{Color, Depth, Distance, Listed, Mask, Normal, Position, ShadingNormal};
 use super::super::imperfection::{Exposure, Holes, Imperfections, ShotNoise};
 use super::super::{Camera, CameraCfg, CameraConvention, CameraError, Channels, Extrinsics, Intrinsics};
 use super::stage::{DT, bits, built, cfg, context, state};
@@ -8,6 +7,7 @@ use crate::SensorContext;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorCfg};
+use kinetoscope_render::frame::{Color, Depth, Distance, Listed, Mask, Normal, Position, ShadingNormal};
 use ndarray::{Axis, array};
 
 /// A past image as bits, in the order of [`bits`].

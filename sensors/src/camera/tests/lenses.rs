@@ -1,10 +1,10 @@
 //! Lenses against closed forms, OpenCV's numbers, and themselves backward.
 
-use super::super::lens::{
-    Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
-};
 use super::super::{Intrinsics, Lens, LensRays, Optics, OpticsError, PixelIntrinsics};
 use super::harness::opencv;
+use kinetoscope_render::lens::{
+    Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
+};
 use kinetoscope_scene::pattern::UnknownName;
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 const GRAY: f32 = 0.7;
 
 /// A gray floor, and a gray box of these half sizes, by the hybrid.
-fn floor_and_box(half: [f32; 3], place: PoseF32, ambient: f32, view: crate::visibility::View) -> Still {
+fn floor_and_box(half: [f32; 3], place: PoseF32, ambient: f32, view: kinetoscope_render::visibility::View) -> Still {
     let gray = matt([GRAY; 3]);
     let (mut scene, poses) =
         things([(Shape::from(Plane::INFINITE), gray.clone(), PoseF32::IDENTITY), (Box { half }.into(), gray, place)]);
@@ -190,7 +190,7 @@ fn shadow_maps() {
 }
 
 /// A cube of 5 cm and an arm of boxes on a plane of half size `ground`, in the light of a simulation, from a camera above.
-fn tabletop(ground: f32, view: crate::visibility::View) -> Still {
+fn tabletop(ground: f32, view: kinetoscope_render::visibility::View) -> Still {
     let gray = || matt([GRAY; 3]);
     let cuboid = |half: [f32; 3], pose| (Shape::from(Box { half }), gray(), pose);
     // The cube sinks in by what a contact does.
@@ -279,7 +279,8 @@ fn middle(material: Material, headlight: Headlight, sky: [f32; 3], tone: ToneCur
     let (scene, poses) = things([(Plane::INFINITE, material, PoseF32::IDENTITY)]);
     let mut scene = unlit(scene);
     (scene.headlight, scene.sky) = (headlight, Sky::uniform(sky));
-    let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+    let view = kinetoscope_render::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0])
+        .unwrap();
     let still = Still { stops: by.1, ..Still::new((scene, poses), view) };
     still.with(|still| still.cfg.tone = tone).by(by.0).color()[16 * 33 + 16]
 }
@@ -407,7 +408,9 @@ fn display_sum() {
         scene.light_sum = LightSum::Display;
         let lamp = |direction| Light { direction, diffuse: [light; 3], cast_shadow: false, ..Light::default() };
         scene.lights = directions.map(lamp).to_vec();
-        let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+        let view =
+            kinetoscope_render::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0])
+                .unwrap();
         let still = Still::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
         let renderers = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced];
         // The sum has its end already: the soft curve bends nothing.
@@ -435,7 +438,8 @@ fn display_headlight() {
     let mut scene = unlit(scene);
     scene.light_sum = LightSum::Display;
     scene.headlight = Headlight { ambient: [0.1; 3], diffuse: [0.5; 3], specular: [0.0; 3], active: true };
-    let view = crate::visibility::View::look_at([33, 33], 1.2, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+    let view = kinetoscope_render::visibility::View::look_at([33, 33], 1.2, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0])
+        .unwrap();
     let still = Still::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
     let expected = 255.0 * 0.8 * (0.1 + 0.5);
     let corners = |image: &Image| [0, 32, 16 * 33 + 16].map(|k| f32::from(image.color()[k][0]));

@@ -3,7 +3,7 @@
 use super::super::{RasterCfg, Renderer, ToneCurve};
 use super::harness::{Image, Still, linear, look, matt, srgb, things, unlit};
 use super::scenes::{EXACT, Random, random};
-use crate::visibility::View;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::shape::{Box, Plane, Sphere};
 use kinetoscope_scene::{Instance, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Shape, Sky};
 

@@ -1,12 +1,12 @@
 //! Long renderings report their progress and can be cancelled.
 
-use super::super::channel::Color;
 use super::super::{Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, RenderProgress, Renderer, Shot};
 use super::scenes::figure;
 use super::stage::{built, cfg, context, state};
 use crate::camera::{CameraCfg, CameraError};
 use crate::sensor::{Sensor, SensorCfg};
-use crate::visibility::{RenderError, View};
+use kinetoscope_render::frame::Color;
+use kinetoscope_render::visibility::{RenderError, View};
 use kinetoscope_scene::{Marker, PoseF32};
 use std::time::{Duration, Instant};
 
@@ -111,7 +111,8 @@ fn cancel() {
     clone.render(&mut [(shot, frame.as_mut())]).unwrap();
     assert_eq!((clone.progress().samples(), progress.samples()), (2 * 64 * 64, 64 * 64));
     assert!(rasterizer.render(&mut [(shot, frame.as_mut())]).is_err());
-    let single = Rasterizer { renderer: paths(4), ..Rasterizer::default() };
+    let mut single = Rasterizer::default();
+    single.renderer = paths(4);
     let clone = single.clone();
     single.progress.cancel();
     assert!(!clone.progress.is_cancelled() && clone.renderer == single.renderer);

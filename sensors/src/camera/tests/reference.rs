@@ -4,7 +4,7 @@
 use super::super::{Channels, RasterCfg};
 use super::harness::{Still, look, things};
 use super::scenes::{Random, every_shape, random};
-use crate::visibility::View;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::Mesh;
 use kinetoscope_scene::{Material, PoseF32, RenderMesh, RenderScene, Shape};

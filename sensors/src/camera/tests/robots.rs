@@ -2,7 +2,7 @@
 
 use super::harness::{Still, look};
 use super::scenes::checker_plane;
-use crate::visibility::View;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::mesh::{TextureSource, load};
 use kinetoscope_scene::shape::Mesh;
 use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderMesh, RenderScene, Texture, TextureKind};

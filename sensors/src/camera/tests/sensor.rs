@@ -1,12 +1,12 @@
 //! The camera as a sensor: when it captures and draws, measured values against closed forms, and refused mistakes.
 
-use super::super::channel::Depth;
 use super::super::*;
 use super::stage::{BALL, DT, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
 use crate::camera::OpticsError;
 use crate::error::SensorError;
 use crate::sensor::{Requires, Sensor, SensorCfg};
-use crate::visibility::RenderError;
+use kinetoscope_render::frame::Depth;
+use kinetoscope_render::visibility::RenderError;
 use kinetoscope_scene::pose::{from_row, from_wxyz, from_xyz_rpy, to_row};
 use kinetoscope_scene::{Pose, PoseF32, SceneState};
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, UnitQuaternion, Vector3};

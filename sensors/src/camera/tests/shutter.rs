@@ -1,14 +1,14 @@
 //! Rolling shutters and motion blur, against closed forms.
 
-use super::super::channel::Mask;
-use super::super::lens::Equidistant;
 use super::super::{Aperture, Camera, CameraCfg, CameraError, Channels, PixelIntrinsics, RasterCfg, Renderer, Shutter};
 use super::harness::{Image, Still, linear, matt, things, unlit};
 use super::lenses::rays_of;
 use super::stage::{DT, SIZE, ball, bits, built, cfg, context, state};
 use crate::error::SensorError;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
-use crate::visibility::{RenderError, View};
+use kinetoscope_render::frame::Mask;
+use kinetoscope_render::lens::Equidistant;
+use kinetoscope_render::visibility::{RenderError, View};
 use kinetoscope_scene::shape::Box;
 use kinetoscope_scene::{Material, PoseF32, RenderScene, Sky};
 use ndarray::Axis;

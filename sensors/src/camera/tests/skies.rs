@@ -3,7 +3,7 @@
 use super::super::{RasterCfg, Renderer, ToneCurve};
 use super::harness::{Still, look, matt, things, unlit};
 use super::scenes::EXACT;
-use crate::visibility::View;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::shape::Plane;
 use kinetoscope_scene::{HorizonHaze, LightSum, Material, PoseF32, RenderScene, Texture, TextureKind};
 use std::sync::Arc;

@@ -1,6 +1,5 @@
 //! Pairs of eyes, against cameras that stand alone, the geometry of pairs, and OpenCV's rectification.
 
-use super::super::lens::{Equisolid, OpenCv, OpenCvFisheye};
 use super::super::{
     CalibrationError, Camera, CameraCfg, CameraConvention, CameraError, CameraInfo, Channels, DepthMiss,
     DistortionModel, Extrinsics, Imperfections, Intrinsics, Lens, Optics, PixelIntrinsics, Placement, Rectification,
@@ -13,6 +12,7 @@ use crate::camera::imperfection::{DepthNoise, Holes, ReadNoise};
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use kinetoscope_render::lens::{Equisolid, OpenCv, OpenCvFisheye};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
 use nalgebra::{Matrix3, Matrix3x4, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};

@@ -2,7 +2,7 @@
 
 use super::super::{Channels, RasterCfg, Renderer};
 use super::harness::{Still, at, linear, look, matt, srgb, things, unlit};
-use crate::visibility::View;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::shape::{Box, Cylinder, Mesh, Plane, Sphere};
 use kinetoscope_scene::{Hemisphere, Light, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture, TextureKind};
 use std::sync::Arc;

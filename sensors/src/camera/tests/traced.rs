@@ -3,7 +3,7 @@
 use super::super::{Channels, RasterCfg, Renderer, ToneCurve};
 use super::harness::{Image, Still, at, far_apart, look, matt, srgb, things, unlit};
 use super::scenes::{EXACT, Random, random};
-use crate::visibility::View;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::shape::{Box, Cylinder, Ellipsoid, Plane, Sphere};
 use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderScene, Shape, Sky};
 use nalgebra::Vector3;

@@ -4,8 +4,8 @@
 
 pub use grid::GridOrder;
 
-use super::vector::unit;
 use super::{Ray, RayError};
+use kinetoscope_render::geometry::vector::unit;
 use serde::{Deserialize, Serialize};
 
 /// A start, and a direction of any length.

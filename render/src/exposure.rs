@@ -1,0 +1,157 @@
+//! Pictures by path tracing: threads share the rows of one picture at a time.
+
+use super::lens::LensRays;
+use super::rasterizer::{Rasterizer, Shot};
+use super::renderer::Renderer;
+use super::shutter::{Clock, Take};
+use crate::frame::FrameMut;
+use crate::path::eye::{Eye, Pupil};
+use crate::path::film::{Film, develop};
+use crate::path::smooth;
+use crate::path::{Moving, Paths, Ways};
+use crate::raster::tile::BLOCK;
+use crate::shade::plan::Plan;
+use crate::trace::motion::Motion;
+use crate::visibility::RenderError;
+use kinetoscope_exec::ThreadPool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// Rows of pixels that a thread takes at once: a row of blocks.
+const ROWS: usize = BLOCK;
+
+/// Draws a shot with the threads of some rasterizers. The bits do not depend on their number.
+pub(super) fn expose(
+    pool: &ThreadPool,
+    rasterizers: &mut [Rasterizer],
+    (shot, take): (&Shot<'_>, &Take<'_>),
+    frame: &mut FrameMut<'_>,
+) -> Result<(), RenderError> {
+    let Some(first) = rasterizers.first_mut() else { return Ok(()) };
+    let (mut plan, mut film) = (std::mem::take(&mut first.plan), std::mem::take(&mut first.film));
+    let ready = plan.prepare(first.style(), shot, frame).and_then(|()| first.shutter.clock(shot, take));
+    let result = ready.and_then(|clock| {
+        let opened = take.opened.filter(|_| clock.is_some());
+        if let Some(opened) = opened.filter(|_| frame.color.is_some()) {
+            plan.tracer.place(shot.scene, shot.poses, Some(opened.poses));
+        }
+        draw_colors(pool, rasterizers, (&plan, clock.as_ref()), &mut film, (shot, take), frame)?;
+        draw_others(pool, rasterizers, (&plan, clock.as_ref()), (shot, take), frame)?;
+        show(pool, rasterizers, &plan, &film, frame);
+        Ok(())
+    });
+    if let Some(first) = rasterizers.first_mut() {
+        (first.plan, first.film) = (plan, film);
+    }
+    result
+}
+
+/// Follows the paths of a prepared shot; writes nothing into the frame.
+fn draw_colors(
+    pool: &ThreadPool,
+    rasterizers: &mut [Rasterizer],
+    (plan, clock): (&Plan, Option<&Clock>),
+    film: &mut Film,
+    (shot, take): (&Shot<'_>, &Take<'_>),
+    frame: &FrameMut<'_>,
+) -> Result<(), RenderError> {
+    let (Some(projection), Some(first)) = (&plan.projection, rasterizers.first()) else { return Ok(()) };
+    let Renderer::RayTraced { samples, max_bounces, denoise, seed } = plan.renderer else { return Ok(()) };
+    if frame.color.is_none() {
+        return Ok(());
+    }
+    let (cfg, progress) = (first.cfg, first.progress.clone());
+    let (width, height) = (projection.width, projection.height);
+    film.resize([width, height], denoise);
+    let (tracer, lens) = (&plan.tracer, shot.lens);
+    let forward = lens.is_none_or(LensRays::is_forward);
+    let lights = shot.lights.unwrap_or(&shot.scene.lights);
+    film.lamps.prepare((shot.scene, tracer), lights, cfg.shadows, (projection, forward));
+    let moving = clock.zip(take.opened).map(|(clock, opened)| Moving {
+        clock: *clock,
+        camera: Motion::between(&opened.world_from_camera, &shot.view.world_from_camera),
+    });
+    let eye = Eye { projection, lens, pupil: first.aperture.as_ref().and_then(Pupil::of) };
+    let (lamps, rows) = film.rows(ROWS);
+    // Takes of number 0 are as they were without.
+    let seed = seed ^ take.noise;
+    let (scene, moving) = (shot.scene, moving.as_ref());
+    let paths = Paths { scene, tracer, eye, moving, samples, max_bounces, seed, lamps, ways: Ways::Both };
+    // Not what the progress says afterwards: it may have been resumed meanwhile, and rows be missing.
+    let broken_off = AtomicBool::new(false);
+    pool.for_each(rasterizers, rows, |rasterizer, mut rows| {
+        let level = rasterizer.level;
+        if !rows.expose(level, &paths, denoise, rasterizer.brush.stack(), &progress) {
+            broken_off.store(true, Ordering::Relaxed);
+        }
+    });
+    if broken_off.into_inner() {
+        return Err(RenderError::Cancelled { samples: progress.samples(), total: progress.total() });
+    }
+    let size = width * ROWS;
+    if denoise && samples == 1 {
+        let Film { pixels, next, guides, .. } = &mut *film;
+        let (pixels, guides) = (&*pixels, &*guides);
+        pool.for_each(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
+            smooth::guess([width, k * ROWS], pixels, guides, to);
+        });
+        std::mem::swap(&mut film.pixels, &mut film.next);
+    }
+    for pass in (0..smooth::PASSES).filter(|_| denoise) {
+        let Film { pixels, next, guides, .. } = &mut *film;
+        let (pixels, guides) = (&*pixels, &*guides);
+        pool.for_each(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
+            smooth::pass([width, k * ROWS], (pass, plan.exposure), pixels, guides, to);
+        });
+        std::mem::swap(&mut film.pixels, &mut film.next);
+    }
+    Ok(())
+}
+
+/// Draws all channels but the colour: what the pixels' centres see.
+fn draw_others(
+    pool: &ThreadPool,
+    rasterizers: &mut [Rasterizer],
+    (plan, clock): (&Plan, Option<&Clock>),
+    (shot, take): (&Shot<'_>, &Take<'_>),
+    frame: &mut FrameMut<'_>,
+) -> Result<(), RenderError> {
+    let Some(projection) = &plan.projection else { return Ok(()) };
+    let (width, height) = (projection.width, projection.height);
+    let color = frame.color.take();
+    let mut failure = Ok(());
+    if frame.channels() != Default::default() {
+        let mut rest = frame.reborrow();
+        if let Some((clock, opened)) = clock.zip(take.opened) {
+            let first = Mutex::new(&mut failure);
+            let rows = (0..height).map(move |y| (y, rest.split_off_first(width)));
+            pool.for_each(rasterizers, rows, |rasterizer, (y, mut row)| {
+                if let Err(error) = rasterizer.draw_row(shot, (&opened, clock), y, &mut row) {
+                    **first.lock().unwrap_or_else(PoisonError::into_inner) = Err(error);
+                }
+            });
+        } else {
+            let bands = (0..height).step_by(ROWS).map(move |row| {
+                let rows = ROWS.min(height - row);
+                (row / BLOCK, rest.split_off_first(width * rows))
+            });
+            pool.for_each(rasterizers, bands, |rasterizer, (block, mut frame)| {
+                rasterizer.brush.paint(rasterizer.level, plan, shot, &mut frame, block..block + 1);
+            });
+        }
+    }
+    frame.color = color;
+    failure
+}
+
+/// Makes bytes of what the paths found.
+fn show(pool: &ThreadPool, rasterizers: &mut [Rasterizer], plan: &Plan, film: &Film, frame: &mut FrameMut<'_>) {
+    let Renderer::RayTraced { denoise, .. } = plan.renderer else { return };
+    let Some(color) = frame.color.as_deref_mut() else { return };
+    let size = film.width * ROWS;
+    let parts = film.pixels.chunks(size).zip(color.chunks_mut(4 * size)).enumerate();
+    pool.for_each(rasterizers, parts, |rasterizer, (k, (pixels, out))| {
+        let guides = if denoise { &film.guides[k * size..k * size + pixels.len()] } else { &[] };
+        develop(rasterizer.level, (plan.exposure, plan.tone), pixels, guides, out);
+    });
+}

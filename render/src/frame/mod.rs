@@ -1,0 +1,402 @@
+//! What a camera measures: one channel per file, all of them in one list.
+
+mod file_format;
+
+use crate::visibility::RenderError;
+use kinetoscope_scene::pattern::{UnknownName, closest};
+use ndarray::{Array, ArrayView, Dimension, Ix3, Ix4};
+use std::ops::Range;
+
+/// Lanes of a [`PixelGroup`].
+const LANES: usize = 16;
+
+/// Everything that is known of 8 x 2 pixels; what channels are made of.
+#[derive(Clone, Debug)]
+pub struct PixelGroup {
+    /// Linear or final, as the stage says: final bytes.
+    pub color: [[u8; 4]; LANES],
+    /// Colour of the surface itself, final bytes; 0 on a miss.
+    pub albedo: [[u8; 4]; LANES],
+    /// Depth along the optical axis \[m\]; +inf on a miss.
+    pub depth: [f32; LANES],
+    /// Distance from the camera \[m\]; +inf on a miss.
+    pub distance: [f32; LANES],
+    /// Mask id; 0 on a miss.
+    pub mask: [i32; LANES],
+    /// Normal of the surface itself, turned to the camera, world frame; 0 on a miss.
+    pub normal: [[f32; LANES]; 3],
+    /// Smooth normal, world frame; 0 on a miss.
+    pub shading_normal: [[f32; LANES]; 3],
+    /// Where the surface is, frame of the environment \[m\]; 0 on a miss.
+    pub position: [[f32; LANES]; 3],
+    /// How far it has moved since the picture before \[pixels\]; +inf on a miss.
+    pub flow: [[f32; LANES]; 2],
+}
+
+impl Default for PixelGroup {
+    fn default() -> Self {
+        let v = [[0.0; LANES]; 3];
+        Self {
+            color: [[0; 4]; LANES],
+            albedo: [[0; 4]; LANES],
+            depth: [0.0; LANES],
+            distance: [0.0; LANES],
+            mask: [0; LANES],
+            normal: v,
+            shading_normal: v,
+            position: v,
+            flow: [[0.0; LANES]; 2],
+        }
+    }
+}
+
+/// When a channel is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// As soon as it is known what each pixel centre sees.
+    Geometry,
+    /// As [`Geometry`](Self::Geometry), and computed only for cameras that measure such a channel: few do.
+    Detail,
+    /// As [`Detail`](Self::Detail), for the colour of surfaces: textures are read for it.
+    Albedo,
+    /// As [`Detail`](Self::Detail), for what needs the picture before.
+    Flow,
+    /// After light, transparency and multisampling.
+    Color,
+}
+
+/// One thing a camera measures at every pixel.
+pub trait Channel {
+    /// The type of its numbers.
+    type Number: Copy + Default + PartialEq + std::fmt::Debug + Send + Sync + 'static;
+    /// Axes of its pictures: views, rows, columns, and the numbers of a pixel where there are several.
+    type Layout: Layout;
+    /// Its name.
+    const NAME: &'static str;
+    /// What others call it.
+    const ALIASES: &'static [&'static str];
+    /// Numbers per pixel.
+    const COMPONENTS: usize;
+    /// When it is known.
+    const STAGE: Stage;
+
+    /// The numbers of one pixel.
+    fn write(group: &PixelGroup, lane: usize, out: &mut [Self::Number]);
+
+    /// The numbers of pixels beside each other, at most 8 of them. Channels that have them in this order already copy them.
+    #[inline(always)]
+    fn write_row(group: &PixelGroup, first: usize, out: &mut [Self::Number]) {
+        for (column, out) in out.chunks_exact_mut(Self::COMPONENTS).enumerate() {
+            Self::write(group, first + column, out);
+        }
+    }
+
+    /// Puts `value` where nothing was hit: see `DepthMiss` of cameras. Only for channels that measure how far
+    /// something is; the others have a value of their own for a miss.
+    fn replace_misses(_numbers: &mut [Self::Number], _value: f32) {}
+}
+
+/// The axes of a batch of pictures.
+pub trait Layout: Dimension {
+    /// The shape of `views` pictures with `height` rows of `width` pixels.
+    fn of(views: usize, height: usize, width: usize, components: usize) -> Self;
+}
+
+/// One number per pixel: (views, height, width).
+impl Layout for Ix3 {
+    fn of(views: usize, height: usize, width: usize, _components: usize) -> Self {
+        Ix3(views, height, width)
+    }
+}
+
+/// Several numbers per pixel: (views, height, width, components).
+impl Layout for Ix4 {
+    fn of(views: usize, height: usize, width: usize, components: usize) -> Self {
+        Ix4(views, height, width, components)
+    }
+}
+
+/// A channel of the list: [`Pictures`] have a place for it.
+pub trait Listed: Channel {
+    /// Whether it is wanted.
+    fn is_in(channels: Channels) -> bool;
+
+    /// Its pictures, if it is there.
+    fn of(pictures: &Pictures) -> Option<PictureView<'_, Self>>;
+}
+
+/// Pictures of one channel, shape (views, height, width) or (views, height, width, components).
+pub type PictureView<'a, C> = ArrayView<'a, <C as Channel>::Number, <C as Channel>::Layout>;
+
+/// Declares the channels: a module with a type of its own each.
+macro_rules! channels {
+    ($($(#[$doc:meta])* $field:ident :: $Name:ident,)*) => {
+        $(mod $field; pub use $field::$Name;)*
+
+        /// Which channels are wanted.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        pub struct Channels {
+            $($(#[$doc])* pub $field: bool,)*
+        }
+
+        impl Channels {
+            /// All of them.
+            pub const ALL: Self = Self { $($field: true,)* };
+            /// None of them.
+            pub const NONE: Self = Self { $($field: false,)* };
+            /// Their names.
+            pub const NAMES: &'static [&'static str] = &[$($Name::NAME),*];
+
+            /// The channels of these names, which may be aliases (`rgb`, `distance_to_image_plane`, `normals`...).
+            /// All of Isaac's names of segmentations are the mask, ids of links; see [`Mask`] for instances and classes.
+            ///
+            /// # Errors
+            ///
+            /// [`UnknownName`] with the names most like one that is not known.
+            pub fn from_names<S: AsRef<str>>(names: &[S]) -> Result<Self, UnknownName> {
+                let mut channels = Self::default();
+                for name in names.iter().map(AsRef::as_ref) {
+                    match name {
+                        $(_ if name == $Name::NAME || $Name::ALIASES.contains(&name) => channels.$field = true,)*
+                        _ => return Err(unknown(name, &[$(($Name::NAME, $Name::ALIASES)),*])),
+                    }
+                }
+                Ok(channels)
+            }
+
+            /// Whether a channel is wanted.
+            pub fn has<C: Listed>(self) -> bool {
+                C::is_in(self)
+            }
+
+            /// The names of those that are wanted.
+            pub fn names(self) -> Vec<&'static str> {
+                [$((self.$field, $Name::NAME)),*].into_iter().filter(|(on, _)| *on).map(|(_, name)| name).collect()
+            }
+
+            /// Memory of a pixel \[bytes\].
+            pub fn bytes_per_pixel(self) -> usize {
+                0 $(+ usize::from(self.$field) * size_of::<<$Name as Channel>::Number>() * $Name::COMPONENTS)*
+            }
+        }
+
+        /// Pictures of many views, one array per channel; the first axis is the view.
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct Pictures {
+            $($field: Option<Array<<$Name as Channel>::Number, <$Name as Channel>::Layout>>,)*
+        }
+
+        impl Pictures {
+            /// Pictures of `views` views of `width` by `height` pixels, empty.
+            ///
+            /// # Panics
+            ///
+            /// If they do not fit into the address space.
+            #[track_caller]
+            pub fn new(channels: Channels, views: usize, width: usize, height: usize) -> Self {
+                Self {
+                    $($field: channels.$field.then(|| {
+                        let shape = <$Name as Channel>::Layout::of(views, height, width, $Name::COMPONENTS);
+                        Array::from_elem(shape, Default::default())
+                    }),)*
+                }
+            }
+
+            /// Which channels there are.
+            pub fn channels(&self) -> Channels {
+                Channels { $($field: self.$field.is_some(),)* }
+            }
+
+            /// The pictures of one channel, if it is there.
+            pub fn get<C: Listed>(&self) -> Option<PictureView<'_, C>> {
+                C::of(self)
+            }
+
+            /// Moves the pictures of `views`, of `all` there are, up by as many places as `by` says; the last ones fall out.
+            pub fn move_up(&mut self, all: usize, views: Range<usize>, by: usize) {
+                $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
+                    let each = numbers.len() / all.max(1);
+                    let kept = views.len().saturating_sub(by) * each;
+                    numbers[views.start * each..views.end * each].copy_within(..kept, by.min(views.len()) * each);
+                })*
+            }
+
+            /// Makes zeros of the pictures of `views`, of `all` there are.
+            pub fn forget(&mut self, all: usize, views: Range<usize>) {
+                $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
+                    let each = numbers.len() / all.max(1);
+                    numbers[views.start * each..views.end * each].fill(Default::default());
+                })*
+            }
+
+            /// Copies a view of others, which have the same channels and size; of both it is said how many views there are, and
+            /// which.
+            pub fn copy_view(&mut self, (all, view): (usize, usize), others: &Self, (count, from): (usize, usize)) {
+                $(if let (Some(numbers), Some(others)) = (
+                    self.$field.as_mut().and_then(|array| array.as_slice_mut()),
+                    others.$field.as_ref().and_then(|array| array.as_slice()),
+                ) {
+                    let (each, other) = (numbers.len() / all.max(1), others.len() / count.max(1));
+                    numbers[view * each..(view + 1) * each].copy_from_slice(&others[from * other..(from + 1) * other]);
+                })*
+            }
+
+            /// Every view borrowed for drawing, in order.
+            pub fn frames_mut(&mut self, views: usize) -> impl Iterator<Item = FrameMut<'_>> {
+                $(let mut $field = self.$field.as_mut().and_then(|array| array.as_slice_mut()).map(|numbers| {
+                    let each = (numbers.len() / views.max(1)).max(1);
+                    numbers.chunks_exact_mut(each)
+                });)*
+                (0..views).map(move |_| FrameMut { $($field: $field.as_mut().and_then(Iterator::next),)* })
+            }
+        }
+
+        $(impl Listed for $Name {
+            fn is_in(channels: Channels) -> bool {
+                channels.$field
+            }
+
+            fn of(pictures: &Pictures) -> Option<PictureView<'_, Self>> {
+                pictures.$field.as_ref().map(|array| array.view())
+            }
+        })*
+
+        /// Pictures of one view, row by row from the top left.
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct Frame {
+            $($(#[$doc])* pub $field: Option<Vec<<$Name as Channel>::Number>>,)*
+        }
+
+        /// Where the pictures of one view go; missing channels are not computed.
+        #[derive(Debug, Default)]
+        pub struct FrameMut<'a> {
+            $($(#[$doc])* pub $field: Option<&'a mut [<$Name as Channel>::Number]>,)*
+        }
+
+        impl Frame {
+            /// Pictures of `width` by `height` pixels, empty.
+            pub fn new(width: usize, height: usize, channels: Channels) -> Self {
+                let pixels = width * height;
+                Self { $($field: channels.$field.then(|| vec![Default::default(); pixels * $Name::COMPONENTS]),)* }
+            }
+
+            /// Borrowed for drawing.
+            pub fn as_mut(&mut self) -> FrameMut<'_> {
+                FrameMut { $($field: self.$field.as_deref_mut(),)* }
+            }
+        }
+
+        impl<'a> FrameMut<'a> {
+            /// The same frame for a shorter time.
+            pub fn reborrow(&mut self) -> FrameMut<'_> {
+                FrameMut { $($field: self.$field.as_deref_mut(),)* }
+            }
+
+            /// Takes the first pixels of all channels, or as many as there are.
+            pub(crate) fn split_off_first(&mut self, pixels: usize) -> FrameMut<'a> {
+                FrameMut { $($field: split_off::<$Name>(&mut self.$field, pixels),)* }
+            }
+        }
+
+        impl FrameMut<'_> {
+            /// Puts `value` where nothing was hit, in the channels that measure how far something is.
+            pub fn replace_misses(&mut self, value: f32) {
+                $(if let Some(numbers) = self.$field.as_deref_mut() {
+                    $Name::replace_misses(numbers, value);
+                })*
+            }
+
+            /// Which channels there are.
+            pub fn channels(&self) -> Channels {
+                Channels { $($field: self.$field.is_some(),)* }
+            }
+
+            /// Takes over a row of a frame with the same channels and `width`, as the first row.
+            pub(crate) fn take_row(&mut self, from: &Frame, row: usize, width: usize) {
+                $(if let (Some(to), Some(from)) = (self.$field.as_deref_mut(), from.$field.as_deref()) {
+                    let each = width * $Name::COMPONENTS;
+                    to[..each].copy_from_slice(&from[row * each..(row + 1) * each]);
+                })*
+            }
+
+            /// Checks the lengths against a number of pixels.
+            pub(crate) fn validate(&self, pixels: usize) -> Result<(), RenderError> {
+                $(if let Some(buffer) = &self.$field {
+                    let (found, expected) = (buffer.len(), pixels * $Name::COMPONENTS);
+                    if found != expected {
+                        return Err(RenderError::BufferSize { channel: $Name::NAME, expected, found });
+                    }
+                })*
+                Ok(())
+            }
+
+            /// Whether a channel of this stage is wanted.
+            pub(crate) fn wants(&self, stage: Stage) -> bool {
+                false $(|| (self.$field.is_some() && $Name::STAGE == stage))*
+            }
+
+            /// Writes the pixels of a group, whose first is at (x, y), that are inside of the picture.
+            #[inline(always)]
+            pub(crate) fn write(&mut self, stage: Stage, group: &PixelGroup, at: [usize; 2], size: [usize; 2]) {
+                $(if $Name::STAGE == stage && let Some(buffer) = &mut self.$field {
+                    put::<$Name>(buffer, group, at, size);
+                })*
+            }
+        }
+    };
+}
+
+/// The error for a name that is no channel, with the names and aliases most like it.
+fn unknown(name: &str, known: &[(&'static str, &[&'static str])]) -> UnknownName {
+    let all = known.iter().flat_map(|(own, aliases)| aliases.iter().chain([own]));
+    let candidates = closest(name, all.copied()).into_iter().map(String::from).collect();
+    UnknownName { what: "channel", name: name.into(), candidates }
+}
+
+/// The first pixels of one channel.
+fn split_off<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Number]>, pixels: usize) -> Option<&'a mut [C::Number]> {
+    let all = buffer.take()?;
+    let (first, rest) = all.split_at_mut(pixels.saturating_mul(C::COMPONENTS).min(all.len()));
+    *buffer = Some(rest);
+    Some(first)
+}
+
+/// Copies the numbers of a row of pixels, of which there are N in a whole one: that many are copied without a call.
+#[inline(always)]
+fn copy_row<const N: usize, T: Copy>(from: &[T], out: &mut [T]) {
+    match (<&mut [T; N]>::try_from(&mut *out), from.first_chunk()) {
+        (Ok(out), Some(from)) => *out = *from,
+        _ => out.copy_from_slice(&from[..out.len()]),
+    }
+}
+
+#[inline(always)]
+fn put<C: Channel>(buffer: &mut [C::Number], group: &PixelGroup, [x, y]: [usize; 2], [width, height]: [usize; 2]) {
+    let columns = 8.min(width - x);
+    for row in 0..2.min(height - y) {
+        let first = ((y + row) * width + x) * C::COMPONENTS;
+        C::write_row(group, row * 8, &mut buffer[first..first + columns * C::COMPONENTS]);
+    }
+}
+
+channels! {
+    /// Colour (sRGB) and opacity (always 255), u8, 4 per pixel.
+    color::Color,
+    /// Depth along the optical axis \[m\], f32; +inf where nothing was hit.
+    depth::Depth,
+    /// Distance from the camera \[m\], f32; +inf where nothing was hit.
+    distance::Distance,
+    /// Mask id, i32; 0 where nothing was hit.
+    mask::Mask,
+    /// Normal of the surface itself, turned to the camera, unit, world frame, f32, 3 per pixel; 0 where nothing was hit.
+    normal::Normal,
+    /// Normal that light sees (smooth), unit, world frame, f32, 3 per pixel; 0 where nothing was hit.
+    shading_normal::ShadingNormal,
+    /// Where the surface is, frame of the environment \[m\], f32, 3 per pixel; 0 where nothing was hit.
+    position::Position,
+    /// Colour of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
+    albedo::Albedo,
+    /// How far what is seen has moved since the picture before (right, down) \[pixels\], f32, 2 per pixel; +inf where nothing
+    /// was hit and in the first picture.
+    flow::Flow,
+}

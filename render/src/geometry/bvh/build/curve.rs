@@ -1,0 +1,153 @@
+//! Boxes along a Morton curve, and the groups of those that lie together on it.
+
+use super::{Bounds, Cells, GROUP, Item, NOTHING, TO_BITS};
+use crate::simd::{F4, Simd};
+
+/// Bits of a coordinate on the curve.
+const BITS: u32 = 10;
+/// Keys are sorted by as many digits as there are axes.
+const DIGITS: usize = 1 << BITS;
+/// Fewer keys than these are compared: clearing and summing up places takes longer.
+const FEW: usize = 512;
+/// Cells that follow each other are one group where that is no more than these: a node less, and no more to test.
+const JOINED: usize = 12;
+/// Bits of a place within a cell that more than a group may not share.
+const CROWDED: u32 = 3;
+
+/// The bits of each coordinate, with room for those of two others behind each: a table takes a third of what moving them takes.
+static SPREAD: [u32; 1 << BITS] = {
+    let mut table = [0; 1 << BITS];
+    let mut x = 0;
+    while x < table.len() {
+        let mut bit = 0;
+        while bit < BITS {
+            table[x] |= (x as u32 >> bit & 1) << (3 * bit);
+            bit += 1;
+        }
+        x += 1;
+    }
+    table
+};
+
+/// Items in the order of the curve: places on it in the upper half of each number, indices of items in the lower.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Curve {
+    keys: Vec<u64>,
+    /// Memory to sort in.
+    sorted: Vec<u64>,
+}
+
+impl Curve {
+    /// Sorts items by their middles' places on the curve through a box around them, and says where groups begin, and where the
+    /// last one ends: the largest cells of the curve, halves of halves of the box, that hold no more than a group may, or a few
+    /// small ones.
+    #[inline(always)]
+    pub(super) fn sort<S: Simd>(&mut self, s: S, items: &[Item], bounds: &Bounds, starts: &mut Vec<u32>) -> &[u64] {
+        self.through(s, items, 0..items.len() as u32, bounds);
+        starts.clear();
+        group(s, items, &mut self.keys, 0, starts);
+        starts.push(items.len() as u32);
+        &self.keys
+    }
+
+    /// Keys of some of the items, sorted.
+    #[inline(always)]
+    fn through<S: Simd>(&mut self, s: S, items: &[Item], numbers: impl ExactSizeIterator<Item = u32>, bounds: &Bounds) {
+        let mut cells = Cells::<{ 1 << BITS }>::of(bounds);
+        // Cells are cubes: what a flat thing has of thickness, rounding perhaps, is not cut as if it were as long as the rest.
+        let least =
+            cells.scale.iter().take(3).filter(|&&scale| scale > 0.0).fold(f32::INFINITY, |least, &x| least.min(x));
+        cells.scale = [if least.is_finite() { least } else { 0.0 }; 4];
+        let [half, down, to_bits] = [0.5, -0.5, TO_BITS].map(|x| F4::splat(s, x));
+        let (base, scale) = (F4::load(s, &cells.base), F4::load(s, &cells.scale));
+        self.keys.clear();
+        self.keys.reserve(numbers.len());
+        // No closures of the library's: what those hold is not compiled for the instruction set.
+        for number in numbers {
+            let Bounds { lo: [a, b, c, _], hi: [d, e, f, _] } = items[number as usize];
+            let middle = half * F4::load(s, &[a, b, c, 0.0]) + half * F4::load(s, &[d, e, f, 0.0]);
+            let [x, y, z, _] = ((middle - base) * scale + down + to_bits).array();
+            let place = |x: f32| SPREAD[x.to_bits() as usize % DIGITS];
+            self.keys.push(u64::from(place(x) | place(y) << 1 | place(z) << 2) << 32 | u64::from(number));
+        }
+        if self.keys.len() < FEW {
+            self.keys.sort_unstable();
+            return;
+        }
+        // Digit by digit: a part of what comparing them takes.
+        let digit = |key: u64, pass: u32| (key >> (32 + BITS * pass)) as usize % DIGITS;
+        let mut places = [[0u32; DIGITS]; 3];
+        for &key in &self.keys {
+            for (pass, places) in (0..).zip(&mut places) {
+                places[digit(key, pass)] += 1;
+            }
+        }
+        self.sorted.resize(self.keys.len(), 0);
+        for (pass, places) in (0..).zip(&mut places) {
+            let mut sum = 0;
+            for place in places.iter_mut() {
+                (*place, sum) = (sum, sum + *place);
+            }
+            for &key in &self.keys {
+                let place = &mut places[digit(key, pass)];
+                self.sorted[*place as usize] = key;
+                *place += 1;
+            }
+            std::mem::swap(&mut self.keys, &mut self.sorted);
+        }
+    }
+}
+
+/// Where the groups of sorted keys begin.
+fn group<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
+    let place = |key: u64| (key >> 32) as u32;
+    // None that the first one could join.
+    let (mut at, mut last) = (0, GROUP);
+    while at < keys.len() {
+        let here = place(keys[at]);
+        let differs = |key: Option<&u64>| key.map_or(u32::MAX, |&key| place(key) ^ here);
+        // Neither what comes before nor what is one too many may be in the cell.
+        let (before, after) = (differs(keys[..at].last()), differs(keys.get(at + GROUP)));
+        if after >> CROWDED == 0 {
+            let count = keys[at..].partition_point(|&key| place(key) >> CROWDED == here >> CROWDED);
+            crowd(s, items, &mut keys[at..at + count], first + at as u32, starts);
+            (at, last) = (at + count, GROUP);
+            continue;
+        }
+        let bits = before.checked_ilog2().unwrap_or(0).min(after.ilog2());
+        // Of those that may be in the cell, all are looked at: where it ends cannot be foreseen.
+        let few = &keys[at..keys.len().min(at + GROUP)];
+        let count = few.iter().filter(|&&key| place(key) >> bits == here >> bits).count();
+        if last + count <= JOINED {
+            last += count;
+        } else {
+            starts.push(first + at as u32);
+            last = count;
+        }
+        at += count;
+    }
+}
+
+/// The same of more keys than the bits that are left can tell apart: they are sorted along a curve of their own. Details that
+/// lie close together, and something else far away.
+#[cold]
+fn crowd<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
+    let numbers = || keys.iter().map(|&key| key as u32);
+    let within = numbers().fold(NOTHING, |sum, number| {
+        let middle = items[number as usize].middle();
+        sum.with(&Bounds { lo: middle, hi: middle })
+    });
+    let mut finer = Curve::default();
+    s.vectorize(
+        #[inline(always)]
+        || finer.through(s, items, numbers(), &within),
+    );
+    let finer = finer.keys;
+    if finer[0] >> 32 != finer[finer.len() - 1] >> 32 {
+        keys.copy_from_slice(&finer);
+        group(s, items, keys, first, starts);
+    } else {
+        // At one place.
+        starts.extend((0..keys.len() as u32).step_by(GROUP).map(|k| first + k));
+    }
+}

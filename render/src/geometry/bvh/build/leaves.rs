@@ -1,0 +1,153 @@
+//! The leaves of a group: which way to cut it costs least. By dynamic programming over the cuts: the cheapest leaves of the first
+//! j things are the cheapest leaves of fewer, and one leaf more.
+
+use super::{GROUP, Item, WIDE};
+use crate::simd::{F4, F8, Simd};
+
+/// Things of a leaf, at most.
+const LEAF: usize = 4;
+/// What a leaf that is met costs, in tests of one thing.
+const LEAF_COST: f32 = 1.0;
+/// What leaves of one thing, two, and so on cost that are met.
+const TESTS: [f32; LEAF] = [1.0 + LEAF_COST, 2.0 + LEAF_COST, 3.0 + LEAF_COST, 4.0 + LEAF_COST];
+const _: () = assert!(GROUP <= LEAF * WIDE, "every group can be cut into leaves");
+
+/// What leaves of a group cost: memory to be kept, so that only what is looked at is written. Rows of more things than the group
+/// has are an earlier group's.
+#[derive(Clone, Debug)]
+pub(super) struct Costs {
+    /// Of leaves that end with each of the things, one thing long, two, and so on.
+    costs: [[f32; LEAF]; GROUP],
+    /// Least cost of the first j things as k leaves; and before those, of fewer things than none.
+    least: [[f32; WIDE]; LEAF + GROUP],
+}
+
+impl Default for Costs {
+    fn default() -> Self {
+        let mut least = [[f32::INFINITY; WIDE]; LEAF + GROUP];
+        least[LEAF - 1][0] = 0.0;
+        Self { costs: [[0.0; LEAF]; GROUP], least }
+    }
+}
+
+/// Where the leaves of things that lie together on the curve end, and how many leaves there are.
+#[inline(always)]
+pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut Costs) -> ([u8; WIDE], usize) {
+    let things = &things[..things.len().min(GROUP)];
+    // The last rows, the newest first: not read from memory that has just been written.
+    let none = F8::splat(s, f32::INFINITY);
+    let mut recent = [none; LEAF];
+    recent[0] = F8::load(s, &least[LEAF - 1]);
+    // And of all of them, as k + 1.
+    let mut best = none;
+    // The boxes around the last thing, the last two, and so on.
+    let mut lo = [F4::splat(s, f32::INFINITY); 3];
+    let mut hi = [F4::splat(s, f32::NEG_INFINITY); 3];
+    let (longest, tests) = (F4::splat(s, f32::MAX), F4::load(s, &TESTS));
+    for (j, thing) in things.iter().enumerate() {
+        for axis in 0..3 {
+            lo[axis] = lo[axis].shift_in(f32::INFINITY).min(F4::splat(s, thing.lo[axis]));
+            hi[axis] = hi[axis].shift_in(f32::NEG_INFINITY).max(F4::splat(s, thing.hi[axis]));
+        }
+        // Numbers all of them: no side is infinite, so that none times infinity is none.
+        let [x, y, z] = [0, 1, 2].map(
+            #[inline(always)]
+            |axis| (hi[axis] - lo[axis]).min(longest),
+        );
+        costs[j] = ((x * y + y * z + z * x) * tests).array();
+        // The newest row last: it is what all else waits for.
+        best = none;
+        for (row, &cost) in recent.iter().zip(&costs[j]).rev() {
+            best = best.min(*row + F8::splat(s, cost));
+        }
+        recent = [best.shift_in(f32::INFINITY), recent[0], recent[1], recent[2]];
+        least[LEAF + j] = recent[0].array();
+    }
+    let (mut leaves, mut cost) = (0, f32::INFINITY);
+    for (k, other) in best.array().into_iter().enumerate() {
+        (leaves, cost) = if other < cost { (k, other) } else { (leaves, cost) };
+    }
+    // Sizes beyond the range cost too much to compare: any leaves will do, but not too long ones.
+    if cost == f32::INFINITY {
+        let ends = std::array::from_fn(|k| (LEAF * (k + 1)).min(things.len()) as u8);
+        return (ends, things.len().div_ceil(LEAF));
+    }
+    let mut ends = [0; WIDE];
+    let mut j = things.len();
+    for k in (0..=leaves).rev() {
+        ends[k] = j as u8;
+        // Those that gave the least. All are looked at: where the first one is cannot be foreseen.
+        let gave = (0..LEAF).fold(1 << LEAF, |bits: u32, before| {
+            bits | u32::from(least[LEAF + j - 2 - before][k] + costs[j - 1][before] == cost) << before
+        });
+        j -= gave.trailing_zeros() as usize + 1;
+        cost = least[LEAF + j - 1][k];
+    }
+    (ends, leaves + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Bounds;
+    use super::*;
+    use crate::simd::{Scalar, at_level, levels};
+
+    /// Cost of leaves: the tests of those that are met.
+    fn cost(things: &[Item], ends: impl IntoIterator<Item = usize>) -> f32 {
+        let mut first = 0;
+        let mut sum = 0.0;
+        for end in ends {
+            let leaf = &things[first..end];
+            sum += (leaf.len() as f32 + LEAF_COST) * Bounds::around(leaf).area();
+            first = end;
+        }
+        assert_eq!(first, things.len(), "everything is in a leaf");
+        sum
+    }
+
+    /// Every way to cut is looked at.
+    #[test]
+    fn least_cost() {
+        let mut state = 1u32;
+        let mut dice = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1u32 << 24) as f32
+        };
+        // Kept from group to group, as the builder does.
+        let mut kept = Costs::default();
+        for round in 0..200 {
+            let count = 1 + round % 14;
+            let things: Vec<Item> = (0..count as u32)
+                .map(|k| {
+                    let lo = [dice() + 0.3 * k as f32, dice(), dice()];
+                    let long = dice() * dice();
+                    Item::item(lo, lo.map(|x| x + long), k, 1)
+                })
+                .collect();
+            let (ends, leaves) = ends(Scalar, &things, &mut kept);
+            let chosen = ends[..leaves].iter().map(|&end| usize::from(end));
+            assert!(chosen.clone().scan(0, |last, end| Some(end - std::mem::replace(last, end))).all(|n| n <= LEAF));
+            let mut least = f32::INFINITY;
+            for cuts in 0..1u32 << (count - 1) {
+                let all = (1..count).filter(|k| cuts >> (k - 1) & 1 == 1).chain([count]);
+                let lengths = all.clone().scan(0, |last, end| Some(end - std::mem::replace(last, end)));
+                if all.clone().count() <= WIDE && lengths.max().is_some_and(|longest| longest <= LEAF) {
+                    least = least.min(cost(&things, all));
+                }
+            }
+            // Both are sums of up to eight numbers: they may be rounded otherwise.
+            let ours = cost(&things, chosen);
+            assert!(ours <= least * (1.0 + 16.0 * f32::EPSILON), "{ours}, not {least}, of {count}");
+        }
+    }
+
+    #[test]
+    fn huge_boxes() {
+        let huge = [[-3e38f32; 3], [3e38; 3]];
+        let things: Vec<Item> = (0..GROUP as u32).map(|k| Item::item(huge[0], huge[1], k, 1)).collect();
+        for level in levels() {
+            let (ends, leaves) = at_level!(level, s => ends(s, &things, &mut Costs::default()));
+            assert_eq!(ends[..leaves], [4, 8, 12, 16, 20, 24]);
+        }
+    }
+}

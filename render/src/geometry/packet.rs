@@ -1,0 +1,136 @@
+//! Rays that are cast together, one in each lane.
+
+use super::vector::V3;
+use crate::geometry::ray::Ray;
+use crate::simd::{D, D3, DOUBLES, Simd, axes, dot_3, load_3};
+use kinetoscope_scene::PoseF64;
+
+/// Rays of a packet.
+pub const WIDTH: usize = DOUBLES;
+/// All lanes, a bit for each.
+pub(crate) const ALL: u64 = (1 << WIDTH) - 1;
+
+/// Some rays: lanes of the same number in all arrays. Every number of origins and directions is finite.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Packet {
+    origin: [[f64; WIDTH]; 3],
+    direction: [[f64; WIDTH]; 3],
+    /// Nothing farther away counts \[m\]; negative for a lane without a ray.
+    limit: [f64; WIDTH],
+}
+
+impl Packet {
+    /// The first rays of a list that hit things up to `max_distance`. A ray with a number that is not finite is none; its lane
+    /// and those at the end look like one of the others.
+    #[inline(always)]
+    pub(crate) fn of(rays: &[Ray], max_distance: f64) -> Self {
+        let like = rays.iter().find(|ray| ray.is_finite()).copied();
+        let like = like.unwrap_or(Ray { origin: [0.0; 3], direction: [0.0; 3] });
+        let mut packet = Self { origin: [[0.0; WIDTH]; 3], direction: [[0.0; WIDTH]; 3], limit: [-1.0; WIDTH] };
+        for k in 0..WIDTH {
+            let ray = rays.get(k).filter(|ray| ray.is_finite());
+            let Ray { origin, direction } = ray.unwrap_or(&like);
+            for axis in 0..3 {
+                (packet.origin[axis][k], packet.direction[axis][k]) = (origin[axis], direction[axis]);
+            }
+            if ray.is_some() {
+                packet.limit[k] = f64::INFINITY.min(max_distance);
+            }
+        }
+        packet
+    }
+
+    /// The ray of a lane.
+    #[inline(always)]
+    pub(crate) fn ray(&self, k: usize) -> Ray {
+        Ray {
+            origin: [0, 1, 2].map(|axis| self.origin[axis][k]),
+            direction: [0, 1, 2].map(|axis| self.direction[axis][k]),
+        }
+    }
+
+    /// One ray alone, in its lane.
+    #[inline(always)]
+    pub(super) fn only(&self, k: usize) -> Self {
+        let mut limit = [-1.0; WIDTH];
+        limit[k] = self.limit[k];
+        Self { origin: self.origin.map(|x| [x[k]; WIDTH]), direction: self.direction.map(|x| [x[k]; WIDTH]), limit }
+    }
+
+    #[inline(always)]
+    pub(crate) fn limit(&self, k: usize) -> f64 {
+        self.limit[k]
+    }
+
+    /// Nothing farther away than this counts in a lane any more.
+    #[inline(always)]
+    pub(crate) fn shorten(&mut self, k: usize, limit: f64) {
+        self.limit[k] = self.limit[k].min(limit);
+    }
+
+    /// Whether a lane has a ray.
+    #[inline(always)]
+    pub(crate) fn has(&self, k: usize) -> bool {
+        self.limit[k] >= 0.0
+    }
+
+    #[inline(always)]
+    pub(crate) fn origins<S: Simd>(&self, s: S) -> D3<S> {
+        load_3(s, &self.origin)
+    }
+
+    #[inline(always)]
+    pub(crate) fn directions<S: Simd>(&self, s: S) -> D3<S> {
+        load_3(s, &self.direction)
+    }
+
+    #[inline(always)]
+    pub(crate) fn limits<S: Simd>(&self, s: S) -> D<S> {
+        D::load(s, &self.limit)
+    }
+
+    /// The rays that may meet a sphere before their limits, in the frame that `pose` maps from; `None` where no ray does. A
+    /// radius of +inf is met by all. To the bit what one ray alone is in that frame.
+    #[inline(always)]
+    pub(super) fn seen_from<S: Simd>(&self, s: S, pose: &PoseF64, middle: V3, radius: f64) -> Option<Self> {
+        let (origin, direction, limit) = (self.origins(s), self.directions(s), self.limits(s));
+        let zero = D::splat(s, 0.0);
+        let mut met = zero.le(limit);
+        if radius < f64::INFINITY {
+            let to_middle = axes(
+                #[inline(always)]
+                |k| D::splat(s, middle[k]) - origin[k],
+            );
+            let t = dot_3(to_middle, direction);
+            // Where the ray is nearest to the middle; not by the difference of squares, which cancels.
+            let beside = axes(
+                #[inline(always)]
+                |k| to_middle[k] + (-t) * direction[k],
+            );
+            let r = D::splat(s, radius);
+            met = met & dot_3(beside, beside).le(r * r) & zero.le(t + r) & (t - r).le(limit);
+        }
+        if met.to_bitmask() == 0 {
+            return None;
+        }
+        let from = axes(
+            #[inline(always)]
+            |k| origin[k] - pose.translation[k],
+        );
+        Some(Self {
+            origin: turned_back(pose, from),
+            direction: turned_back(pose, direction),
+            limit: met.select(limit, D::splat(s, -1.0)).array(),
+        })
+    }
+}
+
+/// As [`PoseF64::rotate_inverse`], to the bit.
+#[inline(always)]
+fn turned_back<S: Simd>(pose: &PoseF64, v: D3<S>) -> [[f64; WIDTH]; 3] {
+    let r = &pose.rotation;
+    axes(
+        #[inline(always)]
+        |j| (v[0] * r[0][j] + v[1] * r[1][j] + v[2] * r[2][j]).array(),
+    )
+}

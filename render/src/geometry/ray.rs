@@ -1,0 +1,34 @@
+//! [`Ray`]: a half-line.
+
+/// A ray: where it begins, and which way it goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it begins \[m\].
+    pub origin: [f64; 3],
+    /// Which way it goes; of length 1.
+    pub direction: [f64; 3],
+}
+
+impl Ray {
+    /// The point at a distance \[m\].
+    #[inline]
+    pub fn at(&self, distance: f64) -> [f64; 3] {
+        super::vector::along(self.origin, distance, self.direction)
+    }
+
+    /// The ray in the frame that `pose` maps from.
+    #[inline(always)]
+    #[cfg(test)]
+    pub(crate) fn seen_from(&self, pose: &kinetoscope_scene::PoseF64) -> Self {
+        Self { origin: pose.apply_inverse(self.origin), direction: pose.rotate_inverse(self.direction) }
+    }
+
+    /// The ray of this frame in the frame that `pose` maps to.
+    pub fn mapped_by(&self, pose: &kinetoscope_scene::PoseF64) -> Self {
+        Self { origin: pose.apply(self.origin), direction: pose.rotate(self.direction) }
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        self.origin.iter().chain(&self.direction).all(|x| x.is_finite())
+    }
+}

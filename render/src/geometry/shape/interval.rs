@@ -1,0 +1,84 @@
+//! Over which part of a ray a convex body is.
+
+use crate::geometry::vector::{V3, along, dot};
+
+/// Where a ray enters a convex body and where it leaves it; nothing where it leaves before it enters.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interval {
+    pub(super) enter: f64,
+    pub(super) leave: f64,
+}
+
+impl Interval {
+    pub(super) const EMPTY: Self = Self { enter: f64::INFINITY, leave: f64::NEG_INFINITY };
+    pub(super) const ALL: Self = Self { enter: f64::NEG_INFINITY, leave: f64::INFINITY };
+
+    #[inline(always)]
+    pub(super) fn is_empty(self) -> bool {
+        self.enter > self.leave
+    }
+
+    /// What is in both.
+    #[inline(always)]
+    pub(super) fn and(self, other: Self) -> Self {
+        Self { enter: self.enter.max(other.enter), leave: self.leave.min(other.leave) }
+    }
+
+    /// What is in one of them or between them: for two parts of one convex body.
+    #[inline(always)]
+    pub(super) fn or(self, other: Self) -> Self {
+        Self { enter: self.enter.min(other.enter), leave: self.leave.max(other.leave) }
+    }
+
+    /// The first end at a distance from 0 to `limit`: where the ray enters, or where it leaves if it began inside.
+    #[inline(always)]
+    pub(super) fn first(self, limit: f64) -> Option<f64> {
+        let t = if self.enter >= 0.0 { self.enter } else { self.leave };
+        // Ends without a number belong to rays that run along the surface.
+        (self.enter <= self.leave && t >= 0.0 && t <= limit && t < f64::INFINITY).then_some(t)
+    }
+}
+
+/// A ball about the origin, for directions of any length. The distance of the ray from the middle is taken at its nearest
+/// point, not by the discriminant, which cancels for small balls far away. Source: Haines et al., Precision improvements
+/// for ray/sphere intersection, Ray Tracing Gems, 2019.
+#[inline(always)]
+pub(super) fn ball(o: V3, d: V3, radius: f64) -> Interval {
+    let dd = dot(d, d);
+    let middle = -dot(o, d) / dd;
+    let p = along(o, middle, d);
+    around(middle, radius * radius - dot(p, p), dd)
+}
+
+/// An endless cylinder about z.
+#[inline(always)]
+pub(super) fn tube(o: V3, d: V3, radius: f64) -> Interval {
+    let dd = d[0] * d[0] + d[1] * d[1];
+    if dd < 1e-30 {
+        let inside = o[0] * o[0] + o[1] * o[1] <= radius * radius;
+        return if inside { Interval::ALL } else { Interval::EMPTY };
+    }
+    let middle = -(o[0] * d[0] + o[1] * d[1]) / dd;
+    let (x, y) = (o[0] + middle * d[0], o[1] + middle * d[1]);
+    around(middle, radius * radius - (x * x + y * y), dd)
+}
+
+#[inline(always)]
+fn around(middle: f64, rest: f64, dd: f64) -> Interval {
+    if rest >= 0.0 {
+        let half = (rest / dd).sqrt();
+        Interval { enter: middle - half, leave: middle + half }
+    } else {
+        Interval::EMPTY
+    }
+}
+
+/// The space between -h and h along one axis.
+#[inline(always)]
+pub(super) fn slab(o: f64, d: f64, h: f64) -> Interval {
+    if d == 0.0 {
+        return if o.abs() <= h { Interval::ALL } else { Interval::EMPTY };
+    }
+    let (a, b) = ((-h - o) / d, (h - o) / d);
+    Interval { enter: a.min(b), leave: a.max(b) }
+}

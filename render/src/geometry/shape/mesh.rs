@@ -1,0 +1,284 @@
+//! Triangles.
+
+pub(crate) mod columns;
+
+use super::{RayShape, Touch, Touches, touch_each};
+use crate::simd::{D, Level, Simd};
+use crate::geometry::bvh::{Beam, Builder, Bvh, Stack, Walked};
+use crate::geometry::packet::{Packet, WIDTH};
+use crate::geometry::triangle::{Shear, ShearPacket, Triangle, has_area, normal};
+use crate::geometry::vector::{V3, to_f64};
+use crate::geometry::assets::Assets;
+use crate::geometry::ray::Ray;
+use columns::Columns;
+use kinetoscope_scene::RenderMesh;
+use std::sync::{Arc, OnceLock};
+
+/// Triangles that a packet tests against all of its rays; where there are more in its way, rays go on one by one. That costs
+/// about as much as these.
+const BUDGET: usize = 320;
+
+/// Triangles in a tree, one for each asset.
+#[derive(Clone, Debug)]
+pub(crate) struct Mesh {
+    tree: Arc<MeshTree>,
+}
+
+/// The triangles of an asset, in the order of the leaves.
+#[derive(Clone, Debug)]
+pub(crate) struct MeshTree {
+    bvh: Bvh,
+    triangles: Vec<Triangle>,
+    /// Which triangle of the mesh each of them is.
+    numbers: Vec<u32>,
+    /// Along each axis, made when the first steep rays come; none for some meshes.
+    columns: [OnceLock<Option<Columns>>; 3],
+}
+
+/// Builds trees over meshes, one after the other: what building takes of memory is kept from one to the next. New memory would
+/// take a fifth of the time.
+#[derive(Debug)]
+pub(crate) struct MeshBuilder {
+    builder: Builder,
+    triangles: Vec<Triangle>,
+}
+
+impl Default for MeshBuilder {
+    fn default() -> Self {
+        Self { builder: Builder::new(Level::best()), triangles: Vec::new() }
+    }
+}
+
+impl MeshBuilder {
+    /// Over the triangles that have an area.
+    pub(crate) fn build(&mut self, mesh: &RenderMesh) -> MeshTree {
+        let (indices, positions) = (mesh.triangles(), mesh.positions());
+        let corners = |indices: &[u32; 3]| indices.map(|i| positions[i as usize]);
+        self.triangles.clear();
+        self.triangles.reserve(indices.len());
+        for indices in indices {
+            let triangle = corners(indices);
+            if has_area(&triangle) {
+                self.triangles.push(triangle);
+            }
+        }
+        let mut tree = self.tree();
+        // Mostly there are no others.
+        if tree.triangles.len() < indices.len() {
+            let with_area: Vec<u32> =
+                (0..).zip(indices).filter(|(_, indices)| has_area(&corners(indices))).map(|(k, _)| k).collect();
+            tree.numbers.iter_mut().for_each(|number| *number = with_area[*number as usize]);
+        }
+        tree
+    }
+
+    /// Over its own triangles, of which each has an area.
+    fn tree(&mut self) -> MeshTree {
+        // Plain comparisons: those of the library look for what is no number.
+        let smaller = |a: f32, b: f32| if a < b { a } else { b };
+        let larger = |a: f32, b: f32| if a > b { a } else { b };
+        let around = |[a, b, c]: &Triangle| {
+            [
+                [0, 1, 2].map(|k| smaller(smaller(a[k], b[k]), c[k])),
+                [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k])),
+            ]
+        };
+        let (bvh, numbers) = self.builder.build(self.triangles.iter().map(around));
+        let triangles = numbers.iter().map(|&number| self.triangles[number as usize]).collect();
+        MeshTree { bvh, triangles, numbers, columns: Default::default() }
+    }
+}
+
+impl Mesh {
+    pub(super) fn of(shape: &kinetoscope_scene::shape::Mesh, assets: &mut Assets) -> Self {
+        Self { tree: assets.mesh(&shape.mesh) }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn of_tree(tree: Arc<MeshTree>) -> Self {
+        Self { tree }
+    }
+}
+
+impl MeshTree {
+    #[cfg(test)]
+    pub(crate) fn of_triangles(triangles: &[Triangle]) -> Self {
+        MeshBuilder { triangles: triangles.to_vec(), ..Default::default() }.tree()
+    }
+
+    #[cfg(test)]
+    pub(crate) fn bvh(&self) -> &Bvh {
+        &self.bvh
+    }
+
+    #[cfg(test)]
+    pub(crate) fn triangles(&self) -> &[Triangle] {
+        &self.triangles
+    }
+
+    #[inline(always)]
+    pub(crate) fn columns(&self, axes: [usize; 3]) -> Option<&Columns> {
+        self.columns[axes[2]].get_or_init(|| Columns::new(&self.triangles, &self.bounds(), axes)).as_ref()
+    }
+
+    /// The number that a triangle, given by its place in the tree, has in the mesh.
+    #[inline(always)]
+    pub(crate) fn number(&self, index: usize) -> u32 {
+        self.numbers[index]
+    }
+
+    /// Unit normal of a triangle, given by its place in the tree: counter-clockwise corners seen from its tip.
+    #[inline(always)]
+    pub(crate) fn normal(&self, index: usize) -> Option<V3> {
+        normal(&self.triangles[index])
+    }
+
+    /// Smallest and largest coordinates.
+    pub(crate) fn bounds(&self) -> [V3; 2] {
+        self.bvh.around().map(to_f64)
+    }
+
+    /// Whether some triangle is met at a distance from 0 to `limit`.
+    #[inline(always)]
+    pub(crate) fn blocks(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> bool {
+        let shear = Shear::new(ray);
+        let mut blocked = false;
+        self.bvh.walk(
+            ray,
+            limit,
+            stack,
+            #[inline(always)]
+            |leaf, limit| {
+                for triangle in &self.triangles[leaf] {
+                    blocked = shear.distance(triangle).is_some_and(|t| t >= 0.0 && t <= limit);
+                    if blocked {
+                        break;
+                    }
+                }
+                // Nothing is nearer than this: the walk ends.
+                if blocked { -1.0 } else { limit }
+            },
+        );
+        blocked
+    }
+
+    /// The nearest triangle up to `limit`, or one that was found before: how far away, and its place in the tree.
+    #[inline(always)]
+    pub(crate) fn nearest(
+        &self,
+        ray: &Ray,
+        limit: f64,
+        found: Option<(f64, usize)>,
+        stack: &mut Stack,
+    ) -> Option<(f64, usize)> {
+        let shear = Shear::new(ray);
+        let mut best = found;
+        self.bvh.walk(
+            ray,
+            limit,
+            stack,
+            #[inline(always)]
+            |leaf, mut limit| {
+                let first = leaf.start;
+                for (k, triangle) in self.triangles[leaf].iter().enumerate() {
+                    let Some(t) = shear.distance(triangle).filter(|&t| t >= 0.0 && t <= limit) else { continue };
+                    // On an edge the first triangle counts, in whatever order they are met.
+                    if best.is_none_or(|(s, index)| t < s || first + k < index) {
+                        best = Some((t, first + k));
+                        limit = t;
+                    }
+                }
+                limit
+            },
+        );
+        best
+    }
+
+    /// [`nearest`](Self::nearest) for every ray of a packet, up to its limit, to the bit; `shear` is that of the rays, if they
+    /// have one. One walk for all of them where they run side by side. Only lanes with a ray are written.
+    #[inline(always)]
+    pub(crate) fn nearest_of_packet<S: Simd>(
+        &self,
+        s: S,
+        packet: &Packet,
+        shear: Option<&ShearPacket<S>>,
+        stack: &mut Stack,
+        found: &mut [Option<(f64, usize)>; WIDTH],
+    ) {
+        let beam = shear.and_then(
+            #[inline(always)]
+            |shear| Some((shear, Beam::around(s, packet, shear, &self.bvh)?)),
+        );
+        let narrow = beam.filter(|(_, beam)| beam.share() * self.triangles.len() as f64 <= BUDGET as f64);
+        let Some((shear, beam)) = narrow else {
+            for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+                found[k] = self.nearest(&packet.ray(k), packet.limit(k), None, stack);
+            }
+            return;
+        };
+        let (zero, mut limit) = (D::splat(s, 0.0), packet.limits(s));
+        // Of the best triangle, as a number that has all of them; +inf where there is none.
+        let mut best = D::splat(s, f64::INFINITY);
+        let walked = self.bvh.walk_beam(
+            &beam,
+            limit,
+            BUDGET,
+            stack,
+            #[inline(always)]
+            |leaf| {
+                let mut nearer = 0;
+                for (index, triangle) in leaf.clone().zip(&self.triangles[leaf]) {
+                    let Some((t, inside)) = shear.distances(triangle) else { continue };
+                    let index = D::splat(s, index as f64);
+                    let better = inside & zero.le(t) & t.le(limit) & (t.lt(limit) | index.lt(best));
+                    (limit, best) = (better.select(t, limit), better.select(index, best));
+                    nearer |= better.to_bitmask();
+                }
+                if nearer != 0 { Some(limit) } else { None }
+            },
+        );
+        let (limit, best) = (limit.array(), best.array());
+        for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+            found[k] = (best[k] < f64::INFINITY).then(|| (limit[k], best[k] as usize));
+            if walked == Walked::Part {
+                found[k] = self.nearest(&packet.ray(k), limit[k], found[k], stack);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn touch(&self, (t, index): (f64, usize)) -> Option<Touch> {
+        Some(Touch { t: t + 0.0, normal: normal(&self.triangles[index])? })
+    }
+}
+
+impl RayShape for Mesh {
+    #[inline(always)]
+    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch> {
+        self.tree.touch(self.tree.nearest(ray, limit, None, stack)?)
+    }
+
+    /// Steep rays look into columns; others take one walk for all where they run side by side. Every triangle that a ray may
+    /// hit is tested by the arithmetic of the single ray, and the nearest one counts, the first one of those that are as
+    /// near: the same bits.
+    #[inline(always)]
+    fn touch_packet<S: Simd>(&self, s: S, packet: &Packet, stack: &mut Stack, touches: &mut Touches) {
+        let tree = &*self.tree;
+        let Some(shear) = ShearPacket::new(s, packet) else { return touch_each(self, packet, stack, touches) };
+        if columns::are_steep(s, &shear)
+            && let Some(columns) = tree.columns(shear.axes())
+            && columns.touch_packet(s, tree, packet, &shear, touches)
+        {
+            return;
+        }
+        let mut found = [None; WIDTH];
+        tree.nearest_of_packet(s, packet, Some(&shear), stack, &mut found);
+        for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+            touches[k] = found[k].and_then(|found| tree.touch(found));
+        }
+    }
+
+    fn bounds(&self) -> Option<[V3; 2]> {
+        Some(self.tree.bounds())
+    }
+}

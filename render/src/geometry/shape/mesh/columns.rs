@@ -1,0 +1,372 @@
+//! Triangles by where they are seen from above: a list for each of many columns.
+//!
+//! What height scanners look at is terrain, from above. There a steep ray has few triangles near it, and which ones is known
+//! without a walk: those of the columns that it passes between the lowest and the highest corner. It is tested against each of
+//! them, eight pairs of a ray and a triangle at a time, by the arithmetic of a single ray: the same bits.
+//!
+//! Above is along any axis of the mesh's own frame (MuJoCo turns meshes to their principal axes); below, that is called z.
+//!
+//! No triangle is missed that [`Shear`](crate::geometry::triangle::Shear) finds a ray inside of. Of that triangle, a point at a
+//! height z between those of its corners is, along x, where the ray is at that height, up to rounding: its corners as seen from
+//! the ray are on both sides of it. With coordinates up to M, slopes b up to 1 and e = 2^-53, a corner is off by at most e M
+//! times 2 (the difference to the ray's origin along x), 2 (along z), 2 (their product with b) and 4 (the difference of both).
+//! Where the ray is at the lowest and the highest corner is off by 2 (the difference along z), 2 (the product) and 3 (the sum).
+//! So the interval between these two, wider by 15 e M, meets the triangle's own; along y likewise. Rounding keeps order when
+//! coordinates become columns, so intervals that meet have columns in common, and both have all columns of a rectangle.
+
+use super::MeshTree;
+use crate::simd::{D, D3, Simd};
+use crate::geometry::bvh::FAR;
+use crate::geometry::packet::{Packet, WIDTH};
+use crate::geometry::shape::{Touch, Touches};
+use crate::geometry::triangle::{ShearPacket, Triangle, distances, normals};
+use crate::geometry::vector::V3;
+
+/// Meshes of fewer triangles have no columns: their trees are small.
+const FEWEST: usize = 256;
+/// How wide columns are, by the mean extent of triangles: of narrow ones there are many to look at, in wide ones there is much
+/// to test.
+const NARROW: f64 = 0.7;
+/// Columns by triangles, at most.
+const MOST: f64 = 2.0;
+/// In how many columns triangles are on average, at most; meshes of triangles of very different sizes have none.
+const SPREAD: usize = 12;
+/// How far a steep ray gets along x or y for each metre along z, at most.
+const STEEP: f64 = 0.125;
+/// Columns that a ray may pass along x, and along y.
+const PASSED: usize = 4;
+/// Triangles in columns that the rays of a packet pass, at most. A walk through the tree costs about as much as these.
+const CROWD: usize = 320;
+/// No triangle.
+const NONE: u32 = u32::MAX;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Columns {
+    /// The axis of the columns comes last; all other numbers are in this order.
+    axes: [usize; 3],
+    /// Smallest coordinates of all triangles.
+    low: [f64; 2],
+    per_metre: [f64; 2],
+    /// Columns along x and y.
+    size: [usize; 2],
+    /// Where the list of each column begins, row by row along x, and after the last one where it ends.
+    starts: Vec<u32>,
+    lists: Vec<u32>,
+    /// Smallest and largest coordinates of each triangle across the columns.
+    sides: Vec<[[f32; 2]; 2]>,
+    /// Lowest and highest corner.
+    heights: [f64; 2],
+    /// The largest coordinate.
+    reach: f64,
+    /// By how much rays are wider, as a part of the largest coordinate.
+    slack: f64,
+}
+
+impl Columns {
+    /// Columns a bit narrower than the mean triangle; `None` where triangles are in too many.
+    pub(crate) fn new(triangles: &[Triangle], bounds: &[V3; 2], axes: [usize; 3]) -> Option<Self> {
+        if triangles.len() < FEWEST {
+            return None;
+        }
+        let count = triangles.len() as f64;
+        let size = [0, 1].map(|axis| {
+            let mean = triangles.iter().map(|t| extent(t, axes[axis])).map(|[low, high]| high - low).sum::<f64>() / count;
+            (bounds[1][axes[axis]] - bounds[0][axes[axis]]) / (NARROW * mean)
+        });
+        // No more than are worth the memory.
+        let fewer = (MOST * count / (size[0] * size[1])).sqrt().min(1.0);
+        let size = size.map(|n| (n * fewer).ceil());
+        let known = size.iter().all(|n| (1.0..=MOST * count).contains(n));
+        if known { Self::with_size(triangles, bounds, axes, size.map(|n| n as usize)) } else { None }
+    }
+
+    pub(crate) fn with_size(
+        triangles: &[Triangle],
+        bounds: &[V3; 2],
+        axes: [usize; 3],
+        size: [usize; 2],
+    ) -> Option<Self> {
+        let [low, high] = bounds.map(|p| axes.map(|axis| p[axis]));
+        let per_metre = [0, 1].map(|axis| size[axis] as f64 / (high[axis] - low[axis]));
+        let mut columns = Self {
+            axes,
+            low: [low[0], low[1]],
+            per_metre,
+            size,
+            starts: vec![0; size[0] * size[1] + 2],
+            lists: Vec::new(),
+            sides: Vec::new(),
+            heights: [low[2], high[2]],
+            reach: bounds.iter().flatten().fold(0.0, |m, x| x.abs().max(m)),
+            // 32 e.
+            slack: 16.0 * f64::EPSILON,
+        };
+        let most = SPREAD * triangles.len();
+        let rectangles = triangles.iter().map(|t| columns.rectangle(t));
+        let in_all: usize = rectangles.map(|[from, to]| (to[0] - from[0] + 1) * (to[1] - from[1] + 1)).sum();
+        if in_all > most || !per_metre.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let side = |t: &Triangle, axis: usize| extent(t, axes[axis]).map(|x| x as f32);
+        columns.sides = triangles.iter().map(|t| [side(t, 0), side(t, 1)]).collect();
+        // Counted two columns ahead, a running sum says one ahead where each list begins; when a list is written, that is where
+        // the next one begins.
+        for t in triangles {
+            columns.each_row(t, |row, starts, _| row.for_each(|column| starts[column + 2] += 1));
+        }
+        let mut sum = 0;
+        for start in &mut columns.starts {
+            sum += *start;
+            *start = sum;
+        }
+        columns.lists.resize(in_all, 0);
+        for (k, t) in triangles.iter().enumerate() {
+            columns.each_row(t, |row, starts, lists| {
+                for column in row {
+                    let at = &mut starts[column + 1];
+                    lists[*at as usize] = k as u32;
+                    *at += 1;
+                }
+            });
+        }
+        Some(columns)
+    }
+
+    #[cfg(test)]
+    pub(crate) fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
+    /// The same, with rays as wide as they are.
+    #[cfg(test)]
+    pub(crate) fn without_slack(&self) -> Self {
+        Self { slack: 0.0, ..self.clone() }
+    }
+
+    /// The first and the last column of a triangle along both axes.
+    fn rectangle(&self, triangle: &Triangle) -> [[usize; 2]; 2] {
+        let ends = |axis: usize| extent(triangle, self.axes[axis]).map(|x| self.column(axis, x));
+        let ([left, right], [bottom, top]) = (ends(0), ends(1));
+        [[left, bottom], [right, top]]
+    }
+
+    /// Which column a coordinate is in; the first or the last one of those outside.
+    fn column(&self, axis: usize, x: f64) -> usize {
+        let at = (x - self.low[axis]) * self.per_metre[axis];
+        at.max(0.0).min((self.size[axis] - 1) as f64) as usize
+    }
+
+    /// Shows the columns of a triangle, row by row.
+    fn each_row(&mut self, triangle: &Triangle, show: impl Fn(std::ops::Range<usize>, &mut [u32], &mut [u32])) {
+        let [[left, bottom], [right, top]] = self.rectangle(triangle);
+        for row in bottom..=top {
+            let row = row * self.size[0];
+            show(row + left..row + right + 1, &mut self.starts, &mut self.lists);
+        }
+    }
+}
+
+/// Smallest and largest coordinate of a triangle along an axis.
+fn extent(triangle: &Triangle, axis: usize) -> [f64; 2] {
+    let [a, b, c] = triangle.map(|p| f64::from(p[axis]));
+    [a.min(b).min(c), a.max(b).max(c)]
+}
+
+/// Whether the rays of a packet are steep enough.
+#[inline(always)]
+pub(crate) fn are_steep<S: Simd>(s: S, shear: &ShearPacket<S>) -> bool {
+    let [x, y] = shear.slopes();
+    x.abs().max(y.abs()).le(D::splat(s, STEEP)).to_bitmask() == crate::geometry::packet::ALL
+}
+
+/// For both ends, along both axes, what is so of each ray.
+type Ends<T> = [[[T; WIDTH]; 2]; 2];
+
+/// Whether two intervals have something in common.
+#[inline(always)]
+fn meet([a, b]: &[f32; 2], [c, d]: [f64; 2]) -> bool {
+    (f64::from(*a) <= d) & (c <= f64::from(*b))
+}
+
+/// The nearest triangle of each ray that was found.
+struct Nearest {
+    limit: [f64; WIDTH],
+    best: [u32; WIDTH],
+}
+
+/// Triangles and rays to be tested.
+#[derive(Default)]
+struct Pairs {
+    count: usize,
+    triangles: [u32; WIDTH],
+    rays: [usize; WIDTH],
+}
+
+impl Columns {
+    /// What the rays of a packet touch, all of which are steep; false where too much is in their columns, or where they begin
+    /// so far away that rounding could put them into triangles whose boxes they miss in the tree.
+    #[inline(always)]
+    pub(crate) fn touch_packet<S: Simd>(
+        &self,
+        s: S,
+        tree: &MeshTree,
+        packet: &Packet,
+        shear: &ShearPacket<S>,
+        touches: &mut Touches,
+    ) -> bool {
+        let (origin, by) = (shear.origin(), shear.by());
+        if origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).most() > FAR * self.reach {
+            return false;
+        }
+        let (ends, [[left, bottom], [right, top]]) = self.passed(s, &origin, &by);
+        let mut crowd = 0;
+        for k in 0..WIDTH {
+            if !packet.has(k) {
+                continue;
+            }
+            if right[k] - left[k] >= PASSED || top[k] - bottom[k] >= PASSED {
+                return false;
+            }
+            for row in bottom[k]..=top[k] {
+                crowd += self.list(row, left[k], right[k]).len();
+            }
+        }
+        if crowd > CROWD {
+            return false;
+        }
+        let mut nearest = Nearest { limit: packet.limits(s).array(), best: [NONE; WIDTH] };
+        let rays = [origin, by].map(|v| [v[0].array(), v[1].array(), v[2].array()]);
+        let mut pairs = Pairs::default();
+        for k in 0..WIDTH {
+            if !packet.has(k) {
+                continue;
+            }
+            let [x, y] = [[ends[0][0][k], ends[1][0][k]], [ends[0][1][k], ends[1][1][k]]];
+            for row in bottom[k]..=top[k] {
+                for &triangle in self.list(row, left[k], right[k]) {
+                    let at = pairs.count % WIDTH;
+                    (pairs.triangles[at], pairs.rays[at]) = (triangle, k);
+                    // No jump that could not be foretold: about half of them are near the ray.
+                    let sides = &self.sides[triangle as usize];
+                    pairs.count += usize::from(meet(&sides[0], x) & meet(&sides[1], y));
+                    if pairs.count == WIDTH {
+                        pairs.test(s, &tree.triangles, self.axes, &rays, &mut nearest);
+                        pairs.count = 0;
+                    }
+                }
+            }
+        }
+        if pairs.count > 0 {
+            // The others are of before, or none at first: they change nothing.
+            pairs.test(s, &tree.triangles, self.axes, &rays, &mut nearest);
+        }
+        tree.show(s, &nearest.limit, &nearest.best, touches);
+        true
+    }
+
+    /// Between which coordinates rays are, along both axes, and the first and the last columns there.
+    #[inline(always)]
+    fn passed<S: Simd>(&self, s: S, origin: &D3<S>, by: &D3<S>) -> (Ends<f64>, Ends<usize>) {
+        let reach = origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).max(D::splat(s, self.reach));
+        let slack = reach * self.slack;
+        let [below, above] = self.heights.map(|z| D::splat(s, z) - origin[2]);
+        let zero = D::splat(s, 0.0);
+        let (mut ends, mut columns) = ([[[0.0; WIDTH]; 2]; 2], [[[0; WIDTH]; 2]; 2]);
+        for axis in 0..2 {
+            let (a, b) = (origin[axis] + by[axis] * below, origin[axis] + by[axis] * above);
+            let last = D::splat(s, (self.size[axis] - 1) as f64);
+            for (end, x) in [a.min(b) - slack, a.max(b) + slack].into_iter().enumerate() {
+                ends[end][axis] = x.array();
+                let at = (x - D::splat(s, self.low[axis])) * self.per_metre[axis];
+                let at = at.max(zero).min(last).array();
+                for k in 0..WIDTH {
+                    columns[end][axis][k] = at[k] as u32 as usize;
+                }
+            }
+        }
+        (ends, columns)
+    }
+
+    /// What is in some columns of a row.
+    #[inline(always)]
+    fn list(&self, row: usize, left: usize, right: usize) -> &[u32] {
+        let row = row * self.size[0];
+        &self.lists[self.starts[row + left] as usize..self.starts[row + right + 1] as usize]
+    }
+}
+
+impl Pairs {
+    /// Tests all lanes.
+    #[inline(always)]
+    fn test<S: Simd>(
+        &self,
+        s: S,
+        triangles: &[Triangle],
+        axes: [usize; 3],
+        rays: &[[[f64; WIDTH]; 3]; 2],
+        nearest: &mut Nearest,
+    ) {
+        let mut corners = [[[0.0; WIDTH]; 3]; 3];
+        let mut lines = [[[0.0; WIDTH]; 3]; 2];
+        for lane in 0..WIDTH {
+            let triangle = &triangles[self.triangles[lane] as usize];
+            let ray = self.rays[lane] % WIDTH;
+            for axis in 0..3 {
+                for corner in 0..3 {
+                    corners[corner][axis][lane] = f64::from(triangle[corner][axis]);
+                }
+                lines[0][axis][lane] = rays[0][axis][ray];
+                lines[1][axis][lane] = rays[1][axis][ray];
+            }
+        }
+        let load = |v: &[[f64; WIDTH]; 3]| [D::load(s, &v[0]), D::load(s, &v[1]), D::load(s, &v[2])];
+        let [origin, by] = [load(&lines[0]), load(&lines[1])];
+        let met = distances(
+            s,
+            &origin,
+            &by,
+            #[inline(always)]
+            |corner, axis| D::load(s, &corners[corner][axes[axis]]),
+        );
+        let Some((t, inside)) = met else { return };
+        let mut met = (inside & D::splat(s, 0.0).le(t)).to_bitmask();
+        let t = t.array();
+        while met != 0 {
+            let lane = met.trailing_zeros() as usize % WIDTH;
+            met &= met - 1;
+            let (triangle, ray) = (self.triangles[lane], self.rays[lane] % WIDTH);
+            let (limit, best) = (&mut nearest.limit[ray], &mut nearest.best[ray]);
+            // On an edge the first triangle counts.
+            if t[lane] < *limit || t[lane] == *limit && triangle < *best {
+                (*limit, *best) = (t[lane], triangle);
+            }
+        }
+    }
+}
+
+impl MeshTree {
+    /// What the rays touch that found something, lane by lane.
+    #[inline(always)]
+    fn show<S: Simd>(&self, s: S, limit: &[f64; WIDTH], best: &[u32; WIDTH], touches: &mut Touches) {
+        let mut corners = [[[0.0; WIDTH]; 3]; 3];
+        for lane in 0..WIDTH {
+            let found = if best[lane] == NONE { 0 } else { best[lane] as usize };
+            let triangle = &self.triangles[found];
+            for axis in 0..3 {
+                for corner in 0..3 {
+                    corners[corner][axis][lane] = f64::from(triangle[corner][axis]);
+                }
+            }
+        }
+        let (normal, known) = normals(
+            s,
+            #[inline(always)]
+            |corner, axis| D::load(s, &corners[corner][axis]),
+        );
+        let known = known.to_bitmask();
+        for lane in 0..WIDTH {
+            touches[lane] = (best[lane] != NONE && known >> lane & 1 == 1)
+                .then(|| Touch { t: limit[lane] + 0.0, normal: [normal[0][lane], normal[1][lane], normal[2][lane]] });
+        }
+    }
+}

@@ -1,0 +1,340 @@
+//! Steep rays in packets, which look into columns, find what single rays find in the tree, to the bit.
+
+use super::packets::{Compare, targets};
+use super::trees::soup;
+use super::{Dice, bits};
+use crate::geometry::bvh::Stack;
+use crate::geometry::packet::{Packet, WIDTH};
+use crate::geometry::ray::Ray;
+use crate::geometry::shape::mesh::columns::{Columns, are_steep};
+use crate::geometry::shape::mesh::{Mesh, MeshTree};
+use crate::geometry::shape::{ForShape, RayShape, Touches};
+use crate::geometry::triangle::{Shear, ShearPacket, Triangle};
+use crate::geometry::vector::{along, cross, dot, scale, sub, to_f64, unit};
+use crate::geometry::world::{RayHit, RayWorld};
+use crate::simd::{Scalar, at_level, levels};
+use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::{PoseF64, RenderMesh, Shape, pose};
+use std::sync::Arc;
+
+/// The axes of columns along z.
+const ABOVE: [usize; 3] = [0, 1, 2];
+
+/// Numbers of compared rays and packets.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Count {
+    hits: usize,
+    packets: usize,
+    /// Packets that looked into columns.
+    columns: usize,
+    /// Rays that are not what they are alone.
+    wrong: usize,
+}
+
+/// Casts packets as they are and by some columns, at every level, and each ray alone.
+fn compare(tree: &Arc<MeshTree>, columns: Option<&Columns>, rays: &[Ray], max_distance: f64) -> Count {
+    let mesh = Mesh::of_tree(Arc::clone(tree));
+    let mut count = Count { packets: rays.len().div_ceil(WIDTH), ..Count::default() };
+    Compare { rays, max_distance, what: "steep", hits: &mut count.hits }.run(&mesh);
+    let Some(columns) = columns else { return count };
+    for rays in rays.chunks(WIDTH) {
+        let packet = Packet::of(rays, max_distance);
+        for (index, level) in levels().into_iter().enumerate() {
+            let mut touches: Touches = [None; WIDTH];
+            let by_columns = at_level!(level, s => match ShearPacket::new(s, &packet) {
+                Some(shear) if are_steep(s, &shear) && columns.axes() == shear.axes() => {
+                    columns.touch_packet(s, tree, &packet, &shear, &mut touches)
+                }
+                _ => false,
+            });
+            if by_columns {
+                count.columns += usize::from(index == 0);
+                let alone = |ray: &Ray| mesh.touch(ray, max_distance, &mut Stack::default());
+                let alone = |k: usize| rays.get(k).filter(|ray| ray.is_finite()).and_then(alone);
+                count.wrong += (0..WIDTH).filter(|&k| bits(&alone(k)) != bits(&touches[k])).count();
+            }
+        }
+    }
+    count
+}
+
+/// Packets of steep rays towards about `at`, from above and from below: along z, on a grid of eighths, where edges and corners
+/// are hit exactly; along z anywhere; parallel ones; fans to points of the grid; from within; and some that are not steep.
+fn steep(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
+    let mut rays = Vec::new();
+    for kind in 0..240 {
+        let sign = if kind % 2 == 0 { -1.0 } else { 1.0 };
+        let eighth = |x: f64| (8.0 * x).round() / 8.0;
+        let first = dice.point(1.0);
+        let slope = [0; 2].map(|_| dice.number(-0.125, 0.125) * if kind % 12 == 2 { 2.0 } else { 0.9 });
+        let slanted = unit([slope[0], slope[1], sign]).unwrap();
+        let far = if kind % 5 == 0 { 0.2 } else { 10f64.powf(dice.number(0.3, 2.0)) };
+        for k in 0..WIDTH {
+            let grid = [eighth(first[0]) + 0.125 * (k % 4) as f64, eighth(first[1]) + 0.125 * (k / 4) as f64];
+            let near = along(first, 0.3, dice.point(1.0));
+            let (to, direction) = match kind % 6 {
+                0 => ([grid[0], grid[1], 0.0], [0.0, 0.0, sign]),
+                1 => (near, [0.0, -0.0, sign]),
+                2 => (near, slanted),
+                3 => ([grid[0], grid[1], eighth(first[2])], slanted),
+                4 => (near, unit([dice.number(-0.1, 0.1), dice.number(-0.1, 0.1), sign]).unwrap()),
+                _ => {
+                    let from = [first[0], first[1], -9.0 * sign];
+                    ([grid[0], grid[1], 0.0], unit(sub([grid[0], grid[1], 0.0], from)).unwrap())
+                }
+            };
+            let mut ray = Ray { origin: along(along(to, -far, direction), 1.0, at), direction };
+            if dice.number(0.0, 1.0) < 0.01 {
+                ray.origin[k % 3] = f64::NAN;
+            }
+            rays.push(ray);
+        }
+    }
+    rays
+}
+
+/// Cells of eighths about the middle, two triangles each, at heights of sixty-fourths.
+fn sheet(dice: &mut Dice, side: usize, height: f64) -> Vec<Triangle> {
+    let heights: Vec<f32> =
+        (0..side * side).map(|_| (height + f64::from(dice.number(0.0, 16.0) as u8) / 64.0) as f32).collect();
+    let half = (side - 1) as f32 / 16.0;
+    let point = |i: usize, j: usize| [i as f32 / 8.0 - half, j as f32 / 8.0 - half, heights[j * side + i]];
+    let cell = |i: usize, j: usize| {
+        let [a, b, c, d] = [point(i, j), point(i + 1, j), point(i, j + 1), point(i + 1, j + 1)];
+        [[a, b, d], [a, d, c]]
+    };
+    let cells = (0..side - 1).flat_map(|j| (0..side - 1).map(move |i| (i, j)));
+    cells.flat_map(|(i, j)| cell(i, j)).collect()
+}
+
+/// With the coordinates x, y, z along some axes.
+fn turned<T: Copy>(p: [T; 3], axes: [usize; 3]) -> [T; 3] {
+    let mut to = p;
+    axes.into_iter().zip(p).for_each(|(axis, x)| to[axis] = x);
+    to
+}
+
+fn moved(triangles: &[Triangle], by: f32) -> Vec<Triangle> {
+    triangles.iter().map(|t| t.map(|p| p.map(|x| x + by))).collect()
+}
+
+#[test]
+fn steep_rays() {
+    let mut dice = Dice(51);
+    let ground = sheet(&mut dice, 25, 0.0);
+    // Twice the same triangles: of all ties the first one counts.
+    let twice: Vec<Triangle> = ground.iter().chain(&ground).copied().collect();
+    let layers: Vec<Triangle> = (0..4).flat_map(|k| sheet(&mut dice, 25, 0.3 * f64::from(k) - 0.9)).collect();
+    let rotated = ground.iter().map(|t| t.map(|p| [0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1], p[2]]));
+    let flat = ground.iter().map(|t| t.map(|p| [p[0], p[1], 0.25]));
+    for (what, triangles, at) in [
+        ("a sheet", ground.clone(), 0.0),
+        ("two sheets", twice, 0.0),
+        ("four layers", layers, 0.0),
+        ("a turned sheet", rotated.collect(), 0.0),
+        ("a flat sheet", flat.collect(), 0.0),
+        ("a sheet far away", moved(&ground, 4096.0), 4096.0),
+        ("soup", soup(&mut dice, 1500, [0.0; 3]), 0.0),
+        ("soup far away", soup(&mut dice, 1500, [3000.0; 3]), 3000.0),
+    ] {
+        let mut all = Count::default();
+        for (last, max_distance) in [(2, f64::INFINITY), (2, 3.0), (2, 0.5), (0, f64::INFINITY), (1, 3.0)] {
+            // The same with other axes above.
+            let axes = [(last + 1) % 3, (last + 2) % 3, last];
+            let tree: Vec<_> = triangles.iter().map(|t| t.map(|p| turned(p, axes))).collect();
+            let tree = Arc::new(MeshTree::of_triangles(&tree));
+            let rays: Vec<Ray> = steep(&mut dice, [at; 3])
+                .iter()
+                .map(|ray| Ray { origin: turned(ray.origin, axes), direction: turned(ray.direction, axes) })
+                .collect();
+            let count = compare(&tree, tree.columns(axes), &rays, max_distance);
+            assert_eq!(count.wrong, 0, "{what}: {count:?}");
+            (all.hits, all.packets, all.columns) =
+                (all.hits + count.hits, all.packets + count.packets, all.columns + count.columns);
+        }
+        // In a soup, much is above each other; its packets go on in the tree.
+        let least = if what.starts_with("soup") { 0 } else { all.packets / 3 };
+        assert!(all.hits > 1000 && all.columns >= least, "{what}: {all:?}");
+    }
+}
+
+/// Rays to corners of a nearly flat sheet (its normals tell which triangle was hit), where columns meet, from a bit less than
+/// -8192 m along x: there the difference to a corner is rounded and that to the sheet is not. The slack of rays is needed.
+/// The control: without it, some are lost.
+#[test]
+fn slack() {
+    let mut dice = Dice(52);
+    let flat = sheet(&mut dice, 33, 0.0);
+    let flat: Vec<Triangle> = flat.iter().map(|t| t.map(|p| [p[0] + 2.5, p[1] + 2.5, 1e-30 * p[2]])).collect();
+    let tree = Arc::new(MeshTree::of_triangles(&flat));
+    let columns = Columns::with_size(tree.triangles(), &[[0.5, 0.5, 0.0], [4.5, 4.5, 1e-30]], ABOVE, [32, 32]).unwrap();
+    let rays: Vec<Ray> = (0..12_000)
+        .map(|k| {
+            let corner = to_f64(tree.triangles()[k % 2048][k % 3]);
+            let slope = dice.number(0.05, 0.12);
+            let direction = unit([slope, dice.number(-0.01, 0.01), -1.0]).unwrap();
+            let across = 8192.0 + corner[0] * dice.number(0.0, 1.0);
+            let mut origin = along(corner, -across / direction[0], direction);
+            origin[0] += dice.number(-1e-12, 1e-12);
+            Ray { origin, direction }
+        })
+        .collect();
+    let count = compare(&tree, Some(&columns), &rays, f64::INFINITY);
+    assert_eq!((count.wrong, count.columns), (0, count.packets));
+    assert!(count.hits > 9000, "{count:?}");
+    let without = compare(&tree, Some(&columns.without_slack()), &rays, f64::INFINITY);
+    assert!(without.wrong > 10, "{without:?}");
+}
+
+/// From very far away, the place of a ray at the mesh is rounding, and columns would hit triangles that the boxes of the tree
+/// hide: these rays are left to the tree. The control: from closer, columns are used.
+#[test]
+fn far_rays() {
+    let mut dice = Dice(57);
+    let tree = Arc::new(MeshTree::of_triangles(&sheet(&mut dice, 25, 0.0)));
+    let mut count = |sizes: f64| {
+        // The sheet is 3 m wide.
+        let ray = |_| {
+            let direction = unit([dice.number(-0.1, 0.1), dice.number(-0.1, 0.1), -1.0]).unwrap();
+            Ray { origin: along(dice.point(1.6), -3.0 * sizes, direction), direction }
+        };
+        let rays: Vec<Ray> = (0..16_000).map(ray).collect();
+        compare(&tree, tree.columns(ABOVE), &rays, f64::INFINITY)
+    };
+    for sizes in [1e10, 1e11, 1e12] {
+        let count = count(sizes);
+        assert_eq!((count.wrong, count.columns), (0, 0), "{sizes}: {count:?}");
+        assert!(count.hits > 8000, "{sizes}: {count:?}");
+    }
+    let near = count(1e3);
+    assert!(near.wrong == 0 && near.columns == near.packets && near.hits > 8000, "{near:?}");
+}
+
+/// Columns are for meshes that are spread out, of triangles of about the same size.
+#[test]
+fn meshes_without_columns() {
+    let mut dice = Dice(53);
+    let ground = sheet(&mut dice, 25, 0.0);
+    let wall: Vec<Triangle> = ground.iter().map(|t| t.map(|p| [0.5, p[0], p[1]])).collect();
+    let all = [[-1.5, -1.5, 0.0], [1.5, -1.5, 0.0], [1.5, 1.5, 0.0]];
+    let mix = |(k, t): (usize, &Triangle)| if k.is_multiple_of(40) { all } else { *t };
+    let mixed: Vec<Triangle> = ground.iter().enumerate().map(mix).collect();
+    for (what, triangles, expected) in [
+        ("ground", &ground[..], true),
+        ("few", &ground[..100], false),
+        ("none", &[], false),
+        ("a wall, without extent along x", &wall, false),
+        ("of very different sizes", &mixed, false),
+    ] {
+        assert_eq!(MeshTree::of_triangles(triangles).columns(ABOVE).is_some(), expected, "{what}");
+    }
+}
+
+/// A packet whose columns hold too many triangles takes the tree.
+#[test]
+fn crowded_columns() {
+    let mut dice = Dice(54);
+    let mut triangles = sheet(&mut dice, 33, 0.0);
+    triangles.extend(soup(&mut dice, 900, [0.0; 3]).iter().map(|t| t.map(|p| p.map(|x| 0.05 * x))));
+    let tree = Arc::new(MeshTree::of_triangles(&triangles));
+    let rays = |x: f64| -> Vec<Ray> {
+        let ray = |k: usize| [x + 0.01 * (k % 4) as f64, 0.01 * (k / 4) as f64, 2.0];
+        (0..WIDTH).map(|k| Ray { origin: ray(k), direction: [0.0, 0.0, -1.0] }).collect()
+    };
+    let count = compare(&tree, tree.columns(ABOVE), &rays(0.0), f64::INFINITY);
+    assert_eq!(count, Count { hits: WIDTH, packets: 1, columns: 0, wrong: 0 });
+    let count = compare(&tree, tree.columns(ABOVE), &rays(1.0), f64::INFINITY);
+    assert_eq!(count, Count { hits: WIDTH, packets: 1, columns: 1, wrong: 0 }, "the control: beside it");
+}
+
+/// Rays in the planes of triangles pass them at a distance of at least their length: none is inside, however edges are
+/// rounded. The control: by the signs of edges alone, as the source of the test has it, some are.
+#[test]
+fn edge_on() {
+    let mut dice = Dice(55);
+    let (mut rays, mut by_signs) = (0, 0);
+    for _ in 0..200_000 {
+        let triangle: Triangle = [0; 3].map(|_| dice.point(1.0).map(|x| x as f32));
+        let [a, b, c] = triangle.map(to_f64);
+        let (p, q) = (sub(b, a), sub(c, a));
+        let Some(direction) = unit(along(scale(p, dice.number(-1.0, 1.0)), dice.number(-1.0, 1.0), q)) else {
+            continue;
+        };
+        let Some(beside) = unit(cross(direction, cross(p, q))) else { continue };
+        let [x, y, z] = [a, b, c].map(|p| dot(beside, p));
+        let (low, high) = (x.min(y).min(z), x.max(y).max(z));
+        let away = high + (high - low) * dice.number(1.0, 3.0) - x;
+        let origin = along(along(a, away, beside), -dice.number(0.0, 5.0), direction);
+        let ray = Ray { origin, direction };
+        rays += 1;
+        assert_eq!(Shear::new(&ray).distance(&triangle), None, "{ray:?} {triangle:?}");
+        let packet = Packet::of(&[ray], f64::INFINITY);
+        let together = ShearPacket::new(Scalar, &packet).unwrap().distances(&triangle);
+        assert!(together.is_none_or(|(_, inside)| inside.to_bitmask() == 0), "{ray:?} {triangle:?}");
+        by_signs += usize::from(inside_by_signs(&ray, &triangle));
+    }
+    assert!(rays > 190_000 && by_signs > 10, "{by_signs} of {rays}");
+}
+
+fn inside_by_signs(ray: &Ray, triangle: &Triangle) -> bool {
+    let shear = ShearPacket::new(Scalar, &Packet::of(&[*ray], f64::INFINITY)).unwrap();
+    let ([i, j, k], o) = (shear.axes(), ray.origin);
+    let by = shear.slopes().map(|x| x.array()[0]);
+    let [a, b, c] = triangle.map(to_f64).map(|p| {
+        let z = p[k] - o[k];
+        [(p[i] - o[i]) - by[0] * z, (p[j] - o[j]) - by[1] * z]
+    });
+    let edges = [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]];
+    let mixed = edges.iter().any(|&x| x < 0.0) && edges.iter().any(|&x| x > 0.0);
+    !mixed && edges.iter().sum::<f64>() != 0.0
+}
+
+/// Height scanners over and beside fixed and moving meshes: scans of the whole world, and every ray alone.
+#[test]
+fn scans() {
+    let mut dice = Dice(56);
+    let mesh = |triangles: &[Triangle]| {
+        let positions = triangles.iter().flatten().copied().collect();
+        let triangles = (0..triangles.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+        let mesh = TriMesh { positions, triangles, ..TriMesh::default() };
+        Shape::from(kinetoscope_scene::shape::Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) })
+    };
+    let (ground, heap) = (mesh(&sheet(&mut dice, 40, 0.0)), mesh(&soup(&mut dice, 400, [0.0; 3])));
+    let targets = targets(&[ground.clone(), ground, heap.clone(), heap], 4, |k| k < 2);
+    // The grid of a height scanner: 16 by 10 parallel rays, 0.1 m apart.
+    let pattern: Vec<Ray> = (0..160)
+        .map(|k| [-0.8 + 0.1 * (k % 16) as f64, -0.5 + 0.1 * (k / 16) as f64, 0.0])
+        .map(|origin| Ray { origin, direction: [0.0, 0.0, -1.0] })
+        .collect();
+    let (mut hits, mut seen) = (0, [0; 4]);
+    for round in 0..12 {
+        let mut placed = |far: f64| PoseF64::from(&pose::from_xyz_rpy(dice.point(far), dice.point(1.0)));
+        // The first two at the same place: the first one counts.
+        let poses = [PoseF64::IDENTITY, PoseF64::IDENTITY, placed(1.0), placed(1.0)];
+        let poses = if round % 3 == 0 { poses } else { [PoseF64::IDENTITY, placed(0.3), poses[2], poses[3]] };
+        let roll = if round % 2 == 0 { 0.0 } else { 0.4 };
+        let yaw = dice.number(-3.0, 3.0);
+        let at = pose::from_xyz_rpy([dice.number(-2.0, 2.0), dice.number(-2.0, 2.0), 6.0], [roll, -roll, yaw]);
+        let mut rays: Vec<Ray> = pattern.iter().map(|ray| ray.mapped_by(&PoseF64::from(&at))).collect();
+        rays[round * 7].origin[1] = f64::NAN;
+        for level in levels() {
+            let mut world = RayWorld::with_level(&targets, level);
+            world.place(&poses);
+            let mut together = vec![RayHit::MISS; rays.len()];
+            world.cast(&rays, 8.0, &mut together);
+            for (ray, hit) in rays.iter().zip(&together) {
+                let mut alone = *hit;
+                world.cast(std::slice::from_ref(ray), 8.0, std::slice::from_mut(&mut alone));
+                assert_eq!(
+                    (alone, alone.distance.to_bits()),
+                    (*hit, hit.distance.to_bits()),
+                    "round {round}, {level:?}"
+                );
+            }
+            for hit in together.iter().filter(|hit| hit.is_hit()) {
+                (hits, seen[hit.instance as usize]) = (hits + 1, seen[hit.instance as usize] + 1);
+            }
+        }
+    }
+    assert!(hits > 2000 && seen.iter().all(|&n| n > 5), "{hits} {seen:?}");
+}

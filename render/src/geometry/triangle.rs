@@ -1,0 +1,214 @@
+//! A ray against a triangle, without gaps between neighbours.
+
+use super::packet::{ALL, Packet, WIDTH};
+use super::vector::{V3, cross, dot, sub, to_f64, unit};
+use crate::geometry::ray::Ray;
+use crate::simd::{D, D3, N, Simd, axes, dot_3};
+
+/// Corners of a triangle \[m\].
+pub(crate) type Triangle = [[f32; 3]; 3];
+
+/// A ray, sheared so that it runs along one axis. Source: Woop, Benthin, Wald: Watertight ray/triangle intersection,
+/// JCGT 2(1), 2013; in double precision. An edge has the same magnitude, to the bit, in both triangles that share it, so
+/// that no ray passes between them.
+///
+/// What is on which side of an edge is the sign of a difference of two products. Rounding keeps order, so that sign is never
+/// the wrong one; but it may be none, and of a triangle that is seen edge on a ray in its plane would be inside however far
+/// it passes beside it. So with an edge that has no sign, a ray is inside only if it is between the corners along both axes.
+/// That is so for every ray that is inside or on an edge, which leaves no gap either.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shear {
+    origin: V3,
+    /// The axis along which the ray is longest comes last.
+    axes: [usize; 3],
+    by: V3,
+}
+
+impl Shear {
+    #[inline(always)]
+    pub(crate) fn new(ray: &Ray) -> Self {
+        let d = ray.direction;
+        let [x, y, z] = d.map(f64::abs);
+        let last = if x > y && x > z { 0 } else { 1 + usize::from(z >= y) };
+        let axes = [(last + 1) % 3, (last + 2) % 3, last];
+        let inverse = 1.0 / d[last];
+        Self { origin: ray.origin, axes, by: [d[axes[0]] * inverse, d[axes[1]] * inverse, inverse] }
+    }
+
+    /// Distance of the plane of a triangle, where the ray is inside of the triangle; from either side. Of any sign.
+    #[inline(always)]
+    pub(crate) fn distance(&self, triangle: &Triangle) -> Option<f64> {
+        let [i, j, k] = self.axes;
+        let [a, b, c] = triangle.map(|p| {
+            let v =
+                [f64::from(p[i]) - self.origin[i], f64::from(p[j]) - self.origin[j], f64::from(p[k]) - self.origin[k]];
+            [v[0] - self.by[0] * v[2], v[1] - self.by[1] * v[2], v[2]]
+        });
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
+        let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
+        let whole = u + v + w;
+        // Zero where the ray runs in the plane of the triangle: its neighbours are hit.
+        if outside || whole == 0.0 {
+            return None;
+        }
+        let beside = |axis: usize| {
+            let [a, b, c] = [a, b, c].map(|p| p[axis]);
+            a < 0.0 && b < 0.0 && c < 0.0 || a > 0.0 && b > 0.0 && c > 0.0
+        };
+        if (u == 0.0 || v == 0.0 || w == 0.0) && (beside(0) || beside(1)) {
+            return None;
+        }
+        Some((u * a[2] + v * b[2] + w * c[2]) * self.by[2] / whole)
+    }
+}
+
+/// The same for all rays of a packet, of which every one runs along the same axis: the same operations in the same order, so
+/// the same bits.
+#[derive(Clone, Copy)]
+pub(crate) struct ShearPacket<S: Simd> {
+    s: S,
+    /// In the order of `axes`.
+    origin: D3<S>,
+    axes: [usize; 3],
+    by: D3<S>,
+}
+
+impl<S: Simd> ShearPacket<S> {
+    /// `None` where some rays run along one axis and some along another.
+    #[inline(always)]
+    pub(crate) fn new(s: S, packet: &Packet) -> Option<Self> {
+        let d = packet.directions(s);
+        let (x, y, z) = (d[0].abs(), d[1].abs(), d[2].abs());
+        let first = (y.lt(x) & z.lt(x)).to_bitmask();
+        let third = y.le(z).to_bitmask() & !first;
+        let last = match (first, third) {
+            (ALL, _) => 0,
+            (0, ALL) => 2,
+            (0, 0) => 1,
+            _ => return None,
+        };
+        let [i, j] = [(last + 1) % 3, (last + 2) % 3];
+        let origin = packet.origins(s);
+        let inverse = D::splat(s, 1.0) / d[last];
+        let by = [d[i] * inverse, d[j] * inverse, inverse];
+        Some(Self { s, origin: [origin[i], origin[j], origin[last]], axes: [i, j, last], by })
+    }
+
+    /// The axis along which rays are longest comes last.
+    #[inline(always)]
+    pub(crate) fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
+    /// Where rays begin, in the order of the axes.
+    #[inline(always)]
+    pub(crate) fn origin(&self) -> D3<S> {
+        self.origin
+    }
+
+    /// How far rays get along the first and the second axis, for each metre along the third.
+    #[inline(always)]
+    pub(crate) fn slopes(&self) -> [D<S>; 2] {
+        [self.by[0], self.by[1]]
+    }
+
+    /// How far rays get along the first and the second axis for each metre along the third, and how far along themselves.
+    #[inline(always)]
+    pub(crate) fn by(&self) -> D3<S> {
+        self.by
+    }
+
+    /// Distances of the plane of a triangle, and which rays are inside of the triangle; `None` where none is.
+    #[inline(always)]
+    pub(crate) fn distances(&self, triangle: &Triangle) -> Option<(D<S>, N<S>)> {
+        let s = self.s;
+        distances(
+            s,
+            &self.origin,
+            &self.by,
+            #[inline(always)]
+            |corner, axis| D::splat(s, f64::from(triangle[corner][self.axes[axis]])),
+        )
+    }
+}
+
+/// Distances of the planes of triangles along rays, a pair of them in each lane, and which rays are inside; `None` where none
+/// is. Coordinates are in the order of a [`Shear`]'s axes: those of rays, how they are sheared, and those of a corner.
+#[inline(always)]
+pub(crate) fn distances<S: Simd>(
+    s: S,
+    origin: &D3<S>,
+    by: &D3<S>,
+    corner: impl Fn(usize, usize) -> D<S>,
+) -> Option<(D<S>, N<S>)> {
+    let [a, b, c] = axes(
+        #[inline(always)]
+        |k| {
+            let [x, y, z] = [corner(k, 0) - origin[0], corner(k, 1) - origin[1], corner(k, 2) - origin[2]];
+            [x - by[0] * z, y - by[1] * z, z]
+        },
+    );
+    let u = c[0] * b[1] - c[1] * b[0];
+    let v = a[0] * c[1] - a[1] * c[0];
+    let w = b[0] * a[1] - b[1] * a[0];
+    let zero = D::splat(s, 0.0);
+    // Where one of them is no number, neither is the distance, and it does not matter which side that is.
+    let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+    let whole = u + v + w;
+    let mut inside = !((least.lt(zero) & zero.lt(most)) | whole.eq(zero));
+    let on_edge = inside & (u.eq(zero) | v.eq(zero) | w.eq(zero));
+    if inside.to_bitmask() == 0 {
+        return None;
+    }
+    if on_edge.to_bitmask() != 0 {
+        for axis in 0..2 {
+            let [a, b, c] = [a[axis], b[axis], c[axis]];
+            let below = a.lt(zero) & b.lt(zero) & c.lt(zero);
+            let above = zero.lt(a) & zero.lt(b) & zero.lt(c);
+            inside = inside & !(on_edge & (below | above));
+        }
+    }
+    Some(((u * a[2] + v * b[2] + w * c[2]) * by[2] / whole, inside))
+}
+
+/// As [`normal`], to the bit, of a triangle in each lane, and which ones have an area.
+#[inline(always)]
+pub(crate) fn normals<S: Simd>(s: S, corner: impl Fn(usize, usize) -> D<S>) -> ([[f64; WIDTH]; 3], N<S>) {
+    let p = axes(
+        #[inline(always)]
+        |axis| corner(1, axis) - corner(0, axis),
+    );
+    let q = axes(
+        #[inline(always)]
+        |axis| corner(2, axis) - corner(0, axis),
+    );
+    let across = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
+    let largest = across[0].abs().max(across[1].abs()).max(across[2].abs());
+    let across = [across[0] / largest, across[1] / largest, across[2] / largest];
+    let by = D::splat(s, 1.0) / dot_3(across, across).sqrt();
+    let known = D::splat(s, 0.0).lt(largest) & largest.lt(D::splat(s, f64::INFINITY));
+    ([(across[0] * by).array(), (across[1] * by).array(), (across[2] * by).array()], known)
+}
+
+/// Unit normal, counter-clockwise corners seen from its tip; `None` for a triangle without an area.
+pub(crate) fn normal(triangle: &Triangle) -> Option<V3> {
+    unit(across(triangle))
+}
+
+/// Whether a triangle has corners of finite numbers and an area, and so a [`normal`].
+#[inline(always)]
+pub(crate) fn has_area(triangle: &Triangle) -> bool {
+    // Squares of products of two single precision numbers, 1e-180 to 1e157, are in the range; what is not finite makes
+    // something that is not.
+    let across = across(triangle);
+    let square = dot(across, across);
+    square > 0.0 && square < f64::INFINITY
+}
+
+#[inline(always)]
+fn across(triangle: &Triangle) -> V3 {
+    let [a, b, c] = triangle.map(to_f64);
+    cross(sub(b, a), sub(c, a))
+}

@@ -1,0 +1,447 @@
+//! What rays hit in one environment.
+
+use super::bvh::{Beam, Bvh, Stack, Walked};
+use super::packet::{Packet, WIDTH};
+use super::shape::{ForShape, RayShape, Solid, Touch};
+use super::triangle::ShearPacket;
+use super::vector::{V3, dot};
+use crate::geometry::assets::RayAssets;
+use crate::geometry::ray::Ray;
+use crate::simd::{D, Level, Simd, at_level};
+use kinetoscope_scene::{PoseF64, RenderScene};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// More instances that do not move than this are put into a tree.
+const FEW: usize = 4;
+/// How much larger bounding spheres are: more than the rounding of the test, for things down to a billionth of their
+/// distance.
+const LARGER: f64 = 1.0 + 1e-6;
+/// Targets of a tree that a packet meets together; where there are more in its way, rays go on one by one.
+const BUDGET: usize = 48;
+
+/// What a ray hit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// How far away \[m\]; +inf for a miss.
+    pub distance: f64,
+    /// Unit normal of the surface, turned to where the ray comes from, in the environment; 0 for a miss.
+    pub normal: [f64; 3],
+    /// Index of the instance in the scene; [`RayHit::NOTHING`] for a miss.
+    pub instance: u32,
+    /// The instance's mask id; 0 for a miss.
+    pub mask_id: i32,
+}
+
+impl RayHit {
+    /// The instance of a miss.
+    pub const NOTHING: u32 = u32::MAX;
+    /// No hit.
+    pub const MISS: Self = Self { distance: f64::INFINITY, normal: [0.0; 3], instance: Self::NOTHING, mask_id: 0 };
+
+    /// Whether something was hit.
+    pub fn is_hit(&self) -> bool {
+        self.instance != Self::NOTHING
+    }
+}
+
+/// Instances of a scene that rays hit: immutable, shared by all environments and threads.
+#[derive(Clone, Debug)]
+pub struct RayTargets {
+    targets: Vec<Target>,
+    /// Those of `targets` that do not move, and those that may.
+    fixed: Vec<u32>,
+    moving: Vec<u32>,
+    /// Instances of the scene.
+    instances: usize,
+}
+
+#[derive(Clone, Debug)]
+struct Target {
+    instance: u32,
+    mask_id: i32,
+    /// Whether it can be hit: what cannot be seen keeps its place, since it may be seen in another environment.
+    visible: bool,
+    solid: Solid,
+    /// Middle and radius of a sphere around it; `None` for a shape without an end.
+    sphere: Option<(V3, f64)>,
+}
+
+/// A target in an environment.
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    target: u32,
+    world_from_target: PoseF64,
+    /// Of the sphere around it; a radius of +inf where there is none.
+    middle: V3,
+    radius: f64,
+}
+
+/// Targets that do not move, where they are: shared by all environments where they are at the same places.
+#[derive(Clone, Debug, Default)]
+pub struct FixedWorld {
+    placed: Vec<Placed>,
+    /// Over some of `placed`, given by the list; the others are tested one by one.
+    tree: Option<(Bvh, Vec<u32>)>,
+    one_by_one: Vec<u32>,
+}
+
+/// What rays hit, at the places of one environment. Keeps its scratch memory; use one per thread.
+#[derive(Clone, Debug)]
+pub struct RayWorld {
+    targets: Arc<RayTargets>,
+    fixed: Arc<FixedWorld>,
+    moving: Vec<Placed>,
+    level: Level,
+    packets: Vec<Packet>,
+    outer: Stack,
+    inner: Stack,
+}
+
+impl RayTargets {
+    /// The instances of `scene` that `wanted` names, by their indices; repetitions count once, others are left out.
+    /// Those that are not visible are never hit. Trees over meshes are taken from `assets`, or built.
+    pub fn new(scene: &RenderScene, wanted: impl IntoIterator<Item = usize>, assets: &RayAssets) -> Self {
+        let mut is_wanted = vec![false; scene.instances().len()];
+        for index in wanted {
+            if let Some(is_wanted) = is_wanted.get_mut(index) {
+                *is_wanted = true;
+            }
+        }
+        let mut out = Self { targets: vec![], fixed: vec![], moving: vec![], instances: is_wanted.len() };
+        assets.with(|assets| {
+            for (index, instance) in scene.instances().iter().enumerate().filter(|(index, _)| is_wanted[*index]) {
+                let solid = Solid::of(&instance.shape, assets);
+                let sphere = solid.bounds().map(|[lo, hi]| {
+                    let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
+                    ([0, 1, 2].map(|k| 0.5 * (hi[k] + lo[k])), dot(half, half).sqrt() * LARGER)
+                });
+                let list = if instance.fixed { &mut out.fixed } else { &mut out.moving };
+                list.push(out.targets.len() as u32);
+                out.targets.push(Target {
+                    instance: index as u32,
+                    mask_id: instance.mask_id,
+                    visible: instance.visible,
+                    solid,
+                    sphere,
+                });
+            }
+        });
+        out
+    }
+
+    /// Indices of the instances that can be hit.
+    pub fn instances(&self) -> impl Iterator<Item = usize> {
+        self.targets.iter().map(|t| t.instance as usize)
+    }
+
+    /// How many instances can be hit.
+    pub fn len(&self) -> usize {
+        self.targets.len()
+    }
+
+    /// Whether nothing can be hit.
+    pub fn is_empty(&self) -> bool {
+        self.targets.is_empty()
+    }
+
+    /// How many of them never move.
+    pub fn fixed_count(&self) -> usize {
+        self.fixed.len()
+    }
+
+    /// How many of them may move.
+    pub fn moving_count(&self) -> usize {
+        self.moving.len()
+    }
+
+    /// The poses of those that may move, from those of all instances.
+    pub fn moving_poses(&self, poses: &[PoseF64]) -> impl Iterator<Item = PoseF64> {
+        self.moving.iter().map(|&index| self.pose_of(index, poses))
+    }
+
+    fn pose_of(&self, index: u32, poses: &[PoseF64]) -> PoseF64 {
+        poses[self.targets[index as usize].instance as usize]
+    }
+
+    /// A target at a pose; `None` where that is no pose, or the target cannot be seen: it cannot be hit there.
+    fn place(&self, index: u32, pose: PoseF64) -> Option<Placed> {
+        let target = &self.targets[index as usize];
+        if !pose.is_finite() || !target.visible {
+            return None;
+        }
+        let (middle, radius) = target.sphere.map_or(([0.0; 3], f64::INFINITY), |(m, r)| (pose.apply(m), r));
+        Some(Placed { target: index, world_from_target: pose, middle, radius })
+    }
+}
+
+impl FixedWorld {
+    pub fn new(targets: &RayTargets, poses: &[PoseF64]) -> Self {
+        let placed: Vec<Placed> =
+            targets.fixed.iter().filter_map(|&t| targets.place(t, targets.pose_of(t, poses))).collect();
+        let (mut in_tree, mut one_by_one): (Vec<u32>, Vec<u32>) =
+            (0..placed.len() as u32).partition(|&k| placed[k as usize].radius < f64::from(f32::MAX));
+        if in_tree.len() <= FEW {
+            one_by_one.append(&mut in_tree);
+            return Self { placed, tree: None, one_by_one };
+        }
+        let (bvh, order) = Bvh::build(in_tree.iter().map(|&k| targets.world_box(&placed[k as usize])));
+        let order = order.into_iter().map(|i| in_tree[i as usize]).collect();
+        Self { placed, tree: Some((bvh, order)), one_by_one }
+    }
+
+    /// Whether targets that do not move are where they were when this was built.
+    pub fn is_at(&self, targets: &RayTargets, poses: &[PoseF64]) -> bool {
+        let mut placed = self.placed.iter();
+        let same = targets.fixed.iter().all(|&t| match targets.place(t, targets.pose_of(t, poses)) {
+            None => true,
+            Some(here) => {
+                placed.next().is_some_and(|p| p.target == here.target && p.world_from_target == here.world_from_target)
+            }
+        });
+        same && placed.next().is_none()
+    }
+}
+
+impl RayTargets {
+    /// The box around a target in the world, rounded outward.
+    fn world_box(&self, placed: &Placed) -> [[f32; 3]; 2] {
+        let [lo, hi] = self.targets[placed.target as usize].solid.bounds().unwrap_or([[0.0; 3]; 2]);
+        let (middle, half) = ([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k])), [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k])));
+        let pose = &placed.world_from_target;
+        let at = pose.apply(middle);
+        let reach = pose.rotation.map(|r| LARGER * (0..3).map(|k| r[k].abs() * half[k]).sum::<f64>());
+        [
+            [0, 1, 2].map(|k| ((at[k] - reach[k]) as f32).next_down()),
+            [0, 1, 2].map(|k| ((at[k] + reach[k]) as f32).next_up()),
+        ]
+    }
+}
+
+impl RayWorld {
+    /// Nothing is placed yet.
+    pub fn new(targets: &Arc<RayTargets>) -> Self {
+        Self::with_level(targets, Level::best())
+    }
+
+    pub(crate) fn with_level(targets: &Arc<RayTargets>, level: Level) -> Self {
+        Self {
+            targets: Arc::clone(targets),
+            fixed: Arc::new(FixedWorld::default()),
+            moving: Vec::with_capacity(targets.moving.len()),
+            level,
+            packets: Vec::new(),
+            outer: Stack::default(),
+            inner: Stack::default(),
+        }
+    }
+
+    /// What can be hit.
+    pub fn targets(&self) -> &Arc<RayTargets> {
+        &self.targets
+    }
+
+    /// Puts everything where it is: `poses` are world from instance, one for every instance of the scene. What does not
+    /// move is prepared anew only where it is elsewhere than before. A target whose pose is not finite is not hit.
+    ///
+    /// # Panics
+    ///
+    /// There are fewer poses than instances in the scene.
+    #[track_caller]
+    pub fn place(&mut self, poses: &[PoseF64]) {
+        assert!(poses.len() >= self.targets.instances, "poses of another scene");
+        if !self.fixed.is_at(&self.targets, poses) {
+            self.fixed = Arc::new(FixedWorld::new(&self.targets, poses));
+        }
+        let targets = Arc::clone(&self.targets);
+        self.place_moving(targets.moving_poses(poses));
+    }
+
+    /// The same, of other targets, with what does not move already prepared, and the poses of what may move:
+    /// [`RayTargets::moving_poses`].
+    pub fn place_with(&mut self, targets: &Arc<RayTargets>, fixed: &Arc<FixedWorld>, moving: &[PoseF64]) {
+        if !Arc::ptr_eq(&self.targets, targets) {
+            self.targets = Arc::clone(targets);
+        }
+        if !Arc::ptr_eq(&self.fixed, fixed) {
+            self.fixed = Arc::clone(fixed);
+        }
+        self.place_moving(moving.iter().copied());
+    }
+
+    fn place_moving(&mut self, poses: impl Iterator<Item = PoseF64>) {
+        let targets = &self.targets;
+        self.moving.clear();
+        self.moving.extend(targets.moving.iter().zip(poses).filter_map(|(&t, pose)| targets.place(t, pose)));
+    }
+
+    /// The nearest hit of every ray, at a distance from 0 to `max_distance` \[m\]. Of two that are as near, the instance
+    /// that comes first in the scene counts. A ray with a number that is not finite hits nothing.
+    ///
+    /// # Panics
+    ///
+    /// `hits` has another length than `rays`.
+    #[track_caller]
+    pub fn cast(&mut self, rays: &[Ray], max_distance: f64, hits: &mut [RayHit]) {
+        assert_eq!(rays.len(), hits.len(), "as many hits as rays");
+        hits.fill(RayHit::MISS);
+        let level = self.level;
+        at_level!(level, s => self.cast_at(s, rays, max_distance, hits));
+    }
+
+    fn cast_at<S: Simd>(&mut self, s: S, rays: &[Ray], max_distance: f64, hits: &mut [RayHit]) {
+        let Self { targets, fixed, moving, packets, outer, inner, .. } = self;
+        packets.clear();
+        let bundle = s.vectorize(
+            #[inline(always)]
+            || {
+                packets.extend(rays.chunks(WIDTH).map(|rays| Packet::of(rays, max_distance)));
+                Bundle::around(s, packets, max_distance)
+            },
+        );
+        let single = fixed.one_by_one.iter().map(|&k| &fixed.placed[k as usize]);
+        for placed in single.chain(moving.iter()).filter(|placed| bundle.may_meet(placed)) {
+            meet(s, targets, placed, packets, hits, inner);
+        }
+        for (packet, hits) in packets.iter_mut().zip(hits.chunks_mut(WIDTH)) {
+            fixed.meet_tree(s, targets, packet, hits, [&mut *outer, &mut *inner]);
+        }
+    }
+}
+
+impl FixedWorld {
+    /// The rays of a packet against what is in the tree; keeps what is nearer than the hits.
+    fn meet_tree<S: Simd>(
+        &self,
+        s: S,
+        targets: &RayTargets,
+        packet: &mut Packet,
+        hits: &mut [RayHit],
+        [outer, inner]: [&mut Stack; 2],
+    ) {
+        let Some((bvh, order)) = &self.tree else { return };
+        let mut leaf = |leaf: Range<usize>, packet: &mut Packet| {
+            for &k in &order[leaf] {
+                meet(s, targets, &self.placed[k as usize], std::slice::from_mut(packet), hits, inner);
+            }
+        };
+        s.vectorize(
+            #[inline(always)]
+            || {
+                let limits = packet.limits(s);
+                if let Some(shear) = ShearPacket::new(s, packet)
+                    && let Some(beam) = Beam::around(s, packet, &shear, bvh)
+                {
+                    let walked = bvh.walk_beam(
+                        &beam,
+                        limits,
+                        BUDGET,
+                        outer,
+                        #[inline(always)]
+                        |things| {
+                            leaf(things, packet);
+                            Some(packet.limits(s))
+                        },
+                    );
+                    if walked == Walked::All {
+                        return;
+                    }
+                }
+                for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+                    let mut one = packet.only(k);
+                    bvh.walk(&packet.ray(k), packet.limit(k), outer, |things, _| {
+                        leaf(things, &mut one);
+                        one.limit(k)
+                    });
+                }
+            },
+        );
+    }
+}
+
+/// Every ray of some packets against one target: keeps what is nearer than the hits, in `hits`, of the same rays. Compiled once
+/// for each instruction set.
+#[inline(never)]
+fn meet<S: Simd>(
+    s: S,
+    targets: &RayTargets,
+    placed: &Placed,
+    packets: &mut [Packet],
+    hits: &mut [RayHit],
+    stack: &mut Stack,
+) {
+    let target = &targets.targets[placed.target as usize];
+    s.vectorize(
+        #[inline(always)]
+        || target.solid.with(Sweep { s, target, placed, packets, hits, stack }),
+    );
+}
+
+/// The box around some rays.
+struct Bundle {
+    lo: V3,
+    hi: V3,
+}
+
+impl Bundle {
+    #[inline(always)]
+    fn around<S: Simd>(s: S, packets: &[Packet], max_distance: f64) -> Self {
+        // An infinity times a zero would be no number.
+        let far = max_distance.min(1e30);
+        let (mut lo, mut hi) = ([D::splat(s, f64::INFINITY); 3], [D::splat(s, f64::NEG_INFINITY); 3]);
+        for packet in packets {
+            let (origin, direction) = (packet.origins(s), packet.directions(s));
+            for k in 0..3 {
+                let (a, b) = (origin[k], origin[k] + direction[k] * far);
+                (lo[k], hi[k]) = (lo[k].min(a.min(b)), hi[k].max(a.max(b)));
+            }
+        }
+        let ([x, y, z], [a, b, c]) = (lo, hi);
+        Self { lo: [x.least(), y.least(), z.least()], hi: [a.most(), b.most(), c.most()] }
+    }
+
+    /// Whether it meets the sphere around a target.
+    #[inline(always)]
+    fn may_meet(&self, placed: &Placed) -> bool {
+        (0..3).all(|k| placed.middle[k] + placed.radius >= self.lo[k] && placed.middle[k] - placed.radius <= self.hi[k])
+    }
+}
+
+/// Every ray against one target.
+struct Sweep<'a, S> {
+    s: S,
+    target: &'a Target,
+    placed: &'a Placed,
+    packets: &'a mut [Packet],
+    hits: &'a mut [RayHit],
+    stack: &'a mut Stack,
+}
+
+impl<S: Simd> ForShape for Sweep<'_, S> {
+    #[inline(always)]
+    fn run<T: RayShape>(self, shape: &T) {
+        let Self { s, target, placed, packets, hits, stack } = self;
+        let pose = &placed.world_from_target;
+        for (packet, hits) in packets.iter_mut().zip(hits.chunks_mut(WIDTH)) {
+            let Some(local) = packet.seen_from(s, pose, placed.middle, placed.radius) else { continue };
+            let mut touches = [None; WIDTH];
+            shape.touch_packet(s, &local, stack, &mut touches);
+            for (k, hit) in hits.iter_mut().enumerate() {
+                if let Some(touch) = touches[k] {
+                    keep(hit, packet.ray(k).direction, target, placed, touch);
+                    packet.shorten(k, hit.distance);
+                }
+            }
+        }
+    }
+}
+
+/// Keeps a touch that is nearer than the hit, or as near and of an instance that comes before.
+#[inline(always)]
+fn keep(hit: &mut RayHit, direction: V3, target: &Target, placed: &Placed, touch: Touch) {
+    if touch.t < hit.distance || touch.t == hit.distance && target.instance < hit.instance {
+        let normal = placed.world_from_target.rotate(touch.normal);
+        let normal = if dot(normal, direction) > 0.0 { normal.map(|x| 0.0 - x) } else { normal };
+        *hit = RayHit { distance: touch.t, normal, instance: target.instance, mask_id: target.mask_id };
+    }
+}

@@ -1,0 +1,262 @@
+//! Lenses: which way the ray of a point of the picture goes. One model per file, all of them in one list.
+//!
+//! A model maps directions in the camera's optical frame (x right, y down, z forward) to points of the *normalised picture*
+//! and back: a point (x, y) of it is the pixel (u, v) = (cx + fx x, cy + fy y), so [`Intrinsics`](crate::intrinsics::Intrinsics) and
+//! lens are independent of each other. All of it is double precision.
+
+pub mod optics;
+mod poles;
+mod polynomial;
+mod radial;
+pub mod rays;
+mod rows;
+
+use super::optics_error::OpticsError;
+use kinetoscope_scene::pattern::{UnknownName, closest};
+pub use optics::Optics;
+use poles::Poles;
+pub use rays::LensRays;
+pub(crate) use rays::Sight;
+pub use rows::RaysOfRows;
+use serde::de::{Error as _, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
+
+/// How far a lens sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Domain {
+    /// The largest angle between a ray and the optical axis \[rad\].
+    pub angle: f64,
+    /// How far from the principal point such a ray is, in the normalised picture (times fx: in pixels).
+    pub radius: f64,
+    /// Whether rays end there because the mapping folds back or has a pole, not because the lens was to see no farther.
+    pub folds: bool,
+    /// Of [`OpenCv`] alone.
+    poles: Poles,
+}
+
+impl Domain {
+    /// How far a lens sees that needs no more to be known of it.
+    pub const fn new(angle: f64, radius: f64, folds: bool) -> Self {
+        Self { angle, radius, folds, poles: Poles::NONE }
+    }
+}
+
+/// One kind of lens: its file, and a line in the list below.
+pub trait LensModel: Copy + Default {
+    /// Its name.
+    const NAME: &'static str;
+    /// What others call it.
+    const ALIASES: &'static [&'static str];
+    /// Whether every ray goes forward, so that near, far and depth are measured along the optical axis, as without a lens.
+    /// Of others, near and far are distances along the ray.
+    const FORWARD: bool = false;
+    /// Whether there is an aperture with an optical axis; a panorama is put together of many pictures.
+    const HAS_AXIS: bool = true;
+
+    /// Whether it is no lens at all, with these numbers.
+    fn is_pinhole(&self) -> bool {
+        false
+    }
+
+    /// The angle that was given as the end of what it sees \[rad\], where one was.
+    fn max_angle(&self) -> Option<f64>;
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    ///
+    /// [`OpticsError::Lens`].
+    fn validate(&self) -> Result<(), OpticsError>;
+
+    /// How far it sees; the numbers are good.
+    fn domain(&self) -> Domain;
+
+    /// The point of the normalised picture where a direction is seen; `None` outside of the domain.
+    fn project(&self, domain: &Domain, direction: [f64; 3]) -> Option<[f64; 2]>;
+
+    /// The direction that is seen at a point of the normalised picture: with z = 1 if all rays go
+    /// [forward](Self::FORWARD), else of length 1. `None` outside of the domain.
+    fn unproject(&self, domain: &Domain, point: [f64; 2]) -> Option<[f64; 3]>;
+}
+
+/// Declares the lenses: a module with a type of its own each.
+macro_rules! lenses {
+    ($($(#[$doc:meta])* $file:ident :: $Name:ident,)*) => {
+        $(mod $file; pub use $file::$Name;)*
+
+        /// A lens, in front of a picture whose focal lengths and principal point are [`Intrinsics`](crate::intrinsics::Intrinsics).
+        ///
+        /// In files: the name alone (`lens = "equidistant"`) for the default numbers, or a table with the name
+        /// (`lens.opencv = { k1 = -0.28, k2 = 0.07 }`).
+        ///
+        /// Lenses other than a pinhole bend straight lines, which only rays follow: they need another renderer than
+        /// [`Renderer::Raster`](crate::renderer::Renderer::Raster).
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[non_exhaustive]
+        pub enum Lens {
+            $($(#[$doc])* $Name($Name),)*
+        }
+
+        $(impl From<$Name> for Lens {
+            fn from(lens: $Name) -> Self {
+                Self::$Name(lens)
+            }
+        })*
+
+        impl Lens {
+            /// The names of all lenses.
+            pub const NAMES: &'static [&'static str] = &[$($Name::NAME),*];
+
+            /// The lens of a name, which may be an alias, with its default numbers.
+            ///
+            /// # Errors
+            ///
+            /// [`UnknownName`] with the names most like it.
+            pub fn from_name(name: &str) -> Result<Self, UnknownName> {
+                $(if name == $Name::NAME || $Name::ALIASES.contains(&name) {
+                    return Ok(Self::$Name($Name::default()));
+                })*
+                let all = [$($Name::NAME),*].into_iter().chain([$($Name::ALIASES),*].into_iter().flatten().copied());
+                let candidates = closest(name, all).into_iter().map(String::from).collect();
+                Err(UnknownName { what: "lens", name: name.into(), candidates })
+            }
+
+            /// Its name.
+            pub fn name(&self) -> &'static str {
+                match self { $(Self::$Name(_) => $Name::NAME,)* }
+            }
+
+            /// Whether every ray goes forward: near, far and depth are those of a pinhole. Of other lenses, near and far are
+            /// distances along the ray.
+            pub fn is_forward(&self) -> bool {
+                match self { $(Self::$Name(_) => $Name::FORWARD,)* }
+            }
+
+            /// Whether it is one lens with an optical axis, off which there is less light.
+            pub fn has_axis(&self) -> bool {
+                match self { $(Self::$Name(_) => $Name::HAS_AXIS,)* }
+            }
+
+            /// Whether it bends nothing: pictures are those without a lens, bit for bit, with every renderer.
+            pub fn is_pinhole(&self) -> bool {
+                match self { $(Self::$Name(lens) => lens.is_pinhole(),)* }
+            }
+
+            /// Checks every number.
+            ///
+            /// # Errors
+            ///
+            /// [`OpticsError::Lens`]; [`OpticsError::LensFolds`] where the mapping folds back before the angle that the lens
+            /// is to see.
+            pub fn domain(&self) -> Result<Domain, OpticsError> {
+                let (domain, max_angle) = match self { $(Self::$Name(lens) => {
+                    lens.validate()?;
+                    (lens.domain(), lens.max_angle())
+                })* };
+                match max_angle {
+                    Some(wanted) if domain.folds => Err(OpticsError::LensFolds {
+                        lens: self.name(),
+                        angle: domain.angle,
+                        radius: domain.radius,
+                        wanted: format!("it is to see {:.2} degrees (max_angle)", wanted.to_degrees()),
+                    }),
+                    _ => Ok(domain),
+                }
+            }
+
+            fn project(&self, domain: &Domain, direction: [f64; 3]) -> Option<[f64; 2]> {
+                match self { $(Self::$Name(lens) => lens.project(domain, direction),)* }
+            }
+
+            fn unproject(&self, domain: &Domain, point: [f64; 2]) -> Option<[f64; 3]> {
+                match self { $(Self::$Name(lens) => lens.unproject(domain, point),)* }
+            }
+        }
+
+        impl Serialize for Lens {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                match self {
+                    $(Self::$Name(lens) => serializer.serialize_newtype_variant("Lens", 0, $Name::NAME, lens),)*
+                }
+            }
+        }
+
+        impl<'de> Visitor<'de> for InFile {
+            type Value = Lens;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("the name of a lens, or a table with one")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Lens, E> {
+                Lens::from_name(name).map_err(E::custom)
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Lens, A::Error> {
+                let Some(name) = map.next_key::<String>()? else {
+                    return Err(A::Error::custom("a lens is a table with its name, such as { opencv = { k1 = -0.3 } }"));
+                };
+                let lens = match Lens::from_name(&name).map_err(A::Error::custom)? {
+                    $(Lens::$Name(_) => Lens::$Name(map.next_value()?),)*
+                };
+                match map.next_key::<String>()? {
+                    Some(other) => Err(A::Error::custom(format!("one lens only: {name:?} or {other:?}"))),
+                    None => Ok(lens),
+                }
+            }
+        }
+    };
+}
+
+lenses! {
+    /// No lens: straight lines stay straight.
+    pinhole::Pinhole,
+    /// A pinhole with OpenCV's distortion, 12 coefficients.
+    open_cv::OpenCv,
+    /// OpenCV's fisheye, 4 coefficients.
+    open_cv_fisheye::OpenCvFisheye,
+    /// A fisheye: r = f theta.
+    equidistant::Equidistant,
+    /// A fisheye that keeps areas: r = 2 f sin(theta / 2).
+    equisolid::Equisolid,
+    /// A fisheye: r = f sin(theta).
+    orthographic::Orthographic,
+    /// A fisheye that keeps angles: r = 2 f tan(theta / 2).
+    stereographic::Stereographic,
+    /// NVIDIA's f-theta: the angle is a polynomial of the radius.
+    f_theta::FTheta,
+    /// All around: longitudes along rows, latitudes along columns.
+    panorama::Panorama,
+}
+
+/// Reads a lens.
+struct InFile;
+
+impl<'de> Deserialize<'de> for Lens {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(InFile)
+    }
+}
+
+impl Default for Lens {
+    fn default() -> Self {
+        Self::Pinhole(Pinhole {})
+    }
+}
+
+/// Checks that numbers are finite.
+fn finite(numbers: &[(&'static str, f64)]) -> Result<(), OpticsError> {
+    match numbers.iter().find(|(_, value)| !value.is_finite()) {
+        Some(&(what, value)) => Err(OpticsError::Lens { what, value, allowed: "finite" }),
+        None => Ok(()),
+    }
+}
+
+/// Checks the angle at which a lens ends.
+fn angle_up_to(max_angle: f64, most: f64, allowed: &'static str) -> Result<(), OpticsError> {
+    if max_angle > 0.0 && max_angle <= most {
+        return Ok(());
+    }
+    Err(OpticsError::Lens { what: "max_angle", value: max_angle, allowed })
+}

@@ -1,0 +1,131 @@
+//! A lens in front of pixels.
+
+use super::{Domain, Lens};
+use crate::intrinsics::{Intrinsics, PixelIntrinsics};
+use crate::optics_error::OpticsError;
+use nalgebra::Vector3;
+
+/// A lens in front of pixels, checked: from directions to pixels and back.
+///
+/// ```
+/// use kinetoscope_sensors::camera::{Intrinsics, Lens, Optics};
+///
+/// let intrinsics = Intrinsics::Pixels { fx: 300.0, fy: 300.0, cx: 320.0, cy: 240.0 };
+/// let optics = Optics::new(Lens::from_name("equidistant")?, intrinsics.to_pixels(640, 480)?)?;
+/// // A right angle from the optical axis: r = f theta.
+/// let [u, v] = optics.project([1.0, 0.0, 0.0]).ok_or("not seen")?;
+/// assert!((u - 320.0 - 300.0 * std::f64::consts::FRAC_PI_2).abs() < 1e-9 && (v - 240.0).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Optics {
+    lens: Lens,
+    pixels: PixelIntrinsics,
+    domain: Domain,
+}
+
+impl Optics {
+    /// The lens in front of pixels.
+    ///
+    /// # Errors
+    ///
+    /// [`OpticsError::Lens`] for a bad number, [`OpticsError::LensFolds`] where the mapping folds back before
+    /// the angle that the lens is to see.
+    pub fn new(lens: Lens, pixels: PixelIntrinsics) -> Result<Self, OpticsError> {
+        let pixels = Intrinsics::from(pixels).to_pixels(1, 1)?;
+        Ok(Self { lens, pixels, domain: lens.domain()? })
+    }
+
+    /// The same lens in front of other pixels, which are good.
+    pub(crate) fn with_pixels(&self, pixels: PixelIntrinsics) -> Self {
+        Self { pixels, ..*self }
+    }
+
+    /// The lens.
+    pub fn lens(&self) -> Lens {
+        self.lens
+    }
+
+    /// The pixels.
+    pub fn pixels(&self) -> PixelIntrinsics {
+        self.pixels
+    }
+
+    /// How far the lens sees.
+    pub fn domain(&self) -> Domain {
+        self.domain
+    }
+
+    /// The pixel (u, v) where a direction of the optical frame (x right, y down, z forward), of any length, is seen; `None`
+    /// where the lens does not see it. The centre of the pixel in column k is at k + 0.5.
+    pub fn project(&self, direction: [f64; 3]) -> Option<[f64; 2]> {
+        let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
+        let [x, y] = self.lens.project(&self.domain, direction)?;
+        Some([cx + fx * x, cy + fy * y])
+    }
+
+    /// The direction of length 1 in the optical frame that is seen at the pixel (u, v); `None` outside of what the lens sees.
+    pub fn unproject(&self, pixel: [f64; 2]) -> Option<[f64; 3]> {
+        let [x, y, z] = self.ray(pixel)?;
+        let by = 1.0 / (x * x + y * y + z * z).sqrt();
+        Some([x * by, y * by, z * by])
+    }
+
+    /// As [`unproject`](Self::unproject), with z = 1 where all rays go forward: near and far count lengths of it.
+    pub fn ray(&self, [u, v]: [f64; 2]) -> Option<[f64; 3]> {
+        let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
+        self.lens.unproject(&self.domain, [(u - cx) / fx, (v - cy) / fy])
+    }
+
+    /// How much light falls on pixels, where 1 falls on the principal point: the solid angle that one sees, and the cosine by
+    /// which the aperture is turned aside. 0 where nothing is seen, and from a right angle on.
+    pub(crate) fn falloff(&self) -> impl Fn([f64; 2]) -> f64 {
+        let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
+        let most = self.solid_angle([0.0; 2]);
+        move |pixel| {
+            let point = [(pixel[0] - cx) / fx, (pixel[1] - cy) / fy];
+            let (Some(ray), Some(seen), Some(most)) = (self.unit(point), self.solid_angle(point), most) else {
+                return 0.0;
+            };
+            ray.z.max(0.0) * seen / most
+        }
+    }
+
+    /// The solid angle \[sr\] that a unit of area of the normalised picture sees at a point: by differences of rays that are
+    /// 1e-7 rad apart near the axis. Where they spread without end, at a right angle of the orthographic fisheye and where a
+    /// distortion is about to fold back, that is not little.
+    fn solid_angle(&self, point: [f64; 2]) -> Option<f64> {
+        const NEAR_THE_AXIS: f64 = 1e-4;
+        let [x, y] = self.lens.project(&self.domain, [NEAR_THE_AXIS, 0.0, 1.0])?;
+        let apart = 1e-7 * x.hypot(y) / NEAR_THE_AXIS;
+        // On the edge of what the lens sees there may be nothing on either side of a point, but there is of one farther in.
+        self.solid_angle_by(point, apart).or_else(|| {
+            let inwards = 1.0 - apart / point[0].hypot(point[1]);
+            self.solid_angle_by(point.map(|x| inwards * x), apart)
+        })
+    }
+
+    fn solid_angle_by(&self, point: [f64; 2], apart: f64) -> Option<f64> {
+        let here = self.unit(point)?;
+        let slope = |axis: usize| {
+            let beside = |by: f64| {
+                let mut there = point;
+                there[axis] += by;
+                self.unit(there)
+            };
+            // One side may be outside of what the lens sees.
+            match (beside(-apart), beside(apart)) {
+                (Some(before), Some(after)) => Some((after - before) / (2.0 * apart)),
+                (Some(before), None) => Some((here - before) / apart),
+                (None, Some(after)) => Some((after - here) / apart),
+                (None, None) => None,
+            }
+        };
+        Some(slope(0)?.cross(&slope(1)?).norm())
+    }
+
+    /// The direction of length 1 that is seen at a point of the normalised picture.
+    fn unit(&self, point: [f64; 2]) -> Option<Vector3<f64>> {
+        Some(Vector3::from(self.lens.unproject(&self.domain, point)?).normalize())
+    }
+}

@@ -1,0 +1,336 @@
+//! The rays of all samples of a picture behind a lens: computed once, for all pictures of the same lens.
+
+use super::Optics;
+use crate::optics_error::OpticsError;
+use crate::raster::tile::{BLOCK, SAMPLES};
+use crate::simd::{F, LANES, Simd, V3, load};
+use std::fmt;
+use std::sync::OnceLock;
+
+/// Numbers of a group: x, y, z of two rows of eight pixels.
+const GROUP: usize = 3 * LANES;
+/// Cones are wider by this \[rad\]: more than what is lost by single precision.
+const WIDER: f64 = 1e-5;
+
+/// The rays of a picture behind a lens, single precision; see [`Shot::lens`](crate::rasterizer::Shot::lens).
+///
+/// It takes 12 bytes for each pixel, 60 where colours have four samples besides, 4 more where there is vignetting, and is
+/// computed once: cameras keep one for each kind of lens and intrinsics among their environments.
+#[derive(Clone)]
+pub struct LensRays {
+    optics: Optics,
+    size: [usize; 2],
+    /// Samples of a pixel: its centre, or all of [`SAMPLES`].
+    planes: usize,
+    /// Plane after plane, pairs of rows from the top, groups from the left; 0 where there is no ray. Length 1, or z = 1.
+    directions: Vec<f32>,
+    /// What each block of 8 x 8 pixels sees, row by row.
+    cones: Vec<Cone>,
+    /// Distance of the rays of neighbouring pixels, where they are as long as they are kept: a mean.
+    pixel: f64,
+    /// Of each pixel, row by row, once somebody asks for one; see [`Optics::falloff`].
+    falloff: OnceLock<Vec<f32>>,
+}
+
+/// Directions around one.
+#[derive(Clone, Copy, Debug)]
+struct Cone {
+    axis: [f64; 3],
+    /// Of half the angle; no ray at all has a cosine of 2.
+    cosine: f64,
+    sine: f64,
+}
+
+/// A ball as the eye sees it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Sight {
+    /// In all directions.
+    Everywhere,
+    /// In those around one.
+    Around {
+        /// Where its middle is, length 1.
+        axis: [f64; 3],
+        /// Of half the angle.
+        cosine: f64,
+        /// Of half the angle.
+        sine: f64,
+    },
+}
+
+impl Sight {
+    /// A ball around a point of the optical frame \[m\].
+    pub(crate) fn of_ball(middle: [f64; 3], radius: f64) -> Self {
+        let far = dot(middle, middle).sqrt();
+        let sine = radius / far + WIDER;
+        if sine >= 1.0 || sine.is_nan() {
+            return Self::Everywhere;
+        }
+        Self::Around { axis: middle.map(|x| x / far), cosine: (1.0 - sine * sine).sqrt(), sine }
+    }
+}
+
+impl LensRays {
+    /// The rays of a picture of `width` by `height` pixels: one through the middle of each, and with `samples` 4 those of
+    /// its other four colour samples.
+    ///
+    /// # Errors
+    ///
+    /// [`OpticsError::LensFolds`] if pixels are where the mapping of the lens cannot be inverted, and
+    /// [`OpticsError::LensBlind`] if no pixel sees anything.
+    pub fn new(optics: &Optics, [width, height]: [usize; 2], samples: u8) -> Result<Self, OpticsError> {
+        let planes = if samples == 4 { SAMPLES.len() } else { 1 };
+        let blocks = [width.div_ceil(BLOCK), height.div_ceil(BLOCK)];
+        let mut rays = Self {
+            optics: *optics,
+            size: [width, height],
+            planes,
+            directions: vec![0.0; planes * blocks[0] * blocks[1] * (BLOCK / 2) * GROUP],
+            cones: Vec::with_capacity(blocks[0] * blocks[1]),
+            pixel: 0.0,
+            falloff: OnceLock::new(),
+        };
+        for (plane, offset) in SAMPLES.iter().enumerate().take(planes) {
+            let [dx, dy] = offset.map(|x| f64::from(x) / 256.0 + 0.5);
+            for y in 0..height {
+                for x in 0..width {
+                    let at = [x as f64 + dx, y as f64 + dy];
+                    match optics.ray(at) {
+                        Some(direction) => rays.set(plane, [x, y], direction.map(|c| c as f32)),
+                        None => not_folded(optics, at)?,
+                    }
+                }
+            }
+        }
+        for by in 0..blocks[1] {
+            for bx in 0..blocks[0] {
+                let cone = rays.cone([bx * BLOCK, by * BLOCK]);
+                rays.cones.push(cone);
+            }
+        }
+        rays.pixel = rays.spacing().ok_or_else(|| OpticsError::LensBlind { lens: optics.lens().name() })?;
+        Ok(rays)
+    }
+
+    /// The lens and the pixels.
+    pub fn optics(&self) -> &Optics {
+        &self.optics
+    }
+
+    /// Pixels per row, rows.
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// Samples of a pixel: 1, or 4 if colours have four besides the centre.
+    pub fn samples(&self) -> u8 {
+        if self.planes > 1 { 4 } else { 1 }
+    }
+
+    /// Memory held \[bytes\].
+    pub fn bytes(&self) -> usize {
+        let numbers = self.directions.capacity() + self.falloff.get().map_or(0, Vec::capacity);
+        size_of::<f32>() * numbers + size_of::<Cone>() * self.cones.capacity()
+    }
+
+    /// The memory of rays for a picture \[bytes\], before it is taken.
+    pub(crate) fn bytes_of([width, height]: [usize; 2], samples: u8) -> usize {
+        let blocks = width.div_ceil(BLOCK).saturating_mul(height.div_ceil(BLOCK));
+        let planes = if samples == 4 { SAMPLES.len() } else { 1 };
+        let of_block = planes * BLOCK / 2 * GROUP + BLOCK * BLOCK;
+        blocks.saturating_mul(size_of::<Cone>() + of_block * size_of::<f32>())
+    }
+
+    /// Whether all rays have z = 1, not length 1.
+    pub fn is_forward(&self) -> bool {
+        self.optics.lens().is_forward()
+    }
+
+    /// About how far the rays of neighbouring pixels are apart, where they are as long as they are kept.
+    pub(crate) fn pixel(&self) -> f64 {
+        self.pixel
+    }
+
+    /// Where the group of a pixel begins, and which lane is its.
+    #[inline(always)]
+    fn place(&self, plane: usize, [x, y]: [usize; 2]) -> (usize, usize) {
+        let wide = self.size[0].div_ceil(BLOCK);
+        let pairs = self.size[1].div_ceil(BLOCK) * (BLOCK / 2);
+        (((plane * pairs + y / 2) * wide + x / BLOCK) * GROUP, y % 2 * BLOCK + x % BLOCK)
+    }
+
+    fn set(&mut self, plane: usize, at: [usize; 2], direction: [f32; 3]) {
+        let (group, lane) = self.place(plane, at);
+        for (axis, x) in direction.into_iter().enumerate() {
+            self.directions[group + axis * LANES + lane] = x;
+        }
+    }
+
+    /// The ray of a sample in the optical frame; 0 where there is none.
+    #[inline(always)]
+    pub fn direction(&self, plane: usize, at: [usize; 2]) -> [f32; 3] {
+        let (group, lane) = self.place(plane, at);
+        [0, 1, 2].map(|axis| self.directions[group + axis * LANES + lane])
+    }
+
+    /// How much of the light of the optical axis falls on a pixel: [`Optics::falloff`] of its centre.
+    pub fn falloff(&self, [x, y]: [usize; 2]) -> f64 {
+        let all = self.falloff.get_or_init(|| {
+            let [width, height] = self.size;
+            let centre = |k: usize| [(k % width) as f64 + 0.5, (k / width) as f64 + 0.5];
+            let falloff = self.optics.falloff();
+            (0..width * height).map(|k| falloff(centre(k)) as f32).collect()
+        });
+        f64::from(all[y * self.size[0] + x])
+    }
+
+    /// The rays of the centres of 8 x 2 pixels, of which this is the first.
+    #[inline(always)]
+    pub(crate) fn of_pixels<S: Simd>(&self, s: S, at: [usize; 2]) -> V3<S> {
+        let group = &self.directions[self.place(0, at).0..];
+        V3 { x: load(s, group), y: load(s, &group[LANES..]), z: load(s, &group[2 * LANES..]) }
+    }
+
+    /// The rays of sixteen points, each of which is a sample of a pixel.
+    #[inline(always)]
+    pub(crate) fn of_points<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> V3<S> {
+        let (u, v): ([f32; LANES], [f32; LANES]) = (u.array(), v.array());
+        let mut out = [[0.0f32; LANES]; 3];
+        for lane in 0..LANES {
+            let [x, y] = [u[lane].floor(), v[lane].floor()];
+            // Multiples of 1/256 that single precision holds exactly.
+            let offset = [u[lane] - x - 0.5, v[lane] - y - 0.5].map(|d| (d * 256.0) as i32);
+            let plane = SAMPLES.iter().take(self.planes).position(|sample| *sample == offset).unwrap_or(0);
+            let inside = [(x as usize).min(self.size[0] - 1), (y as usize).min(self.size[1] - 1)];
+            let direction = self.direction(plane, inside);
+            for (to, from) in out.iter_mut().zip(direction) {
+                to[lane] = from;
+            }
+        }
+        V3 { x: load(s, &out[0]), y: load(s, &out[1]), z: load(s, &out[2]) }
+    }
+
+    /// Whether a block of 8 x 8 pixels, which this counts, may see something.
+    #[inline(always)]
+    pub(crate) fn may_see(&self, [bx, by]: [usize; 2], sight: &Sight) -> bool {
+        let cone = &self.cones[by * self.size[0].div_ceil(BLOCK) + bx];
+        if cone.cosine > 1.0 {
+            return false;
+        }
+        let Sight::Around { axis, cosine, sine } = sight else { return true };
+        // The angle between the axes against the sum of both, which may be more than half a turn.
+        let (sum_cosine, sum_sine) = (cone.cosine * cosine - cone.sine * sine, cone.sine * cosine + cone.cosine * sine);
+        sum_sine <= 0.0 || dot(cone.axis, *axis) >= sum_cosine
+    }
+
+    /// What a block sees, whose first pixel is given.
+    fn cone(&self, [x0, y0]: [usize; 2]) -> Cone {
+        let rays = (0..self.planes).flat_map(|plane| {
+            let pixels = (0..BLOCK * BLOCK).map(move |k| [x0 + k % BLOCK, y0 + k / BLOCK]);
+            pixels.filter_map(move |at| unit(self.direction(plane, at).map(f64::from)))
+        });
+        let sum = rays.clone().fold([0.0; 3], |sum, ray| [0, 1, 2].map(|k| sum[k] + ray[k]));
+        let Some(first) = rays.clone().next() else { return Cone { axis: [0.0; 3], cosine: 2.0, sine: 0.0 } };
+        let axis = unit(sum).unwrap_or(first);
+        // By the chord, which small angles keep their digits in.
+        let apart = |ray: [f64; 3]| {
+            let chord = [0, 1, 2].map(|k| ray[k] - axis[k]);
+            2.0 * (0.5 * dot(chord, chord).sqrt()).min(1.0).asin()
+        };
+        let angle = (rays.map(apart).fold(0.0f64, f64::max) + WIDER).min(std::f64::consts::PI);
+        Cone { axis, cosine: angle.cos(), sine: angle.sin().max(0.0) }
+    }
+
+    /// The mean distance of the rays of neighbouring pixels, in a row or in a column, whichever is larger; `None` where there
+    /// is no ray.
+    fn spacing(&self) -> Option<f64> {
+        let [width, height] = self.size;
+        let (mut sum, mut count, mut any) = ([0.0; 2], [0.0f64; 2], false);
+        for y in 0..height {
+            for x in 0..width {
+                let here = self.direction(0, [x, y]).map(f64::from);
+                if here == [0.0; 3] {
+                    continue;
+                }
+                any = true;
+                for (axis, beside) in [[x + 1, y], [x, y + 1]].into_iter().enumerate() {
+                    if beside[0] >= width || beside[1] >= height {
+                        continue;
+                    }
+                    let there = self.direction(0, beside).map(f64::from);
+                    if there != [0.0; 3] {
+                        let apart = [0, 1, 2].map(|k| there[k] - here[k]);
+                        sum[axis] += dot(apart, apart).sqrt();
+                        count[axis] += 1.0;
+                    }
+                }
+            }
+        }
+        let f = self.optics.pixels();
+        let mean = |axis: usize| if count[axis] > 0.0 { sum[axis] / count[axis] } else { 0.0 };
+        let larger = mean(0).max(mean(1));
+        any.then(|| if larger > 0.0 { larger } else { 1.0 / f.fx.min(f.fy) })
+    }
+}
+
+/// Says where the mapping folds back, if that is why there is no ray.
+fn not_folded(optics: &Optics, [u, v]: [f64; 2]) -> Result<(), OpticsError> {
+    let (domain, f) = (optics.domain(), optics.pixels());
+    if !domain.folds {
+        return Ok(());
+    }
+    let reach = ((u - f.cx) / f.fx).hypot((v - f.cy) / f.fy);
+    let wanted = format!("pixel ({u:.1}, {v:.1}) is at radius {reach:.4}");
+    Err(OpticsError::LensFolds { lens: optics.lens().name(), angle: domain.angle, radius: domain.radius, wanted })
+}
+
+/// All else follows from these.
+impl PartialEq for LensRays {
+    fn eq(&self, other: &Self) -> bool {
+        let Self { optics, size, planes, directions, cones: _, pixel: _, falloff: _ } = self;
+        (optics, size, planes) == (&other.optics, &other.size, &other.planes) && *directions == other.directions
+    }
+}
+
+/// Short: the table is long.
+impl fmt::Debug for LensRays {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LensRays").field("optics", &self.optics).field("size", &self.size).finish_non_exhaustive()
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
+    let length = dot(a, a).sqrt();
+    (length > 0.0).then(|| a.map(|x| x / length))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::intrinsics::PixelIntrinsics;
+    use crate::lens::Equidistant;
+    use crate::raster::tile::SAMPLES;
+    use crate::simd::{at_level, levels, load};
+
+    /// Rays in lanes are those of the optics, to the bit, at every SIMD level.
+    #[test]
+    fn points_in_lanes() {
+        let pixels = PixelIntrinsics { fx: 20.0, fy: 22.0, cx: 30.25, cy: 25.5 };
+        let optics = Optics::new(Equidistant { max_angle: 1.2 }.into(), pixels).unwrap();
+        let rays = LensRays::new(&optics, [64, 48], 4).unwrap();
+        for offset in SAMPLES {
+            let at = [31.5 + offset[0] as f32 / 256.0, 17.5 + offset[1] as f32 / 256.0];
+            let expected = optics.ray(at.map(f64::from)).unwrap().map(|x| x as f32);
+            for level in levels() {
+                let found = at_level!(level, s => {
+                    let found = rays.of_points(s, load(s, &[at[0]; 16]), load(s, &[at[1]; 16]));
+                    [found.x, found.y, found.z].map(|x| x.array()[7])
+                });
+                assert_eq!(found, expected);
+            }
+        }
+    }
+}

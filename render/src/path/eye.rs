@@ -1,0 +1,85 @@
+//! Where a camera's paths begin, and which way they go.
+
+use super::lobe::{Basis, on_disc};
+use crate::aperture::Aperture;
+use crate::geometry::ray::Ray;
+use crate::geometry::vector::{along, dot, scale, sub};
+use crate::lens::rays::LensRays;
+use crate::visibility::Projection;
+use kinetoscope_scene::PoseF64;
+
+/// A camera, as paths see it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Eye<'a> {
+    pub(crate) projection: &'a Projection,
+    /// Instead of the projection's rays.
+    pub(crate) lens: Option<&'a LensRays>,
+    pub(crate) pupil: Option<Pupil>,
+}
+
+/// The opening of a lens.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pupil {
+    /// \[m\].
+    radius: f64,
+    /// What is this far away is sharp \[m\].
+    focus: f64,
+}
+
+/// The first ray of a path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct First {
+    /// From the near plane on.
+    pub(super) ray: Ray,
+    /// How far it was already \[m\].
+    pub(super) travelled: f64,
+    /// How far it goes \[m\].
+    pub(super) limit: f64,
+    /// How wide a pixel is where it begins, and how much wider it gets by the metre.
+    pub(super) width: f64,
+    pub(super) spread: f64,
+}
+
+impl Pupil {
+    /// `None` for an opening without a size.
+    pub(crate) fn of(aperture: &Aperture) -> Option<Self> {
+        let radius = 0.5 * aperture.diameter();
+        (radius > 0.0).then_some(Self { radius, focus: aperture.focus_distance })
+    }
+}
+
+impl Eye<'_> {
+    /// The ray through a point of the picture and the point of the opening that two numbers in 0..1 choose, of a camera at
+    /// `pose`; `None` outside of the image circle.
+    pub(super) fn look(&self, [u, v]: [f64; 2], pose: &PoseF64, choice: impl Fn() -> [f64; 2]) -> Option<First> {
+        let (view, wide) = (self.projection, f64::from);
+        let (c, f) = match self.lens {
+            None => {
+                let c = [(u - wide(view.cx)) / wide(view.fx), (v - wide(view.cy)) / wide(view.fy), 1.0];
+                (c, wide(view.fx))
+            }
+            Some(lens) => (lens.optics().ray([u, v])?, 1.0 / lens.pixel()),
+        };
+        let (c, from) = match self.pupil {
+            None => (c, pose.translation),
+            Some(Pupil { radius, focus }) => {
+                let [x, y] = on_disc(choice()).map(|x| radius * x);
+                // The opening faces forward, or each ray of those that go aside.
+                let forward = self.lens.is_none_or(LensRays::is_forward);
+                let off = if forward { [x, y, 0.0] } else { Basis::of(c).to_world([x, y, 0.0]) };
+                (sub(c, scale(off, 1.0 / focus)), pose.apply(off))
+            }
+        };
+        let d = pose.rotation.map(|r| dot(r, c));
+        let length = dot(d, d).sqrt();
+        let direction = scale(d, 1.0 / length);
+        let (near, far) = (wide(view.near) * length, wide(view.far) * length);
+        Some(First {
+            ray: Ray { origin: along(from, near, direction), direction },
+            travelled: near,
+            limit: far - near,
+            width: wide(view.near) / f,
+            spread: 1.0 / (f * length),
+        })
+    }
+}

@@ -1,0 +1,158 @@
+//! The colours of a picture while its paths are followed: one row of memory per row of pixels, so that threads share it.
+
+use super::smooth::Guide;
+use super::{Found, Lamps, Paths};
+use crate::geometry::bvh::Stack;
+use crate::progress::RenderProgress;
+use crate::shade::tone::{ToneCurve, encode};
+use crate::simd::{LANES, Level, Simd, at_level, load};
+
+/// Light that is brighter is not told apart from this: sums of some dozen of its squares are numbers of single precision.
+const BRIGHTEST: f32 = 1e18;
+
+/// A picture in linear light; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub struct Film {
+    pub(crate) width: usize,
+    pub(crate) lamps: Lamps,
+    /// Radiance; with smoothing that of a white surface, until it is encoded.
+    pub(crate) pixels: Vec<Pixel>,
+    /// The pixels of the next pass of smoothing.
+    pub(crate) next: Vec<Pixel>,
+    /// None without smoothing.
+    pub(crate) guides: Vec<Guide>,
+}
+
+/// A pixel of a film.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Pixel {
+    pub(crate) color: [f32; 3],
+    /// Variance of its brightness.
+    pub(crate) variance: f32,
+}
+
+/// Rows of a film, in the hands of a thread.
+#[derive(Debug)]
+pub(crate) struct Rows<'a> {
+    /// The first row.
+    pub(crate) first: usize,
+    pub(crate) pixels: &'a mut [Pixel],
+    pub(crate) guides: &'a mut [Guide],
+}
+
+impl Film {
+    /// Memory for a pixel of a picture, with or without smoothing.
+    pub const fn bytes_per_pixel(smooth: bool) -> usize {
+        if smooth { 2 * size_of::<Pixel>() + size_of::<Guide>() } else { size_of::<Pixel>() }
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        (self.pixels.capacity() + self.next.capacity()) * size_of::<Pixel>()
+            + self.guides.capacity() * size_of::<Guide>()
+            + self.lamps.bytes()
+    }
+
+    /// Memory for a picture.
+    pub(crate) fn resize(&mut self, [width, height]: [usize; 2], smooth: bool) {
+        self.width = width;
+        let count = width * height;
+        self.pixels.resize(count, Pixel::default());
+        self.guides.resize(if smooth { count } else { 0 }, Guide::default());
+        self.next.resize(if smooth { count } else { 0 }, Pixel::default());
+    }
+
+    /// The film in parts of some rows, and its lamps.
+    pub(crate) fn rows(&mut self, rows: usize) -> (&Lamps, impl Iterator<Item = Rows<'_>>) {
+        let size = (self.width * rows).max(1);
+        let (parts, mut guides) = (self.pixels.chunks_mut(size).enumerate(), self.guides.chunks_mut(size));
+        let part = move |(k, pixels)| Rows { first: k * rows, pixels, guides: guides.next().unwrap_or_default() };
+        (&self.lamps, parts.map(part))
+    }
+}
+
+impl Rows<'_> {
+    /// Follows the paths of all pixels, until it is broken off; whether it was not. With `smooth` the colour of surfaces is
+    /// divided out.
+    pub(crate) fn expose(
+        &mut self,
+        level: Level,
+        paths: &Paths<'_>,
+        smooth: bool,
+        stack: &mut Stack,
+        progress: &RenderProgress,
+    ) -> bool {
+        at_level!(level, s => self.expose_lanes(s, paths, smooth, stack, progress))
+    }
+
+    fn expose_lanes<S: Simd>(
+        &mut self,
+        s: S,
+        paths: &Paths<'_>,
+        smooth: bool,
+        stack: &mut Stack,
+        progress: &RenderProgress,
+    ) -> bool {
+        let width = paths.eye.projection.width;
+        for (k, pixel) in self.pixels.iter_mut().enumerate() {
+            if progress.is_cancelled() {
+                return false;
+            }
+            let at = [k % width, self.first + k / width];
+            let found @ Found { color, variance, albedo, rays, .. } = s.vectorize(
+                #[inline(always)]
+                || paths.pixel(s, at, stack),
+            );
+            progress.add(paths.samples.into(), rays);
+            let mut by = [1.0; 3];
+            if let Some(guide) = self.guides.get_mut(k).filter(|_| smooth) {
+                *guide = Guide::new(&found);
+                by = guide.albedo;
+            }
+            let mean = super::brightness(by.map(f64::from));
+            *pixel = Pixel {
+                color: [0, 1, 2].map(|c| (color[c] as f32 / by[c]).min(BRIGHTEST)),
+                variance: ((variance / (mean * mean)) as f32).min(BRIGHTEST * BRIGHTEST),
+            };
+            debug_assert!(albedo.iter().all(|x| x.is_finite()));
+        }
+        true
+    }
+}
+
+/// Colours for the screen, of as many pixels as there are; where there are guides the colour of surfaces is multiplied again.
+/// Light is multiplied by `exposure` before the tone curve.
+pub(crate) fn develop(
+    level: Level,
+    (exposure, curve): (f32, ToneCurve),
+    pixels: &[Pixel],
+    guides: &[Guide],
+    out: &mut [u8],
+) {
+    at_level!(level, s => develop_lanes(s, (exposure, curve), pixels, guides, out));
+}
+
+fn develop_lanes<S: Simd>(
+    s: S,
+    (exposure, curve): (f32, ToneCurve),
+    pixels: &[Pixel],
+    guides: &[Guide],
+    out: &mut [u8],
+) {
+    for (group, (pixels, out)) in pixels.chunks(LANES).zip(out.chunks_mut(4 * LANES)).enumerate() {
+        for c in 0..3 {
+            let mut linear = [0.0f32; LANES];
+            for ((to, pixel), k) in linear.iter_mut().zip(pixels).zip(group * LANES..) {
+                *to = pixel.color[c] * guides.get(k).map_or(1.0, |guide| guide.albedo[c]);
+            }
+            let mut bytes = [0i32; LANES];
+            // Outside of this, the wide registers of some instruction sets are put on a stack that is not aligned for them.
+            s.vectorize(
+                #[inline(always)]
+                || bytes = encode(s, curve, load(s, &linear) * exposure).to_int().array(),
+            );
+            for (to, byte) in out.chunks_exact_mut(4).zip(bytes) {
+                (to[c], to[3]) = (byte as u8, 255);
+            }
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Lamps, as paths see them.
+
+use super::lobe::{Basis, on_disc};
+use crate::geometry::vector::{V3, along, dot, scale, sub, to_f64, unit};
+use crate::shade::shade::{cos_deg, whole_exponent};
+use crate::visibility::Projection;
+use kinetoscope_scene::{Light, LightKind};
+
+/// A lamp of a frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lamp {
+    kind: LightKind,
+    position: V3,
+    /// Unit vector along which it shines.
+    along: V3,
+    cutoff_cos: f64,
+    exponent: u32,
+    attenuation: V3,
+    radius: f64,
+    pub(super) ambient: V3,
+    pub(super) diffuse: V3,
+    pub(super) specular: V3,
+    pub(super) cast_shadow: bool,
+    /// Of a lamp at a camera: where the camera looks, and the depth that it sees from \[m\]. Without a direction that is a
+    /// distance.
+    sight: Option<(Option<V3>, f64)>,
+}
+
+/// Light from a lamp at a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Incoming {
+    /// Unit vector to where it comes from.
+    pub(super) direction: V3,
+    /// How far it may be cut off \[m\].
+    pub(super) distance: f64,
+    /// How much of it arrives.
+    pub(super) strength: f64,
+}
+
+impl Incoming {
+    /// Light that was asked for at one point, asked for at another beside it: the same point of the lamp, where it is from there
+    /// and how far.
+    pub(super) fn seen_from(&self, asked: V3, origin: V3) -> (V3, f64) {
+        if !(self.distance.is_finite() && self.distance > 0.0) {
+            return (self.direction, self.distance);
+        }
+        let to = sub(along(asked, self.distance, self.direction), origin);
+        // Where both are one point nothing is between them.
+        unit(to).map_or((self.direction, 0.0), |direction| (direction, dot(to, to).sqrt()))
+    }
+}
+
+impl Lamp {
+    pub(super) fn new(light: &Light) -> Self {
+        let wide = |v: [f32; 3]| v.map(f64::from);
+        let (cutoff_cos, exponent) = match light.kind {
+            LightKind::Spot { cutoff_deg, exponent } => (f64::from(cos_deg(cutoff_deg)), whole_exponent(exponent)),
+            LightKind::Directional | LightKind::Point => (-2.0, 0),
+        };
+        Self {
+            kind: light.kind,
+            position: wide(light.position),
+            along: unit(wide(light.direction)).unwrap_or([0.0, 0.0, -1.0]),
+            cutoff_cos,
+            exponent,
+            attenuation: wide(light.attenuation),
+            radius: f64::from(light.radius.max(0.0)),
+            ambient: wide(light.ambient),
+            diffuse: wide(light.diffuse),
+            specular: wide(light.specular),
+            cast_shadow: light.cast_shadow,
+            sight: None,
+        }
+    }
+
+    /// A lamp at a camera.
+    pub(super) fn of_camera(headlight: &kinetoscope_scene::Headlight, view: &Projection, along_axis: bool) -> Self {
+        let light = Light {
+            kind: LightKind::Point,
+            ambient: headlight.ambient,
+            diffuse: headlight.diffuse,
+            specular: headlight.specular,
+            ..Light::default()
+        };
+        let (position, forward) = (view.world_from_camera.translation, view.world_from_camera.rotation.map(|r| r[2]));
+        let sight = Some((along_axis.then(|| to_f64(forward)), f64::from(view.near)));
+        Self { position: to_f64(position), sight, ..Self::new(&light) }
+    }
+
+    /// Light at `point` from the point of the lamp's disc that two numbers in 0..1 choose; `None` where none arrives.
+    pub(super) fn at(&self, point: V3, choice: [f64; 2]) -> Option<Incoming> {
+        if self.kind == LightKind::Directional {
+            let toward = scale(self.along, -1.0);
+            let direction = self.spread(toward, toward, choice)?;
+            return Some(Incoming { direction: unit(direction)?, distance: f64::INFINITY, strength: 1.0 });
+        }
+        let to = sub(self.position, point);
+        let distance = dot(to, to).sqrt();
+        let toward = unit(to)?;
+        let [constant, linear, quadratic] = self.attenuation;
+        let mut strength = 1.0 / (constant + distance * (linear + distance * quadratic)).max(1e-6);
+        if matches!(self.kind, LightKind::Spot { .. }) {
+            let cos = -dot(toward, self.along);
+            if cos < self.cutoff_cos {
+                return None;
+            }
+            strength *= power(cos.max(0.0), self.exponent);
+        }
+        let to = self.spread(to, toward, choice)?;
+        let direction = unit(to)?;
+        let mut distance = dot(to, to).sqrt();
+        if let Some((forward, near)) = self.sight {
+            // What is nearer than the camera sees, its housing, does not shade it.
+            let cos = forward.map_or(1.0, |forward| -dot(direction, forward));
+            distance -= if cos > 1e-3 { near / cos } else { 0.0 };
+        }
+        Some(Incoming { direction, distance, strength })
+    }
+
+    /// From the middle of the disc to a point of it.
+    fn spread(&self, to: V3, normal: V3, choice: [f64; 2]) -> Option<V3> {
+        if self.radius == 0.0 {
+            return Some(to);
+        }
+        let [x, y] = on_disc(choice);
+        let on = Basis::of(normal).to_world([self.radius * x, self.radius * y, 0.0]);
+        Some(along(to, 1.0, on))
+    }
+
+    pub(super) fn has_size(&self) -> bool {
+        self.radius > 0.0
+    }
+}
+
+/// x to an integer power, by squaring.
+pub(super) fn power(x: f64, mut exponent: u32) -> f64 {
+    let (mut result, mut square) = (1.0, x);
+    while exponent > 0 {
+        if exponent & 1 == 1 {
+            result *= square;
+        }
+        square *= square;
+        exponent >>= 1;
+    }
+    result
+}

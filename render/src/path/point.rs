@@ -1,0 +1,128 @@
+//! What a path finds where it meets a surface.
+
+use super::lobe::Lobe;
+use super::texel;
+use crate::geometry::ray::Ray;
+use crate::geometry::vector::{V3, along, cross, dot, scale, sub, to_f64, unit};
+use crate::trace::Hit;
+use kinetoscope_scene::{Instance, RenderMesh, RenderScene, Shape, TextureKind};
+
+/// Points are lifted by this part of the size of their triangle, at most: those of a ball of eight sides are.
+const LIFT: f64 = 0.15;
+
+/// A point of a surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Point {
+    pub(super) position: V3,
+    /// The point on the surface that the smooth normals mean: of a round thing made of triangles, outside of them, so that
+    /// light at the edge of its dark side is not cut off triangle by triangle. Source: Hanika, Hacking the shadow terminator,
+    /// Ray Tracing Gems II, 2021.
+    pub(super) lifted: V3,
+    /// Unit normal of the surface itself, to where the ray came from.
+    pub(super) flat: V3,
+    /// Unit normal that light sees, on the same side.
+    pub(super) normal: V3,
+    /// Whether the ray came from outside.
+    pub(super) front: bool,
+    pub(super) lobe: Lobe,
+    pub(super) emission: V3,
+    pub(super) alpha: f64,
+}
+
+/// A point in a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Corner {
+    pub(crate) normal: V3,
+    /// From the triangle to the surface that is meant.
+    lift: V3,
+    pub(crate) uv: Option<([f64; 2], f64)>,
+}
+
+impl Point {
+    /// The point of a hit. `footprint` is how much of the surface is seen together, if it is seen straight on \[m\].
+    pub(super) fn new(scene: &RenderScene, ray: &Ray, hit: &Hit, footprint: f64) -> Option<Self> {
+        let index = hit.instance as usize;
+        let (instance, pose) = (scene.instances().get(index)?, &hit.world_from_instance);
+        let position = ray.at(hit.distance);
+        let front = dot(hit.normal, ray.direction) < 0.0;
+        let side = if front { 1.0 } else { -1.0 };
+        let flat = scale(hit.normal, side);
+        let rotation = pose.rotation;
+        let from = sub(position, pose.translation);
+        let local = [0, 1, 2].map(|j| (0..3).map(|i| rotation[i][j] * from[i]).sum::<f64>());
+        let corner = instance.mesh().map(|mesh| in_triangle(mesh, hit.triangle as usize, local, side));
+        let normal = corner.and_then(|c| {
+            let turned = rotation.map(|row| side * dot(row, c.normal));
+            // A smooth normal may look away from where the surface itself is seen.
+            unit(turned).filter(|n| dot(*n, ray.direction) < -1e-3 && dot(*n, flat) > 0.0)
+        });
+        let slant = (-dot(flat, ray.direction)).max(0.02).sqrt();
+        let uv = corner.and_then(|c| c.uv);
+        let texel = texture(scene, index, instance, local, uv, footprint / slant);
+        let albedo = [0, 1, 2].map(|k| f64::from(scene.linear_colors()[index][k]) * texel[k]);
+        let material = &instance.material;
+        let reflectance = if mirrors(instance, hit) { material.reflectance } else { 0.0 };
+        let emission = scale(albedo, f64::from(material.emission.max(0.0)));
+        let alpha = f64::from(material.rgba[3].clamp(0.0, 1.0));
+        let lift = corner.map_or([0.0; 3], |c| rotation.map(|row| dot(row, c.lift)));
+        let lifted = along(position, 1.0, lift);
+        let normal = normal.unwrap_or(flat);
+        let lobe = Lobe::new(material, reflectance, albedo, front);
+        Some(Self { position, lifted, flat, normal, front, lobe, emission, alpha })
+    }
+}
+
+/// True if the reflectance of a material acts where a ray meets an instance: of boxes, the +z face has it.
+fn mirrors(instance: &Instance, hit: &Hit) -> bool {
+    let up = hit.world_from_instance.rotation.map(|row| row[2]);
+    !matches!(instance.shape, Shape::Box(_)) || dot(hit.normal, up) > 0.5
+}
+
+/// Linear colour of an instance's texture.
+fn texture(
+    scene: &RenderScene,
+    index: usize,
+    instance: &Instance,
+    local: V3,
+    uv: Option<([f64; 2], f64)>,
+    width: f64,
+) -> V3 {
+    let Some(image) = instance.material.texture.as_deref() else { return [1.0; 3] };
+    let by = scene.texture_scales()[index].map(f64::from);
+    if image.kind() == TextureKind::Cube {
+        let largest = by.iter().fold(0.0f64, |m, &x| m.max(x));
+        return texel::at_cube(image, [0, 1, 2].map(|k| local[k] * by[k]), width * largest);
+    }
+    let offset = scene.texture_offsets()[index].map(f64::from);
+    let projected = ([0, 1].map(|k| local[k] * by[k] + offset[k]), by[0].abs().max(by[1].abs()));
+    let (at, density) = uv.unwrap_or(projected);
+    texel::at(image, at, width * density)
+}
+
+/// The smooth normal at a point of a triangle that is seen from a side (1 from outside), its texture coordinates and how many
+/// of them a metre has.
+pub(crate) fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64) -> Corner {
+    let corners = mesh.triangles()[triangle].map(|i| i as usize);
+    let ends @ [a, b, c] = corners.map(|i| to_f64(mesh.positions()[i]));
+    let (ab, ac, w) = (sub(b, a), sub(c, a), sub(at, a));
+    let across = cross(ab, ac);
+    let area = dot(across, across).max(f64::MIN_POSITIVE);
+    let kb = (dot(cross(w, ac), across) / area).clamp(0.0, 1.0);
+    let kc = (dot(cross(ab, w), across) / area).clamp(0.0, 1.0 - kb);
+    let share = [1.0 - kb - kc, kb, kc];
+    let normals = corners.map(|i| to_f64(mesh.normals()[i]));
+    let normal = [0, 1, 2].map(|k| (0..3).map(|n| share[n] * normals[n][k]).sum());
+    // How far the point is below the plane of each corner.
+    let below = [0, 1, 2].map(|n| (side * dot(sub(at, ends[n]), normals[n])).min(0.0));
+    let lift: V3 = [0, 1, 2].map(|k| (0..3).map(|n| -side * share[n] * below[n] * normals[n][k]).sum());
+    let (far, most) = (dot(lift, lift).sqrt(), LIFT * area.sqrt().sqrt());
+    let lift = if far > most { scale(lift, most / far) } else { lift };
+    let uv = mesh.uvs().map(|uvs| {
+        let t = corners.map(|i| uvs[i].map(f64::from));
+        let uv = [0, 1].map(|k| (0..3).map(|n| share[n] * t[n][k]).sum());
+        let [p, q] = [1, 2].map(|n| [t[n][0] - t[0][0], t[n][1] - t[0][1]]);
+        // Square root of the ratio of areas, in the picture and on the surface.
+        (uv, ((p[0] * q[1] - q[0] * p[1]).abs() / area.sqrt()).sqrt())
+    });
+    Corner { normal, lift, uv }
+}

@@ -1,0 +1,313 @@
+//! What is drawn in a frame, in which order, and where in the picture.
+
+use super::detail;
+use super::tile::BLOCK;
+use crate::lens::rays::LensRays;
+use crate::visibility::Projection;
+use crate::visibility::projection::LocalCamera;
+use kinetoscope_scene::shape::Cluster;
+use kinetoscope_scene::{Instance, Marker, PoseF32, RenderMesh, RenderScene};
+
+/// A primitive or a cluster that may be seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Item {
+    pub(crate) instance: u32,
+    /// `None` for shapes with a closed form.
+    pub(crate) cluster: Option<u32>,
+    /// Blocks that it may touch: x0, y0, x1, y1, the last included.
+    pub(crate) rect: [u16; 4],
+    /// It is nowhere nearer than this.
+    pub(crate) nearness: f32,
+    /// Nearer things are drawn first: the nearness, but endless planes are drawn last.
+    order: f32,
+}
+
+/// An instance as the camera sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed {
+    pub(crate) camera_from_instance: PoseF32,
+    pub(crate) local: LocalCamera,
+    /// Whether the camera is outside of the instance's bounds, far enough that nothing is cut off in front.
+    pub(crate) outside: bool,
+    /// The level of its mesh that is drawn: ids count that level's triangles.
+    pub(crate) level: u8,
+    /// How far that may be from the mesh \[m\].
+    pub(crate) error: f32,
+}
+
+impl Placed {
+    /// The triangles that are drawn of the instance that is placed.
+    #[inline(always)]
+    pub(crate) fn mesh<'a>(&self, instance: &'a Instance) -> Option<&'a RenderMesh> {
+        let mesh = instance.mesh()?;
+        Some(if self.level == 0 { mesh } else { mesh.level(usize::from(self.level)) })
+    }
+}
+
+/// Which instances are drawn where.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layer {
+    /// Not drawn.
+    Hidden,
+    /// Seen by all channels.
+    Opaque,
+    /// Blended into the colour, and seen by the other channels.
+    Veil,
+}
+
+impl Layer {
+    pub fn of(instance: &Instance, groups: u32) -> Self {
+        let alpha = instance.material.rgba[3];
+        if !instance.visible || alpha <= 0.0 || groups >> instance.group.min(31) & 1 == 0 {
+            Self::Hidden
+        } else if alpha >= 1.0 {
+            Self::Opaque
+        } else {
+            Self::Veil
+        }
+    }
+
+    /// True if an instance casts shadows into shadow maps: it is drawn, its alpha is at least 0.5, and it is no marker, which
+    /// shows a measurement and is no thing of the scene.
+    pub(crate) fn casts_shadows(instance: &Instance, groups: u32) -> bool {
+        Self::of(instance, groups) != Self::Hidden
+            && instance.material.rgba[3] >= 0.5
+            && instance.group != Marker::GROUP
+    }
+}
+
+/// In which parts instances are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parts {
+    /// Meshes by cluster, each as coarse as it may be.
+    Levels,
+    /// Meshes by cluster, as they are.
+    Clusters,
+    /// Each in one piece.
+    Whole,
+}
+
+/// Everything that may be seen in a frame.
+#[derive(Clone, Debug, Default)]
+pub struct DrawList {
+    pub(crate) placed: Vec<Placed>,
+    /// Opaque things, the nearest first.
+    pub(crate) opaque: Vec<Item>,
+    /// Things that are not quite opaque, the farthest instance first.
+    pub(crate) blended: Vec<(Layer, Item)>,
+    /// The largest [`Placed::error`].
+    pub(crate) error: f32,
+}
+
+impl DrawList {
+    pub(crate) fn bytes(&self) -> usize {
+        self.placed.capacity() * size_of::<Placed>()
+            + self.opaque.capacity() * size_of::<Item>()
+            + self.blended.capacity() * size_of::<(Layer, Item)>()
+    }
+
+    /// Empties the list, with room for everything that is kept: what is seen changes from frame to frame, and memory must not
+    /// grow with it.
+    pub(crate) fn reserve(&mut self, scene: &RenderScene, parts: Parts, keep: impl Fn(&Instance) -> Layer) {
+        self.placed.clear();
+        self.opaque.clear();
+        self.blended.clear();
+        let (mut opaque, mut blended) = (0, 0);
+        for instance in scene.instances() {
+            let mesh = instance.mesh().filter(|_| parts != Parts::Whole);
+            let items = mesh.map_or(1, |mesh| mesh.clusters().len());
+            match keep(instance) {
+                Layer::Hidden => {}
+                Layer::Opaque => opaque += items,
+                _ => blended += items,
+            }
+        }
+        self.placed.reserve_exact(scene.instances().len());
+        self.opaque.reserve_exact(opaque);
+        self.blended.reserve_exact(blended);
+    }
+
+    /// Finds what may be seen. `keep` tells instances apart. Behind a lens anything may be anywhere in the picture.
+    pub(crate) fn build(
+        &mut self,
+        projection: &Projection,
+        lens: Option<&LensRays>,
+        scene: &RenderScene,
+        poses: &[PoseF32],
+        parts: Parts,
+        keep: impl Fn(&Instance) -> Layer,
+    ) {
+        self.error = 0.0;
+        self.reserve(scene, parts, &keep);
+        for (index, (instance, pose)) in scene.instances().iter().zip(poses).enumerate() {
+            let [lo, hi] = instance.shape.aabb();
+            let local = projection.local(pose);
+            let t = local.instance_from_camera.translation;
+            let margin = if projection.parallel { f32::NEG_INFINITY } else { 2.0 * projection.near };
+            let outside = (0..3).any(|k| t[k] < lo[k] - margin || t[k] > hi[k] + margin);
+            let camera_from_instance = projection.world_from_camera.inverse_times(pose);
+            let placed = Placed { camera_from_instance, local, outside, level: 0, error: 0.0 };
+            self.placed.push(placed);
+            let layer = keep(instance);
+            if layer == Layer::Hidden {
+                continue;
+            }
+            let middle = [0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]));
+            let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
+            let seen = match lens {
+                None => bounds(projection, &placed.camera_from_instance, middle, half),
+                Some(lens) => lens_bounds(projection, lens, placed.camera_from_instance.apply(middle), half),
+            };
+            let Some((rect, nearness)) = seen else { continue };
+            let order = if half.iter().all(|h| h.is_finite()) { nearness } else { f32::MIN };
+            let whole = Item { instance: index as u32, cluster: None, rect, nearness, order };
+            let mut push = |item| match layer {
+                Layer::Opaque => self.opaque.push(item),
+                _ => self.blended.push((layer, item)),
+            };
+            let Some(mesh) = instance.mesh().filter(|_| parts != Parts::Whole) else {
+                push(whole);
+                continue;
+            };
+            let level = if parts == Parts::Levels {
+                detail::level(projection, instance, &placed.camera_from_instance)
+            } else {
+                0
+            };
+            let error = mesh.level_error(usize::from(level));
+            self.placed[index] = Placed { level, error, ..placed };
+            self.error = self.error.max(error);
+            for (k, cluster) in mesh.level(usize::from(level)).clusters().iter().enumerate() {
+                if outside && faces_away(projection, &placed, cluster) {
+                    continue;
+                }
+                let c = placed.camera_from_instance.apply(cluster.center);
+                if let Some((rect, nearness)) = ball_bounds(projection, c, cluster.radius) {
+                    push(Item { cluster: Some(k as u32), rect, nearness, order: nearness, ..whole });
+                }
+            }
+        }
+        // By nearness, then by order in the scene: the same order on every run.
+        self.opaque.sort_unstable_by(|a, b| {
+            b.order.total_cmp(&a.order).then((a.instance, a.cluster).cmp(&(b.instance, b.cluster)))
+        });
+        let depth = |i: u32| {
+            let t = self.placed[i as usize].camera_from_instance.translation;
+            if lens.is_none_or(LensRays::is_forward) { t[2] } else { t.iter().map(|x| x * x).sum::<f32>().sqrt() }
+        };
+        self.blended.sort_unstable_by(|(_, a), (_, b)| {
+            let order = depth(b.instance).total_cmp(&depth(a.instance));
+            order.then((a.instance, a.cluster).cmp(&(b.instance, b.cluster)))
+        });
+    }
+}
+
+/// Whether all triangles of a closed cluster show their back.
+fn faces_away(projection: &Projection, placed: &Placed, cluster: &Cluster) -> bool {
+    if !cluster.closed || cluster.cone_cos <= 0.0 {
+        return false;
+    }
+    let camera = &placed.local.instance_from_camera;
+    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let sine = (1.0 - cluster.cone_cos * cluster.cone_cos).max(0.0).sqrt();
+    if projection.parallel {
+        return dot(camera.rotate([0., 0., 1.]), cluster.cone_axis) > sine + 1e-4;
+    }
+    let t = camera.translation;
+    let to = [0, 1, 2].map(|k| cluster.center[k] - t[k]);
+    dot(to, cluster.cone_axis) > sine * dot(to, to).sqrt() + 1.01 * cluster.radius
+}
+
+/// Where a box may be seen, and how near.
+fn bounds(
+    projection: &Projection,
+    camera_from_instance: &PoseF32,
+    middle: [f32; 3],
+    half: [f32; 3],
+) -> Option<([u16; 4], f32)> {
+    let everywhere = everywhere(projection);
+    if !half.iter().all(|h| h.is_finite()) {
+        return Some((everywhere, f32::MAX));
+    }
+    let c = camera_from_instance.apply(middle);
+    let r = camera_from_instance.rotation;
+    let reach =
+        [0, 1, 2].map(|i| 1.0001 * (r[i][0].abs() * half[0] + r[i][1].abs() * half[1] + r[i][2].abs() * half[2]));
+    if projection.parallel {
+        return box_bounds(projection, c, reach);
+    }
+    // Corner by corner where all are in front, which is tighter than the box around the box.
+    let (near, far) = (c[2] - reach[2], c[2] + reach[2]);
+    if far < projection.near || near > projection.far {
+        return None;
+    }
+    if near < projection.near {
+        return Some((everywhere, f32::MAX));
+    }
+    let (mut lo, mut hi) = ([f32::MAX; 2], [f32::MIN; 2]);
+    for corner in 0..8 {
+        let local = [0, 1, 2].map(|k| middle[k] + if corner >> k & 1 == 1 { half[k] } else { -half[k] });
+        let p = camera_from_instance.apply(local);
+        let screen = [p[0] / p[2] * projection.fx + projection.cx, p[1] / p[2] * projection.fy + projection.cy];
+        for k in 0..2 {
+            (lo[k], hi[k]) = (lo[k].min(screen[k]), hi[k].max(screen[k]));
+        }
+    }
+    Some((blocks(projection, lo, hi)?, projection.nearness(near * 0.9999)))
+}
+
+/// Where a box around a point of the optical frame may be seen through a lens, and how near: somewhere, if the range allows
+/// it. Its blocks look for themselves.
+fn lens_bounds(projection: &Projection, lens: &LensRays, middle: [f32; 3], half: [f32; 3]) -> Option<([u16; 4], f32)> {
+    let everywhere = everywhere(projection);
+    let length = |v: [f32; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    let radius = 1.0001 * length(half);
+    if !radius.is_finite() {
+        return Some((everywhere, f32::MAX));
+    }
+    let at = if lens.is_forward() { middle[2] } else { length(middle) };
+    let (near, far) = (at - radius - 1e-4 * at.abs(), at + radius + 1e-4 * at.abs());
+    if far < projection.near || near > projection.far {
+        return None;
+    }
+    Some((everywhere, if near < projection.near { f32::MAX } else { projection.nearness(near) }))
+}
+
+/// Where a ball may be seen, and how near.
+fn ball_bounds(projection: &Projection, c: [f32; 3], radius: f32) -> Option<([u16; 4], f32)> {
+    box_bounds(projection, c, [radius; 3])
+}
+
+fn box_bounds(projection: &Projection, c: [f32; 3], r: [f32; 3]) -> Option<([u16; 4], f32)> {
+    let (near, far) = (c[2] - r[2], c[2] + r[2]);
+    if far < projection.near || near > projection.far {
+        return None;
+    }
+    let f = [projection.fx, projection.fy];
+    let middle = [projection.cx, projection.cy];
+    if projection.parallel {
+        let lo = [0, 1].map(|k| (c[k] - r[k]) * f[k] + middle[k]);
+        let hi = [0, 1].map(|k| (c[k] + r[k]) * f[k] + middle[k]);
+        return Some((blocks(projection, lo, hi)?, projection.nearness(near) + 1e-6));
+    }
+    if near < projection.near {
+        return Some((everywhere(projection), f32::MAX));
+    }
+    let lo = [0, 1].map(|k| (c[k] - r[k]) / if c[k] - r[k] < 0.0 { near } else { far } * f[k] + middle[k]);
+    let hi = [0, 1].map(|k| (c[k] + r[k]) / if c[k] + r[k] > 0.0 { near } else { far } * f[k] + middle[k]);
+    Some((blocks(projection, lo, hi)?, projection.nearness(near * 0.9999)))
+}
+
+fn everywhere(projection: &Projection) -> [u16; 4] {
+    [0, 0, ((projection.width - 1) / BLOCK) as u16, ((projection.height - 1) / BLOCK) as u16]
+}
+
+/// The blocks of a rectangle \[pixels\], one pixel wider on each side; `None` outside of the picture.
+fn blocks(projection: &Projection, lo: [f32; 2], hi: [f32; 2]) -> Option<[u16; 4]> {
+    let size = [projection.width as f32, projection.height as f32];
+    if (0..2).any(|k| hi[k] + 1.0 < 0.0 || lo[k] - 1.0 > size[k]) {
+        return None;
+    }
+    let block = |x: f32, k: usize| (x.clamp(0.0, size[k] - 1.0) as usize / BLOCK) as u16;
+    Some([block(lo[0] - 1.0, 0), block(lo[1] - 1.0, 1), block(hi[0] + 1.0, 0), block(hi[1] + 1.0, 1)])
+}

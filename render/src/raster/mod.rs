@@ -1,0 +1,207 @@
+//! The tile rasterizer: fills a visibility buffer with the nearest surface at every sample.
+//!
+//! Meshes are drawn triangle by triangle, shapes with a closed form by casting the rays of the pixels they may cover, endless
+//! planes by their nearness, which is linear in the picture. The picture is drawn in bands that stay in the cache; things are
+//! drawn front to back, and blocks that are full of nearer things are skipped.
+
+mod cluster;
+mod detail;
+mod draw_list;
+pub mod tile;
+mod triangle;
+
+use crate::simd::{COLUMN, F, LANES, M, ROW, Simd, U};
+use crate::simd::{load, load_u, select, select_u, splat, splat_u, store, store_u};
+use crate::visibility::{Projection, primitive};
+use cluster::{Pass, Vertices};
+pub(crate) use detail::level;
+pub use draw_list::{DrawList, Item, Layer, Parts, Placed};
+use kinetoscope_scene::{RenderScene, Shape};
+use tile::{BLOCK, NOTHING, SAMPLES, Tile};
+
+/// Draws things into a visibility buffer.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Painter {
+    vertices: Vertices,
+}
+
+impl Painter {
+    /// Draws one thing of a draw list. One copy per instruction set: inlined into every caller, it took minutes to compile.
+    #[inline(never)]
+    pub(crate) fn draw<S: Simd>(
+        &mut self,
+        s: S,
+        tile: &mut Tile,
+        projection: &Projection,
+        scene: &RenderScene,
+        placed: &[Placed],
+        item: &Item,
+    ) {
+        let Some(area) = tile.overlap(item.rect) else { return };
+        let index = item.instance as usize;
+        let (instance, placed) = (&scene.instances()[index], &placed[index]);
+        let first_id = scene.first_ids()[index];
+        match (item.cluster, placed.mesh(instance)) {
+            (Some(k), Some(mesh)) => {
+                let mut hidden = true;
+                'search: for by in area[1]..=area[3] {
+                    for bx in area[0]..=area[2] {
+                        let block = tile.block(bx, by);
+                        if !tile.hidden(block, item.nearness) {
+                            hidden = false;
+                            break 'search;
+                        }
+                    }
+                }
+                if !hidden {
+                    let cluster = &mesh.clusters()[k as usize];
+                    let pass = Pass {
+                        projection,
+                        camera_from_instance: &placed.camera_from_instance,
+                        cull: cluster.closed && placed.outside,
+                        first_id,
+                    };
+                    let vertices = &mut self.vertices;
+                    s.vectorize(
+                        #[inline(always)]
+                        || cluster::draw(s, tile, vertices, mesh, cluster, &pass),
+                    );
+                }
+            }
+            _ if is_floor(&instance.shape, projection) => s.vectorize(
+                #[inline(always)]
+                || draw_floor(s, tile, projection, placed, first_id, area),
+            ),
+            _ => s.vectorize(
+                #[inline(always)]
+                || draw_primitive(s, tile, projection, &instance.shape, placed, item, first_id, area),
+            ),
+        }
+    }
+}
+
+/// Whether something is an endless plane seen through a pinhole.
+#[inline(always)]
+fn is_floor(shape: &Shape, projection: &Projection) -> bool {
+    matches!(shape, Shape::Plane(plane) if plane.half == [0.0; 2]) && !projection.parallel
+}
+
+/// An endless plane, whose nearness is linear in the picture: 1/z = -d.z / o.z, where a ray d from the camera o goes down
+/// in the plane's frame. Most pictures are full of one.
+#[inline(always)]
+fn draw_floor<S: Simd>(
+    s: S,
+    tile: &mut Tile,
+    projection: &Projection,
+    placed: &Placed,
+    first_id: u32,
+    area: [usize; 4],
+) {
+    let camera = &placed.local;
+    let ([right, down, forward], height) =
+        (camera.instance_from_camera.rotation[2], camera.instance_from_camera.translation[2]);
+    // Seen from above only.
+    if height <= 0.0 {
+        return;
+    }
+    let (nearest, zero) = (splat(s, projection.nearest()), splat(s, 0.0));
+    let (id, nothing) = (splat_u(s, first_id), splat_u(s, NOTHING));
+    for by in area[1]..=area[3] {
+        for bx in area[0]..=area[2] {
+            let block = tile.block(bx, by);
+            // Most of a floor is drawn where nothing else is: then there is nothing to compare.
+            let empty = tile.take_fresh(block);
+            let mut drawn = false;
+            for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+                let offset = offset.map(|x| x as f32 / 256.0);
+                let u = load(s, &COLUMN) + ((bx * BLOCK) as f32 + 0.5 + offset[0]);
+                let across = (u - projection.cx) * camera.inverse_f[0] * right;
+                let samples = tile.samples(block, plane);
+                for row in 0..BLOCK / 2 {
+                    let v = load(s, &ROW) + ((by * BLOCK + 2 * row) as f32 + 0.5 + offset[1]);
+                    // Rounded as [`Projection::rays`] does: what is resolved is what was seen.
+                    let down = across + (v - projection.cy) * camera.inverse_f[1] * down + forward;
+                    let q = primitive::plane_nearness(down, height);
+                    let hit = down.simd_lt(zero) & q.simd_le(nearest);
+                    let at = samples + row * LANES;
+                    let Some(empty) = empty else {
+                        drawn |= keep(s, tile, at, hit, q, id);
+                        continue;
+                    };
+                    let empty = splat(s, empty);
+                    let nearer = hit & q.simd_gt(empty);
+                    store(select(nearer, q, empty), &mut tile.nearness[at..]);
+                    store_u(select_u(nearer, id, nothing), &mut tile.id[at..]);
+                    drawn = true;
+                }
+            }
+            if drawn {
+                tile.touch(block);
+            }
+        }
+    }
+}
+
+/// Keeps the samples that are hit nearer than what is there, or as near by a later instance. True if there are any.
+#[inline(always)]
+fn keep<S: Simd>(s: S, tile: &mut Tile, at: usize, hit: M<S>, nearness: F<S>, id: U<S>) -> bool {
+    let old = load(s, &tile.nearness[at..]);
+    let near = hit & nearness.simd_ge(old);
+    if !near.any_true() {
+        return false;
+    }
+    let old_id = load_u(s, &tile.id[at..]);
+    let nearer = near & (nearness.simd_gt(old) | old_id.simd_lt(id));
+    store(select(nearer, nearness, old), &mut tile.nearness[at..]);
+    store_u(select_u(nearer, id, old_id), &mut tile.id[at..]);
+    nearer.any_true()
+}
+
+/// Casts the rays of all samples in an area of blocks.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
+fn draw_primitive<S: Simd>(
+    s: S,
+    tile: &mut Tile,
+    projection: &Projection,
+    shape: &Shape,
+    placed: &Placed,
+    item: &Item,
+    first_id: u32,
+    area: [usize; 4],
+) {
+    for by in area[1]..=area[3] {
+        for bx in area[0]..=area[2] {
+            let block = tile.block(bx, by);
+            if tile.hidden(block, item.nearness) {
+                continue;
+            }
+            tile.open(block);
+            let mut drawn = false;
+            for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+                let offset = offset.map(|x| x as f32 / 256.0);
+                let u = load(s, &COLUMN) + ((bx * BLOCK) as f32 + 0.5 + offset[0]);
+                let samples = tile.samples(block, plane);
+                for row in 0..BLOCK / 2 {
+                    let v = load(s, &ROW) + ((by * BLOCK + 2 * row) as f32 + 0.5 + offset[1]);
+                    let (o, d) = projection.rays(s, &placed.local, u, v);
+                    let hit = primitive::intersect(s, shape, o, d, projection.near);
+                    if !hit.hit.any_true() {
+                        continue;
+                    }
+                    let q = match shape {
+                        // As an endless one at the same height, so that the later one does not shine through.
+                        Shape::Plane(_) if !projection.parallel => {
+                            primitive::plane_nearness(d.z, placed.local.instance_from_camera.translation[2])
+                        }
+                        _ => projection.nearness_lanes(hit.t),
+                    };
+                    drawn |= keep(s, tile, samples + row * LANES, hit.hit, q, hit.face + splat_u(s, first_id));
+                }
+            }
+            if drawn {
+                tile.touch(block);
+            }
+        }
+    }
+}

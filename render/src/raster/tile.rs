@@ -1,0 +1,168 @@
+//! The visibility buffer: nearness and id of the nearest surface, for a part of the picture.
+
+/// Pixels along the side of a block.
+pub(crate) const BLOCK: usize = 8;
+/// Pixels in a block.
+pub(crate) const AREA: usize = BLOCK * BLOCK;
+/// The id where nothing is.
+pub(crate) const NOTHING: u32 = u32::MAX;
+
+/// Where the samples of a pixel are, from its centre, in 1/256 pixel. The first is the centre, which all channels but the
+/// colour see; the other four are the rotated grid that graphics cards use.
+pub const SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, -96], [96, -32], [-96, 32], [32, 96]];
+/// The largest offset of a sample.
+pub(crate) const REACH: i32 = 96;
+
+/// A rectangle of 8x8 blocks of the picture. Within a block, samples of one kind are together: `[block][plane][64]`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tile {
+    /// The first pixel; a multiple of [`BLOCK`].
+    pub(crate) x0: usize,
+    pub(crate) y0: usize,
+    pub(crate) blocks_x: usize,
+    pub(crate) blocks_y: usize,
+    /// 1, or 5 with multisampling.
+    pub(crate) planes: usize,
+    pub(crate) nearness: Vec<f32>,
+    pub(crate) id: Vec<u32>,
+    /// The smallest nearness in each block, or less.
+    farthest: Vec<f32>,
+    /// Whether the block was drawn into since `farthest` was taken.
+    stale: Vec<bool>,
+    /// Whether the block is empty whatever its memory holds: it is cleared when something is drawn into it, while it is on
+    /// its way through the cache anyway.
+    fresh: Vec<bool>,
+    /// The nearness where nothing is.
+    empty: f32,
+    /// The only row of each block that rays are cast for, if not all.
+    pub(crate) only: Option<usize>,
+}
+
+impl Tile {
+    /// Takes memory for tiles of up to so many samples.
+    pub(crate) fn reserve(&mut self, samples: usize) {
+        let blocks = samples.div_ceil(AREA);
+        self.nearness.reserve_exact(samples.saturating_sub(self.nearness.len()));
+        self.id.reserve_exact(samples.saturating_sub(self.id.len()));
+        self.farthest.reserve_exact(blocks.saturating_sub(self.farthest.len()));
+        self.stale.reserve_exact(blocks.saturating_sub(self.stale.len()));
+        self.fresh.reserve_exact(blocks.saturating_sub(self.fresh.len()));
+    }
+
+    /// Moves the tile and empties it. What is left of it must be [settled](Self::settle) before it is read.
+    pub(crate) fn clear(&mut self, origin: [usize; 2], blocks: [usize; 2], planes: usize, farthest: f32) {
+        [self.x0, self.y0] = origin;
+        [self.blocks_x, self.blocks_y] = blocks;
+        self.planes = planes;
+        self.empty = farthest;
+        let count = blocks[0] * blocks[1];
+        self.nearness.resize(count * planes * AREA, farthest);
+        self.id.resize(count * planes * AREA, NOTHING);
+        for (flags, value) in [(&mut self.stale, false), (&mut self.fresh, true)] {
+            flags.clear();
+            flags.resize(count, value);
+        }
+        self.farthest.clear();
+        self.farthest.resize(count, farthest);
+    }
+
+    /// Readies a block to be drawn into.
+    #[inline(always)]
+    pub(crate) fn open(&mut self, block: usize) {
+        if self.fresh[block] {
+            self.empty_block(block);
+        }
+    }
+
+    #[inline(never)]
+    fn empty_block(&mut self, block: usize) {
+        let samples = self.samples(block, 0)..self.samples(block + 1, 0);
+        self.nearness[samples.clone()].fill(self.empty);
+        self.id[samples].fill(NOTHING);
+        self.fresh[block] = false;
+    }
+
+    /// Readies a block of which every sample is about to be written, and says what they all hold, if nothing was drawn yet.
+    #[inline(always)]
+    pub(crate) fn take_fresh(&mut self, block: usize) -> Option<f32> {
+        std::mem::take(&mut self.fresh[block]).then_some(self.empty)
+    }
+
+    /// Readies the tile to be read, when all is drawn.
+    pub(crate) fn settle(&mut self) {
+        for block in 0..self.fresh.len() {
+            self.open(block);
+        }
+    }
+
+    /// Takes over the depths of another tile, with nothing in it.
+    pub(crate) fn behind(&mut self, other: &Self) {
+        self.copy(other);
+        self.id.fill(NOTHING);
+    }
+
+    /// Takes over another tile.
+    pub(crate) fn copy(&mut self, other: &Self) {
+        let Self { x0, y0, blocks_x, blocks_y, planes, .. } = *other;
+        (self.x0, self.y0, self.blocks_x, self.blocks_y, self.planes) = (x0, y0, blocks_x, blocks_y, planes);
+        self.nearness.clone_from(&other.nearness);
+        self.id.clone_from(&other.id);
+        self.farthest.clone_from(&other.farthest);
+        self.stale.clone_from(&other.stale);
+        self.fresh.clone_from(&other.fresh);
+        (self.empty, self.only) = (other.empty, other.only);
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        4 * (self.nearness.capacity() + self.id.capacity() + self.farthest.capacity())
+            + self.stale.capacity()
+            + self.fresh.capacity()
+    }
+
+    /// The block with the pixel (8 bx, 8 by) of the picture.
+    #[inline(always)]
+    pub(crate) fn block(&self, bx: usize, by: usize) -> usize {
+        (by - self.y0 / BLOCK) * self.blocks_x + bx - self.x0 / BLOCK
+    }
+
+    /// Where the samples of a block and plane begin.
+    #[inline(always)]
+    pub(crate) fn samples(&self, block: usize, plane: usize) -> usize {
+        (block * self.planes + plane) * AREA
+    }
+
+    /// The blocks of a rectangle that are in this tile: x0, y0, x1, y1, the last included.
+    #[inline(always)]
+    pub(crate) fn overlap(&self, rect: [u16; 4]) -> Option<[usize; 4]> {
+        let [x, y] = [self.x0 / BLOCK, self.y0 / BLOCK];
+        let r = rect.map(usize::from);
+        let out = [r[0].max(x), r[1].max(y), r[2].min(x + self.blocks_x - 1), r[3].min(y + self.blocks_y - 1)];
+        (out[0] <= out[2] && out[1] <= out[3]).then_some(out)
+    }
+
+    #[inline(always)]
+    pub(crate) fn touch(&mut self, block: usize) {
+        self.stale[block] = true;
+    }
+
+    /// Whether nothing of this nearness can be seen in a block any more.
+    #[inline(always)]
+    pub(crate) fn hidden(&mut self, block: usize, nearness: f32) -> bool {
+        if nearness <= self.farthest[block] {
+            return true;
+        }
+        if self.stale[block] {
+            let first = self.samples(block, 0);
+            let mut lanes = [f32::MAX; 16];
+            for row in self.nearness[first..first + self.planes * AREA].chunks_exact(16) {
+                for (lane, &x) in lanes.iter_mut().zip(row) {
+                    *lane = if x < *lane { x } else { *lane };
+                }
+            }
+            self.farthest[block] = lanes.iter().copied().fold(f32::MAX, f32::min);
+            self.stale[block] = false;
+        }
+        nearness <= self.farthest[block]
+    }
+}

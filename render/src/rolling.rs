@@ -1,0 +1,57 @@
+//! Draws rows of pictures, each at an instant of its own: all channels but colours, which paths draw.
+
+use super::rasterizer::Shot;
+use super::shutter::{Clock, Opened};
+use crate::frame::{Channels, Frame, FrameMut};
+use crate::raster::tile::BLOCK;
+use crate::shade::band::Brush;
+use crate::shade::plan::{Plan, Style};
+use crate::simd::Level;
+use crate::trace::motion::Motion;
+use crate::visibility::{RenderError, View};
+use kinetoscope_scene::PoseF32;
+
+/// What is needed for it; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Roll {
+    plan: Plan,
+    poses: Vec<PoseF32>,
+    /// A row of blocks.
+    frame: Frame,
+    /// What the frame is for.
+    size: (usize, Channels),
+}
+
+impl Roll {
+    pub(super) fn bytes(&self) -> usize {
+        let (width, channels) = self.size;
+        self.plan.bytes() + self.poses.capacity() * size_of::<PoseF32>() + width * BLOCK * channels.bytes_per_pixel()
+    }
+
+    /// Draws row `y` of a picture, as it is in the middle of its exposure, into a frame of that row.
+    pub(super) fn draw(
+        &mut self,
+        (brush, style, level): (&mut Brush, Style<'_>, Level),
+        shot: &Shot<'_>,
+        (opened, clock): (&Opened<'_>, &Clock),
+        y: usize,
+        row: &mut FrameMut<'_>,
+    ) -> Result<(), RenderError> {
+        let Self { plan, poses, frame, size } = self;
+        let wanted = (shot.view.width, row.channels());
+        if *size != wanted {
+            (*frame, *size) = (Frame::new(wanted.0, BLOCK, wanted.1), wanted);
+        }
+        let time = clock.at(y, 0.5);
+        let at = |from: &PoseF32, to: &PoseF32| Motion::between(from, to).map_or(*to, |m| PoseF32::from(&m.at(time)));
+        poses.clear();
+        poses.extend(opened.poses.iter().zip(shot.poses).map(|(from, to)| at(from, to)));
+        let world_from_camera = at(&opened.world_from_camera, &shot.view.world_from_camera);
+        let shot = Shot { poses, view: &View { world_from_camera, ..*shot.view }, ..*shot };
+        plan.prepare_row(style, &shot, &frame.as_mut(), y)?;
+        let block = y / BLOCK;
+        brush.paint(level, plan, &shot, &mut frame.as_mut(), block..block + 1);
+        row.take_row(frame, y % BLOCK, wanted.0);
+        Ok(())
+    }
+}

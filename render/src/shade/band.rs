@@ -1,0 +1,228 @@
+//! A band of a picture: from what is drawn where to the pixels of all channels.
+
+use super::group::{At, Colors, resolve};
+use super::multisample::{Edges, blend};
+use super::plan::Plan;
+use super::shadow::ShadowBand;
+use super::tone::encode;
+use crate::frame::{FrameMut, PixelGroup, Stage};
+use crate::geometry::bvh::Stack;
+use crate::raster::tile::{BLOCK, Tile};
+use crate::raster::{Item, Painter};
+use crate::rasterizer::Shot;
+use crate::simd::{LANES, Level, Simd, at_level, first, load, splat_i};
+use crate::visibility::Projection;
+use kinetoscope_scene::RenderScene;
+use std::cell::RefCell;
+use std::ops::Range;
+
+/// What a thread needs to draw; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Brush {
+    tile: Tile,
+    layer: Tile,
+    veiled: Tile,
+    painter: Painter,
+    /// Of rays that are cast for a picture, and of those that are cast while it is shaded.
+    stack: Stack,
+    shade_stack: Stack,
+    colors: Vec<Colors>,
+    edges: Edges,
+}
+
+impl Brush {
+    pub(crate) fn bytes(&self) -> usize {
+        self.tile.bytes()
+            + self.layer.bytes()
+            + self.veiled.bytes()
+            + size_of::<Painter>()
+            + self.colors.capacity() * size_of::<Colors>()
+            + self.edges.bytes()
+            + self.stack.bytes()
+            + self.shade_stack.bytes()
+    }
+
+    /// Scratch memory of rays.
+    pub(crate) fn stack(&mut self) -> &mut Stack {
+        &mut self.stack
+    }
+
+    /// Draws a part of a shadow map.
+    pub(crate) fn shadow(&mut self, level: Level, scene: &RenderScene, band: ShadowBand<'_>) {
+        band.draw(level, scene, &mut self.tile, &mut self.painter);
+    }
+
+    /// Draws rows of blocks of a prepared shot, a band at a time. `frame` begins with the first of them.
+    pub(crate) fn paint(
+        &mut self,
+        level: Level,
+        plan: &Plan,
+        shot: &Shot<'_>,
+        frame: &mut FrameMut<'_>,
+        rows: Range<usize>,
+    ) {
+        let Some(projection) = &plan.projection else { return };
+        let wide = projection.width.div_ceil(BLOCK);
+        let (step, top) = (plan.rows(), rows.start * BLOCK);
+        // Shadows may come later: memory is taken once.
+        self.tile.reserve(plan.most_of_shadow_bands());
+        self.tile.only = plan.only;
+        for first in rows.clone().step_by(step) {
+            let size = [wide, step.min(rows.end - first)];
+            self.tile.clear([0, first * BLOCK], size, plan.planes, projection.farthest());
+            let groups = size[0] * size[1] * (BLOCK / 2);
+            if frame.wants(Stage::Color) && self.colors.len() < groups {
+                self.colors.resize(groups, [[0.0; LANES]; 3]);
+            }
+            if frame.wants(Stage::Color) && plan.planes > 1 {
+                self.edges.reserve();
+            }
+            at_level!(level, s => self.band(s, plan, shot, projection, frame, top));
+        }
+    }
+
+    /// Draws a band of the picture, where the tile is.
+    #[inline(always)]
+    fn band<S: Simd>(
+        &mut self,
+        s: S,
+        plan: &Plan,
+        shot: &Shot<'_>,
+        projection: &Projection,
+        frame: &mut FrameMut<'_>,
+        top: usize,
+    ) {
+        let Self { tile, layer, veiled, painter, stack, shade_stack, colors, edges } = self;
+        let list = &plan.list;
+        let mut draw = |tile: &mut Tile, item: &Item| {
+            if plan.sees_by_rays {
+                let what = (&*list.placed, shot.scene.first_ids());
+                plan.tracer.draw(s, stack, tile, (projection, shot.lens), what, item);
+            } else {
+                painter.draw(s, tile, projection, shot.scene, &list.placed, item);
+            }
+        };
+        for item in &list.opaque {
+            draw(tile, item);
+        }
+        tile.settle();
+        let wanted = [Stage::Detail, Stage::Albedo, Stage::Flow].map(|stage| frame.wants(stage));
+        let [wants_detail, wants_albedo, wants_flow] = wanted;
+        // A pixel's rays need it where only shared things are at hand.
+        let shade_stack = RefCell::new(shade_stack);
+        let context = plan.context(shot, projection, &shade_stack, wanted);
+        let veils = !list.blended.is_empty();
+        if veils {
+            veiled.copy(tile);
+            for (_, item) in &list.blended {
+                draw(veiled, item);
+            }
+        }
+        let size = [projection.width, projection.height];
+        let wants_color = frame.wants(Stage::Color);
+        let wants_geometry = wanted.contains(&true) || frame.wants(Stage::Geometry);
+        let mut pixels = PixelGroup::default();
+        for (block, row, [x, y]) in groups(tile, size) {
+            let at = tile.samples(block, 0) + row * LANES;
+            let (ids, points) = (first(&tile.id[at..]), At::Pixels([x, y]));
+            let color = if wants_color { Some(&mut colors[block * 4 + row]) } else { None };
+            if veils && wants_geometry {
+                resolve(s, &context, first(&veiled.id[at..]), points, Some(&mut pixels), None);
+                resolve(s, &context, ids, points, None, color);
+            } else {
+                resolve(s, &context, ids, points, wants_geometry.then_some(&mut pixels), color);
+            }
+            // Without the instruction set: with it, normals become scattered writes, which are slower.
+            write(frame, Stage::Geometry, &pixels, [x, y], size, top);
+            if wants_detail {
+                write(frame, Stage::Detail, &pixels, [x, y], size, top);
+            }
+            if wants_flow {
+                write(frame, Stage::Flow, &pixels, [x, y], size, top);
+            }
+            if wants_albedo {
+                write(frame, Stage::Albedo, &pixels, [x, y], size, top);
+            }
+        }
+        if !wants_color {
+            return;
+        }
+        if tile.planes > 1 {
+            let mut line = 0;
+            for (block, row, [x, y]) in groups(tile, size) {
+                // A row of blocks at a time: what is computed together does not depend on the bands.
+                if block / tile.blocks_x != line {
+                    line = block / tile.blocks_x;
+                    edges.resolve(s, &context, colors);
+                }
+                let corner = [x as f32, (y - 2 * row) as f32];
+                s.vectorize(
+                    #[inline(always)]
+                    || edges.collect(s, &context, tile, [block, row], corner, colors),
+                );
+            }
+            edges.resolve(s, &context, colors);
+        }
+        for items in list.blended.chunk_by(|(_, a), (_, b)| a.instance == b.instance) {
+            layer.behind(tile);
+            for (_, item) in items {
+                draw(layer, item);
+            }
+            let Some((_, item)) = items.first() else { continue };
+            let alpha = shot.scene.instances()[item.instance as usize].material.rgba[3];
+            for (block, row, [x, y]) in groups(tile, size) {
+                let corner = [x as f32, (y - 2 * row) as f32];
+                s.vectorize(
+                    #[inline(always)]
+                    || blend(s, &context, layer, block, row, corner, alpha, &mut colors[block * 4 + row]),
+                );
+            }
+        }
+        let (curve, exposure) = (plan.tone, plan.exposure);
+        for (block, row, at) in groups(tile, size) {
+            s.vectorize(
+                #[inline(always)]
+                || {
+                    let [r, g, b] = &colors[block * 4 + row];
+                    // Spelled out: a closure that is called thrice is compiled without the instruction set.
+                    let r = encode(s, curve, load(s, r) * exposure).to_int();
+                    let g = encode(s, curve, load(s, g) * exposure).to_int() * (1 << 8);
+                    let b = encode(s, curve, load(s, b) * exposure).to_int() * (1 << 16);
+                    let rgba = r | g | b | splat_i(s, i32::MIN >> 7);
+                    let rgba: [i32; LANES] = rgba.array();
+                    for (to, from) in pixels.color.iter_mut().zip(rgba) {
+                        *to = from.to_le_bytes();
+                    }
+                    write(frame, Stage::Color, &pixels, at, size, top);
+                },
+            );
+        }
+    }
+}
+
+/// Groups of 8 x 2 pixels of a tile that are inside of the picture: block, pair of rows, first pixel. Along the rows, not
+/// block after block: then pictures are written in few places at a time, which the machine's prefetching keeps up with.
+#[inline(always)]
+fn groups(tile: &Tile, [width, height]: [usize; 2]) -> impl Iterator<Item = (usize, usize, [usize; 2])> + use<> {
+    let (wide, high) = (tile.blocks_x, tile.blocks_y);
+    let [x0, y0] = [tile.x0, tile.y0];
+    let pairs = (0..high * (BLOCK / 2)).filter(move |pair| y0 + 2 * pair < height);
+    pairs.flat_map(move |pair| {
+        let (first, row) = (pair / (BLOCK / 2) * wide, pair % (BLOCK / 2));
+        let inside = wide.min((width - x0).div_ceil(BLOCK));
+        (0..inside).map(move |bx| (first + bx, row, [x0 + bx * BLOCK, y0 + 2 * pair]))
+    })
+}
+
+/// Writes a group into a frame whose first row is `top` of the picture.
+#[inline(always)]
+fn write(
+    frame: &mut FrameMut<'_>,
+    stage: Stage,
+    pixels: &PixelGroup,
+    [x, y]: [usize; 2],
+    [width, height]: [usize; 2],
+    top: usize,
+) {
+    frame.write(stage, pixels, [x, y - top], [width, height - top]);
+}

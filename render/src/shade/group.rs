@@ -1,0 +1,250 @@
+//! Sixteen samples: which instances they see, and what each channel makes of it.
+
+use super::mirror::Mirrors;
+use super::moves::Moves;
+use super::shade::{Lighting, albedo, shade, sky};
+use super::shadow::ShadowMap;
+use super::shadow_rays::ShadowRays;
+use super::surface::{Ray, Source, surface};
+use super::tone::to_srgb;
+use crate::frame::PixelGroup;
+use crate::lens::rays::LensRays;
+use crate::raster::Placed;
+use crate::raster::tile::NOTHING;
+use crate::simd::{
+    COLUMN, F, LANES, M, ROW, Simd, U, V3, load, load_u, max, min, select, select_i, splat, splat_i, splat_u, store,
+};
+use crate::visibility::Projection;
+use kinetoscope_scene::{PoseF32, RenderScene};
+
+/// What the pixels of a frame have in common.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Context<'a> {
+    pub(crate) projection: &'a Projection,
+    /// The rays, where a lens bends them.
+    pub(crate) lens: Option<&'a LensRays>,
+    pub(crate) scene: &'a RenderScene,
+    pub(crate) poses: &'a [PoseF32],
+    pub(crate) placed: &'a [Placed],
+    pub(crate) lighting: &'a Lighting,
+    pub(crate) shadows: &'a [ShadowMap],
+    /// Instead of maps.
+    pub(crate) shadow_rays: Option<ShadowRays<'a>>,
+    /// Surfaces that mirror, where there are some.
+    pub(crate) mirrors: Option<Mirrors<'a>>,
+    /// Width of a pixel at depth 1 (behind lenses whose rays go aside, at distance 1).
+    pub(crate) pixel: f32,
+    /// Whether channels of [`Stage::Detail`](crate::frame::Stage::Detail) are wanted.
+    pub(crate) detail: bool,
+    /// Whether channels of [`Stage::Albedo`](crate::frame::Stage::Albedo) are wanted.
+    pub(crate) albedo: bool,
+    /// Where channels of [`Stage::Flow`](crate::frame::Stage::Flow) are wanted.
+    pub(crate) moves: Option<&'a Moves>,
+}
+
+impl<'a> Context<'a> {
+    /// The instance that an id belongs to.
+    #[inline(always)]
+    pub(crate) fn instance(&self, id: u32, last: usize) -> usize {
+        let first = self.scene.first_ids();
+        if id >= first[last] && id < first[last + 1] {
+            return last;
+        }
+        first.partition_point(|&f| f <= id) - 1
+    }
+
+    #[inline(always)]
+    pub(crate) fn source(&self, index: usize) -> Source<'a> {
+        Source {
+            instance: &self.scene.instances()[index],
+            world_from_instance: &self.poses[index],
+            placed: &self.placed[index],
+            first_id: self.scene.first_ids()[index],
+            color: self.scene.linear_colors()[index],
+            texture_scale: self.scene.texture_scales()[index],
+            texture_offset: self.scene.texture_offsets()[index],
+        }
+    }
+}
+
+/// Linear colours of sixteen samples.
+pub(crate) type Colors = [[f32; LANES]; 3];
+
+/// Where sixteen samples are in the picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum At<'a> {
+    /// In the middle of 8 x 2 pixels, of which this is the first.
+    Pixels([usize; 2]),
+    /// At these u and v.
+    Points([&'a [f32; LANES]; 2]),
+}
+
+impl At<'_> {
+    #[inline(always)]
+    fn uv<S: Simd>(self, s: S) -> [F<S>; 2] {
+        match self {
+            // Not from memory: numbers that were just written one by one are waited for.
+            Self::Pixels([x, y]) => [load(s, &COLUMN) + (x as f32 + 0.5), load(s, &ROW) + (y as f32 + 0.5)],
+            Self::Points([u, v]) => [load(s, u), load(s, v)],
+        }
+    }
+}
+
+/// Resolves sixteen samples: geometry into `pixels`, colour into `colors`, each only if wanted.
+///
+/// One copy per instruction set, so its arguments are in memory.
+#[inline(never)]
+pub(crate) fn resolve<S: Simd>(
+    s: S,
+    context: &Context<'_>,
+    ids: &[u32; LANES],
+    at: At<'_>,
+    pixels: Option<&mut PixelGroup>,
+    colors: Option<&mut Colors>,
+) {
+    s.vectorize(
+        #[inline(always)]
+        || {
+            let uv = at.uv(s);
+            let bent = context.lens.map(|lens| match at {
+                At::Pixels(first) => lens.of_pixels(s, first),
+                At::Points(_) => lens.of_points(s, uv[0], uv[1]),
+            });
+            resolve_lanes(s, context, load_u(s, ids), (uv, bent), pixels, colors);
+        },
+    );
+}
+
+#[inline(always)]
+fn resolve_lanes<S: Simd>(
+    s: S,
+    context: &Context<'_>,
+    ids: U<S>,
+    ([u, v], bent): ([F<S>; 2], Option<V3<S>>),
+    mut pixels: Option<&mut PixelGroup>,
+    mut colors: Option<&mut Colors>,
+) {
+    let projection = context.projection;
+    let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+    let direction = match bent {
+        None => projection.world_directions(s, u, v),
+        Some(ray) => ray.rotate(&projection.world_from_camera.rotation),
+    };
+    let mut length = direction.dot(direction).sqrt();
+    if bent.is_some() {
+        // There are pixels without a ray.
+        length = select(length.simd_gt(zero), length, one);
+    }
+    // What a number along a ray means for depths.
+    let forward = context.lens.is_none_or(LensRays::is_forward);
+    let ray = bent.map(|ray| Ray { direction: ray, forward });
+    let view = if colors.is_some() || context.albedo { direction.scale(1.0 / length) } else { direction };
+    let nothing = splat_u(s, NOTHING);
+    let missed = ids.simd_eq(nothing);
+    let mut along = splat(s, f32::INFINITY);
+    let none = V3::splat(s, [0.0; 3]);
+    let (mut normal, mut shading, mut position) = (none, none, none);
+    let mut color = none;
+    let mut mask = splat_i(s, 0);
+    if colors.is_some() && missed.any_true() {
+        color = sky(s, context.lighting, view, context.pixel);
+        if let Some(horizon) = &context.lighting.ground_haze {
+            color = horizon.over_sky(s, view, color);
+        }
+    }
+    // Kept in memory, where they are wanted: registers are for what everybody wants.
+    if let Some(pixels) = pixels.as_mut().filter(|_| context.albedo) {
+        pixels.albedo = [[0; 4]; LANES];
+    }
+    if let Some(pixels) = pixels.as_mut().filter(|_| context.moves.is_some()) {
+        pixels.flow = [[f32::INFINITY; LANES]; 2];
+    }
+    let list: [u32; LANES] = ids.array();
+    let mut left = (!missed).to_bitmask();
+    let mut last = 0;
+    while left != 0 {
+        let lane = left.trailing_zeros() as usize;
+        last = context.instance(list[lane], last);
+        let source = context.source(last);
+        let end = context.scene.first_ids()[last + 1];
+        let here: M<S> = ids.simd_ge(splat_u(s, source.first_id)) & ids.simd_lt(splat_u(s, end));
+        let bits = here.to_bitmask();
+        left &= !bits;
+        let at = surface(s, projection, &source, ids, here, ([u, v], ray), direction);
+        if pixels.is_some() {
+            along = select(here, at.along, along);
+            normal = V3::select(here, at.normal, normal);
+            mask = select_i(here, splat_i(s, source.instance.mask_id), mask);
+            if context.detail {
+                shading = V3::select(here, at.shading, shading);
+                position = V3::select(here, at.position, position);
+            }
+        }
+        if let (Some(pixels), Some(moves)) = (&mut pixels, context.moves) {
+            let [right, down] = moves.of(s, last, at.local, [u, v], here);
+            store(select(here, right, load(s, &pixels.flow[0])), &mut pixels.flow[0]);
+            store(select(here, down, load(s, &pixels.flow[1])), &mut pixels.flow[1]);
+        }
+        if let Some(pixels) = pixels.as_mut().filter(|_| context.albedo) {
+            let base = albedo(s, &source, &at, view, context.pixel, here);
+            store_bytes(s, base, here, &mut pixels.albedo);
+        }
+        if colors.is_some() {
+            let Context { scene, lighting, pixel, .. } = *context;
+            let shadows = (context.shadows, context.shadow_rays);
+            let distance = at.along * length;
+            let mut seen = shade(s, scene, lighting, shadows, &source, &at, view, distance, (pixel, 1.0), here);
+            if let Some(mirrors) = context.mirrors.filter(|mirrors| mirrors.has(last, source.instance)) {
+                let from = (at.position, at.normal, at.along);
+                seen = mirrors.reflect(s, context, &source, from, (view, length), (seen, here));
+            }
+            if let Some(horizon) = lighting.ground_haze.as_ref().filter(|horizon| horizon.ground == last) {
+                seen = horizon.over_ground(s, view, seen, || sky(s, lighting, view, pixel));
+            }
+            color = V3::select(here, seen, color);
+        }
+    }
+    if let Some(pixels) = &mut pixels {
+        let depth = bent.map_or(along, |ray| select(missed, along, along * ray.z));
+        store(depth, &mut pixels.depth);
+        pixels.mask = mask.array();
+        store_v3(normal, &mut pixels.normal);
+        if context.detail {
+            store(along * length, &mut pixels.distance);
+            store_v3(shading, &mut pixels.shading_normal);
+            store_v3(V3::select(missed, none, position), &mut pixels.position);
+        }
+    }
+    if let Some(colors) = &mut colors {
+        if let Some(ray) = bent {
+            // Outside of the image circle no light falls.
+            color = V3::select(ray.dot(ray).simd_gt(zero), color, none);
+        }
+        store_v3(color, colors);
+    }
+}
+
+/// Some linear colours as bytes, opaque.
+#[inline(always)]
+fn store_bytes<S: Simd>(s: S, color: V3<S>, lanes: M<S>, to: &mut [[u8; 4]; LANES]) {
+    let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+    // Spelled out: a closure that is called thrice is compiled without the instruction set.
+    let r = to_srgb(s, min(max(color.x, zero), one)).to_int();
+    let g = to_srgb(s, min(max(color.y, zero), one)).to_int() * (1 << 8);
+    let b = to_srgb(s, min(max(color.z, zero), one)).to_int() * (1 << 16);
+    let rgba = r | g | b | splat_i(s, i32::MIN >> 7);
+    let rgba: [i32; LANES] = rgba.array();
+    let bits = lanes.to_bitmask();
+    for (lane, (to, from)) in to.iter_mut().zip(rgba).enumerate() {
+        if bits >> lane & 1 == 1 {
+            *to = from.to_le_bytes();
+        }
+    }
+}
+
+#[inline(always)]
+fn store_v3<S: Simd>(v: V3<S>, to: &mut [[f32; LANES]; 3]) {
+    store(v.x, &mut to[0]);
+    store(v.y, &mut to[1]);
+    store(v.z, &mut to[2]);
+}

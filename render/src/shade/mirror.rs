@@ -1,0 +1,300 @@
+//! Planar mirrors of pictures that are shaded without paths: one ray from each sample that shows a mirror, and the shading of
+//! the rasterizer where it ends. Mirrors in mirrors show their own colour.
+
+use super::group::{Colors, Context};
+use super::shade::{shade, sky};
+use super::shadow_rays::{Points, arrays, lanes_of};
+use super::surface::{Source, Surface};
+use super::tone::{decode_bytes, to_bytes};
+use crate::geometry::bvh::Stack;
+use crate::geometry::ray::Ray;
+use crate::geometry::vector::{along, dot, scale, sub, to_f64};
+use crate::path::point::in_triangle;
+use crate::simd::{F, LANES, M, Simd, V3, load, max, min, splat};
+use crate::trace::motion::NOW;
+use crate::trace::{Hit, Tracer};
+use kinetoscope_scene::{Instance, LightSum, RenderScene, Shape};
+use std::cell::RefCell;
+
+/// Surfaces that are not opaque that a mirrored ray goes through, at most.
+const MAX_PASSES: usize = 16;
+/// Rays go on this part of their coordinates past a surface.
+const PAST: f64 = 1e-7;
+/// Light that is weaker than this part is not followed.
+const FAINT: f32 = 1e-3;
+
+/// Surfaces that mirror, and a thread's scratch memory.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Mirrors<'a> {
+    pub(crate) tracer: &'a Tracer,
+    pub(crate) stack: &'a RefCell<&'a mut Stack>,
+    /// The first instance that mirrors.
+    pub(crate) first: usize,
+    /// True if no other instance mirrors, as in MuJoCo's renderer.
+    pub(crate) only_first: bool,
+}
+
+/// Share that an instance mirrors where it is a planar mirror, 0..=1; 0 of other shapes and of what is not opaque.
+pub(crate) fn reflectance(instance: &Instance) -> f32 {
+    let material = &instance.material;
+    match instance.shape {
+        Shape::Plane(_) | Shape::Box(_) if material.rgba[3] >= 1.0 => material.reflectance.clamp(0.0, 1.0),
+        _ => 0.0,
+    }
+}
+
+/// A mirrored ray, and how far it was followed \[m\].
+#[derive(Clone, Copy, Debug)]
+struct Reflected {
+    ray: Ray,
+    travelled: f64,
+    /// The part of the light that nothing took yet.
+    left: f32,
+}
+
+/// Surfaces at some lanes, one by one.
+#[derive(Clone, Debug)]
+struct Lanes {
+    positions: [[f32; LANES]; 3],
+    normals: [[f32; LANES]; 3],
+    shading: [[f32; LANES]; 3],
+    local: [[f32; LANES]; 3],
+    uv: [[f32; LANES]; 2],
+    uv_density: [f32; LANES],
+    distances: [f32; LANES],
+}
+
+impl Lanes {
+    const EMPTY: Self = Self {
+        positions: [[0.0; LANES]; 3],
+        normals: [[0.0; LANES]; 3],
+        shading: [[0.0; LANES]; 3],
+        local: [[0.0; LANES]; 3],
+        uv: [[0.0; LANES]; 2],
+        uv_density: [1.0; LANES],
+        distances: [1.0; LANES],
+    };
+
+    /// Sets a lane to what a ray met.
+    fn set(&mut self, k: usize, scene: &RenderScene, reflected: &Reflected, hit: &Hit) {
+        let (ray, pose) = (&reflected.ray, &hit.world_from_instance);
+        let position = ray.at(hit.distance);
+        let side = if dot(hit.normal, ray.direction) < 0.0 { 1.0 } else { -1.0 };
+        let (rotation, from) = (pose.rotation, sub(position, pose.translation));
+        let local = [0, 1, 2].map(|j| (0..3).map(|i| rotation[i][j] * from[i]).sum::<f64>());
+        let mesh = scene.instances()[hit.instance as usize].mesh();
+        let corner = mesh.map(|mesh| in_triangle(mesh, hit.triangle as usize, local, side));
+        let normal = scale(hit.normal, side);
+        let shading = corner.map_or(normal, |corner| {
+            let turned = rotation.map(|row| side * dot(row, corner.normal));
+            scale(turned, 1.0 / dot(turned, turned).sqrt().max(f64::MIN_POSITIVE))
+        });
+        let vectors = [
+            (&mut self.positions, position),
+            (&mut self.normals, normal),
+            (&mut self.shading, shading),
+            (&mut self.local, local),
+        ];
+        for (to, from) in vectors {
+            (to[0][k], to[1][k], to[2][k]) = (from[0] as f32, from[1] as f32, from[2] as f32);
+        }
+        let (uv, density) = corner.and_then(|corner| corner.uv).unwrap_or(([0.0; 2], 1.0));
+        (self.uv[0][k], self.uv[1][k], self.uv_density[k]) = (uv[0] as f32, uv[1] as f32, density as f32);
+        self.distances[k] = (reflected.travelled + hit.distance) as f32;
+    }
+
+    #[inline(always)]
+    fn surface<S: Simd>(&self, s: S, along: F<S>) -> Surface<S> {
+        let v3 = |v: &[[f32; LANES]; 3]| V3 { x: load(s, &v[0]), y: load(s, &v[1]), z: load(s, &v[2]) };
+        Surface {
+            along,
+            normal: v3(&self.normals),
+            shading: v3(&self.shading),
+            position: v3(&self.positions),
+            local: v3(&self.local),
+            uv: [load(s, &self.uv[0]), load(s, &self.uv[1])],
+            uv_density: load(s, &self.uv_density),
+        }
+    }
+}
+
+impl Mirrors<'_> {
+    /// True if an instance mirrors.
+    #[inline(always)]
+    pub(crate) fn has(&self, index: usize, instance: &Instance) -> bool {
+        index == self.first || index > self.first && !self.only_first && reflectance(instance) > 0.0
+    }
+
+    /// The colour of a mirror with what it reflects: `color` is its own, `position`, `normal` and `depth` are those of the
+    /// sample, `view` the direction of its ray, of which a number along it is `length` metres.
+    ///
+    /// Of linear light, `(1 - r) color + r mirrored`; the sky is mirrored, too. Of MuJoCo's, `color + mirrored` in numbers of the
+    /// screen, where the colours of surfaces, but not their highlights, are multiplied by r before they are lit; the sky is not
+    /// mirrored.
+    #[inline(never)]
+    pub(crate) fn reflect<S: Simd>(
+        &self,
+        s: S,
+        context: &Context<'_>,
+        source: &Source<'_>,
+        (position, normal, depth): (V3<S>, V3<S>, F<S>),
+        (view, length): (V3<S>, F<S>),
+        (color, lanes): (V3<S>, M<S>),
+    ) -> V3<S> {
+        s.vectorize(
+            #[inline(always)]
+            || {
+                let up = source.world_from_instance.rotation.map(|row| row[2]);
+                let lanes = lanes & normal.dot(V3::splat(s, up)).simd_gt(splat(s, 0.5));
+                let wanted = lanes.to_bitmask();
+                if wanted == 0 {
+                    return color;
+                }
+                let points = Points::new(position, normal, depth);
+                let (directions, lengths, depths) = (arrays(view), length.array(), depth.array());
+                let mut rays = [None; LANES];
+                for k in lanes_of(wanted) {
+                    let (n, d) = (points.normal(k), to_f64(directions.map(|axis| axis[k])));
+                    let mirrored = along(d, -2.0 * dot(d, n), n);
+                    let direction = scale(mirrored, 1.0 / dot(mirrored, mirrored).sqrt());
+                    let ray = Ray { origin: points.above(k), direction };
+                    let travelled = f64::from(depths[k]) * f64::from(lengths[k]);
+                    rays[k] = Some(Reflected { ray, travelled, left: 1.0 });
+                }
+                let r = reflectance(source.instance);
+                let display = context.scene.light_sum == LightSum::Display;
+                let mut sum: Colors = [[0.0; LANES]; 3];
+                let met = self.follow(s, context, &mut rays, (r, display), length, &mut sum);
+                let mut left = [0.0f32; LANES];
+                for (left, ray) in left.iter_mut().zip(&rays) {
+                    *left = ray.map_or(0.0, |ray| ray.left);
+                }
+                let sum = V3 { x: load(s, &sum[0]), y: load(s, &sum[1]), z: load(s, &sum[2]) };
+                if display {
+                    if met == 0 {
+                        return color;
+                    }
+                    let hit = lanes & mask(s, met);
+                    // Spelled out: a closure that is called thrice is compiled without the instruction set.
+                    let lit = V3 { x: add(s, color.x, sum.x), y: add(s, color.y, sum.y), z: add(s, color.z, sum.z) };
+                    return V3::select(hit, lit, color);
+                }
+                let beyond = sky(s, context.lighting, view.sub(normal.scale(view.dot(normal) * 2.0)), context.pixel);
+                let mirrored = sum.add(beyond.scale(load(s, &left)));
+                V3::select(lanes, color.scale(splat(s, 1.0 - r)).add(mirrored.scale(splat(s, r))), color)
+            },
+        )
+    }
+
+    /// Adds up what mirrored rays meet, as linear light or as bytes of a display; returns the lanes that meet something.
+    #[inline(always)]
+    fn follow<S: Simd>(
+        &self,
+        s: S,
+        context: &Context<'_>,
+        rays: &mut [Option<Reflected>; LANES],
+        (reflectance, display): (f32, bool),
+        length: F<S>,
+        sum: &mut Colors,
+    ) -> u64 {
+        let (scene, mut at) = (context.scene, Lanes::EMPTY);
+        let tint = if display { reflectance } else { 1.0 };
+        let mut met = 0;
+        for _ in 0..MAX_PASSES {
+            let mut hits = [None; LANES];
+            let mut left = 0u64;
+            {
+                let mut stack = self.stack.borrow_mut();
+                for (k, reflected) in rays.iter_mut().enumerate() {
+                    let Some(reflected) = reflected.as_mut().filter(|r| r.left > FAINT) else { continue };
+                    hits[k] = self.next(s, scene, reflected, &mut stack);
+                    left |= u64::from(hits[k].is_some()) << k;
+                }
+            }
+            if left == 0 {
+                break;
+            }
+            met |= left;
+            while left != 0 {
+                let Some(instance) = hits[left.trailing_zeros() as usize].map(|hit| hit.instance) else { break };
+                let mut bits = 0u64;
+                let mut directions = [[0.0f32; LANES], [0.0; LANES], [1.0; LANES]];
+                for k in lanes_of(left) {
+                    let (Some(hit), Some(reflected)) = (&hits[k], &rays[k]) else { continue };
+                    if hit.instance == instance {
+                        bits |= 1 << k;
+                        at.set(k, scene, reflected, hit);
+                        for (to, from) in directions.iter_mut().zip(reflected.ray.direction) {
+                            to[k] = from as f32;
+                        }
+                    }
+                }
+                left &= !bits;
+                let source = context.source(instance as usize);
+                let distance = load(s, &at.distances);
+                let here = at.surface(s, distance / length);
+                let [x, y, z] = &directions;
+                let view = V3 { x: load(s, x), y: load(s, y), z: load(s, z) };
+                let shadows = (context.shadows, context.shadow_rays);
+                let (lighting, by) = (context.lighting, (context.pixel, tint));
+                let seen = shade(s, scene, lighting, shadows, &source, &here, view, distance, by, mask(s, bits));
+                let seen = if display {
+                    V3 { x: to_bytes(s, seen.x), y: to_bytes(s, seen.y), z: to_bytes(s, seen.z) }
+                } else {
+                    seen
+                };
+                let seen = arrays(seen);
+                let alpha = source.instance.material.rgba[3].min(1.0);
+                for k in lanes_of(bits) {
+                    let (Some(hit), Some(reflected)) = (&hits[k], &mut rays[k]) else { continue };
+                    for (sum, seen) in sum.iter_mut().zip(&seen) {
+                        sum[k] += reflected.left * alpha * seen[k];
+                    }
+                    reflected.left *= 1.0 - alpha;
+                    reflected.pass(hit.distance);
+                }
+            }
+        }
+        met
+    }
+
+    /// The next surface along a mirrored ray: not the back of something that is not opaque.
+    #[inline(always)]
+    fn next<S: Simd>(&self, s: S, scene: &RenderScene, reflected: &mut Reflected, stack: &mut Stack) -> Option<Hit> {
+        for _ in 0..MAX_PASSES {
+            let hit = self.tracer.nearest(s, &reflected.ray, f64::INFINITY, NOW, stack)?;
+            let opaque = scene.instances()[hit.instance as usize].material.rgba[3] >= 1.0;
+            if opaque || dot(hit.normal, reflected.ray.direction) < 0.0 {
+                return Some(hit);
+            }
+            reflected.pass(hit.distance);
+        }
+        None
+    }
+}
+
+impl Reflected {
+    /// Goes on past a surface.
+    fn pass(&mut self, distance: f64) {
+        let far = self.ray.origin.iter().fold(distance.max(1.0), |m, x| m.max(x.abs()));
+        let onward = distance + PAST * far;
+        self.ray.origin = self.ray.at(onward);
+        self.travelled += onward;
+    }
+}
+
+/// The lanes of some bits.
+#[inline(always)]
+fn mask<S: Simd>(s: S, bits: u64) -> M<S> {
+    let mut set = [0.0f32; LANES];
+    for k in lanes_of(bits) {
+        set[k] = 1.0;
+    }
+    load(s, &set).simd_gt(splat(s, 0.5))
+}
+
+/// Linear light of the sum of linear light and of bytes of a display, which ends at white.
+#[inline(always)]
+fn add<S: Simd>(s: S, light: F<S>, byte: F<S>) -> F<S> {
+    decode_bytes(min(max(to_bytes(s, light) + byte, splat(s, 0.0)), splat(s, 255.0)))
+}

@@ -1,0 +1,18 @@
+//! From the visibility buffer to channels: every channel is computed from the same hit.
+//!
+//! Colour is computed in linear light; `tone` says how it reaches the screen.
+
+pub(crate) mod band;
+pub(crate) mod group;
+pub(crate) mod horizon;
+pub(crate) mod mirror;
+pub(crate) mod moves;
+pub(crate) mod multisample;
+pub mod plan;
+pub(crate) mod shade;
+pub(crate) mod shadow;
+mod shadow_fit;
+pub(crate) mod shadow_rays;
+pub(crate) mod surface;
+pub(crate) mod texture;
+pub mod tone;

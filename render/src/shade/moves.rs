@@ -1,0 +1,112 @@
+//! Where things were when the picture before was taken.
+
+use crate::intrinsics::PixelIntrinsics;
+use crate::lens::optics::Optics;
+use crate::lens::rays::LensRays;
+use crate::rasterizer::{Before, Shot};
+use crate::simd::{F, LANES, M, Simd, V3, load, select, splat};
+use crate::visibility::{RenderError, View};
+use kinetoscope_scene::PoseF32;
+
+/// How instances moved against the camera; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Moves {
+    list: Vec<Move>,
+    /// Where the picture before saw what; `None` where there is none.
+    eye: Option<Eye>,
+}
+
+/// Where a camera sees a point of its optical frame.
+#[expect(clippy::large_enum_variant, reason = "there is one for a picture; a box would be an allocation for each")]
+#[derive(Clone, Copy, Debug)]
+enum Eye {
+    /// fx, fy, cx, cy \[pixels\].
+    Pinhole([f32; 4]),
+    Lens(Optics),
+}
+
+/// How one instance moved.
+#[derive(Clone, Copy, Debug)]
+struct Move {
+    /// Neither it nor the camera moved, and the lens is the same.
+    still: bool,
+    /// The camera of the picture before, from the instance.
+    camera_from_instance: PoseF32,
+}
+
+impl Moves {
+    pub(crate) fn bytes(&self) -> usize {
+        self.list.capacity() * size_of::<Move>()
+    }
+
+    /// Takes up where the instances of a shot were.
+    ///
+    /// # Errors
+    ///
+    /// A picture before of another scene, or with a view or a pose that is no good.
+    pub(crate) fn prepare(&mut self, shot: &Shot<'_>) -> Result<(), RenderError> {
+        self.list.clear();
+        self.eye = None;
+        let Some(Before { poses, view }) = shot.before else { return Ok(()) };
+        view.validate()?;
+        let expected = shot.scene.instances().len();
+        if poses.len() != expected {
+            return Err(RenderError::PoseCount { expected, found: poses.len() });
+        }
+        if let Some((instance, pose)) = poses.iter().enumerate().find(|(_, pose)| !pose.is_rigid()) {
+            return Err(RenderError::InstancePose { instance, pose: *pose });
+        }
+        let numbers = |view: &View| [view.fx, view.fy, view.cx, view.cy];
+        let (then, now) = (numbers(view), numbers(shot.view));
+        let same = then == now && view.world_from_camera == shot.view.world_from_camera;
+        self.list.extend(poses.iter().zip(shot.poses).map(|(before, now)| Move {
+            still: same && before == now,
+            camera_from_instance: view.world_from_camera.inverse_times(before),
+        }));
+        let behind = |rays: &LensRays| {
+            // The rays' own numbers have more digits.
+            let [fx, fy, cx, cy] = then.map(f64::from);
+            if then == now { *rays.optics() } else { rays.optics().with_pixels(PixelIntrinsics { fx, fy, cx, cy }) }
+        };
+        self.eye = Some(shot.lens.map_or(Eye::Pinhole(then), |rays| Eye::Lens(behind(rays))));
+        Ok(())
+    }
+
+    /// How far points of an instance, seen at (u, v), have moved; `local` is where they are in its frame. Of lanes that are
+    /// not `here` it says nothing of use.
+    #[inline(always)]
+    pub(crate) fn of<S: Simd>(&self, s: S, instance: usize, local: V3<S>, [u, v]: [F<S>; 2], here: M<S>) -> [F<S>; 2] {
+        let unknown = splat(s, f32::INFINITY);
+        let (Some(Move { still, camera_from_instance }), Some(eye)) = (self.list.get(instance), self.eye) else {
+            return [unknown; 2];
+        };
+        if *still {
+            return [splat(s, 0.0); 2];
+        }
+        let there = local.rotate(&camera_from_instance.rotation).add(V3::splat(s, camera_from_instance.translation));
+        match eye {
+            Eye::Pinhole([fx, fy, cx, cy]) => {
+                let ahead = there.z.simd_gt(splat(s, 0.0));
+                let nearness = 1.0 / select(ahead, there.z, splat(s, 1.0));
+                let right = u - (there.x * nearness * fx + cx);
+                let down = v - (there.y * nearness * fy + cy);
+                [select(ahead, right, unknown), select(ahead, down, unknown)]
+            }
+            Eye::Lens(optics) => {
+                let [x, y, z]: [[f32; LANES]; 3] = [there.x, there.y, there.z].map(|axis| axis.array());
+                let [u, v]: [[f32; LANES]; 2] = [u, v].map(|axis| axis.array());
+                let mut flow = [[f32::INFINITY; LANES]; 2];
+                // One after the other, and some lenses take long: only what is wanted.
+                let here = here.to_bitmask();
+                for lane in (0..LANES).filter(|lane| here >> lane & 1 == 1) {
+                    let direction = [x[lane], y[lane], z[lane]].map(f64::from);
+                    if let Some(before) = optics.project(direction) {
+                        flow[0][lane] = (f64::from(u[lane]) - before[0]) as f32;
+                        flow[1][lane] = (f64::from(v[lane]) - before[1]) as f32;
+                    }
+                }
+                flow.map(|axis| load(s, &axis))
+            }
+        }
+    }
+}

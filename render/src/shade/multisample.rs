@@ -1,0 +1,193 @@
+//! Colours of pixels whose four samples do not see the same: the mean of the samples.
+
+use super::group::{At, Colors, Context, resolve};
+use crate::raster::tile::{BLOCK, NOTHING, SAMPLES, Tile};
+use crate::simd::{LANES, Simd, load, load_u, splat_u, store};
+
+/// Requests that are resolved together, at most.
+const CAPACITY: usize = 1024;
+
+/// A colour to compute: for which pixel of which group, how many of its samples it stands for, where and of which id.
+#[derive(Clone, Copy, Debug)]
+struct Request {
+    group: u32,
+    lane: u8,
+    weight: u8,
+    id: u32,
+    u: f32,
+    v: f32,
+}
+
+/// Colours that pixels on edges still need. They are collected over many groups: there are few in each, and sixteen are
+/// computed at a time.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Edges {
+    requests: Vec<Request>,
+}
+
+/// Whether two ids of one pixel look different enough to need a colour each.
+#[inline(always)]
+fn differ(context: &Context<'_>, a: u32, b: u32, qa: f32, qb: f32, last: &mut usize) -> bool {
+    if a == b {
+        return false;
+    }
+    if a == NOTHING || b == NOTHING {
+        return true;
+    }
+    *last = context.instance(a, *last);
+    let first = context.scene.first_ids();
+    if b < first[*last] || b >= first[*last + 1] {
+        return true;
+    }
+    let Some(mesh) = context.placed[*last].mesh(&context.scene.instances()[*last]) else { return true };
+    // Neighbouring triangles of a smooth surface look the same: same normal, same distance.
+    let corner = |id: u32| mesh.normals()[mesh.triangles()[(id - first[*last]) as usize][0] as usize];
+    let (na, nb) = (corner(a), corner(b));
+    let cosine = na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2];
+    cosine < 0.97 || (qa - qb).abs() > 0.02 * qa
+}
+
+impl Edges {
+    pub(crate) fn bytes(&self) -> usize {
+        self.requests.capacity() * size_of::<Request>()
+    }
+
+    /// Takes the memory it will ever need: later pictures have more edges.
+    pub(crate) fn reserve(&mut self) {
+        self.requests.reserve_exact(CAPACITY - self.requests.len());
+    }
+
+    /// Finds the pixels of a group (two rows of a block, `row` counts pairs) that lie on an edge. What their centre sees
+    /// keeps its share of the colour; the rest is added by [`resolve`](Self::resolve).
+    #[inline(always)]
+    pub(crate) fn collect<S: Simd>(
+        &mut self,
+        s: S,
+        context: &Context<'_>,
+        tile: &Tile,
+        [block, row]: [usize; 2],
+        corner: [f32; 2],
+        colors: &mut [Colors],
+    ) {
+        let at = |plane: usize| tile.samples(block, plane) + row * LANES;
+        let center = load_u(s, &tile.id[at(0)..]);
+        let mut same = center.simd_eq(load_u(s, &tile.id[at(1)..]));
+        for plane in 2..SAMPLES.len() {
+            same &= center.simd_eq(load_u(s, &tile.id[at(plane)..]));
+        }
+        let mut left = (!same).to_bitmask();
+        if left == 0 {
+            return;
+        }
+        if self.requests.len() + 4 * LANES > CAPACITY {
+            self.resolve(s, context, colors);
+        }
+        let group = block * (BLOCK / 2) + row;
+        let mut last = 0;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let sample = |plane: usize| (tile.id[at(plane) + lane], tile.nearness[at(plane) + lane]);
+            let (center, nearness) = sample(0);
+            let (mut own, begin) = (0u8, self.requests.len());
+            let mut seen = [0.0f32; SAMPLES.len()];
+            for (plane, offset) in SAMPLES.iter().enumerate().skip(1) {
+                let (id, q) = sample(plane);
+                if !differ(context, center, id, nearness, q, &mut last) {
+                    own += 1;
+                    continue;
+                }
+                let mut others = self.requests[begin..].iter_mut().zip(&seen);
+                if let Some((other, _)) =
+                    others.find(|(other, seen)| !differ(context, other.id, id, **seen, q, &mut last))
+                {
+                    other.weight += 1;
+                    continue;
+                }
+                seen[self.requests.len() - begin] = q;
+                self.requests.push(Request {
+                    group: group as u32,
+                    lane: lane as u8,
+                    weight: 1,
+                    id,
+                    u: corner[0] + (lane % 8) as f32 + 0.5 + offset[0] as f32 / 256.0,
+                    v: corner[1] + (2 * row + lane / 8) as f32 + 0.5 + offset[1] as f32 / 256.0,
+                });
+            }
+            if own < 4 {
+                for channel in &mut colors[group] {
+                    channel[lane] *= f32::from(own) * 0.25;
+                }
+            }
+        }
+    }
+
+    /// Computes what was collected, and adds it to the pixels.
+    #[inline(always)]
+    pub(crate) fn resolve<S: Simd>(&mut self, s: S, context: &Context<'_>, colors: &mut [Colors]) {
+        // By id: the same surfaces together. The rest makes the order one of a kind.
+        self.requests.sort_unstable_by_key(|r| (r.id, r.group, r.lane));
+        for batch in self.requests.chunks(LANES) {
+            let (mut u, mut v, mut id) = ([batch[0].u; LANES], [batch[0].v; LANES], [NOTHING; LANES]);
+            for (k, request) in batch.iter().enumerate() {
+                (u[k], v[k], id[k]) = (request.u, request.v, request.id);
+            }
+            let mut out: Colors = [[0.0; LANES]; 3];
+            resolve(s, context, &id, At::Points([&u, &v]), None, Some(&mut out));
+            for (k, request) in batch.iter().enumerate() {
+                let weight = f32::from(request.weight) * 0.25;
+                for (to, from) in colors[request.group as usize].iter_mut().zip(&out) {
+                    to[usize::from(request.lane)] += from[k] * weight;
+                }
+            }
+        }
+        self.requests.clear();
+    }
+}
+
+/// Blends a layer over a group: `alpha` times the share of the samples that the layer covers.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
+pub(crate) fn blend<S: Simd>(
+    s: S,
+    context: &Context<'_>,
+    layer: &Tile,
+    block: usize,
+    row: usize,
+    corner: [f32; 2],
+    alpha: f32,
+    colors: &mut Colors,
+) {
+    let at = |plane: usize| layer.samples(block, plane) + row * LANES;
+    let nothing = splat_u(s, NOTHING);
+    let mut share = [0.0f32; LANES];
+    let mut id = [NOTHING; LANES];
+    let (mut u, mut v) = ([0.0f32; LANES], [0.0f32; LANES]);
+    let planes = if layer.planes == 1 { 0..1 } else { 1..layer.planes };
+    if planes.clone().all(|plane| load_u(s, &layer.id[at(plane)..]).simd_eq(nothing).all_true()) {
+        return;
+    }
+    let each = 1.0 / planes.len() as f32;
+    for lane in 0..LANES {
+        (u[lane], v[lane]) = (corner[0] + (lane % 8) as f32 + 0.5, corner[1] + (2 * row + lane / 8) as f32 + 0.5);
+        id[lane] = layer.id[at(0) + lane];
+        for plane in planes.clone() {
+            let sample = layer.id[at(plane) + lane];
+            if sample != NOTHING {
+                share[lane] += each;
+                if id[lane] == NOTHING {
+                    id[lane] = sample;
+                    u[lane] += SAMPLES[plane][0] as f32 / 256.0;
+                    v[lane] += SAMPLES[plane][1] as f32 / 256.0;
+                }
+            }
+        }
+    }
+    let mut over: Colors = [[0.0; LANES]; 3];
+    resolve(s, context, &id, At::Points([&u, &v]), None, Some(&mut over));
+    let k = load(s, &share) * alpha;
+    for (to, from) in colors.iter_mut().zip(&over) {
+        let (below, above) = (load(s, to), load(s, from));
+        store(below + (above - below) * k, to);
+    }
+}

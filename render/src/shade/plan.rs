@@ -1,0 +1,344 @@
+//! What the parts of a picture have in common: what is drawn where, the lamps and their shadows.
+
+use super::group::Context;
+use super::horizon::Horizon;
+use super::mirror::{self, Mirrors};
+use super::moves::Moves;
+use super::shade::{Lighting, MAX_LIGHTS};
+use super::shadow::{ShadowBand, ShadowMap};
+use super::shadow_fit::{self, LampView};
+use super::shadow_rays::ShadowRays;
+use super::tone::ToneCurve;
+use crate::aperture::Aperture;
+use crate::frame::{FrameMut, Stage};
+use crate::geometry::assets::RayAssets;
+use crate::geometry::bvh::Stack;
+use crate::lens::rays::LensRays;
+use crate::raster::tile::{BLOCK, SAMPLES};
+use crate::raster::{DrawList, Layer, Parts, level};
+use crate::rasterizer::RasterCfg;
+use crate::rasterizer::Shot;
+use crate::renderer::Renderer;
+use crate::shutter::Shutter;
+use crate::trace::Tracer;
+use crate::visibility::{Projection, RenderError, View};
+use kinetoscope_scene::{Instance, LightSum, PoseF32};
+use std::cell::RefCell;
+
+/// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
+pub(crate) const BAND: usize = 128 * 1024;
+/// Lamps with a shadow, at most.
+const MAX_SHADOWS: usize = 4;
+
+/// A shot that is ready to be drawn, band by band; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Plan {
+    pub(crate) list: DrawList,
+    lighting: Lighting,
+    moves: Moves,
+    shadows: Vec<ShadowMap>,
+    /// How many of the maps are in use.
+    maps: usize,
+    /// Kinds of samples: 1, or 5 with multisampling.
+    pub(crate) planes: usize,
+    /// The picture, while there is one.
+    pub(crate) projection: Option<Projection>,
+    /// What rays meet, where some are cast.
+    pub(crate) tracer: Tracer,
+    pub(crate) renderer: Renderer,
+    /// Whether what is seen is found by rays.
+    pub(crate) sees_by_rays: bool,
+    /// Whether shadows are cast by rays.
+    shadow_rays: bool,
+    /// Rays for ambient occlusion.
+    occlusion_rays: u16,
+    /// The first instance that mirrors, of pictures with colours that are shaded without paths.
+    first_mirror: Option<usize>,
+    pub(crate) tone: ToneCurve,
+    /// What light is multiplied by before the tone curve.
+    pub(crate) exposure: f32,
+    /// The only row of each block that is wanted, if not all.
+    pub(crate) only: Option<usize>,
+}
+
+/// How shots are drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Style<'a> {
+    pub(crate) cfg: RasterCfg,
+    pub(crate) renderer: Renderer,
+    pub(crate) aperture: Option<&'a Aperture>,
+    pub(crate) shutter: Shutter,
+    pub(crate) stops: f64,
+    /// Where trees over meshes are kept.
+    pub(crate) assets: &'a RayAssets,
+}
+
+/// The most stops by which pictures are lighter or darker.
+const STOPS: f64 = 20.0;
+
+impl Plan {
+    pub(crate) fn bytes(&self) -> usize {
+        self.list.bytes()
+            + self.tracer.bytes()
+            + self.moves.bytes()
+            + self.shadows.iter().map(ShadowMap::bytes).sum::<usize>()
+    }
+
+    /// Checks a shot and finds what is drawn where. Shadows are not drawn yet, see [`Plan::shadow_bands`].
+    pub(crate) fn prepare(
+        &mut self,
+        style: Style<'_>,
+        shot: &Shot<'_>,
+        frame: &FrameMut<'_>,
+    ) -> Result<(), RenderError> {
+        self.projection = None;
+        let View { width, height, .. } = *shot.view;
+        shot.view.validate()?;
+        frame.validate(width * height)?;
+        self.prepare_part(style, shot, frame)
+    }
+
+    /// As [`prepare`](Self::prepare), for one row of the picture; the frame is that of the row of blocks that it is in.
+    pub(crate) fn prepare_row(
+        &mut self,
+        style: Style<'_>,
+        shot: &Shot<'_>,
+        frame: &FrameMut<'_>,
+        row: usize,
+    ) -> Result<(), RenderError> {
+        self.projection = None;
+        self.prepare_part(style, shot, frame)?;
+        self.only = Some(row % BLOCK);
+        Ok(())
+    }
+
+    fn prepare_part(&mut self, style: Style<'_>, shot: &Shot<'_>, frame: &FrameMut<'_>) -> Result<(), RenderError> {
+        let Style { cfg, renderer, aperture, shutter, stops, assets } = style;
+        (self.maps, self.only) = (0, None);
+        let Shot { scene, poses, view, .. } = *shot;
+        view.validate()?;
+        if !matches!(cfg.samples, 1 | 4) {
+            return Err(RenderError::Samples { samples: cfg.samples });
+        }
+        if !(-STOPS..=STOPS).contains(&stops) {
+            return Err(RenderError::Stops { stops: stops as f32 });
+        }
+        renderer.validate()?;
+        check_occlusion(cfg, renderer)?;
+        if poses.len() != scene.instances().len() {
+            return Err(RenderError::PoseCount { expected: scene.instances().len(), found: poses.len() });
+        }
+        if let Some((instance, pose)) = poses.iter().enumerate().find(|(_, p)| !p.is_rigid()) {
+            return Err(RenderError::InstancePose { instance, pose: *pose });
+        }
+        aperture.map_or(Ok(()), Aperture::check)?;
+        shutter.check()?;
+        check_light(renderer, aperture, shutter)?;
+        if frame.wants(Stage::Flow) {
+            self.moves.prepare(shot)?;
+        }
+        let projection = Projection::from(view);
+        let wants_color = frame.wants(Stage::Color);
+        let multisampled = wants_color && cfg.samples == 4 && !renderer.follows_paths();
+        if let Some(lens) = shot.lens {
+            check_lens(lens, renderer, view, if multisampled { 4 } else { 1 })?;
+        }
+        let shaded = wants_color && !renderer.follows_paths();
+        let hybrid = wants_color && renderer == Renderer::Hybrid;
+        self.shadow_rays = hybrid && cfg.shadows;
+        self.occlusion_rays = if hybrid { cfg.occlusion_rays } else { 0 };
+        (self.tone, self.exposure) = (cfg.tone, stops.exp2() as f32);
+        if shaded && scene.light_sum == LightSum::Display && cfg.tone == ToneCurve::Soft {
+            self.tone = ToneCurve::Clip;
+        }
+        let shown = |i: &Instance| Layer::of(i, cfg.groups) != Layer::Hidden && mirror::reflectance(i) > 0.0;
+        self.first_mirror = scene.instances().iter().position(shown).filter(|_| shaded);
+        let casts_rays = self.shadow_rays || self.occlusion_rays > 0 || self.first_mirror.is_some();
+        if shaded {
+            self.light(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);
+        }
+        self.planes = if multisampled { SAMPLES.len() } else { 1 };
+        self.sees_by_rays = renderer.sees_by_rays(shot.lens.is_some());
+        let parts = match renderer {
+            _ if self.sees_by_rays => Parts::Whole,
+            Renderer::Raster if cfg.lod => Parts::Levels,
+            _ => Parts::Clusters,
+        };
+        let keep = |instance: &Instance| Layer::of(instance, cfg.groups);
+        self.list.build(&projection, shot.lens, scene, poses, parts, keep);
+        if self.sees_by_rays || casts_rays {
+            self.tracer.find_bodies(scene, assets, keep);
+        }
+        if casts_rays || wants_color && renderer.follows_paths() {
+            self.tracer.place(scene, poses, None);
+        }
+        self.renderer = renderer;
+        self.projection = Some(projection);
+        Ok(())
+    }
+
+    /// Prepares lamps and their shadows.
+    fn light(&mut self, cfg: RasterCfg, shot: &Shot<'_>) {
+        let Shot { scene, poses, view, lights, lens, .. } = *shot;
+        let lights = lights.unwrap_or(&scene.lights);
+        let mut maps = [None; 256];
+        if cfg.shadows {
+            let side = shadow_side(cfg, view);
+            let lamps = lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS);
+            let mut views = [None; MAX_LIGHTS];
+            let mut casting = [0; MAX_LIGHTS];
+            let lamps = lamps.filter(|(k, l)| l.cast_shadow && *k < maps.len());
+            let lamps = lamps.filter_map(|(k, light)| Some((k, LampView::of(light)?)));
+            for ((k, lamp), (view, of)) in lamps.zip(views.iter_mut().zip(&mut casting)) {
+                (*view, *of) = (Some(lamp), k);
+            }
+            let receivers = match lens {
+                None => {
+                    let shown = |i: &Instance| Layer::of(i, cfg.groups) != Layer::Hidden;
+                    shadow_fit::seen(&Projection::from(view), scene, poses, shown, &views)
+                }
+                Some(_) => shadow_fit::everything(),
+            };
+            for ((lamp, receivers), k) in views.iter().flatten().zip(&receivers).zip(casting) {
+                if self.maps == MAX_SHADOWS {
+                    break;
+                }
+                if self.shadows.len() == self.maps {
+                    self.shadows.push(ShadowMap::empty());
+                }
+                if self.shadows[self.maps].prepare((lamp, receivers), scene, poses, cfg, side) {
+                    maps[k] = Some(self.maps);
+                    self.maps += 1;
+                }
+            }
+        }
+        let forward = lens.is_none_or(LensRays::is_forward).then(|| view.world_from_camera.rotation.map(|row| row[2]));
+        self.lighting.prepare(scene, lights, forward, |k| maps.get(k).copied().flatten());
+        let shown = |i: &Instance| Layer::of(i, cfg.groups) != Layer::Hidden;
+        self.lighting.ground_haze = Horizon::of(scene, poses, view.world_from_camera.translation, shown);
+    }
+
+    /// Whether there are shadow maps to draw.
+    pub(crate) fn has_shadows(&self) -> bool {
+        self.maps > 0
+    }
+
+    /// The parts of the shadow maps; all must be drawn before the picture.
+    pub(crate) fn shadow_bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
+        self.shadows.iter_mut().take(self.maps).flat_map(ShadowMap::bands)
+    }
+
+    /// Samples of a tile that can hold any band of the shadow maps, of lamps too that cast no shadow now.
+    pub(crate) fn most_of_shadow_bands(&self) -> usize {
+        self.shadows.iter().map(ShadowMap::most_of_bands).max().unwrap_or(0)
+    }
+
+    /// Rows of blocks that are drawn together.
+    pub(crate) fn rows(&self) -> usize {
+        let Some(projection) = &self.projection else { return 1 };
+        let blocks = [projection.width.div_ceil(BLOCK), projection.height.div_ceil(BLOCK)];
+        // Small pictures with many samples in halves, so that the scratch memory is not much larger than the picture.
+        let most = if self.planes > 1 { blocks[1].div_ceil(2) } else { blocks[1] };
+        (BAND / (self.planes * blocks[0] * BLOCK * BLOCK)).clamp(1, most)
+    }
+
+    /// What all pixels need; `detail`, `albedo` and `flow` say whether channels of these stages are wanted.
+    pub(crate) fn context<'a>(
+        &'a self,
+        shot: &Shot<'a>,
+        projection: &'a Projection,
+        stack: &'a RefCell<&'a mut Stack>,
+        [detail, albedo, flow]: [bool; 3],
+    ) -> Context<'a> {
+        let (shadows, occlusion_rays) = (self.shadow_rays, self.occlusion_rays);
+        let rays = ShadowRays { tracer: &self.tracer, stack, shadows, occlusion_rays };
+        let only_first = shot.scene.light_sum == LightSum::Display;
+        let mirrors = self.first_mirror.map(|first| Mirrors { tracer: &self.tracer, stack, first, only_first });
+        Context {
+            shadow_rays: (shadows || occlusion_rays > 0).then_some(rays),
+            mirrors,
+            projection,
+            scene: shot.scene,
+            poses: shot.poses,
+            placed: &self.list.placed,
+            lighting: &self.lighting,
+            shadows: &self.shadows[..self.maps],
+            pixel: shot.lens.map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel() as f32),
+            lens: shot.lens,
+            detail,
+            albedo,
+            moves: flow.then_some(&self.moves),
+        }
+    }
+}
+
+/// Whether a renderer casts rays for ambient occlusion, if it is to.
+pub fn check_occlusion(cfg: RasterCfg, renderer: Renderer) -> Result<(), RenderError> {
+    match renderer {
+        Renderer::Raster | Renderer::FastRayTraced if cfg.occlusion_rays > 0 => {
+            Err(RenderError::Occlusion { rays: cfg.occlusion_rays, renderer: renderer.name() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether a renderer can draw what a lens and a shutter do to light.
+pub fn check_light(renderer: Renderer, aperture: Option<&Aperture>, shutter: Shutter) -> Result<(), RenderError> {
+    let what = match (aperture, shutter.is_instant()) {
+        _ if renderer.follows_paths() => return Ok(()),
+        (None, true) => return Ok(()),
+        (Some(_), _) => "an aperture (depth of field)",
+        (None, false) => "a shutter that takes time",
+    };
+    Err(RenderError::NeedsPaths { what, renderer: renderer.name() })
+}
+
+/// Whether the rays of a lens are those of the picture, and can be followed.
+fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> Result<(), RenderError> {
+    if !renderer.sees_by_rays(true) {
+        let (lens, renderer) = (lens.optics().lens().name(), renderer.name());
+        return Err(RenderError::LensRenderer { lens, renderer });
+    }
+    let (expected, found) = ([view.width, view.height], lens.size());
+    if found != expected || lens.samples() < samples {
+        return Err(RenderError::LensRays { expected, samples, found, found_samples: lens.samples() });
+    }
+    Ok(())
+}
+
+/// Texels along the side of a shadow map: about three for two pixels of a square picture of the same area.
+fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
+    match cfg.shadow_size {
+        0 => (view.width.saturating_mul(view.height).isqrt().min(1024) * 3 / 2).next_power_of_two().clamp(128, 1024),
+        n => n.clamp(64, 8192).next_multiple_of(BLOCK),
+    }
+}
+
+/// Triangles of all meshes, each as coarse as it is drawn.
+fn triangle_count(cfg: RasterCfg, shot: &Shot<'_>) -> usize {
+    let Shot { scene, poses, view, .. } = *shot;
+    if !cfg.lod {
+        return scene.triangle_count();
+    }
+    let projection = Projection::from(view);
+    let count = |(instance, pose): (&Instance, &PoseF32)| {
+        let mesh = instance.mesh().filter(|_| Layer::of(instance, cfg.groups) != Layer::Hidden)?;
+        let level = level(&projection, instance, &view.world_from_camera.inverse_times(pose));
+        Some(mesh.level(usize::from(level)).triangles().len())
+    };
+    scene.instances().iter().zip(poses).filter_map(count).sum()
+}
+
+/// How long a shot takes, about \[ns\]: to tell whether another thread is worth its start.
+pub(crate) fn estimate(cfg: RasterCfg, shot: &Shot<'_>, frame: &FrameMut<'_>) -> usize {
+    let Shot { scene, view, .. } = *shot;
+    let wants_color = frame.wants(Stage::Color);
+    let (pixels, triangles) = (view.width.saturating_mul(view.height), triangle_count(cfg, shot));
+    let shadows = if wants_color && cfg.shadows {
+        let texels = shadow_side(cfg, view).pow(2);
+        scene.lights.len().min(MAX_SHADOWS) * (2 * texels + 20 * triangles) + 5 * pixels
+    } else {
+        0
+    };
+    pixels.saturating_mul(if wants_color { 15 } else { 8 }) + 20 * triangles + shadows
+}

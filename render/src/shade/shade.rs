@@ -1,0 +1,438 @@
+//! How much light of which colour a surface sends to the camera.
+
+use super::horizon::Horizon;
+use super::shadow::ShadowMap;
+use super::shadow_rays::ShadowRays;
+use super::surface::{Source, Surface};
+use super::{texture, tone};
+use crate::simd::{F, M, Simd, V3, abs, max, min, root, select, splat};
+use kinetoscope_scene::{Light, LightKind, LightSum, Material, RenderScene, Texture};
+use std::sync::Arc;
+
+/// The largest number of lamps that are drawn.
+pub(crate) const MAX_LIGHTS: usize = 16;
+
+/// A light prepared for a frame.
+#[derive(Clone, Copy, Debug)]
+struct Lamp {
+    light: Light,
+    /// Unit vector along which it shines.
+    along: [f32; 3],
+    cutoff_cos: f32,
+    exponent: u32,
+    shadow: Option<usize>,
+}
+
+/// What colours need besides the surface, prepared once per frame.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Lighting {
+    lamps: Vec<Lamp>,
+    zenith: [f32; 3],
+    horizon: [f32; 3],
+    nadir: [f32; 3],
+    skybox: Option<Arc<Texture>>,
+    haze: Option<[f32; 3]>,
+    /// Haze at the end of the ground, where there is some.
+    pub(crate) ground_haze: Option<Horizon>,
+    /// True if the headlight is one of the lamps: of MuJoCo's light it is directional.
+    headlight_is_lamp: bool,
+}
+
+pub(crate) fn unit(v: [f32; 3]) -> [f32; 3] {
+    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    if length > 0.0 && length.is_finite() { v.map(|x| x / length) } else { [0., 0., -1.] }
+}
+
+/// The cosine of an angle in degrees, by its series: `cos()` is not the same on every machine.
+pub(crate) fn cos_deg(deg: f32) -> f32 {
+    let x = f64::from(deg.clamp(0.0, 180.0)) * (std::f64::consts::PI / 180.0);
+    let (mut sum, mut term) = (1.0f64, 1.0f64);
+    for k in 1..16 {
+        term *= -(x * x) / f64::from((2 * k - 1) * (2 * k));
+        sum += term;
+    }
+    sum as f32
+}
+
+impl Lamp {
+    /// The direction to the lamp (unit) and how much of its light reaches points, without shadows; `None` where it lights
+    /// none of them.
+    #[inline(always)]
+    fn reaches<S: Simd>(&self, s: S, position: V3<S>, lanes: M<S>) -> Option<(V3<S>, F<S>)> {
+        let (light, zero, one) = (&self.light, splat(s, 0.0), splat(s, 1.0));
+        if light.kind == LightKind::Directional {
+            let [x, y, z] = self.along;
+            return Some((V3::splat(s, [-x, -y, -z]), one));
+        }
+        let to = V3::splat(s, light.position).sub(position);
+        let square = to.dot(to);
+        let axis = -to.dot(V3::splat(s, self.along));
+        let is_spot = matches!(light.kind, LightKind::Spot { .. });
+        // Most of a floor is outside of a cone, and needs no root to know it. A little more than the cone, so that what a
+        // point gets does not depend on the points beside it.
+        if is_spot && self.cutoff_cos > 0.0 {
+            let least = square * (self.cutoff_cos * self.cutoff_cos * 0.9999);
+            if !(lanes & axis.simd_gt(zero) & (axis * axis).simd_ge(least)).any_true() {
+                return None;
+            }
+        }
+        let distance = square.sqrt();
+        let inverse = 1.0 / select(distance.simd_gt(zero), distance, one);
+        let [constant, linear, quadratic] = light.attenuation;
+        let mut strength = if linear == 0.0 && quadratic == 0.0 {
+            splat(s, 1.0 / constant.max(1e-6))
+        } else {
+            1.0 / max(square * quadratic + distance * linear + constant, splat(s, 1e-6))
+        };
+        if is_spot {
+            let cosine = axis * inverse;
+            let inside = cosine.simd_ge(splat(s, self.cutoff_cos));
+            strength = select(inside, strength * power(s, max(cosine, zero), self.exponent), zero);
+        }
+        Some((to.scale(inverse), strength))
+    }
+}
+
+impl Lighting {
+    /// `forward` is the camera's viewing direction, of a camera that has one.
+    pub(crate) fn prepare(
+        &mut self,
+        scene: &RenderScene,
+        lights: &[Light],
+        forward: Option<[f32; 3]>,
+        shadow: impl Fn(usize) -> Option<usize>,
+    ) {
+        let sky = scene.sky;
+        (self.zenith, self.horizon, self.nadir) =
+            (tone::decode(sky.zenith), tone::decode(sky.horizon), tone::decode(sky.nadir));
+        self.skybox.clone_from(&scene.skybox);
+        self.haze = scene.haze.and_then(|h| h.color).map(tone::decode);
+        self.lamps.clear();
+        for (k, light) in lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS) {
+            let (cutoff_cos, exponent) = match light.kind {
+                LightKind::Spot { cutoff_deg, exponent } => (cos_deg(cutoff_deg), whole_exponent(exponent)),
+                LightKind::Directional | LightKind::Point => (-2.0, 0),
+            };
+            self.lamps.push(Lamp {
+                light: *light,
+                along: unit(light.direction),
+                cutoff_cos,
+                exponent,
+                shadow: shadow(k),
+            });
+        }
+        let headlight = scene.headlight.along(scene.light_sum, forward);
+        self.headlight_is_lamp = headlight.is_some();
+        self.lamps.extend(headlight.map(|light| Lamp {
+            light,
+            along: unit(light.direction),
+            cutoff_cos: -2.0,
+            exponent: 0,
+            shadow: None,
+        }));
+    }
+}
+
+/// The exponent of a spot as it is drawn: the nearest whole number, up to OpenGL's largest.
+pub fn whole_exponent(exponent: f32) -> u32 {
+    (exponent.clamp(0.0, 128.0) + 0.5) as u32
+}
+
+/// Highlights weaker than this are black: a third of the weakest light that is not black on a screen.
+const FAINT: f32 = 1e-4;
+
+/// The numbers whose power is [`FAINT`], by exponent: below them there is no highlight to compute.
+const FAINT_ROOT: [f32; 129] = {
+    let mut roots = [0.0f32; 129];
+    let mut exponent = 1;
+    while exponent < roots.len() {
+        // Halving the interval: a constant is computed the same on every machine.
+        let (mut low, mut high) = (0.0f32, 1.0f32);
+        let mut halvings = 0;
+        while halvings < 24 {
+            let middle = 0.5 * (low + high);
+            let (mut power, mut k) = (1.0f32, 0);
+            while k < exponent {
+                power *= middle;
+                k += 1;
+            }
+            if power < FAINT {
+                low = middle
+            } else {
+                high = middle
+            }
+            halvings += 1;
+        }
+        roots[exponent] = low;
+        exponent += 1;
+    }
+    roots
+};
+
+/// How a surface shines.
+#[derive(Clone, Copy)]
+struct Gloss {
+    strength: f32,
+    exponent: u32,
+    /// Cosines below this give no highlight.
+    faint: f32,
+}
+
+impl Gloss {
+    /// A metal mirrors lamps as it does everything, whatever `specular` says of what is not metal.
+    fn of(material: &Material, display: bool) -> Self {
+        let exponent = (material.exponent() + 0.5) as u32;
+        let strength = if material.metallic > 0.0 && !display { 1.0 } else { material.specular };
+        Self { strength, exponent, faint: FAINT_ROOT[exponent as usize] }
+    }
+
+    /// Whether it shines in a light of this colour.
+    fn shows(&self, specular: [f32; 3]) -> bool {
+        self.strength != 0.0 && specular.iter().any(|&x| x != 0.0)
+    }
+}
+
+/// x to an integer power, by squaring.
+#[inline(always)]
+fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
+    let (mut result, mut square) = (splat(s, 1.0), x);
+    while exponent > 0 {
+        if exponent & 1 == 1 {
+            result = result * square;
+        }
+        square = square * square;
+        exponent >>= 1;
+    }
+    result
+}
+
+/// The sky in a direction (unit). `pixel` is the width of a pixel at depth 1.
+#[inline(always)]
+pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>, pixel: f32) -> V3<S> {
+    if let Some(image) = &lighting.skybox {
+        return skybox(s, image, direction, pixel);
+    }
+    let k = root(s, min(abs(direction.z), splat(s, 1.0)));
+    let up = direction.z.simd_gt(splat(s, 0.0));
+    let mix = {
+        #[inline(always)]
+        |c: usize| {
+            let (h, z, n) = (lighting.horizon[c], lighting.zenith[c], lighting.nadir[c]);
+            k * select(up, splat(s, z - h), splat(s, n - h)) + h
+        }
+    };
+    V3 { x: mix(0), y: mix(1), z: mix(2) }
+}
+
+/// The image around everything in a direction: a cube map whose y is up.
+#[inline(never)]
+fn skybox<S: Simd>(s: S, image: &Texture, direction: V3<S>, pixel: f32) -> V3<S> {
+    s.vectorize(
+        #[inline(always)]
+        || {
+            let all = direction.z.simd_eq(direction.z);
+            let turned = V3 { x: direction.x, y: direction.z, z: -direction.y };
+            let [r, g, b] = texture::sample_cube(s, image, turned, splat(s, pixel), all);
+            V3 { x: tone::decode_bytes(r), y: tone::decode_bytes(g), z: tone::decode_bytes(b) }
+        },
+    )
+}
+
+/// The colour of a surface, linear, seen along `view` (unit, away from the camera) from a distance. `pixel` is the width of
+/// a pixel at depth 1; `tint` multiplies the colour of the surface, but not its highlights.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "inlined into its few callers")]
+pub(crate) fn shade<S: Simd>(
+    s: S,
+    scene: &RenderScene,
+    lighting: &Lighting,
+    (shadows, shadow_rays): (&[ShadowMap], Option<ShadowRays<'_>>),
+    source: &Source<'_>,
+    at: &Surface<S>,
+    view: V3<S>,
+    distance: F<S>,
+    (pixel, tint): (f32, f32),
+    lanes: M<S>,
+) -> V3<S> {
+    let material = &source.instance.material;
+    let display = scene.light_sum == LightSum::Display;
+    let base = if display {
+        display_albedo(s, source, at, view, pixel, lanes)
+    } else {
+        albedo(s, source, at, view, pixel, lanes)
+    };
+    let base = if tint == 1.0 { base } else { base.scale(splat(s, tint)) };
+    let zero = splat(s, 0.0);
+    let n = at.shading;
+    // Ambient: between ground and sky by the normal's height.
+    let up = n.z * 0.5 + 0.5;
+    let (sky_light, ground) = (scene.ambient.sky, scene.ambient.ground);
+    let ambient = {
+        #[inline(always)]
+        |k: usize| up * (sky_light[k] - ground[k]) + (ground[k] + material.emission)
+    };
+    let mut diffuse = [ambient(0), ambient(1), ambient(2)];
+    if let Some(rays) = shadow_rays.filter(|rays| rays.occlusion_rays > 0) {
+        let [above, below] = rays.blocked(s, (at.position, at.normal, n, at.along), lanes);
+        // What is counted with rays may be more than there is: light is never taken twice.
+        let (above, below) = (min(above, up), min(below, splat(s, 1.0) - up));
+        for (k, diffuse) in diffuse.iter_mut().enumerate() {
+            *diffuse = *diffuse - above * sky_light[k] - below * ground[k];
+        }
+    }
+    let mut gloss = [zero, zero, zero];
+    let shiny = Gloss::of(material, display);
+    let headlight = &scene.headlight;
+    if headlight.active && !lighting.headlight_is_lamp {
+        let facing = max(-n.dot(view), zero);
+        for (k, diffuse) in diffuse.iter_mut().enumerate() {
+            *diffuse += facing * headlight.diffuse[k] + headlight.ambient[k];
+        }
+        let seen = lanes & facing.simd_gt(splat(s, shiny.faint));
+        if shiny.shows(headlight.specular) && seen.any_true() {
+            let shine = select(seen, power(s, facing, shiny.exponent) * shiny.strength, zero);
+            for (gloss, specular) in gloss.iter_mut().zip(headlight.specular) {
+                *gloss += shine * specular;
+            }
+        }
+    }
+    for lamp in &lighting.lamps {
+        let light = &lamp.light;
+        let Some((to, strength)) = lamp.reaches(s, at.position, lanes) else { continue };
+        let facing = max(n.dot(to), zero);
+        let mut lit = strength;
+        if let Some(map) = lamp.shadow.and_then(|k| shadows.get(k)) {
+            let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
+            if matters.any_true() {
+                lit = lit * map.light(s, at.position, at.normal, source.placed.error, matters);
+            }
+        }
+        if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow) {
+            let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
+            if matters.any_true() {
+                let from = (at.position, at.normal, at.along);
+                lit = lit * rays.light(s, light, lamp.along.map(|x| -x), from, matters);
+            }
+        }
+        for (k, diffuse) in diffuse.iter_mut().enumerate() {
+            *diffuse += facing * lit * light.diffuse[k] + strength * light.ambient[k];
+        }
+        if shiny.shows(light.specular) {
+            // The cosine between the normal and the half vector, compared before its root is taken.
+            let half = to.sub(view);
+            let (along, square) = (n.dot(half), half.dot(half));
+            let bright = (along * along).simd_gt(square * (shiny.faint * shiny.faint));
+            let seen = lanes & bright & along.simd_gt(zero) & facing.simd_gt(zero);
+            if seen.any_true() {
+                let cosine = along / select(seen, square, splat(s, 1.0)).sqrt();
+                let shine = select(seen, power(s, cosine, shiny.exponent) * shiny.strength, zero);
+                for (gloss, specular) in gloss.iter_mut().zip(light.specular) {
+                    *gloss += shine * lit * specular;
+                }
+            }
+        }
+    }
+    let plain = {
+        #[inline(always)]
+        |gloss: [F<S>; 3]| V3 {
+            x: base.x * diffuse[0] + gloss[0],
+            y: base.y * diffuse[1] + gloss[1],
+            z: base.z * diffuse[2] + gloss[2],
+        }
+    };
+    let mut color = if display {
+        // OpenGL's sum ends at 1.
+        let sum = plain(gloss);
+        V3 { x: display_light(s, sum.x), y: display_light(s, sum.y), z: display_light(s, sum.z) }
+    } else if material.metallic > 0.0 {
+        // What it mirrors, in its colour, and its own light; of a scene without a mirror, the sky.
+        let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)), pixel);
+        let metal = V3 {
+            x: base.x * (mirrored.x + gloss[0] + material.emission),
+            y: base.y * (mirrored.y + gloss[1] + material.emission),
+            z: base.z * (mirrored.z + gloss[2] + material.emission),
+        };
+        let k = splat(s, material.metallic.min(1.0));
+        plain(gloss.map(|light| light * material.specular)).scale(1.0 - k).add(metal.scale(k))
+    } else {
+        plain(gloss)
+    };
+    if let Some(haze) = scene.haze {
+        let k = (distance - haze.start) / (haze.end - haze.start).max(1e-6);
+        let k = min(max(k, zero), splat(s, 1.0));
+        let k = k * k * (3.0 - k * 2.0);
+        let behind = match lighting.haze {
+            Some(c) => V3::splat(s, c),
+            None => sky(s, lighting, V3 { x: view.x, y: view.y, z: max(view.z, zero) }, pixel),
+        };
+        color = color.scale(1.0 - k).add(behind.scale(k));
+    }
+    color
+}
+
+/// Linear light of an sRGB number, cut to 0..=1.
+#[inline(always)]
+fn display_light<S: Simd>(s: S, x: F<S>) -> F<S> {
+    tone::decode_bytes(min(max(x, splat(s, 0.0)), splat(s, 1.0)) * 255.0)
+}
+
+/// The colour of the surface itself, linear.
+#[inline(always)]
+pub(crate) fn albedo<S: Simd>(
+    s: S,
+    source: &Source<'_>,
+    at: &Surface<S>,
+    view: V3<S>,
+    pixel: f32,
+    lanes: M<S>,
+) -> V3<S> {
+    let flat = source.color;
+    let Some(bytes) = texels(s, source, at, view, pixel, lanes) else { return V3::splat(s, flat) };
+    // Spelled out: a closure is compiled without the instruction set where the compiler does not inline it.
+    V3 {
+        x: tone::decode_bytes(bytes[0]) * flat[0],
+        y: tone::decode_bytes(bytes[1]) * flat[1],
+        z: tone::decode_bytes(bytes[2]) * flat[2],
+    }
+}
+
+/// The colour of the surface itself, as numbers of the screen (sRGB, 0..=1).
+#[inline(always)]
+fn display_albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixel: f32, lanes: M<S>) -> V3<S> {
+    let [r, g, b, _] = source.instance.material.rgba;
+    let Some(bytes) = texels(s, source, at, view, pixel, lanes) else { return V3::splat(s, [r, g, b]) };
+    V3 { x: bytes[0] * (r / 255.0), y: bytes[1] * (g / 255.0), z: bytes[2] * (b / 255.0) }
+}
+
+/// The texture's bytes (0..=255) at the surface; `None` without a texture.
+#[inline(always)]
+fn texels<S: Simd>(
+    s: S,
+    source: &Source<'_>,
+    at: &Surface<S>,
+    view: V3<S>,
+    pixel: f32,
+    lanes: M<S>,
+) -> Option<[F<S>; 3]> {
+    let instance = source.instance;
+    let image = instance.material.texture.as_deref()?;
+    // The width of a pixel on the surface: between its narrow and its wide side where it is seen at a slant.
+    let slant = max(-at.normal.dot(view), splat(s, 0.02));
+    let width = at.along * pixel / root(s, slant);
+    let scale = source.texture_scale;
+    Some(if texture::is_cube(image) {
+        let direction = V3 { x: at.local.x * scale[0], y: at.local.y * scale[1], z: at.local.z * scale[2] };
+        let largest = scale.iter().copied().fold(0.0, f32::max);
+        texture::sample_cube(s, image, direction, width * largest, lanes)
+    } else {
+        let has_uvs = instance.mesh().is_some_and(|m| m.uvs().is_some());
+        let (uv, density) = if has_uvs {
+            (at.uv, at.uv_density)
+        } else {
+            let offset = source.texture_offset;
+            let uv = [at.local.x * scale[0] + offset[0], at.local.y * scale[1] + offset[1]];
+            (uv, splat(s, scale[0].abs().max(scale[1].abs())))
+        };
+        texture::sample(s, image, uv[0], uv[1], width * density, lanes)
+    })
+}

@@ -1,0 +1,303 @@
+//! Shadow maps: what a lamp sees.
+
+use super::plan::BAND;
+use super::shadow_fit::{Extent, LampView};
+use crate::raster::tile::{AREA, BLOCK, Tile};
+use crate::raster::{DrawList, Layer, Painter, Parts};
+use crate::rasterizer::RasterCfg;
+use crate::simd::{F, Level};
+use crate::simd::{LANES, M, Simd, V3, at_level, load, max, min, select, splat};
+use crate::visibility::Projection;
+use kinetoscope_scene::{Instance, PoseF32, RenderScene, Shape};
+
+/// Depths from a lamp.
+#[derive(Clone, Debug)]
+pub(crate) struct ShadowMap {
+    projection: Projection,
+    /// What the lamp sees.
+    list: DrawList,
+    /// Texels along a side before it was cut.
+    side: usize,
+    /// Rotation from the world's axes to the lamp's.
+    lamp_from_world: [[f32; 3]; 3],
+    /// A texel's width on a surface: at any depth, or at depth 1 for a spot.
+    texel: f32,
+    /// Nearness of what the lamp sees at each texel, row by row: the taps of a point are together in four rows.
+    nearness: Vec<f32>,
+    /// The smallest and the largest nearness in each block of texels: most points are lit, or not, by all of their texels.
+    range: Vec<[f32; 2]>,
+}
+
+/// Rows of a map that are drawn together, and what is needed for that.
+#[derive(Debug)]
+pub(crate) struct ShadowBand<'a> {
+    projection: &'a Projection,
+    list: &'a DrawList,
+    /// Which row of blocks is the first.
+    first: usize,
+    /// Texels of a band, at most, however the map is cut.
+    most: usize,
+    nearness: &'a mut [f32],
+    range: &'a mut [[f32; 2]],
+}
+
+/// Rows of blocks of a map that are drawn together. Of small maps a quarter, so that the scratch memory is smaller than the
+/// map.
+fn rows_of_bands([width, height]: [usize; 2]) -> usize {
+    (BAND / (width * BLOCK)).min(height / BLOCK / 4).max(1)
+}
+
+/// Texels of a band, at most, however a map of `side` by `side` texels is cut.
+fn most_of_bands(side: usize) -> usize {
+    if side == 0 { 0 } else { rows_of_bands([side, side]) * BLOCK * side }
+}
+
+impl ShadowMap {
+    /// A map without memory.
+    pub(crate) fn empty() -> Self {
+        let projection = Projection {
+            parallel: true,
+            width: BLOCK,
+            height: BLOCK,
+            fx: 1.0,
+            fy: 1.0,
+            cx: 0.0,
+            cy: 0.0,
+            near: 0.0,
+            far: 1.0,
+            world_from_camera: PoseF32::IDENTITY,
+        };
+        Self {
+            projection,
+            list: DrawList::default(),
+            side: 0,
+            lamp_from_world: PoseF32::IDENTITY.rotation,
+            texel: 1.0,
+            nearness: Vec::new(),
+            range: Vec::new(),
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        self.list.bytes() + size_of::<f32>() * (self.nearness.capacity() + 2 * self.range.capacity())
+    }
+
+    /// Finds the casters that a lamp sees before `receivers`, on a map of up to `side` by `side` texels, without drawing them.
+    /// `false` where none of them is shaded.
+    pub(super) fn prepare(
+        &mut self,
+        (lamp, receivers): (&LampView, &Extent),
+        scene: &RenderScene,
+        poses: &[PoseF32],
+        cfg: RasterCfg,
+        side: usize,
+    ) -> bool {
+        let solid = |instance: &Instance| {
+            Layer::casts_shadows(instance, cfg.groups) && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
+        };
+        // Room for the whole map and all casters from the beginning: what casts shadows moves, and memory must not grow with it.
+        let parts = if cfg.lod { Parts::Levels } else { Parts::Clusters };
+        self.list.reserve(scene, parts, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
+        self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
+        self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));
+        self.side = side;
+        let Some((projection, planes)) = lamp.fit(scene, poses, receivers, side, solid) else { return false };
+        let rotation = lamp.rotation;
+        let casts = |i: &Instance| solid(i) && (planes || !matches!(i.shape, Shape::Plane(_)));
+        self.texel = 1.0 / projection.fx;
+        self.lamp_from_world = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
+        self.projection = projection;
+        self.list.build(
+            &projection,
+            None,
+            scene,
+            poses,
+            parts,
+            |i| if casts(i) { Layer::Opaque } else { Layer::Hidden },
+        );
+        if !self.crop() {
+            return false;
+        }
+        let Projection { width, height, .. } = self.projection;
+        // All of it is written when it is drawn.
+        self.nearness.resize(width * height, 0.0);
+        self.range.resize((width / BLOCK) * (height / BLOCK), [0.0; 2]);
+        true
+    }
+
+    /// Samples of a tile that can hold any band of the map, even if there is no map now.
+    pub(crate) fn most_of_bands(&self) -> usize {
+        most_of_bands(self.side)
+    }
+
+    /// Cuts the map to what is seen, and a block more on each side for the texels around a point: everything else is lit.
+    /// `false` where nothing is seen.
+    fn crop(&mut self) -> bool {
+        let Self { projection, list, .. } = self;
+        let (mut lo, mut hi) = ([u16::MAX; 2], [0u16; 2]);
+        for item in &list.opaque {
+            let [x0, y0, x1, y1] = item.rect;
+            (lo, hi) = ([lo[0].min(x0), lo[1].min(y0)], [hi[0].max(x1), hi[1].max(y1)]);
+        }
+        if lo[0] > hi[0] {
+            return false;
+        }
+        let last = [projection.width, projection.height].map(|size| (size / BLOCK - 1) as u16);
+        let lo = lo.map(|x| x.saturating_sub(1));
+        let hi = [0, 1].map(|k| (hi[k] + 1).min(last[k]));
+        for item in &mut list.opaque {
+            let [x0, y0, x1, y1] = item.rect;
+            item.rect = [x0 - lo[0], y0 - lo[1], x1 - lo[0], y1 - lo[1]];
+        }
+        [projection.width, projection.height] = [0, 1].map(|k| usize::from(hi[k] - lo[k] + 1) * BLOCK);
+        // Whole texels: the cut moves no texel over the surfaces.
+        projection.cx -= (usize::from(lo[0]) * BLOCK) as f32;
+        projection.cy -= (usize::from(lo[1]) * BLOCK) as f32;
+        true
+    }
+
+    /// The map in parts that can be drawn one by one.
+    pub(crate) fn bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
+        let Self { projection, list, nearness, range, side, .. } = self;
+        let (projection, list) = (&*projection, &*list);
+        let most = most_of_bands(*side);
+        let rows = rows_of_bands([projection.width, projection.height]);
+        let parts = nearness.chunks_mut(rows * BLOCK * projection.width);
+        let parts = parts.zip(range.chunks_mut(rows * (projection.width / BLOCK)));
+        parts.enumerate().map(move |(k, (nearness, range))| ShadowBand {
+            projection,
+            list,
+            first: k * rows,
+            most,
+            nearness,
+            range,
+        })
+    }
+
+    /// How much of the lamp's light reaches points, 0..=1: the mean over 3x3 texels, blended between them. The points are
+    /// moved off the surface first, by more than a texel, so that a surface does not shadow itself: and farther where it is
+    /// drawn coarser by up to `error` \[m\], or what casts the shadow is.
+    #[inline(always)]
+    pub(crate) fn light<S: Simd>(&self, s: S, position: V3<S>, normal: V3<S>, error: f32, lanes: M<S>) -> F<S> {
+        let p = &self.projection;
+        let mut c = position.sub(V3::splat(s, p.world_from_camera.translation)).rotate(&self.lamp_from_world);
+        let width = if p.parallel { splat(s, self.texel) } else { c.z * self.texel };
+        c = c.add(normal.rotate(&self.lamp_from_world).scale(width * 1.8 + (error + self.list.error)));
+        let (x, y, nearness) = if p.parallel {
+            (c.x * p.fx, c.y * p.fy, p.nearness_lanes(c.z - width * 0.3))
+        } else {
+            let inverse = 1.0 / c.z;
+            (c.x * inverse * p.fx, c.y * inverse * p.fy, inverse * (1.0 / (1.0 - self.texel * 0.3)))
+        };
+        let (x, y) = (x + (p.cx - 0.5), y + (p.cy - 0.5));
+        let inside = x.simd_gt(splat(s, 2.0))
+            & y.simd_gt(splat(s, 2.0))
+            & x.simd_lt(splat(s, p.width as f32 - 3.0))
+            & y.simd_lt(splat(s, p.height as f32 - 3.0))
+            & c.z.simd_gt(splat(s, p.near));
+        let wanted = inside & lanes;
+        let bits = wanted.to_bitmask();
+        if bits == 0 {
+            return splat(s, 1.0);
+        }
+        // Lanes that are not wanted look where one that is does.
+        let some = bits.trailing_zeros() as usize % LANES;
+        let x = select(wanted, x, splat(s, x.array()[some]));
+        let y = select(wanted, y, splat(s, y.array()[some]));
+        let (columns, rows): ([i32; LANES], [i32; LANES]) = (x.to_int().array(), y.to_int().array());
+        let (mut lo, mut hi) = ([i32::MAX; 2], [0i32; 2]);
+        for (&x, &y) in columns.iter().zip(&rows) {
+            (lo, hi) = ([lo[0].min(x), lo[1].min(y)], [hi[0].max(x), hi[1].max(y)]);
+        }
+        let [x0, y0] = [(lo[0] as usize - 1) / BLOCK, (lo[1] as usize - 1) / BLOCK];
+        let [x1, y1] = [(hi[0] as usize + 2) / BLOCK, (hi[1] as usize + 2) / BLOCK];
+        // Pixels far apart on the map would look at too many blocks.
+        if (x1 + 1 - x0) * (y1 + 1 - y0) <= 12 {
+            let (mut low, mut high) = (f32::MAX, f32::MIN);
+            for row in y0..=y1 {
+                let first = row * (p.width / BLOCK);
+                for &[l, h] in &self.range[first + x0..=first + x1] {
+                    (low, high) = (if l < low { l } else { low }, if h > high { h } else { high });
+                }
+            }
+            if !(wanted & nearness.simd_lt(splat(s, high))).any_true() {
+                return splat(s, 1.0);
+            }
+            if !(wanted & nearness.simd_ge(splat(s, low))).any_true() {
+                return select(wanted, splat(s, 0.0), splat(s, 1.0));
+            }
+        }
+        let (x, y, q): ([f32; LANES], [f32; LANES], [f32; LANES]) = (x.array(), y.array(), nearness.array());
+        let mut lit = [1.0f32; LANES];
+        for lane in (0..LANES).filter(|lane| bits >> lane & 1 == 1) {
+            let (column, row) = (columns[lane], rows[lane]);
+            lit[lane] =
+                self.taps([column as usize, row as usize], x[lane] - column as f32, y[lane] - row as f32, q[lane]);
+        }
+        load(s, &lit)
+    }
+
+    /// Sixteen texels around a point. Exactly 1 where none of them is nearer, as if they had not been looked at (and where
+    /// those that are weigh less than a ninety-thousandth).
+    #[inline(always)]
+    fn taps(&self, [column, row]: [usize; 2], fx: f32, fy: f32, q: f32) -> f32 {
+        let width = self.projection.width;
+        let mut lit = [0.0f32; 4];
+        for (k, weight) in [1.0 - fy, 1.0, 1.0, fy].into_iter().enumerate() {
+            let first = (row + k - 1) * width + column - 1;
+            let Some(texels) = self.nearness[first..].first_chunk::<4>() else { continue };
+            for (lit, texel) in lit.iter_mut().zip(texels) {
+                *lit += if *texel > q { 0.0 } else { weight };
+            }
+        }
+        let sum = lit[0] * (1.0 - fx) + lit[1] + lit[2] + lit[3] * fx;
+        if sum > 8.9999 { 1.0 } else { sum * (1.0 / 9.0) }
+    }
+}
+
+impl ShadowBand<'_> {
+    /// Draws the band, by way of a tile that stays in the cache.
+    pub(crate) fn draw(self, level: Level, scene: &RenderScene, tile: &mut Tile, painter: &mut Painter) {
+        let Self { projection, list, first, most, nearness, range } = self;
+        let wide = projection.width / BLOCK;
+        let rows = range.len() / wide;
+        tile.reserve(most);
+        tile.clear([0, first * BLOCK], [wide, rows], 1, projection.farthest());
+        at_level!(level, s => {
+            for item in &list.opaque {
+                painter.draw(s, tile, projection, scene, &list.placed, item);
+            }
+            tile.settle();
+            s.vectorize(
+                #[inline(always)]
+                || unfold(s, tile, nearness, range),
+            );
+        });
+    }
+}
+
+/// Blocks into rows.
+#[inline(always)]
+fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2]]) {
+    let side = tile.blocks_x * BLOCK;
+    let lines = nearness.chunks_exact_mut(BLOCK * side).zip(range.chunks_exact_mut(tile.blocks_x));
+    for ((lines, range), blocks) in lines.zip(tile.nearness.chunks_exact(AREA * tile.blocks_x)) {
+        for (bx, (block, range)) in blocks.chunks_exact(AREA).zip(range).enumerate() {
+            let (mut low, mut high) = (load(s, block), load(s, block));
+            for two in block.chunks_exact(LANES) {
+                (low, high) = (min(load(s, two), low), max(load(s, two), high));
+            }
+            let (lows, highs): ([f32; LANES], [f32; LANES]) = (low.array(), high.array());
+            *range = [lows[0], highs[0]];
+            for (&l, &h) in lows.iter().zip(&highs) {
+                *range = [if l < range[0] { l } else { range[0] }, if h > range[1] { h } else { range[1] }];
+            }
+            // Arrays: slices of a length that is not known are copied by a call.
+            for (row, from) in block.as_chunks::<BLOCK>().0.iter().enumerate() {
+                if let Some(to) = lines[row * side + bx * BLOCK..].first_chunk_mut() {
+                    *to = *from;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Colours of textures: bilinear within a level, and between two levels.
+//!
+//! Texels are blended as they are (sRGB bytes), which is four times as fast as in linear light; the levels themselves were
+//! averaged in linear light.
+
+use crate::simd::{F, LANES, M, Simd, V3, abs, halves, max, min, select, select_i, splat, splat_i};
+use kinetoscope_scene::material::Level;
+use kinetoscope_scene::{Texture, TextureKind};
+
+/// Adding and subtracting this rounds to an integer (of less than 2^22).
+const ROUND: f32 = 12_582_912.0;
+
+/// The largest integer that is not larger.
+#[inline(always)]
+fn floor_lanes<S: Simd>(s: S, x: F<S>) -> F<S> {
+    let r = (x + ROUND) - ROUND;
+    r - select(r.simd_gt(x), splat(s, 1.0), splat(s, 0.0))
+}
+
+/// Colours (bytes, 0..=255) at (u, v), v upward, of surfaces where one pixel is `footprint` wide in texture coordinates.
+#[inline(always)]
+pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footprint: F<S>, lanes: M<S>) -> [F<S>; 3] {
+    let first = &texture.levels()[0];
+    let (zero, one, limit) = (splat(s, 0.0), splat(s, 1.0), splat(s, 1e6));
+    let lanes = lanes & abs(u).simd_lt(limit) & abs(v).simd_lt(limit);
+    let (u, v) = (select(lanes, u, zero), select(lanes, v, zero));
+    let (u, v) = (u - floor_lanes(s, u), one - (v - floor_lanes(s, v)));
+    let texels = footprint * first.width().max(first.height()) as f32;
+    between_levels(
+        s,
+        texture,
+        texels,
+        lanes,
+        #[inline(always)]
+        |level, wanted| {
+            let (w, h) = (level.width() as f32, level.height() as f32);
+            let (x, y) = (u * w - 0.5, v * h - 0.5);
+            let (ix, iy) = (floor_lanes(s, x), floor_lanes(s, y));
+            bilinear(s, level, [wrap(s, ix, w), wrap(s, iy, h)], [x - ix, y - iy], wanted)
+        },
+    )
+}
+
+/// Colours (bytes, 0..=255) in directions of a cube texture, where one pixel is `footprint` wide on a cube of half length 1.
+#[inline(always)]
+pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint: F<S>, lanes: M<S>) -> [F<S>; 3] {
+    let zero = splat(s, 0.0);
+    let (ax, ay, az) = (abs(d.x), abs(d.y), abs(d.z));
+    let by_x = ax.simd_ge(ay) & ax.simd_ge(az);
+    let by_y = !by_x & ay.simd_ge(az);
+    let axis = {
+        #[inline(always)]
+        |x: F<S>, y: F<S>, z: F<S>| select(by_x, x, select(by_y, y, z))
+    };
+    let major = axis(ax, ay, az);
+    // Faces +x, -x, +y, -y, +z, -z, from top to bottom of the image.
+    let back = axis(d.x, d.y, d.z).simd_gt(zero);
+    let face = axis(zero, splat(s, 2.0), splat(s, 4.0)) + select(back, zero, splat(s, 1.0));
+    let turned = {
+        #[inline(always)]
+        |x: F<S>| select(back, x, -x)
+    };
+    let (u, v) = (axis(-turned(d.z), d.x, turned(d.x)), axis(-d.y, turned(d.z), -d.y));
+    let k = 0.5 / select(major.simd_gt(zero), major, splat(s, 1.0));
+    let (u, v) = (u * k + 0.5, v * k + 0.5);
+    let texels = footprint * (0.5 * texture.levels()[0].width() as f32);
+    between_levels(
+        s,
+        texture,
+        texels,
+        lanes,
+        #[inline(always)]
+        |level, wanted| {
+            let side = level.width() as f32;
+            // Nothing is blended across the edge of a face.
+            let inside = {
+                #[inline(always)]
+                |x: F<S>| min(max(x * side - 0.5, zero), splat(s, side - 1.0))
+            };
+            let (x, y) = (inside(u), inside(v));
+            let (ix, iy) = (floor_lanes(s, x), floor_lanes(s, y));
+            bilinear(s, level, [ix, iy + face * side], [x - ix, y - iy], wanted)
+        },
+    )
+}
+
+/// The colours that `at` finds in the levels that pixels `texels` wide need.
+///
+/// Neighbouring pixels use the same two or three levels, so the loop is over levels, whose sizes all lanes share.
+#[inline(always)]
+fn between_levels<S: Simd>(
+    s: S,
+    texture: &Texture,
+    texels: F<S>,
+    lanes: M<S>,
+    at: impl Fn(&Level, M<S>) -> [F<S>; 3],
+) -> [F<S>; 3] {
+    let levels = texture.levels();
+    let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+    let mut out = [zero, zero, zero];
+    // Level k is for pixels 2^k to 2^(k+1) texels wide. Up to 1.75 times 2^k it is enough alone: the four texels of a point
+    // nearly cover that; beyond it is blended with the next, which costs a second look.
+    let (mut from_last, mut left, mut width) = (zero, lanes, 1.0f32);
+    let mut carried = false;
+    for (k, level) in levels.iter().enumerate() {
+        let last = k + 1 == levels.len();
+        if !last && !carried && !(left & texels.simd_lt(splat(s, 2.0 * width))).any_true() {
+            width *= 2.0;
+            continue;
+        }
+        let here = if last { left } else { left & texels.simd_lt(splat(s, 2.0 * width)) };
+        let to_next = if last { zero } else { min(max(texels * (4.0 / width) - 7.0, zero), one) };
+        let to_next = select(here, to_next, zero);
+        let weight = select(here, one - to_next, zero) + from_last;
+        let wanted = weight.simd_gt(zero);
+        if wanted.any_true() {
+            let color = at(level, wanted);
+            out = [out[0] + color[0] * weight, out[1] + color[1] * weight, out[2] + color[2] * weight];
+        }
+        left &= !here;
+        from_last = to_next;
+        carried = from_last.simd_gt(zero).any_true();
+        if !carried && !left.any_true() {
+            break;
+        }
+        width *= 2.0;
+    }
+    out
+}
+
+/// Two texels beside each other.
+#[inline(always)]
+fn pair(bytes: &[u8], from: usize) -> u64 {
+    match bytes.get(from..from + 8) {
+        Some(&[a, b, c, d, e, f, g, h]) => u64::from_le_bytes([a, b, c, d, e, f, g, h]),
+        _ => 0,
+    }
+}
+
+/// The colours between four texels each: column and row of the upper left one, and how far from it to the next.
+#[inline(always)]
+fn bilinear<S: Simd>(s: S, level: &Level, [x, y]: [F<S>; 2], [fx, fy]: [F<S>; 2], lanes: M<S>) -> [F<S>; 3] {
+    let stride = level.width() as i32 + 1;
+    let at = select_i(lanes, y.to_int() * stride + x.to_int(), splat_i(s, 0));
+    let at: [i32; LANES] = at.array();
+    let (bytes, next_row) = (level.bytes(), 4 * stride as usize);
+    // Spelled out: `from_fn` stays a call, and a loop goes through memory.
+    macro_rules! pairs {
+        ($row:expr, $($lane:literal)*) => { [$(pair(bytes, 4 * at[$lane] as usize + $row)),*] };
+    }
+    let above = pairs!(0, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15);
+    let below = pairs!(next_row, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15);
+    let ([a, b], [c, d]) = (halves(s, &above), halves(s, &below));
+    let (a, b, c, d) = (a.bytes(), b.bytes(), c.bytes(), d.bytes());
+    let mut out = a;
+    for k in 0..3 {
+        let (top, bottom) = (a[k] + (b[k] - a[k]) * fx, c[k] + (d[k] - c[k]) * fx);
+        out[k] = top + (bottom - top) * fy;
+    }
+    out
+}
+
+/// Into 0..n, from -1..=n.
+#[inline(always)]
+fn wrap<S: Simd>(s: S, i: F<S>, n: f32) -> F<S> {
+    let i = select(i.simd_lt(splat(s, 0.0)), i + n, i);
+    let i = select(i.simd_ge(splat(s, n)), i - n, i);
+    min(max(i, splat(s, 0.0)), splat(s, n - 1.0))
+}
+
+/// The kind of a texture decides how it lies.
+pub(crate) fn is_cube(texture: &Texture) -> bool {
+    texture.kind() == TextureKind::Cube
+}

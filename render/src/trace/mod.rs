@@ -1,0 +1,479 @@
+//! Visibility by rays: what a ray from anywhere meets, and a visibility buffer filled by the rays of its samples.
+//!
+//! Two levels. Below, one tree for each mesh, in the mesh's own frame: built once, shared by all environments, the one that
+//! ray casters use. Above, a tree over the boxes of what there is in a frame, built for every frame ([`tree`]). Shapes with
+//! a closed form are met exactly; height fields as the triangles that the rasterizer draws. Everything is in double
+//! precision.
+//!
+//! The rays of a picture need no upper tree: an instance is met only within the rectangle of the picture that it covers,
+//! where its rays are cast in packets of eight, the nearest instances first. What is written is the rasterizer's own
+//! visibility buffer, so every channel comes from the same code.
+
+pub(crate) mod motion;
+mod tree;
+
+use super::raster::tile::{AREA, BLOCK, NOTHING, SAMPLES, Tile};
+use super::raster::{Item, Layer, Placed};
+use crate::geometry::assets::{Assets, RayAssets};
+use crate::geometry::bvh::Stack;
+use crate::geometry::packet::{Packet, WIDTH};
+use crate::geometry::ray::Ray;
+use crate::geometry::shape::Solid;
+use crate::geometry::shape::mesh::MeshTree;
+use crate::geometry::triangle::ShearPacket;
+use crate::geometry::vector::{V3, along, dot, scale};
+use crate::lens::Sight;
+use crate::lens::rays::LensRays;
+use crate::simd::Simd;
+use crate::visibility::Projection;
+use kinetoscope_scene::{Instance, Marker, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
+use motion::{Motion, rigid, wide};
+use std::sync::Arc;
+use tree::Tree;
+
+/// Surfaces of one thing that is not opaque that a shadow ray goes through, at most.
+const MAX_FRONTS: usize = 64;
+/// Rays go on this part of their coordinates past a surface.
+const PAST: f64 = 1e-9;
+
+/// Where the samples of a packet are beside the first, in pixels.
+type Side = [[usize; 2]; WIDTH];
+/// As near to each other as can be: fewer triangles are between them than between those of a row.
+const TOGETHER: Side = [[0, 0], [1, 0], [2, 0], [3, 0], [0, 1], [1, 1], [2, 1], [3, 1]];
+/// Of pictures whose rows have an instant each.
+const IN_A_ROW: Side = [[0, 0], [1, 0], [2, 0], [3, 0], [4, 0], [5, 0], [6, 0], [7, 0]];
+
+/// What rays meet of an instance, in its own frame.
+#[derive(Clone, Debug)]
+enum Body {
+    /// Triangles, and the mesh that they are of.
+    Mesh(Arc<RenderMesh>, Arc<MeshTree>),
+    /// A closed form.
+    Closed(Solid),
+}
+
+/// A body in the world.
+#[derive(Clone, Copy, Debug)]
+struct Thing {
+    instance: u32,
+    world_from_instance: PoseF64,
+    /// Of what moves while the shutter is open.
+    motion: Option<Motion>,
+    /// Opacity.
+    alpha: f64,
+    /// False for markers, which show measurements and are no things of the scene.
+    casts_shadow: bool,
+}
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Hit {
+    /// How far away \[m\].
+    pub(crate) distance: f64,
+    pub(crate) instance: u32,
+    /// The triangle of the instance's mesh; 0 for a closed form.
+    pub(crate) triangle: u32,
+    /// Unit normal out of the body, world frame.
+    pub(crate) normal: V3,
+    /// Where the instance is.
+    pub(crate) world_from_instance: PoseF64,
+}
+
+/// What rays meet in a frame; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tracer {
+    /// One for each instance; `None` where it is not seen.
+    bodies: Vec<Option<Body>>,
+    things: Vec<Thing>,
+    /// Things without an end.
+    endless: Vec<u32>,
+    tree: Tree,
+}
+
+impl Body {
+    fn of(instance: &Instance, known: Option<Self>, assets: &mut Assets) -> Self {
+        let mesh = match &instance.shape {
+            Shape::Mesh(shape) => &shape.mesh,
+            Shape::HeightField(shape) => shape.mesh(),
+            shape => return Self::Closed(Solid::of(shape, assets)),
+        };
+        match known {
+            Some(Self::Mesh(of, tree)) if Arc::ptr_eq(&of, mesh) => Self::Mesh(of, tree),
+            _ => Self::Mesh(Arc::clone(mesh), assets.mesh(mesh)),
+        }
+    }
+
+    /// Smallest and largest coordinates; `None` for a shape without an end.
+    fn bounds(&self) -> Option<[V3; 2]> {
+        match self {
+            Self::Mesh(_, tree) => Some(tree.bounds()),
+            Self::Closed(solid) => solid.bounds(),
+        }
+    }
+}
+
+impl Thing {
+    /// Where it is at a time.
+    #[inline(always)]
+    fn at(&self, time: f64) -> PoseF64 {
+        self.motion.as_ref().map_or(self.world_from_instance, |motion| motion.at(time))
+    }
+}
+
+impl Tracer {
+    pub(crate) fn bytes(&self) -> usize {
+        self.bodies.capacity() * size_of::<Option<Body>>()
+            + self.things.capacity() * size_of::<Thing>()
+            + self.endless.capacity() * size_of::<u32>()
+            + self.tree.bytes()
+    }
+
+    /// Finds the trees of everything that `keep` does not hide; those that nobody has yet are built.
+    pub(crate) fn find_bodies(&mut self, scene: &RenderScene, assets: &RayAssets, keep: impl Fn(&Instance) -> Layer) {
+        let instances = scene.instances();
+        self.bodies.resize_with(instances.len(), || None);
+        // All at once: what building takes of memory is kept from one mesh to the next.
+        assets.with(|assets| {
+            for (body, instance) in self.bodies.iter_mut().zip(instances) {
+                *body = match keep(instance) {
+                    Layer::Hidden => None,
+                    _ => Some(Body::of(instance, body.take(), assets)),
+                };
+            }
+        });
+    }
+
+    /// Puts everything where it is, for rays that go anywhere at any time; `before` is where it was at time 0, if it was not
+    /// where it is all the time. Its bodies were found before.
+    pub(crate) fn place(&mut self, scene: &RenderScene, poses: &[PoseF32], before: Option<&[PoseF32]>) {
+        let Self { bodies, things, endless, tree } = self;
+        things.clear();
+        endless.clear();
+        tree.clear();
+        for (k, body) in bodies.iter().enumerate() {
+            let Some(body) = body else { continue };
+            let world_from_instance = rigid(&poses[k]);
+            let thing = things.len() as u32;
+            let alpha = f64::from(scene.instances()[k].material.rgba[3].min(1.0));
+            let motion = before.and_then(|before| Motion::between(before.get(k)?, &poses[k]));
+            let casts_shadow = scene.instances()[k].group != Marker::GROUP;
+            things.push(Thing { instance: k as u32, world_from_instance, motion, alpha, casts_shadow });
+            match (body.bounds(), motion) {
+                (Some(bounds), None) => tree.add(thing, &world_from_instance, bounds),
+                (Some(bounds), Some(motion)) => tree.add_moving(thing, &motion, bounds),
+                (None, _) => endless.push(thing),
+            }
+        }
+        tree.build();
+    }
+
+    /// Where an instance that is seen is at a time.
+    pub(crate) fn pose_of(&self, instance: u32, time: f64) -> Option<PoseF64> {
+        let thing = self.things.binary_search_by_key(&instance, |thing| thing.instance).ok()?;
+        Some(self.things[thing].at(time))
+    }
+
+    /// The nearest surface at a distance from 0 to `limit` \[m\], at a time. One copy per instruction set.
+    #[inline(never)]
+    pub(crate) fn nearest<S: Simd>(&self, s: S, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Hit> {
+        s.vectorize(
+            #[inline(always)]
+            || {
+                let (mut best, mut limit): (Option<Found>, f64) = (None, limit);
+                let mut meet = {
+                    #[inline(always)]
+                    |thing: u32, limit: f64| {
+                        let Some(found) = self.meet(thing, ray, limit, time, stack) else { return limit };
+                        if best.is_none_or(|b| {
+                            found.distance < b.distance || found.distance == b.distance && thing > b.thing
+                        }) {
+                            best = Some(found);
+                        }
+                        limit.min(found.distance)
+                    }
+                };
+                for &thing in &self.endless {
+                    limit = meet(thing, limit);
+                }
+                self.tree.visit(ray, limit, meet);
+                self.hit(best?, time)
+            },
+        )
+    }
+
+    /// The part of the light that gets along a ray from distance 0 to `limit` \[m\], at a time: nothing past something opaque,
+    /// and past the front of other things what they let through. One copy per instruction set.
+    #[inline(never)]
+    pub(crate) fn passes<S: Simd>(&self, s: S, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> f64 {
+        s.vectorize(
+            #[inline(always)]
+            || {
+                let mut left = 1.0;
+                let mut meet = {
+                    #[inline(always)]
+                    |thing: u32, limit: f64| {
+                        let placed @ Thing { instance, alpha, casts_shadow, .. } = &self.things[thing as usize];
+                        if !casts_shadow {
+                            return limit;
+                        }
+                        if *alpha < 1.0 {
+                            left *= (1.0 - alpha).powi(self.fronts(thing, ray, limit, time, stack));
+                            return limit;
+                        }
+                        let local = seen_from(ray, &placed.at(time));
+                        let blocked = match &self.bodies[*instance as usize] {
+                            Some(Body::Mesh(_, tree)) => tree.blocks(&local, limit, stack),
+                            Some(Body::Closed(solid)) => solid.touch(&local, limit, stack).is_some(),
+                            None => false,
+                        };
+                        if !blocked {
+                            return limit;
+                        }
+                        left = 0.0;
+                        // Nothing is nearer than this: the visit ends.
+                        -1.0
+                    }
+                };
+                let mut limit = limit;
+                for &thing in &self.endless {
+                    limit = meet(thing, limit);
+                }
+                self.tree.visit(ray, limit, meet);
+                left
+            },
+        )
+    }
+
+    /// How many fronts of a thing a ray goes through, at most [`MAX_FRONTS`].
+    #[inline(never)]
+    fn fronts(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> i32 {
+        // Closed forms are convex: after the first surface there is only a back.
+        let body = &self.bodies[self.things[thing as usize].instance as usize];
+        let most = if matches!(body, Some(Body::Closed(_))) { 1 } else { MAX_FRONTS };
+        let (mut from, mut left, mut count) = (*ray, limit, 0);
+        for _ in 0..most {
+            let met = self.meet(thing, &from, left, time, stack);
+            let Some(hit) = met.and_then(|found| self.hit(found, time)) else { break };
+            count += i32::from(dot(hit.normal, ray.direction) < 0.0);
+            let onward = hit.distance + PAST * from.origin.iter().fold(hit.distance.max(1.0), |m, x| m.max(x.abs()));
+            from.origin = along(from.origin, onward, from.direction);
+            left -= onward;
+        }
+        count
+    }
+
+    /// Where a ray meets a thing.
+    #[inline(always)]
+    fn meet(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Found> {
+        let placed @ Thing { instance, .. } = &self.things[thing as usize];
+        let local = seen_from(ray, &placed.at(time));
+        match self.bodies[*instance as usize].as_ref()? {
+            Body::Mesh(_, tree) => {
+                let (distance, index) = tree.nearest(&local, limit, None, stack)?;
+                Some(Found { thing, distance, index, normal: [0.0; 3] })
+            }
+            Body::Closed(solid) => {
+                let touch = solid.touch(&local, limit, stack)?;
+                // These bodies are convex, about their origin: outward is where the surface is. A plane's points are level
+                // with it.
+                let inward = dot(touch.normal, local.at(touch.t)) < 0.0 && !matches!(solid, Solid::Plane(_));
+                let normal = scale(touch.normal, if inward { -1.0 } else { 1.0 });
+                Some(Found { thing, distance: touch.t, index: 0, normal })
+            }
+        }
+    }
+
+    fn hit(&self, found: Found, time: f64) -> Option<Hit> {
+        let placed @ Thing { instance, .. } = &self.things[found.thing as usize];
+        let world_from_instance = placed.at(time);
+        let (triangle, normal) = match self.bodies[*instance as usize].as_ref()? {
+            Body::Mesh(_, tree) => (tree.number(found.index), tree.normal(found.index)?),
+            Body::Closed(_) => (0, found.normal),
+        };
+        let normal = world_from_instance.rotate(normal);
+        Some(Hit { distance: found.distance, instance: *instance, triangle, normal, world_from_instance })
+    }
+
+    /// Casts the rays of all samples where an instance may be seen, into a visibility buffer. One copy per instruction set.
+    #[inline(never)]
+    pub(crate) fn draw<S: Simd>(
+        &self,
+        s: S,
+        stack: &mut Stack,
+        tile: &mut Tile,
+        (projection, lens_rays): (&Projection, Option<&LensRays>),
+        (placed, first_ids): (&[Placed], &[u32]),
+        item: &Item,
+    ) {
+        let Some(area) = tile.overlap(item.rect) else { return };
+        let index = item.instance as usize;
+        let Some(body) = &self.bodies[index] else { return };
+        let lens = Lens::new(projection, &placed[index]);
+        let sight = lens_rays.zip(body.bounds()).map_or(Sight::Everywhere, |(_, bounds)| sight(&placed[index], bounds));
+        s.vectorize(
+            #[inline(always)]
+            || {
+                for by in area[1]..=area[3] {
+                    for bx in area[0]..=area[2] {
+                        if lens_rays.is_some_and(|rays| !rays.may_see([bx, by], &sight)) {
+                            continue;
+                        }
+                        let block = tile.block(bx, by);
+                        if tile.hidden(block, item.nearness) {
+                            continue;
+                        }
+                        tile.open(block);
+                        let mut drawn = false;
+                        for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+                            let [dx, dy] = offset.map(|x| f64::from(x) / 256.0 + 0.5);
+                            let samples = tile.samples(block, plane);
+                            let (side, parts) =
+                                if tile.only.is_some() { (&IN_A_ROW, 1) } else { (&TOGETHER, AREA / WIDTH) };
+                            for part in 0..parts {
+                                let [x, y] = tile.only.map_or([4 * (part % 2), part & !1], |row| [0, row]);
+                                let first = [bx * BLOCK + x, by * BLOCK + y];
+                                let at = side.map(|[i, j]| samples + (y + j) * BLOCK + x + i);
+                                let rays = match lens_rays {
+                                    None => lens.pinhole([first[0] as f64 + dx, first[1] as f64 + dy], side),
+                                    Some(rays) => lens.bent(rays, plane, first, side),
+                                };
+                                let (near, ids) = (&mut tile.nearness, &mut tile.id);
+                                drawn |= lens.cast(s, body, rays, stack, (near, ids, at), first_ids[index]);
+                            }
+                        }
+                        if drawn {
+                            tile.touch(block);
+                        }
+                    }
+                }
+            },
+        );
+    }
+}
+
+/// Where a ray meets a thing, as far as it must be known to compare.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    thing: u32,
+    distance: f64,
+    /// Place of a triangle in its tree.
+    index: usize,
+    /// Of a closed form, out of it, in its own frame.
+    normal: V3,
+}
+
+/// The ray in the frame that a pose maps from.
+#[inline(always)]
+fn seen_from(ray: &Ray, pose: &PoseF64) -> Ray {
+    Ray { origin: pose.apply_inverse(ray.origin), direction: pose.rotate_inverse(ray.direction) }
+}
+
+/// Where a thing with bounds in its own frame may be seen.
+fn sight(placed: &Placed, [lo, hi]: [V3; 2]) -> Sight {
+    let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
+    let pose = wide(&placed.camera_from_instance);
+    // Poses are single precision.
+    let size = lo.iter().chain(&hi).chain(&pose.translation).fold(0.0f64, |m, x| m.max(x.abs()));
+    Sight::of_ball(pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]))), dot(half, half).sqrt() + 1e-6 * size)
+}
+
+/// A camera's rays in the frame of an instance.
+struct Lens {
+    rotation: [V3; 3],
+    origin: V3,
+    c: [f64; 2],
+    f: [f64; 2],
+    near: f64,
+}
+
+impl Lens {
+    fn new(projection: &Projection, placed: &Placed) -> Self {
+        let pose = wide(&placed.local.instance_from_camera);
+        Self {
+            rotation: pose.rotation,
+            origin: pose.translation,
+            c: [projection.cx, projection.cy].map(f64::from),
+            f: [projection.fx, projection.fy].map(f64::from),
+            near: f64::from(projection.near),
+        }
+    }
+
+    /// The rays of eight samples through a pinhole, in the optical frame, the first of them at (u, v).
+    #[inline(always)]
+    fn pinhole(&self, [u, v]: [f64; 2], side: &Side) -> [V3; WIDTH] {
+        let mut rays = [[0.0, 0.0, 1.0]; WIDTH];
+        for (ray, [i, j]) in rays.iter_mut().zip(side) {
+            *ray = [(u + *i as f64 - self.c[0]) / self.f[0], (v + *j as f64 - self.c[1]) / self.f[1], 1.0];
+        }
+        rays
+    }
+
+    /// The rays of a kind of samples of eight pixels behind a lens; 0 where there is none.
+    #[inline(always)]
+    fn bent(&self, rays: &LensRays, plane: usize, [x, y]: [usize; 2], side: &Side) -> [V3; WIDTH] {
+        let mut out = [[0.0; 3]; WIDTH];
+        for (ray, [i, j]) in out.iter_mut().zip(side) {
+            *ray = rays.direction(plane, [x + i, y + j]).map(f64::from);
+        }
+        out
+    }
+
+    /// Casts the rays of eight samples, and keeps what is nearer than what is there, `at` some places of the tile. Whether there
+    /// is any.
+    #[inline(always)]
+    fn cast<S: Simd>(
+        &self,
+        s: S,
+        body: &Body,
+        directions: [V3; WIDTH],
+        stack: &mut Stack,
+        (nearness, ids, at): (&mut [f32], &mut [u32], [usize; WIDTH]),
+        first_id: u32,
+    ) -> bool {
+        // Distances along a ray for a metre of depth.
+        let mut length = [1.0; WIDTH];
+        let mut rays = [Ray { origin: self.origin, direction: [0.0, 0.0, 1.0] }; WIDTH];
+        let mut none = [false; WIDTH];
+        for (((ray, length), c), none) in rays.iter_mut().zip(&mut length).zip(&directions).zip(&mut none) {
+            *none = *c == [0.0; 3];
+            let c = if *none { [0.0, 0.0, 1.0] } else { *c };
+            let d = self.rotation.map(|r| r[0] * c[0] + r[1] * c[1] + r[2] * c[2]);
+            *length = dot(d, d).sqrt();
+            // Nothing before the near plane counts: rays begin there.
+            *ray = Ray { origin: along(self.origin, self.near, d), direction: scale(d, 1.0 / *length) };
+        }
+        let mut packet = Packet::of(&rays, f64::INFINITY);
+        for k in 0..WIDTH {
+            // What is there is known to single precision.
+            let limit = (1.000_001 / f64::from(nearness[at[k]]) - self.near) * length[k];
+            packet.shorten(k, if none[k] { -1.0 } else { limit });
+        }
+        let mut found = [None; WIDTH];
+        match body {
+            Body::Mesh(_, tree) => {
+                tree.nearest_of_packet(s, &packet, ShearPacket::new(s, &packet).as_ref(), stack, &mut found);
+                for (_, index) in found.iter_mut().flatten() {
+                    *index = tree.number(*index) as usize;
+                }
+            }
+            Body::Closed(solid) => {
+                for k in (0..WIDTH).filter(|&k| packet.has(k)) {
+                    let touch = solid.touch(&rays[k], packet.limit(k), stack);
+                    found[k] = touch.map(|touch| (touch.t, solid.face(&touch, &rays[k])));
+                }
+            }
+        }
+        let mut drawn = false;
+        for k in 0..WIDTH {
+            let Some((t, number)) = found[k] else { continue };
+            let q = (1.0 / (self.near + t / length[k])) as f32;
+            let (old, id) = (nearness[at[k]], first_id + number as u32);
+            if q > old || q == old && id > ids[at[k]] {
+                (nearness[at[k]], ids[at[k]]) = (q, id);
+                drawn = true;
+            }
+        }
+        debug_assert!(first_id != NOTHING);
+        drawn
+    }
+}

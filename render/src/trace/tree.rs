@@ -1,0 +1,251 @@
+//! The tree over the things of a frame: parts that rays meet least often, by the surface area heuristic; of many things, and
+//! far down, halves of equal number along the longest side.
+//!
+//! Source: Goldsmith and Salmon, Automatic creation of object hierarchies for ray tracing, 1987.
+
+use super::motion::Motion;
+use crate::geometry::ray::Ray;
+use crate::geometry::vector::{V3, scale};
+use kinetoscope_scene::PoseF64;
+
+/// How much larger boxes are: more than the rounding of the test.
+const LARGER: f64 = 1.0 + 1e-6;
+/// Levels of parts that may be of any size.
+const UNEVEN: usize = 8;
+/// Deeper than any tree: below those, halves of equal number of less than 2^32 things.
+const DEPTH: usize = UNEVEN + 32;
+/// Of more things all places to cut are not looked at: that takes as long as some thousand rays.
+const FEW: usize = 64;
+
+/// A box with two boxes in it, or with a thing.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: [V3; 2],
+    /// The second node in it; the first one follows this node. 0 for a thing.
+    second: u32,
+    thing: u32,
+}
+
+/// A box, its middle (doubled), and the thing in it.
+type Boxed = ([V3; 2], V3, u32);
+
+/// A tree over boxes; keeps its memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tree {
+    boxes: Vec<Boxed>,
+    nodes: Vec<Node>,
+}
+
+impl Tree {
+    pub(super) fn bytes(&self) -> usize {
+        self.boxes.capacity() * size_of::<Boxed>() + self.nodes.capacity() * size_of::<Node>()
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.boxes.clear();
+        self.nodes.clear();
+    }
+
+    /// Adds a thing by the box around it in its own frame.
+    pub(super) fn add(&mut self, thing: u32, pose: &PoseF64, [lo, hi]: [V3; 2]) {
+        let at = pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k])));
+        let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
+        let reach = pose.rotation.map(|r| LARGER * (0..3).map(|k| r[k].abs() * half[k]).sum::<f64>());
+        let pad = [0, 1, 2].map(|k| reach[k] + 1e-9 * (at[k].abs() + reach[k]));
+        let bounds = [[0, 1, 2].map(|k| at[k] - pad[k]), [0, 1, 2].map(|k| at[k] + pad[k])];
+        self.boxes.push((bounds, scale(at, 2.0), thing));
+    }
+
+    /// Adds a thing that moves.
+    pub(super) fn add_moving(&mut self, thing: u32, motion: &Motion, bounds: [V3; 2]) {
+        let [lo, hi] = motion.bounds(bounds, LARGER);
+        self.boxes.push(([lo, hi], [0, 1, 2].map(|k| lo[k] + hi[k]), thing));
+    }
+
+    /// Builds the tree over what was added.
+    pub(super) fn build(&mut self) {
+        let Self { boxes, nodes } = self;
+        if !boxes.is_empty() {
+            nodes.reserve(2 * boxes.len() - 1);
+            split(boxes, nodes, 0);
+        }
+    }
+
+    /// Visits the things whose boxes a ray meets at distances from 0 to `limit`, the near boxes first. `act` is given a thing
+    /// and the limit, and returns a new limit.
+    #[inline(always)]
+    pub(super) fn visit(&self, ray: &Ray, mut limit: f64, mut act: impl FnMut(u32, f64) -> f64) {
+        // A direction that is almost none would make an infinity, and no number of it and a zero.
+        let inverse = ray.direction.map(|d| 1.0 / if d.abs() < 1e-200 { 1e-200f64.copysign(d) } else { d });
+        // Plain comparisons: those of the library look for what is no number.
+        let smaller = |a: f64, b: f64| if a < b { a } else { b };
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        let enter = {
+            #[inline(always)]
+            |node: u32, limit: f64| {
+                let [lo, hi] = &self.nodes[node as usize].bounds;
+                let (mut near, mut far) = (0.0f64, limit);
+                for k in 0..3 {
+                    let (a, b) = ((lo[k] - ray.origin[k]) * inverse[k], (hi[k] - ray.origin[k]) * inverse[k]);
+                    (near, far) = (larger(near, smaller(a, b)), smaller(far, larger(a, b)));
+                }
+                (near <= far * LARGER).then_some(near)
+            }
+        };
+        let mut waiting = [(0.0, 0u32); DEPTH];
+        let mut count = 0usize;
+        let mut next = if self.nodes.is_empty() { None } else { enter(0, limit).map(|_| 0) };
+        loop {
+            let Some(node) = next else {
+                // What waits may be too far by now.
+                let Some(last) = count.checked_sub(1) else { return };
+                count = last;
+                let (near, node) = waiting[count];
+                next = (near <= limit).then_some(node);
+                continue;
+            };
+            let Node { second, thing, .. } = self.nodes[node as usize];
+            next = None;
+            if second == 0 {
+                limit = act(thing, limit);
+                continue;
+            }
+            let first = node + 1;
+            next = match (enter(first, limit), enter(second, limit)) {
+                (Some(a), Some(b)) => {
+                    let (near, far) = if b < a { (second, (a, first)) } else { (first, (b, second)) };
+                    waiting[count] = far;
+                    count += 1;
+                    Some(near)
+                }
+                (Some(_), None) => Some(first),
+                (None, Some(_)) => Some(second),
+                (None, None) => None,
+            };
+        }
+    }
+}
+
+const NOTHING: [V3; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+
+fn union(all: [V3; 2], b: &[V3; 2]) -> [V3; 2] {
+    [[0, 1, 2].map(|k| all[0][k].min(b[0][k])), [0, 1, 2].map(|k| all[1][k].max(b[1][k]))]
+}
+
+/// Sorts by the middles along an axis; of those that are at one place the first thing comes first.
+fn order(axis: usize, a: &Boxed, b: &Boxed) -> std::cmp::Ordering {
+    a.1[axis].total_cmp(&b.1[axis]).then(a.2.cmp(&b.2))
+}
+
+/// Sorts a few boxes so that the best place to cut them is where it says.
+fn best_cut(boxes: &mut [Boxed]) -> usize {
+    let area = |b: [V3; 2]| {
+        let [x, y, z] = [0, 1, 2].map(|k| b[1][k] - b[0][k]);
+        x * y + y * z + z * x
+    };
+    let mut best = (f64::INFINITY, 0, boxes.len() / 2);
+    for axis in 0..3 {
+        boxes.sort_unstable_by(|a, b| order(axis, a, b));
+        let mut costs = [0.0f64; FEW];
+        let mut sum = NOTHING;
+        for (k, (b, ..)) in boxes.iter().enumerate().skip(1).rev() {
+            sum = union(sum, b);
+            costs[k] = (boxes.len() - k) as f64 * area(sum);
+        }
+        sum = NOTHING;
+        for (k, (b, ..)) in (1..).zip(&boxes[..boxes.len() - 1]) {
+            sum = union(sum, b);
+            let cost = k as f64 * area(sum) + costs[k];
+            if cost < best.0 {
+                best = (cost, axis, k);
+            }
+        }
+    }
+    if best.1 != 2 {
+        boxes.sort_unstable_by(|a, b| order(best.1, a, b));
+    }
+    best.2
+}
+
+/// Adds the node of some boxes, and all below.
+fn split(boxes: &mut [Boxed], nodes: &mut Vec<Node>, depth: usize) {
+    let around = boxes.iter().fold(NOTHING, |all, (b, ..)| union(all, b));
+    let index = nodes.len();
+    nodes.push(Node { bounds: around, second: 0, thing: boxes[0].2 });
+    if boxes.len() == 1 {
+        return;
+    }
+    let at = if depth < UNEVEN && boxes.len() <= FEW { best_cut(boxes) } else { halve(boxes) };
+    let (low, high) = boxes.split_at_mut(at);
+    split(low, nodes, depth + 1);
+    nodes[index].second = nodes.len() as u32;
+    split(high, nodes, depth + 1);
+}
+
+/// Cuts boxes in halves of equal number, along the longest side.
+fn halve(boxes: &mut [Boxed]) -> usize {
+    let spread = |axis: usize| {
+        let ends = boxes
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], (_, m, _)| [lo.min(m[axis]), hi.max(m[axis])]);
+        ends[1] - ends[0]
+    };
+    let axis = (1..3).fold(0, |best, k| if spread(k) > spread(best) { k } else { best });
+    let half = boxes.len() / 2;
+    boxes.select_nth_unstable_by(half, |a, b| order(axis, a, b));
+    half
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn brute_force() {
+        let mut state = 9u64;
+        let mut number = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        for count in [0usize, 1, 2, 3, 7, 64, 65, 300] {
+            let mut tree = Tree::default();
+            let boxes: Vec<[V3; 2]> = (0..count)
+                .map(|_| {
+                    let lo = [0, 1, 2].map(|_| 4.0 * number() - 2.0);
+                    [lo, lo.map(|x| x + 0.5 * number())]
+                })
+                .collect();
+            for (k, b) in boxes.iter().enumerate() {
+                tree.add(k as u32, &PoseF64::IDENTITY, *b);
+            }
+            tree.build();
+            let mut met_at_all = 0;
+            for _ in 0..200 {
+                let d = [0, 1, 2].map(|_| number() - 0.5);
+                let length = d.iter().map(|x| x * x).sum::<f64>().sqrt();
+                let ray = Ray { origin: [0, 1, 2].map(|_| 6.0 * number() - 3.0), direction: d.map(|x| x / length) };
+                let limit = 3.0 * number();
+                // The textbook's slabs, with the boxes as they are.
+                let meets = |[lo, hi]: &[V3; 2]| {
+                    let (mut near, mut far) = (0.0f64, limit);
+                    for (k, (o, d)) in ray.origin.iter().zip(ray.direction).enumerate() {
+                        let (a, b) = ((lo[k] - o) / d, (hi[k] - o) / d);
+                        (near, far) = (near.max(a.min(b)), far.min(a.max(b)));
+                    }
+                    near <= far
+                };
+                let mut visited = vec![false; count];
+                tree.visit(&ray, limit, |thing, limit| {
+                    assert!(!std::mem::replace(&mut visited[thing as usize], true), "visited twice");
+                    limit
+                });
+                for (visited, b) in visited.iter().zip(&boxes) {
+                    assert!(*visited || !meets(b), "{count} boxes");
+                    // Boxes are a millionth larger: few are visited for nothing.
+                    met_at_all += usize::from(*visited != meets(b));
+                }
+            }
+            assert!(met_at_all <= 2, "{met_at_all} of {count} boxes visited for nothing");
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! From pixels to rays and back, for cameras (pinhole) and lamps (pinhole or parallel).
+
+use super::View;
+use crate::simd::{F, Simd, V3, splat};
+use kinetoscope_scene::PoseF32;
+
+/// A view with pinhole or parallel rays.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Projection {
+    /// Whether rays are parallel; `fx` and `fy` are pixels per metre then.
+    pub(crate) parallel: bool,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) fx: f32,
+    pub(crate) fy: f32,
+    pub(crate) cx: f32,
+    pub(crate) cy: f32,
+    pub(crate) near: f32,
+    pub(crate) far: f32,
+    pub(crate) world_from_camera: PoseF32,
+}
+
+impl From<&View> for Projection {
+    fn from(v: &View) -> Self {
+        let View { width, height, fx, fy, cx, cy, near, far, world_from_camera } = *v;
+        Self { parallel: false, width, height, fx, fy, cx, cy, near, far, world_from_camera }
+    }
+}
+
+impl Projection {
+    /// Nearness of a depth: larger is nearer. 1/z for a pinhole, so that it is linear on the screen.
+    #[inline(always)]
+    pub(crate) fn nearness(&self, z: f32) -> f32 {
+        if self.parallel { 1.0 - z / self.far } else { 1.0 / z }
+    }
+
+    /// Nearness of sixteen depths.
+    #[inline(always)]
+    pub(crate) fn nearness_lanes<S: Simd>(&self, z: F<S>) -> F<S> {
+        if self.parallel { 1.0 - z / self.far } else { 1.0 / z }
+    }
+
+    /// The nearness beyond which nothing is seen.
+    pub(crate) fn farthest(&self) -> f32 {
+        // The largest number that is smaller, so that the far plane itself is seen.
+        if self.parallel { f32::MIN } else { (1.0 / self.far).next_down() }
+    }
+
+    /// The nearness above which nothing is seen.
+    pub(crate) fn nearest(&self) -> f32 {
+        self.nearness(self.near)
+    }
+
+    /// Rays through the points (u, v) of the picture, in the frame of an instance: origin and direction, such that the
+    /// parameter is the depth.
+    #[inline(always)]
+    pub(crate) fn rays<S: Simd>(&self, s: S, camera: &LocalCamera, u: F<S>, v: F<S>) -> (V3<S>, V3<S>) {
+        let x = (u - self.cx) * camera.inverse_f[0];
+        let y = (v - self.cy) * camera.inverse_f[1];
+        let r = &camera.instance_from_camera.rotation;
+        let t = camera.instance_from_camera.translation;
+        let row = |i: usize| x * r[i][0] + y * r[i][1];
+        let across = V3 { x: row(0), y: row(1), z: row(2) };
+        let forward = V3::splat(s, [r[0][2], r[1][2], r[2][2]]);
+        let origin = V3::splat(s, t);
+        if self.parallel { (origin.add(across), forward) } else { (origin, across.add(forward)) }
+    }
+
+    /// The camera as an instance sees it.
+    pub(crate) fn local(&self, world_from_instance: &PoseF32) -> LocalCamera {
+        LocalCamera {
+            instance_from_camera: world_from_instance.inverse_times(&self.world_from_camera),
+            inverse_f: [1.0 / self.fx, 1.0 / self.fy],
+        }
+    }
+
+    /// Directions of the rays in the world frame, such that the parameter is the depth. Not for parallel rays.
+    #[inline(always)]
+    pub(crate) fn world_directions<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> V3<S> {
+        let c = V3 { x: (u - self.cx) * (1.0 / self.fx), y: (v - self.cy) * (1.0 / self.fy), z: splat(s, 1.0) };
+        c.rotate(&self.world_from_camera.rotation)
+    }
+}
+
+/// The camera in the frame of an instance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LocalCamera {
+    pub(crate) instance_from_camera: PoseF32,
+    pub(crate) inverse_f: [f32; 2],
+}
