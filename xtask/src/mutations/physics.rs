@@ -307,7 +307,7 @@ pub(super) const PHYSICS: &[Mutation] = &[
     Mutation::of(
         "physics",
         "pixels half a percent too wide",
-        "sensors/src/visibility/projection.rs",
+        "render/src/visibility/projection.rs",
         ["inverse_f: [1.0 / self.fx, 1.0 / self.fy],", "inverse_f: [1.005 / self.fx, 1.0 / self.fy],"],
         &["sphere_depth"],
     ),

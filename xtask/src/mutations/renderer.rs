@@ -6,7 +6,7 @@ pub(super) const RENDERER: &[Mutation] = &[
     Mutation::of(
         "kinetoscope-sensors",
         "tangential coefficients of a lens exchanged",
-        "sensors/src/camera/lens/open_cv.rs",
+        "render/src/lens/open_cv.rs",
         [
             "x * g + 2.0 * p1 * x * y + p2 * (r + 2.0 * x * x) + r * (s1 + r * s2),",
             "x * g + 2.0 * p2 * x * y + p1 * (r + 2.0 * x * x) + r * (s1 + r * s2),",
@@ -16,7 +16,7 @@ pub(super) const RENDERER: &[Mutation] = &[
     Mutation::of(
         "kinetoscope-sensors",
         "optical flow to the left, not to the right",
-        "sensors/src/resolve/moves.rs",
+        "render/src/shade/moves.rs",
         ["let right = u - (there.x * nearness * fx + cx);", "let right = (there.x * nearness * fx + cx) - u;"],
         &["camera::tests::flow::homography", "camera::tests::flow::random_scenes"],
     ),
@@ -30,7 +30,7 @@ pub(super) const RENDERER: &[Mutation] = &[
     Mutation::of(
         "kinetoscope-sensors",
         "rolling shutter from the bottom up",
-        "sensors/src/camera/shutter.rs",
+        "render/src/shutter.rs",
         ["self.last_row.saturating_sub(row) as f64 * self.row", "row as f64 * self.row"],
         &["camera::tests::shutter::shear"],
     ),
