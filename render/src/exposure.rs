@@ -1,8 +1,9 @@
 //! Pictures by path tracing: threads share the rows of one picture at a time.
 
 use super::lens::LensRays;
-use super::rasterizer::{Rasterizer, Shot};
+use super::rasterizer::Rasterizer;
 use super::renderer::Renderer;
+use super::request::Shot;
 use super::shutter::{Clock, Take};
 use crate::frame::FrameMut;
 use crate::path::eye::{Eye, Pupil};

@@ -9,6 +9,7 @@
 //! | module | content |
 //! |---|---|
 //! | [`rasterizer`], [`parallel`] | one frame, and many on several threads: what callers use |
+//! | [`request`] | the scene, the view and the settings of a frame |
 //! | [`frame`] | channels (colour, depth, ...), one file each, and their images |
 //! | [`renderer`], [`aperture`], [`shutter`], [`progress`] | settings of a frame |
 //! | [`lens`], [`intrinsics`] | from pixels to rays |
@@ -32,6 +33,7 @@ pub mod progress;
 pub mod raster;
 pub mod rasterizer;
 pub mod renderer;
+pub mod request;
 pub mod rolling;
 pub mod shade;
 pub mod shutter;

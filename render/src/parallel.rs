@@ -3,8 +3,9 @@
 use super::aperture::Aperture;
 use super::exposure::expose;
 use super::progress::RenderProgress;
-use super::rasterizer::{RasterCfg, Rasterizer, Shot};
+use super::rasterizer::Rasterizer;
 use super::renderer::Renderer;
+use super::request::{RasterCfg, Shot};
 use super::shutter::{Shutter, Take};
 use crate::frame::FrameMut;
 use crate::geometry::assets::RayAssets;

@@ -1,6 +1,6 @@
 //! Which renderer draws pictures.
 
-use super::rasterizer::{RasterCfg, Shot};
+use super::request::{RasterCfg, Shot};
 use crate::frame::FrameMut;
 use crate::visibility::RenderError;
 use kinetoscope_scene::pattern::{UnknownName, closest};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
 
 /// Which renderer draws pictures. All of them give the same depth, distance, mask, normals and positions off silhouettes,
-/// where the rasterizer draws meshes as they are: with [`RasterCfg::lod`](crate::rasterizer::RasterCfg::lod), which is on by default, its
+/// where the rasterizer draws meshes as they are: with [`RasterCfg::lod`](crate::request::RasterCfg::lod), which is on by default, its
 /// surfaces are moved as is said there, and no other renderer's are.
 ///
 /// In files it is a name, `"hybrid"`, or a table of paths with what is not as in [`Renderer::RAY_TRACED`]:
@@ -23,10 +23,10 @@ pub enum Renderer {
     Raster,
     /// What is seen is found by rays: one through each sample, against every triangle and the exact shapes. Light, shadows
     /// and transparency are the rasterizer's. Meshes are never drawn coarser
-    /// ([`RasterCfg::lod`](crate::rasterizer::RasterCfg::lod) is for shadow maps only).
+    /// ([`RasterCfg::lod`](crate::request::RasterCfg::lod) is for shadow maps only).
     FastRayTraced,
     /// The rasterizer, with shadows by rays: sharp at every distance, of all lamps that cast shadows, point lamps too; and
-    /// with ambient occlusion by rays, where [`RasterCfg::occlusion_rays`](crate::rasterizer::RasterCfg::occlusion_rays) asks for some.
+    /// with ambient occlusion by rays, where [`RasterCfg::occlusion_rays`](crate::request::RasterCfg::occlusion_rays) asks for some.
     /// Meshes are never drawn coarser. Rays begin on the triangles: near the edge of its dark side, a coarse mesh with smooth normals
     /// goes dark triangle by triangle. Behind a lens that bends lines what is seen is found by rays too.
     Hybrid,
@@ -55,7 +55,7 @@ pub enum Renderer {
     ///   backs are not seen. Paths end, black, after 64 such surfaces, and where a smooth normal mirrors them below the surface
     ///   itself.
     ///
-    /// The [tone curve](crate::rasterizer::RasterCfg::tone) and sRGB are those of the rasterizer. Noise depends on the pixel and the seed only: the same bits for
+    /// The [tone curve](crate::request::RasterCfg::tone) and sRGB are those of the rasterizer. Noise depends on the pixel and the seed only: the same bits for
     /// any number of threads. Pictures of [`Camera`](kinetoscope_sensors::camera::sensor::Camera)s have noise of their own each, by the seed of the
     /// simulation, the environment's global index, the name of the camera and which picture it is, besides this seed: the
     /// same in any batch.

@@ -1,6 +1,6 @@
 //! Draws rows of pictures, each at an instant of its own: all channels but colours, which paths draw.
 
-use super::rasterizer::Shot;
+use super::request::Shot;
 use super::shutter::{Clock, Opened};
 use crate::frame::{Channels, Frame, FrameMut};
 use crate::raster::tile::BLOCK;

@@ -1,6 +1,6 @@
 //! When light falls on which row of a picture.
 
-use super::rasterizer::Shot;
+use super::request::Shot;
 use crate::visibility::RenderError;
 use kinetoscope_scene::PoseF32;
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use crate::camera::{CalibrationError, CameraError};
 use crate::ray::RayError;
-use crate::sensor::Requires;
+use crate::requires::Requires;
 
 /// Why a sensor cannot be built or updated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -2,10 +2,11 @@
 
 use crate::error::SensorError;
 use crate::frames::{check_offset, pose, put};
+use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::select::{at_least_one, matching};
-use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use kinetoscope_scene::pose::{from_row, to_wxyz};
 use kinetoscope_scene::{Marker, Pose, SceneState};

@@ -4,10 +4,11 @@
 //! names for what can be read of it.
 
 use crate::error::SensorError;
+use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::select::{at_least_one, read_columns, select_or_all};
-use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use kinetoscope_scene::SceneState;
 use ndarray::{ArrayView1, ArrayView2, ArrayView3};

@@ -2,10 +2,11 @@
 
 use crate::error::SensorError;
 use crate::frames::{pose, put, vector};
+use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::select::{at_least_one, select};
-use crate::sensor::{Requires, Sensor, SensorCfg, SensorContext};
+use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use nalgebra::Vector3;

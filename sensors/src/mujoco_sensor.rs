@@ -1,10 +1,11 @@
 //! The physics engine's own sensors, as its models declare them: MuJoCo's `<sensor>` elements.
 
 use crate::error::SensorError;
+use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::select::{at_least_one, select};
-use crate::sensor::{EngineSensor, Requires, Sensor, SensorCfg, SensorContext};
+use crate::sensor::{EngineSensor, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use kinetoscope_scene::SceneState;
 use kinetoscope_scene::pattern::closest;

@@ -1,8 +1,9 @@
 //! The place of a sensor with its owner: measures when it is due, or when it is read.
 
 use crate::error::SensorError;
+use crate::requires::Requires;
 use crate::schedule::{Phases, Schedule};
-use crate::sensor::{Requires, Sensor};
+use crate::sensor::Sensor;
 use kinetoscope_scene::SceneState;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Mutex, OnceLock, PoisonError};

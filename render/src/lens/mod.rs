@@ -4,6 +4,7 @@
 //! and back: a point (x, y) of it is the pixel (u, v) = (cx + fx x, cy + fy y), so [`Intrinsics`](crate::intrinsics::Intrinsics) and
 //! lens are independent of each other. All of it is double precision.
 
+mod model;
 pub mod optics;
 mod poles;
 mod polynomial;
@@ -13,72 +14,15 @@ mod rows;
 
 use super::optics_error::OpticsError;
 use kinetoscope_scene::pattern::{UnknownName, closest};
+pub use model::{Domain, LensModel};
+use model::{angle_up_to, finite};
 pub use optics::Optics;
-use poles::Poles;
 pub use rays::LensRays;
 pub(crate) use rays::Sight;
 pub use rows::RaysOfRows;
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
-
-/// How far a lens sees.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Domain {
-    /// The largest angle between a ray and the optical axis \[rad\].
-    pub angle: f64,
-    /// How far from the principal point such a ray is, in the normalised picture (times fx: in pixels).
-    pub radius: f64,
-    /// Whether rays end there because the mapping folds back or has a pole, not because the lens was to see no farther.
-    pub folds: bool,
-    /// Of [`OpenCv`] alone.
-    poles: Poles,
-}
-
-impl Domain {
-    /// How far a lens sees that needs no more to be known of it.
-    pub const fn new(angle: f64, radius: f64, folds: bool) -> Self {
-        Self { angle, radius, folds, poles: Poles::NONE }
-    }
-}
-
-/// One kind of lens: its file, and a line in the list below.
-pub trait LensModel: Copy + Default {
-    /// Its name.
-    const NAME: &'static str;
-    /// What others call it.
-    const ALIASES: &'static [&'static str];
-    /// Whether every ray goes forward, so that near, far and depth are measured along the optical axis, as without a lens.
-    /// Of others, near and far are distances along the ray.
-    const FORWARD: bool = false;
-    /// Whether there is an aperture with an optical axis; a panorama is put together of many pictures.
-    const HAS_AXIS: bool = true;
-
-    /// Whether it is no lens at all, with these numbers.
-    fn is_pinhole(&self) -> bool {
-        false
-    }
-
-    /// The angle that was given as the end of what it sees \[rad\], where one was.
-    fn max_angle(&self) -> Option<f64>;
-
-    /// Checks every number.
-    ///
-    /// # Errors
-    ///
-    /// [`OpticsError::Lens`].
-    fn validate(&self) -> Result<(), OpticsError>;
-
-    /// How far it sees; the numbers are good.
-    fn domain(&self) -> Domain;
-
-    /// The point of the normalised picture where a direction is seen; `None` outside of the domain.
-    fn project(&self, domain: &Domain, direction: [f64; 3]) -> Option<[f64; 2]>;
-
-    /// The direction that is seen at a point of the normalised picture: with z = 1 if all rays go
-    /// [forward](Self::FORWARD), else of length 1. `None` outside of the domain.
-    fn unproject(&self, domain: &Domain, point: [f64; 2]) -> Option<[f64; 3]>;
-}
 
 /// Declares the lenses: a module with a type of its own each.
 macro_rules! lenses {
@@ -243,20 +187,4 @@ impl Default for Lens {
     fn default() -> Self {
         Self::Pinhole(Pinhole {})
     }
-}
-
-/// Checks that numbers are finite.
-fn finite(numbers: &[(&'static str, f64)]) -> Result<(), OpticsError> {
-    match numbers.iter().find(|(_, value)| !value.is_finite()) {
-        Some(&(what, value)) => Err(OpticsError::Lens { what, value, allowed: "finite" }),
-        None => Ok(()),
-    }
-}
-
-/// Checks the angle at which a lens ends.
-fn angle_up_to(max_angle: f64, most: f64, allowed: &'static str) -> Result<(), OpticsError> {
-    if max_angle > 0.0 && max_angle <= most {
-        return Ok(());
-    }
-    Err(OpticsError::Lens { what: "max_angle", value: max_angle, allowed })
 }

@@ -12,7 +12,7 @@ const GROUP: usize = 3 * LANES;
 /// Cones are wider by this \[rad\]: more than what is lost by single precision.
 const WIDER: f64 = 1e-5;
 
-/// The rays of a picture behind a lens, single precision; see [`Shot::lens`](crate::rasterizer::Shot::lens).
+/// The rays of a picture behind a lens, single precision; see [`Shot::lens`](crate::request::Shot::lens).
 ///
 /// It takes 12 bytes for each pixel, 60 where colours have four samples besides, 4 more where there is vignetting, and is
 /// computed once: cameras keep one for each kind of lens and intrinsics among their environments.

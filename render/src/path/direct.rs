@@ -1,10 +1,11 @@
 //! Light that comes to a point straight from lamps and from what glows.
 
-use super::lobe::Basis;
 use super::point::Point;
-use super::{Path, Paths, REACH, SCATTERED, above, times};
+use super::{Path, Paths, SCATTERED, above, times};
+use crate::geometry::basis::Basis;
 use crate::geometry::ray::Ray;
 use crate::geometry::vector::{V3, along, dot, sub, unit};
+use crate::shade::shadow_rays::REACH;
 use crate::simd::Simd;
 use crate::trace::Hit;
 use std::f64::consts::PI;

@@ -1,10 +1,12 @@
 //! Where a camera's paths begin, and which way they go.
 
-use super::lobe::{Basis, on_disc};
+use crate::geometry::basis::Basis;
+
 use crate::aperture::Aperture;
 use crate::geometry::ray::Ray;
 use crate::geometry::vector::{along, dot, scale, sub};
 use crate::lens::rays::LensRays;
+use crate::path::disc::on_disc;
 use crate::visibility::Projection;
 use kinetoscope_scene::PoseF64;
 

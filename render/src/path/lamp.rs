@@ -1,7 +1,9 @@
 //! Lamps, as paths see them.
 
-use super::lobe::{Basis, on_disc};
+use crate::geometry::basis::Basis;
+
 use crate::geometry::vector::{V3, along, dot, scale, sub, to_f64, unit};
+use crate::path::disc::on_disc;
 use crate::shade::shade::{cos_deg, whole_exponent};
 use crate::visibility::Projection;
 use kinetoscope_scene::{Light, LightKind};

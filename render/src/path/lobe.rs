@@ -5,6 +5,7 @@
 //! Schlick, 1994; Lagarde and de Rousiers, Moving Frostbite to physically based rendering, 2014 (F90).
 
 use super::brightness;
+use super::disc::{cosine, turn};
 use crate::geometry::vector::{V3, dot, scale};
 use kinetoscope_scene::Material;
 use std::f64::consts::PI;
@@ -34,10 +35,6 @@ pub(super) struct Lobe {
 /// The least alpha², of a roughness of 0: highlights of a twentieth of a degree.
 const SMOOTHEST: f64 = 1e-6;
 
-/// Axes at a point, the third is the normal.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Basis([V3; 3]);
-
 /// Where light is followed to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scattered {
@@ -54,50 +51,6 @@ pub(super) struct Scattered {
 pub(super) struct Scatter {
     pub(super) below: V3,
     pub(super) layer: V3,
-}
-
-impl Basis {
-    /// Source: Duff et al., Building an orthonormal basis, revisited, JCGT 6(1), 2017.
-    pub(crate) fn of(n: V3) -> Self {
-        let sign = if n[2] < 0.0 { -1.0 } else { 1.0 };
-        let a = -1.0 / (sign + n[2]);
-        let b = n[0] * n[1] * a;
-        Self([[1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]], [b, sign + n[1] * n[1] * a, -n[1]], n])
-    }
-
-    pub(crate) fn to_world(self, v: V3) -> V3 {
-        [0, 1, 2].map(|k| self.0[0][k] * v[0] + self.0[1][k] * v[1] + self.0[2][k] * v[2])
-    }
-
-    pub(super) fn to_local(self, v: V3) -> V3 {
-        self.0.map(|axis| dot(axis, v))
-    }
-}
-
-/// Cosine and sine of a part of a turn, 0..=1, by their series: those of the library differ from machine to machine.
-pub(super) fn turn(part: f64) -> [f64; 2] {
-    let quarter = (4.0 * part + 0.5) as i64;
-    let x = (part - quarter as f64 / 4.0) * (2.0 * PI);
-    let (mut cos, mut sin, mut term) = (1.0, x, 1.0);
-    // Up to an eighth of a turn: the last terms are below 1e-15.
-    for k in 1..9 {
-        let k = f64::from(k);
-        term *= -(x * x) / ((2.0 * k - 1.0) * (2.0 * k));
-        cos += term;
-        sin += term * x / (2.0 * k + 1.0);
-    }
-    match quarter % 4 {
-        0 => [cos, sin],
-        1 => [-sin, cos],
-        2 => [-cos, -sin],
-        _ => [sin, -cos],
-    }
-}
-
-/// A point of a disc of radius 1, evenly.
-pub(super) fn on_disc([a, b]: [f64; 2]) -> [f64; 2] {
-    let (r, [cos, sin]) = (a.sqrt(), turn(b));
-    [r * cos, r * sin]
 }
 
 impl Lobe {
@@ -269,12 +222,6 @@ impl Lobe {
         let i = [0, 1, 2].map(|k| twice * facet[k] - o[k]);
         (twice > 0.0 && i.iter().all(|x| x.is_finite())).then_some(i)
     }
-}
-
-/// A direction by the cosine law.
-pub(crate) fn cosine(at: [f64; 2]) -> V3 {
-    let [x, y] = on_disc(at);
-    [x, y, (1.0 - at[0]).max(0.0).sqrt()]
 }
 
 #[cfg(test)]

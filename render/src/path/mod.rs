@@ -7,6 +7,7 @@
 //! light are those of [`Renderer`](crate::renderer::Renderer).
 
 mod direct;
+pub(crate) mod disc;
 mod emitter;
 pub(crate) mod eye;
 pub mod film;
@@ -20,6 +21,7 @@ mod texel;
 #[cfg(test)]
 mod tests;
 
+use crate::geometry::basis::Basis;
 use crate::geometry::bvh::Stack;
 use crate::geometry::ray::Ray;
 use crate::geometry::vector::{V3, along, dot, scale, to_f64};
@@ -33,7 +35,6 @@ use emitter::{Emitters, power_heuristic};
 use eye::Eye;
 use kinetoscope_scene::{Light, LightSum, PoseF64, RenderScene, Texture};
 use lamp::Lamp;
-use lobe::Basis;
 use point::Point;
 use sobol::{Sample, Sequence};
 use std::sync::Arc;
@@ -44,8 +45,6 @@ const MAX_LAMPS: usize = crate::shade::shade::MAX_LIGHTS;
 const ABOVE: f64 = 1e-7;
 /// Bounces after which paths may end by chance.
 const SURE: u32 = 2;
-/// Light is asked for up to this part of its way: a lamp on a ceiling is not behind it.
-pub(super) const REACH: f64 = 1.0 - 1e-6;
 /// Surfaces that are not opaque that a path goes through, at most.
 const MAX_PASSES: u32 = 64;
 /// How much wider by the metre what is seen together gets where light is scattered, at least.

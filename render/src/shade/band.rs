@@ -9,7 +9,7 @@ use crate::frame::{FrameMut, PixelGroup, Stage};
 use crate::geometry::bvh::Stack;
 use crate::raster::tile::{BLOCK, Tile};
 use crate::raster::{Item, Painter};
-use crate::rasterizer::Shot;
+use crate::request::Shot;
 use crate::simd::{LANES, Level, Simd, at_level, first, load, splat_i};
 use crate::visibility::Projection;
 use kinetoscope_scene::RenderScene;

@@ -16,3 +16,6 @@ pub(crate) mod shadow_rays;
 pub(crate) mod surface;
 pub(crate) mod texture;
 pub mod tone;
+
+/// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
+pub(crate) const BAND: usize = 128 * 1024;

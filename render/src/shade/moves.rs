@@ -3,7 +3,7 @@
 use crate::intrinsics::PixelIntrinsics;
 use crate::lens::optics::Optics;
 use crate::lens::rays::LensRays;
-use crate::rasterizer::{Before, Shot};
+use crate::request::{Before, Shot};
 use crate::simd::{F, LANES, M, Simd, V3, load, select, splat};
 use crate::visibility::{RenderError, View};
 use kinetoscope_scene::PoseF32;

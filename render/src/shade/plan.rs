@@ -1,5 +1,6 @@
 //! What the parts of a picture have in common: what is drawn where, the lamps and their shadows.
 
+use super::BAND;
 use super::group::Context;
 use super::horizon::Horizon;
 use super::mirror::{self, Mirrors};
@@ -16,17 +17,15 @@ use crate::geometry::bvh::Stack;
 use crate::lens::rays::LensRays;
 use crate::raster::tile::{BLOCK, SAMPLES};
 use crate::raster::{DrawList, Layer, Parts, level};
-use crate::rasterizer::RasterCfg;
-use crate::rasterizer::Shot;
 use crate::renderer::Renderer;
+use crate::request::RasterCfg;
+use crate::request::Shot;
 use crate::shutter::Shutter;
 use crate::trace::Tracer;
 use crate::visibility::{Projection, RenderError, View};
 use kinetoscope_scene::{Instance, LightSum, PoseF32};
 use std::cell::RefCell;
 
-/// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
-pub(crate) const BAND: usize = 128 * 1024;
 /// Lamps with a shadow, at most.
 const MAX_SHADOWS: usize = 4;
 

@@ -1,10 +1,10 @@
 //! Shadow maps: what a lamp sees.
 
-use super::plan::BAND;
+use super::BAND;
 use super::shadow_fit::{Extent, LampView};
 use crate::raster::tile::{AREA, BLOCK, Tile};
 use crate::raster::{DrawList, Layer, Painter, Parts};
-use crate::rasterizer::RasterCfg;
+use crate::request::RasterCfg;
 use crate::simd::{F, Level};
 use crate::simd::{LANES, M, Simd, V3, at_level, load, max, min, select, splat};
 use crate::visibility::Projection;

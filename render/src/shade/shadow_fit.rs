@@ -6,7 +6,7 @@ use kinetoscope_scene::{Instance, Light, LightKind, PoseF32, RenderScene, Shape}
 
 /// Texels around the covered part: for the taps around a point and for its offset along the normal.
 const ROOM: f32 = 6.0;
-/// Meshes are drawn coarser by up to this \[m\] (see [`RasterCfg::lod`](crate::rasterizer::RasterCfg::lod)), receivers and casters.
+/// Meshes are drawn coarser by up to this \[m\] (see [`RasterCfg::lod`](crate::request::RasterCfg::lod)), receivers and casters.
 const DETAIL: f32 = 2e-3;
 /// Nearest depth of a spot's map \[m\].
 const SPOT_NEAR: f32 = 0.02;

@@ -1,16 +1,19 @@
 //! Shadows and ambient occlusion by rays, for pictures that are shaded without paths.
 
+use crate::geometry::basis::Basis;
 use crate::geometry::bvh::Stack;
 use crate::geometry::ray::Ray;
 use crate::geometry::vector::{along, dot, scale, sub, to_f64};
-use crate::path::REACH;
-use crate::path::lobe::{Basis, cosine};
+use crate::path::disc::cosine;
 use crate::path::sobol::Sequence;
 use crate::simd::{F, LANES, M, Simd, V3, load, splat};
 use crate::trace::Tracer;
 use crate::trace::motion::NOW;
 use kinetoscope_scene::{Light, LightKind};
 use std::cell::RefCell;
+
+/// Light is asked for up to this part of its way: a lamp on a ceiling is not behind it.
+pub(crate) const REACH: f64 = 1.0 - 1e-6;
 
 /// Rays begin this part of the numbers that their origins are made of above the surface: positions are single precision.
 const ABOVE: f32 = 1e-5;

@@ -3,24 +3,7 @@
 use std::path::Path;
 
 use super::error::Ctx;
-use super::{MeshError, TriMesh, dae, glb, obj, stl};
-
-/// What a reader cannot know from the file alone.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct MeshOptions {
-    /// What to do with `<up_axis>` of COLLADA files.
-    pub dae_up_axis: DaeUpAxis,
-}
-
-/// The two conventions for `<up_axis>` of COLLADA files in robot descriptions.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum DaeUpAxis {
-    /// Coordinates stay as written: RViz, hence every URDF that looks right there.
-    #[default]
-    Ignore,
-    /// The scene turns so that the axis named up becomes +z (a file that names none is y up, says the standard).
-    Apply,
-}
+use super::{MeshError, MeshOptions, TriMesh, dae, glb, obj, stl};
 
 /// The formats; the hull cache keys by it, because the same bytes under two formats are two meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 use std::f64::consts::PI;
 
+use super::super::HullError;
 use super::*;
 use crate::mesh::tests_robots::{Random, files, load_of};
 

@@ -1,6 +1,6 @@
 //! What cameras showed in the picture before: for optical flow.
 
-use kinetoscope_render::rasterizer::Before;
+use kinetoscope_render::request::Before;
 use kinetoscope_render::visibility::View;
 use kinetoscope_scene::PoseF32;
 use ndarray::{Array2, Axis};

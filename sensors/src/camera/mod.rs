@@ -3,6 +3,7 @@
 mod accessors;
 mod arrived;
 pub mod boxes;
+mod build;
 pub mod calibration;
 mod captures;
 pub mod cfg;
@@ -40,8 +41,9 @@ pub use kinetoscope_render::lens::{Lens, LensModel, LensRays, Optics};
 pub use kinetoscope_render::optics_error::OpticsError;
 pub use kinetoscope_render::parallel::ParallelRasterizer;
 pub use kinetoscope_render::progress::RenderProgress;
-pub use kinetoscope_render::rasterizer::{Before, RasterCfg, Rasterizer, Shot};
+pub use kinetoscope_render::rasterizer::Rasterizer;
 pub use kinetoscope_render::renderer::Renderer;
+pub use kinetoscope_render::request::{Before, RasterCfg, Shot};
 pub use kinetoscope_render::shade::tone::ToneCurve;
 pub use kinetoscope_render::shutter::{Opened, Shutter, Take};
 pub use past::HistoryView;

@@ -15,6 +15,7 @@ mod acceleration;
 mod cfg;
 mod drawn;
 mod force;
+mod mode;
 mod none;
 
 pub mod actuator;
@@ -24,34 +25,10 @@ pub mod plan;
 pub mod table;
 
 pub use cfg::{DriveCfg, JointGains, PerJoint, resolve};
+pub use mode::{ActuatorSpec, DriveMode, JointInfo};
 pub use models::{ActuatorModel, DcMotor, DelayedPd, IdealPd};
 
 use serde::{Deserialize, Serialize};
-
-/// What a drive mode knows of its joint.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointInfo {
-    /// Inertia that the joint feels at the initial pose, `1 / (M⁻¹)_ii` \[kg m² or kg\].
-    pub effective_inertia: f64,
-}
-
-/// Proportional and derivative gain of an actuator in torque units \[N m/rad, N m s/rad\] or \[N/m, N s/m\].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ActuatorSpec {
-    /// Proportional gain.
-    pub kp: f64,
-    /// Derivative gain.
-    pub kd: f64,
-}
-
-/// How stiffness and damping become an actuator's gains: one file per mode.
-pub trait DriveMode: std::fmt::Debug + Sync {
-    /// Name in configuration files (EmbodiChain's words).
-    fn name(&self) -> &'static str;
-
-    /// The actuator of a joint, or `None` where the joint stays passive.
-    fn actuator(&self, stiffness: f64, damping: f64, joint: &JointInfo) -> Option<ActuatorSpec>;
-}
 
 /// The list of drive modes: `Variant => the mode`.
 macro_rules! drive_modes {

@@ -3,6 +3,18 @@
 use crate::camera::CameraError;
 use std::path::PathBuf;
 
+/// The fields of a file.
+pub(super) const FIELDS: [&str; 8] = [
+    "image_width",
+    "image_height",
+    "camera_name",
+    "camera_matrix",
+    "distortion_model",
+    "distortion_coefficients",
+    "rectification_matrix",
+    "projection_matrix",
+];
+
 /// Why a calibration file cannot be read or written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -28,7 +40,7 @@ pub enum CalibrationError {
         message: String,
     },
     /// A field is not there.
-    #[error("{file}: {field} is missing; a camera_info file has {}", super::FIELDS.join(", "))]
+    #[error("{file}: {field} is missing; a camera_info file has {}", FIELDS.join(", "))]
     Missing {
         /// The file.
         file: String,

@@ -20,17 +20,6 @@ use std::fmt;
 use std::path::Path;
 use yaml::{Node, Value};
 
-/// The fields of a file.
-const FIELDS: [&str; 8] = [
-    "image_width",
-    "image_height",
-    "camera_name",
-    "camera_matrix",
-    "distortion_model",
-    "distortion_coefficients",
-    "rectification_matrix",
-    "projection_matrix",
-];
 /// How far a rectification matrix may be from a rotation: files have six digits or more.
 const ROTATION: f64 = 1e-3;
 

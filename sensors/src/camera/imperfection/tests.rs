@@ -2,7 +2,10 @@
 
 use super::*;
 use crate::camera::{Frame, Lens, Optics, PixelIntrinsics};
+use kinetoscope_render::lens::LensRays;
 use kinetoscope_render::lens::{Equidistant, FTheta, OpenCv};
+use kinetoscope_render::ticket::Ticket;
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::PoseF32;
 use std::f64::consts::FRAC_PI_2;
 

@@ -8,7 +8,7 @@ use crate::camera::mounts::Mount;
 use kinetoscope_render::frame::{FrameMut, Pictures};
 use kinetoscope_render::lens::LensRays;
 use kinetoscope_render::parallel::{Job, ParallelRasterizer};
-use kinetoscope_render::rasterizer::Shot;
+use kinetoscope_render::request::Shot;
 use kinetoscope_render::shutter::{Opened, Take};
 use kinetoscope_render::ticket::Stream;
 use kinetoscope_render::visibility::RenderError;

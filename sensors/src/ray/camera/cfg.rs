@@ -7,9 +7,10 @@ use crate::camera::{DepthMiss, Extrinsics, Intrinsics};
 use crate::error::SensorError;
 use crate::ray::caster::scan::Scan;
 use crate::ray::{HitTargets, RayError, RayPattern, RayTargets};
+use crate::requires::Requires;
 use crate::sampling::{Channel, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::sensor::{Requires, SensorCfg, SensorContext};
+use crate::sensor::{SensorCfg, SensorContext};
 use serde::{Deserialize, Serialize};
 
 /// The most memory that the pictures may take \[bytes\].

@@ -6,9 +6,10 @@ use super::{HitTargets, RayAlignment};
 use crate::error::SensorError;
 use crate::ray::pattern::Grid;
 use crate::ray::{Ray, RayError, RayPattern, RayTargets};
+use crate::requires::Requires;
 use crate::sampling::{Channel, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::sensor::{Requires, SensorCfg, SensorContext};
+use crate::sensor::{SensorCfg, SensorContext};
 use kinetoscope_scene::{Pose, PoseF64};
 use serde::{Deserialize, Serialize};
 

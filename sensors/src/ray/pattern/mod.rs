@@ -2,23 +2,14 @@
 //!
 //! Rays are in the frame of the sensor (x forward, y left, z up); all directions have length 1.
 
+mod pattern_impl;
+
 pub use grid::GridOrder;
+use pattern_impl::{Line, PatternImpl};
 
 use super::{Ray, RayError};
 use kinetoscope_render::geometry::vector::unit;
 use serde::{Deserialize, Serialize};
-
-/// A start, and a direction of any length.
-type Line = ([f64; 3], [f64; 3]);
-
-/// What a pattern must be able to do.
-trait PatternImpl {
-    /// How many rays there are, before they are made; the numbers were not checked yet.
-    fn count(&self) -> f64;
-
-    /// The rays; called where the count is possible.
-    fn rays(&self) -> Result<Vec<Line>, RayError>;
-}
 
 /// Declares the patterns: a module with a type of its own each.
 macro_rules! patterns {

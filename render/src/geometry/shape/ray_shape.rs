@@ -1,0 +1,56 @@
+//! The trait of shapes that rays hit.
+
+use crate::geometry::bvh::Stack;
+use crate::geometry::packet::{Packet, WIDTH};
+use crate::geometry::ray::Ray;
+use crate::geometry::vector::V3;
+use crate::simd::Simd;
+
+/// Where a ray touches a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Touch {
+    /// Distance along the ray \[m\].
+    pub(crate) t: f64,
+    /// Unit normal of the surface, of either sign.
+    pub(crate) normal: V3,
+}
+
+/// What the rays of a packet touch, lane by lane.
+pub(crate) type Touches = [Option<Touch>; WIDTH];
+
+/// What a shape must be able to do.
+pub(crate) trait RayShape {
+    /// The nearest surface at a distance from 0 to `limit`, both included.
+    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch>;
+
+    /// The same for every ray of a packet, up to its limit, to the bit. Of what `touches` were before only those of lanes
+    /// without a ray may stay.
+    #[inline(always)]
+    fn touch_packet<S: Simd>(&self, _s: S, packet: &Packet, stack: &mut Stack, touches: &mut Touches)
+    where
+        Self: Sized,
+    {
+        touch_each(self, packet, stack, touches);
+    }
+
+    /// Which smooth part of the surface a ray touches, of shapes with a closed form: numbered as the rasterizer's.
+    fn face(&self, _touch: &Touch, _ray: &Ray) -> usize {
+        0
+    }
+
+    /// Smallest and largest coordinates; `None` for a shape without an end.
+    fn bounds(&self) -> Option<[V3; 2]>;
+}
+
+/// One ray after the other.
+#[inline(always)]
+pub(super) fn touch_each(shape: &impl RayShape, packet: &Packet, stack: &mut Stack, touches: &mut Touches) {
+    for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| packet.has(*k)) {
+        *touch = shape.touch(&packet.ray(k), packet.limit(k), stack);
+    }
+}
+
+/// Work that does not depend on the kind of shape, compiled for each.
+pub(crate) trait ForShape {
+    fn run<T: RayShape>(self, shape: &T);
+}

@@ -1,0 +1,94 @@
+//! Errors of convex hulls.
+
+use super::MeshFault;
+
+/// Why points have no hull.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum HullError {
+    /// A field of the configuration is out of its range.
+    #[error("HullCfg::{field} is {value}; expected {expected}")]
+    InvalidCfg {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is accepted.
+        expected: &'static str,
+    },
+    /// A field of the configuration of convex pieces is out of its range.
+    #[error("PiecesCfg::{field} is {value}; expected {expected}")]
+    InvalidPieces {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is accepted.
+        expected: &'static str,
+    },
+    /// The thickness of prisms is none.
+    #[error("the thickness of prisms is {value} m; expected a length above 0")]
+    InvalidThickness {
+        /// The thickness \[m\].
+        value: f64,
+    },
+    /// A mesh breaks a promise of its type.
+    #[error("{source}")]
+    Mesh {
+        /// Which.
+        source: MeshFault,
+    },
+    /// A mesh has more triangles than are cut into pieces.
+    #[error("{found} triangles; at most {most} are cut into convex pieces: simplify the mesh, or let its hull collide")]
+    TooManyTriangles {
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        most: usize,
+    },
+    /// No triangle of a mesh has an area.
+    #[error("none of {triangles} triangles has an area")]
+    NoArea {
+        /// How many there are.
+        triangles: usize,
+    },
+    /// Fewer than four points.
+    #[error("{found} points; a hull needs at least 4")]
+    TooFewPoints {
+        /// How many there are.
+        found: usize,
+    },
+    /// A coordinate is infinite or not a number.
+    #[error("point {index} is {value:?}; expected finite coordinates")]
+    NonFinite {
+        /// Which point.
+        index: usize,
+        /// Its coordinates.
+        value: [f32; 3],
+    },
+    /// All points are the same.
+    #[error("all {count} points coincide")]
+    Coincident {
+        /// How many there are.
+        count: usize,
+    },
+    /// All points are on a line, within the tolerance.
+    #[error("the points lie on a line: they leave it by {deviation:e} m, the tolerance is {tolerance:e} m")]
+    Collinear {
+        /// Largest distance from the line \[m\].
+        deviation: f64,
+        /// The tolerance \[m\].
+        tolerance: f64,
+    },
+    /// All points are in a plane, within the tolerance, and no thickness is configured.
+    #[error(
+        "the points lie in a plane: they leave it by {deviation:e} m, the tolerance is {tolerance:e} m; \
+         HullCfg::min_thickness would thicken them"
+    )]
+    Coplanar {
+        /// Largest distance from the plane \[m\].
+        deviation: f64,
+        /// The tolerance \[m\].
+        tolerance: f64,
+    },
+}

@@ -1,0 +1,174 @@
+//! Makes cameras of their configurations, and refuses those that cannot be.
+
+use super::cfg::CameraCfg;
+use super::error::CameraError;
+use super::faults::Faults;
+use super::imperfection::Imperfections;
+use super::memory::Memory;
+use super::opening::Opening;
+use super::sensor::{Camera, Lens};
+use crate::error::SensorError;
+use crate::requires::Requires;
+use crate::schedule::Schedule;
+use crate::sensor::{SensorCfg, SensorContext};
+use kinetoscope_render::aperture::Aperture;
+use kinetoscope_render::frame::{Channels, Pictures};
+use kinetoscope_render::intrinsics::PixelIntrinsics;
+use kinetoscope_render::lens::RaysOfRows;
+use kinetoscope_render::path::film::Film;
+use kinetoscope_render::renderer::Renderer;
+use kinetoscope_render::shade::plan::{check_light, check_occlusion};
+use kinetoscope_render::visibility::RenderError;
+use kinetoscope_scene::{Light, PoseF32};
+
+/// The most memory that the pictures of a camera may take \[bytes\].
+const MAX_BYTES: u64 = 64 << 30;
+/// What a capture takes besides poses and lamps, at most \[bytes\]: its place, its lens, its stamp, its ticket.
+const CAPTURE: usize = 512;
+
+impl SensorCfg for CameraCfg {
+    type Sensor = Camera;
+
+    /// What can be seen; the poses of bodies only where it hangs on one.
+    fn requires(&self) -> Requires {
+        Camera::requires(self.extrinsics.parent.is_some(), self.draw_markers)
+    }
+
+    fn debug_vis(&self) -> bool {
+        self.debug_vis
+    }
+
+    /// # Errors
+    ///
+    /// Sizes, lens, depth range or placement that are no good, an unknown parent, environments that do not exist or are
+    /// named twice, a period that is no whole number of steps, a dropout that is no probability, noise of a channel that is not
+    /// there or has none, numbers of noise or of imperfections that are no good, pictures, history or latency that do not fit into
+    /// memory.
+    fn build(&self, context: &SensorContext) -> Result<Camera, SensorError> {
+        let schedule = Schedule::new(self.update_period, context.dt, self.round_period)?;
+        let scene = context.scene.clone().ok_or(CameraError::NoScene)?;
+        let parent = self.extrinsics.parent.as_deref().map(|name| context.body(name)).transpose()?;
+        if self.channels == Channels::default() {
+            return Err(CameraError::NoChannels.into());
+        }
+        if !matches!(self.raster.samples, 1 | 4) {
+            return Err(CameraError::View(RenderError::Samples { samples: self.raster.samples }).into());
+        }
+        self.renderer.validate().map_err(CameraError::View)?;
+        self.aperture.as_ref().map_or(Ok(()), Aperture::check).map_err(CameraError::View)?;
+        self.shutter.check().map_err(CameraError::View)?;
+        check_light(self.renderer, self.aperture.as_ref(), self.shutter).map_err(CameraError::View)?;
+        check_occlusion(self.raster, self.renderer).map_err(CameraError::View)?;
+        self.check_flow()?;
+        self.check_lens()?;
+        let lens = Lens::new(self)?;
+        let pixels = self.intrinsics.to_pixels(self.width, self.height)?;
+        lens.view(&pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)?;
+        let env_ids = self.env_ids.clone().unwrap_or_else(|| (0..context.num_envs).collect());
+        check_env_ids(&env_ids, context.num_envs)?;
+        self.check_memory(env_ids.len(), scene.instances().len(), scene.lights.len(), schedule)?;
+        let opening = Opening::new(self, schedule, context.dt, env_ids.len(), &scene)?;
+        let rays = self.lens_rays(&pixels, env_ids.len())?;
+        let faults = Faults::new(self, context, schedule.period_steps() as f64 * context.dt)?;
+        let mount = self.extrinsics.parent_from_camera()?;
+        let pictures = Pictures::new(self.channels, env_ids.len(), self.width, self.height);
+        let optics = (lens, pixels, mount);
+        Ok(Camera::new(self, context, scene, (schedule, opening), parent, optics, rays, env_ids, (pictures, faults)))
+    }
+}
+
+impl CameraCfg {
+    /// Flow is of two pictures that follow each other.
+    fn check_flow(&self) -> Result<(), CameraError> {
+        let past = self.latency_steps > 0 || self.dropout > 0.0 || self.history_length > 0;
+        match self.channels.flow {
+            true if past => Err(CameraError::FlowOfThePast),
+            true if !self.shutter.is_instant() => Err(CameraError::FlowOfRows),
+            _ => Ok(()),
+        }
+    }
+
+    /// What some lenses do not have.
+    fn check_lens(&self) -> Result<(), CameraError> {
+        let (lens, Imperfections { vignetting, holes, .. }) = (self.lens.name(), &self.imperfections);
+        if vignetting.is_some() && !self.lens.has_axis() {
+            return Err(CameraError::NoAxis { what: "vignetting", lens });
+        }
+        if holes.as_ref().is_some_and(|holes| holes.baseline != 0.0) && !self.lens.is_pinhole() {
+            return Err(CameraError::PinholeOnly {
+                what: "shadows of a projector (holes with a baseline other than 0)",
+                lens,
+            });
+        }
+        Ok(())
+    }
+
+    /// The rays of the lens in every row.
+    fn lens_rays(&self, pixels: &PixelIntrinsics, rows: usize) -> Result<RaysOfRows, CameraError> {
+        if !self.lens.is_pinhole() && !self.renderer.sees_by_rays(true) {
+            let (lens, renderer) = (self.lens.name(), self.renderer.name());
+            return Err(CameraError::View(RenderError::LensRenderer { lens, renderer }));
+        }
+        // Paths have rays of their own; only colours without them have more samples than a pixel's centre.
+        let samples = if self.channels.color && !self.renderer.follows_paths() { self.raster.samples } else { 1 };
+        Ok(RaysOfRows::new(self.lens, pixels, [self.width, self.height], samples, rows)?)
+    }
+
+    /// Refuses what would end the process: an allocation that fails.
+    fn check_memory(
+        &self,
+        views: usize,
+        instances: usize,
+        lamps: usize,
+        schedule: Schedule,
+    ) -> Result<(), CameraError> {
+        let bytes_per_pixel = self.channels.bytes_per_pixel();
+        // A shutter that takes time is twice a moment.
+        let moments = if self.shutter.is_instant() { 1 } else { 2 };
+        let capture = moments * instances * size_of::<PoseF32>() + lamps * size_of::<Light>();
+        // What paths find is kept for one picture at a time.
+        let film = match self.renderer {
+            Renderer::RayTraced { denoise, .. } if self.channels.color => {
+                self.width.saturating_mul(self.height).saturating_mul(Film::bytes_per_pixel(denoise))
+            }
+            _ => 0,
+        };
+        let picture = self.width.checked_mul(self.height).and_then(|pixels| pixels.checked_mul(bytes_per_pixel));
+        let fits = |pictures: usize, captures: usize| {
+            let captures = captures.checked_mul(capture.saturating_add(CAPTURE));
+            let pictures = picture.and_then(|bytes| bytes.checked_mul(pictures));
+            let bytes = pictures
+                .zip(captures)
+                .and_then(|(pictures, captures)| pictures.checked_add(captures)?.checked_mul(views)?.checked_add(film))
+                .filter(|&bytes| bytes as u64 <= MAX_BYTES);
+            // Asks for the memory, and gives it back untouched: that may fail, an array's own request must not.
+            bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
+        };
+        if !fits(1, 1) {
+            let (width, height) = (self.width, self.height);
+            return Err(CameraError::Memory { views, width, height, bytes_per_pixel, paths: film, limit: MAX_BYTES });
+        }
+        let (pictures, captures) = (self.history_length, Memory::waiting(self, schedule));
+        let all = pictures.saturating_add(captures).saturating_add(1);
+        if !fits(pictures.saturating_add(1), all) {
+            return Err(CameraError::Past { pictures, captures, views, limit: MAX_BYTES });
+        }
+        Ok(())
+    }
+}
+
+fn check_env_ids(env_ids: &[usize], count: usize) -> Result<(), SensorError> {
+    if env_ids.is_empty() {
+        return Err(CameraError::NoEnvironments.into());
+    }
+    let mut seen = vec![false; count];
+    for &env in env_ids {
+        let Some(seen) = seen.get_mut(env) else {
+            return Err(SensorError::IndexOutOfRange { what: "environment", index: env, count });
+        };
+        if std::mem::replace(seen, true) {
+            return Err(CameraError::DuplicateEnvironment { env }.into());
+        }
+    }
+    Ok(())
+}
