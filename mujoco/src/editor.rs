@@ -22,12 +22,12 @@ const NOT_LOOKED_AT: [&str; 12] =
 /// Nobody outside can write what says where things are in the other arrays:
 ///
 /// ```
-/// # use kinetoscope_sim::mj::{self, Editor};
+/// # use kinetoscope_mujoco::{self as mj, Editor};
 /// # let model = mj::compile("<mujoco/>", &[]).unwrap().into_model();
 /// Editor::new(&model).unwrap().body_mass_mut();
 /// ```
 /// ```compile_fail,E0624
-/// # use kinetoscope_sim::mj::{self, Editor};
+/// # use kinetoscope_mujoco::{self as mj, Editor};
 /// # let model = mj::compile("<mujoco/>", &[]).unwrap().into_model();
 /// Editor::new(&model).unwrap().body_simple_mut();
 /// ```

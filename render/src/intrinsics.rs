@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 /// A pinhole lens without distortion, in the terms that users have. The centre of pixel (u, v) is (u + 0.5, v + 0.5).
 ///
 /// For OpenCV and ROS it is (u, v): of what they calibrate, cx and cy are to be half a pixel more here. To read and write files of
-/// ROS there is [`CameraInfo`](kinetoscope_sensors::camera::calibration::CameraInfo), which minds that.
+/// ROS there is `CameraInfo`, which minds that.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]

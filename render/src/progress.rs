@@ -11,7 +11,8 @@ use std::time::{Duration, Instant};
 /// [`RenderError::Cancelled`](crate::visibility::RenderError::Cancelled).
 ///
 /// ```
-/// use kinetoscope_sensors::camera::{ParallelRasterizer, RasterCfg};
+/// use kinetoscope_render::parallel::ParallelRasterizer;
+/// use kinetoscope_render::request::RasterCfg;
 ///
 /// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 1);
 /// let progress = rasterizer.progress().clone();

@@ -84,6 +84,7 @@ impl Rasterizer {
         Self::with_level(cfg, Level::best())
     }
 
+    /// A rasterizer that uses a SIMD level of its own.
     pub fn with_level(cfg: RasterCfg, level: Level) -> Self {
         Self {
             cfg,

@@ -56,7 +56,7 @@ pub enum Renderer {
     ///   itself.
     ///
     /// The [tone curve](crate::request::RasterCfg::tone) and sRGB are those of the rasterizer. Noise depends on the pixel and the seed only: the same bits for
-    /// any number of threads. Pictures of [`Camera`](kinetoscope_sensors::camera::sensor::Camera)s have noise of their own each, by the seed of the
+    /// any number of threads. Pictures of `Camera`s have noise of their own each, by the seed of the
     /// simulation, the environment's global index, the name of the camera and which picture it is, besides this seed: the
     /// same in any batch.
     RayTraced {

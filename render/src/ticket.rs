@@ -22,10 +22,13 @@ pub struct Stream(u8);
 impl Stream {
     /// Whether a picture gets lost.
     pub const DROPOUT: Self = Self(0);
+    /// Shot noise.
     pub const SHOT: Self = Self(1);
     /// Where the count of a pixel with few electrons stands in its distribution.
     pub const SHOT_IN_THE_DARK: Self = Self(4);
+    /// Read noise.
     pub const READ: Self = Self(2);
+    /// Depth noise.
     pub const DEPTH: Self = Self(3);
     /// The noise of paths.
     pub const PATHS: Self = Self(5);

@@ -20,7 +20,6 @@ use crate::visible::{self, Identities, Look, MaskId, Owner, Replacements, Visibl
 use crate::wrenches::Wrenches;
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::ObjectKind;
 use kinetoscope_robot::description::Geometry;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};

@@ -5,7 +5,6 @@ use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::manager::{EnvId, SimulationManager, env_list, env_mask};
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::Data;
 use kinetoscope_scene::state::Contact;
 use kinetoscope_scene::{Light, OwnScene, Pose, PoseF32, RenderScene};

@@ -176,6 +176,7 @@ impl RayTargets {
 }
 
 impl FixedWorld {
+    /// The fixed ones of `targets` at their poses (world from target).
     pub fn new(targets: &RayTargets, poses: &[PoseF64]) -> Self {
         let placed: Vec<Placed> =
             targets.fixed.iter().filter_map(|&t| targets.place(t, targets.pose_of(t, poses))).collect();

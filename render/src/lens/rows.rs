@@ -35,10 +35,15 @@ impl RaysOfRows {
         Ok(all)
     }
 
+    /// The lens of all rows.
     pub fn lens(&self) -> Lens {
         self.lens
     }
 
+    /// The rays of a row; `None` for a pinhole.
+    ///
+    /// # Panics
+    /// If there is no such row.
     #[track_caller]
     pub fn row(&self, row: usize) -> Option<&LensRays> {
         self.rows[row].as_deref()

@@ -4,7 +4,7 @@ use crate::geometry::basis::Basis;
 
 use crate::geometry::vector::{V3, along, dot, scale, sub, to_f64, unit};
 use crate::path::disc::on_disc;
-use crate::shade::shade::{cos_deg, whole_exponent};
+use crate::shade::light::{cos_deg, whole_exponent};
 use crate::visibility::Projection;
 use kinetoscope_scene::{Light, LightKind};
 

@@ -40,7 +40,7 @@ use sobol::{Sample, Sequence};
 use std::sync::Arc;
 
 /// Lamps that are asked, at most; the camera's comes besides.
-const MAX_LAMPS: usize = crate::shade::shade::MAX_LIGHTS;
+const MAX_LAMPS: usize = crate::shade::light::MAX_LIGHTS;
 /// Paths begin this part of their coordinates above a surface.
 const ABOVE: f64 = 1e-7;
 /// Bounces after which paths may end by chance.

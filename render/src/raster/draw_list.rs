@@ -56,6 +56,7 @@ pub enum Layer {
 }
 
 impl Layer {
+    /// The layer of an instance, where the geom groups of `groups` are drawn (bit k is group k).
     pub fn of(instance: &Instance, groups: u32) -> Self {
         let alpha = instance.material.rgba[3];
         if !instance.visible || alpha <= 0.0 || groups >> instance.group.min(31) & 1 == 0 {

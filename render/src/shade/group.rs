@@ -1,8 +1,8 @@
 //! Sixteen samples: which instances they see, and what each channel makes of it.
 
+use super::light::{Lighting, albedo, shade, sky};
 use super::mirror::Mirrors;
 use super::moves::Moves;
-use super::shade::{Lighting, albedo, shade, sky};
 use super::shadow::ShadowMap;
 use super::shadow_rays::ShadowRays;
 use super::surface::{Ray, Source, surface};

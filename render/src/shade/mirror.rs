@@ -2,7 +2,7 @@
 //! the rasterizer where it ends. Mirrors in mirrors show their own colour.
 
 use super::group::{Colors, Context};
-use super::shade::{shade, sky};
+use super::light::{shade, sky};
 use super::shadow_rays::{Points, arrays, lanes_of};
 use super::surface::{Source, Surface};
 use super::tone::{decode_bytes, to_bytes};

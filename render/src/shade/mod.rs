@@ -5,11 +5,11 @@
 pub(crate) mod band;
 pub(crate) mod group;
 pub(crate) mod horizon;
+pub(crate) mod light;
 pub(crate) mod mirror;
 pub(crate) mod moves;
 pub(crate) mod multisample;
 pub mod plan;
-pub(crate) mod shade;
 pub(crate) mod shadow;
 mod shadow_fit;
 pub(crate) mod shadow_rays;

@@ -3,9 +3,9 @@
 use super::BAND;
 use super::group::Context;
 use super::horizon::Horizon;
+use super::light::{Lighting, MAX_LIGHTS};
 use super::mirror::{self, Mirrors};
 use super::moves::Moves;
-use super::shade::{Lighting, MAX_LIGHTS};
 use super::shadow::{ShadowBand, ShadowMap};
 use super::shadow_fit::{self, LampView};
 use super::shadow_rays::ShadowRays;

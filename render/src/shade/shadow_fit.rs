@@ -1,6 +1,6 @@
 //! The part of the scene that a shadow map covers: the surfaces in view, and the casters between them and the light.
 
-use super::shade::unit;
+use super::light::unit;
 use crate::visibility::Projection;
 use kinetoscope_scene::{Instance, Light, LightKind, PoseF32, RenderScene, Shape};
 

@@ -7,12 +7,12 @@
 mod double;
 mod narrow;
 mod scalar;
-mod simd;
+mod vector;
 
 pub(crate) use double::{D3, axes, dot_3, load_3};
 pub(crate) use fearless_simd::Level as SimdLevel;
 pub use scalar::Scalar;
-pub(crate) use simd::{D, F, F4, F8, I, M, N, Simd, U};
+pub(crate) use vector::{D, F, F4, F8, I, M, N, Simd, U};
 
 /// An instruction set that this machine has.
 #[derive(Clone, Copy, Debug)]
@@ -105,7 +105,7 @@ fn first_mut<T>(x: &mut [T]) -> &mut [T; LANES] {
 
 /// The same number in all lanes.
 #[inline(always)]
-pub fn splat<S: Simd>(s: S, x: f32) -> F<S> {
+pub(crate) fn splat<S: Simd>(s: S, x: f32) -> F<S> {
     F::new(s, s.splat(x))
 }
 
@@ -123,7 +123,7 @@ pub(crate) fn splat_u<S: Simd>(s: S, x: u32) -> U<S> {
 
 /// Sixteen numbers of a slice.
 #[inline(always)]
-pub fn load<S: Simd>(s: S, x: &[f32]) -> F<S> {
+pub(crate) fn load<S: Simd>(s: S, x: &[f32]) -> F<S> {
     F::new(s, s.load(first(x)))
 }
 

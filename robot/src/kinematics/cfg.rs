@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use kinetoscope_scene::Pose;
-/// use kinetoscope_sim::kinematics::Tip;
+/// use kinetoscope_robot::kinematics::Tip;
 ///
 /// // 0.12 m in front of the flange, moved by the arm.
 /// let tip = Tip::of_part("arm").at("ee_link").with_tcp(Pose::translation(0.0, 0.0, 0.12));
@@ -18,16 +18,22 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tip<'n> {
+    /// The part or link that it ends.
     pub name: TipName<'n>,
+    /// A link of that part to use instead of its last one.
     pub link: Option<&'n str>,
+    /// Tool centre point in the frame of the link \[m\].
     pub tcp: Pose,
 }
 
-/// What was named.
+/// The name of a tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TipName<'n> {
+    /// A control part: its last link.
     Part(&'n str),
+    /// A link.
     Link(&'n str),
+    /// A control part or, where there is none of that name, a link.
     Either(&'n str),
 }
 

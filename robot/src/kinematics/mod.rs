@@ -3,8 +3,8 @@
 //!
 //! [`Chain`] is the way from a base link to a frame, with everything that does not move folded together; it gives the
 //! pose of the frame ([`Chain::pose`]) and its Jacobian ([`Chain::jacobian`]). [`IkSolver`] turns it round. All of them
-//! work in the axes of the base link; [`Robot::compute_fk`](kinetoscope_sim::objects::robot::Robot::compute_fk),
-//! [`Robot::jacobian`](kinetoscope_sim::objects::robot::Robot::jacobian) and [`Robot::compute_ik`](kinetoscope_sim::objects::robot::Robot::compute_ik) do so for the
+//! work in the axes of the base link; `Robot::compute_fk`,
+//! `Robot::jacobian` and `Robot::compute_ik` do so for the
 //! environments of a simulation, and in their frames.
 //!
 //! Mimic joints are no variables: they follow, and what they do is part of what the joint does that they follow.
@@ -12,8 +12,8 @@
 //! ```
 //! use nalgebra::Vector3;
 //! use kinetoscope_scene::Pose;
-//! use kinetoscope_sim::kinematics::{Chain, IkCfg, IkSolver};
-//! # use kinetoscope_sim::urdf::{UrdfCfg, assemble};
+//! use kinetoscope_robot::kinematics::{Chain, IkCfg, IkSolver};
+//! # use kinetoscope_robot::urdf::{UrdfCfg, assemble};
 //! # let urdf = std::env::temp_dir().join(format!("kinetoscope-slide-{}.urdf", std::process::id()));
 //! # std::fs::write(&urdf, "<robot name='r'><link name='rail'/><link name='cart'/><joint name='slide' type='prismatic'>
 //! #   <parent link='rail'/><child link='cart'/><axis xyz='0 0 1'/><limit lower='0' upper='2' effort='1' velocity='1'/>

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// A robot made of one or several URDF files.
 ///
 /// ```
-/// use kinetoscope_sim::urdf::{ComponentCfg, UrdfCfg};
+/// use kinetoscope_robot::urdf::{ComponentCfg, UrdfCfg};
 ///
 /// let cfg = UrdfCfg {
 ///     components: vec![ComponentCfg::new("arm", "arm.urdf"), ComponentCfg::new("hand", "hand.urdf")],
@@ -63,7 +63,7 @@ impl UrdfCfg {
     /// and `hand`, more are `part1`, `part2` and so on.
     ///
     /// ```
-    /// use kinetoscope_sim::UrdfCfg;
+    /// use kinetoscope_robot::urdf::UrdfCfg;
     ///
     /// let cfg = UrdfCfg::chain(["arm.urdf", "hand.urdf"]);
     /// assert_eq!(cfg.components[1].parent.as_deref(), Some("arm"));

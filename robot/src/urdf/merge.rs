@@ -33,7 +33,7 @@ pub struct Assembly {
 /// Reads and merges the files of a robot.
 ///
 /// Mass properties are those of the files: [`MissingInertia`](super::MissingInertia) holds for robots that are added to a
-/// simulation, whose [`description`](kinetoscope_sim::objects::robot::Robot::description) is complete.
+/// simulation, whose `description` is complete.
 ///
 /// The order of links and joints is that of the components (parents first, else as given) and, within one, that of its
 /// file.

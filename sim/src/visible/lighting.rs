@@ -212,8 +212,8 @@ mod tests {
         let active = |scene: &RenderScene| scene.lights.iter().filter(|light| light.active).count();
         let alone = Visible::of_model(&mj::compile(STARS, &[]).expect("compiles").into_model());
         let alone = alone.scene();
-        let grounds: [&dyn Fn(&mut SimulationManagerCfg); 3] =
-            [&|_| {}, &|cfg| cfg.ground = Some(GroundCfg::default()), &|cfg| cfg.lights = Vec::new()];
+        let grounds: [&dyn Fn(&mut SimulationManagerCfg); 2] =
+            [&|_| {}, &|cfg| cfg.ground = Some(GroundCfg::default())];
         for change in grounds {
             let shown = scene(change, false);
             assert_eq!((shown.headlight, shown.ambient, shown.sky), (alone.headlight, alone.ambient, alone.sky));
@@ -221,7 +221,8 @@ mod tests {
             assert_eq!((shown.skybox.as_ref(), active(&shown)), (alone.skybox.as_ref(), 1), "the file's lamp");
         }
         let two: &dyn Fn(&mut SimulationManagerCfg) = &|cfg| cfg.lights.push(LightCfg::default());
-        for (change, ball, lamps) in [(grounds[0], true, 2), (two, false, 3)] {
+        let none: &dyn Fn(&mut SimulationManagerCfg) = &|cfg| cfg.lights.clear();
+        for (change, ball, lamps) in [(grounds[0], true, 2), (two, false, 3), (none, false, 1)] {
             let shown = scene(change, ball);
             assert_eq!((shown.headlight, shown.light_sum), (Headlight::default(), LightSum::Linear));
             assert_eq!((shown.skybox.as_ref(), shown.horizon, active(&shown)), (alone.skybox.as_ref(), None, lamps));

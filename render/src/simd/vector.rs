@@ -307,7 +307,7 @@ impl<S: Simd> Neg for F<S> {
 
 impl<S: Simd> F<S> {
     #[inline(always)]
-    pub fn array(self) -> [f32; LANES] {
+    pub(crate) fn array(self) -> [f32; LANES] {
         S::array(self.v)
     }
     #[inline(always)]

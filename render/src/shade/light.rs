@@ -134,7 +134,7 @@ impl Lighting {
 }
 
 /// The exponent of a spot as it is drawn: the nearest whole number, up to OpenGL's largest.
-pub fn whole_exponent(exponent: f32) -> u32 {
+pub(crate) fn whole_exponent(exponent: f32) -> u32 {
     (exponent.clamp(0.0, 128.0) + 0.5) as u32
 }
 
