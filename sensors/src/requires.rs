@@ -26,11 +26,11 @@ impl Requires {
     pub const JOINT_STATE: Self = Self(1 << 5);
     /// [`SceneState::sensordata`].
     pub const SENSORDATA: Self = Self(1 << 6);
-    /// [`SceneState::visible`], and [`SensorContext::scene`].
+    /// [`SceneState::visible`], and [`SensorContext::scene`](crate::SensorContext::scene).
     pub const VISIBLE: Self = Self(1 << 7);
     /// [`SceneState::joint_wrenches`]; costs the engine a pass of its own.
     pub const JOINT_WRENCHES: Self = Self(1 << 8);
-    /// [`SceneState::instance_poses`], and [`SensorContext::scene`].
+    /// [`SceneState::instance_poses`], and [`SensorContext::scene`](crate::SensorContext::scene).
     pub const INSTANCES: Self = Self(1 << 9);
     /// [`SceneState::actuator_controls`], [`SceneState::actuator_forces`] and [`SceneState::actuator_activations`].
     pub const ACTUATORS: Self = Self(1 << 10);

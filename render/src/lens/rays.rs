@@ -172,7 +172,7 @@ impl LensRays {
         [0, 1, 2].map(|axis| self.directions[group + axis * LANES + lane])
     }
 
-    /// How much of the light of the optical axis falls on a pixel: [`Optics::falloff`] of its centre.
+    /// How much of the light of the optical axis falls on a pixel: `Optics::falloff` of its centre.
     pub fn falloff(&self, [x, y]: [usize; 2]) -> f64 {
         let all = self.falloff.get_or_init(|| {
             let [width, height] = self.size;

@@ -3,7 +3,7 @@
 //! At every surface all lamps are asked for their light (one shadow ray each), and one direction is chosen by the surface's
 //! own law; what is met there sends its emission, what is not met the dome's light. So lamps are met by shadow rays only, the
 //! dome by paths only: nothing counts twice. Surfaces that glow are met in both ways, each of which has its share of the light
-//! ([`emitter`]). Later bounces end by Russian roulette. Source: Kajiya, The rendering equation, 1986; the conventions of
+//! (`emitter`). Later bounces end by Russian roulette. Source: Kajiya, The rendering equation, 1986; the conventions of
 //! light are those of [`Renderer`](crate::renderer::Renderer).
 
 mod direct;

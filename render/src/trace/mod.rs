@@ -1,7 +1,7 @@
 //! Visibility by rays: what a ray from anywhere meets, and a visibility buffer filled by the rays of its samples.
 //!
 //! Two levels. Below, one tree for each mesh, in the mesh's own frame: built once, shared by all environments, the one that
-//! ray casters use. Above, a tree over the boxes of what there is in a frame, built for every frame ([`tree`]). Shapes with
+//! ray casters use. Above, a tree over the boxes of what there is in a frame, built for every frame (`tree`). Shapes with
 //! a closed form are met exactly; height fields as the triangles that the rasterizer draws. Everything is in double
 //! precision.
 //!

@@ -28,7 +28,7 @@ pub enum DepthMiss {
     Zero,
 }
 
-/// Configuration of a [`Camera`].
+/// Configuration of a [`Camera`](super::Camera).
 ///
 /// ```
 /// use kinetoscope_sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
@@ -87,7 +87,7 @@ pub struct CameraCfg {
     /// Draw when somebody reads (and only then), not when the picture is due. The pictures are the same: what there is
     /// to see is kept when it is due.
     pub lazy: bool,
-    /// Pictures to remember, the newest included: see [`Camera::history`]. Those of a lazy camera are drawn when somebody
+    /// Pictures to remember, the newest included: see [`Camera::history`](super::Camera::history). Those of a lazy camera are drawn when somebody
     /// looks at the history.
     pub history_length: usize,
     /// Physics steps from the capture of a picture until it can be read. It keeps the stamp of its capture. What somebody
@@ -111,7 +111,7 @@ pub struct CameraCfg {
     /// ([`Sensor::markers`](crate::Sensor::markers)).
     pub debug_vis: bool,
     /// Draw what the other sensors show people into the channel `color`, which is otherwise as without: ray hits, forces of
-    /// contacts, frames, what cameras see ([`SensorCfg::debug_vis`] says for each whether it shows
+    /// contacts, frames, what cameras see ([`SensorCfg::debug_vis`](crate::SensorCfg::debug_vis) says for each whether it shows
     /// anything). All other channels stay what they are. Markers are what each sensor had measured last at
     /// the instant of the picture (of cameras that draw markers and were added later, at the instant before), things are in front of them and behind them, and they cast
     /// shadows; every renderer draws them.
