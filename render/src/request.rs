@@ -14,6 +14,9 @@ pub struct RasterCfg {
     pub samples: u8,
     /// Whether lamps cast shadows (directional lamps and spots, the first four of them).
     pub shadows: bool,
+    /// True if planar mirrors (material `reflectance` of planes and of the +z face of boxes) show what is before them: one ray
+    /// from each sample that shows a mirror, and the light where it ends. Path tracing mirrors always.
+    pub reflections: bool,
     /// Texels along the side of a shadow map; 0 chooses by the picture's size.
     pub shadow_size: usize,
     /// Rays from each sample of a colour for ambient occlusion, of [`Renderer::Hybrid`](crate::renderer::Renderer::Hybrid) only; 0 is none. Ambient light is then
@@ -52,6 +55,7 @@ impl Default for RasterCfg {
         Self {
             samples: 4,
             shadows: true,
+            reflections: true,
             shadow_size: 0,
             occlusion_rays: 0,
             tone: ToneCurve::Soft,

@@ -5,7 +5,7 @@
 //! draw one image after the other draw a few environments per turn, in turn: rates are images per second of each side.
 //! OSMesa uses all cores, and is compared with ours on two threads; the others use one, and are compared with one thread.
 //!
-//! `plain` is without shadows and with one sample per pixel, `full` with shadows and four samples. "MuJoCo on OSMesa" is
+//! `plain` is without shadows and with one sample per pixel, `full` with shadows and four samples; mirrors are off on both sides. "MuJoCo on OSMesa" is
 //! `mujoco.Renderer` at its best settings (see `rivals/mujoco_osmesa.py`); "OSMesa by hand" is what its library can do when
 //! it is called with two passes instead of three, which that class does not offer. Shadow maps are as large as each side
 //! makes them by default, 4096 texels wide in MuJoCo and at most 1024 in ours, so there is also a row with MuJoCo's made as

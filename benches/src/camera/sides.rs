@@ -64,7 +64,13 @@ impl<'s> Ours<'s> {
     pub(super) fn new(scene: &'s Scene, work: &Work, threads: usize, by: camera::Renderer) -> Outcome<Self> {
         let full = work.look != Look::Plain;
         let groups = GROUPS.iter().fold(0, |mask, group| mask | 1 << group);
-        let cfg = RasterCfg { samples: if full { 4 } else { 1 }, shadows: full, groups, ..RasterCfg::default() };
+        let cfg = RasterCfg {
+            samples: if full { 4 } else { 1 },
+            shadows: full,
+            reflections: full,
+            groups,
+            ..RasterCfg::default()
+        };
         let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
         let [width, height] = work.size;
         let seen = scene.visible.scene();

@@ -151,7 +151,7 @@ impl Plan {
             self.tone = ToneCurve::Clip;
         }
         let shown = |i: &Instance| Layer::of(i, cfg.groups) != Layer::Hidden && mirror::reflectance(i) > 0.0;
-        self.first_mirror = scene.instances().iter().position(shown).filter(|_| shaded);
+        self.first_mirror = scene.instances().iter().position(shown).filter(|_| shaded && cfg.reflections);
         let casts_rays = self.shadow_rays || self.occlusion_rays > 0 || self.first_mirror.is_some();
         if shaded {
             self.light(RasterCfg { shadows: cfg.shadows && !self.shadow_rays, ..cfg }, shot);

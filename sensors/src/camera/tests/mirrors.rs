@@ -148,7 +148,7 @@ fn only_upper_faces() {
 /// Of MuJoCo's light only the first surface with reflectance mirrors, as in MuJoCo's renderer; of linear light all do.
 #[test]
 fn first_mirror() {
-    let draw = |sum, reflectances: [f32; 2]| {
+    let draw_with = |sum, reflectances: [f32; 2], reflections| {
         let side = |x| (Shape::from(Plane { half: [0.8, 1.5] }), PoseF32::from_translation([x, 0.0, 0.0]));
         let [(a, left), (b, right)] = [side(-0.8), side(0.8)];
         let [first, second] = reflectances.map(|reflectance| Material { reflectance, ..glowing(FLOOR) });
@@ -156,8 +156,12 @@ fn first_mirror() {
         let (scene, poses) = things([(a, first, left), (b, second, right), ball(-0.7), ball(0.7)]);
         let mut scene = unlit(scene);
         scene.light_sum = sum;
-        Still::new((scene, poses), look([96, 72], 0.9, [0.0, -2.4, 1.6], [0.0; 3])).draw()
+        let still = Still::new((scene, poses), look([96, 72], 0.9, [0.0, -2.4, 1.6], [0.0; 3]));
+        still.with(|still| still.cfg.reflections = reflections).draw()
     };
+    let draw = |sum, reflectances| draw_with(sum, reflectances, true);
+    let off = draw_with(LightSum::Linear, [0.5; 2], false);
+    assert_eq!(off.color(), draw(LightSum::Linear, [0.0; 2]).color(), "reflections are off");
     let changed = |sum, reflectances| {
         let (image, plain) = (draw(sum, reflectances), draw(sum, [0.0; 2]));
         assert_eq!(image.bits_but_color(), plain.bits_but_color(), "only the colour mirrors");

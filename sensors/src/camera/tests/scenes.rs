@@ -44,6 +44,7 @@ impl Random {
 /// Every geom group, and meshes as they are: what all renderers draw alike.
 pub(super) const EXACT: RasterCfg = RasterCfg {
     samples: 4,
+    reflections: true,
     shadows: true,
     shadow_size: 0,
     occlusion_rays: 0,
