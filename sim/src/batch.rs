@@ -4,11 +4,12 @@
 //! mostly stays in the cache of one core, and then helps with what is left of the other shares. Which thread steps an
 //! environment decides nothing, since environments share only the immutable model.
 
+use crate::batch_error::BatchError;
 use crate::capture::Capture;
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::Env;
 use kinetoscope_exec::ThreadPool;
-use kinetoscope_mujoco::{EngineError, Model};
+use kinetoscope_mujoco::Model;
 use ndarray::{Array2, Array3, Axis, aview1};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -36,30 +37,6 @@ struct Taken<'a> {
 /// to 1024 humanoids and arms on 2 MiB of cache for each core: to ask for all arrays of the next one makes a step 5 %
 /// slower at 3 MB and 7 % faster at 11 MB.
 const CACHE: usize = 8 << 20;
-
-/// An error of [`Batch::new`].
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum BatchError {
-    /// `num_envs` is zero.
-    #[error("num_envs is 0; a simulation needs at least 1 environment")]
-    NoEnvironments,
-    /// `threads` is zero.
-    #[error("threads is 0; use at least 1, or leave it out to use every core")]
-    NoThreads,
-    /// An environment could not be made.
-    #[error("environment {index}: {error}")]
-    Environment {
-        /// Which one.
-        index: usize,
-        /// Why.
-        #[source]
-        error: EngineError,
-    },
-    /// The operating system gives no thread.
-    #[error("cannot start a worker thread: {0}")]
-    Thread(String),
-}
 
 /// N environments of one model.
 #[derive(Debug)]

@@ -1,9 +1,9 @@
 //! The error of the public API: what the user did, where, and what would be right.
 
-use crate::batch::BatchError;
+use crate::batch_error::BatchError;
 use crate::drive::plan::PlanError;
+use crate::mjcf::error::EmitError;
 use crate::mjcf::part::PartError;
-use crate::mjcf::robot::EmitError;
 use crate::mjcf::robot_file::RobotFileError;
 use crate::named::Named;
 use crate::pattern::PatternError;

@@ -1,6 +1,6 @@
 //! Every stage of the pipeline as files: URDF, description, MJCF for both MuJoCo lines with real meshes.
 
-use crate::compile::{Simulation, document};
+use crate::compile::document;
 use crate::contents::Contents;
 use crate::drive::actuator::{Scheme, stable_timestep_of};
 use crate::drive::plan::JointPlan;
@@ -9,7 +9,8 @@ use crate::mjcf::document::{Integrator, Keyframe, MaterialAsset, MeshAsset, Mesh
 use crate::mjcf::part::MjcfPart;
 use crate::mjcf::robot::{Purpose, VisualAssets};
 use crate::mjcf::{scene as world, write};
-use crate::objects::robot::RobotData;
+use crate::objects::robot_data::RobotData;
+use crate::simulation::Simulation;
 use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_mujoco::Target;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};

@@ -1,8 +1,9 @@
 //! What a simulation holds, by name, for those who know nothing of how it was built: recorders, inspectors.
 
 use crate::error::Result;
-use crate::manager::{RobotId, SimulationManager};
-use crate::objects::robot::RobotData;
+use crate::ids::RobotId;
+use crate::manager::SimulationManager;
+use crate::objects::robot_data::RobotData;
 use kinetoscope_sensors::Sensor;
 
 impl SimulationManager {

@@ -3,7 +3,8 @@
 use crate::capture::{Capture, body_velocity, link_pose};
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManager, env_list, env_mask};
+use crate::ids::{EnvId, env_list, env_mask};
+use crate::manager::SimulationManager;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::Data;
 use kinetoscope_scene::state::Contact;

@@ -1,19 +1,24 @@
 //! `SimulationManager`: robots and objects in N environments, compiled and stepped together.
 
 use crate::batch::Batch;
-use crate::compile::{Simulation, compile};
+use crate::compile::compile;
 use crate::contents::Contents;
 use crate::env::{Env, EnvStatus};
 use crate::error::{Error, Result};
+use crate::ids::{EnvId, MjcfId, ObjectId, RobotId, TerrainId, env_mask};
 use crate::mjcf::document::Integrator;
-use crate::mjcf::scene::MAX_ROBOTS;
-use crate::objects::mjcf_part::{MjcfCfg, MjcfData, MjcfPart, MjcfPartMut};
-use crate::objects::rigid_object::{RigidObject, RigidObjectCfg, RigidObjectData, RigidObjectMut};
-use crate::objects::robot::{Robot, RobotCfg, RobotData, RobotMut, Role};
+use crate::mjcf::scene_names::MAX_ROBOTS;
+use crate::objects::mjcf_part::{MjcfPart, MjcfPartMut};
+use crate::objects::mjcf_part_data::{MjcfCfg, MjcfData};
+use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
+use crate::objects::rigid_object_data::{RigidObjectCfg, RigidObjectData};
+use crate::objects::robot::{Robot, RobotCfg, RobotMut};
+use crate::objects::robot_data::{RobotData, Role};
 use crate::objects::terrain::{Terrain, TerrainCfg};
 use crate::observer::{Moment, Observers};
 use crate::outcome::Outcome;
 use crate::sensor_list::{SensorId, SensorList};
+use crate::simulation::Simulation;
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::viewpoint::Viewpoint;
 use crate::visible::{MaskId, Visible, VisualCache};
@@ -28,38 +33,6 @@ use ndarray::Array2;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-
-/// Index of an environment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct EnvId(pub usize);
-
-/// Handle of a robot; valid for the manager that made it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct RobotId {
-    manager: u64,
-    index: usize,
-}
-
-/// Handle of a rigid object; valid for the manager that made it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ObjectId {
-    manager: u64,
-    index: usize,
-}
-
-/// Handle of an MJCF file that is a part of the scene; valid for the manager that made it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct MjcfId {
-    manager: u64,
-    index: usize,
-}
-
-/// Handle of a terrain; valid for the manager that made it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct TerrainId {
-    manager: u64,
-    index: usize,
-}
 
 /// Tells managers of one process apart, so that a handle is not used with another one.
 static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
@@ -690,19 +663,3 @@ impl SimulationManager {
 
 /// Steps done in one go: a caller's Ctrl+C and other environments wait no longer.
 const BLOCK: u32 = 1000;
-
-/// Which environments are meant, as a mask.
-pub(crate) fn env_mask(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<bool>> {
-    let Some(ids) = env_ids else { return Ok(vec![true; num_envs]) };
-    let mut mask = vec![false; num_envs];
-    for &EnvId(index) in ids {
-        *mask.get_mut(index).ok_or(Error::UnknownIndex { what: "environment", index, count: num_envs })? = true;
-    }
-    Ok(mask)
-}
-
-/// Which environments are meant, in the order given; all of them where `None`.
-pub(crate) fn env_list(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
-    env_mask(env_ids, num_envs)?;
-    Ok(env_ids.map_or_else(|| (0..num_envs).collect(), |ids| ids.iter().map(|id| id.0).collect()))
-}

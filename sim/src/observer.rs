@@ -1,7 +1,8 @@
 //! Those who look at a simulation while it runs, and may act on it: windows, browser views, recorders.
 
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManager};
+use crate::ids::EnvId;
+use crate::manager::SimulationManager;
 use std::any::Any;
 use std::fmt;
 use std::marker::PhantomData;

@@ -4,11 +4,12 @@
 //! the environments on threads of its own: the environments and their sensors stay as they are, to the last bit. What it
 //! gives is what stepping by hand would give: `set_qpos` and `set_ctrl` with the controls of a step, `update(1)`, read.
 
-use crate::compile::Simulation;
 use crate::drive::table::DriveState;
 use crate::env::{Env, EnvState, EnvStatus};
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManager, env_list};
+use crate::ids::{EnvId, env_list};
+use crate::manager::SimulationManager;
+use crate::simulation::Simulation;
 use crate::snapshot::{Entry, Snapshot};
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco;

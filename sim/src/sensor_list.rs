@@ -1,12 +1,12 @@
 //! The sensors of a simulation: built from their configurations, ticked after every step, read by typed handles.
 
 use crate::capture::{Capture, link_pose};
-use crate::compile::Simulation;
 use crate::contents::check_usable;
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::gather;
-use crate::manager::EnvId;
+use crate::ids::EnvId;
+use crate::simulation::Simulation;
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use kinetoscope_sensors::{Requires, Schedule, Sensor, SensorCfg, SensorContext, SensorError, SensorSlot};
 use std::any::Any;

@@ -5,7 +5,7 @@
 //! with it, so it is written anew for every step. Gravity is compensated by the force `-m g` in the same place, on both
 //! lines of MuJoCo: the model, which 4.x could tell to (`body_gravcomp`), is the same for all environments.
 
-use crate::mjcf::scene::MAX_ROBOTS;
+use crate::mjcf::scene_names::MAX_ROBOTS;
 use kinetoscope_mujoco::Data;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 

@@ -7,7 +7,7 @@
 mod contacts;
 mod motion;
 
-use crate::compile::{FreeIndex, PartIndex, RobotIndex};
+use crate::index::{FreeIndex, PartIndex, RobotIndex};
 use kinetoscope_mujoco::{Data, EngineError, Model};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::state::Contact;

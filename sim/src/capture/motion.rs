@@ -6,7 +6,7 @@
 //! MuJoCo accelerates the world by minus gravity, so gravity is added: 0 at rest, gravity in free fall.
 
 use super::{Plan, Solved};
-use crate::objects::free_body::body_pose;
+use crate::body_pose::body_pose;
 use kinetoscope_mujoco::Data;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;

@@ -1,7 +1,7 @@
 //! Controls, forces and activations of drives and of the actuators of MJCF files.
 
-use crate::compile::Simulation;
 use crate::env::Env;
+use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
 /// The drives of all robots.

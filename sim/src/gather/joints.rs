@@ -1,6 +1,7 @@
 //! One number per joint with one degree of freedom.
 
-use crate::compile::{JointIndexing, Simulation};
+use crate::index::JointIndexing;
+use crate::simulation::Simulation;
 use ndarray::Array2;
 
 /// Movable joints of all robots, then those of parts.

@@ -5,8 +5,9 @@ mod joints;
 mod motion;
 mod solved;
 
-use crate::compile::{JointIndexing, Simulation};
 use crate::env::EnvStatus;
+use crate::index::JointIndexing;
+use crate::simulation::Simulation;
 use kinetoscope_scene::state::Contacts;
 use kinetoscope_scene::{Light, OwnScene, PoseF32, PoseF64, SceneState, VisibleState};
 use kinetoscope_sensors::{Phases, Requires};

@@ -2,14 +2,15 @@
 //! of any crate.
 
 use crate::error::{Error, Result};
-use crate::manager::{MjcfId, ObjectId, RobotId, SimulationManager, TerrainId};
+use crate::ids::{MjcfId, ObjectId, RobotId, TerrainId};
+use crate::manager::SimulationManager;
 use crate::objects::articulation::{ArticulationCfg, ArticulationId};
-use crate::objects::mjcf_part::MjcfCfg;
-use crate::objects::object_group::{GroupId, RigidObjectGroupCfg};
-use crate::objects::rigid_object::RigidObjectCfg;
+use crate::objects::mjcf_part_data::MjcfCfg;
+use crate::objects::object_group_data::{GroupId, RigidObjectGroupCfg};
+use crate::objects::rigid_object_data::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
-use crate::objects::weld::{WeldCfg, WeldId};
+use crate::objects::weld_data::{WeldCfg, WeldId};
 use crate::pattern::in_every_env;
 use crate::sensor_list::SensorId;
 use kinetoscope_sensors::{Sensor, SensorCfg};

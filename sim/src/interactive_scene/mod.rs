@@ -16,7 +16,8 @@ pub use exclusion::ExclusionCfg;
 pub use types::EntityTypes;
 
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManager};
+use crate::ids::EnvId;
+use crate::manager::SimulationManager;
 use crate::pattern::in_every_env;
 use crate::simulation_cfg::SimulationManagerCfg;
 use entity::{Handle, Turn};

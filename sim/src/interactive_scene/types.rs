@@ -3,12 +3,12 @@
 use super::entity::{EntityCfg, SensorEntity};
 use super::value::{Value, ValueError};
 use crate::objects::articulation::ArticulationCfg;
-use crate::objects::mjcf_part::MjcfCfg;
-use crate::objects::object_group::RigidObjectGroupCfg;
-use crate::objects::rigid_object::RigidObjectCfg;
+use crate::objects::mjcf_part_data::MjcfCfg;
+use crate::objects::object_group_data::RigidObjectGroupCfg;
+use crate::objects::rigid_object_data::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
-use crate::objects::weld::WeldCfg;
+use crate::objects::weld_data::WeldCfg;
 use kinetoscope_sensors::{
     ActuatorStateCfg, CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg,
     MujocoSensorCfg, RayCasterCameraCfg, RayCasterCfg, StereoCameraCfg,

@@ -6,11 +6,13 @@
 //! of the user's file.
 
 pub mod document;
+pub mod error;
 pub(crate) mod part;
 pub(crate) mod robot;
 pub mod robot_file;
 pub(crate) mod scene;
+pub(crate) mod scene_names;
 pub mod write;
 
 pub use document::Mjcf;
-pub use robot::MAX_BODY_DEPTH;
+pub use error::MAX_BODY_DEPTH;

@@ -4,6 +4,7 @@ use super::document::{
     Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Integrator, Joint, JointEquality, JointType,
     MaterialAsset, MeshAsset, MeshContent, Mjcf, Shape, Site,
 };
+use super::error::{EmitError, MAX_BODY_DEPTH};
 use crate::drive::plan::JointPlan;
 use kinetoscope_robot::body_inertia::{BodyInertia, RigidBody, fuse};
 use kinetoscope_robot::description::{Geometry, JointId, JointKind, LinkId, RobotDescription};
@@ -15,13 +16,6 @@ use kinetoscope_scene::source::Source;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// The most moving bodies one below the other: MuJoCo's XML reader refuses documents nested deeper than 100 elements on 2.2.2
-/// and 500 on 4.x.
-pub const MAX_BODY_DEPTH: usize = match kinetoscope_mujoco::TARGET {
-    kinetoscope_mujoco::Target::V2 => 96,
-    kinetoscope_mujoco::Target::V4 => 480,
-};
 
 /// What the document is for.
 #[derive(Clone, Debug, PartialEq)]
@@ -120,25 +114,6 @@ pub(crate) struct LinkFrame {
     pub body: String,
     /// Pose of the link in the body.
     pub body_from_link: Pose,
-}
-
-/// An error of [`add`].
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum EmitError {
-    /// MuJoCo cannot read it.
-    #[error(
-        "{source_line}: link {link:?} is {depth} moving bodies below the root; MuJoCo reads at most {MAX_BODY_DEPTH}: \
-         join rigid parts by fixed joints"
-    )]
-    TooDeep {
-        /// The link.
-        link: String,
-        /// Its place.
-        source_line: Source,
-        /// Its depth.
-        depth: usize,
-    },
 }
 
 /// Adds a robot to `mjcf`.

@@ -5,10 +5,11 @@ use super::document::{
     Surface,
 };
 use super::robot::Purpose;
+use super::scene_names::{MAX_ROBOTS, light_name};
 use crate::light_cfg::{LampKind, LightCfg};
 use crate::objects::mass_properties::MassProperties;
 use crate::objects::restitution;
-use crate::objects::rigid_object::{BodyType, RigidObjectData};
+use crate::objects::rigid_object_data::{BodyType, RigidObjectData};
 use crate::objects::terrain::Terrain;
 use kinetoscope_scene::Pose;
 
@@ -16,8 +17,6 @@ use kinetoscope_scene::Pose;
 pub(crate) const WORLD_BIT: i32 = 1;
 /// Bits that can be used: MuJoCo's are signed 32-bit numbers.
 const ALL_BITS: i32 = i32::MAX;
-/// How many robots can have a bit of their own.
-pub(crate) const MAX_ROBOTS: usize = 30;
 
 /// Contact bits of the ground and of objects: they collide with everything.
 pub(crate) const WORLD_CONTACT: GeomRole =
@@ -163,11 +162,6 @@ fn visuals(object: &RigidObjectData, purpose: &Purpose<'_>) -> Vec<Geom> {
 
 /// Size of a proxy \[m\]: it has a pose, no mass and no contact.
 const PROXY: f64 = 1e-3;
-
-/// Name of a lamp of the simulation.
-pub(crate) fn light_name(index: usize) -> String {
-    format!("light{index}")
-}
 
 /// Adds a lamp. MuJoCo has no dome: that is of our renderers alone.
 pub(crate) fn add_light(mjcf: &mut Mjcf, index: usize, cfg: &LightCfg) {

@@ -2,8 +2,10 @@
 
 use crate::drive::{DriveCfg, DriveType, PerJoint};
 use crate::error::Result;
-use crate::manager::{RobotId, SimulationManager};
-use crate::objects::robot::{Robot, RobotCfg, RobotMut, Role};
+use crate::ids::RobotId;
+use crate::manager::SimulationManager;
+use crate::objects::robot::{Robot, RobotCfg, RobotMut};
+use crate::objects::robot_data::Role;
 use crate::objects::robot_file::MjcfFile;
 use crate::surface_cfg::SurfaceCfg;
 use kinetoscope_robot::urdf::UrdfCfg;

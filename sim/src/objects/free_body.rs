@@ -1,24 +1,18 @@
 //! Bodies that stand or move freely in the world: pose and velocity of objects and of the root links of robots.
 
-use crate::compile::FreeIndex;
-use crate::compile::Simulation;
+use crate::body_pose::body_pose;
 use crate::env::Env;
 use crate::error::{Error, Result};
-use crate::manager::EnvId;
+use crate::ids::EnvId;
+use crate::index::FreeIndex;
 use crate::objects::rows::{Rows, Table, distinct_envs};
 use crate::randomization::Property;
 use crate::sensor_list::SensorList;
+use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
-use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
 use nalgebra::Vector3;
 use ndarray::{Array2, ArrayView2};
-
-/// Pose of a MuJoCo body in the environment.
-pub(crate) fn body_pose(data: &mj::Data, body: usize) -> Pose {
-    let (p, q) = (&data.xpos()[3 * body..3 * body + 3], &data.xquat()[4 * body..4 * body + 4]);
-    from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]])
-}
 
 /// One body in all environments, to read.
 #[derive(Clone, Copy)]

@@ -1,10 +1,11 @@
 //! Kinematics of robots in a simulation: where frames would be, how joints move them, and how to get them somewhere.
 
+use crate::body_pose::body_pose;
 use crate::env::Env;
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, env_list};
-use crate::objects::free_body::body_pose;
-use crate::objects::robot::{Robot, check_pose, unknown};
+use crate::ids::{EnvId, env_list};
+use crate::objects::robot::Robot;
+use crate::objects::robot_data::{check_pose, unknown};
 use crate::objects::rows::{Rows, Table};
 use kinetoscope_robot::description::{FileDrive, JointId, JointKind, LinkId};
 use kinetoscope_robot::kinematics::{Chain, IkCfg, IkSolver, KinematicsError, Posture, Tip, TipName, link_poses};

@@ -1,7 +1,7 @@
 //! What a rigid object weighs and how it turns: from its shape, and what the user says instead.
 
 use super::object_mesh::ObjectMesh;
-use super::rigid_object::RigidObjectCfg;
+use super::rigid_object_data::RigidObjectCfg;
 use kinetoscope_robot::inertia::RigidInertia;
 use nalgebra::{UnitQuaternion, Vector3};
 

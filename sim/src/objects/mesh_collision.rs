@@ -1,7 +1,7 @@
 //! What collides of an object that is a mesh file.
 
 use crate::error::{Error, Result};
-use crate::objects::rigid_object::{BodyType, RigidObjectCfg};
+use crate::objects::rigid_object_data::{BodyType, RigidObjectCfg};
 use crate::objects::shape::ObjectShape;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::mesh::{HullCache, HullCfg, MeshError, PiecesCfg, TriMesh, prisms};

@@ -1,50 +1,18 @@
 //! Groups: several rigid objects behind one name, written and read together.
 
 use super::free_body::{FreeBody, FreeBodyMut};
+use super::object_group_data::{GroupData, GroupId, RigidObjectGroupCfg};
 use super::rows::distinct_envs;
-use crate::compile::Simulation;
 use crate::contents::Contents;
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManager};
-use crate::objects::rigid_object::{RigidObjectCfg, RigidObjectData};
+use crate::ids::EnvId;
+use crate::manager::SimulationManager;
+use crate::objects::rigid_object_data::RigidObjectData;
 use crate::sensor_list::SensorList;
+use crate::simulation::Simulation;
 use nalgebra::Vector3;
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Axis, Ix3};
-use serde::{Deserialize, Serialize};
-use std::ops::Range;
 use std::sync::Arc;
-
-/// Configuration of a group of rigid objects.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RigidObjectGroupCfg {
-    /// Name of the group, unique in the simulation.
-    pub uid: String,
-    /// Its objects, in the order in which they are read and written. In the simulation each is called by the group's name, a
-    /// point and its own: `blocks.red`.
-    pub objects: Vec<RigidObjectCfg>,
-}
-
-impl Default for RigidObjectGroupCfg {
-    /// A group of nothing, which is to be filled in.
-    fn default() -> Self {
-        Self { uid: "group".into(), objects: Vec::new() }
-    }
-}
-
-/// Handle of a group of rigid objects; valid for the manager that made it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct GroupId {
-    manager: u64,
-    index: usize,
-}
-
-/// A group that was added: which of the objects it is.
-#[derive(Clone, Debug)]
-pub(crate) struct GroupData {
-    pub(crate) uid: String,
-    pub(crate) objects: Range<usize>,
-}
 
 /// A group of rigid objects, to read. Arrays have one row per environment and object.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Meshes of rigid objects: what collides, what is seen, what is inside.
 
-use super::rigid_object::RigidObjectCfg;
+use super::rigid_object_data::RigidObjectCfg;
 use super::shape::{ObjectShape, cone};
 use crate::error::{Error, Result};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};

@@ -5,8 +5,9 @@
 
 use crate::env::Env;
 use crate::error::{Error, Result};
-use crate::manager::EnvId;
-use crate::objects::rigid_object::{BodyType, RigidObject, RigidObjectMut};
+use crate::ids::EnvId;
+use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
+use crate::objects::rigid_object_data::BodyType;
 use crate::objects::rows::{Rows, Table, distinct_envs};
 use crate::randomization::Property;
 use crate::wrenches::{Wrench, WrenchFrame};

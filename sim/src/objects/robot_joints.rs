@@ -5,8 +5,9 @@
 //! [`properties`](crate::SimulationManager::properties), so that random draws and these setters work on the same numbers.
 
 use crate::error::Result;
-use crate::manager::EnvId;
-use crate::objects::robot::{JointIndex, Robot, RobotMut};
+use crate::ids::EnvId;
+use crate::objects::robot::{Robot, RobotMut};
+use crate::objects::robot_data::JointIndex;
 use crate::objects::rows::Numbers;
 use crate::randomization::Property;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};

@@ -2,8 +2,9 @@
 
 use crate::drive::table::{DriveState, Gains};
 use crate::error::{Error, Result};
-use crate::manager::EnvId;
-use crate::objects::robot::{JointIndex, JointRows, Robot, RobotMut};
+use crate::ids::EnvId;
+use crate::objects::robot::{JointRows, Robot, RobotMut};
+use crate::objects::robot_data::JointIndex;
 use crate::objects::rows::{Numbers, Rows, Table, distinct_envs};
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix2, Ix3};
 use std::sync::Arc;

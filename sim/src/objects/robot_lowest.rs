@@ -1,9 +1,11 @@
 //! Heights of the lowest collision points of a robot: how far it is above the ground, or in it.
 
-use crate::compile::{GeomIndex, compile};
+use crate::compile::compile;
 use crate::contents::Contents;
 use crate::error::{Error, Result};
-use crate::objects::robot::{Robot, RobotData};
+use crate::index::GeomIndex;
+use crate::objects::robot::Robot;
+use crate::objects::robot_data::RobotData;
 use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco;

@@ -1,8 +1,9 @@
 //! A control part of a robot, to command by its name.
 
-use super::robot::{JointIndex, RobotMut};
+use super::robot::RobotMut;
+use super::robot_data::JointIndex;
 use crate::error::Result;
-use crate::manager::EnvId;
+use crate::ids::EnvId;
 use ndarray::{AsArray, Ix2};
 
 /// A control part of a robot, to command: as [`RobotMut`] with `joint_ids` of the part. The columns of all values are the

@@ -1,12 +1,13 @@
 //! The state of a robot beside its joints' positions: accelerations, targets, root and links, and what is called how.
 
+use crate::body_pose::body_pose;
 use crate::capture::{body_velocity, link_pose};
-use crate::compile::RobotIndex;
 use crate::env::Env;
 use crate::error::{Error, Result};
-use crate::manager::EnvId;
-use crate::objects::free_body::body_pose;
-use crate::objects::robot::{JointIndex, Robot, RobotMut};
+use crate::ids::EnvId;
+use crate::index::RobotIndex;
+use crate::objects::robot::{Robot, RobotMut};
+use crate::objects::robot_data::JointIndex;
 use crate::objects::rows::Numbers;
 use crate::pattern::{self, PatternError};
 use kinetoscope_robot::description::LinkId;

@@ -1,8 +1,9 @@
 //! Whole states of a robot in one call, as Isaac Lab writes them: root pose with velocity, joint positions with velocities.
 
 use crate::error::Result;
-use crate::manager::EnvId;
-use crate::objects::robot::{JointIndex, Robot, RobotMut};
+use crate::ids::EnvId;
+use crate::objects::robot::{Robot, RobotMut};
+use crate::objects::robot_data::JointIndex;
 use nalgebra::Vector3;
 use ndarray::{Array2, ArrayView2, AsArray, Axis, Ix2};
 

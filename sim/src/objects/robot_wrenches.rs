@@ -1,7 +1,7 @@
 //! Forces and torques on links of a robot, and gravity compensation, per environment.
 
 use crate::error::{Error, Result};
-use crate::manager::EnvId;
+use crate::ids::EnvId;
 use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::rows::{Rows, Table, check_named_once, distinct_envs};
 use crate::wrenches::{Wrench, WrenchFrame};

@@ -1,7 +1,7 @@
 //! Rows of numbers that a user gives, one for each environment: checked before anything is written.
 
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, env_list};
+use crate::ids::{EnvId, env_list};
 use ndarray::{ArrayView1, ArrayView2};
 
 /// What a table of numbers must look like.

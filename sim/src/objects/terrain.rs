@@ -1,7 +1,7 @@
 //! Terrain: ground that is not flat.
 
 use crate::error::{Error, Result};
-use crate::objects::robot::check_pose;
+use crate::objects::robot_data::check_pose;
 use crate::objects::terrain_file::{TerrainFile, rows};
 use crate::surface_cfg::SurfaceCfg;
 use kinetoscope_scene::Pose;

@@ -1,59 +1,19 @@
 //! Welds: two bodies that are held together while somebody says so, in each environment by itself.
 
-use crate::compile::Simulation;
+use super::weld_data::{WeldCfg, WeldData, WeldId};
+use crate::body_pose::body_pose;
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManager};
-use crate::objects::free_body::body_pose;
+use crate::ids::EnvId;
+use crate::index::WeldIndex;
+use crate::manager::SimulationManager;
 use crate::objects::rows::distinct_envs;
 use crate::sensor_list::SensorList;
+use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 use ndarray::Array1;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-
-/// Configuration of a weld. It holds nothing until it is [attached](WeldMut::attach).
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct WeldCfg {
-    /// Name of the weld, unique in the simulation.
-    pub uid: String,
-    /// The one body: the uid of an object, `uid/link` of a robot, `uid/body` of an MJCF part, or `world`. A link that a fixed
-    /// joint holds is one body with the link that carries it.
-    pub first: String,
-    /// The other one.
-    pub second: String,
-}
-
-impl Default for WeldCfg {
-    /// A weld of nothing: both names are to be filled in.
-    fn default() -> Self {
-        Self { uid: "weld".into(), first: String::new(), second: String::new() }
-    }
-}
-
-/// Handle of a weld; valid for the manager that made it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct WeldId {
-    manager: u64,
-    index: usize,
-}
-
-/// A weld that was added.
-#[derive(Clone, Debug)]
-pub(crate) struct WeldData {
-    pub(crate) cfg: Arc<WeldCfg>,
-    /// Whether the second body is fixed or moved by hand, and the first is not.
-    pub(crate) second_is_fixed: bool,
-}
-
-/// Which equality a weld is, and MuJoCo's bodies that it holds together.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct WeldIndex {
-    pub(crate) equality: usize,
-    pub(crate) bodies: [usize; 2],
-}
 
 /// A weld, to read.
 #[derive(Clone, Copy, Debug)]

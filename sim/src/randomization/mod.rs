@@ -35,10 +35,11 @@ use tables::Beside;
 pub(crate) use tables::Tables;
 pub use terms::{Draw, Randomization, Term};
 
-use crate::compile::Simulation;
 use crate::env::Env;
 use crate::error::Result;
-use crate::manager::{EnvId, SimulationManager, env_mask};
+use crate::ids::{EnvId, env_mask};
+use crate::manager::SimulationManager;
+use crate::simulation::Simulation;
 use kinetoscope_scene::{OwnScene, Random, RenderSceneError};
 use std::sync::Arc;
 

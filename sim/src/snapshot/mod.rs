@@ -32,10 +32,11 @@ pub use error::SnapshotError;
 pub(crate) use layout::Layout;
 pub(crate) use own::OwnProperties;
 
-use crate::compile::Simulation;
 use crate::env::EnvState;
 use crate::error::Result;
-use crate::manager::{EnvId, SimulationManager, env_list};
+use crate::ids::{EnvId, env_list};
+use crate::manager::SimulationManager;
+use crate::simulation::Simulation;
 use std::sync::Arc;
 
 /// States of environments. Cheap to clone.

@@ -1,10 +1,11 @@
 //! Properties of environments in snapshots.
 
 use super::{Snapshot, SnapshotError};
-use crate::compile::Simulation;
 use crate::error::Result;
-use crate::manager::{EnvId, SimulationManager};
+use crate::ids::EnvId;
+use crate::manager::SimulationManager;
 use crate::randomization::{NamedValue, Property, RandomizationError, Tables};
+use crate::simulation::Simulation;
 use std::sync::Arc;
 
 /// What an environment has for itself, and how often it was drawn for.

@@ -3,7 +3,7 @@
 use super::surface;
 use crate::contents::Contents;
 use crate::light_cfg::{LampKind, LightCfg};
-use crate::mjcf::scene::light_name;
+use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_mujoco::{Data, LightType, Model, ObjectKind, TextureType};
 use kinetoscope_scene::material::decode_srgb;
@@ -153,8 +153,8 @@ pub(super) fn read(data: &Data, lamps: &[Light], out: &mut [Light]) {
 mod tests {
     use super::super::Visible;
     use super::*;
-    use crate::objects::mjcf_part::MjcfCfg;
-    use crate::objects::rigid_object::RigidObjectCfg;
+    use crate::objects::mjcf_part_data::MjcfCfg;
+    use crate::objects::rigid_object_data::RigidObjectCfg;
     use crate::simulation_cfg::GroundCfg;
     use crate::{LightCfg, SimulationManager};
     use kinetoscope_mujoco as mj;

@@ -10,11 +10,13 @@ mod identity;
 mod lighting;
 mod overview;
 mod own;
+pub(crate) mod painted;
 mod shown;
 mod still;
 mod surface;
 mod urdf_visual;
 
+use self::painted::Surfaces;
 use deforming::{Buffers, Deforming};
 use identity::GeomIdentity;
 pub use identity::MaskId;
@@ -25,20 +27,15 @@ pub(crate) use surface::color_of;
 pub(crate) use urdf_visual::{Replacements, VisualCache};
 
 use crate::light_cfg::LightCfg;
-use crate::mjcf::scene::light_name;
+use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::GroundCfg;
-use crate::surface_cfg::SurfaceCfg;
 use kinetoscope_mujoco::{Data, Model, ObjectKind};
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::Plane;
 use kinetoscope_scene::{
     Hemisphere, Instance, Light, Material, OwnScene, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture,
 };
-use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// What surfaces look like, by the name of what they are of: that of an instance.
-pub(crate) type Surfaces = BTreeMap<String, SurfaceCfg>;
 
 /// What can be seen of a model.
 #[derive(Clone, Debug)]

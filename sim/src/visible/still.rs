@@ -2,7 +2,8 @@
 
 use super::{MaskId, Visible, overview};
 use crate::error::{Error, Result};
-use crate::manager::{EnvId, SimulationManager, env_list, env_mask};
+use crate::ids::{EnvId, env_list, env_mask};
+use crate::manager::SimulationManager;
 use crate::pattern;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco;

@@ -1,8 +1,8 @@
 //! Visuals of URDF files and of objects that are meshes: what is drawn in place of their proxy geoms.
 
 use super::Part;
-use crate::objects::rigid_object::RigidObjectData;
-use crate::objects::robot::RobotData;
+use crate::objects::rigid_object_data::RigidObjectData;
+use crate::objects::robot_data::RobotData;
 use kinetoscope_robot::description::{Geometry, Visual};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_robot::mesh_key::MeshKey;

@@ -20,7 +20,7 @@ use super::robot::{DampedJoint, GeomOwner, LinkFrame, Purpose, RobotCfg, RobotLa
 use crate::error::Result;
 use crate::mjcf::document::GeomRole;
 use crate::named::Named;
-use crate::objects::mjcf_part::{engine_sensors, read};
+use crate::objects::mjcf_part_data::{engine_sensors, read};
 use crate::objects::robot_file::MjcfFile;
 use kinetoscope_mujoco::{Asset, Model, words};
 use kinetoscope_robot::body_inertia::{RigidBody, fuse};

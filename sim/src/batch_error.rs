@@ -1,0 +1,27 @@
+//! Errors of batches.
+
+use kinetoscope_mujoco::EngineError;
+
+/// An error of [`Batch::new`](crate::batch::Batch::new).
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BatchError {
+    /// `num_envs` is zero.
+    #[error("num_envs is 0; a simulation needs at least 1 environment")]
+    NoEnvironments,
+    /// `threads` is zero.
+    #[error("threads is 0; use at least 1, or leave it out to use every core")]
+    NoThreads,
+    /// An environment could not be made.
+    #[error("environment {index}: {error}")]
+    Environment {
+        /// Which one.
+        index: usize,
+        /// Why.
+        #[source]
+        error: EngineError,
+    },
+    /// The operating system gives no thread.
+    #[error("cannot start a worker thread: {0}")]
+    Thread(String),
+}

@@ -1,0 +1,340 @@
+//! MJCF files as they were added: configuration, model, frames.
+
+use crate::error::{Error, Result};
+use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, PartOf, compare, sensors_left_out};
+use crate::named::Named;
+use crate::objects::robot_data::check_pose;
+use crate::pattern;
+use crate::surface_cfg::SurfaceCfg;
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco;
+use kinetoscope_mujoco::{CompileError, LoadError, Model, words};
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::pose::from_row;
+use kinetoscope_scene::source::Source;
+use kinetoscope_sensors::EngineSensor;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Configuration of an MJCF file as a part of a scene.
+///
+/// MuJoCo itself reads the file; what it made of it is put into the scene, every name with `uid/` before it. Bodies that the
+/// file leaves free are free, others stand as the file says. Settings for the whole model (`option`, `visual`, ...) are the
+/// scene's: what differs is a diagnostic.
+///
+/// ```
+/// use kinetoscope_sim::{MjcfCfg, SimulationManager, SimulationManagerCfg};
+///
+/// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
+/// let pendulum = r#"<mujoco><worldbody><body name="rod" pos="0 0 1">
+///     <joint name="hinge" axis="0 1 0"/><geom size="0.05" pos="0.3 0 0"/></body></worldbody>
+///   <actuator><motor name="motor" joint="hinge"/></actuator></mujoco>"#;
+/// let part = sim.add_mjcf(MjcfCfg::text("pendulum", pendulum))?;
+/// let motor = sim.mjcf_part(part).actuator_ids(&["motor"])?;
+/// sim.mjcf_part_mut(part).set_ctrl(&ndarray::array![[0.1]], Some(&motor), None)?;
+/// sim.update(10);
+/// assert!(sim.mjcf_part(part).get_qpos()[(0, 0)] > 0.0, "it falls");
+/// # Ok::<(), kinetoscope_sim::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MjcfCfg {
+    /// Name of the part, unique in the simulation; prefix of its names.
+    pub uid: String,
+    /// The file; with `text` only what errors call it.
+    pub path: PathBuf,
+    /// The MJCF itself, which names no files; the file's content where `None`.
+    pub text: Option<String>,
+    /// Pose of the file's world in the environment.
+    #[serde(with = "kinetoscope_scene::file_format::pose")]
+    pub init_pose: Pose,
+    /// What surfaces of bodies look like besides what the file says, by pattern of their names; `world` is what stands in the
+    /// file's world. No body may be matched twice.
+    #[serde(with = "kinetoscope_scene::file_format::pairs")]
+    pub surfaces: Vec<(String, SurfaceCfg)>,
+    /// What kind of thing it is, for the table of mask ids; `mjcf` where `None`.
+    pub semantic_class: Option<String>,
+}
+
+impl Default for MjcfCfg {
+    /// No file yet.
+    fn default() -> Self {
+        Self {
+            uid: "mjcf".into(),
+            path: PathBuf::new(),
+            text: None,
+            init_pose: Pose::identity(),
+            surfaces: Vec::new(),
+            semantic_class: None,
+        }
+    }
+}
+
+impl MjcfCfg {
+    /// A file where its own world is the environment.
+    pub fn file(uid: impl Into<String>, path: impl Into<PathBuf>) -> Self {
+        Self { uid: uid.into(), path: path.into(), ..Self::default() }
+    }
+
+    /// MJCF text, which names no files.
+    pub fn text(uid: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { uid: uid.into(), path: "text".into(), text: Some(text.into()), ..Self::default() }
+    }
+}
+
+/// Number of an actuator of a part: its column in `get_ctrl`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ActuatorIndex(pub usize);
+
+/// A body or a site of a part, as sensors see it.
+#[derive(Clone, Debug)]
+pub(crate) struct Frame {
+    /// `uid/body` or `uid/site`.
+    pub(crate) name: String,
+    /// The body in the file.
+    pub(crate) body: usize,
+    /// Its pose in the body's frame.
+    pub(crate) body_from_frame: Pose,
+    /// Which frame of the part moves it.
+    pub(crate) carrier: usize,
+}
+
+/// A file that was added: what does not change while the simulation runs.
+#[derive(Debug)]
+pub struct MjcfData {
+    cfg: MjcfCfg,
+    pub(super) model: Model,
+    pub(super) names: PartNames,
+    document: Arc<PartDocument>,
+    files: Vec<mj::Asset>,
+    frames: Vec<Frame>,
+    sensors: Vec<EngineSensor>,
+    pub(super) sensor_names: Vec<String>,
+    first_mask_id: i32,
+    /// What is known of the surfaces of some bodies besides.
+    surfaces: Vec<(usize, SurfaceCfg)>,
+}
+
+/// What the configuration says of the surfaces of bodies.
+fn surfaces(cfg: &MjcfCfg, names: &PartNames) -> Result<Vec<(usize, SurfaceCfg)>> {
+    cfg.surfaces.iter().try_for_each(|(_, surface)| surface.validate())?;
+    let surfaces = pattern::assign(&cfg.surfaces, &BTreeMap::new(), &names.bodies, "body").map_err(|error| {
+        Error::Surfaces { of: Named { what: "part", uid: cfg.uid.clone() }, error: Box::new(error) }
+    })?;
+    Ok(surfaces.into_iter().enumerate().filter_map(|(body, surface)| Some((body, surface?))).collect())
+}
+
+impl MjcfData {
+    /// What is known of the surfaces of some bodies besides.
+    pub(crate) fn surfaces(&self) -> &[(usize, SurfaceCfg)] {
+        &self.surfaces
+    }
+
+    /// Reads and compiles the file, part number `index` of the simulation, whose model is `scene` so far.
+    pub(crate) fn load(
+        cfg: MjcfCfg,
+        index: usize,
+        first_mask_id: i32,
+        scene: &Model,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Result<Self> {
+        check_pose("init_pose", &cfg.init_pose)?;
+        let file = cfg.path.display().to_string();
+        let (text, model) = read(&cfg.path, cfg.text.as_deref(), |error| Error::MjcfFile {
+            part: cfg.uid.clone(),
+            file: file.clone(),
+            error: Box::new(error),
+        })?;
+        let names = PartNames::of_model(&model);
+        let surfaces = surfaces(&cfg, &names)?;
+        let (stem, source) = (format!("part{index}_"), Source::new(&cfg.path, 1));
+        let of = PartOf { model: &model, names: &names, uid: &cfg.uid, pose: &cfg.init_pose, stem: &stem, rig: None };
+        let document = PartDocument::new(&of, sensors_left_out(&model, &names), &source);
+        let (document, files) = document
+            .and_then(|document| Ok((document, of.files()?)))
+            .map_err(|error| Error::MjcfPart { part: cfg.uid.clone(), file, error: Box::new(error) })?;
+        let left_out = document.sensors_left_out();
+        diagnostics.extend(compare(&format!("part {:?}", cfg.uid), &text, &cfg.path, &model, scene, left_out));
+        let frames = frames(&cfg.uid, &model, &names, diagnostics);
+        let is_kept = |s: &usize| left_out.iter().all(|(other, _)| other != s);
+        let kept: Vec<usize> = (0..model.nsensor()).filter(is_kept).collect();
+        let sensors = engine_sensors(&cfg.uid, &model, &names, &kept);
+        let sensor_names = kept.iter().map(|&s| names.sensors[s].clone()).collect();
+        Ok(Self {
+            cfg,
+            model,
+            names,
+            document: Arc::new(document),
+            files,
+            frames,
+            sensors,
+            sensor_names,
+            first_mask_id,
+            surfaces,
+        })
+    }
+
+    /// Name of the part.
+    pub fn uid(&self) -> &str {
+        &self.cfg.uid
+    }
+
+    /// The configuration it was added with.
+    pub fn cfg(&self) -> &MjcfCfg {
+        &self.cfg
+    }
+
+    /// What MuJoCo made of the file alone.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Names of everything in the file, without the uid.
+    pub fn names(&self) -> &PartNames {
+        &self.names
+    }
+
+    pub(crate) fn document(&self) -> &Arc<PartDocument> {
+        &self.document
+    }
+
+    /// The files that its lines name.
+    pub(crate) fn files(&self) -> &[mj::Asset] {
+        &self.files
+    }
+
+    /// Its bodies but the world, then its sites that have a name, as sensors see them.
+    pub(crate) fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// MuJoCo's own sensors that the scene has; the first value is that among those of the part.
+    pub(crate) fn sensors(&self) -> &[EngineSensor] {
+        &self.sensors
+    }
+
+    /// Names of the joints with one degree of freedom, in MuJoCo's order.
+    pub(crate) fn single_joints(&self) -> impl Iterator<Item = &str> {
+        let names = self.names.joints.iter().zip(self.model.jnt_type());
+        names.filter(|(_, kind)| matches!(words::joint(**kind), Some("hinge" | "slide"))).map(|(name, _)| name.as_str())
+    }
+
+    /// Name in the scene of something of the file.
+    pub(crate) fn full(&self, name: &str) -> String {
+        format!("{}/{name}", self.cfg.uid)
+    }
+
+    /// What the mask channel of cameras says of a body of the file; body 0 is what stands in its world.
+    pub(crate) fn mask_id(&self, body: usize) -> i32 {
+        self.first_mask_id + body as i32
+    }
+}
+
+/// The text of a file, or the text itself, and what MuJoCo makes of it; `refused` is the error that its refusal is.
+pub(crate) fn read(
+    path: &Path,
+    text: Option<&str>,
+    refused: impl FnOnce(CompileError) -> Error,
+) -> Result<(String, Model)> {
+    let is_file = text.is_none();
+    let (text, compiled) = match text {
+        Some(text) => (text.to_string(), mj::compile(text, &[])),
+        None => {
+            let read = std::fs::read_to_string(path);
+            let text = read.map_err(|error| Error::File { path: path.to_path_buf(), error })?;
+            (text, mj::compile_file(path))
+        }
+    };
+    let compiled = compiled.map_err(|error| match error {
+        LoadError::Version(error) => Error::MujocoVersion(error),
+        LoadError::Compile(error) if is_file => refused(located(error, path, &text)),
+        LoadError::Compile(error) => refused(error),
+    })?;
+    Ok((text, compiled.into_model()))
+}
+
+/// With the line of the file that MuJoCo names; of a file that includes others it does not say whose line that is.
+fn located(error: CompileError, path: &Path, text: &str) -> CompileError {
+    let line = error.line.filter(|_| !text.contains("<include")).map(|line| Source::new(path, line));
+    CompileError { source_line: error.source_line.clone().or(line), ..error }
+}
+
+/// Bodies and sites as frames. A site that is called as a body gets `.site` behind its name.
+fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Diagnostic>) -> Vec<Frame> {
+    // Frame k is body k + 1. A body that is welded to another moves with it; what never moves stands for itself.
+    let carrier = |body: usize| match model.body_weldid()[body] as usize {
+        0 => body - 1,
+        moving => moving - 1,
+    };
+    let mut frames: Vec<Frame> = (1..model.nbody())
+        .map(|body| Frame {
+            name: format!("{uid}/{}", names.bodies[body]),
+            body,
+            body_from_frame: Pose::identity(),
+            carrier: carrier(body),
+        })
+        .collect();
+    for site in (0..model.nsite()).filter(|&site| names.named_sites[site]) {
+        let body = model.site_bodyid()[site] as usize;
+        let mut name = names.sites[site].clone();
+        while frames.iter().any(|frame| frame.name.strip_prefix(uid).is_some_and(|rest| rest[1..] == *name)) {
+            let message = format!("part {uid:?}: the site {name:?} is called as a body; its frame is \"{name}.site\"");
+            diagnostics.push(Diagnostic::new(DiagnosticKind::NameClash, None, message));
+            name.push_str(".site");
+        }
+        let (p, q) = (&model.site_pos()[3 * site..3 * site + 3], &model.site_quat()[4 * site..4 * site + 4]);
+        let carrier = if body == 0 { frames.len() } else { carrier(body) };
+        frames.push(Frame {
+            name: format!("{uid}/{name}"),
+            body,
+            body_from_frame: from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]),
+            carrier,
+        });
+    }
+    frames
+}
+
+/// MuJoCo's own sensors of a file, those of `kept`.
+pub(crate) fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: &[usize]) -> Vec<EngineSensor> {
+    let mut next = 0;
+    kept.iter()
+        .filter_map(|&s| {
+            let word = words::sensor(model.sensor_type()[s])?;
+            // Angles and lengths have different units; what is observed decides.
+            let hinge = || {
+                let joint = usize::try_from(model.sensor_objid()[s]).ok()?;
+                words::joint(model.jnt_type()[joint]).map(|kind| kind == "hinge")
+            };
+            let unit = match word.word {
+                "jointpos" | "jointlimitpos" => hinge().map(|hinge| if hinge { "rad" } else { "m" }),
+                "jointvel" | "jointlimitvel" => hinge().map(|hinge| if hinge { "rad/s" } else { "m/s" }),
+                "jointlimitfrc" | "jointactuatorfrc" => hinge().map(|hinge| if hinge { "N m" } else { "N" }),
+                _ => word.unit,
+            };
+            let width = model.sensor_dim()[s] as usize;
+            let first = next;
+            next += width;
+            Some(EngineSensor {
+                name: format!("{uid}/{}", names.sensors[s]),
+                kind: word.word.into(),
+                unit: unit.map(Into::into),
+                first,
+                width,
+                solved: words::is_solved(model.sensor_needstage()[s]),
+                quaternion: word.quaternion,
+            })
+        })
+        .collect()
+}
+
+impl MjcfCfg {
+    /// Makes its path relative to a folder; an absolute one stays, and text has none.
+    pub(crate) fn place_beside(&mut self, beside: impl Fn(&Path) -> PathBuf) {
+        if self.text.is_none() {
+            self.path = beside(&self.path);
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! Robots as they were added: configuration, description, drives.
+
+use crate::drive::plan::{JointPlan, plan};
+use crate::drive::table::Gains;
+use crate::drive::{ActuatorSpec, DriveModel};
+use crate::error::{Error, Result};
+use crate::mjcf::document::Integrator;
+use crate::mjcf::robot_file::{Loading, RobotFile, RobotFileError};
+use crate::named::Named;
+use crate::objects::robot_cfg::RobotCfg;
+use crate::pattern;
+use crate::simulation_cfg::SimulationManagerCfg;
+use crate::surface_cfg::SurfaceCfg;
+use kinetoscope_mujoco as mj;
+use kinetoscope_robot::description::RobotDescription;
+use kinetoscope_robot::diagnostic::Diagnostic;
+use kinetoscope_robot::mesh_key::MeshKey;
+use kinetoscope_robot::shape_inertia::{Hulls, ball, complete};
+use kinetoscope_robot::urdf::{Assembly, assemble};
+use kinetoscope_scene::Pose;
+use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::pose::to_row;
+use std::collections::BTreeMap;
+
+/// Column of a joint in `get_qpos` and its kin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct JointIndex(pub usize);
+
+/// A loaded robot: everything about it that does not change while the simulation runs.
+#[derive(Clone, Debug)]
+pub struct RobotData {
+    cfg: RobotCfg,
+    pub(super) description: RobotDescription,
+    pub(super) plans: Vec<JointPlan>,
+    pub(super) joint_names: Vec<String>,
+    pub(super) parts: BTreeMap<String, Vec<usize>>,
+    hulls: BTreeMap<MeshKey, TriMesh>,
+    /// The MJCF file that it is; `None` where it is made of URDF files.
+    file: Option<RobotFile>,
+    first_mask_id: i32,
+    role: Role,
+    /// What is known of the surfaces of some links besides.
+    surfaces: Vec<(usize, SurfaceCfg)>,
+}
+
+/// What it was added as.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// By `add_robot`.
+    Robot,
+    /// By `add_articulation`, with its semantic class.
+    Articulation(String),
+}
+
+impl Role {
+    /// How errors call it.
+    fn named(&self, uid: &str) -> Named {
+        let what = match self {
+            Self::Robot => "robot",
+            Self::Articulation(_) => "articulation",
+        };
+        Named { what, uid: uid.into() }
+    }
+}
+
+impl RobotData {
+    /// Reads the files, resolves names, drives and meshes of robot number `index` of a simulation, whose model is `scene` so
+    /// far.
+    pub(crate) fn load(
+        cfg: RobotCfg,
+        role: Role,
+        manager: &SimulationManagerCfg,
+        (index, scene): (usize, &mj::Model),
+        first_mask_id: i32,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Result<Self> {
+        check_pose("init_pose", &cfg.init_pose)?;
+        if let Some(clearance) = cfg.ground_clearance.filter(|clearance| !clearance.is_finite()) {
+            let (value, expected) = (clearance.to_string(), "it must be a finite height in metres, such as 0");
+            return Err(Error::Config { field: "ground_clearance", value, expected });
+        }
+        if !(0.0..=1.0).contains(&cfg.soft_limit_factor) {
+            let (value, expected) = (cfg.soft_limit_factor.to_string(), "the share of a joint's range must be 0 to 1");
+            return Err(Error::Config { field: "soft_limit_factor", value, expected });
+        }
+        for component in &cfg.urdf.components {
+            check_pose("component transform", &component.transform)?;
+        }
+        let mut hulls = Hulls::new(&cfg.hull);
+        let (file, mut description, mut found) =
+            described(&cfg, &role.named(&cfg.uid), index, Some(scene), &mut hulls)?;
+        load_up(&mut description, &cfg)?;
+        let surfaces = surfaces(&description, &cfg, &role)?;
+        let joint_names: Vec<String> = description.drivable_joints().map(|(_, j)| j.name.clone()).collect();
+        let mut parts = BTreeMap::new();
+        for (part, patterns) in &cfg.control_parts {
+            let members = pattern::select(patterns, &joint_names, "joint").map_err(|error| Error::ControlPart {
+                robot: role.named(&cfg.uid),
+                part: part.clone(),
+                error: Box::new(error),
+            })?;
+            if parts.insert(part.clone(), members).is_some() {
+                return Err(Error::ControlPartRepeated { robot: role.named(&cfg.uid), part: part.clone() });
+            }
+        }
+        let at_plan = |error| Error::Plan { robot: role.named(&cfg.uid), error: Box::new(error) };
+        let (plans, mut planned) =
+            plan(&description, &cfg.drive, &parts, &cfg.init_qpos, !cfg.fix_base).map_err(at_plan)?;
+        check_integrator(&cfg, &role, &plans, manager.integrator)?;
+        found.append(&mut planned);
+        let explicit = explicitly_driven(&plans, cfg.drive.model);
+        if explicit.iter().any(|plan| plan.actuator.is_some()) {
+            let dt = manager.physics_option().timestep;
+            found.extend(crate::drive::actuator::warn_if_unstable(&description, &explicit, !cfg.fix_base, dt));
+        }
+        let hulls = hulls.of_collisions(&description)?;
+        diagnostics.append(&mut found);
+        Ok(Self { cfg, description, plans, joint_names, parts, hulls, file, first_mask_id, role, surfaces })
+    }
+
+    /// Name of the robot.
+    pub fn uid(&self) -> &str {
+        &self.cfg.uid
+    }
+
+    /// The configuration it was added with.
+    pub fn cfg(&self) -> &RobotCfg {
+        &self.cfg
+    }
+
+    /// What is known of the surfaces of some links besides.
+    pub(crate) fn surfaces(&self) -> &[(usize, SurfaceCfg)] {
+        &self.surfaces
+    }
+
+    /// What kind of thing it is, for the table of mask ids.
+    pub(crate) fn semantic_class(&self) -> &str {
+        match &self.role {
+            Role::Robot => "robot",
+            Role::Articulation(class) => class,
+        }
+    }
+
+    /// How errors call it.
+    pub(crate) fn named(&self) -> Named {
+        self.role.named(self.uid())
+    }
+
+    /// Whether it was added as a robot, and not as another articulation.
+    pub(crate) fn is_robot(&self) -> bool {
+        self.role == Role::Robot
+    }
+
+    /// The merged robot as its files describe it, with its payloads.
+    pub fn description(&self) -> &RobotDescription {
+        &self.description
+    }
+
+    /// Limits and drives of its joints.
+    pub fn plans(&self) -> &[JointPlan] {
+        &self.plans
+    }
+
+    /// Names of the movable joints in the order of the merged URDF, or of the MJCF file.
+    pub fn joint_names(&self) -> &[String] {
+        &self.joint_names
+    }
+
+    /// What the mask channel of cameras says of a link.
+    pub(crate) fn mask_id(&self, link: usize) -> i32 {
+        self.first_mask_id + link as i32
+    }
+
+    /// Names of the tendons of its MJCF file. Their numbers in the mask channel follow those of its links.
+    pub(crate) fn tendons(&self) -> &[String] {
+        self.file.as_ref().map_or(&[], |file| file.tendon_names())
+    }
+
+    /// The MJCF file that it is; `None` where it is made of URDF files.
+    pub fn file(&self) -> Option<&RobotFile> {
+        self.file.as_ref()
+    }
+
+    /// Something of its MJCF file is wrong.
+    pub(crate) fn file_error(&self, error: RobotFileError) -> Error {
+        file_error(&self.cfg, self.named(), error)
+    }
+
+    /// Pose of the root link at the start.
+    pub(crate) fn root_pose(&self) -> Pose {
+        self.file.as_ref().map_or(self.cfg.init_pose, |file| self.cfg.init_pose * file.root_pose())
+    }
+
+    /// Moves the start along z \[m\].
+    pub(super) fn raise(&mut self, by: f64) {
+        self.cfg.init_pose.translation.z += by;
+    }
+
+    pub(crate) fn hulls(&self) -> &BTreeMap<MeshKey, TriMesh> {
+        &self.hulls
+    }
+}
+
+fn file_error(cfg: &RobotCfg, robot: Named, error: RobotFileError) -> Error {
+    let path = cfg.mjcf.as_ref().map(|file| file.path.display().to_string());
+    Error::RobotFile { robot, file: path.unwrap_or_default(), error: Box::new(error) }
+}
+
+/// The robot as its files describe it, without payloads, and what is odd in them; where there is a `scene`, also what of the
+/// settings of its MJCF file is not the scene's.
+pub(crate) fn described(
+    cfg: &RobotCfg,
+    named: &Named,
+    index: usize,
+    scene: Option<&mj::Model>,
+    hulls: &mut Hulls<'_>,
+) -> Result<(Option<RobotFile>, RobotDescription, Vec<Diagnostic>)> {
+    let Some(file) = &cfg.mjcf else {
+        let Assembly { mut description, mut diagnostics } = assemble(&cfg.urdf)?;
+        complete(&mut description, cfg.urdf.missing_inertia, !cfg.fix_base, hulls, &mut diagnostics)?;
+        return Ok((None, description, diagnostics));
+    };
+    if !cfg.urdf.components.is_empty() {
+        let expected = "a robot is one MJCF file, or made of URDF files; leave out mjcf or the components of urdf";
+        return Err(Error::Config { field: "mjcf", value: format!("{:?}", file.path), expected });
+    }
+    let mut found = Vec::new();
+    let (fix_base, self_collision) = (cfg.fix_base, cfg.self_collision);
+    let loading = Loading { uid: &cfg.uid, named, index, fix_base, self_collision, scene };
+    let (file, description) =
+        RobotFile::load(file, &loading, |error| file_error(cfg, named.clone(), error), &mut found)?;
+    Ok((Some(file), description, found))
+}
+
+/// The joints with the gains of those drives that are evaluated at the start of a step, and of no others; the damping is the
+/// largest that the model of the joint can show.
+fn explicitly_driven(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan> {
+    let explicit = |plan: &JointPlan| {
+        let spec = plan.actuator?;
+        match plan.model {
+            Some(law) => {
+                let (max_effort, max_velocity) = (plan.max_effort, plan.max_velocity);
+                let kd = law.law().damping(&Gains { kp: spec.kp, kd: spec.kd, max_effort, max_velocity });
+                Some(ActuatorSpec { kd, ..spec })
+            }
+            None => Some(spec).filter(|_| model == DriveModel::Actuator),
+        }
+    };
+    plans.iter().map(|plan| JointPlan { actuator: explicit(plan), ..plan.clone() }).collect()
+}
+
+/// Adds what links carry.
+fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
+    if let Some((_, mass)) = cfg.payload.iter().find(|(_, mass)| !(mass.is_finite() && *mass >= 0.0)) {
+        let expected = "a payload must be a finite mass >= 0 kg";
+        return Err(Error::Config { field: "payload", value: mass.to_string(), expected });
+    }
+    let names: Vec<&str> = description.named_links().iter().map(|link| link.name.as_str()).collect();
+    let payloads = pattern::assign(&cfg.payload, &BTreeMap::new(), &names, "link")
+        .map_err(|error| Error::Payload { robot: (&cfg.uid).into(), error: Box::new(error) })?;
+    for (link, payload) in description.links.iter_mut().zip(payloads) {
+        let Some(payload) = payload.filter(|mass| *mass > 0.0) else { continue };
+        match &mut link.inertial {
+            // A point in the centre of mass: neither the centre nor the inertia about it change.
+            Some(inertial) => inertial.mass += payload,
+            None => link.inertial = Some(ball(link, payload, 1000.0)),
+        }
+    }
+    Ok(())
+}
+
+/// What the configuration says of the surfaces of links.
+fn surfaces(description: &RobotDescription, cfg: &RobotCfg, role: &Role) -> Result<Vec<(usize, SurfaceCfg)>> {
+    cfg.surfaces.iter().try_for_each(|(_, surface)| surface.validate())?;
+    let names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
+    let surfaces = pattern::assign(&cfg.surfaces, &BTreeMap::new(), &names, "link")
+        .map_err(|error| Error::Surfaces { of: role.named(&cfg.uid), error: Box::new(error) })?;
+    Ok(surfaces.into_iter().enumerate().filter_map(|(link, surface)| Some((link, surface?))).collect())
+}
+
+/// There is no such name; the nearest of those there are.
+#[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
+pub(super) fn unknown<'n>(what: &'static str, name: &str, names: impl IntoIterator<Item = &'n str>) -> Error {
+    let candidates = pattern::closest(name, names).into_iter().map(str::to_string).collect();
+    Error::UnknownName { what, name: name.into(), candidates }
+}
+
+pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
+    let fail = |expected| Err(Error::Config { field, value: format!("{:?}", to_row(pose)), expected });
+    if !to_row(pose).iter().all(|x| x.is_finite()) {
+        return fail("every number must be finite");
+    }
+    if (pose.rotation.norm() - 1.0).abs() > 1e-6 {
+        return fail("its rotation must be a unit quaternion (w, x, y, z in the last four numbers)");
+    }
+    Ok(())
+}
+
+/// Implicit drives need an integrator that adds nothing to the acceleration that the solver found.
+fn check_integrator(cfg: &RobotCfg, role: &Role, plans: &[JointPlan], integrator: Integrator) -> Result<()> {
+    let allowed = match integrator {
+        Integrator::Euler => true,
+        Integrator::ImplicitFast => mj::TARGET == mj::Target::V4,
+        Integrator::Rk4 | Integrator::Implicit => false,
+    };
+    // Joints that are passive, follow others or have an explicit model have no row.
+    let row = |plan: &JointPlan| plan.actuator.is_some() && plan.model.is_none();
+    if cfg.drive.model == DriveModel::Implicit && plans.iter().any(row) && !allowed {
+        let also = if mj::TARGET == mj::Target::V4 { " or implicitfast" } else { "" };
+        return Err(Error::Integrator { robot: role.named(&cfg.uid), integrator: integrator.name(), also });
+    }
+    Ok(())
+}

@@ -1,0 +1,254 @@
+//! A compiled scene and its environments.
+
+use crate::batch::Batch;
+use crate::capture::Plan;
+use crate::contents::Contents;
+use crate::env::Env;
+use crate::index::{FreeIndex, PartIndex, RobotIndex, WeldIndex, joint_widths};
+use crate::randomization::{Maker, OwnValues, Tables};
+use crate::simulation_cfg::SimulationManagerCfg;
+use crate::snapshot::Layout;
+use crate::visible::{self, Identities, Look, MaskId, Replacements, Visible, VisualCache};
+use crate::wrenches::Wrenches;
+use kinetoscope_mujoco as mj;
+use kinetoscope_mujoco::ObjectKind;
+use kinetoscope_robot::diagnostic::Diagnostic;
+use kinetoscope_scene::OwnScene;
+use std::sync::{Arc, OnceLock};
+
+/// A compiled scene and its environments.
+#[derive(Debug)]
+pub(crate) struct Simulation {
+    pub(crate) batch: Batch,
+    pub(crate) robots: Vec<RobotIndex>,
+    pub(crate) objects: Vec<FreeIndex>,
+    pub(crate) parts: Vec<PartIndex>,
+    pub(crate) welds: Vec<WeldIndex>,
+    pub(crate) identities: Identities,
+    /// Where sensors find bodies and contacts.
+    pub(crate) plan: Arc<Plan>,
+    /// What cameras draw; made when the first sensor asks for it.
+    pub(crate) visible: Option<Arc<Visible>>,
+    pub(crate) xml: String,
+    pub(crate) diagnostics: Vec<Diagnostic>,
+    pub(crate) start: Arc<Start>,
+    /// Which numbers a state has.
+    pub(crate) layout: Arc<Layout>,
+    /// Where properties are that environments may have for themselves.
+    pub(crate) tables: OnceLock<Arc<Tables>>,
+    /// Makes models with such properties; made when the first is drawn.
+    pub(crate) maker: Option<Maker>,
+    /// What each environment has for itself.
+    pub(crate) own_values: Vec<Option<Box<OwnValues>>>,
+    /// What each environment looks like, where its sizes or colours are its own; empty where nobody's are, or nobody looks.
+    pub(crate) own_scenes: Vec<OwnScene>,
+    /// Whether each geom only has a pose, for a mesh that is drawn in its place.
+    pub(crate) proxies: Vec<bool>,
+    /// Pairs of bodies that are excluded from contact because they overlap at the start.
+    pub(crate) excluded: Vec<(String, String)>,
+}
+
+/// The initial state, as far as it differs from the model's `qpos0`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Start {
+    /// (address in qpos, position).
+    pub qpos: Vec<(usize, f64)>,
+    /// (drive, position target).
+    pub targets: Vec<(usize, f64)>,
+}
+
+impl Simulation {
+    /// What each number of the mask channel is.
+    pub(crate) fn mask_ids(&self) -> &[MaskId] {
+        self.identities.table()
+    }
+
+    /// Makes what cameras draw, if nobody did before.
+    pub(crate) fn make_visible(
+        &mut self,
+        cfg: &SimulationManagerCfg,
+        contents: &Contents,
+        cache: &mut VisualCache,
+    ) -> Arc<Visible> {
+        if let Some(visible) = &self.visible {
+            return Arc::clone(visible);
+        }
+        let mut replacements = Replacements::new();
+        let ground = self.batch.model().id(ObjectKind::Geom, "ground");
+        if let (Some(geom), Some(cfg)) = (ground, &cfg.ground) {
+            replacements.insert(geom, vec![visible::ground(cfg)]);
+        }
+        for (data, index) in contents.robots.iter().zip(&self.robots) {
+            cache.check_robot(data);
+            for geom in &index.geoms {
+                let link = &data.description().links[geom.link];
+                if let Some(visual) = geom.visual.and_then(|v| link.visuals.get(v)) {
+                    replacements.insert(geom.geom, cache.parts(&link.name, visual));
+                }
+            }
+        }
+        for object in &contents.objects {
+            let geom = self.batch.model().id(ObjectKind::Geom, &format!("{}/visual", object.uid()));
+            if let Some(geom) = geom {
+                replacements.insert(geom, cache.object_parts(object));
+            }
+        }
+        let model = self.batch.model();
+        let (surfaces, look) = (contents.surfaces(), Look::of(cfg, contents));
+        let visible = Visible::extract(model, &self.identities, &replacements, self.plan.bodies(), &surfaces, &look)
+            .with_lamps_of(model, &cfg.lights);
+        let visible = Arc::new(visible);
+        self.visible = Some(Arc::clone(&visible));
+        for (env, error) in self.look_anew() {
+            cache.say_look(env, &error);
+        }
+        visible
+    }
+
+    /// The control input of a drive.
+    pub(crate) fn drive_ctrl(&self, drive: usize) -> usize {
+        self.batch.read(0, |env| env.drives.table().drives[drive].ctrl)
+    }
+
+    /// Puts the chosen environments in the initial state.
+    pub(crate) fn reset(&mut self, chosen: &[bool]) {
+        let start = &self.start;
+        (0..chosen.len()).filter(|&i| chosen[i]).for_each(|i| self.batch.edit(i, Env::expect_reset));
+        self.batch.run(|i, env| {
+            if chosen[i] {
+                env.reset(|data, drives| {
+                    for &(address, position) in &start.qpos {
+                        data.qpos_mut()[address] = position;
+                    }
+                    for &(drive, target) in &start.targets {
+                        let [low, high] = drives.ranges[drive];
+                        drives.position[drive] = target.clamp(low, high);
+                    }
+                });
+            }
+        });
+    }
+
+    /// Takes over, by name, the state of everything that `old` has too: positions, velocities, warm start, targets,
+    /// time; and what happened to each environment: a diverged one stays out until it is reset.
+    pub(crate) fn carry_over(&mut self, old: &Self) {
+        let (old_model, model) = (old.batch.model(), self.batch.model());
+        let mut qpos = Vec::new();
+        let mut dofs = Vec::new();
+        for joint in 0..old_model.njnt() {
+            let Some(new) = old_model.name(ObjectKind::Joint, joint).and_then(|n| model.id(ObjectKind::Joint, &n))
+            else {
+                continue;
+            };
+            let (nq, nv) = joint_widths(old_model.jnt_type()[joint]);
+            let at = |m: &mj::Model, j: usize| (m.jnt_qposadr()[j] as usize, m.jnt_dofadr()[j] as usize);
+            let ((from_q, from_v), (to_q, to_v)) = (at(old_model, joint), at(model, new));
+            qpos.extend((0..nq).map(|k| (from_q + k, to_q + k)));
+            dofs.extend((0..nv).map(|k| (from_v + k, to_v + k)));
+        }
+        let drives: Vec<(usize, usize)> = old
+            .robots
+            .iter()
+            .zip(&self.robots)
+            .flat_map(|(old, new)| old.joints.iter().zip(&new.joints))
+            .filter_map(|(old, new)| Some((old.drive?, new.drive?)))
+            .collect();
+        let bodies: Vec<Option<usize>> = (0..old_model.nbody())
+            .map(|body| old_model.name(ObjectKind::Body, body).and_then(|name| model.id(ObjectKind::Body, &name)))
+            .collect();
+        let parts = PartTransfer::new(old, self);
+        // In the order in which they were added.
+        let equality = |old_weld: usize| {
+            let at = old.welds.iter().position(|weld| weld.equality == old_weld)?;
+            self.welds.get(at).map(|weld| weld.equality)
+        };
+        let moved = |weld: &mj::Weld| Some(mj::Weld { equality: equality(weld.equality)?, ..*weld });
+        for i in 0..self.batch.num_envs() {
+            let part_state = old.batch.read(i, |env| parts.read(env.data()));
+            let (state, time, targets, history) =
+                old.batch.read(i, |env| (env.saved_arrays(), env.data().time(), env.drives.clone(), env.history()));
+            let wrenches = old.batch.read(i, |env| env.wrenches().moved(|body| bodies[body]));
+            let held: Vec<mj::Weld> = old.batch.read(i, |env| env.welds().iter().filter_map(moved).collect());
+            self.batch.write(i, |env| {
+                for &(from, to) in &drives {
+                    env.drives.copy_from(&targets, from, to);
+                }
+                for &(from, to) in &dofs {
+                    env.drives.copy_applied_from(&targets, from, to);
+                }
+                env.write(|data| {
+                    for &(from, to) in &qpos {
+                        data.qpos_mut()[to] = state.qpos[from];
+                    }
+                    for &(from, to) in &dofs {
+                        data.qvel_mut()[to] = state.qvel[from];
+                        data.qacc_warmstart_mut()[to] = state.warmstart[from];
+                    }
+                    parts.write(&part_state, data);
+                    data.set_time(time);
+                });
+                env.set_welds(held);
+                if wrenches != Wrenches::default() {
+                    env.set_wrenches(|mine| *mine = wrenches);
+                }
+                env.take_history(&history);
+            });
+        }
+    }
+}
+
+/// What parts that were MJCF files, and objects that are moved by hand, have beside joints, from an old simulation to a new one: pairs of places.
+struct PartTransfer {
+    controls: Vec<(usize, usize)>,
+    activations: Vec<(usize, usize)>,
+    mocaps: Vec<(usize, usize)>,
+}
+
+/// The values of a [`PartTransfer`] in one environment.
+struct PartState {
+    controls: Vec<f64>,
+    activations: Vec<f64>,
+    mocaps: Vec<([f64; 3], [f64; 4])>,
+}
+
+impl PartTransfer {
+    fn new(old: &Simulation, new: &Simulation) -> Self {
+        let pairs = |of: fn(&PartIndex) -> &Vec<usize>| {
+            let parts = old.parts.iter().zip(&new.parts);
+            parts.flat_map(|(old, new)| of(old).iter().copied().zip(of(new).iter().copied())).collect::<Vec<_>>()
+        };
+        let number = |model: &mj::Model, body: usize| usize::try_from(model.body_mocapid()[body]).unwrap_or(0);
+        let objects = old.objects.iter().zip(&new.objects).filter_map(|(old, new)| old.mocap.zip(new.mocap));
+        let mocaps = pairs(|part| &part.mocaps).into_iter();
+        Self {
+            controls: pairs(|part| &part.controls),
+            activations: pairs(|part| &part.activations),
+            mocaps: mocaps
+                .map(|(from, to)| (number(old.batch.model(), from), number(new.batch.model(), to)))
+                .chain(objects)
+                .collect(),
+        }
+    }
+
+    fn read(&self, data: &mj::Data) -> PartState {
+        let mocap = |k: usize| (data.mocap_pos().as_chunks::<3>().0[k], data.mocap_quat().as_chunks::<4>().0[k]);
+        PartState {
+            controls: self.controls.iter().map(|&(from, _)| data.ctrl()[from]).collect(),
+            activations: self.activations.iter().map(|&(from, _)| data.act()[from]).collect(),
+            mocaps: self.mocaps.iter().map(|&(from, _)| mocap(from)).collect(),
+        }
+    }
+
+    fn write(&self, state: &PartState, data: &mut mj::Data) {
+        for (&(_, to), value) in self.controls.iter().zip(&state.controls) {
+            data.ctrl_mut()[to] = *value;
+        }
+        for (&(_, to), value) in self.activations.iter().zip(&state.activations) {
+            data.act_mut()[to] = *value;
+        }
+        for (&(_, to), (position, quaternion)) in self.mocaps.iter().zip(&state.mocaps) {
+            data.mocap_pos_mut().as_chunks_mut::<3>().0[to] = *position;
+            data.mocap_quat_mut().as_chunks_mut::<4>().0[to] = *quaternion;
+        }
+    }
+}
