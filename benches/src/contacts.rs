@@ -3,7 +3,7 @@
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::row::Row;
-use crate::{Outcome, Settings};
+use crate::settings::{Outcome, Settings};
 use kinetoscope::prelude::*;
 use std::time::{Duration, Instant};
 

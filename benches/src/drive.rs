@@ -5,7 +5,7 @@
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{State, drive_sr5, sr5};
 use crate::row::Row;
-use crate::{Outcome, Settings};
+use crate::settings::{Outcome, Settings};
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::batch::Batch;

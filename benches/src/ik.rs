@@ -5,7 +5,7 @@
 
 use crate::interleave::{Plan, Side, measure, median};
 use crate::row::Row;
-use crate::{Outcome, Settings};
+use crate::settings::{Outcome, Settings};
 use kinetoscope::mujoco::{Data, ObjectKind};
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;

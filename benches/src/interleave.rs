@@ -8,7 +8,8 @@
 //! times as fast as the other, whichever it was (it gets the larger pages). Comparisons of many environments are
 //! therefore done [in both orders](in_both_orders).
 
-use crate::{Outcome, foreign};
+use crate::foreign;
+use crate::settings::Outcome;
 use kinetoscope::mujoco::release_freed;
 use std::time::{Duration, Instant};
 

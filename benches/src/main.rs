@@ -16,6 +16,7 @@ mod rays;
 mod record;
 mod rival;
 mod row;
+mod settings;
 mod startup;
 mod step;
 mod trace;
@@ -23,6 +24,7 @@ mod view;
 
 use clap::Parser;
 use row::Row;
+use settings::{Outcome, Settings};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -43,15 +45,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("memory", memory::run),
 ];
 
-type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 type Bench = fn(&Settings) -> Outcome<Vec<Row>>;
-
-/// How long to measure.
-#[derive(Clone, Copy, Debug)]
-struct Settings {
-    /// Time for one comparison \[s\], setting up not counted.
-    seconds: f64,
-}
 
 /// Ours and the rivals in one run.
 #[derive(Debug, Parser)]

@@ -3,7 +3,7 @@
 
 use crate::models::{Case, drive_sr5, sr5};
 use crate::row::Row;
-use crate::{Outcome, Settings};
+use crate::settings::{Outcome, Settings};
 use kinetoscope::mujoco::Data;
 use std::process::Command;
 

@@ -1,6 +1,6 @@
 //! What is stepped: Debian's humanoid and the bundled arm with its hand, from many different states.
 
-use crate::Outcome;
+use crate::settings::Outcome;
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{Data, Model};

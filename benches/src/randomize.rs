@@ -6,7 +6,7 @@
 use crate::interleave::{Plan, Side, measure};
 use crate::models::sr5;
 use crate::row::Row;
-use crate::{Outcome, Settings};
+use crate::settings::{Outcome, Settings};
 use kinetoscope::mujoco::{Editor, Model};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;

@@ -12,7 +12,7 @@
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::row::Row;
-use crate::{Outcome, Settings};
+use crate::settings::{Outcome, Settings};
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{Data, TARGET, Target};
 use kinetoscope::ndarray::{Array2, Array3, Axis};

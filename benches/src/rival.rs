@@ -1,6 +1,6 @@
 //! A rival in Python: a process that is told what to do over pipes (see `rivals/*.py`), one line each way.
 
-use crate::Outcome;
+use crate::settings::Outcome;
 use kinetoscope::mujoco::{TARGET, Target};
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Write};

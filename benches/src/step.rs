@@ -6,7 +6,7 @@
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{Case, Loop, STEPS};
 use crate::row::Row;
-use crate::{Outcome, Settings};
+use crate::settings::{Outcome, Settings};
 use kinetoscope::mujoco::Data;
 use kinetoscope::sim::batch::Batch;
 use std::time::{Duration, Instant};

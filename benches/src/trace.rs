@@ -8,7 +8,7 @@
 use crate::camera::{Scene, by_rays};
 use crate::interleave::{Plan, Side, Times, measure};
 use crate::row::Row;
-use crate::{Outcome, Settings};
+use crate::settings::{Outcome, Settings};
 use kinetoscope::mujoco::release_freed;
 use kinetoscope::prelude::*;
 use kinetoscope::render::visibility::View;

@@ -7,8 +7,8 @@
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{arm_with_hand, drive_sr5};
 use crate::row::Row;
+use crate::settings::{Outcome, Settings};
 use crate::startup::robots;
-use crate::{Outcome, Settings};
 use kinetoscope::prelude::*;
 use kinetoscope::viewer::Wants;
 use std::io::{BufRead as _, BufReader};

@@ -1,8 +1,9 @@
 //! `kinetoscope bench`: how fast a model runs and is drawn on this machine.
 
+use crate::ending::{Ending, Result};
 use crate::model::{Model, ModelArgs, Setup, SpawnArgs};
+use crate::progress;
 use crate::render::{Look, rate};
-use crate::{Ending, Result, progress};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::env::EnvStatus;
 use std::time::Instant;

@@ -1,8 +1,8 @@
 //! `kinetoscope check`: what is in a robot's files, and everything odd in them.
 
+use crate::ending::{Ending, Result};
 use crate::model::{Files, ModelArgs, Setup, is_scene};
 use crate::scene_report::{MjcfReport, SceneReport};
-use crate::{Ending, Result};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::inspect::{InspectCfg, InspectError, inspect};
 use std::io::Write;

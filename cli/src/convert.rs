@@ -1,7 +1,8 @@
 //! `kinetoscope convert`: a robot as MJCF, for both lines of MuJoCo, with its meshes.
 
+use crate::ending::{Ending, Result};
+use crate::excerpt;
 use crate::model::{ModelArgs, Setup};
-use crate::{Ending, Result, excerpt};
 use std::path::{Path, PathBuf};
 
 /// The robot as MJCF that plain MuJoCo loads, one file for 2.2.2 and one for 4.x, with meshes and textures beside them

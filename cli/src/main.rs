@@ -3,6 +3,7 @@
 mod bench;
 mod check;
 mod convert;
+mod ending;
 mod excerpt;
 mod file_kind;
 mod interrupt;
@@ -18,6 +19,7 @@ mod scene_report;
 mod view;
 
 use clap::{Parser, Subcommand};
+use ending::{Ending, Result};
 use std::process::ExitCode;
 
 /// Robots from URDF and MJCF: what is in the files, how they look, how fast they run. No GPU, no OpenGL.
@@ -57,17 +59,6 @@ enum Command {
     Replay(replay::Args),
     Recover(recover::Args),
 }
-
-/// How a command ended that did its work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Ending {
-    Done,
-    /// Something of the input was repaired, ignored or missing.
-    Warned,
-}
-
-/// Errors are sentences for the user; those about a file begin with its name and line.
-type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> ExitCode {
     let args = match Args::try_parse() {

@@ -1,7 +1,8 @@
 //! Models that commands take: URDF files, an MJCF file, or a scene file.
 
+use crate::ending::Result;
+use crate::excerpt;
 use crate::file_kind::FileKind;
-use crate::{Result, excerpt};
 use kinetoscope::assets;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::mjcf::robot_file::RobotFileError;

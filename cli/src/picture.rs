@@ -1,6 +1,6 @@
 //! A channel of a picture as a PNG.
 
-use crate::Result;
+use crate::ending::Result;
 use image::{Rgb, RgbImage};
 use kinetoscope::sensors::camera::Frame;
 use kinetoscope::sensors::camera::colormap::{depth_color, mask_color, normal_color};

@@ -1,7 +1,7 @@
 //! `kinetoscope plot`: numbers of a recording over time, as a picture.
 
+use crate::ending::{Ending, Result};
 use crate::names::{fits, grouped};
-use crate::{Ending, Result};
 use kinetoscope::record::{RecordedTopic, Recording, Wanted};
 use kinetoscope::viewer::plot::{Plot, Series};
 use std::io::Write;

@@ -1,6 +1,6 @@
 //! `kinetoscope recover`: a whole file of what a killed recording has left.
 
-use crate::{Ending, Result};
+use crate::ending::{Ending, Result};
 use kinetoscope::record::recover_to;
 use std::path::PathBuf;
 

@@ -1,8 +1,9 @@
 //! `kinetoscope render`: a picture of a model at its initial state.
 
+use crate::ending::{Ending, Result};
 use crate::model::{Files, ModelArgs, Setup};
 use crate::picture::{self, Channel};
-use crate::{Ending, Result, progress};
+use crate::progress;
 use clap::ValueEnum;
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;

@@ -1,6 +1,7 @@
 //! `kinetoscope replay`: a recording shown again, drawn, or run again.
 
-use crate::{Ending, Result, excerpt, interrupt};
+use crate::ending::{Ending, Result};
+use crate::{excerpt, interrupt};
 use kinetoscope::RecordedFilm;
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Film, Recording, replay};

@@ -1,6 +1,6 @@
 //! Reports of `check` about scenes: MJCF files that are no robot, and scene files.
 
-use crate::Result;
+use crate::ending::Result;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};

@@ -1,7 +1,8 @@
 //! `kinetoscope view`: a model as it moves, in a window or in a browser.
 
+use crate::ending::{Ending, Result};
+use crate::interrupt;
 use crate::model::{ModelArgs, Setup, SpawnArgs};
-use crate::{Ending, Result, interrupt};
 use kinetoscope::prelude::*;
 use kinetoscope::viewer::{Closed, Command, Speed, Viewer, Wants};
 use std::path::PathBuf;

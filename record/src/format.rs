@@ -1,6 +1,6 @@
 //! The formats, and which one a name means.
 
-use crate::episodes;
+use crate::episodes::holds;
 use crate::error::{RecordError, Result};
 use crate::stream::{Kind, Stream};
 use std::path::Path;
@@ -47,7 +47,7 @@ const ALL: [Known; 9] = [
     Known { format: Format::Mcap, end: "mcap", name: "an MCAP file", holds: |_| true },
     Known { format: Format::Npz, end: "npz", name: "a NumPy archive", holds: |_| true },
     Known { format: Format::Pictures, end: "", name: "a folder of pictures", holds: is_seen },
-    Known { format: Format::LeRobot, end: "lerobot", name: "a LeRobot dataset", holds: episodes::holds },
+    Known { format: Format::LeRobot, end: "lerobot", name: "a LeRobot dataset", holds },
     Known { format: Format::Hdf5, end: "hdf5", name: "an HDF5 file (robomimic)", holds: is_of_robomimic },
     Known { format: Format::Apng, end: "apng", name: "an animated PNG", holds: is_color },
     Known { format: Format::Gif, end: "gif", name: "an animated GIF", holds: is_color },
@@ -56,7 +56,7 @@ const ALL: [Known; 9] = [
 ];
 
 fn is_of_robomimic(stream: &Stream) -> bool {
-    stream.kind == Kind::EngineState || episodes::holds(stream)
+    stream.kind == Kind::EngineState || holds(stream)
 }
 
 fn is_color(stream: &Stream) -> bool {

@@ -3,7 +3,8 @@
 use crate::batch::Batch;
 use crate::capture::Plan;
 use crate::contents::{Contents, GROUND_MASK_ID};
-use crate::drive::table::{Drive, DriveTable, Gains, Realization};
+use crate::drive::gains::Gains;
+use crate::drive::table::{Drive, DriveTable, Realization};
 use crate::drive::{DriveModel, implicit};
 use crate::env::{Env, with_small_buffers};
 use crate::error::{Error, Result};

@@ -7,7 +7,7 @@ use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, no_findings};
 use crate::setup::{self, Line, Need, Ready, Wanted};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
-use crate::{arrows, docs_check, examples, mutate, own_time, source_check, wheel};
+use crate::{arrows, circles, docs_check, examples, mutate, own_time, source_check, wheel};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -63,6 +63,7 @@ const STAGES: &[Stage] = &[
     Stage { name: "setup", what: "what the machine lacks", when: When::Always, run: install },
     Stage { name: "fmt", what: "formatting", when: When::Always, run: fmt },
     Stage { name: "arrows", what: "rooms and their arrows", when: When::Always, run: |c| arrows::run(c.repo) },
+    Stage { name: "circles", what: "circles of files", when: When::Always, run: |c| circles::run(c.repo) },
     Stage { name: "rules", what: "rules of the tree", when: When::Always, run: rules },
     Stage {
         name: "docs",
@@ -284,7 +285,7 @@ mod tests {
 
     #[test]
     fn quick_run() {
-        assert_eq!(names(true, None), ["setup", "fmt", "arrows", "rules", "docs", "clippy", "unit"]);
+        assert_eq!(names(true, None), ["setup", "fmt", "arrows", "circles", "rules", "docs", "clippy", "unit"]);
     }
 
     #[test]

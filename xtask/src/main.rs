@@ -9,6 +9,7 @@ mod arrows;
 mod bench;
 mod bless;
 mod ci;
+mod circles;
 mod demo;
 mod docs_check;
 mod examples;

@@ -67,7 +67,7 @@ pub(crate) fn files_below(root: &Path) -> Vec<String> {
     found
 }
 
-fn text_files(root: &Path) -> Vec<TextFile> {
+pub(crate) fn text_files(root: &Path) -> Vec<TextFile> {
     files_below(root)
         .into_iter()
         .filter(|path| path != ".git")

@@ -4,7 +4,7 @@ use super::scene::Scene;
 use super::sides::{Look, Renderer, Work};
 use super::{Contest, Rivals, VGA};
 use crate::row::Row;
-use crate::{Outcome, Settings};
+use crate::settings::{Outcome, Settings};
 use kinetoscope::sensors::camera::Renderer as OurRenderer;
 
 /// Pictures in a step.

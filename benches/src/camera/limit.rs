@@ -1,7 +1,7 @@
 //! What this machine can do at most: loops that only copy, and loops that only compute.
 
-use crate::Outcome;
 use crate::interleave::Side;
+use crate::settings::Outcome;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 

@@ -22,7 +22,7 @@ pub(crate) use scene::Scene;
 use crate::interleave::{Plan, Side, Times, measure};
 use crate::rival::{can_run, python};
 use crate::row::Row;
-use crate::{Outcome, Settings};
+use crate::settings::{Outcome, Settings};
 use kinetoscope::sensors::camera::Renderer as OurRenderer;
 use limit::{Compute, Copying};
 use scene::Scenes;

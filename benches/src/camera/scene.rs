@@ -1,8 +1,8 @@
 //! What is drawn: MuJoCo's humanoid, the vendor's arm with its 160 000 triangles, and the bundled arm, each as an MJCF file
 //! that ours and the rivals compile.
 
-use crate::Outcome;
 use crate::models::{Case, HUMANOID, arm_with_hand, sr5};
+use crate::settings::Outcome;
 use crate::startup::robots;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{Data, Model, TARGET, Target};

@@ -1,9 +1,9 @@
 //! Those that draw: our rasterizer in this process, rivals in others.
 
 use super::scene::{GROUPS, Scene};
-use crate::Outcome;
 use crate::interleave::Side;
 use crate::rival::Process;
+use crate::settings::Outcome;
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::render::visibility::View;
 use kinetoscope::scene::{Light, PoseF32};

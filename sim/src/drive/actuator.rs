@@ -2,8 +2,9 @@
 //!
 //! Explicit: stable only while the time step is small against the joint's inertia, see [`stable_timestep`].
 
+use super::gains::{Gains, Target};
 use super::plan::{JointPlan, mass_matrix_at_start};
-use super::table::{Drive, Gains, Target};
+use super::table::Drive;
 use kinetoscope_mujoco as mj;
 use kinetoscope_robot::description::RobotDescription;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};

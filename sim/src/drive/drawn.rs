@@ -2,7 +2,8 @@
 //! they stand in for, and an environment that goes on from a snapshot keeps its own.
 
 use super::DriveType;
-use super::table::{DriveState, Gains, Setting};
+use super::gains::{Gains, Setting};
+use super::table::DriveState;
 
 /// A gain that was drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]

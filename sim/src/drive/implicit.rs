@@ -16,7 +16,9 @@
 //! armature raised by `h B` (`mjcf::robot`) and `-B v` applied, `(M + h B) a = tau - B v`, the same implicit damping
 //! inside the solve.
 
-use super::table::{Drive, DriveTable, Gains, Target};
+use super::gains::{Gains, Target};
+
+use super::table::{Drive, DriveTable};
 use kinetoscope_mujoco as mj;
 
 /// A limit that is never reached, for drives without one: MuJoCo's row needs a finite number.

@@ -19,6 +19,7 @@ mod mode;
 mod none;
 
 pub mod actuator;
+pub mod gains;
 pub mod implicit;
 pub mod models;
 pub mod plan;

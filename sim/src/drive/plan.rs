@@ -2,8 +2,8 @@
 //! configuration. The stage between `RobotDescription` and MJCF.
 
 use super::cfg::{DEFAULT_DAMPING, DEFAULT_STIFFNESS, DriveCfg, DriveCfgError, JointGains, resolve};
+use super::gains::{Gains, Setting};
 use super::models::ActuatorModel;
-use super::table::{Gains, Setting};
 use super::{ActuatorSpec, DriveType};
 use crate::pattern::{self, PatternError};
 use kinetoscope_robot::description::{Curve, FileDrive, Joint, JointId, JointKind, RobotDescription};

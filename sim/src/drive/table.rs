@@ -1,6 +1,7 @@
 //! The drives of a compiled model: which joint, which row or actuator; and their targets in one environment.
 
 use super::drawn::DrawnGains;
+use super::gains::{Gains, Setting, Target};
 use super::models::{ActuatorLaw, ActuatorModel, JointMotion};
 use super::{ActuatorSpec, DriveType, JointInfo, actuator, implicit};
 use kinetoscope_mujoco as mj;
@@ -38,40 +39,6 @@ pub struct Drive {
     pub setting: Setting,
     /// Positions a target may have \[rad or m\].
     pub range: [f64; 2],
-}
-
-/// What a user asks of one drive, in the user's units; the law takes [`Gains`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setting {
-    /// What stiffness and damping mean.
-    pub drive_type: DriveType,
-    /// Stiffness, in the unit of the drive type.
-    pub stiffness: f64,
-    /// Damping, in the unit of the drive type.
-    pub damping: f64,
-    /// Inertia that the joint feels at the initial pose \[kg m² or kg\], once a drive type asked for it.
-    pub inertia: Option<f64>,
-}
-
-impl Setting {
-    /// Gains in torque units; `None` where the joint is to be passive.
-    pub fn actuator(&self) -> Option<ActuatorSpec> {
-        let info = JointInfo { effective_inertia: self.inertia.unwrap_or(f64::NAN) };
-        self.drive_type.mode().actuator(self.stiffness, self.damping, &info)
-    }
-}
-
-/// Gains and limits of one drive.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gains {
-    /// Proportional gain \[N m/rad or N/m\].
-    pub kp: f64,
-    /// Derivative gain \[N m s/rad or N s/m\].
-    pub kd: f64,
-    /// Largest effort \[N m or N\]; infinite where there is no limit.
-    pub max_effort: f64,
-    /// Largest speed \[rad/s or m/s\]; infinite where there is no limit. Reported; it bounds nothing by itself.
-    pub max_velocity: f64,
 }
 
 /// All drives of a model, and the joints whose damping is integrated with them. Shared by all environments.
@@ -438,17 +405,6 @@ pub(crate) fn numbers_fault(numbers: &[f64], drives: usize) -> Option<&'static s
         }
     }
     rest.iter().any(|x| !x.is_finite()).then_some("a target, an effort or an applied force is not finite")
-}
-
-/// What one drive is asked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Target {
-    /// Position target \[rad or m\].
-    pub position: f64,
-    /// Velocity target \[rad/s or m/s\].
-    pub velocity: f64,
-    /// Feed-forward effort \[N m or N\].
-    pub feedforward: f64,
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Robots as they were added: configuration, description, drives.
 
+use crate::drive::gains::Gains;
 use crate::drive::plan::{JointPlan, plan};
-use crate::drive::table::Gains;
 use crate::drive::{ActuatorSpec, DriveModel};
 use crate::error::{Error, Result};
 use crate::mjcf::document::Integrator;

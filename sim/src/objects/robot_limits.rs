@@ -1,6 +1,8 @@
 //! Limits of a robot's joints: positions, speeds and efforts, per joint and per environment.
 
-use crate::drive::table::{DriveState, Gains};
+use crate::drive::gains::Gains;
+
+use crate::drive::table::DriveState;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::objects::robot::{JointRows, Robot, RobotMut};

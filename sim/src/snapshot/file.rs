@@ -262,7 +262,8 @@ fn read_weld(reader: &mut Reader<'_>) -> Result<Weld, Malformed> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::table::{Drive, DriveTable, Gains, Realization, Setting};
+    use crate::drive::gains::{Gains, Setting};
+    use crate::drive::table::{Drive, DriveTable, Realization};
     use crate::drive::{DelayedPd, DriveType};
     use crate::env::Env;
 

@@ -1,7 +1,7 @@
 //! Actuator model `dc_motor`: the effort of a motor falls with its speed.
 
 use super::{ActuatorLaw, JointMotion, proportional_derivative};
-use crate::drive::table::{Gains, Target};
+use crate::drive::gains::{Gains, Target};
 use serde::{Deserialize, Serialize};
 
 /// A direct-current motor with its gear, as Isaac Lab 2 has it: in all four quadrants of speed and effort the effort of

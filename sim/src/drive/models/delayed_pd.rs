@@ -1,7 +1,7 @@
 //! Actuator model `delayed_pd`: the law of `ideal_pd` with targets of some steps ago.
 
 use super::{ActuatorLaw, JointMotion, proportional_derivative};
-use crate::drive::table::{Gains, Target};
+use crate::drive::gains::{Gains, Target};
 use serde::{Deserialize, Serialize};
 
 /// A controller that hears of its targets some steps later: [`IdealPd`](super::IdealPd) with the position, velocity and

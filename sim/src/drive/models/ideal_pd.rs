@@ -1,7 +1,7 @@
 //! Actuator model `ideal_pd`: tau = clamp(kp (q* - q) + kd (v* - v) + tau_ff, ±max_effort).
 
 use super::{ActuatorLaw, JointMotion, proportional_derivative};
-use crate::drive::table::{Gains, Target};
+use crate::drive::gains::{Gains, Target};
 use serde::{Deserialize, Serialize};
 
 /// A controller that gives what its law asks for, up to the effort limit:

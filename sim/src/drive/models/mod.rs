@@ -17,7 +17,7 @@ pub use dc_motor::DcMotor;
 pub use delayed_pd::DelayedPd;
 pub use ideal_pd::IdealPd;
 
-use super::table::{Gains, Target};
+use super::gains::{Gains, Target};
 use serde::{Deserialize, Serialize};
 
 /// What an actuator model sees of its joint, at the start of the step.

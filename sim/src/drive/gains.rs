@@ -1,0 +1,46 @@
+//! Gains, settings and targets of drives.
+
+/// What a user asks of one drive, in the user's units; the law takes [`Gains`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// What stiffness and damping mean.
+    pub drive_type: DriveType,
+    /// Stiffness, in the unit of the drive type.
+    pub stiffness: f64,
+    /// Damping, in the unit of the drive type.
+    pub damping: f64,
+    /// Inertia that the joint feels at the initial pose \[kg m² or kg\], once a drive type asked for it.
+    pub inertia: Option<f64>,
+}
+
+impl Setting {
+    /// Gains in torque units; `None` where the joint is to be passive.
+    pub fn actuator(&self) -> Option<ActuatorSpec> {
+        let info = JointInfo { effective_inertia: self.inertia.unwrap_or(f64::NAN) };
+        self.drive_type.mode().actuator(self.stiffness, self.damping, &info)
+    }
+}
+
+/// Gains and limits of one drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// Proportional gain \[N m/rad or N/m\].
+    pub kp: f64,
+    /// Derivative gain \[N m s/rad or N s/m\].
+    pub kd: f64,
+    /// Largest effort \[N m or N\]; infinite where there is no limit.
+    pub max_effort: f64,
+    /// Largest speed \[rad/s or m/s\]; infinite where there is no limit. Reported; it bounds nothing by itself.
+    pub max_velocity: f64,
+}
+
+/// What one drive is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    /// Position target \[rad or m\].
+    pub position: f64,
+    /// Velocity target \[rad/s or m/s\].
+    pub velocity: f64,
+    /// Feed-forward effort \[N m or N\].
+    pub feedforward: f64,
+}
