@@ -19,7 +19,7 @@ mod scene_report;
 mod view;
 
 use clap::{Parser, Subcommand};
-use ending::{Ending, Result};
+use ending::Ending;
 use std::process::ExitCode;
 
 /// Robots from URDF and MJCF: what is in the files, how they look, how fast they run. No GPU, no OpenGL.

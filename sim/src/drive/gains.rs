@@ -1,5 +1,7 @@
 //! Gains, settings and targets of drives.
 
+use super::{ActuatorSpec, DriveType, JointInfo};
+
 /// What a user asks of one drive, in the user's units; the law takes [`Gains`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {

@@ -3,7 +3,7 @@
 use super::drawn::DrawnGains;
 use super::gains::{Gains, Setting, Target};
 use super::models::{ActuatorLaw, ActuatorModel, JointMotion};
-use super::{ActuatorSpec, DriveType, JointInfo, actuator, implicit};
+use super::{DriveType, actuator, implicit};
 use kinetoscope_mujoco as mj;
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::Arc;
