@@ -5,9 +5,9 @@
 //!
 //! | file | content |
 //! |---|---|
-//! | `thread_pool.rs` | [`ThreadPool`]: what callers use |
+//! | `thread_pool.rs` | [`ThreadPool`]: the interface |
 //! | `workers.rs` | the threads, and the one place of unsafe code in this crate |
-//! | `patience.rs` | how long an idle worker spins before it sleeps |
+//! | `patience.rs` | time for which an idle worker spins before it sleeps |
 //!
 //! ```
 //! use kinetoscope_exec::ThreadPool;

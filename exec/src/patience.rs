@@ -1,4 +1,4 @@
-//! How long an idle worker spins before it sleeps.
+//! Time for which an idle worker spins before it sleeps.
 
 /// Number of times an idle worker polls for a job before it sleeps.
 ///

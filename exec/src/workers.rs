@@ -39,13 +39,13 @@ struct Shared {
 /// The current job. It belongs to one caller from `post` until its `finish` has returned.
 #[derive(Default)]
 struct JobState {
-    /// Whether a job is in flight.
+    /// True while a job is in flight.
     taken: bool,
     work: Option<Lent>,
     /// The next slot to take, and the number of slots.
     slot: usize,
     slots: usize,
-    /// Workers that sleep, and whether the caller does.
+    /// Number of workers that sleep; true if the caller sleeps.
     sleeping: usize,
     caller_sleeps: bool,
     panicked: bool,

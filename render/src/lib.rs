@@ -3,12 +3,12 @@
 //!
 //! ```text
 //! Shot (scene, poses, view) -> shade::plan -> raster | trace -> shade::group -> frame
-//!       rasterizer             what to draw    what is seen     light            channels
+//!       request                preparation     visibility       light            channels
 //! ```
 //!
 //! | module | content |
 //! |---|---|
-//! | [`rasterizer`], [`parallel`] | one frame, and many on several threads: what callers use |
+//! | [`rasterizer`], [`parallel`] | one frame, and many on several threads |
 //! | [`request`] | the scene, the view and the settings of a frame |
 //! | [`frame`] | channels (colour, depth, ...), one file each, and their images |
 //! | [`renderer`], [`aperture`], [`shutter`], [`progress`] | settings of a frame |

@@ -1,4 +1,4 @@
-//! What is asked of a renderer: the scene, the poses, the view, and how frames are drawn.
+//! The request of a frame: scene, poses, view, and the settings of drawing.
 
 use crate::lens::LensRays;
 use crate::shade::tone::ToneCurve;
