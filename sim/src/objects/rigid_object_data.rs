@@ -55,7 +55,7 @@ pub struct RigidObjectCfg {
     /// filled evenly, where `None`.
     pub inertia: Option<[f64; 3]>,
     /// Force against the velocity of the object's frame \[N s/m\]: `-linear_damping v`. Of single environments, and later:
-    /// [`RigidObjectMut::set_damping`], or the [property](crate::Property).
+    /// [`RigidObjectMut::set_damping`](crate::objects::rigid_object::RigidObjectMut::set_damping), or the [property](crate::Property).
     pub linear_damping: f64,
     /// Torque against its angular velocity \[N m s/rad\]: `-angular_damping w`.
     pub angular_damping: f64,
