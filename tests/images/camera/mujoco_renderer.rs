@@ -33,7 +33,9 @@ fn theirs(model: &Path, folder: &Path) -> Images {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/images/camera/mujoco_renderer.py");
     let [width, height] = SIZE.map(|n| n.to_string());
     let mut command = Command::new(python_renderer());
-    let status = command.arg(script).arg(model).args(["judge", &width, &height]).arg(folder).status();
+    command.arg(script).arg(model).args(["judge", &width, &height]).arg(folder);
+    // Its MuJoCo writes a log of warnings to the folder that it runs in.
+    let status = command.current_dir(folder).status();
     assert!(status.unwrap().success(), "MuJoCo's renderer did not draw");
     let bytes = |name: &str| std::fs::read(folder.join(name)).unwrap();
     Images {
