@@ -1,6 +1,6 @@
 //! The time of a measurement, and its result.
 
-/// Rows, or the reason why there are none.
+/// Rows, or the reason why a benchmark has no result.
 pub(crate) type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 /// How long to measure.

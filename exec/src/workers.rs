@@ -58,8 +58,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Workers {
-    /// Runs a job: see [`ThreadPool::run`](crate::ThreadPool::run). Where the workers are busy with another job, or there
-    /// are none, the calling thread works alone.
+    /// Runs a job: see [`ThreadPool::run`](crate::ThreadPool::run). Where the workers are busy with another job, or the
+    /// pool has no worker, the calling thread works alone.
     pub(crate) fn run(&self, slots: usize, work: &(dyn Fn(usize) + Sync)) {
         if !self.post(slots, work) {
             return work(0);

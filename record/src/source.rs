@@ -517,7 +517,7 @@ impl Stamps {
     }
 }
 
-/// Whether a sensor measures a channel at [`kinetoscope_scene::SceneState::force_time`], as its documentation says.
+/// True if a sensor measures a channel at [`kinetoscope_scene::SceneState::force_time`], as its documentation says.
 fn of_forces(sensor: &dyn Any, channel: &str) -> bool {
     if let Some(engine) = sensor.downcast_ref::<MujocoSensor>() {
         // All values are one channel: of both kinds, positions have the word.

@@ -11,7 +11,7 @@ pub enum OpticsError {
         what: &'static str,
         /// The number.
         value: f64,
-        /// What is possible.
+        /// Accepted values.
         allowed: &'static str,
     },
     /// The mapping of a lens folds back on itself, or has a pole, before where the lens is to see: there are two directions for a
@@ -30,7 +30,7 @@ pub enum OpticsError {
         angle: f64,
         /// How far from the principal point that is, in the normalised picture (times fx: in pixels).
         radius: f64,
-        /// What needs more.
+        /// The part of the image that needs more.
         wanted: String,
     },
     /// Nothing at all is seen through a lens.
@@ -47,7 +47,7 @@ pub enum OpticsError {
     LensMemory {
         /// How many different intrinsics there are.
         tables: usize,
-        /// What they need \[bytes\].
+        /// Memory that they need \[bytes\].
         bytes: usize,
         /// The most that is allowed.
         limit: usize,

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct RasterCfg {
     /// Samples per pixel for the colour: 1 or 4. All other channels see the pixel's centre.
     pub samples: u8,
-    /// Whether lamps cast shadows (directional lamps and spots, the first four of them).
+    /// True if lamps cast shadows (directional lamps and spots, the first four of them).
     pub shadows: bool,
     /// True if planar mirrors (material `reflectance` of planes and of the +z face of boxes) show what is before them: one ray
     /// from each sample that shows a mirror, and the light where it ends. Path tracing mirrors always.
@@ -65,12 +65,12 @@ impl Default for RasterCfg {
     }
 }
 
-/// Everything in a picture.
+/// The request of one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Shot<'a> {
     /// What can be seen.
     pub scene: &'a RenderScene,
-    /// Where each instance is: world from instance.
+    /// Pose of each instance: world from instance.
     pub poses: &'a [PoseF32],
     /// The camera.
     pub view: &'a View,
@@ -78,14 +78,14 @@ pub struct Shot<'a> {
     pub lights: Option<&'a [Light]>,
     /// The rays of a lens, instead of the view's focal lengths and principal point; `None` is a pinhole.
     pub lens: Option<&'a LensRays>,
-    /// What the picture before showed, for [`Flow`](crate::frame::Flow); nothing else looks at it.
+    /// The previous frame, for [`Flow`](crate::frame::Flow) only.
     pub before: Option<Before<'a>>,
 }
 
-/// What the picture before showed.
+/// The previous frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Before<'a> {
-    /// Where each instance was: world from instance.
+    /// Pose of each instance then: world from instance.
     pub poses: &'a [PoseF32],
     /// The camera. Behind a lens, its focal lengths and principal point tell the intrinsics from those of
     /// [`Shot::view`]: where both are the same, the lens had the same ones.

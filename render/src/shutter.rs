@@ -36,7 +36,7 @@ pub struct Take<'a> {
 /// Where things were when the shutter opened.
 #[derive(Clone, Copy, Debug)]
 pub struct Opened<'a> {
-    /// Where each instance was: world from instance.
+    /// Pose of each instance then: world from instance.
     pub poses: &'a [PoseF32],
     /// Where the camera was.
     pub world_from_camera: PoseF32,

@@ -4,7 +4,7 @@ use kinetoscope_scene::SceneState;
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
 
-/// What a sensor needs of a [`SceneState`]: a set of fields.
+/// The fields of a [`SceneState`] that a sensor needs.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Requires(u16);
 
@@ -56,7 +56,7 @@ impl Requires {
         (Self::MARKERS, "markers"),
     ];
 
-    /// Whether all of `other` is in this set.
+    /// True if all of `other` is in this set.
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
@@ -92,7 +92,7 @@ impl Requires {
         }
     }
 
-    /// What is in both sets.
+    /// The fields of both sets.
     pub const fn intersection(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
@@ -107,12 +107,12 @@ impl Requires {
         Self(self.0 & !other.0)
     }
 
-    /// Whether the set has nothing in it.
+    /// True if the set is empty.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// What `state` has.
+    /// The fields that `state` has.
     pub fn present_in(state: &SceneState) -> Self {
         let has = |present: bool, field: Self| if present { field } else { Self::NONE };
         has(state.body_poses.is_some(), Self::POSES)

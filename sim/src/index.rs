@@ -1,9 +1,9 @@
-//! Where entities are in MuJoCo's arrays.
+//! Places of entities in MuJoCo's arrays.
 
 use kinetoscope_mujoco as mj;
 use kinetoscope_scene::Pose;
 
-/// Where one robot's numbers are in MuJoCo's arrays.
+/// Places of one robot in MuJoCo's arrays.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotIndex {
     /// Position and velocity address of each drivable joint.
@@ -19,7 +19,7 @@ pub(crate) struct RobotIndex {
 /// A geom of a robot.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GeomIndex {
-    /// Where it is in MuJoCo's arrays.
+    /// Its index in MuJoCo's arrays.
     pub geom: usize,
     /// The link it belongs to.
     pub link: usize,
@@ -27,7 +27,7 @@ pub(crate) struct GeomIndex {
     pub visual: Option<usize>,
 }
 
-/// Where the numbers of a body that may be free are in MuJoCo's arrays.
+/// Places of a body that may be free in MuJoCo's arrays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FreeIndex {
     pub body: usize,
@@ -38,13 +38,13 @@ pub(crate) struct FreeIndex {
 }
 
 impl FreeIndex {
-    /// Whether it neither moves nor is moved by hand.
+    /// True if it neither moves nor is kinematic.
     pub(crate) fn stands(&self) -> bool {
         self.joint.is_none() && self.mocap.is_none()
     }
 }
 
-/// Where one joint's numbers are.
+/// Places of one joint.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointIndexing {
     pub qpos: usize,
@@ -53,7 +53,7 @@ pub(crate) struct JointIndexing {
     pub drive: Option<usize>,
 }
 
-/// Where the numbers of a part that was an MJCF file are in MuJoCo's arrays.
+/// Places of an MJCF part in MuJoCo's arrays.
 #[derive(Clone, Debug)]
 pub(crate) struct PartIndex {
     /// Each of the file's bodies; the first is the one that what stands in the file's world belongs to.

@@ -25,7 +25,7 @@ pub(crate) struct Simulation {
     pub(crate) parts: Vec<PartIndex>,
     pub(crate) welds: Vec<WeldIndex>,
     pub(crate) identities: Identities,
-    /// Where sensors find bodies and contacts.
+    /// Bodies and contacts as sensors see them.
     pub(crate) plan: Arc<Plan>,
     /// What cameras draw; made when the first sensor asks for it.
     pub(crate) visible: Option<Arc<Visible>>,
@@ -34,15 +34,15 @@ pub(crate) struct Simulation {
     pub(crate) start: Arc<Start>,
     /// Which numbers a state has.
     pub(crate) layout: Arc<Layout>,
-    /// Where properties are that environments may have for themselves.
+    /// Places of properties that differ per environment.
     pub(crate) tables: OnceLock<Arc<Tables>>,
     /// Makes models with such properties; made when the first is drawn.
     pub(crate) maker: Option<Maker>,
-    /// What each environment has for itself.
+    /// Properties of each environment that differ from the model.
     pub(crate) own_values: Vec<Option<Box<OwnValues>>>,
     /// What each environment looks like, where its sizes or colours are its own; empty where nobody's are, or nobody looks.
     pub(crate) own_scenes: Vec<OwnScene>,
-    /// Whether each geom only has a pose, for a mesh that is drawn in its place.
+    /// True for each geom that only has a pose, for a mesh that is drawn in its place.
     pub(crate) proxies: Vec<bool>,
     /// Pairs of bodies that are excluded from contact because they overlap at the start.
     pub(crate) excluded: Vec<(String, String)>,
@@ -58,7 +58,7 @@ pub(crate) struct Start {
 }
 
 impl Simulation {
-    /// What each number of the mask channel is.
+    /// The table of mask ids.
     pub(crate) fn mask_ids(&self) -> &[MaskId] {
         self.identities.table()
     }

@@ -68,7 +68,7 @@ pub trait Channel {
     type Layout: Layout;
     /// Its name.
     const NAME: &'static str;
-    /// What others call it.
+    /// Accepted aliases.
     const ALIASES: &'static [&'static str];
     /// Numbers per pixel.
     const COMPONENTS: usize;

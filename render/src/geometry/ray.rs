@@ -1,11 +1,11 @@
 //! [`Ray`]: a half-line.
 
-/// A ray: where it begins, and which way it goes.
+/// A half-line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it begins \[m\].
+    /// Origin \[m\].
     pub origin: [f64; 3],
-    /// Which way it goes; of length 1.
+    /// Direction, a unit vector.
     pub direction: [f64; 3],
 }
 

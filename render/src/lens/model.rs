@@ -10,7 +10,7 @@ pub struct Domain {
     pub angle: f64,
     /// How far from the principal point such a ray is, in the normalised picture (times fx: in pixels).
     pub radius: f64,
-    /// Whether rays end there because the mapping folds back or has a pole, not because the lens was to see no farther.
+    /// True if rays end there because the mapping folds back or has a pole, not at an angle that was asked for.
     pub folds: bool,
     /// Of [`OpenCv`] alone.
     pub(super) poles: Poles,
@@ -27,15 +27,15 @@ impl Domain {
 pub trait LensModel: Copy + Default {
     /// Its name.
     const NAME: &'static str;
-    /// What others call it.
+    /// Accepted aliases.
     const ALIASES: &'static [&'static str];
-    /// Whether every ray goes forward, so that near, far and depth are measured along the optical axis, as without a lens.
+    /// True if every ray goes forward, so that near, far and depth are measured along the optical axis, as without a lens.
     /// Of others, near and far are distances along the ray.
     const FORWARD: bool = false;
-    /// Whether there is an aperture with an optical axis; a panorama is put together of many pictures.
+    /// True if there is an aperture with an optical axis; a panorama is put together of many images.
     const HAS_AXIS: bool = true;
 
-    /// Whether it is no lens at all, with these numbers.
+    /// True if these numbers make a pinhole.
     fn is_pinhole(&self) -> bool {
         false
     }

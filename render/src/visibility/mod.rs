@@ -130,7 +130,7 @@ pub enum RenderError {
         what: &'static str,
         /// The number.
         value: f64,
-        /// What is possible.
+        /// Accepted values.
         allowed: &'static str,
     },
     /// A shutter that no camera has.

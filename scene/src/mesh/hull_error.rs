@@ -13,7 +13,7 @@ pub enum HullError {
         field: &'static str,
         /// Its value.
         value: f64,
-        /// What is accepted.
+        /// Accepted values.
         expected: &'static str,
     },
     /// A field of the configuration of convex pieces is out of its range.
@@ -23,10 +23,10 @@ pub enum HullError {
         field: &'static str,
         /// Its value.
         value: f64,
-        /// What is accepted.
+        /// Accepted values.
         expected: &'static str,
     },
-    /// The thickness of prisms is none.
+    /// The thickness of prisms is not positive.
     #[error("the thickness of prisms is {value} m; expected a length above 0")]
     InvalidThickness {
         /// The thickness \[m\].

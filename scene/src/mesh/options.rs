@@ -1,9 +1,9 @@
 //! Options of mesh readers.
 
-/// What a reader cannot know from the file alone.
+/// Options that a file does not settle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeshOptions {
-    /// What to do with `<up_axis>` of COLLADA files.
+    /// Treatment of `<up_axis>` of COLLADA files.
     pub dae_up_axis: DaeUpAxis,
 }
 

@@ -164,7 +164,7 @@ impl RenderMesh {
         out
     }
 
-    /// Whether [`deform`](Self::deform) can move its vertices.
+    /// True if [`deform`](Self::deform) can move its vertices.
     pub fn is_deformable(&self) -> bool {
         self.deformation.is_some()
     }

@@ -2,7 +2,7 @@
 
 use crate::mesh::TriMesh;
 
-/// What a shape must be able to do.
+/// The operations of a shape.
 pub(super) trait ShapeImpl {
     /// Triangles of the surface, counter-clockwise seen from outside, with about `segments` edges around a circle.
     fn tessellate(&self, segments: usize) -> TriMesh;

@@ -88,7 +88,7 @@ impl CameraCfg {
         }
     }
 
-    /// What some lenses do not have.
+    /// Refuses imperfections that the lens cannot have.
     fn check_lens(&self) -> Result<(), CameraError> {
         let (lens, Imperfections { vignetting, holes, .. }) = (self.lens.name(), &self.imperfections);
         if vignetting.is_some() && !self.lens.has_axis() {

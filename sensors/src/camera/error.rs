@@ -99,7 +99,7 @@ pub enum CameraError {
         what: &'static str,
         /// The number.
         value: f64,
-        /// What is possible.
+        /// Accepted values.
         expected: &'static str,
     },
     /// Two calibrations that are not those of a left and a right eye.

@@ -15,7 +15,7 @@ pub enum RayError {
         of: &'static str,
         /// The number.
         value: f64,
-        /// What is possible.
+        /// Accepted values.
         allowed: &'static str,
     },
     /// More rays than fit into memory, or none.
@@ -46,7 +46,7 @@ pub enum RayError {
         pattern: &'static str,
         /// Which ray.
         ray: usize,
-        /// Where it begins \[m\].
+        /// Origin \[m\].
         start: [f64; 3],
         /// Where it goes.
         direction: [f64; 3],

@@ -38,7 +38,7 @@ impl<K: Into<String>, const N: usize> From<[(K, f64); N]> for PerJoint {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveCfg {
-    /// What stiffness and damping mean.
+    /// The meaning of stiffness and damping.
     pub drive_type: DriveType,
     /// Who evaluates the law.
     pub model: DriveModel,

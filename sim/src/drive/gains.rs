@@ -2,10 +2,10 @@
 
 use super::{ActuatorSpec, DriveType, JointInfo};
 
-/// What a user asks of one drive, in the user's units; the law takes [`Gains`].
+/// The configuration of one drive, in the user's units; the law takes [`Gains`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    /// What stiffness and damping mean.
+    /// The meaning of stiffness and damping.
     pub drive_type: DriveType,
     /// Stiffness, in the unit of the drive type.
     pub stiffness: f64,
@@ -36,7 +36,7 @@ pub struct Gains {
     pub max_velocity: f64,
 }
 
-/// What one drive is asked for.
+/// The targets of one drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
     /// Position target \[rad or m\].

@@ -34,7 +34,7 @@ use serde::{Deserialize, Serialize};
 /// The list of drive modes: `Variant => the mode`.
 macro_rules! drive_modes {
     ($($(#[$doc:meta])* $variant:ident => $mode:expr,)*) => {
-        /// What stiffness and damping mean.
+        /// The meaning of stiffness and damping.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
         pub enum DriveType {

@@ -1,6 +1,6 @@
 //! The trait of drive modes.
 
-/// What a drive mode knows of its joint.
+/// Properties of a joint that a drive mode uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointInfo {
     /// Inertia that the joint feels at the initial pose, `1 / (M⁻¹)_ii` \[kg m² or kg\].

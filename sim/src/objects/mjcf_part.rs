@@ -45,7 +45,7 @@ impl<'a> MjcfPart<'a> {
         self.data.cfg()
     }
 
-    /// What MuJoCo made of the file alone.
+    /// The compiled model of the file alone.
     pub fn model(&self) -> &'a Model {
         self.data.model()
     }

@@ -118,7 +118,7 @@ pub struct MjcfData {
     surfaces: Vec<(usize, SurfaceCfg)>,
 }
 
-/// What the configuration says of the surfaces of bodies.
+/// Configured surfaces of bodies.
 fn surfaces(cfg: &MjcfCfg, names: &PartNames) -> Result<Vec<(usize, SurfaceCfg)>> {
     cfg.surfaces.iter().try_for_each(|(_, surface)| surface.validate())?;
     let surfaces = pattern::assign(&cfg.surfaces, &BTreeMap::new(), &names.bodies, "body").map_err(|error| {
@@ -187,7 +187,7 @@ impl MjcfData {
         &self.cfg
     }
 
-    /// What MuJoCo made of the file alone.
+    /// The compiled model of the file alone.
     pub fn model(&self) -> &Model {
         &self.model
     }

@@ -13,7 +13,7 @@ use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_scene::Pose;
 use serde::{Deserialize, Serialize};
 
-/// Whether an object moves.
+/// The way in which an object moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]

@@ -43,7 +43,7 @@ pub struct RobotData {
     surfaces: Vec<(usize, SurfaceCfg)>,
 }
 
-/// What it was added as.
+/// The kind of entity that it was added as.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     /// By `add_robot`.
@@ -146,7 +146,7 @@ impl RobotData {
         self.role.named(self.uid())
     }
 
-    /// Whether it was added as a robot, and not as another articulation.
+    /// True if it was added as a robot, not as another articulation.
     pub(crate) fn is_robot(&self) -> bool {
         self.role == Role::Robot
     }
@@ -269,7 +269,7 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
     Ok(())
 }
 
-/// What the configuration says of the surfaces of links.
+/// Configured surfaces of links.
 fn surfaces(description: &RobotDescription, cfg: &RobotCfg, role: &Role) -> Result<Vec<(usize, SurfaceCfg)>> {
     cfg.surfaces.iter().try_for_each(|(_, surface)| surface.validate())?;
     let names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();

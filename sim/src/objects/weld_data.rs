@@ -34,6 +34,6 @@ pub struct WeldId {
 #[derive(Clone, Debug)]
 pub(crate) struct WeldData {
     pub(crate) cfg: Arc<WeldCfg>,
-    /// Whether the second body is fixed or moved by hand, and the first is not.
+    /// True if the second body is fixed or kinematic, and the first is not.
     pub(crate) second_is_fixed: bool,
 }

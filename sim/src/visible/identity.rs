@@ -45,7 +45,7 @@ pub(crate) struct Identities {
     of_geom: Vec<GeomIdentity>,
     /// Sites that are drawn.
     of_site: Vec<(usize, GeomIdentity)>,
-    /// What is drawn and changes its shape.
+    /// Drawn elements that change their shape.
     of_drawable: Vec<(Drawable, GeomIdentity)>,
 }
 
@@ -99,7 +99,7 @@ impl Identities {
         self.of_site.iter().map(|(site, identity)| (*site, identity))
     }
 
-    /// What is drawn and changes its shape.
+    /// Drawn elements that change their shape.
     pub(super) fn drawables(&self) -> impl Iterator<Item = (Drawable, &GeomIdentity)> {
         self.of_drawable.iter().map(|(drawable, identity)| (*drawable, identity))
     }

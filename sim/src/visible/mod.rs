@@ -254,7 +254,7 @@ impl Visible {
         out.0.unwrap_or_else(|| Arc::clone(&self.scene))
     }
 
-    /// Whether some shapes change from frame to frame.
+    /// True if some shapes change from frame to frame.
     pub(crate) fn deforms(&self) -> bool {
         !self.deforming.is_empty()
     }

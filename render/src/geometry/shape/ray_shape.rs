@@ -6,7 +6,7 @@ use crate::geometry::ray::Ray;
 use crate::geometry::vector::V3;
 use crate::simd::Simd;
 
-/// Where a ray touches a surface.
+/// An intersection of a ray and a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Touch {
     /// Distance along the ray \[m\].
@@ -15,10 +15,10 @@ pub(crate) struct Touch {
     pub(crate) normal: V3,
 }
 
-/// What the rays of a packet touch, lane by lane.
+/// Intersections of the rays of a packet, lane by lane.
 pub(crate) type Touches = [Option<Touch>; WIDTH];
 
-/// What a shape must be able to do.
+/// The operations of a shape.
 pub(crate) trait RayShape {
     /// The nearest surface at a distance from 0 to `limit`, both included.
     fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch>;

@@ -23,7 +23,7 @@ pub(super) trait OfDepth {
     fn spoil(&self, depths: &mut [f32], picture: &Picture<'_>);
 }
 
-/// What picture it is, and through which lens.
+/// An image and its lens.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::camera) struct Picture<'a> {
     pub(in crate::camera) view: &'a View,
@@ -52,7 +52,7 @@ impl Picture<'_> {
         [(u - f64::from(cx)) / f64::from(fx), (v - f64::from(cy)) / f64::from(fy), 1.0]
     }
 
-    /// Whether rays go aside, so that reach is distance, not depth.
+    /// True if rays go aside, so that reach is distance, not depth.
     pub(super) fn reaches_aside(&self) -> bool {
         self.rays.is_some_and(|rays| !rays.is_forward())
     }
@@ -72,7 +72,7 @@ impl Picture<'_> {
     }
 }
 
-/// Whether `field` of an imperfection is from `range[0]` to `range[1]`, as `expected` says.
+/// Checks that `field` of an imperfection is from `range[0]` to `range[1]`; `expected` says so in the error.
 pub(super) fn within(
     field: &'static str,
     value: f64,

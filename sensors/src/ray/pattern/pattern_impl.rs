@@ -5,7 +5,7 @@ use crate::ray::RayError;
 /// A start, and a direction of any length.
 pub(super) type Line = ([f64; 3], [f64; 3]);
 
-/// What a pattern must be able to do.
+/// The operations of a pattern.
 pub(super) trait PatternImpl {
     /// How many rays there are, before they are made; the numbers were not checked yet.
     fn count(&self) -> f64;

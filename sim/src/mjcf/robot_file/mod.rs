@@ -112,7 +112,7 @@ impl RobotFile {
         Ok((this, description))
     }
 
-    /// What MuJoCo made of the file alone.
+    /// The compiled model of the file alone.
     pub fn model(&self) -> &Model {
         &self.model
     }

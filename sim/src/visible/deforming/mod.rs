@@ -1,4 +1,4 @@
-//! What changes its shape from frame to frame: spatial tendons, skins, flexes.
+//! Elements that change their shape from frame to frame: spatial tendons, skins, flexes.
 //!
 //! Each is one or several instances of the scene: a tendon has a fixed number of capsules, of which it shows as many as its
 //! path has segments; a skin or a flex is a mesh whose vertices move. Every environment has a copy of the scene with the
