@@ -41,9 +41,9 @@ impl<'a> RigidObject<'a> {
         self.data.mask_id
     }
 
-    /// Mass \[kg\], as configured, whatever moves it. What it is in each environment says
+    /// Configured mass \[kg\]. The mass of each environment is
     /// [`get_mass`](Self::get_mass).
-    pub fn mass(&self) -> f64 {
+    pub fn nominal_mass(&self) -> f64 {
         self.data.mass_properties.mass
     }
 

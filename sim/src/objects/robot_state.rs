@@ -39,14 +39,9 @@ impl Robot<'_> {
         Ok(found.into_iter().map(LinkId).collect())
     }
 
-    /// The joints that follow no other joint, in the order of [`joint_names`](Self::joint_names).
-    pub fn active_joint_ids(&self) -> Vec<JointIndex> {
-        (0..self.dof()).map(JointIndex).filter(|joint| self.data.plans()[joint.0].mimic.is_none()).collect()
-    }
-
     /// Names of the joints that follow no other joint.
     pub fn active_joint_names(&self) -> Vec<&str> {
-        self.active_joint_ids().into_iter().map(|joint| self.joint_names()[joint.0].as_str()).collect()
+        self.active_joints().map(|joint| self.joint_names()[joint.0].as_str()).collect()
     }
 
     /// The joints that follow another one; [`mimic_drivers`](Self::mimic_drivers) says which, and how.
@@ -57,7 +52,7 @@ impl Robot<'_> {
 
     /// Number of joints that follow no other joint: [`dof`](Self::dof) without the mimic ones.
     pub fn active_dof(&self) -> usize {
-        self.active_joint_ids().len()
+        self.active_joints().count()
     }
 
     /// Whether a joint has a drive, which [`set_qpos`](crate::RobotMut::set_qpos) gives a target; a passive joint and one that
@@ -80,6 +75,10 @@ impl Robot<'_> {
         let mut joints = self.get_joint_ids(part)?;
         joints.retain(|joint| self.data.plans()[joint.0].mimic.is_none());
         Ok(joints)
+    }
+
+    fn active_joints(&self) -> impl Iterator<Item = JointIndex> {
+        (0..self.dof()).map(JointIndex).filter(|joint| self.data.plans()[joint.0].mimic.is_none())
     }
 
     fn name_error(&self, error: PatternError) -> Error {

@@ -31,7 +31,7 @@ fn mass() {
     sim.update(10);
     assert!(sim.rigid_object(id).get_velocity().iter().all(|v| *v == 0.0));
     // The configuration is what it was.
-    assert_eq!(sim.rigid_object(id).mass(), 2.0);
+    assert_eq!(sim.rigid_object(id).nominal_mass(), 2.0);
     sim.reset_properties(None).unwrap();
     assert_eq!(sim.rigid_object(id).get_mass().to_vec(), [2.0; 3]);
 }

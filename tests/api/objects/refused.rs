@@ -113,7 +113,7 @@ fn writes() {
         ("rolling", object.set_friction(&array![[0.1, 0.0, -1.0]], None)),
     ];
     assert_refused(results.map(|(what, result)| (what, result, "Randomization(Value {", [])));
-    let mass = object.read().mass();
+    let mass = object.read().nominal_mass();
     assert_eq!(object.read().get_mass().to_vec(), [mass; 3]);
     assert_eq!(object.read().get_friction().row(0).to_vec(), [1.0, 0.005, 0.0001]);
     for id in [free, hand, stands] {
