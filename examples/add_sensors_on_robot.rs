@@ -78,12 +78,12 @@ fn run(args: &Args) -> launcher::Result {
         if args.reset_every > 0 && step % args.reset_every == 0 {
             // Poses are in the environments: origins are not added.
             let mut robot = scene.robot_mut("robot")?;
-            let (root, standing) = (robot.read().get_default_root_state(), robot.read().get_default_qpos());
+            let (root, standing) = (robot.read().default_root_state(), robot.read().default_qpos());
             robot.write_root_state(&root, None)?;
             let start = Array2::from_shape_fn(standing.dim(), |at| standing[at] + 0.1 * noise[at.0].uniform());
-            let still = robot.read().get_default_qvel();
+            let still = robot.read().default_qvel();
             robot.write_joint_state(&start, &still, None, None)?;
-            robot.set_qpos(&standing, None, None)?;
+            robot.set_qpos_target(&standing, None, None)?;
             // The written state stays: this clears the buffers of sensors.
             scene.reset(None)?;
             totals.seen = [0; 3];
@@ -93,7 +93,7 @@ fn run(args: &Args) -> launcher::Result {
         step += 1;
         totals.count(&scene)?;
         if step % SECOND == 0 {
-            let base = scene.robot("robot")?.get_root_pose();
+            let base = scene.robot("robot")?.root_pose();
             heights.iter_mut().enumerate().for_each(|(env, heights)| heights.push(base[(env, 2)]));
         }
         if args.print_every > 0 && step % args.print_every == 0 {

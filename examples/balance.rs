@@ -152,11 +152,11 @@ fn run(args: &Args) -> launcher::Result<bool> {
         let turn = Array3::zeros(push.dim());
         let mut robot_now = sim.robot_mut(robot);
         robot_now.set_external_wrench(&push, &turn, WrenchFrame::World, Some(&[body]), None)?;
-        robot_now.set_qvel(&speeds, None, None)?;
+        robot_now.set_qvel_target(&speeds, None, None)?;
         sim.update(1);
         step += 1;
         progress.advance(step);
-        let poses = trial::poses(&sim.robot(robot).get_root_pose());
+        let poses = trial::poses(&sim.robot(robot).root_pose());
         for (record, pose) in records.iter_mut().zip(&poses) {
             record.tilt = record.tilt.max(tilt(pose));
         }
@@ -166,7 +166,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     }
 
     let rate = progress.env_steps_per_second(step, sim.num_envs());
-    let (poses, velocities) = (trial::poses(&sim.robot(robot).get_root_pose()), sim.robot(robot).get_root_velocity());
+    let (poses, velocities) = (trial::poses(&sim.robot(robot).root_pose()), sim.robot(robot).root_velocity());
     let diverged = trial::diverged(&sim);
     let mut table = Vec::new();
     for env in 0..sim.num_envs() {

@@ -71,7 +71,7 @@ fn run(args: &Args) -> launcher::Result {
         if step % PHASE == 0 {
             progress.say(phase.message);
             let targets = phase.targets(sim.num_envs());
-            sim.robot_mut(robot).set_qpos(&targets, Some(&phase.joints), None)?;
+            sim.robot_mut(robot).set_qpos_target(&targets, Some(&phase.joints), None)?;
         }
         let block = (BLOCK / sim.num_envs() as u64).clamp(1, PHASE - step % PHASE);
         let end = progress.end_of_block(step, block);
@@ -119,13 +119,13 @@ struct Phase {
 
 fn phases(sim: &SimulationManager, robot: RobotId, swap_hand: bool) -> launcher::Result<Vec<Phase>> {
     let view = sim.robot(robot);
-    let (arm, hand) = (view.get_joint_ids("arm")?, view.get_joint_ids("hand")?);
+    let (arm, hand) = (view.joint_ids("arm")?, view.joint_ids("hand")?);
     // The tutorial's positions are for six joints; a longer arm keeps its others at zero.
     let arm_target =
         |first: &[f64]| arm.iter().enumerate().map(|(i, _)| first.get(i).copied().unwrap_or(0.0)).collect();
     let limits = view.qpos_limits();
     let hand_target = |end: usize| -> Vec<f64> {
-        let targets = view.get_target_qpos();
+        let targets = view.qpos_target();
         hand.iter()
             .map(|joint| Some(limits[(0, joint.0, end)]).filter(|l| l.is_finite()).unwrap_or(targets[(0, joint.0)]))
             .collect()
@@ -148,8 +148,8 @@ impl Phase {
     fn report(&self, sim: &SimulationManager, robot: RobotId, end_step: u64) -> Value {
         let view = sim.robot(robot);
         let columns: Vec<usize> = self.joints.iter().map(|j| j.0).collect();
-        let (qpos, qvel) = (view.get_qpos().select(Axis(1), &columns), view.get_qvel().select(Axis(1), &columns));
-        let target = view.get_target_qpos().select(Axis(1), &columns);
+        let (qpos, qvel) = (view.qpos().select(Axis(1), &columns), view.qvel().select(Axis(1), &columns));
+        let target = view.qpos_target().select(Axis(1), &columns);
         let largest = |values: &Array2<f64>| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         json!({
             "name": self.name,

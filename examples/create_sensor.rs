@@ -113,7 +113,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("Starting simulation...");
     println!("Robot will move through different poses");
     println!("Press Ctrl+C to stop");
-    let arm = sim.robot(robot).get_joint_ids("arm")?;
+    let arm = sim.robot(robot).joint_ids("arm")?;
     let position = |wrist: f64| {
         // The tutorial's positions are for six joints; a longer arm keeps its others at zero.
         let mut target = vec![0.0; arm.len()];
@@ -149,7 +149,7 @@ fn run(args: &Args) -> launcher::Result {
             if step % every == 0 {
                 progress.say(message);
                 let target = position(wrist);
-                sim.robot_mut(robot).set_qpos(ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
+                sim.robot_mut(robot).set_qpos_target(ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
                 if !album.add(sim.sensor(camera)?, step)? {
                     break 'steps;
                 }

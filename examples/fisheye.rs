@@ -72,9 +72,9 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.write_dump(&sim)?;
     let out = args.launcher.out_folder(true)?;
 
-    let arm = sim.robot(robot).get_joint_ids("arm")?;
+    let arm = sim.robot(robot).joint_ids("arm")?;
     let target = [0.0, 0.5, -1.5, 0.3, -0.5, 0.0];
-    sim.robot_mut(robot).set_qpos(ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
+    sim.robot_mut(robot).set_qpos_target(ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;

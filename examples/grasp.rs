@@ -101,7 +101,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     }
     args.launcher.write_dump(&sim)?;
     let cubes = scatter(&mut sim, cube)?;
-    let places = |sim: &SimulationManager| trial::poses(&sim.rigid_object(cube).get_pose());
+    let places = |sim: &SimulationManager| trial::poses(&sim.rigid_object(cube).pose());
     let above = |poses: &[Pose], height: f64| trial::moved(poses, |_| [0.0, 0.0, height]);
 
     args.launcher.serve(&mut sim)?;
@@ -153,7 +153,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let rate = progress.env_steps_per_second(steps, sim.num_envs());
     let held = held as f64 * sim.cfg().physics_dt;
     let mut table = Vec::new();
-    let (poses, velocities) = (places(&sim), sim.rigid_object(cube).get_velocity());
+    let (poses, velocities) = (places(&sim), sim.rigid_object(cube).velocity());
     let (palms, diverged) = (trial::poses(&sim.robot(robot).link_pose(grip::PALM)?), trial::diverged(&sim));
     for env in 0..sim.num_envs() {
         let mass = sim.properties(EnvId(env))?.get(Property::Mass, "cube")?[0];

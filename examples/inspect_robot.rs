@@ -119,7 +119,7 @@ fn show(args: &Args, cfg: InspectCfg) -> launcher::Result {
     let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
     let drive = DriveCfg { drive_type: DriveType::None, ..Default::default() };
     let id = sim.add_robot(RobotCfg { urdf, mjcf, drive, fix_base: !floating_base, ..Default::default() })?;
-    let mut positions = sim.robot(id).get_qpos();
+    let mut positions = sim.robot(id).qpos();
     for (name, value) in &qpos {
         if let Some(joint) = sim.robot(id).joint_names().iter().position(|joint| joint == name) {
             positions[(0, joint)] = *value;

@@ -137,7 +137,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let (steps, planned) = (motion.step(), motion.planned().to_vec());
     let rate = progress.env_steps_per_second(steps, sim.num_envs());
     let view = sim.articulation(cabinet);
-    let (open, speed, ends) = (view.get_qpos(), view.get_qvel(), trial::poses(&view.get_root_pose()));
+    let (open, speed, ends) = (view.qpos(), view.qvel(), trial::poses(&view.root_pose()));
     let diverged = trial::diverged(&sim);
     let mut table = Vec::new();
     for env in 0..sim.num_envs() {

@@ -105,7 +105,7 @@ fn run(args: &Args) -> launcher::Result {
         "frames_of_env_0": table,
         "distance_of_foot_urdf_from_foot": own,
         "distance_of_foot_user_from_foot": user,
-        "base_height": sim.robot(robot).get_root_pose()[(0, 2)],
+        "base_height": sim.robot(robot).root_pose()[(0, 2)],
         "env_steps_per_second": rate,
         "warnings": sim.warning_counts(),
     }))

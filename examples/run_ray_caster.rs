@@ -191,7 +191,7 @@ fn scanner_cfg(args: &Args) -> RayCasterCfg {
 fn throw(sim: &mut SimulationManager, ball: ObjectId, noise: &mut [Random]) -> launcher::Result {
     sim.reset(None)?;
     let mut between = |env: usize, most: f64| most * (2.0 * noise[env].uniform() - 1.0);
-    let mut poses = sim.rigid_object(ball).get_pose();
+    let mut poses = sim.rigid_object(ball).pose();
     let mut velocities = Array2::zeros((sim.num_envs(), 6));
     for env in 0..sim.num_envs() {
         for axis in 0..2 {
@@ -231,7 +231,7 @@ fn median_ms(mut times: Vec<Duration>) -> f64 {
 
 /// Where the ball of environment 0 is and what it sees below itself.
 fn summary(sim: &SimulationManager, scene: &Scene) -> launcher::Result<(String, Value)> {
-    let (scanner, pose) = (sim.sensor(scene.scanner)?, sim.rigid_object(scene.ball).get_pose());
+    let (scanner, pose) = (sim.sensor(scene.scanner)?, sim.rigid_object(scene.ball).pose());
     let of_first = scanner.hits().index_axis_move(Axis(0), 0);
     let heights: Vec<f64> = of_first.rows().into_iter().map(|hit| hit[2]).filter(|z| z.is_finite()).collect();
     let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), z| (a.min(*z), b.max(*z)));

@@ -150,7 +150,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let (steps, planned) = (motion.step(), motion.planned().to_vec());
     let rate = progress.env_steps_per_second(steps, sim.num_envs());
     // To judge: nothing was moved by these.
-    let cubes = trial::poses(&sim.rigid_object(cube).get_pose());
+    let cubes = trial::poses(&sim.rigid_object(cube).pose());
     let (flanges, diverged) = (trial::poses(&sim.robot(robot).link_pose("ee_link")?), trial::diverged(&sim));
     let mut table = Vec::new();
     for env in 0..sim.num_envs() {
@@ -194,8 +194,8 @@ fn above(place: [f64; 3]) -> Pose {
 /// What the encoders of the arm say \[rad\].
 fn positions(sim: &SimulationManager, robot: RobotId) -> launcher::Result<kinetoscope::ndarray::Array2<f64>> {
     let robot = sim.robot(robot);
-    let columns: Vec<usize> = robot.get_joint_ids("arm")?.iter().map(|joint| joint.0).collect();
-    Ok(robot.get_qpos().select(kinetoscope::ndarray::Axis(1), &columns))
+    let columns: Vec<usize> = robot.joint_ids("arm")?.iter().map(|joint| joint.0).collect();
+    Ok(robot.qpos().select(kinetoscope::ndarray::Axis(1), &columns))
 }
 
 /// What mask pictures say of the thing called `name`.

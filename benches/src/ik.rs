@@ -237,7 +237,7 @@ fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -
     let reachable = Array2::from_shape_fn((TARGETS, limits.len()), |(_, j)| {
         limits[j][0] + (limits[j][1] - limits[j][0]) * random.uniform()
     });
-    let start = view.get_default_qpos().row(0).to_vec();
+    let start = view.default_qpos().row(0).to_vec();
     let mut task = Task { link, limits, start, targets: Vec::new(), cfg: IkCfg::default() };
     let mut judge = Bare::new(&task, &sim, robot)?;
     let targets = reachable.rows().into_iter().map(|row| judge.place(&row.to_vec())).collect::<Outcome<_>>()?;

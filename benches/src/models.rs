@@ -181,15 +181,15 @@ pub(crate) fn arm_with_hand(
 
 /// Sends arm and hand to one of two poses.
 pub(crate) fn drive_sr5(sim: &mut SimulationManager, robot: RobotId, closed: bool) -> Outcome<()> {
-    let arm = sim.robot(robot).get_joint_ids("arm")?;
-    let hand = sim.robot(robot).get_joint_ids("hand")?;
+    let arm = sim.robot(robot).joint_ids("arm")?;
+    let hand = sim.robot(robot).joint_ids("hand")?;
     let limits = sim.robot(robot).qpos_limits();
     let wrist = if closed { 0.3 } else { -0.3 };
     let pose = [0.0, 0.5, -1.5, wrist, -0.5, 0.0];
     let envs = sim.num_envs();
     let arm_targets = Array2::from_shape_fn((envs, arm.len()), |(_, j)| pose[j]);
     let hand_targets = Array2::from_shape_fn((envs, hand.len()), |(_, j)| limits[(0, hand[j].0, usize::from(closed))]);
-    sim.robot_mut(robot).set_qpos(&arm_targets, Some(&arm), None)?;
-    sim.robot_mut(robot).set_qpos(&hand_targets, Some(&hand), None)?;
+    sim.robot_mut(robot).set_qpos_target(&arm_targets, Some(&arm), None)?;
+    sim.robot_mut(robot).set_qpos_target(&hand_targets, Some(&hand), None)?;
     Ok(())
 }

@@ -87,7 +87,7 @@ impl Side for Arms {
 
     fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
         let arm = self.sim.robot_id("arm")?;
-        Ok(Some(self.sim.robot(arm).get_qpos().into_iter().collect()))
+        Ok(Some(self.sim.robot(arm).qpos().into_iter().collect()))
     }
 }
 

@@ -191,7 +191,7 @@ impl Side for Arms {
     }
 
     fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
-        Ok(Some(self.sim.robot(self.robot).get_qpos().into_iter().collect()))
+        Ok(Some(self.sim.robot(self.robot).qpos().into_iter().collect()))
     }
 }
 

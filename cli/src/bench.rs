@@ -98,7 +98,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
 /// Reads the state, as a program that trains does after each step.
 fn read_state(model: &Model) {
     match model.robot {
-        Some(robot) => drop(model.sim.robot(robot).get_qpos()),
+        Some(robot) => drop(model.sim.robot(robot).qpos()),
         None => drop(model.sim.engine_states()),
     }
 }

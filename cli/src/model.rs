@@ -124,7 +124,7 @@ impl Model {
         /// Less is rounding of the files' numbers \[m\].
         const SLACK: f64 = 1e-3;
         let robot = self.sim.robot(id);
-        let (names, heights) = (robot.link_names(), robot.get_link_lowest_heights());
+        let (names, heights) = (robot.link_names(), robot.link_lowest_heights());
         let mut lowest = (-SLACK, None);
         for (link, &height) in heights.row(0).iter().enumerate() {
             // Links that never move do not collide with the ground.
@@ -225,7 +225,7 @@ impl ModelArgs {
         let refused = match self.robot(setup, robot(), setup.spawn_height) {
             Ok(model) => {
                 let free = self.floating_base && setup.ground && setup.spawn_height.is_none();
-                let in_ground = |id| model.sim.robot(id).get_lowest_heights()[0] < -SLACK;
+                let in_ground = |id| model.sim.robot(id).lowest_heights()[0] < -SLACK;
                 return if free && model.robot.is_some_and(in_ground) {
                     self.robot(setup, robot(), Some(0.0))
                 } else {

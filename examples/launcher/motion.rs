@@ -34,7 +34,7 @@ impl<'a> Motion<'a> {
         tip: Tip<'a>,
         progress: &'a Progress,
     ) -> Result<Self> {
-        let (arm, planned) = (sim.robot(robot).get_joint_ids(arm)?, vec![true; sim.num_envs()]);
+        let (arm, planned) = (sim.robot(robot).joint_ids(arm)?, vec![true; sim.num_envs()]);
         Ok(Self { sim, robot, tip, arm, progress, step: 0, planned })
     }
 
@@ -87,7 +87,7 @@ impl<'a> Motion<'a> {
 
     fn targets(&self, joints: &[JointIndex]) -> Array2<f64> {
         let columns: Vec<usize> = joints.iter().map(|joint| joint.0).collect();
-        self.sim.robot(self.robot).get_target_qpos().select(Axis(1), &columns)
+        self.sim.robot(self.robot).qpos_target().select(Axis(1), &columns)
     }
 
     /// Joint positions for poses, from positions near them; an environment without a solution stays where it is.
@@ -124,7 +124,7 @@ impl<'a> Motion<'a> {
                 let point = (along as usize).min(last);
                 let part = along - point as f64;
                 let target = &way[point] * (1.0 - part) + &way[point + 1] * part;
-                self.sim.robot_mut(self.robot).set_qpos(&target, Some(joints), None)?;
+                self.sim.robot_mut(self.robot).set_qpos_target(&target, Some(joints), None)?;
             }
             self.sim.update(1);
             self.step += 1;

@@ -77,7 +77,7 @@ impl Film {
 
     fn in_scene(recording: &Recording, sim: &SimulationManager, part: MjcfId) -> Result<Self> {
         let view = sim.mjcf_part(part);
-        let qpos = view.get_qpos();
+        let qpos = view.qpos();
         let envs: Vec<usize> = recording.env_ids().into_iter().filter(|env| *env < sim.num_envs()).collect();
         let by_hand = bodies_by_hand(&view);
         let start = |body: &String| view.body_pose(body).map(|poses| Hand { body: body.clone(), poses, known: false });

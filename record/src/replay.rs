@@ -146,7 +146,7 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
         }
     }
     for uid in sim.mjcf_uids() {
-        let moves = sim.mjcf_part(sim.mjcf_id(uid)?).get_ctrl().ncols() > 0;
+        let moves = sim.mjcf_part(sim.mjcf_id(uid)?).ctrl().ncols() > 0;
         if moves && !states.iter().any(|source| source.stream.name == format!("{uid}/state")) {
             return Err(archive.malformed(format!("it has no controls of {uid}: record Topic::MjcfState({uid:?})")));
         }
@@ -210,9 +210,9 @@ impl Repetition {
             let envs: Vec<EnvId> = source.stream.env_ids.iter().copied().map(EnvId).collect();
             let of = |part: &str| archive.rows(&format!("{}/{part}", source.stream.name), row);
             let (positions, velocities, efforts) = (of("positions")?, of("velocities")?, of("efforts")?);
-            sim.robot_mut(id).set_qpos(positions, None, Some(&envs))?;
-            sim.robot_mut(id).set_qvel(velocities, None, Some(&envs))?;
-            sim.robot_mut(id).set_qf(efforts, None, Some(&envs))?;
+            sim.robot_mut(id).set_qpos_target(positions, None, Some(&envs))?;
+            sim.robot_mut(id).set_qvel_target(velocities, None, Some(&envs))?;
+            sim.robot_mut(id).set_qf_target(efforts, None, Some(&envs))?;
         }
         for source in states {
             let Some(uid) = source.stream.name.strip_suffix("/state") else { continue };

@@ -152,7 +152,7 @@ impl Source {
     pub(crate) fn mjcf_state(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
         let id = sim.mjcf_id(uid)?;
         let part = sim.mjcf_part(id);
-        let widths = [part.get_qpos().ncols(), part.get_qvel().ncols(), part.get_ctrl().ncols()];
+        let widths = [part.qpos().ncols(), part.qvel().ncols(), part.ctrl().ncols()];
         let names = ["positions", "velocities", "controls"];
         let parts = names.iter().zip(widths).map(|(name, width)| Part::new(name, [width])).collect();
         Ok(Self::new(format!("{uid}/state"), Kind::unnamed(), Element::F64, parts, envs, What::MjcfState(id)))
@@ -371,18 +371,18 @@ impl Source {
         match &self.what {
             What::JointStates(id) => {
                 let robot = sim.robot(*id);
-                self.join(values, &[robot.get_qpos().view(), robot.get_qvel().view(), robot.get_qf().view()]);
+                self.join(values, &[robot.qpos().view(), robot.qvel().view(), robot.qf().view()]);
             }
             What::Targets(id) => {
                 let robot = sim.robot(*id);
-                let targets = [robot.get_target_qpos(), robot.get_target_qvel(), robot.get_target_qf()];
+                let targets = [robot.qpos_target(), robot.qvel_target(), robot.qf_target()];
                 self.join(values, &[targets[0].view(), targets[1].view(), targets[2].view()]);
             }
-            What::LinkPoses(id) => self.put(values, &sim.robot(*id).get_link_poses()),
-            What::ObjectPose(id) => self.put(values, &sim.rigid_object(*id).get_pose()),
+            What::LinkPoses(id) => self.put(values, &sim.robot(*id).link_poses()),
+            What::ObjectPose(id) => self.put(values, &sim.rigid_object(*id).pose()),
             What::MjcfState(id) => {
                 let part = sim.mjcf_part(*id);
-                self.join(values, &[part.get_qpos().view(), part.get_qvel().view(), part.get_ctrl().view()]);
+                self.join(values, &[part.qpos().view(), part.qvel().view(), part.ctrl().view()]);
             }
             What::BodyPoses(id) => {
                 let part = sim.mjcf_part(*id);

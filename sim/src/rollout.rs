@@ -2,7 +2,7 @@
 //!
 //! As MuJoCo's own `rollout`: initial states and controls in, states out, many rows in parallel. A rollout steps copies of
 //! the environments on threads of its own: the environments and their sensors stay as they are, to the last bit. What it
-//! gives is what stepping by hand would give: `set_qpos` and `set_ctrl` with the controls of a step, `update(1)`, read.
+//! gives is what stepping by hand would give: `set_qpos_target` and `set_ctrl` with the controls of a step, `update(1)`, read.
 
 use crate::drive::table::DriveState;
 use crate::env::{Env, EnvState, EnvStatus};
@@ -143,7 +143,7 @@ impl SimulationManager {
 
     /// What would happen under `controls`, shape (N, T, columns of [`control_names`](Self::control_names)): N rows, each
     /// with the controls of T physics steps. The controls of a robot are its position targets \[rad or m\], clamped to the
-    /// limits of the row's initial state as [`set_qpos`](crate::RobotMut::set_qpos) does (columns of joints that follow others or have no drive are
+    /// limits of the row's initial state as [`set_qpos_target`](crate::RobotMut::set_qpos_target) does (columns of joints that follow others or have no drive are
     /// ignored); those of an MJCF part are as [`set_ctrl`](crate::MjcfPartMut::set_ctrl) takes them. Other targets and
     /// inputs stay as they are in the initial state.
     ///

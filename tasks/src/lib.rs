@@ -25,14 +25,14 @@
 //! })?;
 //! let mut env = EnvBuilder::new(sim, EnvCfg { episode_steps: Some(100), ..Default::default() })
 //!     .action(ActionTerm::new("push", Space::uniform(["slide"], [-5.0, 5.0])?, move |sim, forces| {
-//!         Ok(sim.robot_mut(cart).set_qf(forces, None, None)?)
+//!         Ok(sim.robot_mut(cart).set_qf_target(forces, None, None)?)
 //!     }))
-//!     .observation(ObservationTerm::new("place", ["slide"], move |now| Ok(now.sim().robot(cart).get_qpos())))
+//!     .observation(ObservationTerm::new("place", ["slide"], move |now| Ok(now.sim().robot(cart).qpos())))
 //!     .reward(RewardTerm::new("near", -1.0, move |now| {
-//!         Ok(now.sim().robot(cart).get_qpos().column(0).mapv(f64::abs))
+//!         Ok(now.sim().robot(cart).qpos().column(0).mapv(f64::abs))
 //!     }))
 //!     .termination(TerminationTerm::new("far", move |now| {
-//!         Ok(now.sim().robot(cart).get_qpos().column(0).mapv(|x| x.abs() > 1.0))
+//!         Ok(now.sim().robot(cart).qpos().column(0).mapv(|x| x.abs() > 1.0))
 //!     }))
 //!     .event(EventTerm::on_reset("scatter", move |sim, dice| {
 //!         for die in dice {

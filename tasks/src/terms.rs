@@ -55,7 +55,7 @@ pub fn joint_positions(
     robot: RobotId,
     patterns: &[&str],
 ) -> Result<ObservationTerm> {
-    seen_of_joints(sim, name, robot, patterns, |robot| robot.get_qpos() - robot.get_default_qpos())
+    seen_of_joints(sim, name, robot, patterns, |robot| robot.qpos() - robot.default_qpos())
 }
 
 /// Velocities of joints \[rad/s or m/s\], as [`joint_positions`].
@@ -71,7 +71,7 @@ pub fn joint_velocities(
     robot: RobotId,
     patterns: &[&str],
 ) -> Result<ObservationTerm> {
-    seen_of_joints(sim, name, robot, patterns, |robot| robot.get_qvel())
+    seen_of_joints(sim, name, robot, patterns, |robot| robot.qvel())
 }
 
 /// What `read` gives of the joints of a robot that match `patterns`.
@@ -101,7 +101,7 @@ pub fn commanded<N: Into<String>>(
     ObservationTerm::new(name, names, move |now| Ok(now.command(&command)?.to_owned()))
 }
 
-/// Efforts of joints \[N m or N\], from minus `bound` to `bound`, as [`set_qf`](kinetoscope_sim::RobotMut::set_qf) takes them.
+/// Efforts of joints \[N m or N\], from minus `bound` to `bound`, as [`set_qf_target`](kinetoscope_sim::RobotMut::set_qf_target) takes them.
 ///
 /// # Errors
 /// A pattern that matches nothing, or a bound that is negative or not a number.
@@ -117,7 +117,7 @@ pub fn joint_efforts(
 ) -> Result<ActionTerm> {
     let (names, joints) = joints(sim, robot, patterns)?;
     Ok(ActionTerm::new(name, Space::uniform(names, [-bound, bound])?, move |sim, efforts| {
-        Ok(sim.robot_mut(robot).set_qf(efforts, Some(&joints), None)?)
+        Ok(sim.robot_mut(robot).set_qf_target(efforts, Some(&joints), None)?)
     }))
 }
 
@@ -138,8 +138,8 @@ pub fn target_changes(
 ) -> Result<ActionTerm> {
     let (names, joints) = joints(sim, robot, patterns)?;
     Ok(ActionTerm::new(name, Space::uniform(names, [-1.0, 1.0])?, move |sim, actions| {
-        let targets = columns(&sim.robot(robot).get_target_qpos(), &joints) + actions.mapv(|action| step * action);
-        Ok(sim.robot_mut(robot).set_qpos(&targets, Some(&joints), None)?)
+        let targets = columns(&sim.robot(robot).qpos_target(), &joints) + actions.mapv(|action| step * action);
+        Ok(sim.robot_mut(robot).set_qpos_target(&targets, Some(&joints), None)?)
     }))
 }
 

@@ -174,7 +174,7 @@ impl RecordedWorld {
         let (envs, dof) = (self.sim.num_envs(), self.sim.robot(self.arm).dof());
         let target = |(env, joint)| 0.3 * (0.1 * f64::from(step) + joint as f64 + env as f64).sin();
         let targets = Array2::from_shape_fn((envs, dof), target);
-        self.sim.robot_mut(self.arm).set_qpos(&targets, None, None).unwrap();
+        self.sim.robot_mut(self.arm).set_qpos_target(&targets, None, None).unwrap();
         self.sim.update(1);
     }
 }

@@ -38,7 +38,7 @@ impl Watched {
     fn step(&mut self) {
         self.world.step(self.step);
         self.step += 1;
-        let positions = self.world.sim.robot(self.world.arm).get_qpos().into_iter().collect();
+        let positions = self.world.sim.robot(self.world.arm).qpos().into_iter().collect();
         self.positions.insert(nanos(self.world.sim.time()[0]), positions);
     }
 

@@ -97,14 +97,14 @@ fn use_it(robot: RobotCfg, what: &str) -> Result<(), String> {
     let mut sim = sim(2);
     let id = sim.add_robot(robot).map_err(|e| format!("refused: {e}"))?;
     let dof = sim.robot(id).dof();
-    sim.robot_mut(id).set_qpos(&Array2::from_elem((1, dof), 0.7), None, None).map_err(text)?;
+    sim.robot_mut(id).set_qpos_target(&Array2::from_elem((1, dof), 0.7), None, None).map_err(text)?;
     sim.robot_mut(id).write_qpos(&Array2::from_elem((1, dof), 0.3), None, None).map_err(text)?;
     sim.update(30);
     if !sim.diverged().is_empty() && !is(&["1e300", "1e308", "mimic", "far", "huge"]) {
         return Err(format!("diverged: {:?}", sim.diverged()));
     }
     let view = sim.robot(id);
-    let mut numbers = vec![view.get_qpos(), view.get_qvel(), view.get_qf(), view.get_target_qpos()];
+    let mut numbers = vec![view.qpos(), view.qvel(), view.qf(), view.qpos_target()];
     for link in view.link_names() {
         numbers.push(view.link_pose(link).map_err(text)?);
     }

@@ -40,9 +40,9 @@ fn world() -> (SimulationManager, Ids) {
 /// Everything that a writer here may change.
 fn told(sim: &SimulationManager, ids: Ids) -> String {
     let view = sim.robot(ids.robot);
-    let drives = [view.get_stiffness(), view.get_damping(), view.qf_limits(), view.qvel_limits()];
-    let joints = [view.get_friction(), view.get_joint_damping(), view.get_armature()];
-    let targets = [view.get_target_qpos(), view.get_target_qvel(), view.get_target_qf()];
+    let drives = [view.stiffness(), view.damping(), view.qf_limits(), view.qvel_limits()];
+    let joints = [view.friction(), view.joint_damping(), view.armature()];
+    let targets = [view.qpos_target(), view.qvel_target(), view.qf_target()];
     let mut told = format!("{:?} {drives:?} {joints:?} {targets:?}", bits(sim));
     for env in 0..ENVS {
         let properties = sim.properties(EnvId(env)).unwrap();
@@ -67,9 +67,9 @@ type Joints<'a> = Option<&'a [JointIndex]>;
 type OfJoints = (&'static str, bool, fn(&mut RobotMut<'_>, Values<'_>, Joints<'_>, Envs<'_>) -> Result<()>);
 
 const OF_JOINTS: &[OfJoints] = &[
-    ("set_qpos", false, |r, v, j, e| r.set_qpos(v, j, e)),
-    ("set_qvel", false, |r, v, j, e| r.set_qvel(v, j, e)),
-    ("set_qf", false, |r, v, j, e| r.set_qf(v, j, e)),
+    ("set_qpos_target", false, |r, v, j, e| r.set_qpos_target(v, j, e)),
+    ("set_qvel_target", false, |r, v, j, e| r.set_qvel_target(v, j, e)),
+    ("set_qf_target", false, |r, v, j, e| r.set_qf_target(v, j, e)),
     ("write_qpos", false, |r, v, j, e| r.write_qpos(v, j, e)),
     ("write_qvel", false, |r, v, j, e| r.write_qvel(v, j, e)),
     ("write_joint_state", false, |r, v, j, e| r.write_joint_state(&v.mapv(|x| 0.5 * x), v, j, e)),

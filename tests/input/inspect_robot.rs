@@ -210,7 +210,7 @@ fn compare_with_mujoco(files: &[&str], urdf: UrdfCfg, floating: bool) {
     let qpos: Vec<f64> = drivers.iter().map(|&(driver, ratio, offset)| ratio * own[driver.0] + offset).collect();
     let row = Array2::from_shape_vec((1, qpos.len()), qpos.clone()).unwrap();
     sim.robot_mut(robot).write_qpos(&row, None, None).unwrap();
-    assert_eq!(sim.robot(robot).get_qpos(), row, "inside of all limits");
+    assert_eq!(sim.robot(robot).qpos(), row, "inside of all limits");
 
     let positions = sim.robot(robot).joint_names().iter().zip(&qpos).map(|(n, q)| format!("{n}={q:?}"));
     let positions = positions.collect::<Vec<_>>().join(",");

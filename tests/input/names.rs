@@ -61,9 +61,9 @@ fn links_and_joints() {
                 assert_eq!(sim.robot(id).joint_id(name).unwrap(), JointIndex(i), "{what}");
                 sim.robot(id).link_pose(name).unwrap();
             }
-            sim.robot_mut(id).set_qpos(&array![[0.5, -0.5]], None, None).unwrap();
+            sim.robot_mut(id).set_qpos_target(&array![[0.5, -0.5]], None, None).unwrap();
             sim.update(100);
-            let q = sim.robot(id).get_qpos();
+            let q = sim.robot(id).qpos();
             assert!((q[(0, 0)] - 0.5).abs() < 0.1 && (q[(0, 1)] + 0.5).abs() < 0.1, "{what}: joints are at {q}");
             assert_exports(&sim, &dir.path().join("out"));
         }
@@ -87,7 +87,7 @@ fn generated_names() {
         let urdf = format!("<robot name=\"r\">{elements}</robot>");
         let id = sim.add_robot(robot(dir.path(), "r", &urdf)).unwrap();
         sim.robot_mut(id).write_qpos(&array![[0.1, 0.2, 0.3, 0.4]], None, None).unwrap();
-        assert_eq!(sim.robot(id).get_qpos(), array![[0.1, 0.2, 0.3, 0.4]]);
+        assert_eq!(sim.robot(id).qpos(), array![[0.1, 0.2, 0.3, 0.4]]);
         sim.update(3);
     }
 }

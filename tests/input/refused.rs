@@ -154,7 +154,7 @@ fn rows() -> Vec<Row> {
 fn moving(dir: &Path) -> SimulationManager {
     let mut sim = sim(2);
     let first = sim.add_robot(robot(dir, "first", &hinge())).unwrap();
-    sim.robot_mut(first).set_qpos(&array![[0.8], [-0.5]], None, None).unwrap();
+    sim.robot_mut(first).set_qpos_target(&array![[0.8], [-0.5]], None, None).unwrap();
     sim.update(4);
     sim
 }

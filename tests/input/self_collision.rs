@@ -31,7 +31,7 @@ fn world(self_collision: bool, urdf: &str) -> (SimulationManager, RobotId) {
 }
 
 fn drift(sim: &SimulationManager, id: RobotId) -> f64 {
-    sim.robot(id).get_qpos().iter().fold(0.0_f64, |most, q| most.max(q.abs()))
+    sim.robot(id).qpos().iter().fold(0.0_f64, |most, q| most.max(q.abs()))
 }
 
 #[test]
@@ -45,9 +45,9 @@ fn overlapping_links() {
     sim.update(50);
     assert!(drift(&sim, id) < 1e-9, "they push each other away: {}", drift(&sim, id));
     // The two that are apart still collide.
-    sim.robot_mut(id).set_qpos(&array![[1.2, 0.0, 0.0, 0.0, 0.0]], None, None).unwrap();
+    sim.robot_mut(id).set_qpos_target(&array![[1.2, 0.0, 0.0, 0.0, 0.0]], None, None).unwrap();
     sim.update(200);
-    assert!(sim.robot(id).get_qpos()[(0, 4)] > 0.01, "arm 4 is pushed: {}", sim.robot(id).get_qpos());
+    assert!(sim.robot(id).qpos()[(0, 4)] > 0.01, "arm 4 is pushed: {}", sim.robot(id).qpos());
     // Without self-collision nothing is excluded.
     let (mut sim, _) = world(false, &star(5, 1));
     assert!(overlaps(&sim).is_empty() && !sim.mjcf().contains("<exclude"));

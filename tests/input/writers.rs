@@ -1,4 +1,4 @@
-//! Messages of `set_qpos`, `write_qpos`, `reset` and look-ups by name; layouts of arrays. All writers and their kinds of
+//! Messages of `set_qpos_target`, `write_qpos`, `reset` and look-ups by name; layouts of arrays. All writers and their kinds of
 //! errors are in `every_writer`.
 
 use super::support::{LIMIT, bits, chain, robot, sim};
@@ -41,9 +41,9 @@ fn messages() {
         let joints: Option<Vec<_>> = joints.map(|j| j.iter().map(|&i| JointIndex(i)).collect());
         let envs: Option<Vec<_>> = envs.map(|e| e.iter().map(|&i| EnvId(i)).collect());
         let (joints, envs) = (joints.as_deref(), envs.as_deref());
-        for name in ["set_qpos", "write_qpos"] {
+        for name in ["set_qpos_target", "write_qpos"] {
             let mut robot = sim.robot_mut(id);
-            let write = if name == "set_qpos" { RobotMut::set_qpos } else { RobotMut::write_qpos };
+            let write = if name == "set_qpos_target" { RobotMut::set_qpos_target } else { RobotMut::write_qpos };
             let message = write(&mut robot, values, joints, envs).unwrap_err().to_string();
             assert!(expected.iter().all(|part| message.contains(part)), "row {i}, {name}: {expected:?} in {message:?}");
             assert!(message.contains(name) || message.contains("does not exist"), "{message:?}");
@@ -64,7 +64,7 @@ fn messages() {
     let robot = sim.robot(id);
     for (message, expected) in [
         (robot.joint_id("J1").unwrap_err().to_string(), ["joint \"J1\"", "\"j1\""]),
-        (robot.get_joint_ids("arm").unwrap_err().to_string(), ["control part \"arm\"", "\"wrist\""]),
+        (robot.joint_ids("arm").unwrap_err().to_string(), ["control part \"arm\"", "\"wrist\""]),
         (robot.link_pose("link2").unwrap_err().to_string(), ["link \"link2\"", "\"l2\""]),
         (sim.robot_id("R").unwrap_err().to_string(), ["robot \"R\"", "\"r\""]),
         (self::sim(1).robot_id("r").unwrap_err().to_string(), ["robot \"r\"", "there are none"]),
@@ -79,16 +79,16 @@ fn layouts() {
     let rows = Array2::from_shape_fn((3, 3), |(e, j)| 0.1 * e as f64 + 0.02 * j as f64);
     let columns = rows.t().as_standard_layout().into_owned().reversed_axes();
     sim.robot_mut(id).write_qpos(&columns, None, None).unwrap();
-    assert_eq!(sim.robot(id).get_qpos(), rows);
+    assert_eq!(sim.robot(id).qpos(), rows);
     // Columns and rows in any order, each once.
     let (joints, envs) = ([JointIndex(2), JointIndex(0)], [EnvId(2), EnvId(0)]);
     sim.robot_mut(id).write_qpos(&array![[0.7, 0.6], [0.5, 0.4]], Some(&joints), Some(&envs)).unwrap();
-    let q = sim.robot(id).get_qpos();
+    let q = sim.robot(id).qpos();
     assert_eq!([q[(2, 2)], q[(2, 0)], q[(0, 2)], q[(0, 0)]], [0.7, 0.6, 0.5, 0.4]);
     assert_eq!([q[(2, 1)], q[(1, 0)]], [rows[(2, 1)], rows[(1, 0)]]);
     // Outside of the limits: clamped.
     sim.robot_mut(id).write_qpos(&array![[5.0, -5.0, f64::MAX]], None, None).unwrap();
-    assert_eq!(sim.robot(id).get_qpos().row(1), array![1.0, -1.0, 1.0]);
-    sim.robot_mut(id).set_qpos(&array![[f64::MIN, 5.0, 0.0]], None, None).unwrap();
-    assert_eq!(sim.robot(id).get_target_qpos().row(2), array![-1.0, 1.0, 0.0]);
+    assert_eq!(sim.robot(id).qpos().row(1), array![1.0, -1.0, 1.0]);
+    sim.robot_mut(id).set_qpos_target(&array![[f64::MIN, 5.0, 0.0]], None, None).unwrap();
+    assert_eq!(sim.robot(id).qpos_target().row(2), array![-1.0, 1.0, 0.0]);
 }

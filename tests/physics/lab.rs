@@ -127,7 +127,7 @@ impl Lab {
     pub(crate) fn period(&mut self, robot: RobotId, steps: u32) -> f64 {
         let (mut before, mut times) = ([0.0, self.q(robot)[0]], Vec::new());
         self.watch(steps, |t, sim| {
-            let q = sim.robot(robot).get_qpos()[(0, 0)];
+            let q = sim.robot(robot).qpos()[(0, 0)];
             if q * before[1] < 0.0 {
                 times.push(before[0] + (t - before[0]) * before[1] / (before[1] - q));
             }
@@ -156,7 +156,7 @@ impl Lab {
 
     /// Efforts of all joints, from the next step on.
     pub(crate) fn push_joints(&mut self, robot: RobotId, efforts: &[f64]) {
-        self.sim.robot_mut(robot).set_qf(&row(efforts), None, None).unwrap();
+        self.sim.robot_mut(robot).set_qf_target(&row(efforts), None, None).unwrap();
     }
 
     /// A force in the centre of mass of a link and a torque, in world axes, from the next step on.
@@ -174,16 +174,16 @@ impl Lab {
     }
 
     pub(crate) fn q(&self, robot: RobotId) -> Vec<f64> {
-        self.sim.robot(robot).get_qpos().row(0).to_vec()
+        self.sim.robot(robot).qpos().row(0).to_vec()
     }
 
     pub(crate) fn v(&self, robot: RobotId) -> Vec<f64> {
-        self.sim.robot(robot).get_qvel().row(0).to_vec()
+        self.sim.robot(robot).qvel().row(0).to_vec()
     }
 
     /// Efforts of the drives in the last step.
     pub(crate) fn effort(&self, robot: RobotId) -> Vec<f64> {
-        self.sim.robot(robot).get_qf().row(0).to_vec()
+        self.sim.robot(robot).qf().row(0).to_vec()
     }
 
     pub(crate) fn root(&self, robot: RobotId) -> Body {
@@ -223,13 +223,13 @@ impl Body {
 /// The root link of a robot.
 pub(crate) fn root(sim: &SimulationManager, robot: RobotId) -> Body {
     let robot: sim::Robot<'_> = sim.robot(robot);
-    Body::new(&robot.get_root_pose(), &robot.get_root_velocity())
+    Body::new(&robot.root_pose(), &robot.root_velocity())
 }
 
 /// A rigid object.
 pub(crate) fn body(sim: &SimulationManager, object: ObjectId) -> Body {
     let object = sim.rigid_object(object);
-    Body::new(&object.get_pose(), &object.get_velocity())
+    Body::new(&object.pose(), &object.velocity())
 }
 
 pub(crate) fn row(values: &[f64]) -> Array2<f64> {

@@ -46,7 +46,7 @@ fn arms() -> SimulationManager {
     };
     sim.add_sensor("camera", camera).unwrap();
     let target = ndarray::arr2(&[[0.3, 0.5, -1.4, 0.3, -0.5, 0.0]]);
-    sim.robot_mut(robot).set_qpos(&target, None, None).unwrap();
+    sim.robot_mut(robot).set_qpos_target(&target, None, None).unwrap();
     sim.update(150);
     sim
 }

@@ -190,7 +190,7 @@ mod tests {
         sim.update(20);
         let state = |sim: &SimulationManager| {
             let (robot, cube) = (sim.robot(sim.robot_id("arm").unwrap()), sim.rigid_object_id("cube").unwrap());
-            (sim.time(), sim.steps(), robot.get_qpos(), robot.get_qvel(), sim.rigid_object(cube).get_pose())
+            (sim.time(), sim.steps(), robot.qpos(), robot.qvel(), sim.rigid_object(cube).pose())
         };
         let red = |image: &image::RgbaImage| image.pixels().filter(|p| p[0] > 100 && p[1] < 60 && p[2] < 60).count();
         let written = |sim: &mut SimulationManager| {

@@ -30,7 +30,7 @@ fn poses(sim: &SimulationManager) -> Vec<(String, Array2<f64>)> {
         poses.extend(robot.link_names().iter().map(|link| (format!("{uid}/{link}"), robot.link_pose(link).unwrap())));
     }
     for uid in ["cube", "hand"] {
-        poses.push((uid.into(), sim.rigid_object(sim.rigid_object_id(uid).unwrap()).get_pose()));
+        poses.push((uid.into(), sim.rigid_object(sim.rigid_object_id(uid).unwrap()).pose()));
     }
     let part = sim.mjcf_part(sim.mjcf_id("part").unwrap());
     poses.extend(["ball", "tip"].map(|body| (format!("part/{body}"), part.body_pose(body).unwrap())));
@@ -46,7 +46,7 @@ fn recorded(path: &Path, scene: bool) -> Vec<Vec<(String, Array2<f64>)>> {
     for step in 0..STEPS {
         let target = |(env, joint)| 0.4 * (0.2 * step as f64 + joint as f64 + env as f64).sin();
         let targets = Array2::from_shape_fn((2, sim.robot(arm).dof()), target);
-        sim.robot_mut(arm).set_qpos(&targets, None, None).unwrap();
+        sim.robot_mut(arm).set_qpos_target(&targets, None, None).unwrap();
         let row = ndarray::array![[1.0, 1.0 + 0.01 * step as f64, 0.8, 0.6, 0.0, 0.8, 0.0]];
         sim.rigid_object_mut(hand).write_pose(&row, Some(&[EnvId(step % 2)])).unwrap();
         // What was written is recorded at the time of the step before: it is what is shown there.
@@ -106,11 +106,11 @@ fn poses_of_a_recording() {
         assert!(largest.0 < 1e-9, "{name}: {largest:?}");
         // To and fro.
         film.show(&mut sim, STEPS).unwrap();
-        let end = sim.mjcf_part(film.part).get_qpos();
+        let end = sim.mjcf_part(film.part).qpos();
         film.show(&mut sim, 0).unwrap();
-        assert_ne!(sim.mjcf_part(film.part).get_qpos(), end);
+        assert_ne!(sim.mjcf_part(film.part).qpos(), end);
         film.show(&mut sim, usize::MAX).unwrap();
-        assert_eq!(sim.mjcf_part(film.part).get_qpos(), end);
+        assert_eq!(sim.mjcf_part(film.part).qpos(), end);
         // The control: what was recorded a step later is elsewhere.
         assert!(largest_difference(&mut film, &mut sim, &all[1..]).0 > 1e-4);
     }
@@ -128,7 +128,7 @@ fn divergence() {
         let mut at = |film: &mut Film, frame: usize| {
             film.show(&mut sim, frame).unwrap();
             let part = sim.mjcf_part(film.part);
-            (part.get_qpos(), part.body_pose("hand").unwrap())
+            (part.qpos(), part.body_pose("hand").unwrap())
         };
         let (whole, last) = (at(&mut film, STEPS), at(&mut film, LOST));
         let lost_at = film.times[LOST];

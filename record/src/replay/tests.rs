@@ -23,7 +23,7 @@ fn drive(sim: &mut SimulationManager, mut at_step: impl FnMut(&mut SimulationMan
         let targets = ndarray::Array2::from_shape_fn((2, sim.robot(arm).dof()), |(env, joint)| {
             0.3 * (0.1 * f64::from(step) + joint as f64 + env as f64).sin()
         });
-        sim.robot_mut(arm).set_qpos(&targets, None, None).unwrap();
+        sim.robot_mut(arm).set_qpos_target(&targets, None, None).unwrap();
         sim.mjcf_part_mut(pusher).set_ctrl(&ndarray::array![[f64::from(step)]], None, None).unwrap();
         at_step(sim, step);
         sim.update(1);
@@ -108,7 +108,7 @@ fn other_actions() {
         recording(&path, |sim, step| {
             if step == 20 {
                 let arm = sim.robot_id("arm").unwrap();
-                let row = sim.robot(arm).get_qpos().row(0).mapv(|q| q + 0.01);
+                let row = sim.robot(arm).qpos().row(0).mapv(|q| q + 0.01);
                 let row = row.insert_axis(ndarray::Axis(0));
                 sim.robot_mut(arm).write_qpos(&row, None, Some(&[EnvId(0)])).unwrap();
             }

@@ -12,8 +12,8 @@ fn messages_of_a_run() {
     let (mut states, mut imu, mut depths, mut joint_stamps) = (vec![], vec![], vec![], vec![]);
     let read = |world: &World| {
         let robot = world.sim.robot(world.arm);
-        let state = [robot.get_qpos(), robot.get_qvel(), robot.get_qf()];
-        (world.sim.time()[1], state, robot.get_target_qpos(), world.sim.rigid_object(world.cube).get_pose())
+        let state = [robot.qpos(), robot.qvel(), robot.qf()];
+        (world.sim.time()[1], state, robot.qpos_target(), world.sim.rigid_object(world.cube).pose())
     };
     states.push(read(&world));
     for step in 0..STEPS {
@@ -105,7 +105,7 @@ fn no_side_effect() {
             (0..STEPS).for_each(|step| world.step(step));
         }
         let robot = world.sim.robot(world.arm);
-        let physics = (robot.get_qpos(), robot.get_qvel(), world.sim.rigid_object(world.cube).get_pose());
+        let physics = (robot.qpos(), robot.qvel(), world.sim.rigid_object(world.cube).pose());
         let (imu, joints) = (world.sim.sensor(world.imu).unwrap(), world.sim.sensor(world.joints).unwrap());
         let numbers = (imu.lin_acc_b().to_owned(), imu.sample_counts().to_owned(), joints.efforts().to_owned());
         let camera = world.sim.sensor(world.camera).unwrap();

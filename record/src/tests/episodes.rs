@@ -82,11 +82,11 @@ impl Expected {
         let of = |values: Array2<f64>| values.row(env).to_vec();
         self.were[env] = now;
         Row {
-            positions: of(robot.get_qpos()),
-            velocities: of(robot.get_qvel()),
-            efforts: of(robot.get_qf()),
-            targets: [of(robot.get_target_qpos()), of(robot.get_target_qvel()), of(robot.get_target_qf())],
-            cube: of(world.sim.rigid_object(world.cube).get_pose()),
+            positions: of(robot.qpos()),
+            velocities: of(robot.qvel()),
+            efforts: of(robot.qf()),
+            targets: [of(robot.qpos_target()), of(robot.qvel_target()), of(robot.qf_target())],
+            cube: of(world.sim.rigid_object(world.cube).pose()),
             image: if now[0] == were[0] { before.image.clone() } else { Some(color()) },
             acceleration: match now[1] == were[1] {
                 true => before.acceleration.clone(),

@@ -85,7 +85,7 @@ fn many_episodes() {
                 positions.extend((0..ENVS).map(|_| Vec::new()));
             }
             let begun = positions.len() - ENVS;
-            let q = sim.mjcf_part(cart).get_qpos();
+            let q = sim.mjcf_part(cart).qpos();
             positions[begun..].iter_mut().enumerate().for_each(|(env, rows)| rows.push(q.row(env).to_vec()));
             let force = Array2::from_shape_fn((ENVS, 1), |(env, _)| (env + step) as f64 * 0.01);
             sim.mjcf_part_mut(cart).set_ctrl(&force, None, None).unwrap();

@@ -21,11 +21,11 @@ fn task() -> Env {
     let cart = sim.add_robot(passive(mjcf_robot("cart", cart))).unwrap();
     let push = kinetoscope_tasks::Space::uniform(["slide"], [-1e5, 1e5]).unwrap();
     EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE) })
-        .action(ActionTerm::new("push", push, move |sim, forces| Ok(sim.robot_mut(cart).set_qf(forces, None, None)?)))
-        .observation(ObservationTerm::new("place", ["slide"], move |now| Ok(now.sim().robot(cart).get_qpos())))
-        .reward(RewardTerm::new("place", 3.0, move |now| Ok(now.sim().robot(cart).get_qpos().column(0).to_owned())))
+        .action(ActionTerm::new("push", push, move |sim, forces| Ok(sim.robot_mut(cart).set_qf_target(forces, None, None)?)))
+        .observation(ObservationTerm::new("place", ["slide"], move |now| Ok(now.sim().robot(cart).qpos())))
+        .reward(RewardTerm::new("place", 3.0, move |now| Ok(now.sim().robot(cart).qpos().column(0).to_owned())))
         .termination(TerminationTerm::new("far", move |now| {
-            Ok(now.sim().robot(cart).get_qpos().column(0).mapv(|x| x.abs() > 0.1))
+            Ok(now.sim().robot(cart).qpos().column(0).mapv(|x| x.abs() > 0.1))
         }))
         .event(EventTerm::on_reset("scatter", move |sim, dice| {
             for die in dice {

@@ -108,8 +108,8 @@ pub struct ArticulationId(RobotId);
 pub type Articulation<'a> = Robot<'a>;
 
 /// An articulation, to write: everything that can be done with a robot. Joints without a drive have no targets:
-/// [`write_qpos`](RobotMut::write_qpos) puts them somewhere, [`set_qf`](RobotMut::set_qf) pushes them, and
-/// [`set_qpos`](RobotMut::set_qpos) does nothing.
+/// [`write_qpos`](RobotMut::write_qpos) puts them somewhere, [`set_qf_target`](RobotMut::set_qf_target) pushes them, and
+/// [`set_qpos_target`](RobotMut::set_qpos_target) does nothing.
 pub type ArticulationMut<'a> = RobotMut<'a>;
 
 impl SimulationManager {

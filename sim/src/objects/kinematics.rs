@@ -36,7 +36,7 @@ pub struct IkResult {
 /// A [`Tip`] of a robot.
 struct Resolved {
     chain: Chain,
-    /// The joints that were named, as columns of `get_qpos`: the columns of all arrays.
+    /// The joints that were named, as columns of `qpos`: the columns of all arrays.
     columns: Vec<usize>,
     /// Whose joints they are, as errors say it.
     of: String,
@@ -48,7 +48,7 @@ impl Robot<'_> {
     /// \[m\], shape (N, 7). Where the robot's root is in each environment is part of them.
     ///
     /// `qpos` has a row for each of `env_ids` (all environments where `None`), or one for all of them, and a column for
-    /// each joint of the control part that `tip` names ([`get_joint_ids`](Self::get_joint_ids)), or for each joint of
+    /// each joint of the control part that `tip` names ([`joint_ids`](Self::joint_ids)), or for each joint of
     /// the robot. Other joints are where they are in the environment, mimic joints where those are that they follow:
     /// their own columns are accepted and ignored. Positions beyond the limits are taken as they are. The state does
     /// not change.
@@ -122,7 +122,7 @@ impl Robot<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<Array3<f64>> {
         let Resolved { chain, columns, .. } = self.resolve(&tip.into())?;
-        let present = self.get_qpos();
+        let present = self.qpos();
         let rows = qpos.map(|qpos| self.part_rows("jacobian", qpos, &columns, env_ids)).transpose()?;
         let envs = env_list(env_ids, self.simulation.batch.num_envs())?;
         let mut jacobians = Array3::zeros((envs.len(), 6, columns.len()));
@@ -156,11 +156,11 @@ impl Robot<'_> {
     /// The joints of the control part that `tip` names, or all of the robot, are found within the limits that the robot was
     /// added with (joints' own, narrowed by their followers'). Tighter ones of
     /// [`set_qpos_limits`](crate::objects::robot::RobotMut::set_qpos_limits) are not looked at: a success may be outside of
-    /// [`qpos_limits`](Self::qpos_limits), and `set_qpos` would clamp it. Other joints stay where they are in the
+    /// [`qpos_limits`](Self::qpos_limits), and `set_qpos_target` would clamp it. Other joints stay where they are in the
     /// environment. The search starts from `initial` \[rad or m\], with rows and columns as in
     /// [`compute_fk`](Self::compute_fk), or from where the joints are. How: [`IkSolver`], on the calling thread. Contacts
     /// are not considered, and the state does not change: give what comes out to
-    /// [`set_qpos`](crate::objects::robot::RobotMut::set_qpos), where [`success`](IkResult::success)
+    /// [`set_qpos_target`](crate::objects::robot::RobotMut::set_qpos_target), where [`success`](IkResult::success)
     /// says that it is right.
     ///
     /// No [`Property`](crate::Property) moves a joint or a link's frame, and neither masses nor sizes are looked at: what is
@@ -304,7 +304,7 @@ impl Robot<'_> {
         };
         let (columns, of): (Vec<usize>, String) = match part {
             Some(part) => {
-                let ids = self.get_joint_ids(part)?;
+                let ids = self.joint_ids(part)?;
                 (ids.iter().map(|id| id.0).collect(), format!("control part {part:?}"))
             }
             None => ((0..self.dof()).collect(), "the robot".into()),

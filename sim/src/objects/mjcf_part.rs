@@ -65,7 +65,7 @@ impl<'a> MjcfPart<'a> {
         &self.data.names.sites
     }
 
-    /// Names of its actuators, in MuJoCo's order: the columns of [`get_ctrl`](Self::get_ctrl).
+    /// Names of its actuators, in MuJoCo's order: the columns of [`ctrl`](Self::ctrl).
     pub fn actuator_names(&self) -> &'a [String] {
         &self.data.names.actuators
     }
@@ -84,7 +84,7 @@ impl<'a> MjcfPart<'a> {
         Ok(found.into_iter().map(ActuatorIndex).collect())
     }
 
-    /// Columns of [`get_qpos`](Self::get_qpos) of the joints that patterns match: 7 for a free joint (position, then w x y
+    /// Columns of [`qpos`](Self::qpos) of the joints that patterns match: 7 for a free joint (position, then w x y
     /// z), 4 for a ball, 1 for others.
     ///
     /// # Errors
@@ -93,7 +93,7 @@ impl<'a> MjcfPart<'a> {
         self.columns(patterns, self.model().jnt_qposadr(), [7, 4, 1])
     }
 
-    /// Columns of [`get_qvel`](Self::get_qvel) of the joints that patterns match: 6 for a free joint (velocity in the
+    /// Columns of [`qvel`](Self::qvel) of the joints that patterns match: 6 for a free joint (velocity in the
     /// environment, then angular velocity in the body), 3 for a ball, 1 for others.
     ///
     /// # Errors
@@ -128,23 +128,27 @@ impl<'a> MjcfPart<'a> {
     }
 
     /// Positions of its joints as MuJoCo has them \[m, rad, quaternions w x y z\], in the environment, shape (N, nq).
-    pub fn get_qpos(&self) -> Array2<f64> {
+    #[doc(alias = "get_qpos")]
+    pub fn qpos(&self) -> Array2<f64> {
         self.rows(&self.places().qpos, |env, place| env.data().qpos()[place])
     }
 
     /// Velocities of its joints as MuJoCo has them \[m/s, rad/s\], shape (N, nv).
-    pub fn get_qvel(&self) -> Array2<f64> {
+    #[doc(alias = "get_qvel")]
+    pub fn qvel(&self) -> Array2<f64> {
         self.rows(&self.places().dofs, |env, place| env.data().qvel()[place])
     }
 
     /// Controls of its actuators, in the units that the file gives them, shape (N, nu).
-    pub fn get_ctrl(&self) -> Array2<f64> {
+    #[doc(alias = "get_ctrl")]
+    pub fn ctrl(&self) -> Array2<f64> {
         self.rows(&self.places().controls, |env, place| env.data().ctrl()[place])
     }
 
     /// Forces of its actuators as MuJoCo last solved them \[N or N m\], shape (N, nu): in the last step; after a reset or a
     /// write 0, or those of the state as it is where a sensor asks for what is solved.
-    pub fn get_actuator_force(&self) -> Array2<f64> {
+    #[doc(alias = "get_actuator_force")]
+    pub fn actuator_force(&self) -> Array2<f64> {
         self.rows(&self.places().actuators, |env, place| env.data().actuator_force()[place])
     }
 
@@ -256,7 +260,7 @@ impl<'a> MjcfPartMut<'a> {
         Ok(())
     }
 
-    /// Writes positions of all joints into the state, as [`get_qpos`](MjcfPart::get_qpos) gives them: rows of nq numbers for
+    /// Writes positions of all joints into the state, as [`qpos`](MjcfPart::qpos) gives them: rows of nq numbers for
     /// `env_ids` (all where `None`; a single row is for all of them). Quaternions are normalised. A forward pass follows,
     /// so that everything that is read afterwards belongs to the new state.
     ///
@@ -288,7 +292,7 @@ impl<'a> MjcfPartMut<'a> {
         Ok(())
     }
 
-    /// Writes velocities of all joints into the state, as [`get_qvel`](MjcfPart::get_qvel) gives them: rows of nv numbers, as
+    /// Writes velocities of all joints into the state, as [`qvel`](MjcfPart::qvel) gives them: rows of nv numbers, as
     /// in [`write_qpos`](Self::write_qpos).
     ///
     /// # Errors
@@ -355,7 +359,7 @@ impl<'a> MjcfPartMut<'a> {
         Ok(())
     }
 
-    /// First columns of the quaternions of `get_qpos`.
+    /// First columns of the quaternions of `qpos`.
     fn quaternions(&self) -> Vec<usize> {
         let model = &self.data.model;
         let first = |joint: usize| {

@@ -36,7 +36,7 @@ use std::sync::Arc;
 /// let motor = sim.mjcf_part(part).actuator_ids(&["motor"])?;
 /// sim.mjcf_part_mut(part).set_ctrl(&ndarray::array![[0.1]], Some(&motor), None)?;
 /// sim.update(10);
-/// assert!(sim.mjcf_part(part).get_qpos()[(0, 0)] > 0.0, "it falls");
+/// assert!(sim.mjcf_part(part).qpos()[(0, 0)] > 0.0, "it falls");
 /// # Ok::<(), kinetoscope_sim::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -85,7 +85,7 @@ impl MjcfCfg {
     }
 }
 
-/// Number of an actuator of a part: its column in `get_ctrl`.
+/// Number of an actuator of a part: its column in `ctrl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ActuatorIndex(pub usize);
 

@@ -48,12 +48,14 @@ impl<'a> RigidObjectGroup<'a> {
     }
 
     /// Poses of the objects in the environment: `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, K, 7).
-    pub fn get_pose(&self) -> Array3<f64> {
+    #[doc(alias = "get_pose")]
+    pub fn pose(&self) -> Array3<f64> {
         self.gather(|body| body.poses())
     }
 
     /// Velocities of the objects' frames, then angular velocities, in world axes \[m/s, rad/s\], shape (N, K, 6).
-    pub fn get_velocity(&self) -> Array3<f64> {
+    #[doc(alias = "get_velocity")]
+    pub fn velocity(&self) -> Array3<f64> {
         self.gather(|body| body.velocities())
     }
 

@@ -42,19 +42,21 @@ impl<'a> RigidObject<'a> {
     }
 
     /// Configured mass \[kg\]. The mass of each environment is
-    /// [`get_mass`](Self::get_mass).
+    /// [`mass`](Self::mass).
     pub fn nominal_mass(&self) -> f64 {
         self.data.mass_properties.mass
     }
 
     /// Pose of its frame in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
-    pub fn get_pose(&self) -> Array2<f64> {
+    #[doc(alias = "get_pose")]
+    pub fn pose(&self) -> Array2<f64> {
         self.body().poses()
     }
 
     /// Velocity of its frame, then angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 where it is
     /// not dynamic.
-    pub fn get_velocity(&self) -> Array2<f64> {
+    #[doc(alias = "get_velocity")]
+    pub fn velocity(&self) -> Array2<f64> {
         self.body().velocities()
     }
 }

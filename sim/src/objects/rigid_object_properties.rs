@@ -21,13 +21,15 @@ const OBJECTS: usize = 1 << 20;
 impl RigidObject<'_> {
     /// Mass in each environment \[kg\], shape (N), as MuJoCo has it; that of the configuration where the object is not
     /// dynamic.
-    pub fn get_mass(&self) -> Array1<f64> {
+    #[doc(alias = "get_mass")]
+    pub fn mass(&self) -> Array1<f64> {
         let nominal = self.data.mass_properties().mass;
         self.numbers(1, [nominal].into(), |model, body| model.body_mass()[body..=body].to_vec()).remove_axis(Axis(1))
     }
 
     /// Centre of mass in the object's frame in each environment \[m\], shape (N, 3).
-    pub fn get_center_of_mass(&self) -> Array2<f64> {
+    #[doc(alias = "get_center_of_mass")]
+    pub fn center_of_mass(&self) -> Array2<f64> {
         let nominal = self.data.mass_properties().com.iter().copied().collect();
         self.numbers(3, nominal, |model, body| model.body_ipos()[3 * body..3 * body + 3].to_vec())
     }
@@ -35,13 +37,15 @@ impl RigidObject<'_> {
     /// Principal moments of inertia about the centre of mass in each environment \[kg m²\], shape (N, 3). They are
     /// those along x, y and z of the object's frame; those of a mesh whose configuration names no `inertia` are along its
     /// principal axes, the largest first.
-    pub fn get_inertia(&self) -> Array2<f64> {
+    #[doc(alias = "get_inertia")]
+    pub fn inertia(&self) -> Array2<f64> {
         let nominal = self.data.mass_properties().moments.iter().copied().collect();
         self.numbers(3, nominal, |model, body| model.body_inertia()[3 * body..3 * body + 3].to_vec())
     }
 
     /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] in each environment, shape (N, 3).
-    pub fn get_friction(&self) -> Array2<f64> {
+    #[doc(alias = "get_friction")]
+    pub fn friction(&self) -> Array2<f64> {
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), 3));
         let body = self.simulation.objects[self.index].body;
         self.simulation.batch.for_each(|i, env| {
@@ -56,7 +60,8 @@ impl RigidObject<'_> {
 
     /// Linear damping \[N s/m\] and angular damping \[N m s/rad\] in each environment, shape (N, 2); 0 where the object is not
     /// dynamic.
-    pub fn get_damping(&self) -> Array2<f64> {
+    #[doc(alias = "get_damping")]
+    pub fn damping(&self) -> Array2<f64> {
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), 2));
         if let Some((_, dof)) = self.simulation.objects[self.index].joint {
             self.simulation.batch.for_each(|i, env| {
@@ -69,7 +74,8 @@ impl RigidObject<'_> {
 
     /// Forces and torques of [`set_external_wrench`](RigidObjectMut::set_external_wrench), in world axes with the object where
     /// it is \[N, N m\], shape (N, 6).
-    pub fn get_external_wrench(&self) -> Array2<f64> {
+    #[doc(alias = "get_external_wrench")]
+    pub fn external_wrench(&self) -> Array2<f64> {
         let mut wrenches = Array2::zeros((self.simulation.batch.num_envs(), 6));
         self.simulation.batch.for_each(|i, env: &Env| {
             for wrench in env.wrenches().list.iter().filter(|wrench| wrench.of == (OBJECTS, self.index)) {
@@ -122,7 +128,7 @@ impl RigidObjectMut<'_> {
         self.set(argument, meaning, &[Property::CenterOfMass], centers.into(), env_ids)
     }
 
-    /// Sets the principal moments of inertia \[kg m²\], as [`get_inertia`](RigidObject::get_inertia) gives them: rows of 3, as in
+    /// Sets the principal moments of inertia \[kg m²\], as [`inertia`](RigidObject::inertia) gives them: rows of 3, as in
     /// [`set_mass`](Self::set_mass).
     ///
     /// # Errors

@@ -52,7 +52,7 @@ impl<'a> Robot<'a> {
         self.data.description()
     }
 
-    /// Number of movable joints with one degree of freedom, mimic ones included: the columns of `get_qpos`.
+    /// Number of movable joints with one degree of freedom, mimic ones included: the columns of `qpos`.
     pub fn dof(&self) -> usize {
         self.data.plans.len()
     }
@@ -74,12 +74,13 @@ impl<'a> Robot<'a> {
     }
 
     /// Columns of the joints of a control part, mimic joints included, in the order of its patterns; of all joints where
-    /// `part` is `None`. Without the mimic joints: [`get_active_joint_ids`](Self::get_active_joint_ids).
+    /// `part` is `None`. Without the mimic joints: [`active_joint_ids`](Self::active_joint_ids).
     ///
     /// # Errors
     /// There is no such part; the error lists those there are.
+    #[doc(alias = "get_joint_ids")]
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
-    pub fn get_joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
+    pub fn joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
         let Some(part) = part.into() else { return Ok((0..self.dof()).map(JointIndex).collect()) };
         let members = self.data.parts.get(part).ok_or_else(|| unknown("control part", part, self.control_parts()))?;
         Ok(members.iter().map(|&i| JointIndex(i)).collect())
@@ -125,23 +126,27 @@ impl<'a> Robot<'a> {
     }
 
     /// Joint positions \[rad or m\], shape (N, dof).
-    pub fn get_qpos(&self) -> Array2<f64> {
+    #[doc(alias = "get_qpos")]
+    pub fn qpos(&self) -> Array2<f64> {
         self.gather(|env, joint| env.data().qpos()[joint.qpos])
     }
 
     /// Joint velocities \[rad/s or m/s\], shape (N, dof).
-    pub fn get_qvel(&self) -> Array2<f64> {
+    #[doc(alias = "get_qvel")]
+    pub fn qvel(&self) -> Array2<f64> {
         self.gather(|env, joint| env.data().qvel()[joint.dof])
     }
 
     /// Efforts of the drives in the last step \[N m or N\], shape (N, dof); 0 for joints without a drive.
-    pub fn get_qf(&self) -> Array2<f64> {
+    #[doc(alias = "get_qf")]
+    pub fn qf(&self) -> Array2<f64> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |d| env.drives.effort[d]))
     }
 
     /// Position targets \[rad or m\], shape (N, dof); for a mimic joint, what its driver's target implies; the present
     /// position for a joint without a drive.
-    pub fn get_target_qpos(&self) -> Array2<f64> {
+    #[doc(alias = "get_target_qpos")]
+    pub fn qpos_target(&self) -> Array2<f64> {
         let mut targets = self.gather(|env, joint| match joint.drive {
             Some(d) => env.drives.position[d],
             None => env.data().qpos()[joint.qpos],
@@ -165,25 +170,29 @@ impl<'a> Robot<'a> {
     /// Joint positions at the start, which [`reset`](crate::SimulationManager::reset) goes back to \[rad or m\], shape
     /// (N, dof).
     #[doc(alias = "default_joint_pos")]
-    pub fn get_default_qpos(&self) -> Array2<f64> {
+    #[doc(alias = "get_default_qpos")]
+    pub fn default_qpos(&self) -> Array2<f64> {
         let n = self.simulation.batch.num_envs();
         Array2::from_shape_fn((n, self.dof()), |(_, joint)| self.data.plans[joint].initial)
     }
 
     /// Pose of the root link at the start: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, 7).
-    pub fn get_default_root_pose(&self) -> Array2<f64> {
+    #[doc(alias = "get_default_root_pose")]
+    pub fn default_root_pose(&self) -> Array2<f64> {
         let row = to_row(&self.data.root_pose());
         Array2::from_shape_fn((self.simulation.batch.num_envs(), 7), |(_, k)| row[k])
     }
 
     /// Pose of the root link in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
-    pub fn get_root_pose(&self) -> Array2<f64> {
+    #[doc(alias = "get_root_pose")]
+    pub fn root_pose(&self) -> Array2<f64> {
         self.root().poses()
     }
 
     /// Velocity of the root link's frame, then its angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 where
     /// the base is fixed.
-    pub fn get_root_velocity(&self) -> Array2<f64> {
+    #[doc(alias = "get_root_velocity")]
+    pub fn root_velocity(&self) -> Array2<f64> {
         self.root().velocities()
     }
 
@@ -246,14 +255,15 @@ impl<'a> RobotMut<'a> {
     /// # Errors
     /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
     /// set.
+    #[doc(alias = "set_qpos")]
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
-    pub fn set_qpos<'t>(
+    pub fn set_qpos_target<'t>(
         &mut self,
         targets: impl AsArray<'t, f64, Ix2>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        self.set_targets("set_qpos", targets.into(), joint_ids, env_ids, |drives, indexing, _, value| {
+        self.set_targets("set_qpos_target", targets.into(), joint_ids, env_ids, |drives, indexing, _, value| {
             if let Some(drive) = indexing.drive {
                 let [low, high] = drives.ranges[drive];
                 drives.position[drive] = value.clamp(low, high);
@@ -262,19 +272,20 @@ impl<'a> RobotMut<'a> {
     }
 
     /// Sets velocity targets \[rad/s or m/s\] of the drives; they stay until changed or reset, and are 0 at first. Rows
-    /// and columns as in [`set_qpos`](Self::set_qpos); columns of joints without a drive are accepted and ignored.
+    /// and columns as in [`set_qpos_target`](Self::set_qpos_target); columns of joints without a drive are accepted and ignored.
     ///
     /// # Errors
     /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
     /// set.
+    #[doc(alias = "set_qvel")]
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
-    pub fn set_qvel<'t>(
+    pub fn set_qvel_target<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix2>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        self.set_targets("set_qvel", velocities.into(), joint_ids, env_ids, |drives, indexing, _, value| {
+        self.set_targets("set_qvel_target", velocities.into(), joint_ids, env_ids, |drives, indexing, _, value| {
             if let Some(drive) = indexing.drive {
                 drives.velocity[drive] = value;
             }
@@ -283,20 +294,21 @@ impl<'a> RobotMut<'a> {
 
     /// Sets efforts \[N m or N\] that are added to what the drives give, before the sum is clamped to their limits; they
     /// stay until changed or reset, and are 0 at first. A joint without a drive (drive type `None`) gets the effort as it
-    /// is, clamped to its own limit. Rows and columns as in [`set_qpos`](Self::set_qpos); columns of mimic joints are
+    /// is, clamped to its own limit. Rows and columns as in [`set_qpos_target`](Self::set_qpos_target); columns of mimic joints are
     /// accepted and ignored.
     ///
     /// # Errors
     /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
     /// set.
+    #[doc(alias = "set_qf")]
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
-    pub fn set_qf<'t>(
+    pub fn set_qf_target<'t>(
         &mut self,
         efforts: impl AsArray<'t, f64, Ix2>,
         joint_ids: Option<&[JointIndex]>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
-        self.set_targets("set_qf", efforts.into(), joint_ids, env_ids, |drives, indexing, plan, value| {
+        self.set_targets("set_qf_target", efforts.into(), joint_ids, env_ids, |drives, indexing, plan, value| {
             if let Some(drive) = indexing.drive {
                 drives.feedforward[drive] = value;
             } else if plan.mimic.is_none() {
@@ -327,7 +339,7 @@ impl<'a> RobotMut<'a> {
     }
 
     /// Writes joint positions \[rad or m\] into the state, clamped to the limits; targets stay. Rows and columns as in
-    /// [`set_qpos`](Self::set_qpos); mimic joints are written as given. A forward pass follows, so that everything that
+    /// [`set_qpos_target`](Self::set_qpos_target); mimic joints are written as given. A forward pass follows, so that everything that
     /// is read afterwards belongs to the new state.
     ///
     /// # Errors

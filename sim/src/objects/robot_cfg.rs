@@ -65,7 +65,7 @@ pub struct RobotCfg {
     /// let robot = sim.add_robot(RobotCfg { mjcf: Some(MjcfFile::text(arm)), ..Default::default() })?;
     /// let robot = sim.robot(robot);
     /// assert_eq!((robot.joint_names(), robot.link_names()), (&["elbow".into()][..], vec!["base", "arm", "tip"]));
-    /// assert_eq!(robot.get_stiffness()[(0, 0)], 200.0);
+    /// assert_eq!(robot.stiffness()[(0, 0)], 200.0);
     /// # Ok::<(), kinetoscope_sim::Error>(())
     /// ```
     #[serde(default, deserialize_with = "crate::file_format::mjcf_file")]

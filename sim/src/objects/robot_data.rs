@@ -22,7 +22,7 @@ use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::pose::to_row;
 use std::collections::BTreeMap;
 
-/// Column of a joint in `get_qpos` and its kin.
+/// Column of a joint in `qpos` and its kin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct JointIndex(pub usize);
 

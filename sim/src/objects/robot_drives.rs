@@ -18,25 +18,29 @@ use std::sync::Arc;
 impl Robot<'_> {
     /// Stiffness of the drives, in the unit of each one's drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
     /// joints without a drive.
-    pub fn get_stiffness(&self) -> Array2<f64> {
+    #[doc(alias = "get_stiffness")]
+    pub fn stiffness(&self) -> Array2<f64> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].stiffness))
     }
 
     /// Damping of the drives, in the unit of each one's drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
     /// joints without a drive. The viscous friction of the joint itself is not part of it.
-    pub fn get_damping(&self) -> Array2<f64> {
+    #[doc(alias = "get_damping")]
+    pub fn damping(&self) -> Array2<f64> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].damping))
     }
 
     /// What stiffness and damping of each drive mean, shape (N, dof); `None` for joints without a drive.
-    pub fn get_drive_types(&self) -> Array2<DriveType> {
+    #[doc(alias = "get_drive_types")]
+    pub fn drive_types(&self) -> Array2<DriveType> {
         self.simulation.batch.gather(&self.indexing().joints, |env, joint| {
             joint.drive.map_or(DriveType::None, |drive| env.drives.settings[drive].drive_type)
         })
     }
 
     /// Delays of the drives \[MuJoCo steps\], shape (N, dof); 0 for joints that [`DelayedPd`] does not drive.
-    pub fn get_delay(&self) -> Array2<u32> {
+    #[doc(alias = "get_delay")]
+    pub fn delay(&self) -> Array2<u32> {
         let delays = self.gather(|env, joint| match joint.drive.and_then(|drive| env.drives.table().model_of(drive)) {
             Some(DriveActuator { model: ActuatorModel::DelayedPd(_), memory, .. }) => {
                 f64::from(DelayedPd::delay_of(&env.drives.memory[memory.clone()]))
@@ -70,7 +74,7 @@ impl RobotMut<'_> {
     /// # std::fs::remove_file(&urdf)?;
     /// let knee = sim.robot(leg).joint_id("knee")?;
     /// sim.robot_mut(leg).set_stiffness(&array![[40.0]], Some(&[knee]), Some(&[EnvId(1)]))?;
-    /// assert_eq!(sim.robot(leg).get_stiffness(), array![[1e4], [40.0]]);
+    /// assert_eq!(sim.robot(leg).stiffness(), array![[1e4], [40.0]]);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
@@ -111,7 +115,7 @@ impl RobotMut<'_> {
     /// Sets what stiffness and damping of drives mean, for `joint_ids` (all where `None`; mimic joints are left out) in
     /// `env_ids` (all where `None`). Their numbers stay, and so does everything else; gains that were drawn
     /// ([`randomize`](crate::SimulationManager::randomize)) stay what they are in torque units. With `None` a drive gives nothing but
-    /// the effort of [`set_qf`](Self::set_qf), until it gets another type. `Acceleration` multiplies the gains by the
+    /// the effort of [`set_qf_target`](Self::set_qf_target), until it gets another type. `Acceleration` multiplies the gains by the
     /// inertia that the joint feels at the robot's initial positions, with the masses of the files and payloads: those that
     /// were drawn for an environment do not count. Nothing warns where that makes an explicit model
     /// unstable: see [`set_stiffness`](Self::set_stiffness).

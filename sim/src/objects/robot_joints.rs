@@ -14,18 +14,21 @@ use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 
 impl Robot<'_> {
     /// Dry friction of the joints \[N m or N\], shape (N, dof); 0 for joints that have none.
-    pub fn get_friction(&self) -> Array2<f64> {
+    #[doc(alias = "get_friction")]
+    pub fn friction(&self) -> Array2<f64> {
         self.property(Property::DryFriction)
     }
 
     /// Viscous damping of the joints themselves \[N m s/rad or N s/m\], shape (N, dof); 0 for joints that have none. The
-    /// damping of the drives is not part of it: see [`get_damping`](Self::get_damping).
-    pub fn get_joint_damping(&self) -> Array2<f64> {
+    /// damping of the drives is not part of it: see [`damping`](Self::damping).
+    #[doc(alias = "get_joint_damping")]
+    pub fn joint_damping(&self) -> Array2<f64> {
         self.property(Property::JointDamping)
     }
 
     /// Rotor inertia of the joints \[kg m² or kg\], shape (N, dof).
-    pub fn get_armature(&self) -> Array2<f64> {
+    #[doc(alias = "get_armature")]
+    pub fn armature(&self) -> Array2<f64> {
         self.property(Property::Armature)
     }
 
@@ -51,7 +54,7 @@ impl RobotMut<'_> {
     /// place that MuJoCo has for it, so that a joint with one has dry friction only where the model has another place:
     /// where [`DriveCfg::friction`](crate::DriveCfg::friction) is given for the robot, 0 will do, or the file's
     /// `<dynamics friction="..">` is above 0. The others can be told 0, which they have: what
-    /// [`get_friction`](Robot::get_friction) returns can be set.
+    /// [`friction`](Robot::friction) returns can be set.
     ///
     /// ```
     /// use ndarray::array;
@@ -66,7 +69,7 @@ impl RobotMut<'_> {
     /// let drawer = sim.add_articulation(ArticulationCfg { urdf: UrdfCfg::single(&urdf), ..Default::default() })?;
     /// # std::fs::remove_file(&urdf)?;
     /// sim.articulation_mut(drawer).set_friction(&array![[30.0]], None, Some(&[EnvId(1)]))?;
-    /// assert_eq!(sim.articulation(drawer).get_friction(), array![[2.0], [30.0]]);
+    /// assert_eq!(sim.articulation(drawer).friction(), array![[2.0], [30.0]]);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///

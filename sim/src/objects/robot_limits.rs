@@ -42,7 +42,7 @@ impl Robot<'_> {
     }
 
     /// Effort limits of the drives \[N m or N\], infinite where there are none, shape (N, dof). A passive joint has that of
-    /// its file or configuration, which bounds what [`set_qf`](RobotMut::set_qf) gives it; a mimic joint has none.
+    /// its file or configuration, which bounds what [`set_qf_target`](RobotMut::set_qf_target) gives it; a mimic joint has none.
     pub fn qf_limits(&self) -> Array2<f64> {
         let mut limits = self.gather(|env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_effort));
         for ((_, joint), limit) in limits.indexed_iter_mut().filter(|(_, limit)| limit.is_nan()) {
@@ -163,7 +163,7 @@ impl RobotMut<'_> {
     }
 
     /// Sets the effort limits of drives \[N m or N\], infinite for none; rows and columns as in
-    /// [`set_stiffness`](Self::set_stiffness). The sum that a drive gives, with the effort of [`set_qf`](Self::set_qf), is
+    /// [`set_stiffness`](Self::set_stiffness). The sum that a drive gives, with the effort of [`set_qf_target`](Self::set_qf_target), is
     /// clamped to them.
     ///
     /// # Errors

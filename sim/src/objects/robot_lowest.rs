@@ -20,7 +20,8 @@ impl Robot<'_> {
     /// [`link_names`](Self::link_names), shape (N, links); +∞ where a link has no collision shape.
     ///
     /// They are exact for MuJoCo's primitives, and for meshes, which collide as their convex hulls.
-    pub fn get_link_lowest_heights(&self) -> Array2<f64> {
+    #[doc(alias = "get_link_lowest_heights")]
+    pub fn link_lowest_heights(&self) -> Array2<f64> {
         let links: Vec<usize> = (0..self.link_names().len()).collect();
         self.simulation.batch.gather(&links, |env, link| {
             let geoms = self.indexing().geoms.iter().filter(|geom| geom.link == *link);
@@ -30,7 +31,8 @@ impl Robot<'_> {
 
     /// Height of the lowest collision point of the robot in the environment \[m\], shape (N,); +∞ where it has no collision
     /// shape. Above the ground plane at z = 0 it is the robot's clearance, below it the depth of the penetration.
-    pub fn get_lowest_heights(&self) -> Array1<f64> {
+    #[doc(alias = "get_lowest_heights")]
+    pub fn lowest_heights(&self) -> Array1<f64> {
         let heights = self.simulation.batch.gather(&[()], |env, ()| lowest(env.data(), &self.indexing().geoms));
         heights.index_axis(Axis(1), 0).to_owned()
     }
@@ -63,7 +65,7 @@ impl RobotData {
         let (mut contents, index) = (others.clone(), others.robots.len());
         contents.robots.push(Arc::new(self));
         let trial = compile(&one, &contents, &kinetoscope_exec::ThreadPool::serial())?;
-        let height = Robot::new(&contents.robots[index], &trial, index).get_lowest_heights()[0];
+        let height = Robot::new(&contents.robots[index], &trial, index).lowest_heights()[0];
         let mut robot = Arc::unwrap_or_clone(contents.robots.swap_remove(index));
         if height.is_finite() {
             robot.raise(clearance - height);

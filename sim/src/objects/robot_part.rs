@@ -20,7 +20,7 @@ impl<'a> RobotMut<'a> {
     /// # Errors
     /// There is no such part; the error lists those there are.
     pub fn into_part(self, name: &str) -> Result<RobotPartMut<'a>> {
-        let joints = self.read().get_joint_ids(name)?;
+        let joints = self.read().joint_ids(name)?;
         Ok(RobotPartMut { robot: self, joints })
     }
 }
@@ -36,26 +36,29 @@ impl RobotPartMut<'_> {
     /// all of them), a column for each joint of the part; those of mimic joints are accepted and ignored.
     ///
     /// # Errors
-    /// As [`RobotMut::set_qpos`]; then nothing is set.
-    pub fn set_qpos<'t>(&mut self, targets: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
-        self.robot.set_qpos(targets, Some(&self.joints), env_ids)
+    /// As [`RobotMut::set_qpos_target`]; then nothing is set.
+    #[doc(alias = "set_qpos")]
+    pub fn set_qpos_target<'t>(&mut self, targets: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        self.robot.set_qpos_target(targets, Some(&self.joints), env_ids)
     }
 
     /// Sets velocity targets \[rad/s or m/s\], which stay until changed or reset; rows and columns as in
-    /// [`set_qpos`](Self::set_qpos).
+    /// [`set_qpos_target`](Self::set_qpos_target).
     ///
     /// # Errors
-    /// As [`RobotMut::set_qvel`]; then nothing is set.
-    pub fn set_qvel<'t>(&mut self, velocities: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
-        self.robot.set_qvel(velocities, Some(&self.joints), env_ids)
+    /// As [`RobotMut::set_qvel_target`]; then nothing is set.
+    #[doc(alias = "set_qvel")]
+    pub fn set_qvel_target<'t>(&mut self, velocities: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        self.robot.set_qvel_target(velocities, Some(&self.joints), env_ids)
     }
 
     /// Sets efforts \[N m or N\], which stay until changed or reset, beside what drives give; rows and columns as in
-    /// [`set_qpos`](Self::set_qpos).
+    /// [`set_qpos_target`](Self::set_qpos_target).
     ///
     /// # Errors
-    /// As [`RobotMut::set_qf`]; then nothing is set.
-    pub fn set_qf<'t>(&mut self, efforts: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
-        self.robot.set_qf(efforts, Some(&self.joints), env_ids)
+    /// As [`RobotMut::set_qf_target`]; then nothing is set.
+    #[doc(alias = "set_qf")]
+    pub fn set_qf_target<'t>(&mut self, efforts: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+        self.robot.set_qf_target(efforts, Some(&self.joints), env_ids)
     }
 }

@@ -30,7 +30,7 @@ impl Robot<'_> {
 
     /// Links whose names match `patterns`, fused ones too; otherwise as [`find_joints`](Self::find_joints). A [`LinkId`] is
     /// the link's place in [`link_names`](Self::link_names) and on the second axis of
-    /// [`get_link_poses`](Self::get_link_poses).
+    /// [`link_poses`](Self::link_poses).
     ///
     /// # Errors
     /// As [`find_joints`](Self::find_joints).
@@ -55,7 +55,7 @@ impl Robot<'_> {
         self.active_joints().count()
     }
 
-    /// Whether a joint has a drive, which [`set_qpos`](crate::RobotMut::set_qpos) gives a target; a passive joint and one that
+    /// Whether a joint has a drive, which [`set_qpos_target`](crate::RobotMut::set_qpos_target) gives a target; a passive joint and one that
     /// follows another have none.
     ///
     /// # Errors
@@ -70,9 +70,10 @@ impl Robot<'_> {
     /// # Errors
     /// There is no such part; the error lists those there are.
     #[doc(alias = "remove_mimic")]
+    #[doc(alias = "get_active_joint_ids")]
     #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
-    pub fn get_active_joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
-        let mut joints = self.get_joint_ids(part)?;
+    pub fn active_joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
+        let mut joints = self.joint_ids(part)?;
         joints.retain(|joint| self.data.plans()[joint.0].mimic.is_none());
         Ok(joints)
     }
@@ -96,20 +97,23 @@ impl Robot<'_> {
     /// the step, (v' - v) / h. They are not where something acts on the velocity after the solver: the viscous damping of
     /// joints of a robot of [`DriveModel::Actuator`](crate::DriveModel::Actuator) (v' - v is h M a / (M + h B) for a single
     /// joint), velocity terms of the integrators implicit and implicitfast; nor with RK4, where they are those of a stage
-    /// inside of the step. Take the difference of [`get_qvel`](Robot::get_qvel) there.
-    pub fn get_qacc(&self) -> Array2<f64> {
+    /// inside of the step. Take the difference of [`qvel`](Robot::qvel) there.
+    #[doc(alias = "get_qacc")]
+    pub fn qacc(&self) -> Array2<f64> {
         // The warm start is the acceleration of the last step, and what an environment keeps when it is done again.
         self.gather(|env, joint| env.data().qacc_warmstart()[joint.dof])
     }
 
     /// Velocity targets \[rad/s or m/s\], shape (N, dof); 0 for joints without a drive.
-    pub fn get_target_qvel(&self) -> Array2<f64> {
+    #[doc(alias = "get_target_qvel")]
+    pub fn qvel_target(&self) -> Array2<f64> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.velocity[drive]))
     }
 
-    /// Efforts that [`set_qf`](RobotMut::set_qf) asked for \[N m or N\], shape (N, dof); 0 for mimic joints. A passive
+    /// Efforts that [`set_qf_target`](RobotMut::set_qf_target) asked for \[N m or N\], shape (N, dof); 0 for mimic joints. A passive
     /// joint has what it really gets, within its limit.
-    pub fn get_target_qf(&self) -> Array2<f64> {
+    #[doc(alias = "get_target_qf")]
+    pub fn qf_target(&self) -> Array2<f64> {
         self.gather(|env, joint| match joint.drive {
             Some(drive) => env.drives.feedforward[drive],
             None => env.drives.applied[joint.dof],
@@ -119,9 +123,10 @@ impl Robot<'_> {
 
 /// The root link.
 impl Robot<'_> {
-    /// Pose, velocity and angular velocity of the root link at the start, as [`get_root_state`](Self::get_root_state) has
+    /// Pose, velocity and angular velocity of the root link at the start, as [`root_state`](Self::root_state) has
     /// them, shape (N, 13): the pose of the configuration, at rest.
-    pub fn get_default_root_state(&self) -> Array2<f64> {
+    #[doc(alias = "get_default_root_state")]
+    pub fn default_root_state(&self) -> Array2<f64> {
         let pose = to_row(&self.data.root_pose());
         let n = self.simulation.batch.num_envs();
         Array2::from_shape_fn((n, 13), |(_, k)| pose.get(k).copied().unwrap_or(0.0))
@@ -129,20 +134,23 @@ impl Robot<'_> {
 
     /// Pose of the root link in the environment, then the velocity of its frame and its angular velocity in world axes:
     /// rows `[x, y, z, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz]` \[m, m/s, rad/s\], shape (N, 13).
-    pub fn get_root_state(&self) -> Array2<f64> {
+    #[doc(alias = "get_root_state")]
+    pub fn root_state(&self) -> Array2<f64> {
         // Both have one row for each environment.
-        concatenate(Axis(1), &[self.get_root_pose().view(), self.get_root_velocity().view()]).unwrap_or_default()
+        concatenate(Axis(1), &[self.root_pose().view(), self.root_velocity().view()]).unwrap_or_default()
     }
 
     /// Centre of mass of the root link and of what is fixed to it, in the environment \[m\], shape (N, 3).
-    pub fn get_root_com_position(&self) -> Array2<f64> {
+    #[doc(alias = "get_root_com_position")]
+    pub fn root_com_position(&self) -> Array2<f64> {
         self.rows(|env, robot| centre_of_mass(env, robot).into())
     }
 
     /// Velocity of the centre of mass of the root link and of what is fixed to it, then its angular velocity, in world axes
-    /// \[m/s, rad/s\], shape (N, 6); 0 where the base is fixed. [`get_root_velocity`](Self::get_root_velocity) has that of
+    /// \[m/s, rad/s\], shape (N, 6); 0 where the base is fixed. [`root_velocity`](Self::root_velocity) has that of
     /// the link's frame.
-    pub fn get_root_com_velocity(&self) -> Array2<f64> {
+    #[doc(alias = "get_root_com_velocity")]
+    pub fn root_com_velocity(&self) -> Array2<f64> {
         self.rows(|env, robot| {
             let [v, w] = body_velocity(env.data(), robot.root.body, &centre_of_mass(env, robot));
             [v.x, v.y, v.z, w.x, w.y, w.z]
@@ -151,18 +159,21 @@ impl Robot<'_> {
 
     /// Velocity of the root link's frame in its own axes \[m/s\], shape (N, 3): what a sensor of speed on the root would
     /// measure.
-    pub fn get_root_lin_vel_b(&self) -> Array2<f64> {
+    #[doc(alias = "get_root_lin_vel_b")]
+    pub fn root_lin_vel_b(&self) -> Array2<f64> {
         self.in_root_axes(|env, robot, root| body_velocity(env.data(), robot.root.body, &root.translation.vector)[0])
     }
 
     /// Angular velocity of the root link in its own axes \[rad/s\], shape (N, 3): what an ideal gyroscope would measure.
-    pub fn get_root_ang_vel_b(&self) -> Array2<f64> {
+    #[doc(alias = "get_root_ang_vel_b")]
+    pub fn root_ang_vel_b(&self) -> Array2<f64> {
         self.in_root_axes(|env, robot, root| body_velocity(env.data(), robot.root.body, &root.translation.vector)[1])
     }
 
     /// Direction of gravity in the axes of the root link, a unit vector, shape (N, 3): (0, 0, -1) where it stands upright;
     /// 0 where there is no gravity.
-    pub fn get_projected_gravity_b(&self) -> Array2<f64> {
+    #[doc(alias = "get_projected_gravity_b")]
+    pub fn projected_gravity_b(&self) -> Array2<f64> {
         self.in_root_axes(|env, _, _| {
             let gravity = Vector3::from(env.data().model().gravity());
             gravity.try_normalize(0.0).unwrap_or_else(Vector3::zeros)
@@ -170,7 +181,8 @@ impl Robot<'_> {
     }
 
     /// Heading of the root link \[rad\], shape (N,): the angle about the world's z of its x axis, from -π to π.
-    pub fn get_root_heading(&self) -> Array1<f64> {
+    #[doc(alias = "get_root_heading")]
+    pub fn root_heading(&self) -> Array1<f64> {
         let headings = self.rows(|env, robot| {
             let forward = body_pose(env.data(), robot.root.body).rotation * Vector3::x();
             [forward.y.atan2(forward.x)]
@@ -194,13 +206,15 @@ impl Robot<'_> {
 impl Robot<'_> {
     /// Poses of all links, fused ones too, in the order of [`link_names`](Self::link_names): rows
     /// `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, links, 7).
-    pub fn get_link_poses(&self) -> Array3<f64> {
+    #[doc(alias = "get_link_poses")]
+    pub fn link_poses(&self) -> Array3<f64> {
         self.of_links(|env, link| to_row(&link_pose(env.data(), link)))
     }
 
     /// Velocities of the frames of all links, fused ones too, then their angular velocities, in world axes \[m/s, rad/s\],
     /// shape (N, links, 6).
-    pub fn get_link_velocities(&self) -> Array3<f64> {
+    #[doc(alias = "get_link_velocities")]
+    pub fn link_velocities(&self) -> Array3<f64> {
         self.of_links(link_velocity)
     }
 
@@ -229,12 +243,12 @@ fn centre_of_mass(env: &Env, robot: &RobotIndex) -> Vector3<f64> {
 }
 
 impl RobotMut<'_> {
-    /// Writes the accelerations that [`get_qacc`](Robot::get_qacc) tells \[rad/s² or m/s²\], from which MuJoCo's solver begins
+    /// Writes the accelerations that [`qacc`](Robot::qacc) tells \[rad/s² or m/s²\], from which MuJoCo's solver begins
     /// its search in the next step (its warm start, and `qacc`). Rows and columns as in [`write_qpos`](Self::write_qpos).
     ///
     /// They are a result, not a state: each step finds its own from positions, velocities and forces, within the solver's
     /// tolerance wherever it begins, and puts them in the place of these. To push a joint there is
-    /// [`set_qf`](Self::set_qf). Written together with the positions and velocities of another simulation's robot, they let
+    /// [`set_qf_target`](Self::set_qf_target). Written together with the positions and velocities of another simulation's robot, they let
     /// this one go on to the last bit as that one does, where its base is fixed, it touches nothing else that moves, and targets
     /// are the same; of everything else there is [`snapshot`](crate::SimulationManager::snapshot).
     ///

@@ -9,14 +9,15 @@ use ndarray::{Array2, ArrayView2, AsArray, Axis, Ix2};
 
 impl Robot<'_> {
     /// Velocities of the joints at the start: zero, shape (N, dof).
-    pub fn get_default_qvel(&self) -> Array2<f64> {
+    #[doc(alias = "get_default_qvel")]
+    pub fn default_qvel(&self) -> Array2<f64> {
         Array2::zeros((self.simulation.batch.num_envs(), self.dof()))
     }
 }
 
 impl RobotMut<'_> {
     /// Writes pose and velocity of the root link of a robot without a fixed base: rows of 13 as in
-    /// [`get_root_state`](Robot::get_root_state), for `env_ids` (all where `None`; a single row is for all of them). Poses are in the
+    /// [`root_state`](Robot::root_state), for `env_ids` (all where `None`; a single row is for all of them). Poses are in the
     /// environment: `env_origins` are not added.
     ///
     /// # Errors

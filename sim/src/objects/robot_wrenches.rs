@@ -12,7 +12,8 @@ use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix3};
 impl Robot<'_> {
     /// Forces and torques of [`set_external_wrench`](RobotMut::set_external_wrench), in world axes with the links where
     /// they are \[N, N m\], shape (N, links, 6). Gravity compensation is not among them.
-    pub fn get_external_wrenches(&self) -> Array3<f64> {
+    #[doc(alias = "get_external_wrenches")]
+    pub fn external_wrenches(&self) -> Array3<f64> {
         let (n, links) = (self.simulation.batch.num_envs(), self.indexing().links.len());
         let mut wrenches = Array3::zeros((n, links, 6));
         self.simulation.batch.for_each(|i, env| {
@@ -28,7 +29,8 @@ impl Robot<'_> {
     }
 
     /// Whether gravity is compensated for each link, shape (N, links).
-    pub fn get_gravity_compensation(&self) -> Array2<bool> {
+    #[doc(alias = "get_gravity_compensation")]
+    pub fn gravity_compensation(&self) -> Array2<bool> {
         let links = &self.indexing().links;
         let mut weightless = Array2::from_elem((self.simulation.batch.num_envs(), links.len()), false);
         self.simulation.batch.for_each(|i, env| {
@@ -64,7 +66,7 @@ impl RobotMut<'_> {
     /// sim.robot_mut(id).set_external_wrench(&force, &torque, WrenchFrame::World, Some(&[puck]), None)?;
     /// sim.update(100);
     /// // 3 N on 2 kg for a second.
-    /// assert!((sim.robot(id).get_root_velocity()[(0, 0)] - 1.5).abs() < 1e-9);
+    /// assert!((sim.robot(id).root_velocity()[(0, 0)] - 1.5).abs() < 1e-9);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///

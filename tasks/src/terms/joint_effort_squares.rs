@@ -23,7 +23,7 @@ pub fn joint_effort_squares(
 ) -> Result<RewardTerm> {
     let (_, joints) = joints(sim, robot, patterns)?;
     Ok(RewardTerm::new(name, weight, move |now| {
-        let efforts = columns(&now.sim().robot(robot).get_qf(), &joints);
+        let efforts = columns(&now.sim().robot(robot).qf(), &joints);
         Ok(efforts.map_axis(Axis(1), |row| row.iter().map(|x| x * x).sum()))
     }))
 }

@@ -24,7 +24,7 @@ pub fn reset_joints_by_offset(
 ) -> Result<EventTerm> {
     let (_, joints) = joints(sim, robot, patterns)?;
     Ok(EventTerm::on_reset(name, move |sim, dice| {
-        let starts = sim.robot(robot).get_default_qpos();
+        let starts = sim.robot(robot).default_qpos();
         for die in dice {
             let env = die.env();
             let mut drawn = |[low, high]: [f64; 2]| Array2::from_shape_fn((1, joints.len()), |_| die.between(low, high));

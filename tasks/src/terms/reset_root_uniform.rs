@@ -25,7 +25,7 @@ pub fn reset_root_uniform(name: &str, robot: RobotId, ranges: RootRanges) -> Eve
     EventTerm::on_reset(name, move |sim, dice| {
         for die in dice {
             let start: [f64; 7] = {
-                let starts = sim.robot(robot).get_default_root_pose();
+                let starts = sim.robot(robot).default_root_pose();
                 std::array::from_fn(|k| starts[(die.env().0, k)])
             };
             let (position, rpy) = (drawn(die, ranges.position), drawn(die, ranges.rpy));

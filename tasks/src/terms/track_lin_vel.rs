@@ -8,7 +8,7 @@ use kinetoscope_sim::RobotId;
 pub fn track_lin_vel(name: &str, weight: f64, robot: RobotId, command: impl Into<String>, std: f64) -> RewardTerm {
     let command = command.into();
     RewardTerm::new(name, weight, move |now| {
-        let (moves, wanted) = (now.sim().robot(robot).get_root_lin_vel_b(), now.command(&command)?);
+        let (moves, wanted) = (now.sim().robot(robot).root_lin_vel_b(), now.command(&command)?);
         if wanted.ncols() < 2 {
             return Err(format!("the command {command:?} has {} columns; x and y are wanted of it", wanted.ncols()).into());
         }

@@ -27,7 +27,7 @@ fn contact_with_a_ball() {
     let ball = object("ball", ObjectShape::Sphere { radius: 0.05 }, [0.0, 0.0, 0.45]);
     let ball = sim.add_rigid_object(ball).unwrap();
     sim.update(2000);
-    let height = sim.rigid_object(ball).get_pose()[(0, 2)];
+    let height = sim.rigid_object(ball).pose()[(0, 2)];
     assert!((height - (0.34 + 0.05)).abs() < 1e-3, "{height}: the cabinet is 0.34 m high");
 }
 
@@ -63,13 +63,13 @@ fn names() {
 #[test]
 fn recompilation() {
     let (mut sim, id) = with(1, cabinet());
-    sim.articulation_mut(id).set_qf(&array![[6.0]], None, None).unwrap();
+    sim.articulation_mut(id).set_qf_target(&array![[6.0]], None, None).unwrap();
     sim.update(300);
-    let (open, speed) = (sim.articulation(id).get_qpos(), sim.articulation(id).get_qvel());
+    let (open, speed) = (sim.articulation(id).qpos(), sim.articulation(id).qvel());
     assert!(open[(0, 0)] > 0.05);
     add_ball(&mut sim, "ball", [3.0, 0.0, 1.0]);
     let view = sim.articulation(id);
-    assert_eq!((view.get_qpos(), view.get_qvel()), (open, speed), "bit for bit");
+    assert_eq!((view.qpos(), view.qvel()), (open, speed), "bit for bit");
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn scene_file() {
     let mut scene = InteractiveScene::new(cfg).unwrap();
     let open = array![[0.125]];
     scene.articulation_mut("{ENV}/cabinet").unwrap().write_qpos(&open, None, None).unwrap();
-    assert_eq!(scene.articulation("cabinet").unwrap().get_qpos(), open);
+    assert_eq!(scene.articulation("cabinet").unwrap().qpos(), open);
     assert_eq!(scene.articulation_id("sprung").unwrap(), scene.sim().articulation_id("sprung").unwrap());
     assert_error(scene.robot("cabinet").map(drop), "", &["cabinet", "articulation", "robot"]);
 }
@@ -138,7 +138,7 @@ fn refused_configurations() {
         ("drive", ArticulationCfg { drive: negative, ..b() }, "", &["stiffness", "-1"]),
         ("pose", ArticulationCfg { init_pose, ..b() }, "Config { field: \"init_pose\"", &[]),
     ];
-    let cabinet = |sim: &SimulationManager| (sim.articulation(id).get_qpos(), sim.articulation_id("cabinet").unwrap());
+    let cabinet = |sim: &SimulationManager| (sim.articulation(id).qpos(), sim.articulation_id("cabinet").unwrap());
     assert_eq!(cabinet(&sim), (array![[0.0]], id));
     assert_refused_unchanged(&mut sim, cabinet, rows, |sim, cfg| sim.add_articulation(cfg));
 }

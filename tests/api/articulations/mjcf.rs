@@ -20,11 +20,11 @@ fn swinging_door() {
     let files = Files::default();
     let [mine, other] = [leaf(LEAF), door(&files)].map(|cfg| {
         let (mut sim, id) = with(2, cfg);
-        sim.articulation_mut(id).set_qf(&array![[2.0], [-1.0]], None, None).unwrap();
+        sim.articulation_mut(id).set_qf_target(&array![[2.0], [-1.0]], None, None).unwrap();
         sim.articulation_mut(id).write_qvel(&array![[0.3], [0.9]], None, None).unwrap();
         sim.update(400);
-        assert_eq!(sim.articulation(id).get_stiffness(), array![[0.0], [0.0]], "its actuator drives nothing");
-        sim.articulation(id).get_qpos()
+        assert_eq!(sim.articulation(id).stiffness(), array![[0.0], [0.0]], "its actuator drives nothing");
+        sim.articulation(id).qpos()
     });
     assert!((&mine - &other).iter().all(|d| d.abs() < 1e-12), "{mine} {other}");
     // I = 1.1 + 20 · 0.4² = 4.3 about the hinge: 0.3 t + 1/2 (2 / 4.3) t² at t = 0.4 s, with Euler's half step more.
@@ -32,10 +32,10 @@ fn swinging_door() {
     assert!((mine[(0, 0)] - expected).abs() < 1e-9, "{} is not {expected}", mine[(0, 0)]);
     // Controls: with a drive the actuator's numbers hold, and it stays.
     let (mut sim, id) = with(1, ArticulationCfg { drive: Some(DriveCfg::default()), ..leaf(LEAF) });
-    assert_eq!(sim.articulation(id).get_stiffness(), array![[300.0]]);
+    assert_eq!(sim.articulation(id).stiffness(), array![[300.0]]);
     assert_eq!(sim.articulation(id).link_names(), ["frame", "leaf", "knob"]);
     sim.update(400);
-    assert!(sim.articulation(id).get_qpos()[(0, 0)].abs() < 1e-9);
+    assert!(sim.articulation(id).qpos()[(0, 0)].abs() < 1e-9);
 }
 
 /// Numbers of the file hold unless the configuration has others.
@@ -47,7 +47,7 @@ fn friction_and_start() {
     for (cfg, expected) in [(leaf(&text), [0.5, 3.0, 0.7]), (other, [1.0, 1.0, 0.1])] {
         let (sim, id) = with(1, cfg);
         let door = sim.articulation(id);
-        assert_eq!([door.get_qpos(), door.get_friction(), door.get_armature()].map(|a| a[(0, 0)]), expected);
+        assert_eq!([door.qpos(), door.friction(), door.armature()].map(|a| a[(0, 0)]), expected);
     }
 }
 

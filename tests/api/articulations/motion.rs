@@ -28,11 +28,11 @@ fn sliding_drawer() {
     let (mut sim, id) = with(2, cabinet());
     sim.articulation_mut(id).write_qvel(&array![[0.5], [0.3]], None, None).unwrap();
     sim.update(1000);
-    let (open, speed) = (sim.articulation(id).get_qpos(), sim.articulation(id).get_qvel());
+    let (open, speed) = (sim.articulation(id).qpos(), sim.articulation(id).qvel());
     assert_number("way", open[(0, 0)], slides(MASS, 0.5, FRICTION), SOFT);
     assert_number("way", open[(1, 0)], slides(MASS, 0.3, FRICTION), SOFT);
     assert!(speed.iter().all(|v| v.abs() < 1e-6), "{speed}");
-    assert_eq!(sim.articulation(id).get_qf(), array![[0.0], [0.0]], "no drive gives anything");
+    assert_eq!(sim.articulation(id).qf(), array![[0.0], [0.0]], "no drive gives anything");
     // Controls: with other numbers it would be elsewhere.
     let (friction, rotor) = (3.0, 2.0);
     assert!((open[(0, 0)] / slides(MASS, 0.5, 1.5 * FRICTION) - 1.0).abs() > 0.1);
@@ -42,33 +42,33 @@ fn sliding_drawer() {
     for drive in [None, Some(other)] {
         let armature = Some([("drawer_.*", rotor)].into());
         let (mut sim, id) = with(1, ArticulationCfg { friction: Some(friction.into()), armature, drive, ..cabinet() });
-        assert_eq!(sim.articulation(id).get_friction(), array![[friction]]);
-        assert_number("rotor inertia", sim.articulation(id).get_armature()[(0, 0)], rotor, SOFT);
+        assert_eq!(sim.articulation(id).friction(), array![[friction]]);
+        assert_number("rotor inertia", sim.articulation(id).armature()[(0, 0)], rotor, SOFT);
         sim.articulation_mut(id).write_qvel(&array![[0.5]], None, None).unwrap();
         sim.update(1000);
-        assert_number("way", sim.articulation(id).get_qpos()[(0, 0)], slides(MASS + rotor, 0.5, friction), SOFT);
-        assert_eq!(sim.articulation(id).get_qf(), array![[0.0]], "no drive gives anything");
+        assert_number("way", sim.articulation(id).qpos()[(0, 0)], slides(MASS + rotor, 0.5, friction), SOFT);
+        assert_eq!(sim.articulation(id).qf(), array![[0.0]], "no drive gives anything");
     }
     let (mut sim, id) = with(1, ArticulationCfg { drive: Some(DriveCfg::default()), ..cabinet() });
     sim.articulation_mut(id).write_qvel(&array![[0.5]], None, None).unwrap();
     sim.update(1000);
-    assert!(sim.articulation(id).get_qpos()[(0, 0)].abs() < 1e-3, "held at its target");
+    assert!(sim.articulation(id).qpos()[(0, 0)].abs() < 1e-3, "held at its target");
 }
 
 /// A push opens it where it exceeds the friction, also that of its own environment.
 #[test]
 fn pushed_drawer() {
     let (mut sim, id) = with(2, cabinet());
-    sim.articulation_mut(id).set_qf(&array![[6.0], [1.5]], None, None).unwrap();
+    sim.articulation_mut(id).set_qf_target(&array![[6.0], [1.5]], None, None).unwrap();
     sim.update(500);
-    let open = sim.articulation(id).get_qpos();
+    let open = sim.articulation(id).qpos();
     // v' = (F - f)/m - b/m v from rest.
     let (speed, time) = ((6.0 - FRICTION) / DAMPING, MASS / DAMPING);
     assert_number("way", open[(0, 0)], speed * (0.5 - time * (1.0 - (-0.5 / time).exp())), SOFT);
     // Dry friction is a soft constraint: below it there is a creep of less than a millimeter per second.
     assert!(open[(1, 0)].abs() < 1e-3, "{open}");
     sim.update(1500);
-    let open = sim.articulation(id).get_qpos();
+    let open = sim.articulation(id).qpos();
     assert!((open[(0, 0)] - 0.3).abs() < 2e-3, "open to its stop: {open}");
 
     let (mut sim, id) = with(2, cabinet());
@@ -76,7 +76,7 @@ fn pushed_drawer() {
     sim.randomize(&sticky, Some(&[EnvId(1)])).unwrap();
     sim.articulation_mut(id).write_qvel(&array![[0.5], [0.5]], None, None).unwrap();
     sim.update(1000);
-    let open = sim.articulation(id).get_qpos();
+    let open = sim.articulation(id).qpos();
     assert_number("way", open[(0, 0)], slides(MASS, 0.5, FRICTION), SOFT);
     assert_number("way", open[(1, 0)], slides(MASS, 0.5, 6.0), SOFT);
 }
@@ -85,15 +85,15 @@ fn pushed_drawer() {
 #[test]
 fn targets_and_states() {
     let (mut sim, id) = with(2, ArticulationCfg { init_qpos: vec![("drawer_.*".into(), 0.1)], ..cabinet() });
-    sim.articulation_mut(id).set_qpos(&array![[0.25], [0.25]], None, None).unwrap();
+    sim.articulation_mut(id).set_qpos_target(&array![[0.25], [0.25]], None, None).unwrap();
     sim.update(100);
-    assert_eq!(sim.articulation(id).get_qpos(), array![[0.1], [0.1]], "nothing has moved");
+    assert_eq!(sim.articulation(id).qpos(), array![[0.1], [0.1]], "nothing has moved");
     sim.articulation_mut(id).write_qpos(&array![[0.2]], None, Some(&[EnvId(1)])).unwrap();
-    assert_eq!(sim.articulation(id).get_qpos(), array![[0.1], [0.2]]);
+    assert_eq!(sim.articulation(id).qpos(), array![[0.1], [0.2]]);
     let drawer = sim.articulation(id).link_pose("drawer").unwrap();
     assert!((drawer[(0, 0)] - 0.3).abs() < 1e-15 && (drawer[(1, 0)] - 0.4).abs() < 1e-15, "{drawer}");
     sim.reset(None).unwrap();
-    assert_eq!(sim.articulation(id).get_qpos(), array![[0.1], [0.1]]);
+    assert_eq!(sim.articulation(id).qpos(), array![[0.1], [0.1]]);
 }
 
 /// A spring closes a door, against 2.5 N m by all but 0.5 rad.
@@ -103,9 +103,9 @@ fn sprung_door() {
     let (mut sim, id) =
         with(2, ArticulationCfg { drive: Some(kinetoscope_testkit::worlds::gains(5.0, 8.0)), ..door(&files) });
     sim.articulation_mut(id).write_qpos(&array![[1.0], [1.0]], None, None).unwrap();
-    sim.articulation_mut(id).set_qpos(&array![[0.0], [0.0]], None, None).unwrap();
-    sim.articulation_mut(id).set_qf(&array![[0.0], [2.5]], None, None).unwrap();
+    sim.articulation_mut(id).set_qpos_target(&array![[0.0], [0.0]], None, None).unwrap();
+    sim.articulation_mut(id).set_qf_target(&array![[0.0], [2.5]], None, None).unwrap();
     sim.update(20_000);
-    let angle = sim.articulation(id).get_qpos();
+    let angle = sim.articulation(id).qpos();
     assert!(angle[(0, 0)].abs() < 1e-3 && (angle[(1, 0)] - 0.5).abs() < 1e-3, "{angle}");
 }

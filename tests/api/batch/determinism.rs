@@ -19,7 +19,7 @@ fn scene(num_envs: usize, threads: usize) -> SimulationManager {
         let target = |(env, joint)| {
             if joint == 1 { reach + 0.01 * env as f64 } else { 0.3 + 0.003 * env as f64 }
         };
-        sim.robot_mut(robot).set_qpos(&Array2::from_shape_fn((num_envs, dof), target), None, None).unwrap();
+        sim.robot_mut(robot).set_qpos_target(&Array2::from_shape_fn((num_envs, dof), target), None, None).unwrap();
     }
     sim
 }
@@ -85,10 +85,10 @@ fn efforts_beside_contacts() {
         for i in 0..balls {
             add_ball(&mut sim, &format!("ball{i}"), [3.0 + f64::from(i), 0.0, 0.1 + 0.05 * f64::from(i)]);
         }
-        sim.robot_mut(id).set_qpos(&row([0.4]), None, None).unwrap();
+        sim.robot_mut(id).set_qpos_target(&row([0.4]), None, None).unwrap();
         let step = |_| {
             sim.update(1);
-            sim.robot(id).get_qf()[(0, 0)]
+            sim.robot(id).qf()[(0, 0)]
         };
         (0..80).map(step).collect::<Vec<f64>>()
     });

@@ -41,10 +41,10 @@ fn many_contacts() {
 fn drives_at_work() {
     let mut sim = sim(cfg(2, 1));
     let robot = add_plate(&mut sim, [16, 5], [0.0, 0.0, 0.1], [0.05, 0.04, 0.3]);
-    sim.robot_mut(robot).set_qpos(&row([-0.9, -0.8, -0.7, -1.1, -0.3]), None, None).unwrap();
+    sim.robot_mut(robot).set_qpos_target(&row([-0.9, -0.8, -0.7, -1.1, -0.3]), None, None).unwrap();
     compare_with_huge_buffers(&mut sim, 150, 60);
     assert!(sim.buffer_growths() > 0);
-    let moved = sim.robot(robot).get_qf();
+    let moved = sim.robot(robot).qf();
     assert!(moved.iter().any(|effort| effort.abs() > 0.1), "{moved}");
 }
 

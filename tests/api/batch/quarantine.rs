@@ -109,12 +109,12 @@ fn divergence_in_a_step() {
     sim.update(1);
     let diverged = sim.diverged();
     assert!(diverged.len() == 1 && diverged[0].1.contains("step 10"), "{diverged:?}");
-    assert_eq!(sim.robot(robot).get_qpos()[(2, 0)], 9e9, "the state before the step");
+    assert_eq!(sim.robot(robot).qpos()[(2, 0)], 9e9, "the state before the step");
     assert!((sim.time()[2] - 0.1).abs() < 1e-12);
-    assert!(sim.robot(robot).get_qvel().iter().all(|v| v.is_finite()));
+    assert!(sim.robot(robot).qvel().iter().all(|v| v.is_finite()));
     sim.reset(None).unwrap();
     assert!(sim.diverged().is_empty());
-    assert_eq!(sim.robot(robot).get_qpos()[(2, 0)], 0.7);
+    assert_eq!(sim.robot(robot).qpos()[(2, 0)], 0.7);
 }
 
 /// Writing to it and adding a robot revive nothing.
@@ -134,6 +134,6 @@ fn no_revival() {
         put(&mut sim, robot, value, 1);
         sim.update(3);
         assert_eq!(sim.diverged().len(), 1);
-        assert!(sim.robot(robot).get_qpos().iter().all(|q| q.abs() < 10.0), "{}", sim.robot(robot).get_qpos());
+        assert!(sim.robot(robot).qpos().iter().all(|q| q.abs() < 10.0), "{}", sim.robot(robot).qpos());
     }
 }

@@ -33,7 +33,7 @@ fn state(sim: &SimulationManager, robots: [RobotId; 2]) -> State {
         sim.batch().for_each(|_, env| bits.push(bits_of_robot(env, prefix)));
         bits
     });
-    (bits, robots.map(|robot| [sim.robot(robot).get_target_qpos(), sim.robot(robot).get_qf()]))
+    (bits, robots.map(|robot| [sim.robot(robot).qpos_target(), sim.robot(robot).qf()]))
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn robot_in_motion() {
     for robot in robots {
         let target = |(e, j)| 0.2 + 0.1 * e as f64 + 0.01 * j as f64;
         let targets = Array2::from_shape_fn((n, sim.robot(robot).dof()), target);
-        sim.robot_mut(robot).set_qpos(&targets, None, None).unwrap();
+        sim.robot_mut(robot).set_qpos_target(&targets, None, None).unwrap();
     }
     for steps in [37, 120, 3] {
         sim.update(steps);
@@ -53,7 +53,7 @@ fn robot_in_motion() {
         assert_eq!(state(&sim, robots), before, "{steps}");
         assert!(before.0[0].iter().all(|bits| bits.len() > 10));
         assert_eq!(sim.robot(added).link_pose("trunk").unwrap()[(0, 2)], 2.0, "the new one starts at its start");
-        assert_eq!(sim.robot(added).get_qpos(), Array2::<f64>::zeros((n, 2)));
+        assert_eq!(sim.robot(added).qpos(), Array2::<f64>::zeros((n, 2)));
     }
 }
 
@@ -63,14 +63,14 @@ fn robot_far_away() {
         let mut sim = sim(SimulationManagerCfg { ground: None, ..cfg(2, 1) });
         let arm = sim.add_robot(arm_and_hand("sr5")).unwrap();
         let dof = sim.robot(arm).dof();
-        sim.robot_mut(arm).set_qpos(&Array2::from_elem((1, dof), 0.3), None, None).unwrap();
+        sim.robot_mut(arm).set_qpos_target(&Array2::from_elem((1, dof), 0.3), None, None).unwrap();
         sim.update(30);
         if add {
             let files = Files::default();
             sim.add_robot(RobotCfg { init_pose: Pose::translation(50.0, 0.0, 1.0), ..wheel(&files) }).unwrap();
         }
         sim.update(100);
-        sim.robot(arm).get_qpos()
+        sim.robot(arm).qpos()
     });
     // The solver stops when all rows together are good enough: equal to what it leaves, not bit for bit.
     let difference = (with - without).iter().fold(0.0_f64, |most, d| most.max(d.abs()));
@@ -105,7 +105,7 @@ fn second_without_rows(added: Added) -> Vec<f64> {
     let body = sim.add_rigid_object(body_at("body", [10.0, 0.0, 1.0], [0.2, 0.3, 0.1])).unwrap();
     let driven = [pendulum, motor].map(|robot| sim.robot(robot).is_driven(JointIndex(0)).unwrap());
     assert_eq!(driven, [false, true]);
-    sim.robot_mut(motor).set_qpos(&array![[1.5], [-0.4]], None, None).unwrap();
+    sim.robot_mut(motor).set_qpos_target(&array![[1.5], [-0.4]], None, None).unwrap();
     sim.rigid_object_mut(body).write_velocity(&array![[0.1, 0.2, 1.0, 3.0, -2.0, 1.0]], None).unwrap();
     sim.update(30);
     match added {
@@ -124,11 +124,11 @@ fn second_without_rows(added: Added) -> Vec<f64> {
         assert!(rows == 0 || added == Added::InTheWay, "{rows} rows");
         sim.update(1);
         for robot in [pendulum, motor] {
-            states.extend(sim.robot(robot).get_qpos());
-            states.extend(sim.robot(robot).get_qvel());
+            states.extend(sim.robot(robot).qpos());
+            states.extend(sim.robot(robot).qvel());
         }
-        states.extend(sim.rigid_object(body).get_pose());
-        states.extend(sim.rigid_object(body).get_velocity());
+        states.extend(sim.rigid_object(body).pose());
+        states.extend(sim.rigid_object(body).velocity());
     }
     states
 }

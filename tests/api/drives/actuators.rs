@@ -122,11 +122,11 @@ fn dc_motor_limits() {
     let mut robot = world.robot();
     robot.set_qvel_limits(&array![[3.0]], None, Some(&[EnvId(1)])).unwrap();
     robot.write_qvel(&array![[1.5]], None, None).unwrap();
-    robot.set_qf(&array![[100.0]], None, None).unwrap();
+    robot.set_qf_target(&array![[100.0]], None, None).unwrap();
     world.step(1);
     for (env, top) in [(0, 7.5), (1, 3.0)] {
         let expected = 6.0 * (1.0 - 1.5 / top);
-        assert_number(&format!("{top} rad/s"), world.view().get_qf()[(env, 0)], expected, EXACT);
+        assert_number(&format!("{top} rad/s"), world.view().qf()[(env, 0)], expected, EXACT);
     }
     let before = (world.view().qvel_limits(), world.view().qf_limits());
     for bad in [0.0, f64::INFINITY] {
@@ -141,7 +141,7 @@ fn dc_motor_limits() {
     world.robot().set_qf_limits(&array![[2.0]], None, None).unwrap();
     world.robot().write_qvel(&array![[1.5]], None, None).unwrap();
     world.step(1);
-    assert_eq!(world.view().get_qf(), array![[2.0], [2.0]], "below the lines, 4.8 and 3 N m");
+    assert_eq!(world.view().qf(), array![[2.0], [2.0]], "below the lines, 4.8 and 3 N m");
 }
 
 /// With full throttle from rest tau = s (1 - v / v_max) in every step: with r = 1 - h s / (M v_max),
@@ -155,7 +155,7 @@ fn dc_motor_from_rest() {
         let drive = DriveCfg { max_velocity: Some(top.into()), ..motor(stall) };
         let mut world = world(&[wheel().effort(1.5 * stall)], drive, weightless());
         assert_eq!(world.warned_unstable(), !stable, "slope {slope}");
-        world.robot().set_qf(&array![[1e4]], None, None).unwrap();
+        world.robot().set_qf_target(&array![[1e4]], None, None).unwrap();
         for n in 1..=200 {
             world.step(1);
             if stable {
@@ -193,7 +193,7 @@ fn assert_at(found: [f64; 2], law: &Law, what: &str) {
 fn delay_per_environment() {
     let delays = [0, 1, 3, 6];
     let mut world = world(&[wheel()], with(DelayedPd { delay: 1, max_delay: 6 }, 25.0, 1.0), weightless_envs(4));
-    assert_eq!(world.view().get_delay(), Array2::from_elem((4, 1), 1));
+    assert_eq!(world.view().delay(), Array2::from_elem((4, 1), 1));
     world.robot().set_delay(&array![[0_u32], [1], [3], [6]], None, None).unwrap();
     for round in 0..2 {
         let (mut laws, mut apart) = ([law(25.0, 1.0); 4], 0.0_f64);
@@ -204,7 +204,7 @@ fn delay_per_environment() {
                 add_ball(&mut world.sim, &format!("ball{round}"), [5.0, f64::from(round), 5.0]);
             }
             world.step(1);
-            let (q, v) = (world.view().get_qpos(), world.view().get_qvel());
+            let (q, v) = (world.view().qpos(), world.view().qvel());
             for (env, (&delay, law)) in delays.iter().zip(&mut laws).enumerate() {
                 law.step_to(delayed(n, delay));
                 assert_at([q[(env, 0)], v[(env, 0)]], law, &format!("delay {delay}, step {n}, round {round}"));
@@ -214,7 +214,7 @@ fn delay_per_environment() {
         assert!(apart > 0.05, "the control: a delay shows: {apart}");
         // A reset forgets the delayed targets, and keeps the delays.
         world.sim.reset(None).unwrap();
-        assert_eq!(world.view().get_delay().column(0).to_vec(), [0, 1, 3, 6]);
+        assert_eq!(world.view().delay().column(0).to_vec(), [0, 1, 3, 6]);
     }
 }
 
@@ -435,7 +435,7 @@ fn refused_delays() {
     ];
     for (steps, joints, envs, parts) in rows {
         assert_error(world.robot().set_delay(&steps, joints, envs), "", parts);
-        assert_eq!(world.view().get_delay(), array![[2, 0], [2, 0]]);
+        assert_eq!(world.view().delay(), array![[2, 0], [2, 0]]);
     }
 }
 
@@ -449,7 +449,7 @@ type Settings = ([Array2<f64>; 3], Array2<DriveType>);
 
 fn settings_of(world: &World) -> Settings {
     let view = world.view();
-    ([view.get_stiffness(), view.get_damping(), view.qf_limits()], view.get_drive_types())
+    ([view.stiffness(), view.damping(), view.qf_limits()], view.drive_types())
 }
 
 fn first_settings() -> Settings {
@@ -529,8 +529,8 @@ fn changes_at_run_time() {
                     world.command([0, 1, 2].map(|joint| wobble(n, joint)));
                     world.step(1);
                 }
-                let (q, v, effort) = (world.view().get_qpos(), world.view().get_qvel(), world.view().get_qf());
-                let others = unchanged.view().get_qpos();
+                let (q, v, effort) = (world.view().qpos(), world.view().qvel(), world.view().qf());
+                let others = unchanged.view().qpos();
                 for (at, law) in laws.indexed_iter_mut() {
                     let m = MOMENTS[at.1];
                     let ([stiffness, damping, limit], kind) = &settings;

@@ -341,7 +341,7 @@ fn velocity_target() {
     let (m, kd, aim, load) = (0.2, 3.0, 1.5, 0.9);
     let reached = |joint: Joint, kd: f64, aim: f64| {
         let mut world = world(&[joint], gains(0.0, kd), weightless());
-        world.robot().set_qvel(&row(&[aim]), None, None).unwrap();
+        world.robot().set_qvel_target(&row(&[aim]), None, None).unwrap();
         world.step(400);
         world
     };
@@ -368,8 +368,8 @@ fn setters() {
     env.step(50);
     world.aim(&[case.aim[0]]);
     let mut robot = world.robot();
-    robot.set_qvel(&row(&[case.aim[1]]), None, None).unwrap();
-    robot.set_qf(&row(&[case.aim[2]]), Some(&[JointIndex(0)]), Some(&[EnvId(0)])).unwrap();
+    robot.set_qvel_target(&row(&[case.aim[1]]), None, None).unwrap();
+    robot.set_qf_target(&row(&[case.aim[2]]), Some(&[JointIndex(0)]), Some(&[EnvId(0)])).unwrap();
     world.step(50);
     assert_eq!((world.q()[0], world.v()[0]), (env.data().qpos()[0], env.data().qvel()[0]));
     world.sim.reset(None).unwrap();
@@ -383,7 +383,7 @@ fn setters() {
 fn joint_without_a_drive() {
     let mut world = world(&[Joint::wheel("j", 0.2).effort(3.0)], no_drive(), weightless());
     for (tau, speed) in [(1.0, 1.0), (-50.0, 1.0 - 3.0)] {
-        world.robot().set_qf(&row(&[tau]), None, None).unwrap();
+        world.robot().set_qf_target(&row(&[tau]), None, None).unwrap();
         world.step(10);
         assert_number("speed after 10 steps more", world.v()[0], 10.0 * H * speed / 0.2, EXACT);
     }

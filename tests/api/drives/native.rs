@@ -85,7 +85,7 @@ fn integrators_that_change_the_solution() {
     }
 }
 
-/// The solver's acceleration, which `get_qacc` returns, is that of the force, a = -B v / M. MuJoCo's Euler takes the damping
+/// The solver's acceleration, which `qacc` returns, is that of the force, a = -B v / M. MuJoCo's Euler takes the damping
 /// at the end of the step, v' = v + h M a / (M + h B). Row drives do that inside the solver: there they are the same.
 #[test]
 fn accelerations_of_the_solver() {
@@ -95,7 +95,7 @@ fn accelerations_of_the_solver() {
         let mut world = world(&[joint], drive, SimulationManagerCfg { integrator, ..weightless() });
         world.robot().write_qvel(&row(&[speed]), None, None).unwrap();
         world.step(1);
-        [world.view().get_qacc()[(0, 0)], (world.v()[0] - speed) / H]
+        [world.view().qacc()[(0, 0)], (world.v()[0] - speed) / H]
     };
     let felt = -b * speed / (m + H * b);
     for (what, drive, solver) in

@@ -30,7 +30,7 @@ fn beside(model: DriveModel) -> DriveCfg {
 /// Dry friction, damping and rotor inertia.
 fn resistance(world: &World) -> [Array2<f64>; 3] {
     let view = world.view();
-    [view.get_friction(), view.get_joint_damping(), view.get_armature()]
+    [view.friction(), view.joint_damping(), view.armature()]
 }
 
 fn set_all(world: &mut World, [friction, damping, armature]: &[Array2<f64>; 3], envs: Option<&[EnvId]>) {
@@ -42,7 +42,7 @@ fn set_all(world: &mut World, [friction, damping, armature]: &[Array2<f64>; 3], 
 
 /// Speeds by environment and joint.
 fn assert_speeds(world: &World, expected: impl Fn((usize, usize)) -> f64) {
-    assert_close("speeds", world.view().get_qvel(), Array2::from_shape_fn((ENVS, 2), expected), EXACT);
+    assert_close("speeds", world.view().qvel(), Array2::from_shape_fn((ENVS, 2), expected), EXACT);
 }
 
 fn zeros() -> Array2<f64> {
@@ -52,23 +52,23 @@ fn zeros() -> Array2<f64> {
 #[test]
 fn rotor_inertia() {
     let [mut world, mut other] = [(); 2].map(|()| slides(0.0, 0.0, no_drive(), H));
-    assert_eq!(world.view().get_armature(), zeros());
+    assert_eq!(world.view().armature(), zeros());
     let envs = [EnvId(2), EnvId(0)];
     world.robot().set_armature(&array![[3.0], [0.25]], Some(&[JointIndex(1)]), Some(&envs)).unwrap();
     let armature = array![[0.0, 0.25], [0.0, 0.0], [0.0, 3.0]];
-    assert_eq!(world.view().get_armature(), armature);
+    assert_eq!(world.view().armature(), armature);
     for world in [&mut world, &mut other] {
-        world.robot().set_qf(&array![[4.0, 4.0]], None, None).unwrap();
+        world.robot().set_qf_target(&array![[4.0, 4.0]], None, None).unwrap();
         world.step(1);
     }
-    let v = world.view().get_qvel();
+    let v = world.view().qvel();
     assert_speeds(&world, |at| H * 4.0 / (M[at.1] + armature[at]));
-    assert_eq!(v.row(1), other.view().get_qvel().row(1), "bit for bit");
+    assert_eq!(v.row(1), other.view().qvel().row(1), "bit for bit");
     // Implicit damping has a half of its own in MuJoCo's armature, of which nothing shows.
     let (rotor, damping) = (1e-3, 40.0);
     assert_ne!((rotor + H * damping) - H * damping, rotor, "the control: where the half is taken off again");
     let mut world = slides(damping, 0.0, DriveCfg { armature: rotor.into(), ..gains(0.0, 0.0) }, H);
-    let read = world.view().get_armature();
+    let read = world.view().armature();
     assert_eq!(read, Array2::from_elem((ENVS, 2), rotor));
     world.robot().set_armature(&read, None, None).unwrap();
     assert_eq!(world.sim.property_bytes(EnvId(0)).unwrap(), 0, "nothing is another");
@@ -79,13 +79,13 @@ fn rotor_inertia() {
 fn damping() {
     for drive in [no_drive(), gains(0.0, 0.0)] {
         let mut world = slides(1.5, 0.0, drive, H);
-        assert_eq!(world.view().get_joint_damping(), Array2::<f64>::from_elem((ENVS, 2), 1.5));
-        let before = world.view().get_damping();
+        assert_eq!(world.view().joint_damping(), Array2::<f64>::from_elem((ENVS, 2), 1.5));
+        let before = world.view().damping();
         let mut robot = world.robot();
         robot.set_joint_damping(&array![[40.0, 0.0]], None, ENV1).unwrap();
         robot.write_qvel(&array![[1.0, 1.0]], None, None).unwrap();
         let damping = array![[1.5, 1.5], [40.0, 0.0], [1.5, 1.5]];
-        assert_eq!((world.view().get_joint_damping(), world.view().get_damping()), (damping.clone(), before));
+        assert_eq!((world.view().joint_damping(), world.view().damping()), (damping.clone(), before));
         world.step(1);
         assert_speeds(&world, |at| M[at.1] / (M[at.1] + H * damping[at]));
     }
@@ -110,9 +110,9 @@ fn dry_friction() {
         robot.set_friction(&array![[4.0, 0.5]], None, ENV1).unwrap();
         robot.write_qvel(&array![[1.0, 1.0]], None, None).unwrap();
         let friction = array![[own, own], [4.0, 0.5], [own, own]];
-        assert_eq!(world.view().get_friction(), friction);
+        assert_eq!(world.view().friction(), friction);
         world.step(6000);
-        let ways = world.view().get_qpos();
+        let ways = world.view().qpos();
         for (at, &way) in ways.indexed_iter() {
             let stops = M[at.1] / (2.0 * friction[at]);
             let right = if friction[at] > 0.0 { (way / stops - 1.0).abs() < 0.01 } else { (way - 3.0).abs() < 1e-9 };
@@ -125,7 +125,7 @@ fn dry_friction() {
             robot.set_friction(&array![[0.0, 0.0]], None, None).unwrap();
             robot.write_qvel(&array![[1.0, 1.0]], None, None).unwrap();
             world.step(100);
-            assert!(world.view().get_qvel().iter().all(|v| (v - 1.0).abs() < 1e-12), "{}", world.view().get_qvel());
+            assert!(world.view().qvel().iter().all(|v| (v - 1.0).abs() < 1e-12), "{}", world.view().qvel());
         }
     }
 }
@@ -135,7 +135,7 @@ fn dry_friction() {
 fn joints_without_any() {
     for drive in [no_drive(), gains(0.0, 0.0)] {
         let mut world = slides(0.0, 0.0, drive, H);
-        assert_eq!(world.view().get_joint_damping(), zeros());
+        assert_eq!(world.view().joint_damping(), zeros());
         let mut robot = world.robot();
         robot.set_joint_damping(&array![[40.0, 3.0]], None, ENV1).unwrap();
         robot.set_armature(&array![[0.5, 0.25]], None, ENV1).unwrap();
@@ -146,7 +146,7 @@ fn joints_without_any() {
             let mass = M[joint] + own([0.5, 0.25]);
             mass / (mass + H * own([40.0, 3.0]))
         });
-        assert_eq!(world.view().get_qvel().row(0), array![1.0, 1.0], "without any of it nothing slows down");
+        assert_eq!(world.view().qvel().row(0), array![1.0, 1.0], "without any of it nothing slows down");
     }
 }
 
@@ -174,11 +174,11 @@ fn lasting() {
     world.sim.reset_properties(None).unwrap();
     assert_eq!(resistance(&world), at_first);
 
-    let (snapshot, stiffness) = (world.sim.snapshot(None).unwrap(), world.view().get_stiffness());
+    let (snapshot, stiffness) = (world.sim.snapshot(None).unwrap(), world.view().stiffness());
     world.robot().set_stiffness(&array![[70.0, 80.0]], None, None).unwrap();
     set_all(&mut world, &own, None);
     world.sim.restore(&snapshot, None).unwrap();
-    assert_eq!(world.view().get_stiffness(), stiffness, "control: what is restored");
+    assert_eq!(world.view().stiffness(), stiffness, "control: what is restored");
     for (found, own) in resistance(&world).iter().zip(&own) {
         assert_eq!(found, own.broadcast((ENVS, 2)).unwrap());
     }
@@ -210,7 +210,7 @@ fn read_and_set_again() {
         let more = world.robot().set_friction(&array![[1.0, 0.1]], None, None);
         if has_place {
             more.unwrap();
-            assert_eq!(world.view().get_friction(), Array2::from_shape_fn((ENVS, 2), |(_, joint)| [1.0, 0.1][joint]));
+            assert_eq!(world.view().friction(), Array2::from_shape_fn((ENVS, 2), |(_, joint)| [1.0, 0.1][joint]));
         } else {
             assert_error(more, "", &["/b", "drive.friction"]);
             assert_eq!(resistance(&world)[..2], expected);
@@ -232,7 +232,7 @@ fn mistakes() {
     assert_eq!(resistance(&world), before);
     let mut bare = slides(0.0, 0.0, gains(10.0, 1.0), H);
     assert_error(bare.robot().set_friction(&array![[1.0, 1.0]], None, None), "", &["dry friction", "/a"]);
-    assert_eq!(bare.view().get_friction(), zeros());
+    assert_eq!(bare.view().friction(), zeros());
 }
 
 /// A joint in front of one with an implicit drive gets dry friction in one environment, which moves the rows that MuJoCo
@@ -243,11 +243,11 @@ fn friction_in_front_of_a_drive() {
     let mut world = slides(0.0, 0.0, DriveCfg { stiffness, damping, ..beside(DriveModel::Implicit) }, H);
     let mut robot = world.robot();
     robot.set_friction(&array![[1.5]], Some(&[JointIndex(0)]), ENV1).unwrap();
-    robot.set_qpos(&array![[0.0, 0.2]], None, None).unwrap();
+    robot.set_qpos_target(&array![[0.0, 0.2]], None, None).unwrap();
     robot.write_qvel(&array![[1.0, -0.5]], None, None).unwrap();
     for _ in 0..50 {
         world.step(1);
-        let (q, v, effort) = (world.view().get_qpos(), world.view().get_qvel(), world.view().get_qf());
+        let (q, v, effort) = (world.view().qpos(), world.view().qvel(), world.view().qf());
         for env in 0..ENVS {
             let law = 50.0 * (0.2 - q[(env, 1)]) - 4.0 * v[(env, 1)];
             assert!((effort[(env, 1)] - law).abs() < 1e-9, "environment {env}: {}, not {law}", effort[(env, 1)]);
@@ -257,6 +257,6 @@ fn friction_in_front_of_a_drive() {
             assert!((a - b).abs() < 1e-12, "the other joint's friction changes nothing here: {a} {b}");
         }
     }
-    let q = world.view().get_qpos();
+    let q = world.view().qpos();
     assert!((q[(1, 0)] - q[(0, 0)]).abs() > 1e-3, "control: it slows its own joint: {q}");
 }

@@ -40,7 +40,7 @@ fn cycle([arm, hand]: [PathBuf; 2], arm_joints: &str, hand_joints: &str) {
     let robot = RobotCfg { urdf, control_parts, drive: tutorial_gains("arm", "hand"), ..Default::default() };
     let mut world = load(robot, cfg(1, 1));
     let view = world.view();
-    let (arm, hand) = (view.get_joint_ids("arm").unwrap(), view.get_joint_ids("hand").unwrap());
+    let (arm, hand) = (view.joint_ids("arm").unwrap(), view.joint_ids("hand").unwrap());
     let (dof, limits) = (view.dof(), view.qpos_limits());
     let of_hand = |end: usize| hand.iter().map(|j| limits[(0, j.0, end)]).collect::<Vec<_>>();
     let phases = [
@@ -60,7 +60,7 @@ fn cycle([arm, hand]: [PathBuf; 2], arm_joints: &str, hand_joints: &str) {
     let drivers = || (0..dof).filter(|&i| !followers[i]).zip(gains.iter());
     let (mut sag, mut law) = (0.0_f64, 0.0_f64);
     for (joints, aim) in phases {
-        world.robot().set_qpos(&row(&aim), Some(joints), None).unwrap();
+        world.robot().set_qpos_target(&row(&aim), Some(joints), None).unwrap();
         for _ in 0..400 {
             world.step(1);
             let (q, v, tau, target) = (world.q(), world.v(), world.effort(), world.target());

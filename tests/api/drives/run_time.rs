@@ -40,9 +40,9 @@ fn first_speed(m: f64, kp: f64, kd: f64) -> f64 {
 /// Everything that getters of drives return.
 fn settings(world: &World) -> String {
     let view = world.view();
-    let tables = [view.get_stiffness(), view.get_damping(), view.qf_limits(), view.qvel_limits()];
+    let tables = [view.stiffness(), view.damping(), view.qf_limits(), view.qvel_limits()];
     let ends = [view.qpos_limits(), view.soft_qpos_limits()];
-    format!("{tables:?} {ends:?} {:?} {:?}", view.get_drive_types(), view.get_target_qpos())
+    format!("{tables:?} {ends:?} {:?} {:?}", view.drive_types(), view.qpos_target())
 }
 
 #[test]
@@ -55,25 +55,25 @@ fn gains_per_joint_and_environment() {
     robot.set_damping(&array![[7.0, 20.0]], Some(&swapped), Some(&[EnvId(1), EnvId(2)])).unwrap();
     let kp = array![[100.0, 100.0], [100.0, 50.0], [100.0, 300.0]];
     let kd = array![[10.0, 10.0], [20.0, 7.0], [20.0, 7.0]];
-    assert_eq!((world.view().get_stiffness(), world.view().get_damping()), (kp.clone(), kd.clone()));
+    assert_eq!((world.view().stiffness(), world.view().damping()), (kp.clone(), kd.clone()));
     world.step(1);
-    let v = world.view().get_qvel();
+    let v = world.view().qvel();
     for ((env, joint), &v) in v.indexed_iter() {
         let expected = first_speed(M[joint], kp[(env, joint)], kd[(env, joint)]);
         assert_number(&format!("environment {env}, joint {joint}"), v, expected, EXACT);
     }
     let mut other = wheels(gains(100.0, 10.0));
     other.step(1);
-    assert_eq!(v.row(0), other.view().get_qvel().row(0), "not named");
-    assert!((v[(1, 1)] - other.view().get_qvel()[(1, 1)]).abs() > 0.1, "the control: gains matter");
+    assert_eq!(v.row(0), other.view().qvel().row(0), "not named");
+    assert!((v[(1, 1)] - other.view().qvel()[(1, 1)]).abs() > 0.1, "the control: gains matter");
     // Stiffness and damping of 0 leave the feed-forward effort alone: M a = tau.
     world.sim.reset(None).unwrap();
     let mut robot = world.robot();
     robot.set_stiffness(&array![[0.0, 0.0]], None, None).unwrap();
     robot.set_damping(&array![[0.0, 0.0]], None, None).unwrap();
-    robot.set_qf(&array![[0.3, -0.5]], None, None).unwrap();
+    robot.set_qf_target(&array![[0.3, -0.5]], None, None).unwrap();
     world.step(10);
-    for ((env, joint), &v) in world.view().get_qvel().indexed_iter() {
+    for ((env, joint), &v) in world.view().qvel().indexed_iter() {
         let expected = 10.0 * H * [0.3, -0.5][joint] / M[joint];
         assert_number(&format!("an effort alone, environment {env}, joint {joint}"), v, expected, EXACT);
     }
@@ -88,17 +88,17 @@ fn drive_types() {
     };
     set(&mut world, DriveType::Acceleration, 1);
     set(&mut world, DriveType::None, 2);
-    let types = world.view().get_drive_types();
+    let types = world.view().drive_types();
     assert_eq!(types.column(0).to_vec(), [DriveType::Force, DriveType::Acceleration, DriveType::None]);
-    assert!(world.view().get_stiffness().iter().all(|&x| x == k), "numbers stay");
+    assert!(world.view().stiffness().iter().all(|&x| x == k), "numbers stay");
     world.step(1);
-    let v = world.view().get_qvel();
+    let v = world.view().qvel();
     for joint in 0..2 {
         assert_number("force", v[(0, joint)], first_speed(M[joint], k, d), EXACT);
         assert_number("acceleration", v[(1, joint)], first_speed(1.0, k, d), EXACT);
         assert_eq!(v[(2, joint)], 0.0, "none");
     }
-    assert_eq!(world.view().get_qf().row(2).to_vec(), [0.0; 2]);
+    assert_eq!(world.view().qf().row(2).to_vec(), [0.0; 2]);
     // And back: stiffness and damping are in the unit of the type, so they mean torques again.
     world.sim.reset(None).unwrap();
     set(&mut world, DriveType::Force, 1);
@@ -106,7 +106,7 @@ fn drive_types() {
     world.aim(&[AIM; 2]);
     world.step(1);
     for env in 0..ENVS {
-        assert_eq!(world.view().get_qvel().row(env), v.row(0), "environment {env}");
+        assert_eq!(world.view().qvel().row(env), v.row(0), "environment {env}");
     }
     // Stiffness that is set later is in the unit of the type, too.
     set(&mut world, DriveType::Acceleration, 1);
@@ -123,7 +123,7 @@ fn effort_limits() {
     world.robot().set_qf_limits(&limits, None, None).unwrap();
     assert_eq!(world.view().qf_limits(), limits);
     world.step(1);
-    let (v, effort) = (world.view().get_qvel(), world.view().get_qf());
+    let (v, effort) = (world.view().qvel(), world.view().qf());
     for ((env, joint), &limit) in limits.indexed_iter() {
         if limit.is_finite() {
             assert_eq!(effort[(env, joint)], limit);
@@ -146,17 +146,17 @@ fn position_limits() {
         assert_eq!(world.view().qpos_limits().index_axis(Axis(0), env), expected, "environment {env}");
     }
     // Present targets are clamped at once, later ones when they are set.
-    assert_eq!(world.view().get_target_qpos(), array![[1.5, 1.5], [0.5, 0.25], [1.5, 1.5]]);
+    assert_eq!(world.view().qpos_target(), array![[1.5, 1.5], [0.5, 0.25], [1.5, 1.5]]);
     world.aim(&[-9.0, -9.0]);
-    assert_eq!(world.view().get_target_qpos(), array![[-1.0, -9.0], [-0.5, -9.0], [-1.0, -9.0]]);
+    assert_eq!(world.view().qpos_target(), array![[-1.0, -9.0], [-0.5, -9.0], [-1.0, -9.0]]);
     // Wider again, up to the robot's own.
     world.robot().set_qpos_limits(&array![[[-1.0, 2.0]]], FIRST, ENV1).unwrap();
     world.aim(&[-9.0, -9.0]);
-    assert_eq!(world.view().get_target_qpos().column(0).to_vec(), [-1.0; 3]);
+    assert_eq!(world.view().qpos_target().column(0).to_vec(), [-1.0; 3]);
     // A stop is where it was: a load pushes beyond a tighter limit, not beyond the stop (which yields by the depth that
     // MuJoCo's constraint needs to hold 40 N m).
     world.robot().set_qpos_limits(&array![[[-0.1, 0.1]]], FIRST, None).unwrap();
-    world.robot().set_qf(&array![[240.0, 0.0]], None, None).unwrap();
+    world.robot().set_qf_target(&array![[240.0, 0.0]], None, None).unwrap();
     world.step(500);
     let q = world.q()[0];
     assert!(q > 1.99 && q < 2.1, "{q}");
@@ -213,7 +213,7 @@ fn changes_of_the_world() {
     world.aim(&[AIM; 2]);
     assert_eq!(settings(&world), before);
     world.step(1);
-    assert_number("the law of the new gains", world.view().get_qvel()[(2, 1)], first_speed(M[1], 300.0, 10.0), EXACT);
+    assert_number("the law of the new gains", world.view().qvel()[(2, 1)], first_speed(M[1], 300.0, 10.0), EXACT);
 }
 
 /// A call of a setter, and parts of its message.
@@ -229,7 +229,7 @@ const MISTAKES: &[Mistake] = &[
     (|r| r.set_damping(&array![[1.0, 1.0]], None, Some(&[EnvId(3)])), &["environment 3 does not exist"]),
     (|r| r.set_drive_type(DriveType::None, Some(&[JointIndex(9)]), None), &["joint 9 does not exist"]),
     (|r| r.set_drive_type(DriveType::None, None, Some(&[EnvId(usize::MAX)])), &["environment 18446744073709551615"]),
-    (|r| r.set_qf(&array![[f64::NAN, 0.0]], None, None), &["set_qf[0, 0]", "finite"]),
+    (|r| r.set_qf_target(&array![[f64::NAN, 0.0]], None, None), &["set_qf_target[0, 0]", "finite"]),
     (|r| r.set_qf_limits(&array![[-0.5, 1.0]], None, None), &["set_qf_limits[0, 0]", "or infinite for no limit"]),
     (|r| r.set_qvel_limits(&array![[1.0, f64::NAN]], None, None), &["set_qvel_limits[0, 1]", "joint \"b\"", "NaN"]),
     (|r| r.set_qvel_limits(&Array2::zeros((2, 2)), None, None), &["[2, 2]", "[3, 2]"]),
@@ -287,7 +287,7 @@ fn mistakes() {
     // Each once is right, in any order.
     let (joints, envs) = ([JointIndex(1), JointIndex(0)], [EnvId(2), EnvId(0)]);
     world.robot().set_stiffness(&array![[1.0, 2.0]], Some(&joints), Some(&envs)).unwrap();
-    assert_eq!(world.view().get_stiffness(), array![[2.0, 1.0], [100.0, 100.0], [2.0, 1.0]]);
+    assert_eq!(world.view().stiffness(), array![[2.0, 1.0], [100.0, 100.0], [2.0, 1.0]]);
 }
 
 /// Joints without a drive cannot be given one, and MuJoCo's own actuators keep their gains: both say what to do.
@@ -308,8 +308,8 @@ fn drives_that_cannot_change() {
     }
     // A passive joint's limit is that of its file.
     let free = world(&[Joint::wheel("j", 0.1).effort(3.0)], no_drive(), weightless());
-    assert_eq!((free.limits(), free.view().get_stiffness()[(0, 0)]), (vec![3.0], 0.0));
-    assert_eq!(free.view().get_drive_types()[(0, 0)], DriveType::None);
+    assert_eq!((free.limits(), free.view().stiffness()[(0, 0)]), (vec![3.0], 0.0));
+    assert_eq!(free.view().drive_types()[(0, 0)], DriveType::None);
 }
 
 /// Columns of mimic joints are accepted, and change nothing.
@@ -320,7 +320,7 @@ fn mimic_joints() {
     let mut robot = world.robot();
     robot.set_stiffness(&array![[50.0, 999.0]], None, None).unwrap();
     robot.set_qpos_limits(&array![[[-1.0, 1.0], [5.0, -5.0]]], None, None).unwrap();
-    assert_eq!(world.view().get_stiffness(), array![[50.0, 0.0]]);
+    assert_eq!(world.view().stiffness(), array![[50.0, 0.0]]);
     assert_eq!(world.view().qf_limits(), array![[f64::INFINITY, f64::INFINITY]]);
     world.aim(&[3.0, 0.0]);
     assert_eq!(world.target(), [1.0, 2.0]);

@@ -202,15 +202,15 @@ impl World {
     }
 
     pub(crate) fn q(&self) -> Vec<f64> {
-        self.view().get_qpos().row(0).to_vec()
+        self.view().qpos().row(0).to_vec()
     }
 
     pub(crate) fn v(&self) -> Vec<f64> {
-        self.view().get_qvel().row(0).to_vec()
+        self.view().qvel().row(0).to_vec()
     }
 
     pub(crate) fn effort(&self) -> Vec<f64> {
-        self.view().get_qf().row(0).to_vec()
+        self.view().qf().row(0).to_vec()
     }
 
     pub(crate) fn limits(&self) -> Vec<f64> {
@@ -218,21 +218,21 @@ impl World {
     }
 
     pub(crate) fn target(&self) -> Vec<f64> {
-        self.view().get_target_qpos().row(0).to_vec()
+        self.view().qpos_target().row(0).to_vec()
     }
 
     /// Position targets of all joints.
     pub(crate) fn aim(&mut self, targets: &[f64]) {
-        self.robot().set_qpos(&row(targets), None, None).unwrap();
+        self.robot().set_qpos_target(&row(targets), None, None).unwrap();
     }
 
     /// Targets of position, velocity and effort of all joints.
     pub(crate) fn command<const N: usize>(&mut self, targets: [[f64; 3]; N]) {
         let of = |k: usize| row(&targets.map(|target| target[k]));
         let mut robot = self.robot();
-        robot.set_qpos(&of(0), None, None).unwrap();
-        robot.set_qvel(&of(1), None, None).unwrap();
-        robot.set_qf(&of(2), None, None).unwrap();
+        robot.set_qpos_target(&of(0), None, None).unwrap();
+        robot.set_qvel_target(&of(1), None, None).unwrap();
+        robot.set_qf_target(&of(2), None, None).unwrap();
     }
 
     pub(crate) fn step(&mut self, steps: u32) {

@@ -31,7 +31,7 @@ fn command(observations: &Array2<f64>) -> Array2<f64> {
 
 fn look(sim: &SimulationManager, robot: RobotId) -> Array2<f64> {
     let robot = sim.robot(robot);
-    concatenate(Axis(1), &[robot.get_qpos().view(), robot.get_qvel().view()]).unwrap()
+    concatenate(Axis(1), &[robot.qpos().view(), robot.qvel().view()]).unwrap()
 }
 
 type Row = (Vec<u64>, Vec<u64>, u64, bool, bool);
@@ -51,7 +51,7 @@ fn by_hand(num_envs: usize, steps: usize, seed: u64) -> Vec<Vec<Row>> {
     let mut all = Vec::new();
     for _ in 0..steps {
         let force = command(&seen).mapv(|force| force.clamp(-BOUND, BOUND));
-        sim.robot_mut(robot).set_qf(&force, Some(&[slide]), None).unwrap();
+        sim.robot_mut(robot).set_qf_target(&force, Some(&[slide]), None).unwrap();
         sim.update(DECIMATION);
         let last = look(&sim, robot);
         let mut ends = Vec::new();
@@ -85,16 +85,16 @@ fn loop_by_hand() {
     let space = Space::uniform(["force"], [-BOUND, BOUND]).unwrap();
     let mut env = EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(LIMIT) })
         .action(ActionTerm::new("push", space, move |sim, forces| {
-            Ok(sim.robot_mut(robot).set_qf(forces, Some(&[slide]), None)?)
+            Ok(sim.robot_mut(robot).set_qf_target(forces, Some(&[slide]), None)?)
         }))
         .observation(ObservationTerm::new("state", ["x", "angle", "v", "spin"], move |now| Ok(look(now.sim(), robot))))
         .reward(RewardTerm::new("alive", 1.0, |now| Ok(Array1::ones(now.num_envs()))))
         .reward(RewardTerm::new("middle", -0.25, move |now| {
-            Ok(now.sim().robot(robot).get_qpos().column(0).mapv(|x| x * x))
+            Ok(now.sim().robot(robot).qpos().column(0).mapv(|x| x * x))
         }))
         .reward(RewardTerm::new("effort", -0.01, |now| Ok(now.actions().column(0).mapv(|force| force * force))))
         .termination(TerminationTerm::new("fell", move |now| {
-            Ok(now.sim().robot(robot).get_qpos().column(1).mapv(|angle| angle.abs() > FALLEN))
+            Ok(now.sim().robot(robot).qpos().column(1).mapv(|angle| angle.abs() > FALLEN))
         }))
         .event(EventTerm::on_reset("start", move |sim, dice| {
             for die in dice {

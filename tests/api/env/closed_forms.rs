@@ -51,12 +51,12 @@ fn decimation() {
         let space = Space::uniform(["force"], [-10.0, 10.0]).unwrap();
         // Pushes until the cart is 5 mm away: with a look at the state before each physics step, or only before the first.
         let push = ActionTerm::new("push", space, move |sim, forces| {
-            let far = sim.robot(robot).get_qpos()[(0, 0)] > 0.005;
+            let far = sim.robot(robot).qpos()[(0, 0)] > 0.005;
             let force = if far { Array2::zeros((1, 1)) } else { forces.to_owned() };
-            Ok(sim.robot_mut(robot).set_qf(&force, None, None)?)
+            Ok(sim.robot_mut(robot).set_qf_target(&force, None, None)?)
         });
         let push = if every { push.every_physics_step() } else { push };
-        let velocity = ObservationTerm::new("v", ["v"], move |now| Ok(now.sim().robot(robot).get_qvel()));
+        let velocity = ObservationTerm::new("v", ["v"], move |now| Ok(now.sim().robot(robot).qvel()));
         let mut env = EnvBuilder::new(sim, EnvCfg { decimation: 10, ..EnvCfg::default() })
             .action(push)
             .observation(velocity)

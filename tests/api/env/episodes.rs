@@ -268,11 +268,11 @@ fn free_cart(num_envs: usize) -> Env {
     let space = Space::uniform(["force"], [-1e308, 1e308]).unwrap();
     EnvBuilder::new(sim, EnvCfg { decimation: 3, episode_steps: Some(50) })
         .action(ActionTerm::new("push", space, move |sim, forces| {
-            Ok(sim.robot_mut(robot).set_qf(forces, None, None)?)
+            Ok(sim.robot_mut(robot).set_qf_target(forces, None, None)?)
         }))
-        .observation(ObservationTerm::new("x", ["x"], move |now| Ok(now.sim().robot(robot).get_qpos())))
-        .observation(ObservationTerm::new("v", ["v"], move |now| Ok(now.sim().robot(robot).get_qvel())))
-        .reward(RewardTerm::new("v", 1.0, move |now| Ok(now.sim().robot(robot).get_qvel().column(0).to_owned())))
+        .observation(ObservationTerm::new("x", ["x"], move |now| Ok(now.sim().robot(robot).qpos())))
+        .observation(ObservationTerm::new("v", ["v"], move |now| Ok(now.sim().robot(robot).qvel())))
+        .reward(RewardTerm::new("v", 1.0, move |now| Ok(now.sim().robot(robot).qvel().column(0).to_owned())))
         .build()
         .unwrap()
 }

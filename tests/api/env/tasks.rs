@@ -37,9 +37,9 @@ pub(crate) fn cart_task(sim: SimulationManager, robot: RobotId, cfg: EnvCfg) -> 
     EnvBuilder::new(sim, cfg)
         .action(push)
         .observation(ObservationTerm::new("place", ["x"], move |now| {
-            Ok(now.sim().robot(robot).get_qpos().select(Axis(1), &[0]))
+            Ok(now.sim().robot(robot).qpos().select(Axis(1), &[0]))
         }))
-        .reward(RewardTerm::new("x", -1.0, move |now| Ok(now.sim().robot(robot).get_qpos().column(0).to_owned())))
+        .reward(RewardTerm::new("x", -1.0, move |now| Ok(now.sim().robot(robot).qpos().column(0).to_owned())))
 }
 
 /// A cart task without a pole.
@@ -89,12 +89,12 @@ pub(crate) fn everything(cfg: SimulationManagerCfg) -> Env {
         .observation(terms::last_actions("action", ["slide"]))
         .reward(terms::alive("alive", 1.0))
         .reward(RewardTerm::new("near", -0.5, move |now| {
-            let (qpos, goal) = (now.sim().robot(robot).get_qpos(), now.command("goal")?);
+            let (qpos, goal) = (now.sim().robot(robot).qpos(), now.command("goal")?);
             Ok((&qpos.column(0) - &goal.column(0)).mapv(f64::abs))
         }))
         .reward(terms::action_rate("smooth", -1e-3))
         .termination(TerminationTerm::new("fell", move |now| {
-            Ok(now.sim().robot(robot).get_qpos().column(1).mapv(|angle| angle.abs() > 0.3))
+            Ok(now.sim().robot(robot).qpos().column(1).mapv(|angle| angle.abs() > 0.3))
         }))
         .build()
         .unwrap()

@@ -31,7 +31,7 @@ fn floater(num_envs: usize, ground: bool) -> (SimulationManager, RobotId) {
 
 fn task(sim: SimulationManager, robot: RobotId) -> EnvBuilder {
     let height = ObservationTerm::new("z", ["z"], move |now| {
-        Ok(now.sim().robot(robot).get_root_pose().slice_move(s![.., 2..3]))
+        Ok(now.sim().robot(robot).root_pose().slice_move(s![.., 2..3]))
     });
     EnvBuilder::new(sim, EnvCfg::default()).action(idle()).observation(height).reward(terms::alive("alive", 1.0))
 }
@@ -126,7 +126,7 @@ fn begun(event: EventTerm, robot: RobotId, sim: SimulationManager) -> [Array2<f6
     let mut env = task(sim, robot).event(event).build().unwrap();
     env.reset(None, Some(5)).unwrap();
     let robot = env.sim().robot(robot);
-    [robot.get_root_pose(), robot.get_root_velocity(), robot.get_qpos(), robot.get_qvel()]
+    [robot.root_pose(), robot.root_velocity(), robot.qpos(), robot.qvel()]
 }
 
 #[test]
@@ -242,9 +242,9 @@ fn effort_squares() {
     let cart = sim.add_robot(mjcf_robot("cart", &super::tasks::cart(true))).unwrap();
     let squares = terms::joint_effort_squares(&sim, "effort", -0.5, cart, &["slide", "hinge"]).unwrap();
     let mut env = begin(task(sim, cart).reward(squares));
-    env.sim_mut().robot_mut(cart).set_qpos(&array![[0.1, -0.2]], None, None).unwrap();
+    env.sim_mut().robot_mut(cart).set_qpos_target(&array![[0.1, -0.2]], None, None).unwrap();
     let step = env.step(&Array2::zeros((1, 1))).unwrap();
-    let efforts = env.sim().robot(cart).get_qf();
+    let efforts = env.sim().robot(cart).qf();
     let expected = -0.5 * efforts.index_axis(Axis(0), 0).iter().map(|x| x * x).sum::<f64>();
     assert!(expected < 0.0, "they drive: {efforts}");
     assert_eq!(step.info.reward_terms[(0, 1)], expected);

@@ -64,7 +64,7 @@ fn body_motion() {
     sim.update(10);
     let names = sim.body_names();
     let place = |name: &str| names.iter().position(|body| body == name).unwrap();
-    let (pose, velocity) = (sim.rigid_object(cube).get_pose(), sim.rigid_object(cube).get_velocity());
+    let (pose, velocity) = (sim.rigid_object(cube).pose(), sim.rigid_object(cube).velocity());
     let motion = sim.body_motion(EnvId(1), place("cube")).unwrap();
     for k in 0..3 {
         assert!((motion.pose.translation.vector[k] - pose[(1, k)]).abs() < 1e-12);

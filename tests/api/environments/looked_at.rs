@@ -44,7 +44,7 @@ fn look() {
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
     let robot = sim.add_robot(arm()).unwrap();
     let id = sim.add_rigid_object(cube("cube", 0.5, [1.0, 0.0, 2.0])).unwrap();
-    sim.robot_mut(robot).set_qpos(&array![[0.2, 0.4, -0.6, 0.1, 0.3, 0.0]], None, Some(&[EnvId(1)])).unwrap();
+    sim.robot_mut(robot).set_qpos_target(&array![[0.2, 0.4, -0.6, 0.1, 0.3, 0.0]], None, Some(&[EnvId(1)])).unwrap();
     sim.update(20);
     let mut look = Look::default();
     sim.look(EnvId(1), &mut look).unwrap();
@@ -54,7 +54,7 @@ fn look() {
     for (name, body) in names.iter().zip(&look.bodies) {
         let pose = match name.strip_prefix("arm/") {
             Some(link) => sim.robot(robot).link_pose(link).unwrap(),
-            None => sim.rigid_object(id).get_pose(),
+            None => sim.rigid_object(id).pose(),
         };
         let row = kinetoscope::scene::pose::to_row(body);
         assert!((0..7).all(|k| (row[k] - pose[(1, k)]).abs() < 1e-12), "{name}: {row:?} {pose}");
@@ -72,7 +72,7 @@ fn look() {
         assert!((moment / total - data.subtree_com()[2]).abs() < 1e-12);
     });
     let instance = sim.visible().scene().instances().iter().position(|instance| &*instance.name == "cube").unwrap();
-    let expected = PoseF32::from(&pose_in(&sim.rigid_object(id).get_pose(), 1));
+    let expected = PoseF32::from(&pose_in(&sim.rigid_object(id).pose(), 1));
     assert_eq!(look.instances[instance].translation, expected.translation);
     assert!(matches!(sim.look(EnvId(2), &mut look), Err(Error::UnknownIndex { index: 2, .. })));
 }
@@ -92,7 +92,7 @@ fn pull() {
     let turn = Vector3::from(arm).cross(&Vector3::from(force)) / (mass * 0.01 / 6.0);
     let mut step = || {
         sim.update(1);
-        sim.rigid_object(id).get_velocity()
+        sim.rigid_object(id).velocity()
     };
     let (first, second) = (step(), step());
     for k in 0..3 {
@@ -102,7 +102,7 @@ fn pull() {
     assert!(second.row(0).iter().all(|v| *v == 0.0), "the other environment");
     sim.pull(EnvId(1), 0, &[]).unwrap();
     sim.update(1);
-    let third = sim.rigid_object(id).get_velocity();
+    let third = sim.rigid_object(id).velocity();
     assert!((0..3).all(|k| (third[(1, k)] - second[(1, k)]).abs() < 1e-14), "{third}");
     let refused = sim.pull(EnvId(0), 0, &[([0.0, f64::NAN, 0.0], force)]);
     assert!(matches!(refused, Err(Error::NotFinite { argument: "pull", column: 1, .. })), "{refused:?}");

@@ -131,7 +131,7 @@ fn as_built() {
             assert!(!same(&seen, 1, &others, 1), "control: it does not look as ever");
         }
         for uid in ["cube", "ball", "post", "pill"] {
-            let pose = |sim: &SimulationManager| sim.rigid_object(sim.rigid_object_id(uid).unwrap()).get_pose();
+            let pose = |sim: &SimulationManager| sim.rigid_object(sim.rigid_object_id(uid).unwrap()).pose();
             let (mine, built, plain) = (pose(&sim), pose(&built), pose(&plain));
             assert_eq!((mine.row(1), mine.row(0)), (built.row(1), plain.row(0)), "{uid} after {steps} steps");
         }
@@ -155,7 +155,7 @@ fn resting_heights() {
     }
     sim.update(300);
     for uid in ["cube", "ball"] {
-        let pose = sim.rigid_object(sim.rigid_object_id(uid).unwrap()).get_pose();
+        let pose = sim.rigid_object(sim.rigid_object_id(uid).unwrap()).pose();
         for (env, half) in heights.into_iter().enumerate() {
             let z = pose[(env, 2)];
             assert!((z - half).abs() < 5e-4, "{uid} of environment {env} lies at {z}, not {half}");

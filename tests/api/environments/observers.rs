@@ -66,7 +66,7 @@ fn steps_of_their_own() {
         blocks.into_iter().for_each(|block| sim.update(block));
         assert_eq!(entries(&threes), every(3, 100));
         assert_eq!(entries(&sevens), every(7, 100));
-        assert_eq!(sim.rigid_object(same_object).get_pose(), alone.rigid_object(object).get_pose());
+        assert_eq!(sim.rigid_object(same_object).pose(), alone.rigid_object(object).pose());
         let (here, there) = (sim.sensor(same_imu).unwrap(), alone.sensor(imu).unwrap());
         assert_eq!(here.lin_acc_b(), there.lin_acc_b());
         assert_eq!(here.sample_counts(), there.sample_counts());

@@ -41,10 +41,10 @@ fn pendulums() {
     ];
     assert_eq!(get(&sim, 3, Property::Inertia, "p/rod"), [0.06; 3]);
     sim.mjcf_part_mut(id).write_qpos(&array![[0.02]], ALL).unwrap();
-    let (mut crossings, mut before) = (vec![Vec::new(); 6], sim.mjcf_part(id).get_qpos());
+    let (mut crossings, mut before) = (vec![Vec::new(); 6], sim.mjcf_part(id).qpos());
     for step in 1..=8000 {
         sim.update(1);
-        let now = sim.mjcf_part(id).get_qpos();
+        let now = sim.mjcf_part(id).qpos();
         for env in 0..6 {
             let (a, b) = (before[(env, 0)], now[(env, 0)]);
             if a > 0.0 && b <= 0.0 {
@@ -75,9 +75,9 @@ fn sliding_boxes() {
     sim.update(100);
     sim.rigid_object_mut(id).write_velocity(&array![[5.0, 0.0, 0.0, 0.0, 0.0, 0.0]], ALL).unwrap();
     sim.update(10);
-    let before = sim.rigid_object(id).get_velocity();
+    let before = sim.rigid_object(id).velocity();
     sim.update(30);
-    let after = sim.rigid_object(id).get_velocity();
+    let after = sim.rigid_object(id).velocity();
     for (env, mu) in [(1, 0.1), (2, 0.25)] {
         let lost = before[(env, 0)] - after[(env, 0)];
         let pressed = G * 0.3 + after[(env, 2)] - before[(env, 2)];
@@ -110,7 +110,7 @@ fn wheels() {
     sim.robot_mut(id).write_qvel(&array![[10.0]], None, ALL).unwrap();
     let before = 10.0;
     sim.update(1);
-    let after = sim.robot(id).get_qvel();
+    let after = sim.robot(id).qvel();
     let h = 0.01;
     let laws = [(0.2, 0.05, 0.0), (0.7, 0.05, 0.0), (0.2, 0.11, 0.0), (0.1, 0.05, 0.4)];
     for (env, (b, f, a)) in laws.into_iter().enumerate() {
@@ -144,7 +144,7 @@ fn gains_per_environment() {
     set(&mut sim, &values);
     assert_eq!(sim.robot(id).qf_limits(), array![[100.0], [100.0], [4.0]]);
     sim.update(1500);
-    let (q, effort) = (sim.robot(id).get_qpos(), sim.robot(id).get_qf());
+    let (q, effort) = (sim.robot(id).qpos(), sim.robot(id).qf());
     for (env, kp, m) in [(0, 500.0, 2.0), (1, 200.0, 3.0)] {
         let q = q[(env, 0)];
         let weight = m * G * 0.5 * q.cos();
@@ -155,7 +155,7 @@ fn gains_per_environment() {
     let snapshot = sim.snapshot(Some(&[EnvId(2)])).unwrap();
     sim.restore(&snapshot, Some(&[EnvId(0), EnvId(1), EnvId(2)])).unwrap();
     assert_eq!(sim.robot(id).qf_limits(), array![[100.0], [100.0], [4.0]]);
-    assert_eq!(sim.robot(id).get_stiffness(), array![[500.0], [200.0], [500.0]]);
+    assert_eq!(sim.robot(id).stiffness(), array![[500.0], [200.0], [500.0]]);
 }
 
 /// The usual reset of learning goes back to a snapshot from before the draw. What was drawn stays and acts, and what was
@@ -170,7 +170,7 @@ fn drawn_gains_restored() {
         sim.randomize(&drawn, Some(&[EnvId(1), EnvId(2)])).unwrap();
         let kp: Vec<f64> = (0..3).map(|env| get(&sim, env, Property::Stiffness, "lever/hinge")[0]).collect();
         assert!(kp[1] < 0.7 * kp[0] && kp[2] < 0.7 * kp[0] && kp[1] != kp[2], "{kp:?}");
-        let asked = sim.robot(id).get_stiffness();
+        let asked = sim.robot(id).stiffness();
         sim.robot_mut(id).set_damping(&array![[70.0]], None, ALL).unwrap();
         let later = sim.snapshot(ALL).unwrap();
         sim.update(10);
@@ -179,14 +179,14 @@ fn drawn_gains_restored() {
             for (env, kp) in kp.iter().enumerate() {
                 assert_eq!(get(&sim, env, Property::Stiffness, "lever/hinge"), [*kp], "environment {env}");
             }
-            assert_eq!(sim.robot(id).get_stiffness(), asked);
-            assert_eq!(sim.robot(id).get_damping(), Array2::from_elem((3, 1), damping));
+            assert_eq!(sim.robot(id).stiffness(), asked);
+            assert_eq!(sim.robot(id).damping(), Array2::from_elem((3, 1), damping));
         }
         // A rollout from the snapshot goes where stepping goes.
         let rollout = sim.rollout(&Array3::<f64>::zeros((1, 1500, 1)), Some(&start), ALL).unwrap();
         sim.restore(&start, ALL).unwrap();
         sim.update(1500);
-        let q = sim.robot(id).get_qpos();
+        let q = sim.robot(id).qpos();
         for (env, kp) in kp.iter().enumerate() {
             let q = q[(env, 0)];
             assert_eq!(rollout.states[(env, 1499, 0)], q, "environment {env}");
@@ -196,12 +196,12 @@ fn drawn_gains_restored() {
         }
         // What was drawn in one environment is not what another goes on with.
         sim.restore(&later, Some(&[EnvId(2), EnvId(0), EnvId(1)])).unwrap();
-        assert_eq!(sim.robot(id).get_stiffness(), asked);
+        assert_eq!(sim.robot(id).stiffness(), asked);
         // A gain that is set is drawn no longer, and a nominal one neither.
         sim.robot_mut(id).set_stiffness(&array![[333.0]], None, Some(&[EnvId(1)])).unwrap();
         sim.reset_properties(Some(&[EnvId(2)])).unwrap();
         sim.restore(&start, ALL).unwrap();
-        assert_eq!(sim.robot(id).get_stiffness(), Array2::from_elem((3, 1), 500.0));
+        assert_eq!(sim.robot(id).stiffness(), Array2::from_elem((3, 1), 500.0));
     }
 }
 
@@ -214,7 +214,7 @@ fn drawn_equal_to_set() {
     let [stiffness, damping, effort] = [200.0, 40.0, 30.0];
     let gains = |sim: &SimulationManager, env: usize| {
         let robot = sim.robot(id);
-        [robot.get_stiffness()[(env, 0)], robot.get_damping()[(env, 0)], robot.qf_limits()[(env, 0)]]
+        [robot.stiffness()[(env, 0)], robot.damping()[(env, 0)], robot.qf_limits()[(env, 0)]]
     };
     let set_all = |sim: &mut SimulationManager| {
         let mut robot = sim.robot_mut(id);
@@ -269,7 +269,7 @@ fn drawn_across_drive_types() {
         sim.randomize(&draw(value), Some(&[EnvId(1)])).unwrap();
         sim.restore(&set, ALL).unwrap();
         assert_eq!(kp(&sim), [200.0, value]);
-        assert_eq!(sim.robot(id).get_stiffness(), array![[200.0], [value]]);
+        assert_eq!(sim.robot(id).stiffness(), array![[200.0], [value]]);
     }
     // Undrawn where it is nominal, too.
     sim.randomize(&draw(500.0), Some(&[EnvId(1)])).unwrap();
@@ -286,7 +286,7 @@ fn drawn_across_drive_types() {
         assert_ne!(kp(&sim)[0], 200.0, "control: the one that is not drawn changes");
         sim.restore(&start, ALL).unwrap();
         assert_eq!(kp(&sim), [500.0, 300.0], "{drive_type:?}");
-        assert_eq!(sim.robot(id).get_stiffness(), array![[500.0], [300.0]]);
+        assert_eq!(sim.robot(id).stiffness(), array![[500.0], [300.0]]);
         sim.restore(&set, ALL).unwrap();
     }
 }
@@ -434,9 +434,9 @@ fn growing_buffers() {
     assert_eq!(all_values(&sim), drawn);
     assert_eq!(own(&sim, 0), arrays);
     // And it is what is stepped with: one step of free fall.
-    let before = sim.rigid_object(ids.cube).get_velocity();
+    let before = sim.rigid_object(ids.cube).velocity();
     sim.update(1);
-    let after = sim.rigid_object(ids.cube).get_velocity();
+    let after = sim.rigid_object(ids.cube).velocity();
     for k in 0..3 {
         assert!((after[(0, k)] - before[(0, k)] - 0.01 * gravity[k]).abs() < 1e-12);
     }
@@ -451,7 +451,7 @@ fn later_entities() {
     let state = |sim: &SimulationManager| {
         let arm = sim.robot(ids.arm);
         let machine = sim.mjcf_part(ids.machine);
-        (arm.get_qpos(), arm.get_qvel(), sim.rigid_object(ids.cube).get_pose(), machine.get_qpos(), machine.get_qvel())
+        (arm.qpos(), arm.qvel(), sim.rigid_object(ids.cube).pose(), machine.qpos(), machine.qvel())
     };
     let (before, drawn) = (state(&sim), all_values(&sim));
     sim.add_rigid_object(cube("late", 1.0, [2.0, 2.0, 0.05])).unwrap();
@@ -486,7 +486,7 @@ fn snapshots_and_rollouts() {
     let controls = Array3::from_shape_fn((2, 40, 7), |(n, t, k)| (0.5 * n as f64 + 0.1 * t as f64 + k as f64).sin());
     let rollout = sim.rollout(&controls, None, ALL).unwrap();
     for t in 0..40 {
-        sim.robot_mut(ids.arm).set_qpos(controls.slice(s![.., t, ..6]), None, None).unwrap();
+        sim.robot_mut(ids.arm).set_qpos_target(controls.slice(s![.., t, ..6]), None, None).unwrap();
         sim.mjcf_part_mut(ids.machine).set_ctrl(controls.slice(s![.., t, 6..]), None, None).unwrap();
         sim.update(1);
     }
@@ -585,13 +585,13 @@ fn centred_object() {
     // Free fall without spin: a force in the centre of mass turns nothing, and the origin turns about the centre.
     sim.rigid_object_mut(ids.cube).write_velocity(&Array2::zeros((1, 6)), ALL).unwrap();
     sim.update(10);
-    let fallen = sim.rigid_object(ids.cube).get_velocity();
+    let fallen = sim.rigid_object(ids.cube).velocity();
     assert!(fallen.row(1).iter().zip(&fallen.row(0)).all(|(a, b)| (a - b).abs() < 1e-12), "{fallen}");
     // With a spin about z the origin is accelerated to the centre: |a| = w² d.
     sim.rigid_object_mut(ids.cube).write_velocity(&array![[0.0, 0.0, 0.0, 0.0, 0.0, 2.0]], ALL).unwrap();
-    let before = sim.rigid_object(ids.cube).get_velocity();
+    let before = sim.rigid_object(ids.cube).velocity();
     sim.update(1);
-    let change = sim.rigid_object(ids.cube).get_velocity() - before;
+    let change = sim.rigid_object(ids.cube).velocity() - before;
     let sideways = (change[(1, 0)].powi(2) + change[(1, 1)].powi(2)).sqrt() / 0.01;
     assert!((sideways - 4.0 * 0.03).abs() < 2e-3, "{sideways}");
     assert!(change[(0, 0)].abs() + change[(0, 1)].abs() < 1e-9);
@@ -619,7 +619,7 @@ fn lazy_forward_pass() {
         // What is read then is of the new masses: MuJoCo's inertia matrix.
         let of_mass = |env: usize| sim.batch().read(env, |env| env.data().mass_matrix().unwrap());
         let matrices: Vec<Vec<f64>> = (0..3).map(of_mass).collect();
-        let masses = sim.rigid_object(ids.cube).get_mass();
+        let masses = sim.rigid_object(ids.cube).mass();
         sim.update(20);
         (matrices, masses, all_bits(&sim))
     };

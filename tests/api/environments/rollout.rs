@@ -13,7 +13,7 @@ fn controls(rows: usize) -> Array3<f64> {
 /// Gives the controls of step `t` and steps.
 fn step(sim: &mut SimulationManager, ids: Ids, controls: &Array3<f64>, t: usize) {
     let now = controls.index_axis(Axis(1), t);
-    sim.robot_mut(ids.arm).set_qpos(now.slice(s![.., ..6]), None, None).unwrap();
+    sim.robot_mut(ids.arm).set_qpos_target(now.slice(s![.., ..6]), None, None).unwrap();
     sim.mjcf_part_mut(ids.machine).set_ctrl(now.slice(s![.., 6..]), None, None).unwrap();
     sim.update(1);
 }
@@ -36,11 +36,11 @@ fn steps_by_hand() {
         assert_eq!(sim.threads(), threads);
         sim.update(200);
         let (before, warnings) = (all_bits(&sim), sim.warning_counts());
-        let forces = sim.mjcf_part(ids.machine).get_actuator_force();
+        let forces = sim.mjcf_part(ids.machine).actuator_force();
         let controls = controls(3);
         let rollout = sim.rollout(&controls, None, ALL).unwrap();
         assert_eq!(all_bits(&sim), before, "the present stays");
-        assert_eq!((sim.warning_counts(), sim.mjcf_part(ids.machine).get_actuator_force()), (warnings, forces));
+        assert_eq!((sim.warning_counts(), sim.mjcf_part(ids.machine).actuator_force()), (warnings, forces));
         assert!(rollout.diverged.is_empty());
 
         let present = sim.snapshot(ALL).unwrap();
@@ -94,7 +94,7 @@ fn clamped_targets() {
     let rollout = sim.rollout(&Array3::from_elem((1, 5, 7), 100.0), None, ALL).unwrap();
     sim.restore(&rollout.end, ALL).unwrap();
     let limits = sim.robot(ids.arm).qpos_limits();
-    assert_eq!(sim.robot(ids.arm).get_target_qpos().row(0), limits.slice(s![0, .., 1]));
+    assert_eq!(sim.robot(ids.arm).qpos_target().row(0), limits.slice(s![0, .., 1]));
 }
 
 /// Controls were once clamped to the limits that the robot was added with, not to those that a row's state has:
@@ -119,7 +119,7 @@ fn limits_of_start() {
         let end = all_bits(&sim);
         sim.restore(&rollout.end, ALL).unwrap();
         assert_eq!(all_bits(&sim), end);
-        let (targets, limits) = (sim.robot(ids.arm).get_target_qpos(), sim.robot(ids.arm).qpos_limits());
+        let (targets, limits) = (sim.robot(ids.arm).qpos_target(), sim.robot(ids.arm).qpos_limits());
         for ((env, joint), target) in targets.indexed_iter() {
             let asked = controls[(env, STEPS - 1, joint)];
             assert_eq!(*target, asked.clamp(limits[(env, joint, 0)], limits[(env, joint, 1)]));

@@ -200,11 +200,11 @@ fn diverged() {
 fn sensors() {
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
     let robot = sim.add_robot(arm()).unwrap();
-    sim.robot_mut(robot).set_qpos(&Array2::from_elem((1, 6), 0.4), None, None).unwrap();
+    sim.robot_mut(robot).set_qpos_target(&Array2::from_elem((1, 6), 0.4), None, None).unwrap();
     let sampling = SamplingCfg { history_length: 4, ..SamplingCfg::every(0.05) };
     let id = sim.add_sensor("joints", JointStateCfg { sampling, ..Default::default() }).unwrap();
     sim.update(23);
-    let (snapshot, there) = (sim.snapshot(Some(&[EnvId(1)])).unwrap(), sim.robot(robot).get_qpos());
+    let (snapshot, there) = (sim.snapshot(Some(&[EnvId(1)])).unwrap(), sim.robot(robot).qpos());
     sim.update(40);
     let other = sim.sensor(id).unwrap().positions().row(0).to_owned();
     sim.restore(&snapshot, ALL).unwrap();
@@ -217,7 +217,7 @@ fn sensors() {
     sim.update(1);
     let sensor = sim.sensor(id).unwrap();
     assert_eq!(sensor.sample_counts()[1], 1);
-    assert_eq!(sensor.positions().row(1), sim.robot(robot).get_qpos().row(1));
+    assert_eq!(sensor.positions().row(1), sim.robot(robot).qpos().row(1));
 }
 
 /// Delay lines, drives that were changed and wrenches are part of it, in memory and in a file.
@@ -234,7 +234,7 @@ fn drives_and_wrenches() {
     let command = |sim: &mut SimulationManager, id: RobotId, n: u32| {
         let n = f64::from(n);
         let targets = Array2::from_shape_fn((2, 6), |(e, k)| 0.3 * (0.2 * n + k as f64 + 0.5 * e as f64).sin());
-        sim.robot_mut(id).set_qpos(&targets, None, None).unwrap();
+        sim.robot_mut(id).set_qpos_target(&targets, None, None).unwrap();
     };
     let go = |sim: &mut SimulationManager, id: RobotId, from: u32| {
         (from..from + 60).for_each(|n| {
@@ -260,9 +260,9 @@ fn drives_and_wrenches() {
     let end = go(&mut sim, id, 60);
     let (mut fresh, its) = build();
     fresh.restore(&Snapshot::load(file.path()).unwrap(), ALL).unwrap();
-    assert_eq!(fresh.robot(its).get_delay(), sim.robot(id).get_delay());
-    assert_eq!(fresh.robot(its).get_drive_types(), sim.robot(id).get_drive_types());
-    assert_eq!(fresh.robot(its).get_gravity_compensation(), sim.robot(id).get_gravity_compensation());
+    assert_eq!(fresh.robot(its).delay(), sim.robot(id).delay());
+    assert_eq!(fresh.robot(its).drive_types(), sim.robot(id).drive_types());
+    assert_eq!(fresh.robot(its).gravity_compensation(), sim.robot(id).gravity_compensation());
     assert!(go(&mut fresh, its, 60) == end, "the same bits from a file");
     sim.restore(&snapshot, ALL).unwrap();
     assert!(go(&mut sim, id, 60) == end, "and from memory");
@@ -284,7 +284,7 @@ fn with_properties() {
     sim.update(120);
     let (snapshot, there, had) = (sim.snapshot(ALL).unwrap(), all_bits(&sim), all_values(&sim));
     snapshot.save(&path).unwrap();
-    let stiffness = sim.robot(ids.arm).get_stiffness();
+    let stiffness = sim.robot(ids.arm).stiffness();
     sim.update(80);
     let end = all_bits(&sim);
     sim.randomize(&all_properties(), ALL).unwrap();
@@ -304,7 +304,7 @@ fn with_properties() {
         assert!(all_values(sim) == next, "the next draw is the next one");
         // What is drawn is drawn still: a gain stays when a plain state is restored, and one that was set does not.
         sim.restore_with_properties(snapshot, ALL).unwrap();
-        assert_eq!(sim.robot(sim.robot_id("arm").unwrap()).get_stiffness(), stiffness);
+        assert_eq!(sim.robot(sim.robot_id("arm").unwrap()).stiffness(), stiffness);
     }
     // Control: a plain restore leaves properties alone, and goes elsewhere.
     sim.reset_properties(ALL).unwrap();

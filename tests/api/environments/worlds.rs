@@ -49,9 +49,9 @@ pub(crate) fn world(settings: SimulationManagerCfg) -> (SimulationManager, Ids) 
     // Down to the ground: the drives bind.
     let targets = Array2::from_shape_fn((n, 6), |(e, k)| if k == 1 { 1.7 } else { 0.2 + 0.05 * e as f64 });
     let mut arm = sim.robot_mut(ids.arm);
-    arm.set_qpos(&targets, None, None).unwrap();
-    arm.set_qvel(&per_env(6, 0.2), None, None).unwrap();
-    arm.set_qf(&per_env(6, 3.0), None, None).unwrap();
+    arm.set_qpos_target(&targets, None, None).unwrap();
+    arm.set_qvel_target(&per_env(6, 0.2), None, None).unwrap();
+    arm.set_qf_target(&per_env(6, 3.0), None, None).unwrap();
     sim.rigid_object_mut(ids.cube).write_velocity(&per_env(6, 2.0), None).unwrap();
     sim.mjcf_part_mut(ids.machine).set_ctrl(&per_env(1, 1.0), None, None).unwrap();
     let hand = array![[0.05, 2.0, 0.55, 2.0, 0.1, 0.0, 0.3]];

@@ -21,7 +21,7 @@ fn check(name: &str, cfg: RobotCfg, link: &str, at_limits: bool) {
             qpos[joint] = limits[(0, joint, row / 2 % 2)];
         }
     }
-    let start = sim.robot(id).get_default_qpos();
+    let start = sim.robot(id).default_qpos();
     let mut solved = 0;
     for at in 0..targets {
         let target = placed(&mut sim, id, &reachable.select(Axis(0), &[at]), link);
@@ -181,7 +181,7 @@ fn moving_roots() {
 fn nothing_is_written() {
     let (mut sim, id) = simulation(2, sr5());
     sim.update(3);
-    let state = |robot: &kinetoscope::sim::Robot<'_>| (robot.get_qpos(), robot.get_qvel(), robot.get_target_qpos());
+    let state = |robot: &kinetoscope::sim::Robot<'_>| (robot.qpos(), robot.qvel(), robot.qpos_target());
     let (robot, before) = (sim.robot(id), state(&sim.robot(id)));
     let targets = robot.compute_fk(&random_qpos(&sim, id, 2, 6), "arm", None).unwrap();
     assert!(robot.compute_ik(&targets, "arm", &IkCfg::default(), None, None).unwrap().success[1]);

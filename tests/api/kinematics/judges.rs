@@ -176,7 +176,7 @@ fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&s
     assert!(slopes < 1e-7 && elsewhere > 1e-3, "{name}: {slopes} {elsewhere}");
 
     let Some(urdf) = urdf else { return };
-    let (mut reader, joints, roots) = (Reader::of(urdf), robot.joint_names(), robot.get_root_pose());
+    let (mut reader, joints, roots) = (Reader::of(urdf), robot.joint_names(), robot.root_pose());
     let drivers = followed(urdf, joints);
     let body = reader.body(link, names[0]);
     let (start, mut moved, mut elsewhere) = (reader.pose(body), 0.0_f64, 0.0_f64);
@@ -289,7 +289,7 @@ fn tips() {
     let qpos = random_qpos(&sim, id, 3, 5);
     let judge = placed(&mut sim, id, &qpos, "ee_link");
     let robot = sim.robot(id);
-    let (hand, arm) = (robot.get_joint_ids("hand").unwrap(), robot.get_joint_ids("arm").unwrap());
+    let (hand, arm) = (robot.joint_ids("hand").unwrap(), robot.joint_ids("arm").unwrap());
     let of_part = |ids: &[JointIndex]| qpos.select(Axis(1), &ids.iter().map(|id| id.0).collect::<Vec<_>>());
     let near = |what: &str, ours: &Array2<f64>, judge: &Array2<f64>| {
         let (far, turned) = apart(ours, judge);

@@ -13,7 +13,7 @@ fn says(result: Result<impl std::fmt::Debug>, parts: &[&str]) {
 fn names() {
     let (sim, id) = simulation(2, arm_and_hand());
     let robot = sim.robot(id);
-    let qpos = robot.get_qpos();
+    let qpos = robot.qpos();
     says(robot.compute_fk(&qpos, "amr", None), &["control part or link \"amr\"", "\"arm\""]);
     says(robot.compute_fk(&qpos, Tip::of_part("ee_link"), None), &["control part \"ee_link\"", "\"arm\"", "\"hand\""]);
     says(robot.compute_fk(&qpos, Tip::of_link("ee_lnik"), None), &["link \"ee_lnik\"", "\"ee_link\""]);

@@ -93,7 +93,7 @@ fn left_out_sensors() {
     let sensor = sim.sensor(id).unwrap();
     for (part, uid) in parts.into_iter().zip(uids) {
         let (part, value) = (sim.mjcf_part(part), |name: &str| sensor.value(&format!("{uid}/{name}")).unwrap());
-        assert_eq!((value("angle"), value("speed")), (part.get_qpos().view(), part.get_qvel().view()));
+        assert_eq!((value("angle"), value("speed")), (part.qpos().view(), part.qvel().view()));
         assert_eq!(value("seen"), Array2::<f64>::zeros((2, 3)));
     }
     assert_ne!(sensor.value("first/angle").unwrap(), sensor.value("second/angle").unwrap(), "the control");

@@ -22,26 +22,26 @@ fn reads_and_writes() {
     assert_error(read.actuator_ids(&["srevo"]), "", &["part \"m\"", "\"servo\""]);
     assert_error(read.body_pose("hnad"), "", &["\"hand\""]);
 
-    let start = read.get_qpos();
+    let start = read.qpos();
     assert!((start[(0, 0)] - 10_f64.to_radians()).abs() < 1e-15, "degrees of the file are radians here");
     let mut row = start.select(Axis(0), &[1]);
     (row[(0, 0)], row[(0, 9)]) = (0.5, 2.0);
     sim.mjcf_part_mut(part).write_qpos(&row, Some(&[EnvId(1)])).unwrap();
-    let now = sim.mjcf_part(part).get_qpos();
+    let now = sim.mjcf_part(part).qpos();
     assert_eq!((now.row(0), now[(1, 0)]), (start.row(0), 0.5));
     assert_eq!(now[(1, 9)], 1.0, "quaternions are normalised");
 
     sim.mjcf_part_mut(part).set_ctrl(&array![[0.7]], Some(&[ActuatorIndex(0)]), Some(&[EnvId(2)])).unwrap();
-    assert_eq!(sim.mjcf_part(part).get_ctrl(), array![[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.7, 0.0, 0.0]]);
+    assert_eq!(sim.mjcf_part(part).ctrl(), array![[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.7, 0.0, 0.0]]);
     sim.update(1);
-    let force = sim.mjcf_part(part).get_actuator_force();
+    let force = sim.mjcf_part(part).actuator_force();
     // A position servo: kp (ctrl - angle), of the state before the step.
     for (env, ctrl) in [(0, 0.0), (2, 0.7)] {
         assert!((force[(env, 0)] - 3.0 * (ctrl - start[(0, 0)])).abs() < 1e-12, "{force}");
     }
     sim.reset(None).unwrap();
-    assert_eq!(sim.mjcf_part(part).get_ctrl(), Array2::<f64>::zeros((3, 3)));
-    assert_eq!(sim.mjcf_part(part).get_qpos(), start);
+    assert_eq!(sim.mjcf_part(part).ctrl(), Array2::<f64>::zeros((3, 3)));
+    assert_eq!(sim.mjcf_part(part).qpos(), start);
     // Mistakes that `every_writer` does not make: quaternions among positions, columns for actuators. Of two columns for one
     // actuator the last one held silently.
     let nq = start.ncols();
@@ -53,8 +53,8 @@ fn reads_and_writes() {
     let two_columns = write.set_ctrl(&array![[0.1, 0.2, 0.3]], Some(&twice), None);
     assert!(matches!(two_columns, Err(Error::RepeatedColumn { first: 0, second: 2, .. })), "{two_columns:?}");
     assert_error(two_columns, "", &["set_ctrl has two columns for actuator \"pull\""]);
-    assert!(write.read().get_ctrl().iter().all(|c| *c == 0.0), "nothing was set");
-    assert_eq!(write.read().get_qpos(), start);
+    assert!(write.read().ctrl().iter().all(|c| *c == 0.0), "nothing was set");
+    assert_eq!(write.read().qpos(), start);
 }
 
 /// A body moved by hand goes where it is put, in its environment; what is welded to it follows.

@@ -36,7 +36,7 @@ fn copies() {
         sim.update(1);
         data.step().unwrap();
     }
-    let [a, b] = [first, second].map(|part| sim.mjcf_part(part).get_qpos().row(0).to_vec());
+    let [a, b] = [first, second].map(|part| sim.mjcf_part(part).qpos().row(0).to_vec());
     // Each of 200 steps rounds numbers of about 1 (2e-16). What a pendulum of 0.2 m makes of that grows by sqrt(g / l) = 7
     // per second at most, in 0.4 s sixteenfold: 6e-13.
     let rounding = Tolerance::absolute(1e-12, "200 roundings that grow sixteenfold in 0.4 s");
@@ -117,7 +117,7 @@ fn whole_machine() {
     sim.update(300);
     let mut data = data_of(&sim, &alone(MACHINE), &[0.4, -0.3, 0.8]);
     (0..300).for_each(|_| data.step().unwrap());
-    let (qpos, act) = (sim.mjcf_part(part).get_qpos(), sim.batch().read(0, |env| env.data().act().to_vec()));
+    let (qpos, act) = (sim.mjcf_part(part).qpos(), sim.batch().read(0, |env| env.data().act().to_vec()));
     let rounding = Tolerance::absolute(1e-11, "300 roundings that grow by e^4.2 = 67 in 0.6 s, as for copies: 4e-12");
     assert_close("positions", &qpos, data.qpos(), rounding);
     assert_number("activation", act[0], data.act()[0], rounding);
@@ -167,7 +167,7 @@ fn meshes() {
     sim.update(200);
     let mut data = data_of(&sim, &alone, &[]);
     (0..200).for_each(|_| data.step().unwrap());
-    let qpos = sim.mjcf_part(part).get_qpos();
+    let qpos = sim.mjcf_part(part).qpos();
     let corners =
         Tolerance::absolute(1e-5, "it rests on a face and differs by as much as its corners; measured, not derived");
     assert_close("positions", &qpos, data.qpos(), corners);
@@ -188,14 +188,14 @@ fn drives_beside_parts() {
             sim.add_mjcf(MjcfCfg::text("a", MACHINE)).unwrap();
         }
         let robot = sim.add_robot(far_arm()).unwrap();
-        sim.robot_mut(robot).set_qpos(&array![[0.1, 0.4, -0.9, 0.2, -0.5, 0.3]], None, None).unwrap();
+        sim.robot_mut(robot).set_qpos_target(&array![[0.1, 0.4, -0.9, 0.2, -0.5, 0.3]], None, None).unwrap();
         if with_parts {
             let init_pose = Pose::translation(0.0, 3.0, 0.0);
             sim.add_mjcf(MjcfCfg { init_pose, ..MjcfCfg::text("b", MACHINE) }).unwrap();
         }
         sim.update(250);
         assert!(sim.diverged().is_empty());
-        (sim.robot(robot).get_qpos(), sim.robot(robot).get_qf())
+        (sim.robot(robot).qpos(), sim.robot(robot).qf())
     };
     let ((alone, efforts), (beside, efforts_beside)) = (run(false), run(true));
     // The solver stops at a residual of 1e-8 of the whole scene, which is another one.
@@ -213,7 +213,7 @@ fn additions() {
     let state = |sim: &SimulationManager| {
         let act: Vec<f64> = (0..2).map(|env| sim.batch().read(env, |env| env.data().act()[0])).collect();
         let part = sim.mjcf_part(part);
-        (part.get_qpos(), part.get_qvel(), part.get_ctrl(), sim.time(), act)
+        (part.qpos(), part.qvel(), part.ctrl(), sim.time(), act)
     };
     let before = state(&sim);
     assert!(before.4[0] != before.4[1] && before.4[0] > 0.0);

@@ -101,7 +101,7 @@ fn every_sample() {
             data.step().unwrap();
             assert_eq!(data.take_warnings().overflow(), None, "{name}");
         }
-        let (qpos, qvel) = (sim.mjcf_part(part).get_qpos(), sim.mjcf_part(part).get_qvel());
+        let (qpos, qvel) = (sim.mjcf_part(part).qpos(), sim.mjcf_part(part).qvel());
         let far = apart(data.qpos(), qpos.as_slice().unwrap()).max(apart(data.qvel(), qvel.as_slice().unwrap()));
         let travelled = apart(plain.qpos0(), data.qpos());
         assert!(far <= 1e-9, "{name} is {far} from the file alone after {steps} steps");

@@ -70,7 +70,7 @@ fn after_a_write() {
     plain.forward().unwrap();
     assert_eq!(bits(at_start.row(0)), bits(plain.sensordata()), "before any step");
     sim.update(40);
-    let (mut qpos, qvel) = (sim.mjcf_part(part).get_qpos(), sim.mjcf_part(part).get_qvel());
+    let (mut qpos, qvel) = (sim.mjcf_part(part).qpos(), sim.mjcf_part(part).qvel());
     qpos[(1, 0)] += 0.3;
     let before = sim.sensor(id).unwrap().value("angle").unwrap()[(1, 0)];
     sim.mjcf_part_mut(part).write_qpos(&qpos, None).unwrap();
@@ -135,7 +135,7 @@ fn joints_and_actuators() {
         let before = sim.sensor(joints).unwrap().positions().to_owned();
         sim.update(1);
         let (joint, actuator) = (sim.sensor(joints).unwrap(), sim.sensor(actuators).unwrap());
-        let qpos = sim.mjcf_part(part).get_qpos();
+        let qpos = sim.mjcf_part(part).qpos();
         for (env, [motor, servo, lag]) in CONTROLS.into_iter().enumerate() {
             let act = |steps: i32| lag * (1.0 - 0.98_f64.powi(steps));
             let push = 10.0 * (servo - before[(env, 1)]);
@@ -170,9 +170,9 @@ fn joints_of_robots() {
     let motors = sim.add_sensor("motors", motors).unwrap();
     let names = sim.sensor(every).unwrap().joint_names().to_vec();
     assert_eq!((names.len(), &names[0][..], &names[6][..], &names[7][..]), (8, "arm/JOINT1", "m/turn", "m/push"));
-    sim.robot_mut(arm).set_qpos(&array![[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]], None, None).unwrap();
+    sim.robot_mut(arm).set_qpos_target(&array![[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]], None, None).unwrap();
     sim.update(5);
-    let (sensor, qf) = (sim.sensor(motors).unwrap(), sim.robot(arm).get_qf());
+    let (sensor, qf) = (sim.sensor(motors).unwrap(), sim.robot(arm).qf());
     assert_eq!(sensor.actuator_names(), ["m/servo", "arm/JOINT1", "arm/JOINT2"]);
     assert_eq!(sensor.controls(), array![[0.0, 0.1, 0.2]]);
     assert_eq!(sensor.forces().row(0).to_vec()[1..], qf.row(0).to_vec()[..2]);

@@ -92,7 +92,7 @@ fn tendons() {
         let id = sim.mask_ids().iter().find(|id| id.link.as_deref() == Some("string")).cloned().unwrap();
         assert_eq!((id.name().as_str(), id.class.as_str()), ("winch/string", "mjcf"));
         assert_eq!(sim.mask_ids().iter().filter(|other| other.id == id.id).count(), 1, "{:?}", sim.mask_ids());
-        let lowest: Vec<f64> = (0..num_envs).map(|env| 0.6 + sim.mjcf_part(part).get_qpos()[(env, 0)]).collect();
+        let lowest: Vec<f64> = (0..num_envs).map(|env| 0.6 + sim.mjcf_part(part).qpos()[(env, 0)]).collect();
         let seen = sim.sensor(camera).unwrap();
         assert!(!sim.sensor(ray).unwrap().hit_mask().iter().any(|hit| *hit), "rays pass");
         let (depth, mask) = (seen.depth().unwrap().to_owned(), seen.mask().unwrap().to_owned());

@@ -30,27 +30,27 @@ fn fixed_or_free() {
         let (mut sim, id) = with(1, cart(of_file, fix_base));
         assert_eq!(sim.batch().model().nv(), if fix_base { 1 } else { 7 });
         assert_eq!((sim.robot(id).dof(), sim.robot(id).joint_names()), (1, &["axle".to_string()][..]));
-        at_start(sim.robot(id).get_root_pose());
-        at_start(sim.robot(id).get_default_root_pose());
+        at_start(sim.robot(id).root_pose());
+        at_start(sim.robot(id).default_root_pose());
         sim.update(100);
         let fallen = if fix_base { 0.0 } else { FALLEN };
-        let z = sim.robot(id).get_root_pose()[(0, 2)];
+        let z = sim.robot(id).root_pose()[(0, 2)];
         assert!((z - 1.0 + fallen).abs() < 1e-10, "{of_file} {fix_base}: {z}");
         if fix_base {
             assert!(matches!(sim.robot_mut(id).write_root_pose(&start, None), Err(Error::FixedBody(_))));
         } else {
             sim.robot_mut(id).write_root_pose(&start, None).unwrap();
-            at_start(sim.robot(id).get_root_pose());
+            at_start(sim.robot(id).root_pose());
             sim.reset(None).unwrap();
-            at_start(sim.robot(id).get_root_pose());
+            at_start(sim.robot(id).root_pose());
         }
     }
     // `init_pose` moves the world of the file: (0.5, 0, 1) turned by 90 degrees about z, the cart by another 90.
     let init_pose = kinetoscope::scene::pose::from_xyz_rpy([1.0, 2.0, 3.0], [0.0, 0.0, FRAC_PI_2]);
     let (sim, id) = with(1, RobotCfg { init_pose, ..cart(r#"<freejoint name="float"/>"#, false) });
-    let seen = sim.robot(id).get_root_pose();
+    let seen = sim.robot(id).root_pose();
     assert!(largest(&(&seen - &array![[1.0, 2.5, 4.0, 0.0, 0.0, 0.0, 1.0]])) < 1e-15, "{seen}");
-    assert!((sim.robot(id).get_default_root_state()[(0, 1)] - 2.5).abs() < 1e-15);
+    assert!((sim.robot(id).default_root_state()[(0, 1)] - 2.5).abs() < 1e-15);
 }
 
 /// The free joint of a damped body, as an inherited default makes it, is damped as MuJoCo damps it. Without damping it falls
@@ -62,7 +62,7 @@ fn damped_free_joint() {
     let mut data = Data::new(&alone(&CART.replace('%', held))).unwrap();
     sim.update(200);
     (0..200).for_each(|_| data.step().unwrap());
-    let z = sim.robot(id).get_root_pose()[(0, 2)];
+    let z = sim.robot(id).root_pose()[(0, 2)];
     assert!((z - data.qpos()[2]).abs() < 1e-10 && z > 1.0 - 0.75 && z < 1.0 - 0.5, "{z} {}", data.qpos()[2]);
 }
 
@@ -78,8 +78,8 @@ fn joined_to_the_world() {
     let of = sim.robot(id);
     assert_eq!(of.link_names(), ["world", "cart", "rod", "bob"]);
     assert_eq!(of.joint_names(), ["rail", "hinge"]);
-    assert_eq!(of.get_root_pose(), array![[0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]]);
-    assert_eq!(of.link_pose("world").unwrap(), of.get_root_pose());
+    assert_eq!(of.root_pose(), array![[0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0]]);
+    assert_eq!(of.link_pose("world").unwrap(), of.root_pose());
     sim.robot_mut(id).write_qpos(&array![[0.3, FRAC_PI_2]], None, None).unwrap();
     let bob = sim.robot(id).link_pose("bob").unwrap();
     assert!((0..3).all(|k| (bob[(0, k)] - [0.3 - 0.5, 1.0, 2.0][k]).abs() < 1e-12), "{bob}");
@@ -99,10 +99,10 @@ fn massless_base() {
         assert_eq!(massless, expected);
         if !fix_base {
             assert_eq!(sim.robot(id).total_mass(), 1.0);
-            let start = sim.robot(id).get_root_pose()[(0, 2)];
+            let start = sim.robot(id).root_pose()[(0, 2)];
             sim.update(100);
             // All parts fall alike.
-            let fallen = start - sim.robot(id).get_root_pose()[(0, 2)];
+            let fallen = start - sim.robot(id).root_pose()[(0, 2)];
             assert!((fallen - FALLEN).abs() < 1e-6, "{fallen} {FALLEN}");
         }
     }

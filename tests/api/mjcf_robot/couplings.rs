@@ -45,17 +45,17 @@ fn lines() {
     }
     // Followers start where they belong, other joints where the file has them.
     let (left, right) = implied(0.1);
-    let start = sim.robot(id).get_default_qpos();
+    let start = sim.robot(id).default_qpos();
     assert!((start - array![[0.1, left, right, 0.0]]).iter().all(|d| d.abs() < 1e-15));
     for target in [0.6, -0.7] {
-        sim.robot_mut(id).set_qpos(&array![[target]], Some(&[crank]), None).unwrap();
+        sim.robot_mut(id).set_qpos_target(&array![[target]], Some(&[crank]), None).unwrap();
         sim.update(500);
-        let qpos = sim.robot(id).get_qpos();
+        let qpos = sim.robot(id).qpos();
         let (left, right) = implied(qpos[(0, 0)]);
         assert!((qpos[(0, 0)] - target).abs() < 1e-3, "{qpos}");
         // MuJoCo's couplings give way a little; light fingers that nothing holds hardly.
         assert!((qpos[(0, 1)] - left).abs() < 1e-3 && (qpos[(0, 2)] - right).abs() < 1e-3, "{qpos}: {left} {right}");
-        let targets = sim.robot(id).get_target_qpos();
+        let targets = sim.robot(id).qpos_target();
         assert!((targets[(0, 1)] - implied(target).0).abs() < 1e-12, "{targets}");
     }
     // Forward kinematics follow too.
@@ -79,19 +79,19 @@ fn curves_and_circles() {
             // crank = 0.1 + right, right = 0.1 (left + 0.2) and left = -0.15 - 1.5 (crank - 0.1): they meet in one point only,
             // right = 0.1 (0.05 - 1.5 right). Lines that are solved together give way to none: within 1e-3 there.
             let right = 0.005 / 1.15;
-            assert_eq!(sim.robot(id).get_stiffness().row(0).to_vec(), [0.0, 0.0, 0.0, 1e4]);
+            assert_eq!(sim.robot(id).stiffness().row(0).to_vec(), [0.0, 0.0, 0.0, 1e4]);
             sim.update(1000);
-            let qpos = sim.robot(id).get_qpos();
+            let qpos = sim.robot(id).qpos();
             for (column, expected) in [(0, 0.1 + right), (1, -0.15 - 1.5 * right), (2, right)] {
                 assert!((qpos[(0, column)] - expected).abs() < 1e-3, "{qpos}: {expected}");
             }
             assert!(sim.diverged().is_empty());
             continue;
         };
-        assert_eq!(sim.robot(id).get_stiffness().row(0).to_vec(), [1e4, 0.0, 1e4, 1e4]);
-        sim.robot_mut(id).set_qpos(&array![[0.5, 0.0, 0.0, 0.0]], None, None).unwrap();
+        assert_eq!(sim.robot(id).stiffness().row(0).to_vec(), [1e4, 0.0, 1e4, 1e4]);
+        sim.robot_mut(id).set_qpos_target(&array![[0.5, 0.0, 0.0, 0.0]], None, None).unwrap();
         sim.update(1000);
-        let left = sim.robot(id).get_qpos()[(0, 1)];
+        let left = sim.robot(id).qpos()[(0, 1)];
         assert!((left - expected).abs() < 1e-3, "{left} is not {expected}");
         let undriven = sim.robot_mut(id).set_stiffness(&row([1.0; 4]), None, None);
         assert!(matches!(&undriven, Err(Error::NotDriven { joint, .. }) if joint == "left"), "{undriven:?}");
@@ -125,13 +125,13 @@ fn starts_on_curves() {
         let (mut sim, id) = with(2, RobotCfg { init_qpos, ..hand(equalities) });
         let expected = array![crank, left, right, 0.0];
         for when in ["at first", "after a reset"] {
-            let qpos = sim.robot(id).get_qpos();
+            let qpos = sim.robot(id).qpos();
             assert!((&qpos.row(1) - &expected).iter().all(|d| d.abs() < 1e-14), "{when}: {qpos}, not {expected}");
-            assert_eq!(sim.robot(id).get_default_qpos().row(0), qpos.row(0));
+            assert_eq!(sim.robot(id).default_qpos().row(0), qpos.row(0));
             let off = sim.batch().read(0, |env| env.data().efc_pos()[..env.data().ne()].to_vec());
             assert!(!off.is_empty() && off.iter().all(|off| off.abs() < 1e-14), "{when}: {off:?}");
             sim.update(50);
-            let moved = largest(&(sim.robot(id).get_qpos() - &expected));
+            let moved = largest(&(sim.robot(id).qpos() - &expected));
             assert!(moved < 1e-9, "{when}: {moved}");
             sim.reset(None).unwrap();
         }
@@ -142,7 +142,7 @@ fn starts_on_curves() {
     let twice = format!("{parabola}{constant}");
     for (equalities, starts) in [(circle, [0.1, at(0.0)]), (twice, [0.1, -0.2])] {
         let (sim, id) = with(1, hand(&equalities));
-        let qpos = sim.robot(id).get_qpos();
+        let qpos = sim.robot(id).qpos();
         assert!((qpos[(0, 0)] - starts[0]).abs() + (qpos[(0, 1)] - starts[1]).abs() < 1e-14, "{equalities}: {qpos}");
     }
 }
@@ -159,7 +159,7 @@ fn starts_beyond_limits() {
         sim.add_robot(RobotCfg { init_qpos, ..robot("hand", &unlimited) }).map(|id| {
             let mut said = sim.diagnostics().to_vec();
             said.retain(|d| d.kind == DiagnosticKind::FollowerStartsBeyondLimits);
-            (sim.robot(id).get_qpos()[(0, 1)], said.into_iter().map(|d| d.message.clone()).collect::<Vec<String>>())
+            (sim.robot(id).qpos()[(0, 1)], said.into_iter().map(|d| d.message.clone()).collect::<Vec<String>>())
         })
     };
     assert_error(starts(1e100), "", &["\"left\" is inf"]);

@@ -22,11 +22,11 @@ fn gains_and_limits() {
     let infinite = f64::INFINITY;
     // Gear and coefficients count twice in gains and once in efforts; 1e4 and 1e3 where the file says only that there is an
     // effort.
-    assert_eq!(of.get_stiffness(), array![[120.0, 1e4, 0.0, 25.0, 400.0, 0.0]]);
-    assert_eq!(of.get_damping(), array![[0.0, 1e3, 0.7, 0.0, 0.0, 0.0]]);
+    assert_eq!(of.stiffness(), array![[120.0, 1e4, 0.0, 25.0, 400.0, 0.0]]);
+    assert_eq!(of.damping(), array![[0.0, 1e3, 0.7, 0.0, 0.0, 0.0]]);
     assert_eq!(of.qf_limits(), array![[8.0, 11.0, infinite, 5.0, 20.0, infinite]]);
-    assert_eq!((of.get_armature()[(0, 0)], of.get_friction()[(0, 5)]), (0.1, 0.3));
-    let types = of.get_drive_types();
+    assert_eq!((of.armature()[(0, 0)], of.friction()[(0, 5)]), (0.1, 0.3));
+    let types = of.drive_types();
     assert_eq!((types[(0, 4)], types[(0, 5)]), (DriveType::Force, DriveType::None));
     is_said(&sim, &["the place of the actuators \"p\", \"m\", \"v\", \"m2\""]);
     is_said(&sim, &["actuator \"t\" acts on the tendon \"both\""]);
@@ -40,10 +40,10 @@ fn gains_and_limits() {
     };
     let (sim, id) = with(1, RobotCfg { drive, ..robot("m", MACHINE) });
     let of = sim.robot(id);
-    assert_eq!(of.get_stiffness(), array![[50.0, 1e4, 0.0, 25.0, 400.0, 50.0]]);
-    assert_eq!(of.get_damping(), array![[0.0, 1e3, 0.7, 0.0, 0.0, 1e3]]);
+    assert_eq!(of.stiffness(), array![[50.0, 1e4, 0.0, 25.0, 400.0, 50.0]]);
+    assert_eq!(of.damping(), array![[0.0, 1e3, 0.7, 0.0, 0.0, 1e3]]);
     assert_eq!(of.qf_limits()[(0, 1)], 7.0);
-    assert_eq!((of.get_armature()[(0, 0)], of.get_armature()[(0, 2)]), (0.1, 0.4));
+    assert_eq!((of.armature()[(0, 0)], of.armature()[(0, 2)]), (0.1, 0.4));
 
     // One number for all is for all. Without any actuator all joints are driven, as in a URDF.
     let bare = format!("{}</mujoco>", &MACHINE[..MACHINE.find("<tendon>").unwrap()]);
@@ -51,7 +51,7 @@ fn gains_and_limits() {
         [(RobotCfg { drive: gains(9.0, 2.0), ..robot("m", MACHINE) }, 9.0), (robot("m", &bare), 1e4)]
     {
         let (sim, id) = with(1, cfg);
-        assert!(sim.robot(id).get_stiffness().iter().all(|k| *k == stiffness));
+        assert!(sim.robot(id).stiffness().iter().all(|k| *k == stiffness));
     }
 
     // The softness of dry friction is the drives' where they hold it: a file that sets its own is told so.
@@ -72,18 +72,18 @@ fn followers() {
     let (mut sim, id) = with(1, robot("r", CHAIN));
     let of = sim.robot(id);
     let b = of.joint_id("b").unwrap();
-    assert_eq!((of.get_stiffness(), of.get_damping()), (array![[0.0, 122.5, 0.0]], array![[0.0, 9.0, 0.0]]));
-    assert_eq!((of.qf_limits()[(0, 1)], of.get_drive_types()[(0, 1)]), (60.0, DriveType::Force));
+    assert_eq!((of.stiffness(), of.damping()), (array![[0.0, 122.5, 0.0]], array![[0.0, 9.0, 0.0]]));
+    assert_eq!((of.qf_limits()[(0, 1)], of.drive_types()[(0, 1)]), (60.0, DriveType::Force));
     is_said(&sim, &["actuator \"pa\"", "\"a\" follows \"b\""]);
-    sim.robot_mut(id).set_qpos(&array![[0.3]], Some(&[b]), None).unwrap();
+    sim.robot_mut(id).set_qpos_target(&array![[0.3]], Some(&[b]), None).unwrap();
     sim.update(2000);
-    let qpos = sim.robot(id).get_qpos();
+    let qpos = sim.robot(id).qpos();
     // Nothing moves any more, so no coupling is loaded: the decay of four seconds is left.
     assert!(largest(&(&qpos - &array![[-0.1, 0.2, -0.3]])) < 1e-4, "{qpos}");
 
     // A joint on a curve follows nothing that a drive could stand for; that its actuator is gone is said.
     let (sim, id) = with(1, robot("r", &CHAIN.replace("0 -0.5 0 0 0", "0 -0.5 0.1 0 0")));
-    assert!(sim.robot(id).get_drive_types().iter().all(|kind| *kind == DriveType::None));
+    assert!(sim.robot(id).drive_types().iter().all(|kind| *kind == DriveType::None));
     for name in ["pa", "pc"] {
         is_said(&sim, &[&format!("actuator {name:?}"), "an equality holds"]);
     }
@@ -114,20 +114,20 @@ fn gripper() {
         let mut data = Data::new(&mj::compile(&text, &[]).unwrap().into_model()).unwrap();
         let of = sim.robot(id);
         assert_eq!(of.joint_id("left").unwrap(), JointIndex(0));
-        let numbers = [of.get_stiffness(), of.get_damping()].map(|gains| gains[(0, 0)]);
+        let numbers = [of.stiffness(), of.damping()].map(|gains| gains[(0, 0)]);
         assert_eq!((numbers, of.qf_limits()[(0, 0)]), ([100.0, 10.0], 100.0));
         is_said(&sim, &["actuator \"grip\" acts on the tendon \"split\""]);
         assert_eq!(count_diagnostics(&sim, &["ctrlrange"]), 0, "it is all that the fingers can do");
         if scale != 1.0 {
             sim.robot_mut(id).set_stiffness(&row([100.0 * scale]), Some(&[JointIndex(0)]), None).unwrap();
         }
-        sim.robot_mut(id).set_qpos(&row([0.03]), Some(&[JointIndex(0)]), None).unwrap();
+        sim.robot_mut(id).set_qpos_target(&row([0.03]), Some(&[JointIndex(0)]), None).unwrap();
         data.ctrl_mut()[0] = 0.03 * 100.0 / 0.01568627451;
         let [mut worst, mut farthest] = [0.0f64; 2];
         for _ in 0..40 {
             sim.update(100);
             (0..100).for_each(|_| data.step().unwrap());
-            let off: Vec<f64> = sim.robot(id).get_qpos().iter().zip(data.qpos()).map(|(a, b)| a - b).collect();
+            let off: Vec<f64> = sim.robot(id).qpos().iter().zip(data.qpos()).map(|(a, b)| a - b).collect();
             (worst, farthest) = (worst.max(largest(&off)), farthest.max(data.qpos()[0]));
         }
         assert!(farthest > 0.025, "it came there: {farthest}");
@@ -137,8 +137,8 @@ fn gripper() {
 
     // A tendon that keeps its length while the fingers go drives nothing.
     let (sim, id) = with(1, robot("r", &GRIPPER.replace('%', "-1")));
-    assert_eq!(sim.robot(id).get_drive_types()[(0, 0)], DriveType::None);
-    assert_eq!(sim.robot(id).get_stiffness(), Array2::<f64>::zeros((1, 2)));
+    assert_eq!(sim.robot(id).drive_types()[(0, 0)], DriveType::None);
+    assert_eq!(sim.robot(id).stiffness(), Array2::<f64>::zeros((1, 2)));
     is_said(&sim, &["actuator \"grip\"", "never moves \"left\""]);
 }
 
@@ -168,7 +168,7 @@ fn differences() {
         );
         let (sim, id) = with(1, robot("r", &text));
         let of = sim.robot(id);
-        let found = (of.get_stiffness()[(0, 0)], of.get_damping()[(0, 0)]);
+        let found = (of.stiffness()[(0, 0)], of.damping()[(0, 0)]);
         assert_eq!((found, of.qf_limits()[(0, 0)]), (gains, limit), "{actuator}");
         let all = count_diagnostics(&sim, &["differs from its drive"]);
         let expected = usize::from(!words.is_empty());

@@ -36,10 +36,10 @@ fn control_parts() {
     let (sim, id) = with(1, cfg);
     let of = sim.robot(id);
     assert_eq!(of.control_parts(), ["arm", "wrist"]);
-    assert_eq!(of.get_joint_ids("arm").unwrap(), [0, 1, 2].map(JointIndex));
-    assert_eq!(of.get_joint_ids("wrist").unwrap(), [3, 4, 5, 6].map(JointIndex));
-    assert_eq!(of.get_stiffness().row(0).to_vec(), [500.0, 500.0, 500.0, 40.0, 40.0, 40.0, 40.0]);
-    assert_eq!(of.get_qpos().row(0).to_vec(), [0.25, 0.25, 0.25, 0.05, 0.0, 0.0, 0.0]);
+    assert_eq!(of.joint_ids("arm").unwrap(), [0, 1, 2].map(JointIndex));
+    assert_eq!(of.joint_ids("wrist").unwrap(), [3, 4, 5, 6].map(JointIndex));
+    assert_eq!(of.stiffness().row(0).to_vec(), [500.0, 500.0, 500.0, 40.0, 40.0, 40.0, 40.0]);
+    assert_eq!(of.qpos().row(0).to_vec(), [0.25, 0.25, 0.25, 0.05, 0.0, 0.0, 0.0]);
     assert_error(of.link_id("hnd"), "", &["\"hand\""]);
     // Frames behind the joints of a body have no names, where a joint follows or the anchor is beside the body's origin: two
     // of the shoulder, two of the carriage, one of the hand.
@@ -94,13 +94,13 @@ fn humanoid() {
     assert_error(empty(1).add_robot(of_file("humanoid/22_humanoids.xml")), "", &["bodies in its world"]);
     let (mut sim, id) = with(2, of_file("humanoid/humanoid.xml"));
     let of = sim.robot(id);
-    assert_eq!((of.dof(), of.get_qpos().dim(), of.get_root_pose().dim()), (21, (2, 21), (2, 7)));
+    assert_eq!((of.dof(), of.qpos().dim(), of.root_pose().dim()), (21, (2, 21), (2, 7)));
     let mass: f64 = sim.batch().read(0, |env| env.data().model().body_mass().iter().sum());
     assert!((of.total_mass() - mass).abs() < 1e-9 * mass && mass > 30.0, "{} {mass}", of.total_mass());
-    let (start, kp) = (of.get_qpos(), of.get_stiffness());
+    let (start, kp) = (of.qpos(), of.stiffness());
     sim.update(2000);
     assert!(sim.diverged().is_empty());
-    let (off, speed) = (&start - &sim.robot(id).get_qpos(), sim.robot(id).get_qvel());
+    let (off, speed) = (&start - &sim.robot(id).qpos(), sim.robot(id).qvel());
     let load: Vec<f64> = sim.batch().read(0, |env| {
         env.data().qfrc_bias().iter().zip(env.data().qfrc_passive()).map(|(bias, passive)| bias - passive).collect()
     });
@@ -114,7 +114,7 @@ fn humanoid() {
     }
     let (mut limp, id) = with(1, passive(of_file("humanoid/humanoid.xml")));
     limp.update(500);
-    let off = limp.robot(id).get_qpos() - start.row(0);
+    let off = limp.robot(id).qpos() - start.row(0);
     assert!(largest(&off) > 0.3, "{off}");
 }
 
@@ -134,7 +134,7 @@ fn other_samples() {
                 match sim.add_robot(RobotCfg { mjcf: Some(MjcfFile::new(&file)), fix_base, ..Default::default() }) {
                     Ok(id) => {
                         let rows = Array2::zeros((1, sim.robot(id).dof()));
-                        sim.robot_mut(id).set_qpos(&rows, None, None).unwrap();
+                        sim.robot_mut(id).set_qpos_target(&rows, None, None).unwrap();
                         sim.update(5);
                         assert!(sim.diverged().is_empty(), "{}: {:?}", file.display(), sim.diverged());
                         robots += 1;

@@ -49,7 +49,7 @@ fn links() {
         let computed = sim.robot(id).compute_link_fk(qpos, None).unwrap();
         assert_eq!(computed.dim(), (2, links.len(), 7));
         sim.robot_mut(id).write_qpos(qpos, None, None).unwrap();
-        let read = sim.robot(id).get_link_poses();
+        let read = sim.robot(id).link_poses();
         for env in 0..2 {
             let judge = file_at(&joints, &qpos.row(env).to_vec());
             for (link, name) in links.iter().enumerate() {
@@ -66,7 +66,7 @@ fn links() {
     }
     assert!(farthest > 0.2, "{farthest}");
     // The root stands where the file has it in its world.
-    let [root, now] = [sim.robot(id).get_default_root_pose(), sim.robot(id).get_root_pose()];
+    let [root, now] = [sim.robot(id).default_root_pose(), sim.robot(id).root_pose()];
     assert!(errors(&pose_in(&root, 0), &pose_in(&now, 0)).0 < 1e-12);
 }
 
@@ -102,7 +102,7 @@ fn reachable_poses() {
     let control_parts = vec![("arm".to_string(), vec![".*".to_string()])];
     let (mut sim, id) = with(1, RobotCfg { control_parts, ..robot("odd", ODD) });
     let rows = random_qpos(&sim, id, TARGETS);
-    let start = sim.robot(id).get_default_qpos();
+    let start = sim.robot(id).default_qpos();
     let at = |sim: &mut SimulationManager, qpos: &Array2<f64>| {
         sim.robot_mut(id).write_qpos(qpos, None, None).unwrap();
         sim.batch().read(0, |env| from_row(&place(env.data(), "odd/tip")))

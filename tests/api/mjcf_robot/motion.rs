@@ -19,12 +19,12 @@ fn names_and_numbers() {
     let limits = robot.qpos_limits();
     assert_eq!(limits.as_slice().unwrap(), model.jnt_range());
     assert!((limits[(0, 0, 1)] - 150f64.to_radians()).abs() < 1e-15 && limits[(0, 3, 1)] == 0.15);
-    let start = robot.get_default_qpos();
+    let start = robot.default_qpos();
     assert_eq!(start.as_slice().unwrap(), model.qpos0());
     assert!((start[(0, 0)] - 20f64.to_radians()).abs() < 1e-15);
-    assert_eq!(robot.get_armature().as_slice().unwrap(), model.dof_armature());
-    assert_eq!(robot.get_joint_damping()[(0, 2)], 0.2);
-    assert_eq!(robot.get_qpos(), start);
+    assert_eq!(robot.armature().as_slice().unwrap(), model.dof_armature());
+    assert_eq!(robot.joint_damping()[(0, 2)], 0.2);
+    assert_eq!(robot.qpos(), start);
 }
 
 /// Gravity, centrifugal and Coriolis forces and the mass matrix at random states: both are MuJoCo's, on numbers that were
@@ -67,7 +67,7 @@ fn passive_fall() {
         let (mut sim, id) = with(1, passive(robot("odd", text)));
         sim.robot_mut(id).write_qvel(&row(speeds), None, None).unwrap();
         sim.update(50);
-        sim.robot(id).get_qpos()
+        sim.robot(id).qpos()
     };
     let mut data = Data::new(&alone(ODD)).unwrap();
     data.qvel_mut().copy_from_slice(&speeds);
@@ -157,11 +157,11 @@ type Sample = (Array2<f64>, Array2<f64>);
 fn steps(cfg: RobotCfg) -> (SimulationManager, RobotId, Vec<Sample>) {
     let (mut sim, id) = with(2, cfg);
     let targets = array![[0.5, -0.7, 1.0, 0.8, -1.2, 0.1], [-1.0, 0.4, -0.6, 1.5, 0.3, -0.05]];
-    sim.robot_mut(id).set_qpos(&targets, None, None).unwrap();
+    sim.robot_mut(id).set_qpos_target(&targets, None, None).unwrap();
     let mut seen = Vec::new();
     for _ in 0..10 {
         sim.update(50);
-        seen.push((sim.robot(id).get_qpos(), sim.robot(id).get_qf()));
+        seen.push((sim.robot(id).qpos(), sim.robot(id).qf()));
     }
     (sim, id, seen)
 }
@@ -187,10 +187,10 @@ fn same_as_urdf() {
         let ((a, xml, mine), (b, urdf, other)) = (steps(of_mjcf), steps(of_urdf(1.0)));
         let (xml, urdf) = (a.robot(xml), b.robot(urdf));
         for (mine, other) in [
-            (xml.get_stiffness(), urdf.get_stiffness()),
-            (xml.get_damping(), urdf.get_damping()),
-            (xml.get_armature(), urdf.get_armature()),
-            (xml.get_friction(), urdf.get_friction()),
+            (xml.stiffness(), urdf.stiffness()),
+            (xml.damping(), urdf.damping()),
+            (xml.armature(), urdf.armature()),
+            (xml.friction(), urdf.friction()),
             (xml.qf_limits(), urdf.qf_limits()),
         ] {
             assert_eq!(mine, other);
@@ -232,8 +232,8 @@ fn quadruped() {
     assert_eq!(urdf.joint_names(), xml.joint_names());
     assert!((urdf.total_mass() - xml.total_mass()).abs() < 1e-12 && (xml.total_mass() - 52.135).abs() < 1e-3);
     assert!(largest(&(urdf.qpos_limits() - xml.qpos_limits())) < 1e-5);
-    assert_eq!((urdf.qf_limits(), urdf.get_default_qpos()), (xml.qf_limits(), xml.get_default_qpos()));
-    let poses = xml.get_link_poses();
+    assert_eq!((urdf.qf_limits(), urdf.default_qpos()), (xml.qf_limits(), xml.default_qpos()));
+    let poses = xml.link_poses();
     for (link, name) in xml.link_names().into_iter().enumerate() {
         let (there, here) = (urdf.link_pose(name).unwrap(), poses.index_axis(Axis(1), link));
         assert!(largest(&(&there - &here)) < 1e-9, "{name}: {there} {here}");
@@ -254,6 +254,6 @@ fn quadruped_stands() {
         // The mass has three decimals: 5e-4 kg are 5e-3 N; as much again is an acceleration of 1e-4 m/s² that is left.
         assert!((weight - 52.135 * 9.81).abs() < 1e-2, "{weight} N");
         assert_eq!(sim.batch().read(0, |env| env.data().contact().len()), 4);
-        assert!(sim.robot(id).get_root_pose()[(0, 2)] > 0.4);
+        assert!(sim.robot(id).root_pose()[(0, 2)] > 0.4);
     }
 }

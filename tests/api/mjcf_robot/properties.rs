@@ -24,10 +24,10 @@ fn sledding(text: &str, envs: usize) -> (SimulationManager, RobotId) {
 fn slide(sim: &mut SimulationManager, id: RobotId) -> Vec<Vec<f64>> {
     let mut robot = sim.robot_mut(id);
     robot.write_root_velocity(&array![[1.5, 0.2, 0.0, 0.0, 0.0, 0.4]], None).unwrap();
-    robot.set_qpos(&array![[0.6, 0.0]], None, None).unwrap();
+    robot.set_qpos_target(&array![[0.6, 0.0]], None, None).unwrap();
     sim.update(150);
     let robot = sim.robot(id);
-    let (pose, joints) = (robot.get_root_pose(), robot.get_qpos());
+    let (pose, joints) = (robot.root_pose(), robot.qpos());
     (0..sim.num_envs()).map(|env| pose.row(env).iter().chain(joints.row(env)).copied().collect()).collect()
 }
 
@@ -82,9 +82,9 @@ fn setters() {
     let lift = sim.robot(id).joint_id("lift").unwrap();
     sim.robot_mut(id).set_friction(&array![[1.5]], Some(&[lift]), env).unwrap();
     let robot = sim.robot(id);
-    assert_eq!(robot.get_armature(), array![[0.05, 0.01], [0.05, 0.01], [0.2, 0.05]]);
-    assert_eq!(robot.get_joint_damping(), array![[0.3, 0.02], [0.3, 0.02], [1.1, 0.4]]);
-    assert_eq!(robot.get_friction(), array![[0.2, 0.0], [0.2, 0.0], [1.5, 0.0]]);
+    assert_eq!(robot.armature(), array![[0.05, 0.01], [0.05, 0.01], [0.2, 0.05]]);
+    assert_eq!(robot.joint_damping(), array![[0.3, 0.02], [0.3, 0.02], [1.1, 0.4]]);
+    assert_eq!(robot.friction(), array![[0.2, 0.0], [0.2, 0.0], [1.5, 0.0]]);
 }
 
 /// A disc about z: dry friction F alone slows it by F / I, so v = v0 - F t / I until it stands; an effort τ speeds it up by
@@ -115,16 +115,16 @@ fn friction_and_armature() {
         disc.set_armature(&array![[0.0], [0.0], [0.3]], None, None).unwrap();
         disc.write_qvel(&array![[5.0]], None, None).unwrap();
         sim.update(500);
-        let slower = sim.robot(id).get_qvel();
+        let slower = sim.robot(id).qvel();
         let expected = array![[5.0 - 0.3 / 0.2], [5.0 - 0.6 / 0.2], [5.0 - 0.6 / 0.5]];
         assert!(largest(&(&slower - &expected)) < 1e-9, "{what}: {slower}, not {expected}");
-        sim.robot_mut(id).set_qf(&array![[1.6]], None, None).unwrap();
+        sim.robot_mut(id).set_qf_target(&array![[1.6]], None, None).unwrap();
         sim.update(500);
-        let faster = sim.robot(id).get_qvel() - &slower;
+        let faster = sim.robot(id).qvel() - &slower;
         let expected = array![[1.3 / 0.2], [1.0 / 0.2], [1.0 / 0.5]];
         assert!(largest(&(&faster - &expected)) < 1e-9, "{what}: {faster}, not {expected}");
         sim.reset(None).unwrap();
-        assert_eq!(sim.robot(id).get_friction(), array![[0.3], [0.6], [0.6]], "{what}: it stays through a reset");
+        assert_eq!(sim.robot(id).friction(), array![[0.3], [0.6], [0.6]], "{what}: it stays through a reset");
     }
     // A row without room for it says so.
     let (mut sim, id) = with(1, RobotCfg { drive: weak(DriveModel::Implicit), ..robot("r", &text(idle, "")) });
@@ -146,16 +146,16 @@ fn coupled_drives() {
         let (mut sim, id) = with(4, robot("r", text));
         let column = sim.robot(id).joint_id(driver).unwrap();
         let name = format!("r/{driver}");
-        assert_eq!(sim.robot(id).get_stiffness().column(column.0), array![nominal, nominal, nominal, nominal]);
+        assert_eq!(sim.robot(id).stiffness().column(column.0), array![nominal, nominal, nominal, nominal]);
         sim.robot_mut(id).set_stiffness(&array![[spring]], Some(&[column]), Some(&[EnvId(1)])).unwrap();
         let stiff = Randomization::new().with(Property::Stiffness, &name, Draw::Scale([3.0, 3.0]));
         sim.randomize(&stiff, Some(&[EnvId(2)])).unwrap();
         sim.robot_mut(id).set_qf_limits(&array![[0.1 * spring * target]], Some(&[column]), Some(&[EnvId(3)])).unwrap();
         // Of the joint, enough to be at rest soon: a drive at its limit damps nothing.
         sim.robot_mut(id).set_joint_damping(&array![[20.0]], Some(&[column]), None).unwrap();
-        sim.robot_mut(id).set_qpos(&row([target]), Some(&[column]), None).unwrap();
+        sim.robot_mut(id).set_qpos_target(&row([target]), Some(&[column]), None).unwrap();
         sim.update(4000);
-        let qpos = sim.robot(id).get_qpos();
+        let qpos = sim.robot(id).qpos();
         let share = |k: f64| k / (k + spring);
         for (env, expected) in [share(nominal), 0.5, share(3.0 * nominal), 0.1].into_iter().enumerate() {
             let found = qpos[(env, column.0)] / target;
@@ -197,12 +197,12 @@ fn draws_in_snapshots() {
     };
     let drawn = values(&sim);
     assert!(drawn[0] != drawn[1] && drawn[0] != drawn[2] && drawn[1] != drawn[2]);
-    assert!(sim.robot(id).get_friction().column(0).to_vec() != [0.2; 3]);
+    assert!(sim.robot(id).friction().column(0).to_vec() != [0.2; 3]);
     slide(&mut sim, id);
     let snapshot = sim.snapshot(None).unwrap();
     sim.update(100);
     let state =
-        |sim: &SimulationManager| (sim.robot(id).get_root_pose(), sim.robot(id).get_qpos(), sim.robot(id).get_qf());
+        |sim: &SimulationManager| (sim.robot(id).root_pose(), sim.robot(id).qpos(), sim.robot(id).qf());
     let end = state(&sim);
     // Drawn again and moved on, then back: the same bits.
     sim.randomize(&draw, None).unwrap();
@@ -221,5 +221,5 @@ fn draws_in_snapshots() {
     let (mut plain, plain_id) = sledding(SLED, 3);
     plain.restore(&snapshot, None).unwrap();
     plain.update(100);
-    assert!(plain.robot(plain_id).get_qpos().row(0) != end.1.row(0));
+    assert!(plain.robot(plain_id).qpos().row(0) != end.1.row(0));
 }

@@ -143,7 +143,7 @@ fn ground() {
         let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
         let id = sim.add_robot(RobotCfg { fix_base: false, ..robot("r", &text) }).unwrap();
         sim.update(200);
-        let height = sim.robot(id).get_root_pose()[(0, 2)];
+        let height = sim.robot(id).root_pose()[(0, 2)];
         let right = if stands { (height - 0.1).abs() < 2e-3 } else { height < -1.0 };
         assert!(right, "{bits} {contact}: {height}");
         assert_eq!(count_diagnostics(&sim, words), said, "{bits} {contact}: {:?}", sim.diagnostics());
@@ -188,11 +188,11 @@ fn newer(cfg: RobotCfg) -> Option<(SimulationManager, RobotId)> {
 #[test]
 fn newer_gravity_compensation() {
     let Some((mut sim, id)) = newer(passive(robot("r", &pendulum(r#"gravcomp="0.5""#, "", "")))) else { return };
-    let start = sim.robot(id).get_qpos();
+    let start = sim.robot(id).qpos();
     let mut moved = |compensated, steps| {
         sim.robot_mut(id).set_gravity_compensation(compensated, None, None).unwrap();
         sim.update(steps);
-        (sim.robot(id).get_qpos() - &start)[(0, 0)]
+        (sim.robot(id).qpos() - &start)[(0, 0)]
     };
     let off = moved(true, 500);
     assert!(off.abs() < 1e-9, "{off}");
@@ -214,9 +214,9 @@ fn newer_force_limit() {
         assert_eq!(sim.robot(id).qf_limits()[(0, 0)], 5.0);
         let Some((mut sim, id)) = add(Some(20.0)) else { return };
         assert_eq!((sim.robot(id).qf_limits()[(0, 0)], sim.batch().model().joint_actuator_force(0)), (20.0, None));
-        sim.robot_mut(id).set_qpos(&row([1.0]), None, None).unwrap();
+        sim.robot_mut(id).set_qpos_target(&row([1.0]), None, None).unwrap();
         sim.update(1);
-        let effort = sim.robot(id).get_qf()[(0, 0)];
+        let effort = sim.robot(id).qf()[(0, 0)];
         assert!((effort.abs() - 20.0).abs() < 1e-6, "{model:?}: {effort}");
     }
 }

@@ -9,10 +9,10 @@ use kinetoscope_testkit::worlds::gains;
 #[test]
 fn gravity_compensation() {
     let (mut sim, id) = with(2, passive(robot("odd", &ODD.replace(r#"stiffness="1.5""#, ""))));
-    let (start, second) = (sim.robot(id).get_qpos(), Some(&[EnvId(1)][..]));
+    let (start, second) = (sim.robot(id).qpos(), Some(&[EnvId(1)][..]));
     sim.robot_mut(id).set_gravity_compensation(true, None, second).unwrap();
     sim.update(100);
-    let off = sim.robot(id).get_qpos() - &start;
+    let off = sim.robot(id).qpos() - &start;
     assert!(largest(off.row(1)) < 1e-9 && largest(off.row(0)) > 0.05, "{off}");
 }
 
@@ -29,10 +29,10 @@ fn self_collision() {
     for (self_collision, expected, within) in [(false, 0.06, 1e-3), (true, 0.04, 2e-3)] {
         let drive = DriveCfg { max_effort: Some(5.0.into()), ..gains(50.0, 10.0) };
         let (mut sim, id) = with(1, RobotCfg { self_collision, drive, ..robot("hand", text) });
-        sim.robot_mut(id).set_qpos(&array![[0.06, 0.06]], None, None).unwrap();
+        sim.robot_mut(id).set_qpos_target(&array![[0.06, 0.06]], None, None).unwrap();
         sim.update(1000);
         assert!(sim.diverged().is_empty());
-        let found = sim.robot(id).get_qpos();
+        let found = sim.robot(id).qpos();
         assert!(found.iter().all(|q| (q - expected).abs() < within), "{self_collision}: {found}");
     }
 }
@@ -76,7 +76,7 @@ fn sensors() {
         assert!((acc[(0, 2)] - 9.81).abs() < 0.05 && acc[(0, 0)].abs() < 0.05, "{acc}");
         let own = sim.sensor(own).unwrap();
         assert!((own.value("leg/acc").unwrap()[(0, 2)] - 9.81).abs() < 0.05);
-        assert_eq!(own.value("leg/height").unwrap(), sim.robot(id).get_qpos());
+        assert_eq!(own.value("leg/height").unwrap(), sim.robot(id).qpos());
         assert!(own.value("leg/gone").is_err());
         if with_part {
             assert!((own.value("part/clock").unwrap()[(0, 0)] - sim.time()[0]).abs() < 0.01);

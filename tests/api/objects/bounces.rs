@@ -15,7 +15,7 @@ fn meet(mut sim: SimulationManager, [left, right]: [RigidObjectCfg; 2], phase: f
     let right = sim.add_rigid_object(at(right, 0.1)).unwrap();
     sim.rigid_object_mut(left).write_velocity(&row([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]), None).unwrap();
     sim.update(300);
-    [left, right].map(|id| sim.rigid_object(id).get_velocity()[(0, 0)])
+    [left, right].map(|id| sim.rigid_object(id).velocity()[(0, 0)])
 }
 
 /// The error that ten steps in a contact leave of the closed form, over all places in a step where the surfaces may meet:
@@ -106,7 +106,7 @@ fn contacts(sim: &SimulationManager) -> usize {
 fn excluded_objects() {
     let stand = |sim: &mut SimulationManager, ids: [ObjectId; 2], expected: [f64; 2]| {
         sim.update(500);
-        let z = ids.map(|id| sim.rigid_object(id).get_pose()[(1, 2)]);
+        let z = ids.map(|id| sim.rigid_object(id).pose()[(1, 2)]);
         let lies = |k: usize| (z[k] - expected[k]).abs() < 1e-3 || expected[k] == f64::NEG_INFINITY && z[k] < -4.0;
         assert!(lies(0) && lies(1), "{z:?}");
     };

@@ -70,7 +70,7 @@ fn lies(mesh: &TriMesh, collision: MeshCollision, from: [f64; 3]) -> [f64; 3] {
     assert_eq!(sim.diagnostics(), []);
     let ball = sim.add_rigid_object(marble(from)).unwrap();
     sim.update(3000);
-    let pose = sim.rigid_object(ball).get_pose();
+    let pose = sim.rigid_object(ball).pose();
     [0, 1, 2].map(|k| pose[(0, k)])
 }
 
@@ -144,9 +144,9 @@ fn sliding_over_edges() {
     let mut highest = f64::NEG_INFINITY;
     for _ in 0..1500 {
         sim.update(1);
-        highest = highest.max(sim.rigid_object(ball).get_pose()[(0, 2)]);
+        highest = highest.max(sim.rigid_object(ball).pose()[(0, 2)]);
     }
-    let (pose, velocity) = (sim.rigid_object(ball).get_pose(), sim.rigid_object(ball).get_velocity());
+    let (pose, velocity) = (sim.rigid_object(ball).pose(), sim.rigid_object(ball).velocity());
     assert!(pose[(0, 1)] > 0.2 && velocity[(0, 1)] > 0.3, "it came along: {pose} {velocity}");
     assert!((highest - height).abs() < 2e-3, "and did not jump: {highest}");
 }
@@ -166,7 +166,7 @@ fn slivers() {
     }
     let ball = sim.add_rigid_object(marble([0.0, -0.2, 0.1])).unwrap();
     sim.update(1000);
-    assert_number("height", sim.rigid_object(ball).get_pose()[(0, 2)], R, SOFT);
+    assert_number("height", sim.rigid_object(ball).pose()[(0, 2)], R, SOFT);
 }
 
 /// An L that moves collides in pieces too, and weighs what its triangles enclose.
@@ -179,7 +179,7 @@ fn moving_pieces() {
     assert!((sim.rigid_object(id).nominal_mass() / (1000.0 * (0.25 + 0.75 * 0.25)) - 1.0).abs() < 1e-6);
     let ball = sim.add_rigid_object(marble([0.7, 0.1, 0.4])).unwrap();
     sim.update(2000);
-    let (lies, stands) = (sim.rigid_object(ball).get_pose(), sim.rigid_object(id).get_pose());
+    let (lies, stands) = (sim.rigid_object(ball).pose(), sim.rigid_object(id).pose());
     assert_number("the ball", lies[(0, 2)], 0.25 + R, SOFT * 2.0);
     assert_number("the L", stands[(0, 2)], 0.0, SOFT);
     // Friction of all pieces at once, and one mask id.

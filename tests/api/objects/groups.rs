@@ -24,23 +24,23 @@ fn poses() {
     assert!(!sim.rigid_object_group(id).is_empty());
     let there = Array3::from_shape_fn((2, 3, 7), |(e, k, c)| [e as f64, k as f64, 5.0, 0.0, 0.0, 2.0, 0.0][c]);
     sim.rigid_object_group_mut(id).write_pose(&there, None).unwrap();
-    let mut pose = sim.rigid_object_group(id).get_pose();
+    let mut pose = sim.rigid_object_group(id).pose();
     assert_eq!(pose[(1, 2, 5)], 1.0, "normalised");
     for (k, object) in objects(&sim, id).into_iter().enumerate() {
-        assert_eq!(sim.rigid_object(object).get_pose(), pose.index_axis(Axis(1), k));
+        assert_eq!(sim.rigid_object(object).pose(), pose.index_axis(Axis(1), k));
     }
     sim.update(100);
     let fallen = 9.81e-6 * 100.0 * 101.0 / 2.0;
-    let (now, velocity) = (sim.rigid_object_group(id).get_pose(), sim.rigid_object_group(id).get_velocity());
+    let (now, velocity) = (sim.rigid_object_group(id).pose(), sim.rigid_object_group(id).velocity());
     assert_eq!((now.dim(), velocity.dim()), ((2, 3, 7), (2, 3, 6)));
     assert!(now.index_axis(Axis(2), 2).iter().all(|z| (z - 5.0 + fallen).abs() < 1e-12), "{now}");
     assert!(velocity.index_axis(Axis(2), 2).iter().all(|v| (v + 0.981).abs() < 1e-12), "{velocity}");
     pose.index_axis_mut(Axis(2), 0).fill(7.0);
     let one = pose.slice_axis(Axis(0), (0..1).into()).to_owned();
     sim.rigid_object_group_mut(id).write_pose(&one, Some(SECOND)).unwrap();
-    let after = sim.rigid_object_group(id).get_pose();
+    let after = sim.rigid_object_group(id).pose();
     assert_eq!((after[(1, 2, 0)], after[(1, 2, 2)], after[(0, 2, 0)]), (7.0, 5.0, 0.0));
-    assert_eq!(sim.rigid_object(other).get_pose()[(1, 0)], 9.0);
+    assert_eq!(sim.rigid_object(other).pose()[(1, 0)], 9.0);
 }
 
 /// Objects that fly without gravity go on by v t and turn by w t; velocities are read as they were written, in world axes.
@@ -56,21 +56,21 @@ fn velocities() {
         [linear, -linear, 0.2, 0.0, 0.3 * e as f64, 0.5 * k as f64][c]
     });
     sim.rigid_object_group_mut(id).write_velocity(&velocities, None).unwrap();
-    let read = sim.rigid_object_group(id).get_velocity();
+    let read = sim.rigid_object_group(id).velocity();
     assert!((&read - &velocities).iter().all(|d| d.abs() < 1e-12));
     for (k, object) in objects(&sim, id).into_iter().enumerate() {
-        assert_eq!(sim.rigid_object(object).get_velocity(), read.index_axis(Axis(1), k));
+        assert_eq!(sim.rigid_object(object).velocity(), read.index_axis(Axis(1), k));
     }
-    let before = sim.rigid_object_group(id).get_pose();
+    let before = sim.rigid_object_group(id).pose();
     sim.update(200);
-    let after = sim.rigid_object_group(id).get_pose();
+    let after = sim.rigid_object_group(id).pose();
     for ((e, k, c), velocity) in velocities.indexed_iter().filter(|((.., c), _)| *c < 3) {
         let moved = after[(e, k, c)] - before[(e, k, c)];
         assert!((moved - 0.2 * velocity).abs() < 1e-12, "environment {e}, object {k}: {moved}");
     }
     // One row for one environment; the other flies on.
     sim.rigid_object_group_mut(id).write_velocity(&Array3::zeros((1, 3, 6)), Some(SECOND)).unwrap();
-    let velocity = sim.rigid_object_group(id).get_velocity();
+    let velocity = sim.rigid_object_group(id).velocity();
     assert!(velocity.index_axis(Axis(0), 1).iter().all(|v| *v == 0.0));
     assert!((velocity[(0, 2, 0)] - 0.1).abs() < 1e-12);
 }
@@ -103,7 +103,7 @@ fn refusals() {
     };
     let (nan, twice) = (f64::NAN, Some(&[EnvId(1), EnvId(1)][..]));
     let mut group = sim.rigid_object_group_mut(id);
-    let before = (group.read().get_pose(), group.read().get_velocity());
+    let before = (group.read().pose(), group.read().velocity());
     let narrow = poses.slice_axis(Axis(1), (0..2).into()).to_owned();
     assert!(matches!(group.write_pose(&narrow, None), Err(Error::Shape { expected, .. }) if expected == [2, 3, 7]));
     let wide = group.write_velocity(&Array3::zeros((2, 3, 7)), None);
@@ -119,9 +119,9 @@ fn refusals() {
         let shown = format!("{:?}", result.unwrap_err());
         assert!(shown.starts_with(kind) && shown.contains(part), "{shown} is not {kind} {part}");
     }
-    assert_eq!((group.read().get_pose(), group.read().get_velocity()), before);
+    assert_eq!((group.read().pose(), group.read().velocity()), before);
     group.write_pose(&poses, None).unwrap();
-    assert_eq!(group.read().get_pose(), poses, "the control");
+    assert_eq!(group.read().pose(), poses, "the control");
     // One that stands is moved with the others; one that is moved by hand has no velocity, and then none is told.
     for (uid, body_type) in [("static", BodyType::Static), ("mixed", BodyType::Kinematic)] {
         let mut cfg = blocks();
@@ -129,11 +129,11 @@ fn refusals() {
         let id = sim.add_rigid_object_group(RigidObjectGroupCfg { uid: uid.into(), ..cfg }).unwrap();
         let mut group = sim.rigid_object_group_mut(id);
         group.write_pose(&poses, None).unwrap();
-        assert_eq!(group.read().get_pose(), poses);
+        assert_eq!(group.read().pose(), poses);
         if body_type == BodyType::Kinematic {
             let refused = group.write_velocity(&velocities, None);
             assert!(matches!(refused, Err(Error::NotDynamic { object, .. }) if object == "mixed.green"));
-            assert!(group.read().get_velocity().iter().all(|v| *v == 0.0));
+            assert!(group.read().velocity().iter().all(|v| *v == 0.0));
         }
     }
 }

@@ -11,29 +11,29 @@ use kinetoscope_testkit::refusal::assert_error;
 fn mass() {
     let mut sim = weightless(3);
     let id = sim.add_rigid_object(cube("object", 0.1, 2.0, [0.0; 3])).unwrap();
-    assert_eq!(sim.rigid_object(id).get_mass(), array![2.0, 2.0, 2.0]);
+    assert_eq!(sim.rigid_object(id).mass(), array![2.0, 2.0, 2.0]);
     sim.rigid_object_mut(id).set_mass(&array![0.5, 8.0], Some(&[EnvId(2), EnvId(0)])).unwrap();
     let masses = [8.0, 2.0, 0.5];
-    assert_eq!(sim.rigid_object(id).get_mass().to_vec(), masses);
+    assert_eq!(sim.rigid_object(id).mass().to_vec(), masses);
     pull(&mut sim, id, [4.0, 0.0, 0.0], [0.0, 0.0, 0.01]);
-    assert_eq!(sim.rigid_object(id).get_external_wrench().row(1).to_vec(), [4.0, 0.0, 0.0, 0.0, 0.0, 0.01]);
+    assert_eq!(sim.rigid_object(id).external_wrench().row(1).to_vec(), [4.0, 0.0, 0.0, 0.0, 0.0, 0.01]);
     sim.update(500);
-    let v = sim.rigid_object(id).get_velocity();
+    let v = sim.rigid_object(id).velocity();
     for (env, mass) in masses.into_iter().enumerate() {
         assert!((v[(env, 0)] - 4.0 * 0.5 / mass).abs() < 1e-9, "{v}");
         let moment = mass * 0.01 / 6.0;
         assert!((v[(env, 5)] / (0.01 * 0.5 / moment) - 1.0).abs() < 1e-9, "{v}");
-        assert!((sim.rigid_object(id).get_inertia()[(env, 2)] / moment - 1.0).abs() < 1e-12);
+        assert!((sim.rigid_object(id).inertia()[(env, 2)] / moment - 1.0).abs() < 1e-12);
     }
     // It is the environment's: a reset ends the force, and leaves the mass.
     sim.reset(None).unwrap();
-    assert_eq!(sim.rigid_object(id).get_mass().to_vec(), masses);
+    assert_eq!(sim.rigid_object(id).mass().to_vec(), masses);
     sim.update(10);
-    assert!(sim.rigid_object(id).get_velocity().iter().all(|v| *v == 0.0));
+    assert!(sim.rigid_object(id).velocity().iter().all(|v| *v == 0.0));
     // The configuration is what it was.
     assert_eq!(sim.rigid_object(id).nominal_mass(), 2.0);
     sim.reset_properties(None).unwrap();
-    assert_eq!(sim.rigid_object(id).get_mass().to_vec(), [2.0; 3]);
+    assert_eq!(sim.rigid_object(id).mass().to_vec(), [2.0; 3]);
 }
 
 /// With the centre of mass at rest and a spin w about z the origin goes round it: after half a turn it is 2 d farther.
@@ -43,17 +43,17 @@ fn centre_of_mass() {
     let half_a_turn = |sim: &mut SimulationManager, id: ObjectId| {
         sim.rigid_object_mut(id).write_velocity(&row([0.0, -w * d, 0.0, 0.0, 0.0, w]), None).unwrap();
         sim.update((std::f64::consts::PI / w / 1e-3).round() as u32);
-        let pose = sim.rigid_object(id).get_pose();
+        let pose = sim.rigid_object(id).pose();
         [pose[(0, 0)], pose[(0, 1)]]
     };
     let mut sim = weightless(1);
     let cfg = RigidObjectCfg { center_of_mass: Some([d, 0.0, 0.0]), ..cube("object", 0.1, 2.0, [0.0; 3]) };
     let id = sim.add_rigid_object(cfg).unwrap();
-    assert_eq!(sim.rigid_object(id).get_center_of_mass(), array![[d, 0.0, 0.0]]);
+    assert_eq!(sim.rigid_object(id).center_of_mass(), array![[d, 0.0, 0.0]]);
     // A force in it for a second: F t / m, and no spin.
     pull(&mut sim, id, [0.0, 3.0, 0.0], [0.0; 3]);
     sim.update(1000);
-    let v = sim.rigid_object(id).get_velocity();
+    let v = sim.rigid_object(id).velocity();
     assert!((v[(0, 1)] - 1.5).abs() < 1e-9 && v.row(0).iter().skip(3).all(|w| w.abs() < 1e-9), "{v}");
     sim.reset(None).unwrap();
     let [x, y] = half_a_turn(&mut sim, id);
@@ -69,11 +69,11 @@ fn centre_of_mass() {
     // The origin is then accelerated to it by w² d; the spin turns by 2e-3 rad within the step.
     sim.reset(None).unwrap();
     sim.rigid_object_mut(id).set_center_of_mass(&array![[0.03, 0.0, 0.0]], Some(SECOND)).unwrap();
-    assert_eq!(sim.rigid_object(id).get_center_of_mass(), array![[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]]);
+    assert_eq!(sim.rigid_object(id).center_of_mass(), array![[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]]);
     sim.rigid_object_mut(id).write_velocity(&row([0.0, 0.0, 0.0, 0.0, 0.0, w]), None).unwrap();
-    let before = sim.rigid_object(id).get_velocity();
+    let before = sim.rigid_object(id).velocity();
     sim.update(1);
-    let gained = (sim.rigid_object(id).get_velocity() - before) / 1e-3;
+    let gained = (sim.rigid_object(id).velocity() - before) / 1e-3;
     assert!((gained[(1, 0)] - w * w * 0.03).abs() < 1e-3 && gained[(1, 1)].abs() < 1e-3, "{gained}");
     assert!(gained.row(0).iter().all(|a| a.abs() < 1e-9), "{gained}");
 }
@@ -88,7 +88,7 @@ fn moments() {
         let configured = RigidObjectCfg { inertia: Some(moments), ..cube("configured", 0.1, 1.0, [5.0; 3]) };
         let [plain, configured] = [plain, configured].map(|cfg| sim.add_rigid_object(cfg).unwrap());
         sim.rigid_object_mut(plain).set_inertia(&row(moments), Some(SECOND)).unwrap();
-        assert_eq!(sim.rigid_object(configured).get_inertia().row(0).to_vec(), moments);
+        assert_eq!(sim.rigid_object(configured).inertia().row(0).to_vec(), moments);
         let mut torque = [0.0; 3];
         torque[axis] = 0.1;
         for id in [plain, configured] {
@@ -96,7 +96,7 @@ fn moments() {
             sim.rigid_object_mut(id).set_external_wrench(&row([0.0; 3]), &torque, WrenchFrame::Link, None).unwrap();
         }
         sim.update(500);
-        let [own, set] = [plain, configured].map(|id| sim.rigid_object(id).get_velocity().column(3 + axis).to_vec());
+        let [own, set] = [plain, configured].map(|id| sim.rigid_object(id).velocity().column(3 + axis).to_vec());
         let slow = 0.05 / moment;
         for (found, expected) in [(own[0], 0.05 * 600.0), (own[1], slow), (set[0], slow), (set[1], slow)] {
             assert!((found - expected).abs() < 1e-9, "{own:?} {set:?}");
@@ -114,7 +114,7 @@ fn damping() {
     let cfg = RigidObjectCfg { mass: Some(2.0), linear_damping: 0.5, angular_damping: 0.001, ..Default::default() };
     let id = sim.add_rigid_object(RigidObjectCfg { shape: ObjectShape::Box { size: sides }, ..cfg }).unwrap();
     let stands = sim.add_rigid_object(fixed(object("fixed", ObjectShape::cube(0.1), [9.0, 0.0, 0.0]))).unwrap();
-    assert_eq!(sim.rigid_object(stands).get_damping(), Array2::<f64>::zeros((4, 2)));
+    assert_eq!(sim.rigid_object(stands).damping(), Array2::<f64>::zeros((4, 2)));
     let drawn = Randomization::new().with(Property::LinearDamping, "object", Draw::Scale([2.0, 4.0])).with(
         Property::AngularDamping,
         "object",
@@ -122,7 +122,7 @@ fn damping() {
     );
     sim.randomize(&drawn, Some(&[EnvId(3)])).unwrap();
     sim.rigid_object_mut(id).set_damping(&array![[3.0, 0.0]], Some(SECOND)).unwrap();
-    let damping = sim.rigid_object(id).get_damping();
+    let damping = sim.rigid_object(id).damping();
     assert_eq!([0, 1, 2].map(|env| damping.row(env).to_vec()), [[0.5, 0.001], [3.0, 0.0], [0.5, 0.001]]);
     assert!((1.0..2.0).contains(&damping[(3, 0)]) && (0.011..0.021).contains(&damping[(3, 1)]), "{damping}");
     assert_eq!(sim.property_bytes(EnvId(2)).unwrap(), 0);
@@ -135,7 +135,7 @@ fn damping() {
         [0, 1, 2].map(|axis| (0..3).filter(|k| *k != axis).map(|k| 2.0 * sides[k] * sides[k] / 12.0).sum::<f64>());
     let mut go_on = |sim: &mut SimulationManager, damping: &Array2<f64>| {
         sim.update(300);
-        let found = sim.rigid_object(id).get_velocity();
+        let found = sim.rigid_object(id).velocity();
         for ((env, k), v) in expected.indexed_iter_mut() {
             let rate: f64 = if k < 3 { damping[(env, 0)] / 2.0 } else { damping[(env, 1)] / moments[k - 3] };
             *v *= (1.0 + 1e-3 * rate).powi(-300);
@@ -147,15 +147,15 @@ fn damping() {
     go_on(&mut sim, &damping);
     // Adding something leaves it, and it changes from one step to the next.
     sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [0.0, 9.0, 0.0])).unwrap();
-    assert_eq!(sim.rigid_object(id).get_damping(), damping);
+    assert_eq!(sim.rigid_object(id).damping(), damping);
     sim.rigid_object_mut(id).set_damping(&array![[0.0, 0.004]], Some(&[EnvId(0)])).unwrap();
-    let later = sim.rigid_object(id).get_damping();
+    let later = sim.rigid_object(id).damping();
     assert_eq!((later[(0, 0)], later[(0, 1)], later.row(3)), (0.0, 0.004, damping.row(3)));
     go_on(&mut sim, &later);
     sim.reset(None).unwrap();
-    assert_eq!(sim.rigid_object(id).get_damping(), later);
+    assert_eq!(sim.rigid_object(id).damping(), later);
     sim.reset_properties(None).unwrap();
-    assert_eq!(sim.rigid_object(id).get_damping().row(3), array![0.5, 0.001]);
+    assert_eq!(sim.rigid_object(id).damping().row(3), array![0.5, 0.001]);
     let zero = array![[0.0, 0.0]];
     assert_error(sim.rigid_object_mut(stands).set_damping(&zero, None), "NotDynamic { argument: \"set_damping\"", &[]);
     let negative = sim.rigid_object_mut(id).set_damping(&array![[-1.0, 0.0]], None);
@@ -178,7 +178,7 @@ fn friction() {
     let id = sim.add_rigid_object(cfg).unwrap();
     let rows = array![[0.3, 0.005, 0.0001], [0.6, 0.01, 0.0002]];
     sim.rigid_object_mut(id).set_friction(&rows, Some(&[EnvId(2), EnvId(3)])).unwrap();
-    let read = sim.rigid_object(id).get_friction();
+    let read = sim.rigid_object(id).friction();
     assert_eq!(read, array![[0.5, 0.005, 0.0001], [0.5, 0.005, 0.0001], [0.3, 0.005, 0.0001], [0.6, 0.01, 0.0002]]);
     // MuJoCo steps with all three.
     let of_geoms = sim.batch().read(3, |env| env.data().model().geom_friction().to_vec());
@@ -189,10 +189,10 @@ fn friction() {
     let force = Array2::from_shape_fn((4, 3), |(e, k)| if k == 0 { pull[e] } else { 0.0 });
     let torque = Array2::from_shape_fn((4, 3), |(e, k)| if k == 1 { -0.05 * pull[e] } else { 0.0 });
     sim.update(200);
-    let start = sim.rigid_object(id).get_pose();
+    let start = sim.rigid_object(id).pose();
     sim.rigid_object_mut(id).set_external_wrench(&force, &torque, WrenchFrame::World, None).unwrap();
     sim.update(500);
-    let moved = sim.rigid_object(id).get_pose() - start;
+    let moved = sim.rigid_object(id).pose() - start;
     // MuJoCo's friction creeps; what slides goes a t²/2 = (F/m - mu g) t²/2.
     for (env, expected) in [(1, 0.05 * 9.81 / 2.0), (2, 0.15 * 9.81 / 2.0)] {
         assert!((moved[(env, 0)] / expected - 1.0).abs() < 0.05, "{env}: {} {expected}", moved[(env, 0)]);
@@ -201,9 +201,9 @@ fn friction() {
 
     let mut sim = empty(2);
     let shelf = sim.add_rigid_object(fixed(cube("shelf", 0.1, 7.0, [0.0; 3]))).unwrap();
-    assert_eq!(sim.rigid_object(shelf).get_mass().to_vec(), [7.0; 2]);
+    assert_eq!(sim.rigid_object(shelf).mass().to_vec(), [7.0; 2]);
     sim.rigid_object_mut(shelf).set_friction(&array![[0.2, 0.0, 0.0]], Some(SECOND)).unwrap();
-    assert_eq!(sim.rigid_object(shelf).get_friction(), array![[1.0, 0.005, 0.0001], [0.2, 0.0, 0.0]]);
+    assert_eq!(sim.rigid_object(shelf).friction(), array![[1.0, 0.005, 0.0001], [0.2, 0.0, 0.0]]);
     let refused = sim.rigid_object_mut(shelf).set_mass(&array![1.0], None);
     assert_error(refused, "NotDynamic { argument: \"set_mass\", object: \"shelf\"", &[]);
 }
@@ -217,7 +217,7 @@ fn margins() {
         sim.add_rigid_object(RigidObjectCfg { contact_margin, ..cfg }).unwrap()
     });
     sim.update(1500);
-    let z = [low, high].map(|id| sim.rigid_object(id).get_pose()[(0, 2)]);
+    let z = [low, high].map(|id| sim.rigid_object(id).pose()[(0, 2)]);
     let between = if TARGET == Target::V2 { 0.02 } else { 0.03 };
     assert!((z[0] - 0.11).abs() < 1e-3 && (z[1] - z[0] - 0.2 - between).abs() < 1e-3, "{z:?}");
 }

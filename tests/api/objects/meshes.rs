@@ -54,8 +54,8 @@ fn frame_and_format() {
     assert!(mass == 3.0 && (com - Vector3::new(0.5, 0.125, -0.125)).norm() < 1e-12, "{mass} {com}");
     assert!((tensor - Matrix3::from_diagonal(&moments)).norm() < 1e-12, "{tensor}");
     let read = sim.rigid_object(id);
-    assert_eq!(read.get_pose().row(0).to_vec(), [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
-    assert!((&read.get_center_of_mass() - &array![[0.5, 0.125, -0.125]]).iter().all(|d| d.abs() < 1e-12));
+    assert_eq!(read.pose().row(0).to_vec(), [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+    assert!((&read.center_of_mass() - &array![[0.5, 0.125, -0.125]]).iter().all(|d| d.abs() < 1e-12));
 
     let mut stl = Vec::new();
     write_binary_stl(&channel(), &mut stl).unwrap();
@@ -88,7 +88,7 @@ fn hollow_and_hull() {
     let ball = sim.add_rigid_object(ball).unwrap();
     let scanner = sim.add_sensor("scanner", scanner(0.2, 0.1, 0.0317, 0.9, "channel")).unwrap();
     sim.update(400);
-    let lies = sim.rigid_object(ball).get_pose();
+    let lies = sim.rigid_object(ball).pose();
     assert!((lies[(0, 2)] - 0.55).abs() < 1e-3, "on the hull: {}", lies[(0, 2)]);
     let (scan, mask_id) = (sim.sensor(scanner).unwrap(), sim.rigid_object(channel).mask_id());
     let (mut floor, mut walls) = (0, 0);
@@ -127,7 +127,7 @@ fn cone() {
     assert!((tensor - Matrix3::from_diagonal(&moments)).norm() < 1e-12);
     let scanner = sim.add_sensor("scanner", scanner(0.0, 0.0, 0.02, 0.3, "cone")).unwrap();
     sim.update(500);
-    let pose = sim.rigid_object(cone).get_pose();
+    let pose = sim.rigid_object(cone).pose();
     // MuJoCo's soft contacts let it sink by a little.
     assert!((pose[(0, 2)] - h / 2.0).abs() < 1e-3 && pose[(0, 3)] > 1.0 - 1e-6, "{pose}");
     let scan = sim.sensor(scanner).unwrap();
@@ -170,7 +170,7 @@ fn open_meshes() {
         assert!(diagnostic.message.contains("open") && diagnostic.message.contains("o.obj"), "{diagnostic}");
         let read = sim.rigid_object(id);
         assert!((read.nominal_mass() - mass).abs() < within, "{}", read.nominal_mass());
-        let found = read.get_center_of_mass();
+        let found = read.center_of_mass();
         assert!(com.is_none_or(|com| (&found - &row(com)).iter().all(|d| d.abs() < 1e-9)), "{found}");
     }
 }

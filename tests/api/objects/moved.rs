@@ -25,15 +25,15 @@ fn paddle_pushes() {
         let x = 1e-3 * f64::from(step);
         sim.rigid_object_mut(paddle).write_pose(&row(at(x, 0.0)), Some(SECOND)).unwrap();
         sim.update(1);
-        let pose = sim.rigid_object(paddle).get_pose();
+        let pose = sim.rigid_object(paddle).pose();
         assert_eq!([pose[(1, 0)], pose[(0, 0)]], [x, 0.0]);
     }
-    let (x, v) = (sim.rigid_object(ball).get_pose(), sim.rigid_object(ball).get_velocity());
+    let (x, v) = (sim.rigid_object(ball).pose(), sim.rigid_object(ball).velocity());
     // Ahead of the face at 1.05 m by its radius, at the paddle's 1 m/s. To MuJoCo the paddle stands: the contact is where
     // b v = k r, with the defaults of solref (0.02 s, 1) and solimp (0.95) r = 2 * 0.95 * 0.02 s * 1 m/s.
     assert!((1.25 - x[(1, 0)] - 0.038).abs() < 2e-3 && (v[(1, 0)] - 1.0).abs() < 1e-3, "{x} {v}");
     assert_eq!([x[(0, 0)], v[(0, 0)]], [0.4, 0.0]);
-    assert!(sim.rigid_object(paddle).get_velocity().iter().all(|v| *v == 0.0));
+    assert!(sim.rigid_object(paddle).velocity().iter().all(|v| *v == 0.0));
 }
 
 /// Reset, snapshots and additions know where a kinematic object is.
@@ -46,17 +46,17 @@ fn kinematic_state() {
     let there = Array2::from_shape_fn((3, 7), |(e, k)| [e as f64, 0.5, -1.0, 0.0, 1.0, 0.0, 0.0][k]);
     sim.rigid_object_mut(paddle).write_pose(&there, None).unwrap();
     sim.update(5);
-    assert_eq!(sim.rigid_object(paddle).get_pose(), there);
+    assert_eq!(sim.rigid_object(paddle).pose(), there);
     let snapshot = sim.snapshot(None).unwrap();
     // An object that is added later comes before it in MuJoCo's lists, or after: it stays where it is.
     let other = sim.add_rigid_object(kinematic(object("other", ObjectShape::cube(0.1), [9.0; 3]))).unwrap();
     sim.add_rigid_object(object("cube", ObjectShape::cube(0.1), [5.0; 3])).unwrap();
-    assert_eq!(sim.rigid_object(paddle).get_pose(), there);
-    assert_eq!(sim.rigid_object(other).get_pose()[(2, 0)], 9.0);
+    assert_eq!(sim.rigid_object(paddle).pose(), there);
+    assert_eq!(sim.rigid_object(other).pose()[(2, 0)], 9.0);
     sim.update(5);
-    assert_eq!(sim.rigid_object(paddle).get_pose(), there);
+    assert_eq!(sim.rigid_object(paddle).pose(), there);
     sim.reset(Some(SECOND)).unwrap();
-    let pose = sim.rigid_object(paddle).get_pose();
+    let pose = sim.rigid_object(paddle).pose();
     assert_eq!(pose.row(1).to_vec(), init);
     assert_eq!((pose.row(0), pose.row(2)), (there.row(0), there.row(2)));
     // The snapshot is of the scene before more was added.
@@ -64,7 +64,7 @@ fn kinematic_state() {
     let now = sim.snapshot(None).unwrap();
     sim.reset(None).unwrap();
     sim.restore(&now, Some(&[EnvId(2), EnvId(0), EnvId(1)])).unwrap();
-    let pose = sim.rigid_object(paddle).get_pose();
+    let pose = sim.rigid_object(paddle).pose();
     assert_eq!((pose.row(2), pose.row(0).to_vec(), pose.row(1)), (there.row(0), init.to_vec(), there.row(2)));
 }
 
@@ -104,15 +104,15 @@ fn shelves() {
     let rows = Array2::from(vec![at(0.0, heights[2]), at(0.0, heights[1])]);
     sim.rigid_object_mut(shelf_id).write_pose(&rows, Some(&[EnvId(2), EnvId(1)])).unwrap();
     let places = Array2::from(heights.map(|z| at(0.0, z)).to_vec());
-    assert_eq!(sim.rigid_object(shelf_id).get_pose(), places);
+    assert_eq!(sim.rigid_object(shelf_id).pose(), places);
     sim.update(1500);
-    let lies = sim.rigid_object(ball).get_pose();
+    let lies = sim.rigid_object(ball).pose();
     for (env, height) in heights.into_iter().enumerate() {
         assert_number(&format!("environment {env}"), lies[(env, 2)], height + 0.07, SOFT);
         // The judge: a scene that was built so.
         let (mut built, _, ball) = shelf(3, height);
         built.update(1500);
-        assert_eq!(built.rigid_object(ball).get_pose().row(env), lies.row(env), "bit for bit");
+        assert_eq!(built.rigid_object(ball).pose().row(env), lies.row(env), "bit for bit");
     }
     // The environment that was not named shares everything; the others have two arrays and what follows from them.
     let base = sim.batch().model().clone();
@@ -122,9 +122,9 @@ fn shelves() {
     // It stands there after a reset and when more is added, until properties are nominal again.
     sim.reset(None).unwrap();
     sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [5.0; 3])).unwrap();
-    assert_eq!(sim.rigid_object(shelf_id).get_pose(), places);
+    assert_eq!(sim.rigid_object(shelf_id).pose(), places);
     sim.reset_properties(Some(SECOND)).unwrap();
-    let pose = sim.rigid_object(shelf_id).get_pose();
+    let pose = sim.rigid_object(shelf_id).pose();
     assert_eq!((pose[(1, 2)], pose[(2, 2)]), (heights[0], heights[2]));
 }
 
@@ -137,7 +137,7 @@ fn ramp() {
     // Quaternions are normalised.
     let turned = row([0.0, 0.0, 0.5, 3.0 * cos, 0.0, 3.0 * sin, 0.0]);
     sim.rigid_object_mut(shelf_id).write_pose(&turned, Some(SECOND)).unwrap();
-    let read = sim.rigid_object(shelf_id).get_pose();
+    let read = sim.rigid_object(shelf_id).pose();
     assert!((read[(1, 3)] - cos).abs() < 1e-15 && (read[(1, 5)] - sin).abs() < 1e-15, "{read}");
     sim.randomize_with(None, |_, _, p| {
         p.set(Property::Friction, "shelf", &[0.0])?;
@@ -148,7 +148,7 @@ fn ramp() {
     let place = at(0.07 * angle.sin(), 0.5 + 0.07 * angle.cos());
     sim.rigid_object_mut(ball).write_pose(&row(place), Some(SECOND)).unwrap();
     sim.update(150);
-    let v = sim.rigid_object(ball).get_velocity();
+    let v = sim.rigid_object(ball).velocity();
     let along = v[(1, 0)] * angle.cos() - v[(1, 2)] * angle.sin();
     let expected = 9.81 * angle.sin() * 0.15;
     // MuJoCo's contact without friction is soft along its normal only: 1 %.
@@ -164,7 +164,7 @@ fn drawn_places() {
     let rays = sim.add_sensor("rays", rays).unwrap();
     let draw = Randomization::new().with(Property::Position, "shelf", Draw::Add([-0.05, 0.05]));
     sim.randomize(&draw, Some(SECOND)).unwrap();
-    let place = sim.rigid_object(shelf_id).get_pose();
+    let place = sim.rigid_object(shelf_id).pose();
     let moved: Vec<f64> = (0..3).map(|k| place[(1, k)] - place[(0, k)]).collect();
     assert!(moved.iter().all(|d| d.abs() <= 0.05 && *d != 0.0), "{moved:?}");
     let rays = sim.sensor(rays).unwrap();

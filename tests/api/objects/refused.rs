@@ -114,10 +114,10 @@ fn writes() {
     ];
     assert_refused(results.map(|(what, result)| (what, result, "Randomization(Value {", [])));
     let mass = object.read().nominal_mass();
-    assert_eq!(object.read().get_mass().to_vec(), [mass; 3]);
-    assert_eq!(object.read().get_friction().row(0).to_vec(), [1.0, 0.005, 0.0001]);
+    assert_eq!(object.read().mass().to_vec(), [mass; 3]);
+    assert_eq!(object.read().friction().row(0).to_vec(), [1.0, 0.005, 0.0001]);
     for id in [free, hand, stands] {
-        assert!(sim.rigid_object(id).get_pose().column(0).iter().all(|x| *x == 0.0));
+        assert!(sim.rigid_object(id).pose().column(0).iter().all(|x| *x == 0.0));
     }
 }
 
@@ -130,7 +130,7 @@ fn places() {
         ("infinite", (Property::Position, "shelf", &[f64::INFINITY, 0.0, 0.0]), "", ["finite"]),
         ("moves", (Property::Position, "ball", &[0.0; 3]), "", ["static object called"]),
     ];
-    let pose = |sim: &SimulationManager| sim.rigid_object(shelf).get_pose();
+    let pose = |sim: &SimulationManager| sim.rigid_object(shelf).pose();
     assert_refused_unchanged(&mut sim, pose, rows, |sim, (property, name, value)| {
         sim.randomize_with(None, |_, _, p| p.set(property, name, value))
     });

@@ -25,7 +25,7 @@ fn cubes(num_envs: usize) -> (SimulationManager, [ObjectId; 2], WeldId) {
 
 /// Pose of the second in the first.
 fn relative(sim: &SimulationManager, [first, second]: [ObjectId; 2], env: usize) -> Pose {
-    let [a, b] = [first, second].map(|id| pose_in(&sim.rigid_object(id).get_pose(), env));
+    let [a, b] = [first, second].map(|id| pose_in(&sim.rigid_object(id).pose(), env));
     a.inverse() * b
 }
 
@@ -52,7 +52,7 @@ fn held_as_one() {
     assert_eq!(attached(&sim, held), [false, true]);
     push(&mut sim, ids[0], 2.0);
     sim.update(500);
-    let v = ids.map(|id| sim.rigid_object(id).get_velocity());
+    let v = ids.map(|id| sim.rigid_object(id).velocity());
     // The weld gives way by 1e-4 of the acceleration that its load would cause, at first.
     assert!((v[0][(1, 0)] - 0.25).abs() < 1e-3 && (v[1][(1, 0)] - 0.25).abs() < 1e-3, "{v:?}");
     assert!((v[0][(1, 0)] + 3.0 * v[1][(1, 0)] - 1.0).abs() < 1e-9, "momentum is F t: {v:?}");
@@ -61,9 +61,9 @@ fn held_as_one() {
     sim.weld_mut(held).release(None).unwrap();
     assert_eq!(attached(&sim, held), [false, false]);
     sim.update(500);
-    let later = sim.rigid_object(ids[1]).get_velocity();
+    let later = sim.rigid_object(ids[1]).velocity();
     assert!((later[(1, 0)] - v[1][(1, 0)]).abs() < 1e-12, "{later}");
-    assert!((sim.rigid_object(ids[0]).get_velocity()[(1, 0)] - v[0][(1, 0)] - 1.0).abs() < 1e-9);
+    assert!((sim.rigid_object(ids[0]).velocity()[(1, 0)] - v[0][(1, 0)] - 1.0).abs() < 1e-9);
 }
 
 /// It holds how they lie at the moment, each time.
@@ -80,13 +80,13 @@ fn attaching_again() {
     push(&mut sim, ids[0], 1.0);
     sim.update(300);
     assert!(apart(&relative(&sim, ids, 0), &before) < 1e-3, "{}", apart(&relative(&sim, ids, 0), &before));
-    assert!(sim.rigid_object(ids[0]).get_velocity().iter().any(|v| v.abs() > 0.01));
+    assert!(sim.rigid_object(ids[0]).velocity().iter().any(|v| v.abs() > 0.01));
     // A reset lets go.
     sim.reset(None).unwrap();
     assert_eq!(attached(&sim, held), [false]);
     push(&mut sim, ids[0], 1.0);
     sim.update(100);
-    assert_eq!(sim.rigid_object(ids[1]).get_velocity(), Array2::<f64>::zeros((1, 6)));
+    assert_eq!(sim.rigid_object(ids[1]).velocity(), Array2::<f64>::zeros((1, 6)));
 }
 
 /// To a link of an arm that is driven, and to the world, against gravity.
@@ -103,17 +103,17 @@ fn links_and_world() {
     }
     let in_link = |sim: &SimulationManager| {
         pose_in(&sim.robot(arm).link_pose(&tip).unwrap(), 1).inverse()
-            * pose_in(&sim.rigid_object(ids[0]).get_pose(), 1)
+            * pose_in(&sim.rigid_object(ids[0]).pose(), 1)
     };
     let before = in_link(&sim);
     let start = sim.robot(arm).link_pose(&tip).unwrap();
-    sim.robot_mut(arm).set_qpos(&row([0.3; 6]), None, None).unwrap();
+    sim.robot_mut(arm).set_qpos_target(&row([0.3; 6]), None, None).unwrap();
     sim.update(500);
     let moved = sim.robot(arm).link_pose(&tip).unwrap();
     assert!((&moved - &start).iter().any(|d| d.abs() > 0.1), "the arm moved: {moved}");
     // 0.3 kg on a lever of a metre: the weld is soft by 1e-4 of what that would accelerate.
     assert!(apart(&in_link(&sim), &before) < 2e-3, "{}", apart(&in_link(&sim), &before));
-    let hung = sim.rigid_object(ids[1]).get_pose();
+    let hung = sim.rigid_object(ids[1]).pose();
     assert!((hung[(1, 2)] - 1.0).abs() < 1e-5 && hung[(0, 2)] < -3.0, "{hung}");
 }
 
@@ -131,7 +131,7 @@ fn snapshots() {
     snapshot.save(&path).unwrap();
     let run = |sim: &mut SimulationManager| {
         sim.update(70);
-        ids.map(|id| (sim.rigid_object(id).get_pose(), sim.rigid_object(id).get_velocity()))
+        ids.map(|id| (sim.rigid_object(id).pose(), sim.rigid_object(id).velocity()))
     };
     let expected = run(&mut sim);
     assert!(expected[1].1[(1, 0)] > 0.01 && expected[1].1[(0, 0)] == 0.0);
@@ -165,7 +165,7 @@ fn masses_and_additions() {
     assert_eq!(attached(&sim, held), [false, true]);
     push(&mut sim, ids[0], 4.0);
     sim.update(500);
-    let v = ids.map(|id| sim.rigid_object(id).get_velocity()[(1, 0)]);
+    let v = ids.map(|id| sim.rigid_object(id).velocity()[(1, 0)]);
     assert!((v[0] - 0.25).abs() < 1e-3 && (v[1] - 0.25).abs() < 1e-3, "F t / 8 kg: {v:?}");
     assert!(apart(&relative(&sim, ids, 1), &before) < 1e-4);
     sim.reset_properties(None).unwrap();
@@ -188,7 +188,7 @@ fn far_and_fixed() {
         // A quarter of a turn in the time, if nothing held it.
         sim.rigid_object_mut(id).write_velocity(&row([0.0, 0.0, 0.0, 0.0, 0.0, 1.5]), None).unwrap();
         sim.update(500);
-        let (off, angle) = errors(&pose_in(&sim.rigid_object(id).get_pose(), 0), &Pose::translation(0.0, 0.0, 1.0));
+        let (off, angle) = errors(&pose_in(&sim.rigid_object(id).pose(), 0), &Pose::translation(0.0, 0.0, 1.0));
         // One step of 1.5 rad/s before it is stopped, twice over; 1e-4 of the weight.
         assert!(off < 1e-5 && angle < 1e-2, "{body_type:?} {pair:?}: {off} {angle}");
     }
@@ -238,7 +238,7 @@ fn rollouts() {
             }
         }
         let expected = sim.weld(held).is_attached()[1];
-        let moved = sim.rigid_object(ids[1]).get_velocity()[(1, 0)] != 0.0;
+        let moved = sim.rigid_object(ids[1]).velocity()[(1, 0)] != 0.0;
         assert!(moved == expected && expected == std::ptr::eq(start, &tight));
         sim.restore(&rollout.end, Some(&rows)).unwrap();
         assert_eq!(attached(&sim, held), [false, expected]);

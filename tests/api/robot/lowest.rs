@@ -56,7 +56,7 @@ fn closed_forms_and_contacts() {
             let init_pose = Pose::from_parts([0.0, 0.0, below - 0.005].into(), rotation);
             let mut deep = sim(cfg(ENVS, 2));
             let robot = deep.add_robot(RobotCfg { init_pose, ..free() }).unwrap();
-            let heights = deep.robot(robot).get_lowest_heights();
+            let heights = deep.robot(robot).lowest_heights();
             assert_eq!(heights.len(), ENVS);
             for height in heights {
                 assert_number(&format!("{shape}: closed form"), height, -0.005, tolerance);
@@ -70,10 +70,10 @@ fn closed_forms_and_contacts() {
             let robot = standing.add_robot(RobotCfg { init_pose, ground_clearance: Some(0.02), ..free() }).unwrap();
             standing.update(3);
             standing.reset(None).unwrap();
-            assert_number(shape, standing.robot(robot).get_lowest_heights()[1], 0.02, tolerance);
-            assert_number(shape, standing.robot(robot).get_default_root_pose()[(0, 2)], below + 0.02, tolerance);
-            assert_number(shape, standing.robot(robot).get_root_pose()[(2, 0)], 0.5, EXACT);
-            let turned = pose_in(&standing.robot(robot).get_root_pose(), 0).rotation.angle_to(&rotation);
+            assert_number(shape, standing.robot(robot).lowest_heights()[1], 0.02, tolerance);
+            assert_number(shape, standing.robot(robot).default_root_pose()[(0, 2)], below + 0.02, tolerance);
+            assert_number(shape, standing.robot(robot).root_pose()[(2, 0)], 0.5, EXACT);
+            let turned = pose_in(&standing.robot(robot).root_pose(), 0).rotation.angle_to(&rotation);
             assert_number(shape, turned, 0.0, Tolerance::absolute(1e-7, "an angle from a cosine of 1 - 1e-16"));
         }
     }
@@ -90,7 +90,7 @@ fn links() {
     let init_qpos = vec![("turn".into(), 90f64.to_radians())];
     let id = sim.add_robot(RobotCfg { init_qpos, ..mjcf_robot("arm", arm) }).unwrap();
     let robot = sim.robot(id);
-    let heights = robot.get_link_lowest_heights();
+    let heights = robot.link_lowest_heights();
     // The arm hangs down from 0.3 m.
     for (link, (height, fixed)) in
         [(-0.05, true), (0.3 - 0.5 - 0.05, false), (f64::INFINITY, false)].into_iter().enumerate()
@@ -103,7 +103,7 @@ fn links() {
             assert_eq!(heights[(0, link)], height);
         }
     }
-    assert_number("the robot", robot.get_lowest_heights()[0], -0.25, EXACT);
+    assert_number("the robot", robot.lowest_heights()[0], -0.25, EXACT);
 }
 
 /// A clearance that cannot be had.
@@ -116,8 +116,8 @@ fn no_clearance() {
     let ghost = || RobotCfg { fix_base: false, ..mjcf_robot("ghost", &visual) };
     let mut sim = sim(empty_cfg(1));
     let id = sim.add_robot(RobotCfg { ground_clearance: Some(0.1), ..ghost() }).unwrap();
-    assert_eq!(sim.robot(id).get_lowest_heights()[0], f64::INFINITY);
-    assert_eq!(sim.robot(id).get_root_pose()[(0, 2)], 0.0);
+    assert_eq!(sim.robot(id).lowest_heights()[0], f64::INFINITY);
+    assert_eq!(sim.robot(id).root_pose()[(0, 2)], 0.0);
     assert_eq!(count_diagnostics(&sim, &["\"ghost\"", "no link has a collision shape"]), 1);
     for clearance in [f64::NAN, f64::INFINITY] {
         let refused = sim.add_robot(RobotCfg { uid: "second".into(), ground_clearance: Some(clearance), ..ghost() });

@@ -96,7 +96,7 @@ fn stand(robot: RobotCfg, cfg: SimulationManagerCfg) -> Stood {
     let mut least = vec![f64::MAX; foot.len()];
     for step in 0..steps(30.0) {
         sim.update(1);
-        let height = sim.robot(robot).get_root_pose()[(0, 2)];
+        let height = sim.robot(robot).root_pose()[(0, 2)];
         (low, high) = (low.min(height), high.max(height));
         let forces = sim.sensor(all).unwrap().net_forces_w();
         for (body, foot) in foot.iter().enumerate() {

@@ -93,7 +93,7 @@ fn links() {
     let (mut sim, id) = tumbling();
     for round in 0..2 {
         let view = sim.robot(id);
-        let (poses, velocities) = (view.get_link_poses(), view.get_link_velocities());
+        let (poses, velocities) = (view.link_poses(), view.link_velocities());
         assert_eq!((poses.dim(), velocities.dim()), ((ENVS, 4, 7), (ENVS, 4, 6)));
         for (l, name) in view.link_names().into_iter().enumerate() {
             // The tool is part of the arm's body.
@@ -126,10 +126,10 @@ fn root() {
     let (mut sim, id) = tumbling();
     for _ in 0..2 {
         let view = sim.robot(id);
-        let (pose, velocity, state) = (view.get_root_pose(), view.get_root_velocity(), view.get_root_state());
-        let (com, com_velocity) = (view.get_root_com_position(), view.get_root_com_velocity());
-        let (linear, angular) = (view.get_root_lin_vel_b(), view.get_root_ang_vel_b());
-        let (gravity, heading) = (view.get_projected_gravity_b(), view.get_root_heading());
+        let (pose, velocity, state) = (view.root_pose(), view.root_velocity(), view.root_state());
+        let (com, com_velocity) = (view.root_com_position(), view.root_com_velocity());
+        let (linear, angular) = (view.root_lin_vel_b(), view.root_ang_vel_b());
+        let (gravity, heading) = (view.projected_gravity_b(), view.root_heading());
         for env in 0..ENVS {
             let root = pose_in(&pose, env);
             assert_eq!(state.row(env).to_vec(), [pose.row(env).to_vec(), velocity.row(env).to_vec()].concat());
@@ -165,15 +165,15 @@ fn root() {
 #[test]
 fn fixed_root() {
     let (mut sim, id) = two_balls(G, true);
-    let start = sim.robot(id).get_root_pose();
-    assert_eq!(start, sim.robot(id).get_default_root_pose());
+    let start = sim.robot(id).root_pose();
+    assert_eq!(start, sim.robot(id).default_root_pose());
     sim.update(50);
-    let (pose, velocity) = (sim.robot(id).get_root_pose(), sim.robot(id).get_root_velocity());
+    let (pose, velocity) = (sim.robot(id).root_pose(), sim.robot(id).root_velocity());
     assert_eq!((pose, velocity), (start, Array2::zeros((ENVS, 6))));
     let error = sim.robot_mut(id).write_root_pose(&array![[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]], None);
     assert_error(error, "FixedBody", &["\"robot\"", "fix_base"]);
     assert_error(sim.robot_mut(id).write_root_com_velocity(&Array2::ones((1, 6)), None), "FixedBody", &[]);
-    assert_eq!(sim.robot(id).get_root_com_velocity(), Array2::<f64>::zeros((ENVS, 6)));
+    assert_eq!(sim.robot(id).root_com_velocity(), Array2::<f64>::zeros((ENVS, 6)));
 }
 
 /// A velocity in world axes stays in world axes when the root link is put elsewhere and turned; a ball goes on as it is. One
@@ -186,7 +186,7 @@ fn written_root() {
     robot.write_root_velocity(&array![moving], None).unwrap();
     // A quarter turn about x, not normalized.
     robot.write_root_pose(&array![[1.0, 2.0, 3.0, 2.0, 2.0, 0.0, 0.0]], Some(&[EnvId(2), EnvId(0)])).unwrap();
-    let (pose, half) = (sim.robot(id).get_root_pose(), std::f64::consts::FRAC_1_SQRT_2);
+    let (pose, half) = (sim.robot(id).root_pose(), std::f64::consts::FRAC_1_SQRT_2);
     assert_eq!(pose.row(1).to_vec(), [0.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0], "environment 1 was not chosen");
     for env in [0, 2] {
         let limit = Tolerance::absolute(1e-15, "normalization: one rounding of numbers below 3");
@@ -194,27 +194,27 @@ fn written_root() {
     }
     for env in 0..ENVS {
         let limit = Tolerance::absolute(1e-15, "normalization: one rounding of numbers below 3");
-        assert_close("velocity", sim.robot(id).get_root_velocity().row(env), moving, limit);
+        assert_close("velocity", sim.robot(id).root_velocity().row(env), moving, limit);
     }
     sim.update(100);
     // One second later: 2 rad about the world's z. Semi-implicit steps of a ball are exact up to rounding.
     for env in 0..ENVS {
         let limit = Tolerance::absolute(1e-9, "semi-implicit steps of a ball are exact up to rounding");
-        assert_close("velocity after a second", sim.robot(id).get_root_velocity().row(env), moving, limit);
+        assert_close("velocity after a second", sim.robot(id).root_velocity().row(env), moving, limit);
     }
     let turned = UnitQuaternion::from_euler_angles(0.0, 0.0, 2.0)
         * UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0);
     let expected = Pose::from_parts(Translation3::new(1.5, 2.0, 2.0), turned);
-    let (distance, angle) = errors(&pose_in(&sim.robot(id).get_root_pose(), 0), &expected);
+    let (distance, angle) = errors(&pose_in(&sim.robot(id).root_pose(), 0), &expected);
     assert!(distance < 1e-9 && angle < 1e-9, "{distance} {angle}");
 
     let (mut sim, id) = tumbling();
-    let before = sim.robot(id).get_root_com_velocity();
+    let before = sim.robot(id).root_com_velocity();
     let wanted = array![[0.5, -1.0, 2.0, 3.0, -0.4, 0.6]];
     sim.robot_mut(id).write_root_com_velocity(&wanted, Some(&[EnvId(2), EnvId(1)])).unwrap();
     let view = sim.robot(id);
-    let (found, frame) = (view.get_root_com_velocity(), view.get_root_velocity());
-    let (pose, com) = (view.get_root_pose(), view.get_root_com_position());
+    let (found, frame) = (view.root_com_velocity(), view.root_velocity());
+    let (pose, com) = (view.root_pose(), view.root_com_position());
     assert_eq!(found.row(0), before.row(0), "environment 0 was not chosen");
     for env in [1, 2] {
         assert_close("what was written", found.row(env), wanted.row(0), EXACT);
@@ -228,13 +228,13 @@ fn written_root() {
 #[test]
 fn accelerations_of_a_step() {
     let (mut sim, id) = sim_with(G, true);
-    assert_eq!(sim.robot(id).get_qacc(), Array2::<f64>::zeros((ENVS, 2)));
-    sim.robot_mut(id).set_qpos(&array![[1.0, 0.0]], None, Some(&[EnvId(1)])).unwrap();
+    assert_eq!(sim.robot(id).qacc(), Array2::<f64>::zeros((ENVS, 2)));
+    sim.robot_mut(id).set_qpos_target(&array![[1.0, 0.0]], None, Some(&[EnvId(1)])).unwrap();
     let mut apart = 0.0_f64;
     for _ in 0..5 {
-        let before = sim.robot(id).get_qvel();
+        let before = sim.robot(id).qvel();
         sim.update(1);
-        let (after, acceleration) = (sim.robot(id).get_qvel(), sim.robot(id).get_qacc());
+        let (after, acceleration) = (sim.robot(id).qvel(), sim.robot(id).qacc());
         // Differences of velocities of size 1 lose 1e-16 / h.
         let limit = Tolerance::absolute(1e-11, "differences of velocities of size 1 lose 1e-16 / h");
         assert_close("acceleration", &acceleration, &((after - before) / 0.01), limit);
@@ -242,11 +242,11 @@ fn accelerations_of_a_step() {
     }
     assert!(apart > 10.0, "the control: the drive of environment 1 pushes: {apart}");
     // A write leaves them, a reset does not.
-    let last = sim.robot(id).get_qacc();
+    let last = sim.robot(id).qacc();
     sim.robot_mut(id).write_qvel(&array![[0.5, -0.5]], None, None).unwrap();
-    assert_eq!(sim.robot(id).get_qacc(), last);
+    assert_eq!(sim.robot(id).qacc(), last);
     sim.reset(Some(&[EnvId(1)])).unwrap();
-    let after = sim.robot(id).get_qacc();
+    let after = sim.robot(id).qacc();
     assert_eq!((after.row(0), after.row(1).to_vec()), (last.row(0), vec![0.0; 2]));
 }
 
@@ -259,17 +259,17 @@ fn accelerations_of_a_step() {
 fn written_accelerations() {
     let targets = array![[1.0, 0.0], [-0.7, 0.0], [0.2, 0.0]];
     let (mut sim, id) = sim_with(G, true);
-    sim.robot_mut(id).set_qpos(&targets, None, None).unwrap();
+    sim.robot_mut(id).set_qpos_target(&targets, None, None).unwrap();
     sim.update(7);
     let state = |sim: &SimulationManager, id| {
         let view = sim.robot(id);
-        [view.get_qpos(), view.get_qvel(), view.get_qacc()]
+        [view.qpos(), view.qvel(), view.qacc()]
     };
     let [q, v, a] = state(&sim, id);
     let mut others = [Some(a.clone()), None, Some(Array2::from_elem((ENVS, 2), -1e6))].map(|accelerations| {
         let (mut other, here) = sim_with(G, true);
         let mut robot = other.robot_mut(here);
-        robot.set_qpos(&targets, None, None).unwrap();
+        robot.set_qpos_target(&targets, None, None).unwrap();
         robot.write_qpos(&q, None, None).unwrap();
         robot.write_qvel(&v, None, None).unwrap();
         if let Some(a) = accelerations {
@@ -281,7 +281,7 @@ fn written_accelerations() {
         (other, here)
     });
     sim.update(1);
-    let after = sim.robot(id).get_qvel();
+    let after = sim.robot(id).qvel();
     for (k, (other, here)) in others.iter_mut().enumerate() {
         other.update(1);
         let [_, velocity, acceleration] = state(other, *here);
@@ -301,10 +301,10 @@ fn written_accelerations() {
         sim.update(1);
     }
     // The control: an effort of the same size does move the joint.
-    let before = sim.robot(id).get_qvel();
-    sim.robot_mut(id).set_qf(&array![[50.0, 0.0]], None, Some(&[EnvId(0)])).unwrap();
+    let before = sim.robot(id).qvel();
+    sim.robot_mut(id).set_qf_target(&array![[50.0, 0.0]], None, Some(&[EnvId(0)])).unwrap();
     sim.update(1);
-    let push = &sim.robot(id).get_qvel() - &before;
+    let push = &sim.robot(id).qvel() - &before;
     assert!(push[(0, 0)].abs() > 0.1 && push[(1, 0)].abs() < 0.1, "{push}");
 }
 
@@ -315,7 +315,7 @@ fn written_accelerations_of_single_joints() {
     let envs = [EnvId(2), EnvId(0)];
     sim.robot_mut(id).write_qacc(&array![[3.0], [-4.0]], Some(&[JointIndex(1)]), Some(&envs)).unwrap();
     let written = array![[0.0, -4.0], [0.0, 0.0], [0.0, 3.0]];
-    assert_eq!(sim.robot(id).get_qacc(), written);
+    assert_eq!(sim.robot(id).qacc(), written);
     let snapshot = sim.snapshot(None).unwrap();
     for (values, part) in [
         ([f64::NAN, 0.0], "write_qacc[0, 0] (joint \"hinge\") is NaN"),
@@ -323,31 +323,31 @@ fn written_accelerations_of_single_joints() {
         ([0.0, -1.1e10], "-1e10 to 1e10"),
     ] {
         assert_error(sim.robot_mut(id).write_qacc(&array![values], None, None), "", &[part]);
-        assert_eq!(sim.robot(id).get_qacc(), written, "{part}");
+        assert_eq!(sim.robot(id).qacc(), written, "{part}");
     }
     // The largest that may be does no harm: with no force on it the joint stays where it is.
     sim.robot_mut(id).write_qacc(&array![[1e10, -1e10]], None, None).unwrap();
     sim.update(1);
     assert!(sim.diverged().is_empty());
-    assert!(sim.robot(id).get_qpos().iter().all(|q| q.abs() < 1e-7), "{}", sim.robot(id).get_qpos());
+    assert!(sim.robot(id).qpos().iter().all(|q| q.abs() < 1e-7), "{}", sim.robot(id).qpos());
     sim.restore(&snapshot, None).unwrap();
-    assert_eq!(sim.robot(id).get_qacc(), written);
+    assert_eq!(sim.robot(id).qacc(), written);
     sim.reset(None).unwrap();
-    assert_eq!(sim.robot(id).get_qacc(), Array2::<f64>::zeros((ENVS, 2)));
+    assert_eq!(sim.robot(id).qacc(), Array2::<f64>::zeros((ENVS, 2)));
 }
 
 #[test]
 fn targets_and_defaults() {
     let (mut sim, id) = sim_with(0.0, false);
-    assert_eq!(sim.robot(id).get_projected_gravity_b(), Array2::<f64>::zeros((ENVS, 3)));
-    let state = sim.robot(id).get_default_root_state();
+    assert_eq!(sim.robot(id).projected_gravity_b(), Array2::<f64>::zeros((ENVS, 3)));
+    let state = sim.robot(id).default_root_state();
     assert_eq!(state.row(2).to_vec(), [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    assert_eq!((state.clone(), state.dim()), (sim.robot(id).get_root_state(), (ENVS, 13)));
+    assert_eq!((state.clone(), state.dim()), (sim.robot(id).root_state(), (ENVS, 13)));
     let mut robot = sim.robot_mut(id);
-    robot.set_qvel(&array![[0.5, 9.0]], None, Some(&[EnvId(1)])).unwrap();
-    robot.set_qf(&array![[-2.5, 9.0]], None, Some(&[EnvId(2)])).unwrap();
+    robot.set_qvel_target(&array![[0.5, 9.0]], None, Some(&[EnvId(1)])).unwrap();
+    robot.set_qf_target(&array![[-2.5, 9.0]], None, Some(&[EnvId(2)])).unwrap();
     // The follower's columns are ignored. Targets stay until changed or reset.
-    let targets = |sim: &SimulationManager| [sim.robot(id).get_target_qvel(), sim.robot(id).get_target_qf()];
+    let targets = |sim: &SimulationManager| [sim.robot(id).qvel_target(), sim.robot(id).qf_target()];
     let expected = [array![[0.0, 0.0], [0.5, 0.0], [0.0, 0.0]], array![[0.0, 0.0], [0.0, 0.0], [-2.5, 0.0]]];
     assert_eq!(targets(&sim), expected);
     sim.update(5);
@@ -365,12 +365,12 @@ fn names_and_patterns() {
     assert_eq!(view.find_joints(&["f.*", "hinge"]).unwrap(), [follower, hinge]);
     let links = view.find_links(&["tool", "a.*"]).unwrap();
     assert_eq!(links.iter().map(|l| view.link_names()[l.0]).collect::<Vec<_>>(), ["tool", "arm"]);
-    assert_eq!((view.dof(), view.active_dof(), view.get_qpos().ncols()), (2, 1, 2));
-    assert_eq!(view.get_active_joint_ids(None).unwrap(), [hinge]);
-    assert_eq!(view.get_active_joint_ids("all").unwrap(), [hinge]);
-    assert_eq!(view.get_joint_ids("all").unwrap().len(), 2);
+    assert_eq!((view.dof(), view.active_dof(), view.qpos().ncols()), (2, 1, 2));
+    assert_eq!(view.active_joint_ids(None).unwrap(), [hinge]);
+    assert_eq!(view.active_joint_ids("all").unwrap(), [hinge]);
+    assert_eq!(view.joint_ids("all").unwrap().len(), 2);
     // Without a part: of the whole robot, which is the columns of every table.
-    assert_eq!(view.get_joint_ids(None).unwrap(), [hinge, follower]);
+    assert_eq!(view.joint_ids(None).unwrap(), [hinge, follower]);
     assert_eq!((view.active_joint_names(), view.mimic_joint_ids()), (vec!["hinge"], vec![follower]));
     assert_eq!(view.mimic_drivers(), [(hinge, 1.0, 0.0), (hinge, -1.0, 0.0)]);
     assert_error(view.find_joints(&["Hinge"]), "", &["robot \"robot\"", "\"Hinge\"", "\"hinge\""]);
@@ -379,7 +379,7 @@ fn names_and_patterns() {
     assert_error(view.find_links(&["tol"]), "", &["no link", "\"tool\""]);
     assert_error(view.link_velocity("wrist"), "", &["link \"wrist\"", "\"arm\""]);
     assert_error(view.link_id("Arm"), "", &["link \"Arm\"", "\"arm\""]);
-    assert_error(view.get_active_joint_ids("al"), "", &["control part \"al\"", "\"all\""]);
+    assert_error(view.active_joint_ids("al"), "", &["control part \"al\"", "\"all\""]);
 }
 
 /// Targets by the name of a part: its joints in the order of its patterns, and no other joint.
@@ -389,13 +389,13 @@ fn parts() {
     let control_parts = vec![("wrist".into(), vec!["JOINT6".into(), "JOINT4".into()])];
     let arm = sim.add_robot(RobotCfg { control_parts, ..kinetoscope_testkit::worlds::sr5("arm") }).unwrap();
     let [six, four] = ["JOINT6", "JOINT4"].map(|name| sim.robot(arm).joint_id(name).unwrap());
-    let before = sim.robot(arm).get_target_qpos();
+    let before = sim.robot(arm).qpos_target();
     let mut wrist = sim.robot_mut(arm).into_part("wrist").unwrap();
     assert_eq!(wrist.joint_ids(), [six, four]);
-    wrist.set_qpos(&array![[0.2, -0.3]], None).unwrap();
-    wrist.set_qvel(&array![[0.5, 0.25]], Some(&[EnvId(1)])).unwrap();
-    wrist.set_qf(&array![[1.0, 2.0], [3.0, 4.0]], Some(&[EnvId(1), EnvId(0)])).unwrap();
-    assert_error(wrist.set_qpos(&array![[0.2, -0.3, 0.1]], None), "", &["[1, 3]"]);
+    wrist.set_qpos_target(&array![[0.2, -0.3]], None).unwrap();
+    wrist.set_qvel_target(&array![[0.5, 0.25]], Some(&[EnvId(1)])).unwrap();
+    wrist.set_qf_target(&array![[1.0, 2.0], [3.0, 4.0]], Some(&[EnvId(1), EnvId(0)])).unwrap();
+    assert_error(wrist.set_qpos_target(&array![[0.2, -0.3, 0.1]], None), "", &["[1, 3]"]);
     let (mut positions, mut velocities, mut efforts) = (before.clone(), 0.0 * &before, 0.0 * &before);
     for (env, [v6, v4], [f6, f4]) in [(0, [0.0, 0.0], [3.0, 4.0]), (1, [0.5, 0.25], [1.0, 2.0])] {
         (positions[(env, six.0)], positions[(env, four.0)]) = (0.2, -0.3);
@@ -403,7 +403,7 @@ fn parts() {
         (efforts[(env, six.0)], efforts[(env, four.0)]) = (f6, f4);
     }
     let robot = sim.robot(arm);
-    let targets = [robot.get_target_qpos(), robot.get_target_qvel(), robot.get_target_qf()];
+    let targets = [robot.qpos_target(), robot.qvel_target(), robot.qf_target()];
     assert_eq!(targets, [positions, velocities, efforts]);
     assert_error(sim.robot_mut(arm).into_part("wrst").map(drop), "", &["wrst", "wrist"]);
 }

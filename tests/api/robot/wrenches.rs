@@ -53,7 +53,7 @@ fn force_until_it_changes() {
     };
     set(&mut sim, &push, &zero(), outer, chosen);
     set(&mut sim, &zero(), &twist, inner, chosen);
-    let read = sim.robot(id).get_external_wrenches();
+    let read = sim.robot(id).external_wrenches();
     assert_eq!((read.dim(), read[(2, outer.0, 1)], read[(0, inner.0, 5)]), ((ENVS, 3, 6), -2.0, 0.5));
     assert_eq!(read.iter().filter(|x| **x != 0.0).count(), 6);
     let t = 20.0 * H;
@@ -63,14 +63,14 @@ fn force_until_it_changes() {
             set(&mut sim, &zero(), &zero(), link, None);
         }
         sim.update(steps);
-        let (v, spin, x) = (sim.robot(id).get_root_velocity(), sim.robot(id).get_qvel(), share * t / 4.0);
+        let (v, spin, x) = (sim.robot(id).root_velocity(), sim.robot(id).qvel(), share * t / 4.0);
         assert_close("environment 2", v.row(2), [6.0 * x, -2.0 * x, x, 0.0, 0.0, 0.0], EXACT);
         assert_close("environment 0", v.row(0), [0.0, 0.0, 8.0 * x, 0.0, 0.0, 0.0], EXACT);
         let turned = t * 0.5 / 0.02;
         assert_close("spin", spin.column(0), [turned, 0.0, turned], EXACT);
         assert_eq!(v.row(1).to_vec(), [0.0; 6], "environment 1 was not chosen");
     }
-    assert_eq!(sim.robot(id).get_external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
+    assert_eq!(sim.robot(id).external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
 }
 
 /// A ball that turns by w about z: after k steps it is turned by w h k, and so is a force in its axes.
@@ -88,7 +88,7 @@ fn force_in_axes_of_a_link() {
     let mut expected = [[0.0_f64; 2]; ENVS];
     for k in 0..200 {
         sim.update(1);
-        let (angle, v) = (w * H * f64::from(k), sim.robot(id).get_root_velocity());
+        let (angle, v) = (w * H * f64::from(k), sim.robot(id).root_velocity());
         // The grip is a quarter turn ahead; the world does not turn.
         let angles = [angle, angle + std::f64::consts::FRAC_PI_2, 0.0];
         for (env, ([x, y], angle)) in expected.iter_mut().zip(angles).enumerate() {
@@ -99,7 +99,7 @@ fn force_in_axes_of_a_link() {
         }
     }
     let in_world = pose_in(&sim.robot(id).link_pose("grip").unwrap(), 1).rotation * Vector3::new(5.0, 0.0, 0.0);
-    let read = sim.robot(id).get_external_wrenches();
+    let read = sim.robot(id).external_wrenches();
     assert_close("what is read is in world axes", [0, 1, 2].map(|k| read[(1, grip.0, k)]), &in_world, EXACT);
 }
 
@@ -121,7 +121,7 @@ fn gravity_compensation() {
     robot.write_qpos(&array![start], None, None).unwrap();
     robot.set_gravity_compensation(true, None, Some(&[EnvId(0)])).unwrap();
     robot.set_gravity_compensation(true, Some(&[a]), Some(&[EnvId(1)])).unwrap();
-    let on = sim.robot(id).get_gravity_compensation();
+    let on = sim.robot(id).gravity_compensation();
     assert_eq!(on, array![[true, true, true], [false, true, false], [false; 3]]);
     // Forces of gravity on the joints, by virtual work: -m g z of the centers of mass that have weight.
     let height = |q: [f64; 2], weight: [f64; 2]| {
@@ -136,7 +136,7 @@ fn gravity_compensation() {
         })
     };
     sim.update(1);
-    let speeds = sim.robot(id).get_qvel();
+    let speeds = sim.robot(id).qvel();
     assert_close("nothing has weight", speeds.row(0), [0.0; 2], EXACT);
     for (env, weight) in [(1, [0.0, 1.0]), (2, [3.0, 1.0])] {
         // From rest M v' = h load, with MuJoCo's own M.
@@ -149,7 +149,7 @@ fn gravity_compensation() {
         }
     }
     sim.update(100);
-    let q = sim.robot(id).get_qpos();
+    let q = sim.robot(id).qpos();
     assert_close("it stays for a second", q.row(0), start, EXACT);
     assert!((q[(2, 0)] - 0.3).abs() > 0.5, "the control falls: {q}");
     // Off again: it falls as the control did, from the start.
@@ -157,7 +157,7 @@ fn gravity_compensation() {
     sim.reset(None).unwrap();
     sim.robot_mut(id).write_qpos(&array![start], None, None).unwrap();
     sim.update(101);
-    assert_eq!(sim.robot(id).get_qpos().row(0), q.row(2));
+    assert_eq!(sim.robot(id).qpos().row(0), q.row(2));
 }
 
 /// Half of a falling robot without weight falls at half of g. A reset ends wrenches and keeps the compensation; a new model
@@ -172,16 +172,16 @@ fn changes_of_the_world() {
     sim.update(10);
     add_ball(&mut sim, "ball", [9.0, 0.0, 0.0]);
     sim.update(10);
-    let (t, v) = (20.0 * H, sim.robot(id).get_root_velocity());
+    let (t, v) = (20.0 * H, sim.robot(id).root_velocity());
     assert_close("through the change", v.row(1), [t * 2.0 / 4.0, 0.0, -t * G / 2.0, 0.0, 0.0, 0.0], EXACT);
     sim.reset(None).unwrap();
-    assert_eq!(sim.robot(id).get_external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
+    assert_eq!(sim.robot(id).external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
     sim.update(10);
-    let v = sim.robot(id).get_root_velocity();
+    let v = sim.robot(id).root_velocity();
     assert_close("after the reset", v.row(1), [0.0, 0.0, -10.0 * H * G / 2.0, 0.0, 0.0, 0.0], EXACT);
     // Parts that are fixed to the outer ball form one body with it.
     sim.robot_mut(id).set_gravity_compensation(true, Some(&[grip]), Some(&[EnvId(0)])).unwrap();
-    let on = sim.robot(id).get_gravity_compensation();
+    let on = sim.robot(id).gravity_compensation();
     assert_eq!([on.row(0), on.row(1)], [array![true, true, true].view(), array![false, true, false].view()]);
 }
 
@@ -208,7 +208,7 @@ fn mistakes() {
     for (forces, torques, links, envs, parts) in rows {
         let result = sim.robot_mut(id).set_external_wrench(&forces, &torques, WrenchFrame::World, links, envs);
         assert_error(result, "", parts);
-        assert_eq!(sim.robot(id).get_external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
+        assert_eq!(sim.robot(id).external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
     }
     for (links, envs, part) in [
         (unknown, None, "link 3"),
@@ -217,7 +217,7 @@ fn mistakes() {
         (None, again, "set_gravity_compensation names environment 1 twice"),
     ] {
         assert_error(sim.robot_mut(id).set_gravity_compensation(true, links, envs), "", &[part]);
-        assert_eq!(sim.robot(id).get_gravity_compensation(), Array2::from_elem((ENVS, 3), false));
+        assert_eq!(sim.robot(id).gravity_compensation(), Array2::from_elem((ENVS, 3), false));
     }
     // No environment and no link is no mistake.
     let mut robot = sim.robot_mut(id);

@@ -24,7 +24,7 @@ fn names_in_order() {
     assert_eq!(scene.sim().rigid_object_id("zebra").unwrap(), scene.rigid_object_id("zebra").unwrap());
     let pose = row([3.0, 2.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
     scene.rigid_object_mut("apple").unwrap().write_pose(&pose, Some(&[EnvId(2)])).unwrap();
-    let poses = scene.rigid_object("apple").unwrap().get_pose();
+    let poses = scene.rigid_object("apple").unwrap().pose();
     assert_eq!((poses.row(2), poses[(1, 0)]), (pose.row(0), 1.0));
     assert!(scene.sensor::<ContactSensor>("touch").is_ok());
 }

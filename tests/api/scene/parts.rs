@@ -69,9 +69,9 @@ fn run(cfg: SceneCfg) -> ([f64; 2], Array3<f64>, bool) {
     assert!(scene.weld_id("ball").unwrap_err().to_string().contains("is a rigid object, not a weld"));
     scene.weld_mut("nail").unwrap().attach(Some(&[EnvId(1)])).unwrap();
     scene.update_for(1.0).unwrap();
-    let height = |name: &str| scene.rigid_object(name).unwrap().get_pose()[(1, 2)];
+    let height = |name: &str| scene.rigid_object(name).unwrap().pose()[(1, 2)];
     let felt = scene.sensor::<ContactSensor>("touch").unwrap().force_matrix_w();
-    let cubes = scene.rigid_object_group("cubes").unwrap().get_pose();
+    let cubes = scene.rigid_object_group("cubes").unwrap().pose();
     ([height("ball"), height("block")], cubes, felt.iter().any(|f| *f != 0.0))
 }
 
@@ -105,10 +105,10 @@ fn look_up() {
     let mut scene = InteractiveScene::new(declared()).unwrap();
     let group = scene.rigid_object_group_id("{ENV}/cubes").unwrap();
     assert_eq!(scene.sim().rigid_object_group(group).names(), ["cubes.red", "cubes.blue"]);
-    let mut poses = scene.rigid_object_group("cubes").unwrap().get_pose();
+    let mut poses = scene.rigid_object_group("cubes").unwrap().pose();
     poses.index_axis_mut(Axis(2), 0).fill(7.0);
     scene.rigid_object_group_mut("cubes").unwrap().write_pose(&poses, None).unwrap();
-    assert_eq!(scene.rigid_object_group("cubes").unwrap().get_pose(), poses);
+    assert_eq!(scene.rigid_object_group("cubes").unwrap().pose(), poses);
     for (error, expected) in [
         (scene.weld("cubes").unwrap_err(), "\"cubes\" is a group of rigid objects, not a weld"),
         (scene.rigid_object_group("nail").unwrap_err(), "\"nail\" is a weld, not a group of rigid objects"),

@@ -55,12 +55,12 @@ pub(crate) fn declared() -> SceneCfg {
 /// Everything that the scene says after `steps`: equal bits or not at all.
 pub(crate) fn says(scene: &mut InteractiveScene, steps: u32) -> Vec<Vec<u64>> {
     // Environments that differ, so that a mix-up would be seen.
-    let mut start = scene.robot("robot").unwrap().get_qpos();
+    let mut start = scene.robot("robot").unwrap().qpos();
     start.row_mut(1).iter_mut().for_each(|angle| *angle += 0.05);
     scene.robot_mut("robot").unwrap().write_qpos(&start, None, None).unwrap();
     scene.update(steps);
     let robot = scene.robot("robot").unwrap();
-    let state = [robot.get_qpos(), robot.get_qvel(), robot.get_root_pose(), robot.get_root_velocity()];
+    let state = [robot.qpos(), robot.qvel(), robot.root_pose(), robot.root_velocity()];
     let camera = scene.sensor::<Camera>("camera").unwrap();
     let scanner = scene.sensor::<RayCaster>("height_scanner").unwrap();
     let contacts = scene.sensor::<ContactSensor>("contact_forces").unwrap();

@@ -10,7 +10,7 @@ fn written_state_stays() {
     let mut scene = InteractiveScene::new(bundled()).unwrap();
     scene.update(20);
     let mut robot = scene.robot_mut("robot").unwrap();
-    let (mut root, mut joints) = (robot.read().get_default_root_state(), robot.read().get_default_qpos());
+    let (mut root, mut joints) = (robot.read().default_root_state(), robot.read().default_qpos());
     root.row_mut(1)[2] += 0.25;
     root.row_mut(1)[7] = 0.5;
     joints.iter_mut().enumerate().for_each(|(k, q)| *q += 0.004 * k as f64);
@@ -24,10 +24,10 @@ fn written_state_stays() {
 
     let robot = scene.robot("robot").unwrap();
     let same = |found: &Array2<f64>, written: &Array2<f64>| (found - written).iter().all(|off| off.abs() < 1e-15);
-    assert!(same(&robot.get_qpos(), &joints) && same(&robot.get_qvel(), &speeds));
-    assert!(same(&robot.get_root_state(), &root), "{:?}", robot.get_root_state());
+    assert!(same(&robot.qpos(), &joints) && same(&robot.qvel(), &speeds));
+    assert!(same(&robot.root_state(), &root), "{:?}", robot.root_state());
     // Only the named environment's buffers are cleared; its sensors see the written state: 0.25 m higher.
-    let pushed: Vec<f64> = (0..2).map(|env| robot.get_external_wrenches()[(env, 0, 0)]).collect();
+    let pushed: Vec<f64> = (0..2).map(|env| robot.external_wrenches()[(env, 0, 0)]).collect();
     assert_eq!(pushed, [3.0, 0.0]);
     let counts =
         |scene: &InteractiveScene| scene.sensor::<ContactSensor>("contact_forces").unwrap().sample_counts().to_vec();
@@ -41,8 +41,8 @@ fn written_state_stays() {
     scene.reset_to_default(None).unwrap();
     let robot = scene.robot("robot").unwrap();
     assert!(
-        same(&robot.get_qpos(), &robot.get_default_qpos())
-            && same(&robot.get_root_state(), &robot.get_default_root_state())
+        same(&robot.qpos(), &robot.default_qpos())
+            && same(&robot.root_state(), &robot.default_root_state())
     );
     assert_eq!(scene.sim().time(), [0.0; 2]);
     assert!(scene.reset(Some(&[EnvId(2)])).is_err() && scene.reset_to_default(Some(&[EnvId(2)])).is_err());

@@ -172,7 +172,7 @@ fn yaml_files() {
         let mut scene = InteractiveScene::from_file(&path).unwrap();
         assert_eq!((scene.num_envs(), scene.sim().cfg().physics_dt), (2, 0.005));
         scene.update(1);
-        assert_eq!(scene.robot("robot").unwrap().get_stiffness()[(0, 0)], 80.0);
+        assert_eq!(scene.robot("robot").unwrap().stiffness()[(0, 0)], 80.0);
     }
     // The same text is no TOML.
     let path = folder.path().join("scene.toml");

@@ -27,7 +27,7 @@ fn strings(names: &[&str]) -> Vec<String> {
 }
 
 fn velocity(sim: &SimulationManager, object: ObjectId) -> Vector3<f64> {
-    row(&sim.rigid_object(object).get_velocity(), 0, 0)
+    row(&sim.rigid_object(object).velocity(), 0, 0)
 }
 
 /// In every step of a fall, a bounce and the rest after it: the force of the contacts is what the change of velocity needs,
@@ -105,7 +105,7 @@ fn leaning_plank() {
         assert_close("normal force", &normal_force, (weight * cos * normal).as_slice(), REST * weight);
         assert_close("friction", &friction, (weight * sin * up_the_slope).as_slice(), REST * weight);
         assert_eq!(counts[(0, 0, 0)], 4.0, "the corners of the face");
-        let pose = pose_in(&sim.rigid_object(box_).get_pose(), 0);
+        let pose = pose_in(&sim.rigid_object(box_).pose(), 0);
         let face = pose * nalgebra::Point3::new(0.0, 0.0, -0.1);
         assert_close("contact point", &point, face.coords.as_slice(), OVERLAP);
         assert!((point - pose.translation.vector).norm() > 0.09, "the control: not the middle of the box");
@@ -161,7 +161,7 @@ fn action_and_reaction() {
         assert!(rocking < 0.05 * weight * sin, "{rocking} of {weight}");
         let limit = Tolerance::absolute(rocking + 1e-11, "what the stack still rocks");
         assert_number("friction", friction[(a, below, 0)], -weight * sin, limit);
-        let at = vector(&points, a, below) - row(&sim.rigid_object(boxes[a]).get_pose(), 0, 0);
+        let at = vector(&points, a, below) - row(&sim.rigid_object(boxes[a]).pose(), 0, 0);
         // The load on a contact is up to (1/3 + 1/2) * 3 = 2.5 times the acceleration of one box alone.
         assert!((at.z + 0.1).abs() < 2.5 * OVERLAP.absolute && at.x.abs() < 0.1 && at.y.abs() < 0.1, "{at}");
         let net = sensor.friction_forces_w();
@@ -346,7 +346,7 @@ fn bounces() {
             for _ in 0..stride {
                 step += 1;
                 judge.update(1);
-                let now = judge.rigid_object(other).get_velocity();
+                let now = judge.rigid_object(other).velocity();
                 for (env, (touches, since, last)) in phases.iter_mut().enumerate() {
                     // One newton on one kilogram.
                     let pushed = (now[(env, 2)] - speed[(env, 2)]) / dt + G > 1.0;
@@ -364,7 +364,7 @@ fn bounces() {
                 }
             }
             let sensor = sim.sensor(id).unwrap();
-            assert_eq!(sim.rigid_object(ball).get_velocity(), speed, "the same motion");
+            assert_eq!(sim.rigid_object(ball).velocity(), speed, "the same motion");
             let flags = [sensor.first_air().unwrap(), sensor.first_contact().unwrap()];
             for env in 0..2 {
                 let (touches, since, last) = measured[env];

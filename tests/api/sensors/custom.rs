@@ -59,7 +59,7 @@ impl Sensor for Height {
 fn eager_and_lazy() {
     let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(3, 2));
     let robot = sim.add_robot(sr5("robot")).unwrap();
-    sim.robot_mut(robot).set_qpos(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
+    sim.robot_mut(robot).set_qpos_target(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
     let cfg = HeightCfg { lazy: true, ..Default::default() };
     let eager = sim.add_sensor("eager", HeightCfg::default()).unwrap();
     let lazy = sim.add_sensor("lazy", cfg.clone()).unwrap();

@@ -22,7 +22,7 @@ fn targets_from_the_source() {
     let id = sim.add_sensor("frames", cfg).unwrap();
     let bare = sim.add_sensor("bare", FrameTransformerCfg::from("link3", targets)).unwrap();
     let qpos = array![[0.3, 0.5, -0.4, 0.2, 0.7, -0.1], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]];
-    sim.robot_mut(arm).set_qpos(&qpos, None, None).unwrap();
+    sim.robot_mut(arm).set_qpos_target(&qpos, None, None).unwrap();
     sim.update(50);
     let (sensor, bare) = (sim.sensor(id).unwrap(), sim.sensor(bare).unwrap());
     assert_eq!(sensor.target_frame_names(), ["cube", "tool", "arm/link2", "arm/link3"]);

@@ -41,8 +41,8 @@ fn tumbling_corner() {
     let id = sim.add_sensor("imu", ImuCfg { offset, ..ImuCfg::on("box") }).unwrap();
     sim.rigid_object_mut(object).write_velocity(&array![[0.3, -0.1, 0.2, 3.0, 5.0, -4.0]], None).unwrap();
     let dt = sim.cfg().physics_dt;
-    let rotation = |sim: &SimulationManager| pose_in(&sim.rigid_object(object).get_pose(), 0).rotation;
-    let spin = |sim: &SimulationManager| row(&sim.rigid_object(object).get_velocity(), 0, 3);
+    let rotation = |sim: &SimulationManager| pose_in(&sim.rigid_object(object).pose(), 0).rotation;
+    let spin = |sim: &SimulationManager| row(&sim.rigid_object(object).velocity(), 0, 3);
     for _ in 0..100 {
         let world_from_body = rotation(&sim);
         let omega = world_from_body.inverse() * spin(&sim);

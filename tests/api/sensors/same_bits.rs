@@ -49,7 +49,7 @@ fn world(settings: SimulationManagerCfg, with_arm: bool) -> (SimulationManager, 
     sim.mjcf_part_mut(part).write_qvel(&Array2::from_shape_fn((n, 1), |(env, _)| env as f64), None).unwrap();
     if let Some(arm) = arm {
         let targets = Array2::from_shape_fn((n, 6), |(env, joint)| 0.3 * (env as f64 - 2.0) + 0.1 * joint as f64);
-        sim.robot_mut(arm).set_qpos(&targets, None, None).unwrap();
+        sim.robot_mut(arm).set_qpos_target(&targets, None, None).unwrap();
     }
     (sim, arm)
 }
@@ -307,7 +307,7 @@ fn states(settings: SimulationManagerCfg, with_arm: bool, with_sensors: bool) ->
     for k in 0..40 {
         if let Some(arm) = arm {
             let target = 0.5 * f64::from(k % 5) - 1.0;
-            sim.robot_mut(arm).set_qpos(&array![[target, 1.0, -target, 0.3, target, 0.0]], None, None).unwrap();
+            sim.robot_mut(arm).set_qpos_target(&array![[target, 1.0, -target, 0.3, target, 0.0]], None, None).unwrap();
         }
         match k {
             10 => sim.reset(Some(&[EnvId(1)])).unwrap(),

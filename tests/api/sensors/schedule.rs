@@ -26,7 +26,7 @@ fn assert_newest_first(name: &str, read: &[ArrayD<f64>], history: &ArrayViewD<'_
 fn joint_state() {
     let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(2, 2));
     let robot = sim.add_robot(sr5("robot")).unwrap();
-    sim.robot_mut(robot).set_qpos(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
+    sim.robot_mut(robot).set_qpos_target(&array![[0.1, 0.2, -0.3, 0.4, -0.5, 0.6]], None, None).unwrap();
     let slow = JointStateCfg { sampling: remembering(SamplingCfg::every(0.05)), ..Default::default() };
     let id = sim.add_sensor("joints", slow).unwrap();
     let always = sim.add_sensor("always", JointStateCfg::default()).unwrap();
@@ -34,7 +34,7 @@ fn joint_state() {
     for step in 1..=17_u32 {
         sim.update(1);
         if step % 5 == 0 {
-            sampled.push(sim.robot(robot).get_qpos().into_dyn());
+            sampled.push(sim.robot(robot).qpos().into_dyn());
         }
         let sensor = sim.sensor(id).unwrap();
         assert_eq!(sensor.sample_counts().to_vec(), vec![u64::from(step / 5); 2], "step {step}");
@@ -46,15 +46,15 @@ fn joint_state() {
     assert_newest_first("positions", &sampled, &sensor.position_history().into_dyn());
     assert!((sensor.stamps()[0] - 0.15).abs() < 1e-12);
     sim.reset(Some(&[EnvId(1)])).unwrap();
-    assert_eq!(sim.sensor(id).unwrap().positions().row(1), sim.robot(robot).get_qpos().row(1), "nothing stale");
+    assert_eq!(sim.sensor(id).unwrap().positions().row(1), sim.robot(robot).qpos().row(1), "nothing stale");
     for (steps, counts) in [(3, [4, 0]), (2, [4, 1])] {
         sim.update(steps);
         assert_eq!(sim.sensor(id).unwrap().sample_counts().to_vec(), counts);
     }
     // Efforts are those of the drives: gravity's about JOINT2.
     sim.update(400);
-    assert_eq!(sim.sensor(always).unwrap().efforts(), sim.robot(robot).get_qf().view());
-    assert!(sim.robot(robot).get_qf()[(0, 1)].abs() > 5.0);
+    assert_eq!(sim.sensor(always).unwrap().efforts(), sim.robot(robot).qf().view());
+    assert!(sim.robot(robot).qf()[(0, 1)].abs() > 5.0);
 }
 
 /// Forces of a cube that falls onto an edge, so that it tumbles: forces of all directions.

@@ -30,7 +30,7 @@ fn newton_euler() {
     });
     let frame = sim.add_sensor("origin", ImuCfg::on("link3")).unwrap();
     let id = sim.add_sensor("wrench", JointWrenchCfg { links: vec!["link3".into()], ..Default::default() }).unwrap();
-    sim.robot_mut(arm).set_qpos(&array![[1.0, 0.4, -0.5, 0.8, 0.6, -0.7]], None, None).unwrap();
+    sim.robot_mut(arm).set_qpos_target(&array![[1.0, 0.4, -0.5, 0.8, 0.6, -0.7]], None, None).unwrap();
     let vector = |view: kinetoscope::ndarray::ArrayView2<'_, f64>| Vector3::from_fn(|k, _| view[(0, k)]);
     let rotation = |imu: &Imu| from_wxyz(std::array::from_fn(|k| imu.quat_w()[(0, k)]));
     let mut fastest = 0.0_f64;

@@ -38,7 +38,7 @@ fn add_ball(sim: &mut SimulationManager) -> ObjectId {
 }
 
 fn height_of(sim: &SimulationManager, ball: ObjectId) -> f64 {
-    sim.rigid_object(ball).get_pose()[(0, 2)]
+    sim.rigid_object(ball).pose()[(0, 2)]
 }
 
 /// Height of the surface as the configuration describes it, computed with barycentric weights; `None` beside it.
@@ -119,7 +119,7 @@ fn ball_at_rest() {
     let sensor = sim.add_sensor("contact", feel).unwrap();
     assert_eq!((sim.terrain(terrain).uid(), sim.terrain(terrain).cfg()), ("pit", &pit()));
     sim.update(1000);
-    let (pose, velocity) = (sim.rigid_object(ball).get_pose(), sim.rigid_object(ball).get_velocity());
+    let (pose, velocity) = (sim.rigid_object(ball).pose(), sim.rigid_object(ball).velocity());
     let sensor = sim.sensor(sensor).unwrap();
     for env in 0..2 {
         let center = [0, 1, 2].map(|k| pose[(env, k)]);
@@ -142,7 +142,7 @@ fn added_later() {
     let mut sim = empty();
     let ball = add_ball(&mut sim);
     sim.update(10);
-    let state = |sim: &SimulationManager| (sim.rigid_object(ball).get_pose(), sim.rigid_object(ball).get_velocity());
+    let state = |sim: &SimulationManager| (sim.rigid_object(ball).pose(), sim.rigid_object(ball).velocity());
     let before = state(&sim);
     sim.add_terrain(pit()).unwrap();
     assert_eq!(before, state(&sim));

@@ -31,7 +31,7 @@ fn above() -> CameraCfg {
 #[test]
 fn camera_on_a_link() {
     let (mut sim, robot, _) = sim(1, 1);
-    sim.robot_mut(robot).set_qpos(&array![[0.1, 0.4, -0.9, 0.2, -0.5, 0.3]], None, None).unwrap();
+    sim.robot_mut(robot).set_qpos_target(&array![[0.1, 0.4, -0.9, 0.2, -0.5, 0.3]], None, None).unwrap();
     let link_from_camera = from_xyz_rpy([0.09, 0.05, 0.04], [2.4, 0.3, -0.2]);
     let (pos, rotation) = (link_from_camera.translation.vector.into(), link_from_camera.rotation);
     let placement = Placement::Pose { pos, rotation };

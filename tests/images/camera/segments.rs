@@ -84,7 +84,7 @@ fn boxes() {
             let expected = match &entry.link {
                 Some(link) => sim.robot(robot).link_pose(link).unwrap(),
                 None if entry.object == "ground" => continue,
-                None => sim.rigid_object(sim.rigid_object_id(&entry.object).unwrap()).get_pose(),
+                None => sim.rigid_object(sim.rigid_object_id(&entry.object).unwrap()).pose(),
             };
             let expected = pose_in(&expected, env);
             // Poses that are drawn are in single precision.

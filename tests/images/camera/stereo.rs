@@ -46,7 +46,7 @@ fn disparity() {
     let (mut of_ball, mut judged) = (0, 0);
     for env in 0..3 {
         let world_from_camera = pose_in(&poses, env);
-        let middle = Point3::from(pose_in(&ball.get_pose(), env).translation.vector);
+        let middle = Point3::from(pose_in(&ball.pose(), env).translation.vector);
         for ((v, u), &d) in disparity.index_axis(Axis(0), env).indexed_iter() {
             if mask[(env, v, u)] == 0 {
                 assert_eq!(d, 0.0);
@@ -77,7 +77,7 @@ fn on_a_link() {
     let cfg = StereoCameraCfg { camera, left_to_right_pos: [0.06, 0.0, 0.0], ..Default::default() };
     let id = sim.add_sensor("stereo", cfg).unwrap();
     let target = Array2::from_shape_fn((2, sim.robot(robot).dof()), |(env, k)| 0.1 * (env + k) as f64);
-    sim.robot_mut(robot).set_qpos(target.view(), None, None).unwrap();
+    sim.robot_mut(robot).set_qpos_target(target.view(), None, None).unwrap();
     sim.update(50);
     let link = sim.robot(robot).link_pose("ee_link").unwrap();
     let stereo = sim.sensor(id).unwrap();

@@ -42,7 +42,7 @@ fn height_scan() {
     let id = sim.add_sensor("scanner", cfg).unwrap();
     for _ in 0..10 {
         sim.update(2);
-        let poses = sim.rigid_object(trunk).get_pose();
+        let poses = sim.rigid_object(trunk).pose();
         let scan = sim.sensor(id).unwrap();
         assert_eq!(scan.hits().dim(), (3, 187, 3));
         for env in 0..3 {

@@ -91,7 +91,7 @@ fn weight(cfg: RobotCfg) {
     for pose in 0..3 {
         let wanted = Array2::from_shape_fn((1, dof), |(_, j)| 0.3 * f64::from(pose) * (1.0 + j as f64).sin());
         sim.robot_mut(id).write_qpos(&wanted, None, None).unwrap();
-        let qpos = sim.robot(id).get_qpos().row(0).to_vec();
+        let qpos = sim.robot(id).qpos().row(0).to_vec();
         let expected = of_description(sim.robot(id).description(), base, &qpos);
         let (found, subtree, subtree_com) = sim.batch().read(0, |env| {
             let com = Vector3::from_column_slice(&env.data().subtree_com()[..3]);

@@ -272,7 +272,7 @@ fn absurd_inertias() {
         }
         sim.update(1000);
         assert_eq!(sim.diverged(), [], "{what}");
-        let (height, speed) = (sim.robot(id).get_root_pose()[(0, 2)], sim.robot(id).get_root_velocity());
+        let (height, speed) = (sim.robot(id).root_pose()[(0, 2)], sim.robot(id).root_velocity());
         assert!((height - 0.025).abs() < 1e-3, "{what} lies at {height} m");
         assert!(speed.iter().all(|v| v.abs() < 1e-2), "{what} moves: {speed}");
     }

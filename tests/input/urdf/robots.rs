@@ -133,7 +133,7 @@ fn every_real_robot() {
         let Ok(id) = sim.add_robot(urdf_robot("robot", file)) else { continue };
         sim.update(10);
         let robot = sim.robot(id);
-        for numbers in [robot.get_qpos(), robot.get_qvel(), robot.get_qf()] {
+        for numbers in [robot.qpos(), robot.qvel(), robot.qf()] {
             assert!(numbers.iter().all(|x| x.is_finite()), "{}: {numbers}", file.display());
         }
         assert!(sim.diverged().is_empty(), "{}: {:?}", file.display(), sim.diverged());

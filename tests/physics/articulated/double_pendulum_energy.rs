@@ -29,7 +29,7 @@ fn change(cfg: SimulationManagerCfg) -> (f64, Vec<[f64; 2]>) {
     lab.write_joints(robot, &START.0, &START.1);
     let energy = |sim: &SimulationManager| {
         let robot = sim.robot(robot);
-        let (q, v) = (robot.get_qpos().row(0).to_vec(), robot.get_qvel().row(0).to_vec());
+        let (q, v) = (robot.qpos().row(0).to_vec(), robot.qvel().row(0).to_vec());
         tree.energy(&joints(robot.joint_names(), &q, &v, &[0.0; 2]), Motion::rest(EARTH), EARTH)
     };
     let start = energy(&lab.sim);

@@ -79,7 +79,7 @@ fn turned(attached: bool) -> [f64; 3] {
     let mut worst = [0.0_f64; 2];
     lab.watch(2_000, |_, sim| {
         let robot = sim.robot(robot);
-        let (q, v) = (robot.get_qpos(), robot.get_qvel());
+        let (q, v) = (robot.qpos(), robot.qvel());
         worst[0] = worse(worst[0], residual(q[(0, 0)], q[(0, 3)]).abs());
         worst[1] = worse(worst[1], (v[(0, 3)] - velocities(q[(0, 0)], v[(0, 0)])[1]).abs());
     });

@@ -54,7 +54,7 @@ fn fallen(path: PathBuf, cfg: SimulationManagerCfg, seconds: f64, swing: f64, sp
     let state = |sim: &SimulationManager| {
         let body = root(sim, robot);
         let robot = sim.robot(robot);
-        let (q, v) = (robot.get_qpos().row(0).to_vec(), robot.get_qvel().row(0).to_vec());
+        let (q, v) = (robot.qpos().row(0).to_vec(), robot.qvel().row(0).to_vec());
         let still = vec![0.0; q.len()];
         let pose = Pose::from_parts(body.position.into(), body.rotation);
         let motion = Motion { pose, velocity: body.velocity, spin: body.spin, ..Motion::rest(EARTH) };

@@ -32,7 +32,7 @@ fn held(yaw: f64, spin: f64, seconds: f64) -> [f64; 3] {
     let mut lab = Lab::new(weightless());
     let robot = lab.robot(&urdf(&links, &joints), RobotCfg { drive, ..RobotCfg::default() });
     lab.write_joints(robot, &[0.0; 3], &[yaw, 0.0, spin]);
-    lab.sim.robot_mut(robot).set_qvel(&row(&[yaw, 0.0, 0.0]), None, None).unwrap();
+    lab.sim.robot_mut(robot).set_qvel_target(&row(&[yaw, 0.0, 0.0]), None, None).unwrap();
     lab.run(seconds);
     let effort = lab.effort(robot);
     [effort[0], effort[1], lab.v(robot)[2]]

@@ -17,12 +17,12 @@ fn largest(cfg: SimulationManagerCfg) -> [f64; 3] {
     let robot = lab.sim.add_robot(cfg).unwrap();
     let dof = lab.sim.robot(robot).dof();
     let targets: Vec<f64> = (0..dof).map(|k| 0.3 * (1.0 + 2.0 * k as f64).sin()).collect();
-    lab.sim.robot_mut(robot).set_qpos(&row(&targets), None, None).unwrap();
+    lab.sim.robot_mut(robot).set_qpos_target(&row(&targets), None, None).unwrap();
     let mut worst = [0.0_f64; 3];
     lab.watch(1_000, |_, sim| {
         let body = root(sim, robot);
         let robot = sim.robot(robot);
-        let (q, v) = (robot.get_qpos().row(0).to_vec(), robot.get_qvel().row(0).to_vec());
+        let (q, v) = (robot.qpos().row(0).to_vec(), robot.qvel().row(0).to_vec());
         let pose = Pose::from_parts(body.position.into(), body.rotation);
         let motion = Motion { pose, velocity: body.velocity, spin: body.spin, ..Motion::rest(Vector3::zeros()) };
         let still = vec![0.0; q.len()];

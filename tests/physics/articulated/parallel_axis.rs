@@ -94,7 +94,7 @@ fn moved(kind: Robot, parts: &[(Link, [f64; 3], [f64; 3])], force: [f64; 3], tor
             lab.sim.add_robot(cfg).unwrap()
         }
     };
-    let com = lab.sim.robot(robot).get_root_com_position();
+    let com = lab.sim.robot(robot).root_com_position();
     let com = Vector3::new(com[(0, 0)], com[(0, 1)], com[(0, 2)]) - start;
     lab.push_link(robot, "trunk", force.into(), torque.into());
     lab.run(1e-3);

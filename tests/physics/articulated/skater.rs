@@ -25,7 +25,7 @@ fn drawn(stiffness: f64) -> [f64; 2] {
     let mut lab = Lab::new(rk4(weightless()));
     let robot = lab.robot(&urdf(&links, &[turn, rail]), RobotCfg { drive, ..RobotCfg::default() });
     lab.write_joints(robot, &[0.0, 0.5], &[2.0, 0.0]);
-    lab.sim.robot_mut(robot).set_qpos(&row(&[0.0, 0.1]), None, None).unwrap();
+    lab.sim.robot_mut(robot).set_qpos_target(&row(&[0.0, 0.1]), None, None).unwrap();
     lab.run(10.0);
     [lab.v(robot)[0], lab.q(robot)[1]]
 }

@@ -45,7 +45,7 @@ fn errors(closed: bool) -> [f64; 2] {
     let mut worst = [0.0_f64; 2];
     lab.watch(2_000, |_, sim| {
         let robot = sim.robot(robot);
-        let (q, v) = (robot.get_qpos(), robot.get_qvel());
+        let (q, v) = (robot.qpos(), robot.qvel());
         worst[0] = worse(worst[0], (q[(0, 3)] - place(q[(0, 0)])).abs());
         worst[1] = worse(worst[1], (v[(0, 3)] - speed(q[(0, 0)], v[(0, 0)])).abs());
     });

@@ -32,7 +32,7 @@ fn lever(drive_type: DriveType, which: usize) -> f64 {
     let robot = lab.robot(&text, RobotCfg { drive, init_qpos, ..RobotCfg::default() });
     let mut aim = [0.0, 0.7];
     aim[which] += AIM;
-    lab.sim.robot_mut(robot).set_qpos(&row(&aim), None, None).unwrap();
+    lab.sim.robot_mut(robot).set_qpos_target(&row(&aim), None, None).unwrap();
     lab.run(1e-3);
     lab.v(robot)[which] / 1e-3
 }

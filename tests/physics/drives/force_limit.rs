@@ -23,7 +23,7 @@ fn pushed(of: &Variant, limit: f64) -> [f64; 4] {
         wheel.lab.watch(of.delay(), |_, _| ());
         wheel.load(load);
         let (robot, mut least) = (wheel.robot, f64::INFINITY);
-        wheel.lab.watch(STEPS, |_, sim| least = least.min(sim.robot(robot).get_qf()[(0, 0)]));
+        wheel.lab.watch(STEPS, |_, sim| least = least.min(sim.robot(robot).qf()[(0, 0)]));
         (least, wheel.q(), wheel.v())
     };
     let ((least, q, v), (_, _, loaded)) = (run(0.0), run(-LOAD));

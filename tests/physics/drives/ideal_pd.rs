@@ -29,7 +29,7 @@ fn swung(rate: f64, explicit: bool, steps: u32) -> [f64; 2] {
     wheel.aim(0.0);
     let robot = wheel.robot;
     let mut last = [0.0; 2];
-    wheel.lab.watch(steps, |_, sim| last = [last[1], sim.robot(robot).get_qpos()[(0, 0)]]);
+    wheel.lab.watch(steps, |_, sim| last = [last[1], sim.robot(robot).qpos()[(0, 0)]]);
     last
 }
 

@@ -31,10 +31,10 @@ fn followed(coupled: bool) -> [f64; 3] {
     let mut lab = Lab::new(weightless());
     let robot = lab.robot(&text, RobotCfg { drive: implicit(STIFFNESS, 4.0), ..RobotCfg::default() });
     // Where nothing couples it the second joint has a drive, which holds it where it is.
-    lab.sim.robot_mut(robot).set_qpos(&row(&[AIM, 0.0]), None, None).unwrap();
+    lab.sim.robot_mut(robot).set_qpos_target(&row(&[AIM, 0.0]), None, None).unwrap();
     let mut worst = 0.0_f64;
     lab.watch(1_000, |_, sim| {
-        let q = sim.robot(robot).get_qpos();
+        let q = sim.robot(robot).qpos();
         worst = worst.max((q[(0, 1)] - RATIO * q[(0, 0)] - OFFSET).abs());
     });
     lab.push_link(robot, "second", Vector3::zeros(), Vector3::new(0.0, 0.0, LOAD));

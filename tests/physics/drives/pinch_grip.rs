@@ -59,7 +59,7 @@ fn pinch(drive: DriveCfg, limit: f64, friction: f64) -> Pinch {
     let block = lab.object(cube("block", GRIP, MASS, [0.0; 3]));
     let filters = vec!["hand/left".into(), "hand/right".into()];
     let touch = lab.sim.add_sensor("touch", ContactSensorCfg { filters, ..ContactSensorCfg::of("block") }).unwrap();
-    lab.sim.robot_mut(hand).set_qpos(&row(&[0.02, 0.02]), None, None).unwrap();
+    lab.sim.robot_mut(hand).set_qpos_target(&row(&[0.02, 0.02]), None, None).unwrap();
     lab.push(block, Vector3::new(0.0, 0.0, MASS * G), Vector3::zeros());
     lab.sim.update(120);
     lab.push(block, Vector3::zeros(), Vector3::zeros());

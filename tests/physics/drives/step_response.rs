@@ -65,7 +65,7 @@ fn response(drive: DriveCfg) -> Response {
     let (mut rise, mut highest, mut settling, mut before) = (f64::NAN, 0.0_f64, f64::NAN, [0.0, 0.0]);
     let (robot, mut curve) = (wheel.robot, Vec::new());
     wheel.lab.watch(7_500, |t, sim| {
-        let part = sim.robot(robot).get_qpos()[(0, 0)] / AIM;
+        let part = sim.robot(robot).qpos()[(0, 0)] / AIM;
         let crossed = |level: f64| before[0] + (t - before[0]) * (level - before[1]) / (part - before[1]);
         if rise.is_nan() && part >= 1.0 {
             rise = crossed(1.0);

@@ -32,12 +32,12 @@ impl Wheel {
 
     /// Asks for a position \[rad\].
     pub(super) fn aim(&mut self, position: f64) {
-        self.lab.sim.robot_mut(self.robot).set_qpos(&row(&[position]), None, None).unwrap();
+        self.lab.sim.robot_mut(self.robot).set_qpos_target(&row(&[position]), None, None).unwrap();
     }
 
     /// Asks for a velocity \[rad/s\].
     pub(super) fn speed(&mut self, velocity: f64) {
-        self.lab.sim.robot_mut(self.robot).set_qvel(&row(&[velocity]), None, None).unwrap();
+        self.lab.sim.robot_mut(self.robot).set_qvel_target(&row(&[velocity]), None, None).unwrap();
     }
 
     /// Adds an effort to what the drive gives, or is all that there is where there is none \[N m\].

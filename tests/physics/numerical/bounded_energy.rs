@@ -19,7 +19,7 @@ fn changes(cfg: SimulationManagerCfg) -> ([f64; 2], Vec<[f64; 2]>) {
     let steps = (200.0 / lab.dt()).round() as u32;
     lab.watch(steps, |t, sim| {
         let robot = sim.robot(robot);
-        let (q, v) = (robot.get_qpos()[(0, 0)], robot.get_qvel()[(0, 0)]);
+        let (q, v) = (robot.qpos()[(0, 0)], robot.qvel()[(0, 0)]);
         let change = 0.5 * v * v / G - q.cos() + START.cos();
         if t < 10.0 {
             first = worse(first, change.abs());

@@ -39,7 +39,7 @@ impl Fall {
     /// Adds to the velocity of the first joint of an environment \[rad/s\].
     pub(super) fn hasten(&mut self, env: usize, faster: f64) {
         let mut robot = self.sim.robot_mut(self.robot);
-        let mut v = robot.read().get_qvel().row(env).to_vec();
+        let mut v = robot.read().qvel().row(env).to_vec();
         v[0] += faster;
         robot.write_qvel(&row(&v), None, Some(&[EnvId(env)])).unwrap();
     }
@@ -54,7 +54,7 @@ impl Fall {
     /// Everything that moves in one environment.
     pub(super) fn state(&self, env: usize) -> Vec<f64> {
         let robot = self.sim.robot(self.robot);
-        let arrays = [robot.get_root_state(), robot.get_qpos(), robot.get_qvel(), robot.get_qf()];
+        let arrays = [robot.root_state(), robot.qpos(), robot.qvel(), robot.qf()];
         arrays.iter().flat_map(|array| array.row(env).to_vec()).collect()
     }
 

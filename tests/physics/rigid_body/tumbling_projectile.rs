@@ -25,7 +25,7 @@ fn flown_in_steps(dt: f64, gravity: bool, com: [f64; 3]) -> Vector3<f64> {
     let throw = [1.0, 2.0, 8.0, 10.0, 12.0, -9.0];
     lab.sim.robot_mut(robot).write_root_com_velocity(&row(&throw), None).unwrap();
     lab.run(2.0);
-    let com = lab.sim.robot(robot).get_root_com_position();
+    let com = lab.sim.robot(robot).root_com_position();
     Vector3::new(com[(0, 0)], com[(0, 1)], com[(0, 2)])
 }
 

@@ -234,7 +234,7 @@ impl Conductor {
                 }
                 let envs = env.map(|env| [env]);
                 let envs = envs.as_ref().map(<[EnvId; 1]>::as_slice);
-                let set = sim.robot_mut(robot).set_qpos(&arr2(&[[value]]), Some(&[joint]), envs);
+                let set = sim.robot_mut(robot).set_qpos_target(&arr2(&[[value]]), Some(&[joint]), envs);
                 set.map_err(|error| error.to_string())?;
             }
             Command::Drag { env, body, hold, target } => {

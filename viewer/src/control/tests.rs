@@ -132,7 +132,7 @@ fn target_and_reset() {
     let joint = names.joints[0].joint;
     viewer.send(Command::SetTarget { robot, joint, env: Some(EnvId(1)), value: 0.8 });
     sim.update(300);
-    let q = sim.robot(robot).get_qpos();
+    let q = sim.robot(robot).qpos();
     // The drive has no load about the vertical: it ends in its target. Critically damped or slower poles of 10 s⁻¹ and
     // more leave e^-20 of the way after 3 s.
     assert!((q[(1, 0)] - 0.8).abs() < 1e-6, "{q}");
@@ -140,7 +140,7 @@ fn target_and_reset() {
     viewer.send(Command::Reset(Some(EnvId(1))));
     step_until(&mut sim, |sim| sim.time()[1] < 1.0);
     assert!(sim.time()[0] > 2.9, "only one was put back");
-    assert!(sim.robot(robot).get_qpos()[(1, 0)].abs() < 1e-9);
+    assert!(sim.robot(robot).qpos()[(1, 0)].abs() < 1e-9);
 }
 
 /// Refusals are reported and counted; each is shown until the next action.
@@ -249,12 +249,12 @@ fn spring_in_closed_form() {
         sim.update(100);
         let wt = 8.0 * 0.1 * f64::from(k);
         let expected = 1.0 - (1.0 + wt) * (-wt).exp();
-        let x = sim.rigid_object(id).get_pose()[(0, 0)];
+        let x = sim.rigid_object(id).pose()[(0, 0)];
         // Semi-implicit Euler with the force of the beginning of the step moves the poles by w² h / 2 relative to w: the
         // curve is late or early by less than w h = 0.8 %, of a way of 1 m.
         assert!((x - expected).abs() < 0.008, "after {wt}: {x}, not {expected}");
     }
-    let speed = |sim: &SimulationManager| sim.rigid_object(id).get_velocity()[(0, 0)];
+    let speed = |sim: &SimulationManager| sim.rigid_object(id).velocity()[(0, 0)];
     viewer.send(Command::Release);
     sim.update(1);
     let v = speed(&sim);
@@ -281,12 +281,12 @@ fn two_springs() {
     second.send(drag([0.0; 3], [0.0, 1.0, 0.0]));
     // The slower pole is (2 - √2) w = 4.7 s⁻¹: e^-14 of the way is left after 3 s.
     sim.update(3000);
-    let pose = sim.rigid_object(id).get_pose();
+    let pose = sim.rigid_object(id).pose();
     assert!((pose[(0, 0)] - 0.5).abs() < 1e-5 && (pose[(0, 1)] - 0.5).abs() < 1e-5, "{pose}");
     // One lets go: the other has it alone. Its pole is w = 8 s⁻¹, twice: (1 + 24) e^-24 is left.
     first.send(Command::Release);
     sim.update(3000);
-    let pose = sim.rigid_object(id).get_pose();
+    let pose = sim.rigid_object(id).pose();
     assert!(pose[(0, 0)].abs() < 1e-6 && (pose[(0, 1)] - 1.0).abs() < 1e-6, "{pose}");
 
     let (mut sim, id) = floating_cube();
@@ -295,7 +295,7 @@ fn two_springs() {
     second.send(drag([0.0, -0.1, 0.0], [-1.0, -0.1, 0.0]));
     // Obeyed after the first step; the second is the first that is pulled.
     sim.update(2);
-    let v = sim.rigid_object(id).get_velocity();
+    let v = sim.rigid_object(id).velocity();
     // 2 kg (8 rad/s)² 1 m = 128 N, each 0.1 m beside the centre, against m a² / 6, for a millisecond.
     let spin = -2.0 * 0.1 * 128.0 / (MASS * 0.04 / 6.0) * 1e-3;
     assert!((v[(0, 5)] - spin).abs() < 1e-6 * spin.abs(), "{v} instead of {spin}");

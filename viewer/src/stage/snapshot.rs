@@ -200,8 +200,8 @@ impl Snapshot {
         if wants.joints {
             for (_, robot) in sim.robot_ids() {
                 let robot = sim.robot(robot);
-                let (now, target, limits) = (robot.get_qpos(), robot.get_target_qpos(), robot.qpos_limits());
-                let efforts = robot.get_qf();
+                let (now, target, limits) = (robot.qpos(), robot.qpos_target(), robot.qpos_limits());
+                let efforts = robot.qf();
                 for (k, env) in self.envs.iter_mut().enumerate() {
                     let of = |j: usize| [now[(k, j)], target[(k, j)], limits[(k, j, 0)], limits[(k, j, 1)]];
                     env.joints.extend((0..robot.dof()).map(of));

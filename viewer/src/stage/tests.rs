@@ -158,7 +158,7 @@ fn overlays() {
     // A trail of something that moves.
     let mut trails = Trails::default();
     trails.add(&shown, Shown::All);
-    sample.sim.robot_mut(sample.robot).set_qpos(&ndarray::arr2(&[[1.5]]), None, None).unwrap();
+    sample.sim.robot_mut(sample.robot).set_qpos_target(&ndarray::arr2(&[[1.5]]), None, None).unwrap();
     let trail = Overlays { trails: true, ..none };
     assert_eq!(draw(&shown, trail, Some(&trails)), draw(&shown, none, None), "nothing has moved yet");
     sample.put_cube([0.0, 0.0, 0.9]);

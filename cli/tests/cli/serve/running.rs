@@ -70,7 +70,7 @@ impl Running {
                 let took = start.elapsed().as_secs_f64();
                 let mut now = now.lock().unwrap();
                 now.steps += 1;
-                now.positions = sim.robot(robot).get_qpos();
+                now.positions = sim.robot(robot).qpos();
                 now.longest_step = now.longest_step.max(took);
                 drop(now);
                 // As a program with work of its own; both cores are for the tests too.
