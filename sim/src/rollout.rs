@@ -157,7 +157,6 @@ impl SimulationManager {
     /// # Errors
     /// Wrong shape, a control that is not finite, an environment that does not exist, a snapshot of another scene or with
     /// another number of states, or no memory for a copy.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn rollout<'c>(
         &self,
         controls: impl AsArray<'c, f64, Ix3>,

@@ -122,7 +122,6 @@ impl Terms {
     }
 }
 
-#[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
 fn distinct<'n>(kind: TermKind, names: impl Iterator<Item = &'n String>) -> Result<()> {
     let mut seen: Vec<&String> = Vec::new();
     for name in names {

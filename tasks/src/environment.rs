@@ -200,7 +200,6 @@ impl Env {
     /// # Errors
     /// Actions of another shape or that are not finite, or an environment without an episode: then nothing was done. A term that
     /// fails, or gives what is of another shape or not finite: then the step is broken off, and every environment has to be reset.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn step<'a>(&mut self, actions: impl AsArray<'a, f64, Ix2>) -> Result<Step> {
         let actions = self.within_bounds(actions.into())?;
         if let Some(env) = self.rows.iter().position(|row| !row.runs) {

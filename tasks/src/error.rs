@@ -166,7 +166,6 @@ impl EnvError {
     }
 
     /// There is no such name.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub(crate) fn unknown<'n>(what: &'static str, name: &str, names: impl IntoIterator<Item = &'n str>) -> Self {
         let candidates = kinetoscope_sim::pattern::closest(name, names).into_iter().map(str::to_string).collect();
         Self::UnknownName { what, name: name.into(), candidates }

@@ -55,7 +55,6 @@ impl Robot<'_> {
     ///
     /// # Errors
     /// Unknown part, link or environment; wrong shape; a number that is not finite; a part that ends in several links.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn compute_fk<'t, 'n>(
         &self,
         qpos: impl AsArray<'t, f64, Ix2>,
@@ -81,7 +80,6 @@ impl Robot<'_> {
     ///
     /// # Errors
     /// Unknown environment; wrong shape; a number that is not finite.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn compute_link_fk<'t>(
         &self,
         qpos: impl AsArray<'t, f64, Ix2>,
@@ -114,7 +112,6 @@ impl Robot<'_> {
     ///
     /// # Errors
     /// As [`compute_fk`](Self::compute_fk).
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn jacobian<'n>(
         &self,
         tip: impl Into<Tip<'n>>,
@@ -208,7 +205,6 @@ impl Robot<'_> {
     /// of length zero; a part that ends in several links, or none of whose joints moves the frame; a joint that an equality of an
     /// MJCF file holds on a curve, where it would have to move with those that are searched. A target that cannot
     /// be reached is no error.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn compute_ik<'n>(
         &self,
         targets: &(impl Poses + ?Sized),

@@ -228,7 +228,6 @@ impl<'a> MjcfPartMut<'a> {
     /// # Errors
     /// Wrong shape, unknown actuator or environment, or one that is named twice, a value that is not finite; then nothing
     /// is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_ctrl<'t>(
         &mut self,
         controls: impl AsArray<'t, f64, Ix2>,
@@ -267,7 +266,6 @@ impl<'a> MjcfPartMut<'a> {
     /// # Errors
     /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite, a quaternion of length zero;
     /// then nothing is written.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_qpos<'t>(&mut self, positions: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let places = self.simulation.parts[self.index].qpos.clone();
         let rows = self.checked("write_qpos", positions.into(), &places, env_ids)?;
@@ -297,7 +295,6 @@ impl<'a> MjcfPartMut<'a> {
     ///
     /// # Errors
     /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite; then nothing is written.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_qvel<'t>(&mut self, velocities: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let places = self.simulation.parts[self.index].dofs.clone();
         let rows = self.checked("write_qvel", velocities.into(), &places, env_ids)?;
@@ -320,7 +317,6 @@ impl<'a> MjcfPartMut<'a> {
     /// # Errors
     /// There is no such body, or it is not moved by hand (with those that are); wrong shape, unknown environment, or one that
     /// is named twice, a value that is not finite, a quaternion of length zero; then nothing is written.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_mocap_pose<'t>(
         &mut self,
         body: &str,

@@ -100,7 +100,6 @@ impl<'a> RigidObjectGroupMut<'a> {
     /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite,
     /// a quaternion of length zero; then nothing is written. Where MuJoCo itself refuses the pose of an object that stands, those
     /// of objects before it in the group are written.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix3>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let (argument, poses): (_, ArrayView3<'_, f64>) = ("write_pose", poses.into());
         let envs = self.check_shape(argument, poses, (7, "environments, objects, x y z qw qx qy qz"), env_ids)?;
@@ -119,7 +118,6 @@ impl<'a> RigidObjectGroupMut<'a> {
     /// # Errors
     /// One of the objects is not dynamic; wrong shape, unknown environment, or one that is named twice, a value that is not
     /// finite; then nothing is written.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_velocity<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix3>,

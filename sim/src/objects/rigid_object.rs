@@ -96,7 +96,6 @@ impl<'a> RigidObjectMut<'a> {
     /// # Errors
     /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite, a
     /// quaternion of length zero; then nothing is written.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.body().write_poses("write_pose", poses.into(), env_ids)
     }
@@ -106,7 +105,6 @@ impl<'a> RigidObjectMut<'a> {
     ///
     /// # Errors
     /// As [`write_pose`](Self::write_pose); static and kinematic objects have no velocity.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_velocity<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix2>,

@@ -107,7 +107,6 @@ impl RigidObjectMut<'_> {
     /// # Errors
     /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a mass that is not finite or
     /// below 1e-15 kg; then nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_mass<'t>(&mut self, masses: impl AsArray<'t, f64, Ix1>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let masses = masses.into().insert_axis(Axis(1));
         self.set("set_mass", "environments, 1", &[Property::Mass], masses, env_ids)
@@ -118,7 +117,6 @@ impl RigidObjectMut<'_> {
     /// # Errors
     /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a number that is not finite;
     /// then nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_center_of_mass<'t>(
         &mut self,
         centers: impl AsArray<'t, f64, Ix2>,
@@ -134,7 +132,6 @@ impl RigidObjectMut<'_> {
     /// # Errors
     /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, moments that no body has; then
     /// nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_inertia<'t>(&mut self, moments: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let (argument, meaning) = ("set_inertia", "environments, three moments");
         self.set(argument, meaning, &[Property::Inertia], moments.into(), env_ids)
@@ -146,7 +143,6 @@ impl RigidObjectMut<'_> {
     /// # Errors
     /// Wrong shape, unknown environment, or one that is named twice, a coefficient that is negative or not finite; then
     /// nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_friction<'t>(&mut self, frictions: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let properties = [Property::Friction, Property::TorsionalFriction, Property::RollingFriction];
         let meaning = "environments, sliding torsional rolling";
@@ -159,7 +155,6 @@ impl RigidObjectMut<'_> {
     /// # Errors
     /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a number that is negative or
     /// not finite; then nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_damping<'t>(&mut self, dampings: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let properties = [Property::LinearDamping, Property::AngularDamping];
         self.set("set_damping", "environments, linear angular", &properties, dampings.into(), env_ids)
@@ -203,7 +198,6 @@ impl RigidObjectMut<'_> {
     /// # Errors
     /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a value that is not finite;
     /// then nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_external_wrench<'f, 't>(
         &mut self,
         forces: impl AsArray<'f, f64, Ix2>,

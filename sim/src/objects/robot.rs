@@ -79,7 +79,6 @@ impl<'a> Robot<'a> {
     /// # Errors
     /// There is no such part; the error lists those there are.
     #[doc(alias = "get_joint_ids")]
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
         let Some(part) = part.into() else { return Ok((0..self.dof()).map(JointIndex).collect()) };
         let members = self.data.parts.get(part).ok_or_else(|| unknown("control part", part, self.control_parts()))?;
@@ -256,7 +255,6 @@ impl<'a> RobotMut<'a> {
     /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
     /// set.
     #[doc(alias = "set_qpos")]
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qpos_target<'t>(
         &mut self,
         targets: impl AsArray<'t, f64, Ix2>,
@@ -278,7 +276,6 @@ impl<'a> RobotMut<'a> {
     /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
     /// set.
     #[doc(alias = "set_qvel")]
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qvel_target<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix2>,
@@ -301,7 +298,6 @@ impl<'a> RobotMut<'a> {
     /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
     /// set.
     #[doc(alias = "set_qf")]
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qf_target<'t>(
         &mut self,
         efforts: impl AsArray<'t, f64, Ix2>,
@@ -345,7 +341,6 @@ impl<'a> RobotMut<'a> {
     /// # Errors
     /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
     /// written.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_qpos<'t>(
         &mut self,
         positions: impl AsArray<'t, f64, Ix2>,
@@ -368,7 +363,6 @@ impl<'a> RobotMut<'a> {
     ///
     /// # Errors
     /// As [`write_qpos`](Self::write_qpos).
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_qvel<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix2>,
@@ -392,7 +386,6 @@ impl<'a> RobotMut<'a> {
     /// # Errors
     /// The base is fixed; wrong shape, unknown environment, or one that is named twice, a value that is not finite, a
     /// quaternion of length zero; then nothing is written.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_root_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.root().write_poses("write_root_pose", poses.into(), env_ids)
     }
@@ -402,7 +395,6 @@ impl<'a> RobotMut<'a> {
     ///
     /// # Errors
     /// As [`write_root_pose`](Self::write_root_pose).
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_root_velocity<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix2>,

@@ -279,7 +279,6 @@ fn surfaces(description: &RobotDescription, cfg: &RobotCfg, role: &Role) -> Resu
 }
 
 /// There is no such name; the nearest of those there are.
-#[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
 pub(super) fn unknown<'n>(what: &'static str, name: &str, names: impl IntoIterator<Item = &'n str>) -> Error {
     let candidates = pattern::closest(name, names).into_iter().map(str::to_string).collect();
     Error::UnknownName { what, name: name.into(), candidates }

@@ -82,7 +82,6 @@ impl RobotMut<'_> {
     /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is negative or not finite; a
     /// joint that was added without a drive, or is driven by [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then
     /// nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_stiffness<'t>(
         &mut self,
         values: impl AsArray<'t, f64, Ix2>,
@@ -100,7 +99,6 @@ impl RobotMut<'_> {
     ///
     /// # Errors
     /// As [`set_stiffness`](Self::set_stiffness).
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_damping<'t>(
         &mut self,
         values: impl AsArray<'t, f64, Ix2>,
@@ -152,7 +150,6 @@ impl RobotMut<'_> {
     /// # Errors
     /// Wrong shape, unknown joint or environment, or one that is named twice; a joint of another model, or a delay above
     /// the model's `max_delay`. Then nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_delay<'t>(
         &mut self,
         steps: impl AsArray<'t, u32, Ix2>,

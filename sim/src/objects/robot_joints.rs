@@ -76,7 +76,6 @@ impl RobotMut<'_> {
     /// # Errors
     /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is not finite or negative; more
     /// than 0 for a joint whose model has no place for it. Then nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_friction<'t>(
         &mut self,
         values: impl AsArray<'t, f64, Ix2>,
@@ -93,7 +92,6 @@ impl RobotMut<'_> {
     /// # Errors
     /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is negative or not finite. Then
     /// nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_joint_damping<'t>(
         &mut self,
         values: impl AsArray<'t, f64, Ix2>,
@@ -111,7 +109,6 @@ impl RobotMut<'_> {
     /// # Errors
     /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is negative or not finite. Then
     /// nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_armature<'t>(
         &mut self,
         values: impl AsArray<'t, f64, Ix2>,

@@ -74,7 +74,6 @@ impl RobotMut<'_> {
     /// # Errors
     /// Wrong shape, unknown joint or environment, or one that is named twice, NaN, a lower end above the upper one, an end
     /// beyond the robot's own limits; a joint without a drive. Then nothing is set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qpos_limits<'t>(
         &mut self,
         limits: impl AsArray<'t, f64, Ix3>,
@@ -145,7 +144,6 @@ impl RobotMut<'_> {
     /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is negative or NaN, or that its
     /// actuator model cannot take; a joint without a drive. Then nothing is set.
     #[doc(alias = "max_velocity")]
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qvel_limits<'t>(
         &mut self,
         limits: impl AsArray<'t, f64, Ix2>,
@@ -171,7 +169,6 @@ impl RobotMut<'_> {
     /// actuator model cannot take ([`DcMotor`](crate::DcMotor) needs a finite one); a joint without a drive, or one that is
     /// driven by [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
     #[doc(alias = "max_effort")]
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_qf_limits<'t>(
         &mut self,
         limits: impl AsArray<'t, f64, Ix2>,

@@ -82,7 +82,6 @@ impl RobotData {
 }
 
 /// Height of the lowest point of collision shapes \[m\].
-#[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
 fn lowest<'g>(data: &Data, geoms: impl IntoIterator<Item = &'g GeomIndex>) -> f64 {
     let model = data.model();
     let collides = |geom: usize| model.geom_contype()[geom] != 0 || model.geom_conaffinity()[geom] != 0;

@@ -25,7 +25,6 @@ impl<'a> RobotMut<'a> {
     }
 }
 
-#[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
 impl RobotPartMut<'_> {
     /// Columns of the part's joints among those of the robot.
     pub fn joint_ids(&self) -> &[JointIndex] {

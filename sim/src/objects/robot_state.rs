@@ -71,7 +71,6 @@ impl Robot<'_> {
     /// There is no such part; the error lists those there are.
     #[doc(alias = "remove_mimic")]
     #[doc(alias = "get_active_joint_ids")]
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn active_joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
         let mut joints = self.joint_ids(part)?;
         joints.retain(|joint| self.data.plans()[joint.0].mimic.is_none());
@@ -254,7 +253,6 @@ impl RobotMut<'_> {
     ///
     /// # Errors
     /// As [`write_qpos`](Self::write_qpos); an acceleration beyond ±1e10, which MuJoCo takes for a diverged one.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_qacc<'t>(
         &mut self,
         accelerations: impl AsArray<'t, f64, Ix2>,
@@ -277,7 +275,6 @@ impl RobotMut<'_> {
     ///
     /// # Errors
     /// As [`write_root_pose`](Self::write_root_pose).
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_root_com_velocity<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix2>,

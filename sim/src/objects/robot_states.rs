@@ -22,7 +22,6 @@ impl RobotMut<'_> {
     ///
     /// # Errors
     /// As [`write_root_pose`](Self::write_root_pose); then nothing is written.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_root_state<'t>(
         &mut self,
         states: impl AsArray<'t, f64, Ix2>,
@@ -51,7 +50,6 @@ impl RobotMut<'_> {
     ///
     /// # Errors
     /// As [`write_qpos`](Self::write_qpos), of either argument; then nothing is written.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn write_joint_state<'t, 'v>(
         &mut self,
         positions: impl AsArray<'t, f64, Ix2>,

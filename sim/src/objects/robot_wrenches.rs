@@ -73,7 +73,6 @@ impl RobotMut<'_> {
     /// # Errors
     /// Wrong shape, unknown link or environment, or one that is named twice, a value that is not finite; then nothing is
     /// set.
-    #[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
     pub fn set_external_wrench<'f, 't>(
         &mut self,
         forces: impl AsArray<'f, f64, Ix3>,

@@ -42,7 +42,6 @@ fn random_qpos(sim: &SimulationManager, id: RobotId, count: usize) -> Array2<f64
 }
 
 /// Largest absolute number.
-#[expect(single_use_lifetimes, reason = "anonymous lifetimes in impl Trait are unstable")]
 fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
     values.into_iter().fold(0.0, |most, x| most.max(x.abs()))
 }
