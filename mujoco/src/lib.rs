@@ -28,6 +28,7 @@ mod newer;
 mod options;
 mod plugins;
 mod prefetch;
+mod raw;
 mod ray;
 mod state;
 #[cfg(test)]
@@ -56,6 +57,7 @@ pub use version::{TARGET, Target, VersionError, check_version, version_string};
 pub use vfs::{Asset, LoadError, compile, compile_file};
 pub use weld::Weld;
 
+pub use mujoco_sys as sys;
 pub use mujoco_sys::{
     mjCNSTR_FRICTION_DOF, mjCNSTR_FRICTION_TENDON, mjGEOM_BOX, mjGEOM_CAPSULE, mjGEOM_CYLINDER, mjGEOM_ELLIPSOID,
     mjGEOM_HFIELD, mjGEOM_MESH, mjGEOM_PLANE, mjGEOM_SPHERE, mjINT_EULER, mjINT_IMPLICIT, mjINT_RK4, mjJNT_BALL,

@@ -123,3 +123,24 @@ fn forces_before_integration() {
     data.solve_accelerations(&later, &mut spare).expect("solves");
     assert!(far(&data) > 1.0, "{:?}", data.cfrc_int());
 }
+
+/// Potential energy m g h by a function that is not wrapped, and an error of MuJoCo as a value.
+#[test]
+fn raw_calls() {
+    let model = model(
+        r#"<mujoco><option gravity="0 0 -10"/><worldbody><body pos="0 0 0.3"><freejoint/><geom size="0.1" mass="2"/></body></worldbody></mujoco>"#,
+    );
+    let mut data = Data::new(&model).expect("small");
+    data.forward().expect("computes");
+    // SAFETY: an engine function, which writes the energy of the data.
+    let energy = unsafe {
+        data.with_raw(|model, data| {
+            crate::sys::mj_energyPos(model, data);
+            (*data).energy[0]
+        })
+    };
+    assert!((energy.expect("computes") - 2.0 * 10.0 * 0.3).abs() < 1e-12);
+    // SAFETY: the error handler ends the call, in which nothing has a destructor.
+    let stopped = unsafe { data.with_raw(|_, _| crate::sys::mju_error(c"on purpose".as_ptr())) };
+    assert!(stopped.expect_err("an error").to_string().contains("on purpose"));
+}
