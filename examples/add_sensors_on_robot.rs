@@ -12,6 +12,9 @@ use clap::Parser;
 use kinetoscope::ndarray::{Array2, ArrayView3, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
+use kinetoscope::sensors::ContactSensor;
+use kinetoscope::sensors::camera::Camera;
+use kinetoscope::sensors::ray::{HitTargets, RayCaster};
 use launcher::spawn::SpawnFlags;
 use launcher::{Launcher, Progress, picture, stage};
 use serde_json::{Value, json};
@@ -58,7 +61,7 @@ fn run(args: &Args) -> launcher::Result {
     let cfg = scene_cfg(args)?;
     let dt = cfg.simulation.physics_dt;
     let mut scene = InteractiveScene::new(cfg)?;
-    scene.sim_mut().set_camera_view([3.5; 3], [0.0; 3])?;
+    scene.sim_mut().scene_mut().set_camera_view([3.5; 3], [0.0; 3])?;
     for diagnostic in scene.sim().diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
@@ -250,7 +253,7 @@ fn report(
         "base_height": heights,
         "total_mass": scene.robot("robot")?.total_mass(),
         "env_steps_per_second": rate,
-        "warnings": sim.warning_counts(),
+        "warnings": sim.warnings().counts(),
     }))
 }
 
@@ -264,6 +267,6 @@ fn write_pictures(scene: &mut InteractiveScene, out: &Path) -> launcher::Result 
         picture::write_png(&file, &picture::color_picture([width, height], &pixels))?;
     }
     let sim = scene.sim_mut();
-    let markers = sim.markers();
+    let markers = sim.scene().markers();
     stage::write(sim, &markers, [3.5; 3], [0.0; 3], &out.join("stage.png"))
 }

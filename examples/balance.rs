@@ -21,6 +21,7 @@ use kinetoscope::robot::description::{Geometry, RobotDescription};
 use kinetoscope::robot::urdf::assemble;
 use kinetoscope::scene::Random;
 use kinetoscope::scene::pose::from_xyz_rpy;
+use kinetoscope::sensors::NoiseCfg;
 use kinetoscope::sim::WrenchFrame;
 use launcher::trial::{self, Album, Count};
 use launcher::{Launcher, Progress, grip};

@@ -84,8 +84,8 @@ fn run(args: &Args) -> launcher::Result {
     }
     let rate = progress.env_steps_per_second(step, sim.num_envs());
     print_table(&finished, &sim, step, rate);
-    for (env, reason) in sim.diverged() {
-        eprintln!("environment {} diverged: {reason}", env.0);
+    for diverged in sim.diverged() {
+        eprintln!("environment {} diverged: {diverged}", diverged.env.0);
     }
     recording.finish(&mut sim)?;
     args.launcher.screenshot(&mut sim, "create_robot.png")?;
@@ -99,8 +99,8 @@ fn run(args: &Args) -> launcher::Result {
         "env_steps_per_second": rate,
         "steps": step,
         "threads": sim.threads(),
-        "buffer_growths": sim.buffer_growths(),
-        "warnings": sim.warning_counts(),
+        "buffer_growths": sim.warnings().buffer_growths(),
+        "warnings": sim.warnings().counts(),
         "phases": finished,
     }))?;
     println!("Stopping simulation...");

@@ -12,7 +12,9 @@ use clap::{Parser, ValueEnum};
 use kinetoscope::ndarray::{ArrayView1, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
-use kinetoscope::sensors::camera::RenderProgress;
+use kinetoscope::sensors::camera::{
+    Camera, CameraConvention, RenderProgress, SegmentLevel, Segmentation, SegmentationCfg,
+};
 use launcher::arm::ArmWithHand;
 use launcher::panel::{self, Views, grid, tile};
 use launcher::views::SensorWindow;
@@ -133,7 +135,7 @@ fn run(args: &Args) -> launcher::Result {
         out: saved.then(|| args.launcher.out_folder(true)).transpose()?,
         raw: args.raw,
         instances: (args.mask == MaskLevel::Instance)
-            .then(|| sim.segmentation(&SegmentationCfg::default()))
+            .then(|| sim.scene().segmentation(&SegmentationCfg::default()))
             .transpose()?,
         window,
         end: progress.end(),
@@ -149,7 +151,11 @@ fn run(args: &Args) -> launcher::Result {
             if step % every == 0 {
                 progress.say(message);
                 let target = position(wrist);
-                sim.robot_mut(robot).set_qpos_target(ArrayView1::from(&target).insert_axis(Axis(0)), Some(&arm), None)?;
+                sim.robot_mut(robot).set_qpos_target(
+                    ArrayView1::from(&target).insert_axis(Axis(0)),
+                    Some(&arm),
+                    None,
+                )?;
                 if !album.add(sim.sensor(camera)?, step)? {
                     break 'steps;
                 }
@@ -169,7 +175,7 @@ fn run(args: &Args) -> launcher::Result {
         album.images,
         args.width,
         args.height,
-        sim.sensor_threads()
+        sim.cfg().num_threads()
     );
     println!(
         "{step} steps x {} environments, pictures included: {rate:.0} environment steps per second\n",
@@ -183,14 +189,14 @@ fn run(args: &Args) -> launcher::Result {
         "threads": sim.threads(),
         "width": args.width,
         "height": args.height,
-        "ids": sim.mask_ids().iter().map(|id| json!({
+        "ids": sim.scene().mask_ids().iter().map(|id| json!({
             "id": id.id, "object": id.object, "link": id.link, "class": id.class,
         })).collect::<Vec<_>>(),
         "images": album.files,
         "renderer": renderer,
         "images_per_second": images_per_second,
         "env_steps_per_second": rate,
-        "warnings": sim.warning_counts(),
+        "warnings": sim.warnings().counts(),
     }))?;
     println!("Stopping simulation...");
     drop(sim);
@@ -327,8 +333,13 @@ fn print_table(album: &Album, sim: &SimulationManager) {
     for file in &album.files {
         let number = |key: &str| file[key].as_f64().unwrap_or(f64::NAN);
         let ids: Vec<i64> = file["ids"].as_array().into_iter().flatten().filter_map(Value::as_i64).collect();
-        let mut objects: Vec<&str> =
-            sim.mask_ids().iter().filter(|id| ids.contains(&i64::from(id.id))).map(|id| id.object.as_str()).collect();
+        let mut objects: Vec<&str> = sim
+            .scene()
+            .mask_ids()
+            .iter()
+            .filter(|id| ids.contains(&i64::from(id.id)))
+            .map(|id| id.object.as_str())
+            .collect();
         objects.dedup();
         println!(
             "{:<28} {:>6} {:>5} {:>8.3} - {:>7.3}  {}",

@@ -11,9 +11,10 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::ndarray::{ArrayView1, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::render::lens::{Domain, Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Panorama};
-use kinetoscope::render::lens::{Orthographic, Stereographic};
-use kinetoscope::sensors::camera::{CameraInfo, Lens, PointFrame};
+use kinetoscope::render::lens::{
+    Domain, Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
+};
+use kinetoscope::sensors::camera::{Camera, CameraInfo, Lens, PointFrame};
 use launcher::panel::tile;
 use launcher::{Launcher, PathFlags, Progress, Renderer, picture};
 use serde_json::{Value, json};
@@ -109,7 +110,7 @@ fn run(args: &Args) -> launcher::Result {
         "steps": step,
         "env_steps_per_second": rate,
         "lenses": lenses,
-        "warnings": sim.warning_counts(),
+        "warnings": sim.warnings().counts(),
     }))
 }
 

@@ -20,7 +20,7 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
-use kinetoscope::sim::Cone;
+use kinetoscope::sim::{Cone, ObjectId, Tip};
 use launcher::motion::Motion;
 use launcher::trial::{self, Album, Count};
 use launcher::{Launcher, Progress, grip};
@@ -95,7 +95,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let cube = add_things(&mut sim)?;
     let out = args.launcher.out.clone();
     let mut album = Album::new(&mut sim, "grasp", out, [1.25, -0.65, 0.75], [0.45, 0.05, 0.25])?;
-    sim.randomize(&Randomization::new().with(Property::Mass, "cube", Draw::Set(MASSES)), None)?;
+    sim.properties_mut().randomize(&Randomization::new().with(Property::Mass, "cube", Draw::Set(MASSES)), None)?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }
@@ -156,7 +156,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let (poses, velocities) = (places(&sim), sim.rigid_object(cube).velocity());
     let (palms, diverged) = (trial::poses(&sim.robot(robot).link_pose(grip::PALM)?), trial::diverged(&sim));
     for env in 0..sim.num_envs() {
-        let mass = sim.properties(EnvId(env))?.get(Property::Mass, "cube")?[0];
+        let mass = sim.properties().of(EnvId(env))?.get(Property::Mass, "cube")?[0];
         let lifted = held >= HOLD - 1e-9 && rises[env] >= LIFT;
         let on_shelf = shelf_pose().inv_mul(&poses[env]).translation.vector;
         let speed = velocities.row(env).iter().fold(0.0, |most: f64, v| most.max(v.abs()));

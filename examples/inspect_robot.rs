@@ -10,6 +10,7 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
+use kinetoscope::sim::{DriveType, Strictness};
 use launcher::still::StillFlags;
 use std::ffi::OsString;
 use std::io::Write;

@@ -15,6 +15,7 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
+use kinetoscope::sim::{ArticulationId, Tip};
 use launcher::motion::Motion;
 use launcher::trial::{self, Album, Count};
 use launcher::{Launcher, Progress, grip, user_or_asset};
@@ -97,7 +98,8 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let out = args.launcher.out.clone();
     let mut album = Album::new(&mut sim, "open_drawer", out, [0.3, -1.2, 0.75], [0.55, 0.0, 0.2])?;
     let friction = Draw::Set([args.slide_friction; 2]);
-    sim.randomize(&Randomization::new().with(Property::DryFriction, "cabinet/drawer_slide", friction), None)?;
+    sim.properties_mut()
+        .randomize(&Randomization::new().with(Property::DryFriction, "cabinet/drawer_slide", friction), None)?;
     for diagnostic in sim.diagnostics() {
         eprintln!("warning: {diagnostic}");
     }

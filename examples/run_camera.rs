@@ -11,8 +11,9 @@ use clap::Parser;
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, Random};
-use kinetoscope::sensors::camera::PointFrame;
 use kinetoscope::sensors::camera::colormap::mask_color;
+use kinetoscope::sensors::camera::{Camera, CameraConvention, PointFrame};
+use kinetoscope::sim::ObjectId;
 use launcher::{Launcher, Progress, cloud, picture, stage};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -103,7 +104,7 @@ fn run(args: &Args) -> launcher::Result {
     }
     if args.draw {
         let markers = balls(sim.sensor(camera)?, args.camera_id)?;
-        let origins = sim.env_origins();
+        let origins = sim.cfg().env_origins();
         let target = [0, 1, 2].map(|k| origins[(args.camera_id, k)]);
         let eye = target.map(|x| x + 3.2);
         stage::write(&mut sim, &markers, eye, target, &out.join("run_camera.png"))?;
@@ -124,7 +125,7 @@ fn run(args: &Args) -> launcher::Result {
         "width": args.width,
         "height": args.height,
         "camera_id": args.camera_id,
-        "ids": sim.mask_ids().iter().map(|id| json!({
+        "ids": sim.scene().mask_ids().iter().map(|id| json!({
             "id": id.id, "object": id.object, "class": id.class,
         })).collect::<Vec<_>>(),
         "pixels_by_class": classes,
@@ -134,7 +135,7 @@ fn run(args: &Args) -> launcher::Result {
         "files": files,
         "images_per_second": images_per_second,
         "env_steps_per_second": rate,
-        "warnings": sim.warning_counts(),
+        "warnings": sim.warnings().counts(),
     }))
 }
 
@@ -206,9 +207,9 @@ fn shapes(camera: &Camera, step: u64) -> launcher::Result<String> {
 
 /// The class of each mask id, and a number for each class, in the order of the ids.
 fn classes(sim: &SimulationManager) -> (BTreeMap<i32, String>, BTreeMap<String, i32>) {
-    let of_id = sim.mask_ids().iter().map(|id| (id.id, id.class.clone())).collect();
+    let of_id = sim.scene().mask_ids().iter().map(|id| (id.id, id.class.clone())).collect();
     let mut numbers = BTreeMap::new();
-    for id in sim.mask_ids() {
+    for id in sim.scene().mask_ids() {
         let next = numbers.len() as i32 + 1;
         numbers.entry(id.class.clone()).or_insert(next);
     }

@@ -10,6 +10,7 @@ use clap::Parser;
 use kinetoscope::ndarray::{ArrayView3, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
+use kinetoscope::sensors::{FrameTransformer, FrameTransformerCfg, TargetFrameCfg};
 use launcher::spawn::SpawnFlags;
 use launcher::{Launcher, Progress, stage};
 use serde_json::{Value, json};
@@ -87,8 +88,8 @@ fn run(args: &Args) -> launcher::Result {
     println!("{step} steps x {} environments: {rate:.0} environment steps per second", sim.num_envs());
     if let Some(out) = &args.launcher.out {
         launcher::make_folder(out)?;
-        let (markers, file) = (sim.markers(), out.join("run_frame_transformer.png"));
-        let reach = sim.env_origins().iter().fold(0.0, |far: f64, x| far.max(x.abs()));
+        let (markers, file) = (sim.scene().markers(), out.join("run_frame_transformer.png"));
+        let reach = sim.cfg().env_origins().iter().fold(0.0, |far: f64, x| far.max(x.abs()));
         let eye = [1.3 + 1.6 * reach, 1.5 + 1.6 * reach, 1.0 + reach];
         stage::write(&mut sim, &markers, eye, [0.0, 0.0, 0.35], &file)?;
         println!("Picture written to {}", file.display());
@@ -107,7 +108,7 @@ fn run(args: &Args) -> launcher::Result {
         "distance_of_foot_user_from_foot": user,
         "base_height": sim.robot(robot).root_pose()[(0, 2)],
         "env_steps_per_second": rate,
-        "warnings": sim.warning_counts(),
+        "warnings": sim.warnings().counts(),
     }))
 }
 
@@ -163,7 +164,7 @@ fn table(sim: &SimulationManager, frames: SensorId<FrameTransformer>) -> launche
 
 /// The largest distance, over environments, of a frame from the link LF_FOOT \[m\].
 fn apart(sim: &SimulationManager, frames: SensorId<FrameTransformer>, name: &str) -> launcher::Result<f64> {
-    let robot = sim.robot(sim.robot_id("robot")?);
+    let robot = sim.robot(sim.entities().robot_id("robot")?);
     let (foot, frames) = (robot.link_pose("LF_FOOT")?, sim.sensor(frames)?);
     let target = frames.target_frame_names().iter().position(|n| n == name).ok_or("the frame is gone")?;
     let at = frames.target_pos_w();

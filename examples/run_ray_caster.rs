@@ -13,6 +13,7 @@ use kinetoscope::scene::Random;
 use kinetoscope::scene::terrain::RoughTerrain;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
+use kinetoscope::sim::{ObjectId, TerrainId};
 use launcher::{Launcher, Progress, stage};
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -130,9 +131,9 @@ fn run(args: &Args) -> launcher::Result {
     println!("{} hits, {} misses; hits lie on the terrain to {:.1e} m", totals.hits, totals.misses, totals.worst);
     if let Some(out) = &args.launcher.out {
         launcher::make_folder(out)?;
-        let origins = sim.env_origins();
+        let origins = sim.cfg().env_origins();
         let reach = origins.iter().fold(SIDE / 2.0, |far: f64, x| far.max(x.abs() + 1.5));
-        let (markers, file) = (sim.markers(), out.join("run_ray_caster.png"));
+        let (markers, file) = (sim.scene().markers(), out.join("run_ray_caster.png"));
         stage::write(&mut sim, &markers, [1.3 * reach, 1.6 * reach, 1.2 * reach], [0.6, 0.7, -0.5], &file)?;
         println!("Picture written to {}", file.display());
     }
@@ -146,13 +147,13 @@ fn run(args: &Args) -> launcher::Result {
         "hits": totals.hits,
         "misses": totals.misses,
         "largest_distance_of_hits_from_the_terrain": totals.worst,
-        "terrain_height_range": sim.terrain(terrain).height_range(),
+        "terrain_height_range": sim.entities().terrain(terrain).height_range(),
         "ms_per_step_without_rays": bare,
         "ms_per_step_with_rays": scanned,
         "rays_per_second": (scanned > bare).then(|| (rays * sim.num_envs()) as f64 / (scanned - bare) * 1e3),
         "env_steps_per_second": rate,
         "measurements": totals.lines,
-        "warnings": sim.warning_counts(),
+        "warnings": sim.warnings().counts(),
     }))
 }
 
@@ -207,7 +208,7 @@ fn throw(sim: &mut SimulationManager, ball: ObjectId, noise: &mut [Random]) -> l
 impl Totals {
     /// Holds every hit against the terrain's own height there.
     fn count(&mut self, sim: &SimulationManager, scene: &Scene) -> launcher::Result {
-        let (scanner, terrain) = (sim.sensor(scene.scanner)?, sim.terrain(scene.terrain));
+        let (scanner, terrain) = (sim.sensor(scene.scanner)?, sim.entities().terrain(scene.terrain));
         for hit in scanner.hits().rows() {
             if !hit[2].is_finite() {
                 self.misses += 1;

@@ -10,7 +10,7 @@ use clap::Parser;
 use kinetoscope::ndarray::Axis;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::terrain::RoughTerrain;
-use kinetoscope::sensors::camera::PointFrame;
+use kinetoscope::sensors::camera::{CameraConvention, PointFrame};
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCamera, RayCasterCameraCfg};
 use launcher::{Launcher, Progress, cloud, picture};
 use serde_json::json;
@@ -101,7 +101,7 @@ fn run(args: &Args) -> launcher::Result {
         return Err("the camera sees nothing of the terrain".into());
     }
     let off = points.iter().map(|p| {
-        let height = sim.terrain(terrain).height_at([f64::from(p[0]), f64::from(p[1])]);
+        let height = sim.entities().terrain(terrain).height_at([f64::from(p[0]), f64::from(p[1])]);
         height.map_or(f64::INFINITY, |height| (height - f64::from(p[2])).abs())
     });
     // On the rim, rounding puts a point beside the terrain.
@@ -137,7 +137,7 @@ fn run(args: &Args) -> launcher::Result {
         "files": files,
         "images_per_second": images_per_second,
         "env_steps_per_second": rate,
-        "warnings": sim.warning_counts(),
+        "warnings": sim.warnings().counts(),
     }))
 }
 

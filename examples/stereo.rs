@@ -13,6 +13,7 @@ use kinetoscope::ndarray::Axis;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_row;
 use kinetoscope::sensors::camera::colormap::depth_color;
+use kinetoscope::sensors::camera::{Camera, CameraConvention, StereoCamera, StereoCameraCfg};
 use launcher::{Launcher, PathFlags, Progress, cloud, picture};
 use nalgebra::Point3;
 use serde_json::json;
@@ -128,7 +129,7 @@ fn run(args: &Args) -> launcher::Result {
         "files": files,
         "renderer": renderer,
         "env_steps_per_second": rate,
-        "warnings": sim.warning_counts(),
+        "warnings": sim.warnings().counts(),
     }))
 }
 

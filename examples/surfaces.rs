@@ -9,6 +9,7 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::ndarray::Axis;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::{LampKind, SurfaceCfg};
 use launcher::{Launcher, PathFlags, Progress, picture};
 use serde_json::json;
 use std::process::ExitCode;
@@ -118,6 +119,7 @@ fn run(args: &Args) -> launcher::Result {
     let mask: Vec<i32> = camera.mask()?.index_axis(Axis(0), 0).iter().copied().collect();
     picture::write_png(&out.join("surfaces.png"), &picture::color_picture([args.width, args.height], &color))?;
     let means: serde_json::Map<_, _> = sim
+        .scene()
         .mask_ids()
         .iter()
         .filter_map(|id| {
@@ -141,6 +143,6 @@ fn run(args: &Args) -> launcher::Result {
         "steps": step,
         "mean_colors": means,
         "env_steps_per_second": rate,
-        "warnings": sim.warning_counts(),
+        "warnings": sim.warnings().counts(),
     }))
 }

@@ -155,7 +155,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         "curve": rows.iter().map(|[mean, apart, reached]| json!({ "return": mean, "distance": apart, "reached": reached })).collect::<Vec<_>>(),
         "policy": policy.weights.iter().collect::<Vec<_>>(),
         "env_steps_per_second": rate,
-        "warnings": env.sim().warning_counts(),
+        "warnings": env.sim().warnings().counts(),
     }))?;
     Ok(after.is_some_and(|after| after >= LEARNED))
 }
@@ -325,7 +325,7 @@ fn draw_reaching(env: &mut Env, policy: &Policy, seed: u64, file: &Path) -> laun
     let targets = env.now().command("target")?;
     let ball = |row: ArrayView1<'_, f64>| Marker::sphere([row[0], row[1], row[2]], NEAR as f32, [0.9, 0.2, 0.1, 1.0]);
     let balls: Vec<_> = targets.rows().into_iter().enumerate().map(|(env, row)| (EnvId(env), ball(row))).collect();
-    let far = env.sim().env_origins().iter().fold(0.0, |most: f64, x| most.max(*x));
+    let far = env.sim().cfg().env_origins().iter().fold(0.0, |most: f64, x| most.max(*x));
     stage::write(env.sim_mut(), &balls, [far + 2.0, -far - 1.6, 2.2], [far - 1.0, 1.0 - far, 0.0], file)
 }
 

@@ -17,7 +17,9 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
-use kinetoscope::sensors::camera::PixelIntrinsics;
+use kinetoscope::sensors::NoiseCfg;
+use kinetoscope::sensors::camera::{Camera, PixelIntrinsics};
+use kinetoscope::sim::{ObjectId, Tip};
 use launcher::motion::Motion;
 use launcher::panel::{self, Views};
 use launcher::trial::{self, Album, Count};
@@ -200,8 +202,12 @@ fn positions(sim: &SimulationManager, robot: RobotId) -> launcher::Result<kineto
 
 /// What mask pictures say of the thing called `name`.
 fn mask_id(sim: &SimulationManager, name: &str) -> launcher::Result<i32> {
-    let id =
-        sim.mask_ids().iter().find(|id| id.object == name).ok_or(format!("nothing is called {name:?} in masks"))?;
+    let id = sim
+        .scene()
+        .mask_ids()
+        .iter()
+        .find(|id| id.object == name)
+        .ok_or(format!("nothing is called {name:?} in masks"))?;
     Ok(id.id)
 }
 

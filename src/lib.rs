@@ -29,46 +29,29 @@ pub use kinetoscope_sim as sim;
 pub use kinetoscope_tasks as tasks;
 #[cfg(feature = "viewer")]
 pub use kinetoscope_viewer as viewer;
+pub use nalgebra;
 pub use ndarray;
 #[cfg(all(feature = "record", feature = "viewer"))]
 pub use record_button::FileRecording;
 #[cfg(all(feature = "record", feature = "viewer"))]
 pub use recorded_film::RecordedFilm;
 
-/// What most programs need: `use kinetoscope::prelude::*;`.
+/// Names that most programs need, at most 45, and the traits whose methods they call: `use kinetoscope::prelude::*;`.
 pub mod prelude {
-    #[cfg(all(feature = "record", feature = "viewer"))]
-    pub use crate::FileRecording;
     pub use crate::assets;
     #[cfg(feature = "record")]
-    pub use kinetoscope_record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId, Topic};
+    pub use kinetoscope_record::Record;
     pub use kinetoscope_scene::Pose;
     pub use kinetoscope_sensors::camera::{
-        Aperture, Camera, CameraCfg, CameraConvention, CameraInfo, Channels, DepthMiss, Extrinsics, Imperfections,
-        Intrinsics, Lens, Placement, RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg, Shutter,
-        StereoCamera, StereoCameraCfg, StereoOrigin, ToneCurve,
+        CameraCfg, Channels, Extrinsics, Intrinsics, Placement, RasterCfg, Renderer,
     };
-    pub use kinetoscope_sensors::ray::{
-        HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg, RayPattern,
-    };
-    pub use kinetoscope_sensors::{
-        ActuatorState, ActuatorStateCfg, ContactSensor, ContactSensorCfg, FrameTransformer, FrameTransformerCfg, Imu,
-        ImuCfg, JointState, JointStateCfg, JointWrench, JointWrenchCfg, MujocoSensor, MujocoSensorCfg, NoiseCfg,
-        Sampled, SamplingCfg, TargetFrameCfg,
-    };
+    pub use kinetoscope_sensors::ray::{RayCasterCfg, RayPattern};
+    pub use kinetoscope_sensors::{ContactSensorCfg, ImuCfg, Sampled, SamplingCfg};
     pub use kinetoscope_sim::{
-        ActuatorIndex, ActuatorModel, ArticulationCfg, ArticulationId, BodyType, ComponentCfg, DcMotor, DelayedPd,
-        Diagnostic, Draw, DriveCfg, DriveModel, DriveType, EntityCfg, EntityTypes, EnvId, Error, ExclusionCfg,
-        GroundCfg, GroupId, IdealPd, IkCfg, IkResult, IkTask, Integrator, InteractiveScene, JointIndex, LampKind,
-        LightCfg, LinkId, MaskId, MeshCollision, MissingInertia, MjcfCfg, MjcfFile, MjcfId, Moment, NameCase,
-        NameCaseCfg, ObjectId, ObjectShape, Observer, ObserverId, PerJoint, Posture, Properties, Property,
-        Randomization, RandomizationError, Result, RigidObjectCfg, RigidObjectGroupCfg, RobotCfg, RobotId, Rollout,
-        SceneCfg, SensorId, Shard, ShardError, SimulationManager, SimulationManagerCfg, Snapshot, SnapshotError, Still,
-        Strictness, SurfaceCfg, TerrainCfg, TerrainId, Tip, UrdfCfg, WeldCfg, WeldId, WrenchFrame,
+        ArticulationCfg, BodyType, ComponentCfg, Draw, DriveCfg, EntityCfg, EnvId, GroundCfg, InteractiveScene,
+        JointIndex, LightCfg, MjcfCfg, MjcfFile, ObjectShape, PerJoint, Property, Randomization, RigidObjectCfg,
+        RobotCfg, RobotId, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, TerrainCfg, UrdfCfg,
     };
     #[cfg(feature = "viewer")]
-    pub use kinetoscope_viewer::{
-        ImageWindow, ImageWindowCfg, OpenWindow, RecordButton, Screenshot, ScreenshotCfg, ScreenshotError, Serve,
-        ServeCfg, ServeError, Served, Viewing, Window, WindowCfg, WindowError,
-    };
+    pub use kinetoscope_viewer::{OpenWindow, Screenshot, Serve};
 }

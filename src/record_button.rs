@@ -11,7 +11,10 @@ use std::path::{Path, PathBuf};
 /// before.
 ///
 /// ```no_run
+/// use kinetoscope::FileRecording;
 /// use kinetoscope::prelude::*;
+/// use kinetoscope::record::RecorderCfg;
+/// use kinetoscope::viewer::{RecordButton, WindowCfg};
 /// use std::sync::{Arc, Mutex, PoisonError};
 ///
 /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
@@ -79,7 +82,7 @@ impl FileRecording {
 
     fn finish(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<()> {
         let Some((recorder, path)) = self.now.take() else { return Ok(()) };
-        if !sim.has_observer(recorder) {
+        if !sim.observers().contains(recorder) {
             // Somebody else has ended it.
             return Ok(());
         }
@@ -100,7 +103,7 @@ impl FileRecording {
     /// The recorder that is at work, and its file.
     fn recorder<'a>(&'a self, sim: &'a SimulationManager) -> Option<(&'a Recorder, &'a Path)> {
         let (id, path) = self.now.as_ref()?;
-        let recorder = sim.has_observer(*id).then(|| sim.observer(*id).ok()).flatten()?;
+        let recorder = sim.observers().contains(*id).then(|| sim.observers().get(*id).ok()).flatten()?;
         Some((recorder, path.as_path()))
     }
 

@@ -5,6 +5,7 @@ use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::row::Row;
 use crate::settings::{Outcome, Settings};
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::ContactSensor;
 use std::time::{Duration, Instant};
 
 const ENVS: usize = 64;

@@ -11,6 +11,7 @@ use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
 use kinetoscope::scene::pose::from_row;
+use kinetoscope::sim::{IkCfg, Tip};
 use nalgebra::{Matrix6, Vector6};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

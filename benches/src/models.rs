@@ -82,7 +82,7 @@ impl Case {
     /// The bundled arm and hand, limp: the model that drives are written to, without the writes.
     pub(crate) fn sr5() -> Outcome<Self> {
         let (sim, _) = sr5(1, 1)?;
-        Self::new("SR5 + hand", sim.batch().model().clone(), Some(sim.mjcf().into()), Loop::Step21)
+        Self::new("SR5 + hand", sim.batch().model().clone(), Some(sim.scene().mjcf().into()), Loop::Step21)
     }
 
     fn new(name: &'static str, model: Model, mjcf: Option<String>, bare: Loop) -> Outcome<Self> {

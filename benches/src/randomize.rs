@@ -10,6 +10,7 @@ use crate::settings::{Outcome, Settings};
 use kinetoscope::mujoco::{Editor, Model};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Random;
+use kinetoscope::sim::Result;
 use std::time::{Duration, Instant};
 
 const ENVS: usize = 64;
@@ -35,7 +36,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
 
     let (mut sim, _) = sr5(ENVS, 1)?;
     draw(&mut sim)?;
-    let bytes = (0..ENVS).map(|env| sim.property_bytes(EnvId(env))).sum::<Result<usize>>()? as f64 / ENVS as f64;
+    let bytes = (0..ENVS).map(|env| sim.properties().bytes(EnvId(env))).sum::<Result<usize>>()? as f64 / ENVS as f64;
     let whole = model.shared_bytes() as f64;
     let memory = Row::new("randomize", format!("{CASE}, memory"), "KiB/env", 1, bytes / 1024.0);
     Ok(vec![
@@ -51,7 +52,7 @@ fn draw(sim: &mut SimulationManager) -> Outcome<()> {
         ".*",
         Draw::Scale([0.5, 1.5]),
     );
-    Ok(sim.randomize(&randomization, None)?)
+    Ok(sim.properties_mut().randomize(&randomization, None)?)
 }
 
 fn editors(model: &Model) -> Outcome<Vec<Editor>> {

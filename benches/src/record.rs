@@ -8,6 +8,8 @@ use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::row::Row;
 use crate::settings::{Outcome, Settings};
 use kinetoscope::prelude::*;
+use kinetoscope::record::{RecorderCfg, RecorderId};
+use kinetoscope::sensors::camera::Camera;
 use std::time::{Duration, Instant};
 
 const ENVS: usize = 16;
@@ -80,13 +82,13 @@ impl Side for Arms {
             }
         }
         if let Some(recorder) = self.recorder {
-            self.sim.observer_mut(recorder)?.catch_up();
+            self.sim.observers_mut().get(recorder)?.catch_up();
         }
         Ok(start.elapsed())
     }
 
     fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
-        let arm = self.sim.robot_id("arm")?;
+        let arm = self.sim.entities().robot_id("arm")?;
         Ok(Some(self.sim.robot(arm).qpos().into_iter().collect()))
     }
 }

@@ -10,7 +10,7 @@ use crate::row::Row;
 use crate::settings::{Outcome, Settings};
 use crate::startup::robots;
 use kinetoscope::prelude::*;
-use kinetoscope::viewer::Wants;
+use kinetoscope::viewer::{Viewing, Wants, Window, WindowCfg};
 use std::io::{BufRead as _, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Stdio};
@@ -133,9 +133,9 @@ fn shown(arm: &Arm, display: &Display, seconds: f64) -> Outcome<[f64; 2]> {
 
 /// Moves the arms for some seconds.
 fn swing(sim: &mut SimulationManager, robot: RobotId, window: &Window, seconds: f64) -> Outcome<[f64; 2]> {
-    let (start, first, before) = (Instant::now(), sim.steps(), window.pictures());
+    let (start, first, before) = (Instant::now(), sim.observers().steps(), window.pictures());
     while start.elapsed().as_secs_f64() < seconds {
-        let step = sim.steps();
+        let step = sim.observers().steps();
         if step.is_multiple_of(SWING.into()) {
             drive_sr5(sim, robot, (step / u64::from(SWING)).is_multiple_of(2))?;
         }
@@ -143,7 +143,7 @@ fn swing(sim: &mut SimulationManager, robot: RobotId, window: &Window, seconds: 
     }
     let elapsed = start.elapsed().as_secs_f64();
     let pictures = (window.pictures() - before) as f64;
-    Ok([pictures / elapsed, (sim.steps() - first) as f64 * sim.cfg().physics_dt / elapsed])
+    Ok([pictures / elapsed, (sim.observers().steps() - first) as f64 * sim.cfg().physics_dt / elapsed])
 }
 
 /// Arms at free speed, watched by somebody who takes a quarter of a second for each picture, or by nobody.

@@ -5,7 +5,7 @@ use crate::model::{Model, ModelArgs, Setup, SpawnArgs};
 use crate::progress;
 use crate::render::{Look, rate};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::env::EnvStatus;
+use kinetoscope::sim::Still;
 use std::time::Instant;
 
 /// Steps per second and pictures per second of a robot on this machine, on every core
@@ -59,24 +59,25 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         steps += 8;
         read_state(&model);
         let elapsed = start.elapsed().as_secs_f64();
-        if elapsed >= args.seconds || done_by_each(&model.sim).into_iter().all(|done| done.is_some()) {
+        if elapsed >= args.seconds || model.sim.diverged().len() == num_envs {
             return elapsed;
         }
     };
     let share = || Some(start.elapsed().as_secs_f64() / args.seconds);
     let elapsed = progress::during("steps", share, step);
     // An environment that diverged stands still: its later steps are not counted.
-    let done = done_by_each(&model.sim);
-    let (diverged, stopped) = (model.sim.diverged(), done.iter().flatten().count());
-    if let Some((env, reason)) = diverged.first().filter(|_| stopped == num_envs) {
+    let diverged = model.sim.diverged();
+    let stopped = diverged.len();
+    if let Some(first) = diverged.first().filter(|_| stopped == num_envs) {
         return Err(format!(
-            "the simulation diverged in all {num_envs} environments, in environment {} in {reason}: there is no rate of \
+            "the simulation diverged in all {num_envs} environments, in environment {} in {first}: there is no rate of \
              steps. Contacts that overlap at the start, light links on stiff drives or a long time step are the usual causes",
-            env.0
+            first.env.0
         )
         .into());
     }
-    let all = done.iter().map(|done| done.unwrap_or(steps)).sum::<u64>() as f64 / elapsed;
+    let done = diverged.iter().map(|one| one.step).sum::<u64>() + steps * (num_envs - stopped) as u64;
+    let all = done as f64 / elapsed;
     let each = steps as f64 / elapsed;
     println!("{num_envs} environments on {} threads, steps of {dt} s", model.sim.threads());
     println!("  {all:>12.0} environment steps per second, {:.0} x real time in all", all * dt);
@@ -86,8 +87,8 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
             "  {stopped} of {num_envs} environments diverged and stood still from then on: the rates are too high"
         );
     }
-    for (env, reason) in &diverged {
-        eprintln!("warning: environment {} diverged: {reason}", env.0);
+    for one in &diverged {
+        eprintln!("warning: environment {} diverged: {one}", one.env.0);
     }
     let pictures = rate(&mut rasterizer, still.shot(&view), args.seconds)?;
     println!("pictures of {} x {} with color, depth, mask and normals", view.width, view.height);
@@ -99,18 +100,6 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
 fn read_state(model: &Model) {
     match model.robot {
         Some(robot) => drop(model.sim.robot(robot).qpos()),
-        None => drop(model.sim.engine_states()),
+        None => drop(model.sim.entities().engine_states()),
     }
-}
-
-/// Steps that each environment did until it diverged; `None` where it did not.
-fn done_by_each(sim: &SimulationManager) -> Vec<Option<u64>> {
-    let mut done = Vec::with_capacity(sim.num_envs());
-    sim.batch().for_each(|_, env| {
-        done.push(match env.status() {
-            EnvStatus::Diverged { step, .. } => Some(*step),
-            EnvStatus::Running => None,
-        });
-    });
-    done
 }

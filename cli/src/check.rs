@@ -4,6 +4,7 @@ use crate::ending::{Ending, Result};
 use crate::model::{Files, ModelArgs, Setup, is_scene};
 use crate::scene_report::{MjcfReport, SceneReport};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::Error;
 use kinetoscope::sim::inspect::{InspectCfg, InspectError, inspect};
 use std::io::Write;
 use std::path::{Path, PathBuf};

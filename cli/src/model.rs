@@ -5,7 +5,7 @@ use crate::excerpt;
 use crate::file_kind::FileKind;
 use kinetoscope::assets;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::mjcf::robot_file::RobotFileError;
+use kinetoscope::sim::{Error, LinkId, MjcfId, RobotFileError, Strictness};
 use std::path::{Path, PathBuf};
 
 /// The files of a model.

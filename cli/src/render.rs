@@ -10,6 +10,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::render::visibility::View;
 use kinetoscope::scene::PoseF32;
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot, look_at_pose};
+use kinetoscope::sim::{Error, Still};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

@@ -5,8 +5,9 @@ use crate::{excerpt, interrupt};
 use kinetoscope::RecordedFilm;
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Film, Recording, replay};
+use kinetoscope::sim::Still;
 use kinetoscope::viewer::control::{Play, Speed};
-use kinetoscope::viewer::{Closed, Eye};
+use kinetoscope::viewer::{Closed, Eye, ScreenshotCfg, ServeCfg, WindowCfg};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 

@@ -3,8 +3,8 @@
 use crate::ending::Result;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::MjcfPart;
 use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
-use kinetoscope::sim::objects::mjcf_part::MjcfPart;
 use serde_json::{Value, json};
 use std::fmt;
 

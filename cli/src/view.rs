@@ -3,8 +3,12 @@
 use crate::ending::{Ending, Result};
 use crate::interrupt;
 use crate::model::{ModelArgs, Setup, SpawnArgs};
+use kinetoscope::FileRecording;
 use kinetoscope::prelude::*;
-use kinetoscope::viewer::{Closed, Command, Speed, Viewer, Wants};
+use kinetoscope::record::RecorderCfg;
+use kinetoscope::viewer::{
+    Closed, Command, RecordButton, ServeCfg, Speed, Viewer, Viewing, Wants, Window, WindowCfg, WindowError,
+};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -94,8 +98,8 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         return Err(format!("the window is gone after {step} steps: {reason}").into());
     }
     let diverged = sim.diverged();
-    for (env, reason) in &diverged {
-        eprintln!("warning: environment {}: {reason}", env.0);
+    for one in &diverged {
+        eprintln!("warning: environment {}: {one}", one.env.0);
     }
     Ok(if warned || !diverged.is_empty() { Ending::Warned } else { Ending::Done })
 }

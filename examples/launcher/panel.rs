@@ -8,7 +8,7 @@ use embedded_graphics::prelude::*;
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
 use image::{Rgb, RgbImage};
 use kinetoscope::ndarray::{ArrayView, Axis, RemoveAxis};
-use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::Camera;
 use kinetoscope::sensors::camera::colormap::depth_color;
 use std::convert::Infallible;
 

@@ -1,7 +1,9 @@
 //! What an example records, where the build can: the feature `record`.
 
 use super::{Launcher, Result};
+use kinetoscope::FileRecording;
 use kinetoscope::prelude::*;
+use kinetoscope::record::{RecorderCfg, Topic};
 
 #[cfg(all(feature = "record", feature = "viewer"))]
 mod recorded {
@@ -34,7 +36,7 @@ mod recorded {
             if self.record.is_some() {
                 let begun = files.lock().unwrap_or_else(PoisonError::into_inner).begin(sim);
                 begun.map_err(|error| format!("--record {error}"))?;
-                sim.add_observer(Watch { files: Arc::clone(files), looked: Instant::now(), told: false });
+                sim.observers_mut().add(Watch { files: Arc::clone(files), looked: Instant::now(), told: false });
             }
             Ok(Recording { files: Arc::clone(files) })
         }

@@ -5,6 +5,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::render::visibility::View;
 use kinetoscope::scene::{Marker, PoseF32};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
+use kinetoscope::sim::Still;
 use std::path::Path;
 
 /// Draws environments side by side, seen from `eye`, and writes them as PNG.

@@ -5,6 +5,7 @@ use clap::Parser;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_row, to_row};
+use kinetoscope::sensors::camera::Camera;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -34,9 +35,9 @@ pub(crate) fn run(name: &str, example: impl FnOnce() -> Result<bool>) -> ExitCod
 /// which is no result.
 pub(crate) fn diverged(sim: &SimulationManager) -> Vec<Option<String>> {
     let mut reasons = vec![None; sim.num_envs()];
-    for (env, reason) in sim.diverged() {
-        eprintln!("warning: environment {} diverged: {reason}", env.0);
-        reasons[env.0] = Some(reason);
+    for diverged in sim.diverged() {
+        eprintln!("warning: environment {} diverged: {diverged}", diverged.env.0);
+        reasons[diverged.env.0] = Some(diverged.to_string());
     }
     reasons
 }
@@ -81,7 +82,7 @@ pub(crate) fn conclude(launcher: &Launcher, sim: &mut SimulationManager, count: 
         "success_rate": successes as f64 / sim.num_envs() as f64,
         "environments": table,
         "env_steps_per_second": rate,
-        "warnings": sim.warning_counts(),
+        "warnings": sim.warnings().counts(),
     }))?;
     Ok(successes >= needed)
 }

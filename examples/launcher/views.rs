@@ -2,6 +2,7 @@
 
 use super::{Launcher, Result};
 use kinetoscope::prelude::*;
+use kinetoscope::viewer::{ImageWindow, ImageWindowCfg, RecordButton, ServeCfg, Window, WindowCfg};
 
 #[cfg(feature = "viewer")]
 pub(crate) use shown::*;
@@ -11,8 +12,7 @@ mod shown {
     use super::*;
     use embedded_graphics::mono_font::ascii::FONT_10X20;
     use image::RgbImage;
-    use kinetoscope::viewer::Canvas;
-    use kinetoscope::viewer::{Command, Speed, Viewer, Viewing, Wants};
+    use kinetoscope::viewer::{Canvas, Command, Speed, Viewer, Viewing, Wants};
     use std::sync::{Arc, OnceLock};
 
     /// The window of an example, once it is open.

@@ -61,7 +61,7 @@ pub trait Record {
 impl Record for SimulationManager {
     fn record(&mut self, cfg: RecorderCfg) -> Result<RecorderId> {
         let recorder = Recorder::start(self, cfg, &Disk::default())?;
-        Ok(self.add_observer(recorder))
+        Ok(self.observers_mut().add(recorder))
     }
 
     #[track_caller]
@@ -69,13 +69,13 @@ impl Record for SimulationManager {
         if let Some(EnvId(env)) = env.filter(|env| env.0 >= self.num_envs()) {
             return Err(RecordError::Env { env, count: self.num_envs() });
         }
-        let (steps, times) = (self.steps(), self.time());
-        self.observer_mut(recorder)?.note(steps, &times, env, text)
+        let (steps, times) = (self.observers().steps(), self.time());
+        self.observers_mut().get(recorder)?.note(steps, &times, env, text)
     }
 
     #[track_caller]
     fn finish_recording(&mut self, recorder: RecorderId) -> Result<Recorded> {
-        self.remove_observer(recorder)?.finish()
+        self.observers_mut().remove(recorder)?.finish()
     }
 }
 
@@ -211,7 +211,7 @@ impl Recorder {
         let work = move || writer::run(sink, &streams, &filled, &empty, &flag, &reason);
         let thread = std::thread::Builder::new().name("recording".into()).spawn(work);
         let thread = thread.map_err(|error| RecordError::file(&cfg.path, error))?;
-        let clock = Clock::new(sim.cfg().physics_dt, sim.steps(), &sim.time());
+        let clock = Clock::new(sim.cfg().physics_dt, sim.observers().steps(), &sim.time());
         let recorded = Recorded { path: cfg.path.clone(), left_out, ..Recorded::default() };
         let mut recorder = Self {
             cfg,
@@ -326,7 +326,7 @@ impl Recorder {
             return;
         }
         let Some(mut packet) = self.packet() else { return };
-        let steps = sim.steps();
+        let steps = sim.observers().steps();
         let times = sim.time();
         packet.step = self.clock.step(steps);
         packet.event = event;
@@ -405,7 +405,7 @@ impl Recorder {
     /// Something happened to environments.
     fn happened(&mut self, sim: &mut SimulationManager, kind: EventKind, env_ids: &[EnvId]) {
         let envs: Vec<usize> = env_ids.iter().map(|env| env.0).collect();
-        let (steps, times) = (sim.steps(), sim.time());
+        let (steps, times) = (sim.observers().steps(), sim.time());
         self.clock.restarted(&envs, &times, steps);
         self.recount(sim, &envs);
         let of: Vec<usize> = envs.into_iter().filter(|env| self.records(*env)).collect();
@@ -428,10 +428,14 @@ impl Recorder {
         if !self.format.has_events() {
             return;
         }
-        let diverged: Vec<(usize, String)> =
-            sim.diverged().into_iter().map(|(env, why)| (env.0, why)).filter(|(env, _)| self.records(*env)).collect();
+        let diverged: Vec<(usize, String)> = sim
+            .diverged()
+            .iter()
+            .map(|one| (one.env.0, one.to_string()))
+            .filter(|(env, _)| self.records(*env))
+            .collect();
         if !diverged.is_empty() {
-            let (steps, times) = (sim.steps(), sim.time());
+            let (steps, times) = (sim.observers().steps(), sim.time());
             let known = std::mem::take(&mut self.diverged);
             for (env, why) in diverged.iter().filter(|(env, _)| !known.contains(env)) {
                 self.tell(EventKind::Diverged, vec![*env], why.clone(), steps, &times);
@@ -519,9 +523,9 @@ impl Observer for Recorder {
         if self.has_failed() {
             return u64::MAX;
         }
-        let now = sim.steps();
+        let now = sim.observers().steps();
         let wait = |source: &Source| match (&source.sensor, source.every) {
-            (Some(uid), None) => sim.sensor_due_in(uid).unwrap_or(u64::MAX),
+            (Some(uid), None) => sim.entities().sensor_due_in(uid).unwrap_or(u64::MAX),
             _ => source.due_at.saturating_sub(now).max(1),
         };
         // Where nothing but events is recorded, it looks for them as often as it would have recorded.

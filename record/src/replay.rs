@@ -104,7 +104,7 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
         let recorded = &archive.about["physics_dt"];
         return Err(archive.malformed(format!("recorded with physics_dt {recorded}; this simulation has {dt}")));
     }
-    sim.restore_with_properties(&archive.start()?, None)?;
+    sim.properties_mut().restore(&archive.start()?, None)?;
     let (mut states, mut targets) = (Vec::new(), Vec::new());
     for stream in archive.about["streams"].as_array().into_iter().flatten() {
         let name = stream["name"].as_str().unwrap_or_default();
@@ -139,14 +139,14 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
         }
         archive.check(source, steps.len())?;
     }
-    for uid in sim.jointed_uids() {
-        let moves = sim.robot(sim.jointed_id(uid)?).dof() > 0;
+    for uid in sim.entities().jointed_uids() {
+        let moves = sim.robot(sim.entities().jointed_id(uid)?).dof() > 0;
         if moves && !targets.iter().any(|source| source.stream.name == format!("{uid}{TARGETS}")) {
             return Err(archive.malformed(format!("it has no targets of {uid}: record Topic::Targets({uid:?})")));
         }
     }
-    for uid in sim.mjcf_uids() {
-        let moves = sim.mjcf_part(sim.mjcf_id(uid)?).ctrl().ncols() > 0;
+    for uid in sim.entities().mjcf_uids() {
+        let moves = sim.mjcf_part(sim.entities().mjcf_id(uid)?).ctrl().ncols() > 0;
         if moves && !states.iter().any(|source| source.stream.name == format!("{uid}/state")) {
             return Err(archive.malformed(format!("it has no controls of {uid}: record Topic::MjcfState({uid:?})")));
         }
@@ -206,7 +206,7 @@ impl Repetition {
         let Self { archive, states, targets, .. } = self;
         for source in targets {
             let Some(uid) = source.stream.name.strip_suffix(TARGETS) else { continue };
-            let id = sim.jointed_id(uid)?;
+            let id = sim.entities().jointed_id(uid)?;
             let envs: Vec<EnvId> = source.stream.env_ids.iter().copied().map(EnvId).collect();
             let of = |part: &str| archive.rows(&format!("{}/{part}", source.stream.name), row);
             let (positions, velocities, efforts) = (of("positions")?, of("velocities")?, of("efforts")?);
@@ -216,7 +216,7 @@ impl Repetition {
         }
         for source in states {
             let Some(uid) = source.stream.name.strip_suffix("/state") else { continue };
-            let id = sim.mjcf_id(uid)?;
+            let id = sim.entities().mjcf_id(uid)?;
             let envs: Vec<EnvId> = source.stream.env_ids.iter().copied().map(EnvId).collect();
             let controls = archive.rows(&format!("{}/controls", source.stream.name), row)?;
             sim.mjcf_part_mut(id).set_ctrl(controls, None, Some(&envs))?;

@@ -179,7 +179,7 @@ impl Scenes {
         let groups = RasterCfg::default().groups;
         for &env in envs {
             let Some(told) = self.told.get_mut(&env) else { continue };
-            let scene = sim.scene_of(EnvId(env))?;
+            let scene = sim.scene_mut().scene_of(EnvId(env))?;
             if told.as_ref().is_some_and(|told| Arc::ptr_eq(told, &scene)) {
                 continue;
             }
@@ -216,8 +216,8 @@ impl Scenes {
         scene: &RenderScene,
         drawn: &[Option<Drawn>],
     ) -> Result<Vec<Entity>> {
-        let (mut look, bodies) = (Look::default(), sim.body_names());
-        sim.look(EnvId(env), &mut look)?;
+        let (mut look, bodies) = (Look::default(), sim.entities().body_names());
+        sim.scene_mut().look(EnvId(env), &mut look)?;
         let mut entities = Vec::new();
         let deforming = scene.instances().iter().filter(|instance| instance.deforms);
         self.deforming.extend(deforming.map(|instance| instance.name.to_string()));

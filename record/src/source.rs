@@ -81,7 +81,7 @@ impl Source {
     }
 
     pub(crate) fn body_poses(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
-        let id = sim.mjcf_id(uid)?;
+        let id = sim.entities().mjcf_id(uid)?;
         let frames: Vec<String> = sim.mjcf_part(id).body_names().iter().map(|body| format!("{uid}/{body}")).collect();
         let parts = vec![Part::new("", [frames.len(), 7])];
         let (name, kind) = (format!("{uid}/body_poses"), Kind::Poses { frames });
@@ -89,7 +89,7 @@ impl Source {
     }
 
     pub(crate) fn engine_states(sim: &SimulationManager, envs: &[usize]) -> Self {
-        let [positions, velocities] = sim.engine_states().map(|table| table.ncols());
+        let [positions, velocities] = sim.entities().engine_states().map(|table| table.ncols());
         let parts =
             [("clock", 1), ("qpos", positions), ("qvel", velocities)].map(|(part, width)| Part::new(part, [width]));
         Self::new("engine_state".into(), Kind::EngineState, Element::F64, parts.to_vec(), envs, What::EngineStates)
@@ -129,14 +129,14 @@ impl Source {
         topic: &str,
         what: fn(RobotId) -> What,
     ) -> Result<Self> {
-        let id = sim.jointed_id(uid)?;
+        let id = sim.entities().jointed_id(uid)?;
         let names = sim.robot(id).joint_names().to_vec();
         let parts = ["positions", "velocities", "efforts"].map(|part| Part::new(part, [names.len()])).to_vec();
         Ok(Self::new(format!("{uid}/{topic}"), Kind::Joints { names }, Element::F64, parts, envs, what(id)))
     }
 
     pub(crate) fn link_poses(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
-        let id = sim.jointed_id(uid)?;
+        let id = sim.entities().jointed_id(uid)?;
         let frames: Vec<String> = sim.robot(id).link_names().iter().map(|link| format!("{uid}/{link}")).collect();
         let parts = vec![Part::new("", [frames.len(), 7])];
         let name = format!("{uid}/link_poses");
@@ -144,13 +144,13 @@ impl Source {
     }
 
     pub(crate) fn object_pose(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
-        let what = What::ObjectPose(sim.rigid_object_id(uid)?);
+        let what = What::ObjectPose(sim.entities().rigid_object_id(uid)?);
         let kind = Kind::Poses { frames: vec![uid.into()] };
         Ok(Self::new(format!("{uid}/pose"), kind, Element::F64, vec![Part::new("", [1, 7])], envs, what))
     }
 
     pub(crate) fn mjcf_state(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Self> {
-        let id = sim.mjcf_id(uid)?;
+        let id = sim.entities().mjcf_id(uid)?;
         let part = sim.mjcf_part(id);
         let widths = [part.qpos().ncols(), part.qvel().ncols(), part.ctrl().ncols()];
         let names = ["positions", "velocities", "controls"];
@@ -160,7 +160,7 @@ impl Source {
 
     /// Everything that a sensor measures.
     pub(crate) fn sensor(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Vec<Self>> {
-        let sensor = sim.sensor_called(uid)?;
+        let sensor = sim.entities().sensor_called(uid)?;
         let any: &dyn Any = sensor;
         let mut sources = Vec::new();
         let eyes = Eye::of(any);
@@ -213,7 +213,7 @@ impl Source {
 
     /// One channel of a camera; of a pair `left/depth`, `right/depth` or `disparity`.
     pub(crate) fn picture(sim: &SimulationManager, uid: &str, channel: &str, envs: &[usize]) -> Result<Self> {
-        let any: &dyn Any = sim.sensor_called(uid)?;
+        let any: &dyn Any = sim.entities().sensor_called(uid)?;
         let (eye, asked) = Eye::in_front_of(channel);
         let pair = any.downcast_ref().is_some_and(StereoCamera::has_disparity);
         if pair && channel == DISPARITY {
@@ -239,7 +239,7 @@ impl Source {
 
     /// One channel of a camera, which has it, by its own name.
     fn of_eye(sim: &SimulationManager, uid: &str, eye: Eye, channel: &'static str, envs: &[usize]) -> Result<Self> {
-        let sensor = sim.sensor_called(uid)?;
+        let sensor = sim.entities().sensor_called(uid)?;
         let found = eye.channels(sensor).into_iter().find(|(name, ..)| *name == channel);
         let (_, element, components) = found.unwrap_or((DISPARITY, Element::F32, 1));
         let (height, width) = eye.image_shape(sensor);
@@ -292,7 +292,7 @@ impl Source {
     pub(crate) fn recount(&mut self, sim: &SimulationManager, envs: &[usize]) -> Result<()> {
         if let Some(uid) = self.sensor.clone() {
             let were = self.counts.clone();
-            self.count(sim.sensor_called(&uid)?);
+            self.count(sim.entities().sensor_called(&uid)?);
             for ((count, was), env) in self.counts.iter_mut().zip(were).zip(&self.stream.env_ids) {
                 if !envs.contains(env) {
                     *count = was;
@@ -321,7 +321,7 @@ impl Source {
         block: &mut Block,
     ) -> Result<()> {
         if let Some(uid) = &self.sensor {
-            let sensor = sim.sensor_called(uid)?;
+            let sensor = sim.entities().sensor_called(uid)?;
             block.fresh = self.count(sensor);
             let stamps = Stamps::of(sensor);
             if !block.fresh.contains(&true) {
@@ -394,7 +394,7 @@ impl Source {
                 self.join(values, &poses.iter().map(|poses| poses.view()).collect::<Vec<_>>());
             }
             What::EngineStates => {
-                let [positions, velocities] = sim.engine_states();
+                let [positions, velocities] = sim.entities().engine_states();
                 let times = Array2::from_shape_vec((sim.num_envs(), 1), sim.time()).map_err(|_| self.changed())?;
                 self.join(values, &[times.view(), positions.view(), velocities.view()]);
             }
@@ -410,9 +410,11 @@ impl Source {
             }
             // It is drawn instead.
             What::Stage(_) => {}
-            What::Picture { uid, eye, channel } => self.copy_picture(sim.sensor_called(uid)?, *eye, channel, values)?,
+            What::Picture { uid, eye, channel } => {
+                self.copy_picture(sim.entities().sensor_called(uid)?, *eye, channel, values)?
+            }
             What::Lens(uid, eye) => {
-                let sensor: &dyn Any = sim.sensor_called(uid)?;
+                let sensor: &dyn Any = sim.entities().sensor_called(uid)?;
                 let (intrinsics, poses) = eye.lenses(sensor).ok_or_else(|| self.changed())?;
                 let rows = intrinsics.len_of(Axis(0));
                 let flat = intrinsics.into_shape_with_order((rows, 9)).map_err(|_| self.changed())?;
@@ -420,7 +422,7 @@ impl Source {
                 self.join(values, &[flat.view(), poses.view(), rectified.view()]);
             }
             What::Numbers(uid) => {
-                let sensor = sim.sensor_called(uid)?;
+                let sensor = sim.entities().sensor_called(uid)?;
                 let sampler = sensor.sampled().ok_or_else(|| self.changed())?.sampler();
                 if !sampler.channels().eq(self.stream.parts.iter().map(|part| part.name.as_str())) {
                     return Err(self.changed());
@@ -430,7 +432,7 @@ impl Source {
                 self.join(values, &all);
             }
             What::Points(uid) => {
-                let any: &dyn Any = sim.sensor_called(uid)?;
+                let any: &dyn Any = sim.entities().sensor_called(uid)?;
                 let caster = any.downcast_ref::<RayCaster>().ok_or_else(|| self.changed())?;
                 let hits = caster.arrived_hits();
                 // In the order of the parts, behind the hits.

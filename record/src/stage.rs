@@ -14,7 +14,7 @@ pub struct StageCfg {
     pub size: [usize; 2],
     /// Pictures in a second of simulation \[Hz\]; the nearest whole number of physics steps lies between two.
     pub rate: f64,
-    /// From where \[m\], as environments stand side by side ([`SimulationManager::env_origins`]); `None` for a place from which
+    /// From where \[m\], as environments stand side by side ([`kinetoscope_sim::SimulationManagerCfg::env_origins`]); `None` for a place from which
     /// everything but the ground fills two thirds of the image when the recording begins: there is room to move.
     pub eye: Option<[f64; 3]>,
     /// Point in the middle of the image \[m\]; `None` for the middle of everything but the ground when the recording begins.

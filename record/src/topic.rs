@@ -19,7 +19,7 @@ pub enum Topic {
     /// Poses of the bodies of the MJCF part of this name.
     BodyPoses(String),
     /// Simulation time, positions and velocities of all joints of the scene as MuJoCo has them
-    /// ([`SimulationManager::engine_states`](kinetoscope_sim::SimulationManager::engine_states)), called `clock`, `qpos` and `qvel`.
+    /// ([`kinetoscope_sim::Entities::engine_states`](kinetoscope_sim::Entities::engine_states)), called `clock`, `qpos` and `qvel`.
     /// [`Everything`](Self::Everything) has them in HDF5 files only.
     EngineStates,
     /// Rewards and ends of the task that runs in the simulation, told after each of its steps

@@ -183,11 +183,6 @@ fn find_proxies(model: &mj::Model, contents: &Contents, robots: &[RobotIndex]) -
     proxies
 }
 
-/// Threads for those who do not say how many.
-pub(crate) fn all_cores() -> usize {
-    std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get)
-}
-
 fn missing(what: &'static str, name: &str) -> Error {
     Error::UnknownName { what, name: name.into(), candidates: Vec::new() }
 }
@@ -410,7 +405,7 @@ impl Built {
                 format!("{a:?} and {b:?} overlap in the initial pose and never collide with each other"),
             ));
         }
-        let threads = cfg.threads.unwrap_or_else(all_cores);
+        let threads = cfg.num_threads();
         let batch = Batch::new(&with_small_buffers(&self.model), &self.table, cfg.num_envs, threads, pool.clone())?;
         let mut simulation = Simulation {
             batch,

@@ -12,13 +12,34 @@
 //! the program. [`SimulationManager::robot`] and its like are then used without `?`. Names, numbers, files and environments
 //! that do not exist are errors.
 
+#![cfg_attr(
+    not(feature = "internals"),
+    allow(
+        unreachable_pub,
+        dead_code,
+        unused_imports,
+        reason = "public for tests and benchmarks, where the lints look"
+    )
+)]
+
+#[cfg(not(feature = "internals"))]
+mod batch;
+#[cfg(feature = "internals")]
 pub mod batch;
 mod batch_error;
 mod body_pose;
 mod capture;
 mod compile;
 mod contents;
+mod diverged;
+#[cfg(not(feature = "internals"))]
+mod drive;
+#[cfg(feature = "internals")]
 pub mod drive;
+mod entities;
+#[cfg(not(feature = "internals"))]
+mod env;
+#[cfg(feature = "internals")]
 pub mod env;
 mod error;
 mod export;
@@ -27,32 +48,42 @@ mod gather;
 mod ids;
 mod index;
 pub mod inspect;
-pub mod interactive_scene;
+mod interactive_scene;
 mod light_cfg;
-mod listing;
 mod look;
 mod manager;
+#[cfg(not(feature = "internals"))]
+mod mjcf;
+#[cfg(feature = "internals")]
 pub mod mjcf;
 mod named;
-pub mod objects;
+mod objects;
 mod observer;
 mod outcome;
-pub mod randomization;
-pub mod rollout;
+mod randomization;
+mod rollout;
+mod scene_view;
 mod sensor_list;
 mod shard;
 mod simulation;
 mod simulation_cfg;
-pub mod snapshot;
+mod snapshot;
 mod surface_cfg;
 mod viewpoint;
-pub mod visible;
+mod visible;
+mod warnings;
 mod wrenches;
 
-pub use drive::{ActuatorModel, DcMotor, DelayedPd, DriveCfg, DriveModel, DriveType, IdealPd, PerJoint};
+pub use batch_error::BatchError;
+pub use diverged::DivergedEnv;
+pub use drive::plan::PlanError;
+pub use drive::{ActuatorModel, DcMotor, DelayedPd, DriveCfg, DriveCfgError, DriveModel, DriveType, IdealPd, PerJoint};
+pub use entities::Entities;
 pub use error::{Error, Result};
 pub use ids::{EnvId, MjcfId, ObjectId, RobotId, TerrainId};
-pub use interactive_scene::{EntityCfg, EntityTypes, ExclusionCfg, InteractiveScene, SceneCfg};
+pub use interactive_scene::{
+    EntityCfg, EntityTypes, ExclusionCfg, InteractiveScene, SceneCfg, SensorEntity, SensorHandle,
+};
 pub use kinetoscope_robot::description::{LinkId, RobotDescription};
 pub use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 pub use kinetoscope_robot::inertia::{InertiaFault, RigidInertia};
@@ -64,6 +95,9 @@ pub use light_cfg::{LampKind, LightCfg};
 pub use look::{BodyMotion, JointAxis, Look};
 pub use manager::SimulationManager;
 pub use mjcf::document::{Cone, Integrator};
+pub use mjcf::error::EmitError;
+pub use mjcf::part::PartError;
+pub use mjcf::robot_file::RobotFileError;
 pub use named::Named;
 pub use objects::articulation::{Articulation, ArticulationCfg, ArticulationId, ArticulationMut};
 pub use objects::kinematics::IkResult;
@@ -82,15 +116,19 @@ pub use objects::shape::ObjectShape;
 pub use objects::terrain::{Terrain, TerrainCfg};
 pub use objects::weld::{Weld, WeldMut};
 pub use objects::weld_data::{WeldCfg, WeldId};
-pub use observer::{Moment, Observer, ObserverId};
+pub use observer::{Moment, Observer, ObserverId, Observers, ObserversMut};
 pub use outcome::Outcome;
-pub use randomization::{Draw, Properties, Property, Randomization, RandomizationError};
+pub use randomization::{
+    Draw, EnvProperties, EnvPropertiesMut, Properties, Property, Randomization, RandomizationError, Term,
+};
 pub use rollout::Rollout;
+pub use scene_view::{SceneView, SceneViewMut};
 pub use sensor_list::SensorId;
 pub use shard::{Shard, ShardError};
 pub use simulation_cfg::{GroundCfg, SimulationManagerCfg};
 pub use snapshot::{Snapshot, SnapshotError};
 pub use surface_cfg::SurfaceCfg;
 pub use viewpoint::Viewpoint;
-pub use visible::{MaskId, Still, Visible};
+pub use visible::{FreeCamera, MaskId, ModelCamera, Still, Visible};
+pub use warnings::Warnings;
 pub use wrenches::WrenchFrame;

@@ -3,6 +3,8 @@
 use crate::batch::Batch;
 use crate::compile::compile;
 use crate::contents::Contents;
+use crate::diverged::DivergedEnv;
+use crate::entities::Entities;
 use crate::env::{Env, EnvStatus};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, MjcfId, ObjectId, RobotId, TerrainId, env_mask};
@@ -15,22 +17,22 @@ use crate::objects::rigid_object_data::{RigidObjectCfg, RigidObjectData};
 use crate::objects::robot::{Robot, RobotCfg, RobotMut};
 use crate::objects::robot_data::{RobotData, Role};
 use crate::objects::terrain::{Terrain, TerrainCfg};
-use crate::observer::{Moment, Observers};
+use crate::observer::{Moment, ObserverSlots, Observers, ObserversMut};
 use crate::outcome::Outcome;
+use crate::randomization::{EnvProperties, EnvPropertiesMut};
+use crate::scene_view::{SceneView, SceneViewMut};
 use crate::sensor_list::{SensorId, SensorList};
 use crate::simulation::Simulation;
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::viewpoint::Viewpoint;
-use crate::visible::{MaskId, Visible, VisualCache};
+use crate::visible::{Visible, VisualCache};
+use crate::warnings::Warnings;
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco as mj;
-use kinetoscope_robot::diagnostic::{Diagnostic, count_by_name};
-use kinetoscope_scene::{Marker, OwnScene};
-use kinetoscope_sensors::camera::{Segmentation, SegmentationCfg, Thing};
+use kinetoscope_robot::diagnostic::Diagnostic;
+use kinetoscope_scene::OwnScene;
 use kinetoscope_sensors::ray::RayAssets;
 use kinetoscope_sensors::{Requires, Sensor, SensorCfg, SensorContext};
-use ndarray::Array2;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -51,7 +53,7 @@ pub struct SimulationManager {
     diagnostics: Vec<Diagnostic>,
     pub(crate) simulation: Simulation,
     pub(crate) sensors: SensorList,
-    pub(crate) observers: Observers,
+    pub(crate) observers: ObserverSlots,
     /// How often properties were drawn for each environment.
     pub(crate) draws: Vec<u64>,
     /// What came of the last step of the task that runs here.
@@ -89,7 +91,7 @@ impl SimulationManager {
             diagnostics: Vec::new(),
             simulation,
             sensors,
-            observers: Observers::default(),
+            observers: ObserverSlots::default(),
             draws,
             outcome: None,
             viewpoint: None,
@@ -109,11 +111,6 @@ impl SimulationManager {
     /// Number of threads that step.
     pub fn threads(&self) -> usize {
         self.simulation.batch.threads()
-    }
-
-    /// Number of threads that draw and cast rays for sensors. It does not depend on the number of environments.
-    pub fn sensor_threads(&self) -> usize {
-        self.cfg.threads.unwrap_or_else(crate::compile::all_cores)
     }
 
     /// Adds a robot to every environment. The model is compiled here, so that whatever is wrong is said here; on an
@@ -273,51 +270,6 @@ impl SimulationManager {
         self.sensors.get_mut(id)
     }
 
-    /// The sensors of a type with their names, in the order in which they were added; without those that failed.
-    pub fn sensor_ids<S: Sensor>(&self) -> Vec<(String, SensorId<S>)> {
-        self.sensors.ids()
-    }
-
-    /// What all sensors show of their last measurements, for [`Still::overview`](crate::Still::overview): those that are
-    /// configured to ([`SensorCfg::debug_vis`]), or told to since.
-    pub fn markers(&self) -> Vec<(EnvId, Marker)> {
-        self.sensors.markers(&self.simulation, None)
-    }
-
-    /// The same without those of a sensor: what is drawn into the colours of a camera that draws markers.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn markers_beside<S: Sensor>(&self, id: SensorId<S>) -> Vec<(EnvId, Marker)> {
-        self.sensors.markers(&self.simulation, Some(self.sensors.index_of(id)))
-    }
-
-    /// Whether the markers of a sensor are among [`markers`](Self::markers).
-    ///
-    /// # Errors
-    /// There is no such sensor.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn debug_vis<S: Sensor>(&self, id: SensorId<S>) -> Result<bool> {
-        self.sensors.debug_vis(self.sensors.index_of(id))
-    }
-
-    /// Shows the markers of a sensor from now on, or does not: whatever its configuration said, and nothing of what it measures
-    /// changes.
-    ///
-    /// # Errors
-    /// There is no such sensor.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn set_debug_vis<S: Sensor>(&mut self, id: SensorId<S>, shown: bool) -> Result<()> {
-        self.sensors.set_debug_vis(self.sensors.index_of(id), shown)
-    }
-
     /// The scene for a sensor that requires `requires`. What cameras draw is made when the first asks for it.
     fn sensor_context(&mut self, requires: Requires) -> SensorContext {
         let sees = !requires.intersection(Requires::VISIBLE | Requires::INSTANCES).is_empty();
@@ -339,14 +291,14 @@ impl SimulationManager {
             own_scenes,
             rebuilt: false,
             ray_assets: self.ray_assets.clone(),
-            threads: self.sensor_threads(),
+            threads: self.cfg.num_threads(),
             pool: self.pool.clone(),
         }
     }
 
     /// What can be seen: made at the first call, which reads the visual meshes. What cannot be read is left out, with a
     /// diagnostic.
-    pub fn visible(&mut self) -> Arc<Visible> {
+    pub(crate) fn visible(&mut self) -> Arc<Visible> {
         let visible = self.simulation.make_visible(&self.cfg, &self.contents, &mut self.visuals);
         self.diagnostics.extend(self.visuals.take_diagnostics());
         visible
@@ -356,22 +308,6 @@ impl SimulationManager {
     pub(crate) fn own_scene(&self, env: EnvId) -> &OwnScene {
         static AS_ALL: OwnScene = OwnScene(None);
         self.simulation.own_scenes.get(env.0).unwrap_or(&AS_ALL)
-    }
-
-    /// What each number of the mask channel of cameras stands for, the same in every environment. Numbers stay when more
-    /// is added.
-    pub fn mask_ids(&self) -> &[MaskId] {
-        self.simulation.mask_ids()
-    }
-
-    /// What each number of the mask channel is, by instance, link and semantic class, with labels by pattern: turns masks into
-    /// segmented pictures, and finds boxes around things. Make it anew when something was added.
-    ///
-    /// # Errors
-    /// A pattern that is no regular expression or matches nothing, and something that two patterns match.
-    pub fn segmentation(&self, cfg: &SegmentationCfg) -> Result<Segmentation> {
-        let things = self.mask_ids().iter().map(Thing::from);
-        Segmentation::new(things, cfg).map_err(|error| Error::Labels(Box::new(error)))
     }
 
     /// A robot, to read.
@@ -434,33 +370,54 @@ impl SimulationManager {
         MjcfPartMut::new(&self.contents.parts[index], &mut self.simulation, &mut self.sensors, index)
     }
 
-    /// A terrain.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn terrain(&self, id: TerrainId) -> &Terrain {
-        &self.contents.terrains[self.index_of(id.manager, id.index)]
-    }
-
-    #[track_caller]
-    pub(crate) fn index_of(&self, manager: u64, index: usize) -> usize {
-        assert!(manager == self.serial, "this handle is of another SimulationManager");
-        index
-    }
-
-    /// The robot called `uid`.
+    /// MuJoCo's model and the data of one environment, to read: for what this API does not have. The model is the environment's
+    /// own where some of its properties are.
     ///
     /// # Errors
-    /// There is none; the error lists those there are.
-    pub fn robot_id(&self, uid: &str) -> Result<RobotId> {
-        self.find_robot(uid, "robot", RobotData::is_robot)
+    /// There is no such environment.
+    pub fn with_mujoco<T>(&self, env: EnvId, read: impl FnOnce(&mj::Model, &mj::Data) -> T) -> Result<T> {
+        env_mask(Some(&[env]), self.num_envs())?;
+        Ok(self.simulation.batch.read(env.0, |env| read(env.data().model(), env.data())))
     }
 
-    /// All robots with their uids, in the order in which they were added, and the articulations that are none.
-    pub fn robot_ids(&self) -> Vec<(&str, RobotId)> {
-        let robots = self.contents.robots.iter().enumerate();
-        robots.map(|(index, robot)| (robot.uid(), RobotId { manager: self.serial, index })).collect()
+    /// What the simulation contains, by name.
+    pub fn entities(&self) -> Entities<'_> {
+        Entities::new(self)
+    }
+
+    /// The simulation as viewers and renderers see it.
+    pub fn scene(&self) -> SceneView<'_> {
+        SceneView::new(self)
+    }
+
+    /// The simulation as viewers and renderers see it, to change.
+    pub fn scene_mut(&mut self) -> SceneViewMut<'_> {
+        SceneViewMut::new(self)
+    }
+
+    /// Observers of the simulation.
+    pub fn observers(&self) -> Observers<'_> {
+        Observers::new(self)
+    }
+
+    /// Observers of the simulation, to add and to remove.
+    pub fn observers_mut(&mut self) -> ObserversMut<'_> {
+        ObserversMut::new(self)
+    }
+
+    /// Properties of environments: masses, frictions, sizes, gains.
+    pub fn properties(&self) -> EnvProperties<'_> {
+        EnvProperties::new(self)
+    }
+
+    /// Properties of environments, to draw and to reset.
+    pub fn properties_mut(&mut self) -> EnvPropertiesMut<'_> {
+        EnvPropertiesMut::new(self)
+    }
+
+    /// Warnings since the simulation was made.
+    pub fn warnings(&self) -> Warnings<'_> {
+        Warnings::new(self)
     }
 
     /// Of those robots that are `wanted`, the one called `uid`.
@@ -481,30 +438,16 @@ impl SimulationManager {
         })
     }
 
-    /// The rigid object called `uid`.
-    ///
-    /// # Errors
-    /// There is none; the error lists those there are.
-    pub fn rigid_object_id(&self, uid: &str) -> Result<ObjectId> {
-        let index = self.contents.objects.iter().position(|o| o.uid() == uid);
-        index.map(|index| ObjectId { manager: self.serial, index }).ok_or_else(|| Error::UnknownName {
-            what: "rigid object",
-            name: uid.into(),
-            candidates: self.contents.objects.iter().map(|o| o.uid().to_string()).collect(),
-        })
+    /// The batch of environments.
+    #[cfg(feature = "internals")]
+    pub fn batch(&self) -> &Batch {
+        &self.simulation.batch
     }
 
-    /// The MJCF file that is a part called `uid`.
-    ///
-    /// # Errors
-    /// There is none; the error lists those there are.
-    pub fn mjcf_id(&self, uid: &str) -> Result<MjcfId> {
-        let index = self.contents.parts.iter().position(|p| p.uid() == uid);
-        index.map(|index| MjcfId { manager: self.serial, index }).ok_or_else(|| Error::UnknownName {
-            what: "MJCF part",
-            name: uid.into(),
-            candidates: self.contents.parts.iter().map(|p| p.uid().to_string()).collect(),
-        })
+    #[track_caller]
+    pub(crate) fn index_of(&self, manager: u64, index: usize) -> usize {
+        assert!(manager == self.serial, "this handle is of another SimulationManager");
+        index
     }
 
     /// Steps all environments by `steps` times `physics_dt`: `update(n)` equals n times `update(1)`, bit for bit.
@@ -551,7 +494,7 @@ impl SimulationManager {
     ///
     /// # Errors
     /// An environment does not exist; then none is cleared.
-    pub fn reset_buffers(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
+    pub(crate) fn reset_buffers(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         let chosen = env_mask(env_ids, self.num_envs())?;
         let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
         envs.iter().for_each(|&env| self.simulation.batch.write(env, Env::reset_buffers));
@@ -568,29 +511,12 @@ impl SimulationManager {
         times
     }
 
-    /// Places of the environments in the overview \[m\], (N, 3): a grid with `arena_space` between neighbours.
-    ///
-    /// rows = ceil(n / floor(sqrt n)), cols = ceil(n / rows); environment k stands in row k div cols, column k mod cols.
-    pub fn env_origins(&self) -> Array2<f64> {
-        let n = self.num_envs();
-        let rows = n.div_ceil(n.isqrt().max(1));
-        let cols = n.div_ceil(rows);
-        let space = self.cfg.arena_space;
-        let mut origins = Array2::zeros((n, 3));
-        for (k, mut origin) in origins.rows_mut().into_iter().enumerate() {
-            let (i, j) = ((k / cols) as f64, (k % cols) as f64);
-            origin[0] = -(i - (rows - 1) as f64 / 2.0) * space;
-            origin[1] = (j - (cols - 1) as f64 / 2.0) * space;
-        }
-        origins
-    }
-
     /// Environments that a step could not be done in, with the reason; they stand in their last good state.
-    pub fn diverged(&self) -> Vec<(EnvId, String)> {
+    pub fn diverged(&self) -> Vec<DivergedEnv> {
         let mut diverged = Vec::new();
         self.simulation.batch.for_each(|i, env| {
             if let EnvStatus::Diverged { step, reason } = env.status() {
-                diverged.push((EnvId(i), format!("step {step}: {reason}")));
+                diverged.push(DivergedEnv { env: EnvId(i), step: *step, reason: reason.to_string() });
             }
         });
         diverged
@@ -599,54 +525,6 @@ impl SimulationManager {
     /// Everything that was repaired, ignored or unusual when robots were added.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
-    }
-
-    /// Counts of all warnings by name: diagnostics, MuJoCo's warnings over all environments, diverged environments.
-    pub fn warning_counts(&self) -> BTreeMap<String, u64> {
-        let mut counts: BTreeMap<String, u64> =
-            count_by_name(&self.diagnostics).into_iter().map(|(name, n)| (name.to_string(), n as u64)).collect();
-        let mut mujoco = mj::WarningCounts::default();
-        let mut diverged = 0;
-        self.simulation.batch.for_each(|_, env| {
-            mujoco.add(env.warnings());
-            diverged += u64::from(*env.status() != EnvStatus::Running);
-        });
-        for (warning, n) in mj::Warning::ALL.iter().zip(mujoco.0) {
-            if n > 0 {
-                counts.insert(warning.name().into(), n);
-            }
-        }
-        if diverged > 0 {
-            counts.insert("environment-diverged".into(), diverged);
-        }
-        counts
-    }
-
-    /// Counts of MuJoCo's warnings in one environment, by name.
-    ///
-    /// # Errors
-    /// There is no such environment.
-    pub fn env_warning_counts(&self, env: EnvId) -> Result<BTreeMap<&'static str, u64>> {
-        env_mask(Some(&[env]), self.num_envs())?;
-        let counts = self.simulation.batch.read(env.0, |env| *env.warnings());
-        Ok(mj::Warning::ALL.iter().map(|w| (w.name(), counts.get(*w))).filter(|(_, n)| *n > 0).collect())
-    }
-
-    /// How often contact and constraint buffers were doubled, over all environments.
-    pub fn buffer_growths(&self) -> u64 {
-        let mut growths = 0;
-        self.simulation.batch.for_each(|_, env| growths += u64::from(env.growths()));
-        growths
-    }
-
-    /// The MJCF that is being stepped.
-    pub fn mjcf(&self) -> &str {
-        &self.simulation.xml
-    }
-
-    /// The batch of environments, for work below this API.
-    pub fn batch(&self) -> &Batch {
-        &self.simulation.batch
     }
 
     /// Writes every stage of the pipeline to `dir`: the merged robots as URDF, the descriptions, the MJCF for both

@@ -66,7 +66,7 @@ impl<O> fmt::Debug for ObserverId<O> {
 
 /// The observers of a simulation.
 #[derive(Default)]
-pub(crate) struct Observers {
+pub(crate) struct ObserverSlots {
     seats: Vec<Seat>,
     next: u64,
     /// Physics steps that were done since the simulation was made.
@@ -79,38 +79,21 @@ struct Seat {
     observer: Option<Box<dyn Observer>>,
 }
 
-impl fmt::Debug for Observers {
+impl fmt::Debug for ObserverSlots {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_list().entries(self.seats.iter().map(|seat| seat.number)).finish()
     }
 }
 
-impl SimulationManager {
-    /// Adds an observer. It is told of what happens from now on.
-    pub fn add_observer<O: Observer>(&mut self, observer: O) -> ObserverId<O> {
-        // What was written before is told to those who were there.
-        self.tell_written();
-        let number = self.observers.next;
-        self.observers.next += 1;
-        self.observers.seats.push(Seat { number, observer: Some(Box::new(observer)) });
-        ObserverId { manager: self.serial, number, observer: PhantomData }
-    }
+/// Observers of a simulation; see [`SimulationManager::observers`].
+#[derive(Clone, Copy, Debug)]
+pub struct Observers<'a> {
+    sim: &'a SimulationManager,
+}
 
-    /// Takes an observer away and gives it back. It is told of what was written before.
-    ///
-    /// # Errors
-    /// It was taken away before, or is the one that is being told right now.
-    ///
-    /// # Panics
-    /// The handle is of another manager.
-    #[track_caller]
-    pub fn remove_observer<O: Observer>(&mut self, id: ObserverId<O>) -> Result<O> {
-        self.seat_of(id)?;
-        self.tell_written();
-        let index = self.seat_of(id)?;
-        let seat = self.observers.seats.remove(index);
-        let any: Option<Box<dyn Any>> = seat.observer.map(|observer| observer as Box<dyn Any>);
-        any.and_then(|any| any.downcast().ok()).map(|observer| *observer).ok_or(Error::NoObserver)
+impl<'a> Observers<'a> {
+    pub(crate) fn new(sim: &'a SimulationManager) -> Self {
+        Self { sim }
     }
 
     /// An observer, to read.
@@ -121,48 +104,89 @@ impl SimulationManager {
     /// # Panics
     /// The handle is of another manager.
     #[track_caller]
-    pub fn observer<O: Observer>(&self, id: ObserverId<O>) -> Result<&O> {
-        let seat = &self.observers.seats[self.seat_of(id)?];
+    pub fn get<O: Observer>(&self, id: ObserverId<O>) -> Result<&'a O> {
+        let seat = &self.sim.observers.seats[self.sim.seat_of(id)?];
         let any: Option<&dyn Any> = seat.observer.as_deref().map(|observer| observer as &dyn Any);
         any.and_then(|any| any.downcast_ref()).ok_or(Error::NoObserver)
+    }
+
+    /// The observers of a type, in the order in which they were added; without the one that is being told right now.
+    pub fn ids<O: Observer>(&self) -> Vec<ObserverId<O>> {
+        let is = |seat: &&Seat| {
+            let any: Option<&dyn Any> = seat.observer.as_deref().map(|observer| observer as &dyn Any);
+            any.is_some_and(|any| any.is::<O>())
+        };
+        let id = |seat: &Seat| ObserverId { manager: self.sim.serial, number: seat.number, observer: PhantomData };
+        self.sim.observers.seats.iter().filter(is).map(id).collect()
+    }
+
+    /// Whether an observer is there: added to this simulation, not taken away, and not the one that is being told right now.
+    pub fn contains<O: Observer>(&self, id: ObserverId<O>) -> bool {
+        id.manager == self.sim.serial && self.sim.seat_of(id).is_ok()
+    }
+
+    /// Physics steps that [`update`](SimulationManager::update) has done since the simulation was made, whatever was reset meanwhile: what
+    /// an observer counts by.
+    pub fn steps(&self) -> u64 {
+        self.sim.observers.steps
+    }
+}
+
+/// Observers of a simulation, to add, change and remove; see [`SimulationManager::observers_mut`].
+#[derive(Debug)]
+pub struct ObserversMut<'a> {
+    sim: &'a mut SimulationManager,
+}
+
+impl<'a> ObserversMut<'a> {
+    pub(crate) fn new(sim: &'a mut SimulationManager) -> Self {
+        Self { sim }
+    }
+
+    /// Adds an observer. It is told of what happens from now on.
+    pub fn add<O: Observer>(&mut self, observer: O) -> ObserverId<O> {
+        // What was written before is told to those who were there.
+        self.sim.tell_written();
+        let number = self.sim.observers.next;
+        self.sim.observers.next += 1;
+        self.sim.observers.seats.push(Seat { number, observer: Some(Box::new(observer)) });
+        ObserverId { manager: self.sim.serial, number, observer: PhantomData }
+    }
+
+    /// Takes an observer away and gives it back. It is told of what was written before.
+    ///
+    /// # Errors
+    /// It was taken away before, or is the one that is being told right now.
+    ///
+    /// # Panics
+    /// The handle is of another manager.
+    #[track_caller]
+    pub fn remove<O: Observer>(&mut self, id: ObserverId<O>) -> Result<O> {
+        self.sim.seat_of(id)?;
+        self.sim.tell_written();
+        let index = self.sim.seat_of(id)?;
+        let seat = self.sim.observers.seats.remove(index);
+        let any: Option<Box<dyn Any>> = seat.observer.map(|observer| observer as Box<dyn Any>);
+        any.and_then(|any| any.downcast().ok()).map(|observer| *observer).ok_or(Error::NoObserver)
     }
 
     /// An observer, to change.
     ///
     /// # Errors
-    /// As [`observer`](Self::observer).
+    /// As [`Observers::get`].
     ///
     /// # Panics
     /// The handle is of another manager.
     #[track_caller]
-    pub fn observer_mut<O: Observer>(&mut self, id: ObserverId<O>) -> Result<&mut O> {
-        let index = self.seat_of(id)?;
-        let seat = &mut self.observers.seats[index];
+    pub fn get<O: Observer>(self, id: ObserverId<O>) -> Result<&'a mut O> {
+        let index = self.sim.seat_of(id)?;
+        let seat = &mut self.sim.observers.seats[index];
         let any: Option<&mut dyn Any> = seat.observer.as_deref_mut().map(|observer| observer as &mut dyn Any);
         any.and_then(|any| any.downcast_mut()).ok_or(Error::NoObserver)
     }
+}
 
-    /// The observers of a type, in the order in which they were added; without the one that is being told right now.
-    pub fn observer_ids<O: Observer>(&self) -> Vec<ObserverId<O>> {
-        let is = |seat: &&Seat| {
-            let any: Option<&dyn Any> = seat.observer.as_deref().map(|observer| observer as &dyn Any);
-            any.is_some_and(|any| any.is::<O>())
-        };
-        let id = |seat: &Seat| ObserverId { manager: self.serial, number: seat.number, observer: PhantomData };
-        self.observers.seats.iter().filter(is).map(id).collect()
-    }
-
-    /// Whether an observer is there: added to this simulation, not taken away, and not the one that is being told right now.
-    pub fn has_observer<O: Observer>(&self, id: ObserverId<O>) -> bool {
-        id.manager == self.serial && self.seat_of(id).is_ok()
-    }
-
-    /// Physics steps that [`update`](Self::update) has done since the simulation was made, whatever was reset meanwhile: what
-    /// an observer counts by.
-    pub fn steps(&self) -> u64 {
-        self.observers.steps
-    }
-
+impl SimulationManager {
     #[track_caller]
     fn seat_of<O>(&self, id: ObserverId<O>) -> Result<usize> {
         assert!(id.manager == self.serial, "this handle is of another SimulationManager");

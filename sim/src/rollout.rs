@@ -13,7 +13,6 @@ use crate::simulation::Simulation;
 use crate::snapshot::{Entry, Snapshot};
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco;
-use kinetoscope_mujoco::ObjectKind;
 use ndarray::{Array3, ArrayView2, ArrayView3, ArrayViewMut2, AsArray, Ix3};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -21,7 +20,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[derive(Clone, Debug)]
 pub struct Rollout {
     /// Positions, then velocities, after every step, shape (N, T, nq + nv); the columns are called as
-    /// [`state_names`](SimulationManager::state_names) says. A row that diverges stays in its last good state.
+    /// [`state_names`](Entities::state_names) says. A row that diverges stays in its last good state.
     pub states: Array3<f64>,
     /// The states at the end; [`restore`](SimulationManager::restore) makes them the present ones.
     pub end: Snapshot,
@@ -107,41 +106,7 @@ fn roll(
 }
 
 impl SimulationManager {
-    /// Names of the columns of a [rollout](Self::rollout)'s controls: the movable joints of all robots (`uid/joint`), in the
-    /// order in which they were added, then the actuators of all MJCF parts (`uid/actuator`).
-    pub fn control_names(&self) -> Vec<String> {
-        let parts = self.contents.parts.iter();
-        let actuators = parts.flat_map(|part| part.names().actuators.iter().map(|name| part.full(name)));
-        let drives = self
-            .contents
-            .robots
-            .iter()
-            .flat_map(|robot| robot.joint_names().iter().map(|joint| format!("{}/{joint}", robot.uid())));
-        drives.chain(actuators).collect()
-    }
-
-    /// Names of the columns of a [rollout](Self::rollout)'s states: `qpos uid/joint` for each position, then
-    /// `qvel uid/joint` for each velocity, with a number in brackets where a joint has several: position and quaternion
-    /// w x y z of a free joint \[m\], its velocity in the environment \[m/s\] and its angular velocity in the body \[rad/s\].
-    pub fn state_names(&self) -> Vec<String> {
-        let model = self.simulation.batch.model();
-        let list = |what: &str, first: &[i32], count: usize| {
-            let mut names = Vec::with_capacity(count);
-            for joint in 0..model.njnt() {
-                let name = model.name(ObjectKind::Joint, joint).unwrap_or_default();
-                let end = first.get(joint + 1).map_or(count, |&next| next as usize);
-                let width = end - first[joint] as usize;
-                let one = |k| if width == 1 { format!("{what} {name}") } else { format!("{what} {name}[{k}]") };
-                names.extend((0..width).map(one));
-            }
-            names
-        };
-        let mut names = list("qpos", model.jnt_qposadr(), model.nq());
-        names.extend(list("qvel", model.jnt_dofadr(), model.nv()));
-        names
-    }
-
-    /// What would happen under `controls`, shape (N, T, columns of [`control_names`](Self::control_names)): N rows, each
+    /// What would happen under `controls`, shape (N, T, columns of [`control_names`](crate::Entities::control_names)): N rows, each
     /// with the controls of T physics steps. The controls of a robot are its position targets \[rad or m\], clamped to the
     /// limits of the row's initial state as [`set_qpos_target`](crate::RobotMut::set_qpos_target) does (columns of joints that follow others or have no drive are
     /// ignored); those of an MJCF part are as [`set_ctrl`](crate::MjcfPartMut::set_ctrl) takes them. Other targets and
@@ -216,7 +181,7 @@ impl SimulationManager {
         match controls.indexed_iter().find(|(_, value)| !value.is_finite()) {
             None => Ok(()),
             Some(((row, step, column), &value)) => {
-                let of = format!("control {:?} of step {step}", self.control_names()[column]);
+                let of = format!("control {:?} of step {step}", self.entities().control_names()[column]);
                 Err(Error::NotFinite { argument: "rollout", row, column, of, value })
             }
         }

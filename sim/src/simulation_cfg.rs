@@ -6,6 +6,7 @@ use crate::mjcf::document::{Cone, Integrator, PhysicsOption};
 use crate::shard::Shard;
 use crate::surface_cfg::SurfaceCfg;
 use nalgebra::Vector3;
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 /// Configuration of a simulation. `Default` is EmbodiChain's: 100 Hz, gravity, ground and one light.
@@ -99,6 +100,29 @@ impl SimulationManagerCfg {
     /// default, where loaded feet creep apart until the robot kneels.
     pub fn legged() -> Self {
         Self { physics_dt: 0.005, cone: Cone::Elliptic, impratio: 100.0, ..Self::default() }
+    }
+
+    /// Places of the environments in the overview \[m\], (N, 3): a grid with `arena_space` between neighbours.
+    ///
+    /// rows = ceil(n / floor(sqrt n)), cols = ceil(n / rows); environment k stands in row k div cols, column k mod cols.
+    pub fn env_origins(&self) -> Array2<f64> {
+        let n = self.num_envs;
+        let rows = n.div_ceil(n.isqrt().max(1));
+        let cols = n.div_ceil(rows);
+        let space = self.arena_space;
+        let mut origins = Array2::zeros((n, 3));
+        for (k, mut origin) in origins.rows_mut().into_iter().enumerate() {
+            let (i, j) = ((k / cols) as f64, (k % cols) as f64);
+            origin[0] = -(i - (rows - 1) as f64 / 2.0) * space;
+            origin[1] = (j - (cols - 1) as f64 / 2.0) * space;
+        }
+        origins
+    }
+
+    /// Number of threads for drawing and casting rays: [`threads`](Self::threads), or every core. Steps use at most one thread per
+    /// environment.
+    pub fn num_threads(&self) -> usize {
+        self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get))
     }
 
     /// Checks every number.

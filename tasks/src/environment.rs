@@ -81,8 +81,8 @@ impl Env {
         let (mut sim, (_, id)) = (self.present.sim, self.watch);
         sim.end_task();
         // It may be another simulation than at first: then there is nothing to take away.
-        if sim.has_observer(id) {
-            let _ = sim.remove_observer(id);
+        if sim.observers().contains(id) {
+            let _ = sim.observers_mut().remove(id);
         }
         sim
     }
@@ -145,7 +145,7 @@ impl Env {
         let watch = Watch::new(n);
         sim.begin_task();
         let mut env = Self {
-            watch: (watch.clone(), sim.add_observer(watch)),
+            watch: (watch.clone(), sim.observers_mut().add(watch)),
             rows: (0..n).map(row).collect(),
             reward_sums: Array2::zeros((n, terms.rewards.len())),
             observations: Array2::zeros((n, observation_space.len())),
@@ -165,7 +165,7 @@ impl Env {
     ///
     /// With a seed, random numbers of these environments start again: the same seed gives the same episodes. Without one they go
     /// on, as they do when episodes end by themselves; at first the seed is the simulation's. (Noise of sensors and of
-    /// [`randomize`](SimulationManager::randomize) goes by the simulation's seed alone.) Properties, such as masses and gains, stay
+    /// [`randomize`](kinetoscope_sim::EnvPropertiesMut::randomize) goes by the simulation's seed alone.) Properties, such as masses and gains, stay
     /// as events have left them: an event that changes them at a reset sets them, instead of scaling what it finds.
     ///
     /// # Errors
@@ -304,9 +304,9 @@ impl Env {
         let n = self.num_envs();
         let (mut terminated, mut truncated) = (Array1::from_elem(n, false), Array1::from_elem(n, false));
         let mut reasons: Vec<Option<EndReason>> = vec![None; n];
-        for (env, why) in self.present.sim.diverged() {
-            terminated[env.0] = true;
-            reasons[env.0] = Some(EndReason::Diverged(why));
+        for diverged in self.present.sim.diverged() {
+            terminated[diverged.env.0] = true;
+            reasons[diverged.env.0] = Some(EndReason::Diverged(diverged.to_string()));
         }
         for env in (0..n).filter(|&env| self.watch.0.was_reset(env)) {
             truncated[env] = true;

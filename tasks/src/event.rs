@@ -26,7 +26,7 @@ pub enum When {
 ///
 /// Its random numbers are those of the dice, one for each environment that is concerned; draws from these repeat with the seed
 /// that [`Env::reset`](crate::Env::reset) is given. To set properties by them, use
-/// [`randomize_with`](SimulationManager::randomize_with): [`randomize`](SimulationManager::randomize) draws by the seed of the
+/// [`randomize_with`](kinetoscope_sim::EnvPropertiesMut::randomize_with): [`randomize`](kinetoscope_sim::EnvPropertiesMut::randomize) draws by the seed of the
 /// manager, and goes on drawing where it is.
 pub struct EventTerm {
     pub(crate) name: String,

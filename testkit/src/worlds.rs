@@ -3,7 +3,10 @@
 use crate::urdf::Files;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::Camera;
+use kinetoscope::sensors::{Imu, JointState, JointStateCfg};
 use kinetoscope::sim::env::Env;
+use kinetoscope::sim::{DriveType, ObjectId};
 
 /// A configuration with this number of threads.
 pub fn cfg(num_envs: usize, threads: usize) -> SimulationManagerCfg {
@@ -206,7 +209,7 @@ pub fn look_at(eye: [f64; 3], target: [f64; 3]) -> Extrinsics {
 
 /// The mask id of an object.
 pub fn mask_id(sim: &SimulationManager, object: &str) -> i32 {
-    sim.mask_ids().iter().find(|id| id.object == object).expect("an object of this name").id
+    sim.scene().mask_ids().iter().find(|id| id.object == object).expect("an object of this name").id
 }
 
 /// A configuration in which no joint has a drive.

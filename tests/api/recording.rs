@@ -1,8 +1,8 @@
 //! The record button of views writes files, as the recorder does.
 
-use kinetoscope::prelude::*;
-use kinetoscope::record::{Recording, Wanted};
-use kinetoscope::viewer::{Command, Recording as _, Viewer, Wants};
+use kinetoscope::FileRecording;
+use kinetoscope::record::{RecordError, Recorded, RecorderCfg, Recording, Wanted};
+use kinetoscope::viewer::{Command, RecordButton, Recording as _, Viewer, Viewing, Wants};
 use kinetoscope_testkit::worlds::{RecordedWorld, sr5};
 use std::collections::BTreeMap;
 use std::path::Path;

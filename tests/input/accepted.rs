@@ -3,6 +3,7 @@
 use super::support::{INERTIAL, LIMIT, exported, hinge_with, robot, sim};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::Error;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 fn mass(mass: &str, moment: &str) -> String {

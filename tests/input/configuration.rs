@@ -2,7 +2,7 @@
 
 use super::support::{ball, cfg, hinge, robot};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{GroundCfg, LightCfg};
+use kinetoscope::sim::{DriveModel, GroundCfg, Integrator, LightCfg};
 use kinetoscope_testkit::refusal::assert_refused;
 
 type Change = fn(&mut SimulationManagerCfg);
@@ -86,7 +86,7 @@ fn extreme_numbers() {
         let ball = sim.add_robot(robot).unwrap_or_else(|e| panic!("row {i}: {e}"));
         sim.update(20);
         assert!(sim.robot(ball).link_pose("ball").unwrap().iter().all(|x| x.is_finite()), "row {i}");
-        assert!(sim.env_origins().iter().all(|x| !x.is_nan()), "row {i}");
+        assert!(sim.cfg().env_origins().iter().all(|x| !x.is_nan()), "row {i}");
     }
 }
 

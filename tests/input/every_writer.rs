@@ -4,7 +4,7 @@
 use super::support::{LIMIT, bits, chain, robot};
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::RobotMut;
+use kinetoscope::sim::{Error, MjcfId, ObjectId, Result, RobotMut, WrenchFrame};
 
 const ENVS: usize = 3;
 const POSE: &[f64] = &[0.1, 0.2, 1.0, 0.0, 0.0, 0.6, 0.8];
@@ -45,7 +45,7 @@ fn told(sim: &SimulationManager, ids: Ids) -> String {
     let targets = [view.qpos_target(), view.qvel_target(), view.qf_target()];
     let mut told = format!("{:?} {drives:?} {joints:?} {targets:?}", bits(sim));
     for env in 0..ENVS {
-        let properties = sim.properties(EnvId(env)).unwrap();
+        let properties = sim.properties().of(EnvId(env)).unwrap();
         for property in
             [Property::Mass, Property::Inertia, Property::CenterOfMass, Property::Friction, Property::LinearDamping]
         {

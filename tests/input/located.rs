@@ -4,6 +4,7 @@ use super::support::{INERTIAL, TETRAHEDRON, hinge_with, robot, sim};
 use kinetoscope::mujoco::{LoadError, TARGET, compile};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::source::Source;
+use kinetoscope::sim::Integrator;
 use kinetoscope::sim::mjcf::document::{
     Body, Cone, Geom, GeomRole, Inertial, Joint, JointType, Mjcf, PhysicsOption, Shape,
 };

@@ -4,6 +4,7 @@ use super::support::{INERTIAL, LIMIT, TETRAHEDRON, cfg, exported, robot, sim};
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::Error;
 use std::path::Path;
 
 fn escaped(name: &str) -> String {
@@ -109,7 +110,7 @@ fn uids() {
     let dir = dirs[0].path();
     for uid in ["world", "ground", "a\"b<c>&'", "日本", " ", "...", "%s", "İ", "i̇", "robot"] {
         let id = sim.add_robot(two_links(dir, uid, ["l", "m"], "0.1")).unwrap_or_else(|e| panic!("{uid:?}: {e}"));
-        assert_eq!(sim.robot_id(uid).unwrap(), id);
+        assert_eq!(sim.entities().robot_id(uid).unwrap(), id);
     }
     // Names become parts of paths, of files too.
     for uid in [".", "..", "a/b", "a\\b", "a\nb", ""] {

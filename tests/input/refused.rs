@@ -164,8 +164,9 @@ fn robots() {
     let dir = tempfile::tempdir().unwrap();
     let (mut sim, mut calm) = (moving(dir.path()), moving(dir.path()));
     let mut wrong = Vec::new();
-    let state =
-        |sim: &SimulationManager| (bits(sim), sim.mjcf().to_owned(), sim.diagnostics().len(), sim.warning_counts());
+    let state = |sim: &SimulationManager| {
+        (bits(sim), sim.scene().mjcf().to_owned(), sim.diagnostics().len(), sim.warnings().counts())
+    };
     for (what, make, expected) in rows() {
         let dir = tempfile::tempdir().unwrap();
         let before = state(&sim);
@@ -199,13 +200,13 @@ fn more_than_thirty_robots() {
     }
     sim.update(100);
     for i in 0..30 {
-        let id = sim.robot_id(&format!("r{i}")).unwrap();
+        let id = sim.entities().robot_id(&format!("r{i}")).unwrap();
         let z = sim.robot(id).link_pose("ball").unwrap()[(0, 2)];
         let rest = 0.1 + 0.2 * f64::from(i % 2);
         assert!((z - rest).abs() < 0.01, "robot {i} is at {z}");
     }
     assert!(sim.diverged().is_empty());
-    let message = sim.robot_id("r99").unwrap_err().to_string();
+    let message = sim.entities().robot_id("r99").unwrap_err().to_string();
     assert!(message.contains("no robot \"r99\"") && message.contains("\"r0\""), "{message}");
 }
 

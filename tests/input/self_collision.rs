@@ -41,7 +41,7 @@ fn overlapping_links() {
     // Neighbours are 2 * 0.1 * sin(0.15) = 0.03 apart, the next ones 0.059, the next 0.087, and the next 0.113.
     assert_eq!(listed.len(), 4 + 3 + 2, "{listed:#?}");
     assert!(listed[0].contains("\"star/a0\"") && listed[0].contains("\"star/a1\""), "{listed:#?}");
-    assert!(sim.mjcf().contains("<exclude body1=\"star/a0\" body2=\"star/a1\"/>"));
+    assert!(sim.scene().mjcf().contains("<exclude body1=\"star/a0\" body2=\"star/a1\"/>"));
     sim.update(50);
     assert!(drift(&sim, id) < 1e-9, "they push each other away: {}", drift(&sim, id));
     // The two that are apart still collide.
@@ -50,7 +50,7 @@ fn overlapping_links() {
     assert!(sim.robot(id).qpos()[(0, 4)] > 0.01, "arm 4 is pushed: {}", sim.robot(id).qpos());
     // Without self-collision nothing is excluded.
     let (mut sim, _) = world(false, &star(5, 1));
-    assert!(overlaps(&sim).is_empty() && !sim.mjcf().contains("<exclude"));
+    assert!(overlaps(&sim).is_empty() && !sim.scene().mjcf().contains("<exclude"));
     sim.update(1);
     assert!(sim.batch().read(0, |env| env.data().contact().is_empty()));
 }

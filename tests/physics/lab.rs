@@ -6,7 +6,7 @@ pub(crate) use crate::urdf::{Joint, Link, POINT, base, urdf};
 use kinetoscope::ndarray::{Array2, Array3};
 pub(crate) use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_row, to_row};
-use kinetoscope::sim::{self, Cone};
+use kinetoscope::sim::{self, Cone, DriveModel, Integrator, ObjectId, WrenchFrame};
 use kinetoscope_testkit::urdf::Files;
 /// The default drive, evaluated at the end of the step, and none: joints move freely.
 pub(crate) use kinetoscope_testkit::worlds::{gains as implicit, no_drive as passive};
@@ -199,7 +199,7 @@ impl Lab {
 #[track_caller]
 pub(crate) fn assert_well(sim: &SimulationManager) {
     assert!(sim.diverged().is_empty(), "{:?}", sim.diverged());
-    let counts = sim.warning_counts();
+    let counts = sim.warnings().counts();
     assert!(!counts.keys().any(|name| name.starts_with("mujoco")), "{counts:?}");
 }
 

@@ -152,7 +152,7 @@ impl Screenshot for SimulationManager {
         }
         let contacts = cfg.overlays.contacts.then_some(cfg.shown);
         let wants = Wants { contacts, markers: cfg.overlays.sensors, ..Wants::default() };
-        let run = Run { steps: self.steps(), ..Run::default() };
+        let run = Run { steps: self.observers().steps(), ..Run::default() };
         let mut canvas = Canvas::default();
         // A pool of one has one to give.
         let Some(snapshot) = Pool::default().take(self, 1, &wants, run) else { return Ok(canvas) };
@@ -189,8 +189,9 @@ mod tests {
         let mut sim = sample(4).sim;
         sim.update(20);
         let state = |sim: &SimulationManager| {
-            let (robot, cube) = (sim.robot(sim.robot_id("arm").unwrap()), sim.rigid_object_id("cube").unwrap());
-            (sim.time(), sim.steps(), robot.qpos(), robot.qvel(), sim.rigid_object(cube).pose())
+            let (robot, cube) =
+                (sim.robot(sim.entities().robot_id("arm").unwrap()), sim.entities().rigid_object_id("cube").unwrap());
+            (sim.time(), sim.observers().steps(), robot.qpos(), robot.qvel(), sim.rigid_object(cube).pose())
         };
         let red = |image: &image::RgbaImage| image.pixels().filter(|p| p[0] > 100 && p[1] < 60 && p[2] < 60).count();
         let written = |sim: &mut SimulationManager| {
@@ -206,7 +207,7 @@ mod tests {
         assert_eq!((image.dimensions(), image.as_raw().as_slice()), ((960, 540), canvas.bytes()));
         assert!(red(&image) > 100, "the cubes are red: {}", red(&image));
         // The control: without cubes another image replaces the file.
-        let cube = sim.rigid_object_id("cube").unwrap();
+        let cube = sim.entities().rigid_object_id("cube").unwrap();
         sim.rigid_object_mut(cube).write_pose(&array![[0.0, 0.0, -50.0, 1.0, 0.0, 0.0, 0.0]], None).unwrap();
         assert_eq!(red(&written(&mut sim)), 0);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);

@@ -10,7 +10,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::render::visibility::View;
 use kinetoscope::scene::{Instance, PoseF32, RenderScene, Shape};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot};
-use kinetoscope::sim::visible::Visible;
+use kinetoscope::sim::Visible;
 use std::path::{Path, PathBuf};
 
 /// Geom groups that are drawn: not those of collision shapes.

@@ -240,7 +240,7 @@ fn starts_on_the_ground() {
         let (mut film, mut sim) = kinetoscope::record::Film::of(&scene, None).unwrap();
         film.show(&mut sim, 0).unwrap();
         // A recorded scene is one part.
-        let part = sim.mjcf_part(sim.mjcf_id("scene").unwrap());
+        let part = sim.mjcf_part(sim.entities().mjcf_id("scene").unwrap());
         part.body_pose("robot/body").unwrap()[(0, 2)]
     };
     for (flags, height) in

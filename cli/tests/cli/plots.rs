@@ -3,6 +3,7 @@
 use super::support::Shell;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::record::RecorderCfg;
 use kinetoscope_testkit::svg::curves;
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! Commands and programs of docs/recording.md, run as they stand there.
 
 use kinetoscope::prelude::*;
-use kinetoscope::record::Format;
+use kinetoscope::record::{Format, RecorderCfg};
 use kinetoscope_testkit::worlds::RecordedWorld;
 use std::path::Path;
 use std::process::{Command, Output};

@@ -3,7 +3,9 @@
 use super::support::{Running, Shell, colors, red, window_of};
 use kinetoscope::ndarray::{Array3, array};
 use kinetoscope::prelude::*;
-use kinetoscope::viewer::Eye;
+use kinetoscope::record::RecorderCfg;
+use kinetoscope::sim::{LinkId, Still, WrenchFrame};
+use kinetoscope::viewer::{Eye, ScreenshotCfg};
 use kinetoscope_testkit::wait;
 use kinetoscope_testkit::x_server::{Display, close, screenshot};
 
@@ -28,7 +30,7 @@ fn shell() -> Shell {
 fn record(shell: &Shell, start: f64, cfgs: &[RecorderCfg], run: impl FnOnce(&mut SimulationManager, RobotId)) {
     let mut scene = InteractiveScene::from_file(shell.path("cart.toml")).unwrap();
     let sim = scene.sim_mut();
-    let cart = sim.robot_id("cart").unwrap();
+    let cart = sim.entities().robot_id("cart").unwrap();
     if start != 0.0 {
         sim.robot_mut(cart).write_qpos(&array![[start]], None, None).unwrap();
     }

@@ -25,14 +25,14 @@ fn busy() -> SimulationManager {
 /// Poses of all bodies that are called so in both, in both environments.
 fn poses(sim: &SimulationManager) -> Vec<(String, Array2<f64>)> {
     let mut poses = Vec::new();
-    for (uid, robot) in sim.robot_ids() {
+    for (uid, robot) in sim.entities().robot_ids() {
         let robot = sim.robot(robot);
         poses.extend(robot.link_names().iter().map(|link| (format!("{uid}/{link}"), robot.link_pose(link).unwrap())));
     }
     for uid in ["cube", "hand"] {
-        poses.push((uid.into(), sim.rigid_object(sim.rigid_object_id(uid).unwrap()).pose()));
+        poses.push((uid.into(), sim.rigid_object(sim.entities().rigid_object_id(uid).unwrap()).pose()));
     }
-    let part = sim.mjcf_part(sim.mjcf_id("part").unwrap());
+    let part = sim.mjcf_part(sim.entities().mjcf_id("part").unwrap());
     poses.extend(["ball", "tip"].map(|body| (format!("part/{body}"), part.body_pose(body).unwrap())));
     poses
 }
@@ -41,7 +41,7 @@ fn recorded(path: &Path, scene: bool) -> Vec<Vec<(String, Array2<f64>)>> {
     let mut sim = busy();
     sim.update(3);
     let recorder = sim.record(RecorderCfg { scene, ..RecorderCfg::new(path) }).unwrap();
-    let (arm, hand) = (sim.robot_id("arm").unwrap(), sim.rigid_object_id("hand").unwrap());
+    let (arm, hand) = (sim.entities().robot_id("arm").unwrap(), sim.entities().rigid_object_id("hand").unwrap());
     let mut all = Vec::new();
     for step in 0..STEPS {
         let target = |(env, joint)| 0.4 * (0.2 * step as f64 + joint as f64 + env as f64).sin();

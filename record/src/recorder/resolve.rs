@@ -148,19 +148,19 @@ fn everything(
     left_out: &mut Vec<String>,
 ) -> Result<Vec<Source>> {
     let mut sources = Vec::new();
-    for uid in sim.jointed_uids() {
+    for uid in sim.entities().jointed_uids() {
         for of in [Source::joint_states, Source::targets, Source::link_poses] {
             sources.push(of(sim, uid, envs)?);
         }
     }
-    for uid in sim.rigid_object_uids() {
+    for uid in sim.entities().rigid_object_uids() {
         sources.push(Source::object_pose(sim, uid, envs)?);
     }
-    for uid in sim.mjcf_uids() {
+    for uid in sim.entities().mjcf_uids() {
         sources.push(Source::mjcf_state(sim, uid, envs)?);
         sources.push(Source::body_poses(sim, uid, envs)?);
     }
-    for uid in sim.sensor_uids() {
+    for uid in sim.entities().sensor_uids() {
         match Source::sensor(sim, uid, envs) {
             Ok(found) => sources.extend(found),
             Err(error @ (RecordError::Unreadable { .. } | RecordError::Elsewhere { .. })) => {
@@ -220,7 +220,7 @@ pub(super) fn open(
     let sink: Result<Box<dyn Sink>> = match format {
         Format::Mcap => {
             let start = sim.time().iter().copied().fold(f64::INFINITY, f64::min);
-            let (masks, dt) = (sim.mask_ids(), sim.cfg().physics_dt);
+            let (masks, dt) = (sim.scene().mask_ids(), sim.cfg().physics_dt);
             let about = npz::about(streams, masks, dt).to_string().into_bytes();
             let failed = |error| RecordError::file(&cfg.path, error);
             let snapshot = npz::snapshot_bytes(&sim.snapshot(None)?, folder_of(&cfg.path)).map_err(failed)?;
@@ -228,7 +228,7 @@ pub(super) fn open(
             let mut held =
                 vec![(npz::ABOUT, "application/json", about), (npz::START, "application/octet-stream", snapshot)];
             held.extend(scene);
-            let file = McapFile::create(part, storage, streams, &sim.env_origins(), masks, start, &held);
+            let file = McapFile::create(part, storage, streams, &sim.cfg().env_origins(), masks, start, &held);
             file.map(|file| Box::new(file) as Box<dyn Sink>).map_err(|error| RecordError::file(&cfg.path, error))
         }
         Format::Npz => {
@@ -236,7 +236,7 @@ pub(super) fn open(
                 part,
                 storage,
                 streams,
-                sim.mask_ids(),
+                sim.scene().mask_ids(),
                 sim.cfg().physics_dt,
                 &sim.snapshot(None)?,
                 scene,

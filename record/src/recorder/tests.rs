@@ -19,7 +19,7 @@ use std::sync::Mutex;
 
 /// Puts the ball somewhere at rest.
 fn put(sim: &mut SimulationManager, [x, y, z]: [f64; 3], envs: Option<&[EnvId]>) {
-    let ball = sim.mjcf_id("ball").unwrap();
+    let ball = sim.entities().mjcf_id("ball").unwrap();
     sim.mjcf_part_mut(ball).write_qpos(&ndarray::array![[x, y, z, 1.0, 0.0, 0.0, 0.0]], envs).unwrap();
 }
 
@@ -55,7 +55,7 @@ fn record_to(
     let cfg = cfg.with_topics([Topic::MjcfState("ball".into())]);
     let (sources, left_out) = resolve(sim, &cfg, Format::Mcap).unwrap();
     let recorder = Recorder::begin(sim, cfg, Format::Mcap, sources, left_out, Box::new(Calls(write))).unwrap();
-    sim.add_observer(recorder)
+    sim.observers_mut().add(recorder)
 }
 
 /// A simulation waits for a slow disk, reports it, and loses nothing.
@@ -91,8 +91,8 @@ fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) 
     // Without the scene, which would fill the disk alone.
     let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(path) };
     let recorder = Recorder::start(sim, cfg, &Disk::full_after(left))?;
-    let recorder = sim.add_observer(recorder);
-    sim.update(if sim.sensor_uids().is_empty() { 3000 } else { 60 });
+    let recorder = sim.observers_mut().add(recorder);
+    sim.update(if sim.entities().sensor_uids().is_empty() { 3000 } else { 60 });
     sim.finish_recording(recorder)
 }
 
@@ -255,7 +255,7 @@ fn panic_of_the_thread() {
         assert!(packets < 3, "a test of panics");
     });
     sim.update(20);
-    sim.observer_mut(recorder).unwrap().catch_up();
+    sim.observers_mut().get(recorder).unwrap().catch_up();
     kinetoscope_testkit::refusal::assert_error(sim.finish_recording(recorder), "", &["panicked"]);
 }
 
@@ -296,7 +296,8 @@ fn late_sensors() {
     put(&mut sim, [0.2, 0.1, 1.1], Some(&[EnvId(1)]));
     sim.update(1);
     // The images shown in between are read.
-    let late: SensorId<Camera> = sim.sensor_ids().into_iter().find(|(name, _)| name == "late_camera").unwrap().1;
+    let late: SensorId<Camera> =
+        sim.entities().sensor_ids().into_iter().find(|(name, _)| name == "late_camera").unwrap().1;
     assert_eq!(sim.sensor(late).unwrap().frame_counts().to_vec(), [5, 5]);
     assert!(sim.sensor(late).unwrap().depth().unwrap().iter().any(|depth| depth.is_finite()));
     sim.update((STEPS - 9) as u32);
@@ -418,7 +419,7 @@ impl Observer for Resets {
     }
 
     fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment) {
-        if matches!(moment, Moment::Stepped) && self.0.contains(&sim.steps()) {
+        if matches!(moment, Moment::Stepped) && self.0.contains(&sim.observers().steps()) {
             sim.reset(Some(&[EnvId(0)])).unwrap();
         }
     }
@@ -432,7 +433,7 @@ fn resets_of_another_environment() {
     let heights = |resets: &'static [u64]| {
         let (_folder, path) = scratch("run.npz");
         let mut sim = falling(2);
-        sim.add_observer(Resets(resets));
+        sim.observers_mut().add(Resets(resets));
         sim.add_sensor("imu", ImuCfg::on("ball/ball")).unwrap();
         record(&mut sim, RecorderCfg::new(&path), |sim| sim.update(STEPS));
         // Rows of two environments: those of the second, each once.

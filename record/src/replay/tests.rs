@@ -18,7 +18,7 @@ fn arms() -> SimulationManager {
 
 /// Targets that change at every step, otherwise in each environment; a reset on the way.
 fn drive(sim: &mut SimulationManager, mut at_step: impl FnMut(&mut SimulationManager, u32)) {
-    let (arm, pusher) = (sim.robot_id("arm").unwrap(), sim.mjcf_id("pusher").unwrap());
+    let (arm, pusher) = (sim.entities().robot_id("arm").unwrap(), sim.entities().mjcf_id("pusher").unwrap());
     for step in 0..STEPS {
         let targets = ndarray::Array2::from_shape_fn((2, sim.robot(arm).dof()), |(env, joint)| {
             0.3 * (0.1 * f64::from(step) + joint as f64 + env as f64).sin()
@@ -53,7 +53,7 @@ fn same_bits() {
         let verdict = verify(&mut sim, &path).unwrap();
         assert!(verdict.is_same(), "{name}: {verdict}");
         // Each step, the beginning and the reset: positions, velocities, efforts, poses of links, and the pusher's three.
-        let arm = sim.robot(sim.robot_id("arm").unwrap());
+        let arm = sim.robot(sim.entities().robot_id("arm").unwrap());
         let row = 2 * (3 * arm.dof() + 7 * arm.link_names().len() + 3) as u64;
         assert_eq!((verdict.steps, verdict.numbers), (u64::from(STEPS), row * (u64::from(STEPS) + 2)), "{name}");
     }
@@ -90,7 +90,7 @@ fn other_actions() {
         // A push that is no action, before step 12 of environment 1.
         let path = folder.path().join(format!("pushed.{end}"));
         recording(&path, |sim, step| {
-            let arm = sim.robot_id("arm").unwrap();
+            let arm = sim.entities().robot_id("arm").unwrap();
             let mut force = ndarray::Array3::zeros((1, 1, 3));
             force[(0, 0, 0)] = if step == 12 { 5.0 } else { 0.0 };
             let tip = LinkId(sim.robot(arm).link_names().len() - 1);
@@ -107,7 +107,7 @@ fn other_actions() {
         let path = folder.path().join(format!("written.{end}"));
         recording(&path, |sim, step| {
             if step == 20 {
-                let arm = sim.robot_id("arm").unwrap();
+                let arm = sim.entities().robot_id("arm").unwrap();
                 let row = sim.robot(arm).qpos().row(0).mapv(|q| q + 0.01);
                 let row = row.insert_axis(ndarray::Axis(0));
                 sim.robot_mut(arm).write_qpos(&row, None, Some(&[EnvId(0)])).unwrap();

@@ -176,7 +176,7 @@ impl Source {
         if distortion.is_none() {
             return Some(format!("{camera}/camera_info (ROS has no words for its lens)"));
         }
-        let error = rectifications(sim.sensor_called(uid).ok()?)?.err()?;
+        let error = rectifications(sim.entities().sensor_called(uid).ok()?)?.err()?;
         Some(format!("R and P of {camera}/camera_info ({error})"))
     }
 

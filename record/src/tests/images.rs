@@ -76,7 +76,7 @@ fn overwritten_folder() {
     let recorder = world.sim.record(overwriting(cfg.clone())).unwrap();
     assert!(matches!(world.sim.record(overwriting(cfg)), Err(RecordError::Busy { .. })));
     (0..IMAGE_EVERY).for_each(|step| world.step(step));
-    world.sim.observer_mut(recorder).unwrap().catch_up();
+    world.sim.observers_mut().get(recorder).unwrap().catch_up();
     assert!(path.join("camera/color/env_0/000003.png").exists() && part.join("camera/color/env_0/000000.png").exists());
     let time = world.sim.time()[1];
     let recorded = world.sim.finish_recording(recorder).unwrap();
@@ -163,8 +163,14 @@ fn animation_streams() {
         assert!(error.to_string().contains("camera/color in 2 environments"), "{error}");
         // Without a topic, the first of each is taken.
         let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
-        let streams: Vec<_> =
-            world.sim.observer(recorder).unwrap().streams().map(|s| (s.name.clone(), s.env_ids.clone())).collect();
+        let streams: Vec<_> = world
+            .sim
+            .observers()
+            .get(recorder)
+            .unwrap()
+            .streams()
+            .map(|s| (s.name.clone(), s.env_ids.clone()))
+            .collect();
         assert_eq!(streams, [("camera/color".to_string(), vec![0])]);
         // A recording without a frame is no file.
         let error = world.sim.finish_recording(recorder).unwrap_err().to_string();

@@ -21,7 +21,9 @@ fn task() -> Env {
     let cart = sim.add_robot(passive(mjcf_robot("cart", cart))).unwrap();
     let push = kinetoscope_tasks::Space::uniform(["slide"], [-1e5, 1e5]).unwrap();
     EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE) })
-        .action(ActionTerm::new("push", push, move |sim, forces| Ok(sim.robot_mut(cart).set_qf_target(forces, None, None)?)))
+        .action(ActionTerm::new("push", push, move |sim, forces| {
+            Ok(sim.robot_mut(cart).set_qf_target(forces, None, None)?)
+        }))
         .observation(ObservationTerm::new("place", ["slide"], move |now| Ok(now.sim().robot(cart).qpos())))
         .reward(RewardTerm::new("place", 3.0, move |now| Ok(now.sim().robot(cart).qpos().column(0).to_owned())))
         .termination(TerminationTerm::new("far", move |now| {

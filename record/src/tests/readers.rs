@@ -146,7 +146,7 @@ fn sensed(path: &Path) -> Value {
         [fx, 0.0, cx, 0.0 - fx * baseline, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0].map(|x| (x * 1e9).round() / 1e9)
     });
     let names: std::collections::BTreeMap<String, String> =
-        sim.mask_ids().iter().map(|id| (id.id.to_string(), id.name())).collect();
+        sim.scene().mask_ids().iter().map(|id| (id.id.to_string(), id.name())).collect();
     assert!(names.values().any(|name| name == "cube"), "{names:?}");
     let upward = normal.rows().into_iter().filter(|n| n.to_vec() == [0.0, 0.0, 1.0]).count();
     assert!(upward > 0 && upward < 24 * 16, "{upward}");

@@ -133,11 +133,11 @@ fn changed_scene() {
         // Another object changes nothing that is recorded.
         kinetoscope_testkit::worlds::add_ball(&mut world.sim, "ball", [0.0; 3]);
         world.step(1);
-        assert!(!world.sim.observer(recorder).unwrap().has_failed());
+        assert!(!world.sim.observers().get(recorder).unwrap().has_failed());
         // A second robot has joints, which the sensor of all joints now measures.
         world.sim.add_robot(kinetoscope_testkit::worlds::sr5("other")).unwrap();
         world.step(2);
-        let observer = world.sim.observer_mut(recorder).unwrap();
+        let observer = world.sim.observers_mut().get(recorder).unwrap();
         assert!(observer.has_failed());
         observer.catch_up();
         let error = world.sim.finish_recording(recorder).unwrap_err();

@@ -38,9 +38,9 @@ fn outline(shape: &Shape) -> (&'static str, Vec<[f32; 3]>, usize) {
 
 /// The largest distance of points of entities from where MuJoCo has them in an environment \[m\].
 fn farthest(world: &mut World, env: usize, entities: &Value) -> f64 {
-    let scene = world.sim.scene_of(EnvId(env)).unwrap();
+    let scene = world.sim.scene_mut().scene_of(EnvId(env)).unwrap();
     let mut look = Look::default();
-    world.sim.look(EnvId(env), &mut look).unwrap();
+    world.sim.scene_mut().look(EnvId(env), &mut look).unwrap();
     let (mut farthest, mut count): (f64, usize) = (0.0, 0);
     let seen = scene.instances().iter().zip(&look.instances).enumerate();
     for (index, (instance, pose)) in seen.filter(|(_, (one, _))| one.visible && one.group < 3) {
@@ -81,7 +81,11 @@ fn entity_poses() {
     (0..STEPS).for_each(|step| world.step(step));
     // Another color from now on, in one environment.
     let rgba = [0.25, 0.5, 0.75, 1.0];
-    world.sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::Color, "cube", &rgba)).unwrap();
+    world
+        .sim
+        .properties_mut()
+        .randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::Color, "cube", &rgba))
+        .unwrap();
     world.step(STEPS);
     // A fixed object, whose pose is not recorded.
     world.sim.add_rigid_object(fixed(object("table", ObjectShape::cube(0.2), [1.0, -1.0, 0.5]))).unwrap();

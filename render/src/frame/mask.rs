@@ -7,7 +7,7 @@ use ndarray::Ix3;
 ///
 /// Isaac's names `semantic_segmentation` and `instance_segmentation` turn this channel on, they do not choose what its numbers
 /// mean: they are ids of links. Pictures of instances or semantic classes are made of them by a
-/// `Segmentation`, which `SimulationManager::segmentation` knows.
+/// `Segmentation`, which `SceneView::segmentation` knows.
 #[derive(Clone, Copy, Debug)]
 pub struct Mask;
 

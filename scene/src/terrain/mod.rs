@@ -1,7 +1,7 @@
 //! Heights of ground that is not flat: generators of height fields, one per file.
 //!
 //! Each gives an array of heights \[m\] over a regular grid: rows along y, columns along x, the first of both at the negative
-//! end. They hold nothing of MuJoCo; `kinetoscope_sim::objects::terrain::TerrainCfg` takes what they give.
+//! end. They hold nothing of MuJoCo; `kinetoscope_sim::TerrainCfg` takes what they give.
 
 mod generator;
 mod rough;

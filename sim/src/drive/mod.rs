@@ -25,7 +25,7 @@ pub mod models;
 pub mod plan;
 pub mod table;
 
-pub use cfg::{DriveCfg, JointGains, PerJoint, resolve};
+pub use cfg::{DriveCfg, DriveCfgError, JointGains, PerJoint, resolve};
 pub use mode::{ActuatorSpec, DriveMode, JointInfo};
 pub use models::{ActuatorModel, DcMotor, DelayedPd, IdealPd};
 

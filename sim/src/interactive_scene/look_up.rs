@@ -156,7 +156,7 @@ impl InteractiveScene {
     /// # Errors
     /// As [`terrain_id`](Self::terrain_id).
     pub fn terrain(&self, name: &str) -> Result<&Terrain> {
-        Ok(self.sim.terrain(self.terrain_id(name)?))
+        Ok(self.sim.entities().terrain(self.terrain_id(name)?))
     }
 
     /// The handle of an MJCF file that is a part of the scene.
@@ -243,7 +243,7 @@ impl InteractiveScene {
     }
 
     /// Shows the markers of a sensor from now on, or does not, whatever kind of sensor it is: see
-    /// [`SimulationManager::set_debug_vis`](crate::SimulationManager::set_debug_vis).
+    /// [`SceneViewMut::set_debug_vis`](crate::SceneViewMut::set_debug_vis).
     ///
     /// # Errors
     /// There is no such entity, or it is no sensor.

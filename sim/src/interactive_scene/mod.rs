@@ -178,7 +178,7 @@ impl InteractiveScene {
 
     /// Places of the environments in the overview \[m\], (N, 3). Poses are local to the environment: nobody adds these.
     pub fn env_origins(&self) -> Array2<f64> {
-        self.sim.env_origins()
+        self.sim.cfg().env_origins()
     }
 
     /// Clears the buffers of environments, all of them where `env_ids` is `None`, as Isaac Lab's `reset` does: see

@@ -102,7 +102,7 @@ impl ArticulationCfg {
 
 /// Handle of an articulation; valid for the manager that made it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ArticulationId(RobotId);
+pub struct ArticulationId(pub(crate) RobotId);
 
 /// An articulation, to read: everything that can be read of a robot. It has no control parts.
 pub type Articulation<'a> = Robot<'a>;
@@ -140,13 +140,5 @@ impl SimulationManager {
     #[track_caller]
     pub fn articulation_mut(&mut self, id: ArticulationId) -> ArticulationMut<'_> {
         self.robot_mut(id.0)
-    }
-
-    /// The articulation called `uid`.
-    ///
-    /// # Errors
-    /// There is none; the error lists those there are.
-    pub fn articulation_id(&self, uid: &str) -> Result<ArticulationId> {
-        self.find_robot(uid, "articulation", |robot| !robot.is_robot()).map(ArticulationId)
     }
 }

@@ -104,7 +104,7 @@ pub(crate) struct Frame {
 
 /// A file that was added: what does not change while the simulation runs.
 #[derive(Debug)]
-pub struct MjcfData {
+pub(crate) struct MjcfData {
     cfg: MjcfCfg,
     pub(super) model: Model,
     pub(super) names: PartNames,
@@ -178,22 +178,22 @@ impl MjcfData {
     }
 
     /// Name of the part.
-    pub fn uid(&self) -> &str {
+    pub(crate) fn uid(&self) -> &str {
         &self.cfg.uid
     }
 
     /// The configuration it was added with.
-    pub fn cfg(&self) -> &MjcfCfg {
+    pub(crate) fn cfg(&self) -> &MjcfCfg {
         &self.cfg
     }
 
     /// The compiled model of the file alone.
-    pub fn model(&self) -> &Model {
+    pub(crate) fn model(&self) -> &Model {
         &self.model
     }
 
     /// Names of everything in the file, without the uid.
-    pub fn names(&self) -> &PartNames {
+    pub(crate) fn names(&self) -> &PartNames {
         &self.names
     }
 

@@ -89,7 +89,7 @@ impl<'a> RigidObjectMut<'a> {
     /// a single row is for all of them). Quaternions are normalised; velocities, which are in world axes, stay. A forward
     /// pass follows, so that everything that is read afterwards belongs to the new state. A kinematic object stays there until
     /// it is put elsewhere or reset. A static one stays over resets, until it is put elsewhere or
-    /// [`reset_properties`](crate::SimulationManager::reset_properties) is called: its place is
+    /// [`reset_properties`](crate::EnvPropertiesMut::reset) is called: its place is
     /// [`Property::Position`](crate::Property) and `Rotation`, an environment where it differs gets a model of its own, and
     /// what already touches it is pushed out as from anything else.
     ///

@@ -109,7 +109,7 @@ impl Default for RigidObjectCfg {
 
 /// An object that was added: what does not change while the simulation runs.
 #[derive(Debug)]
-pub struct RigidObjectData {
+pub(crate) struct RigidObjectData {
     cfg: RigidObjectCfg,
     pub(super) mask_id: i32,
     mesh: Option<ObjectMesh>,
@@ -185,17 +185,17 @@ impl RigidObjectData {
     }
 
     /// Name of the object.
-    pub fn uid(&self) -> &str {
+    pub(crate) fn uid(&self) -> &str {
         &self.cfg.uid
     }
 
     /// The configuration it was added with.
-    pub fn cfg(&self) -> &RigidObjectCfg {
+    pub(crate) fn cfg(&self) -> &RigidObjectCfg {
         &self.cfg
     }
 
     /// What the mask channel of cameras says of it.
-    pub fn mask_id(&self) -> i32 {
+    pub(crate) fn mask_id(&self) -> i32 {
         self.mask_id
     }
 

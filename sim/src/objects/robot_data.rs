@@ -28,7 +28,7 @@ pub struct JointIndex(pub usize);
 
 /// A loaded robot: everything about it that does not change while the simulation runs.
 #[derive(Clone, Debug)]
-pub struct RobotData {
+pub(crate) struct RobotData {
     cfg: RobotCfg,
     pub(super) description: RobotDescription,
     pub(super) plans: Vec<JointPlan>,
@@ -119,12 +119,12 @@ impl RobotData {
     }
 
     /// Name of the robot.
-    pub fn uid(&self) -> &str {
+    pub(crate) fn uid(&self) -> &str {
         &self.cfg.uid
     }
 
     /// The configuration it was added with.
-    pub fn cfg(&self) -> &RobotCfg {
+    pub(crate) fn cfg(&self) -> &RobotCfg {
         &self.cfg
     }
 
@@ -152,17 +152,17 @@ impl RobotData {
     }
 
     /// The merged robot as its files describe it, with its payloads.
-    pub fn description(&self) -> &RobotDescription {
+    pub(crate) fn description(&self) -> &RobotDescription {
         &self.description
     }
 
     /// Limits and drives of its joints.
-    pub fn plans(&self) -> &[JointPlan] {
+    pub(crate) fn plans(&self) -> &[JointPlan] {
         &self.plans
     }
 
     /// Names of the movable joints in the order of the merged URDF, or of the MJCF file.
-    pub fn joint_names(&self) -> &[String] {
+    pub(crate) fn joint_names(&self) -> &[String] {
         &self.joint_names
     }
 
@@ -177,7 +177,7 @@ impl RobotData {
     }
 
     /// The MJCF file that it is; `None` where it is made of URDF files.
-    pub fn file(&self) -> Option<&RobotFile> {
+    pub(crate) fn file(&self) -> Option<&RobotFile> {
         self.file.as_ref()
     }
 

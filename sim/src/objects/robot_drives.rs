@@ -112,7 +112,7 @@ impl RobotMut<'_> {
 
     /// Sets what stiffness and damping of drives mean, for `joint_ids` (all where `None`; mimic joints are left out) in
     /// `env_ids` (all where `None`). Their numbers stay, and so does everything else; gains that were drawn
-    /// ([`randomize`](crate::SimulationManager::randomize)) stay what they are in torque units. With `None` a drive gives nothing but
+    /// ([`randomize`](crate::EnvPropertiesMut::randomize)) stay what they are in torque units. With `None` a drive gives nothing but
     /// the effort of [`set_qf_target`](Self::set_qf_target), until it gets another type. `Acceleration` multiplies the gains by the
     /// inertia that the joint feels at the robot's initial positions, with the masses of the files and payloads: those that
     /// were drawn for an environment do not count. Nothing warns where that makes an explicit model

@@ -48,7 +48,7 @@ impl RobotMut<'_> {
     ///
     /// It is a property of the environment: it stays through a reset, and, unlike
     /// [`set_stiffness`](Self::set_stiffness), when a [snapshot](crate::snapshot) is restored (but with its properties);
-    /// [`reset_properties`](crate::SimulationManager::reset_properties) gives back what the robot was added with.
+    /// [`reset_properties`](crate::EnvPropertiesMut::reset) gives back what the robot was added with.
     ///
     /// All joints that no implicit drive moves may have some, those of passive articulations too. An implicit drive takes the
     /// place that MuJoCo has for it, so that a joint with one has dry friction only where the model has another place:

@@ -37,7 +37,11 @@ impl RobotPartMut<'_> {
     /// # Errors
     /// As [`RobotMut::set_qpos_target`]; then nothing is set.
     #[doc(alias = "set_qpos")]
-    pub fn set_qpos_target<'t>(&mut self, targets: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+    pub fn set_qpos_target<'t>(
+        &mut self,
+        targets: impl AsArray<'t, f64, Ix2>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
         self.robot.set_qpos_target(targets, Some(&self.joints), env_ids)
     }
 
@@ -47,7 +51,11 @@ impl RobotPartMut<'_> {
     /// # Errors
     /// As [`RobotMut::set_qvel_target`]; then nothing is set.
     #[doc(alias = "set_qvel")]
-    pub fn set_qvel_target<'t>(&mut self, velocities: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
+    pub fn set_qvel_target<'t>(
+        &mut self,
+        velocities: impl AsArray<'t, f64, Ix2>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<()> {
         self.robot.set_qvel_target(velocities, Some(&self.joints), env_ids)
     }
 

@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 /// let heights = rough.heights()?;
 /// let terrain = sim.add_terrain(TerrainCfg { heights: heights.clone(), size: rough.size, ..Default::default() })?;
 /// // Points are 0.2 m apart; the middle of 41 is number 20.
-/// let height = sim.terrain(terrain).height_at([0.2, -0.4]).unwrap_or(f64::NAN);
+/// let height = sim.entities().terrain(terrain).height_at([0.2, -0.4]).unwrap_or(f64::NAN);
 /// assert!((height - heights[(18, 21)]).abs() < 1e-9);
 /// # Ok::<(), kinetoscope_sim::Error>(())
 /// ```

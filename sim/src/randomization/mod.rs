@@ -8,15 +8,16 @@
 //! was drawn for, and the property and name they are for. So they depend neither on the number of environments and
 //! processes, nor on what other environments do, nor on what else is random.
 //!
-//! Properties stay until they are drawn or set again: [`reset`](SimulationManager::reset) and
-//! [`restore`](SimulationManager::restore) leave them alone
-//! ([`restore_with_properties`](SimulationManager::restore_with_properties) does not), gains of drives included, and when more is added to the scene they are carried over by
+//! Properties stay until they are drawn or set again: [`reset`](crate::SimulationManager::reset) and
+//! [`restore`](crate::SimulationManager::restore) leave them alone
+//! ([`EnvPropertiesMut::restore`] does not), gains of drives included, and when more is added to the scene they are carried over by
 //! name. A gain that was drawn and is then set at run time is that of the drive's setting again; one that is set to its
 //! nominal value, too. Cameras, ray casters and overviews see the sizes, colours and places of each
 //! environment. What sees the scene without MuJoCo keeps the nominal values: inverse kinematics and dynamics of descriptions,
 //! `total_mass` and `mass` of robots and objects, and the gravity that an `Imu` adds.
 
 mod apply;
+mod env_properties;
 mod error;
 mod named;
 mod properties;
@@ -26,6 +27,7 @@ mod terms;
 
 use apply::Made;
 pub(crate) use apply::Maker;
+pub use env_properties::{EnvProperties, EnvPropertiesMut};
 pub use error::RandomizationError;
 pub(crate) use named::NamedValue;
 pub(crate) use properties::OwnValues;
@@ -37,10 +39,8 @@ pub use terms::{Draw, Randomization, Term};
 
 use crate::env::Env;
 use crate::error::Result;
-use crate::ids::{EnvId, env_mask};
-use crate::manager::SimulationManager;
 use crate::simulation::Simulation;
-use kinetoscope_scene::{OwnScene, Random, RenderSceneError};
+use kinetoscope_scene::{OwnScene, RenderSceneError};
 use std::sync::Arc;
 
 impl Simulation {
@@ -191,107 +191,3 @@ impl Simulation {
 
 /// No values of its own.
 const NOTHING: OwnValues = [const { None }; Property::ALL.len()];
-
-impl SimulationManager {
-    /// The properties of an environment.
-    ///
-    /// # Errors
-    /// There is no such environment.
-    pub fn properties(&self, env: EnvId) -> Result<Properties> {
-        env_mask(Some(&[env]), self.num_envs())?;
-        let tables = self.simulation.tables();
-        Ok(self.simulation.batch.edit(env.0, |here| self.simulation.properties_of(tables, env.0, here)))
-    }
-
-    /// Draws properties for environments, all of them where `env_ids` is `None`. Properties that no term names stay as they
-    /// are; a forward pass follows, when the environment is read or stepped.
-    ///
-    /// # Errors
-    /// An environment does not exist, a pattern matches nothing or one name twice, a range is none, or a value cannot be,
-    /// such as a negative mass; then nothing changes.
-    pub fn randomize(&mut self, randomization: &Randomization, env_ids: Option<&[EnvId]>) -> Result<()> {
-        let resolved = randomization.resolve(&self.properties(EnvId(0))?)?;
-        let keys = self.keys();
-        // One text for all: there is a key for each environment, property and name.
-        let mut what = String::new();
-        self.draw(env_ids, |env, properties| {
-            resolved.draw(properties, |property, name| {
-                what.clear();
-                what.extend(["/", property.name(), "/", name]);
-                keys(env, &what)
-            });
-            Ok(())
-        })
-    }
-
-    /// As [`randomize`](Self::randomize), by a function that gets random numbers of the environment, its number in this
-    /// manager, and its properties to change. To set properties it need not use the random numbers.
-    ///
-    /// # Errors
-    /// An environment does not exist, the function fails, or a value cannot be; then nothing changes.
-    pub fn randomize_with(
-        &mut self,
-        env_ids: Option<&[EnvId]>,
-        mut change: impl FnMut(&mut Random, EnvId, &mut Properties) -> Result<()>,
-    ) -> Result<()> {
-        let keys = self.keys();
-        self.draw(env_ids, |env, properties| change(&mut keys(env, ""), EnvId(env), properties))
-    }
-
-    /// Gives environments the nominal properties again, gains of drives included; they share the whole model then.
-    ///
-    /// # Errors
-    /// An environment does not exist.
-    pub fn reset_properties(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
-        self.change(env_ids, |_, properties| {
-            properties.values = Property::ALL.map(|property| properties.tables.get(property).nominal.clone());
-            properties.nominal_gains = true;
-            Ok(())
-        })
-    }
-
-    /// Memory that an environment's properties take \[bytes\]: the struct and the arrays of the model that it does not share
-    /// (with those of the welds that hold in it), and the values as they were set; 0 where all properties are nominal, whatever
-    /// welds hold. One whole copy of the model is kept beside, for all.
-    ///
-    /// # Errors
-    /// There is no such environment.
-    pub fn property_bytes(&self, env: EnvId) -> Result<usize> {
-        env_mask(Some(&[env]), self.num_envs())?;
-        let Some(own) = &self.simulation.own_values[env.0] else { return Ok(0) };
-        let values: usize = own.iter().flatten().map(|values| size_of_val(&**values)).sum();
-        let model = self.simulation.batch.read(env.0, |env| env.data().model().own_bytes());
-        Ok(model + size_of::<OwnValues>() + values)
-    }
-
-    /// The random numbers of the next draw for an environment, and what they are for.
-    fn keys(&self) -> impl Fn(usize, &str) -> Random + use<> {
-        let (seed, first, draws) = (self.cfg.seed, self.cfg.first_env(), self.draws.clone());
-        move |env, what| Random::keyed(seed, (first + env) as u64, &format!("properties/{}{what}", draws[env]))
-    }
-
-    /// Changes properties by random numbers: counts the draws.
-    fn draw(
-        &mut self,
-        env_ids: Option<&[EnvId]>,
-        change: impl FnMut(usize, &mut Properties) -> Result<()>,
-    ) -> Result<()> {
-        let chosen = env_mask(env_ids, self.num_envs())?;
-        self.change(env_ids, change)?;
-        let counted = self.draws.iter_mut().zip(chosen);
-        counted.for_each(|(draws, chosen)| *draws = draws.wrapping_add(u64::from(chosen)));
-        Ok(())
-    }
-
-    fn change(
-        &mut self,
-        env_ids: Option<&[EnvId]>,
-        change: impl FnMut(usize, &mut Properties) -> Result<()>,
-    ) -> Result<()> {
-        let chosen = env_mask(env_ids, self.num_envs())?;
-        let envs: Vec<usize> = (0..chosen.len()).filter(|&env| chosen[env]).collect();
-        self.simulation.change_properties(&envs, change)?;
-        self.sensors.refresh(&envs, &mut self.simulation);
-        Ok(())
-    }
-}

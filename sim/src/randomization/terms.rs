@@ -53,8 +53,8 @@ pub struct Term {
 ///     .with(Property::Mass, "cube", Draw::Scale([0.8, 1.2]))
 ///     .with(Property::Friction, "cube|ground", Draw::Set([0.4, 1.0]))
 ///     .with(Property::Gravity, "gravity", Draw::Add([-0.1, 0.1]));
-/// sim.randomize(&randomization, None)?;
-/// let mass = sim.properties(kinetoscope_sim::EnvId(3))?.get(Property::Mass, "cube")?[0];
+/// sim.properties_mut().randomize(&randomization, None)?;
+/// let mass = sim.properties().of(kinetoscope_sim::EnvId(3))?.get(Property::Mass, "cube")?[0];
 /// assert!((1.6..2.4).contains(&mass));
 /// # Ok::<(), kinetoscope_sim::Error>(())
 /// ```

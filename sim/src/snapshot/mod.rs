@@ -11,7 +11,7 @@
 //! drawn, and how often it was drawn for. They belong to the environment, not to its state:
 //! [`restore`](SimulationManager::restore) leaves those of the environment it goes to alone (of a drive whose gain is drawn,
 //! what was set before is restored), as who resets to the same start after every draw wants it.
-//! [`restore_with_properties`](SimulationManager::restore_with_properties) restores them too.
+//! [`EnvPropertiesMut::restore`](crate::EnvPropertiesMut::restore) restores them too.
 //!
 //! What it does not hold:
 //!

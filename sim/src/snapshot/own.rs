@@ -55,29 +55,8 @@ impl Simulation {
 }
 
 impl SimulationManager {
-    /// As [`restore`](Self::restore), with the properties of each environment when the snapshot was taken: what it had for
-    /// itself, gains that were drawn included, and how often it was drawn for, so that what is drawn next is what was drawn
-    /// then. What was nominal becomes nominal. Going on is bit-identical, also from a file in a manager that was built
-    /// alike, and whatever was drawn or set in between.
-    ///
-    /// ```
-    /// use kinetoscope_sim::{Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
-    ///
-    /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 4, ..Default::default() })?;
-    /// sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), shape: ObjectShape::cube(0.1), ..Default::default() })?;
-    /// let draw = Randomization::new().with(Property::Mass, "cube", Draw::Scale([0.5, 2.0]));
-    /// sim.randomize(&draw, None)?;
-    /// let (snapshot, mass) = (sim.snapshot(None)?, sim.properties(kinetoscope_sim::EnvId(2))?.get(Property::Mass, "cube")?.to_vec());
-    /// sim.randomize(&draw, None)?;
-    /// sim.restore_with_properties(&snapshot, None)?;
-    /// assert_eq!(sim.properties(kinetoscope_sim::EnvId(2))?.get(Property::Mass, "cube")?, mass);
-    /// # Ok::<(), kinetoscope_sim::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// As [`restore`](Self::restore); and where nothing of this scene has one of the properties, or not such a value. Then
-    /// nothing is restored.
-    pub fn restore_with_properties(&mut self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<()> {
+    /// Restores states and properties: [`EnvPropertiesMut::restore`](crate::EnvPropertiesMut::restore).
+    pub(crate) fn restore_with_properties(&mut self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<()> {
         let sources = self.sources(snapshot, env_ids)?;
         let chosen: Vec<usize> = (0..sources.len()).filter(|&env| sources[env].is_some()).collect();
         let tables = Arc::clone(self.simulation.tables());

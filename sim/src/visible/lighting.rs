@@ -206,7 +206,7 @@ mod tests {
             if ball {
                 sim.add_rigid_object(RigidObjectCfg::default()).expect("an object");
             }
-            let visible = sim.visible();
+            let visible = sim.scene_mut().visible();
             (**visible.scene()).clone()
         };
         let active = |scene: &RenderScene| scene.lights.iter().filter(|light| light.active).count();

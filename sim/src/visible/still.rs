@@ -91,11 +91,11 @@ impl Still {
     /// There is no such environment.
     pub fn of_env(sim: &mut SimulationManager, env: EnvId) -> Result<Self> {
         env_mask(Some(&[env]), sim.num_envs())?;
-        let visible = sim.visible().seen_as(sim.own_scene(env));
-        Ok(sim.batch().read(env.0, |env| Self::of_data(&visible, env.data())))
+        let visible = sim.scene_mut().visible().seen_as(sim.own_scene(env));
+        Ok(sim.simulation.batch.read(env.0, |env| Self::of_data(&visible, env.data())))
     }
 
-    /// Several environments side by side, as [`SimulationManager::env_origins`] places them (all of them where `envs` is
+    /// Several environments side by side, as [`SimulationManagerCfg::env_origins`] places them (all of them where `envs` is
     /// `None`), with markers in them. What belongs to the ground is drawn once; lamps and cameras are those of environment 0. Everything else is drawn in every environment: terrain that
     /// is larger than the space between them overlaps.
     ///
@@ -104,13 +104,13 @@ impl Still {
     pub fn overview(sim: &mut SimulationManager, envs: Option<&[EnvId]>, markers: &[(EnvId, Marker)]) -> Result<Self> {
         let envs = env_list(envs, sim.num_envs())?;
         env_list(Some(&markers.iter().map(|(env, _)| *env).collect::<Vec<_>>()), sim.num_envs())?;
-        let (visible, origins) = (sim.visible(), sim.env_origins());
+        let (visible, origins) = (sim.scene_mut().visible(), sim.cfg().env_origins());
         let stills: Vec<(usize, Self)> = envs
             .iter()
             .map(|&env| {
                 (
                     env,
-                    sim.batch().read(env, |here| {
+                    sim.simulation.batch.read(env, |here| {
                         let visible = visible.seen_as(sim.own_scene(EnvId(env)));
                         Self::of_data(&visible, here.data())
                     }),

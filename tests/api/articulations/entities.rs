@@ -3,6 +3,8 @@
 use super::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
+use kinetoscope::sensors::JointStateCfg;
+use kinetoscope::sim::{EntityTypes, Error};
 use kinetoscope_testkit::refusal::{assert_error, assert_refused_unchanged};
 use kinetoscope_testkit::worlds::{add_ball, errors, object, pose_in};
 
@@ -39,7 +41,7 @@ fn names() {
     let other = ArticulationCfg { uid: "other".into(), semantic_class: Some("furniture".into()), ..cabinet() };
     let second = sim.add_articulation(other).unwrap();
     let classes: Vec<(&str, Option<&str>, &str)> =
-        sim.mask_ids().iter().map(|id| (id.object.as_str(), id.link.as_deref(), id.class.as_str())).collect();
+        sim.scene().mask_ids().iter().map(|id| (id.object.as_str(), id.link.as_deref(), id.class.as_str())).collect();
     for expected in [
         ("robot", Some("drawer"), "robot"),
         ("cabinet", Some("cabinet"), "articulation"),
@@ -51,10 +53,10 @@ fn names() {
     let joints = sim.add_sensor("joints", JointStateCfg::default()).unwrap();
     let names = sim.sensor(joints).unwrap().joint_names().to_vec();
     assert_eq!(names, ["robot/drawer_slide", "cabinet/drawer_slide", "other/drawer_slide"]);
-    assert_eq!(sim.robot_id("robot").unwrap(), robot);
-    assert_eq!(["cabinet", "other"].map(|uid| sim.articulation_id(uid).unwrap()), [first, second]);
-    assert_error(sim.articulation_id("robot"), "", &["no articulation \"robot\"", "cabinet"]);
-    assert_error(sim.robot_id("cabinet"), "", &["no robot \"cabinet\"", "robot"]);
+    assert_eq!(sim.entities().robot_id("robot").unwrap(), robot);
+    assert_eq!(["cabinet", "other"].map(|uid| sim.entities().articulation_id(uid).unwrap()), [first, second]);
+    assert_error(sim.entities().articulation_id("robot"), "", &["no articulation \"robot\"", "cabinet"]);
+    assert_error(sim.entities().robot_id("cabinet"), "", &["no robot \"cabinet\"", "robot"]);
     let view = sim.articulation(second);
     assert_eq!((view.uid(), view.dof(), view.link_names()), ("other", 1, vec!["cabinet", "drawer"]));
     assert!((view.total_mass() - 22.0).abs() < 1e-12);
@@ -105,7 +107,7 @@ fn scene_file() {
     let open = array![[0.125]];
     scene.articulation_mut("{ENV}/cabinet").unwrap().write_qpos(&open, None, None).unwrap();
     assert_eq!(scene.articulation("cabinet").unwrap().qpos(), open);
-    assert_eq!(scene.articulation_id("sprung").unwrap(), scene.sim().articulation_id("sprung").unwrap());
+    assert_eq!(scene.articulation_id("sprung").unwrap(), scene.sim().entities().articulation_id("sprung").unwrap());
     assert_error(scene.robot("cabinet").map(drop), "", &["cabinet", "articulation", "robot"]);
 }
 
@@ -138,7 +140,8 @@ fn refused_configurations() {
         ("drive", ArticulationCfg { drive: negative, ..b() }, "", &["stiffness", "-1"]),
         ("pose", ArticulationCfg { init_pose, ..b() }, "Config { field: \"init_pose\"", &[]),
     ];
-    let cabinet = |sim: &SimulationManager| (sim.articulation(id).qpos(), sim.articulation_id("cabinet").unwrap());
+    let cabinet =
+        |sim: &SimulationManager| (sim.articulation(id).qpos(), sim.entities().articulation_id("cabinet").unwrap());
     assert_eq!(cabinet(&sim), (array![[0.0]], id));
     assert_refused_unchanged(&mut sim, cabinet, rows, |sim, cfg| sim.add_articulation(cfg));
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
+use kinetoscope::sim::EntityTypes;
 use kinetoscope_testkit::refusal::assert_error;
 
 /// [`door`] as MJCF, with an actuator that says how it could be driven; its limits are in radians.

@@ -5,6 +5,7 @@ mod mjcf;
 mod motion;
 
 use kinetoscope::prelude::*;
+use kinetoscope::sim::ArticulationId;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::text_robot;
 

@@ -73,7 +73,7 @@ fn pushed_drawer() {
 
     let (mut sim, id) = with(2, cabinet());
     let sticky = Randomization::new().with(Property::DryFriction, "cabinet/drawer_slide", Draw::Set([6.0, 6.0]));
-    sim.randomize(&sticky, Some(&[EnvId(1)])).unwrap();
+    sim.properties_mut().randomize(&sticky, Some(&[EnvId(1)])).unwrap();
     sim.articulation_mut(id).write_qvel(&array![[0.5], [0.5]], None, None).unwrap();
     sim.update(1000);
     let open = sim.articulation(id).qpos();

@@ -5,6 +5,7 @@ use kinetoscope::exec::ThreadPool;
 use kinetoscope::mujoco::{Data, Warning};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::DivergedEnv;
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::env::{Divergence, EnvStatus, with_small_buffers};
 use kinetoscope_testkit::urdf::Files;
@@ -78,13 +79,14 @@ fn report_and_revival() {
         sim.update(25);
         calm.update(25);
         let diverged = sim.diverged();
-        let [(EnvId(40), message)] = &diverged[..] else { panic!("{diverged:?}") };
+        let [DivergedEnv { env: EnvId(40), .. }] = &diverged[..] else { panic!("{diverged:?}") };
+        let message = diverged[0].to_string();
         assert!(message.contains("bad-position") && message.contains("25"), "{message}");
         assert_eq!(sim.batch().read(40, bits_of), last_good);
         assert_eq!(sim.time()[40], sim.batch().read(40, |env| env.data().time()));
         assert!((sim.time()[40] - 0.25).abs() < 1e-9 && (sim.time()[39] - 0.5).abs() < 1e-9);
-        assert_eq!(sim.warning_counts()["environment-diverged"], 1);
-        assert_eq!(sim.warning_counts()["mujoco-bad-position"], 1);
+        assert_eq!(sim.warnings().counts()["environment-diverged"], 1);
+        assert_eq!(sim.warnings().counts()["mujoco-bad-position"], 1);
         let (before, undisturbed) = (all_bits(&sim), all_bits(&calm));
         assert!((0..64).all(|k| k == 40 || before[k] == undisturbed[k]), "the others");
         // Only a reset revives, and only the one that is named.
@@ -108,7 +110,7 @@ fn divergence_in_a_step() {
     assert!(sim.diverged().is_empty());
     sim.update(1);
     let diverged = sim.diverged();
-    assert!(diverged.len() == 1 && diverged[0].1.contains("step 10"), "{diverged:?}");
+    assert!(diverged.len() == 1 && diverged[0].step == 10, "{diverged:?}");
     assert_eq!(sim.robot(robot).qpos()[(2, 0)], 9e9, "the state before the step");
     assert!((sim.time()[2] - 0.1).abs() < 1e-12);
     assert!(sim.robot(robot).qvel().iter().all(|v| v.is_finite()));
@@ -123,10 +125,10 @@ fn no_revival() {
     let (mut sim, robot) = wheels(3);
     sim.update(5);
     put(&mut sim, robot, 1e300, 1);
-    let (diverged, counts) = (sim.diverged(), sim.warning_counts());
+    let (diverged, counts) = (sim.diverged(), sim.warnings().counts());
     add_walker(&mut sim, "walker", 0.3);
     assert_eq!(sim.diverged(), diverged);
-    assert_eq!(sim.warning_counts()["mujoco-bad-position"], counts["mujoco-bad-position"]);
+    assert_eq!(sim.warnings().counts()["mujoco-bad-position"], counts["mujoco-bad-position"]);
     sim.update(5);
     assert_eq!(sim.diverged(), diverged, "it stands still");
     assert!((sim.time()[1] - 0.05).abs() < 1e-12);

@@ -79,7 +79,7 @@ pub(crate) fn most_contacts(batch: &Batch) -> usize {
 /// No warning of MuJoCo, and nothing diverged.
 #[track_caller]
 pub(crate) fn assert_quiet(sim: &SimulationManager) {
-    let mujoco: Vec<_> = sim.warning_counts().into_keys().filter(|name| name.starts_with("mujoco")).collect();
+    let mujoco: Vec<_> = sim.warnings().counts().into_keys().filter(|name| name.starts_with("mujoco")).collect();
     assert!(mujoco.is_empty() && sim.diverged().is_empty(), "{mujoco:?} {:?}", sim.diverged());
 }
 

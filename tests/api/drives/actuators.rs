@@ -13,6 +13,9 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::drive::actuator::{Scheme, stable_timestep_of, warn_if_unstable};
 use kinetoscope::sim::drive::plan::{PlanError, effective_inertias, plan};
 use kinetoscope::sim::env::Env;
+use kinetoscope::sim::{
+    ActuatorModel, DcMotor, DelayedPd, DriveModel, DriveType, Error, IdealPd, Integrator, RandomizationError,
+};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::worlds::add_ball;
 use std::collections::BTreeMap;
@@ -488,7 +491,7 @@ fn change(world: &mut World, settings: &mut Settings, n: i32) {
         }
         200 => {
             let drawn = Randomization::new().with(Property::MaxEffort, "robot/a", Draw::Set([0.5, 0.5]));
-            world.sim.randomize(&drawn, ONE).unwrap();
+            world.sim.properties_mut().randomize(&drawn, ONE).unwrap();
             limit[(1, 0)] = 0.5;
         }
         _ => return,
@@ -574,7 +577,7 @@ fn randomized_limits() {
     for model in ActuatorModel::examples() {
         let mut world = three_wheels(model);
         let unlimited = |sim: &mut SimulationManager, joint: &str, envs: Option<&[EnvId]>| {
-            sim.randomize_with(envs, |_, _, all| all.set(Property::MaxEffort, joint, &[f64::INFINITY]))
+            sim.properties_mut().randomize_with(envs, |_, _, all| all.set(Property::MaxEffort, joint, &[f64::INFINITY]))
         };
         let result = unlimited(&mut world.sim, "robot/b", Some(&[EnvId(2)]));
         if let ActuatorModel::DcMotor(_) = model {

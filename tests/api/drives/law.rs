@@ -22,7 +22,7 @@
 use crate::drives::worlds::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::DiagnosticKind;
+use kinetoscope::sim::{DiagnosticKind, DriveModel, DriveType};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 pub(crate) const EXACT: Tolerance =

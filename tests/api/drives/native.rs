@@ -9,7 +9,7 @@ use crate::drives::law::EXACT;
 use crate::drives::worlds::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::DiagnosticKind;
+use kinetoscope::sim::{DiagnosticKind, Error, IdealPd, Integrator};
 
 /// Largest speed after 3000 steps of plain MuJoCo from a slight motion, relative to it.
 fn growth(xml: &str, h: f64) -> f64 {
@@ -49,7 +49,7 @@ fn printed_largest_step() {
         assert!(messages[0].contains("time step is 0.01 s"), "{}", messages[0]);
         let after = messages[0].split("time step of ").nth(1).unwrap();
         let bound: f64 = after.split(' ').next().unwrap().parse().unwrap();
-        let [below, above] = [0.98, 1.02].map(|share| growth(world.sim.mjcf(), share * bound));
+        let [below, above] = [0.98, 1.02].map(|share| growth(world.sim.scene().mjcf(), share * bound));
         assert!(below < 10.0 && above == f64::INFINITY, "{name}, bound {bound} s: {below} {above}");
     }
 }

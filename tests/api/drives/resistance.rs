@@ -8,6 +8,7 @@
 use crate::drives::worlds::*;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::{DriveModel, IdealPd};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::tolerance::assert_close;
 
@@ -71,7 +72,7 @@ fn rotor_inertia() {
     let read = world.view().armature();
     assert_eq!(read, Array2::from_elem((ENVS, 2), rotor));
     world.robot().set_armature(&read, None, None).unwrap();
-    assert_eq!(world.sim.property_bytes(EnvId(0)).unwrap(), 0, "nothing is another");
+    assert_eq!(world.sim.properties().bytes(EnvId(0)).unwrap(), 0, "nothing is another");
 }
 
 /// Damping of a joint is not that of its drive; a drive without stiffness and damping is a row that gives nothing.
@@ -167,11 +168,11 @@ fn lasting() {
     world.sim.add_rigid_object(RigidObjectCfg::default()).unwrap();
     assert_eq!(resistance(&world), set, "when more is added");
     // They are the environment's properties, by the same numbers.
-    let properties = world.sim.properties(EnvId(1)).unwrap();
+    let properties = world.sim.properties().of(EnvId(1)).unwrap();
     assert_eq!(properties.get(Property::DryFriction, "robot/b").unwrap(), [2.5]);
     assert_eq!(properties.get(Property::Armature, "robot/a").unwrap(), [0.125]);
-    assert_eq!(world.sim.property_bytes(EnvId(0)).unwrap(), 0, "others share everything");
-    world.sim.reset_properties(None).unwrap();
+    assert_eq!(world.sim.properties().bytes(EnvId(0)).unwrap(), 0, "others share everything");
+    world.sim.properties_mut().reset(None).unwrap();
     assert_eq!(resistance(&world), at_first);
 
     let (snapshot, stiffness) = (world.sim.snapshot(None).unwrap(), world.view().stiffness());

@@ -23,6 +23,7 @@ use crate::drives::worlds::*;
 use kinetoscope::ndarray::Array3;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
+use kinetoscope::sim::{DriveModel, LinkId, WrenchFrame};
 use kinetoscope_testkit::needs;
 use kinetoscope_testkit::worlds::{cfg, urdf_robot};
 use nalgebra::Vector3;

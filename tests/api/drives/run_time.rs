@@ -8,7 +8,7 @@ use crate::drives::law::EXACT;
 use crate::drives::worlds::*;
 use kinetoscope::ndarray::{Array2, Array3, Axis, array};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::RobotMut;
+use kinetoscope::sim::{DriveType, Error, Result, RobotMut};
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{add_ball, text_robot};
 

@@ -7,6 +7,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::robot::dynamics::{Configuration, Kinematics, MimicPositions};
 use kinetoscope::sim;
 use kinetoscope::sim::env::{Env, EnvStatus};
+use kinetoscope::sim::{ActuatorModel, DriveModel, Error};
 pub(crate) use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
 use kinetoscope_testkit::urdf::{Files, joint, robot};
 pub(crate) use kinetoscope_testkit::worlds::{gains, no_drive};
@@ -253,14 +254,14 @@ impl World {
 
     /// A warning says that the drives are unstable at this time step.
     pub(crate) fn warned_unstable(&self) -> bool {
-        self.sim.warning_counts().keys().any(|name| name.contains("unstable"))
+        self.sim.warnings().counts().keys().any(|name| name.contains("unstable"))
     }
 
     /// No environment diverged and MuJoCo raised no warning.
     #[track_caller]
     pub(crate) fn assert_well(&self) {
         assert!(self.sim.diverged().is_empty(), "{:?}", self.sim.diverged());
-        let counts = self.sim.warning_counts();
+        let counts = self.sim.warnings().counts();
         assert!(!counts.keys().any(|name| name.starts_with("mujoco")), "{counts:?}");
         assert!(self.q().iter().chain(&self.v()).all(|x| x.is_finite()));
     }

@@ -3,6 +3,7 @@
 use super::tasks::{cfg, everything, policy};
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::Shard;
 use kinetoscope::tasks::Ended;
 use kinetoscope_testkit::bits::bits;
 

@@ -2,6 +2,7 @@
 
 use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::WrenchFrame;
 use kinetoscope::tasks::{
     ActionTerm, CommandTerm, Env, EnvBuilder, EnvCfg, EventTerm, Noise, ObservationTerm, RewardTerm, Space,
     TerminationTerm, When, terms,
@@ -61,7 +62,7 @@ pub(crate) fn everything(cfg: SimulationManagerCfg) -> Env {
         .event(EventTerm::new("masses", When::Startup, |sim, dice| {
             for die in dice {
                 let mass = die.between(0.5, 2.0);
-                sim.randomize_with(Some(&[die.env()]), |_, _, properties| {
+                sim.properties_mut().randomize_with(Some(&[die.env()]), |_, _, properties| {
                     properties.set(Property::Mass, "cart/cart", &[mass])?;
                     Ok(())
                 })?;

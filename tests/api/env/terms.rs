@@ -30,9 +30,8 @@ fn floater(num_envs: usize, ground: bool) -> (SimulationManager, RobotId) {
 }
 
 fn task(sim: SimulationManager, robot: RobotId) -> EnvBuilder {
-    let height = ObservationTerm::new("z", ["z"], move |now| {
-        Ok(now.sim().robot(robot).root_pose().slice_move(s![.., 2..3]))
-    });
+    let height =
+        ObservationTerm::new("z", ["z"], move |now| Ok(now.sim().robot(robot).root_pose().slice_move(s![.., 2..3])));
     EnvBuilder::new(sim, EnvCfg::default()).action(idle()).observation(height).reward(terms::alive("alive", 1.0))
 }
 

@@ -1,6 +1,9 @@
 //! Contents of a simulation by name and by handle: for programs that did not build it, such as views and recorders.
 
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::Imu;
+use kinetoscope::sensors::camera::Camera;
+use kinetoscope::sensors::ray::RayCaster;
 use kinetoscope_testkit::worlds::{ball, cube, row, sr5};
 use std::any::Any;
 
@@ -27,19 +30,19 @@ fn world() -> World {
 #[test]
 fn in_order() {
     let World { sim, robots, camera } = world();
-    assert_eq!(sim.jointed_uids(), ["left", "right"]);
-    assert_eq!(sim.robot_ids(), [("left", robots[0]), ("right", robots[1])]);
-    assert_eq!(sim.jointed_id("right").unwrap(), robots[1]);
-    let error = sim.jointed_id("rigth").unwrap_err().to_string();
+    assert_eq!(sim.entities().jointed_uids(), ["left", "right"]);
+    assert_eq!(sim.entities().robot_ids(), [("left", robots[0]), ("right", robots[1])]);
+    assert_eq!(sim.entities().jointed_id("right").unwrap(), robots[1]);
+    let error = sim.entities().jointed_id("rigth").unwrap_err().to_string();
     assert!(error.contains("right"), "{error}");
-    assert_eq!(sim.rigid_object_uids(), ["ball", "cube"]);
-    assert!(sim.mjcf_uids().is_empty());
-    assert_eq!(sim.sensor_uids(), ["imu", "eye"]);
-    assert_eq!(sim.sensor_ids::<Camera>(), [("eye".to_string(), camera)]);
-    assert!(sim.sensor_ids::<RayCaster>().is_empty());
-    let imu: &dyn Any = sim.sensor_called("imu").unwrap();
+    assert_eq!(sim.entities().rigid_object_uids(), ["ball", "cube"]);
+    assert!(sim.entities().mjcf_uids().is_empty());
+    assert_eq!(sim.entities().sensor_uids(), ["imu", "eye"]);
+    assert_eq!(sim.entities().sensor_ids::<Camera>(), [("eye".to_string(), camera)]);
+    assert!(sim.entities().sensor_ids::<RayCaster>().is_empty());
+    let imu: &dyn Any = sim.entities().sensor_called("imu").unwrap();
     assert!(imu.is::<Imu>() && !imu.is::<Camera>());
-    let error = sim.sensor_called("ey").err().unwrap().to_string();
+    let error = sim.entities().sensor_called("ey").err().unwrap().to_string();
     assert!(error.contains("eye"), "{error}");
     assert!((0..6).all(|joint| sim.robot(robots[0]).is_driven(JointIndex(joint)).unwrap()));
 }
@@ -50,8 +53,8 @@ fn due_sensors() {
     let World { mut sim, .. } = world();
     for step in 1..=12_u64 {
         sim.update(1);
-        assert_eq!(sim.sensor_due_in("eye").unwrap(), 5 - step % 5, "step {step}");
-        assert_eq!(sim.sensor_due_in("imu").unwrap(), 1, "step {step}");
+        assert_eq!(sim.entities().sensor_due_in("eye").unwrap(), 5 - step % 5, "step {step}");
+        assert_eq!(sim.entities().sensor_due_in("imu").unwrap(), 1, "step {step}");
     }
 }
 
@@ -59,13 +62,13 @@ fn due_sensors() {
 #[test]
 fn body_motion() {
     let World { mut sim, robots, .. } = world();
-    let cube = sim.rigid_object_id("cube").unwrap();
+    let cube = sim.entities().rigid_object_id("cube").unwrap();
     sim.rigid_object_mut(cube).write_velocity(&row([0.3, -0.2, 0.1, 0.0, 0.0, 1.5]), None).unwrap();
     sim.update(10);
-    let names = sim.body_names();
+    let names = sim.entities().body_names();
     let place = |name: &str| names.iter().position(|body| body == name).unwrap();
     let (pose, velocity) = (sim.rigid_object(cube).pose(), sim.rigid_object(cube).velocity());
-    let motion = sim.body_motion(EnvId(1), place("cube")).unwrap();
+    let motion = sim.scene().body_motion(EnvId(1), place("cube")).unwrap();
     for k in 0..3 {
         assert!((motion.pose.translation.vector[k] - pose[(1, k)]).abs() < 1e-12);
         assert!((motion.linear[k] - velocity[(1, k)]).abs() < 1e-12);
@@ -74,13 +77,13 @@ fn body_motion() {
     // Ten steps of 10 ms in free fall: 0.1 - 9.81 * 0.1.
     assert!((motion.linear[2] + 0.881).abs() < 1e-9, "{}", motion.linear[2]);
     assert!((motion.carried_mass - 2.0).abs() < 1e-12 && !motion.is_fixed);
-    let base = sim.body_motion(EnvId(0), place("left/base_link")).unwrap();
+    let base = sim.scene().body_motion(EnvId(0), place("left/base_link")).unwrap();
     assert!(base.is_fixed);
     // All that has mass hangs on the first link: the file gives the base none. Six numbers are added, in another order.
-    let link = sim.body_motion(EnvId(0), place("left/link1")).unwrap();
-    let last = sim.body_motion(EnvId(0), place("left/link6")).unwrap();
+    let link = sim.scene().body_motion(EnvId(0), place("left/link1")).unwrap();
+    let last = sim.scene().body_motion(EnvId(0), place("left/link6")).unwrap();
     let total = sim.robot(robots[0]).total_mass();
     assert!(!link.is_fixed && (link.carried_mass - total).abs() < 1e-13, "{link:?} of {total}");
     assert!((last.carried_mass - 0.634).abs() < 1e-13, "{last:?}: link6 in the file");
-    assert!(sim.body_motion(EnvId(2), 0).is_err() && sim.body_motion(EnvId(0), names.len()).is_err());
+    assert!(sim.scene().body_motion(EnvId(2), 0).is_err() && sim.scene().body_motion(EnvId(0), names.len()).is_err());
 }

@@ -4,7 +4,7 @@ use super::worlds::{all_bits, arm, cfg, cube};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::PoseF32;
-use kinetoscope::sim::Look;
+use kinetoscope::sim::{Error, Look};
 use kinetoscope_testkit::worlds::pose_in;
 use nalgebra::Vector3;
 
@@ -19,7 +19,7 @@ fn contacts() {
     sim.update(300);
     sim.rigid_object_mut(id).write_pose(&array![[0.0, 0.0, 3.0, 1.0, 0.0, 0.0, 0.0]], Some(&[EnvId(1)])).unwrap();
     let before = all_bits(&sim);
-    let contacts = sim.contacts(None).unwrap();
+    let contacts = sim.scene_mut().contacts(None).unwrap();
     assert_eq!(all_bits(&sim), before);
     assert_eq!((contacts.len(), contacts[0].len(), contacts[1].len()), (2, 4, 0));
     let weight: f64 = contacts[0].iter().map(|contact| contact.normal_force).sum();
@@ -33,9 +33,9 @@ fn contacts() {
         assert!((contact.force[2].abs() - contact.normal_force).abs() < 1e-9, "{contact:?}");
         assert!(contact.point[0].abs() < 0.0501 && contact.point[2].abs() < 1e-3 && contact.distance.abs() < 1e-3);
     }
-    let one = sim.contacts(Some(&[EnvId(0)])).unwrap();
+    let one = sim.scene_mut().contacts(Some(&[EnvId(0)])).unwrap();
     assert_eq!(format!("{one:?}"), format!("{:?}", &contacts[..1]));
-    assert!(matches!(sim.contacts(Some(&[EnvId(2)])), Err(Error::UnknownIndex { index: 2, .. })));
+    assert!(matches!(sim.scene_mut().contacts(Some(&[EnvId(2)])), Err(Error::UnknownIndex { index: 2, .. })));
 }
 
 /// Everything that a look holds is what MuJoCo's arrays and the readers of robots and objects say.
@@ -47,9 +47,9 @@ fn look() {
     sim.robot_mut(robot).set_qpos_target(&array![[0.2, 0.4, -0.6, 0.1, 0.3, 0.0]], None, Some(&[EnvId(1)])).unwrap();
     sim.update(20);
     let mut look = Look::default();
-    sim.look(EnvId(1), &mut look).unwrap();
+    sim.scene_mut().look(EnvId(1), &mut look).unwrap();
     assert_eq!((look.time, look.diverged.clone()), (sim.time()[1], None));
-    let names = sim.body_names();
+    let names = sim.entities().body_names();
     assert_eq!(look.bodies.len(), names.len());
     for (name, body) in names.iter().zip(&look.bodies) {
         let pose = match name.strip_prefix("arm/") {
@@ -71,10 +71,11 @@ fn look() {
         let moment: f64 = look.masses.iter().map(|(at, mass)| at[2] * mass).sum();
         assert!((moment / total - data.subtree_com()[2]).abs() < 1e-12);
     });
-    let instance = sim.visible().scene().instances().iter().position(|instance| &*instance.name == "cube").unwrap();
+    let instance =
+        sim.scene_mut().visible().scene().instances().iter().position(|instance| &*instance.name == "cube").unwrap();
     let expected = PoseF32::from(&pose_in(&sim.rigid_object(id).pose(), 1));
     assert_eq!(look.instances[instance].translation, expected.translation);
-    assert!(matches!(sim.look(EnvId(2), &mut look), Err(Error::UnknownIndex { index: 2, .. })));
+    assert!(matches!(sim.scene_mut().look(EnvId(2), &mut look), Err(Error::UnknownIndex { index: 2, .. })));
 }
 
 /// F at r from the middle of a cube: after a step v = h F / m and w = h r x F / I, I = m a²/6; again in the next; no more once
@@ -87,7 +88,7 @@ fn pull() {
     let id = sim.add_rigid_object(cube("cube", mass, [1.0, 2.0, 3.0])).unwrap();
     let (force, arm) = ([0.3, -0.2, 0.5], [0.05, 0.0, -0.02]);
     let point = [1.0 + arm[0], 2.0 + arm[1], 3.0 + arm[2]];
-    sim.pull(EnvId(1), 0, &[(point, force)]).unwrap();
+    sim.scene_mut().pull(EnvId(1), 0, &[(point, force)]).unwrap();
     let h = sim.cfg().physics_dt;
     let turn = Vector3::from(arm).cross(&Vector3::from(force)) / (mass * 0.01 / 6.0);
     let mut step = || {
@@ -100,26 +101,26 @@ fn pull() {
     }
     assert!((0..3).all(|k| (second[(1, k)] - 2.0 * first[(1, k)]).abs() < 1e-14), "{second}");
     assert!(second.row(0).iter().all(|v| *v == 0.0), "the other environment");
-    sim.pull(EnvId(1), 0, &[]).unwrap();
+    sim.scene_mut().pull(EnvId(1), 0, &[]).unwrap();
     sim.update(1);
     let third = sim.rigid_object(id).velocity();
     assert!((0..3).all(|k| (third[(1, k)] - second[(1, k)]).abs() < 1e-14), "{third}");
-    let refused = sim.pull(EnvId(0), 0, &[([0.0, f64::NAN, 0.0], force)]);
+    let refused = sim.scene_mut().pull(EnvId(0), 0, &[([0.0, f64::NAN, 0.0], force)]);
     assert!(matches!(refused, Err(Error::NotFinite { argument: "pull", column: 1, .. })), "{refused:?}");
-    let body = sim.pull(EnvId(0), 1, &[(point, force)]);
+    let body = sim.scene_mut().pull(EnvId(0), 1, &[(point, force)]);
     assert!(matches!(body, Err(Error::UnknownIndex { what: "body", index: 1, count: 1 })), "{body:?}");
-    assert!(matches!(sim.pull(EnvId(2), 0, &[(point, force)]), Err(Error::UnknownIndex { index: 2, .. })));
+    assert!(matches!(sim.scene_mut().pull(EnvId(2), 0, &[(point, force)]), Err(Error::UnknownIndex { index: 2, .. })));
 }
 
 #[test]
 fn counted_steps() {
     let mut sim = SimulationManager::new(SimulationManagerCfg { substeps: 2, ..cfg(2, 1) }).unwrap();
-    assert_eq!(sim.steps(), 0);
+    assert_eq!(sim.observers().steps(), 0);
     sim.update(3);
     sim.reset(None).unwrap();
     sim.add_rigid_object(cube("cube", 1.0, [0.0, 0.0, 1.0])).unwrap();
     sim.update(4);
-    assert_eq!(sim.steps(), 7);
+    assert_eq!(sim.observers().steps(), 7);
     let none = sim.snapshot(Some(&[])).unwrap();
     let both = sim.snapshot(None).unwrap();
     assert_eq!((none.is_empty(), none.len(), both.is_empty(), both.len()), (true, 0, false, 2));

@@ -9,7 +9,10 @@ use kinetoscope::ndarray::{Array3, Array4, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::Shape;
 use kinetoscope::scene::pose::from_wxyz;
+use kinetoscope::sensors::camera::Camera;
 use kinetoscope::sensors::ray::pattern::Grid;
+use kinetoscope::sensors::ray::{HitTargets, RayCaster, RayCasterCameraCfg};
+use kinetoscope::sim::{Error, RandomizationError, Still};
 use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{sr5, text_robot};
@@ -131,7 +134,7 @@ fn as_built() {
             assert!(!same(&seen, 1, &others, 1), "control: it does not look as ever");
         }
         for uid in ["cube", "ball", "post", "pill"] {
-            let pose = |sim: &SimulationManager| sim.rigid_object(sim.rigid_object_id(uid).unwrap()).pose();
+            let pose = |sim: &SimulationManager| sim.rigid_object(sim.entities().rigid_object_id(uid).unwrap()).pose();
             let (mine, built, plain) = (pose(&sim), pose(&built), pose(&plain));
             assert_eq!((mine.row(1), mine.row(0)), (built.row(1), plain.row(0)), "{uid} after {steps} steps");
         }
@@ -139,7 +142,7 @@ fn as_built() {
     // Back to what it was, through a reset, which leaves properties alone.
     sim.reset(None).unwrap();
     assert!(!same(&images(&sim, before), 1, &nominal, 1));
-    sim.reset_properties(ALL).unwrap();
+    sim.properties_mut().reset(ALL).unwrap();
     assert!((0..3).all(|env| same(&images(&sim, before), env, &nominal, env)));
 }
 
@@ -155,7 +158,7 @@ fn resting_heights() {
     }
     sim.update(300);
     for uid in ["cube", "ball"] {
-        let pose = sim.rigid_object(sim.rigid_object_id(uid).unwrap()).pose();
+        let pose = sim.rigid_object(sim.entities().rigid_object_id(uid).unwrap()).pose();
         for (env, half) in heights.into_iter().enumerate() {
             let z = pose[(env, 2)];
             assert!((z - half).abs() < 5e-4, "{uid} of environment {env} lies at {z}, not {half}");
@@ -178,7 +181,7 @@ fn depth_of_ball() {
         let radius = radii[env];
         set(&mut sim, &[(env, Property::Size, "ball", &[radius, 0.0, 0.0])]);
     }
-    let id = sim.rigid_object(sim.rigid_object_id("ball").unwrap()).mask_id();
+    let id = sim.rigid_object(sim.entities().rigid_object_id("ball").unwrap()).mask_id();
     let (raster, rays) = (sim.sensor(raster).unwrap(), sim.sensor(rays).unwrap());
     let (depth, mask) = (raster.depth().unwrap(), raster.mask().unwrap());
     for (env, radius) in radii.into_iter().enumerate() {
@@ -268,7 +271,7 @@ fn robot_links() {
     let ((mut sim, camera), (built, judge)) = (build(1.0), build(1.5));
     let nominal = images(&sim, camera);
     let larger = Randomization::new().with(Property::Size, "arm/fore", Draw::Scale([1.5, 1.5]));
-    sim.randomize(&larger, Some(&[EnvId(2)])).unwrap();
+    sim.properties_mut().randomize(&larger, Some(&[EnvId(2)])).unwrap();
     let (seen, expected) = (images(&sim, camera), images(&built, judge));
     assert!(same(&seen, 2, &expected, 2) && same(&seen, 0, &nominal, 0) && !same(&seen, 2, &nominal, 2));
     // The shape that collides is scaled as well, and nothing weighs more.
@@ -299,7 +302,7 @@ fn robot_links() {
 fn names() {
     let mut sim = world(NOMINAL);
     sim.add_robot(RobotCfg { init_pose: Pose::translation(3.0, 0.0, 0.0), ..sr5("sr5") }).unwrap();
-    let properties = sim.properties(EnvId(0)).unwrap();
+    let properties = sim.properties().of(EnvId(0)).unwrap();
     // The links of the arm are boxes, cylinders and balls as well.
     let mut sized = properties.names(Property::Size);
     sized.retain(|name| !name.starts_with("sr5/"));
@@ -312,11 +315,13 @@ fn names() {
     // The color of a mesh.
     let camera = sim.add_sensor("camera", above()).unwrap();
     let before = images(&sim, camera);
-    let cone = sim.rigid_object(sim.rigid_object_id("cone").unwrap()).mask_id();
+    let cone = sim.rigid_object(sim.entities().rigid_object_id("cone").unwrap()).mask_id();
     let seen = |p: &Images, env: usize| p.2.index_axis(Axis(0), env).iter().filter(|id| **id == cone).count();
     // Draws are of colors, and leave the opacity: 1, though a factor of 1.5 would be beyond it.
     let black = Randomization::new().with(Property::Color, "cone", Draw::Set([0.0, 0.0]));
-    sim.randomize(&black.with(Property::Color, "cube", Draw::Scale([1.5, 1.5])), Some(&[EnvId(0)])).unwrap();
+    sim.properties_mut()
+        .randomize(&black.with(Property::Color, "cube", Draw::Scale([1.5, 1.5])), Some(&[EnvId(0)]))
+        .unwrap();
     assert_eq!(get(&sim, 0, Property::Color, "cone"), [0.0, 0.0, 0.0, 1.0]);
     let brighter = f64::from(0.6_f32) * 1.5;
     assert_eq!(get(&sim, 0, Property::Color, "cube"), [brighter, brighter, brighter, 1.0]);
@@ -333,12 +338,12 @@ fn draws() {
     let draw = sizes.with(Property::Color, "cube", Draw::Set([0.2, 0.8]));
     let mut sim = world(NOMINAL);
     let camera = sim.add_sensor("camera", above()).unwrap();
-    sim.randomize(&draw, Some(&[EnvId(0), EnvId(2)])).unwrap();
+    sim.properties_mut().randomize(&draw, Some(&[EnvId(0), EnvId(2)])).unwrap();
     let sizes = |sim: &SimulationManager, env| get(sim, env, Property::Size, "cube");
     let (first, third) = (sizes(&sim, 0), sizes(&sim, 2));
     assert!(first[0] == first[1] && first[0] != third[0] && (0.05..=0.15).contains(&first[0]), "{first:?}");
     let mut other = world(NOMINAL);
-    other.randomize(&draw, ALL).unwrap();
+    other.properties_mut().randomize(&draw, ALL).unwrap();
     assert_eq!((sizes(&other, 0), sizes(&other, 2)), (first.clone(), third));
     // What is the environment's own, array by array.
     let base = sim.batch().model().clone();
@@ -355,7 +360,7 @@ fn draws() {
     let rest: Vec<&str> = own.iter().filter(|array| !expected.contains(array)).map(|(name, _)| *name).collect();
     let follows = |name: &&str| TARGET == Target::V4 && ["bvh_aabb", "dof_length"].contains(name);
     assert!(rest.iter().all(follows), "{rest:?}");
-    assert_eq!(sim.property_bytes(EnvId(1)).unwrap(), 0);
+    assert_eq!(sim.properties().bytes(EnvId(1)).unwrap(), 0);
     assert!(sim.batch().read(1, |env| env.data().model().arrays_apart(&base).is_empty()));
     // More is added: the look stays, in images too.
     let before = images(&sim, camera);
@@ -404,10 +409,10 @@ fn mistakes() {
         (Property::Color, "ground", &[0.1; 4], &["body or terrain"]),
     ];
     assert_refused(rows.map(|(property, name, value, parts)| {
-        let done = sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(property, name, value));
+        let done = sim.properties_mut().randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(property, name, value));
         (format!("{name} {value:?}"), done, "", parts)
     }));
-    assert!((0..3).all(|env| sim.property_bytes(EnvId(env)).unwrap() == 0), "nothing has changed");
+    assert!((0..3).all(|env| sim.properties().bytes(EnvId(env)).unwrap() == 0), "nothing has changed");
 }
 
 /// A pattern for nothing that can be seen is a mistake: draws of colors leave opacities, and rays pass what is invisible.
@@ -418,7 +423,7 @@ fn invisible_patterns() {
     let ghost = object("ghost", ObjectShape::cube(0.3), [-0.6, 0.6, 0.8]);
     sim.add_rigid_object(RigidObjectCfg { rgba: [1.0, 1.0, 1.0, 0.0], ..ghost }).unwrap();
     let draw = |pattern: &str| Randomization::new().with(Property::Color, pattern, Draw::Set([0.2, 0.8]));
-    let said = sim.randomize(&draw("ghost"), ALL).unwrap_err();
+    let said = sim.properties_mut().randomize(&draw("ghost"), ALL).unwrap_err();
     assert!(matches!(&said, Error::Randomization(RandomizationError::Pattern { property: "color", .. })), "{said}");
     assert!(said.to_string().contains("\"ghost\"") && said.to_string().contains("\"post\""), "{said}");
     let rays = |name: &str| RayCasterCfg {
@@ -430,7 +435,7 @@ fn invisible_patterns() {
     let said = sim.add_sensor("nothing", rays("ghost")).unwrap_err().to_string();
     assert!(said.contains("ghost") && said.contains("post"), "{said}");
     // Controls: with something that is seen, the pattern is right, and the ghost stays one.
-    sim.randomize(&draw("ghost|cube"), ALL).unwrap();
+    sim.properties_mut().randomize(&draw("ghost|cube"), ALL).unwrap();
     let both = sim.add_sensor("both", rays("ghost|cube")).unwrap();
     assert_eq!(get(&sim, 1, Property::Color, "ghost")[3], 0.0);
     let show = |sim: &mut SimulationManager| set(sim, &[(1, Property::Color, "ghost", &[0.5, 0.5, 0.5, 1.0])]);
@@ -448,12 +453,12 @@ fn invisible_patterns() {
     // Nor does it that sensors are built again, even while the ghost is invisible.
     sim.add_rigid_object(object("first", ObjectShape::cube(0.1), [8.0, 8.0, 0.05])).unwrap();
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 9, 0]));
-    sim.reset_properties(ALL).unwrap();
+    sim.properties_mut().reset(ALL).unwrap();
     sim.add_rigid_object(object("second", ObjectShape::cube(0.1), [9.0, 9.0, 0.05])).unwrap();
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 0, 0]));
     show(&mut sim);
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 9, 0]));
     // Control: a new sensor is refused still, once the ghost is invisible.
-    sim.reset_properties(ALL).unwrap();
+    sim.properties_mut().reset(ALL).unwrap();
     assert!(sim.add_sensor("refused", rays("ghost")).is_err());
 }

@@ -1,6 +1,8 @@
 //! Observers are called where they asked to be, are told of what others do, and change no number.
 
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::Imu;
+use kinetoscope::sim::{Error, Moment, ObjectId, Observer, ObserverId};
 use kinetoscope_testkit::worlds::{add_ball, object, row};
 use std::sync::{Arc, Mutex};
 
@@ -61,8 +63,8 @@ fn steps_of_their_own() {
         let (mut sim, same_object, same_imu) = scene();
         let (three, threes) = Watch::new(3, |_, _| {});
         let (seven, sevens) = Watch::new(7, |_, _| {});
-        sim.add_observer(three);
-        sim.add_observer(seven);
+        sim.observers_mut().add(three);
+        sim.observers_mut().add(seven);
         blocks.into_iter().for_each(|block| sim.update(block));
         assert_eq!(entries(&threes), every(3, 100));
         assert_eq!(entries(&sevens), every(7, 100));
@@ -85,26 +87,26 @@ fn by_type() {
         fn observe(&mut self, _: &mut SimulationManager, _: &Moment) {}
     }
     let (mut sim, ..) = scene();
-    let watches = [3, 7].map(|every| sim.add_observer(Watch::new(every, |_, _| {}).0));
-    let other = sim.add_observer(Other);
+    let watches = [3, 7].map(|every| sim.observers_mut().add(Watch::new(every, |_, _| {}).0));
+    let other = sim.observers_mut().add(Other);
     let same =
         |found: Vec<ObserverId<Watch>>, expected: &[ObserverId<Watch>]| format!("{found:?}") == format!("{expected:?}");
-    assert!(same(sim.observer_ids(), &watches));
-    assert_eq!(format!("{:?}", sim.observer_ids::<Other>()), format!("{:?}", [other]));
-    assert_eq!(sim.observer(watches[1]).unwrap().every, 7);
-    let taken = sim.remove_observer(watches[0]).unwrap();
+    assert!(same(sim.observers().ids(), &watches));
+    assert_eq!(format!("{:?}", sim.observers().ids::<Other>()), format!("{:?}", [other]));
+    assert_eq!(sim.observers().get(watches[1]).unwrap().every, 7);
+    let taken = sim.observers_mut().remove(watches[0]).unwrap();
     assert_eq!(taken.every, 3);
-    assert!(same(sim.observer_ids(), &watches[1..]));
-    assert_eq!([watches[0], watches[1]].map(|id| sim.has_observer(id)), [false, true]);
+    assert!(same(sim.observers().ids(), &watches[1..]));
+    assert_eq!([watches[0], watches[1]].map(|id| sim.observers().contains(id)), [false, true]);
     let (elsewhere, ..) = scene();
-    assert!(sim.has_observer(other) && !elsewhere.has_observer(other));
+    assert!(sim.observers().contains(other) && !elsewhere.observers().contains(other));
 }
 
 #[test]
 fn resets_and_writes() {
     let (mut sim, object, _) = scene();
     let (watch, diary) = Watch::new(1000, |_, _| {});
-    sim.add_observer(watch);
+    sim.observers_mut().add(watch);
     sim.update(2);
     sim.reset(Some(&[EnvId(1)])).unwrap();
     let velocities = row([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
@@ -135,8 +137,8 @@ fn acts_of_others() {
         }
     });
     let (hearer, hearers) = Watch::new(1, |_, _| {});
-    let doer = sim.add_observer(doer);
-    let hearer = sim.add_observer(hearer);
+    let doer = sim.observers_mut().add(doer);
+    let hearer = sim.observers_mut().add(hearer);
     sim.update(5);
     assert_eq!(entries(&doers), [(5, Moment::Stepped)]);
     let reset = (0, Moment::Reset { env_ids: vec![EnvId(0), EnvId(1)] });
@@ -146,12 +148,12 @@ fn acts_of_others() {
     // The fifth step itself, told after the steps that the other did when it was told.
     all.push((3, Moment::Stepped));
     assert_eq!(entries(&hearers), all);
-    assert_eq!(sim.observer(hearer).unwrap().every, 1);
-    sim.observer_mut(hearer).unwrap().every = 2;
-    assert_eq!(sim.remove_observer(hearer).unwrap().every, 2);
-    assert!(matches!(sim.observer(hearer), Err(Error::NoObserver)));
-    assert!(matches!(sim.remove_observer(hearer), Err(Error::NoObserver)));
-    assert_eq!(sim.remove_observer(doer).unwrap().every, 5);
+    assert_eq!(sim.observers().get(hearer).unwrap().every, 1);
+    sim.observers_mut().get(hearer).unwrap().every = 2;
+    assert_eq!(sim.observers_mut().remove(hearer).unwrap().every, 2);
+    assert!(matches!(sim.observers().get(hearer), Err(Error::NoObserver)));
+    assert!(matches!(sim.observers_mut().remove(hearer), Err(Error::NoObserver)));
+    assert_eq!(sim.observers_mut().remove(doer).unwrap().every, 5);
     sim.update(10);
     assert_eq!(entries(&hearers), all, "no observer is left");
 }

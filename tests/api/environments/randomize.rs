@@ -4,7 +4,7 @@ use super::worlds::{ALL, all_bits, all_properties, all_values, arm, cfg, cube, g
 use kinetoscope::mujoco::{ObjectKind, TARGET, Target};
 use kinetoscope::ndarray::{Array2, Array3, array, s};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::Cone;
+use kinetoscope::sim::{Cone, DriveType, Error, RandomizationError};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf;
 use kinetoscope_testkit::urdf::Files;
@@ -167,7 +167,7 @@ fn drawn_gains_restored() {
         sim.robot_mut(id).set_damping(&array![[90.0]], None, ALL).unwrap();
         let start = sim.snapshot(ALL).unwrap();
         let drawn = Randomization::new().with(Property::Stiffness, "lever/hinge", Draw::Scale([0.3, 0.6]));
-        sim.randomize(&drawn, Some(&[EnvId(1), EnvId(2)])).unwrap();
+        sim.properties_mut().randomize(&drawn, Some(&[EnvId(1), EnvId(2)])).unwrap();
         let kp: Vec<f64> = (0..3).map(|env| get(&sim, env, Property::Stiffness, "lever/hinge")[0]).collect();
         assert!(kp[1] < 0.7 * kp[0] && kp[2] < 0.7 * kp[0] && kp[1] != kp[2], "{kp:?}");
         let asked = sim.robot(id).stiffness();
@@ -199,7 +199,7 @@ fn drawn_gains_restored() {
         assert_eq!(sim.robot(id).stiffness(), asked);
         // A gain that is set is drawn no longer, and a nominal one neither.
         sim.robot_mut(id).set_stiffness(&array![[333.0]], None, Some(&[EnvId(1)])).unwrap();
-        sim.reset_properties(Some(&[EnvId(2)])).unwrap();
+        sim.properties_mut().reset(Some(&[EnvId(2)])).unwrap();
         sim.restore(&start, ALL).unwrap();
         assert_eq!(sim.robot(id).stiffness(), Array2::from_elem((3, 1), 500.0));
     }
@@ -226,7 +226,7 @@ fn drawn_equal_to_set() {
     let draw_all = |sim: &mut SimulationManager| {
         let all = [(Property::Stiffness, stiffness), (Property::DriveDamping, damping), (Property::MaxEffort, effort)];
         for (property, value) in all {
-            sim.randomize(&draw(property, value), Some(&[EnvId(1)])).unwrap();
+            sim.properties_mut().randomize(&draw(property, value), Some(&[EnvId(1)])).unwrap();
         }
     };
     let (nominal, drawn) = ([500.0, 100.0, 100.0], [stiffness, damping, effort]);
@@ -237,13 +237,13 @@ fn drawn_equal_to_set() {
     sim.restore(&start, ALL).unwrap();
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (nominal, drawn), "it was drawn");
     // The other way: drawn first, and a state that has the same below it is restored.
-    sim.reset_properties(ALL).unwrap();
+    sim.properties_mut().reset(ALL).unwrap();
     draw_all(&mut sim);
     sim.restore(&both, ALL).unwrap();
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (drawn, drawn));
     // Restored with the properties of then, it is drawn still.
-    sim.reset_properties(ALL).unwrap();
-    sim.restore_with_properties(&both, ALL).unwrap();
+    sim.properties_mut().reset(ALL).unwrap();
+    sim.properties_mut().restore(&both, ALL).unwrap();
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (drawn, drawn));
     sim.restore(&start, ALL).unwrap();
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (nominal, drawn), "it was drawn when the snapshot was taken");
@@ -266,17 +266,17 @@ fn drawn_across_drive_types() {
     let kp = |sim: &SimulationManager| [0, 1].map(|env| get(sim, env, Property::Stiffness, "lever/hinge")[0]);
     // 500 is nominal.
     for value in [500.0, 501.0] {
-        sim.randomize(&draw(value), Some(&[EnvId(1)])).unwrap();
+        sim.properties_mut().randomize(&draw(value), Some(&[EnvId(1)])).unwrap();
         sim.restore(&set, ALL).unwrap();
         assert_eq!(kp(&sim), [200.0, value]);
         assert_eq!(sim.robot(id).stiffness(), array![[200.0], [value]]);
     }
     // Undrawn where it is nominal, too.
-    sim.randomize(&draw(500.0), Some(&[EnvId(1)])).unwrap();
-    sim.reset_properties(ALL).unwrap();
+    sim.properties_mut().randomize(&draw(500.0), Some(&[EnvId(1)])).unwrap();
+    sim.properties_mut().reset(ALL).unwrap();
     sim.restore(&set, ALL).unwrap();
     assert_eq!(kp(&sim), [200.0; 2]);
-    sim.randomize(&draw(300.0), Some(&[EnvId(1)])).unwrap();
+    sim.properties_mut().randomize(&draw(300.0), Some(&[EnvId(1)])).unwrap();
     for (drive_type, passes) in [(DriveType::None, [0.0; 2]), (DriveType::Force, [200.0, 300.0])] {
         sim.robot_mut(id).set_drive_type(drive_type, None, ALL).unwrap();
         assert_eq!(kp(&sim), passes);
@@ -294,9 +294,9 @@ fn drawn_across_drive_types() {
 #[test]
 fn ranges() {
     let (mut sim, _) = world(cfg(4, 2));
-    sim.randomize(&all_properties(), ALL).unwrap();
+    sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
     for env in 0..4 {
-        let properties = sim.properties(EnvId(env)).unwrap();
+        let properties = sim.properties().of(EnvId(env)).unwrap();
         let ratio = |p, name| properties.get(p, name).unwrap()[0] / properties.nominal(p, name).unwrap()[0];
         for name in ["arm/link3", "cube", "machine/tip"] {
             assert!((0.8..1.2).contains(&ratio(Property::Mass, name)));
@@ -325,7 +325,7 @@ fn ranges() {
     // Draws are for the nominal values: they do not drift. They differ from draw to draw, too.
     let first = get(&sim, 1, Property::Mass, "cube");
     for _ in 0..50 {
-        sim.randomize(&all_properties(), ALL).unwrap();
+        sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
     }
     let last = get(&sim, 1, Property::Mass, "cube");
     assert!(last != first && (0.8..1.2).contains(&(last[0] / 0.5)), "{first:?} {last:?}");
@@ -337,7 +337,7 @@ fn ranges() {
 fn seeds() {
     let draw = |num_envs, threads, seed| {
         let (mut sim, _) = world(SimulationManagerCfg { seed, ..cfg(num_envs, threads) });
-        sim.randomize(&all_properties(), ALL).unwrap();
+        sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
         sim
     };
     let (mut eight, mut three) = (draw(8, 2, 5), draw(3, 1, 5));
@@ -347,23 +347,24 @@ fn seeds() {
     }
     assert_ne!(values(&draw(3, 1, 6), 0), values(&three, 0), "another seed");
     // An environment's second draw does not depend on what others drew in between, nor on what else is drawn.
-    three.randomize(&all_properties(), Some(&[EnvId(1)])).unwrap();
-    eight.randomize(&all_properties(), Some(&[EnvId(0), EnvId(4)])).unwrap();
+    three.properties_mut().randomize(&all_properties(), Some(&[EnvId(1)])).unwrap();
+    eight.properties_mut().randomize(&all_properties(), Some(&[EnvId(0), EnvId(4)])).unwrap();
     assert_ne!(values(&eight, 1), values(&three, 1));
-    eight.randomize(&all_properties(), Some(&[EnvId(1)])).unwrap();
+    eight.properties_mut().randomize(&all_properties(), Some(&[EnvId(1)])).unwrap();
     assert_eq!(values(&eight, 1), values(&three, 1));
     let only = Randomization::new().with(Property::Mass, "cube", Draw::Scale([0.8, 1.2]));
-    three.randomize(&only, Some(&[EnvId(0)])).unwrap();
+    three.properties_mut().randomize(&only, Some(&[EnvId(0)])).unwrap();
     assert_eq!(get(&three, 0, Property::Mass, "cube"), get(&eight, 0, Property::Mass, "cube"));
     // By a function: one stream of numbers for each environment and draw.
     let mut streams = Vec::new();
     for sim in [&mut eight, &mut three] {
         let mut numbers = Vec::new();
-        sim.randomize_with(Some(&[EnvId(1)]), |random, env, _| {
-            numbers.push((env, random.uniform()));
-            Ok(())
-        })
-        .unwrap();
+        sim.properties_mut()
+            .randomize_with(Some(&[EnvId(1)]), |random, env, _| {
+                numbers.push((env, random.uniform()));
+                Ok(())
+            })
+            .unwrap();
         streams.push(numbers);
     }
     assert_eq!(streams[0], streams[1]);
@@ -374,11 +375,11 @@ fn memory() {
     let (mut sim, _) = world(cfg(4, 1));
     let masses = Randomization::new().with(Property::Mass, "arm/.*", Draw::Scale([0.8, 1.2]));
     let random = masses.with(Property::Friction, "ground", Draw::Set([0.5, 1.5]));
-    sim.randomize(&random, Some(&[EnvId(1)])).unwrap();
+    sim.properties_mut().randomize(&random, Some(&[EnvId(1)])).unwrap();
     let base = sim.batch().model().clone();
     let model = |sim: &SimulationManager, env| sim.batch().read(env, |env| env.data().model().clone());
     for env in [0, 2, 3] {
-        assert!(model(&sim, env).arrays_apart(&base).is_empty() && sim.property_bytes(EnvId(env)).unwrap() == 0);
+        assert!(model(&sim, env).arrays_apart(&base).is_empty() && sim.properties().bytes(EnvId(env)).unwrap() == 0);
     }
     let own = model(&sim, 1);
     let mut apart = own.arrays_apart(&base);
@@ -392,12 +393,12 @@ fn memory() {
     // Counted array by array: 8 bytes a number.
     let (bodies, dofs, geoms) = (base.nbody(), base.nv(), base.ngeom());
     let at_least = 8 * (bodies * (3 + 2 + 1 + 1) + dofs * 2 + geoms * 3);
-    let bytes = sim.property_bytes(EnvId(1)).unwrap();
+    let bytes = sim.properties().bytes(EnvId(1)).unwrap();
     let arrays: usize = own.own_arrays().map(|(_, bytes)| bytes).sum();
     let small = 8 * (base.ntendon() + base.nactuator() + 3 * base.nlight());
     assert!(arrays >= at_least && arrays <= at_least + small, "{arrays} {at_least}");
     // Beside the model: the lists of masses, of the moments that go with them and of friction, whole ones, 8 bytes a number.
-    let masses = sim.properties(EnvId(1)).unwrap().names(Property::Mass).len();
+    let masses = sim.properties().of(EnvId(1)).unwrap().names(Property::Mass).len();
     let collides = |geom: &usize| base.geom_contype()[*geom] != 0 || base.geom_conaffinity()[*geom] != 0;
     let shapes = (0..geoms).filter(collides).count();
     let lists = Property::ALL.len() * size_of::<Option<Box<[f64]>>>();
@@ -406,8 +407,8 @@ fn memory() {
     assert!(bytes < base.shared_bytes(), "{bytes} of {}", base.shared_bytes());
 
     // Nominal again: all is shared, and goes on as if nothing had been.
-    sim.reset_properties(ALL).unwrap();
-    assert!(model(&sim, 1).arrays_apart(&base).is_empty() && sim.property_bytes(EnvId(1)).unwrap() == 0);
+    sim.properties_mut().reset(ALL).unwrap();
+    assert!(model(&sim, 1).arrays_apart(&base).is_empty() && sim.properties().bytes(EnvId(1)).unwrap() == 0);
     let (mut other, _) = world(cfg(4, 1));
     sim.update(200);
     other.update(200);
@@ -420,16 +421,16 @@ fn growing_buffers() {
     for k in 0..6 {
         sim.add_rigid_object(cube(&format!("more{k}"), 0.2, [1.0, 0.2 * f64::from(k), 0.2])).unwrap();
     }
-    sim.randomize(&all_properties(), Some(&[EnvId(0), EnvId(2)])).unwrap();
+    sim.properties_mut().randomize(&all_properties(), Some(&[EnvId(0), EnvId(2)])).unwrap();
     let drawn = all_values(&sim);
     let own = |sim: &SimulationManager, env| {
         sim.batch().read(env, |env| env.data().model().own_arrays().map(|(name, _)| name).collect::<Vec<_>>())
     };
-    let (arrays, growths) = (own(&sim, 0), sim.buffer_growths());
+    let (arrays, growths) = (own(&sim, 0), sim.warnings().buffer_growths());
     assert!(arrays.len() > 8);
     let gravity = get(&sim, 0, Property::Gravity, "gravity");
     sim.update(150);
-    assert!(sim.buffer_growths() > growths || TARGET == Target::V4, "the arena of 4.x is large enough");
+    assert!(sim.warnings().buffer_growths() > growths || TARGET == Target::V4, "the arena of 4.x is large enough");
     sim.reset(None).unwrap();
     assert_eq!(all_values(&sim), drawn);
     assert_eq!(own(&sim, 0), arrays);
@@ -446,7 +447,7 @@ fn growing_buffers() {
 #[test]
 fn later_entities() {
     let (mut sim, ids) = world(cfg(3, 1));
-    sim.randomize(&all_properties(), Some(&[EnvId(1), EnvId(2)])).unwrap();
+    sim.properties_mut().randomize(&all_properties(), Some(&[EnvId(1), EnvId(2)])).unwrap();
     sim.update(100);
     let state = |sim: &SimulationManager| {
         let arm = sim.robot(ids.arm);
@@ -463,11 +464,11 @@ fn later_entities() {
         assert_eq!(now, *drawn, "environment {env}");
         assert_eq!(get(&sim, env, Property::Mass, "late"), [1.0]);
     }
-    assert_eq!(sim.property_bytes(EnvId(0)).unwrap(), 0);
+    assert_eq!(sim.properties().bytes(EnvId(0)).unwrap(), 0);
     // The same as drawn after everything was there: names are keys.
     let (mut other, _) = world(cfg(3, 1));
     other.add_rigid_object(cube("late", 1.0, [2.0, 2.0, 0.05])).unwrap();
-    other.randomize(&all_properties(), Some(&[EnvId(1), EnvId(2)])).unwrap();
+    other.properties_mut().randomize(&all_properties(), Some(&[EnvId(1), EnvId(2)])).unwrap();
     assert_eq!(get(&other, 2, Property::Mass, "arm/link4"), get(&sim, 2, Property::Mass, "arm/link4"));
     sim.update(50);
     assert!(sim.diverged().is_empty());
@@ -477,7 +478,7 @@ fn later_entities() {
 fn snapshots_and_rollouts() {
     let build = || {
         let (mut sim, ids) = world(cfg(2, 2));
-        sim.randomize(&all_properties(), ALL).unwrap();
+        sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
         (sim, ids)
     };
     let (mut sim, ids) = build();
@@ -498,7 +499,7 @@ fn snapshots_and_rollouts() {
     let again = fresh.rollout(&controls, None, ALL).unwrap();
     assert!(again.states == rollout.states);
     // Control: with nominal properties it goes elsewhere.
-    fresh.reset_properties(ALL).unwrap();
+    fresh.properties_mut().reset(ALL).unwrap();
     assert!(fresh.rollout(&controls, Some(&snapshot), ALL).unwrap().states != rollout.states);
 }
 
@@ -517,43 +518,50 @@ fn mistakes() {
         (Property::Armature, "arm/JOINT1", Draw::Set([-1.0, -1.0]), ">= 0"),
         (Property::MaxEffort, "arm/JOINT1", Draw::Set([-1.0, -1.0]), ">= 0"),
     ] {
-        let done = sim.randomize(&Randomization::new().with(property, name, draw), ALL);
+        let done = sim.properties_mut().randomize(&Randomization::new().with(property, name, draw), ALL);
         let Err(Error::Randomization(fault)) = done else { panic!("{property:?}: {done:?}") };
         assert!(matches!(&fault, RandomizationError::Value { env: 0, name: of, .. } if of == name), "{fault}");
         assert!(fault.to_string().contains(expected), "{fault}");
     }
     let mass = |pattern: &str, draw| Randomization::new().with(Property::Mass, pattern, draw);
     let [range, reach] = [Draw::Scale([1.0, 1.0]), Draw::Add([0.0, 1.0])];
-    assert_error(sim.randomize(&mass("cub", range), ALL), "Randomization(Pattern", &["\"cube\""]);
+    assert_error(sim.properties_mut().randomize(&mass("cub", range), ALL), "Randomization(Pattern", &["\"cube\""]);
     assert_error(
-        sim.randomize(&mass("cube", range).with(Property::Mass, "c.*", reach), ALL),
+        sim.properties_mut().randomize(&mass("cube", range).with(Property::Mass, "c.*", reach), ALL),
         "Randomization",
         &["both"],
     );
     for range in [[1.0, 0.5], [f64::NAN, 1.0], [0.0, f64::INFINITY]] {
-        assert_error(sim.randomize(&mass("cube", Draw::Set(range)), ALL), "Randomization(Range", &[]);
+        assert_error(sim.properties_mut().randomize(&mass("cube", Draw::Set(range)), ALL), "Randomization(Range", &[]);
     }
     // A joint whose implicit drive replaces its friction, and the free joint of an object, have no such property.
     let none = Randomization::new().with(Property::DryFriction, "arm/JOINT1|cube/free", Draw::Set([1.0, 1.0]));
-    assert_error(sim.randomize(&none, ALL), "Randomization(Pattern { property: \"dry_friction\"", &[]);
+    assert_error(sim.properties_mut().randomize(&none, ALL), "Randomization(Pattern { property: \"dry_friction\"", &[]);
     type Set = (Property, &'static str, &'static [f64]);
-    let mut set = |(property, name, values): Set| sim.randomize_with(ALL, |_, _, p| p.set(property, name, values));
+    let mut set = |(property, name, values): Set| {
+        sim.properties_mut().randomize_with(ALL, |_, _, p| p.set(property, name, values))
+    };
     assert_error(set((Property::Inertia, "cube", &[1.0, 1.0, 2.1])), "Randomization", &["sum of the others"]);
     let width = set((Property::Gravity, "gravity", &[0.0]));
     assert!(matches!(width, Err(Error::Randomization(RandomizationError::Width { expected: 3, found: 1, .. }))));
     let name = set((Property::Mass, "kube", &[0.0]));
     assert!(matches!(name, Err(Error::UnknownName { candidates, .. }) if candidates[0] == "cube"));
-    assert!(matches!(sim.properties(EnvId(2)), Err(Error::UnknownIndex { .. })));
-    assert!(matches!(sim.randomize(&Randomization::new(), Some(&[EnvId(7)])), Err(Error::UnknownIndex { .. })));
+    assert!(matches!(sim.properties().of(EnvId(2)), Err(Error::UnknownIndex { .. })));
+    assert!(matches!(
+        sim.properties_mut().randomize(&Randomization::new(), Some(&[EnvId(7)])),
+        Err(Error::UnknownIndex { .. })
+    ));
     // The first environment was good, the second not: neither changes.
-    let half = sim.randomize_with(ALL, |_, env, p| p.set(Property::Mass, "cube", &[1.0 - 2.0 * env.0 as f64]));
+    let half = sim
+        .properties_mut()
+        .randomize_with(ALL, |_, env, p| p.set(Property::Mass, "cube", &[1.0 - 2.0 * env.0 as f64]));
     assert!(matches!(half, Err(Error::Randomization(RandomizationError::Value { env: 1, .. }))));
     assert_eq!(get(&sim, 0, Property::Mass, "cube"), [0.5]);
     assert_eq!(all_bits(&sim), before);
     // Failed draws do not count as draws.
     let (mut other, _) = world(cfg(2, 1));
     for sim in [&mut sim, &mut other] {
-        sim.randomize(&all_properties(), ALL).unwrap();
+        sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
     }
     assert_eq!(values(&sim, 1), values(&other, 1));
 }
@@ -566,7 +574,8 @@ fn centred_body_of_file() {
     let text = r#"<mujoco><worldbody><body name="ball" pos="3 3 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
     sim.add_mjcf(MjcfCfg::text("file", text)).unwrap();
     let set = |sim: &mut SimulationManager, name: &str| {
-        sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::CenterOfMass, name, &[0.03, 0.0, 0.0]))
+        sim.properties_mut()
+            .randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::CenterOfMass, name, &[0.03, 0.0, 0.0]))
     };
     let moved = set(&mut sim, "file/ball");
     if TARGET == Target::V4 {
@@ -607,7 +616,7 @@ fn lazy_forward_pass() {
         sim.update(50);
         for envs in [None, Some(&[EnvId(1)][..])] {
             if draws {
-                sim.randomize(&drawn, envs).unwrap();
+                sim.properties_mut().randomize(&drawn, envs).unwrap();
             }
             if read {
                 let _ = all_bits(&sim);

@@ -3,6 +3,7 @@
 use super::worlds::{ALL, Ids, all_bits, cfg, world};
 use kinetoscope::ndarray::{Array2, Array3, Axis, concatenate, s};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::Error;
 
 const STEPS: usize = 60;
 
@@ -35,12 +36,12 @@ fn steps_by_hand() {
         let (mut sim, ids) = world(settings);
         assert_eq!(sim.threads(), threads);
         sim.update(200);
-        let (before, warnings) = (all_bits(&sim), sim.warning_counts());
+        let (before, warnings) = (all_bits(&sim), sim.warnings().counts());
         let forces = sim.mjcf_part(ids.machine).actuator_force();
         let controls = controls(3);
         let rollout = sim.rollout(&controls, None, ALL).unwrap();
         assert_eq!(all_bits(&sim), before, "the present stays");
-        assert_eq!((sim.warning_counts(), sim.mjcf_part(ids.machine).actuator_force()), (warnings, forces));
+        assert_eq!((sim.warnings().counts(), sim.mjcf_part(ids.machine).actuator_force()), (warnings, forces));
         assert!(rollout.diverged.is_empty());
 
         let present = sim.snapshot(ALL).unwrap();
@@ -72,9 +73,9 @@ fn steps_by_hand() {
 #[test]
 fn names() {
     let (sim, _) = world(cfg(1, 1));
-    let names = sim.control_names();
+    let names = sim.entities().control_names();
     assert_eq!((names.len(), names[0].as_str(), names[6].as_str()), (7, "arm/JOINT1", "machine/motor"));
-    let states = sim.state_names();
+    let states = sim.entities().state_names();
     let model = sim.batch().model();
     assert_eq!(states.len(), model.nq() + model.nv());
     let rollout = sim.rollout(&Array3::zeros((1, 1, 7)), None, ALL).unwrap();

@@ -2,6 +2,8 @@
 
 use super::worlds::{Ids, all_bits, cfg, world};
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::{JointStateCfg, NoiseCfg};
+use kinetoscope::sim::{Error, Shard};
 use kinetoscope_testkit::bits::bits;
 
 /// Bits of states and of what a noisy sensor says, after draws, steps and resets. `first` is the global index of the
@@ -15,13 +17,13 @@ fn run(num_envs: usize, shard: Shard, first: usize) -> Vec<(Vec<u64>, Vec<u64>)>
         .with(Property::Mass, "arm/.*|cube", Draw::Scale([0.7, 1.3]))
         .with(Property::Friction, "cube|ground", Draw::Set([0.3, 1.0]))
         .with(Property::Gravity, "gravity", Draw::Add([-0.3, 0.3]));
-    sim.randomize(&random, None).unwrap();
+    sim.properties_mut().randomize(&random, None).unwrap();
     sim.update(50);
     // Some environments start again and are drawn again, those of global indices 1 and 6.
     let again: Vec<EnvId> = [1, 6].iter().filter_map(|&g: &usize| g.checked_sub(first)).map(EnvId).collect();
     let again: Vec<EnvId> = again.into_iter().filter(|env| env.0 < num_envs).collect();
     sim.reset(Some(&again)).unwrap();
-    sim.randomize(&random, Some(&again)).unwrap();
+    sim.properties_mut().randomize(&random, Some(&again)).unwrap();
     sim.update(70);
     let read = sim.sensor(sensor).unwrap();
     let said = |env| bits(read.positions().row(env));

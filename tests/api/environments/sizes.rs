@@ -4,6 +4,7 @@ use super::worlds::{cfg, cube};
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::{Error, RandomizationError};
 use kinetoscope_testkit::worlds::object;
 
 /// Two cones of one mesh, a small plane, a ball far beside it, and a body of a box and a mesh.
@@ -29,7 +30,7 @@ fn world() -> SimulationManager {
 }
 
 fn size_of(sim: &SimulationManager, env: usize, name: &str) -> [f64; 3] {
-    let properties = sim.properties(EnvId(env)).unwrap();
+    let properties = sim.properties().of(EnvId(env)).unwrap();
     properties.get(Property::Size, name).unwrap().try_into().unwrap()
 }
 
@@ -44,13 +45,15 @@ fn without_size() {
         ("part/shelf", ["it is a plane", "whatever its size"]),
     ];
     for (name, parts) in cases {
-        let properties = sim.properties(EnvId(1)).unwrap();
+        let properties = sim.properties().of(EnvId(1)).unwrap();
         let drawn = Randomization::new().with(Property::Size, name, Draw::Scale([0.9, 1.1]));
         let errors = [
             properties.get(Property::Size, name).unwrap_err(),
             properties.nominal(Property::Size, name).unwrap_err(),
-            sim.randomize(&drawn, None).unwrap_err(),
-            sim.randomize_with(None, |_, _, all| all.set(Property::Size, name, &[0.1; 3])).unwrap_err(),
+            sim.properties_mut().randomize(&drawn, None).unwrap_err(),
+            sim.properties_mut()
+                .randomize_with(None, |_, _, all| all.set(Property::Size, name, &[0.1; 3]))
+                .unwrap_err(),
         ];
         for error in errors {
             let Error::Randomization(RandomizationError::Unsized { name: of, .. }) = &error else {
@@ -61,9 +64,9 @@ fn without_size() {
     }
     // Nothing of that name at all is another mistake.
     let typo = Randomization::new().with(Property::Size, "cubes", Draw::Scale([0.9, 1.1]));
-    let error = sim.randomize(&typo, None).unwrap_err();
+    let error = sim.properties_mut().randomize(&typo, None).unwrap_err();
     assert!(matches!(error, Error::Randomization(RandomizationError::Pattern { .. })), "{error:?}");
-    assert!(sim.properties(EnvId(0)).unwrap().get(Property::Size, "cubes").is_err());
+    assert!(sim.properties().of(EnvId(0)).unwrap().get(Property::Size, "cubes").is_err());
 }
 
 /// A pattern that reaches things of both kinds draws those that have sizes, and of a body the shapes that have.
@@ -71,7 +74,7 @@ fn without_size() {
 fn mixed_patterns() {
     let mut sim = world();
     let drawn = Randomization::new().with(Property::Size, "c.*|part/both", Draw::Scale([1.2, 1.2]));
-    sim.randomize(&drawn, Some(&[EnvId(1)])).unwrap();
+    sim.properties_mut().randomize(&drawn, Some(&[EnvId(1)])).unwrap();
     // Half lengths of 0.05 and 0.1 m, times the factor.
     for (name, half) in [("cube", 0.05), ("part/both", 0.1)] {
         assert_eq!(size_of(&sim, 0, name), [half; 3], "{name}");

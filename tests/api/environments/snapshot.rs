@@ -3,7 +3,8 @@
 use super::worlds::{ALL, all_bits, all_properties, all_values, arm, bits_of, cfg, cube, fewest_contacts, world};
 use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{Cone, Integrator};
+use kinetoscope::sensors::JointStateCfg;
+use kinetoscope::sim::{Cone, DelayedPd, DriveType, Error, Integrator, Snapshot, SnapshotError, WrenchFrame};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf;
 use kinetoscope_testkit::urdf::Files;
@@ -178,10 +179,10 @@ fn diverged() {
     let reason = sim.diverged();
     assert_eq!(reason.len(), 1);
     // MuJoCo's own warnings are those of this environment alone.
-    let counts = [0, 1, 2].map(|env| sim.env_warning_counts(EnvId(env)).unwrap());
+    let counts = [0, 1, 2].map(|env| sim.warnings().env_counts(EnvId(env)).unwrap());
     assert!(counts[0].is_empty() && !counts[1].is_empty() && counts[2].is_empty(), "{counts:?}");
-    assert!(counts[1].iter().all(|(name, count)| sim.warning_counts()[*name] == *count), "{counts:?}");
-    assert!(matches!(sim.env_warning_counts(EnvId(3)), Err(Error::UnknownIndex { index: 3, .. })));
+    assert!(counts[1].iter().all(|(name, count)| sim.warnings().counts()[*name] == *count), "{counts:?}");
+    assert!(matches!(sim.warnings().env_counts(EnvId(3)), Err(Error::UnknownIndex { index: 3, .. })));
     let bad = sim.snapshot(ALL).unwrap();
     bad.save(files.folder().join("bad")).unwrap();
     sim.restore(&good, ALL).unwrap();
@@ -279,7 +280,7 @@ fn with_properties() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("drawn.kts");
     let (mut sim, ids) = world(cfg(3, 2));
-    sim.randomize(&all_properties(), Some(&[EnvId(0), EnvId(2)])).unwrap();
+    sim.properties_mut().randomize(&all_properties(), Some(&[EnvId(0), EnvId(2)])).unwrap();
     sim.robot_mut(ids.arm).set_damping(&array![[77.0, 78.0, 79.0, 80.0, 81.0, 82.0]], None, Some(&[EnvId(2)])).unwrap();
     sim.update(120);
     let (snapshot, there, had) = (sim.snapshot(ALL).unwrap(), all_bits(&sim), all_values(&sim));
@@ -287,41 +288,42 @@ fn with_properties() {
     let stiffness = sim.robot(ids.arm).stiffness();
     sim.update(80);
     let end = all_bits(&sim);
-    sim.randomize(&all_properties(), ALL).unwrap();
+    sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
     let next = all_values(&sim);
     assert!(had != next && (0..3).all(|env| had[env] != next[env]));
     // In itself, from memory, after other properties; in another manager, from the file, where something else was drawn.
     let (mut fresh, _) = world(cfg(3, 1));
-    fresh.randomize_with(ALL, |_, _, p| p.set(Property::Friction, "ground", &[0.1])).unwrap();
+    fresh.properties_mut().randomize_with(ALL, |_, _, p| p.set(Property::Friction, "ground", &[0.1])).unwrap();
     let loaded = Snapshot::load(&path).unwrap();
     for (sim, snapshot) in [(&mut sim, &snapshot), (&mut fresh, &loaded)] {
-        sim.restore_with_properties(snapshot, ALL).unwrap();
+        sim.properties_mut().restore(snapshot, ALL).unwrap();
         assert!(all_bits(sim) == there && all_values(sim) == had, "back, in every bit");
-        assert_eq!(sim.property_bytes(EnvId(1)).unwrap(), 0, "what was nominal is shared again");
+        assert_eq!(sim.properties().bytes(EnvId(1)).unwrap(), 0, "what was nominal is shared again");
         sim.update(80);
         assert!(all_bits(sim) == end, "and goes on as before");
-        sim.randomize(&all_properties(), ALL).unwrap();
+        sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
         assert!(all_values(sim) == next, "the next draw is the next one");
         // What is drawn is drawn still: a gain stays when a plain state is restored, and one that was set does not.
-        sim.restore_with_properties(snapshot, ALL).unwrap();
-        assert_eq!(sim.robot(sim.robot_id("arm").unwrap()).stiffness(), stiffness);
+        sim.properties_mut().restore(snapshot, ALL).unwrap();
+        assert_eq!(sim.robot(sim.entities().robot_id("arm").unwrap()).stiffness(), stiffness);
     }
     // Control: a plain restore leaves properties alone, and goes elsewhere.
-    sim.reset_properties(ALL).unwrap();
+    sim.properties_mut().reset(ALL).unwrap();
     sim.restore(&snapshot, ALL).unwrap();
     assert!(all_values(&sim) != had);
     sim.update(80);
     assert!(all_bits(&sim) != end);
     // Into other environments: each has what the one of the snapshot had.
-    sim.restore_with_properties(&sim.snapshot(ALL).unwrap(), ALL).unwrap();
-    fresh.restore_with_properties(&loaded, Some(&[EnvId(2), EnvId(1), EnvId(0)])).unwrap();
+    let now = sim.snapshot(ALL).unwrap();
+    sim.properties_mut().restore(&now, ALL).unwrap();
+    fresh.properties_mut().restore(&loaded, Some(&[EnvId(2), EnvId(1), EnvId(0)])).unwrap();
     assert_eq!(all_values(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
     fresh.update(80);
     assert!(all_bits(&fresh) == [end[2].clone(), end[1].clone(), end[0].clone()]);
     // A rollout ends with the properties it was done with.
     let rollout = fresh.rollout(&Array3::zeros((1, 5, 7)), None, ALL).unwrap();
-    fresh.reset_properties(ALL).unwrap();
-    fresh.restore_with_properties(&rollout.end, ALL).unwrap();
+    fresh.properties_mut().reset(ALL).unwrap();
+    fresh.properties_mut().restore(&rollout.end, ALL).unwrap();
     assert_eq!(all_values(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
 }
 
@@ -335,14 +337,16 @@ fn missing_properties() {
         sim
     };
     let mut sim = build(true);
-    sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::Size, "box", &[0.1, 0.2, 0.3])).unwrap();
+    sim.properties_mut()
+        .randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::Size, "box", &[0.1, 0.2, 0.3]))
+        .unwrap();
     let snapshot = sim.snapshot(ALL).unwrap();
     let mut other = build(false);
     other.update(3);
     let before = all_bits(&other);
-    let result = other.restore_with_properties(&snapshot, ALL);
+    let result = other.properties_mut().restore(&snapshot, ALL);
     assert_error(result, "Snapshot(OtherScene", &["size", "box"]);
     assert_eq!(all_bits(&other), before);
     other.restore(&snapshot, ALL).unwrap();
-    assert!(matches!(sim.restore_with_properties(&snapshot, Some(&[EnvId(2)])), Err(Error::UnknownIndex { .. })));
+    assert!(matches!(sim.properties_mut().restore(&snapshot, Some(&[EnvId(2)])), Err(Error::UnknownIndex { .. })));
 }

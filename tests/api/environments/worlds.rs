@@ -3,6 +3,7 @@
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::env::Env;
+use kinetoscope::sim::{MjcfId, ObjectId};
 use kinetoscope_testkit::bits::bits;
 pub(crate) use kinetoscope_testkit::worlds::cfg;
 
@@ -82,12 +83,14 @@ pub(crate) const ALL: Option<&[EnvId]> = None;
 /// Sets properties of single environments.
 pub(crate) fn set(sim: &mut SimulationManager, values: &[(usize, Property, &str, &[f64])]) {
     for &(env, property, name, value) in values {
-        sim.randomize_with(Some(&[EnvId(env)]), |_, _, properties| properties.set(property, name, value)).unwrap();
+        sim.properties_mut()
+            .randomize_with(Some(&[EnvId(env)]), |_, _, properties| properties.set(property, name, value))
+            .unwrap();
     }
 }
 
 pub(crate) fn get(sim: &SimulationManager, env: usize, property: Property, name: &str) -> Vec<f64> {
-    sim.properties(EnvId(env)).unwrap().get(property, name).unwrap().to_vec()
+    sim.properties().of(EnvId(env)).unwrap().get(property, name).unwrap().to_vec()
 }
 
 /// The fewest contacts of any environment.
@@ -116,7 +119,7 @@ pub(crate) fn all_properties() -> Randomization {
 
 /// Names and bits of all properties of an environment.
 pub(crate) fn values(sim: &SimulationManager, env: usize) -> Vec<(Property, String, Vec<u64>)> {
-    let properties = sim.properties(EnvId(env)).unwrap();
+    let properties = sim.properties().of(EnvId(env)).unwrap();
     let bits = |property, name| bits(properties.get(property, name).unwrap());
     let named = |property| properties.names(property).into_iter().map(move |name| (property, name));
     let all = Property::ALL.into_iter().flat_map(named);

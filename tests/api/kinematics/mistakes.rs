@@ -2,6 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
+use kinetoscope::sim::{IkCfg, Posture, Result, Tip};
 use kinetoscope_testkit::refusal::assert_error;
 
 #[track_caller]

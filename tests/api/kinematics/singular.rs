@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::ndarray::ArrayView2;
 use kinetoscope::scene::pose::to_row;
-use kinetoscope::sim::Robot;
+use kinetoscope::sim::{IkCfg, Robot, Tip};
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -3,7 +3,8 @@
 use super::*;
 use kinetoscope::mujoco::{TARGET, Target, compile_file};
 use kinetoscope::ndarray::{Array2, array};
-use kinetoscope::sim::DiagnosticKind;
+use kinetoscope::sensors::{MujocoSensor, MujocoSensorCfg};
+use kinetoscope::sim::{DiagnosticKind, EntityTypes};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::count_diagnostics;
@@ -11,9 +12,9 @@ use kinetoscope_testkit::worlds::count_diagnostics;
 /// The error of adding a part, which changes nothing.
 fn refused(cfg: MjcfCfg) -> String {
     let mut sim = empty(1);
-    let before = sim.mjcf().to_string();
+    let before = sim.scene().mjcf().to_string();
     let error = sim.add_mjcf(cfg).unwrap_err().to_string();
-    assert_eq!(sim.mjcf(), before, "nothing was added");
+    assert_eq!(sim.scene().mjcf(), before, "nothing was added");
     error
 }
 
@@ -111,7 +112,7 @@ fn unique_names() {
     }
     let object = RigidObjectCfg { uid: "m".into(), ..Default::default() };
     assert_error(sim.add_rigid_object(object), "DuplicateUid", &[]);
-    assert_error(sim.mjcf_id("n"), "", &["known are \"m\""]);
+    assert_error(sim.entities().mjcf_id("n"), "", &["known are \"m\""]);
 }
 
 /// Elements that only 4.x has and that are not written back are refused by name, never left out; sensors are left out.

@@ -3,6 +3,8 @@
 use super::*;
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, Axis, array};
+use kinetoscope::sensors::{FrameTransformerCfg, TargetFrameCfg};
+use kinetoscope::sim::{ActuatorIndex, Error};
 use kinetoscope_testkit::refusal::assert_error;
 
 #[test]

@@ -10,6 +10,7 @@ mod visible;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{Data, Model};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::MjcfId;
 use kinetoscope_testkit::worlds::{empty_cfg, sim};
 
 /// 500 steps a second, an empty scene.

@@ -4,6 +4,7 @@ use super::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{TARGET, Target, words};
 use kinetoscope::ndarray::Array2;
+use kinetoscope::sim::Error;
 use kinetoscope_testkit::needs::{files_below, sample_model};
 use std::path::Path;
 

@@ -4,6 +4,11 @@ use super::*;
 use kinetoscope::mujoco::{ObjectKind, Overflow};
 use kinetoscope::ndarray::{Array2, ArrayView3, Axis, array};
 use kinetoscope::scene::pose::{from_row, from_xyz_rpy};
+use kinetoscope::sensors::camera::CameraConvention;
+use kinetoscope::sensors::{
+    ActuatorStateCfg, FrameTransformerCfg, JointStateCfg, JointWrenchCfg, MujocoSensor, MujocoSensorCfg, TargetFrameCfg,
+};
+use kinetoscope::sim::MjcfId;
 use kinetoscope_testkit::bits::bits;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};

@@ -17,7 +17,7 @@ fn looks_of_the_file() {
     let file = Visible::of_model(&alone(LOOKS));
     let mut sim = empty(1);
     sim.add_mjcf(MjcfCfg { semantic_class: Some("toy".into()), ..MjcfCfg::text("looks", LOOKS) }).unwrap();
-    let part = sim.visible();
+    let part = sim.scene_mut().visible();
     assert_eq!(part.left_out(), [""; 0]);
     let (here, there) = (part.scene().instances(), file.scene().instances());
     assert_eq!(here.len(), there.len());
@@ -26,7 +26,7 @@ fn looks_of_the_file() {
     }
     assert!(here.iter().filter(|i| i.material.texture.is_some()).count() == 2);
     assert_eq!(part.scene().lights.len(), 1);
-    let ids = sim.mask_ids();
+    let ids = sim.scene().mask_ids();
     let names: Vec<_> = ids.iter().map(|id| (id.object.as_str(), id.link.as_deref(), id.class.as_str())).collect();
     assert_eq!(names, [("looks", None, "toy"), ("looks", Some("thing"), "toy")]);
     let names: Vec<&str> = here.iter().map(|i| i.name.as_ref()).collect();
@@ -44,7 +44,7 @@ fn looks_of_the_file() {
     let camera = sim.add_sensor("camera", camera).unwrap();
     let seen = sim.sensor(camera).unwrap();
     assert!((f64::from(seen.depth().unwrap()[(0, 4, 4)]) - 2.0).abs() < 1e-6);
-    assert_eq!(seen.mask().unwrap()[(0, 4, 4)], sim.mask_ids()[0].id);
+    assert_eq!(seen.mask().unwrap()[(0, 4, 4)], sim.scene().mask_ids()[0].id);
 }
 
 /// A weight on a string from a hook.
@@ -89,9 +89,14 @@ fn tendons() {
         let heights = Array2::from_shape_fn((num_envs, 1), |(env, _)| 0.05 * env as f64);
         sim.mjcf_part_mut(part).write_qpos(&heights, None).unwrap();
         sim.update(1);
-        let id = sim.mask_ids().iter().find(|id| id.link.as_deref() == Some("string")).cloned().unwrap();
+        let id = sim.scene().mask_ids().iter().find(|id| id.link.as_deref() == Some("string")).cloned().unwrap();
         assert_eq!((id.name().as_str(), id.class.as_str()), ("winch/string", "mjcf"));
-        assert_eq!(sim.mask_ids().iter().filter(|other| other.id == id.id).count(), 1, "{:?}", sim.mask_ids());
+        assert_eq!(
+            sim.scene().mask_ids().iter().filter(|other| other.id == id.id).count(),
+            1,
+            "{:?}",
+            sim.scene().mask_ids()
+        );
         let lowest: Vec<f64> = (0..num_envs).map(|env| 0.6 + sim.mjcf_part(part).qpos()[(env, 0)]).collect();
         let seen = sim.sensor(camera).unwrap();
         assert!(!sim.sensor(ray).unwrap().hit_mask().iter().any(|hit| *hit), "rays pass");
@@ -176,7 +181,7 @@ fn metals() {
         );
         let mut sim = empty(1);
         sim.add_mjcf(MjcfCfg::text("ball", text)).map(|_| {
-            let material = sim.visible().scene().instances()[0].material.clone();
+            let material = sim.scene_mut().visible().scene().instances()[0].material.clone();
             (material.metallic, material.roughness)
         })
     };

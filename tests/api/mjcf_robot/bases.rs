@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use kinetoscope::sim::DiagnosticKind;
+use kinetoscope::sim::{DiagnosticKind, Error};
 use kinetoscope_testkit::refusal::assert_error;
 use std::f64::consts::FRAC_PI_2;
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use kinetoscope::sim::{DiagnosticKind, KinematicsError};
+use kinetoscope::sim::{DiagnosticKind, Error, IkCfg, KinematicsError, Tip};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::worlds::count_diagnostics;
 

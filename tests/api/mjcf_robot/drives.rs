@@ -3,6 +3,7 @@
 use super::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::ndarray::array;
+use kinetoscope::sim::DriveType;
 use kinetoscope_testkit::worlds::{count_diagnostics, empty_cfg, gains};
 
 /// Five joints: a servo with a gear, a motor, a servo of velocity, two on a tendon, and one that nothing acts on; the last

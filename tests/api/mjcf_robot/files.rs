@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::mujoco::{TARGET, Target, compile_file};
 use kinetoscope::ndarray::array;
-use kinetoscope::sim::DiagnosticKind;
+use kinetoscope::sim::{DiagnosticKind, Error};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{errors, gains, pose_in, urdf_robot};

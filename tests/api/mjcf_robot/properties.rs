@@ -4,6 +4,7 @@
 use super::drives::{CHAIN, GRIPPER};
 use super::*;
 use kinetoscope::ndarray::array;
+use kinetoscope::sim::{DriveModel, DriveType, Error};
 use kinetoscope_testkit::worlds::gains;
 
 /// A sled that slides on the ground, with an arm, a finger that follows it, a foot that may be larger, and a servo on a
@@ -17,7 +18,7 @@ fn sledding(text: &str, envs: usize) -> (SimulationManager, RobotId) {
         ..kinetoscope_testkit::worlds::cfg(envs, 1)
     });
     let id = sim.add_robot(RobotCfg { fix_base: false, ..robot("r", text) }).unwrap();
-    sim.randomize_with(None, |_, _, p| p.set(Property::Friction, "ground", &[0.01])).unwrap();
+    sim.properties_mut().randomize_with(None, |_, _, p| p.set(Property::Friction, "ground", &[0.01])).unwrap();
     (sim, id)
 }
 
@@ -61,7 +62,7 @@ fn as_another_file() {
     for (property, name, value, edit) in changes {
         let (mut sim, id) = sledding(SLED, 2);
         let of = format!("r/{name}");
-        sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(property, &of, value)).unwrap();
+        sim.properties_mut().randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(property, &of, value)).unwrap();
         assert_eq!(SLED.matches(edit[0]).count(), 1, "{edit:?}");
         let (mut judge, of_judge) = sledding(&SLED.replace(edit[0], edit[1]), 1);
         let (mine, expected) = (slide(&mut sim, id), slide(&mut judge, of_judge));
@@ -149,7 +150,7 @@ fn coupled_drives() {
         assert_eq!(sim.robot(id).stiffness().column(column.0), array![nominal, nominal, nominal, nominal]);
         sim.robot_mut(id).set_stiffness(&array![[spring]], Some(&[column]), Some(&[EnvId(1)])).unwrap();
         let stiff = Randomization::new().with(Property::Stiffness, &name, Draw::Scale([3.0, 3.0]));
-        sim.randomize(&stiff, Some(&[EnvId(2)])).unwrap();
+        sim.properties_mut().randomize(&stiff, Some(&[EnvId(2)])).unwrap();
         sim.robot_mut(id).set_qf_limits(&array![[0.1 * spring * target]], Some(&[column]), Some(&[EnvId(3)])).unwrap();
         // Of the joint, enough to be at rest soon: a drive at its limit damps nothing.
         sim.robot_mut(id).set_joint_damping(&array![[20.0]], Some(&[column]), None).unwrap();
@@ -182,10 +183,10 @@ fn draws_in_snapshots() {
         .with(Property::Size, "r/sled", Draw::Scale([0.8, 1.0]))
         .with(Property::Color, "r/.*", Draw::Set([0.1, 0.9]));
     let (mut sim, id) = sledding(SLED, 3);
-    sim.randomize(&draw, Some(&[EnvId(0), EnvId(2)])).unwrap();
+    sim.properties_mut().randomize(&draw, Some(&[EnvId(0), EnvId(2)])).unwrap();
     let values = |sim: &SimulationManager| {
         let of = |env| {
-            let properties = sim.properties(EnvId(env)).unwrap();
+            let properties = sim.properties().of(EnvId(env)).unwrap();
             let numbers = |property| {
                 let names: Vec<String> = properties.names(property).into_iter().map(String::from).collect();
                 let mine = names.into_iter().filter(|name| name.starts_with("r/"));
@@ -201,13 +202,12 @@ fn draws_in_snapshots() {
     slide(&mut sim, id);
     let snapshot = sim.snapshot(None).unwrap();
     sim.update(100);
-    let state =
-        |sim: &SimulationManager| (sim.robot(id).root_pose(), sim.robot(id).qpos(), sim.robot(id).qf());
+    let state = |sim: &SimulationManager| (sim.robot(id).root_pose(), sim.robot(id).qpos(), sim.robot(id).qf());
     let end = state(&sim);
     // Drawn again and moved on, then back: the same bits.
-    sim.randomize(&draw, None).unwrap();
+    sim.properties_mut().randomize(&draw, None).unwrap();
     assert!(values(&sim) != drawn);
-    sim.restore_with_properties(&snapshot, None).unwrap();
+    sim.properties_mut().restore(&snapshot, None).unwrap();
     assert!(values(&sim) == drawn);
     sim.update(100);
     assert_eq!(state(&sim), end);
@@ -216,7 +216,7 @@ fn draws_in_snapshots() {
     assert!(values(&sim) == drawn);
     assert_eq!(state(&sim), end);
     // Control: with nominal properties what moves goes elsewhere.
-    sim.reset_properties(None).unwrap();
+    sim.properties_mut().reset(None).unwrap();
     assert!(values(&sim)[0] == drawn[1], "nominal again");
     let (mut plain, plain_id) = sledding(SLED, 3);
     plain.restore(&snapshot, None).unwrap();

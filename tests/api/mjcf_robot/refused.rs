@@ -3,7 +3,7 @@
 
 use super::*;
 use kinetoscope::mujoco::{TARGET, Target};
-use kinetoscope::sim::mjcf::robot_file::RobotFileError;
+use kinetoscope::sim::{DriveModel, Error, RobotFileError};
 use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::count_diagnostics;
@@ -12,9 +12,9 @@ use std::path::PathBuf;
 /// The error of adding a robot.
 fn refused(cfg: RobotCfg) -> Error {
     let mut sim = empty(1);
-    let before = sim.mjcf().to_string();
+    let before = sim.scene().mjcf().to_string();
     let error = sim.add_robot(cfg).unwrap_err();
-    assert_eq!(sim.mjcf(), before, "nothing was added");
+    assert_eq!(sim.scene().mjcf(), before, "nothing was added");
     error
 }
 

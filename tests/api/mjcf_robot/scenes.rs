@@ -2,6 +2,8 @@
 
 use super::*;
 use kinetoscope::ndarray::{Axis, array};
+use kinetoscope::sensors::MujocoSensorCfg;
+use kinetoscope::sensors::ray::HitTargets;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope_testkit::worlds::gains;
 
@@ -61,7 +63,7 @@ fn sensors() {
             RayCasterCfg { parent: Some("leg/body".into()), pattern: grid.into(), targets, ..Default::default() };
         let scanner = sim.add_sensor("scanner", scanner).unwrap();
         let own = sim.add_sensor("own", MujocoSensorCfg::default()).unwrap();
-        let entry = sim.mask_ids().iter().find(|id| id.link.as_deref() == Some("body")).unwrap();
+        let entry = sim.scene().mask_ids().iter().find(|id| id.link.as_deref() == Some("body")).unwrap();
         assert_eq!((entry.object.as_str(), entry.class.as_str()), ("leg", "robot"));
         sim.update(400);
         assert!(sim.diverged().is_empty());

@@ -1,7 +1,7 @@
 //! Bounces against the closed form; pairs that never collide.
 
 use super::*;
-use kinetoscope::sim::Cone;
+use kinetoscope::sim::{Cone, ObjectId};
 use kinetoscope_testkit::refusal::assert_error;
 
 fn bouncy(uid: &str, mass: f64, restitution: Option<f64>) -> RigidObjectCfg {

@@ -3,6 +3,7 @@
 use super::*;
 use kinetoscope::ndarray::array;
 use kinetoscope::scene::mesh::PiecesCfg;
+use kinetoscope::sim::MeshCollision;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::worlds::count_diagnostics;
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -191,7 +192,7 @@ fn moving_pieces() {
         let frictions: Vec<f64> = (0..model.ngeom()).filter(of).map(|geom| model.geom_friction()[3 * geom]).collect();
         assert_eq!(frictions, [0.3; 2]);
     });
-    assert_eq!(sim.mask_ids().iter().filter(|id| id.object == "ell").count(), 1);
+    assert_eq!(sim.scene().mask_ids().iter().filter(|id| id.object == "ell").count(), 1);
 }
 
 #[test]

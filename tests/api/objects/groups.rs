@@ -2,6 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::{Array3, Axis};
+use kinetoscope::sim::{Error, GroupId, ObjectId, RigidObjectGroupCfg};
 use kinetoscope_testkit::refusal::assert_error;
 
 fn blocks() -> RigidObjectGroupCfg {
@@ -10,7 +11,7 @@ fn blocks() -> RigidObjectGroupCfg {
 }
 
 fn objects(sim: &SimulationManager, id: GroupId) -> Vec<ObjectId> {
-    sim.rigid_object_group(id).names().iter().map(|name| sim.rigid_object_id(name).unwrap()).collect()
+    sim.rigid_object_group(id).names().iter().map(|name| sim.entities().rigid_object_id(name).unwrap()).collect()
 }
 
 /// Rows are those of the objects in order, in every environment; what falls falls by g h² n (n + 1) / 2.
@@ -90,7 +91,7 @@ fn refusals() {
     ] {
         assert_error(sim.add_rigid_object_group(cfg), kind, &[]);
     }
-    assert!(sim.rigid_object_id("blocks.red").is_err(), "nothing of these was left behind");
+    assert!(sim.entities().rigid_object_id("blocks.red").is_err(), "nothing of these was left behind");
     let id = sim.add_rigid_object_group(blocks()).unwrap();
     assert_error(sim.add_rigid_object_group(blocks()), "DuplicateUid(\"blocks\")", &[]);
 

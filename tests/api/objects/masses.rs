@@ -4,6 +4,7 @@
 use super::*;
 use kinetoscope::mujoco::{TARGET, Target};
 use kinetoscope::ndarray::{Array2, array};
+use kinetoscope::sim::{ObjectId, WrenchFrame};
 use kinetoscope_testkit::refusal::assert_error;
 
 /// F t / m in each environment; with the mass go the moments, T t / I, of a cube m a²/6.
@@ -32,7 +33,7 @@ fn mass() {
     assert!(sim.rigid_object(id).velocity().iter().all(|v| *v == 0.0));
     // The configuration is what it was.
     assert_eq!(sim.rigid_object(id).nominal_mass(), 2.0);
-    sim.reset_properties(None).unwrap();
+    sim.properties_mut().reset(None).unwrap();
     assert_eq!(sim.rigid_object(id).mass().to_vec(), [2.0; 3]);
 }
 
@@ -120,13 +121,15 @@ fn damping() {
         "object",
         Draw::Add([0.01, 0.02]),
     );
-    sim.randomize(&drawn, Some(&[EnvId(3)])).unwrap();
+    sim.properties_mut().randomize(&drawn, Some(&[EnvId(3)])).unwrap();
     sim.rigid_object_mut(id).set_damping(&array![[3.0, 0.0]], Some(SECOND)).unwrap();
     let damping = sim.rigid_object(id).damping();
     assert_eq!([0, 1, 2].map(|env| damping.row(env).to_vec()), [[0.5, 0.001], [3.0, 0.0], [0.5, 0.001]]);
     assert!((1.0..2.0).contains(&damping[(3, 0)]) && (0.011..0.021).contains(&damping[(3, 1)]), "{damping}");
-    assert_eq!(sim.property_bytes(EnvId(2)).unwrap(), 0);
-    assert!(sim.properties(EnvId(3)).unwrap().get(Property::LinearDamping, "object").unwrap() == [damping[(3, 0)]]);
+    assert_eq!(sim.properties().bytes(EnvId(2)).unwrap(), 0);
+    assert!(
+        sim.properties().of(EnvId(3)).unwrap().get(Property::LinearDamping, "object").unwrap() == [damping[(3, 0)]]
+    );
 
     let spin = |env: usize, k: usize| if k == 3 + (env + 2) % 3 { 4.0 } else { 0.0 };
     let mut expected = Array2::from_shape_fn((4, 6), |(env, k)| if k < 3 { [1.0, -2.0, 3.0][k] } else { spin(env, k) });
@@ -154,7 +157,7 @@ fn damping() {
     go_on(&mut sim, &later);
     sim.reset(None).unwrap();
     assert_eq!(sim.rigid_object(id).damping(), later);
-    sim.reset_properties(None).unwrap();
+    sim.properties_mut().reset(None).unwrap();
     assert_eq!(sim.rigid_object(id).damping().row(3), array![0.5, 0.001]);
     let zero = array![[0.0, 0.0]];
     assert_error(sim.rigid_object_mut(stands).set_damping(&zero, None), "NotDynamic { argument: \"set_damping\"", &[]);

@@ -6,6 +6,7 @@ use kinetoscope::ndarray::array;
 use kinetoscope::scene::mesh::write_binary_stl;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
+use kinetoscope::sim::ObjectId;
 use nalgebra::{Matrix3, Vector3};
 
 /// Mass, centre of mass and tensor about it, in the object's frame, as MuJoCo has them.

@@ -11,6 +11,7 @@ mod welds;
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::mesh::{TriMesh, write_obj};
+use kinetoscope::sim::{ObjectId, WrenchFrame};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{ball, cube, empty_cfg, fixed, object, row, sim, weightless_cfg};

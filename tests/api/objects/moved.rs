@@ -5,6 +5,7 @@ use super::*;
 use kinetoscope::ndarray::Array2;
 use kinetoscope::sensors::ray::pattern::Custom;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
+use kinetoscope::sim::ObjectId;
 
 fn paddle() -> RigidObjectCfg {
     kinematic(object("paddle", ObjectShape::Box { size: [0.1, 1.0, 1.0] }, [0.0; 3]))
@@ -123,7 +124,7 @@ fn shelves() {
     sim.reset(None).unwrap();
     sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [5.0; 3])).unwrap();
     assert_eq!(sim.rigid_object(shelf_id).pose(), places);
-    sim.reset_properties(Some(SECOND)).unwrap();
+    sim.properties_mut().reset(Some(SECOND)).unwrap();
     let pose = sim.rigid_object(shelf_id).pose();
     assert_eq!((pose[(1, 2)], pose[(2, 2)]), (heights[0], heights[2]));
 }
@@ -139,11 +140,12 @@ fn ramp() {
     sim.rigid_object_mut(shelf_id).write_pose(&turned, Some(SECOND)).unwrap();
     let read = sim.rigid_object(shelf_id).pose();
     assert!((read[(1, 3)] - cos).abs() < 1e-15 && (read[(1, 5)] - sin).abs() < 1e-15, "{read}");
-    sim.randomize_with(None, |_, _, p| {
-        p.set(Property::Friction, "shelf", &[0.0])?;
-        p.set(Property::Friction, "ball", &[0.0])
-    })
-    .unwrap();
+    sim.properties_mut()
+        .randomize_with(None, |_, _, p| {
+            p.set(Property::Friction, "shelf", &[0.0])?;
+            p.set(Property::Friction, "ball", &[0.0])
+        })
+        .unwrap();
     // On the surface, which is 2 cm from its middle: the ball's middle is 7 cm along the normal.
     let place = at(0.07 * angle.sin(), 0.5 + 0.07 * angle.cos());
     sim.rigid_object_mut(ball).write_pose(&row(place), Some(SECOND)).unwrap();
@@ -163,7 +165,7 @@ fn drawn_places() {
     let rays = RayCasterCfg { offset: Pose::translation(0.013, 0.007, 3.0), ..Default::default() };
     let rays = sim.add_sensor("rays", rays).unwrap();
     let draw = Randomization::new().with(Property::Position, "shelf", Draw::Add([-0.05, 0.05]));
-    sim.randomize(&draw, Some(SECOND)).unwrap();
+    sim.properties_mut().randomize(&draw, Some(SECOND)).unwrap();
     let place = sim.rigid_object(shelf_id).pose();
     let moved: Vec<f64> = (0..3).map(|k| place[(1, k)] - place[(0, k)]).collect();
     assert!(moved.iter().all(|d| d.abs() <= 0.05 && *d != 0.0), "{moved:?}");

@@ -5,6 +5,7 @@ use super::*;
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::scene::mesh::HullCfg;
+use kinetoscope::sim::{Error, Result, WrenchFrame};
 use kinetoscope_testkit::refusal::{assert_error, assert_refused, assert_refused_unchanged};
 
 #[test]
@@ -132,8 +133,8 @@ fn places() {
     ];
     let pose = |sim: &SimulationManager| sim.rigid_object(shelf).pose();
     assert_refused_unchanged(&mut sim, pose, rows, |sim, (property, name, value)| {
-        sim.randomize_with(None, |_, _, p| p.set(property, name, value))
+        sim.properties_mut().randomize_with(None, |_, _, p| p.set(property, name, value))
     });
     let model = sim.batch().model();
-    assert!(model.id(ObjectKind::Body, "shelf").is_some() && sim.property_bytes(EnvId(0)).unwrap() == 0);
+    assert!(model.id(ObjectKind::Body, "shelf").is_some() && sim.properties().bytes(EnvId(0)).unwrap() == 0);
 }

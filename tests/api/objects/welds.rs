@@ -2,6 +2,7 @@
 
 use super::*;
 use kinetoscope::ndarray::{Array2, Array3, Axis, array};
+use kinetoscope::sim::{Error, ObjectId, Snapshot, WeldCfg, WeldId};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::worlds::{errors, pose_in, sr5};
 
@@ -102,8 +103,7 @@ fn links_and_world() {
         sim.weld_mut(id).attach(Some(SECOND)).unwrap();
     }
     let in_link = |sim: &SimulationManager| {
-        pose_in(&sim.robot(arm).link_pose(&tip).unwrap(), 1).inverse()
-            * pose_in(&sim.rigid_object(ids[0]).pose(), 1)
+        pose_in(&sim.robot(arm).link_pose(&tip).unwrap(), 1).inverse() * pose_in(&sim.rigid_object(ids[0]).pose(), 1)
     };
     let before = in_link(&sim);
     let start = sim.robot(arm).link_pose(&tip).unwrap();
@@ -168,7 +168,7 @@ fn masses_and_additions() {
     let v = ids.map(|id| sim.rigid_object(id).velocity()[(1, 0)]);
     assert!((v[0] - 0.25).abs() < 1e-3 && (v[1] - 0.25).abs() < 1e-3, "F t / 8 kg: {v:?}");
     assert!(apart(&relative(&sim, ids, 1), &before) < 1e-4);
-    sim.reset_properties(None).unwrap();
+    sim.properties_mut().reset(None).unwrap();
     assert_eq!(attached(&sim, held), [false, true]);
     sim.update(100);
     assert!(apart(&relative(&sim, ids, 1), &before) < 1e-4);

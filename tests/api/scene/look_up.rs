@@ -1,6 +1,9 @@
 //! Entities by name and type, and the errors where either is wrong.
 
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::Camera;
+use kinetoscope::sensors::{ContactSensor, Imu};
+use kinetoscope::sim::Error;
 use kinetoscope_testkit::worlds::row;
 
 fn cube(x: f64) -> RigidObjectCfg {
@@ -21,7 +24,7 @@ fn names_in_order() {
     assert_eq!(scene.keys().collect::<Vec<_>>(), ["touch", "zebra", "apple"]);
     assert_eq!(scene.rigid_object("apple").unwrap().uid(), "apple");
     assert_eq!(scene.rigid_object_id("{ENV_REGEX_NS}/apple").unwrap(), scene.rigid_object_id("apple").unwrap());
-    assert_eq!(scene.sim().rigid_object_id("zebra").unwrap(), scene.rigid_object_id("zebra").unwrap());
+    assert_eq!(scene.sim().entities().rigid_object_id("zebra").unwrap(), scene.rigid_object_id("zebra").unwrap());
     let pose = row([3.0, 2.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
     scene.rigid_object_mut("apple").unwrap().write_pose(&pose, Some(&[EnvId(2)])).unwrap();
     let poses = scene.rigid_object("apple").unwrap().pose();
@@ -32,7 +35,7 @@ fn names_in_order() {
 /// A handle of a sensor of unknown type names the type, and converts to a handle of that type only.
 #[test]
 fn sensor_handles() {
-    use kinetoscope::sim::interactive_scene::SensorEntity;
+    use kinetoscope::sim::SensorEntity;
     let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
     sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), ..cube(0.0) }).unwrap();
     let kinds: [(&str, Box<dyn SensorEntity>); 2] =
@@ -42,7 +45,7 @@ fn sensor_handles() {
         assert_eq!(handle.type_name(), *name);
     }
     let imu = handles[1].1.get::<Imu>().unwrap();
-    assert_eq!(sim.sensor_ids::<Imu>(), [("Imu".to_string(), imu)]);
+    assert_eq!(sim.entities().sensor_ids::<Imu>(), [("Imu".to_string(), imu)]);
     assert!(handles[0].1.get::<Imu>().is_none());
 }
 

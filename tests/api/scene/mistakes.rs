@@ -3,6 +3,7 @@
 use super::parts;
 use super::round_trip::QUADRUPED;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::{EntityTypes, Error, Result};
 
 fn toml(text: &str) -> Result<SceneCfg> {
     SceneCfg::from_toml(text, "dir/scene.toml", &EntityTypes::default())

@@ -2,6 +2,8 @@
 
 use kinetoscope::ndarray::{Array3, Axis};
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::ContactSensor;
+use kinetoscope::sim::{EntityTypes, Error, RigidObjectGroupCfg, WeldCfg};
 use kinetoscope_testkit::worlds::object;
 
 /// A ball above a block on the ground, two cubes in the air, of which a weld that stands before them may hold the first to the

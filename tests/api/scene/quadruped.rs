@@ -1,7 +1,10 @@
 //! The scene of the tutorial, from the bundled file and from Rust: the same bits, and the numbers that the tutorial prints.
 
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::ContactSensor;
+use kinetoscope::sensors::camera::{Camera, CameraConvention};
 use kinetoscope::sensors::ray::pattern::Grid;
+use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayCaster};
 use kinetoscope::sim::GroundCfg;
 use kinetoscope_testkit::bits::bits;
 

@@ -3,6 +3,9 @@
 use super::quadruped::bundled;
 use kinetoscope::ndarray::{Array2, Array3};
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::ContactSensor;
+use kinetoscope::sensors::ray::RayCaster;
+use kinetoscope::sim::WrenchFrame;
 
 /// `scene.reset()` undid what was written: the tutorial's noise on joint positions was lost.
 #[test]
@@ -40,10 +43,7 @@ fn written_state_stays() {
     // The other reset puts everything back.
     scene.reset_to_default(None).unwrap();
     let robot = scene.robot("robot").unwrap();
-    assert!(
-        same(&robot.qpos(), &robot.default_qpos())
-            && same(&robot.root_state(), &robot.default_root_state())
-    );
+    assert!(same(&robot.qpos(), &robot.default_qpos()) && same(&robot.root_state(), &robot.default_root_state()));
     assert_eq!(scene.sim().time(), [0.0; 2]);
     assert!(scene.reset(Some(&[EnvId(2)])).is_err() && scene.reset_to_default(Some(&[EnvId(2)])).is_err());
 }

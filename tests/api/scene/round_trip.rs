@@ -3,7 +3,11 @@
 use super::quadruped::declared;
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::Imperfections;
+use kinetoscope::sensors::ray::RayCasterCameraCfg;
 use kinetoscope::sensors::ray::pattern::Lidar;
+use kinetoscope::sensors::{FrameTransformerCfg, JointStateCfg, JointWrenchCfg, NoiseCfg, TargetFrameCfg};
+use kinetoscope::sim::{DcMotor, DelayedPd, EntityTypes, Error, IdealPd};
 
 pub(crate) const QUADRUPED: &str = r#"# As assets/scenes/quadruped.toml begins.
 simulation:

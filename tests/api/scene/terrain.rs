@@ -3,7 +3,11 @@
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::terrain::{PyramidStairs, RoughTerrain, Slope, TerrainGenerator};
+use kinetoscope::sensors::NoiseCfg;
+use kinetoscope::sensors::camera::DepthMiss;
 use kinetoscope::sensors::ray::pattern::Grid;
+use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg};
+use kinetoscope::sim::EntityTypes;
 use kinetoscope_testkit::worlds::{look_at, object};
 
 const FILE: &str = r#"

@@ -4,6 +4,7 @@ use super::worlds::{G, ball, cfg, cube, fixed, pose_in, row, sim};
 use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
+use kinetoscope::sim::{Integrator, ObjectId};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 use kinetoscope_testkit::worlds;
 use nalgebra::Vector3;

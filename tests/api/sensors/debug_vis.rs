@@ -3,8 +3,9 @@
 use super::worlds::{G, add_robot, cfg, cube, joint, link, look_at, sim};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, MarkerKind};
-use kinetoscope::sensors::SensorCfg;
+use kinetoscope::sensors::ray::RayCasterCameraCfg;
 use kinetoscope::sensors::ray::pattern::Grid;
+use kinetoscope::sensors::{FrameTransformerCfg, Imu, JointWrenchCfg, SensorCfg, TargetFrameCfg};
 use nalgebra::Vector3;
 
 /// A load that hangs from a crane, and a box that has come to rest on the ground.
@@ -23,10 +24,10 @@ fn shown<C: SensorCfg + Send + 'static>(cfg: impl Fn(bool) -> C) -> Vec<Marker> 
     let mut sim = world();
     sim.add_sensor("quiet", cfg(false)).unwrap();
     sim.update(4);
-    assert_eq!(sim.markers(), [], "off is off");
+    assert_eq!(sim.scene().markers(), [], "off is off");
     sim.add_sensor("shown", cfg(true)).unwrap();
     sim.update(4);
-    let of = |env| sim.markers().into_iter().filter(move |(of, _)| *of == EnvId(env)).map(|(_, marker)| marker);
+    let of = |env| sim.scene().markers().into_iter().filter(move |(of, _)| *of == EnvId(env)).map(|(_, marker)| marker);
     assert_eq!(of(0).count(), of(1).count());
     of(1).collect()
 }
@@ -139,33 +140,33 @@ fn switch() {
     let contact = |debug_vis| ContactSensorCfg { debug_vis, ..ContactSensorCfg::of("box") };
     let (off, on) = (sim.add_sensor("off", contact(false)).unwrap(), sim.add_sensor("on", contact(true)).unwrap());
     let load = sim.add_sensor("load", wrench_of_load(false)).unwrap();
-    assert_eq!([sim.debug_vis(off).unwrap(), sim.debug_vis(on).unwrap()], [false, true]);
+    assert_eq!([sim.scene().debug_vis(off).unwrap(), sim.scene().debug_vis(on).unwrap()], [false, true]);
     sim.update(4);
     // Two environments with a ball and an arrow each.
-    let of_on = sim.markers();
+    let of_on = sim.scene().markers();
     assert_eq!(of_on.len(), 4);
-    sim.set_debug_vis(on, false).unwrap();
-    assert_eq!(sim.markers(), []);
-    sim.set_debug_vis(off, true).unwrap();
-    assert_eq!(sim.markers(), of_on, "the same, of a sensor that was built without");
+    sim.scene_mut().set_debug_vis(on, false).unwrap();
+    assert_eq!(sim.scene().markers(), []);
+    sim.scene_mut().set_debug_vis(off, true).unwrap();
+    assert_eq!(sim.scene().markers(), of_on, "the same, of a sensor that was built without");
     // Markers of all sensors but one.
-    assert_eq!(sim.markers_beside(off), []);
-    assert_eq!(sim.markers_beside(load), of_on);
-    sim.set_debug_vis(load, true).unwrap();
-    let (of_load, all) = (sim.markers_beside(off), sim.markers());
+    assert_eq!(sim.scene().markers_beside(off), []);
+    assert_eq!(sim.scene().markers_beside(load), of_on);
+    sim.scene_mut().set_debug_vis(load, true).unwrap();
+    let (of_load, all) = (sim.scene().markers_beside(off), sim.scene().markers());
     assert!(!of_load.is_empty() && all.len() == of_on.len() + of_load.len());
     assert!(of_load.iter().all(|marker| all.contains(marker) && !of_on.contains(marker)));
-    assert_eq!(sim.markers_beside(load), of_on);
-    sim.set_debug_vis(off, false).unwrap();
-    assert_eq!(sim.markers(), of_load);
+    assert_eq!(sim.scene().markers_beside(load), of_on);
+    sim.scene_mut().set_debug_vis(off, false).unwrap();
+    assert_eq!(sim.scene().markers(), of_load);
     assert_eq!(of_load[0].0, EnvId(0));
     assert_arrow(&of_load[0].1, [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);
     assert!(sim.sensor(off).unwrap().pos_w().is_none(), "poses are for markers, and not measured");
     assert_eq!(sim.sensor(off).unwrap().sample_counts().to_vec(), [4, 4], "no sensor was restarted");
     // The switch stays where an object is added later, which builds all sensors again.
     sim.add_rigid_object(cube("late", 0.2, 1.0, [3.0, 3.0, 0.1])).unwrap();
-    assert_eq!([off, on].map(|id| sim.debug_vis(id).unwrap()), [false, false]);
-    assert!(sim.debug_vis(load).unwrap());
+    assert_eq!([off, on].map(|id| sim.scene().debug_vis(id).unwrap()), [false, false]);
+    assert!(sim.scene().debug_vis(load).unwrap());
 }
 
 /// In a scene, by the name of the sensor.
@@ -174,12 +175,12 @@ fn switch_by_name() {
     let scene =
         SceneCfg::new(cfg(1)).with("box", cube("box", 0.2, 2.0, [0.0, 0.0, 0.1])).with("imu", ImuCfg::on("box"));
     let mut scene = InteractiveScene::new(scene).unwrap();
-    assert_eq!(scene.sim().markers(), []);
+    assert_eq!(scene.sim().scene().markers(), []);
     // It stands: the arrow is there.
     scene.update(50);
     scene.set_debug_vis("{ENV}/imu", true).unwrap();
-    assert_eq!(scene.sim().markers().len(), 2);
-    assert!(scene.sim().debug_vis(scene.sensor_id::<Imu>("imu").unwrap()).unwrap());
+    assert_eq!(scene.sim().scene().markers().len(), 2);
+    assert!(scene.sim().scene().debug_vis(scene.sensor_id::<Imu>("imu").unwrap()).unwrap());
     let text = scene.set_debug_vis("imo", true).unwrap_err().to_string();
     assert!(text.contains("\"imo\"") && text.contains("\"imu\""), "{text}");
     let text = scene.set_debug_vis("box", true).unwrap_err().to_string();

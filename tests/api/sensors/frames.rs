@@ -4,6 +4,7 @@ use super::worlds::{cube, pose_in, sim, sr5};
 use kinetoscope::ndarray::{ArrayView3, Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::to_wxyz;
+use kinetoscope::sensors::{FrameTransformerCfg, JointState, JointStateCfg, TargetFrameCfg};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use nalgebra::UnitQuaternion;
 
@@ -62,13 +63,13 @@ fn handles_of_another_manager() {
         sim.add_sensor("joints", JointStateCfg::default()).unwrap()
     });
     let [id, own] = ids;
-    assert!(sim.sensor(id).is_ok() && sim.sensor_mut(id).is_ok() && sim.debug_vis(id).is_ok());
+    assert!(sim.sensor(id).is_ok() && sim.sensor_mut(id).is_ok() && sim.scene().debug_vis(id).is_ok());
     assert!(other.sensor(own).is_ok(), "the control");
     let uses: [fn(&mut SimulationManager, SensorId<JointState>) -> bool; 4] = [
         |sim, id| sim.sensor(id).is_ok(),
         |sim, id| sim.sensor_mut(id).is_ok(),
-        |sim, id| sim.debug_vis(id).is_ok(),
-        |sim, id| sim.set_debug_vis(id, true).is_ok(),
+        |sim, id| sim.scene().debug_vis(id).is_ok(),
+        |sim, id| sim.scene_mut().set_debug_vis(id, true).is_ok(),
     ];
     for act in uses {
         let panic = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| act(&mut other, id))).unwrap_err();

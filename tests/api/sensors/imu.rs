@@ -4,6 +4,7 @@
 use super::worlds::{G, cube, fixed, pose_in, row, sim};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::Imu;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -19,7 +20,7 @@ fn free_fall_and_rest() {
     sim.add_rigid_object(RigidObjectCfg { init_pose, ..fixed(cube("stands", 0.1, 1.0, [0.0; 3])) }).unwrap();
     let bare = ImuCfg { gravity_bias: Some(Vector3::zeros()), ..ImuCfg::on("falls") };
     let ids = [ImuCfg::on("falls"), bare, ImuCfg::on("stands")]
-        .map(|cfg| sim.add_sensor(format!("imu {}", sim.sensor_ids::<Imu>().len()), cfg).unwrap());
+        .map(|cfg| sim.add_sensor(format!("imu {}", sim.entities().sensor_ids::<Imu>().len()), cfg).unwrap());
     let up = tilt.inverse() * Vector3::new(0.0, 0.0, G);
     for _ in 0..20 {
         for (id, expected) in ids.iter().zip([[0.0; 3], [0.0, 0.0, -G], up.into()]) {

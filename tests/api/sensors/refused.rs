@@ -3,9 +3,13 @@
 use super::worlds::{cube, sim, sr5};
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::CameraError;
-use kinetoscope::sensors::ray::RayError;
 use kinetoscope::sensors::ray::pattern::{Bpearl, Custom, Grid, Lidar, Pinhole};
-use kinetoscope::sensors::{SensorCfg, SensorError};
+use kinetoscope::sensors::ray::{HitTargets, RayCasterCameraCfg, RayError};
+use kinetoscope::sensors::{
+    ActuatorStateCfg, FrameTransformerCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg, NoiseCfg, SensorCfg,
+    SensorError, TargetFrameCfg,
+};
+use kinetoscope::sim::Error;
 use nalgebra::{Quaternion, UnitQuaternion};
 
 const NAN: f64 = f64::NAN;

@@ -6,8 +6,14 @@ use kinetoscope::mujoco as mj;
 use kinetoscope::ndarray::{Array2, ArrayBase, Axis, Data, RemoveAxis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::render::frame::Depth;
-use kinetoscope::sensors::SensorCfg;
+use kinetoscope::sensors::camera::StereoCameraCfg;
 use kinetoscope::sensors::ray::pattern::Grid;
+use kinetoscope::sensors::ray::{RayCaster, RayCasterCameraCfg};
+use kinetoscope::sensors::{
+    ActuatorStateCfg, FrameTransformerCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg, NoiseCfg, SensorCfg,
+    TargetFrameCfg,
+};
+use kinetoscope::sim::{EntityTypes, Integrator};
 use kinetoscope_testkit::bits::Bits;
 use std::collections::BTreeMap;
 
@@ -274,7 +280,7 @@ fn eager_and_lazy() {
             match k {
                 3 | 6 => sim.reset(Some(&[EnvId(k as usize / 3)])).unwrap(),
                 5 => {
-                    let box_ = sim.rigid_object_id("box1").unwrap();
+                    let box_ = sim.entities().rigid_object_id("box1").unwrap();
                     let speed = Array2::from_elem((1, 6), 0.5);
                     sim.rigid_object_mut(box_).write_velocity(&speed, Some(&[EnvId(3)])).unwrap();
                 }
@@ -283,7 +289,7 @@ fn eager_and_lazy() {
             sim.update([7, 1, 7, 0][k as usize % 4]);
             readers.read(&sim, &mut all);
         }
-        let counts = sim.sensor(sim.sensor_ids::<RayCaster>()[0].1).unwrap().sample_counts().to_vec();
+        let counts = sim.sensor(sim.entities().sensor_ids::<RayCaster>()[0].1).unwrap().sample_counts().to_vec();
         assert_eq!(counts, [38, 23, 15, 38, 38], "every step since the last reset");
         all
     });
@@ -302,7 +308,7 @@ fn states(settings: SimulationManagerCfg, with_arm: bool, with_sensors: bool) ->
         let filters = vec!["ground".into()];
         sim.add_sensor("contact", ContactSensorCfg { filters, ..ContactSensorCfg::of("box.*") }).unwrap();
     }
-    let boxes = ["box0", "box1"].map(|name| sim.rigid_object_id(name).unwrap());
+    let boxes = ["box0", "box1"].map(|name| sim.entities().rigid_object_id(name).unwrap());
     let mut states = Vec::new();
     for k in 0..40 {
         if let Some(arm) = arm {
@@ -321,7 +327,7 @@ fn states(settings: SimulationManagerCfg, with_arm: bool, with_sensors: bool) ->
         sim.update(7);
         states.extend(kinetoscope_testkit::worlds::all_bits(&sim));
     }
-    assert!(sim.buffer_growths() > 0 || mj::TARGET == mj::Target::V4, "the arena of 4.x is large enough");
+    assert!(sim.warnings().buffer_growths() > 0 || mj::TARGET == mj::Target::V4, "the arena of 4.x is large enough");
     states
 }
 

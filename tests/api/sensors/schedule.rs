@@ -3,6 +3,7 @@
 use super::worlds::{cfg, cube, sr5};
 use kinetoscope::ndarray::{Array2, ArrayD, ArrayViewD, Axis, array};
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::{FrameTransformerCfg, JointStateCfg, TargetFrameCfg};
 
 const LENGTH: usize = 3;
 

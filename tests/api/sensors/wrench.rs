@@ -5,6 +5,7 @@ use super::worlds::{G, add_robot, joint, link, sim, sr5};
 use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
+use kinetoscope::sensors::{Imu, JointWrenchCfg};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use nalgebra::{UnitQuaternion, Vector3};
 

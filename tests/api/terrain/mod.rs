@@ -7,6 +7,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
+use kinetoscope::sim::ObjectId;
 use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::worlds::{ball, cfg, sim};
 use nalgebra::Point3;
@@ -76,9 +77,9 @@ fn rays() {
     };
     let scanner = sim.add_sensor("scanner", scanner).unwrap();
     sim.update(1);
-    let (scanner, terrain) = (sim.sensor(scanner).unwrap(), sim.terrain(id));
+    let (scanner, terrain) = (sim.sensor(scanner).unwrap(), sim.entities().terrain(id));
     let (start, hit, mask) = (scanner.ray_starts(), scanner.hits(), scanner.hit_mask());
-    let entry = sim.mask_ids().iter().find(|entry| entry.object == "bumps").unwrap();
+    let entry = sim.scene().mask_ids().iter().find(|entry| entry.object == "bumps").unwrap();
     assert_eq!((hit.dim().0, entry.id, entry.class.as_str()), (2, terrain.mask_id(), "terrain"));
     let (mut hits, mut worst, mut control) = (0, 0.0_f64, 0.0_f64);
     for (at, &seen) in mask.indexed_iter() {
@@ -117,7 +118,7 @@ fn ball_at_rest() {
     let (terrain, ball) = (sim.add_terrain(pit()).unwrap(), add_ball(&mut sim));
     let feel = ContactSensorCfg { filters: vec!["world".into()], ..ContactSensorCfg::of("ball") };
     let sensor = sim.add_sensor("contact", feel).unwrap();
-    assert_eq!((sim.terrain(terrain).uid(), sim.terrain(terrain).cfg()), ("pit", &pit()));
+    assert_eq!((sim.entities().terrain(terrain).uid(), sim.entities().terrain(terrain).cfg()), ("pit", &pit()));
     sim.update(1000);
     let (pose, velocity) = (sim.rigid_object(ball).pose(), sim.rigid_object(ball).velocity());
     let sensor = sim.sensor(sensor).unwrap();
@@ -198,13 +199,13 @@ fn mistakes() {
     ];
     let mut add = |uid: &str, cfg| sim.add_terrain(TerrainCfg { uid: uid.into(), ..cfg });
     assert_refused(rows.map(|(uid, cfg, part)| (part, add(uid, cfg), "", [part])));
-    assert_eq!(sim.mask_ids().len(), 1);
+    assert_eq!(sim.scene().mask_ids().len(), 1);
     // A name with characters that mean something in XML, and heights that are all the same.
     let flat = TerrainCfg { uid: "<\"flat\" & wide>".into(), heights: Array2::from_elem((2, 2), 0.3), ..bumps() };
     let flat = sim.add_terrain(flat).unwrap();
-    assert_eq!(sim.terrain(flat).height_at([0.0, 0.0]), Some(0.3));
-    assert_eq!(sim.terrain(flat).height_at([1.6, 0.0]), None);
-    assert_eq!(sim.mask_ids().len(), 2);
+    assert_eq!(sim.entities().terrain(flat).height_at([0.0, 0.0]), Some(0.3));
+    assert_eq!(sim.entities().terrain(flat).height_at([1.6, 0.0]), None);
+    assert_eq!(sim.scene().mask_ids().len(), 2);
     let object = RigidObjectCfg { uid: "bumps".into(), ..Default::default() };
     assert!(sim.add_rigid_object(object).is_err(), "the name is a terrain's");
 }

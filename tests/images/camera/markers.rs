@@ -2,7 +2,7 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::{Marker, SceneState};
-use kinetoscope::sensors::camera::{Channels, RasterCfg, Renderer, Shutter};
+use kinetoscope::sensors::camera::{Camera, Channels, RasterCfg, Renderer, Shutter};
 use kinetoscope::sensors::{Requires, Sensor, SensorCfg, SensorContext, SensorError};
 use kinetoscope_testkit::worlds::{cfg, fixed, look_at, object};
 
@@ -154,7 +154,7 @@ fn every_renderer() {
             }
         }
         // The control: the switch of the sensor, from the next image on.
-        sim.set_debug_vis(ball, false).unwrap();
+        sim.scene_mut().set_debug_vis(ball, false).unwrap();
         assert!(colors(&sim, on, 1).iter().any(|pixel| is_red(*pixel)), "the captured image stays");
         sim.update(1);
         bare.update(1);
@@ -209,7 +209,7 @@ fn hidden_and_own() {
     sim.add_rigid_object(fixed(object("wall", ObjectShape::Box { size: [0.02, 4.0, 4.0] }, [0.8, 0.0, 1.0]))).unwrap();
     let cfg = |draw_markers| CameraCfg { debug_vis: true, ..camera(Renderer::Raster, draw_markers) };
     let off = sim.add_sensor("off", cfg(false)).unwrap();
-    sim.set_debug_vis(off, false).unwrap();
+    sim.scene_mut().set_debug_vis(off, false).unwrap();
     let on = sim.add_sensor("on", cfg(true)).unwrap();
     assert_eq!(colors(&sim, on, 1), colors(&sim, off, 1));
     // The control: markers of another camera are seen.

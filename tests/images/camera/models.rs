@@ -4,6 +4,7 @@ use super::view;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
+use kinetoscope::sim::{Result, Still};
 use kinetoscope_testkit::needs::{files_below, sample_model};
 use kinetoscope_testkit::urdf::Files;
 

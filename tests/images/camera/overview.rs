@@ -5,6 +5,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::render::visibility::View;
 use kinetoscope::scene::{Marker, PoseF32};
 use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, RasterCfg, Rasterizer, look_at_pose};
+use kinetoscope::sim::Still;
 use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object};
 
 const SIZE: [usize; 2] = [400, 400];
@@ -49,7 +50,7 @@ fn environments_and_markers() {
     let mut sim = balls(5);
     let marker = Marker::sphere([-0.5, 0.3, 0.5], 0.1, [1.0, 0.0, 0.0, 1.0]);
     let seen = Seen::of(&Still::overview(&mut sim, None, &[(EnvId(2), marker)]).unwrap());
-    let (id, origins) = (mask_id(&sim, "ball"), sim.env_origins());
+    let (id, origins) = (mask_id(&sim, "ball"), sim.cfg().env_origins());
     let mut of_balls = 0;
     for env in 0..5 {
         let count = seen.near(id, [origins[(env, 0)] + 0.4, origins[(env, 1)] - 0.2]);
@@ -70,7 +71,7 @@ fn environments_and_markers() {
 fn selection_and_refusals() {
     let mut sim = balls(4);
     let two = Seen::of(&Still::overview(&mut sim, Some(&[EnvId(1), EnvId(3)]), &[]).unwrap());
-    let (id, origins) = (mask_id(&sim, "ball"), sim.env_origins());
+    let (id, origins) = (mask_id(&sim, "ball"), sim.cfg().env_origins());
     for env in 0..4 {
         let place = [origins[(env, 0)] + 0.4, origins[(env, 1)] - 0.2];
         assert_eq!(two.near(id, place) > 0, env % 2 == 1, "environment {env}");

@@ -3,6 +3,8 @@
 use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
+use kinetoscope::sensors::camera::CameraConvention;
+use kinetoscope::sim::ObjectId;
 use kinetoscope_testkit::worlds::{cfg, cube, pose_in, sr5, urdf_robot};
 
 fn sim(num_envs: usize, threads: usize) -> (SimulationManager, RobotId, ObjectId) {
@@ -70,11 +72,11 @@ fn environments() {
 #[test]
 fn mask_ids() {
     let (mut sim, ..) = sim(1, 1);
-    let before = sim.mask_ids().to_vec();
+    let before = sim.scene().mask_ids().to_vec();
     let links = before.iter().filter(|id| id.link.is_some()).count();
     assert!(links >= 6 && before.iter().all(|id| id.id != 0), "{before:?}");
     sim.add_robot(urdf_robot("hand", assets::path("revo1_left/revo1_left.urdf").unwrap())).unwrap();
-    let after = sim.mask_ids();
+    let after = sim.scene().mask_ids();
     assert!(after.len() > before.len());
     for id in &before {
         assert!(after.contains(id), "{id:?} is gone or changed");

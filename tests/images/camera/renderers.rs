@@ -3,7 +3,7 @@
 use super::view;
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
-use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
+use kinetoscope::sensors::camera::{Camera, CameraConvention, Frame, ParallelRasterizer, look_at_pose};
 use kinetoscope::sim::Still;
 use kinetoscope_testkit::worlds::{cfg, look_at, object, sr5};
 use std::f64::consts::FRAC_PI_2;

@@ -3,6 +3,8 @@
 use kinetoscope::prelude::*;
 use kinetoscope::render::frame::Depth;
 use kinetoscope::sensors::camera::imperfection::DepthNoise;
+use kinetoscope::sensors::camera::{Camera, Imperfections};
+use kinetoscope::sensors::{JointStateCfg, NoiseCfg};
 use kinetoscope_testkit::worlds::{cfg, look_at, object};
 
 /// A camera on the ground, below a ball that falls.

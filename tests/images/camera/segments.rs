@@ -2,7 +2,7 @@
 
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::sensors::camera::{Box3d, Thing};
+use kinetoscope::sensors::camera::{Box3d, Camera, SegmentLevel, SegmentationCfg, Thing};
 use kinetoscope_testkit::worlds::{cfg, look_at, object, pose_in, sr5};
 use nalgebra::Point3;
 
@@ -30,25 +30,26 @@ fn world() -> (SimulationManager, RobotId, SensorId<Camera>) {
 fn classes() {
     let (sim, _, id) = world();
     let names = |cfg: &SegmentationCfg, level| -> Vec<String> {
-        sim.segmentation(cfg).unwrap().segments(level).iter().map(|segment| segment.name.clone()).collect()
+        sim.scene().segmentation(cfg).unwrap().segments(level).iter().map(|segment| segment.name.clone()).collect()
     };
     let plain = SegmentationCfg::default();
     assert_eq!(names(&plain, SegmentLevel::Instance), ["ground", "sr5", "table", "shelf", "cup"]);
     assert_eq!(names(&plain, SegmentLevel::Semantic), ["ground", "robot", "object", "toy"]);
-    let class = |object: &str| sim.mask_ids().iter().find(|entry| entry.object == object).unwrap().class.as_str();
+    let class =
+        |object: &str| sim.scene().mask_ids().iter().find(|entry| entry.object == object).unwrap().class.as_str();
     assert_eq!((class("cup"), class("table")), ("toy", "object"));
     let cfg = SegmentationCfg::labeled(&[("table|shelf", "furniture"), ("sr5/link6", "tip")]);
     assert_eq!(names(&cfg, SegmentLevel::Semantic), ["ground", "robot", "tip", "furniture", "toy"]);
     let links = names(&plain, SegmentLevel::Link);
     assert!(links.iter().any(|name| name == "sr5/link6"), "{links:?}");
     // Every mask id is in the table; colours differ where classes do.
-    let all = sim.segmentation(&cfg).unwrap();
+    let all = sim.scene().segmentation(&cfg).unwrap();
     let mask = sim.sensor(id).unwrap().mask().unwrap();
     let classes = all.segment(SegmentLevel::Semantic, mask);
     let colors = all.colorize(SegmentLevel::Semantic, mask);
     assert_eq!(colors.dim(), (2, 120, 160, 4));
     for (((env, v, u), &class), &id) in classes.indexed_iter().zip(mask) {
-        let entry = sim.mask_ids().iter().find(|entry| entry.id == id);
+        let entry = sim.scene().mask_ids().iter().find(|entry| entry.id == id);
         let expected = entry.map(|entry| match entry.object.as_str() {
             "table" | "shelf" => "furniture",
             _ if entry.link.as_deref() == Some("link6") => "tip",
@@ -58,16 +59,16 @@ fn classes() {
         assert_eq!(found.map(|segment| segment.name.as_str()), expected, "{env} {v} {u}");
         assert_eq!(colors[(env, v, u, 3)] == 0, id == 0);
     }
-    let error = sim.segmentation(&SegmentationCfg::labeled(&[("tabl", "x")])).unwrap_err().to_string();
+    let error = sim.scene().segmentation(&SegmentationCfg::labeled(&[("tabl", "x")])).unwrap_err().to_string();
     assert!(error.starts_with("labels: there is no object or link \"tabl\"; known are \"table\""), "{error}");
-    assert!(Thing::from(&sim.mask_ids()[0]).name() == "ground");
+    assert!(Thing::from(&sim.scene().mask_ids()[0]).name() == "ground");
 }
 
 /// Boxes are in the links' own frames: they stay the same however the arm moves, and hold all that is seen of the link.
 #[test]
 fn boxes() {
     let (mut sim, robot, id) = world();
-    let all = sim.segmentation(&SegmentationCfg::default()).unwrap();
+    let all = sim.scene().segmentation(&SegmentationCfg::default()).unwrap();
     let boxes = |sim: &SimulationManager, env| all.boxes_3d(SegmentLevel::Link, sim.sensor(id).unwrap(), env).unwrap();
     let before = boxes(&sim, 0);
     let angle = |(env, k): (usize, usize)| 0.15 * (k as f64 + 1.0) * (env as f64 + 1.0);
@@ -80,11 +81,11 @@ fn boxes() {
         let (mask, position) = (camera.mask().unwrap(), camera.position().unwrap());
         for found in boxes(&sim, env) {
             let Box3d { id, pose: of_box, min, max } = found;
-            let entry = sim.mask_ids().iter().find(|entry| entry.id == id).unwrap();
+            let entry = sim.scene().mask_ids().iter().find(|entry| entry.id == id).unwrap();
             let expected = match &entry.link {
                 Some(link) => sim.robot(robot).link_pose(link).unwrap(),
                 None if entry.object == "ground" => continue,
-                None => sim.rigid_object(sim.rigid_object_id(&entry.object).unwrap()).pose(),
+                None => sim.rigid_object(sim.entities().rigid_object_id(&entry.object).unwrap()).pose(),
             };
             let expected = pose_in(&expected, env);
             // Poses that are drawn are in single precision.

@@ -2,6 +2,8 @@
 
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
+use kinetoscope::sensors::camera::{CameraConvention, StereoCamera, StereoCameraCfg};
+use kinetoscope::sim::EntityTypes;
 use kinetoscope_testkit::worlds::{cfg, pose_in, sr5};
 use nalgebra::Point3;
 

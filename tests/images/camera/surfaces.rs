@@ -3,6 +3,7 @@
 use kinetoscope::prelude::*;
 use kinetoscope::scene::material::decode_srgb;
 use kinetoscope::scene::{LightKind, Material};
+use kinetoscope::sim::{EntityTypes, Error, LampKind, SurfaceCfg};
 use kinetoscope_testkit::worlds::{cfg, object, sim, sr5};
 use std::sync::Arc;
 
@@ -30,7 +31,7 @@ fn of(name: &str, surface: SurfaceCfg) -> (String, SurfaceCfg) {
 }
 
 fn materials(sim: &mut SimulationManager, name: &str) -> Vec<Material> {
-    let visible = sim.visible();
+    let visible = sim.scene_mut().visible();
     let found: Vec<_> = visible.scene().instances().iter().filter(|instance| &*instance.name == name).collect();
     found.into_iter().map(|instance| instance.material.clone()).collect()
 }
@@ -47,7 +48,8 @@ fn scene() -> SceneCfg {
 }
 
 fn check(sim: &mut SimulationManager) {
-    let links: Vec<String> = sim.body_names().iter().filter(|name| name.starts_with("robot/")).cloned().collect();
+    let links: Vec<String> =
+        sim.entities().body_names().iter().filter(|name| name.starts_with("robot/")).cloned().collect();
     let mut kinds = [0; 3];
     for link in &links {
         for m in materials(sim, link) {
@@ -88,8 +90,10 @@ fn own_colour() {
     let mut sim = sim(cfg(2, 2));
     let metal = object("object", ObjectShape::cube(0.1), [0.0; 3]);
     sim.add_rigid_object(RigidObjectCfg { surface: SurfaceCfg::metal(0.5), ..metal }).unwrap();
-    sim.randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::Color, "object", &[1.0, 0.0, 0.0, 1.0])).unwrap();
-    let own = sim.scene_of(EnvId(1)).unwrap();
+    sim.properties_mut()
+        .randomize_with(Some(&[EnvId(1)]), |_, _, p| p.set(Property::Color, "object", &[1.0, 0.0, 0.0, 1.0]))
+        .unwrap();
+    let own = sim.scene_mut().scene_of(EnvId(1)).unwrap();
     let ball = own.instances().iter().find(|instance| &*instance.name == "object").unwrap();
     assert_eq!((ball.material.rgba, ball.material.metallic), ([1.0, 0.0, 0.0, 1.0], 1.0));
 }
@@ -150,7 +154,7 @@ fn lights() {
     assert_eq!(again.simulation, cfg.simulation);
     let mut scene = InteractiveScene::new(cfg).unwrap();
     let mut look = kinetoscope::sim::Look::default();
-    scene.sim_mut().look(EnvId(0), &mut look).unwrap();
+    scene.sim_mut().scene_mut().look(EnvId(0), &mut look).unwrap();
     let [sun, bulb, spot] = look.lights[..] else { panic!("{:?}", look.lights) };
     assert_eq!((sun.kind, sun.radius, sun.cast_shadow), (LightKind::Directional, 0.00465, true));
     assert_eq!((bulb.kind, bulb.radius, bulb.cast_shadow), (LightKind::Point, 0.0625, true));
@@ -168,7 +172,7 @@ fn lights() {
 fn dome() {
     let ambient = |lights: Vec<LightCfg>| {
         let mut sim = SimulationManager::new(SimulationManagerCfg { lights, ..cfg(1, 1) }).unwrap();
-        let scene = Arc::clone(sim.visible().scene());
+        let scene = Arc::clone(sim.scene_mut().visible().scene());
         (scene.ambient, scene.lights.len())
     };
     let (first, second) = (LightCfg::dome(0.5, [1.0, 0.75, 0.0]), LightCfg::dome(2.0, [0.25; 3]));

@@ -3,7 +3,8 @@
 use crate::rays::scanner::tumbling;
 use kinetoscope::ndarray::{Axis, s};
 use kinetoscope::prelude::*;
-use kinetoscope::sensors::camera::PointFrame;
+use kinetoscope::sensors::camera::{CameraConvention, PointFrame};
+use kinetoscope::sensors::ray::RayCasterCameraCfg;
 
 const LENSES: [Intrinsics; 2] = [
     Intrinsics::Fovy { radians: 0.7 },

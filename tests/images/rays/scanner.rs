@@ -5,6 +5,8 @@ use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope::sensors::ray::pattern::{Grid, Lidar};
+use kinetoscope::sensors::ray::{HitTargets, RayAlignment};
+use kinetoscope::sim::ObjectId;
 use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object, pose_in, sr5};
 
 /// A box that tumbles over a static wall and a ball, at another pose in every environment.
@@ -121,7 +123,7 @@ fn carrier() {
         };
         let id = sim.add_sensor(format!("lidar {exclude_parent}"), cfg).unwrap();
         let ids: std::collections::BTreeSet<i32> = sim.sensor(id).unwrap().hit_ids().iter().copied().collect();
-        let seen = sim.mask_ids().iter().filter(|mask| ids.contains(&mask.id));
+        let seen = sim.scene().mask_ids().iter().filter(|mask| ids.contains(&mask.id));
         seen.map(|mask| mask.link.clone().unwrap_or(mask.object.clone())).collect::<Vec<String>>()
     });
     assert!(others.contains(&"ground".to_string()) && others.len() >= 2, "{others:?}");

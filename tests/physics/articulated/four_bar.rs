@@ -14,6 +14,7 @@
 //! is off by 0.02823 rad/s, with the second alone by 0.04124. Solver, tolerance and warm start change nothing.
 
 use crate::lab::*;
+use kinetoscope::sim::WeldCfg;
 
 const FRAME: f64 = 0.3;
 const CRANK: f64 = 0.1;

@@ -7,6 +7,7 @@
 //! Tolerance: RK4, (ω h)⁴ per radian: 1e-8 of ω, which is as much of r. What is left of the way after 10 s is e^-35.
 
 use crate::lab::*;
+use kinetoscope::sim::DriveModel;
 
 const PLATFORM: f64 = 0.2;
 const MASS: f64 = 1.5;

@@ -6,6 +6,7 @@
 //! critically damped spring of the time constant 2 h, is stretched by (2 h)² of that at most: 4.7e-5 m.
 
 use crate::lab::*;
+use kinetoscope::sim::WeldCfg;
 
 const CRANK: f64 = 0.1;
 const ROD: f64 = 0.35;

@@ -5,6 +5,7 @@
 //! Tolerance: rounding of accelerations over a step of 1 ms, times 3 kg: 1e-9.
 
 use crate::lab::*;
+use kinetoscope::sensors::JointWrenchCfg;
 use nalgebra::Matrix3;
 
 const MASS: f64 = 3.0;

@@ -12,6 +12,8 @@
 use super::ball_in_picture::{FOCAL, MIDDLE, SIZE, Seen, expected, found};
 use crate::lab::*;
 use kinetoscope::ndarray::Axis;
+use kinetoscope::sensors::camera::CameraConvention;
+use kinetoscope::sensors::ray::RayCasterCameraCfg;
 use kinetoscope_testkit::worlds::{fixed, object};
 
 const RADIUS: f64 = 0.3;

@@ -61,7 +61,7 @@ fn seen(turns: Turns, spin: f64, seconds: f64) -> Seen {
     lab.write_joints(robot, &[0.0], &[spin]);
     lab.run(seconds);
     let is_ball = |id: &&MaskId| id.object == "ball" || id.link.as_deref() == Some("ball");
-    let id = lab.sim.mask_ids().iter().find(is_ball).unwrap().id;
+    let id = lab.sim.scene().mask_ids().iter().find(is_ball).unwrap().id;
     found(&lab.sim.sensor(camera).unwrap().mask().unwrap(), id)
 }
 

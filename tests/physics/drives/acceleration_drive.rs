@@ -6,6 +6,7 @@
 
 use super::wheel::{Wheel, hinge};
 use crate::lab::*;
+use kinetoscope::sim::DriveType;
 
 const STIFFNESS: f64 = 90.0;
 const DAMPING: f64 = 15.0;

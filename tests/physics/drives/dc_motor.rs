@@ -7,6 +7,7 @@
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
+use kinetoscope::sim::DcMotor;
 
 const STALL: f64 = 1.0;
 const LIMIT: f64 = 0.6;

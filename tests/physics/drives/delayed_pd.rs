@@ -5,6 +5,7 @@
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
+use kinetoscope::sim::DelayedPd;
 
 const STEPS: usize = 300;
 

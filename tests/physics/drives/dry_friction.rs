@@ -9,6 +9,7 @@
 
 use super::wheel::{MOMENT, Wheel, hinge};
 use crate::lab::*;
+use kinetoscope::sim::DriveModel;
 
 const FRICTION: f64 = 1.0;
 const START: f64 = 2.0;

@@ -16,6 +16,7 @@
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
+use kinetoscope::sim::IdealPd;
 
 const H: f64 = 1e-3;
 const START: f64 = 0.01;

@@ -20,6 +20,7 @@
 use crate::lab::*;
 use crate::rigid_body::soft_contact::{LARGEST, TIME, depth, impedance};
 use kinetoscope::mujoco::{TARGET, Target};
+use kinetoscope::sim::DriveModel;
 use kinetoscope_testkit::worlds::cube;
 
 const LIMIT: f64 = 5.0;

@@ -2,6 +2,7 @@
 
 use super::wheel::MOMENT;
 use crate::lab::*;
+use kinetoscope::sim::{ActuatorModel, DcMotor, DelayedPd, DriveModel, DriveType};
 
 /// Of the models that hear of their targets late \[steps\].
 const DELAY: u32 = 40;

@@ -6,6 +6,7 @@
 
 use super::wheel::{MOMENT, Wheel, hinge};
 use crate::lab::*;
+use kinetoscope::sim::DriveModel;
 
 const DAMPING: f64 = 0.5;
 const START: f64 = 4.0;

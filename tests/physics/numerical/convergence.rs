@@ -4,6 +4,7 @@
 
 use crate::articulated::double_pendulum_energy;
 use crate::lab::*;
+use kinetoscope::sim::Integrator;
 use std::f64::consts::{FRAC_PI_2, LN_2};
 
 /// Angles of the joints of the double pendulum \[rad\], and their velocities \[rad/s\], at the start.

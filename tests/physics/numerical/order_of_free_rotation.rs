@@ -8,6 +8,7 @@ use super::convergence::{errors, off, order};
 use super::free_rotation;
 use crate::lab::*;
 use kinetoscope::mujoco::{TARGET, Target};
+use kinetoscope::sim::Integrator;
 
 const MOMENTS: [f64; 3] = [0.01, 0.02, 0.025];
 const SPIN: [f64; 3] = [4.0, 1.0, 5.5];

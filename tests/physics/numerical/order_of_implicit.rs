@@ -7,7 +7,7 @@ use super::convergence::{double_pendulum, errors, off, order, reference};
 use super::double_pendulum::{self as written_out, Steps, rounding};
 use crate::law::law;
 use kinetoscope::mujoco::{TARGET, Target};
-use kinetoscope::prelude::*;
+use kinetoscope::sim::Integrator;
 
 #[test]
 fn holds() {

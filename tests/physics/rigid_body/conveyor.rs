@@ -14,6 +14,7 @@
 use super::sliding_block::SOLVER;
 use super::soft_contact::depth;
 use crate::lab::*;
+use kinetoscope::sim::ObjectId;
 use kinetoscope_testkit::worlds::ball;
 
 const BOARD: f64 = 10.0;

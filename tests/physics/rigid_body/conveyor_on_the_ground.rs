@@ -27,6 +27,7 @@
 
 use super::soft_contact::{LARGEST, TIME};
 use crate::lab::*;
+use kinetoscope::sim::ObjectId;
 use kinetoscope_testkit::worlds::{ball, object};
 use nalgebra::{Vector2, Vector3};
 

@@ -7,6 +7,7 @@
 
 use crate::bounce::off;
 use crate::lab::*;
+use kinetoscope::sim::ObjectId;
 use kinetoscope_testkit::worlds::ball;
 
 const RADIUS: f64 = 0.1;

@@ -10,6 +10,7 @@
 use super::soft_contact::depth;
 use crate::lab::*;
 use kinetoscope::mujoco::{TARGET, Target};
+use kinetoscope::sim::ObjectId;
 use kinetoscope_testkit::worlds::object;
 
 const EDGE: f64 = 0.1;

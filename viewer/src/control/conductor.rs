@@ -131,8 +131,8 @@ impl Conductor {
             self.recording = button.state(sim).or(self.recording.take());
         }
         let run = Run {
-            steps: sim.steps(),
-            paused: self.hold_at.is_some_and(|step| step <= sim.steps()),
+            steps: sim.observers().steps(),
+            paused: self.hold_at.is_some_and(|step| step <= sim.observers().steps()),
             speed: self.pace.as_ref().map_or(Speed::Free, Pace::speed),
             measured_speed: self.pace.as_ref().and_then(Pace::measured),
             refused: self.refusals.reason(),
@@ -166,7 +166,7 @@ impl Conductor {
         for viewer in gone {
             self.release(sim, viewer);
         }
-        self.forget_gone(sim.steps(), &viewers);
+        self.forget_gone(sim.observers().steps(), &viewers);
         self.end_recording_of_gone(sim, &viewers);
         !viewers.is_empty()
     }
@@ -191,7 +191,7 @@ impl Conductor {
     }
 
     fn act(&mut self, sim: &mut SimulationManager, viewer: u64, command: Command) -> Result<(), String> {
-        let steps = sim.steps();
+        let steps = sim.observers().steps();
         match command {
             Command::Pause => {
                 self.hold_at = self.hold_at.map(|step| step.min(steps)).or(Some(steps));
@@ -229,7 +229,7 @@ impl Conductor {
                 sim.reset(envs.as_ref().map(<[EnvId; 1]>::as_slice)).map_err(|error| error.to_string())?;
             }
             Command::SetTarget { robot, joint, env, value } => {
-                if !sim.robot_ids().iter().any(|(_, known)| *known == robot) {
+                if !sim.entities().robot_ids().iter().any(|(_, known)| *known == robot) {
                     return Err("there is no such robot in this simulation".into());
                 }
                 let envs = env.map(|env| [env]);
@@ -280,7 +280,7 @@ impl Conductor {
             spring::release(sim, let_go);
         }
         for (held, forces) in forces {
-            match sim.pull(held.0, held.1, &forces) {
+            match sim.scene_mut().pull(held.0, held.1, &forces) {
                 Ok(()) => pulled.push(held),
                 Err(error) => {
                     refusals.note(Kind::Spring, Some(error.to_string()));
@@ -307,7 +307,7 @@ impl Conductor {
 
     /// Steps were done: obeys, shows, waits.
     fn conduct(&mut self, sim: &mut SimulationManager) {
-        let steps = sim.steps();
+        let steps = sim.observers().steps();
         let dt = sim.cfg().physics_dt;
         let pace = self.pace.get_or_insert_with(|| Pace::new(dt, steps, Instant::now()));
         pace.note(steps, Instant::now());
@@ -343,7 +343,7 @@ impl Observer for Conductor {
         if self.hub.viewers() == 0 && self.pace.is_none() {
             return u64::MAX;
         }
-        self.look_at.saturating_sub(sim.steps()).max(1)
+        self.look_at.saturating_sub(sim.observers().steps()).max(1)
     }
 
     fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment) {

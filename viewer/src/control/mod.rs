@@ -179,11 +179,11 @@ fn with_conductor<T>(
     sim: &mut SimulationManager,
     act: impl FnOnce(&mut Conductor, &mut SimulationManager) -> T,
 ) -> Option<T> {
-    let known = sim.observer_ids::<Conductor>().first().copied();
-    let id = known.unwrap_or_else(|| sim.add_observer(Conductor::new()));
+    let known = sim.observers().ids::<Conductor>().first().copied();
+    let id = known.unwrap_or_else(|| sim.observers_mut().add(Conductor::new()));
     // Taken out and put back: it reads the whole simulation. Nobody else takes it.
-    let mut conductor = sim.remove_observer(id).ok()?;
+    let mut conductor = sim.observers_mut().remove(id).ok()?;
     let done = act(&mut conductor, sim);
-    sim.add_observer(conductor);
+    sim.observers_mut().add(conductor);
     Some(done)
 }

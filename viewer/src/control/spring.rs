@@ -38,7 +38,7 @@ impl Spring {
     /// # Errors
     /// There is no such environment or body.
     pub(super) fn force_now(&self, sim: &SimulationManager) -> kinetoscope_sim::Result<Option<([f64; 3], [f64; 3])>> {
-        let motion = sim.body_motion(self.env, self.body)?;
+        let motion = sim.scene().body_motion(self.env, self.body)?;
         Ok((!motion.is_fixed).then(|| self.force(&motion)))
     }
 
@@ -48,12 +48,12 @@ impl Spring {
     /// There is nothing to pull at, or a number is not finite.
     pub(super) fn apply(&self, sim: &mut SimulationManager) -> kinetoscope_sim::Result<()> {
         let force = self.force_now(sim)?;
-        sim.pull(self.env, self.body, force.as_slice())
+        sim.scene_mut().pull(self.env, self.body, force.as_slice())
     }
 }
 
 /// Lets go of a body.
 pub(super) fn release(sim: &mut SimulationManager, (env, body): (EnvId, usize)) {
     // Of a body that is gone nothing has to be let go.
-    let _ = sim.pull(env, body, &[]);
+    let _ = sim.scene_mut().pull(env, body, &[]);
 }

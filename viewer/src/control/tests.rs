@@ -363,7 +363,7 @@ impl Recording for Counter {
     }
 
     fn state(&self, sim: &SimulationManager) -> RecordingState {
-        RecordingState { on: self.on, text: format!("step {}", sim.steps()) }
+        RecordingState { on: self.on, text: format!("step {}", sim.observers().steps()) }
     }
 }
 

@@ -101,7 +101,7 @@ impl Served {
     /// # Panics
     /// It is served by another simulation.
     pub fn close(&self, sim: &mut SimulationManager) -> kinetoscope_sim::Result<()> {
-        sim.remove_observer(self.host).map(drop)
+        sim.observers_mut().remove(self.host).map(drop)
     }
 }
 
@@ -138,7 +138,7 @@ impl Serve for SimulationManager {
         let server = Server::start(listener, Door::new(address, token), theatre, max_viewers)?;
         button.into_iter().for_each(|button| self.record_button(button));
         let house = server.house();
-        let host = self.add_observer(Host(server));
+        let host = self.observers_mut().add(Host(server));
         Ok(Served { url, address, house, host })
     }
 }

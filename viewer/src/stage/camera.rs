@@ -32,18 +32,18 @@ const RAYS_SEE: [f32; 2] = [0.01, 1000.0];
 
 /// All cameras with their names; the eyes of a pair are `NAME/left` and `NAME/right`.
 pub(super) fn cameras(sim: &SimulationManager) -> Vec<(String, CameraId)> {
-    let cameras = sim.sensor_ids::<Camera>().into_iter().map(|(name, id)| (name, CameraId::Camera(id)));
-    let eyes = sim.sensor_ids::<StereoCamera>().into_iter().flat_map(|(name, id)| {
+    let cameras = sim.entities().sensor_ids::<Camera>().into_iter().map(|(name, id)| (name, CameraId::Camera(id)));
+    let eyes = sim.entities().sensor_ids::<StereoCamera>().into_iter().flat_map(|(name, id)| {
         [(format!("{name}/left"), CameraId::Left(id)), (format!("{name}/right"), CameraId::Right(id))]
     });
-    let rays = sim.sensor_ids::<RayCasterCamera>().into_iter().map(|(name, id)| (name, CameraId::Rays(id)));
+    let rays = sim.entities().sensor_ids::<RayCasterCamera>().into_iter().map(|(name, id)| (name, CameraId::Rays(id)));
     cameras.chain(eyes).chain(rays).collect()
 }
 
 /// How many cameras there are.
 pub(super) fn count(sim: &SimulationManager) -> usize {
-    let pairs = sim.sensor_ids::<StereoCamera>().len();
-    sim.sensor_ids::<Camera>().len() + 2 * pairs + sim.sensor_ids::<RayCasterCamera>().len()
+    let pairs = sim.entities().sensor_ids::<StereoCamera>().len();
+    sim.entities().sensor_ids::<Camera>().len() + 2 * pairs + sim.entities().sensor_ids::<RayCasterCamera>().len()
 }
 
 impl CameraId {
@@ -53,13 +53,15 @@ impl CameraId {
         match self {
             Self::Camera(id) => sim
                 .sensor(id)
-                .map_or_else(|_| vec![None; envs], |camera| of_camera(camera, envs, || sim.markers_beside(id))),
-            Self::Left(id) => sim
-                .sensor(id)
-                .map_or_else(|_| vec![None; envs], |pair| of_camera(pair.left(), envs, || sim.markers_beside(id))),
-            Self::Right(id) => sim
-                .sensor(id)
-                .map_or_else(|_| vec![None; envs], |pair| of_camera(pair.right(), envs, || sim.markers_beside(id))),
+                .map_or_else(|_| vec![None; envs], |camera| of_camera(camera, envs, || sim.scene().markers_beside(id))),
+            Self::Left(id) => sim.sensor(id).map_or_else(
+                |_| vec![None; envs],
+                |pair| of_camera(pair.left(), envs, || sim.scene().markers_beside(id)),
+            ),
+            Self::Right(id) => sim.sensor(id).map_or_else(
+                |_| vec![None; envs],
+                |pair| of_camera(pair.right(), envs, || sim.scene().markers_beside(id)),
+            ),
             Self::Rays(id) => sim.sensor(id).map_or_else(|_| vec![None; envs], |camera| of_rays(camera, envs)),
         }
     }

@@ -51,7 +51,7 @@ impl Eye {
         })
     }
 
-    /// The point of view that the program set ([`SimulationManager::set_camera_view`](kinetoscope_sim::SimulationManager::set_camera_view)),
+    /// The point of view that the program set ([`kinetoscope_sim::SceneViewMut::set_camera_view`](kinetoscope_sim::SceneViewMut::set_camera_view)),
     /// else one from which everything of a snapshot but the ground fills an image of `size` pixels, seen from the front, the
     /// side and above.
     pub fn overview(snapshot: &Snapshot, [width, height]: [usize; 2]) -> Self {

@@ -136,10 +136,10 @@ pub struct EnvStage {
 
 impl Names {
     pub(super) fn of(sim: &mut SimulationManager) -> Self {
-        let ids = sim.mask_ids();
+        let ids = sim.scene().mask_ids();
         let ground = ids.iter().find(|id| id.class == "ground").map(|id| id.id);
         let mut joints = Vec::new();
-        for (uid, robot) in sim.robot_ids() {
+        for (uid, robot) in sim.entities().robot_ids() {
             let view = sim.robot(robot);
             let slides = |joint: &&Joint| joint.kind == JointKind::Prismatic;
             let prismatic: Vec<&String> = view.description().joints.iter().filter(slides).map(|j| &j.name).collect();
@@ -152,7 +152,7 @@ impl Names {
             }));
         }
         let (cameras, camera_ids) = camera::cameras(sim).into_iter().unzip();
-        Self { bodies: sim.body_names(), joints, cameras, ground, camera_ids }
+        Self { bodies: sim.entities().body_names(), joints, cameras, ground, camera_ids }
     }
 
     /// Whether they are still those of `sim`: sensors are added without a word.
@@ -165,16 +165,16 @@ impl Snapshot {
     /// Copies everything that `wants` asks for.
     pub(super) fn fill(&mut self, sim: &mut SimulationManager, names: &Arc<Names>, wants: &Wants, run: Run) {
         self.run = run;
-        self.scene = Some(Arc::clone(sim.visible().scene()));
-        self.ids = Arc::clone(sim.visible().ids());
+        self.scene = Some(Arc::clone(sim.scene_mut().visible().scene()));
+        self.ids = Arc::clone(sim.scene_mut().visible().ids());
         self.names = Arc::clone(names);
-        self.viewpoint = sim.viewpoint();
+        self.viewpoint = sim.scene().viewpoint();
         self.envs.resize_with(sim.num_envs(), EnvStage::default);
-        let origins = sim.env_origins();
+        let origins = sim.cfg().env_origins();
         for (k, env) in self.envs.iter_mut().enumerate() {
             env.origin = [0, 1, 2].map(|axis| origins[(k, axis)]);
             // There is such an environment.
-            let _ = sim.look(EnvId(k), &mut env.look);
+            let _ = sim.scene_mut().look(EnvId(k), &mut env.look);
             if let Some(timeline) = self.run.timeline {
                 env.look.time = timeline.now;
             }
@@ -185,20 +185,20 @@ impl Snapshot {
             env.views.clear();
         }
         if wants.markers {
-            for (EnvId(env), marker) in sim.markers() {
+            for (EnvId(env), marker) in sim.scene().markers() {
                 self.envs[env].markers.push(marker);
             }
         }
         self.contacts_of = wants.contacts;
         if let Some(shown) = wants.contacts {
             let chosen: Vec<EnvId> = (0..self.envs.len()).filter(|env| shown.has(*env)).map(EnvId).collect();
-            let contacts = sim.contacts(Some(&chosen)).unwrap_or_default();
+            let contacts = sim.scene_mut().contacts(Some(&chosen)).unwrap_or_default();
             for (EnvId(env), contacts) in chosen.iter().zip(contacts) {
                 self.envs[*env].contacts = contacts;
             }
         }
         if wants.joints {
-            for (_, robot) in sim.robot_ids() {
+            for (_, robot) in sim.entities().robot_ids() {
                 let robot = sim.robot(robot);
                 let (now, target, limits) = (robot.qpos(), robot.qpos_target(), robot.qpos_limits());
                 let efforts = robot.qf();

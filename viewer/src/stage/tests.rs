@@ -28,7 +28,7 @@ impl Sample {
     }
 
     fn put_cube(&mut self, [x, y, z]: [f64; 3]) {
-        let cube = self.sim.rigid_object_id("cube").unwrap();
+        let cube = self.sim.entities().rigid_object_id("cube").unwrap();
         let pose = ndarray::arr2(&[[x, y, z, 1.0, 0.0, 0.0, 0.0]]);
         self.sim.rigid_object_mut(cube).write_pose(&pose, None).unwrap();
     }
@@ -44,7 +44,7 @@ fn painted(painter: &mut Painter, snapshot: &Snapshot, view: &View, look: &Look<
 fn picking() {
     let (sample, snapshot) = stage(4);
     let mut painter = Painter::new(1);
-    let origins = sample.sim.env_origins();
+    let origins = sample.sim.cfg().env_origins();
     for env in 0..4 {
         let origin = Vector3::from([0, 1, 2].map(|k| origins[(env, k)]));
         let above = |at: [f64; 3]| {
@@ -152,7 +152,7 @@ fn overlays() {
     }
     assert_eq!(draw(&snapshot, none, None), plain, "and without them it is as before");
     // Markers of sensors, once these show them.
-    sample.sim.set_debug_vis(sample.camera, true).unwrap();
+    sample.sim.scene_mut().set_debug_vis(sample.camera, true).unwrap();
     let shown = sample.snapshot();
     assert!(unlike(&draw(&shown, none, None), &draw(&shown, Overlays::default(), None)) > 5);
     // A trail of something that moves.
@@ -326,7 +326,7 @@ fn panel_with_markers() {
     let placement = Placement::LookAt { eye: [0.2, 0.1, 0.4], target: [0.0; 3], up: [0.0, 0.0, 1.0] };
     let other = CameraCfg { extrinsics: Extrinsics { placement, ..Default::default() }, ..CameraCfg::default() };
     let other = sample.sim.add_sensor("other", other).unwrap();
-    sample.sim.set_debug_vis(other, true).unwrap();
+    sample.sim.scene_mut().set_debug_vis(other, true).unwrap();
     sample.sim.update(100);
     let snapshot = sample.snapshot();
     let [plain, marked] = [0, 1].map(|camera| {

@@ -67,7 +67,7 @@ impl Shows {
 
     /// Looks from above the cube: the middle of the image is on its upper face.
     fn over_the_cube(&mut self, env: usize) {
-        let origin = self.sample.sim.env_origins();
+        let origin = self.sample.sim.cfg().env_origins();
         let at = |p: [f64; 3]| [0, 1, 2].map(|k| origin[(env, k)] + p[k]);
         self.app.look_from(Eye::looking(at([0.02, 0.01, 1.5]), at([0.0, 0.0, 2.0 * HALF])).unwrap());
     }
@@ -77,7 +77,7 @@ impl Shows {
         let (sim, envs) = (&mut self.sample.sim, self.viewer.newest().unwrap().envs.len());
         let row = |env| [&place(env)[..], &[1.0, 0.0, 0.0, 0.0]].concat();
         let poses = ndarray::Array2::from_shape_fn((envs, 7), |(env, k)| row(env)[k]);
-        let cube = sim.rigid_object_id("cube").unwrap();
+        let cube = sim.entities().rigid_object_id("cube").unwrap();
         sim.rigid_object_mut(cube).write_pose(&poses, None).unwrap();
         self.viewer = sim.viewer(Wants::default());
         self.app.show(self.viewer.newest().unwrap());
@@ -370,7 +370,7 @@ fn sensor_view() {
     shows.press(Key::PageDown);
     shows.type_in("v");
     let mask = shows.sample.sim.sensor(shows.sample.camera).unwrap().mask().unwrap().to_owned();
-    let cube = shows.sample.sim.mask_ids().iter().find(|id| id.object == "cube").unwrap().id;
+    let cube = shows.sample.sim.scene().mask_ids().iter().find(|id| id.object == "cube").unwrap().id;
     // The sensor's 64 x 48 pixels are 7.5 pixels of the window each, in the middle of it.
     let mut tried = 0;
     for (v, u) in (2usize..46).step_by(4).flat_map(|v| (2usize..62).step_by(4).map(move |u| (v, u))) {
@@ -577,11 +577,11 @@ fn coarse_while_moving() {
 fn viewpoint() {
     let mut shows = shows(2);
     let set = |shows: &mut Shows, eye: [f64; 3]| {
-        shows.sample.sim.set_camera_view(eye, [0.0; 3]).unwrap();
+        shows.sample.sim.scene_mut().set_camera_view(eye, [0.0; 3]).unwrap();
         shows.sample.sim.update(1);
         let held = shows.viewer.newest().unwrap();
         let mut next = (*held).clone();
-        next.viewpoint = shows.sample.sim.viewpoint();
+        next.viewpoint = shows.sample.sim.scene().viewpoint();
         shows.app.show(Arc::new(next));
     };
     let expected = |eye: [f64; 3]| Eye::looking(eye, [0.0; 3]).unwrap();
@@ -597,7 +597,7 @@ fn viewpoint() {
     set(&mut shows, [0.0, 2.0, 0.5]);
     assert_eq!(shows.app.eye(), expected([0.0, 2.0, 0.5]));
     for (eye, target) in [([1.0; 3], [1.0; 3]), ([f64::NAN, 0.0, 0.0], [0.0; 3]), ([0.0; 3], [f64::INFINITY; 3])] {
-        assert!(shows.sample.sim.set_camera_view(eye, target).unwrap_err().to_string().contains("apart"));
+        assert!(shows.sample.sim.scene_mut().set_camera_view(eye, target).unwrap_err().to_string().contains("apart"));
     }
-    assert_eq!(shows.sample.sim.viewpoint().unwrap().changes, 2);
+    assert_eq!(shows.sample.sim.scene().viewpoint().unwrap().changes, 2);
 }

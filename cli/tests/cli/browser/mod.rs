@@ -4,7 +4,9 @@ mod chromium;
 
 use super::serve::running::{Running, play_fall};
 use chromium::{Chromium, Tab};
-use kinetoscope::prelude::*;
+use kinetoscope::FileRecording;
+use kinetoscope::record::RecorderCfg;
+use kinetoscope::viewer::{RecordButton, ServeCfg};
 use kinetoscope_testkit::wait;
 use serde_json::json;
 use std::path::PathBuf;

@@ -3,6 +3,7 @@
 use super::running::{Running, scene};
 use super::visitor::{connect, say, status, status_of};
 use kinetoscope::prelude::*;
+use kinetoscope::viewer::{ServeCfg, ServeError};
 use std::io::{Read, Write};
 use std::net::TcpListener;
 

@@ -3,9 +3,9 @@
 use kinetoscope::RecordedFilm;
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
-use kinetoscope::record::{Film, Recording};
+use kinetoscope::record::{Film, RecorderCfg, Recording};
 use kinetoscope::viewer::control::{Play, Speed};
-use kinetoscope::viewer::{Command, Viewer, Viewing, Wants};
+use kinetoscope::viewer::{Command, ServeCfg, Served, Viewer, Viewing, Wants};
 use kinetoscope_testkit::wait;
 use kinetoscope_testkit::worlds::{camera, cfg, cube, gains, sr5};
 use std::net::SocketAddr;
@@ -60,7 +60,7 @@ impl Running {
         let served = sim.serve_with(address, cfg).unwrap();
         let key = sim.viewer(Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false });
         let (now, stop) = (Arc::<Mutex<Now>>::default(), Arc::new(AtomicBool::new(false)));
-        let robot = sim.robot_id("arm").unwrap();
+        let robot = sim.entities().robot_id("arm").unwrap();
         let shared = (Arc::clone(&now), Arc::clone(&stop));
         let thread = std::thread::spawn(move || {
             let (now, stop) = shared;
@@ -128,7 +128,7 @@ pub(crate) fn play_fall(height: f64, watch: impl FnOnce(SocketAddr, &str) + Send
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("fall.mcap");
     let mut sim = scene(1);
-    let cube = sim.rigid_object_id("cube").unwrap();
+    let cube = sim.entities().rigid_object_id("cube").unwrap();
     sim.rigid_object_mut(cube).write_pose(&array![[0.7, 0.0, height, 1.0, 0.0, 0.0, 0.0]], None).unwrap();
     let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
     sim.update(100);

@@ -2,8 +2,7 @@
 
 use super::running::Running;
 use super::visitor::{Visitor, connect, say, status_of};
-use kinetoscope::prelude::*;
-use kinetoscope::viewer::{Command, Speed};
+use kinetoscope::viewer::{Command, ServeCfg, Speed};
 use kinetoscope_testkit::wait;
 use serde_json::json;
 use std::io::{Read, Write};

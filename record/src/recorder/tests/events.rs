@@ -62,7 +62,7 @@ fn divergence() {
     let (_folder, path) = scratch("run.npz");
     let mut sim = falling(2);
     let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
-    let ball = sim.mjcf_id("ball").unwrap();
+    let ball = sim.entities().mjcf_id("ball").unwrap();
     let blow_up = |sim: &mut SimulationManager| {
         // MuJoCo warns of speeds above its mjMAXVAL, 1e10, and the step is not done.
         let fast = ndarray::array![[0.0, 0.0, 1e12, 0.0, 0.0, 0.0]];
@@ -146,12 +146,12 @@ fn early_failure() {
     let mut sim = falling(4);
     let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(&path) };
     let recorder = Recorder::start(&mut sim, cfg, &Disk::full_after(20_000)).unwrap();
-    let recorder = sim.add_observer(recorder);
-    assert_eq!(sim.observer(recorder).unwrap().failure(), None);
+    let recorder = sim.observers_mut().add(recorder);
+    assert_eq!(sim.observers().get(recorder).unwrap().failure(), None);
     let begun = Instant::now();
     let why = loop {
         sim.update(10);
-        if let Some(why) = sim.observer(recorder).unwrap().failure() {
+        if let Some(why) = sim.observers().get(recorder).unwrap().failure() {
             break why;
         }
         assert!(begun.elapsed() < Duration::from_secs(20), "nothing is said");

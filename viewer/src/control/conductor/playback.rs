@@ -49,12 +49,12 @@ pub trait Play {
 impl Play for SimulationManager {
     fn play(&mut self, film: &mut dyn Film, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError> {
         let mut head = Playhead::new(film.times())?;
-        let known = self.observer_ids::<Conductor>().first().copied();
+        let known = self.observers().ids::<Conductor>().first().copied();
         // Taken out, so that it hears of nothing that the film writes.
-        let taken = known.and_then(|id| self.remove_observer(id).ok());
+        let taken = known.and_then(|id| self.observers_mut().remove(id).ok());
         let mut conductor = taken.unwrap_or_else(Conductor::new);
         let result = conductor.play(self, film, &mut head, go_on);
-        self.add_observer(conductor);
+        self.observers_mut().add(conductor);
         result
     }
 }
@@ -240,7 +240,7 @@ mod tests {
         }
 
         fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<(), String> {
-            let cube = sim.rigid_object_id("cube").map_err(|error| error.to_string())?;
+            let cube = sim.entities().rigid_object_id("cube").map_err(|error| error.to_string())?;
             let row = array![[0.0, 0.0, self.0[frame], 1.0, 0.0, 0.0, 0.0]];
             sim.rigid_object_mut(cube).write_pose(&row, None).map_err(|error| error.to_string())
         }
@@ -271,7 +271,7 @@ mod tests {
             }
         }
         let mut sim = sample(1).sim;
-        let steps = sim.steps();
+        let steps = sim.observers().steps();
         let viewer = sim.viewer(Wants { rate: 200.0, ..Wants::default() });
         // Times that do not begin at 0, as those of a recording that was begun late.
         let mut film = Rising((0..=40).map(|k| 3.0 + 0.1 * f64::from(k)).collect());
@@ -283,11 +283,11 @@ mod tests {
             });
             sim.play(&mut film, &mut || !over.load(Ordering::Acquire)).unwrap();
         });
-        assert_eq!(sim.steps(), steps, "nothing was stepped");
+        assert_eq!(sim.observers().steps(), steps, "nothing was stepped");
         // The conductor is there again: the simulation goes on as it would have.
         drop(viewer);
         sim.update(1);
-        assert_eq!(sim.steps(), steps + 1);
+        assert_eq!(sim.observers().steps(), steps + 1);
     }
 
     #[test]

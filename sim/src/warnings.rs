@@ -1,0 +1,59 @@
+//! Counts of warnings.
+
+use crate::env::EnvStatus;
+use crate::error::Result;
+use crate::ids::{EnvId, env_mask};
+use crate::manager::SimulationManager;
+use kinetoscope_mujoco as mj;
+use kinetoscope_robot::diagnostic::count_by_name;
+use std::collections::BTreeMap;
+
+/// Warnings since the simulation was made; see [`SimulationManager::warnings`].
+#[derive(Clone, Copy, Debug)]
+pub struct Warnings<'a> {
+    sim: &'a SimulationManager,
+}
+
+impl<'a> Warnings<'a> {
+    pub(crate) fn new(sim: &'a SimulationManager) -> Self {
+        Self { sim }
+    }
+
+    /// Counts of all warnings by name: diagnostics, MuJoCo's warnings over all environments, diverged environments.
+    pub fn counts(&self) -> BTreeMap<String, u64> {
+        let mut counts: BTreeMap<String, u64> =
+            count_by_name(self.sim.diagnostics()).into_iter().map(|(name, n)| (name.to_string(), n as u64)).collect();
+        let mut mujoco = mj::WarningCounts::default();
+        let mut diverged = 0;
+        self.sim.simulation.batch.for_each(|_, env| {
+            mujoco.add(env.warnings());
+            diverged += u64::from(*env.status() != EnvStatus::Running);
+        });
+        for (warning, n) in mj::Warning::ALL.iter().zip(mujoco.0) {
+            if n > 0 {
+                counts.insert(warning.name().into(), n);
+            }
+        }
+        if diverged > 0 {
+            counts.insert("environment-diverged".into(), diverged);
+        }
+        counts
+    }
+
+    /// Counts of MuJoCo's warnings in one environment, by name.
+    ///
+    /// # Errors
+    /// There is no such environment.
+    pub fn env_counts(&self, env: EnvId) -> Result<BTreeMap<&'static str, u64>> {
+        env_mask(Some(&[env]), self.sim.num_envs())?;
+        let counts = self.sim.simulation.batch.read(env.0, |env| *env.warnings());
+        Ok(mj::Warning::ALL.iter().map(|w| (w.name(), counts.get(*w))).filter(|(_, n)| *n > 0).collect())
+    }
+
+    /// How often contact and constraint buffers were doubled, over all environments.
+    pub fn buffer_growths(&self) -> u64 {
+        let mut growths = 0;
+        self.sim.simulation.batch.for_each(|_, env| growths += u64::from(env.growths()));
+        growths
+    }
+}
