@@ -6,8 +6,8 @@
 use super::captures::Captures;
 use super::error::CameraError;
 use super::extrinsics::CameraConvention;
-use super::mounts::Mount;
 use super::sensor::Camera;
+use super::viewpoints::Viewpoint;
 use crate::error::SensorError;
 use kinetoscope_render::frame::{Listed, PictureView, Pictures};
 use kinetoscope_render::lens::LensRays;
@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 pub(super) struct Landed {
     captures: Captures,
     /// From where, and through which lens, each was captured; `None` before the first since the reset.
-    looks: Vec<Option<(Mount, Option<Arc<LensRays>>)>>,
+    looks: Vec<Option<(Viewpoint, Option<Arc<LensRays>>)>>,
     /// The pictures, once somebody looked.
     drawn: OnceLock<Result<Pictures, CameraError>>,
     /// Who draws: one reader at a time.
@@ -40,10 +40,10 @@ impl Landed {
         row: usize,
         from: &Captures,
         slot: usize,
-        (mount, lens): (&Mount, Option<&Arc<LensRays>>),
+        (viewpoint, lens): (&Viewpoint, Option<&Arc<LensRays>>),
     ) {
         self.captures.copy(row, from, slot);
-        self.looks[row] = Some((*mount, lens.cloned()));
+        self.looks[row] = Some((*viewpoint, lens.cloned()));
         self.drawn = OnceLock::new();
     }
 
@@ -60,11 +60,11 @@ impl Landed {
 
 impl Camera {
     /// What arrived last in a row, where the camera shows something else.
-    fn unseen(&self, row: usize) -> Option<(&Captures, &Mount, Option<&LensRays>)> {
+    fn unseen(&self, row: usize) -> Option<(&Captures, &Viewpoint, Option<&LensRays>)> {
         let past = self.past()?;
         let landed = past.landed.as_ref()?;
-        let (mount, lens) = landed.looks.get(row)?.as_ref().filter(|_| !past.shown[row])?;
-        Some((&landed.captures, mount, lens.as_deref()))
+        let (viewpoint, lens) = landed.looks.get(row)?.as_ref().filter(|_| !past.shown[row])?;
+        Some((&landed.captures, viewpoint, lens.as_deref()))
     }
 
     /// Time of the instant that the pictures show which arrived last \[s\], shape (N): as [`stamps`](Self::stamps), except with a
@@ -81,8 +81,8 @@ impl Camera {
     pub fn arrived_pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         let mut poses = self.pose_w(convention);
         for (row, mut pose) in poses.rows_mut().into_iter().enumerate() {
-            if let Some((captures, mount, _)) = self.unseen(row)
-                && let Some(world) = self.world_from(mount, captures.world_from_parent[row])
+            if let Some((captures, viewpoint, _)) = self.unseen(row)
+                && let Some(world) = self.world_from(viewpoint, captures.world_from_parent[row])
             {
                 pose.iter_mut().zip(to_row(&convention.of_optical(&world))).for_each(|(to, x)| *to = x);
             }
@@ -94,7 +94,7 @@ impl Camera {
     pub fn arrived_intrinsic_matrices(&self) -> Array3<f64> {
         let shown = self.intrinsic_matrices();
         Array3::from_shape_fn(shown.raw_dim(), |(row, i, j)| match self.unseen(row) {
-            Some((_, mount, _)) => mount.pixels.matrix()[(i, j)],
+            Some((_, viewpoint, _)) => viewpoint.pixels.matrix()[(i, j)],
             None => shown[(row, i, j)],
         })
     }
@@ -140,7 +140,8 @@ impl Camera {
     fn draw_landed(&self, landed: &Landed, shown: &Pictures) -> Result<Pictures, CameraError> {
         let (rows, (height, width)) = (self.env_ids().len(), self.image_shape());
         let mut pictures = Pictures::new(self.channels(), rows, width, height);
-        let looks: Vec<_> = (0..rows).map(|row| self.unseen(row).map(|(_, mount, lens)| (mount, lens))).collect();
+        let looks: Vec<_> =
+            (0..rows).map(|row| self.unseen(row).map(|(_, viewpoint, lens)| (viewpoint, lens))).collect();
         let unseen = |row: &usize| looks[*row].is_some();
         for row in (0..rows).filter(|row| !unseen(row)) {
             pictures.copy_view((rows, row), shown, (rows, row));

@@ -70,9 +70,9 @@ impl SensorCfg for CameraCfg {
         let opening = Opening::new(self, schedule, context.dt, env_ids.len(), &scene)?;
         let rays = self.lens_rays(&pixels, env_ids.len())?;
         let faults = Faults::new(self, context, schedule.period_steps() as f64 * context.dt)?;
-        let mount = self.extrinsics.parent_from_camera()?;
+        let viewpoint = self.extrinsics.parent_from_camera()?;
         let pictures = Pictures::new(self.channels, env_ids.len(), self.width, self.height);
-        let optics = (lens, pixels, mount);
+        let optics = (lens, pixels, viewpoint);
         Ok(Camera::new(self, context, scene, (schedule, opening), parent, optics, rays, env_ids, (pictures, faults)))
     }
 }

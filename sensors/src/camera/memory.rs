@@ -3,7 +3,7 @@
 use super::arrived::Landed;
 use super::captures::Captures;
 use super::cfg::CameraCfg;
-use super::mounts::Mount;
+use super::viewpoints::Viewpoint;
 use crate::delay::Queues;
 use crate::schedule::{Phases, Schedule};
 use kinetoscope_render::frame::{Channels, Pictures};
@@ -34,7 +34,7 @@ pub(super) struct Past {
     /// Of each row `length`, one after the other: that which arrived as number k since the reset is at k modulo `length`.
     pub(super) captures: Captures,
     /// From where, and through which lens, each was captured.
-    pub(super) mounts: Vec<Mount>,
+    pub(super) viewpoints: Vec<Viewpoint>,
     pub(super) lenses: Vec<Option<Arc<LensRays>>>,
     arrived: Vec<u64>,
     /// Shape (rows, length), newest first.
@@ -78,7 +78,7 @@ impl Memory {
         schedule: Schedule,
         rows: usize,
         scene: &RenderScene,
-        (mount, ticket): (Mount, Ticket),
+        (viewpoint, ticket): (Viewpoint, Ticket),
     ) -> Option<Box<Self>> {
         let slow = !cfg.shutter.is_instant();
         Self::is_needed(cfg).then(|| {
@@ -93,7 +93,7 @@ impl Memory {
                 past: Past {
                     length: cfg.history_length,
                     captures: Captures::new(kept, scene, ticket, slow),
-                    mounts: vec![mount; kept],
+                    viewpoints: vec![viewpoint; kept],
                     lenses: vec![None; kept],
                     arrived: vec![0; rows],
                     stamps: Array2::zeros((rows, cfg.history_length)),
@@ -120,7 +120,7 @@ impl Memory {
     }
 
     /// Puts what arrived in a slot into the history.
-    pub(super) fn remember(&mut self, row: usize, slot: usize, look: (&Mount, Option<&Arc<LensRays>>)) {
+    pub(super) fn remember(&mut self, row: usize, slot: usize, look: (&Viewpoint, Option<&Arc<LensRays>>)) {
         self.past.remember(row, &self.waiting, slot, look);
     }
 
@@ -162,15 +162,21 @@ impl Past {
         row * self.length + ((self.arrived[row] - 1 - age as u64) % length) as usize
     }
 
-    fn remember(&mut self, row: usize, from: &Captures, slot: usize, (mount, lens): (&Mount, Option<&Arc<LensRays>>)) {
-        self.landed.iter_mut().for_each(|landed| landed.remember(row, from, slot, (mount, lens)));
+    fn remember(
+        &mut self,
+        row: usize,
+        from: &Captures,
+        slot: usize,
+        (viewpoint, lens): (&Viewpoint, Option<&Arc<LensRays>>),
+    ) {
+        self.landed.iter_mut().for_each(|landed| landed.remember(row, from, slot, (viewpoint, lens)));
         if self.length == 0 {
             return;
         }
         self.arrived[row] += 1;
         let to = self.place(row, 0);
         self.captures.copy(to, from, slot);
-        self.mounts[to] = *mount;
+        self.viewpoints[to] = *viewpoint;
         self.lenses[to] = lens.cloned();
         if let Some(stamps) = self.stamps.row_mut(row).as_slice_mut() {
             stamps.copy_within(..self.length - 1, 1);

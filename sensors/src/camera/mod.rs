@@ -15,7 +15,6 @@ mod faults;
 pub(crate) mod frustum;
 pub mod imperfection;
 mod memory;
-pub(crate) mod mounts;
 mod opening;
 mod past;
 mod picture_noise;
@@ -24,6 +23,7 @@ pub mod segmentation;
 pub mod sensor;
 pub mod stereo;
 mod summary;
+pub(crate) mod viewpoints;
 
 #[cfg(test)]
 mod tests;

@@ -120,7 +120,7 @@ impl Camera {
         let frames = pictures.frames_mut(rows * length).enumerate().filter(|(view, _)| wanted(view));
         let places = views.clone().map(|view| (view / length, past.place(view / length, view % length)));
         let frames = frames.map(|(_, frame)| frame);
-        let look = |place: usize| (&past.mounts[place], past.lenses[place].as_deref());
+        let look = |place: usize| (&past.viewpoints[place], past.lenses[place].as_deref());
         let result = self.develop(&past.captures, look, places, frames);
         *failure = result.err().and_then(|(job, error)| {
             let view = views.clone().nth(job)?;

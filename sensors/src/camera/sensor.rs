@@ -10,8 +10,8 @@ use super::extrinsics::{CameraConvention, Poses};
 use super::faults::Faults;
 use super::frustum::frustum;
 use super::memory::{Memory, Past};
-use super::mounts::{Mount, Mounts, chosen_rows};
 use super::opening::Opening;
+use super::viewpoints::{Viewpoint, Viewpoints, chosen_rows};
 use crate::error::SensorError;
 use crate::requires::Requires;
 use crate::schedule::{Phases, Schedule};
@@ -59,7 +59,7 @@ pub struct Camera {
     path: String,
     /// Index of the body it hangs on.
     parent: Option<usize>,
-    pub(super) mounts: Mounts,
+    pub(super) viewpoints: Viewpoints,
     pub(super) rays: RaysOfRows,
     channels: Channels,
     /// Whether the markers of other sensors are drawn into colours.
@@ -250,8 +250,8 @@ impl Camera {
         }
         let key = |env: &usize| Ticket::first(context.seed, (context.first_env + env) as u64, &context.name);
         let tickets: Vec<Ticket> = env_ids.iter().map(key).collect();
-        let mount = Mount { parent_from_camera, pixels };
-        let memory = Memory::new(cfg, schedule, rows, &scene, (mount, tickets[0]));
+        let viewpoint = Viewpoint { parent_from_camera, pixels };
+        let memory = Memory::new(cfg, schedule, rows, &scene, (viewpoint, tickets[0]));
         let captures = Captures::new(rows, &scene, tickets[0], opening.is_some());
         let earlier = cfg.channels.flow.then(|| Earlier::new(rows, scene.instances().len()));
         let marked = u32::from(cfg.draw_markers) << Marker::GROUP;
@@ -270,7 +270,7 @@ impl Camera {
             num_bodies: context.bodies.len(),
             path: summary::path(context, parent),
             parent,
-            mounts: Mounts::new(mount, rows),
+            viewpoints: Viewpoints::new(viewpoint, rows),
             rays,
             channels: cfg.channels,
             draws_markers: cfg.draw_markers,
@@ -412,7 +412,9 @@ impl Camera {
 
     /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
-        Array3::from_shape_fn((self.mounts.len(), 3, 3), |(row, i, j)| self.mounts.row(row).pixels.matrix()[(i, j)])
+        Array3::from_shape_fn((self.viewpoints.len(), 3, 3), |(row, i, j)| {
+            self.viewpoints.row(row).pixels.matrix()[(i, j)]
+        })
     }
 
     /// The lens, the same in all environments.
@@ -426,7 +428,7 @@ impl Camera {
     ///
     /// An environment that the camera does not see.
     pub fn optics(&self, env: usize) -> Result<Optics, SensorError> {
-        let pixels = self.mounts.row(self.row(env)?).pixels;
+        let pixels = self.viewpoints.row(self.row(env)?).pixels;
         Ok(Optics::new(self.rays.lens(), pixels)?)
     }
 
@@ -444,13 +446,15 @@ impl Camera {
     /// attached camera has captured nothing yet.
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         let pose = |row| self.world_from_camera(row).map(|pose| to_row(&convention.of_optical(&pose)));
-        Array2::from((0..self.mounts.len()).map(|row| pose(row).unwrap_or([f64::NAN; 7])).collect::<Vec<[f64; 7]>>())
+        Array2::from(
+            (0..self.viewpoints.len()).map(|row| pose(row).unwrap_or([f64::NAN; 7])).collect::<Vec<[f64; 7]>>(),
+        )
     }
 
     /// Poses in the frame of the parent (of the environment, for a free camera), rows `[x, y, z, qw, qx, qy, qz]` \[m\],
     /// shape (N, 7).
     pub fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
-        self.mounts.local_pose(convention)
+        self.viewpoints.local_pose(convention)
     }
 
     /// The view of environment `env` at the captured instant: what a renderer draws.
@@ -461,7 +465,7 @@ impl Camera {
     pub fn view(&self, env: usize) -> Result<View, SensorError> {
         let row = self.row(env)?;
         let pose = self.world_from_camera(row).ok_or(CameraError::NothingCaptured { env })?;
-        Ok(self.lens.view(&self.mounts.row(row).pixels, PoseF32::from(&pose)))
+        Ok(self.lens.view(&self.viewpoints.row(row).pixels, PoseF32::from(&pose)))
     }
 
     /// Places cameras in the frame of their parent (of the environment, for free ones), from now on.
@@ -480,7 +484,7 @@ impl Camera {
         convention: CameraConvention,
     ) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        self.mounts.set_local(&rows, poses, convention)?;
+        self.viewpoints.set_local(&rows, poses, convention)?;
         self.outdate(&rows);
         Ok(())
     }
@@ -499,8 +503,8 @@ impl Camera {
         convention: CameraConvention,
     ) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        let Self { mounts, parent, captures, env_ids, .. } = self;
-        mounts.set_world(&rows, poses, convention, |row| match (*parent, captures.world_from_parent[row]) {
+        let Self { viewpoints, parent, captures, env_ids, .. } = self;
+        viewpoints.set_world(&rows, poses, convention, |row| match (*parent, captures.world_from_parent[row]) {
             (None, _) => Ok(None),
             (Some(_), Some(world_from_parent)) => Ok(Some(world_from_parent)),
             (Some(_), None) => Err(CameraError::NothingCaptured { env: env_ids[row] }),
@@ -528,7 +532,7 @@ impl Camera {
         env_ids: Option<&[usize]>,
     ) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        self.mounts.look_at(&rows, eye, target, up)?;
+        self.viewpoints.look_at(&rows, eye, target, up)?;
         self.outdate(&rows);
         Ok(())
     }
@@ -541,7 +545,7 @@ impl Camera {
     /// or that is named twice; of a camera with a lens also [`CameraError::Optics`]. Nothing is changed then.
     pub fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        let Self { mounts, lens, rays, .. } = self;
+        let Self { viewpoints, lens, rays, .. } = self;
         let made = match rays.lens().is_pinhole() {
             true => Vec::new(),
             false => {
@@ -550,10 +554,10 @@ impl Camera {
                 rays.make(&pixels?)?
             }
         };
-        mounts.set_intrinsics(&rows, intrinsics, (lens.width, lens.height), |pixels| {
+        viewpoints.set_intrinsics(&rows, intrinsics, (lens.width, lens.height), |pixels| {
             lens.view(pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)
         })?;
-        rays.set(made, &rows, |row| mounts.row(row).pixels);
+        rays.set(made, &rows, |row| viewpoints.row(row).pixels);
         self.outdate(&rows);
         Ok(())
     }
@@ -565,9 +569,9 @@ impl Camera {
     /// An environment that the camera does not see or that is named twice; nothing is changed then.
     pub fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        let Self { mounts, rays, .. } = self;
-        mounts.restore(&rows);
-        rays.set(Vec::new(), &rows, |row| mounts.row(row).pixels);
+        let Self { viewpoints, rays, .. } = self;
+        viewpoints.restore(&rows);
+        rays.set(Vec::new(), &rows, |row| viewpoints.row(row).pixels);
         self.outdate(&rows);
         Ok(())
     }
@@ -618,7 +622,7 @@ impl Camera {
     fn optics_of(&self, row: usize) -> Option<Optics> {
         match self.rays.row(row) {
             Some(rays) => Some(*rays.optics()),
-            None => Optics::new(lens::Lens::default(), self.mounts.row(row).pixels).ok(),
+            None => Optics::new(lens::Lens::default(), self.viewpoints.row(row).pixels).ok(),
         }
     }
 
@@ -629,12 +633,12 @@ impl Camera {
 
     /// Where the optical frame is at the captured instant.
     pub(super) fn world_from_camera(&self, row: usize) -> Option<Pose> {
-        self.world_from(self.mounts.row(row), self.captures.world_from_parent[row])
+        self.world_from(self.viewpoints.row(row), self.captures.world_from_parent[row])
     }
 
-    /// Where the optical frame of a mount is.
-    pub(super) fn world_from(&self, mount: &Mount, world_from_parent: Option<Pose>) -> Option<Pose> {
-        let local = mount.parent_from_camera;
+    /// Where the optical frame of a viewpoint is.
+    pub(super) fn world_from(&self, viewpoint: &Viewpoint, world_from_parent: Option<Pose>) -> Option<Pose> {
+        let local = viewpoint.parent_from_camera;
         match self.parent {
             None => Some(local),
             Some(_) => world_from_parent.map(|world_from_parent| world_from_parent * local),
@@ -735,7 +739,7 @@ impl Camera {
         for row in 0..self.env_ids.len() {
             let mut shows = None;
             while let Some((slot, show)) = memory.receive(row, state.step[self.env_ids[row]]) {
-                memory.remember(row, slot, (self.mounts.row(row), self.rays.shared(row)));
+                memory.remember(row, slot, (self.viewpoints.row(row), self.rays.shared(row)));
                 self.frame_counts[row] += 1;
                 if show {
                     self.captures.copy(row, &memory.waiting, slot);
@@ -783,6 +787,6 @@ impl Camera {
     /// The view of a row that was captured.
     pub(super) fn view_of(&self, row: usize) -> View {
         let pose = self.world_from_camera(row).unwrap_or_else(Pose::identity);
-        self.lens.view(&self.mounts.row(row).pixels, PoseF32::from(&pose))
+        self.lens.view(&self.viewpoints.row(row).pixels, PoseF32::from(&pose))
     }
 }

@@ -4,7 +4,7 @@ use super::{Camera, Canvas, Desk};
 use crate::camera::captures::Captures;
 use crate::camera::cfg::DepthMiss;
 use crate::camera::error::CameraError;
-use crate::camera::mounts::Mount;
+use crate::camera::viewpoints::Viewpoint;
 use kinetoscope_render::frame::{FrameMut, Pictures};
 use kinetoscope_render::lens::LensRays;
 use kinetoscope_render::parallel::{Job, ParallelRasterizer};
@@ -20,7 +20,7 @@ use std::sync::atomic::Ordering;
 impl Camera {
     /// Draws what is stale.
     pub(super) fn draw(&self) -> Canvas {
-        let rows = self.mounts.len();
+        let rows = self.viewpoints.len();
         let canvas = self.desk.lock().unwrap_or_else(PoisonError::into_inner).canvas.take();
         // It is missing only where a drawing panicked.
         let mut canvas = canvas.unwrap_or_else(|| {
@@ -30,7 +30,7 @@ impl Camera {
         let is_stale = |row: &usize| stale[*row];
         let frames = pictures.frames_mut(rows).enumerate().filter(|(row, _)| is_stale(row)).map(|(_, frame)| frame);
         let stale_rows = (0..rows).filter(is_stale).map(|row| (row, row));
-        let look = |row: usize| (self.mounts.row(row), self.rays.row(row));
+        let look = |row: usize| (self.viewpoints.row(row), self.rays.row(row));
         let result = self.develop(&self.captures, look, stale_rows, frames);
         *failure = result.err().and_then(|(job, error)| {
             let row = (0..rows).filter(is_stale).nth(job)?;
@@ -48,7 +48,7 @@ impl Camera {
     pub(in crate::camera) fn develop<'a>(
         &self,
         captures: &Captures,
-        look: impl Fn(usize) -> (&'a Mount, Option<&'a LensRays>),
+        look: impl Fn(usize) -> (&'a Viewpoint, Option<&'a LensRays>),
         places: impl Iterator<Item = (usize, usize)> + Clone,
         frames: impl Iterator<Item = FrameMut<'a>>,
     ) -> Result<(), (usize, RenderError)> {
@@ -56,9 +56,9 @@ impl Camera {
         let Desk { rasterizer, views, jobs: kept, takes: kept_takes, tickets, faults, .. } = &mut *desk;
         views.clear();
         views.extend(places.clone().map(|(_, place)| {
-            let (mount, _) = look(place);
-            let pose = self.world_from(mount, captures.world_from_parent[place]).unwrap_or_else(Pose::identity);
-            self.lens.view(&mount.pixels, PoseF32::from(&pose))
+            let (viewpoint, _) = look(place);
+            let pose = self.world_from(viewpoint, captures.world_from_parent[place]).unwrap_or_else(Pose::identity);
+            self.lens.view(&viewpoint.pixels, PoseF32::from(&pose))
         }));
         tickets.clear();
         let mut jobs: Vec<Job<'_>> = emptied(std::mem::take(kept));
@@ -100,10 +100,10 @@ impl Camera {
         result
     }
 
-    /// What tells the capture of a place from others, seen from a mount.
-    fn take_of<'a>(&self, captures: &'a Captures, place: usize, mount: &Mount) -> Take<'a> {
+    /// What tells the capture of a place from others, seen from a viewpoint.
+    fn take_of<'a>(&self, captures: &'a Captures, place: usize, viewpoint: &Viewpoint) -> Take<'a> {
         let opened = captures.opened(place).and_then(|(poses, parent)| {
-            let camera = self.world_from(mount, Some(parent))?;
+            let camera = self.world_from(viewpoint, Some(parent))?;
             let before = self.opening.as_ref()?.seconds();
             Some(Opened { poses, world_from_camera: PoseF32::from(&camera), before })
         });
@@ -125,7 +125,7 @@ impl Camera {
         let view = &self.view_of(row);
         let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
         let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
-        let take = self.take_of(&self.captures, row, self.mounts.row(row));
+        let take = self.take_of(&self.captures, row, self.viewpoints.row(row));
         act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None }, take)
     }
 }

@@ -4,8 +4,8 @@ use super::cfg::Rig;
 use super::disparity::DisparityMap;
 use crate::camera::error::CameraError;
 use crate::camera::extrinsics::{CameraConvention, Poses};
-use crate::camera::mounts::chosen_rows;
 use crate::camera::sensor::Camera;
+use crate::camera::viewpoints::chosen_rows;
 use crate::error::SensorError;
 use crate::sensor::Sensor;
 use kinetoscope_render::intrinsics::Intrinsics;
@@ -131,7 +131,7 @@ impl StereoCamera {
             left.look_at(eye, target, up, env_ids)?;
             let rows = chosen_rows(left.env_ids().len(), env_ids, |env| left.row(env))?;
             let lefts: Vec<Pose> =
-                rows.iter().map(|&row| left.mounts.row(row).parent_from_camera * origin_from_left).collect();
+                rows.iter().map(|&row| left.viewpoints.row(row).parent_from_camera * origin_from_left).collect();
             let rights: Vec<Pose> = lefts.iter().map(|pose| pose * left_from_right).collect();
             left.set_local_pose(&lefts, env_ids, CameraConvention::Ros)?;
             right.set_local_pose(&rights, env_ids, CameraConvention::Ros)
@@ -186,10 +186,10 @@ impl StereoCamera {
         change: impl FnOnce(&mut Camera, &mut Camera) -> Result<(), SensorError>,
     ) -> Result<(), SensorError> {
         let eyes = [&self.left, &self.right];
-        let before = eyes.map(|eye| (eye.mounts.clone(), eye.rays.clone()));
+        let before = eyes.map(|eye| (eye.viewpoints.clone(), eye.rays.clone()));
         let result = change(&mut self.left, &mut self.right);
         if result.is_err() {
-            [(self.left.mounts, self.left.rays), (self.right.mounts, self.right.rays)] = before;
+            [(self.left.viewpoints, self.left.rays), (self.right.viewpoints, self.right.rays)] = before;
         } else {
             // What was held for the case of failure is not needed any more.
             drop(before);

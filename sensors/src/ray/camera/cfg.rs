@@ -2,7 +2,7 @@
 
 use super::pixels::Pixels;
 use super::sensor::RayCasterCamera;
-use crate::camera::mounts::{Mount, Mounts};
+use crate::camera::viewpoints::{Viewpoint, Viewpoints};
 use crate::camera::{DepthMiss, Extrinsics, Intrinsics};
 use crate::error::SensorError;
 use crate::ray::caster::scan::Scan;
@@ -104,7 +104,7 @@ impl SensorCfg for RayCasterCameraCfg {
             return Err(RayError::Count { pattern: "pixel", count, limit: RayPattern::MAX_RAYS }.into());
         };
         check_memory(context.num_envs, pixels)?;
-        let mount = Mount {
+        let viewpoint = Viewpoint {
             parent_from_camera: self.extrinsics.parent_from_camera()?,
             pixels: self.intrinsics.to_pixels(self.width, self.height)?,
         };
@@ -120,8 +120,8 @@ impl SensorCfg for RayCasterCameraCfg {
         let sampler = Sampler::new("ray caster camera", self.requires(), context, &self.sampling, &channels)?;
         let rays = Pixels { width: self.width, height: self.height };
         let scan = Scan::new(targets, rays, self.max_distance, context);
-        let mounts = Mounts::new(mount, context.num_envs);
-        Ok(RayCasterCamera::new(self, context, parent, mounts, scan, schedule.phases(context.num_envs), sampler))
+        let viewpoints = Viewpoints::new(viewpoint, context.num_envs);
+        Ok(RayCasterCamera::new(self, context, parent, viewpoints, scan, schedule.phases(context.num_envs), sampler))
     }
 }
 

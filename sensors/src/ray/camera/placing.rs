@@ -1,7 +1,7 @@
 //! Placing cameras of rays, and changing their lenses: as with [`Camera`](crate::Camera), by the same code.
 
 use super::sensor::RayCasterCamera;
-use crate::camera::mounts::chosen_rows;
+use crate::camera::viewpoints::chosen_rows;
 use crate::camera::{CameraConvention, CameraError, Intrinsics, Poses};
 use crate::error::SensorError;
 use ndarray::Array2;
@@ -10,7 +10,7 @@ impl RayCasterCamera {
     /// Poses that the next pictures are taken from, in the frame of the parent (of the environment, for a free camera), rows
     /// `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     pub fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
-        self.mounts.local_pose(convention)
+        self.viewpoints.local_pose(convention)
     }
 
     /// Places cameras in the frame of their parent (of the environment, for free ones), from the next picture on.
@@ -29,7 +29,7 @@ impl RayCasterCamera {
         convention: CameraConvention,
     ) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        Ok(self.mounts.set_local(&rows, poses, convention)?)
+        Ok(self.viewpoints.set_local(&rows, poses, convention)?)
     }
 
     /// Places cameras in the environment, as [`set_local_pose`](Self::set_local_pose). An attached camera gets the local
@@ -47,7 +47,7 @@ impl RayCasterCamera {
     ) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
         let (attached, seen) = (self.is_attached(), &self.world_from_parent);
-        Ok(self.mounts.set_world(&rows, poses, convention, |env| match seen[env] {
+        Ok(self.viewpoints.set_world(&rows, poses, convention, |env| match seen[env] {
             None if attached => Err(CameraError::NothingCaptured { env }),
             world_from_parent => Ok(world_from_parent),
         })?)
@@ -72,7 +72,7 @@ impl RayCasterCamera {
         env_ids: Option<&[usize]>,
     ) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        Ok(self.mounts.look_at(&rows, eye, target, up)?)
+        Ok(self.viewpoints.look_at(&rows, eye, target, up)?)
     }
 
     /// Changes lenses from the next picture on: one for each of `env_ids` (`None` is all environments), or one for all.
@@ -84,7 +84,7 @@ impl RayCasterCamera {
     pub fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
         let (height, width) = self.image_shape();
-        Ok(self.mounts.set_intrinsics(&rows, intrinsics, (width, height), |_| Ok(()))?)
+        Ok(self.viewpoints.set_intrinsics(&rows, intrinsics, (width, height), |_| Ok(()))?)
     }
 
     /// Places and lenses as they were configured, in `env_ids` (`None` is all environments), from the next picture on.
@@ -94,11 +94,11 @@ impl RayCasterCamera {
     /// An environment that does not exist or that is named twice; nothing is changed then.
     pub fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.chosen_rows(env_ids)?;
-        self.mounts.restore(&rows);
+        self.viewpoints.restore(&rows);
         Ok(())
     }
 
     fn chosen_rows(&self, env_ids: Option<&[usize]>) -> Result<Vec<usize>, SensorError> {
-        chosen_rows(self.mounts.len(), env_ids, |env| self.expected.check_envs(&[env]).map(|()| env))
+        chosen_rows(self.viewpoints.len(), env_ids, |env| self.expected.check_envs(&[env]).map(|()| env))
     }
 }

@@ -12,7 +12,7 @@ impl RayCasterCamera {
     /// pixel's centre, noise included. (+inf, +inf, +inf) where nothing was hit, which the mask says too.
     pub fn points(&self, frame: PointFrame) -> Array3<f32> {
         let (height, width) = self.image_shape();
-        let count = self.mounts.len();
+        let count = self.viewpoints.len();
         let mut points = Array3::from_elem((count, height * width, 3), f32::INFINITY);
         if let Some(flat) = points.as_slice_mut() {
             flat.chunks_exact_mut(3 * height * width)

@@ -4,7 +4,7 @@ use super::cfg::RayCasterCameraCfg;
 use super::pictures::RayPictures;
 use super::pixels::Pixels;
 use crate::camera::frustum::frustum;
-use crate::camera::mounts::Mounts;
+use crate::camera::viewpoints::Viewpoints;
 use crate::camera::{CameraConvention, DepthMiss, Lens, Optics, PixelIntrinsics};
 use crate::error::SensorError;
 use crate::expected::Expected;
@@ -36,7 +36,7 @@ use std::fmt;
 pub struct RayCasterCamera {
     path: String,
     parent: Option<usize>,
-    pub(super) mounts: Mounts,
+    pub(super) viewpoints: Viewpoints,
     /// What depth and distance say of a miss.
     miss: f32,
     scan: Scan<Pixels>,
@@ -95,7 +95,7 @@ impl RayCasterCamera {
         cfg: &RayCasterCameraCfg,
         context: &SensorContext,
         parent: Option<usize>,
-        mounts: Mounts,
+        viewpoints: Viewpoints,
         scan: Scan<Pixels>,
         phases: Phases,
         sampler: Sampler,
@@ -107,15 +107,15 @@ impl RayCasterCamera {
             DepthMiss::Far => cfg.max_distance as f32,
             DepthMiss::Zero => 0.0,
         };
-        let mount = |env| {
-            let mount = mounts.row(env);
-            Taken { world_from_camera: mount.parent_from_camera, lens: mount.pixels }
+        let viewpoint = |env| {
+            let viewpoint = viewpoints.row(env);
+            Taken { world_from_camera: viewpoint.parent_from_camera, lens: viewpoint.pixels }
         };
-        let taken: Vec<Taken> = (0..n).map(mount).collect();
+        let taken: Vec<Taken> = (0..n).map(viewpoint).collect();
         Self {
             path: summary::path(context, parent),
             parent,
-            mounts,
+            viewpoints,
             miss,
             scan,
             sampler,
@@ -140,15 +140,16 @@ impl RayCasterCamera {
     /// Casts the rays of some environments; `state` was checked.
     fn cast(&mut self, envs: &[usize], state: &SceneState) {
         let Some(poses) = &state.instance_poses else { return };
-        let Self { parent, mounts, scan, world_from_parent, taken, .. } = self;
+        let Self { parent, viewpoints, scan, world_from_parent, taken, .. } = self;
         let parent = parent.zip(state.body_poses.as_ref());
         scan.cast(envs, poses, |env| {
-            let mount = mounts.row(env);
+            let viewpoint = viewpoints.row(env);
             let parent = parent.map(|(body, poses)| from_row(&std::array::from_fn(|k| poses[(env, body, k)])));
-            let world_from_camera = parent.map_or(mount.parent_from_camera, |pose| pose * mount.parent_from_camera);
+            let world_from_camera =
+                parent.map_or(viewpoint.parent_from_camera, |pose| pose * viewpoint.parent_from_camera);
             world_from_parent[env] = parent;
-            taken[env] = Taken { world_from_camera, lens: mount.pixels };
-            (PoseF64::from(&world_from_camera), mount.pixels)
+            taken[env] = Taken { world_from_camera, lens: viewpoint.pixels };
+            (PoseF64::from(&world_from_camera), viewpoint.pixels)
         });
     }
 

@@ -11,23 +11,23 @@ use ndarray::Array2;
 
 /// How one camera is placed, and its lens.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Mount {
+pub(crate) struct Viewpoint {
     /// Of the optical frame.
     pub(crate) parent_from_camera: Pose,
     pub(crate) pixels: PixelIntrinsics,
 }
 
-/// The mounts of all rows of a camera. Whatever fails changes nothing.
+/// The viewpoints of all rows of a camera. Whatever fails changes nothing.
 #[derive(Clone, Debug)]
-pub(crate) struct Mounts {
-    configured: Mount,
-    rows: Vec<Mount>,
+pub(crate) struct Viewpoints {
+    configured: Viewpoint,
+    rows: Vec<Viewpoint>,
 }
 
-impl Mounts {
-    /// The same mount in every row.
-    pub(crate) fn new(mount: Mount, rows: usize) -> Self {
-        Self { configured: mount, rows: vec![mount; rows] }
+impl Viewpoints {
+    /// The same viewpoint in every row.
+    pub(crate) fn new(viewpoint: Viewpoint, rows: usize) -> Self {
+        Self { configured: viewpoint, rows: vec![viewpoint; rows] }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -35,13 +35,13 @@ impl Mounts {
     }
 
     #[track_caller]
-    pub(crate) fn row(&self, row: usize) -> &Mount {
+    pub(crate) fn row(&self, row: usize) -> &Viewpoint {
         &self.rows[row]
     }
 
     /// Poses in the frame of the parent, shape (rows, 7).
     pub(crate) fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
-        let local = |mount: &Mount| to_row(&convention.of_optical(&mount.parent_from_camera));
+        let local = |viewpoint: &Viewpoint| to_row(&convention.of_optical(&viewpoint.parent_from_camera));
         Array2::from(self.rows.iter().map(local).collect::<Vec<[f64; 7]>>())
     }
 
