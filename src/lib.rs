@@ -44,9 +44,9 @@ pub mod prelude {
     pub use kinetoscope_record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId, Topic};
     pub use kinetoscope_scene::Pose;
     pub use kinetoscope_sensors::camera::{
-        Aperture, Camera, CameraCfg, CameraConvention, CameraInfo, Channels, DepthMiss, Extrinsics, Imperfections,
-        Intrinsics, Lens, Placement, RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg, Shutter,
-        StereoCamera, StereoCameraCfg, StereoOrigin, ToneCurve,
+        Aperture, Camera, CameraCfg, CameraConvention, CameraInfo, CameraPlacement, Channels, DepthMiss, Extrinsics,
+        Imperfections, Intrinsics, Lens, Placement, RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg,
+        Shutter, StereoCamera, StereoCameraCfg, StereoOrigin, ToneCurve,
     };
     pub use kinetoscope_sensors::ray::{
         HitTargets, RayAlignment, RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg, RayPattern,

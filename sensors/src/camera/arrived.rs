@@ -82,7 +82,7 @@ impl Camera {
         let mut poses = self.pose_w(convention);
         for (row, mut pose) in poses.rows_mut().into_iter().enumerate() {
             if let Some((captures, viewpoint, _)) = self.unseen(row)
-                && let Some(world) = self.world_from(viewpoint, captures.world_from_parent[row])
+                && let Some(world) = self.viewpoints.world_from(viewpoint, captures.world_from_parent[row])
             {
                 pose.iter_mut().zip(to_row(&convention.of_optical(&world))).for_each(|(to, x)| *to = x);
             }

@@ -1,12 +1,14 @@
 //! Makes cameras of their configurations, and refuses those that cannot be.
 
 use super::cfg::CameraCfg;
+use super::env_rows::EnvRows;
 use super::error::CameraError;
 use super::faults::Faults;
 use super::imperfection::Imperfections;
 use super::memory::Memory;
 use super::opening::Opening;
 use super::sensor::{Camera, Lens};
+use super::viewpoints::{Viewpoint, Viewpoints};
 use crate::error::SensorError;
 use crate::requires::Requires;
 use crate::schedule::Schedule;
@@ -64,16 +66,15 @@ impl SensorCfg for CameraCfg {
         let lens = Lens::new(self)?;
         let pixels = self.intrinsics.to_pixels(self.width, self.height)?;
         lens.view(&pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)?;
-        let env_ids = self.env_ids.clone().unwrap_or_else(|| (0..context.num_envs).collect());
-        check_env_ids(&env_ids, context.num_envs)?;
-        self.check_memory(env_ids.len(), scene.instances().len(), scene.lights.len(), schedule)?;
-        let opening = Opening::new(self, schedule, context.dt, env_ids.len(), &scene)?;
-        let rays = self.lens_rays(&pixels, env_ids.len())?;
+        let envs = EnvRows::new(self.env_ids.as_deref(), context.num_envs)?;
+        self.check_memory(envs.len(), scene.instances().len(), scene.lights.len(), schedule)?;
+        let opening = Opening::new(self, schedule, context.dt, envs.len(), &scene)?;
+        let rays = self.lens_rays(&pixels, envs.len())?;
         let faults = Faults::new(self, context, schedule.period_steps() as f64 * context.dt)?;
-        let viewpoint = self.extrinsics.parent_from_camera()?;
-        let pictures = Pictures::new(self.channels, env_ids.len(), self.width, self.height);
-        let optics = (lens, pixels, viewpoint);
-        Ok(Camera::new(self, context, scene, (schedule, opening), parent, optics, rays, env_ids, (pictures, faults)))
+        let viewpoint = Viewpoint { parent_from_camera: self.extrinsics.parent_from_camera()?, pixels };
+        let pictures = Pictures::new(self.channels, envs.len(), self.width, self.height);
+        let viewpoints = Viewpoints::new(viewpoint, [self.width, self.height], rays, envs, parent);
+        Ok(Camera::new(self, context, scene, (schedule, opening), lens, viewpoints, (pictures, faults)))
     }
 }
 
@@ -155,20 +156,4 @@ impl CameraCfg {
         }
         Ok(())
     }
-}
-
-fn check_env_ids(env_ids: &[usize], count: usize) -> Result<(), SensorError> {
-    if env_ids.is_empty() {
-        return Err(CameraError::NoEnvironments.into());
-    }
-    let mut seen = vec![false; count];
-    for &env in env_ids {
-        let Some(seen) = seen.get_mut(env) else {
-            return Err(SensorError::IndexOutOfRange { what: "environment", index: env, count });
-        };
-        if std::mem::replace(seen, true) {
-            return Err(CameraError::DuplicateEnvironment { env }.into());
-        }
-    }
-    Ok(())
 }

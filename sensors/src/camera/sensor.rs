@@ -5,13 +5,15 @@ mod drawing;
 use super::captures::Captures;
 use super::cfg::{CameraCfg, DepthMiss};
 use super::earlier::Earlier;
+use super::env_rows::EnvRows;
 use super::error::CameraError;
-use super::extrinsics::{CameraConvention, Poses};
+use super::extrinsics::CameraConvention;
 use super::faults::Faults;
 use super::frustum::frustum;
 use super::memory::{Memory, Past};
 use super::opening::Opening;
-use super::viewpoints::{Viewpoint, Viewpoints, chosen_rows};
+use super::placement::{CameraPlacement, PlaceRows, PoseFrame};
+use super::viewpoints::Viewpoints;
 use crate::error::SensorError;
 use crate::requires::Requires;
 use crate::schedule::{Phases, Schedule};
@@ -20,7 +22,7 @@ use crate::summary;
 use kinetoscope_render::frame::{Channels, Listed, PictureView, Pictures};
 use kinetoscope_render::intrinsics::{Intrinsics, PixelIntrinsics};
 use kinetoscope_render::lens;
-use kinetoscope_render::lens::{LensRays, Optics, RaysOfRows};
+use kinetoscope_render::lens::{LensRays, Optics};
 use kinetoscope_render::parallel::{Job, ParallelRasterizer};
 use kinetoscope_render::progress::RenderProgress;
 use kinetoscope_render::request::RasterCfg;
@@ -37,9 +39,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 ///
 /// When a picture is due, the camera *captures*: it keeps where everything is. Pictures are drawn from that at the first
 /// reading afterwards, once, and only where something changed ([`CameraCfg::lazy`]). So a reading always shows the instant
-/// of [`stamps`](Self::stamps), however late it comes. After a setter ([`set_local_pose`](Self::set_local_pose),
-/// [`look_at`](Self::look_at), [`set_intrinsics`](Self::set_intrinsics)...) the next reading shows the same instant from
-/// the new place. Places and lenses set that way stay over a reset, until [`restore`](Self::restore).
+/// of [`stamps`](Self::stamps), however late it comes. After a setter of [`CameraPlacement`] the next reading shows the same
+/// instant from the new place. Places and lenses set that way stay over a reset, until
+/// [`restore`](CameraPlacement::restore).
 ///
 /// A camera is perfect unless it is told otherwise: it may have a [`history`](Self::history), pictures may come late or get
 /// lost, and be noisy or spoilt as those of real cameras ([`CameraCfg::imperfections`]). Then it is lazy still, and
@@ -52,15 +54,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 pub struct Camera {
     lens: Lens,
     scene: Arc<RenderScene>,
-    env_ids: Vec<usize>,
-    /// Which row belongs to an environment; the inverse of `env_ids`.
-    row_of_env: Vec<Option<usize>>,
     num_bodies: usize,
     path: String,
-    /// Index of the body it hangs on.
-    parent: Option<usize>,
     pub(super) viewpoints: Viewpoints,
-    pub(super) rays: RaysOfRows,
     channels: Channels,
     /// Whether the markers of other sensors are drawn into colours.
     draws_markers: bool,
@@ -150,7 +146,7 @@ impl Sensor for Camera {
         self.check(state)?;
         let mut due = std::mem::take(&mut self.due);
         due.clear();
-        due.extend((0..self.env_ids.len()).filter(|&row| self.phases.is_due(row, state.step[self.env_ids[row]])));
+        due.extend((0..self.viewpoints.len()).filter(|&row| self.phases.is_due(row, state.step[self.env_ids()[row]])));
         for &row in &due {
             self.tickets[row].due();
         }
@@ -172,16 +168,16 @@ impl Sensor for Camera {
                 self.draw_if_eager();
             }
         }
-        self.open_shutters(0..self.env_ids.len(), state);
+        self.open_shutters(0..self.viewpoints.len(), state);
         self.due = due;
         Ok(())
     }
 
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
         self.check(state)?;
-        let rows = self.seen_rows(env_ids)?;
+        let rows = self.viewpoints.envs.seen(env_ids)?;
         for &row in &rows {
-            self.phases.reset(row, state.step[self.env_ids[row]]);
+            self.phases.reset(row, state.step[self.env_ids()[row]]);
             self.frame_counts[row] = 0;
             self.tickets[row].reset();
             if let Some(memory) = &mut self.memory {
@@ -197,20 +193,20 @@ impl Sensor for Camera {
 
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
         self.check(state)?;
-        let rows = self.seen_rows(env_ids)?;
+        let rows = self.viewpoints.envs.seen(env_ids)?;
         for &row in &rows {
             self.tickets[row].refresh();
         }
         self.capture(&rows, state, false);
         for &row in &rows {
-            let (now, parent) = ((state, self.env_ids[row]), self.parent);
+            let (now, parent) = ((state, self.env_ids()[row]), self.viewpoints.parent);
             self.opening.iter_mut().for_each(|opening| opening.refresh(row, now, parent));
         }
         Ok(())
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {
-        let steps = || self.env_ids.iter().map(|&env| step[env]);
+        let steps = || self.env_ids().iter().map(|&env| step[env]);
         let wait = |due: u64| self.opening.as_ref().map_or(due, |opening| opening.wait(due));
         let due = self.phases.first_of(steps(), wait);
         self.memory.as_ref().and_then(|memory| memory.due_in(steps())).map_or(due, |arrival| arrival.min(due))
@@ -219,9 +215,43 @@ impl Sensor for Camera {
     /// The optical frame, and an arrow along each edge of the picture's pyramid, at the captured instant; none in an
     /// environment that it does not look into.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
-        let row = self.row_of_env.get(env).copied().flatten();
+        let row = self.viewpoints.envs.of(env);
         let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.optics_of(row)?)));
         placed.map_or_else(Vec::new, |(pose, optics)| frustum(&pose, &optics, self.image_shape()))
+    }
+}
+
+impl PlaceRows for Camera {
+    fn env_rows(&self) -> &EnvRows {
+        &self.viewpoints.envs
+    }
+
+    fn place_rows(&mut self, rows: &[usize], poses: &[Pose], frame: PoseFrame) -> Result<(), SensorError> {
+        let parents = &self.captures.world_from_parent;
+        self.viewpoints.place(rows, poses, frame, |row| parents[row])?;
+        self.outdate(rows);
+        Ok(())
+    }
+
+    fn restore_rows(&mut self, rows: &[usize]) {
+        self.viewpoints.restore(rows);
+        self.outdate(rows);
+    }
+}
+
+impl CameraPlacement for Camera {
+    fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
+        self.viewpoints.local_pose(convention)
+    }
+
+    fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
+        let rows = self.viewpoints.envs.chosen(env_ids)?;
+        let lens = self.lens;
+        self.viewpoints.set_intrinsics(&rows, intrinsics, |pixels| {
+            lens.view(pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)
+        })?;
+        self.outdate(&rows);
+        Ok(())
     }
 }
 
@@ -237,21 +267,15 @@ impl Camera {
         context: &SensorContext,
         scene: Arc<RenderScene>,
         (schedule, opening): (Schedule, Option<Opening>),
-        parent: Option<usize>,
-        (lens, pixels, parent_from_camera): (Lens, PixelIntrinsics, Pose),
-        rays: RaysOfRows,
-        env_ids: Vec<usize>,
+        lens: Lens,
+        viewpoints: Viewpoints,
         (pictures, faults): (Pictures, Option<Faults>),
     ) -> Self {
+        let env_ids = viewpoints.envs.env_ids();
         let rows = env_ids.len();
-        let mut row_of_env = vec![None; context.num_envs];
-        for (row, &env) in env_ids.iter().enumerate() {
-            row_of_env[env] = Some(row);
-        }
         let key = |env: &usize| Ticket::first(context.seed, (context.first_env + env) as u64, &context.name);
         let tickets: Vec<Ticket> = env_ids.iter().map(key).collect();
-        let viewpoint = Viewpoint { parent_from_camera, pixels };
-        let memory = Memory::new(cfg, schedule, rows, &scene, (viewpoint, tickets[0]));
+        let memory = Memory::new(cfg, schedule, rows, &scene, (*viewpoints.row(0), tickets[0]));
         let captures = Captures::new(rows, &scene, tickets[0], opening.is_some());
         let earlier = cfg.channels.flow.then(|| Earlier::new(rows, scene.instances().len()));
         let marked = u32::from(cfg.draw_markers) << Marker::GROUP;
@@ -266,12 +290,9 @@ impl Camera {
         Self {
             lens,
             scene,
-            row_of_env,
             num_bodies: context.bodies.len(),
-            path: summary::path(context, parent),
-            parent,
-            viewpoints: Viewpoints::new(viewpoint, rows),
-            rays,
+            path: summary::path(context, viewpoints.parent),
+            viewpoints,
             channels: cfg.channels,
             draws_markers: cfg.draw_markers,
             depth_miss: cfg.depth_miss,
@@ -298,13 +319,12 @@ impl Camera {
                 faults,
             }),
             draws: AtomicU64::new(0),
-            env_ids,
         }
     }
 
     /// The environments that it looks into: the first axis of everything it measures.
     pub fn env_ids(&self) -> &[usize] {
-        &self.env_ids
+        self.viewpoints.envs.env_ids()
     }
 
     /// Path: `uid/link/name` on a body, the camera's name without one.
@@ -334,7 +354,7 @@ impl Camera {
 
     /// Whether it hangs on a body.
     pub fn is_attached(&self) -> bool {
-        self.parent.is_some()
+        self.viewpoints.parent.is_some()
     }
 
     /// Time of the instant that pictures show \[s\] since the last reset of the environment, shape (N).
@@ -380,7 +400,7 @@ impl Camera {
     ///
     /// [`CameraError::NothingCaptured`] before the first reset or update, and [`CameraError::Draw`].
     pub fn pictures(&self) -> Result<&Pictures, SensorError> {
-        (0..self.env_ids.len()).try_for_each(|row| self.must_have_captured(row))?;
+        (0..self.viewpoints.len()).try_for_each(|row| self.must_have_captured(row))?;
         let canvas = match self.drawn.get() {
             Some(canvas) => canvas,
             None => {
@@ -419,7 +439,7 @@ impl Camera {
 
     /// The lens, the same in all environments.
     pub fn lens(&self) -> lens::Lens {
-        self.rays.lens()
+        self.viewpoints.lens()
     }
 
     /// The lens of environment `env` in front of its pixels: from directions to pixels and back.
@@ -429,7 +449,7 @@ impl Camera {
     /// An environment that the camera does not see.
     pub fn optics(&self, env: usize) -> Result<Optics, SensorError> {
         let pixels = self.viewpoints.row(self.row(env)?).pixels;
-        Ok(Optics::new(self.rays.lens(), pixels)?)
+        Ok(Optics::new(self.viewpoints.lens(), pixels)?)
     }
 
     /// Whether its colours show what other sensors show of their measurements.
@@ -439,7 +459,7 @@ impl Camera {
 
     /// Memory of the rays of a lens \[bytes\]: 0 for a pinhole.
     pub fn lens_bytes(&self) -> usize {
-        self.rays.bytes()
+        self.viewpoints.ray_bytes()
     }
 
     /// Poses in the environment at the captured instant, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7). NaN where an
@@ -449,12 +469,6 @@ impl Camera {
         Array2::from(
             (0..self.viewpoints.len()).map(|row| pose(row).unwrap_or([f64::NAN; 7])).collect::<Vec<[f64; 7]>>(),
         )
-    }
-
-    /// Poses in the frame of the parent (of the environment, for a free camera), rows `[x, y, z, qw, qx, qy, qz]` \[m\],
-    /// shape (N, 7).
-    pub fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
-        self.viewpoints.local_pose(convention)
     }
 
     /// The view of environment `env` at the captured instant: what a renderer draws.
@@ -468,134 +482,9 @@ impl Camera {
         Ok(self.lens.view(&self.viewpoints.row(row).pixels, PoseF32::from(&pose)))
     }
 
-    /// Places cameras in the frame of their parent (of the environment, for free ones), from now on.
-    ///
-    /// `poses` are typed or rows `[x, y, z, qw, qx, qy, qz]`: one for each of `env_ids` (`None` is all environments of the
-    /// camera), or one for all. `convention` says what their axes mean.
-    ///
-    /// # Errors
-    ///
-    /// [`CameraError::Pose`], [`CameraError::Count`], an environment that the camera does not see or that is named twice;
-    /// nothing is changed then.
-    pub fn set_local_pose(
-        &mut self,
-        poses: &(impl Poses + ?Sized),
-        env_ids: Option<&[usize]>,
-        convention: CameraConvention,
-    ) -> Result<(), SensorError> {
-        let rows = self.chosen_rows(env_ids)?;
-        self.viewpoints.set_local(&rows, poses, convention)?;
-        self.outdate(&rows);
-        Ok(())
-    }
-
-    /// Places cameras in the environment, as [`set_local_pose`](Self::set_local_pose). An attached camera gets the local
-    /// pose that puts it there at the captured instant, and moves with its parent from then on.
-    ///
-    /// # Errors
-    ///
-    /// As [`set_local_pose`](Self::set_local_pose), and [`CameraError::NothingCaptured`] for an attached camera whose
-    /// parent was not seen yet.
-    pub fn set_world_poses(
-        &mut self,
-        poses: &(impl Poses + ?Sized),
-        env_ids: Option<&[usize]>,
-        convention: CameraConvention,
-    ) -> Result<(), SensorError> {
-        let rows = self.chosen_rows(env_ids)?;
-        let Self { viewpoints, parent, captures, env_ids, .. } = self;
-        viewpoints.set_world(&rows, poses, convention, |row| match (*parent, captures.world_from_parent[row]) {
-            (None, _) => Ok(None),
-            (Some(_), Some(world_from_parent)) => Ok(Some(world_from_parent)),
-            (Some(_), None) => Err(CameraError::NothingCaptured { env: env_ids[row] }),
-        })?;
-        self.outdate(&rows);
-        Ok(())
-    }
-
-    /// Turns cameras to something: places each at `eye`, looking at `target`, in the frame of its parent (of the
-    /// environment, for free ones). See [`look_at_pose`](super::look_at_pose) for `up`; what one environment gets never depends on another. To
-    /// look from an attached camera at a point of the environment, give [`look_at_pose`](super::look_at_pose) to
-    /// [`set_world_poses`](Self::set_world_poses).
-    ///
-    /// One `eye`, `target` and `up` for each of `env_ids` (`None` is all environments of the camera), or one for all \[m\].
-    ///
-    /// # Errors
-    ///
-    /// [`CameraError::LookAt`], [`CameraError::Count`], an environment that the camera does not see or that is named
-    /// twice; nothing is changed then.
-    pub fn look_at(
-        &mut self,
-        eye: &[[f64; 3]],
-        target: &[[f64; 3]],
-        up: &[[f64; 3]],
-        env_ids: Option<&[usize]>,
-    ) -> Result<(), SensorError> {
-        let rows = self.chosen_rows(env_ids)?;
-        self.viewpoints.look_at(&rows, eye, target, up)?;
-        self.outdate(&rows);
-        Ok(())
-    }
-
-    /// Changes lenses: one for each of `env_ids` (`None` is all environments of the camera), or one for all.
-    ///
-    /// # Errors
-    ///
-    /// [`CameraError::Optics`], [`CameraError::View`], [`CameraError::Count`], an environment that the camera does not see
-    /// or that is named twice; of a camera with a lens also [`CameraError::Optics`]. Nothing is changed then.
-    pub fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
-        let rows = self.chosen_rows(env_ids)?;
-        let Self { viewpoints, lens, rays, .. } = self;
-        let made = match rays.lens().is_pinhole() {
-            true => Vec::new(),
-            false => {
-                let pixels: Result<Vec<_>, _> =
-                    intrinsics.iter().map(|i| i.to_pixels(lens.width, lens.height)).collect();
-                rays.make(&pixels?)?
-            }
-        };
-        viewpoints.set_intrinsics(&rows, intrinsics, (lens.width, lens.height), |pixels| {
-            lens.view(pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)
-        })?;
-        rays.set(made, &rows, |row| viewpoints.row(row).pixels);
-        self.outdate(&rows);
-        Ok(())
-    }
-
-    /// Places and lenses as they were configured, in `env_ids` (`None` is all environments of the camera).
-    ///
-    /// # Errors
-    ///
-    /// An environment that the camera does not see or that is named twice; nothing is changed then.
-    pub fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
-        let rows = self.chosen_rows(env_ids)?;
-        let Self { viewpoints, rays, .. } = self;
-        viewpoints.restore(&rows);
-        rays.set(Vec::new(), &rows, |row| viewpoints.row(row).pixels);
-        self.outdate(&rows);
-        Ok(())
-    }
-
     /// The row of an environment.
     pub(super) fn row(&self, env: usize) -> Result<usize, SensorError> {
-        let count = self.row_of_env.len();
-        let row =
-            self.row_of_env.get(env).ok_or(SensorError::IndexOutOfRange { what: "environment", index: env, count })?;
-        Ok(row.ok_or_else(|| CameraError::NotSeen { env, seen: self.env_ids.clone() })?)
-    }
-
-    /// The rows of the environments that somebody chose.
-    fn chosen_rows(&self, env_ids: Option<&[usize]>) -> Result<Vec<usize>, SensorError> {
-        chosen_rows(self.env_ids.len(), env_ids, |env| self.row(env))
-    }
-
-    /// The rows of those of the environments that the camera sees; the simulation speaks of all.
-    fn seen_rows(&self, env_ids: &[usize]) -> Result<Vec<usize>, SensorError> {
-        let count = self.row_of_env.len();
-        match env_ids.iter().find(|&&env| env >= count) {
-            Some(&index) => Err(SensorError::IndexOutOfRange { what: "environment", index, count }),
-            None => Ok(env_ids.iter().filter_map(|&env| self.row_of_env[env]).collect()),
-        }
+        self.viewpoints.envs.row(env)
     }
 
     /// Whether a number of the depth channel is that of a surface.
@@ -609,18 +498,18 @@ impl Camera {
 
     /// Whether straight lines are bent in the picture.
     pub(super) fn bends_lines(&self) -> bool {
-        !self.rays.lens().is_pinhole()
+        !self.viewpoints.lens().is_pinhole()
     }
 
     /// Refuses what is only known of pictures without a lens.
     pub(super) fn must_be_pinhole(&self, what: &'static str) -> Result<(), CameraError> {
-        let lens = self.rays.lens();
+        let lens = self.viewpoints.lens();
         if lens.is_pinhole() { Ok(()) } else { Err(CameraError::PinholeOnly { what, lens: lens.name() }) }
     }
 
     /// The lens of a row, in front of its pixels.
     fn optics_of(&self, row: usize) -> Option<Optics> {
-        match self.rays.row(row) {
+        match self.rays_of(row) {
             Some(rays) => Some(*rays.optics()),
             None => Optics::new(lens::Lens::default(), self.viewpoints.row(row).pixels).ok(),
         }
@@ -628,21 +517,12 @@ impl Camera {
 
     /// The rays of a row; none for a pinhole.
     pub(super) fn rays_of(&self, row: usize) -> Option<&LensRays> {
-        self.rays.row(row)
+        self.viewpoints.rays(row).map(|rays| &**rays)
     }
 
     /// Where the optical frame is at the captured instant.
     pub(super) fn world_from_camera(&self, row: usize) -> Option<Pose> {
-        self.world_from(self.viewpoints.row(row), self.captures.world_from_parent[row])
-    }
-
-    /// Where the optical frame of a viewpoint is.
-    pub(super) fn world_from(&self, viewpoint: &Viewpoint, world_from_parent: Option<Pose>) -> Option<Pose> {
-        let local = viewpoint.parent_from_camera;
-        match self.parent {
-            None => Some(local),
-            Some(_) => world_from_parent.map(|world_from_parent| world_from_parent * local),
-        }
+        self.viewpoints.world_from(self.viewpoints.row(row), self.captures.world_from_parent[row])
     }
 
     /// The history, of a camera that has a memory.
@@ -657,7 +537,7 @@ impl Camera {
         else {
             return Err(SensorError::MissingFields { sensor: "camera", missing });
         };
-        let envs = self.row_of_env.len();
+        let envs = self.viewpoints.envs.num_envs();
         let counts = [
             ("environments", envs, state.num_envs()),
             ("environments with a time", envs, state.time.len()),
@@ -692,9 +572,9 @@ impl Camera {
 
     /// Opens the shutters of those of some rows whose time it is.
     fn open_shutters(&mut self, rows: impl Iterator<Item = usize>, state: &SceneState) {
-        let Self { opening, phases, env_ids, parent, .. } = self;
+        let Self { opening, phases, viewpoints, .. } = self;
         if let Some(opening) = opening {
-            opening.open(rows, phases, (state, env_ids), *parent);
+            opening.open(rows, phases, (state, viewpoints.envs.env_ids()), viewpoints.parent);
         }
     }
 
@@ -710,9 +590,9 @@ impl Camera {
     /// was checked.
     fn capture(&mut self, rows: &[usize], state: &SceneState, opened: bool) {
         for &row in rows {
-            let env = self.env_ids[row];
+            let env = self.env_ids()[row];
             let opening = self.opening.as_ref().filter(|_| opened).map(|opening| (opening, row));
-            self.captures.keep(row, (state, env), self.parent, self.tickets[row], opening);
+            self.captures.keep(row, (state, env), self.viewpoints.parent, self.tickets[row], opening);
             if let Some(memory) = &mut self.memory {
                 memory.refresh(row, state.step[env]);
             }
@@ -726,20 +606,20 @@ impl Camera {
     /// Keeps what there is to see in some environments for later.
     fn send(&mut self, rows: &[usize], state: &SceneState, memory: &mut Memory) {
         for &row in rows {
-            let (env, ticket) = (self.env_ids[row], self.tickets[row]);
+            let (env, ticket) = (self.env_ids()[row], self.tickets[row]);
             if let Some(slot) = memory.send(row, state.step[env], &ticket) {
                 let opening = self.opening.as_ref().map(|opening| (opening, row));
-                memory.waiting.keep(slot, (state, env), self.parent, ticket, opening);
+                memory.waiting.keep(slot, (state, env), self.viewpoints.parent, ticket, opening);
             }
         }
     }
 
     /// Takes what has arrived; `shown` become the rows that show something else.
     fn receive(&mut self, state: &SceneState, memory: &mut Memory, shown: &mut Vec<usize>) {
-        for row in 0..self.env_ids.len() {
+        for row in 0..self.viewpoints.len() {
             let mut shows = None;
-            while let Some((slot, show)) = memory.receive(row, state.step[self.env_ids[row]]) {
-                memory.remember(row, slot, (self.viewpoints.row(row), self.rays.shared(row)));
+            while let Some((slot, show)) = memory.receive(row, state.step[self.env_ids()[row]]) {
+                memory.remember(row, slot, (self.viewpoints.row(row), self.viewpoints.rays(row)));
                 self.frame_counts[row] += 1;
                 if show {
                     self.captures.copy(row, &memory.waiting, slot);
@@ -781,7 +661,7 @@ impl Camera {
     /// Fails before the first reset or update of a row, when poses of things are not known yet.
     pub(super) fn must_have_captured(&self, row: usize) -> Result<(), CameraError> {
         let captured = self.captures.world_from_parent[row].is_some();
-        captured.then_some(()).ok_or(CameraError::NothingCaptured { env: self.env_ids[row] })
+        captured.then_some(()).ok_or(CameraError::NothingCaptured { env: self.env_ids()[row] })
     }
 
     /// The view of a row that was captured.

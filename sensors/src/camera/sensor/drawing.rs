@@ -30,11 +30,11 @@ impl Camera {
         let is_stale = |row: &usize| stale[*row];
         let frames = pictures.frames_mut(rows).enumerate().filter(|(row, _)| is_stale(row)).map(|(_, frame)| frame);
         let stale_rows = (0..rows).filter(is_stale).map(|row| (row, row));
-        let look = |row: usize| (self.viewpoints.row(row), self.rays.row(row));
+        let look = |row: usize| (self.viewpoints.row(row), self.rays_of(row));
         let result = self.develop(&self.captures, look, stale_rows, frames);
         *failure = result.err().and_then(|(job, error)| {
             let row = (0..rows).filter(is_stale).nth(job)?;
-            Some(CameraError::Draw { env: self.env_ids[row], error })
+            Some(CameraError::Draw { env: self.env_ids()[row], error })
         });
         // After a failure it is not known which are good.
         if failure.is_none() {
@@ -57,7 +57,8 @@ impl Camera {
         views.clear();
         views.extend(places.clone().map(|(_, place)| {
             let (viewpoint, _) = look(place);
-            let pose = self.world_from(viewpoint, captures.world_from_parent[place]).unwrap_or_else(Pose::identity);
+            let pose =
+                self.viewpoints.world_from(viewpoint, captures.world_from_parent[place]).unwrap_or_else(Pose::identity);
             self.lens.view(&viewpoint.pixels, PoseF32::from(&pose))
         }));
         tickets.clear();
@@ -103,7 +104,7 @@ impl Camera {
     /// What tells the capture of a place from others, seen from a viewpoint.
     fn take_of<'a>(&self, captures: &'a Captures, place: usize, viewpoint: &Viewpoint) -> Take<'a> {
         let opened = captures.opened(place).and_then(|(poses, parent)| {
-            let camera = self.world_from(viewpoint, Some(parent))?;
+            let camera = self.viewpoints.world_from(viewpoint, Some(parent))?;
             let before = self.opening.as_ref()?.seconds();
             Some(Opened { poses, world_from_camera: PoseF32::from(&camera), before })
         });
@@ -126,7 +127,7 @@ impl Camera {
         let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
         let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
         let take = self.take_of(&self.captures, row, self.viewpoints.row(row));
-        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None }, take)
+        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays_of(row), before: None }, take)
     }
 }
 

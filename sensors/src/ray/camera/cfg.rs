@@ -2,8 +2,9 @@
 
 use super::pixels::Pixels;
 use super::sensor::RayCasterCamera;
+use crate::camera::env_rows::EnvRows;
 use crate::camera::viewpoints::{Viewpoint, Viewpoints};
-use crate::camera::{DepthMiss, Extrinsics, Intrinsics};
+use crate::camera::{CameraError, DepthMiss, Extrinsics, Intrinsics, Lens};
 use crate::error::SensorError;
 use crate::ray::caster::scan::Scan;
 use crate::ray::{HitTargets, RayError, RayPattern, RayTargets};
@@ -11,6 +12,7 @@ use crate::requires::Requires;
 use crate::sampling::{Channel, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{SensorCfg, SensorContext};
+use kinetoscope_render::lens::RaysOfRows;
 use serde::{Deserialize, Serialize};
 
 /// The most memory that the pictures may take \[bytes\].
@@ -120,8 +122,12 @@ impl SensorCfg for RayCasterCameraCfg {
         let sampler = Sampler::new("ray caster camera", self.requires(), context, &self.sampling, &channels)?;
         let rays = Pixels { width: self.width, height: self.height };
         let scan = Scan::new(targets, rays, self.max_distance, context);
-        let viewpoints = Viewpoints::new(viewpoint, context.num_envs);
-        Ok(RayCasterCamera::new(self, context, parent, viewpoints, scan, schedule.phases(context.num_envs), sampler))
+        let envs = EnvRows::all(context.num_envs);
+        let size = [self.width, self.height];
+        let rays =
+            RaysOfRows::new(Lens::default(), &viewpoint.pixels, size, 1, envs.len()).map_err(CameraError::from)?;
+        let viewpoints = Viewpoints::new(viewpoint, size, rays, envs, parent);
+        Ok(RayCasterCamera::new(self, context, viewpoints, scan, schedule.phases(context.num_envs), sampler))
     }
 }
 

@@ -3,9 +3,11 @@
 use super::cfg::RayCasterCameraCfg;
 use super::pictures::RayPictures;
 use super::pixels::Pixels;
+use crate::camera::env_rows::EnvRows;
 use crate::camera::frustum::frustum;
+use crate::camera::placement::{CameraPlacement, PlaceRows, PoseFrame};
 use crate::camera::viewpoints::Viewpoints;
-use crate::camera::{CameraConvention, DepthMiss, Lens, Optics, PixelIntrinsics};
+use crate::camera::{CameraConvention, DepthMiss, Intrinsics, Lens, Optics, PixelIntrinsics};
 use crate::error::SensorError;
 use crate::expected::Expected;
 use crate::ray::caster::scan::Scan;
@@ -28,14 +30,11 @@ use std::fmt;
 /// and points follow, so that all three stay on the ray. Noisy distances are from 0 to the largest that rays reach, and
 /// misses stay misses. Normals, masks, poses and lenses are exact.
 ///
-/// Setters ([`set_local_pose`](Self::set_local_pose), [`look_at`](Self::look_at),
-/// [`set_intrinsics`](Self::set_intrinsics)...) act from the next picture on, and stay over a reset until
-/// [`restore`](Self::restore). Poses, intrinsics and points that are read are those of the pictures that are read, however
+/// Setters of [`CameraPlacement`] act from the next picture on. Poses, intrinsics and points that are read are those of the pictures that are read, however
 /// late these come.
 #[derive(Clone, Debug)]
 pub struct RayCasterCamera {
     path: String,
-    parent: Option<usize>,
     pub(super) viewpoints: Viewpoints,
     /// What depth and distance say of a miss.
     miss: f32,
@@ -94,7 +93,6 @@ impl RayCasterCamera {
     pub(super) fn new(
         cfg: &RayCasterCameraCfg,
         context: &SensorContext,
-        parent: Option<usize>,
         viewpoints: Viewpoints,
         scan: Scan<Pixels>,
         phases: Phases,
@@ -113,8 +111,7 @@ impl RayCasterCamera {
         };
         let taken: Vec<Taken> = (0..n).map(viewpoint).collect();
         Self {
-            path: summary::path(context, parent),
-            parent,
+            path: summary::path(context, viewpoints.parent),
             viewpoints,
             miss,
             scan,
@@ -140,8 +137,8 @@ impl RayCasterCamera {
     /// Casts the rays of some environments; `state` was checked.
     fn cast(&mut self, envs: &[usize], state: &SceneState) {
         let Some(poses) = &state.instance_poses else { return };
-        let Self { parent, viewpoints, scan, world_from_parent, taken, .. } = self;
-        let parent = parent.zip(state.body_poses.as_ref());
+        let Self { viewpoints, scan, world_from_parent, taken, .. } = self;
+        let parent = viewpoints.parent.zip(state.body_poses.as_ref());
         scan.cast(envs, poses, |env| {
             let viewpoint = viewpoints.row(env);
             let parent = parent.map(|(body, poses)| from_row(&std::array::from_fn(|k| poses[(env, body, k)])));
@@ -195,7 +192,7 @@ impl RayCasterCamera {
 
     /// Whether it hangs on a body.
     pub fn is_attached(&self) -> bool {
-        self.parent.is_some()
+        self.viewpoints.parent.is_some()
     }
 
     /// Rows and pixels per row: (H, W).
@@ -254,6 +251,33 @@ impl RayCasterCamera {
         let RayPictures { depth, mask, .. } = &self.shown.pictures;
         let (depth, mask) = (depth.index_axis(Axis(0), env), mask.index_axis(Axis(0), env));
         depth.into_iter().zip(mask).map(|(depth, id)| (*id != 0).then_some(*depth))
+    }
+}
+
+/// Acts from the next image on.
+impl PlaceRows for RayCasterCamera {
+    fn env_rows(&self) -> &EnvRows {
+        &self.viewpoints.envs
+    }
+
+    fn place_rows(&mut self, rows: &[usize], poses: &[Pose], frame: PoseFrame) -> Result<(), SensorError> {
+        let parents = &self.world_from_parent;
+        Ok(self.viewpoints.place(rows, poses, frame, |row| parents[row])?)
+    }
+
+    fn restore_rows(&mut self, rows: &[usize]) {
+        self.viewpoints.restore(rows);
+    }
+}
+
+impl CameraPlacement for RayCasterCamera {
+    fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
+        self.viewpoints.local_pose(convention)
+    }
+
+    fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
+        let rows = self.viewpoints.envs.chosen(env_ids)?;
+        Ok(self.viewpoints.set_intrinsics(&rows, intrinsics, |_| Ok(()))?)
     }
 }
 
