@@ -6,7 +6,7 @@ use crate::camera::env_rows::EnvRows;
 use crate::camera::viewpoints::{Viewpoint, Viewpoints};
 use crate::camera::{CameraError, DepthMiss, Extrinsics, Intrinsics, Lens};
 use crate::error::SensorError;
-use crate::ray::caster::scan::Scan;
+use crate::ray::scan::Scan;
 use crate::ray::{HitTargets, RayError, RayPattern, RayTargets};
 use crate::requires::Requires;
 use crate::sampling::{Channel, Sampler, SamplingCfg};

@@ -10,7 +10,7 @@ use crate::camera::viewpoints::Viewpoints;
 use crate::camera::{CameraConvention, DepthMiss, Intrinsics, Lens, Optics, PixelIntrinsics};
 use crate::error::SensorError;
 use crate::expected::Expected;
-use crate::ray::caster::scan::Scan;
+use crate::ray::scan::Scan;
 use crate::sampling::{Sampled, Sampler};
 use crate::schedule::Phases;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};

@@ -1,11 +1,11 @@
 //! What a ray caster is, before it exists.
 
-use super::scan::Scan;
+use super::RayAlignment;
 use super::sensor::RayCaster;
-use super::{HitTargets, RayAlignment};
 use crate::error::SensorError;
 use crate::ray::pattern::Grid;
-use crate::ray::{Ray, RayError, RayPattern, RayTargets};
+use crate::ray::scan::Scan;
+use crate::ray::{HitTargets, Ray, RayError, RayPattern, RayTargets};
 use crate::requires::Requires;
 use crate::sampling::{Channel, Sampler, SamplingCfg};
 use crate::schedule::Schedule;

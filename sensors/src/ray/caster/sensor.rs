@@ -2,9 +2,9 @@
 
 use super::RayAlignment;
 use super::cfg::RayCasterCfg;
-use super::scan::Scan;
 use crate::error::SensorError;
 use crate::expected::Expected;
+use crate::ray::scan::Scan;
 use crate::ray::{Ray, RayTargets};
 use crate::sampling::{Sampled, Sampler};
 use crate::schedule::Phases;
