@@ -236,6 +236,12 @@ impl Sampler {
         Ok(())
     }
 
+    /// True where the next [`update`](Self::update) measures in environment `env`, which is at physics step `step`.
+    #[track_caller]
+    pub(crate) fn is_due(&self, env: usize, step: u64) -> bool {
+        self.phases.fallen_due_by(env, step) > 0
+    }
+
     /// Starts the environments `env_ids` anew from `state`: see [`Sensor::reset`](crate::Sensor::reset). Biases are drawn
     /// again.
     ///
@@ -420,6 +426,11 @@ impl Sampler {
         }
     }
 
+    /// Measurements that arrived since the last reset, environment by environment.
+    pub(crate) fn counts(&self) -> ArrayView1<'_, u64> {
+        self.counts.view()
+    }
+
     /// Whether measurements arrive later than they are captured.
     pub(crate) fn is_late(&self) -> bool {
         self.arrived.length() > 0
@@ -525,7 +536,7 @@ pub trait Sampled {
     /// Measurements that arrived since the last reset, shape \[num_envs\], those of a lazy sensor that nobody read among
     /// them; the refresh of a reset is none.
     fn sample_counts(&self) -> ArrayView1<'_, u64> {
-        self.sampler().counts.view()
+        self.sampler().counts()
     }
 
     /// How many rows of the histories of environment `env` are filled.

@@ -5,6 +5,7 @@ pub mod caster;
 mod error;
 mod order;
 pub mod pattern;
+mod sampler;
 mod scan;
 mod targets;
 

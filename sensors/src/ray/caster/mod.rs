@@ -3,7 +3,6 @@
 mod alignment;
 mod cfg;
 mod sensor;
-mod summary;
 
 pub use alignment::RayAlignment;
 pub use cfg::RayCasterCfg;
