@@ -3,7 +3,7 @@
 //! A sensor says which [`Channel`]s it has and how to read the true values of one environment; the [`Sampler`] does the
 //! rest. [`crate::joint_state`] is the model to follow.
 
-use crate::delay::{Delay, Queues};
+use crate::delay::{self, DelayLine};
 use crate::error::SensorError;
 use crate::expected::Expected;
 use crate::history::History;
@@ -103,10 +103,8 @@ pub struct Sampler {
     /// Both stamps of the measurement that arrived last, with a latency.
     arrived: History<f64>,
     counts: Array1<u64>,
-    /// Step at which the current value was last refreshed: what was captured before does not replace it.
-    refreshed: Vec<u64>,
     noise: Option<Noise>,
-    delay: Option<Delay>,
+    delay: Option<DelayLine<Vec<f64>>>,
     /// One measurement: two stamps, then the channels.
     row: Vec<f64>,
 }
@@ -149,7 +147,7 @@ impl Sampler {
         let width = STAMPS + channels.iter().map(|c| c.width).sum::<usize>();
         let latency = u64::from(cfg.latency_steps);
         let late = usize::from(latency > 0);
-        let rows = Queues::capacity(latency, period).saturating_add(cfg.history_length).saturating_add(late);
+        let rows = delay::capacity(latency, period).saturating_add(cfg.history_length).saturating_add(late);
         let numbers = rows.saturating_mul(n).saturating_mul(width);
         if numbers > MAX_NUMBERS {
             return Err(SensorError::TooLarge { rows, width, num_envs: n });
@@ -171,9 +169,8 @@ impl Sampler {
             stamp_history: History::new(n, cfg.history_length, STAMPS),
             arrived: History::new(n, late, STAMPS),
             counts: Array1::zeros(n),
-            refreshed: vec![0; n],
             noise,
-            delay: (latency > 0).then(|| Delay::new(n, width, latency, period)),
+            delay: (latency > 0).then(|| DelayLine::new(n, latency, period, vec![0.0; width])),
             row: vec![0.0; width],
         })
     }
@@ -217,7 +214,7 @@ impl Sampler {
                 let arrives = self.noise.as_mut().is_none_or(|noise| noise.measure(env, &mut self.row[STAMPS..]));
                 match &mut self.delay {
                     _ if !arrives => {}
-                    Some(delay) => delay.push(env, step, &self.row),
+                    Some(delay) => delay.push(env, step).copy_from_slice(&self.row),
                     None => {
                         self.remember(env);
                         // Those before that nobody read, where the sensor is lazy.
@@ -226,9 +223,10 @@ impl Sampler {
                     }
                 }
             }
-            while let Some(captured) = self.delay.as_mut().and_then(|delay| delay.take(env, step, &mut self.row)) {
+            while let Some((row, is_newest)) = self.delay.as_mut().and_then(|delay| delay.take(env, step)) {
+                self.row.copy_from_slice(row);
                 self.remember(env);
-                if captured > self.refreshed[env] {
+                if is_newest {
                     self.show(env);
                 }
             }
@@ -291,7 +289,9 @@ impl Sampler {
         self.check(state)?;
         self.expected.check_envs(env_ids)?;
         for &env in env_ids {
-            self.refreshed[env] = state.step[env];
+            if let Some(delay) = &mut self.delay {
+                delay.refresh(env, state.step[env]);
+            }
             self.read(env, state, &mut read);
             if let Some(noise) = &mut self.noise {
                 noise.disturb(env, &mut self.row[STAMPS..]);
@@ -355,12 +355,8 @@ impl Sampler {
     /// [`Sensor::due_in`](crate::Sensor::due_in).
     pub fn due_in(&self, step: &[u64]) -> u64 {
         let due = self.phases.due_in(step.iter().copied());
-        let Some(delay) = &self.delay else { return due };
-        let arrivals = (0..)
-            .zip(step)
-            .filter(|(_, now)| **now != Phases::STANDS)
-            .filter_map(|(env, &now)| Some(delay.arrival(env)?.saturating_sub(now).max(1)));
-        arrivals.fold(due, u64::min)
+        let arrival = self.delay.as_ref().and_then(|delay| delay.due_in(step.iter().copied()));
+        arrival.map_or(due, |arrival| arrival.min(due))
     }
 
     /// When it measures.

@@ -2,6 +2,7 @@
 
 use super::cfg::Rig;
 use super::disparity::DisparityMap;
+use crate::cached::Cached;
 use crate::camera::env_rows::EnvRows;
 use crate::camera::extrinsics::{CameraConvention, Poses};
 use crate::camera::placement::{CameraPlacement, PlaceRows, PoseFrame};
@@ -13,7 +14,6 @@ use kinetoscope_scene::pose::{from_row, to_row};
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use ndarray::Array2;
 use std::fmt;
-use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// A pair of eyes in each of several environments: two [`Camera`]s on one rig.
 ///
@@ -25,15 +25,12 @@ pub struct StereoCamera {
     left: Camera,
     right: Camera,
     pub(super) rig: Rig,
-    /// What was computed of the pictures shown now.
-    pub(super) shown: OnceLock<DisparityMap>,
-    /// What was computed before: its memory is kept.
-    spare: Mutex<DisparityMap>,
+    pub(super) disparities: Cached<DisparityMap>,
 }
 
 impl StereoCamera {
     pub(super) fn new(left: Camera, right: Camera, rig: Rig) -> Self {
-        Self { left, right, rig, shown: OnceLock::new(), spare: Mutex::default() }
+        Self { left, right, rig, disparities: Cached::outdated(DisparityMap::default()) }
     }
 
     /// The left eye.
@@ -111,14 +108,7 @@ impl StereoCamera {
 
     /// What was computed may be of other pictures than those shown.
     fn outdate(&mut self) {
-        if let Some(map) = self.shown.take() {
-            *self.spare.get_mut().unwrap_or_else(PoisonError::into_inner) = map;
-        }
-    }
-
-    /// The memory of what was computed before.
-    pub(super) fn take_spare(&self) -> DisparityMap {
-        std::mem::take(&mut *self.spare.lock().unwrap_or_else(PoisonError::into_inner))
+        self.disparities.invalidate();
     }
 }
 
