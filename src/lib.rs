@@ -43,14 +43,14 @@ pub mod prelude {
     pub use kinetoscope_record::Record;
     pub use kinetoscope_scene::Pose;
     pub use kinetoscope_sensors::camera::{
-        CameraCfg, Channels, Extrinsics, Intrinsics, Placement, RasterCfg, Renderer,
+        CameraCfg, CameraPlacement, Channels, Extrinsics, Intrinsics, Placement, RasterCfg, Renderer,
     };
     pub use kinetoscope_sensors::ray::{RayCasterCfg, RayPattern};
     pub use kinetoscope_sensors::{ContactSensorCfg, ImuCfg, Sampled, SamplingCfg};
     pub use kinetoscope_sim::{
         ArticulationCfg, BodyType, ComponentCfg, Draw, DriveCfg, EntityCfg, EnvId, GroundCfg, InteractiveScene,
-        JointIndex, LightCfg, MjcfCfg, MjcfFile, ObjectShape, PerJoint, Property, Randomization, RigidObjectCfg,
-        RobotCfg, RobotId, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, TerrainCfg, UrdfCfg,
+        JointIndex, LightCfg, MjcfCfg, MjcfFile, ObjectShape, Property, Randomization, RigidObjectCfg, RobotCfg,
+        RobotId, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, TerrainCfg, UrdfCfg,
     };
     #[cfg(feature = "viewer")]
     pub use kinetoscope_viewer::{OpenWindow, Screenshot, Serve};

@@ -4,7 +4,7 @@ use crate::error::SensorError;
 use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::select::{at_least_one, read_columns, select_or_all};
+use crate::select::{Choice, at_least_one, read_columns, select_or_all};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use kinetoscope_scene::SceneState;
@@ -49,7 +49,7 @@ impl SensorCfg for ActuatorStateCfg {
     fn build(&self, context: &SensorContext) -> Result<ActuatorState, SensorError> {
         let all = &context.actuators;
         let actuators = select_or_all(self.actuators.as_deref(), all, "actuator")?;
-        at_least_one(actuators.len(), ("actuator state", "actuators", "actuator"), all)?;
+        at_least_one(actuators.len(), Choice { sensor: "actuator state", field: "actuators", what: "actuator" }, all)?;
         let channels = ["controls", "forces", "activations"].map(|name| Channel::new(name, actuators.len()));
         Ok(ActuatorState {
             names: actuators.iter().map(|&actuator| all[actuator].clone()).collect(),

@@ -1,21 +1,19 @@
-//! Measurements on their way: captured, and not to be read yet.
+//! Values on their way: captured, and not to be read yet.
 
-/// A queue of rows per environment, each row with the step at which it was captured. All memory is taken at construction.
-#[derive(Clone, Debug)]
-pub(crate) struct Delay {
-    queues: Queues,
-    width: usize,
-    rows: Vec<f64>,
-}
+use crate::schedule::Phases;
 
-/// The queues themselves: which slot holds what, and since when. What is in a slot is kept by who owns them: `capacity` slots
-/// per environment, one after the other.
+/// Values that arrive a fixed number of steps after their capture, in a queue per environment. All memory is taken at
+/// construction.
 #[derive(Clone, Debug)]
-pub(crate) struct Queues {
+pub(crate) struct DelayLine<T> {
     steps: u64,
+    /// Slots per environment.
     capacity: usize,
     queues: Vec<Queue>,
-    captured: Vec<u64>,
+    /// Values and the steps of their capture: the slots of one environment after those of the other.
+    slots: Vec<(u64, T)>,
+    /// Steps at which environments were last refreshed.
+    refreshed: Vec<u64>,
 }
 
 /// A ring in the slots of one environment.
@@ -25,85 +23,66 @@ struct Queue {
     len: usize,
 }
 
-impl Queues {
-    /// How many slots an environment needs: with one filled every `period` steps, those of the last `steps` and the newest.
-    pub(crate) fn capacity(steps: u64, period: u64) -> usize {
-        usize::try_from(steps.div_ceil(period)).map_or(usize::MAX, |n| n.saturating_add(1))
+/// How many values an environment has on their way at most: with one captured every `period` steps, those of the last `steps`
+/// and the newest.
+pub(crate) fn capacity(steps: u64, period: u64) -> usize {
+    usize::try_from(steps.div_ceil(period)).map_or(usize::MAX, |n| n.saturating_add(1))
+}
+
+impl<T: Clone> DelayLine<T> {
+    /// Queues of values that are captured every `period` steps at most and arrive `steps` later; slots hold `value` first.
+    pub(crate) fn new(num_envs: usize, steps: u64, period: u64, value: T) -> Self {
+        let capacity = capacity(steps, period);
+        let slots = vec![(0, value); num_envs * capacity];
+        Self { steps, capacity, queues: vec![Queue::default(); num_envs], slots, refreshed: vec![0; num_envs] }
     }
 
-    /// Queues of what is captured every `period` steps at most, and arrives `steps` later.
-    pub(crate) fn new(num_envs: usize, steps: u64, period: u64) -> Self {
-        let capacity = Self::capacity(steps, period);
-        Self { steps, capacity, queues: vec![Queue::default(); num_envs], captured: vec![0; num_envs * capacity] }
-    }
-
-    /// Number of slots of all environments.
-    pub(crate) fn slots(&self) -> usize {
-        self.captured.len()
-    }
-
-    /// The slot for what environment `env` captures at `step`.
-    pub(crate) fn push(&mut self, env: usize, step: u64) -> usize {
+    /// Sends a value of environment `env` on its way at `step`: it is to be written over what this slot held before.
+    pub(crate) fn push(&mut self, env: usize, step: u64) -> &mut T {
         let queue = &mut self.queues[env];
         if queue.len == self.capacity {
-            // Nobody asked for a long time: what is oldest would have been overtaken anyway.
+            // Nothing was taken for a long time: the oldest value would have been overtaken anyway.
             *queue = Queue { first: (queue.first + 1) % self.capacity, len: queue.len - 1 };
         }
         let slot = env * self.capacity + (queue.first + queue.len) % self.capacity;
         queue.len += 1;
-        self.captured[slot] = step;
-        slot
+        let (captured, value) = &mut self.slots[slot];
+        *captured = step;
+        value
     }
 
-    /// The slot of the oldest that has arrived in environment `env` by `step`, and the step of its capture. The slot is free
-    /// then, and holds what it held until the next [`push`](Self::push).
-    pub(crate) fn take(&mut self, env: usize, step: u64) -> Option<(usize, u64)> {
+    /// Takes the oldest value of environment `env` that has arrived by `step`, and true where it was captured after the last
+    /// [`refresh`](Self::refresh).
+    pub(crate) fn take(&mut self, env: usize, step: u64) -> Option<(&T, bool)> {
         self.arrival(env).filter(|&arrival| arrival <= step)?;
         let queue = &mut self.queues[env];
         let slot = env * self.capacity + queue.first;
         *queue = Queue { first: (queue.first + 1) % self.capacity, len: queue.len - 1 };
-        Some((slot, self.captured[slot]))
+        let (captured, value) = &self.slots[slot];
+        Some((value, *captured > self.refreshed[env]))
     }
 
-    /// The step at which the next arrives in environment `env`.
-    pub(crate) fn arrival(&self, env: usize) -> Option<u64> {
+    /// The step at which the next value of environment `env` arrives.
+    fn arrival(&self, env: usize) -> Option<u64> {
         let queue = self.queues[env];
-        (queue.len > 0).then(|| self.captured[env * self.capacity + queue.first] + self.steps)
+        (queue.len > 0).then(|| self.slots[env * self.capacity + queue.first].0 + self.steps)
+    }
+
+    /// Steps until the next arrival in any environment, at least 1, when they are at `steps`; `None` where nothing is on its
+    /// way.
+    pub(crate) fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> Option<u64> {
+        let running = steps.into_iter().enumerate().filter(|(_, now)| *now != Phases::STANDS);
+        running.filter_map(|(env, now)| Some(self.arrival(env)?.saturating_sub(now).max(1))).min()
+    }
+
+    /// Notes that the current value of environment `env` was read anew at `step`: values that were captured before are not to
+    /// replace it when they arrive.
+    pub(crate) fn refresh(&mut self, env: usize, step: u64) {
+        self.refreshed[env] = step;
     }
 
     /// Forgets what is on its way in environment `env`.
     pub(crate) fn clear(&mut self, env: usize) {
         self.queues[env] = Queue::default();
-    }
-}
-
-impl Delay {
-    /// Delays rows of `width` numbers, captured every `period` steps at most, by `steps`.
-    pub(crate) fn new(num_envs: usize, width: usize, steps: u64, period: u64) -> Self {
-        let queues = Queues::new(num_envs, steps, period);
-        Self { rows: vec![0.0; queues.slots() * width], queues, width }
-    }
-
-    /// Sends a row on its way at `step`.
-    pub(crate) fn push(&mut self, env: usize, step: u64, row: &[f64]) {
-        let slot = self.queues.push(env, step);
-        self.rows[slot * self.width..(slot + 1) * self.width].copy_from_slice(row);
-    }
-
-    /// Takes the oldest row of environment `env` that has arrived by `step`; gives the step of its capture.
-    pub(crate) fn take(&mut self, env: usize, step: u64, row: &mut [f64]) -> Option<u64> {
-        let (slot, captured) = self.queues.take(env, step)?;
-        row.copy_from_slice(&self.rows[slot * self.width..(slot + 1) * self.width]);
-        Some(captured)
-    }
-
-    /// The step at which the next row of environment `env` arrives.
-    pub(crate) fn arrival(&self, env: usize) -> Option<u64> {
-        self.queues.arrival(env)
-    }
-
-    /// Forgets what is on its way in environment `env`.
-    pub(crate) fn clear(&mut self, env: usize) {
-        self.queues.clear(env);
     }
 }

@@ -5,7 +5,7 @@ use crate::frames::{check_offset, pose, put};
 use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::select::{at_least_one, matching};
+use crate::select::{Choice, at_least_one, matching};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use kinetoscope_scene::pose::{from_row, to_wxyz};
@@ -93,7 +93,11 @@ impl SensorCfg for FrameTransformerCfg {
     /// name, and what is wrong with the sampling.
     fn build(&self, context: &SensorContext) -> Result<FrameTransformer, SensorError> {
         let source = context.body(&self.source)?;
-        at_least_one(self.targets.len(), ("frame transformer", "targets", "target"), &context.bodies)?;
+        at_least_one(
+            self.targets.len(),
+            Choice { sensor: "frame transformer", field: "targets", what: "target" },
+            &context.bodies,
+        )?;
         let (mut targets, mut names) = (Vec::new(), Vec::<String>::new());
         for target in &self.targets {
             let bodies = matching(&target.bodies, &context.bodies, "body")?;

@@ -2,11 +2,11 @@
 
 use ndarray::{Array3, ArrayView1, ArrayView2, ArrayView3, Axis};
 
-/// Rows of numbers, newest first, per environment.
+/// Rows of values, newest first, per environment.
 ///
-/// All memory is taken at construction. Environments measure at their own times, so each has its own fill; rows that are
-/// not filled yet are `T::default()`. Older rows are moved up by one at each measurement, so that the whole history is
-/// one plain array view; a ring of indices would save the move (a few hundred bytes) and cost the view.
+/// All memory is taken at construction. Environments measure at their own times, so each has its own fill; rows of numbers
+/// that are not filled yet are `T::default()`. Older rows are moved up by one at each measurement, so that the whole history
+/// is one plain array view; a ring of indices would save the move (a few hundred bytes) and cost the view.
 #[derive(Clone, Debug)]
 pub struct History<T> {
     rows: Array3<T>,
@@ -16,7 +16,7 @@ pub struct History<T> {
 impl<T: Copy + Default> History<T> {
     /// Room for `length` rows of `width` numbers in each of `num_envs` environments. A length of 0 remembers nothing.
     pub fn new(num_envs: usize, length: usize, width: usize) -> Self {
-        Self { rows: Array3::from_elem((num_envs, length, width), T::default()), filled: vec![0; num_envs] }
+        Self::of((num_envs, length, width), T::default())
     }
 
     /// Adds the newest row of environment `env`; the oldest one falls out where the history is full.
@@ -45,6 +45,38 @@ impl<T: Copy + Default> History<T> {
     #[track_caller]
     pub fn reset(&mut self, env: usize) {
         self.rows.index_axis_mut(Axis(0), env).fill(T::default());
+        self.filled[env] = 0;
+    }
+}
+
+impl<T: Clone> History<T> {
+    /// Rows of `(num_envs, length, width)` values, which are `value` first.
+    pub(crate) fn of(shape: (usize, usize, usize), value: T) -> Self {
+        Self { rows: Array3::from_elem(shape, value), filled: vec![0; shape.0] }
+    }
+
+    /// The newest row of environment `env`, to be written: it holds what the row that fell out held. `None` where the history
+    /// has no length.
+    #[track_caller]
+    pub(crate) fn push_reused(&mut self, env: usize) -> Option<&mut [T]> {
+        let (_, length, width) = self.rows.dim();
+        let flat = self.rows.index_axis_mut(Axis(0), env).into_slice().filter(|_| length > 0)?;
+        flat.rotate_right(width);
+        self.filled[env] = length.min(self.filled[env] + 1);
+        Some(&mut flat[..width])
+    }
+
+    /// The row of environment `env` that is `age` measurements old, as a slice; `None` where there is none.
+    #[track_caller]
+    pub(crate) fn slice(&self, env: usize, age: usize) -> Option<&[T]> {
+        let (_, length, width) = self.rows.dim();
+        let first = (env * length + age) * width;
+        self.rows.as_slice()?.get(first..first + width).filter(|_| age < self.filled[env])
+    }
+
+    /// Forgets the rows of environment `env`; their memory is reused by [`push_reused`](Self::push_reused).
+    #[track_caller]
+    pub(crate) fn forget(&mut self, env: usize) {
         self.filled[env] = 0;
     }
 

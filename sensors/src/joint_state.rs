@@ -7,7 +7,7 @@ use crate::error::SensorError;
 use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::select::{at_least_one, read_columns, select_or_all};
+use crate::select::{Choice, at_least_one, read_columns, select_or_all};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use kinetoscope_scene::SceneState;
@@ -53,7 +53,11 @@ impl SensorCfg for JointStateCfg {
     fn build(&self, context: &SensorContext) -> Result<JointState, SensorError> {
         let joints = select_or_all(self.joints.as_deref(), &context.joints, "joint")?;
         if self.joints.is_some() {
-            at_least_one(joints.len(), ("joint state", "joints", "joint"), &context.joints)?;
+            at_least_one(
+                joints.len(),
+                Choice { sensor: "joint state", field: "joints", what: "joint" },
+                &context.joints,
+            )?;
         }
         let channels = ["positions", "velocities", "efforts"].map(|name| Channel::new(name, joints.len()));
         Ok(JointState {

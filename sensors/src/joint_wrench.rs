@@ -5,7 +5,7 @@ use crate::frames::{pose, put, vector};
 use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::select::{at_least_one, select};
+use crate::select::{Choice, at_least_one, select};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use kinetoscope_scene::{Marker, Pose, SceneState};
@@ -88,7 +88,11 @@ impl SensorCfg for JointWrenchCfg {
             }
         }
         let frames = select(&self.frames, &context.bodies, "link")?;
-        at_least_one(links.len() + frames.len(), ("joint wrench", "links and frames", "link"), &context.bodies)?;
+        at_least_one(
+            links.len() + frames.len(),
+            Choice { sensor: "joint wrench", field: "links and frames", what: "link" },
+            &context.bodies,
+        )?;
         let names = links.iter().chain(&frames).map(|&link| context.bodies[link].clone()).collect();
         let in_frame = |frame: usize| {
             let link = context.carriers.get(frame).copied().unwrap_or(frame);

@@ -10,6 +10,7 @@
 #![forbid(unsafe_code)]
 
 pub mod actuator_state;
+mod cached;
 pub mod camera;
 pub mod contact_sensor;
 mod delay;

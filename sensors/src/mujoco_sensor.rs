@@ -4,7 +4,7 @@ use crate::error::SensorError;
 use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
-use crate::select::{at_least_one, select};
+use crate::select::{Choice, at_least_one, select};
 use crate::sensor::{EngineSensor, Sensor, SensorCfg, SensorContext};
 use crate::summary;
 use kinetoscope_scene::SceneState;
@@ -60,7 +60,7 @@ impl SensorCfg for MujocoSensorCfg {
             Some(patterns) => select(patterns, &known, "MuJoCo sensor")?,
             None => (0..known.len()).collect(),
         };
-        at_least_one(chosen.len(), ("MuJoCo", "sensors", "MuJoCo sensor"), &known)?;
+        at_least_one(chosen.len(), Choice { sensor: "MuJoCo", field: "sensors", what: "MuJoCo sensor" }, &known)?;
         let sensors: Vec<EngineSensor> = chosen.iter().map(|&s| context.engine_sensors[s].clone()).collect();
         let mut columns = Vec::with_capacity(sensors.len());
         let mut width = 0;

@@ -3,7 +3,7 @@
 //! A sensor says which [`Channel`]s it has and how to read the true values of one environment; the [`Sampler`] does the
 //! rest. [`crate::joint_state`] is the model to follow.
 
-use crate::delay::{Delay, Queues};
+use crate::delay::{self, DelayLine};
 use crate::error::SensorError;
 use crate::expected::Expected;
 use crate::history::History;
@@ -103,10 +103,8 @@ pub struct Sampler {
     /// Both stamps of the measurement that arrived last, with a latency.
     arrived: History<f64>,
     counts: Array1<u64>,
-    /// Step at which the current value was last refreshed: what was captured before does not replace it.
-    refreshed: Vec<u64>,
     noise: Option<Noise>,
-    delay: Option<Delay>,
+    delay: Option<DelayLine<Vec<f64>>>,
     /// One measurement: two stamps, then the channels.
     row: Vec<f64>,
 }
@@ -149,7 +147,7 @@ impl Sampler {
         let width = STAMPS + channels.iter().map(|c| c.width).sum::<usize>();
         let latency = u64::from(cfg.latency_steps);
         let late = usize::from(latency > 0);
-        let rows = Queues::capacity(latency, period).saturating_add(cfg.history_length).saturating_add(late);
+        let rows = delay::capacity(latency, period).saturating_add(cfg.history_length).saturating_add(late);
         let numbers = rows.saturating_mul(n).saturating_mul(width);
         if numbers > MAX_NUMBERS {
             return Err(SensorError::TooLarge { rows, width, num_envs: n });
@@ -171,9 +169,8 @@ impl Sampler {
             stamp_history: History::new(n, cfg.history_length, STAMPS),
             arrived: History::new(n, late, STAMPS),
             counts: Array1::zeros(n),
-            refreshed: vec![0; n],
             noise,
-            delay: (latency > 0).then(|| Delay::new(n, width, latency, period)),
+            delay: (latency > 0).then(|| DelayLine::new(n, latency, period, vec![0.0; width])),
             row: vec![0.0; width],
         })
     }
@@ -217,7 +214,7 @@ impl Sampler {
                 let arrives = self.noise.as_mut().is_none_or(|noise| noise.measure(env, &mut self.row[STAMPS..]));
                 match &mut self.delay {
                     _ if !arrives => {}
-                    Some(delay) => delay.push(env, step, &self.row),
+                    Some(delay) => delay.push(env, step).copy_from_slice(&self.row),
                     None => {
                         self.remember(env);
                         // Those before that nobody read, where the sensor is lazy.
@@ -226,14 +223,21 @@ impl Sampler {
                     }
                 }
             }
-            while let Some(captured) = self.delay.as_mut().and_then(|delay| delay.take(env, step, &mut self.row)) {
+            while let Some((row, is_newest)) = self.delay.as_mut().and_then(|delay| delay.take(env, step)) {
+                self.row.copy_from_slice(row);
                 self.remember(env);
-                if captured > self.refreshed[env] {
+                if is_newest {
                     self.show(env);
                 }
             }
         }
         Ok(())
+    }
+
+    /// True where the next [`update`](Self::update) measures in environment `env`, which is at physics step `step`.
+    #[track_caller]
+    pub(crate) fn is_due(&self, env: usize, step: u64) -> bool {
+        self.phases.fallen_due_by(env, step) > 0
     }
 
     /// Starts the environments `env_ids` anew from `state`: see [`Sensor::reset`](crate::Sensor::reset). Biases are drawn
@@ -285,7 +289,9 @@ impl Sampler {
         self.check(state)?;
         self.expected.check_envs(env_ids)?;
         for &env in env_ids {
-            self.refreshed[env] = state.step[env];
+            if let Some(delay) = &mut self.delay {
+                delay.refresh(env, state.step[env]);
+            }
             self.read(env, state, &mut read);
             if let Some(noise) = &mut self.noise {
                 noise.disturb(env, &mut self.row[STAMPS..]);
@@ -349,12 +355,8 @@ impl Sampler {
     /// [`Sensor::due_in`](crate::Sensor::due_in).
     pub fn due_in(&self, step: &[u64]) -> u64 {
         let due = self.phases.due_in(step.iter().copied());
-        let Some(delay) = &self.delay else { return due };
-        let arrivals = (0..)
-            .zip(step)
-            .filter(|(_, now)| **now != Phases::STANDS)
-            .filter_map(|(env, &now)| Some(delay.arrival(env)?.saturating_sub(now).max(1)));
-        arrivals.fold(due, u64::min)
+        let arrival = self.delay.as_ref().and_then(|delay| delay.due_in(step.iter().copied()));
+        arrival.map_or(due, |arrival| arrival.min(due))
     }
 
     /// When it measures.
@@ -418,6 +420,11 @@ impl Sampler {
         } else {
             quantity.arrived.view().index_axis_move(Axis(1), 0)
         }
+    }
+
+    /// Measurements that arrived since the last reset, environment by environment.
+    pub(crate) fn counts(&self) -> ArrayView1<'_, u64> {
+        self.counts.view()
     }
 
     /// Whether measurements arrive later than they are captured.
@@ -525,7 +532,7 @@ pub trait Sampled {
     /// Measurements that arrived since the last reset, shape \[num_envs\], those of a lazy sensor that nobody read among
     /// them; the refresh of a reset is none.
     fn sample_counts(&self) -> ArrayView1<'_, u64> {
-        self.sampler().counts.view()
+        self.sampler().counts()
     }
 
     /// How many rows of the histories of environment `env` are filled.

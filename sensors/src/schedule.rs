@@ -101,10 +101,17 @@ impl Phases {
     /// As [`is_due`](Self::is_due).
     #[track_caller]
     pub fn fallen_due(&mut self, env: usize, step: u64) -> u64 {
-        let (phase, period) = (&mut self.envs[env], self.schedule.period_steps);
+        let fallen_due = self.fallen_due_by(env, step);
+        self.envs[env].seen = step;
+        fallen_due
+    }
+
+    /// The number that [`fallen_due`](Self::fallen_due) would return; it counts as not asked.
+    #[track_caller]
+    pub(crate) fn fallen_due_by(&self, env: usize, step: u64) -> u64 {
+        let (phase, period) = (&self.envs[env], self.schedule.period_steps);
         assert!(step >= phase.seen, "environment {env} went from step {} to {step} without a reset", phase.seen);
         let before = (phase.seen - phase.start) / period;
-        phase.seen = step;
         let run = step - phase.start;
         if run.is_multiple_of(period) { run / period - before } else { 0 }
     }

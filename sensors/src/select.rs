@@ -48,19 +48,26 @@ pub(crate) fn read_columns(fields: [&Option<Array2<f64>>; 3], columns: &[usize],
     row.iter_mut().zip(numbers).for_each(|(to, from)| *to = from);
 }
 
-/// Refuses to choose nothing: `field` of the kind of sensor called `sensor` chose `count` of `names`.
+/// A field of a configuration that chooses by names.
+#[derive(Clone, Copy)]
+pub(crate) struct Choice {
+    /// Kind of sensor.
+    pub(crate) sensor: &'static str,
+    pub(crate) field: &'static str,
+    /// Kind of thing that the names are of.
+    pub(crate) what: &'static str,
+}
+
+/// Refuses a choice of nothing, where `count` of `names` were chosen.
 ///
 /// # Errors
 ///
 /// [`SensorError::NothingChosen`] with the first of the names.
-pub(crate) fn at_least_one(
-    count: usize,
-    (sensor, field, what): (&'static str, &'static str, &'static str),
-    names: &[String],
-) -> Result<(), SensorError> {
+pub(crate) fn at_least_one(count: usize, choice: Choice, names: &[String]) -> Result<(), SensorError> {
     if count > 0 {
         return Ok(());
     }
+    let Choice { sensor, field, what } = choice;
     let candidates = names.iter().take(MAX_CANDIDATES).cloned().collect();
     Err(SensorError::NothingChosen { sensor, field, what, candidates })
 }

@@ -1,12 +1,11 @@
 //! The place of a sensor with its owner: measures when it is due, or when it is read.
 
+use crate::cached::Cached;
 use crate::error::SensorError;
 use crate::requires::Requires;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::Sensor;
 use kinetoscope_scene::SceneState;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// A sensor, eager or [lazy](crate::SensorCfg::lazy), as an owner keeps it: everything that happens is told to the slot, and
 /// the sensor is read through it.
@@ -21,10 +20,8 @@ pub struct SensorSlot {
     kept: Option<SceneState>,
     /// Environments that are due, between updates without meaning: its memory is kept.
     due: Vec<bool>,
-    /// The sensor, where it has nothing to measure.
-    ready: OnceLock<Option<Holder>>,
-    /// The sensor, where it has something to measure: `kept`. Empty then and now where measuring panicked.
-    waiting: Mutex<Option<Holder>>,
+    /// The sensor, outdated while it has something to measure: `kept`. Empty where measuring panicked.
+    sensor: Cached<Holder>,
 }
 
 /// A sensor, and why it is not asked any more.
@@ -53,8 +50,7 @@ impl SensorSlot {
             phases: lazy.map(|schedule| schedule.phases(num_envs)),
             kept: None,
             due: vec![false; num_envs],
-            ready: OnceLock::from(Some(holder)),
-            waiting: Mutex::new(None),
+            sensor: Cached::current(holder),
         }
     }
 
@@ -88,17 +84,14 @@ impl SensorSlot {
 
     /// From now on the sensor has something to measure, unless it failed.
     fn wait(&mut self) {
-        if self.due.contains(&true)
-            && !self.has_failed()
-            && let Some(holder) = self.ready.take()
-        {
-            *self.waiting.get_mut().unwrap_or_else(PoisonError::into_inner) = holder;
+        if self.due.contains(&true) && !self.has_failed() {
+            self.sensor.invalidate();
         }
     }
 
     /// As [`Sensor::reset`], at once. What the environments had to measure is gone.
     pub fn reset(&mut self, env_ids: &[usize], state: &SceneState) {
-        if let Some(holder) = self.unmeasured() {
+        if let Some(holder) = self.sensor.value_mut() {
             holder.ask(|sensor| sensor.reset(env_ids, state));
             if holder.fault.is_some() {
                 return;
@@ -140,16 +133,15 @@ impl SensorSlot {
     pub fn due_in(&self, step: &[u64]) -> u64 {
         match &self.phases {
             Some(phases) => phases.due_in(step.iter().copied()),
-            None => self.ready.get().and_then(Option::as_ref).map_or(u64::MAX, |holder| holder.sensor.due_in(step)),
+            None => self.sensor.get().map_or(u64::MAX, |holder| holder.sensor.due_in(step)),
         }
     }
 
     /// Whether it failed, as far as that is known: one that has something to measure may yet fail.
     pub fn has_failed(&self) -> bool {
-        match self.ready.get() {
-            Some(Some(holder)) => holder.fault.is_some(),
-            Some(None) => true,
-            None => false,
+        match self.sensor.get() {
+            Some(holder) => holder.fault.is_some(),
+            None => self.sensor.is_empty(),
         }
     }
 
@@ -159,27 +151,17 @@ impl SensorSlot {
     ///
     /// Why it failed. A panic of the sensor goes on to who reads first; after that it has failed.
     pub fn sensor(&self) -> Result<&dyn Sensor, &SensorError> {
-        let mut panic = None;
-        let measured = self.ready.get_or_init(|| {
-            let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-            let mut holder = waiting.take()?;
+        // One that panics is lost: its state is not known any more.
+        let lost = || Err(&SensorError::BrokenOff);
+        let holder = self.sensor.get_or_update(lost, |holder| {
             if let Some(kept) = &self.kept {
-                let measure = AssertUnwindSafe(|| holder.ask(|sensor| sensor.update(kept)));
-                // One that panics is not put back: nobody knows what it would say.
-                if let Err(cause) = catch_unwind(measure) {
-                    panic = Some(cause);
-                    return None;
-                }
+                holder.ask(|sensor| sensor.update(kept));
             }
-            Some(holder)
-        });
-        if let Some(cause) = panic {
-            resume_unwind(cause);
-        }
-        match measured {
-            Some(Holder { fault: None, sensor }) => Ok(sensor.as_ref()),
-            Some(Holder { fault: Some(fault), .. }) => Err(fault),
-            None => Err(&SensorError::BrokenOff),
+            Ok(())
+        })?;
+        match holder {
+            Holder { fault: None, sensor } => Ok(sensor.as_ref()),
+            Holder { fault: Some(fault), .. } => Err(fault),
         }
     }
 
@@ -198,17 +180,9 @@ impl SensorSlot {
 
     /// The sensor with nothing to measure.
     fn now(&mut self) -> Option<&mut Holder> {
-        // What is wrong stays with it.
+        // Its fault is returned by the next read.
         let _ = self.sensor();
-        self.ready.get_mut()?.as_mut()
-    }
-
-    /// The sensor as it is.
-    fn unmeasured(&mut self) -> Option<&mut Holder> {
-        match self.ready.get_mut() {
-            Some(ready) => ready.as_mut(),
-            None => self.waiting.get_mut().unwrap_or_else(PoisonError::into_inner).as_mut(),
-        }
+        self.sensor.value_mut()
     }
 }
 

@@ -1,25 +1,36 @@
 //! Makes cameras of their configurations, and refuses those that cannot be.
 
+use super::arrivals::PastImages;
 use super::cfg::CameraCfg;
+use super::env_rows::EnvRows;
 use super::error::CameraError;
 use super::faults::Faults;
+use super::frame_buffer::FrameBuffer;
 use super::imperfection::Imperfections;
-use super::memory::Memory;
-use super::opening::Opening;
+use super::motion::Motion;
+use super::sensor::drawing::{DrawnImages, FrameRenderer};
 use super::sensor::{Camera, Lens};
+use super::viewpoints::{Viewpoint, Viewpoints};
+use crate::cached::Cached;
 use crate::error::SensorError;
 use crate::requires::Requires;
 use crate::schedule::Schedule;
 use crate::sensor::{SensorCfg, SensorContext};
+use crate::summary;
 use kinetoscope_render::aperture::Aperture;
-use kinetoscope_render::frame::{Channels, Pictures};
+use kinetoscope_render::frame::Channels;
 use kinetoscope_render::intrinsics::PixelIntrinsics;
 use kinetoscope_render::lens::RaysOfRows;
+use kinetoscope_render::parallel::ParallelRasterizer;
 use kinetoscope_render::path::film::Film;
 use kinetoscope_render::renderer::Renderer;
+use kinetoscope_render::request::RasterCfg;
 use kinetoscope_render::shade::plan::{check_light, check_occlusion};
+use kinetoscope_render::ticket::Ticket;
 use kinetoscope_render::visibility::RenderError;
-use kinetoscope_scene::{Light, PoseF32};
+use kinetoscope_scene::{Light, Marker, PoseF32};
+use std::sync::Mutex;
+use std::sync::atomic::AtomicU64;
 
 /// The most memory that the pictures of a camera may take \[bytes\].
 const MAX_BYTES: u64 = 64 << 30;
@@ -64,20 +75,53 @@ impl SensorCfg for CameraCfg {
         let lens = Lens::new(self)?;
         let pixels = self.intrinsics.to_pixels(self.width, self.height)?;
         lens.view(&pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)?;
-        let env_ids = self.env_ids.clone().unwrap_or_else(|| (0..context.num_envs).collect());
-        check_env_ids(&env_ids, context.num_envs)?;
-        self.check_memory(env_ids.len(), scene.instances().len(), scene.lights.len(), schedule)?;
-        let opening = Opening::new(self, schedule, context.dt, env_ids.len(), &scene)?;
-        let rays = self.lens_rays(&pixels, env_ids.len())?;
+        let envs = EnvRows::new(self.env_ids.as_deref(), context.num_envs)?;
+        self.check_memory(envs.len(), scene.instances().len(), scene.lights.len(), schedule)?;
+        let motion = Motion::new(self, schedule, context.dt, envs.len(), &scene)?;
+        let rays = self.lens_rays(&pixels, envs.len())?;
         let faults = Faults::new(self, context, schedule.period_steps() as f64 * context.dt)?;
-        let mount = self.extrinsics.parent_from_camera()?;
-        let pictures = Pictures::new(self.channels, env_ids.len(), self.width, self.height);
-        let optics = (lens, pixels, mount);
-        Ok(Camera::new(self, context, scene, (schedule, opening), parent, optics, rays, env_ids, (pictures, faults)))
+        let viewpoint = Viewpoint { parent_from_camera: self.extrinsics.parent_from_camera()?, pixels };
+        let viewpoints = Viewpoints::new(viewpoint, [self.width, self.height], rays, envs, parent);
+        let rows = viewpoints.len();
+        let key = |env: &usize| Ticket::first(context.seed, (context.first_env + env) as u64, &context.name);
+        let tickets: Vec<Ticket> = viewpoints.envs.env_ids().iter().map(key).collect();
+        let rasterizer = self.rasterizer(context);
+        Ok(Camera {
+            path: summary::path(context, parent),
+            num_bodies: context.bodies.len(),
+            dt: context.dt,
+            lens,
+            phases: schedule.phases(rows),
+            frames: FrameBuffer::new(self, schedule, &scene, &viewpoints, tickets[0]),
+            motion,
+            images: Cached::outdated(DrawnImages::new(self, rows)),
+            latest_images: Cached::empty(),
+            past_images: Cached::outdated(PastImages::new(self, rows, |_| 0)),
+            progress: rasterizer.progress().clone(),
+            renderer: Mutex::new(FrameRenderer::new(rasterizer, faults)),
+            draws: AtomicU64::new(0),
+            changed: Vec::with_capacity(rows),
+            cfg: self.clone(),
+            scene,
+            viewpoints,
+            tickets,
+        })
     }
 }
 
 impl CameraCfg {
+    /// The rasterizer of all rows.
+    fn rasterizer(&self, context: &SensorContext) -> ParallelRasterizer {
+        let marked = u32::from(self.draw_markers) << Marker::GROUP;
+        let raster = RasterCfg { groups: self.raster.groups | marked, ..self.raster };
+        let mut rasterizer = ParallelRasterizer::new(raster, context.threads).with_pool(context.pool.clone());
+        rasterizer.set_renderer(self.renderer);
+        rasterizer.set_light(self.aperture, self.shutter);
+        rasterizer.set_stops(self.imperfections.exposure.map_or(0.0, |exposure| exposure.stops));
+        rasterizer.share_assets(&context.ray_assets);
+        rasterizer
+    }
+
     /// Flow is of two pictures that follow each other.
     fn check_flow(&self) -> Result<(), CameraError> {
         let past = self.latency_steps > 0 || self.dropout > 0.0 || self.history_length > 0;
@@ -148,27 +192,11 @@ impl CameraCfg {
             let (width, height) = (self.width, self.height);
             return Err(CameraError::Memory { views, width, height, bytes_per_pixel, paths: film, limit: MAX_BYTES });
         }
-        let (pictures, captures) = (self.history_length, Memory::waiting(self, schedule));
+        let (pictures, captures) = (self.history_length, FrameBuffer::pending(self, schedule));
         let all = pictures.saturating_add(captures).saturating_add(1);
         if !fits(pictures.saturating_add(1), all) {
             return Err(CameraError::Past { pictures, captures, views, limit: MAX_BYTES });
         }
         Ok(())
     }
-}
-
-fn check_env_ids(env_ids: &[usize], count: usize) -> Result<(), SensorError> {
-    if env_ids.is_empty() {
-        return Err(CameraError::NoEnvironments.into());
-    }
-    let mut seen = vec![false; count];
-    for &env in env_ids {
-        let Some(seen) = seen.get_mut(env) else {
-            return Err(SensorError::IndexOutOfRange { what: "environment", index: env, count });
-        };
-        if std::mem::replace(seen, true) {
-            return Err(CameraError::DuplicateEnvironment { env }.into());
-        }
-    }
-    Ok(())
 }

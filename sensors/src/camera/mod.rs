@@ -1,33 +1,33 @@
 //! Cameras: the sensor, its configuration, channels, frames and the rasterizer that fills them.
 
 mod accessors;
-mod arrived;
+mod arrivals;
 pub mod boxes;
 mod build;
 pub mod calibration;
-mod captures;
 pub mod cfg;
 pub mod colormap;
-mod earlier;
+pub(crate) mod env_rows;
 pub mod error;
 pub mod extrinsics;
 mod faults;
+mod frame_buffer;
 pub(crate) mod frustum;
 pub mod imperfection;
-mod memory;
-pub(crate) mod mounts;
-mod opening;
-mod past;
+mod motion;
 mod picture_noise;
+pub(crate) mod placement;
 pub mod point_cloud;
 pub mod segmentation;
 pub mod sensor;
 pub mod stereo;
 mod summary;
+pub(crate) mod viewpoints;
 
 #[cfg(test)]
 mod tests;
 
+pub use arrivals::HistoryView;
 pub use boxes::{Box2d, Box3d, Occlusion, PixelBox};
 pub use calibration::{CalibrationError, CameraInfo, DistortionModel};
 pub use cfg::{CameraCfg, DepthMiss};
@@ -46,7 +46,7 @@ pub use kinetoscope_render::renderer::Renderer;
 pub use kinetoscope_render::request::{Before, RasterCfg, Shot};
 pub use kinetoscope_render::shade::tone::ToneCurve;
 pub use kinetoscope_render::shutter::{Opened, Shutter, Take};
-pub use past::HistoryView;
+pub use placement::{CameraPlacement, PoseFrame};
 pub use point_cloud::PointFrame;
 pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing, segment_color};
 pub use sensor::Camera;

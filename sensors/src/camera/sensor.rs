@@ -1,45 +1,42 @@
 //! The camera: captures what there is to see, draws when somebody looks.
 
-mod drawing;
+pub(super) mod drawing;
 
-use super::captures::Captures;
+use super::arrivals::PastImages;
 use super::cfg::{CameraCfg, DepthMiss};
-use super::earlier::Earlier;
+use super::env_rows::EnvRows;
 use super::error::CameraError;
-use super::extrinsics::{CameraConvention, Poses};
-use super::faults::Faults;
+use super::extrinsics::CameraConvention;
+use super::frame_buffer::{FrameBuffer, FrameSource, Observation};
 use super::frustum::frustum;
-use super::memory::{Memory, Past};
-use super::mounts::{Mount, Mounts, chosen_rows};
-use super::opening::Opening;
+use super::motion::Motion;
+use super::placement::{CameraPlacement, PlaceRows, PoseFrame};
+use super::viewpoints::Viewpoints;
+use crate::cached::Cached;
 use crate::error::SensorError;
 use crate::requires::Requires;
 use crate::schedule::{Phases, Schedule};
-use crate::sensor::{Sensor, SensorContext};
-use crate::summary;
+use crate::sensor::Sensor;
+use drawing::{DrawnImages, FrameRenderer};
 use kinetoscope_render::frame::{Channels, Listed, PictureView, Pictures};
 use kinetoscope_render::intrinsics::{Intrinsics, PixelIntrinsics};
-use kinetoscope_render::lens;
-use kinetoscope_render::lens::{LensRays, Optics, RaysOfRows};
-use kinetoscope_render::parallel::{Job, ParallelRasterizer};
+use kinetoscope_render::lens::{self, LensRays, Optics};
 use kinetoscope_render::progress::RenderProgress;
-use kinetoscope_render::request::RasterCfg;
-use kinetoscope_render::shutter::Take;
 use kinetoscope_render::ticket::Ticket;
 use kinetoscope_render::visibility::{RenderError, View};
 use kinetoscope_scene::pose::to_row;
 use kinetoscope_scene::{Marker, Pose, PoseF32, RenderScene, SceneState, VisibleState};
-use ndarray::{Array1, Array2, Array3, ArrayView1};
+use ndarray::{Array2, Array3, ArrayView1};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// A camera in each of several environments.
 ///
 /// When a picture is due, the camera *captures*: it keeps where everything is. Pictures are drawn from that at the first
 /// reading afterwards, once, and only where something changed ([`CameraCfg::lazy`]). So a reading always shows the instant
-/// of [`stamps`](Self::stamps), however late it comes. After a setter ([`set_local_pose`](Self::set_local_pose),
-/// [`look_at`](Self::look_at), [`set_intrinsics`](Self::set_intrinsics)...) the next reading shows the same instant from
-/// the new place. Places and lenses set that way stay over a reset, until [`restore`](Self::restore).
+/// of [`stamps`](Self::stamps), however late it comes. After a setter of [`CameraPlacement`] the next reading shows the same
+/// instant from the new place. Places and lenses set that way stay over a reset, until
+/// [`restore`](CameraPlacement::restore).
 ///
 /// A camera is perfect unless it is told otherwise: it may have a [`history`](Self::history), pictures may come late or get
 /// lost, and be noisy or spoilt as those of real cameras ([`CameraCfg::imperfections`]). Then it is lazy still, and
@@ -50,44 +47,28 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// environments, [`env_ids`](Self::env_ids); the frame is that of the environment, units are metres. An environment whose
 /// state cannot be drawn (a pose that is not finite) makes reading an error, until it was captured anew.
 pub struct Camera {
-    lens: Lens,
-    scene: Arc<RenderScene>,
-    env_ids: Vec<usize>,
-    /// Which row belongs to an environment; the inverse of `env_ids`.
-    row_of_env: Vec<Option<usize>>,
-    num_bodies: usize,
-    path: String,
-    /// Index of the body it hangs on.
-    parent: Option<usize>,
-    pub(super) mounts: Mounts,
-    pub(super) rays: RaysOfRows,
-    channels: Channels,
-    /// Whether the markers of other sensors are drawn into colours.
-    draws_markers: bool,
-    depth_miss: DepthMiss,
-    lazy: bool,
-    phases: Phases,
+    pub(super) cfg: CameraCfg,
+    pub(super) path: String,
+    pub(super) scene: Arc<RenderScene>,
+    pub(super) num_bodies: usize,
     /// Physics step \[s\].
-    dt: f64,
-    captures: Captures,
-    /// Those of the newest captures.
-    tickets: Vec<Ticket>,
-    /// What is late, and what was; `None` for a camera that has none of it.
-    memory: Option<Box<Memory>>,
-    /// Where flow is measured.
-    earlier: Option<Earlier>,
-    /// Where the shutter takes time.
-    opening: Option<Opening>,
-    progress: RenderProgress,
-    frame_counts: Array1<u64>,
-    /// Rows that are due, between updates without meaning: its memory is kept.
-    due: Vec<usize>,
-    /// The pictures of what was captured, once somebody looked.
-    drawn: OnceLock<Canvas>,
-    /// Who draws: one reader at a time.
-    turn: Mutex<()>,
-    desk: Mutex<Desk>,
-    draws: AtomicU64,
+    pub(super) dt: f64,
+    pub(super) lens: Lens,
+    pub(super) viewpoints: Viewpoints,
+    pub(super) phases: Phases,
+    /// Keys of the random numbers of the frames captured last, row by row.
+    pub(super) tickets: Vec<Ticket>,
+    pub(super) frames: FrameBuffer,
+    pub(super) motion: Motion,
+    /// Images of the shown frames, of the frames that arrived last where others are shown, and of the history.
+    pub(super) images: Cached<DrawnImages>,
+    pub(super) latest_images: Cached<DrawnImages>,
+    pub(super) past_images: Cached<PastImages>,
+    pub(super) renderer: Mutex<FrameRenderer>,
+    pub(super) progress: RenderProgress,
+    pub(super) draws: AtomicU64,
+    /// Rows that show another frame, between updates without meaning: its memory is kept.
+    pub(super) changed: Vec<usize>,
 }
 
 /// What all views have in common.
@@ -97,29 +78,6 @@ pub(super) struct Lens {
     height: usize,
     near: f32,
     far: f32,
-}
-
-/// Pictures, and which of them are not of what was captured last.
-#[derive(Debug)]
-struct Canvas {
-    pictures: Pictures,
-    stale: Vec<bool>,
-    failure: Option<CameraError>,
-}
-
-/// What is needed for drawing: one at a time.
-#[derive(Debug)]
-struct Desk {
-    rasterizer: ParallelRasterizer,
-    /// The canvas, while it is not in `Camera::drawn`.
-    canvas: Option<Canvas>,
-    /// Lists that are empty between drawings: their memory is kept.
-    views: Vec<View>,
-    jobs: Vec<Job<'static>>,
-    takes: Vec<Take<'static>>,
-    tickets: Vec<Ticket>,
-    /// What happens to pictures after they were drawn.
-    faults: Option<Faults>,
 }
 
 impl Lens {
@@ -139,89 +97,100 @@ impl Lens {
     }
 }
 
-impl Canvas {
-    fn new(pictures: Pictures, rows: usize) -> Self {
-        Self { pictures, stale: vec![true; rows], failure: None }
-    }
-}
-
 impl Sensor for Camera {
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
         self.check(state)?;
-        let mut due = std::mem::take(&mut self.due);
-        due.clear();
-        due.extend((0..self.env_ids.len()).filter(|&row| self.phases.is_due(row, state.step[self.env_ids[row]])));
-        for &row in &due {
-            self.tickets[row].due();
-        }
-        match self.memory.take() {
-            None => {
-                for &row in &due {
-                    self.frame_counts[row] += 1;
-                }
-                self.keep_earlier(&due);
-                self.capture(&due, state, true);
-                self.close_shutters(&due);
-            }
-            Some(mut memory) => {
-                self.send(&due, state, &mut memory);
-                self.close_shutters(&due);
-                due.clear();
-                self.receive(state, &mut memory, &mut due);
-                self.memory = Some(memory);
-                self.draw_if_eager();
+        let mut changed = std::mem::take(&mut self.changed);
+        changed.clear();
+        for row in 0..self.viewpoints.len() {
+            let (seen, before) = (self.observe(row, state), self.frames.counts()[row]);
+            let step = state.step[seen.env];
+            let is_due = self.phases.is_due(row, step);
+            let shown = is_due && self.capture(row, &seen);
+            let shown = self.frames.receive(row, step, &self.viewpoints) || shown;
+            self.note_arrivals(row, self.frames.counts()[row] - before);
+            if shown {
+                changed.push(row);
             }
         }
-        self.open_shutters(0..self.env_ids.len(), state);
-        self.due = due;
+        self.outdate(&changed);
+        changed.iter().for_each(|&row| self.frames.set_shows_latest(row, true));
+        self.changed = changed;
+        self.draw_if_eager();
+        (0..self.viewpoints.len()).for_each(|row| self.open_shutter(row, state));
         Ok(())
     }
 
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
         self.check(state)?;
-        let rows = self.seen_rows(env_ids)?;
+        let rows = self.viewpoints.envs.seen(env_ids)?;
         for &row in &rows {
-            self.phases.reset(row, state.step[self.env_ids[row]]);
-            self.frame_counts[row] = 0;
+            self.phases.reset(row, state.step[self.env_ids()[row]]);
             self.tickets[row].reset();
-            if let Some(memory) = &mut self.memory {
-                memory.reset(row);
-            }
-            self.earlier.iter_mut().for_each(|earlier| earlier.forget(row));
+            self.frames.reset(row);
+            self.motion.reset(row);
+            self.forget_past_images(row);
         }
-        self.close_shutters(&rows);
-        self.capture(&rows, state, false);
-        self.open_shutters(rows.into_iter(), state);
+        self.show_now(&rows, state);
+        rows.iter().for_each(|&row| self.open_shutter(row, state));
         Ok(())
     }
 
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError> {
         self.check(state)?;
-        let rows = self.seen_rows(env_ids)?;
-        for &row in &rows {
-            self.tickets[row].refresh();
-        }
-        self.capture(&rows, state, false);
-        for &row in &rows {
-            let (now, parent) = ((state, self.env_ids[row]), self.parent);
-            self.opening.iter_mut().for_each(|opening| opening.refresh(row, now, parent));
-        }
+        let rows = self.viewpoints.envs.seen(env_ids)?;
+        rows.iter().for_each(|&row| self.tickets[row].refresh());
+        self.show_now(&rows, state);
+        rows.iter().for_each(|&row| self.motion.refresh(row, &self.observe(row, state)));
         Ok(())
     }
 
     fn due_in(&self, step: &[u64]) -> u64 {
-        let steps = || self.env_ids.iter().map(|&env| step[env]);
-        let wait = |due: u64| self.opening.as_ref().map_or(due, |opening| opening.wait(due));
-        let due = self.phases.first_of(steps(), wait);
-        self.memory.as_ref().and_then(|memory| memory.due_in(steps())).map_or(due, |arrival| arrival.min(due))
+        let steps = || self.env_ids().iter().map(|&env| step[env]);
+        let due = self.phases.first_of(steps(), |due| self.motion.wait(due));
+        self.frames.arrives_in(steps()).map_or(due, |arrival| arrival.min(due))
     }
 
     /// The optical frame, and an arrow along each edge of the picture's pyramid, at the captured instant; none in an
     /// environment that it does not look into.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
-        let row = self.row_of_env.get(env).copied().flatten();
+        let row = self.viewpoints.envs.of(env);
         let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.optics_of(row)?)));
         placed.map_or_else(Vec::new, |(pose, optics)| frustum(&pose, &optics, self.image_shape()))
+    }
+}
+
+impl PlaceRows for Camera {
+    fn env_rows(&self) -> &EnvRows {
+        &self.viewpoints.envs
+    }
+
+    fn place_rows(&mut self, rows: &[usize], poses: &[Pose], frame: PoseFrame) -> Result<(), SensorError> {
+        let Self { viewpoints, frames, .. } = self;
+        viewpoints.place(rows, poses, frame, |row| frames.shown(row).world_from_parent)?;
+        self.outdate(rows);
+        Ok(())
+    }
+
+    fn restore_rows(&mut self, rows: &[usize]) {
+        self.viewpoints.restore(rows);
+        self.outdate(rows);
+    }
+}
+
+impl CameraPlacement for Camera {
+    fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
+        self.viewpoints.local_pose(convention)
+    }
+
+    fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
+        let rows = self.viewpoints.envs.chosen(env_ids)?;
+        let lens = self.lens;
+        self.viewpoints.set_intrinsics(&rows, intrinsics, |pixels| {
+            lens.view(pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)
+        })?;
+        self.outdate(&rows);
+        Ok(())
     }
 }
 
@@ -231,80 +200,9 @@ impl Camera {
         Requires::VISIBLE | part(attached, Requires::POSES) | part(draws_markers, Requires::MARKERS)
     }
 
-    #[allow(clippy::too_many_arguments, reason = "the parts that the configuration has checked, in one place")]
-    pub(super) fn new(
-        cfg: &CameraCfg,
-        context: &SensorContext,
-        scene: Arc<RenderScene>,
-        (schedule, opening): (Schedule, Option<Opening>),
-        parent: Option<usize>,
-        (lens, pixels, parent_from_camera): (Lens, PixelIntrinsics, Pose),
-        rays: RaysOfRows,
-        env_ids: Vec<usize>,
-        (pictures, faults): (Pictures, Option<Faults>),
-    ) -> Self {
-        let rows = env_ids.len();
-        let mut row_of_env = vec![None; context.num_envs];
-        for (row, &env) in env_ids.iter().enumerate() {
-            row_of_env[env] = Some(row);
-        }
-        let key = |env: &usize| Ticket::first(context.seed, (context.first_env + env) as u64, &context.name);
-        let tickets: Vec<Ticket> = env_ids.iter().map(key).collect();
-        let mount = Mount { parent_from_camera, pixels };
-        let memory = Memory::new(cfg, schedule, rows, &scene, (mount, tickets[0]));
-        let captures = Captures::new(rows, &scene, tickets[0], opening.is_some());
-        let earlier = cfg.channels.flow.then(|| Earlier::new(rows, scene.instances().len()));
-        let marked = u32::from(cfg.draw_markers) << Marker::GROUP;
-        let raster = RasterCfg { groups: cfg.raster.groups | marked, ..cfg.raster };
-        let mut rasterizer = ParallelRasterizer::new(raster, context.threads).with_pool(context.pool.clone());
-        rasterizer.set_renderer(cfg.renderer);
-        rasterizer.set_light(cfg.aperture, cfg.shutter);
-        rasterizer.set_stops(cfg.imperfections.exposure.map_or(0.0, |exposure| exposure.stops));
-        let progress = rasterizer.progress().clone();
-        rasterizer.share_assets(&context.ray_assets);
-        let canvas = Some(Canvas::new(pictures, rows));
-        Self {
-            lens,
-            scene,
-            row_of_env,
-            num_bodies: context.bodies.len(),
-            path: summary::path(context, parent),
-            parent,
-            mounts: Mounts::new(mount, rows),
-            rays,
-            channels: cfg.channels,
-            draws_markers: cfg.draw_markers,
-            depth_miss: cfg.depth_miss,
-            lazy: cfg.lazy,
-            phases: schedule.phases(rows),
-            dt: context.dt,
-            captures,
-            tickets,
-            memory,
-            earlier,
-            opening,
-            progress,
-            frame_counts: Array1::zeros(rows),
-            due: Vec::with_capacity(rows),
-            drawn: OnceLock::new(),
-            turn: Mutex::new(()),
-            desk: Mutex::new(Desk {
-                rasterizer,
-                canvas,
-                views: Vec::new(),
-                jobs: Vec::new(),
-                takes: Vec::new(),
-                tickets: Vec::new(),
-                faults,
-            }),
-            draws: AtomicU64::new(0),
-            env_ids,
-        }
-    }
-
     /// The environments that it looks into: the first axis of everything it measures.
     pub fn env_ids(&self) -> &[usize] {
-        &self.env_ids
+        self.viewpoints.envs.env_ids()
     }
 
     /// Path: `uid/link/name` on a body, the camera's name without one.
@@ -314,7 +212,7 @@ impl Camera {
 
     /// What it measures.
     pub fn channels(&self) -> Channels {
-        self.channels
+        self.cfg.channels
     }
 
     /// When it measures.
@@ -334,18 +232,18 @@ impl Camera {
 
     /// Whether it hangs on a body.
     pub fn is_attached(&self) -> bool {
-        self.parent.is_some()
+        self.viewpoints.parent.is_some()
     }
 
     /// Time of the instant that pictures show \[s\] since the last reset of the environment, shape (N).
     pub fn stamps(&self) -> ArrayView1<'_, f64> {
-        self.captures.stamps.view()
+        self.frames.stamps()
     }
 
     /// Pictures since the last reset, shape (N): those that were due and have arrived, whether somebody looked or not. The
     /// refresh of a reset is none.
     pub fn frame_counts(&self) -> ArrayView1<'_, u64> {
-        self.frame_counts.view()
+        self.frames.counts()
     }
 
     /// How many pictures were drawn since the camera was built, each environment counted: a measure of work.
@@ -367,11 +265,17 @@ impl Camera {
     /// [`CameraError::ChannelOff`], [`CameraError::NothingCaptured`] before the first reset or update, and
     /// [`CameraError::Draw`].
     pub fn channel<C: Listed>(&self) -> Result<PictureView<'_, C>, SensorError> {
-        let off = || CameraError::ChannelOff { channel: C::NAME, enabled: self.channels.names() };
-        if !self.channels.has::<C>() {
-            return Err(off().into());
-        }
-        self.pictures()?.get::<C>().ok_or_else(|| off().into())
+        self.must_have::<C>()?;
+        self.pictures()?.get::<C>().ok_or_else(|| self.channel_off::<C>().into())
+    }
+
+    /// Refuses a channel that is not measured.
+    pub(super) fn must_have<C: Listed>(&self) -> Result<(), CameraError> {
+        if self.cfg.channels.has::<C>() { Ok(()) } else { Err(self.channel_off::<C>()) }
+    }
+
+    pub(super) fn channel_off<C: Listed>(&self) -> CameraError {
+        CameraError::ChannelOff { channel: C::NAME, enabled: self.cfg.channels.names() }
     }
 
     /// All pictures. Draws what was captured since the last reading.
@@ -380,44 +284,22 @@ impl Camera {
     ///
     /// [`CameraError::NothingCaptured`] before the first reset or update, and [`CameraError::Draw`].
     pub fn pictures(&self) -> Result<&Pictures, SensorError> {
-        (0..self.env_ids.len()).try_for_each(|row| self.must_have_captured(row))?;
-        let canvas = match self.drawn.get() {
-            Some(canvas) => canvas,
-            None => {
-                // One reader draws, the others wait.
-                let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
-                match self.drawn.get() {
-                    Some(canvas) => canvas,
-                    None => self.keep_drawn(self.draw())?,
-                }
-            }
-        };
-        match &canvas.failure {
-            Some(failure) => Err(failure.clone().into()),
-            None => Ok(&canvas.pictures),
-        }
-    }
-
-    /// Keeps what was drawn for the next readers, except what was broken off: they draw it again.
-    fn keep_drawn(&self, canvas: Canvas) -> Result<&Canvas, CameraError> {
-        match &canvas.failure {
-            Some(failure) if failure.is_cancelled() => {
-                let failure = failure.clone();
-                self.desk.lock().unwrap_or_else(PoisonError::into_inner).canvas = Some(canvas);
-                Err(failure)
-            }
-            _ => Ok(self.drawn.get_or_init(|| canvas)),
-        }
+        (0..self.viewpoints.len()).try_for_each(|row| self.must_have_captured(row))?;
+        let make = || Ok(DrawnImages::new(&self.cfg, self.viewpoints.len()));
+        let draw = |images: &mut DrawnImages| self.redraw(images, |row| Some(self.shown_source(row)));
+        Ok(self.images.get_or_update(make, draw)?.pictures()?)
     }
 
     /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\], shape (N, 3, 3).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
-        Array3::from_shape_fn((self.mounts.len(), 3, 3), |(row, i, j)| self.mounts.row(row).pixels.matrix()[(i, j)])
+        Array3::from_shape_fn((self.viewpoints.len(), 3, 3), |(row, i, j)| {
+            self.viewpoints.row(row).pixels.matrix()[(i, j)]
+        })
     }
 
     /// The lens, the same in all environments.
     pub fn lens(&self) -> lens::Lens {
-        self.rays.lens()
+        self.viewpoints.lens()
     }
 
     /// The lens of environment `env` in front of its pixels: from directions to pixels and back.
@@ -426,31 +308,27 @@ impl Camera {
     ///
     /// An environment that the camera does not see.
     pub fn optics(&self, env: usize) -> Result<Optics, SensorError> {
-        let pixels = self.mounts.row(self.row(env)?).pixels;
-        Ok(Optics::new(self.rays.lens(), pixels)?)
+        let pixels = self.viewpoints.row(self.row(env)?).pixels;
+        Ok(Optics::new(self.viewpoints.lens(), pixels)?)
     }
 
     /// Whether its colours show what other sensors show of their measurements.
     pub fn draws_markers(&self) -> bool {
-        self.draws_markers
+        self.cfg.draw_markers
     }
 
     /// Memory of the rays of a lens \[bytes\]: 0 for a pinhole.
     pub fn lens_bytes(&self) -> usize {
-        self.rays.bytes()
+        self.viewpoints.ray_bytes()
     }
 
     /// Poses in the environment at the captured instant, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7). NaN where an
     /// attached camera has captured nothing yet.
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         let pose = |row| self.world_from_camera(row).map(|pose| to_row(&convention.of_optical(&pose)));
-        Array2::from((0..self.mounts.len()).map(|row| pose(row).unwrap_or([f64::NAN; 7])).collect::<Vec<[f64; 7]>>())
-    }
-
-    /// Poses in the frame of the parent (of the environment, for a free camera), rows `[x, y, z, qw, qx, qy, qz]` \[m\],
-    /// shape (N, 7).
-    pub fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
-        self.mounts.local_pose(convention)
+        Array2::from(
+            (0..self.viewpoints.len()).map(|row| pose(row).unwrap_or([f64::NAN; 7])).collect::<Vec<[f64; 7]>>(),
+        )
     }
 
     /// The view of environment `env` at the captured instant: what a renderer draws.
@@ -461,142 +339,17 @@ impl Camera {
     pub fn view(&self, env: usize) -> Result<View, SensorError> {
         let row = self.row(env)?;
         let pose = self.world_from_camera(row).ok_or(CameraError::NothingCaptured { env })?;
-        Ok(self.lens.view(&self.mounts.row(row).pixels, PoseF32::from(&pose)))
-    }
-
-    /// Places cameras in the frame of their parent (of the environment, for free ones), from now on.
-    ///
-    /// `poses` are typed or rows `[x, y, z, qw, qx, qy, qz]`: one for each of `env_ids` (`None` is all environments of the
-    /// camera), or one for all. `convention` says what their axes mean.
-    ///
-    /// # Errors
-    ///
-    /// [`CameraError::Pose`], [`CameraError::Count`], an environment that the camera does not see or that is named twice;
-    /// nothing is changed then.
-    pub fn set_local_pose(
-        &mut self,
-        poses: &(impl Poses + ?Sized),
-        env_ids: Option<&[usize]>,
-        convention: CameraConvention,
-    ) -> Result<(), SensorError> {
-        let rows = self.chosen_rows(env_ids)?;
-        self.mounts.set_local(&rows, poses, convention)?;
-        self.outdate(&rows);
-        Ok(())
-    }
-
-    /// Places cameras in the environment, as [`set_local_pose`](Self::set_local_pose). An attached camera gets the local
-    /// pose that puts it there at the captured instant, and moves with its parent from then on.
-    ///
-    /// # Errors
-    ///
-    /// As [`set_local_pose`](Self::set_local_pose), and [`CameraError::NothingCaptured`] for an attached camera whose
-    /// parent was not seen yet.
-    pub fn set_world_poses(
-        &mut self,
-        poses: &(impl Poses + ?Sized),
-        env_ids: Option<&[usize]>,
-        convention: CameraConvention,
-    ) -> Result<(), SensorError> {
-        let rows = self.chosen_rows(env_ids)?;
-        let Self { mounts, parent, captures, env_ids, .. } = self;
-        mounts.set_world(&rows, poses, convention, |row| match (*parent, captures.world_from_parent[row]) {
-            (None, _) => Ok(None),
-            (Some(_), Some(world_from_parent)) => Ok(Some(world_from_parent)),
-            (Some(_), None) => Err(CameraError::NothingCaptured { env: env_ids[row] }),
-        })?;
-        self.outdate(&rows);
-        Ok(())
-    }
-
-    /// Turns cameras to something: places each at `eye`, looking at `target`, in the frame of its parent (of the
-    /// environment, for free ones). See [`look_at_pose`](super::look_at_pose) for `up`; what one environment gets never depends on another. To
-    /// look from an attached camera at a point of the environment, give [`look_at_pose`](super::look_at_pose) to
-    /// [`set_world_poses`](Self::set_world_poses).
-    ///
-    /// One `eye`, `target` and `up` for each of `env_ids` (`None` is all environments of the camera), or one for all \[m\].
-    ///
-    /// # Errors
-    ///
-    /// [`CameraError::LookAt`], [`CameraError::Count`], an environment that the camera does not see or that is named
-    /// twice; nothing is changed then.
-    pub fn look_at(
-        &mut self,
-        eye: &[[f64; 3]],
-        target: &[[f64; 3]],
-        up: &[[f64; 3]],
-        env_ids: Option<&[usize]>,
-    ) -> Result<(), SensorError> {
-        let rows = self.chosen_rows(env_ids)?;
-        self.mounts.look_at(&rows, eye, target, up)?;
-        self.outdate(&rows);
-        Ok(())
-    }
-
-    /// Changes lenses: one for each of `env_ids` (`None` is all environments of the camera), or one for all.
-    ///
-    /// # Errors
-    ///
-    /// [`CameraError::Optics`], [`CameraError::View`], [`CameraError::Count`], an environment that the camera does not see
-    /// or that is named twice; of a camera with a lens also [`CameraError::Optics`]. Nothing is changed then.
-    pub fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
-        let rows = self.chosen_rows(env_ids)?;
-        let Self { mounts, lens, rays, .. } = self;
-        let made = match rays.lens().is_pinhole() {
-            true => Vec::new(),
-            false => {
-                let pixels: Result<Vec<_>, _> =
-                    intrinsics.iter().map(|i| i.to_pixels(lens.width, lens.height)).collect();
-                rays.make(&pixels?)?
-            }
-        };
-        mounts.set_intrinsics(&rows, intrinsics, (lens.width, lens.height), |pixels| {
-            lens.view(pixels, PoseF32::IDENTITY).validate().map_err(CameraError::View)
-        })?;
-        rays.set(made, &rows, |row| mounts.row(row).pixels);
-        self.outdate(&rows);
-        Ok(())
-    }
-
-    /// Places and lenses as they were configured, in `env_ids` (`None` is all environments of the camera).
-    ///
-    /// # Errors
-    ///
-    /// An environment that the camera does not see or that is named twice; nothing is changed then.
-    pub fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
-        let rows = self.chosen_rows(env_ids)?;
-        let Self { mounts, rays, .. } = self;
-        mounts.restore(&rows);
-        rays.set(Vec::new(), &rows, |row| mounts.row(row).pixels);
-        self.outdate(&rows);
-        Ok(())
+        Ok(self.lens.view(&self.viewpoints.row(row).pixels, PoseF32::from(&pose)))
     }
 
     /// The row of an environment.
     pub(super) fn row(&self, env: usize) -> Result<usize, SensorError> {
-        let count = self.row_of_env.len();
-        let row =
-            self.row_of_env.get(env).ok_or(SensorError::IndexOutOfRange { what: "environment", index: env, count })?;
-        Ok(row.ok_or_else(|| CameraError::NotSeen { env, seen: self.env_ids.clone() })?)
-    }
-
-    /// The rows of the environments that somebody chose.
-    fn chosen_rows(&self, env_ids: Option<&[usize]>) -> Result<Vec<usize>, SensorError> {
-        chosen_rows(self.env_ids.len(), env_ids, |env| self.row(env))
-    }
-
-    /// The rows of those of the environments that the camera sees; the simulation speaks of all.
-    fn seen_rows(&self, env_ids: &[usize]) -> Result<Vec<usize>, SensorError> {
-        let count = self.row_of_env.len();
-        match env_ids.iter().find(|&&env| env >= count) {
-            Some(&index) => Err(SensorError::IndexOutOfRange { what: "environment", index, count }),
-            None => Ok(env_ids.iter().filter_map(|&env| self.row_of_env[env]).collect()),
-        }
+        self.viewpoints.envs.row(env)
     }
 
     /// Whether a number of the depth channel is that of a surface.
     pub(super) fn is_hit(&self, depth: f32) -> bool {
-        match self.depth_miss {
+        match self.cfg.depth_miss {
             DepthMiss::Inf => depth.is_finite(),
             DepthMiss::Far => depth < self.lens.far,
             DepthMiss::Zero => depth > 0.0,
@@ -605,55 +358,41 @@ impl Camera {
 
     /// Whether straight lines are bent in the picture.
     pub(super) fn bends_lines(&self) -> bool {
-        !self.rays.lens().is_pinhole()
+        !self.viewpoints.lens().is_pinhole()
     }
 
     /// Refuses what is only known of pictures without a lens.
     pub(super) fn must_be_pinhole(&self, what: &'static str) -> Result<(), CameraError> {
-        let lens = self.rays.lens();
+        let lens = self.viewpoints.lens();
         if lens.is_pinhole() { Ok(()) } else { Err(CameraError::PinholeOnly { what, lens: lens.name() }) }
     }
 
     /// The lens of a row, in front of its pixels.
     fn optics_of(&self, row: usize) -> Option<Optics> {
-        match self.rays.row(row) {
+        match self.rays_of(row) {
             Some(rays) => Some(*rays.optics()),
-            None => Optics::new(lens::Lens::default(), self.mounts.row(row).pixels).ok(),
+            None => Optics::new(lens::Lens::default(), self.viewpoints.row(row).pixels).ok(),
         }
     }
 
     /// The rays of a row; none for a pinhole.
     pub(super) fn rays_of(&self, row: usize) -> Option<&LensRays> {
-        self.rays.row(row)
+        self.viewpoints.rays(row).map(|rays| &**rays)
     }
 
     /// Where the optical frame is at the captured instant.
     pub(super) fn world_from_camera(&self, row: usize) -> Option<Pose> {
-        self.world_from(self.mounts.row(row), self.captures.world_from_parent[row])
-    }
-
-    /// Where the optical frame of a mount is.
-    pub(super) fn world_from(&self, mount: &Mount, world_from_parent: Option<Pose>) -> Option<Pose> {
-        let local = mount.parent_from_camera;
-        match self.parent {
-            None => Some(local),
-            Some(_) => world_from_parent.map(|world_from_parent| world_from_parent * local),
-        }
-    }
-
-    /// The history, of a camera that has a memory.
-    pub(super) fn past(&self) -> Option<&Past> {
-        self.memory.as_ref().map(|memory| &memory.past)
+        self.viewpoints.world_from(self.viewpoints.row(row), self.frames.shown(row).world_from_parent)
     }
 
     /// Whether the state is of the scene that the camera was built for.
     fn check(&self, state: &SceneState) -> Result<(), SensorError> {
-        let missing = Self::requires(self.is_attached(), self.draws_markers).without(Requires::present_in(state));
+        let missing = Self::requires(self.is_attached(), self.cfg.draw_markers).without(Requires::present_in(state));
         let Some(VisibleState { instance_poses, lights, .. }) = state.visible.as_ref().filter(|_| missing.is_empty())
         else {
             return Err(SensorError::MissingFields { sensor: "camera", missing });
         };
-        let envs = self.row_of_env.len();
+        let envs = self.viewpoints.envs.num_envs();
         let counts = [
             ("environments", envs, state.num_envs()),
             ("environments with a time", envs, state.time.len()),
@@ -670,7 +409,7 @@ impl Camera {
                 ("numbers per body pose", 7, numbers),
             ]
         });
-        let of_markers = state.markers.as_ref().filter(|_| self.draws_markers);
+        let of_markers = state.markers.as_ref().filter(|_| self.cfg.draw_markers);
         let of_markers = of_markers.map(|markers| ("environments with markers", envs, markers.len()));
         let all = counts.into_iter().chain(of_bodies.into_iter().flatten()).chain(of_markers);
         match all.into_iter().find(|(_, expected, found)| expected != found) {
@@ -679,110 +418,76 @@ impl Camera {
         }
     }
 
-    /// Closes the shutters of some rows.
-    fn close_shutters(&mut self, rows: &[usize]) {
-        if let Some(opening) = &mut self.opening {
-            rows.iter().for_each(|&row| opening.close(row));
-        }
+    fn observe<'a>(&self, row: usize, state: &'a SceneState) -> Observation<'a> {
+        Observation { state, env: self.env_ids()[row], parent: self.viewpoints.parent }
     }
 
-    /// Opens the shutters of those of some rows whose time it is.
-    fn open_shutters(&mut self, rows: impl Iterator<Item = usize>, state: &SceneState) {
-        let Self { opening, phases, env_ids, parent, .. } = self;
-        if let Some(opening) = opening {
-            opening.open(rows, phases, (state, env_ids), *parent);
+    /// Captures a frame of a row that is due; gives whether it is shown at once.
+    fn capture(&mut self, row: usize, seen: &Observation<'_>) -> bool {
+        let Self { frames, motion, viewpoints, tickets, .. } = self;
+        tickets[row].due();
+        motion.advance(row, frames.shown(row));
+        let shown = frames.capture(row, seen, tickets[row], motion.opening(row), viewpoints);
+        motion.close(row);
+        if shown {
+            self.motion.show(row, self.view_of(row));
         }
+        shown
     }
 
-    /// What some rows show now is what the pictures before showed, from now on.
-    fn keep_earlier(&mut self, rows: &[usize]) {
-        let Self { earlier, captures, .. } = self;
-        if let Some(earlier) = earlier {
-            rows.iter().for_each(|&row| earlier.keep(row, &captures.poses));
-        }
-    }
-
-    /// Shows what there is to see in some environments, and with `opened` what there was since the shutter opened; the state
-    /// was checked.
-    fn capture(&mut self, rows: &[usize], state: &SceneState, opened: bool) {
+    /// Shows some environments as they are now; the state was checked.
+    fn show_now(&mut self, rows: &[usize], state: &SceneState) {
         for &row in rows {
-            let env = self.env_ids[row];
-            let opening = self.opening.as_ref().filter(|_| opened).map(|opening| (opening, row));
-            self.captures.keep(row, (state, env), self.parent, self.tickets[row], opening);
-            if let Some(memory) = &mut self.memory {
-                memory.refresh(row, state.step[env]);
-            }
-            let view = self.view_of(row);
-            self.earlier.iter_mut().for_each(|earlier| earlier.capture(row, view));
+            self.frames.refresh(row, &self.observe(row, state), self.tickets[row]);
+            self.motion.show(row, self.view_of(row));
         }
         self.outdate(rows);
         self.draw_if_eager();
     }
 
-    /// Keeps what there is to see in some environments for later.
-    fn send(&mut self, rows: &[usize], state: &SceneState, memory: &mut Memory) {
-        for &row in rows {
-            let (env, ticket) = (self.env_ids[row], self.tickets[row]);
-            if let Some(slot) = memory.send(row, state.step[env], &ticket) {
-                let opening = self.opening.as_ref().map(|opening| (opening, row));
-                memory.waiting.keep(slot, (state, env), self.parent, ticket, opening);
-            }
-        }
-    }
-
-    /// Takes what has arrived; `shown` become the rows that show something else.
-    fn receive(&mut self, state: &SceneState, memory: &mut Memory, shown: &mut Vec<usize>) {
-        for row in 0..self.env_ids.len() {
-            let mut shows = None;
-            while let Some((slot, show)) = memory.receive(row, state.step[self.env_ids[row]]) {
-                memory.remember(row, slot, (self.mounts.row(row), self.rays.shared(row)));
-                self.frame_counts[row] += 1;
-                if show {
-                    self.captures.copy(row, &memory.waiting, slot);
-                }
-                shows = Some(show);
-            }
-            if shows == Some(true) {
-                shown.push(row);
-            }
-        }
-        self.outdate(shown);
-        shown.iter().for_each(|&row| memory.past.shown[row] = true);
+    fn open_shutter(&mut self, row: usize, state: &SceneState) {
+        self.motion.open_if_due(row, &self.phases, &self.observe(row, state));
     }
 
     fn draw_if_eager(&self) {
-        if !self.lazy {
-            // What is wrong is said to who reads.
+        if !self.cfg.lazy {
+            // Errors are returned by the next read.
             let _ = self.pictures();
             self.draw_history();
         }
     }
 
-    /// The pictures of some rows are not those of the last capture any more.
+    /// The images of some rows are outdated: another frame is shown, or another viewpoint.
     fn outdate(&mut self, rows: &[usize]) {
         if rows.is_empty() {
             return;
         }
-        if let Some(memory) = &mut self.memory {
-            rows.iter().for_each(|&row| memory.past.shown[row] = false);
-        }
-        let drawn = self.drawn.take();
-        let desk = self.desk.get_mut().unwrap_or_else(PoisonError::into_inner);
-        desk.canvas = drawn.or(desk.canvas.take());
-        if let Some(canvas) = &mut desk.canvas {
-            rows.iter().for_each(|&row| canvas.stale[row] = true);
+        rows.iter().for_each(|&row| self.frames.set_shows_latest(row, false));
+        self.latest_images = Cached::empty();
+        self.images.invalidate();
+        if let Some(images) = self.images.value_mut() {
+            rows.iter().for_each(|&row| images.set_stale(row, true));
         }
     }
 
     /// Fails before the first reset or update of a row, when poses of things are not known yet.
     pub(super) fn must_have_captured(&self, row: usize) -> Result<(), CameraError> {
-        let captured = self.captures.world_from_parent[row].is_some();
-        captured.then_some(()).ok_or(CameraError::NothingCaptured { env: self.env_ids[row] })
+        let captured = self.frames.shown(row).world_from_parent.is_some();
+        captured.then_some(()).ok_or(CameraError::NothingCaptured { env: self.env_ids()[row] })
+    }
+
+    /// The shown frame of a row, from its present viewpoint.
+    fn shown_source(&self, row: usize) -> FrameSource<'_> {
+        FrameSource::present(row, self.frames.shown(row), &self.viewpoints)
     }
 
     /// The view of a row that was captured.
     pub(super) fn view_of(&self, row: usize) -> View {
-        let pose = self.world_from_camera(row).unwrap_or_else(Pose::identity);
-        self.lens.view(&self.mounts.row(row).pixels, PoseF32::from(&pose))
+        self.view_from(&self.shown_source(row))
+    }
+
+    fn view_from(&self, source: &FrameSource<'_>) -> View {
+        let pose = self.viewpoints.world_from(source.viewpoint, source.frame.world_from_parent);
+        self.lens.view(&source.viewpoint.pixels, PoseF32::from(&pose.unwrap_or_else(Pose::identity)))
     }
 }

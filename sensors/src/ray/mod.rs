@@ -3,13 +3,18 @@
 pub mod camera;
 pub mod caster;
 mod error;
+mod order;
 pub mod pattern;
+mod sampler;
+mod scan;
+mod targets;
 
 pub use camera::{RayCasterCamera, RayCasterCameraCfg, RayPictures};
-pub use caster::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
+pub use caster::{RayAlignment, RayCaster, RayCasterCfg};
 pub use error::RayError;
 pub use kinetoscope_render::geometry::assets::Assets;
 pub use kinetoscope_render::geometry::assets::RayAssets;
 pub use kinetoscope_render::geometry::ray::Ray;
 pub use kinetoscope_render::geometry::world::{RayHit, RayTargets, RayWorld};
 pub use pattern::RayPattern;
+pub use targets::HitTargets;

@@ -44,15 +44,15 @@ pub(super) const SENSORS: &[Mutation] = &[
     Mutation::of(
         "kinetoscope-sensors",
         "measurement from the instant of a write replaces it",
-        "sensors/src/sampling.rs",
-        ["if captured > self.refreshed[env] {", "if captured >= self.refreshed[env] {"],
+        "sensors/src/delay.rs",
+        ["*captured > self.refreshed[env]", "*captured >= self.refreshed[env]"],
         &["sampling::tests::refresh"],
     ),
     Mutation::of(
         "kinetoscope-sensors",
         "arrivals forgotten in when something is due",
         "sensors/src/sampling.rs",
-        ["arrivals.fold(due, u64::min)", "arrivals.fold(due, |due, _| due)"],
+        ["arrival.map_or(due, |arrival| arrival.min(due))", "arrival.map_or(due, |_| due)"],
         &["sampling::tests::due"],
     ),
     Mutation::of(

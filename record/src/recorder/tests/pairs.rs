@@ -3,7 +3,7 @@
 use super::*;
 use crate::{Recording, Wanted};
 use kinetoscope_sensors::StereoCameraCfg;
-use kinetoscope_sensors::camera::StereoCamera;
+use kinetoscope_sensors::camera::{CameraPlacement, StereoCamera};
 
 /// A pair of small eyes, the right one turned and askew.
 fn toed_in(left_to_right_pos: [f64; 3]) -> StereoCameraCfg {
@@ -29,7 +29,7 @@ fn calibrations() {
     sim.update(1);
     // Another lens, from then on: in this environment only.
     let wide = [Intrinsics::Pixels { fx: 15.0, fy: 14.0, cx: 7.0, cy: 6.0 }];
-    sim.sensor_mut(id).unwrap().set_intrinsics(&wide, None, Some(&[1])).unwrap();
+    sim.sensor_mut(id).unwrap().set_intrinsics(&wide, Some(&[1])).unwrap();
     sim.update(1);
     let expected = [0, 1].map(|env| sim.sensor(id).unwrap().camera_info("eyes", env).unwrap());
     for recorder in recorders {

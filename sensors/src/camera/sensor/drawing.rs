@@ -1,82 +1,143 @@
 //! Drawing what a camera captured.
 
-use super::{Camera, Canvas, Desk};
-use crate::camera::captures::Captures;
-use crate::camera::cfg::DepthMiss;
+use super::Camera;
+use crate::camera::cfg::{CameraCfg, DepthMiss};
 use crate::camera::error::CameraError;
-use crate::camera::mounts::Mount;
+use crate::camera::faults::Faults;
+use crate::camera::frame_buffer::FrameSource;
 use kinetoscope_render::frame::{FrameMut, Pictures};
-use kinetoscope_render::lens::LensRays;
 use kinetoscope_render::parallel::{Job, ParallelRasterizer};
-use kinetoscope_render::request::Shot;
+use kinetoscope_render::request::{Before, Shot};
 use kinetoscope_render::shutter::{Opened, Take};
-use kinetoscope_render::ticket::Stream;
-use kinetoscope_render::visibility::RenderError;
-use kinetoscope_scene::{Instance, Marker, Pose, PoseF32, RenderScene};
-use ndarray::Array2;
+use kinetoscope_render::ticket::{Stream, Ticket};
+use kinetoscope_render::visibility::{RenderError, View};
+use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
+use std::ops::Range;
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 
-impl Camera {
-    /// Draws what is stale.
-    pub(super) fn draw(&self) -> Canvas {
-        let rows = self.mounts.len();
-        let canvas = self.desk.lock().unwrap_or_else(PoisonError::into_inner).canvas.take();
-        // It is missing only where a drawing panicked.
-        let mut canvas = canvas.unwrap_or_else(|| {
-            Canvas::new(Pictures::new(self.channels, rows, self.lens.width, self.lens.height), rows)
-        });
-        let Canvas { pictures, stale, failure } = &mut canvas;
-        let is_stale = |row: &usize| stale[*row];
-        let frames = pictures.frames_mut(rows).enumerate().filter(|(row, _)| is_stale(row)).map(|(_, frame)| frame);
-        let stale_rows = (0..rows).filter(is_stale).map(|row| (row, row));
-        let look = |row: usize| (self.mounts.row(row), self.rays.row(row));
-        let result = self.develop(&self.captures, look, stale_rows, frames);
-        *failure = result.err().and_then(|(job, error)| {
-            let row = (0..rows).filter(is_stale).nth(job)?;
-            Some(CameraError::Draw { env: self.env_ids[row], error })
-        });
-        // After a failure it is not known which are good.
-        if failure.is_none() {
-            stale.fill(false);
-        }
-        canvas
+/// Images, and which of them are outdated.
+#[derive(Debug)]
+pub(in crate::camera) struct DrawnImages {
+    pictures: Pictures,
+    /// One flag per image.
+    stale: Vec<bool>,
+    failure: Option<CameraError>,
+}
+
+impl DrawnImages {
+    /// `count` images, all of them outdated.
+    pub(in crate::camera) fn new(cfg: &CameraCfg, count: usize) -> Self {
+        let pictures = Pictures::new(cfg.channels, count, cfg.width, cfg.height);
+        Self { pictures, stale: vec![true; count], failure: None }
     }
 
-    /// Draws captures, those of some rows at some places, into frames, and does to them what the camera does; `look` says from
-    /// where, and through which lens, a place was captured.
-    pub(in crate::camera) fn develop<'a>(
-        &self,
-        captures: &Captures,
-        look: impl Fn(usize) -> (&'a Mount, Option<&'a LensRays>),
-        places: impl Iterator<Item = (usize, usize)> + Clone,
+    /// The images, or why they could not be drawn.
+    pub(in crate::camera) fn pictures(&self) -> Result<&Pictures, CameraError> {
+        self.failure.clone().map_or(Ok(&self.pictures), Err)
+    }
+
+    pub(in crate::camera) fn is_stale(&self, image: usize) -> bool {
+        self.stale[image]
+    }
+
+    pub(in crate::camera) fn set_stale(&mut self, image: usize, stale: bool) {
+        self.stale[image] = stale;
+    }
+
+    /// Copies image `from` of `count` others.
+    pub(in crate::camera) fn copy(&mut self, image: usize, others: &Pictures, count: usize, from: usize) {
+        self.pictures.copy_view((self.stale.len(), image), others, (count, from));
+        self.stale[image] = false;
+    }
+
+    /// Moves some images up by `by` places; the last ones fall out, and the first ones are outdated.
+    pub(in crate::camera) fn move_up(&mut self, images: Range<usize>, by: usize) {
+        self.pictures.move_up(self.stale.len(), images.clone(), by);
+        let stale = &mut self.stale[images];
+        stale.rotate_right(by);
+        stale[..by].fill(true);
+    }
+
+    /// Makes zeros of some images, which are not outdated then.
+    pub(in crate::camera) fn forget(&mut self, images: Range<usize>) {
+        self.pictures.forget(self.stale.len(), images.clone());
+        self.stale[images].fill(false);
+    }
+}
+
+/// The rasterizer of a camera, its noise, and memory that is kept between drawings.
+#[derive(Debug)]
+pub(in crate::camera) struct FrameRenderer {
+    rasterizer: ParallelRasterizer,
+    views: Vec<View>,
+    jobs: Vec<Job<'static>>,
+    takes: Vec<Take<'static>>,
+    tickets: Vec<Ticket>,
+    /// Noise and imperfections of drawn images.
+    faults: Option<Faults>,
+}
+
+impl FrameRenderer {
+    pub(in crate::camera) fn new(rasterizer: ParallelRasterizer, faults: Option<Faults>) -> Self {
+        let (views, jobs, takes, tickets) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { rasterizer, views, jobs, takes, tickets, faults }
+    }
+}
+
+impl Camera {
+    /// Draws the outdated ones of some images, each from its `source`. Their failure is kept with them.
+    ///
+    /// # Errors
+    ///
+    /// A drawing that was cancelled.
+    pub(in crate::camera) fn redraw<'a>(
+        &'a self,
+        images: &mut DrawnImages,
+        source: impl Fn(usize) -> Option<FrameSource<'a>>,
+    ) -> Result<(), CameraError> {
+        let DrawnImages { pictures, stale, failure } = images;
+        let count = stale.len();
+        let outdated = |image: usize| source(image).filter(|_| stale[image]);
+        let sources = (0..count).filter_map(outdated);
+        let frames = pictures.frames_mut(count).enumerate().filter(|(image, _)| outdated(*image).is_some());
+        let result = self.develop(sources.clone(), frames.map(|(_, frame)| frame));
+        *failure = result.err().and_then(|(job, error)| {
+            let row = sources.clone().nth(job)?.row;
+            Some(CameraError::Draw { env: self.env_ids()[row], error })
+        });
+        match failure {
+            None => stale.fill(false),
+            Some(failure) if failure.is_cancelled() => return Err(failure.clone()),
+            // It is not known which of them are good.
+            Some(_) => {}
+        }
+        Ok(())
+    }
+
+    /// Draws frames into images, with the noise and the imperfections of the camera.
+    fn develop<'a>(
+        &'a self,
+        sources: impl Iterator<Item = FrameSource<'a>> + Clone,
         frames: impl Iterator<Item = FrameMut<'a>>,
     ) -> Result<(), (usize, RenderError)> {
-        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
-        let Desk { rasterizer, views, jobs: kept, takes: kept_takes, tickets, faults, .. } = &mut *desk;
+        let mut renderer = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
+        let FrameRenderer { rasterizer, views, jobs: kept, takes: kept_takes, tickets, faults } = &mut *renderer;
         views.clear();
-        views.extend(places.clone().map(|(_, place)| {
-            let (mount, _) = look(place);
-            let pose = self.world_from(mount, captures.world_from_parent[place]).unwrap_or_else(Pose::identity);
-            self.lens.view(&mount.pixels, PoseF32::from(&pose))
-        }));
+        views.extend(sources.clone().map(|source| self.view_from(&source)));
         tickets.clear();
         let mut jobs: Vec<Job<'_>> = emptied(std::mem::take(kept));
         let mut takes: Vec<Take<'_>> = emptied(std::mem::take(kept_takes));
         let mut marked: Vec<&[Marker]> = Vec::new();
-        for (((row, place), frame), view) in places.zip(frames).zip(&*views) {
-            let poses = row_of(&captures.poses, place);
-            let lights = Some(row_of(&captures.lights, place));
-            let scene = captures.scenes[place].0.as_deref().unwrap_or(&self.scene);
-            let before = self.earlier.as_ref().and_then(|earlier| earlier.of(row));
-            jobs.push((Shot { scene, poses, view, lights, lens: look(place).1, before }, frame));
-            tickets.push(captures.tickets[place]);
-            if self.draws_markers {
-                marked.push(&captures.markers[place]);
+        for ((source, frame), view) in sources.zip(frames).zip(&*views) {
+            jobs.push((self.shot(&source, view, self.motion.before(source.row)), frame));
+            tickets.push(source.frame.ticket);
+            if self.cfg.draw_markers {
+                marked.push(&source.frame.markers);
             }
-            takes.push(self.take_of(captures, place, look(place).0));
+            takes.push(self.take_of(&source));
         }
-        let result = match self.draws_markers && self.channels.color {
+        let result = match self.cfg.draw_markers && self.cfg.channels.color {
             true => render_marked(rasterizer, &mut jobs, &takes, &marked),
             false => rasterizer.render_takes(&mut jobs, &takes),
         };
@@ -84,13 +145,13 @@ impl Camera {
         if let Some(faults) = faults {
             faults.spoil(&mut jobs, tickets);
         }
-        let miss = match self.depth_miss {
+        let miss = match self.cfg.depth_miss {
             DepthMiss::Inf => None,
             DepthMiss::Far => Some(self.lens.far),
             DepthMiss::Zero => Some(0.0),
         };
         for (shot, frame) in &mut jobs {
-            if self.depth_miss == DepthMiss::Far {
+            if self.cfg.depth_miss == DepthMiss::Far {
                 keep_before(self.lens.far, shot.lens.is_some_and(|rays| !rays.is_forward()), frame);
             }
             miss.into_iter().for_each(|value| frame.replace_misses(value));
@@ -100,33 +161,37 @@ impl Camera {
         result
     }
 
-    /// What tells the capture of a place from others, seen from a mount.
-    fn take_of<'a>(&self, captures: &'a Captures, place: usize, mount: &Mount) -> Take<'a> {
-        let opened = captures.opened(place).and_then(|(poses, parent)| {
-            let camera = self.world_from(mount, Some(parent))?;
-            let before = self.opening.as_ref()?.seconds();
+    fn shot<'a>(&'a self, source: &FrameSource<'a>, view: &'a View, before: Option<Before<'a>>) -> Shot<'a> {
+        let FrameSource { frame, rays, .. } = *source;
+        let scene = frame.scene.0.as_deref().unwrap_or(&self.scene);
+        Shot { scene, poses: &frame.poses, view, lights: Some(&frame.lights), lens: rays.map(|rays| &**rays), before }
+    }
+
+    /// The shutter and the key of the noise of a frame.
+    fn take_of<'a>(&self, source: &FrameSource<'a>) -> Take<'a> {
+        let opened = source.frame.opened().and_then(|(poses, parent)| {
+            let camera = self.viewpoints.world_from(source.viewpoint, Some(parent))?;
+            let before = self.motion.shutter_seconds()?;
             Some(Opened { poses, world_from_camera: PoseF32::from(&camera), before })
         });
-        Take { noise: captures.tickets[place].bits(Stream::PATHS), opened }
+        Take { noise: source.frame.ticket.bits(Stream::PATHS), opened }
     }
 
     /// Whether rows of its pictures may be of several instants.
     pub(in crate::camera) fn takes_time(&self) -> bool {
-        self.opening.is_some()
+        self.motion.shutter_seconds().is_some()
     }
 
-    /// What there is to draw of a row as it was captured, and what draws it: for whoever needs more than pictures.
+    /// The shown frame of a row and its rasterizer: for what is computed of more than pictures.
     pub(in crate::camera) fn shot_of<T>(
         &self,
         row: usize,
         act: impl FnOnce(&mut ParallelRasterizer, Shot<'_>, Take<'_>) -> T,
     ) -> T {
-        let mut desk = self.desk.lock().unwrap_or_else(PoisonError::into_inner);
-        let view = &self.view_of(row);
-        let scene = self.captures.scenes[row].0.as_deref().unwrap_or(&self.scene);
-        let (poses, lights) = (row_of(&self.captures.poses, row), Some(row_of(&self.captures.lights, row)));
-        let take = self.take_of(&self.captures, row, self.mounts.row(row));
-        act(&mut desk.rasterizer, Shot { scene, poses, view, lights, lens: self.rays.row(row), before: None }, take)
+        let mut renderer = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
+        let source = self.shown_source(row);
+        let view = self.view_from(&source);
+        act(&mut renderer.rasterizer, self.shot(&source, &view, None), self.take_of(&source))
     }
 }
 
@@ -204,10 +269,4 @@ fn emptied<T, U>(mut list: Vec<T>) -> Vec<U> {
     list.clear();
     // Collected in place.
     list.into_iter().filter_map(|_| None).collect()
-}
-
-/// A row of an array that the camera allocated itself, in C order.
-fn row_of<T>(array: &Array2<T>, row: usize) -> &[T] {
-    let width = array.ncols();
-    array.as_slice().map_or(&[], |flat| &flat[row * width..(row + 1) * width])
 }

@@ -39,7 +39,11 @@ impl StereoCamera {
     pub fn disparity(&self) -> Result<ArrayView3<'_, f32>, SensorError> {
         let baseline = self.baseline()?;
         let depth = self.left().depth()?;
-        Ok(self.shown.get_or_init(|| self.disparities(baseline, depth)).pixels.view())
+        let update = |map: &mut DisparityMap| {
+            self.update_disparities(map, baseline, depth);
+            Ok::<(), SensorError>(())
+        };
+        Ok(self.disparities.get_or_update(|| Ok(DisparityMap::default()), update)?.pixels.view())
     }
 
     /// [`disparity`](Self::disparity) of the pictures that arrived last, as [`Camera::arrived`](crate::Camera::arrived) has their
@@ -97,12 +101,11 @@ impl StereoCamera {
         Ok(t.x)
     }
 
-    fn disparities(&self, baseline: f64, depth: ArrayView3<'_, f32>) -> DisparityMap {
-        let mut map = self.take_spare();
+    fn update_disparities(&self, map: &mut DisparityMap, baseline: f64, depth: ArrayView3<'_, f32>) {
         let (draws, stamps) = (self.left().draws(), self.left().stamps());
         // Nothing was drawn since, nor is anything else shown.
         if map.draws == draws && map.stamps == stamps && map.pixels.dim() == depth.dim() {
-            return map;
+            return;
         }
         if map.pixels.dim() != depth.dim() {
             map.pixels = Array3::zeros(depth.dim());
@@ -116,6 +119,5 @@ impl StereoCamera {
                 *to = if self.left().is_hit(z) { (scale / f64::from(z)) as f32 } else { 0.0 };
             });
         }
-        map
     }
 }

@@ -113,7 +113,7 @@ impl StereoCamera {
     /// An environment that the eyes do not see, and [`CameraError::NotRectifiable`].
     pub fn rectification(&self, env: usize) -> Result<Rectification, SensorError> {
         let row = self.left().row(env)?;
-        let pixels = [self.left(), self.right()].map(|eye| eye.mounts.row(row).pixels);
+        let pixels = [self.left(), self.right()].map(|eye| eye.viewpoints.row(row).pixels);
         Ok(Rectification::of(&self.rig.left_from_right, pixels)?)
     }
 }

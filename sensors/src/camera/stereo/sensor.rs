@@ -2,9 +2,10 @@
 
 use super::cfg::Rig;
 use super::disparity::DisparityMap;
-use crate::camera::error::CameraError;
+use crate::cached::Cached;
+use crate::camera::env_rows::EnvRows;
 use crate::camera::extrinsics::{CameraConvention, Poses};
-use crate::camera::mounts::chosen_rows;
+use crate::camera::placement::{CameraPlacement, PlaceRows, PoseFrame};
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;
 use crate::sensor::Sensor;
@@ -13,7 +14,6 @@ use kinetoscope_scene::pose::{from_row, to_row};
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use ndarray::Array2;
 use std::fmt;
-use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// A pair of eyes in each of several environments: two [`Camera`]s on one rig.
 ///
@@ -25,15 +25,12 @@ pub struct StereoCamera {
     left: Camera,
     right: Camera,
     pub(super) rig: Rig,
-    /// What was computed of the pictures shown now.
-    pub(super) shown: OnceLock<DisparityMap>,
-    /// What was computed before: its memory is kept.
-    spare: Mutex<DisparityMap>,
+    pub(super) disparities: Cached<DisparityMap>,
 }
 
 impl StereoCamera {
     pub(super) fn new(left: Camera, right: Camera, rig: Rig) -> Self {
-        Self { left, right, rig, shown: OnceLock::new(), spare: Mutex::default() }
+        Self { left, right, rig, disparities: Cached::outdated(DisparityMap::default()) }
     }
 
     /// The left eye.
@@ -57,11 +54,6 @@ impl StereoCamera {
         self.origins(&self.left.pose_w(CameraConvention::Ros), convention)
     }
 
-    /// Poses of the rig's [origin](super::StereoOrigin) in the frame of the parent, as [`Camera::local_pose`].
-    pub fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
-        self.origins(&self.left.local_pose(CameraConvention::Ros), convention)
-    }
-
     /// Where origins are, given where left eyes are.
     fn origins(&self, left: &Array2<f64>, convention: CameraConvention) -> Array2<f64> {
         let left_from_origin = self.rig.origin_from_left.inverse();
@@ -76,108 +68,22 @@ impl StereoCamera {
         Array2::from(rows.collect::<Vec<[f64; 7]>>())
     }
 
-    /// Places rigs in the frame of their parent (of the environment, for free ones), by their
-    /// [origin](super::StereoOrigin): as [`Camera::set_local_pose`].
+    /// Sets different intrinsics of left and right eyes: otherwise as
+    /// [`CameraPlacement::set_intrinsics`].
     ///
     /// # Errors
     ///
-    /// As [`Camera::set_local_pose`]; nothing is changed then.
-    pub fn set_local_pose(
-        &mut self,
-        poses: &(impl Poses + ?Sized),
-        env_ids: Option<&[usize]>,
-        convention: CameraConvention,
-    ) -> Result<(), SensorError> {
-        let [lefts, rights] = self.eyes_of(poses, convention)?;
-        self.both(|left, right| {
-            left.set_local_pose(&lefts, env_ids, CameraConvention::Ros)?;
-            right.set_local_pose(&rights, env_ids, CameraConvention::Ros)
-        })
-    }
-
-    /// Places rigs in the environment, by their [origin](super::StereoOrigin): as [`Camera::set_world_poses`].
-    ///
-    /// # Errors
-    ///
-    /// As [`Camera::set_world_poses`]; nothing is changed then.
-    pub fn set_world_poses(
-        &mut self,
-        poses: &(impl Poses + ?Sized),
-        env_ids: Option<&[usize]>,
-        convention: CameraConvention,
-    ) -> Result<(), SensorError> {
-        let [lefts, rights] = self.eyes_of(poses, convention)?;
-        self.both(|left, right| {
-            left.set_world_poses(&lefts, env_ids, CameraConvention::Ros)?;
-            right.set_world_poses(&rights, env_ids, CameraConvention::Ros)
-        })
-    }
-
-    /// Turns rigs to something: places the [origin](super::StereoOrigin) of each at `eye`, the left eye's optical axis
-    /// parallel to the line from there to `target`: as [`Camera::look_at`].
-    ///
-    /// # Errors
-    ///
-    /// As [`Camera::look_at`]; nothing is changed then.
-    pub fn look_at(
-        &mut self,
-        eye: &[[f64; 3]],
-        target: &[[f64; 3]],
-        up: &[[f64; 3]],
-        env_ids: Option<&[usize]>,
-    ) -> Result<(), SensorError> {
-        let Rig { left_from_right, origin_from_left } = self.rig;
-        self.both(|left, right| {
-            left.look_at(eye, target, up, env_ids)?;
-            let rows = chosen_rows(left.env_ids().len(), env_ids, |env| left.row(env))?;
-            let lefts: Vec<Pose> =
-                rows.iter().map(|&row| left.mounts.row(row).parent_from_camera * origin_from_left).collect();
-            let rights: Vec<Pose> = lefts.iter().map(|pose| pose * left_from_right).collect();
-            left.set_local_pose(&lefts, env_ids, CameraConvention::Ros)?;
-            right.set_local_pose(&rights, env_ids, CameraConvention::Ros)
-        })
-    }
-
-    /// Changes lenses, `right` of the right eyes (`None`: as the left ones): as [`Camera::set_intrinsics`].
-    ///
-    /// # Errors
-    ///
-    /// [`SensorError::Eye`] with those of [`Camera::set_intrinsics`]; nothing is changed then.
-    pub fn set_intrinsics(
+    /// [`SensorError::Eye`] with those of [`CameraPlacement::set_intrinsics`]; nothing is changed then.
+    pub fn set_eye_intrinsics(
         &mut self,
         left: &[Intrinsics],
-        right: Option<&[Intrinsics]>,
+        right: &[Intrinsics],
         env_ids: Option<&[usize]>,
     ) -> Result<(), SensorError> {
         self.both(|left_eye, right_eye| {
             left_eye.set_intrinsics(left, env_ids).map_err(SensorError::of_eye("left"))?;
-            right_eye.set_intrinsics(right.unwrap_or(left), env_ids).map_err(SensorError::of_eye("right"))
+            right_eye.set_intrinsics(right, env_ids).map_err(SensorError::of_eye("right"))
         })
-    }
-
-    /// Places and lenses as they were configured: as [`Camera::restore`].
-    ///
-    /// # Errors
-    ///
-    /// As [`Camera::restore`]; nothing is changed then.
-    pub fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
-        self.both(|left, right| {
-            left.restore(env_ids)?;
-            right.restore(env_ids)
-        })
-    }
-
-    /// Where the eyes of rigs are, left and right, given where their origins are.
-    fn eyes_of(
-        &self,
-        origins: &(impl Poses + ?Sized),
-        convention: CameraConvention,
-    ) -> Result<[Vec<Pose>; 2], CameraError> {
-        let Rig { left_from_right, origin_from_left } = self.rig;
-        let origins = origins.to_poses()?;
-        let lefts: Vec<Pose> = origins.iter().map(|pose| convention.to_optical(pose) * origin_from_left).collect();
-        let rights = lefts.iter().map(|pose| pose * left_from_right).collect();
-        Ok([lefts, rights])
     }
 
     /// Changes both eyes, or none.
@@ -186,15 +92,15 @@ impl StereoCamera {
         change: impl FnOnce(&mut Camera, &mut Camera) -> Result<(), SensorError>,
     ) -> Result<(), SensorError> {
         let eyes = [&self.left, &self.right];
-        let before = eyes.map(|eye| (eye.mounts.clone(), eye.rays.clone()));
+        let before = eyes.map(|eye| eye.viewpoints.clone());
         let result = change(&mut self.left, &mut self.right);
         if result.is_err() {
-            [(self.left.mounts, self.left.rays), (self.right.mounts, self.right.rays)] = before;
+            [self.left.viewpoints, self.right.viewpoints] = before;
         } else {
             // What was held for the case of failure is not needed any more.
             drop(before);
-            self.left.rays.forget();
-            self.right.rays.forget();
+            self.left.viewpoints.free_unused_rays();
+            self.right.viewpoints.free_unused_rays();
         }
         self.outdate();
         result
@@ -202,14 +108,41 @@ impl StereoCamera {
 
     /// What was computed may be of other pictures than those shown.
     fn outdate(&mut self) {
-        if let Some(map) = self.shown.take() {
-            *self.spare.get_mut().unwrap_or_else(PoisonError::into_inner) = map;
-        }
+        self.disparities.invalidate();
+    }
+}
+
+/// Places rigs by their origins: both eyes move, or none.
+impl PlaceRows for StereoCamera {
+    fn env_rows(&self) -> &EnvRows {
+        self.left.env_rows()
     }
 
-    /// The memory of what was computed before.
-    pub(super) fn take_spare(&self) -> DisparityMap {
-        std::mem::take(&mut *self.spare.lock().unwrap_or_else(PoisonError::into_inner))
+    fn place_rows(&mut self, rows: &[usize], poses: &[Pose], frame: PoseFrame) -> Result<(), SensorError> {
+        let Rig { left_from_right, origin_from_left } = self.rig;
+        let lefts: Vec<Pose> = poses.iter().map(|origin| origin * origin_from_left).collect();
+        let rights: Vec<Pose> = lefts.iter().map(|left| left * left_from_right).collect();
+        let (lefts, rights) = (lefts.to_poses()?, rights.to_poses()?);
+        self.both(|left, right| {
+            left.place_rows(rows, &lefts, frame)?;
+            right.place_rows(rows, &rights, frame)
+        })
+    }
+
+    fn restore_rows(&mut self, rows: &[usize]) {
+        self.left.restore_rows(rows);
+        self.right.restore_rows(rows);
+        self.outdate();
+    }
+}
+
+impl CameraPlacement for StereoCamera {
+    fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
+        self.origins(&self.left.local_pose(CameraConvention::Ros), convention)
+    }
+
+    fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError> {
+        self.set_eye_intrinsics(intrinsics, intrinsics, env_ids)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::super::imperfection::{DepthNoise, Vignetting};
 use super::super::{
-    Camera, CameraCfg, CameraConvention, Channels, Extrinsics, Intrinsics, LensRays, Optics, PixelIntrinsics,
-    Placement, RasterCfg, Renderer,
+    Camera, CameraCfg, CameraConvention, CameraPlacement, Channels, Extrinsics, Intrinsics, LensRays, Optics,
+    PixelIntrinsics, Placement, RasterCfg, Renderer,
 };
 use super::harness::{Image, Still, look, pinhole, point, wide};
 use super::scenes::{Random, random};

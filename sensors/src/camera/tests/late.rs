@@ -1,7 +1,9 @@
 //! Images that come late, get lost or are kept in the history, against those of a perfect camera.
 
 use super::super::imperfection::{Exposure, Holes, Imperfections, ShotNoise};
-use super::super::{Camera, CameraCfg, CameraConvention, CameraError, Channels, Extrinsics, Intrinsics};
+use super::super::{
+    Camera, CameraCfg, CameraConvention, CameraError, CameraPlacement, Channels, Extrinsics, Intrinsics,
+};
 use super::stage::{DT, bits, built, cfg, context, state};
 use crate::SensorContext;
 use crate::error::SensorError;

@@ -1,8 +1,8 @@
 //! Images through lenses: against closed forms, and against images without a lens of the same rays.
 
 use super::super::{
-    Camera, CameraCfg, CameraError, Channels, DepthMiss, Intrinsics, Lens, LensRays, PixelIntrinsics, PointFrame,
-    RasterCfg, Renderer,
+    Camera, CameraCfg, CameraError, CameraPlacement, Channels, DepthMiss, Intrinsics, Lens, LensRays, PixelIntrinsics,
+    PointFrame, RasterCfg, Renderer,
 };
 use super::harness::{Still, at, far_apart, look, matt, point, things, unlit};
 use super::lenses::{FISHEYE, WARPED, all, bent, rays_of};

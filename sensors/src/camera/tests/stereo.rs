@@ -1,9 +1,9 @@
 //! Pairs of eyes, against cameras that stand alone, the geometry of pairs, and OpenCV's rectification.
 
 use super::super::{
-    CalibrationError, Camera, CameraCfg, CameraConvention, CameraError, CameraInfo, Channels, DepthMiss,
-    DistortionModel, Extrinsics, Imperfections, Intrinsics, Lens, Optics, PixelIntrinsics, Placement, Rectification,
-    Renderer, StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
+    CalibrationError, Camera, CameraCfg, CameraConvention, CameraError, CameraInfo, CameraPlacement, Channels,
+    DepthMiss, DistortionModel, Extrinsics, Imperfections, Intrinsics, Lens, Optics, PixelIntrinsics, Placement,
+    Rectification, Renderer, StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
 };
 use super::harness::{opencv, pinhole, point};
 use super::stage::{BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
@@ -223,7 +223,7 @@ fn lazy_disparity() {
     // Other intrinsics change it, of the same instant.
     let other = [Intrinsics::Pixels { fx: 20.0, fy: 26.0, cx: 22.25, cy: 17.5 }];
     let before = stereo.disparity().unwrap().to_owned();
-    stereo.set_intrinsics(&other, None, Some(&[1])).unwrap();
+    stereo.set_intrinsics(&other, Some(&[1])).unwrap();
     let after = stereo.disparity().unwrap();
     assert_eq!(after.index_axis(Axis(0), 0), before.index_axis(Axis(0), 0));
     assert_ne!(after.index_axis(Axis(0), 1), before.index_axis(Axis(0), 1));
@@ -344,8 +344,8 @@ fn placement() {
     assert_eyes(&free, 0, eyes(there));
     let untouched = free.left().local_pose(CameraConvention::Ros);
     let lens = |fx| Intrinsics::Pixels { fx, fy: 44.0, cx: 20.0, cy: 16.0 };
-    assert!(free.set_intrinsics(&[lens(44.0)], Some(&[lens(-1.0)]), None).is_err());
-    assert!(free.set_intrinsics(&[lens(44.0)], Some(&[lens(44.0); 3]), None).is_err());
+    assert!(free.set_eye_intrinsics(&[lens(44.0)], &[lens(-1.0)], None).is_err());
+    assert!(free.set_eye_intrinsics(&[lens(44.0)], &[lens(44.0); 3], None).is_err());
     assert_eq!(free.left().intrinsic_matrices()[(0, 0, 0)], 40.0, "the left eye was not changed either");
     assert!(free.set_local_pose(&there, Some(&[2]), CameraConvention::Ros).is_err());
     assert!(free.look_at(&[[0.0; 3]], &[[0.0; 3]], &[[0.0; 3]], None).is_err());
@@ -424,13 +424,13 @@ fn failed_changes() {
     let mut stereo = of(&pair_of(camera), &context(2));
     let lens = |fx| Intrinsics::Pixels { fx, fy: 44.0, cx: 20.0, cy: 16.0 };
     // The intrinsics that were set before stay, not those of the configuration.
-    stereo.set_intrinsics(&[lens(44.0)], None, Some(&[1])).unwrap();
+    stereo.set_intrinsics(&[lens(44.0)], Some(&[1])).unwrap();
     let (before, bytes) = (both_bits(&stereo, 2), stereo.left().lens_bytes());
-    assert!(stereo.set_intrinsics(&[lens(30.0)], Some(&[lens(-1.0)]), None).is_err());
+    assert!(stereo.set_eye_intrinsics(&[lens(30.0)], &[lens(-1.0)], None).is_err());
     stereo.set_local_pose(&stereo.local_pose(CameraConvention::Ros), None, CameraConvention::Ros).unwrap();
     assert!(both_bits(&stereo, 2) == before && stereo.left().lens_bytes() == bytes);
     // The control: one that does not fail is seen, and tables that are not needed are freed.
-    stereo.set_intrinsics(&[lens(30.0)], None, Some(&[1])).unwrap();
+    stereo.set_intrinsics(&[lens(30.0)], Some(&[1])).unwrap();
     assert!(bits(stereo.left(), 0..2) != before[0] && stereo.left().lens_bytes() == bytes);
 }
 

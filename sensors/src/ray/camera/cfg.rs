@@ -2,19 +2,21 @@
 
 use super::pixels::Pixels;
 use super::sensor::RayCasterCamera;
-use crate::camera::mounts::{Mount, Mounts};
-use crate::camera::{DepthMiss, Extrinsics, Intrinsics};
+use crate::camera::env_rows::EnvRows;
+use crate::camera::viewpoints::{Viewpoint, Viewpoints};
+use crate::camera::{CameraError, DepthMiss, Extrinsics, Intrinsics, Lens};
 use crate::error::SensorError;
-use crate::ray::caster::scan::Scan;
-use crate::ray::{HitTargets, RayError, RayPattern, RayTargets};
+use crate::ray::sampler::{RaySampler, RaySamplerCfg, check_memory};
+use crate::ray::{HitTargets, RayError, RayPattern};
 use crate::requires::Requires;
-use crate::sampling::{Channel, Sampler, SamplingCfg};
+use crate::sampling::{Channel, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{SensorCfg, SensorContext};
+use kinetoscope_render::lens::RaysOfRows;
 use serde::{Deserialize, Serialize};
 
-/// The most memory that the pictures may take \[bytes\].
-const MAX_BYTES: u64 = 64 << 30;
+/// A hit of 40 bytes; five numbers of the sampler; depth, distance, normal and mask.
+const BYTES_PER_RAY: usize = 40 + 40 + 24;
 
 /// Configuration of a [`RayCasterCamera`]: a pinhole camera that casts one ray through the centre of every pixel.
 ///
@@ -89,8 +91,6 @@ impl SensorCfg for RayCasterCameraCfg {
     /// Sizes, lens, distance or placement that are no good; an unknown parent or target; a period that is no whole number
     /// of steps and what else is wrong with the sampling; pictures that do not fit into memory.
     fn build(&self, context: &SensorContext) -> Result<RayCasterCamera, SensorError> {
-        let scene = context.scene.as_ref().ok_or(RayError::NoScene)?;
-        let schedule = Schedule::new(self.sampling.update_period, context.dt, self.sampling.round_period)?;
         let parent = self.extrinsics.parent.as_deref().map(|name| context.body(name)).transpose()?;
         if !(self.max_distance > 0.0 && self.max_distance < f64::from(f32::MAX)) {
             let (what, of, value) = ("max_distance", "ray caster camera", self.max_distance);
@@ -103,33 +103,26 @@ impl SensorCfg for RayCasterCameraCfg {
             let count = self.width as f64 * self.height as f64;
             return Err(RayError::Count { pattern: "pixel", count, limit: RayPattern::MAX_RAYS }.into());
         };
-        check_memory(context.num_envs, pixels)?;
-        let mount = Mount {
+        check_memory(context.num_envs, pixels, BYTES_PER_RAY)?;
+        let viewpoint = Viewpoint {
             parent_from_camera: self.extrinsics.parent_from_camera()?,
             pixels: self.intrinsics.to_pixels(self.width, self.height)?,
         };
-        let wanted = self.targets.select(scene, self.groups, parent, context)?;
-        let targets = RayTargets::new(scene, wanted, &context.ray_assets);
-        let channels = [
-            Channel::within("distances", pixels, [0.0, self.max_distance]),
-            Channel::exact("normals", 3 * pixels),
-            Channel::exact("ids", pixels),
-            Channel::exact("poses", 7),
-            Channel::exact("lenses", 4),
-        ];
-        let sampler = Sampler::new("ray caster camera", self.requires(), context, &self.sampling, &channels)?;
-        let rays = Pixels { width: self.width, height: self.height };
-        let scan = Scan::new(targets, rays, self.max_distance, context);
-        let mounts = Mounts::new(mount, context.num_envs);
-        Ok(RayCasterCamera::new(self, context, parent, mounts, scan, schedule.phases(context.num_envs), sampler))
+        let cfg = RaySamplerCfg {
+            kind: "ray caster camera",
+            requires: self.requires(),
+            sampling: &self.sampling,
+            targets: &self.targets,
+            groups: self.groups,
+            parent,
+            rays: Pixels { width: self.width, height: self.height },
+            max_distance: self.max_distance,
+            frame_channels: &[Channel::exact("poses", 7), Channel::exact("lenses", 4)],
+        };
+        let rays = RaySampler::new(cfg, context)?;
+        let (size, envs) = ([self.width, self.height], EnvRows::all(context.num_envs));
+        let lens =
+            RaysOfRows::new(Lens::default(), &viewpoint.pixels, size, 1, envs.len()).map_err(CameraError::from)?;
+        Ok(RayCasterCamera::new(self, context, rays, Viewpoints::new(viewpoint, size, lens, envs, parent)))
     }
-}
-
-/// Refuses what would end the process: an allocation that fails.
-fn check_memory(envs: usize, rays: usize) -> Result<(), RayError> {
-    // A hit of 40 bytes; five numbers of the sampler; depth, distance, normal and mask.
-    const BYTES_PER_RAY: usize = 40 + 40 + 24;
-    let bytes = rays.checked_mul(envs).and_then(|n| n.checked_mul(BYTES_PER_RAY)).filter(|&b| b as u64 <= MAX_BYTES);
-    let granted = bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
-    if granted { Ok(()) } else { Err(RayError::Memory { envs, rays, limit: MAX_BYTES }) }
 }

@@ -3,7 +3,6 @@
 mod cfg;
 mod pictures;
 mod pixels;
-mod placing;
 mod points;
 mod sensor;
 

@@ -2,7 +2,7 @@
 
 use crate::camera::PixelIntrinsics;
 use crate::ray::Ray;
-use crate::ray::caster::scan::Rays;
+use crate::ray::scan::Rays;
 use kinetoscope_scene::PoseF64;
 use nalgebra::Vector3;
 

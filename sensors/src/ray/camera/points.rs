@@ -4,6 +4,7 @@ use super::sensor::RayCasterCamera;
 use crate::camera::PointFrame;
 use crate::camera::point_cloud::{seen, unproject};
 use crate::error::SensorError;
+use crate::sampling::Sampled;
 use kinetoscope_scene::Pose;
 use ndarray::{Array2, Array3};
 
@@ -12,7 +13,7 @@ impl RayCasterCamera {
     /// pixel's centre, noise included. (+inf, +inf, +inf) where nothing was hit, which the mask says too.
     pub fn points(&self, frame: PointFrame) -> Array3<f32> {
         let (height, width) = self.image_shape();
-        let count = self.mounts.len();
+        let count = self.sampler().num_envs();
         let mut points = Array3::from_elem((count, height * width, 3), f32::INFINITY);
         if let Some(flat) = points.as_slice_mut() {
             flat.chunks_exact_mut(3 * height * width)
@@ -28,7 +29,7 @@ impl RayCasterCamera {
     ///
     /// An environment that does not exist.
     pub fn point_map(&self, env: usize, frame: PointFrame) -> Result<Array3<f32>, SensorError> {
-        self.expected.check_envs(&[env])?;
+        self.sampler().check_envs(&[env])?;
         let (height, width) = self.image_shape();
         let mut points = Array3::from_elem((height, width, 3), f32::INFINITY);
         if let Some(flat) = points.as_slice_mut() {

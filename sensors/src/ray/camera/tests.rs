@@ -2,7 +2,7 @@
 
 use super::{RayCasterCamera, RayCasterCameraCfg};
 use crate::camera::OpticsError;
-use crate::camera::{CameraConvention, DepthMiss, Extrinsics, Intrinsics, Placement, PointFrame};
+use crate::camera::{CameraConvention, CameraPlacement, DepthMiss, Extrinsics, Intrinsics, Placement, PointFrame};
 use crate::noise::NoiseCfg;
 use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};

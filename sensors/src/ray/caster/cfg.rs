@@ -1,20 +1,20 @@
 //! What a ray caster is, before it exists.
 
-use super::scan::Scan;
+use super::RayAlignment;
 use super::sensor::RayCaster;
-use super::{HitTargets, RayAlignment};
 use crate::error::SensorError;
 use crate::ray::pattern::Grid;
-use crate::ray::{Ray, RayError, RayPattern, RayTargets};
+use crate::ray::sampler::{RaySampler, RaySamplerCfg, check_memory};
+use crate::ray::{HitTargets, Ray, RayError, RayPattern};
 use crate::requires::Requires;
-use crate::sampling::{Channel, Sampler, SamplingCfg};
+use crate::sampling::{Channel, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{SensorCfg, SensorContext};
 use kinetoscope_scene::{Pose, PoseF64};
 use serde::{Deserialize, Serialize};
 
-/// The most memory that the rays of a ray caster may take \[bytes\].
-const MAX_BYTES: u64 = 64 << 30;
+/// A hit of 40 bytes; twice five numbers of the sampler; point, id and mask.
+const BYTES_PER_RAY: usize = 40 + 80 + 32;
 
 /// Configuration of a [`RayCaster`].
 ///
@@ -112,9 +112,7 @@ impl SensorCfg for RayCasterCfg {
     /// A pattern, a distance, an offset or a drift that is no good; an unknown parent or target; a period that is no whole
     /// number of steps; rays that do not fit into memory.
     fn build(&self, context: &SensorContext) -> Result<RayCaster, SensorError> {
-        let scene = context.scene.as_ref().ok_or(RayError::NoScene)?;
         let parent = self.parent.as_deref().map(|name| context.body(name)).transpose()?;
-        let schedule = Schedule::new(self.sampling.update_period, context.dt, self.sampling.round_period)?;
         let number = |what, value, allowed| RayError::Number { what, of: "ray caster", value, allowed };
         if self.max_distance.is_nan() || self.max_distance <= 0.0 {
             return Err(number("max_distance", self.max_distance, "positive").into());
@@ -132,29 +130,20 @@ impl SensorCfg for RayCasterCfg {
         }
         // A pattern of more rays than any may have says so itself, on every machine.
         if self.pattern.count() <= RayPattern::MAX_RAYS {
-            check_memory(context.num_envs, self.pattern.count())?;
+            check_memory(context.num_envs, self.pattern.count(), BYTES_PER_RAY)?;
         }
         let rays: Vec<Ray> = self.pattern.rays()?.into_iter().map(|ray| ray.mapped_by(&offset)).collect();
-        let wanted = self.targets.select(scene, self.groups, parent, context)?;
-        let targets = RayTargets::new(scene, wanted, &context.ray_assets);
-        let channels = [
-            Channel::within("distances", rays.len(), [0.0, self.max_distance]),
-            Channel::exact("normals", 3 * rays.len()),
-            Channel::exact("ids", rays.len()),
-            Channel::exact("pos_w", 3),
-            Channel::exact("quat_w", 4),
-        ];
-        let sampler = Sampler::new("ray caster", self.requires(), context, &self.sampling, &channels)?;
-        let scan = Scan::new(targets, rays, self.max_distance, context);
-        Ok(RayCaster::new(self, context, parent, scan, schedule.phases(context.num_envs), sampler))
+        let cfg = RaySamplerCfg {
+            kind: "ray caster",
+            requires: self.requires(),
+            sampling: &self.sampling,
+            targets: &self.targets,
+            groups: self.groups,
+            parent,
+            rays,
+            max_distance: self.max_distance,
+            frame_channels: &[Channel::exact("pos_w", 3), Channel::exact("quat_w", 4)],
+        };
+        Ok(RayCaster::new(self, context, RaySampler::new(cfg, context)?, parent))
     }
-}
-
-/// Refuses what would end the process: an allocation that fails.
-fn check_memory(envs: usize, rays: usize) -> Result<(), RayError> {
-    // A hit of 40 bytes; twice five numbers of the sampler; point, id and mask.
-    const BYTES_PER_RAY: usize = 40 + 80 + 32;
-    let bytes = rays.checked_mul(envs).and_then(|n| n.checked_mul(BYTES_PER_RAY)).filter(|&b| b as u64 <= MAX_BYTES);
-    let granted = bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());
-    if granted { Ok(()) } else { Err(RayError::Memory { envs, rays, limit: MAX_BYTES }) }
 }

@@ -1,6 +1,7 @@
 //! The ray caster as a sensor: on a floor with a step, a ball that moves and the robot itself.
 
-use super::{HitTargets, RayAlignment, RayCaster, RayCasterCfg};
+use super::{RayAlignment, RayCaster, RayCasterCfg};
+use crate::ray::HitTargets;
 use crate::ray::pattern::{Custom, Grid, Lidar};
 use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};

@@ -1,7 +1,7 @@
 //! What rays hit.
 
 use crate::error::SensorError;
-use crate::select::{at_least_one, matching};
+use crate::select::{Choice, at_least_one, matching};
 use crate::sensor::SensorContext;
 use kinetoscope_scene::RenderScene;
 use serde::{Deserialize, Serialize};
@@ -89,13 +89,13 @@ fn names(
             let own = context.own_scenes.iter().filter_map(|own| own.0.as_deref());
             std::iter::once(scene).chain(own).any(|scene| scene.instances().get(index).is_some_and(|i| i.visible))
         });
-        at_least_one(patterns.len(), ("ray", "targets", "thing to hit"), &shown)?;
+        at_least_one(patterns.len(), Choice { sensor: "ray", field: "targets", what: "thing to hit" }, &shown)?;
         for pattern in patterns {
             matching(pattern, &shown, "thing to hit")?;
         }
     }
     let names = names_of(&|_| true);
-    at_least_one(patterns.len(), ("ray", "targets", "thing to hit"), &names)?;
+    at_least_one(patterns.len(), Choice { sensor: "ray", field: "targets", what: "thing to hit" }, &names)?;
     let mut named = vec![false; names.len()];
     for pattern in patterns {
         matching(pattern, &names, "thing to hit")?.into_iter().for_each(|index| named[index] = true);

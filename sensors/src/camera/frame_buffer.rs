@@ -1,0 +1,323 @@
+//! Frames of a camera: captured, on their way, shown, and past.
+
+use super::cfg::CameraCfg;
+use super::motion::OpeningPoses;
+use super::viewpoints::{Viewpoint, Viewpoints};
+use crate::delay::{self, DelayLine};
+use crate::history::History;
+use crate::schedule::Schedule;
+use kinetoscope_render::lens::LensRays;
+use kinetoscope_render::ticket::{Stream, Ticket};
+use kinetoscope_scene::pose::from_row;
+use kinetoscope_scene::{Light, Marker, OwnScene, Pose, PoseF32, RenderScene, SceneState};
+use ndarray::{Array1, Array2, ArrayView1, ArrayViewMut1, Axis};
+use std::sync::Arc;
+
+/// An environment at the instant of a frame.
+#[derive(Clone, Copy)]
+pub(super) struct Observation<'a> {
+    pub(super) state: &'a SceneState,
+    pub(super) env: usize,
+    /// Index of the body that the camera is attached to.
+    pub(super) parent: Option<usize>,
+}
+
+impl Observation<'_> {
+    /// Pose of the body that the camera is attached to; the identity for a free camera.
+    pub(super) fn parent_pose(&self) -> Pose {
+        let parent = self.parent.zip(self.state.body_poses.as_ref());
+        let pose = parent.map(|(body, poses)| from_row(&std::array::from_fn(|k| poses[(self.env, body, k)])));
+        pose.unwrap_or_else(Pose::identity)
+    }
+}
+
+/// Everything that the image of one environment at one instant is drawn of, except the viewpoint.
+#[derive(Clone, Debug)]
+pub(super) struct CapturedFrame {
+    /// World from instance.
+    pub(super) poses: Vec<PoseF32>,
+    pub(super) lights: Vec<Light>,
+    /// Scene of the environment's own, instead of that of all.
+    pub(super) scene: OwnScene,
+    /// Pose of the parent; the identity for a free camera, `None` before the first capture.
+    pub(super) world_from_parent: Option<Pose>,
+    /// Time of the capture \[s\].
+    pub(super) stamp: f64,
+    /// Key of the random numbers of the image.
+    pub(super) ticket: Ticket,
+    /// Markers of other sensors; empty for a camera that does not draw them.
+    pub(super) markers: Vec<Marker>,
+    /// Poses at shutter opening, for a shutter that takes time.
+    opening: Option<OpeningPoses>,
+}
+
+impl CapturedFrame {
+    /// Room for a frame of a scene, by a shutter that takes time or not.
+    fn new(scene: &RenderScene, ticket: Ticket, slow_shutter: bool) -> Self {
+        let instances = scene.instances().len();
+        Self {
+            poses: vec![PoseF32::IDENTITY; instances],
+            lights: vec![Light::default(); scene.lights.len()],
+            scene: OwnScene::default(),
+            world_from_parent: None,
+            stamp: 0.0,
+            ticket,
+            markers: Vec::new(),
+            opening: slow_shutter.then(|| OpeningPoses::new(instances)),
+        }
+    }
+
+    /// Captures an environment; the state was checked.
+    fn capture(&mut self, seen: &Observation<'_>, ticket: Ticket, opening: Option<&OpeningPoses>) {
+        let Observation { state, env, .. } = *seen;
+        let Some(visible) = &state.visible else { return };
+        copy_row(&mut self.poses, &visible.instance_poses, env);
+        copy_row(&mut self.lights, &visible.lights, env);
+        self.scene.clone_from(state.seen_scene(env));
+        self.world_from_parent = Some(seen.parent_pose());
+        self.stamp = state.time[env];
+        self.ticket = ticket;
+        if let Some(markers) = &state.markers {
+            self.markers.clone_from(&markers[env]);
+        }
+        if let Some(own) = &mut self.opening {
+            own.assign_valid(opening);
+        }
+    }
+
+    /// Copies another frame of the same scene into this one's memory.
+    fn assign(&mut self, other: &Self) {
+        self.poses.copy_from_slice(&other.poses);
+        self.lights.clone_from_slice(&other.lights);
+        self.scene.clone_from(&other.scene);
+        self.world_from_parent = other.world_from_parent;
+        self.stamp = other.stamp;
+        self.ticket = other.ticket;
+        self.markers.clone_from(&other.markers);
+        if let (Some(own), Some(other)) = (&mut self.opening, &other.opening) {
+            own.assign(other);
+        }
+    }
+
+    /// Poses of instances and parent at shutter opening; `None` for a frame of one instant.
+    pub(super) fn opened(&self) -> Option<(&[PoseF32], Pose)> {
+        self.opening.as_ref()?.get()
+    }
+}
+
+/// A captured frame, and the viewpoint and lens that it is drawn with.
+#[derive(Clone, Copy)]
+pub(super) struct FrameSource<'a> {
+    pub(super) row: usize,
+    pub(super) frame: &'a CapturedFrame,
+    pub(super) viewpoint: &'a Viewpoint,
+    pub(super) rays: Option<&'a Arc<LensRays>>,
+}
+
+impl<'a> FrameSource<'a> {
+    /// A frame of a row, from the row's present viewpoint.
+    pub(super) fn present(row: usize, frame: &'a CapturedFrame, viewpoints: &'a Viewpoints) -> Self {
+        Self { row, frame, viewpoint: viewpoints.row(row), rays: viewpoints.rays(row) }
+    }
+}
+
+/// A frame that has arrived, with the viewpoint and the lens at that time: later setters do not change it.
+#[derive(Clone, Debug)]
+struct ArrivedFrame {
+    frame: CapturedFrame,
+    viewpoint: Viewpoint,
+    rays: Option<Arc<LensRays>>,
+}
+
+impl ArrivedFrame {
+    fn assign(&mut self, source: FrameSource<'_>) {
+        self.frame.assign(source.frame);
+        self.viewpoint = *source.viewpoint;
+        self.rays = source.rays.cloned();
+    }
+
+    fn source(&self, row: usize) -> FrameSource<'_> {
+        FrameSource { row, frame: &self.frame, viewpoint: &self.viewpoint, rays: self.rays.as_ref() }
+    }
+}
+
+/// Frames of a camera in all its environments, row by row. All memory is taken at construction.
+#[derive(Debug)]
+pub(super) struct FrameBuffer {
+    shown: Vec<CapturedFrame>,
+    /// Times of the shown frames \[s\].
+    stamps: Array1<f64>,
+    /// Frames on their way, with a latency.
+    delay: Option<DelayLine<CapturedFrame>>,
+    /// Probability that a frame gets lost on its way.
+    dropout: f64,
+    arrived: Arrived,
+    /// True where the frame that arrived last is shown, from the viewpoint that it arrived with.
+    shows_latest: Vec<bool>,
+}
+
+/// Frames that have arrived.
+#[derive(Debug)]
+struct Arrived {
+    counts: Array1<u64>,
+    /// The frame that arrived last, with a latency; without one, it is the shown frame.
+    latest: History<ArrivedFrame>,
+    history: History<ArrivedFrame>,
+    stamps: History<f64>,
+}
+
+impl Arrived {
+    fn push(&mut self, source: FrameSource<'_>) {
+        let row = source.row;
+        self.counts[row] += 1;
+        for frames in [&mut self.latest, &mut self.history] {
+            if let Some([newest]) = frames.push_reused(row) {
+                newest.assign(source);
+            }
+        }
+        self.stamps.push(row, &[source.frame.stamp]);
+    }
+}
+
+impl FrameBuffer {
+    /// How many frames of an environment are on their way at once, where a frame is captured every `period` steps.
+    pub(super) fn pending(cfg: &CameraCfg, schedule: Schedule) -> usize {
+        let keeps_frames = cfg.latency_steps > 0 || cfg.history_length > 0 || cfg.dropout > 0.0;
+        if keeps_frames { delay::capacity(cfg.latency_steps.into(), schedule.period_steps()) } else { 0 }
+    }
+
+    /// Room for the frames that `cfg` asks for.
+    pub(super) fn new(
+        cfg: &CameraCfg,
+        schedule: Schedule,
+        scene: &RenderScene,
+        viewpoints: &Viewpoints,
+        ticket: Ticket,
+    ) -> Self {
+        let rows = viewpoints.len();
+        let frame = CapturedFrame::new(scene, ticket, !cfg.shutter.is_instant());
+        let arrived = ArrivedFrame { frame: frame.clone(), viewpoint: *viewpoints.row(0), rays: None };
+        let latency = u64::from(cfg.latency_steps);
+        Self {
+            shown: vec![frame.clone(); rows],
+            stamps: Array1::zeros(rows),
+            delay: (latency > 0).then(|| DelayLine::new(rows, latency, schedule.period_steps(), frame)),
+            dropout: cfg.dropout,
+            arrived: Arrived {
+                counts: Array1::zeros(rows),
+                latest: History::of((rows, usize::from(latency > 0), 1), arrived.clone()),
+                history: History::of((rows, cfg.history_length, 1), arrived),
+                stamps: History::new(rows, cfg.history_length, 1),
+            },
+            shows_latest: vec![false; rows],
+        }
+    }
+
+    /// Captures a frame of a row that is due: it is on its way, or gets lost, or is shown at once, where it says so.
+    pub(super) fn capture(
+        &mut self,
+        row: usize,
+        seen: &Observation<'_>,
+        ticket: Ticket,
+        opening: Option<&OpeningPoses>,
+        viewpoints: &Viewpoints,
+    ) -> bool {
+        if self.dropout > 0.0 && ticket.uniforms(Stream::DROPOUT, 0)[0] < self.dropout {
+            return false;
+        }
+        if let Some(delay) = &mut self.delay {
+            delay.push(row, seen.state.step[seen.env]).capture(seen, ticket, opening);
+            return false;
+        }
+        self.shown[row].capture(seen, ticket, opening);
+        self.stamps[row] = self.shown[row].stamp;
+        self.arrived.push(FrameSource::present(row, &self.shown[row], viewpoints));
+        true
+    }
+
+    /// Takes the frames of a row that have arrived by `step`; gives whether another one is shown.
+    pub(super) fn receive(&mut self, row: usize, step: u64, viewpoints: &Viewpoints) -> bool {
+        let mut shows = false;
+        while let Some((frame, is_newest)) = self.delay.as_mut().and_then(|delay| delay.take(row, step)) {
+            self.arrived.push(FrameSource::present(row, frame, viewpoints));
+            if is_newest {
+                self.shown[row].assign(frame);
+                self.stamps[row] = frame.stamp;
+                shows = true;
+            }
+        }
+        shows
+    }
+
+    /// Shows an environment as it is now, which is not a measurement: after a reset, or a write to its state.
+    pub(super) fn refresh(&mut self, row: usize, seen: &Observation<'_>, ticket: Ticket) {
+        if let Some(delay) = &mut self.delay {
+            delay.refresh(row, seen.state.step[seen.env]);
+        }
+        self.shown[row].capture(seen, ticket, None);
+        self.stamps[row] = self.shown[row].stamp;
+    }
+
+    /// Forgets the frames of a row that are on their way or past.
+    pub(super) fn reset(&mut self, row: usize) {
+        let Arrived { counts, latest, history, stamps } = &mut self.arrived;
+        counts[row] = 0;
+        latest.forget(row);
+        history.forget(row);
+        stamps.reset(row);
+        if let Some(delay) = &mut self.delay {
+            delay.clear(row);
+        }
+    }
+
+    /// Steps until the next frame arrives, at least 1, when the rows are at `steps`; `None` where none is on its way.
+    pub(super) fn arrives_in(&self, steps: impl Iterator<Item = u64>) -> Option<u64> {
+        self.delay.as_ref()?.due_in(steps)
+    }
+
+    /// The shown frame of a row.
+    pub(super) fn shown(&self, row: usize) -> &CapturedFrame {
+        &self.shown[row]
+    }
+
+    /// True where the frame that arrived last is shown, from the viewpoint that it arrived with.
+    pub(super) fn shows_latest(&self, row: usize) -> bool {
+        self.shows_latest[row]
+    }
+
+    pub(super) fn set_shows_latest(&mut self, row: usize, shows_latest: bool) {
+        self.shows_latest[row] = shows_latest;
+    }
+
+    /// The frame that arrived last in a row, where another one is shown.
+    pub(super) fn unseen(&self, row: usize) -> Option<FrameSource<'_>> {
+        let [latest] = self.arrived.latest.slice(row, 0).filter(|_| !self.shows_latest[row])? else { return None };
+        Some(latest.source(row))
+    }
+
+    /// The frame of the history of a row that is `age` frames old.
+    pub(super) fn past(&self, row: usize, age: usize) -> Option<FrameSource<'_>> {
+        let [past] = self.arrived.history.slice(row, age)? else { return None };
+        Some(past.source(row))
+    }
+
+    /// Times of the shown frames \[s\], shape (rows).
+    pub(super) fn stamps(&self) -> ArrayView1<'_, f64> {
+        self.stamps.view()
+    }
+
+    /// Frames that arrived since the last reset, shape (rows).
+    pub(super) fn counts(&self) -> ArrayView1<'_, u64> {
+        self.arrived.counts.view()
+    }
+
+    /// Times of past frames \[s\], newest first.
+    pub(super) fn stamp_history(&self) -> &History<f64> {
+        &self.arrived.stamps
+    }
+}
+
+/// Copies a row of an array.
+pub(super) fn copy_row<T: Clone>(to: &mut [T], from: &Array2<T>, row: usize) {
+    ArrayViewMut1::from(to).assign(&from.index_axis(Axis(0), row));
+}

@@ -1,0 +1,139 @@
+//! Setters of poses and intrinsics, shared by all camera sensors.
+
+use super::env_rows::EnvRows;
+use super::extrinsics::{CameraConvention, Poses, look_at_pose};
+use super::viewpoints::one_each;
+use crate::error::SensorError;
+use kinetoscope_render::intrinsics::Intrinsics;
+use kinetoscope_scene::Pose;
+use ndarray::Array2;
+
+/// Frame in which poses are given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PoseFrame {
+    /// The parent's frame; the environment's for a free camera.
+    Parent,
+    /// The environment's frame.
+    Environment,
+}
+
+/// The steps of [`CameraPlacement`] that differ between sensors.
+pub trait PlaceRows {
+    /// Environments that the sensor sees.
+    fn env_rows(&self) -> &EnvRows;
+
+    /// Sets poses of optical frames: one for each of `rows`, or one for all.
+    ///
+    /// # Errors
+    ///
+    /// A wrong number of poses, a parent without a known pose; nothing is changed then.
+    fn place_rows(&mut self, rows: &[usize], poses: &[Pose], frame: PoseFrame) -> Result<(), SensorError>;
+
+    /// Sets the configured poses and intrinsics.
+    fn restore_rows(&mut self, rows: &[usize]);
+}
+
+/// Placement of a camera sensor: its pose and its intrinsics in each environment, settable at any time.
+///
+/// A [`Camera`](crate::Camera) and a [`StereoCamera`](crate::StereoCamera) show the captured instant from the new pose at the
+/// next read; a [`RayCasterCamera`](crate::RayCasterCamera) uses it from the next image on. A stereo camera is placed by the
+/// [origin](super::StereoOrigin) of its rig. What was set stays over a reset, until [`restore`](Self::restore).
+pub trait CameraPlacement: PlaceRows {
+    /// Poses in the frame of the parent (of the environment, for a free camera), rows `[x, y, z, qw, qx, qy, qz]` \[m\],
+    /// shape (N, 7).
+    fn local_pose(&self, convention: CameraConvention) -> Array2<f64>;
+
+    /// Sets intrinsics: one for each of `env_ids` (`None` is all environments of the camera), or one for all. Both eyes of a
+    /// stereo camera get them.
+    ///
+    /// # Errors
+    ///
+    /// [`CameraError::Optics`](super::CameraError::Optics), also where a camera with a lens cannot have them;
+    /// [`CameraError::View`](super::CameraError::View), [`CameraError::Count`](super::CameraError::Count), an environment that
+    /// the camera does not see or that is named twice. Nothing is changed then.
+    fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError>;
+
+    /// Places cameras in the frame of their parent (of the environment, for free ones).
+    ///
+    /// `poses` are typed or rows `[x, y, z, qw, qx, qy, qz]`: one for each of `env_ids` (`None` is all environments of the
+    /// camera), or one for all. `convention` is the meaning of their axes.
+    ///
+    /// # Errors
+    ///
+    /// [`CameraError::Pose`](super::CameraError::Pose), [`CameraError::Count`](super::CameraError::Count), an environment that
+    /// the camera does not see or that is named twice; nothing is changed then.
+    fn set_local_pose(
+        &mut self,
+        poses: &(impl Poses + ?Sized),
+        env_ids: Option<&[usize]>,
+        convention: CameraConvention,
+    ) -> Result<(), SensorError> {
+        place_in(self, poses, env_ids, convention, PoseFrame::Parent)
+    }
+
+    /// Places cameras in the environment, as [`set_local_pose`](Self::set_local_pose). An attached camera gets the local pose
+    /// that puts it there at the captured instant (of a camera of rays, when rays were cast last), and moves with its parent
+    /// from then on.
+    ///
+    /// # Errors
+    ///
+    /// As [`set_local_pose`](Self::set_local_pose), and [`CameraError::NothingCaptured`](super::CameraError::NothingCaptured)
+    /// for an attached camera whose parent was not seen yet.
+    fn set_world_poses(
+        &mut self,
+        poses: &(impl Poses + ?Sized),
+        env_ids: Option<&[usize]>,
+        convention: CameraConvention,
+    ) -> Result<(), SensorError> {
+        place_in(self, poses, env_ids, convention, PoseFrame::Environment)
+    }
+
+    /// Places each camera at `eye`, looking at `target`, in the frame of its parent (of the environment, for free ones). A
+    /// stereo camera has its origin there, and the left eye's optical axis is parallel to the line to `target`. See
+    /// [`look_at_pose`](super::look_at_pose) for `up`; the pose of one environment never depends on another. To look from an
+    /// attached camera at a point of the environment, give [`look_at_pose`](super::look_at_pose) to
+    /// [`set_world_poses`](Self::set_world_poses).
+    ///
+    /// One `eye`, `target` and `up` for each of `env_ids` (`None` is all environments of the camera), or one for all \[m\].
+    ///
+    /// # Errors
+    ///
+    /// [`CameraError::LookAt`](super::CameraError::LookAt), [`CameraError::Count`](super::CameraError::Count), an environment
+    /// that the camera does not see or that is named twice; nothing is changed then.
+    fn look_at(
+        &mut self,
+        eye: &[[f64; 3]],
+        target: &[[f64; 3]],
+        up: &[[f64; 3]],
+        env_ids: Option<&[usize]>,
+    ) -> Result<(), SensorError> {
+        let rows = self.env_rows().chosen(env_ids)?;
+        let n = rows.len();
+        let points = one_each("eyes", eye, n)?.zip(one_each("targets", target, n)?).zip(one_each("ups", up, n)?);
+        let poses: Result<Vec<Pose>, _> = points.map(|((eye, target), up)| look_at_pose(*eye, *target, *up)).collect();
+        self.place_rows(&rows, &poses?, PoseFrame::Parent)
+    }
+
+    /// Sets the configured poses and intrinsics in `env_ids` (`None` is all environments of the camera).
+    ///
+    /// # Errors
+    ///
+    /// An environment that the camera does not see or that is named twice; nothing is changed then.
+    fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
+        let rows = self.env_rows().chosen(env_ids)?;
+        self.restore_rows(&rows);
+        Ok(())
+    }
+}
+
+fn place_in(
+    camera: &mut (impl PlaceRows + ?Sized),
+    poses: &(impl Poses + ?Sized),
+    env_ids: Option<&[usize]>,
+    convention: CameraConvention,
+    frame: PoseFrame,
+) -> Result<(), SensorError> {
+    let rows = camera.env_rows().chosen(env_ids)?;
+    let poses: Vec<Pose> = poses.to_poses()?.iter().map(|pose| convention.to_optical(pose)).collect();
+    camera.place_rows(&rows, &poses, frame)
+}
