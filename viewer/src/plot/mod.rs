@@ -19,8 +19,9 @@ mod layout;
 mod svg;
 mod thin;
 
+use crate::file_extension;
 use crate::stage::Canvas;
-use crate::whole_file;
+use kinetoscope_scene::AtomicFile;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -133,13 +134,13 @@ impl Plot {
     /// [`PlotError::Extension`], [`PlotError::Size`], [`PlotError::File`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), PlotError> {
         let path = path.as_ref();
-        let end = whole_file::end_of(path);
+        let end = file_extension::lower_case(path);
         let bytes = match end.as_str() {
             "svg" => Ok(self.to_svg()?.into_bytes()),
             "png" => self.to_canvas()?.to_png(),
             _ => return Err(PlotError::Extension { path: path.into(), end }),
         };
-        let written = bytes.and_then(|bytes| whole_file::write(path, &bytes));
+        let written = bytes.and_then(|bytes| AtomicFile::write(path, &bytes));
         written.map_err(|error| PlotError::File { path: path.into(), error: Arc::new(error) })
     }
 
