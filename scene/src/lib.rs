@@ -20,6 +20,7 @@ pub mod shape;
 pub mod source;
 pub mod state;
 pub mod terrain;
+pub mod yaml;
 
 pub use atomic_file::AtomicFile;
 pub use light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightSum, Sky};
