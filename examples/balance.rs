@@ -363,7 +363,7 @@ struct Pushes {
 impl Pushes {
     fn draw(sim: &SimulationManager, env: usize, strength: f64) -> Self {
         let mut random = Random::keyed(sim.cfg().seed, (sim.cfg().first_env() + env) as u64, "pushes");
-        let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.uniform();
+        let mut between = |[low, high]: [f64; 2]| random.between(low, high);
         let mut push = |(k, window): (usize, [f64; 2])| {
             let begin = between(window);
             let side = if between([-1.0, 1.0]) < 0.0 { -1.0 } else { 1.0 };

@@ -144,7 +144,7 @@ fn add_objects(sim: &mut SimulationManager, args: &Args) -> launcher::Result<Vec
     let mut random = Random::keyed(args.launcher.seed, 0, "objects");
     let mut objects = Vec::new();
     for k in 0..args.objects {
-        let mut between = |low: f64, high: f64| low + (high - low) * random.uniform();
+        let mut between = |low: f64, high: f64| random.between(low, high);
         let (size, length) = (between(0.1, 0.25), between(0.2, 0.5));
         let (class, shape) = match (between(0.0, 4.0) as usize).min(3) {
             0 => ("box", ObjectShape::Box { size: [size, length, 1.5 * size] }),

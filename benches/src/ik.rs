@@ -130,7 +130,7 @@ impl<'t> Bare<'t> {
         for start in 0..task.cfg.num_seeds {
             let mut q = task.start.clone();
             if start > 0 {
-                q = task.limits.iter().map(|[low, high]| low + (high - low) * random.uniform()).collect();
+                q = task.limits.iter().map(|&[low, high]| random.between(low, high)).collect();
             }
             for _ in 0..task.cfg.max_iterations {
                 let pose = self.place(&q)?;

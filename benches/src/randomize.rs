@@ -61,7 +61,7 @@ fn editors(model: &Model) -> Outcome<Vec<Editor>> {
 
 /// The draws of the rival: as many numbers as ours.
 fn write(editor: &mut Editor, model: &Model, random: &mut Random) -> Outcome<()> {
-    let mut factor = |low: f64, high: f64| low + (high - low) * random.uniform();
+    let mut factor = |low: f64, high: f64| random.between(low, high);
     for body in 1..model.nbody() {
         let scale = factor(0.8, 1.2);
         editor.body_mass_mut()[body] = model.body_mass()[body] * scale;

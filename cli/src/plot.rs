@@ -3,7 +3,7 @@
 use crate::ending::{Ending, Result};
 use crate::names::{fits, grouped};
 use kinetoscope::record::{RecordedTopic, Recording, Wanted};
-use kinetoscope::viewer::plot::{Plot, Series};
+use kinetoscope::viewer::plot::{self, Plot, Series};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -103,7 +103,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
         let name = if names.len() == 1 { wanted.field.clone() } else { format!("{} {}", wanted.topic, wanted.field) };
         plot.series.push(Series::new(name, samples.times.into_iter().zip(samples.values).map(|(t, x)| [t, x])));
     }
-    plot.write(out)?;
+    plot::write(&plot, out)?;
     println!("{}: {} curves, {} points", out.display(), plot.series.len(), points(&plot));
     Ok(if warned { Ending::Warned } else { Ending::Done })
 }

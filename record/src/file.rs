@@ -1,6 +1,7 @@
 //! Files that have their name when they are whole, not before.
 
 use crate::error::{RecordError, Result};
+use kinetoscope_scene::AtomicFile;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -45,13 +46,9 @@ impl Disk {
 /// there is of it.
 #[derive(Debug)]
 pub(crate) struct PartFile {
-    path: PathBuf,
-    part: PathBuf,
-    overwrite: bool,
     /// Locked as long as it is written, so that no other recorder takes it for one that was left.
-    file: File,
-    /// Whether somebody can read what there is.
-    keep: bool,
+    file: AtomicFile,
+    overwrite: bool,
 }
 
 impl PartFile {
@@ -82,56 +79,48 @@ impl PartFile {
             return Err(RecordError::file(path, error));
         }
         let begin = || {
-            let file = File::create_new(&part)?;
-            file.try_lock()?;
-            Ok((file.try_clone()?, file))
+            let mut file = AtomicFile::create_as(path, part.clone())?;
+            // Where another recorder was faster, the file is its own.
+            file.file().try_lock().inspect_err(|_| file.keep())?;
+            Ok((file.file().try_clone()?, file))
         };
         let (file, mine) = begin().map_err(|error: io::Error| RecordError::file(&part, error))?;
-        Ok((Self { path: path.into(), part, overwrite, file: mine, keep: false }, file))
+        Ok((Self { file: mine, overwrite }, file))
     }
 
     /// What was written can be read, whole or not: it stays.
     pub(crate) fn keep(&mut self) {
-        self.keep = true;
+        self.file.keep();
     }
 
     /// Gives the file its name: it is whole. Gives its size \[bytes\].
     pub(crate) fn commit(&mut self) -> io::Result<u64> {
-        self.file.sync_all()?;
-        self.keep = true;
-        let bytes = self.file.metadata()?.len();
+        self.file.file().sync_all()?;
+        self.file.keep();
+        let bytes = self.file.file().metadata()?.len();
         if self.overwrite {
-            fs::rename(&self.part, &self.path)?;
+            self.file.persist()?;
         } else {
-            rename_new(&self.part, &self.path)?;
+            self.file.persist_noclobber()?;
         }
-        sync_folder(&self.path);
+        sync_folder(self.file.path());
         Ok(bytes)
     }
 
     /// What the file is to be called.
     pub(crate) fn path(&self) -> &Path {
-        &self.path
+        self.file.path()
     }
 
     /// What it is called until then.
     #[cfg(feature = "hdf5")]
     pub(crate) fn part(&self) -> &Path {
-        &self.part
+        self.file.part()
     }
 
     /// What was written, where it stays.
     pub(crate) fn kept(&self) -> Option<PathBuf> {
-        self.keep.then(|| self.part.clone())
-    }
-}
-
-impl Drop for PartFile {
-    fn drop(&mut self) {
-        if !self.keep {
-            // That it cannot be taken away changes nothing of the error that led here.
-            let _ = fs::remove_file(&self.part);
-        }
+        self.file.is_kept().then(|| self.file.part().into())
     }
 }
 
@@ -157,18 +146,6 @@ pub(crate) fn remove(file: &Path) -> Result<()> {
     match fs::remove_file(file) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(RecordError::file(file, error)),
         _ => Ok(()),
-    }
-}
-
-/// Renames, but replaces nothing.
-fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
-    let exists = || io::Error::new(io::ErrorKind::AlreadyExists, "a file of that name has appeared meanwhile");
-    match fs::hard_link(from, to) {
-        Ok(()) => fs::remove_file(from),
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(exists()),
-        // A disk without links: there, somebody may make the file between the look and the rename.
-        Err(_) if to.symlink_metadata().is_ok() => Err(exists()),
-        Err(_) => fs::rename(from, to),
     }
 }
 

@@ -33,7 +33,7 @@ mod folder;
 mod format;
 mod lerobot;
 mod mcap_file;
-mod npy;
+pub mod npy;
 mod npz;
 mod packet;
 mod picture;

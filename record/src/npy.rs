@@ -1,7 +1,9 @@
 //! Arrays as NumPy keeps them in files: version 1.0 of its `.npy` format, as `numpy.lib.format` describes it.
 
 use crate::stream::Element;
+use ndarray::{ArrayBase, Data, Dimension};
 use std::fmt::Write as _;
+use std::io::{self, Write};
 
 /// The data begin at a multiple of 64 bytes.
 const ALIGN: usize = 64;
@@ -19,6 +21,48 @@ impl Element {
             Self::F64 => "<f8",
         }
     }
+}
+
+/// Numbers that array files hold.
+pub trait Number: Copy {
+    /// Type in the file.
+    const ELEMENT: Element;
+
+    /// Appends the bytes, lowest first.
+    fn put(self, bytes: &mut Vec<u8>);
+}
+
+macro_rules! numbers {
+    ($($number:ty: $element:ident),*) => {$(
+        impl Number for $number {
+            const ELEMENT: Element = Element::$element;
+
+            fn put(self, bytes: &mut Vec<u8>) {
+                bytes.extend_from_slice(&self.to_le_bytes());
+            }
+        }
+    )*};
+}
+
+numbers!(u8: U8, i32: I32, f32: F32, f64: F64);
+
+/// Writes a `.npy` file: the numbers of `array` in C order, independent of their order in memory.
+///
+/// # Errors
+/// `to` cannot be written, or the array has more axes than the format has room for.
+pub fn write<S, D>(to: &mut impl Write, array: &ArrayBase<S, D>) -> io::Result<()>
+where
+    S: Data,
+    S::Elem: Number,
+    D: Dimension,
+{
+    let head = header(S::Elem::ELEMENT, array.shape());
+    to.write_all(&head.ok_or_else(|| io::Error::other("more axes than the format has room for"))?)?;
+    let mut bytes = Vec::with_capacity(array.len() * size_of::<S::Elem>());
+    for &number in array {
+        number.put(&mut bytes);
+    }
+    to.write_all(&bytes)
 }
 
 /// What stands before the numbers of an array in C order; `None` for more axes than the format has room for.

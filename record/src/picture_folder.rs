@@ -7,6 +7,7 @@ use crate::packet::Packet;
 use crate::picture::Png;
 use crate::stream::{Kind, Stream};
 use crate::writer::{Sink, Written};
+use kinetoscope_scene::AtomicFile;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -43,15 +44,9 @@ impl PictureFolder {
 
 /// Writes a file that has its name when it is whole.
 fn write_whole(disk: &Disk, path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let part = part_of(path);
-    let write = || {
-        disk.storage(File::create(&part)?).write_all(bytes)?;
-        fs::rename(&part, path)
-    };
-    write().inspect_err(|_| {
-        // The error is told; that the rest of it cannot be taken away changes nothing of it.
-        let _ = fs::remove_file(&part);
-    })
+    let mut file = AtomicFile::create_as(path, part_of(path))?;
+    disk.storage(file.file().try_clone()?).write_all(bytes)?;
+    file.persist()
 }
 
 impl Sink for PictureFolder {

@@ -28,7 +28,6 @@ pub mod lens;
 pub mod optics_error;
 pub mod parallel;
 pub mod path;
-pub mod philox;
 pub mod progress;
 pub mod raster;
 pub mod rasterizer;

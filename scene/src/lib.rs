@@ -3,6 +3,7 @@
 //! Nothing here knows of MuJoCo. Units are SI, angles radians, quaternions w, x, y, z.
 #![forbid(unsafe_code)]
 
+pub mod atomic_file;
 pub mod file_format;
 pub mod framing;
 pub mod light;
@@ -19,7 +20,9 @@ pub mod shape;
 pub mod source;
 pub mod state;
 pub mod terrain;
+pub mod yaml;
 
+pub use atomic_file::AtomicFile;
 pub use light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightSum, Sky};
 pub use marker::{Marker, MarkerKind};
 pub use material::{Material, Texture, TextureKind};

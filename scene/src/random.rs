@@ -1,8 +1,12 @@
 //! Random numbers that depend on what they are for, and on nothing else.
 //!
 //! Every use has a generator of its own, keyed by the seed of the simulation, the global index of the environment and a
-//! name. Threads, the number of environments and what else is random do not change what comes out.
+//! name. Threads, the number of environments and what else is random do not change what comes out. [`Random`] draws one number
+//! after the other; [`Philox`] computes the numbers of any place.
 
+mod philox;
+
+pub use philox::Philox;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -26,6 +30,11 @@ impl Random {
     /// Uniform in 0 (included) to 1 (excluded).
     pub fn uniform(&mut self) -> f64 {
         StandardUniform.sample(&mut self.0)
+    }
+
+    /// Uniform from `low` to `high`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.uniform()
     }
 
     /// Of the normal distribution with mean 0 and standard deviation 1.

@@ -1,8 +1,11 @@
 //! What surfaces look like besides their colour: gloss, metal, glass, light of their own.
 
 use crate::error::{Error, Result};
+use crate::named::Named;
+use crate::pattern;
 use kinetoscope_scene::Material;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// What a surface looks like besides its colour and its texture. What is `None` is as the file or the model says, MuJoCo's
 /// defaults where those say nothing. Nothing of it changes how things move.
@@ -47,6 +50,22 @@ impl SurfaceCfg {
     /// Metal in the colour of the surface: roughness 0 is polished, 1 is matt.
     pub fn metal(roughness: f64) -> Self {
         Self { metallic: Some(1.0), roughness: Some(roughness), ..Self::default() }
+    }
+
+    /// The surfaces of those of `names` that `patterns` name, by index; `what` is what they are names of, `of` the entity.
+    ///
+    /// # Errors
+    /// A number that is out of range, or a pattern that is bad, matches none of `names`, or one that another matches too.
+    pub(crate) fn assign(
+        patterns: &[(String, Self)],
+        names: &[impl AsRef<str>],
+        what: &'static str,
+        of: Named,
+    ) -> Result<Vec<(usize, Self)>> {
+        patterns.iter().try_for_each(|(_, surface)| surface.validate())?;
+        let surfaces = pattern::assign(patterns, &BTreeMap::new(), names, what)
+            .map_err(|error| Error::Surfaces { of, error: Box::new(error) })?;
+        Ok(surfaces.into_iter().enumerate().filter_map(|(index, surface)| Some((index, surface?))).collect())
     }
 
     /// Checks every number.

@@ -65,7 +65,7 @@ impl Dice {
 
     /// Uniform from `low` to `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.random.uniform()
+        self.random.between(low, high)
     }
 
     /// Of the normal distribution with mean 0 and standard deviation 1.

@@ -31,7 +31,7 @@ impl Noise {
     fn draw(self, random: &mut Random) -> f64 {
         match self {
             Self::Normal { std } => std * random.normal(),
-            Self::Uniform { low, high } => low + (high - low) * random.uniform(),
+            Self::Uniform { low, high } => random.between(low, high),
         }
     }
 

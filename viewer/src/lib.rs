@@ -12,13 +12,13 @@
 #![forbid(unsafe_code)]
 
 pub mod control;
+mod file_extension;
 pub mod plot;
 #[cfg(test)]
 mod sample;
 mod screenshot;
 pub mod serve;
 pub mod stage;
-mod whole_file;
 pub mod window;
 
 pub use control::{

@@ -1,9 +1,10 @@
 //! A picture of the stage in one call, without a window or a screen.
 
 use crate::control::Wants;
+use crate::file_extension;
 use crate::stage::{Canvas, Eye, Look, Overlays, Painter, Pool, Run, Shown, Snapshot};
-use crate::whole_file;
 use kinetoscope_render::visibility::{RenderError, View};
+use kinetoscope_scene::AtomicFile;
 use kinetoscope_sim::SimulationManager;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -121,7 +122,7 @@ pub trait Screenshot {
 impl Screenshot for SimulationManager {
     fn screenshot_with(&mut self, path: impl AsRef<Path>, cfg: &ScreenshotCfg) -> Result<(), ScreenshotError> {
         let path = path.as_ref();
-        let end = whole_file::end_of(path);
+        let end = file_extension::lower_case(path);
         if end != "png" {
             return Err(ScreenshotError::Extension { path: path.into(), end });
         }
@@ -130,7 +131,7 @@ impl Screenshot for SimulationManager {
             return Err(ScreenshotError::NoFolder { path: path.into(), folder: folder.into() });
         }
         let canvas = self.picture_of_stage(cfg)?;
-        let written = canvas.to_png().and_then(|bytes| whole_file::write(path, &bytes));
+        let written = canvas.to_png().and_then(|bytes| AtomicFile::write(path, &bytes));
         written.map_err(|error| ScreenshotError::File { path: path.into(), error: Arc::new(error) })
     }
 

@@ -49,7 +49,7 @@ pub(crate) fn check(ours: &Path, other: &Path, lit: bool) -> Result<(), String> 
 /// An array of numbers of four bytes: its shape, and the bits.
 type Array = (Vec<usize>, Vec<u32>);
 
-/// Reads what `examples/launcher/npy.rs` writes, version 1.0 of NumPy's format.
+/// Reads an array that an example has written, version 1.0 of NumPy's format.
 fn array(path: &Path) -> Result<Array, String> {
     let wrong = |what: &str| format!("{}: {what}", path.display());
     let bytes = fs::read(path).map_err(|e| wrong(&e.to_string()))?;

@@ -18,13 +18,13 @@ mod mutations;
 mod own_time;
 mod physics_page;
 mod physics_report;
-mod plot;
 mod progress;
 mod python;
 mod robots;
 mod run;
 mod setup;
 mod source_check;
+mod svg;
 mod test;
 mod wheel;
 

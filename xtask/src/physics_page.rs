@@ -1,7 +1,7 @@
 //! The page of numbers: what the laws of physics measured, as tables, and whether a page still says the truth.
 
-use crate::plot::{Plot, Series};
 use crate::run::{Failure, Outcome};
+use kinetoscope_plot::{Plot, Series};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -109,7 +109,10 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
             series.push(Series { name: text(&curve["name"])?, points });
         }
         let axes = [text(&plot["x"])?, text(&plot["y"])?];
-        let plot = Plot { title: text(&plot["title"])?, axes, log: plot["log"].as_bool()?, series };
+        let log = plot["log"].as_bool()?;
+        // Few points are measurements, not samples of a curve.
+        let marks = series.iter().all(|series: &Series| series.points.len() <= 12);
+        let plot = Plot { title: text(&plot["title"])?, axes, log, marks, series, ..Plot::default() };
         to.plots.push((name.clone(), plot, mujoco.clone()));
     }
     Some(())
@@ -515,7 +518,7 @@ mod tests {
     fn curves() {
         let plot = |y: f64| {
             let series = vec![Series { name: "RK4".into(), points: vec![[1.0, y], [2.0, 1.0]] }];
-            Plot { title: "t".into(), axes: ["x".into(), "y".into()], log: false, series }
+            Plot { title: "t".into(), series, ..Plot::default() }
         };
         let of =
             |mujoco: &str, y| Measured { plots: vec![("law".into(), plot(y), mujoco.into())], ..Measured::default() };

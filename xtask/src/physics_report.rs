@@ -1,10 +1,11 @@
 //! `cargo xtask physics-report`: the laws of physics on both lines of MuJoCo, and the page with what they measured.
 
 use crate::physics_page::{self, Measured};
-use crate::plot;
 use crate::progress::Progress;
 use crate::run::{Failure, Outcome, Repo, no_findings};
 use crate::setup::{self, Line, Wanted};
+use crate::svg;
+use kinetoscope_plot::Plot;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -85,8 +86,12 @@ fn measured(repo: &Repo) -> Outcome<Vec<Measured>> {
     LINES.iter().map(|&line| physics_page::read(&folder(repo, line))).collect()
 }
 
-fn pictures(runs: &[Measured]) -> Vec<(String, String)> {
-    physics_page::plots(runs).into_iter().map(|(law, plot)| (format!("{law}.svg"), plot::svg(&plot))).collect()
+fn pictures(runs: &[Measured]) -> Outcome<Vec<(String, String)>> {
+    let picture = |(law, plot): (String, Plot)| {
+        let text = plot.to_svg().map_err(|e| Failure::new(format!("{law}: {e}")))?;
+        Ok((format!("{law}.svg"), text))
+    };
+    physics_page::plots(runs).into_iter().map(picture).collect()
 }
 
 fn write(repo: &Repo, runs: &[Measured]) -> Outcome {
@@ -97,7 +102,7 @@ fn write(repo: &Repo, runs: &[Measured]) -> Outcome {
         fs::remove_dir_all(&plots).map_err(fail)?;
     }
     fs::create_dir_all(&plots).map_err(fail)?;
-    for (name, text) in pictures(runs) {
+    for (name, text) in pictures(runs)? {
         fs::write(plots.join(name), text).map_err(fail)?;
     }
     fs::write(repo.root.join(PAGE), page).map_err(|e| Failure::new(format!("{PAGE}: {e}")))
@@ -107,7 +112,7 @@ fn compare(repo: &Repo, runs: &[Measured]) -> Outcome {
     // Fails where the lines differ without a reason.
     physics_page::page(runs)?;
     let mut findings = physics_page::untrue(&repo.read(PAGE)?, runs);
-    findings.extend(untrue_pictures(&repo.root.join(PLOTS), &pictures(runs))?);
+    findings.extend(untrue_pictures(&repo.root.join(PLOTS), &pictures(runs)?)?);
     no_findings(&format!("{PAGE} is no longer true; `cargo xtask physics-report` writes it again"), &findings)
 }
 
@@ -116,7 +121,7 @@ fn untrue_pictures(folder: &Path, pictures: &[(String, String)]) -> Outcome<Vec<
     let mut findings = Vec::new();
     for (name, text) in pictures {
         match fs::read_to_string(folder.join(name)) {
-            Ok(old) if plot::agree(&old, text, PIXELS) => {}
+            Ok(old) if svg::agree(&old, text, PIXELS) => {}
             Ok(_) => findings.push(format!("{PLOTS}/{name} shows other curves, or other numbers at its axes")),
             Err(_) => findings.push(format!("{PLOTS}/{name} is not there")),
         }
@@ -135,14 +140,14 @@ fn untrue_pictures(folder: &Path, pictures: &[(String, String)]) -> Outcome<Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plot::{Plot, Series};
+    use kinetoscope_plot::Series;
 
     #[test]
     fn pictures() {
         let of = |name: &str, size: f64| {
             let series = vec![Series { name: "RK4".into(), points: vec![[0.0, 0.0], [1.0, size], [2.0, 0.0]] }];
-            let plot = Plot { title: "t".into(), axes: ["x".into(), "y".into()], log: false, series };
-            (format!("{name}.svg"), plot::svg(&plot))
+            let plot = Plot { title: "t".into(), series, ..Plot::default() };
+            (format!("{name}.svg"), plot.to_svg().expect("a size that can be drawn"))
         };
         let folder = tempfile::tempdir().expect("a scratch folder");
         let look = |pictures: &[(String, String)]| untrue_pictures(folder.path(), pictures).expect("readable");

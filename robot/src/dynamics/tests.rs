@@ -21,7 +21,7 @@ impl Random {
     }
 
     fn range(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.0.uniform()
+        self.0.between(low, high)
     }
 
     fn below(&mut self, n: usize) -> usize {

@@ -1,13 +1,13 @@
 //! Hulls of mesh files, kept on disk between runs.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
 use super::load::{Format, read};
 use super::{DaeUpAxis, HullCfg, MeshError, MeshOptions, TriMesh, convex_hull, hull, load_bytes};
+use crate::atomic_file::AtomicFile;
 
 /// Changes whenever the readers give other vertices for the same file.
 const READERS: u32 = 1;
@@ -144,14 +144,12 @@ pub(super) fn decoded(bytes: &[u8], key: &[u8; KEY]) -> Option<TriMesh> {
     hull.validate().is_ok().then_some(hull)
 }
 
-/// Writes beside the place and renames, so that no reader ever sees half a file.
+/// Writes a file of the cache, and its folder where that is missing.
 pub(super) fn store(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let dir = file.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(dir)?;
-    let mut temporary = tempfile::NamedTempFile::new_in(dir)?;
-    temporary.write_all(bytes)?;
-    temporary.persist(file)?;
-    Ok(())
+    if let Some(dir) = file.parent() {
+        std::fs::create_dir_all(dir)?;
+    }
+    AtomicFile::write(file, bytes)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::entity::EntityCfg;
 use super::types::EntityTypes;
 use super::value::{Value, ValueError};
-use super::yaml::{self, Translation};
+use super::yaml;
 use super::{ExclusionCfg, SceneCfg, in_every_env};
 use crate::error::{Error, Result};
 use crate::objects::robot_file::MjcfFile;
@@ -12,6 +12,7 @@ use crate::pattern::closest;
 use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_robot::urdf::UrdfCfg;
 use kinetoscope_scene::source::Source;
+use kinetoscope_scene::yaml::{YamlError, parse};
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -62,7 +63,9 @@ impl SceneCfg {
     /// [`Error::SceneFile`] with file and line: no TOML, a key or a type that nobody knows (with those there are), a value of
     /// another form, a terrain that its generator refuses. All other numbers and names are checked when the scene is built.
     pub fn from_toml(text: &str, file: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
-        Reader { text, file: file.as_ref(), types, translated: None }.scene()
+        let reader = Reader { text: Some(text), file: file.as_ref(), types };
+        let root = DeTable::parse(text).map_err(|e| reader.located(&e, 0..0))?;
+        reader.scene(root.into_inner())
     }
 
     /// As [`from_toml`](Self::from_toml), of YAML 1.2: the same tables and lists, in the same words.
@@ -70,10 +73,10 @@ impl SceneCfg {
     /// # Errors
     /// As [`from_toml`](Self::from_toml); several documents, tags, and `null`, too.
     pub fn from_yaml(text: &str, file: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
-        let file = file.as_ref();
-        let translated = yaml::translate(text)
-            .map_err(|error| Error::SceneFile { at: Source::new(file, error.line), reason: error.message })?;
-        Reader { text: &translated.toml, file, types, translated: Some(&translated) }.scene()
+        let reader = Reader { text: None, file: file.as_ref(), types };
+        let wrong = |error: YamlError| reader.at(error.line..error.line, error.message);
+        let root = parse(text, &yaml::DIALECT).map_err(wrong)?;
+        reader.scene(yaml::table(root.as_ref()).map_err(wrong)?)
     }
 
     /// The text of a scene file that declares this scene, with the kinds of entities of `types`. Paths are written as they
@@ -120,17 +123,14 @@ fn has_name(entity: &EntityCfg, field: &str) -> bool {
 
 /// One file that is being read.
 struct Reader<'a> {
-    /// In words of TOML.
-    text: &'a str,
+    /// The text that spans are places of; `None` where spans are lines, as of YAML.
+    text: Option<&'a str>,
     file: &'a Path,
     types: &'a EntityTypes,
-    /// Where the words are from, in a file of other words.
-    translated: Option<&'a Translation>,
 }
 
 impl<'a> Reader<'a> {
-    fn scene(&self) -> Result<SceneCfg> {
-        let root = DeTable::parse(self.text).map_err(|e| self.located(&e, 0..0))?.into_inner();
+    fn scene(&self, root: DeTable<'a>) -> Result<SceneCfg> {
         let mut scene = SceneCfg::default();
         for (key, value) in root {
             match key.get_ref().as_ref() {
@@ -296,10 +296,10 @@ impl<'a> Reader<'a> {
 
     /// The line of a place, counted from 1.
     fn line(&self, span: Range<usize>) -> u32 {
-        if let Some(translated) = self.translated {
-            return translated.line(span.start);
-        }
-        let before = self.text.as_bytes().iter().take(span.start);
-        u32::try_from(1 + before.filter(|byte| **byte == b'\n').count()).unwrap_or(u32::MAX)
+        let line = match self.text {
+            None => span.start,
+            Some(text) => 1 + text.as_bytes().iter().take(span.start).filter(|byte| **byte == b'\n').count(),
+        };
+        u32::try_from(line).unwrap_or(u32::MAX)
     }
 }

@@ -4,10 +4,8 @@ use crate::error::{Error, Result};
 use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, PartOf, compare, sensors_left_out};
 use crate::named::Named;
 use crate::objects::robot_data::check_pose;
-use crate::pattern;
 use crate::surface_cfg::SurfaceCfg;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::{CompileError, LoadError, Model, words};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::Pose;
@@ -15,7 +13,6 @@ use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::source::Source;
 use kinetoscope_sensors::EngineSensor;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -118,15 +115,6 @@ pub(crate) struct MjcfData {
     surfaces: Vec<(usize, SurfaceCfg)>,
 }
 
-/// Configured surfaces of bodies.
-fn surfaces(cfg: &MjcfCfg, names: &PartNames) -> Result<Vec<(usize, SurfaceCfg)>> {
-    cfg.surfaces.iter().try_for_each(|(_, surface)| surface.validate())?;
-    let surfaces = pattern::assign(&cfg.surfaces, &BTreeMap::new(), &names.bodies, "body").map_err(|error| {
-        Error::Surfaces { of: Named { what: "part", uid: cfg.uid.clone() }, error: Box::new(error) }
-    })?;
-    Ok(surfaces.into_iter().enumerate().filter_map(|(body, surface)| Some((body, surface?))).collect())
-}
-
 impl MjcfData {
     /// What is known of the surfaces of some bodies besides.
     pub(crate) fn surfaces(&self) -> &[(usize, SurfaceCfg)] {
@@ -149,7 +137,8 @@ impl MjcfData {
             error: Box::new(error),
         })?;
         let names = PartNames::of_model(&model);
-        let surfaces = surfaces(&cfg, &names)?;
+        let named = Named { what: "part", uid: cfg.uid.clone() };
+        let surfaces = SurfaceCfg::assign(&cfg.surfaces, &names.bodies, "body", named)?;
         let (stem, source) = (format!("part{index}_"), Source::new(&cfg.path, 1));
         let of = PartOf { model: &model, names: &names, uid: &cfg.uid, pose: &cfg.init_pose, stem: &stem, rig: None };
         let document = PartDocument::new(&of, sensors_left_out(&model, &names), &source);

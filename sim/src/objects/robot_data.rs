@@ -90,7 +90,8 @@ impl RobotData {
         let (file, mut description, mut found) =
             described(&cfg, &role.named(&cfg.uid), index, Some(scene), &mut hulls)?;
         load_up(&mut description, &cfg)?;
-        let surfaces = surfaces(&description, &cfg, &role)?;
+        let link_names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
+        let surfaces = SurfaceCfg::assign(&cfg.surfaces, &link_names, "link", role.named(&cfg.uid))?;
         let joint_names: Vec<String> = description.drivable_joints().map(|(_, j)| j.name.clone()).collect();
         let mut parts = BTreeMap::new();
         for (part, patterns) in &cfg.control_parts {
@@ -267,15 +268,6 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Configured surfaces of links.
-fn surfaces(description: &RobotDescription, cfg: &RobotCfg, role: &Role) -> Result<Vec<(usize, SurfaceCfg)>> {
-    cfg.surfaces.iter().try_for_each(|(_, surface)| surface.validate())?;
-    let names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
-    let surfaces = pattern::assign(&cfg.surfaces, &BTreeMap::new(), &names, "link")
-        .map_err(|error| Error::Surfaces { of: role.named(&cfg.uid), error: Box::new(error) })?;
-    Ok(surfaces.into_iter().enumerate().filter_map(|(link, surface)| Some((link, surface?))).collect())
 }
 
 /// There is no such name; the nearest of those there are.

@@ -136,7 +136,7 @@ impl Resolved {
                 let [low, high] = draw.range();
                 let mut numbers = [0.0; Property::WIDEST];
                 let count = if matches!(draw, Draw::Scale(_)) { 1 } else { drawn };
-                numbers[..count].fill_with(|| low + (high - low) * random.uniform());
+                numbers[..count].fill_with(|| random.between(low, high));
                 for &element in elements {
                     let mut value = [0.0; Property::WIDEST];
                     let value = &mut value[..width];

@@ -17,8 +17,8 @@ use crate::error::{Error, Result};
 use crate::randomization::{NamedValue, Property};
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::{Buffers, EngineError, Inputs, Motion, Warning, Weld};
+use kinetoscope_scene::AtomicFile;
 use sha2::{Digest, Sha256};
 use std::io::Write as _;
 use std::path::Path;
@@ -39,20 +39,11 @@ impl Snapshot {
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
         let failed = |error| Error::File { path: path.into(), error };
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let mut builder = tempfile::Builder::new();
-        #[cfg(unix)]
-        {
-            // As any other file: the user's umask decides, not the secrecy of temporary files.
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        let mut temporary = builder.tempfile_in(folder).map_err(failed)?;
-        temporary.write_all(&self.encode(FORMAT, &mj::version_string())).map_err(failed)?;
+        let mut file = AtomicFile::create(path).map_err(failed)?;
+        file.file().write_all(&self.encode(FORMAT, &mj::version_string())).map_err(failed)?;
         // Before its name: a machine that stops in between leaves the old file, not an empty one.
-        temporary.as_file().sync_all().map_err(failed)?;
-        temporary.persist(path).map_err(|error| failed(error.error))?;
-        Ok(())
+        file.file().sync_all().map_err(failed)?;
+        file.persist().map_err(failed)
     }
 
     /// Reads a file that [`save`](Self::save) wrote.

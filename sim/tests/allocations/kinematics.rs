@@ -14,7 +14,7 @@ fn solve() {
         .map(|(_, joint)| joint.limit.as_ref().map(|l| [l.lower.unwrap(), l.upper.unwrap()]).unwrap())
         .collect();
     let mut random = Random::keyed(3, 0, "targets");
-    let mut positions = || limits.iter().map(|[low, high]| low + (high - low) * random.uniform()).collect::<Vec<f64>>();
+    let mut positions = || limits.iter().map(|&[low, high]| random.between(low, high)).collect::<Vec<f64>>();
     let targets: Vec<Pose> = (0..20).map(|_| chain.pose(&positions())).collect();
     let far = Pose::translation(9.0, 0.0, 0.0);
     let cfg = IkCfg { posture: Some(Posture::at([0.0; 7])), ..Default::default() };

@@ -1,10 +1,9 @@
 //! Files that examples write, byte by byte as their formats say.
 
 use kinetoscope::ndarray::{Array, Dimension, arr1, arr2, arr3};
+use kinetoscope::record::npy;
 use kinetoscope_testkit::urdf::Files;
 
-#[path = "../../../examples/launcher/npy.rs"]
-mod npy;
 #[path = "../../../examples/launcher/cloud.rs"]
 #[allow(dead_code, reason = "examples use the rest")]
 mod ply;
@@ -35,7 +34,7 @@ fn ply_bytes() {
 /// Compares an array with the bytes that `numpy.save` (2.x) writes for it: the dictionary is filled up with spaces to byte
 /// 127, and ended with a line feed.
 #[track_caller]
-fn check_npy<S: npy::Element, D: Dimension>(array: &Array<S, D>, [kind, shape]: [&str; 2], data: &[u8]) {
+fn check_npy<S: npy::Number, D: Dimension>(array: &Array<S, D>, [kind, shape]: [&str; 2], data: &[u8]) {
     let dictionary = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
     let mut expected = b"\x93NUMPY\x01\x00v\x00".to_vec();
     expected.extend_from_slice(format!("{dictionary:<117}\n").as_bytes());

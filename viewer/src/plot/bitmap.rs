@@ -1,12 +1,12 @@
 //! A plot as pixels.
 
-use super::layout::{Anchor, Curve, Drawing, Label};
 use crate::stage::Canvas;
 use embedded_graphics::mono_font::MonoTextStyle;
 use embedded_graphics::mono_font::iso_8859_1::FONT_7X13;
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::*;
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
+use kinetoscope_plot::{Anchor, Curve, Drawing, Label};
 
 const GREY: [u8; 3] = [221; 3];
 const BLACK: [u8; 3] = [0; 3];
@@ -23,7 +23,7 @@ pub(super) fn picture(drawing: &Drawing) -> Canvas {
         pen.stroke(*from, *to, 0.5);
     }
     pen.ink(&mut canvas, GREY);
-    for Curve { color, pieces } in curves {
+    for Curve { color, pieces, marks } in curves {
         for piece in pieces {
             for pair in piece.windows(2) {
                 pen.stroke(pair[0], pair[1], CURVE);
@@ -31,6 +31,9 @@ pub(super) fn picture(drawing: &Drawing) -> Canvas {
             if let [one] = piece[..] {
                 pen.stroke(one, one, 2.0);
             }
+        }
+        for mark in marks {
+            pen.stroke(*mark, *mark, 3.0);
         }
         pen.ink(&mut canvas, *color);
     }

@@ -15,10 +15,10 @@ use kinetoscope_render::intrinsics::{Intrinsics, PixelIntrinsics};
 use kinetoscope_render::lens::{Lens, LensModel, OpenCv, OpenCvFisheye};
 use kinetoscope_render::renderer::Renderer;
 use kinetoscope_scene::pattern::closest;
+use kinetoscope_scene::yaml::{Node, Scalar, Value};
 use nalgebra::{Matrix3, Matrix3x4};
 use std::fmt;
 use std::path::Path;
-use yaml::{Node, Value};
 
 /// How far a rectification matrix may be from a rotation: files have six digits or more.
 const ROTATION: f64 = 1e-3;
@@ -161,7 +161,7 @@ impl CameraInfo {
         let root = yaml::parse(text, file)?;
         let reader = Reader { file };
         let Value::Table(fields) = &root.value else {
-            let problem = format!("is {}, not a table of fields", root.value.kind());
+            let problem = format!("is {}, not a table of fields", root.value.describe());
             return Err(reader.wrong(root.line, "the file", problem));
         };
         let find = |name: &str| fields.iter().find(|(key, _)| key == name).map(|(_, node)| node);
@@ -317,8 +317,8 @@ impl Reader<'_> {
 
     fn text<'n>(&self, field: &str, node: &'n Node) -> Result<&'n str, CalibrationError> {
         match &node.value {
-            Value::Scalar(text) => Ok(text),
-            other => Err(self.wrong(node.line, field, format!("is {}, not a word", other.kind()))),
+            Value::Scalar(Scalar { text, .. }) => Ok(text),
+            other => Err(self.wrong(node.line, field, format!("is {}, not a word", other.describe()))),
         }
     }
 
@@ -340,7 +340,7 @@ impl Reader<'_> {
     /// `rows`, `cols` and `data` of a matrix.
     fn numbers(&self, field: &str, node: &Node) -> Result<([usize; 2], Vec<f64>), CalibrationError> {
         let Value::Table(parts) = &node.value else {
-            let problem = format!("is {}, not a table of rows, cols and data", node.value.kind());
+            let problem = format!("is {}, not a table of rows, cols and data", node.value.describe());
             return Err(self.wrong(node.line, field, problem));
         };
         let part = |name: &str| {
@@ -359,7 +359,7 @@ impl Reader<'_> {
         let (shape, data) = ([size("rows")?, size("cols")?], part("data")?);
         let name = format!("{field}.data");
         let Value::List(list) = &data.value else {
-            return Err(self.wrong(data.line, &name, format!("is {}, not a list of numbers", data.value.kind())));
+            return Err(self.wrong(data.line, &name, format!("is {}, not a list of numbers", data.value.describe())));
         };
         let numbers = list.iter().map(|node| self.number(&name, node)).collect::<Result<Vec<f64>, _>>()?;
         if shape[0].checked_mul(shape[1]) != Some(numbers.len()) {
@@ -445,7 +445,7 @@ impl Reader<'_> {
     fn not_a_part(&self, roi: &Node, [width, height]: [usize; 2]) -> Result<(), CalibrationError> {
         let Value::Table(parts) = &roi.value else {
             let problem =
-                format!("is {}, not a table of x_offset, y_offset, height, width and do_rectify", roi.value.kind());
+                format!("is {}, not a table of x_offset, y_offset, height, width and do_rectify", roi.value.describe());
             return Err(self.wrong(roi.line, "roi", problem));
         };
         let part = |name: &str| match parts.iter().find(|(key, _)| key == name) {

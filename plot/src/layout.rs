@@ -1,4 +1,4 @@
-//! Where everything of a plot is, before it is text or pixels.
+//! Places of lines and letters of a plot, before they are text or pixels.
 
 use super::Plot;
 use super::axis::Axis;
@@ -6,41 +6,52 @@ use super::thin::thinned;
 
 /// Everything that is drawn, in pixels from the top left.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Drawing {
-    pub(super) size: [usize; 2],
+pub struct Drawing {
+    /// Pixels per row, rows.
+    pub size: [usize; 2],
     /// Left, top, right and bottom of the frame.
-    pub(super) frame: [f64; 4],
+    pub frame: [f64; 4],
     /// Lines of the grid.
-    pub(super) grid: Vec<[[f64; 2]; 2]>,
-    pub(super) labels: Vec<Label>,
-    pub(super) curves: Vec<Curve>,
-    /// The strokes of the legend, with their colours.
-    pub(super) keys: Vec<([[f64; 2]; 2], [u8; 3])>,
+    pub grid: Vec<[[f64; 2]; 2]>,
+    /// All texts.
+    pub labels: Vec<Label>,
+    /// The curves.
+    pub curves: Vec<Curve>,
+    /// The strokes of the legend, with their colors.
+    pub keys: Vec<([[f64; 2]; 2], [u8; 3])>,
 }
 
-/// Some letters.
+/// A text.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Label {
-    pub(super) text: String,
+pub struct Label {
+    /// The text.
+    pub text: String,
     /// A point of the line that letters stand on.
-    pub(super) at: [f64; 2],
-    /// What of the text is there.
-    pub(super) anchor: Anchor,
+    pub at: [f64; 2],
+    /// The part of the text at that point.
+    pub anchor: Anchor,
 }
 
-/// What of a text is at its place.
+/// The part of a text that is at its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Anchor {
+pub enum Anchor {
+    /// Its left end.
     Start,
+    /// Its middle.
     Middle,
+    /// Its right end.
     End,
 }
 
-/// A curve in pieces that hang together.
+/// A curve in connected pieces.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Curve {
-    pub(super) color: [u8; 3],
-    pub(super) pieces: Vec<Vec<[f64; 2]>>,
+pub struct Curve {
+    /// Red, green, blue.
+    pub color: [u8; 3],
+    /// Points of each piece.
+    pub pieces: Vec<Vec<[f64; 2]>>,
+    /// Points with a mark.
+    pub marks: Vec<[f64; 2]>,
 }
 
 /// Colors of curves: seven that are distinct in any color vision, then others that differ from these and from each other in
@@ -72,7 +83,7 @@ const COLORS: [[u8; 3]; 24] = [
     [190, 170, 160],
 ];
 /// Width and height of a letter \[pixels\].
-pub(super) const LETTER: [f64; 2] = [7.0, 13.0];
+const LETTER: [f64; 2] = [7.0, 13.0];
 /// A stroke of the legend, and the gaps around it \[pixels\].
 const KEY: f64 = 24.0;
 const GAP: f64 = 8.0;
@@ -82,17 +93,17 @@ const BOTTOM: f64 = 46.0;
 impl Drawing {
     pub(super) fn of(plot: &Plot) -> Self {
         let [width, height] = plot.size.map(|n| n as f64);
-        let finite = |p: &&[f64; 2]| p.iter().all(|x| x.is_finite());
-        let values = |k: usize| plot.series.iter().flat_map(|s| &s.points).filter(finite).map(move |p| p[k]);
+        let shown = |p: &&[f64; 2]| p.iter().all(|x| x.is_finite() && (!plot.log || *x > 0.0));
+        let values = |k: usize| plot.series.iter().flat_map(|s| &s.points).filter(shown).map(move |p| p[k]);
         let letters = plot.series.iter().map(|s| s.name.chars().count()).max().unwrap_or(0);
         let room = (((0.4 * width - KEY - 3.0 * GAP) / LETTER[0]) as usize).min(letters);
         let beside = if letters == 0 { 0.0 } else { KEY + 2.0 * GAP + LETTER[0] * room as f64 };
         let (top, right, bottom) = (TOP, width - 2.0 * GAP - beside, height - BOTTOM);
-        let across = Axis::new(values(1), [bottom, top]);
+        let across = Axis::new(values(1), plot.log, [bottom, top]);
         let rows = across.ticks();
         let longest = rows.iter().map(|(_, label)| label.len()).max().unwrap_or(0);
         let left = LETTER[0] * longest as f64 + 3.0 * GAP;
-        let along = Axis::new(values(0), [left, right]);
+        let along = Axis::new(values(0), plot.log, [left, right]);
         let mut drawing = Self {
             size: plot.size,
             frame: [left, top, right, bottom],
@@ -118,10 +129,11 @@ impl Drawing {
         let most = ((bottom - top) / (LETTER[1] + 3.0)) as usize;
         for (k, series) in plot.series.iter().enumerate() {
             let color = COLORS[k % COLORS.len()];
-            let pieces = series.points.split(|p| !finite(&p)).filter(|piece| !piece.is_empty());
+            let pieces = series.points.split(|p| !shown(&p)).filter(|piece| !piece.is_empty());
             let places = |piece: &[[f64; 2]]| piece.iter().map(|p| [along.place(p[0]), across.place(p[1])]).collect();
-            let pieces = pieces.map(|piece| thinned(places(piece))).collect();
-            drawing.curves.push(Curve { color, pieces });
+            let pieces: Vec<Vec<[f64; 2]>> = pieces.map(|piece| thinned(places(piece))).collect();
+            let marks = if plot.marks { pieces.concat() } else { Vec::new() };
+            drawing.curves.push(Curve { color, pieces, marks });
             let [from, y] = [right + GAP, top + (LETTER[1] + 3.0) * (k as f64 + 0.5)];
             let more = plot.series.len() - k;
             if k + 1 < most || more == 1 && k < most {

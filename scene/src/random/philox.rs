@@ -1,26 +1,24 @@
-//! Random numbers that are looked up, not drawn one after the other.
-//!
-//! Who measures when somebody looks, on any thread and in any order, cannot draw from a sequence: what it got would depend on
-//! what was drawn before. Here a number is a function of its key and its place.
+//! A counter-based generator: a number is a function of its key and its place, and of nothing that was drawn before. So
+//! numbers may be drawn on any thread and in any order.
 
-use kinetoscope_scene::Random;
+use super::Random;
 use std::f64::consts::TAU;
 
 /// Philox 4x32-10: a cipher-like function of a key and a counter of 128 bits. Source: Salmon, Moraes, Dror and Shaw 2011,
 /// "Parallel random numbers: as easy as 1, 2, 3".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Philox([u32; 2]);
+pub struct Philox([u32; 2]);
 
 impl Philox {
     /// The numbers of the thing called `name` in the environment of global index `env`: keyed as [`Random::keyed`].
-    pub(crate) fn keyed(seed: u64, env: u64, name: &str) -> Self {
+    pub fn keyed(seed: u64, env: u64, name: &str) -> Self {
         let mut random = Random::keyed(seed, env, name);
         Self([(); 2].map(|()| (random.uniform() * 2f64.powi(32)) as u32))
     }
 
     /// 128 random bits at the place `at`.
     #[inline]
-    pub(crate) fn bits(self, at: [u32; 4]) -> [u32; 4] {
+    pub fn bits(self, at: [u32; 4]) -> [u32; 4] {
         let multiply = |a: u32, b: u32| {
             let product = u64::from(a) * u64::from(b);
             ((product >> 32) as u32, product as u32)
@@ -37,14 +35,14 @@ impl Philox {
 
     /// Four numbers of the uniform distribution on 0 to 1, both excluded.
     #[inline]
-    pub(crate) fn uniforms(self, at: [u32; 4]) -> [f64; 4] {
+    pub fn uniforms(self, at: [u32; 4]) -> [f64; 4] {
         self.bits(at).map(|bits| (f64::from(bits) + 0.5) * 2f64.powi(-32))
     }
 
     /// Four numbers of the normal distribution with mean 0 and standard deviation 1, by the transform of Box and Muller
     /// (1958). With 32 bits each, none is beyond 6.8.
     #[inline]
-    pub(crate) fn normals(self, at: [u32; 4]) -> [f64; 4] {
+    pub fn normals(self, at: [u32; 4]) -> [f64; 4] {
         let [a, b, c, d] = self.uniforms(at);
         let pair = |a: f64, b: f64| {
             let (radius, (sin, cos)) = ((-2.0 * a.ln()).sqrt(), (TAU * b).sin_cos());

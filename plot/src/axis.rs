@@ -3,6 +3,8 @@
 /// From values to the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axis {
+    /// Logarithmic: `low` and `high` are decimal logarithms.
+    log: bool,
     low: f64,
     high: f64,
     /// Where `low` and `high` are \[pixels\].
@@ -13,8 +15,10 @@ pub(super) struct Axis {
 const BETWEEN: f64 = 80.0;
 
 impl Axis {
-    /// An axis on which all values have a place, with a margin; `ends` are where it begins and ends \[pixels\].
-    pub(super) fn new(values: impl Iterator<Item = f64>, ends: [f64; 2]) -> Self {
+    /// An axis on which all values have a place, with a margin; `ends` are where it begins and ends \[pixels\]. Values of a
+    /// logarithmic axis are above 0.
+    pub(super) fn new(values: impl Iterator<Item = f64>, log: bool, ends: [f64; 2]) -> Self {
+        let values = values.map(|x| if log { x.log10() } else { x });
         let (mut low, mut high) = values.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
         if low > high {
             (low, high) = (0.0, 1.0);
@@ -27,25 +31,30 @@ impl Axis {
         }
         // Half as large, so that the largest numbers there are have a difference.
         let margin = 0.04 * (high / 2.0 - low / 2.0);
-        Self { low: (low - margin).max(f64::MIN / 4.0), high: (high + margin).min(f64::MAX / 4.0), ends }
+        Self { log, low: (low - margin).max(f64::MIN / 4.0), high: (high + margin).min(f64::MAX / 4.0), ends }
     }
 
     /// Where a value is \[pixels\].
     pub(super) fn place(&self, value: f64) -> f64 {
+        let value = if self.log { value.log10() } else { value };
         let share = (value - self.low) / (self.high - self.low);
         self.ends[0] + share * (self.ends[1] - self.ends[0])
     }
 
-    /// Values with a tick and what is written there: 1, 2 or 5 times a power of ten.
+    /// Values with a tick and their labels: 1, 2 or 5 times a power of ten; whole powers of ten on a logarithmic axis.
     pub(super) fn ticks(&self) -> Vec<(f64, String)> {
         let wanted = ((self.ends[1] - self.ends[0]).abs() / BETWEEN).clamp(2.0, 20.0);
         let raw = (self.high - self.low) / wanted;
         let power = 10.0_f64.powf(raw.log10().floor());
         let step = [1.0, 2.0, 5.0].map(|k| k * power).into_iter().find(|step| *step >= raw).unwrap_or(10.0 * power);
+        let step = if self.log { step.max(1.0).round() } else { step };
         let (first, last) = ((self.low / step).ceil(), (self.high / step).floor());
         // Not more than a screen is wide, whatever was rounded.
         let count = (last - first).clamp(0.0, 100.0) as u32;
         let ticks = (0..=count).map(|k| (first + f64::from(k)) * step).filter(|tick| tick.is_finite());
+        if self.log {
+            return ticks.map(|power| (10.0_f64.powf(power), format!("1e{power}"))).collect();
+        }
         ticks.map(|tick| (tick, self.label(tick, step))).collect()
     }
 
@@ -71,7 +80,7 @@ mod tests {
     #[test]
     fn ticks() {
         let labels = |values: [f64; 2]| -> Vec<String> {
-            Axis::new(values.into_iter(), [0.0, 400.0]).ticks().into_iter().map(|(_, label)| label).collect()
+            Axis::new(values.into_iter(), false, [0.0, 400.0]).ticks().into_iter().map(|(_, label)| label).collect()
         };
         for (values, expected) in [
             ([0.0, 1.0], "0.0 0.5 1.0"),
@@ -80,13 +89,24 @@ mod tests {
         ] {
             assert_eq!(labels(values).join(" "), expected);
         }
-        assert!(Axis::new(std::iter::empty(), [0.0, 1.0]).place(0.5).is_finite());
+        assert!(Axis::new(std::iter::empty(), false, [0.0, 1.0]).place(0.5).is_finite());
         for values in [[1e9, 1e9 + 50.0], [1e-9, 5e-9], [-1e300, 1e300], [f64::MIN, f64::MAX], [7.0, 7.0], [0.0, 0.0]] {
-            assert!(Axis::new(values.into_iter(), [0.0, 1.0]).place(0.0).is_finite());
+            assert!(Axis::new(values.into_iter(), false, [0.0, 1.0]).place(0.0).is_finite());
             let labels = labels(values);
             assert!((2..=12).contains(&labels.len()), "{values:?}: {labels:?}");
             assert!(labels.windows(2).all(|pair| pair[0] != pair[1]), "{values:?}: {labels:?}");
             assert!(labels.iter().all(|label| label.parse::<f64>().is_ok_and(f64::is_finite)), "{labels:?}");
         }
+    }
+
+    #[test]
+    fn logarithmic_ticks() {
+        let axis = Axis::new([1e-9, 1e-3].into_iter(), true, [0.0, 400.0]);
+        let ticks = axis.ticks();
+        let labels: Vec<&str> = ticks.iter().map(|(_, label)| &label[..]).collect();
+        assert_eq!(labels, ["1e-8", "1e-6", "1e-4"]);
+        // Equal factors are equal distances.
+        let places: Vec<f64> = ticks.iter().map(|(tick, _)| axis.place(*tick)).collect();
+        assert!((places[2] - 2.0 * places[1] + places[0]).abs() < 1e-9, "{places:?}");
     }
 }

@@ -19,7 +19,7 @@ pub(super) fn text(drawing: &Drawing) -> String {
         out,
         "<rect x=\"{left:.2}\" y=\"{top:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" fill=\"none\" stroke=\"black\"/>"
     );
-    for Curve { color, pieces } in curves {
+    for Curve { color, pieces, marks } in curves {
         let color = hex(*color);
         for piece in pieces {
             match &piece[..] {
@@ -35,6 +35,9 @@ pub(super) fn text(drawing: &Drawing) -> String {
                     );
                 }
             }
+        }
+        for [x, y] in marks {
+            let _ = writeln!(out, "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"3\" fill=\"{color}\"/>");
         }
     }
     for ([from, to], color) in keys {

@@ -1,0 +1,352 @@
+//! YAML as a tree of values that know their lines, for calibration and scene files.
+
+use saphyr_parser::{Event, Parser, ScalarStyle, Tag};
+use std::collections::{HashMap, HashSet};
+use std::rc::Rc;
+
+/// Lists and tables within each other, at most.
+const DEPTH: usize = 48;
+/// Bytes at most, with everything that aliases stand for: aliases of aliases grow without end.
+const LARGEST: usize = 64 << 20;
+
+/// A kind of YAML files.
+#[derive(Clone, Copy, Debug)]
+pub struct Dialect {
+    /// Name of these files in errors.
+    pub files: &'static str,
+    /// Accepts aliases. They are refused otherwise.
+    pub aliases: bool,
+    /// Ignores tags. Tags other than `!!str` are refused otherwise.
+    pub tags: bool,
+}
+
+/// A value and its line, counted from 1; in a table, the line of its key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// Line, counted from 1.
+    pub line: usize,
+    /// The value.
+    pub value: Value,
+}
+
+/// A value. Aliases share what they stand for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Neither a list nor a table.
+    Scalar(Scalar),
+    /// A list.
+    List(Rc<[Node]>),
+    /// Keys and values, in the order of the file. Each key is there once.
+    Table(Rc<[(String, Node)]>),
+}
+
+/// A word, a number, or a text.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scalar {
+    /// As in the file, without quotes.
+    pub text: String,
+    /// Type by YAML 1.2's core schema.
+    pub kind: ScalarKind,
+}
+
+/// Types of YAML 1.2's core schema.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ScalarKind {
+    /// Nothing, `~` or `null`.
+    Null,
+    /// `true` or `false`.
+    Bool(bool),
+    /// A number as TOML writes it: without superfluous zeros and signs, with a digit on both sides of a point.
+    Number(String),
+    /// All others, and everything in quotes.
+    Text,
+}
+
+/// Error in a file, with its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct YamlError {
+    /// Line, counted from 1.
+    pub line: usize,
+    /// Column, counted from 1.
+    pub column: usize,
+    /// Cause.
+    pub message: String,
+}
+
+impl Value {
+    /// Describes the value for errors.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Scalar(scalar) => format!("{:?}", scalar.text),
+            Self::List(list) => format!("a list of {}", list.len()),
+            Self::Table(_) => "a table".into(),
+        }
+    }
+}
+
+/// A list or a table that has not ended.
+#[derive(Debug)]
+struct Open {
+    line: usize,
+    content: Content,
+    /// Its anchor, and the size of the file before it.
+    anchor: usize,
+    begin: usize,
+}
+
+#[derive(Debug)]
+enum Content {
+    List(Vec<Node>),
+    Table {
+        entries: Vec<(String, Node)>,
+        names: HashSet<String>,
+        /// A key without its value, and its line.
+        key: Option<(String, usize)>,
+    },
+}
+
+/// Reads the only document of a text; `None` without one.
+///
+/// # Errors
+/// No YAML, several documents, keys that are there twice, aliases and tags that `dialect` refuses, and more than this reader's
+/// limits of depth and size.
+pub fn parse(text: &str, dialect: &Dialect) -> Result<Option<Node>, YamlError> {
+    let mut builder = Builder { dialect, open: Vec::new(), root: None, anchors: HashMap::new(), size: 0 };
+    let mut parser = Parser::new_from_str(text);
+    while let Some(event) = parser.next_event() {
+        let (event, span) = event.map_err(|e| {
+            let (line, column) = (e.marker().line().max(1), e.marker().col() + 1);
+            YamlError { line, column, message: e.info().into() }
+        })?;
+        let line = span.start.line().max(1);
+        builder.event(event, line).map_err(|message| YamlError { line, column: span.start.col() + 1, message })?;
+    }
+    Ok(builder.root)
+}
+
+#[derive(Debug)]
+struct Builder<'a> {
+    dialect: &'a Dialect,
+    open: Vec<Open>,
+    root: Option<Node>,
+    /// Values of anchors, and their sizes.
+    anchors: HashMap<usize, (Value, usize)>,
+    /// About as many bytes as the file has with everything that aliases stand for.
+    size: usize,
+}
+
+impl Builder<'_> {
+    fn event(&mut self, event: Event<'_>, line: usize) -> Result<(), String> {
+        match event {
+            Event::DocumentStart(_) if self.root.is_some() => return Err("a second document begins".into()),
+            Event::Scalar(text, style, anchor, tag) => {
+                let is_text = self.is_text(tag.as_deref())?;
+                let text = text.into_owned();
+                let kind = if is_text || style != ScalarStyle::Plain { ScalarKind::Text } else { kind_of(&text) };
+                let begin = self.grow(text.len())?;
+                self.close(Node { line, value: Value::Scalar(Scalar { text, kind }) }, anchor, begin)?;
+            }
+            Event::SequenceStart(anchor, tag) => self.begin(line, Content::List(Vec::new()), anchor, tag.as_deref())?,
+            Event::MappingStart(anchor, tag) => {
+                let table = Content::Table { entries: Vec::new(), names: HashSet::new(), key: None };
+                self.begin(line, table, anchor, tag.as_deref())?;
+            }
+            Event::SequenceEnd | Event::MappingEnd => {
+                let Some(Open { line, content, anchor, begin }) = self.open.pop() else {
+                    return Err("something ends that did not begin".into());
+                };
+                let value = match content {
+                    Content::List(list) => Value::List(list.into()),
+                    Content::Table { entries, .. } => Value::Table(entries.into()),
+                };
+                self.close(Node { line, value }, anchor, begin)?;
+            }
+            Event::Alias(_) if !self.dialect.aliases => {
+                return Err(format!("aliases are not for {}", self.dialect.files));
+            }
+            Event::Alias(anchor) => {
+                let known = self.anchors.get(&anchor).cloned();
+                let (value, size) = known.ok_or("an alias of something that has not ended")?;
+                self.grow(size)?;
+                self.no_key()?;
+                self.place(Node { line, value })?;
+            }
+            Event::Nothing | Event::StreamStart | Event::StreamEnd | Event::DocumentStart(_) | Event::DocumentEnd => {}
+        }
+        Ok(())
+    }
+
+    /// Returns true for the tag of texts.
+    fn is_text(&self, tag: Option<&Tag>) -> Result<bool, String> {
+        match tag {
+            Some(tag) if tag.is_yaml_core_schema() && tag.suffix == "str" => Ok(true),
+            Some(tag) if !self.dialect.tags => Err(self.refused(tag)),
+            _ => Ok(false),
+        }
+    }
+
+    fn refused(&self, tag: &Tag) -> String {
+        format!("the tag {}{} is not for {}", tag.handle, tag.suffix, self.dialect.files)
+    }
+
+    fn begin(&mut self, line: usize, content: Content, anchor: usize, tag: Option<&Tag>) -> Result<(), String> {
+        if let Some(tag) = tag.filter(|_| !self.dialect.tags) {
+            return Err(self.refused(tag));
+        }
+        if self.open.len() == DEPTH {
+            return Err(format!("there are more than {DEPTH} lists and tables within each other"));
+        }
+        self.no_key()?;
+        let begin = self.grow(0)?;
+        self.open.push(Open { line, content, anchor, begin });
+        Ok(())
+    }
+
+    /// Counts a value of `bytes`. Returns the size before it.
+    fn grow(&mut self, bytes: usize) -> Result<usize, String> {
+        let begin = self.size;
+        // Two for brackets, commas and colons.
+        self.size += bytes + 2;
+        if self.size > LARGEST {
+            return Err("with all its aliases the file is larger than 64 MiB".into());
+        }
+        Ok(begin)
+    }
+
+    /// Refuses values other than words in place of a key.
+    fn no_key(&self) -> Result<(), String> {
+        match self.open.last() {
+            Some(Open { content: Content::Table { key: None, .. }, .. }) => {
+                Err("a key is a word, not a list or a table".into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Places a complete value, and keeps it for aliases.
+    fn close(&mut self, node: Node, anchor: usize, begin: usize) -> Result<(), String> {
+        if anchor > 0 && self.dialect.aliases {
+            self.anchors.insert(anchor, (node.value.clone(), self.size - begin));
+        }
+        self.place(node)
+    }
+
+    fn place(&mut self, node: Node) -> Result<(), String> {
+        match self.open.last_mut().map(|open| &mut open.content) {
+            None => self.root = Some(node),
+            Some(Content::List(list)) => list.push(node),
+            Some(Content::Table { entries, names, key }) => match (key.take(), node.value) {
+                (Some((name, line)), value) => entries.push((name, Node { line, value })),
+                (None, Value::Scalar(Scalar { text, .. })) => {
+                    if !names.insert(text.clone()) {
+                        return Err(format!("{text:?} is there twice (duplicate key)"));
+                    }
+                    *key = Some((text, node.line));
+                }
+                // `no_key` has refused it.
+                (None, _) => {}
+            },
+        }
+        Ok(())
+    }
+}
+
+/// Returns the type of a word without quotes.
+fn kind_of(text: &str) -> ScalarKind {
+    let number = |text: String| ScalarKind::Number(text);
+    match text {
+        "" | "~" | "null" | "Null" | "NULL" => return ScalarKind::Null,
+        "true" | "True" | "TRUE" => return ScalarKind::Bool(true),
+        "false" | "False" | "FALSE" => return ScalarKind::Bool(false),
+        ".nan" | ".NaN" | ".NAN" => return number("nan".into()),
+        _ => {}
+    }
+    let (sign, digits) = match text.as_bytes()[0] {
+        b'-' => ("-", &text[1..]),
+        b'+' => ("", &text[1..]),
+        _ => ("", text),
+    };
+    if matches!(digits, ".inf" | ".Inf" | ".INF") {
+        return number(format!("{sign}inf"));
+    }
+    let all = |text: &str, radix: u32| !text.is_empty() && text.chars().all(|c| c.is_digit(radix));
+    if all(digits, 10) {
+        let short = digits.trim_start_matches('0');
+        return number(format!("{sign}{}", if short.is_empty() { "0" } else { short }));
+    }
+    let with_radix = digits.strip_prefix("0x").map(|rest| (rest, 16));
+    if let Some((rest, radix)) = with_radix.or_else(|| digits.strip_prefix("0o").map(|rest| (rest, 8)))
+        && digits.len() == text.len()
+        && all(rest, radix)
+    {
+        return number(text.into());
+    }
+    // Rust's other numbers (`inf`, `nan`, `infinity`) are texts in YAML.
+    let is_number = digits.bytes().any(|byte| byte.is_ascii_digit())
+        && digits.bytes().all(|byte| byte.is_ascii_digit() || b".eE+-".contains(&byte))
+        && !digits.starts_with(['+', '-', 'e', 'E']);
+    match digits.parse::<f64>() {
+        Ok(value) if is_number && value.is_finite() => number(format!("{sign}{value:?}")),
+        // Larger than every number: refused when it is read.
+        Ok(_) if is_number => number(format!("{sign}1e999")),
+        _ => ScalarKind::Text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: Dialect = Dialect { files: "these files", aliases: true, tags: false };
+
+    #[test]
+    fn nodes() {
+        let root = parse("a:\n  b: 1\n  c:\n    - 2\n    - 'x'\n", &ALL).unwrap().unwrap();
+        let scalar = |text: &str, kind| Value::Scalar(Scalar { text: text.into(), kind });
+        let number = |text: &str| scalar(text, ScalarKind::Number(text.into()));
+        let list = [Node { line: 4, value: number("2") }, Node { line: 5, value: scalar("x", ScalarKind::Text) }];
+        let table = [
+            ("b".to_owned(), Node { line: 2, value: number("1") }),
+            ("c".to_owned(), Node { line: 3, value: Value::List(list.into()) }),
+        ];
+        let expected = [("a".to_owned(), Node { line: 1, value: Value::Table(table.into()) })];
+        assert_eq!(root, Node { line: 1, value: Value::Table(expected.into()) });
+        assert_eq!(parse("", &ALL), Ok(None));
+    }
+
+    #[test]
+    fn dialects() {
+        let strict = Dialect { aliases: false, tags: true, ..ALL };
+        let error = parse("a: &a 1\nb: *a\n", &strict).unwrap_err();
+        assert_eq!(error, YamlError { line: 2, column: 4, message: "aliases are not for these files".into() });
+        assert!(parse("a: !cup 1\nb: !!opencv-matrix {rows: 3}\n", &strict).is_ok());
+        for (text, tag) in [("a: !cup 1\n", "!cup"), ("b: !!set {rows: 3}\n", "set"), ("b: ! [1]\n", "!")] {
+            let error = parse(text, &ALL).unwrap_err();
+            assert!(error.message.contains(tag) && error.message.ends_with("is not for these files"), "{error:?}");
+        }
+        let text = parse("a: !!str 1\n", &ALL).unwrap();
+        assert_eq!(text, parse("a: '1'\n", &ALL).unwrap());
+    }
+
+    #[test]
+    fn refusals() {
+        let deep = format!("a: {}1{}", "[".repeat(60), "]".repeat(60));
+        let item = |k: usize| if k == 0 { "lol".into() } else { format!("*k{}", k - 1) };
+        let bomb: String = (0..40).map(|k| format!("k{k}: &k{k} [{}]\n", vec![item(k); 9].join(", "))).collect();
+        for (yaml, line, needle) in [
+            ("a: 1\n---\nb: 2\n", 2, "second document"),
+            ("a:\n  [1]: 2\n", 2, "a key is a word"),
+            ("a: &a b\n*a : 2\n", 2, "a key is a word"),
+            ("a: 1\nb: 2\na: 3\n", 3, "\"a\" is there twice"),
+            ("a: [1\n", 2, ""),
+            ("a: *b\n", 1, ""),
+            ("a: &b [*b]\n", 1, "has not ended"),
+            (&deep, 1, "within each other"),
+            (&bomb, 8, "64 MiB"),
+        ] {
+            let error = parse(yaml, &ALL).unwrap_err();
+            assert!(error.message.contains(needle), "{yaml}: {error:?}");
+            assert_eq!(error.line, line, "{yaml}: {error:?}");
+        }
+    }
+}
