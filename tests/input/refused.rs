@@ -3,6 +3,7 @@
 use super::support::{INERTIAL, TETRAHEDRON, ball, bits, cfg, chain, hinge, hinge_with, robot, sim};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::sim::PerJoint;
 use kinetoscope::sim::mjcf::MAX_BODY_DEPTH;
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 use super::*;
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Axis, array};
-use kinetoscope::sim::DriveModel;
+use kinetoscope::sim::{DriveModel, PerJoint};
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{gains, text_robot, urdf_robot};
 

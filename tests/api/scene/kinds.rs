@@ -8,7 +8,7 @@ use kinetoscope::sensors::ray::pattern::{Bpearl, Custom, Grid, GridOrder, Lidar,
 use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayPattern};
 use kinetoscope::sensors::{FrameTransformerCfg, JointStateCfg, JointWrenchCfg, NoiseCfg, TargetFrameCfg};
 use kinetoscope::sim::{
-    DcMotor, DelayedPd, DriveModel, DriveType, EntityTypes, Error, Integrator, NameCase, NameCaseCfg,
+    DcMotor, DelayedPd, DriveModel, DriveType, EntityTypes, Error, Integrator, NameCase, NameCaseCfg, PerJoint,
 };
 use std::path::Path;
 
