@@ -1,6 +1,6 @@
 //! [`Requires`]: the fields of the scene's state that a sensor needs.
 
-use kinetoscope_scene::SceneState;
+use crate::SceneState;
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
 
@@ -26,11 +26,11 @@ impl Requires {
     pub const JOINT_STATE: Self = Self(1 << 5);
     /// [`SceneState::sensordata`].
     pub const SENSORDATA: Self = Self(1 << 6);
-    /// [`SceneState::visible`], and [`SensorContext::scene`](crate::SensorContext::scene).
+    /// [`SceneState::visible`], and the [`RenderScene`](crate::RenderScene) that sensors are built for.
     pub const VISIBLE: Self = Self(1 << 7);
     /// [`SceneState::joint_wrenches`]; costs the engine a pass of its own.
     pub const JOINT_WRENCHES: Self = Self(1 << 8);
-    /// [`SceneState::instance_poses`], and [`SensorContext::scene`](crate::SensorContext::scene).
+    /// [`SceneState::instance_poses`], and the [`RenderScene`](crate::RenderScene) that sensors are built for.
     pub const INSTANCES: Self = Self(1 << 9);
     /// [`SceneState::actuator_controls`], [`SceneState::actuator_forces`] and [`SceneState::actuator_activations`].
     pub const ACTUATORS: Self = Self(1 << 10);
