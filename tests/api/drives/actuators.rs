@@ -538,6 +538,7 @@ fn changes_at_run_time() {
                         DriveType::Force => 1.0,
                         DriveType::Acceleration => m,
                         DriveType::None => 0.0,
+                        other => panic!("{other:?} is not set here"),
                     };
                     let (kp, kd) = (unit * stiffness[at], unit * damping[at]);
                     *law = Law { m, kp, kd, limit: limit[at], ..*law };
