@@ -45,7 +45,7 @@ pub use kinetoscope_scene::requires::{self, Requires};
 pub use mujoco_sensor::{MujocoSensor, MujocoSensorCfg};
 pub use noise::NoiseCfg;
 pub use ray::{RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg};
-pub use sampling::{Channel, Sampled, Sampler, SamplingCfg};
+pub use sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{EngineSensor, Sensor, SensorCfg, SensorContext};
 pub use slot::SensorSlot;

@@ -111,7 +111,7 @@ impl SensorCfg for RayCasterCameraCfg {
         let wanted = self.targets.select(scene, self.groups, parent, context)?;
         let targets = RayTargets::new(scene, wanted, &context.ray_assets);
         let channels = [
-            Channel::within("distances", pixels, [0.0, self.max_distance]),
+            Channel::within("distances", pixels, [0.0, self.max_distance]).in_unit("m"),
             Channel::exact("normals", 3 * pixels),
             Channel::exact("ids", pixels),
             Channel::exact("poses", 7),

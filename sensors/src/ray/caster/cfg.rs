@@ -138,10 +138,10 @@ impl SensorCfg for RayCasterCfg {
         let wanted = self.targets.select(scene, self.groups, parent, context)?;
         let targets = RayTargets::new(scene, wanted, &context.ray_assets);
         let channels = [
-            Channel::within("distances", rays.len(), [0.0, self.max_distance]),
+            Channel::within("distances", rays.len(), [0.0, self.max_distance]).in_unit("m"),
             Channel::exact("normals", 3 * rays.len()),
             Channel::exact("ids", rays.len()),
-            Channel::exact("pos_w", 3),
+            Channel::exact("pos_w", 3).in_unit("m"),
             Channel::exact("quat_w", 4),
         ];
         let sampler = Sampler::new("ray caster", self.requires(), context, &self.sampling, &channels)?;
