@@ -8,7 +8,7 @@ use crate::stage::{Painter, StageCfg};
 use crate::stream::{Element, Kind, Part, Stream};
 use camera::{DISPARITY, Eye, timed};
 use kinetoscope_sensors::{Imu, RayCaster, Sampled, Sensor, StereoCamera};
-use kinetoscope_sim::{MjcfId, ObjectId, RobotId, SimulationManager};
+use kinetoscope_sim::{MjcfId, ObjectId, RobotId, SimulationManager, StepResult};
 use ndarray::{Array2, ArrayBase, ArrayView2, Axis, Data, Dimension};
 use std::any::Any;
 
@@ -303,13 +303,15 @@ impl Source {
     }
 
     /// Copies what there is now. `times` are the simulation times of all environments; `renewed` are environments whose state
-    /// is another one, whatever their time. What is there at every step is new in the others only where it is `due`.
+    /// is another one, whatever their time. What is there at every step is new in the others only where it is `due`. `result` is of
+    /// the step of a task that is over now.
     pub(crate) fn read(
         &mut self,
         sim: &mut SimulationManager,
         times: &[f64],
         renewed: &[usize],
         due: bool,
+        result: Option<&StepResult>,
         block: &mut Block,
     ) -> Result<()> {
         if let Some(uid) = &self.sensor {
@@ -345,7 +347,7 @@ impl Source {
         }
         match (&mut self.painter, &mut block.values) {
             (Some(painter), Values::U8(pixels)) => painter.draw(sim, pixels)?,
-            _ => self.copy(sim, &mut block.values)?,
+            _ => self.copy(sim, result, &mut block.values)?,
         }
         let wanted = self.rows.len() * self.stream.width();
         if block.values.len() != wanted {
@@ -359,7 +361,7 @@ impl Source {
         RecordError::Changed { path: Default::default(), stream: self.stream.name.clone() }
     }
 
-    fn copy(&self, sim: &SimulationManager, values: &mut Values) -> Result<()> {
+    fn copy(&self, sim: &SimulationManager, result: Option<&StepResult>, values: &mut Values) -> Result<()> {
         match &self.what {
             What::JointStates(id) => {
                 let robot = sim.robot(*id);
@@ -391,12 +393,11 @@ impl Source {
                 self.join(values, &[times.view(), positions.view(), velocities.view()]);
             }
             What::Outcomes => {
-                let Some(outcome) = sim.outcome() else { return Ok(()) };
                 let number = |is: bool| f64::from(u8::from(is));
-                if let Values::F64(values) = values {
-                    for &row in self.rows.iter().filter(|row| **row < outcome.rewards.len()) {
-                        let ends = [outcome.terminated[row], outcome.truncated[row]].map(number);
-                        values.extend([outcome.rewards[row], ends[0], ends[1]]);
+                if let (Some(result), Values::F64(values)) = (result, values) {
+                    for &row in self.rows.iter().filter(|row| **row < result.rewards.len()) {
+                        let ends = [result.terminated[row], result.truncated[row]].map(number);
+                        values.extend([result.rewards[row], ends[0], ends[1]]);
                     }
                 }
             }

@@ -16,7 +16,6 @@ use crate::objects::robot::{Robot, RobotCfg, RobotMut};
 use crate::objects::robot_data::{RobotData, Role};
 use crate::objects::terrain::{Terrain, TerrainCfg};
 use crate::observer::{Moment, Observers};
-use crate::outcome::Outcome;
 use crate::sensor_list::{SensorId, SensorList};
 use crate::simulation::Simulation;
 use crate::simulation_cfg::SimulationManagerCfg;
@@ -55,7 +54,6 @@ pub struct SimulationManager {
     /// How often properties were drawn for each environment.
     pub(crate) draws: Vec<u64>,
     /// What came of the last step of the task that runs here.
-    pub(crate) outcome: Option<Outcome>,
     /// Point of view of windows, browser views and screenshots, where the program set one.
     pub(crate) viewpoint: Option<Viewpoint>,
 }
@@ -91,7 +89,6 @@ impl SimulationManager {
             sensors,
             observers: Observers::default(),
             draws,
-            outcome: None,
             viewpoint: None,
         })
     }
