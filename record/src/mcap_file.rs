@@ -15,7 +15,7 @@
 //! | ray caster, what it hit | `/env_0/scanner/points` | `sensor_msgs/msg/PointCloud2`: x, y, z, distance, normal, mask id |
 //! | its distances, of all rays | `/env_0/scanner/distances` | `std_msgs/msg/Float64MultiArray`; infinite for a miss |
 //! | its body | `/env_0/tf` | frame `env_0/sensors/scanner` |
-//! | other sensors | `/env_0/feet/net_forces_w` | `std_msgs/msg/Float64MultiArray`; metadata `rows` and `filters` of the channel name bodies |
+//! | other sensors | `/env_0/feet/net_forces_w` | `std_msgs/msg/Float64MultiArray`; metadata of the channel: `rows` and `filters` name bodies, `unit` |
 //! | resets, writes, divergence, notes | `/events` | `rcl_interfaces/msg/Log` |
 //! | names of mask ids | metadata `mask_ids`, `mask_classes` | from the number to the thing and its class |
 //! | places of environments | `/tf_static` | `tf2_msgs/msg/TFMessage`, from `world` to `env_0` |
@@ -167,11 +167,11 @@ impl McapFile {
         let mut rows = Vec::new();
         let nothing = BTreeMap::new();
         for stream in streams {
-            let about = about(stream);
             let mut of_stream = Vec::new();
             for env in &stream.env_ids {
                 let mut of_row = Vec::new();
-                for (topic, schema) in topics(stream) {
+                for (k, (topic, schema)) in topics(stream).into_iter().enumerate() {
+                    let about = about(stream, k);
                     of_row.push(channels.add(&mut writer, format!("/env_{env}/{topic}"), schema, &about)?);
                 }
                 of_stream.push(of_row);
@@ -323,11 +323,12 @@ fn small(values: &Values, range: std::ops::Range<usize>) -> Option<Vec<u16>> {
     ids.get(range)?.iter().map(|id| u16::try_from(*id).ok()).collect()
 }
 
-/// What is said of the channels of a stream: names, with commas between them.
-fn about(stream: &Stream) -> BTreeMap<String, String> {
+/// Metadata of the channel of quantity number `part` of a stream: names, separated by commas, and the unit.
+fn about(stream: &Stream, part: usize) -> BTreeMap<String, String> {
     let Kind::Numbers { rows, filters } = &stream.kind else { return BTreeMap::new() };
-    let lists = [("rows", rows), ("filters", filters)].into_iter().filter(|(_, names)| !names.is_empty());
-    lists.map(|(what, names)| (what.to_string(), names.join(","))).collect()
+    let unit = stream.parts.get(part).map(|part| part.unit.clone()).unwrap_or_default();
+    let all = [("rows", rows.join(",")), ("filters", filters.join(",")), ("unit", unit)];
+    all.into_iter().filter(|(_, text)| !text.is_empty()).map(|(what, text)| (what.to_string(), text)).collect()
 }
 
 /// A topic that streams would share whose messages are of different types: one of them would be read as the other.

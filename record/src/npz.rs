@@ -9,7 +9,7 @@
 //! | `arm/joint_states/step` | (T,) | physics steps since the recording began, f64 |
 //! | `events/step`, `events/env`, `events/kind`, `events/time` | (E,) | kind 0: reset, 1: written, 2: diverged, 3: note |
 //! | `notes.jsonl` | | a line of JSON for each event with a text: `event` is its row |
-//! | `recording.json` | | time step, environments, names of joints, frames and bodies, how lenses distort, what mask ids are |
+//! | `recording.json` | | time step, environments, names of joints, frames and bodies, units of sensors, how lenses distort, what mask ids are |
 //! | `scene.zip` | | the scene, as MJCF with meshes: see `scene_file.rs` |
 //! | `start.snapshot` | | the state of all environments when the recording began, as `Snapshot::load` reads it |
 //!
@@ -110,7 +110,14 @@ pub(crate) fn about(streams: &[Stream], masks: &[MaskId], dt: f64) -> Value {
             _ => None,
         };
         let distortion = distortion.map(|lens| json!({ "model": lens.model, "coefficients": lens.coefficients }));
-        let part = |part: &Part| json!({ "name": member(stream, &part.name), "shape": part.shape, "of_forces": part.of_forces });
+        let part = |part: &Part| {
+            let name = member(stream, &part.name);
+            let mut about = json!({ "name": name, "shape": part.shape, "of_forces": part.of_forces });
+            if !part.unit.is_empty() {
+                about["unit"] = json!(part.unit);
+            }
+            about
+        };
         let parts = stream.parts.iter().map(part);
         json!({
             "name": stream.name,

@@ -13,8 +13,9 @@ use crate::source::Source;
 use crate::stream::Stream;
 use crate::topic::Topic;
 use crate::writer::{self, Failure, Fault, Sink};
-use kinetoscope_sim::{EnvId, Moment, Observer, ObserverId, SimulationManager};
+use kinetoscope_sim::{EnvId, Moment, Observer, ObserverId, SimulationManager, StepResult};
 use resolve::{open, packed_scene, resolve};
+use std::any::Any;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -141,15 +142,6 @@ pub struct Recorder {
     restyled: Vec<usize>,
 }
 
-/// What is recorded of a moment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Due {
-    /// What is there at steps.
-    Steps,
-    /// What came of a step of a task.
-    Outcome,
-}
-
 impl fmt::Debug for Recorder {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Recorder").field("cfg", &self.cfg).field("recorded", &self.recorded).finish_non_exhaustive()
@@ -231,7 +223,7 @@ impl Recorder {
             restyled: (0..sim.num_envs()).collect(),
         };
         let all: Vec<usize> = (0..sim.num_envs()).collect();
-        recorder.take(sim, None, &all, Due::Steps);
+        recorder.take(sim, None, &all, None);
         if recorder.failure.is_some() {
             recorder.end()?;
         }
@@ -320,8 +312,15 @@ impl Recorder {
         Err(RecordError::BrokenOff { error: Box::new(failure), also: error.map(|error| error.to_string()), kept })
     }
 
-    /// Records what is due, and everything that is there at any time in environments `renewed`.
-    fn take(&mut self, sim: &mut SimulationManager, event: Option<Event>, renewed: &[usize], what: Due) {
+    /// Records what is due, and everything that is there at any time in environments `renewed`; with the result of a step of a
+    /// task, that result only.
+    fn take(
+        &mut self,
+        sim: &mut SimulationManager,
+        event: Option<Event>,
+        renewed: &[usize],
+        result: Option<&StepResult>,
+    ) {
         if self.has_failed() {
             return;
         }
@@ -339,14 +338,14 @@ impl Recorder {
         }
         let mut used = packet.event.is_some() || !packet.scenes.is_empty();
         for (source, block) in self.sources.iter_mut().zip(&mut packet.blocks) {
-            if source.is_outcome() != (what == Due::Outcome) {
+            if source.is_outcome() != result.is_some() {
                 continue;
             }
             let due = source.due_at <= steps;
             if !due && (source.sensor.is_some() || source.is_stage() || renewed.is_empty()) {
                 continue;
             }
-            if let Err(error) = source.read(sim, &times, renewed, due, block) {
+            if let Err(error) = source.read(sim, &times, renewed, due, result, block) {
                 return self.give_up(packet, error);
             }
             if let Some(every) = source.every.filter(|_| due) {
@@ -416,7 +415,7 @@ impl Recorder {
         let (step, at) = (self.clock.step(steps), self.clock.now(steps));
         let text = String::new();
         self.restyled.extend_from_slice(&of);
-        self.take(sim, Some(Event { kind, env_ids: of.clone(), times, step, at, text }), &of, Due::Steps);
+        self.take(sim, Some(Event { kind, env_ids: of.clone(), times, step, at, text }), &of, None);
     }
 
     fn records(&self, env: usize) -> bool {
@@ -505,7 +504,7 @@ impl Recorder {
         if self.scenes.is_some() {
             self.restyled = (0..sim.num_envs()).collect();
             // Nothing else is due: this was recorded after the last step.
-            self.take(sim, None, &[], Due::Steps);
+            self.take(sim, None, &[], None);
         }
     }
 }
@@ -536,18 +535,21 @@ impl Observer for Recorder {
         match moment {
             Moment::Stepped => {
                 self.look_for_divergence(sim);
-                self.take(sim, None, &[], Due::Steps);
-            }
-            Moment::Judged => {
-                let all: Vec<usize> = (0..sim.num_envs()).collect();
-                if self.sources.iter().any(Source::is_outcome) {
-                    self.take(sim, None, &all, Due::Outcome);
-                }
+                self.take(sim, None, &[], None);
             }
             Moment::Reset { env_ids } => self.happened(sim, EventKind::Reset, env_ids),
             Moment::Written { env_ids } => self.happened(sim, EventKind::Written, env_ids),
             Moment::Compiled => self.compiled(sim),
             _ => {}
+        }
+    }
+
+    fn receive(&mut self, sim: &mut SimulationManager, event: &dyn Any) {
+        if let Some(result) = event.downcast_ref::<StepResult>()
+            && self.sources.iter().any(Source::is_outcome)
+        {
+            let all: Vec<usize> = (0..sim.num_envs()).collect();
+            self.take(sim, None, &all, Some(result));
         }
     }
 }

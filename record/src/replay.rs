@@ -236,7 +236,7 @@ impl Repetition {
         for source in &mut self.states {
             let mut packet = Packet::new(std::slice::from_ref(&source.stream));
             let Some(block) = packet.blocks.first_mut() else { continue };
-            source.read(sim, &times, &[], true, block)?;
+            source.read(sim, &times, &[], true, None, block)?;
             if let Some(difference) = difference(&self.archive, source, block, row, written)? {
                 verdict.difference = Some(Difference { step: verdict.steps, ..difference });
                 return Ok(false);

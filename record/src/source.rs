@@ -7,11 +7,8 @@ use crate::packet::{Block, Values};
 use crate::stage::{Painter, StageCfg};
 use crate::stream::{Element, Kind, Part, Stream};
 use camera::{DISPARITY, Eye, timed};
-use kinetoscope_sensors::{
-    ActuatorState, ContactSensor, FrameTransformer, Imu, JointState, JointWrench, MujocoSensor, RayCaster, Sampled,
-    Sensor, StereoCamera,
-};
-use kinetoscope_sim::{MjcfId, ObjectId, RobotId, SimulationManager};
+use kinetoscope_sensors::{Imu, RayCaster, Sampled, Sensor, StereoCamera};
+use kinetoscope_sim::{MjcfId, ObjectId, RobotId, SimulationManager, StepResult};
 use ndarray::{Array2, ArrayBase, ArrayView2, Axis, Data, Dimension};
 use std::any::Any;
 
@@ -196,13 +193,8 @@ impl Source {
             sources
                 .push(Self::new(uid.into(), Kind::Points, Element::F64, parts, envs, points).of_sensor(uid, sensor)?);
         } else if let Some(sampled) = sensor.sampled() {
-            let kind = if any.is::<Imu>() { Kind::Imu } else { named(any) };
-            let sampler = sampled.sampler();
-            let part = |channel| {
-                let of_forces = of_forces(any, channel);
-                Part { of_forces, ..Part::new(channel, [sampler.values(channel).ncols()]) }
-            };
-            let parts = sampler.channels().map(part).collect();
+            let kind = if any.is::<Imu>() { Kind::Imu } else { kind_of(sampled) };
+            let parts = sampled.sampler().channels().map(Part::of_channel).collect();
             let numbers = What::Numbers(uid.into());
             sources.push(Self::new(uid.into(), kind, Element::F64, parts, envs, numbers).of_sensor(uid, sensor)?);
         } else {
@@ -311,13 +303,15 @@ impl Source {
     }
 
     /// Copies what there is now. `times` are the simulation times of all environments; `renewed` are environments whose state
-    /// is another one, whatever their time. What is there at every step is new in the others only where it is `due`.
+    /// is another one, whatever their time. What is there at every step is new in the others only where it is `due`. `result` is of
+    /// the step of a task that is over now.
     pub(crate) fn read(
         &mut self,
         sim: &mut SimulationManager,
         times: &[f64],
         renewed: &[usize],
         due: bool,
+        result: Option<&StepResult>,
         block: &mut Block,
     ) -> Result<()> {
         if let Some(uid) = &self.sensor {
@@ -353,7 +347,7 @@ impl Source {
         }
         match (&mut self.painter, &mut block.values) {
             (Some(painter), Values::U8(pixels)) => painter.draw(sim, pixels)?,
-            _ => self.copy(sim, &mut block.values)?,
+            _ => self.copy(sim, result, &mut block.values)?,
         }
         let wanted = self.rows.len() * self.stream.width();
         if block.values.len() != wanted {
@@ -367,7 +361,7 @@ impl Source {
         RecordError::Changed { path: Default::default(), stream: self.stream.name.clone() }
     }
 
-    fn copy(&self, sim: &SimulationManager, values: &mut Values) -> Result<()> {
+    fn copy(&self, sim: &SimulationManager, result: Option<&StepResult>, values: &mut Values) -> Result<()> {
         match &self.what {
             What::JointStates(id) => {
                 let robot = sim.robot(*id);
@@ -399,12 +393,11 @@ impl Source {
                 self.join(values, &[times.view(), positions.view(), velocities.view()]);
             }
             What::Outcomes => {
-                let Some(outcome) = sim.outcome() else { return Ok(()) };
                 let number = |is: bool| f64::from(u8::from(is));
-                if let Values::F64(values) = values {
-                    for &row in self.rows.iter().filter(|row| **row < outcome.rewards.len()) {
-                        let ends = [outcome.terminated[row], outcome.truncated[row]].map(number);
-                        values.extend([outcome.rewards[row], ends[0], ends[1]]);
+                if let (Some(result), Values::F64(values)) = (result, values) {
+                    for &row in self.rows.iter().filter(|row| **row < result.rewards.len()) {
+                        let ends = [result.terminated[row], result.truncated[row]].map(number);
+                        values.extend([result.rewards[row], ends[0], ends[1]]);
                     }
                 }
             }
@@ -424,11 +417,12 @@ impl Source {
             What::Numbers(uid) => {
                 let sensor = sim.entities().sensor_called(uid)?;
                 let sampler = sensor.sampled().ok_or_else(|| self.changed())?.sampler();
-                if !sampler.channels().eq(self.stream.parts.iter().map(|part| part.name.as_str())) {
+                if !sampler.channels().map(|channel| channel.name).eq(self.stream.parts.iter().map(|part| &*part.name))
+                {
                     return Err(self.changed());
                 }
                 let all: Vec<ArrayView2<'_, f64>> =
-                    sampler.channels().map(|channel| sampler.arrived(channel)).collect();
+                    sampler.channels().map(|channel| sampler.arrived(channel.name)).collect();
                 self.join(values, &all);
             }
             What::Points(uid) => {
@@ -519,32 +513,9 @@ impl Stamps {
     }
 }
 
-/// True if a sensor measures a channel at [`kinetoscope_scene::SceneState::force_time`], as its documentation says.
-fn of_forces(sensor: &dyn Any, channel: &str) -> bool {
-    if let Some(engine) = sensor.downcast_ref::<MujocoSensor>() {
-        // All values are one channel: of both kinds, positions have the word.
-        return engine.sensors().iter().all(|sensor| sensor.solved);
-    }
-    match channel {
-        _ if sensor.is::<Imu>() || sensor.is::<JointWrench>() => true,
-        "efforts" => sensor.is::<JointState>(),
-        "forces" => sensor.is::<ActuatorState>(),
-        "pos_w" | "quat_w" => false,
-        _ => sensor.is::<ContactSensor>(),
-    }
-}
-
 /// Numbers of a sensor, with the names of what they are of.
-fn named(sensor: &dyn Any) -> Kind {
-    let contacts = sensor.downcast_ref::<ContactSensor>();
-    let rows = contacts.map(ContactSensor::body_names);
-    let rows = rows.or_else(|| sensor.downcast_ref().map(JointWrench::link_names));
-    let rows = rows.or_else(|| sensor.downcast_ref().map(JointState::joint_names));
-    let rows = rows.or_else(|| sensor.downcast_ref().map(ActuatorState::actuator_names));
-    let rows = rows.or_else(|| sensor.downcast_ref().map(FrameTransformer::target_frame_names));
-    let rows = rows.or_else(|| sensor.downcast_ref().map(MujocoSensor::names));
-    let filters = contacts.map(ContactSensor::filters);
-    Kind::Numbers { rows: rows.unwrap_or_default().to_vec(), filters: filters.unwrap_or_default().to_vec() }
+fn kind_of(sensor: &dyn Sampled) -> Kind {
+    Kind::Numbers { rows: sensor.columns().to_vec(), filters: sensor.filters().to_vec() }
 }
 
 fn sim_error(source: &Source) -> impl Fn(kinetoscope_sensors::SensorError) -> RecordError + '_ {

@@ -1,5 +1,7 @@
 //! What a file is told of the numbers that it gets.
 
+use kinetoscope_sensors::{Channel, Stamp};
+
 /// Numbers that are recorded together: their names, shapes and meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stream {
@@ -44,11 +46,19 @@ pub struct Part {
     /// Whether a sensor measures it at [`kinetoscope_scene::SceneState::force_time`]: forces, efforts and accelerations, which the engine
     /// solves for at the beginning of the step that leads to positions and velocities.
     pub of_forces: bool,
+    /// Unit that the sensor gives it ([`Channel::unit`](kinetoscope_sensors::Channel::unit)); empty where it gives none.
+    pub unit: String,
 }
 
 impl Part {
     pub(crate) fn new(name: &str, shape: impl Into<Vec<usize>>) -> Self {
-        Self { name: name.into(), shape: shape.into(), of_forces: false }
+        Self { name: name.into(), shape: shape.into(), of_forces: false, unit: String::new() }
+    }
+
+    /// A channel of a sensor.
+    pub(crate) fn of_channel(channel: &Channel) -> Self {
+        let (of_forces, unit) = (channel.stamp == Stamp::Force, channel.unit.to_string());
+        Self { of_forces, unit, ..Self::new(channel.name, [channel.width]) }
     }
 
     /// How many numbers it has in one environment.

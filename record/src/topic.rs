@@ -22,8 +22,8 @@ pub enum Topic {
     /// ([`kinetoscope_sim::Entities::engine_states`](kinetoscope_sim::Entities::engine_states)), called `clock`, `qpos` and `qvel`.
     /// [`Everything`](Self::Everything) has them in HDF5 files only.
     EngineStates,
-    /// Rewards and ends of the task that runs in the simulation, told after each of its steps
-    /// ([`SimulationManager::outcome`](kinetoscope_sim::SimulationManager::outcome)): those of an `Env`, which tells them by itself.
+    /// Rewards and ends of the task that runs in the simulation, which it publishes after each of its steps
+    /// ([`StepResult`](kinetoscope_sim::StepResult)), as an `Env` does by itself.
     Outcomes,
     /// All environments in one picture, as `RecorderCfg::stage` says; it is called as a camera `stage` of the first environment that is
     /// recorded. [`Everything`](Self::Everything) has it only where the file shows pictures and there is no camera.

@@ -6,70 +6,132 @@
 //! Two instants meet in one step from t_k to t_(k+1): contacts, efforts and accelerations are solved for t_k, positions
 //! and velocities are those of t_(k+1). Both times are given.
 
+use crate::quantities::{PerEnv, quantities};
+use crate::requires::Requires;
 use crate::{Light, Marker, PoseF32, PoseF64, RenderScene};
-use ndarray::{Array, Array2, Array3, Axis, RemoveAxis};
+use ndarray::{Array2, Array3};
 use std::sync::Arc;
 
-/// State of all environments after a physics step (or after a reset).
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SceneState {
-    /// Physics steps since the last reset of each environment, shape \[num_envs\].
-    pub step: Vec<u64>,
-    /// Time of positions and velocities \[s\] since the last reset, shape \[num_envs\].
-    pub time: Vec<f64>,
-    /// Time of efforts, accelerations and contacts \[s\] since the last reset, shape \[num_envs\]: one step of the physics
-    /// engine earlier than [`time`](Self::time); the same right after a reset or after somebody wrote to the state, when
-    /// accelerations and contacts are solved for the state as it is.
-    pub force_time: Vec<f64>,
-    /// Poses of bodies `[x, y, z, qw, qx, qy, qz]` \[m\], shape \[num_envs, bodies, 7\].
-    pub body_poses: Option<Array3<f64>>,
-    /// Velocities of body origins, then angular velocities \[m/s, rad/s\], in world axes, shape \[num_envs, bodies, 6\].
-    pub body_velocities: Option<Array3<f64>>,
-    /// Accelerations of body origins, then angular accelerations \[m/s², rad/s²\], in world axes, without gravity (0 at
-    /// rest, -9.81 along z in free fall), shape \[num_envs, bodies, 6\]. They are what the engine solved for; where it damps
-    /// joints implicitly after that (the `damping` of joints with native actuators), velocities change by a little less.
-    pub body_accelerations: Option<Array3<f64>>,
-    /// Poses of bodies at [`force_time`](Self::force_time), as in [`body_poses`](Self::body_poses); there where
-    /// [`body_accelerations`](Self::body_accelerations) is.
-    pub force_poses: Option<Array3<f64>>,
-    /// Velocities of bodies at [`force_time`](Self::force_time), as in [`body_velocities`](Self::body_velocities); there
-    /// where [`body_accelerations`](Self::body_accelerations) is.
-    pub force_velocities: Option<Array3<f64>>,
-    /// Forces, then torques that the joint of each link exerts on it \[N, N m\], about the origin of the link and in the
-    /// link's own axes, shape \[num_envs, bodies, 6\]. NaN for links that are fused to others: no joint of theirs moves.
-    pub joint_wrenches: Option<Array3<f64>>,
-    /// Joint positions \[rad or m\], shape \[num_envs, joints\]: one for each joint with one degree of freedom.
-    pub joint_positions: Option<Array2<f64>>,
-    /// Joint velocities \[rad/s or m/s\], shape \[num_envs, joints\].
-    pub joint_velocities: Option<Array2<f64>>,
-    /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\]. For joints of
-    /// MJCF files, MuJoCo's `qfrc_actuator`: the sum of what the file's actuators exert on the joint, with the compensation of
-    /// gravity that is the actuators' (`actuatorgravcomp`), within the joint's `actuatorfrcrange` (MuJoCo 2.2.2 has neither of
-    /// these two); after a reset, on the state as it is.
-    pub joint_efforts: Option<Array2<f64>>,
-    /// Controls of actuators, shape \[num_envs, actuators\]: the target of a drive's position \[rad or m\], what an actuator
-    /// of an MJCF file is told, in the unit that the file gives it.
-    pub actuator_controls: Option<Array2<f64>>,
-    /// Forces of actuators \[N m or N\], as [`joint_efforts`](Self::joint_efforts) for drives, in the unit of the file for
-    /// those of MJCF files (before the gear), shape \[num_envs, actuators\].
-    pub actuator_forces: Option<Array2<f64>>,
-    /// Activations of actuators, shape \[num_envs, actuators\]; 0 for those that have none. Of those that have several (MuJoCo
-    /// 4.x: `actdim`), the last one, which is what their force is made of.
-    pub actuator_activations: Option<Array2<f64>>,
-    /// Contacts with forces.
-    pub contacts: Option<Contacts>,
-    /// Values of the physics engine's own sensors, shape \[num_envs, values\].
-    pub sensordata: Option<Array2<f64>>,
-    /// Where things are that can be seen.
-    pub visible: Option<VisibleState>,
-    /// World from instance, in the order of [`RenderScene::instances`], in double precision
-    /// (what ray casters work with), shape \[num_envs, instances\].
-    pub instance_poses: Option<Array2<PoseF64>>,
-    /// What can be seen where sizes or colours are the environment's own, shape \[num_envs\]; empty where all environments
-    /// look alike.
-    pub own_scenes: Vec<OwnScene>,
-    /// What sensors show people of their measurements, shape \[num_envs\]: for cameras that draw it.
-    pub markers: Option<Vec<Vec<Marker>>>,
+// All quantities that sensors may ask for; the simulation fills each by a file of its own.
+quantities! {
+    /// [`SceneState::body_poses`].
+    POSES = "poses" {
+        /// Poses of bodies `[x, y, z, qw, qx, qy, qz]` \[m\], shape \[num_envs, bodies, 7\].
+        body_poses: Array3<f64> [bodies, 7],
+    }
+
+    /// [`SceneState::body_velocities`].
+    VELOCITIES = "velocities" {
+        /// Velocities of body origins, then angular velocities \[m/s, rad/s\], in world axes, shape \[num_envs, bodies, 6\].
+        body_velocities: Array3<f64> [bodies, 6],
+    }
+
+    /// [`SceneState::body_accelerations`], [`SceneState::force_poses`] and [`SceneState::force_velocities`]; costs the
+    /// engine a pass of its own.
+    ACCELERATIONS = "accelerations" {
+        /// Accelerations of body origins, then angular accelerations \[m/s², rad/s²\], in world axes, without gravity (0 at
+        /// rest, -9.81 along z in free fall), shape \[num_envs, bodies, 6\]. They are what the engine solved for; where it damps
+        /// joints implicitly after that (the `damping` of joints with native actuators), velocities change by a little less.
+        body_accelerations: Array3<f64> [bodies, 6],
+        /// Poses of bodies at [`force_time`](Self::force_time), as in [`body_poses`](Self::body_poses); there where
+        /// [`body_accelerations`](Self::body_accelerations) is.
+        force_poses: Array3<f64> [bodies, 7],
+        /// Velocities of bodies at [`force_time`](Self::force_time), as in [`body_velocities`](Self::body_velocities); there
+        /// where [`body_accelerations`](Self::body_accelerations) is.
+        force_velocities: Array3<f64> [bodies, 6],
+    }
+
+    /// [`SceneState::contacts`].
+    CONTACTS = "contacts" {
+        /// Contacts with forces.
+        contacts: Contacts,
+    }
+
+    /// [`SceneState::joint_efforts`].
+    JOINT_EFFORTS = "joint_efforts" {
+        /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\]. For joints of
+        /// MJCF files, MuJoCo's `qfrc_actuator`: the sum of what the file's actuators exert on the joint, with the compensation of
+        /// gravity that is the actuators' (`actuatorgravcomp`), within the joint's `actuatorfrcrange` (MuJoCo 2.2.2 has neither of
+        /// these two); after a reset, on the state as it is.
+        joint_efforts: Array2<f64> [joints],
+    }
+
+    /// [`SceneState::joint_positions`] and [`SceneState::joint_velocities`].
+    JOINT_STATE = "joint_state" {
+        /// Joint positions \[rad or m\], shape \[num_envs, joints\]: one for each joint with one degree of freedom.
+        joint_positions: Array2<f64> [joints],
+        /// Joint velocities \[rad/s or m/s\], shape \[num_envs, joints\].
+        joint_velocities: Array2<f64> [joints],
+    }
+
+    /// [`SceneState::sensordata`].
+    SENSORDATA = "sensordata" {
+        /// Values of the physics engine's own sensors, shape \[num_envs, values\].
+        sensordata: Array2<f64> [engine_values],
+    }
+
+    /// [`SceneState::visible`], and the [`RenderScene`] that sensors are built for.
+    VISIBLE = "visible" {
+        /// Where things are that can be seen.
+        visible: VisibleState,
+    }
+
+    /// [`SceneState::joint_wrenches`]; costs the engine a pass of its own.
+    JOINT_WRENCHES = "joint_wrenches" {
+        /// Forces, then torques that the joint of each link exerts on it \[N, N m\], about the origin of the link and in the
+        /// link's own axes, shape \[num_envs, bodies, 6\]. NaN for links that are fused to others: no joint of theirs moves.
+        joint_wrenches: Array3<f64> [bodies, 6],
+    }
+
+    /// [`SceneState::instance_poses`], and the [`RenderScene`] that sensors are built for.
+    INSTANCES = "instances" {
+        /// World from instance, in the order of [`RenderScene::instances`], in double precision
+        /// (what ray casters work with), shape \[num_envs, instances\].
+        instance_poses: Array2<PoseF64> [instances],
+    }
+
+    /// [`SceneState::actuator_controls`], [`SceneState::actuator_forces`] and [`SceneState::actuator_activations`].
+    ACTUATORS = "actuators" {
+        /// Controls of actuators, shape \[num_envs, actuators\]: the target of a drive's position \[rad or m\], what an actuator
+        /// of an MJCF file is told, in the unit that the file gives it.
+        actuator_controls: Array2<f64> [actuators],
+        /// Forces of actuators \[N m or N\], as [`joint_efforts`](Self::joint_efforts) for drives, in the unit of the file for
+        /// those of MJCF files (before the gear), shape \[num_envs, actuators\].
+        actuator_forces: Array2<f64> [actuators],
+        /// Activations of actuators, shape \[num_envs, actuators\]; 0 for those that have none. Of those that have several (MuJoCo
+        /// 4.x: `actdim`), the last one, which is what their force is made of.
+        actuator_activations: Array2<f64> [actuators],
+    }
+
+    /// [`SceneState::markers`], of all other sensors.
+    MARKERS = "markers" {
+        /// What sensors show people of their measurements, shape \[num_envs\]: for cameras that draw it.
+        markers: Vec<Vec<Marker>>,
+    }
+}
+
+/// Lengths of the axes of a [`SceneState`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Lengths {
+    /// Number of environments.
+    pub num_envs: usize,
+    /// Number of bodies.
+    pub bodies: usize,
+    /// Number of joints with one degree of freedom.
+    pub joints: usize,
+    /// Number of actuators.
+    pub actuators: usize,
+    /// Number of values of the physics engine's own sensors.
+    pub engine_values: usize,
+    /// Number of instances of the [`RenderScene`].
+    pub instances: usize,
+}
+
+impl Lengths {
+    /// The entries of an axis in messages.
+    fn label(axis: &'static str) -> &'static str {
+        if axis == "engine_values" { "values of the engine's sensors" } else { axis }
+    }
 }
 
 /// What can be seen in one environment instead of the scene of all: the same instances in the same order and of the same
@@ -166,30 +228,7 @@ impl SceneState {
             self.time[env] = other.time[env];
             self.force_time[env] = other.force_time[env];
         }
-        for (to, from) in self.per_body_mut().into_iter().zip(other.per_body()) {
-            copy_rows(to, from, envs());
-        }
-        for (to, from) in self.per_env_mut().into_iter().zip(other.per_env()) {
-            copy_rows(to, from, envs());
-        }
-        copy_rows(&mut self.instance_poses, &other.instance_poses, envs());
-        if let (Some(to), Some(from)) = (&mut self.visible, &other.visible) {
-            for env in envs() {
-                to.instance_poses.row_mut(env).assign(&from.instance_poses.row(env));
-                to.lights.row_mut(env).assign(&from.lights.row(env));
-                if let (Some(to), Some(from)) = (to.scenes.get_mut(env), from.scenes.get(env)) {
-                    to.clone_from(from);
-                }
-            }
-        }
-        if let (Some(to), Some(from)) = (&mut self.contacts, &other.contacts) {
-            to.take_over(from, chosen);
-        }
-        if let (Some(to), Some(from)) = (&mut self.markers, &other.markers) {
-            for env in envs() {
-                to[env].clone_from(&from[env]);
-            }
-        }
+        self.take_over_quantities(other, chosen);
         let sees = self.visible.is_some() || self.instance_poses.is_some();
         if sees && !(self.own_scenes.is_empty() && other.own_scenes.is_empty()) {
             self.own_scenes.resize(chosen.len(), OwnScene::default());
@@ -200,99 +239,43 @@ impl SceneState {
         true
     }
 
-    /// Whether `other` has every field of this state, with the same numbers of everything.
+    /// True if `other` has every field of this state, with as many of everything.
     fn fits(&self, other: &Self) -> bool {
         let n = self.num_envs();
-        let same_envs = [other.step.len(), other.time.len(), other.force_time.len()] == [n; 3];
-        let visible = match (&self.visible, &other.visible) {
-            (None, _) => true,
-            (Some(_), None) => false,
-            (Some(a), Some(b)) => {
-                a.instance_poses.dim() == b.instance_poses.dim()
-                    && a.lights.dim() == b.lights.dim()
-                    && a.scenes.len() == b.scenes.len()
-            }
-        };
-        let contacts = match (&self.contacts, &other.contacts) {
-            (None, _) => true,
-            (Some(_), None) => false,
-            (Some(a), Some(b)) => a.first.len() == n + 1 && b.first.len() == n + 1,
-        };
-        let markers = match (&self.markers, &other.markers) {
-            (None, _) => true,
-            (Some(a), b) => a.len() == n && b.as_ref().is_some_and(|b| b.len() == n),
-        };
-        same_envs
-            && visible
-            && markers
-            && contacts
-            && self.per_body().into_iter().zip(other.per_body()).all(|(a, b)| same_shape(a, b))
-            && self.per_env().into_iter().zip(other.per_env()).all(|(a, b)| same_shape(a, b))
-            && same_shape(&self.instance_poses, &other.instance_poses)
-    }
-
-    fn per_body(&self) -> [&Option<Array3<f64>>; 6] {
-        let Self { body_poses, body_velocities, body_accelerations, force_poses, force_velocities, .. } = self;
-        [body_poses, body_velocities, body_accelerations, force_poses, force_velocities, &self.joint_wrenches]
-    }
-
-    fn per_body_mut(&mut self) -> [&mut Option<Array3<f64>>; 6] {
-        let Self {
-            body_poses, body_velocities, body_accelerations, force_poses, force_velocities, joint_wrenches, ..
-        } = self;
-        [body_poses, body_velocities, body_accelerations, force_poses, force_velocities, joint_wrenches]
-    }
-
-    fn per_env(&self) -> [&Option<Array2<f64>>; 7] {
-        let Self { joint_positions, joint_velocities, joint_efforts, sensordata, .. } = self;
-        let Self { actuator_controls, actuator_forces, actuator_activations, .. } = self;
-        let [controls, forces, activations] = [actuator_controls, actuator_forces, actuator_activations];
-        [joint_positions, joint_velocities, joint_efforts, sensordata, controls, forces, activations]
-    }
-
-    fn per_env_mut(&mut self) -> [&mut Option<Array2<f64>>; 7] {
-        let Self {
-            joint_positions,
-            joint_velocities,
-            joint_efforts,
-            sensordata,
-            actuator_controls,
-            actuator_forces,
-            actuator_activations,
-            ..
-        } = self;
-        [
-            joint_positions,
-            joint_velocities,
-            joint_efforts,
-            sensordata,
-            actuator_controls,
-            actuator_forces,
-            actuator_activations,
-        ]
+        [other.step.len(), other.time.len(), other.force_time.len()] == [n; 3] && self.has_quantities_of(other)
     }
 }
 
-/// Whether `b` has the shape of `a`, where there is an `a`.
-fn same_shape<T, D: RemoveAxis>(a: &Option<Array<T, D>>, b: &Option<Array<T, D>>) -> bool {
-    a.as_ref().is_none_or(|a| b.as_ref().is_some_and(|b| a.shape() == b.shape()))
-}
+impl PerEnv for VisibleState {
+    /// No instance and no lamp: a [`RenderScene`] says how many there are.
+    fn with_room(_num_envs: usize, _shape: &[usize]) -> Self {
+        Self::default()
+    }
 
-/// Copies the rows of some environments between arrays of the same shape.
-fn copy_rows<T: Clone, D: RemoveAxis>(
-    to: &mut Option<Array<T, D>>,
-    from: &Option<Array<T, D>>,
-    envs: impl Iterator<Item = usize>,
-) {
-    if let (Some(to), Some(from)) = (to, from) {
-        for env in envs {
-            to.index_axis_mut(Axis(0), env).assign(&from.index_axis(Axis(0), env));
+    fn fits(&self, other: &Self, _num_envs: usize) -> bool {
+        self.instance_poses.dim() == other.instance_poses.dim()
+            && self.lights.dim() == other.lights.dim()
+            && self.scenes.len() == other.scenes.len()
+    }
+
+    fn take_over(&mut self, other: &Self, chosen: &[bool]) {
+        self.instance_poses.take_over(&other.instance_poses, chosen);
+        self.lights.take_over(&other.lights, chosen);
+        for ((to, from), _) in self.scenes.iter_mut().zip(&other.scenes).zip(chosen).filter(|(_, chosen)| **chosen) {
+            to.clone_from(from);
         }
     }
 }
 
-impl Contacts {
-    /// Takes over the environments where `chosen` is true from contacts of as many environments.
+impl PerEnv for Contacts {
+    fn with_room(num_envs: usize, _shape: &[usize]) -> Self {
+        Self { first: vec![0; num_envs + 1], list: Vec::new() }
+    }
+
+    fn fits(&self, other: &Self, num_envs: usize) -> bool {
+        [self.first.len(), other.first.len()] == [num_envs + 1; 2]
+    }
+
     fn take_over(&mut self, other: &Self, chosen: &[bool]) {
         // The new list grows behind the old one, which then goes: it allocates only while both together are more than ever.
         let old = self.list.len();
@@ -310,7 +293,9 @@ impl Contacts {
         }
         self.list.drain(..old);
     }
+}
 
+impl Contacts {
     /// The contacts of environment `env`.
     ///
     /// # Panics
@@ -325,6 +310,7 @@ impl Contacts {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ndarray::Axis;
 
     fn contact(z: f64, who: f64) -> Contact {
         Contact {
@@ -377,8 +363,8 @@ mod tests {
                 scenes: vec![OwnScene::default(); 3],
             }),
             instance_poses: Some(Array2::from_elem((3, 2), PoseF64::IDENTITY)),
-            own_scenes: Vec::new(),
             markers: Some((0..3).map(|env| vec![Marker::sphere([who, f64::from(env), 0.0], 0.1, [1.0; 4])]).collect()),
+            ..SceneState::new(3)
         }
     }
 
@@ -388,9 +374,14 @@ mod tests {
         let mut kept = state(100.0, [1, 0, 2]);
         assert!(kept.take_over(&state(200.0, [0, 3, 5]), &[false, true, false]));
         let one = |s: &SceneState, env: usize| {
+            let per_body = [&s.body_poses, &s.body_velocities, &s.body_accelerations];
+            let per_body = [per_body, [&s.force_poses, &s.force_velocities, &s.joint_wrenches]].concat();
             let rows: Vec<f64> =
-                s.per_body().into_iter().flatten().flat_map(|a| a.index_axis(Axis(0), env).to_owned()).collect();
-            let numbers: Vec<f64> = s.per_env().into_iter().flatten().flat_map(|a| a.row(env).to_owned()).collect();
+                per_body.into_iter().flatten().flat_map(|a| a.index_axis(Axis(0), env).to_owned()).collect();
+            let per_env = [&s.joint_positions, &s.joint_velocities, &s.joint_efforts, &s.sensordata];
+            let of_actuators = [&s.actuator_controls, &s.actuator_forces, &s.actuator_activations];
+            let per_env = per_env.into_iter().chain(of_actuators);
+            let numbers: Vec<f64> = per_env.flatten().flat_map(|a| a.row(env).to_owned()).collect();
             let seen = s.visible.as_ref().map(|v| (v.instance_poses.row(env).to_owned(), v.lights.row(env).to_owned()));
             let contacts = s.contacts.as_ref().map(|c| c.of(env).to_vec());
             let markers = s.markers.as_ref().map(|m| m[env].clone());

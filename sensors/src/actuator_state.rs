@@ -2,7 +2,7 @@
 
 use crate::error::SensorError;
 use crate::requires::Requires;
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{Choice, at_least_one, read_columns, select_or_all};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
@@ -50,7 +50,9 @@ impl SensorCfg for ActuatorStateCfg {
         let all = &context.actuators;
         let actuators = select_or_all(self.actuators.as_deref(), all, "actuator")?;
         at_least_one(actuators.len(), Choice { sensor: "actuator state", field: "actuators", what: "actuator" }, all)?;
-        let channels = ["controls", "forces", "activations"].map(|name| Channel::new(name, actuators.len()));
+        // MJCF files give their actuators units of their own.
+        let channel = |name| Channel::new(name, actuators.len());
+        let channels = [channel("controls"), channel("forces").at(Stamp::Force), channel("activations")];
         Ok(ActuatorState {
             names: actuators.iter().map(|&actuator| all[actuator].clone()).collect(),
             actuators,
@@ -97,6 +99,10 @@ impl fmt::Display for ActuatorState {
 impl Sampled for ActuatorState {
     fn sampler(&self) -> &Sampler {
         &self.sampler
+    }
+
+    fn columns(&self) -> &[String] {
+        &self.names
     }
 }
 

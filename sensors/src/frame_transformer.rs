@@ -120,11 +120,11 @@ impl SensorCfg for FrameTransformerCfg {
             .try_for_each(|t| check_offset(&format!("the offset of target {:?}", t.bodies), &t.offset))?;
         let m = targets.len();
         let channels = [
-            Channel::new("source_pos_w", 3),
+            Channel::new("source_pos_w", 3).in_unit("m"),
             Channel::exact("source_quat_w", 4),
-            Channel::new("target_pos_w", 3 * m),
+            Channel::new("target_pos_w", 3 * m).in_unit("m"),
             Channel::exact("target_quat_w", 4 * m),
-            Channel::new("target_pos_source", 3 * m),
+            Channel::new("target_pos_source", 3 * m).in_unit("m"),
             Channel::exact("target_quat_source", 4 * m),
         ];
         Ok(FrameTransformer {
@@ -210,6 +210,10 @@ impl fmt::Display for FrameTransformer {
 impl Sampled for FrameTransformer {
     fn sampler(&self) -> &Sampler {
         &self.sampler
+    }
+
+    fn columns(&self) -> &[String] {
+        &self.names
     }
 }
 

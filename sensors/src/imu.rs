@@ -3,7 +3,7 @@
 use crate::error::SensorError;
 use crate::frames::{check_offset, pose, put, vector};
 use crate::requires::Requires;
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
@@ -95,13 +95,14 @@ impl SensorCfg for ImuCfg {
             return Err(SensorError::OutOfRange { field, value, expected: "every number must be finite" });
         }
         let channels = [
-            Channel::new("pos_w", 3),
+            Channel::new("pos_w", 3).in_unit("m"),
             Channel::exact("quat_w", 4),
-            Channel::new("lin_vel_b", 3),
-            Channel::new("ang_vel_b", 3),
-            Channel::new("lin_acc_b", 3),
-            Channel::new("ang_acc_b", 3),
-        ];
+            Channel::new("lin_vel_b", 3).in_unit("m/s"),
+            Channel::new("ang_vel_b", 3).in_unit("rad/s"),
+            Channel::new("lin_acc_b", 3).in_unit("m/s²"),
+            Channel::new("ang_acc_b", 3).in_unit("rad/s²"),
+        ]
+        .map(|channel| channel.at(Stamp::Force));
         Ok(Imu {
             body: context.bodies[body].clone(),
             mount: Mount { body, body_from_imu: self.offset, gravity_bias },

@@ -5,7 +5,7 @@
 
 use crate::error::SensorError;
 use crate::requires::Requires;
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{Choice, at_least_one, read_columns, select_or_all};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
@@ -59,7 +59,11 @@ impl SensorCfg for JointStateCfg {
                 &context.joints,
             )?;
         }
-        let channels = ["positions", "velocities", "efforts"].map(|name| Channel::new(name, joints.len()));
+        let channels = [
+            Channel::new("positions", joints.len()).in_unit("rad or m"),
+            Channel::new("velocities", joints.len()).in_unit("rad/s or m/s"),
+            Channel::new("efforts", joints.len()).in_unit("N m or N").at(Stamp::Force),
+        ];
         Ok(JointState {
             names: joints.iter().map(|&joint| context.joints[joint].clone()).collect(),
             joints,
@@ -106,6 +110,10 @@ impl fmt::Display for JointState {
 impl Sampled for JointState {
     fn sampler(&self) -> &Sampler {
         &self.sampler
+    }
+
+    fn columns(&self) -> &[String] {
+        &self.names
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::error::SensorError;
 use crate::frames::{pose, put, vector};
 use crate::requires::Requires;
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{Choice, at_least_one, select};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
@@ -100,7 +100,8 @@ impl SensorCfg for JointWrenchCfg {
         };
         let in_links = links.into_iter().map(|link| Measured { link, frame: None });
         let measured: Vec<Measured> = in_links.chain(frames.into_iter().map(in_frame)).collect();
-        let channels = ["forces", "torques"].map(|name| Channel::new(name, 3 * measured.len()));
+        let channels = [("forces", "N"), ("torques", "N m")]
+            .map(|(name, unit)| Channel::new(name, 3 * measured.len()).in_unit(unit).at(Stamp::Force));
         Ok(JointWrench {
             names,
             measured,
@@ -178,6 +179,10 @@ impl fmt::Display for JointWrench {
 impl Sampled for JointWrench {
     fn sampler(&self) -> &Sampler {
         &self.sampler
+    }
+
+    fn columns(&self) -> &[String] {
+        &self.names
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::SensorError;
 use crate::requires::Requires;
-use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
+use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{Choice, at_least_one, select};
 use crate::sensor::{EngineSensor, Sensor, SensorCfg, SensorContext};
@@ -69,13 +69,24 @@ impl SensorCfg for MujocoSensorCfg {
             width += sensor.width;
         }
         let noisy = !sensors.iter().any(|s| s.quaternion);
-        let channels = [Channel { noisy, ..Channel::new("values", width) }];
+        // All values are one channel: where it has both kinds, it is stamped as the positions.
+        let stamp = if sensors.iter().all(|s| s.solved) { Stamp::Force } else { Stamp::State };
+        let channels = [Channel { noisy, ..Channel::new("values", width).in_unit(unit(&sensors)).at(stamp) }];
         Ok(MujocoSensor {
             names: sensors.iter().map(|s| s.name.clone()).collect(),
             sensors,
             columns,
             sampler: Sampler::new("MuJoCo", self.requires(), context, &self.sampling, &channels)?,
         })
+    }
+}
+
+/// The unit that all sensors have, or else the units of all of them, separated by commas; empty for one that is not known.
+fn unit(sensors: &[EngineSensor]) -> String {
+    let units: Vec<&str> = sensors.iter().map(|s| s.unit.as_deref().unwrap_or_default()).collect();
+    match units.as_slice() {
+        [first, rest @ ..] if rest.iter().all(|unit| unit == first) => (*first).into(),
+        _ => units.join(","),
     }
 }
 
@@ -118,6 +129,10 @@ impl fmt::Display for MujocoSensor {
 impl Sampled for MujocoSensor {
     fn sampler(&self) -> &Sampler {
         &self.sampler
+    }
+
+    fn columns(&self) -> &[String] {
+        &self.names
     }
 }
 

@@ -14,6 +14,7 @@ use crate::sensor::SensorContext;
 use kinetoscope_scene::SceneState;
 use ndarray::{Array1, Array2, ArrayView, ArrayView1, ArrayView2, ArrayView3, Axis, Dimension, IntoDimension};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -58,13 +59,28 @@ impl SamplingCfg {
     }
 }
 
-/// Numbers of one kind in a measurement.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Instant at which a channel is captured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Stamp {
+    /// The time of positions and velocities, [`SceneState::time`]: [`Sampled::stamps`].
+    #[default]
+    State,
+    /// The time of forces, efforts and accelerations, [`SceneState::force_time`]: [`Sampled::force_stamps`].
+    Force,
+}
+
+/// Numbers of one kind in a measurement. Recorders take name, unit and instant from here.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
     /// What they are called, in [`SamplingCfg::noise`] too.
     pub name: &'static str,
     /// How many there are in one environment.
     pub width: usize,
+    /// Unit, such as `m/s` or `rad or m`; empty where the numbers have no unit or the unit is not known. Where the
+    /// [columns](Sampled::columns) differ in their units, the units of all columns, separated by commas.
+    pub unit: Cow<'static, str>,
+    /// Instant of capture.
+    pub stamp: Stamp,
     /// Whether noise may be added: not to counts, nor to quaternions, which would no longer have length 1.
     pub noisy: bool,
     /// Smallest and largest value that can be measured: with noise, values beyond become these. Infinite for no bound.
@@ -72,19 +88,32 @@ pub struct Channel {
 }
 
 impl Channel {
-    /// `width` numbers that may have noise.
+    /// `width` numbers without a unit that may have noise, captured with positions and velocities.
     pub const fn new(name: &'static str, width: usize) -> Self {
-        Self { name, width, noisy: true, range: [f64::NEG_INFINITY, f64::INFINITY] }
+        let range = [f64::NEG_INFINITY, f64::INFINITY];
+        Self { name, width, unit: Cow::Borrowed(""), stamp: Stamp::State, noisy: true, range }
     }
 
     /// `width` numbers that may have noise, and are from `range[0]` to `range[1]` with it too.
-    pub const fn within(name: &'static str, width: usize, range: [f64; 2]) -> Self {
-        Self { name, width, noisy: true, range }
+    pub fn within(name: &'static str, width: usize, range: [f64; 2]) -> Self {
+        Self { range, ..Self::new(name, width) }
     }
 
     /// `width` numbers without noise.
-    pub const fn exact(name: &'static str, width: usize) -> Self {
+    pub fn exact(name: &'static str, width: usize) -> Self {
         Self { noisy: false, ..Self::new(name, width) }
+    }
+
+    /// Sets the unit.
+    #[must_use]
+    pub fn in_unit(self, unit: impl Into<Cow<'static, str>>) -> Self {
+        Self { unit: unit.into(), ..self }
+    }
+
+    /// Sets the instant of capture.
+    #[must_use]
+    pub fn at(self, stamp: Stamp) -> Self {
+        Self { stamp, ..self }
     }
 }
 
@@ -112,7 +141,7 @@ pub struct Sampler {
 /// Current values of a channel, shape \[num_envs, width\], and those of past measurements.
 #[derive(Clone, Debug)]
 struct Quantity {
-    name: &'static str,
+    channel: Channel,
     now: Array2<f64>,
     history: History<f64>,
     /// The measurement that arrived last, with a latency; without one, that is what is shown.
@@ -153,7 +182,7 @@ impl Sampler {
             return Err(SensorError::TooLarge { rows, width, num_envs: n });
         }
         let quantity = |channel: &Channel| Quantity {
-            name: channel.name,
+            channel: channel.clone(),
             now: Array2::zeros((n, channel.width)),
             history: History::new(n, cfg.history_length, channel.width),
             arrived: History::new(n, late, channel.width),
@@ -381,17 +410,17 @@ impl Sampler {
 
     /// Whether the sampler was built with a channel.
     pub fn has(&self, channel: &str) -> bool {
-        self.quantities.iter().any(|q| q.name == channel)
+        self.channels().any(|known| known.name == channel)
     }
 
-    /// Names of its channels, in their order.
-    pub fn channels(&self) -> impl Iterator<Item = &'static str> {
-        self.quantities.iter().map(|q| q.name)
+    /// Its channels, in the order of the numbers in a measurement.
+    pub fn channels(&self) -> impl Iterator<Item = &Channel> {
+        self.quantities.iter().map(|quantity| &quantity.channel)
     }
 
     #[track_caller]
     fn quantity(&self, channel: &str) -> &Quantity {
-        let found = self.quantities.iter().find(|q| q.name == channel);
+        let found = self.quantities.iter().find(|quantity| quantity.channel.name == channel);
         found.unwrap_or_else(|| panic!("this sampler was built without the channel {channel:?}"))
     }
 
@@ -487,10 +516,25 @@ fn shaped<D: Dimension>(values: Option<&[f64]>, shape: D) -> ArrayView<'_, f64, 
     }
 }
 
-/// What all sensors with a [`Sampler`] can tell.
+/// Measurements of a sensor with a [`Sampler`]: their times and counts, and the meaning of their numbers.
+///
+/// [`Sampler::channels`] has the name, unit and instant of every channel. Recorders and plots need no more than this trait, so
+/// that they treat a sensor of another crate like a built-in one.
 pub trait Sampled {
     /// The sensor's sampler.
     fn sampler(&self) -> &Sampler;
+
+    /// Names of the bodies, joints or other things that the numbers of each channel belong to, in order. A channel has one or
+    /// more numbers for each of them, one after the other. Empty where they have no names.
+    fn columns(&self) -> &[String] {
+        &[]
+    }
+
+    /// Names along the second axis of channels that are matrices: the counterparts of each [column](Self::columns). Empty for
+    /// sensors without such channels.
+    fn filters(&self) -> &[String] {
+        &[]
+    }
 
     /// When it measures.
     fn schedule(&self) -> Schedule {

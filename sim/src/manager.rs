@@ -18,7 +18,6 @@ use crate::objects::robot::{Robot, RobotCfg, RobotMut};
 use crate::objects::robot_data::{RobotData, Role};
 use crate::objects::terrain::{Terrain, TerrainCfg};
 use crate::observer::{Moment, ObserverSlots, Observers, ObserversMut};
-use crate::outcome::Outcome;
 use crate::randomization::{EnvProperties, EnvPropertiesMut};
 use crate::scene_view::{SceneView, SceneViewMut};
 use crate::sensor_list::{SensorId, SensorList};
@@ -57,7 +56,6 @@ pub struct SimulationManager {
     /// How often properties were drawn for each environment.
     pub(crate) draws: Vec<u64>,
     /// What came of the last step of the task that runs here.
-    pub(crate) outcome: Option<Outcome>,
     /// Point of view of windows, browser views and screenshots, where the program set one.
     pub(crate) viewpoint: Option<Viewpoint>,
 }
@@ -93,7 +91,6 @@ impl SimulationManager {
             sensors,
             observers: ObserverSlots::default(),
             draws,
-            outcome: None,
             viewpoint: None,
         })
     }

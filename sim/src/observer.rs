@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::manager::SimulationManager;
-use std::any::Any;
+use std::any::{Any, TypeId};
 use std::fmt;
 use std::marker::PhantomData;
 
@@ -18,6 +18,19 @@ pub trait Observer: Any + Send {
 
     /// Something happened. What an observer does to the simulation in here, steps too, the others are told of, and itself not.
     fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment);
+
+    /// Handles an event that another crate publishes ([`ObserversMut::publish`](crate::ObserversMut::publish)), such as a
+    /// [`StepResult`](crate::StepResult). An observer ignores events of types that it does not know.
+    fn receive(&mut self, sim: &mut SimulationManager, event: &dyn Any) {
+        let _ = (sim, event);
+    }
+
+    /// True if events of this type are published while this observer is in the simulation: the observer of a task says so of
+    /// [`StepResult`](crate::StepResult). See [`Observers::is_published`].
+    fn publishes(&self, event: TypeId) -> bool {
+        let _ = event;
+        false
+    }
 }
 
 /// What happened.
@@ -39,8 +52,6 @@ pub enum Moment {
     },
     /// Something was added to the simulation: the model and its arrays are other ones.
     Compiled,
-    /// A task has told what came of a step: [`SimulationManager::outcome`].
-    Judged,
 }
 
 /// Handle of an observer; valid for the manager that made it.
@@ -125,6 +136,13 @@ impl<'a> Observers<'a> {
         id.manager == self.sim.serial && self.sim.seat_of(id).is_ok()
     }
 
+    /// True if events of a type will be published, by what one of the observers belongs to ([`Observer::publishes`]): recorders
+    /// look here when they begin.
+    pub fn is_published<E: Any>(&self) -> bool {
+        let mut observers = self.sim.observers.seats.iter().filter_map(|seat| seat.observer.as_ref());
+        observers.any(|observer| observer.publishes(TypeId::of::<E>()))
+    }
+
     /// Physics steps that [`update`](SimulationManager::update) has done since the simulation was made, whatever was reset meanwhile: what
     /// an observer counts by.
     pub fn steps(&self) -> u64 {
@@ -141,6 +159,11 @@ pub struct ObserversMut<'a> {
 impl<'a> ObserversMut<'a> {
     pub(crate) fn new(sim: &'a mut SimulationManager) -> Self {
         Self { sim }
+    }
+
+    /// Publishes an event of any type to all observers ([`Observer::receive`]). The simulation keeps nothing of it.
+    pub fn publish<E: Any>(self, event: &E) {
+        self.sim.tell_each(|observer, sim| observer.receive(sim, event));
     }
 
     /// Adds an observer. It is told of what happens from now on.
@@ -213,7 +236,7 @@ impl SimulationManager {
         step(self, block);
         self.observers.steps += u64::from(block);
         for (number, _) in waits.iter().filter(|(_, wait)| *wait <= u64::from(block)) {
-            self.tell(*number, &Moment::Stepped);
+            self.tell(*number, |observer, sim| observer.observe(sim, &Moment::Stepped));
         }
         block
     }
@@ -227,17 +250,21 @@ impl SimulationManager {
 
     /// Tells all observers of something that happened.
     pub(crate) fn tell_all(&mut self, moment: &Moment) {
+        self.tell_each(|observer, sim| observer.observe(sim, moment));
+    }
+
+    fn tell_each(&mut self, tell: impl Fn(&mut dyn Observer, &mut Self)) {
         let numbers: Vec<u64> = self.observers.seats.iter().map(|seat| seat.number).collect();
         for number in numbers {
-            self.tell(number, moment);
+            self.tell(number, &tell);
         }
     }
 
-    fn tell(&mut self, number: u64, moment: &Moment) {
+    fn tell(&mut self, number: u64, tell: impl FnOnce(&mut dyn Observer, &mut Self)) {
         // One that is being told hears of nothing that happens inside.
         let Some(seat) = self.observers.seats.iter_mut().find(|seat| seat.number == number) else { return };
         let Some(mut observer) = seat.observer.take() else { return };
-        observer.observe(self, moment);
+        tell(observer.as_mut(), self);
         // It may have been taken away meanwhile: then it is dropped here.
         if let Some(seat) = self.observers.seats.iter_mut().find(|seat| seat.number == number) {
             seat.observer = Some(observer);

@@ -10,7 +10,7 @@ use crate::space::Space;
 use crate::step::{EndReason, Ended, Info, Step};
 use crate::watch::Watch;
 use kinetoscope_scene::Random;
-use kinetoscope_sim::{EnvId, ObserverId, Outcome, SimulationManager};
+use kinetoscope_sim::{EnvId, ObserverId, SimulationManager, StepResult};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
 
 /// Environments with a task: reset, then stepped.
@@ -20,7 +20,7 @@ use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
 ///
 /// 1. actions are put between their bounds and applied, and [`EnvCfg::decimation`] physics steps are done;
 /// 2. episodes are one step longer; terms say which of them end, and why;
-/// 3. rewards are computed, and observers of the simulation are told of them and of the ends ([`SimulationManager::outcome`]);
+/// 3. rewards are computed; they and the ends are published to observers of the simulation ([`StepResult`]);
 /// 4. events of [`When::Interval`] happen where they are due and the episode goes on;
 /// 5. observations are made: the final ones of episodes that ended are among them;
 /// 6. environments whose episode ended go back to the initial state, get new commands, events of [`When::Reset`] happen, and they
@@ -79,7 +79,6 @@ impl Env {
     /// The simulation, as the last step left it.
     pub fn into_sim(self) -> SimulationManager {
         let (mut sim, (_, id)) = (self.present.sim, self.watch);
-        sim.end_task();
         // It may be another simulation than at first: then there is nothing to take away.
         if sim.observers().contains(id) {
             let _ = sim.observers_mut().remove(id);
@@ -143,7 +142,6 @@ impl Env {
         let commands = commands.map(|term| (term.name.clone(), Array2::zeros((n, term.columns.len())))).collect();
         let previous = actions.clone();
         let watch = Watch::new(n);
-        sim.begin_task();
         let mut env = Self {
             watch: (watch.clone(), sim.observers_mut().add(watch)),
             rows: (0..n).map(row).collect(),
@@ -239,9 +237,9 @@ impl Env {
         self.reward_sums += &reward_terms;
         // In the order of the terms.
         let rewards = reward_terms.map_axis(Axis(1), |terms| terms.iter().fold(0.0, |sum, reward| sum + reward));
-        let outcome =
-            Outcome { rewards: rewards.clone(), terminated: terminated.clone(), truncated: truncated.clone() };
-        self.present.sim.judge(outcome)?;
+        let result =
+            StepResult { rewards: rewards.clone(), terminated: terminated.clone(), truncated: truncated.clone() };
+        result.publish(&mut self.present.sim)?;
         let going_on: Vec<usize> = (0..self.num_envs()).filter(|&env| reasons[env].is_none()).collect();
         self.happen_at_intervals(&going_on)?;
         let all: Vec<usize> = (0..self.num_envs()).collect();

@@ -1,6 +1,8 @@
-//! Resets that a task has not asked for: viewers reset environments, and programs do.
+//! The observer of a task. It notes resets that the task has not asked for, by viewers and by programs, and says that the
+//! results of steps are published.
 
-use kinetoscope_sim::{Moment, Observer, SimulationManager};
+use kinetoscope_sim::{Moment, Observer, SimulationManager, StepResult};
+use std::any::TypeId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -35,5 +37,9 @@ impl Observer for Watch {
             let known = env_ids.iter().filter_map(|env| self.0.get(env.0));
             known.for_each(|reset| reset.store(true, Ordering::Relaxed));
         }
+    }
+
+    fn publishes(&self, event: TypeId) -> bool {
+        event == TypeId::of::<StepResult>()
     }
 }

@@ -14,7 +14,7 @@ use crate::source::Source;
 use crate::stream::{Kind, Stream};
 use crate::topic::Topic;
 use crate::writer::Sink;
-use kinetoscope_sim::SimulationManager;
+use kinetoscope_sim::{SimulationManager, StepResult};
 
 /// What the topics of a configuration mean in a simulation, and the sensors that were left out.
 pub(super) fn resolve(
@@ -46,7 +46,9 @@ pub(super) fn resolve(
             Topic::MjcfState(uid) => vec![Source::mjcf_state(sim, uid, &envs)?],
             Topic::BodyPoses(uid) => vec![Source::body_poses(sim, uid, &envs)?],
             Topic::EngineStates => vec![Source::engine_states(sim, &envs)],
-            Topic::Outcomes if sim.outcome().is_none() => return Err(RecordError::NoTask { path: cfg.path.clone() }),
+            Topic::Outcomes if !sim.observers().is_published::<StepResult>() => {
+                return Err(RecordError::NoTask { path: cfg.path.clone() });
+            }
             Topic::Outcomes => vec![Source::outcomes(&envs)],
             Topic::Stage => vec![Source::stage(sim, &cfg.stage, &envs)?],
             Topic::Sensor(uid) => Source::sensor(sim, uid, &envs)?,
@@ -169,7 +171,7 @@ fn everything(
             Err(error) => return Err(error),
         }
     }
-    if sim.outcome().is_some() {
+    if sim.observers().is_published::<StepResult>() {
         sources.push(Source::outcomes(envs));
     }
     if format == Format::Hdf5 {

@@ -9,6 +9,7 @@ mod images;
 mod kill;
 mod lerobot;
 mod outcomes;
+mod own_sensor;
 mod readers;
 mod refusals;
 mod scenes;

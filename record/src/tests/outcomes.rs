@@ -1,10 +1,11 @@
 //! Rewards and ends of a task in datasets and other recordings.
 
 use super::*;
-use kinetoscope_sim::{JointIndex, Outcome};
+use kinetoscope_sim::{JointIndex, Moment, Observer, StepResult};
 use kinetoscope_tasks::{ActionTerm, Env, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, TerminationTerm};
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use ndarray::Array1;
+use std::any::TypeId;
 
 const ENVS: usize = 3;
 /// Physics steps in a step of the task.
@@ -173,7 +174,22 @@ fn archive_and_messages() {
     }
 }
 
-/// A program with a task of its own reports the outcomes itself; a recording without a task has no outcomes.
+/// The observer of a program with a task of its own.
+struct OwnTask;
+
+impl Observer for OwnTask {
+    fn due_in(&self, _: &SimulationManager) -> u64 {
+        u64::MAX
+    }
+
+    fn observe(&mut self, _: &mut SimulationManager, _: &Moment) {}
+
+    fn publishes(&self, event: TypeId) -> bool {
+        event == TypeId::of::<StepResult>()
+    }
+}
+
+/// A program with a task of its own publishes the outcomes itself; a recording without a task has no outcomes.
 #[test]
 fn own_task() {
     let (_folder, path) = scratch("run.npz");
@@ -184,22 +200,21 @@ fn own_task() {
     assert!(Recording::open(&path).unwrap().topic("task", None).is_err());
 
     let mut sim = task().into_sim();
-    assert_eq!(sim.outcome(), None);
-    sim.begin_task();
-    assert_eq!(sim.outcome().map(|outcome| outcome.rewards.to_vec()), Some(vec![0.0; ENVS]));
+    assert!(!sim.observers().is_published::<StepResult>());
+    sim.observers_mut().add(OwnTask);
+    assert!(sim.observers().is_published::<StepResult>());
     let outcome = |reward: f64, count: usize| {
         let ends = Array1::from_elem(ENVS, false);
         let rewards = (0..count).map(|env| reward + env as f64).collect();
-        Outcome { rewards, terminated: ends.clone(), truncated: ends }
+        StepResult { rewards, terminated: ends.clone(), truncated: ends }
     };
     record(&mut sim, overwriting(cfg), |sim| {
         for step in 0..4 {
             sim.update(2);
-            sim.judge(outcome(f64::from(step), ENVS)).unwrap();
-            // One number too few is refused.
-            let error = sim.judge(outcome(100.0, ENVS - 1)).unwrap_err().to_string();
+            outcome(f64::from(step), ENVS).publish(sim).unwrap();
+            // One number too few is refused, and is not in the recording.
+            let error = outcome(100.0, ENVS - 1).publish(sim).unwrap_err().to_string();
             assert!(error.contains("rewards"), "{error}");
-            assert_eq!(sim.outcome(), Some(&outcome(f64::from(step), ENVS)));
         }
     });
     let samples = Recording::open(&path).unwrap().samples(&[Wanted::new("/env_2/task", "reward[0]")]).unwrap();

@@ -28,14 +28,14 @@ struct Phase {
 }
 
 impl AirTimes {
-    /// The numbers of a measurement, one per body each.
-    pub(super) const CHANNELS: [&'static str; 6] = [
-        "current_air_time",
-        "current_contact_time",
-        "last_air_time",
-        "last_contact_time",
-        "first_contact",
-        "first_air",
+    /// Names and units of the numbers of a measurement, one per body each.
+    pub(super) const CHANNELS: [(&'static str, &'static str); 6] = [
+        ("current_air_time", "s"),
+        ("current_contact_time", "s"),
+        ("last_air_time", "s"),
+        ("last_contact_time", "s"),
+        ("first_contact", ""),
+        ("first_air", ""),
     ];
 
     pub(super) fn new(num_envs: usize, bodies: usize, dt: f64, threshold: f64) -> Self {

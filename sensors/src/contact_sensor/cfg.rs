@@ -5,7 +5,7 @@ use super::pairs::{Layout, Pairs, count};
 use super::sensor::ContactSensor;
 use crate::error::SensorError;
 use crate::requires::Requires;
-use crate::sampling::{Channel, Sampler, SamplingCfg};
+use crate::sampling::{Channel, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{matching, select};
 use crate::sensor::{SensorCfg, SensorContext};
@@ -110,23 +110,23 @@ impl SensorCfg for ContactSensorCfg {
             poses: self.track_pose,
             air: self.track_air_time,
         };
-        let mut channels =
-            ["net_forces_w", "friction_forces_w", "total_forces_w"].map(|c| Channel::new(c, 3 * b)).to_vec();
-        channels.push(Channel::new("force_matrix_w", 3 * b * m));
+        let vectors = |name, count, unit| Channel::new(name, 3 * count).in_unit(unit).at(Stamp::Force);
+        let counts = |name, count| Channel::exact(name, count).at(Stamp::Force);
+        let mut channels = ["net_forces_w", "friction_forces_w", "total_forces_w"].map(|c| vectors(c, b, "N")).to_vec();
+        channels.push(vectors("force_matrix_w", b * m, "N"));
         if layout.friction {
-            channels.push(Channel::new("friction_matrix_w", 3 * b * m));
+            channels.push(vectors("friction_matrix_w", b * m, "N"));
         }
         if layout.points {
-            channels.extend([Channel::new("contact_points_w", 3 * b), Channel::exact("contact_counts", b)]);
-            let by_filter =
-                [Channel::new("contact_point_matrix_w", 3 * b * m), Channel::exact("contact_count_matrix", b * m)];
+            channels.extend([vectors("contact_points_w", b, "m"), counts("contact_counts", b)]);
+            let by_filter = [vectors("contact_point_matrix_w", b * m, "m"), counts("contact_count_matrix", b * m)];
             channels.extend(by_filter);
         }
         if layout.poses {
-            channels.extend([Channel::new("pos_w", 3 * b), Channel::exact("quat_w", 4 * b)]);
+            channels.extend([Channel::new("pos_w", 3 * b).in_unit("m"), Channel::exact("quat_w", 4 * b)]);
         }
         if layout.air {
-            channels.extend(AirTimes::CHANNELS.map(|name| Channel::exact(name, b)));
+            channels.extend(AirTimes::CHANNELS.map(|(name, unit)| counts(name, b).in_unit(unit)));
         }
         debug_assert_eq!(channels.iter().map(|c| c.width).sum::<usize>(), count(&layout));
         Ok(ContactSensor {

@@ -100,6 +100,14 @@ impl Sampled for ContactSensor {
     fn sampler(&self) -> &Sampler {
         &self.sampler
     }
+
+    fn columns(&self) -> &[String] {
+        &self.names
+    }
+
+    fn filters(&self) -> &[String] {
+        &self.filters
+    }
 }
 
 impl ContactSensor {

@@ -74,11 +74,11 @@ impl<R: Rays> RaySampler<R> {
         let targets = RayTargets::new(scene, wanted, &context.ray_assets);
         let count = cfg.rays.count();
         let mut channels = vec![
-            Channel::within("distances", count, [0.0, cfg.max_distance]),
+            Channel::within("distances", count, [0.0, cfg.max_distance]).in_unit("m"),
             Channel::exact("normals", 3 * count),
             Channel::exact("ids", count),
         ];
-        channels.extend(cfg.frame_channels);
+        channels.extend_from_slice(cfg.frame_channels);
         let frame_width = cfg.frame_channels.iter().map(|channel| channel.width).sum();
         Ok(Self {
             sampler: Sampler::new(cfg.kind, cfg.requires, context, cfg.sampling, &channels)?,

@@ -1,6 +1,6 @@
 //! Drive mode `acceleration`: gains in acceleration units, so that one set of gains moves light and heavy joints alike.
 
-use super::{ActuatorSpec, DriveMode, JointInfo};
+use super::{DriveMode, JointInfo};
 
 #[derive(Debug)]
 pub(super) struct Acceleration;
@@ -11,7 +11,11 @@ impl DriveMode for Acceleration {
     }
 
     /// tau = I (k (q* - q) + d (v* - v)), with I the inertia the joint feels at the initial pose.
-    fn actuator(&self, stiffness: f64, damping: f64, joint: &JointInfo) -> Option<ActuatorSpec> {
-        Some(ActuatorSpec { kp: stiffness * joint.effective_inertia, kd: damping * joint.effective_inertia })
+    fn unit(&self, joint: &JointInfo) -> Option<f64> {
+        Some(joint.effective_inertia)
+    }
+
+    fn needs_inertia(&self) -> bool {
+        true
     }
 }

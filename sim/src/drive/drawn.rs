@@ -46,19 +46,16 @@ impl Kind {
 
     /// Sets the gain; the drive type stays, and gives it back in its unit. A passive joint has no gains.
     fn put(self, value: f64, gains: &mut Gains, setting: &mut Setting) {
-        let unit = match *setting {
-            Setting { drive_type: DriveType::Acceleration, inertia: Some(inertia), .. } => inertia,
-            _ => 1.0,
-        };
-        let passive = setting.drive_type == DriveType::None;
+        let unit = setting.unit();
+        let in_unit = value / unit.unwrap_or(1.0);
         match self {
             Self::Stiffness => {
-                setting.stiffness = value / unit;
-                gains.kp = if passive { gains.kp } else { value };
+                setting.stiffness = in_unit;
+                gains.kp = if unit.is_some() { value } else { gains.kp };
             }
             Self::Damping => {
-                setting.damping = value / unit;
-                gains.kd = if passive { gains.kd } else { value };
+                setting.damping = in_unit;
+                gains.kd = if unit.is_some() { value } else { gains.kd };
             }
             Self::MaxEffort => gains.max_effort = value,
         }

@@ -1,6 +1,6 @@
 //! Drive mode `force`: gains in torque (force) units.
 
-use super::{ActuatorSpec, DriveMode, JointInfo};
+use super::{DriveMode, JointInfo};
 
 #[derive(Debug)]
 pub(super) struct Force;
@@ -10,7 +10,7 @@ impl DriveMode for Force {
         "force"
     }
 
-    fn actuator(&self, stiffness: f64, damping: f64, _joint: &JointInfo) -> Option<ActuatorSpec> {
-        Some(ActuatorSpec { kp: stiffness, kd: damping })
+    fn unit(&self, _joint: &JointInfo) -> Option<f64> {
+        Some(1.0)
     }
 }

@@ -16,10 +16,14 @@ pub struct Setting {
 }
 
 impl Setting {
+    /// Unit of stiffness and damping in torque units; `None` where the joint is to be passive.
+    pub fn unit(&self) -> Option<f64> {
+        self.drive_type.mode().unit(&JointInfo { effective_inertia: self.inertia.unwrap_or(f64::NAN) })
+    }
+
     /// Gains in torque units; `None` where the joint is to be passive.
     pub fn actuator(&self) -> Option<ActuatorSpec> {
-        let info = JointInfo { effective_inertia: self.inertia.unwrap_or(f64::NAN) };
-        self.drive_type.mode().actuator(self.stiffness, self.damping, &info)
+        self.unit().map(|unit| ActuatorSpec { kp: self.stiffness * unit, kd: self.damping * unit })
     }
 }
 

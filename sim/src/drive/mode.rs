@@ -16,11 +16,17 @@ pub struct ActuatorSpec {
     pub kd: f64,
 }
 
-/// How stiffness and damping become an actuator's gains: one file per mode.
+/// Meaning of stiffness and damping: one file per mode.
 pub trait DriveMode: std::fmt::Debug + Sync {
     /// Name in configuration files (EmbodiChain's words).
     fn name(&self) -> &'static str;
 
-    /// The actuator of a joint, or `None` where the joint stays passive.
-    fn actuator(&self, stiffness: f64, damping: f64, joint: &JointInfo) -> Option<ActuatorSpec>;
+    /// Unit of stiffness and damping in torque units: the gains of [`ActuatorSpec`] are this times stiffness and damping. `None`
+    /// where the joint stays passive.
+    fn unit(&self, joint: &JointInfo) -> Option<f64>;
+
+    /// True if the unit depends on [`JointInfo::effective_inertia`], which is NaN for other modes.
+    fn needs_inertia(&self) -> bool {
+        false
+    }
 }

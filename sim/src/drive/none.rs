@@ -1,6 +1,6 @@
 //! Drive mode `none`: a passive joint.
 
-use super::{ActuatorSpec, DriveMode, JointInfo};
+use super::{DriveMode, JointInfo};
 
 #[derive(Debug)]
 pub(super) struct None;
@@ -10,7 +10,7 @@ impl DriveMode for None {
         "none"
     }
 
-    fn actuator(&self, _stiffness: f64, _damping: f64, _joint: &JointInfo) -> Option<ActuatorSpec> {
+    fn unit(&self, _joint: &JointInfo) -> Option<f64> {
         Option::None
     }
 }

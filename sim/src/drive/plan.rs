@@ -4,7 +4,7 @@
 use super::cfg::{DEFAULT_DAMPING, DEFAULT_STIFFNESS, DriveCfg, DriveCfgError, JointGains, resolve};
 use super::gains::{Gains, Setting};
 use super::models::ActuatorModel;
-use super::{ActuatorSpec, DriveType};
+use super::{ActuatorSpec, DriveType, JointInfo};
 use crate::pattern::{self, PatternError};
 use kinetoscope_robot::description::{Curve, FileDrive, Joint, JointId, JointKind, RobotDescription};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
@@ -121,7 +121,7 @@ pub fn plan(
     narrow_by_mimics(description, &mut plans, &mut diagnostics);
     set_initial_positions(description, &mut plans, &initial, &mut diagnostics)?;
 
-    if drive.drive_type == DriveType::Acceleration {
+    if drive.drive_type.mode().needs_inertia() {
         let inertias = effective_inertias(description, &plans, floating_base)?;
         for (plan, inertia) in plans.iter_mut().zip(inertias) {
             plan.setting.inertia = Some(inertia);
@@ -150,8 +150,11 @@ pub fn plan(
 /// its file leaves passive is driven where the configuration names it, and one that a coupling moves never is.
 fn setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> Setting {
     let of_file = joint.defaults.map_or(FileDrive::Unsaid, |file| file.drive);
-    let (stiffness, damping) = match of_file {
-        FileDrive::Servo { stiffness, damping } if drive_type == DriveType::Force => (Some(stiffness), Some(damping)),
+    // The file's gains are in torque units; in a unit that needs the inertia, they are not known here.
+    let mode = drive_type.mode();
+    let unit = mode.unit(&JointInfo { effective_inertia: f64::NAN }).filter(|_| !mode.needs_inertia());
+    let (stiffness, damping) = match (of_file, unit) {
+        (FileDrive::Servo { stiffness, damping }, Some(unit)) => (Some(stiffness / unit), Some(damping / unit)),
         _ => (None, None),
     };
     let named = gains.stiffness.is_some() || gains.damping.is_some() || gains.actuator.is_some();

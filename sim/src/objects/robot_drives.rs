@@ -130,7 +130,7 @@ impl RobotMut<'_> {
         let argument = "set_drive_type";
         let drives = self.drives_of(argument, &self.joint_columns(argument, joint_ids)?)?;
         let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;
-        let inertias = if drive_type == DriveType::Acceleration { Some(self.inertias_at_start()?) } else { None };
+        let inertias = if drive_type.mode().needs_inertia() { Some(self.inertias_at_start()?) } else { None };
         for env in envs {
             self.simulation.batch.write(env, |env| {
                 for &(_, joint, drive) in &drives {

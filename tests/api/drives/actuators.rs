@@ -540,7 +540,8 @@ fn changes_at_run_time() {
                     let unit = match kind[at] {
                         DriveType::Force => 1.0,
                         DriveType::Acceleration => m,
-                        DriveType::None => 0.0,
+                        // Nothing but `None` is left of what is set here.
+                        _ => 0.0,
                     };
                     let (kp, kd) = (unit * stiffness[at], unit * damping[at]);
                     *law = Law { m, kp, kd, limit: limit[at], ..*law };

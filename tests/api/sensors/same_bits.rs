@@ -78,7 +78,7 @@ impl Words {
         self.add(&sensor.stamps());
         self.add(&sensor.force_stamps());
         self.add(&sensor.stamp_history());
-        for channel in sampler.channels() {
+        for channel in sampler.channels().map(|channel| channel.name) {
             self.add(&sampler.values(channel));
             self.add(&sampler.history(channel));
         }

@@ -2,6 +2,7 @@
 
 use super::wheel::MOMENT;
 use crate::lab::*;
+use kinetoscope::sim::drive::JointInfo;
 use kinetoscope::sim::{ActuatorModel, DcMotor, DelayedPd, DriveModel, DriveType};
 
 /// Of the models that hear of their targets late \[steps\].
@@ -56,7 +57,7 @@ impl Variant {
                     DriveType::Force => 1.0,
                     // Gains are accelerations.
                     DriveType::Acceleration => MOMENT,
-                    DriveType::None => panic!("no drive has no gains"),
+                    other => other.mode().unit(&JointInfo { effective_inertia: MOMENT }).unwrap(),
                 };
                 DriveCfg { drive_type: *mode, model: *model, ..implicit(stiffness / unit, damping / unit) }
             }

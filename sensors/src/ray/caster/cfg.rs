@@ -142,7 +142,7 @@ impl SensorCfg for RayCasterCfg {
             parent,
             rays,
             max_distance: self.max_distance,
-            frame_channels: &[Channel::exact("pos_w", 3), Channel::exact("quat_w", 4)],
+            frame_channels: &[Channel::exact("pos_w", 3).in_unit("m"), Channel::exact("quat_w", 4)],
         };
         Ok(RayCaster::new(self, context, RaySampler::new(cfg, context)?, parent))
     }

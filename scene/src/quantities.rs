@@ -1,0 +1,162 @@
+//! The macro behind the list of quantities in [`state`](crate::state): it makes the fields of `SceneState`, the flags of
+//! `Requires`, and everything that is done field by field.
+
+use ndarray::{Array, Axis, RemoveAxis};
+
+/// Values of a quantity in all environments.
+pub(crate) trait PerEnv: Clone {
+    /// Values with `shape` in each environment, for lists without any entry.
+    fn with_room(num_envs: usize, shape: &[usize]) -> Self;
+
+    /// True if `other` has as many of everything, in `num_envs` environments.
+    fn fits(&self, other: &Self, num_envs: usize) -> bool;
+
+    /// Takes over the environments where `chosen` is true from values that [fit](Self::fits).
+    fn take_over(&mut self, other: &Self, chosen: &[bool]);
+}
+
+impl<T: Clone + Default, D: RemoveAxis> PerEnv for Array<T, D> {
+    fn with_room(num_envs: usize, shape: &[usize]) -> Self {
+        let mut lengths = D::zeros(1 + shape.len());
+        lengths[0] = num_envs;
+        shape.iter().enumerate().for_each(|(axis, length)| lengths[1 + axis] = *length);
+        Self::default(lengths)
+    }
+
+    fn fits(&self, other: &Self, _num_envs: usize) -> bool {
+        self.shape() == other.shape()
+    }
+
+    fn take_over(&mut self, other: &Self, chosen: &[bool]) {
+        for (env, _) in (0..).zip(chosen).filter(|(_, chosen)| **chosen) {
+            self.index_axis_mut(Axis(0), env).assign(&other.index_axis(Axis(0), env));
+        }
+    }
+}
+
+/// Lists of any length, one for each environment.
+impl<T: Clone> PerEnv for Vec<Vec<T>> {
+    fn with_room(num_envs: usize, _shape: &[usize]) -> Self {
+        vec![Vec::new(); num_envs]
+    }
+
+    fn fits(&self, other: &Self, num_envs: usize) -> bool {
+        [self.len(), other.len()] == [num_envs; 2]
+    }
+
+    fn take_over(&mut self, other: &Self, chosen: &[bool]) {
+        for ((to, from), _) in self.iter_mut().zip(other).zip(chosen).filter(|(_, chosen)| **chosen) {
+            to.clone_from(from);
+        }
+    }
+}
+
+/// Takes a list of flags of `Requires`, each with its name in messages and the fields of `SceneState` that it stands for. A field
+/// has a type that is [`PerEnv`], and its shape in an environment: an axis of `Lengths`, and the width where there is another axis.
+macro_rules! quantities {
+    ($(
+        $(#[$about:meta])*
+        $FLAG:ident = $name:literal {
+            $($(#[$doc:meta])* $field:ident: $Type:ty $([$axis:ident $(, $width:literal)?])?,)+
+        }
+    )+) => {
+        /// State of all environments after a physics step (or after a reset).
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct SceneState {
+            /// Physics steps since the last reset of each environment, shape \[num_envs\].
+            pub step: Vec<u64>,
+            /// Time of positions and velocities \[s\] since the last reset, shape \[num_envs\].
+            pub time: Vec<f64>,
+            /// Time of efforts, accelerations and contacts \[s\] since the last reset, shape \[num_envs\]: one step of the physics
+            /// engine earlier than [`time`](Self::time); the same right after a reset or after somebody wrote to the state, when
+            /// accelerations and contacts are solved for the state as it is.
+            pub force_time: Vec<f64>,
+            $($($(#[$doc])* pub $field: Option<$Type>,)+)+
+            /// What can be seen where sizes or colours are the environment's own, shape \[num_envs\]; empty where all environments
+            /// look alike.
+            pub own_scenes: Vec<OwnScene>,
+        }
+
+        /// Numbers of the flags.
+        #[allow(non_camel_case_types, clippy::upper_case_acronyms, reason = "named as the flags")]
+        enum Bit {
+            $($FLAG,)+
+        }
+
+        impl Requires {
+            $($(#[$about])* pub const $FLAG: Self = Self(1 << Bit::$FLAG as u32);)+
+
+            /// All flags, with their names in messages.
+            pub(crate) const NAMES: &'static [(Self, &'static str)] = &[$((Self::$FLAG, $name),)+];
+
+            /// The fields that `state` has.
+            pub fn present_in(state: &SceneState) -> Self {
+                let mut present = Self::NONE;
+                $(if [$(state.$field.is_some()),+].iter().all(|is| *is) {
+                    present |= Self::$FLAG;
+                })+
+                present
+            }
+
+            /// The part of `state` that is in the set, with its steps and times.
+            pub fn part_of(self, state: &SceneState) -> SceneState {
+                let sees = self.contains(Self::VISIBLE) || self.contains(Self::INSTANCES);
+                SceneState {
+                    step: state.step.clone(),
+                    time: state.time.clone(),
+                    force_time: state.force_time.clone(),
+                    $($($field: state.$field.as_ref().filter(|_| self.contains(Self::$FLAG)).cloned(),)+)+
+                    own_scenes: if sees { state.own_scenes.clone() } else { Vec::new() },
+                }
+            }
+        }
+
+        impl SceneState {
+            /// A state at step 0 with room for the quantities of `requires`.
+            pub fn with_room(requires: Requires, lengths: &Lengths) -> Self {
+                let n = lengths.num_envs;
+                let wants = |flag| requires.contains(flag);
+                Self {
+                    $($($field: wants(Requires::$FLAG)
+                        .then(|| <$Type as PerEnv>::with_room(n, &[$(lengths.$axis $(, $width)?)?])),)+)+
+                    ..Self::new(n)
+                }
+            }
+
+            /// The first array of `requires` that has another number of something than `lengths` says: of what, the number
+            /// that it should have, and the one it has.
+            pub fn misfit(&self, requires: Requires, lengths: &Lengths) -> Option<(&'static str, usize, usize)> {
+                $($($(if let Some([envs, count, ..]) = self.$field.as_ref().map(|array| array.shape())
+                    && requires.contains(Requires::$FLAG)
+                {
+                    let all = [
+                        ("environments", lengths.num_envs, *envs),
+                        (Lengths::label(stringify!($axis)), lengths.$axis, *count),
+                    ];
+                    if let Some(misfit) = all.into_iter().find(|(_, expected, found)| expected != found) {
+                        return Some(misfit);
+                    }
+                })?)+)+
+                None
+            }
+
+            /// True if `other` has every quantity of this state, with as many of everything.
+            fn has_quantities_of(&self, other: &Self) -> bool {
+                let n = self.num_envs();
+                [$($(match (&self.$field, &other.$field) {
+                    (None, _) => true,
+                    (Some(_), None) => false,
+                    (Some(mine), Some(others)) => mine.fits(others, n),
+                },)+)+].iter().all(|fits| *fits)
+            }
+
+            /// Takes over the quantities of this state in the environments where `chosen` is true.
+            fn take_over_quantities(&mut self, other: &Self, chosen: &[bool]) {
+                $($(if let (Some(mine), Some(others)) = (&mut self.$field, &other.$field) {
+                    mine.take_over(others, chosen);
+                })+)+
+            }
+        }
+    };
+}
+pub(crate) use quantities;

@@ -1,0 +1,100 @@
+//! [`Requires`]: the fields of the scene's state that a sensor needs.
+
+use std::fmt;
+use std::ops::{BitOr, BitOrAssign};
+
+/// The fields of a [`SceneState`](crate::SceneState) that a sensor needs. The flags are made from the list in [`state`](crate::state).
+#[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub struct Requires(pub(crate) u32);
+
+impl Requires {
+    /// Nothing.
+    pub const NONE: Self = Self(0);
+
+    /// What the engine solves for the beginning of a step: it is gone when the step is done, so that the simulation must
+    /// know before the step that somebody wants it.
+    pub const SOLVED: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
+
+    /// True if all of `other` is in this set.
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// The fields of both sets.
+    pub const fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
+    /// Both sets together.
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// This set without `other`.
+    pub const fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// True if the set is empty.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The names of the fields in the set.
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        Self::NAMES.iter().filter(move |(field, _)| self.contains(*field)).map(|(_, name)| *name)
+    }
+}
+
+impl BitOr for Requires {
+    type Output = Self;
+
+    fn bitor(self, other: Self) -> Self {
+        self.union(other)
+    }
+}
+
+impl BitOrAssign for Requires {
+    fn bitor_assign(&mut self, other: Self) {
+        *self = *self | other;
+    }
+}
+
+/// `poses, contacts`; `nothing` for the empty set.
+impl fmt::Display for Requires {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.is_empty() {
+            return f.write_str("nothing");
+        }
+        for (k, name) in self.names().enumerate() {
+            f.write_str(if k == 0 { "" } else { ", " })?;
+            f.write_str(name)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Debug for Requires {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Requires({self})")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::SceneState;
+
+    #[test]
+    fn requirements() {
+        let mut need = Requires::POSES | Requires::CONTACTS;
+        assert_eq!(need.to_string(), "poses, contacts");
+        assert!(need.contains(Requires::POSES) && !need.contains(Requires::POSES | Requires::SENSORDATA));
+        need |= Requires::SENSORDATA;
+        assert_eq!(need.without(Requires::POSES).names().collect::<Vec<_>>(), ["contacts", "sensordata"]);
+        assert_eq!(format!("{:?}", Requires::default()), "Requires(nothing)");
+        assert_eq!(Requires::present_in(&SceneState::new(2)), Requires::NONE);
+        let all = Requires::NAMES.iter().fold(Requires::NONE, |sum, (field, _)| sum | *field);
+        assert_eq!(all.names().count(), Requires::NAMES.len(), "every field has a bit of its own");
+    }
+}

@@ -1,0 +1,21 @@
+//! Accelerations of links and objects, with the poses and velocities that they are of.
+
+use super::rows::captured;
+use super::{poses, velocities};
+use crate::env::Env;
+use crate::simulation::Simulation;
+use kinetoscope_scene::SceneState;
+
+/// Fills the rows of environment number `i`.
+pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
+    let solved = env.solved();
+    if solved.poses.is_empty() {
+        // Nothing can be solved for the state as it is, but it is somewhere.
+        poses::rows(simulation, env, i, &mut state.force_poses);
+        velocities::rows(simulation, env, i, &mut state.force_velocities);
+    } else {
+        captured(&solved.poses, i, &mut state.force_poses);
+        captured(&solved.velocities, i, &mut state.force_velocities);
+    }
+    captured(&solved.accelerations, i, &mut state.body_accelerations);
+}

@@ -1,0 +1,15 @@
+//! Contacts with their forces.
+
+use crate::env::Env;
+use crate::simulation::Simulation;
+use kinetoscope_scene::SceneState;
+
+/// Appends the contacts of environment number `i`; those of the environments before it are there.
+pub(super) fn fill(_simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
+    if let Some(contacts) = &mut state.contacts {
+        // Those of the last time go with the first environment.
+        contacts.list.truncate(contacts.first[i]);
+        contacts.list.extend_from_slice(&env.solved().contacts);
+        contacts.first[i + 1] = contacts.list.len();
+    }
+}

@@ -1,0 +1,23 @@
+//! Poses of links and objects.
+
+use crate::capture::link_pose;
+use crate::env::Env;
+use crate::simulation::Simulation;
+use kinetoscope_scene::SceneState;
+use kinetoscope_scene::pose::to_row;
+use ndarray::Array3;
+
+/// Fills the rows of environment number `i`.
+pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
+    rows(simulation, env, i, &mut state.body_poses);
+}
+
+/// Fills the poses of environment number `i`, as they are now.
+pub(super) fn rows(simulation: &Simulation, env: &Env, i: usize, array: &mut Option<Array3<f64>>) {
+    let Some(array) = array else { return };
+    for (b, link) in simulation.plan.bodies().iter().enumerate() {
+        for (k, value) in to_row(&link_pose(env.data(), link)).into_iter().enumerate() {
+            array[(i, b, k)] = value;
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! Rows of one environment: a number of each joint, or what was captured inside the step.
+
+use crate::index::JointIndexing;
+use crate::simulation::Simulation;
+use ndarray::{Array2, Array3, Axis};
+
+/// Movable joints of all robots, then those of parts.
+pub(super) fn all_joints(simulation: &Simulation) -> impl Iterator<Item = &JointIndexing> {
+    let of_robots = simulation.robots.iter().flat_map(|robot| &robot.joints);
+    of_robots.chain(simulation.parts.iter().flat_map(|part| &part.joints))
+}
+
+/// Fills the row of an environment with a number of each joint.
+pub(super) fn joints(
+    array: &mut Option<Array2<f64>>,
+    env: usize,
+    simulation: &Simulation,
+    value: impl Fn(&JointIndexing) -> f64,
+) {
+    if let Some(array) = array {
+        for (j, joint) in all_joints(simulation).enumerate() {
+            array[(env, j)] = value(joint);
+        }
+    }
+}
+
+/// Copies what was captured inside the step to the rows of an environment; zeros where nothing was captured, because a step
+/// failed.
+pub(super) fn captured(values: &[f64], env: usize, array: &mut Option<Array3<f64>>) {
+    if let Some(array) = array
+        && let Some(row) = array.index_axis_mut(Axis(0), env).as_slice_mut()
+    {
+        if row.len() == values.len() { row.copy_from_slice(values) } else { row.fill(0.0) }
+    }
+}

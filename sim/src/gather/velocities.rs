@@ -1,0 +1,24 @@
+//! Velocities of links and objects.
+
+use crate::capture::{body_velocity, link_pose};
+use crate::env::Env;
+use crate::simulation::Simulation;
+use kinetoscope_scene::SceneState;
+use ndarray::Array3;
+
+/// Fills the rows of environment number `i`.
+pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
+    rows(simulation, env, i, &mut state.body_velocities);
+}
+
+/// Fills the velocities of environment number `i`, as they are now.
+pub(super) fn rows(simulation: &Simulation, env: &Env, i: usize, array: &mut Option<Array3<f64>>) {
+    let Some(array) = array else { return };
+    for (b, link) in simulation.plan.bodies().iter().enumerate() {
+        let origin = link_pose(env.data(), link).translation.vector;
+        let [velocity, turning] = body_velocity(env.data(), link.0, &origin);
+        for (k, value) in velocity.iter().chain(&turning).enumerate() {
+            array[(i, b, k)] = *value;
+        }
+    }
+}
