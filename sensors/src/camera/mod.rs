@@ -46,7 +46,7 @@ pub use kinetoscope_render::renderer::Renderer;
 pub use kinetoscope_render::request::{Before, RasterCfg, Shot};
 pub use kinetoscope_render::shade::tone::ToneCurve;
 pub use kinetoscope_render::shutter::{Opened, Shutter, Take};
-pub use placement::{CameraPlacement, PoseFrame};
+pub use placement::CameraPlacement;
 pub use point_cloud::PointFrame;
 pub use segmentation::{Segment, SegmentLevel, Segmentation, SegmentationCfg, Thing, segment_color};
 pub use sensor::Camera;
