@@ -3,6 +3,7 @@
 //! Nothing here knows of MuJoCo. Units are SI, angles radians, quaternions w, x, y, z.
 #![forbid(unsafe_code)]
 
+pub mod basis;
 pub mod file_format;
 pub mod framing;
 pub mod light;
@@ -14,11 +15,14 @@ pub mod pose;
 pub mod pose_f32;
 pub mod pose_f64;
 pub mod random;
+pub mod ray;
 pub mod render_scene;
+pub mod sampling;
 pub mod shape;
 pub mod source;
 pub mod state;
 pub mod terrain;
+pub mod vector;
 
 pub use light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightSum, Sky};
 pub use marker::{Marker, MarkerKind};
@@ -27,6 +31,7 @@ pub use pose::Pose;
 pub use pose_f32::PoseF32;
 pub use pose_f64::PoseF64;
 pub use random::Random;
+pub use ray::Ray;
 pub use render_scene::{Instance, RenderScene, RenderSceneError};
 pub use shape::{RenderMesh, Shape};
 pub use state::{OwnScene, SceneState, VisibleState};

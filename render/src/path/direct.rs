@@ -2,12 +2,12 @@
 
 use super::point::Point;
 use super::{Path, Paths, SCATTERED, above, times};
-use crate::geometry::basis::Basis;
-use crate::geometry::ray::Ray;
-use crate::geometry::vector::{V3, along, dot, sub, unit};
 use crate::shade::shadow_rays::REACH;
 use crate::simd::Simd;
 use crate::trace::Hit;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::basis::Basis;
+use kinetoscope_scene::vector::{V3, along, dot, sub, unit};
 use std::f64::consts::PI;
 
 /// Pairs of numbers of what glows, two at each surface: far beyond those of paths.

@@ -5,11 +5,11 @@
 //! heuristic); Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996 (cones of balls).
 
 use super::brightness;
-use crate::geometry::basis::Basis;
-use crate::geometry::vector::{V3, along, cross, dot, scale, sub, to_f64, unit};
-use crate::path::disc::{on_disc, turn};
 use crate::trace::Tracer;
 use crate::trace::motion::NOW;
+use kinetoscope_scene::basis::Basis;
+use kinetoscope_scene::sampling::{on_disc, turn};
+use kinetoscope_scene::vector::{V3, along, cross, dot, scale, sub, to_f64, unit};
 use kinetoscope_scene::{Instance, RenderMesh, RenderScene, Shape};
 use std::f64::consts::PI;
 use std::sync::Arc;

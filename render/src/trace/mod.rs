@@ -17,15 +17,15 @@ use super::raster::{Item, Layer, Placed};
 use crate::geometry::assets::{Assets, RayAssets};
 use crate::geometry::bvh::Stack;
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::ray::Ray;
 use crate::geometry::shape::Solid;
 use crate::geometry::shape::mesh::MeshTree;
 use crate::geometry::triangle::ShearPacket;
-use crate::geometry::vector::{V3, along, dot, scale};
 use crate::lens::Sight;
 use crate::lens::rays::LensRays;
 use crate::simd::Simd;
 use crate::visibility::Projection;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::{V3, along, dot, scale};
 use kinetoscope_scene::{Instance, Marker, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
 use motion::{Motion, rigid, wide};
 use std::sync::Arc;
@@ -220,7 +220,7 @@ impl Tracer {
                             left *= (1.0 - alpha).powi(self.fronts(thing, ray, limit, time, stack));
                             return limit;
                         }
-                        let local = seen_from(ray, &placed.at(time));
+                        let local = ray.seen_from(&placed.at(time));
                         let blocked = match &self.bodies[*instance as usize] {
                             Some(Body::Mesh(_, tree)) => tree.blocks(&local, limit, stack),
                             Some(Body::Closed(solid)) => solid.touch(&local, limit, stack).is_some(),
@@ -266,7 +266,7 @@ impl Tracer {
     #[inline(always)]
     fn meet(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Found> {
         let placed @ Thing { instance, .. } = &self.things[thing as usize];
-        let local = seen_from(ray, &placed.at(time));
+        let local = ray.seen_from(&placed.at(time));
         match self.bodies[*instance as usize].as_ref()? {
             Body::Mesh(_, tree) => {
                 let (distance, index) = tree.nearest(&local, limit, None, stack)?;
@@ -360,12 +360,6 @@ struct Found {
     index: usize,
     /// Of a closed form, out of it, in its own frame.
     normal: V3,
-}
-
-/// The ray in the frame that a pose maps from.
-#[inline(always)]
-fn seen_from(ray: &Ray, pose: &PoseF64) -> Ray {
-    Ray { origin: pose.apply_inverse(ray.origin), direction: pose.rotate_inverse(ray.direction) }
 }
 
 /// Where a thing with bounds in its own frame may be seen.

@@ -2,10 +2,10 @@
 
 use super::interval::slab;
 use super::{RayShape, Touch};
-use crate::geometry::bvh::Stack;
-use crate::geometry::vector::V3;
 use crate::geometry::assets::Assets;
-use crate::geometry::ray::Ray;
+use crate::geometry::bvh::Stack;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::V3;
 
 /// A box.
 #[derive(Clone, Copy, Debug)]

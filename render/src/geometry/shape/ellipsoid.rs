@@ -2,10 +2,10 @@
 
 use super::interval::ball;
 use super::{RayShape, Touch};
-use crate::geometry::bvh::Stack;
-use crate::geometry::vector::{V3, along, unit};
 use crate::geometry::assets::Assets;
-use crate::geometry::ray::Ray;
+use crate::geometry::bvh::Stack;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::{V3, along, unit};
 
 /// A ball stretched along its axes.
 #[derive(Clone, Copy, Debug)]

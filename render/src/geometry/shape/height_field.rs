@@ -9,12 +9,12 @@
 mod packet;
 
 use super::{RayShape, Touch, Touches};
-use crate::simd::Simd;
+use crate::geometry::assets::Assets;
 use crate::geometry::bvh::Stack;
 use crate::geometry::packet::{ALL, Packet};
-use crate::geometry::vector::{V3, along, unit};
-use crate::geometry::assets::Assets;
-use crate::geometry::ray::Ray;
+use crate::simd::Simd;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::{V3, along, unit};
 use std::sync::Arc;
 
 /// Cells that a walk looks at one by one before it looks at blocks: rays from above mostly hit in the first or the second.

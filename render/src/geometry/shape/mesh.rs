@@ -3,15 +3,15 @@
 pub(crate) mod columns;
 
 use super::{RayShape, Touch, Touches, touch_each};
-use crate::simd::{D, Level, Simd};
+use crate::geometry::assets::Assets;
 use crate::geometry::bvh::{Beam, Builder, Bvh, Stack, Walked};
 use crate::geometry::packet::{Packet, WIDTH};
 use crate::geometry::triangle::{Shear, ShearPacket, Triangle, has_area, normal};
-use crate::geometry::vector::{V3, to_f64};
-use crate::geometry::assets::Assets;
-use crate::geometry::ray::Ray;
+use crate::simd::{D, Level, Simd};
 use columns::Columns;
+use kinetoscope_scene::Ray;
 use kinetoscope_scene::RenderMesh;
+use kinetoscope_scene::vector::{V3, to_f64};
 use std::sync::{Arc, OnceLock};
 
 /// Triangles that a packet tests against all of its rays; where there are more in its way, rays go on one by one. That costs
@@ -78,10 +78,7 @@ impl MeshBuilder {
         let smaller = |a: f32, b: f32| if a < b { a } else { b };
         let larger = |a: f32, b: f32| if a > b { a } else { b };
         let around = |[a, b, c]: &Triangle| {
-            [
-                [0, 1, 2].map(|k| smaller(smaller(a[k], b[k]), c[k])),
-                [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k])),
-            ]
+            [[0, 1, 2].map(|k| smaller(smaller(a[k], b[k]), c[k])), [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k]))]
         };
         let (bvh, numbers) = self.builder.build(self.triangles.iter().map(around));
         let triangles = numbers.iter().map(|&number| self.triangles[number as usize]).collect();

@@ -7,10 +7,10 @@ mod interval;
 mod ray_shape;
 
 use super::bvh::Stack;
-use super::vector::V3;
 use crate::geometry::assets::Assets;
-use crate::geometry::ray::Ray;
+use kinetoscope_scene::Ray;
 use kinetoscope_scene::Shape;
+use kinetoscope_scene::vector::V3;
 use ray_shape::touch_each;
 pub(crate) use ray_shape::{ForShape, RayShape, Touch, Touches};
 

@@ -1,10 +1,10 @@
 //! A plane.
 
 use super::{RayShape, Touch};
-use crate::geometry::bvh::Stack;
-use crate::geometry::vector::V3;
 use crate::geometry::assets::Assets;
-use crate::geometry::ray::Ray;
+use crate::geometry::bvh::Stack;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::V3;
 
 /// The plane z = 0, hit from +z only.
 #[derive(Clone, Copy, Debug)]

@@ -2,9 +2,9 @@
 
 use crate::geometry::bvh::Stack;
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::ray::Ray;
-use crate::geometry::vector::V3;
 use crate::simd::Simd;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::V3;
 
 /// An intersection of a ray and a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,9 +6,9 @@ mod shapes;
 mod terrain;
 mod trees;
 
-use crate::geometry::ray::Ray;
 use crate::geometry::shape::Touch;
-use crate::geometry::vector::{V3, unit};
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::{V3, unit};
 
 fn bits(touch: &Option<Touch>) -> Option<(u64, [u64; 3])> {
     touch.as_ref().map(|touch| (touch.t.to_bits(), touch.normal.map(f64::to_bits)))
@@ -31,7 +31,7 @@ impl Dice {
     pub(super) fn direction(&mut self) -> V3 {
         loop {
             let p = self.point(1.0);
-            if crate::geometry::vector::dot(p, p) < 1.0
+            if kinetoscope_scene::vector::dot(p, p) < 1.0
                 && let Some(d) = unit(p)
             {
                 return d;
@@ -42,7 +42,7 @@ impl Dice {
     /// A ray from somewhere within `far` of the origin to somewhere within `near` of it.
     pub(super) fn ray(&mut self, far: f64, near: f64) -> Ray {
         let (origin, target) = (self.point(far), self.point(near));
-        let direction = unit(crate::geometry::vector::sub(target, origin)).unwrap();
+        let direction = unit(kinetoscope_scene::vector::sub(target, origin)).unwrap();
         Ray { origin, direction }
     }
 }
