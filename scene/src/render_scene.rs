@@ -320,11 +320,7 @@ impl Instance {
 
     /// The triangles, for shapes that are made of them.
     pub fn mesh(&self) -> Option<&crate::RenderMesh> {
-        match &self.shape {
-            Shape::Mesh(shape) => Some(&shape.mesh),
-            Shape::HeightField(shape) => Some(shape.mesh()),
-            _ => None,
-        }
+        self.shape.mesh().map(|mesh| &**mesh)
     }
 }
 

@@ -19,3 +19,5 @@ pub mod world;
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::Dice;

@@ -17,7 +17,6 @@ use super::raster::{Item, Layer, Placed};
 use crate::geometry::assets::{Assets, RayAssets};
 use crate::geometry::bvh::Stack;
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::shape::Solid;
 use crate::geometry::shape::mesh::MeshTree;
 use crate::geometry::triangle::ShearPacket;
 use crate::lens::Sight;
@@ -49,7 +48,7 @@ enum Body {
     /// Triangles, and the mesh that they are of.
     Mesh(Arc<RenderMesh>, Arc<MeshTree>),
     /// A closed form.
-    Closed(Solid),
+    Closed(Shape),
 }
 
 /// A body in the world.
@@ -92,11 +91,7 @@ pub(crate) struct Tracer {
 
 impl Body {
     fn of(instance: &Instance, known: Option<Self>, assets: &mut Assets) -> Self {
-        let mesh = match &instance.shape {
-            Shape::Mesh(shape) => &shape.mesh,
-            Shape::HeightField(shape) => shape.mesh(),
-            shape => return Self::Closed(Solid::of(shape, assets)),
-        };
+        let Some(mesh) = instance.shape.mesh() else { return Self::Closed(instance.shape.clone()) };
         match known {
             Some(Self::Mesh(of, tree)) if Arc::ptr_eq(&of, mesh) => Self::Mesh(of, tree),
             _ => Self::Mesh(Arc::clone(mesh), assets.mesh(mesh)),
@@ -107,7 +102,7 @@ impl Body {
     fn bounds(&self) -> Option<[V3; 2]> {
         match self {
             Self::Mesh(_, tree) => Some(tree.bounds()),
-            Self::Closed(solid) => solid.bounds(),
+            Self::Closed(shape) => shape.bounds(),
         }
     }
 }
@@ -223,7 +218,7 @@ impl Tracer {
                         let local = ray.seen_from(&placed.at(time));
                         let blocked = match &self.bodies[*instance as usize] {
                             Some(Body::Mesh(_, tree)) => tree.blocks(&local, limit, stack),
-                            Some(Body::Closed(solid)) => solid.touch(&local, limit, stack).is_some(),
+                            Some(Body::Closed(shape)) => shape.intersect(&local, limit).is_some(),
                             None => false,
                         };
                         if !blocked {
@@ -272,13 +267,13 @@ impl Tracer {
                 let (distance, index) = tree.nearest(&local, limit, None, stack)?;
                 Some(Found { thing, distance, index, normal: [0.0; 3] })
             }
-            Body::Closed(solid) => {
-                let touch = solid.touch(&local, limit, stack)?;
+            Body::Closed(shape) => {
+                let at = shape.intersect(&local, limit)?;
                 // These bodies are convex, about their origin: outward is where the surface is. A plane's points are level
                 // with it.
-                let inward = dot(touch.normal, local.at(touch.t)) < 0.0 && !matches!(solid, Solid::Plane(_));
-                let normal = scale(touch.normal, if inward { -1.0 } else { 1.0 });
-                Some(Found { thing, distance: touch.t, index: 0, normal })
+                let inward = dot(at.normal, local.at(at.t)) < 0.0 && !shape.is_one_sided();
+                let normal = scale(at.normal, if inward { -1.0 } else { 1.0 });
+                Some(Found { thing, distance: at.t, index: 0, normal })
             }
         }
     }
@@ -450,10 +445,10 @@ impl Lens {
                     *index = tree.number(*index) as usize;
                 }
             }
-            Body::Closed(solid) => {
+            Body::Closed(shape) => {
                 for k in (0..WIDTH).filter(|&k| packet.has(k)) {
-                    let touch = solid.touch(&rays[k], packet.limit(k), stack);
-                    found[k] = touch.map(|touch| (touch.t, solid.face(&touch, &rays[k])));
+                    let at = shape.intersect(&rays[k], packet.limit(k));
+                    found[k] = at.map(|at| (at.t, shape.face(&at, &rays[k])));
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 pub(crate) mod columns;
 
-use super::{RayShape, Touch, Touches, touch_each};
+use super::{RayShape, Touches, touch_each};
 use crate::geometry::assets::Assets;
 use crate::geometry::bvh::{Beam, Builder, Bvh, Stack, Walked};
 use crate::geometry::packet::{Packet, WIDTH};
@@ -11,6 +11,7 @@ use crate::simd::{D, Level, Simd};
 use columns::Columns;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::RenderMesh;
+use kinetoscope_scene::shape::Intersection;
 use kinetoscope_scene::vector::{V3, to_f64};
 use std::sync::{Arc, OnceLock};
 
@@ -87,8 +88,13 @@ impl MeshBuilder {
 }
 
 impl Mesh {
-    pub(super) fn of(shape: &kinetoscope_scene::shape::Mesh, assets: &mut Assets) -> Self {
-        Self { tree: assets.mesh(&shape.mesh) }
+    pub(super) fn of(mesh: &Arc<RenderMesh>, assets: &mut Assets) -> Self {
+        Self { tree: assets.mesh(mesh) }
+    }
+
+    /// Smallest and largest coordinates.
+    pub(super) fn bounds(&self) -> [V3; 2] {
+        self.tree.bounds()
     }
 
     #[cfg(test)]
@@ -244,14 +250,14 @@ impl MeshTree {
     }
 
     #[inline(always)]
-    fn touch(&self, (t, index): (f64, usize)) -> Option<Touch> {
-        Some(Touch { t: t + 0.0, normal: normal(&self.triangles[index])? })
+    fn touch(&self, (t, index): (f64, usize)) -> Option<Intersection> {
+        Some(Intersection { t: t + 0.0, normal: normal(&self.triangles[index])? })
     }
 }
 
 impl RayShape for Mesh {
     #[inline(always)]
-    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch> {
+    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Intersection> {
         self.tree.touch(self.tree.nearest(ray, limit, None, stack)?)
     }
 
@@ -273,9 +279,5 @@ impl RayShape for Mesh {
         for k in (0..WIDTH).filter(|&k| packet.has(k)) {
             touches[k] = found[k].and_then(|found| tree.touch(found));
         }
-    }
-
-    fn bounds(&self) -> Option<[V3; 2]> {
-        Some(self.tree.bounds())
     }
 }

@@ -2,8 +2,9 @@
 
 use super::{FIRST_CELLS, Field, SLACK};
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::shape::{Touch, Touches};
+use crate::geometry::shape::Touches;
 use crate::simd::{D, D3, N, Simd, axes, dot_3};
+use kinetoscope_scene::shape::Intersection;
 
 /// Heights of the corners of a cell in each lane, and where the cell is.
 #[derive(Clone, Copy)]
@@ -193,6 +194,6 @@ fn cross<S: Simd>(
 fn write<S: Simd>(touches: &mut Touches, t: D<S>, normal: &[[f64; WIDTH]; 3], lanes: u64) {
     let t = t.array();
     for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| lanes >> k & 1 == 1) {
-        *touch = Some(Touch { t: t[k], normal: [normal[0][k], normal[1][k], normal[2][k]] });
+        *touch = Some(Intersection { t: t[k], normal: [normal[0][k], normal[1][k], normal[2][k]] });
     }
 }

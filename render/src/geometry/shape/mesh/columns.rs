@@ -17,9 +17,10 @@
 use super::MeshTree;
 use crate::geometry::bvh::FAR;
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::shape::{Touch, Touches};
+use crate::geometry::shape::Touches;
 use crate::geometry::triangle::{ShearPacket, Triangle, distances, normals};
 use crate::simd::{D, D3, Simd};
+use kinetoscope_scene::shape::Intersection;
 use kinetoscope_scene::vector::V3;
 
 /// Meshes of fewer triangles have no columns: their trees are small.
@@ -366,8 +367,10 @@ impl MeshTree {
         );
         let known = known.to_bitmask();
         for lane in 0..WIDTH {
-            touches[lane] = (best[lane] != NONE && known >> lane & 1 == 1)
-                .then(|| Touch { t: limit[lane] + 0.0, normal: [normal[0][lane], normal[1][lane], normal[2][lane]] });
+            touches[lane] = (best[lane] != NONE && known >> lane & 1 == 1).then(|| Intersection {
+                t: limit[lane] + 0.0,
+                normal: [normal[0][lane], normal[1][lane], normal[2][lane]],
+            });
         }
     }
 }
