@@ -41,3 +41,6 @@ pub mod simd;
 pub mod ticket;
 pub mod trace;
 pub mod visibility;
+
+#[cfg(test)]
+mod tests;
