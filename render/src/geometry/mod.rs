@@ -10,11 +10,11 @@
 //! height fields look at the first cells in all lanes. Rays that run apart are cast one by one.
 
 pub mod assets;
-pub mod bvh;
+pub(crate) mod bvh;
 pub(crate) mod corner;
 pub mod packet;
-pub mod shape;
-pub mod triangle;
+pub(crate) mod shape;
+pub(crate) mod triangle;
 pub mod world;
 
 #[cfg(test)]
