@@ -320,7 +320,7 @@ impl Instance {
 
     /// The triangles, for shapes that are made of them.
     pub fn mesh(&self) -> Option<&crate::RenderMesh> {
-        self.shape.mesh().map(|mesh| &**mesh)
+        self.shape.mesh().map(Arc::as_ref)
     }
 }
 

@@ -4,11 +4,12 @@ use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, M
 use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture};
 use std::sync::Arc;
 
-/// A small generator (xorshift64*) so that every run tests the same.
+/// Random numbers (xorshift64*) that are the same in every run, from a seed that is not 0.
+#[derive(Clone, Debug)]
 pub struct Random(pub u64);
 
 impl Random {
-    pub fn next(&mut self) -> u64 {
+    fn next(&mut self) -> u64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
         self.0 ^= self.0 >> 27;
@@ -20,10 +21,12 @@ impl Random {
         lo + (hi - lo) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
+    /// Three numbers, uniform in lo..hi.
     pub fn vector(&mut self, lo: f64, hi: f64) -> [f64; 3] {
         [self.within(lo, hi), self.within(lo, hi), self.within(lo, hi)]
     }
 
+    /// A random rotation, at a place within `reach` of the origin along each axis \[m\].
     pub fn pose(&mut self, reach: f64) -> PoseF32 {
         let q = nalgebra::Quaternion::new(
             self.within(-1., 1.),
@@ -54,6 +57,7 @@ pub fn random(random: &mut Random, reach: f64) -> (RenderScene, Vec<PoseF32>) {
     (RenderScene::new(instances).unwrap(), poses)
 }
 
+/// An infinite ground with a checker texture, mask id 100.
 pub fn checker_plane() -> Instance {
     let checker = Texture::checker(64, [110, 120, 130], [140, 150, 160]);
     let material = Material {
@@ -146,6 +150,7 @@ pub fn figure() -> (RenderScene, Vec<PoseF32>) {
     (scene, poses)
 }
 
+/// A place without rotation \[m\].
 pub fn at(x: f32, y: f32, z: f32) -> PoseF32 {
     PoseF32::from_translation([x, y, z])
 }

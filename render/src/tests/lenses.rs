@@ -33,7 +33,7 @@ pub(super) const FISHEYE: OpenCvFisheye =
     OpenCvFisheye { k1: 0.03, k2: -0.012, k3: 0.004, k4: -0.0011, max_angle: Some(1.6) };
 
 /// One of each kind, and the pixels of an image of 64 x 48 that it fills, or more than fills.
-pub(in crate::camera) fn all() -> Vec<(Lens, PixelIntrinsics)> {
+pub(super) fn all() -> Vec<(Lens, PixelIntrinsics)> {
     let f = |f: f64| PixelIntrinsics { fx: f, fy: 1.1 * f, cx: 30.25, cy: 25.5 };
     let panorama = Panorama::intrinsics(64, 48).to_pixels(64, 48).unwrap();
     let theta = FTheta { polynomial: [0.0, 0.00245, 1e-7, -3e-10, 0.0, 0.0], ..FTheta::default() };

@@ -28,8 +28,8 @@ pub use triangulated::{TriangleSampling, Triangulated};
 /// Declares the shapes: a module with a type of its own each.
 macro_rules! shapes {
     (
-        closed forms: $($(#[$doc:meta])* $module:ident :: $Name:ident,)*
-        triangulated: $($(#[$triangles_doc:meta])* $triangles_module:ident :: $TrianglesName:ident,)*
+        closed_forms { $($(#[$doc:meta])* $module:ident :: $Name:ident,)* }
+        triangulated { $($(#[$triangles_doc:meta])* $triangles_module:ident :: $TrianglesName:ident,)* }
     ) => {
         $(mod $module; pub use $module::$Name;)*
         $(mod $triangles_module; pub use $triangles_module::$TrianglesName;)*
@@ -84,24 +84,26 @@ macro_rules! shapes {
 }
 
 shapes! {
-    closed forms:
-    /// A plane, seen from +z only.
-    plane::Plane,
-    /// A ball.
-    sphere::Sphere,
-    /// A cylinder with round ends.
-    capsule::Capsule,
-    /// A ball stretched along its axes.
-    ellipsoid::Ellipsoid,
-    /// A cylinder with flat ends.
-    cylinder::Cylinder,
-    /// A box.
-    box_::Box,
-    triangulated:
-    /// Triangles.
-    mesh::Mesh,
-    /// Terrain over a grid.
-    height_field::HeightField,
+    closed_forms {
+        /// A plane, seen from +z only.
+        plane::Plane,
+        /// A ball.
+        sphere::Sphere,
+        /// A cylinder with round ends.
+        capsule::Capsule,
+        /// A ball stretched along its axes.
+        ellipsoid::Ellipsoid,
+        /// A cylinder with flat ends.
+        cylinder::Cylinder,
+        /// A box.
+        box_::Box,
+    }
+    triangulated {
+        /// Triangles.
+        mesh::Mesh,
+        /// Terrain over a grid.
+        height_field::HeightField,
+    }
 }
 
 /// The two kinds of geometry.

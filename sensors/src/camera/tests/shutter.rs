@@ -83,8 +83,8 @@ fn expected(camera: &Camera, env: usize, step: u64, opened: Option<u64>) -> Vec<
     let opened = opened.map(|(poses, camera, before)| Opened { poses, world_from_camera: *camera, before: *before });
     let channels = Channels { mask: true, position: true, ..Channels::NONE };
     let by = (PATHS, rolling().shutter);
-    let shot = (&*context(1).scene.unwrap(), &*poses(step), &view);
-    let frame = super::stage::frame_of(RasterCfg::default(), by, channels, shot, opened);
+    let (scene, poses) = (context(1).scene.unwrap(), poses(step));
+    let frame = super::stage::frame_of(RasterCfg::default(), by, channels, (&scene, &poses, &view), opened);
     let mask = frame.mask.unwrap().into_iter().map(|x| x as u32);
     mask.chain(frame.position.unwrap().into_iter().map(f32::to_bits)).collect()
 }
