@@ -2,7 +2,7 @@
 
 use super::harness::{Image, Still, look, wide};
 use crate::frame::Channels;
-use crate::intrinsics::{Intrinsics, PixelIntrinsics};
+use crate::intrinsics::PixelIntrinsics;
 use crate::lens::{LensRays, Optics};
 use crate::renderer::Renderer;
 use crate::request::RasterCfg;

@@ -173,8 +173,6 @@ fn blur() {
     assert!(of(still.shutter, &still.opened) != instant);
 }
 
-const PATHS: Renderer = Renderer::RayTraced { samples: 2, max_bounces: 1, denoise: false, seed: 3 };
-
 #[test]
 fn refusals() {
     // Renderers without paths say which one to use.

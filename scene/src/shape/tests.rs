@@ -141,7 +141,7 @@ fn corner_normals() {
     let height = |k: usize| (k.wrapping_mul(2_654_435_761) >> 7 & 1023) as f32 / 1023.0;
     let terrain = |size| {
         let elevation: Vec<f32> = (0..14 * 17).map(height).collect();
-        HeightField::new(size, 14, 17, &elevation).unwrap().tessellate(0)
+        Shape::from(HeightField::new(size, 14, 17, &elevation).unwrap()).tessellate(0)
     };
     let mut flat = Sphere { radius: 1.0 }.tessellate(16);
     flat.positions[7] = flat.positions[8];

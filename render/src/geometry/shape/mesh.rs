@@ -93,7 +93,7 @@ impl Mesh {
     }
 
     /// Smallest and largest coordinates.
-    pub(super) fn bounds(&self) -> [V3; 2] {
+    pub(crate) fn bounds(&self) -> [V3; 2] {
         self.tree.bounds()
     }
 

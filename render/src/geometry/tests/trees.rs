@@ -167,7 +167,7 @@ fn degenerate() {
     let nothing = tree(&[]);
     let ray = Ray { origin: [0.0, 0.0, 1.0], direction: [0.0, 0.0, -1.0] };
     assert_eq!(distance(&nothing, &ray, 10.0), None);
-    assert_eq!(nothing.bounds(), Some([[0.0; 3]; 2]));
+    assert_eq!(nothing.bounds(), [[0.0; 3]; 2]);
     // Triangles without an area are left out; the others are hit.
     let flat = [[0u32, 0, 1], [0, 1, 1], [0, 1, 2]];
     let mesh = TriMesh::from_triangles(vec![[-1., -1., 0.], [1., -1., 0.], [0., 2., 0.]], flat.to_vec());

@@ -11,9 +11,8 @@ use crate::SensorError;
 use crate::camera::OpticsError;
 use crate::sensor::{Sensor, SensorCfg};
 use kinetoscope_render::lens::{Equidistant, OpenCv, Panorama};
-use kinetoscope_render::visibility::{RenderError, View};
+use kinetoscope_render::visibility::RenderError;
 use kinetoscope_scene::Pose;
-use kinetoscope_testkit::scenes::at;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::FRAC_PI_2;
 

@@ -4,7 +4,6 @@ use super::super::{CameraCfg, Lens, PixelIntrinsics};
 use kinetoscope_render::lens::{
     Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
 };
-use kinetoscope_testkit::opencv::opencv;
 
 /// All twelve of a cheap camera.
 pub(super) const WARPED: OpenCv = OpenCv {

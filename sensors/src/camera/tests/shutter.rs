@@ -1,11 +1,11 @@
 //! Rolling shutters and motion blur, against closed forms.
 
-use super::super::{Aperture, Camera, CameraCfg, CameraError, Channels, RasterCfg, Renderer, Shutter};
+use super::super::{Opened, Aperture, Camera, CameraCfg, CameraError, Channels, RasterCfg, Renderer, Shutter};
 use super::stage::{DT, SIZE, ball, bits, built, cfg, context, state};
 use crate::error::SensorError;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use kinetoscope_render::frame::Mask;
-use kinetoscope_render::visibility::{RenderError, View};
+use kinetoscope_render::visibility::RenderError;
 use kinetoscope_scene::PoseF32;
 use ndarray::Axis;
 
