@@ -1,6 +1,6 @@
 //! Rolling shutters and motion blur, against closed forms.
 
-use super::super::{Opened, Aperture, Camera, CameraCfg, CameraError, Channels, RasterCfg, Renderer, Shutter};
+use super::super::{Aperture, Camera, CameraCfg, CameraError, Channels, Opened, RasterCfg, Renderer, Shutter};
 use super::stage::{DT, SIZE, ball, bits, built, cfg, context, state};
 use crate::error::SensorError;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
