@@ -13,14 +13,14 @@
 //! | [`frame`] | channels (colour, depth, ...), one file each, and their images |
 //! | [`renderer`], [`aperture`], [`shutter`], [`progress`] | settings of a frame |
 //! | [`lens`], [`intrinsics`] | from pixels to rays |
-//! | [`visibility`] | views and the surface at each pixel; [`raster`] finds it by triangles, [`trace`] by rays |
+//! | [`visibility`] | views and the surface at each pixel; [`raster`] finds it by triangles, `trace` by rays |
 //! | [`shade`] | light: from what is seen to channels; [`path`] is the path tracer |
 //! | [`geometry`] | rays, triangles, shapes, bounding volume hierarchies |
-//! | [`simd`] | lanes, chosen at run time |
+//! | `simd` | lanes, chosen at run time |
 #![forbid(unsafe_code)]
 
 pub mod aperture;
-pub mod exposure;
+mod exposure;
 pub mod frame;
 pub mod geometry;
 pub mod intrinsics;
@@ -33,10 +33,13 @@ pub mod raster;
 pub mod rasterizer;
 pub mod renderer;
 pub mod request;
-pub mod rolling;
+mod rolling;
 pub mod shade;
 pub mod shutter;
-pub mod simd;
+mod simd;
 pub mod ticket;
-pub mod trace;
+mod trace;
 pub mod visibility;
+
+#[cfg(test)]
+mod tests;

@@ -85,7 +85,7 @@ impl Rasterizer {
     }
 
     /// A rasterizer that uses a SIMD level of its own.
-    pub fn with_level(cfg: RasterCfg, level: Level) -> Self {
+    pub(crate) fn with_level(cfg: RasterCfg, level: Level) -> Self {
         Self {
             cfg,
             renderer: Renderer::default(),
@@ -106,11 +106,6 @@ impl Rasterizer {
     pub(super) fn style(&self) -> Style<'_> {
         let Self { cfg, renderer, aperture, shutter, stops, assets, .. } = self;
         Style { cfg: *cfg, renderer: *renderer, aperture: aperture.as_ref(), shutter: *shutter, stops: *stops, assets }
-    }
-
-    /// The instruction set in use.
-    pub fn simd_level(&self) -> String {
-        format!("{:?}", self.level)
     }
 
     /// Scratch memory held \[bytes\].

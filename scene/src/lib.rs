@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod atomic_file;
+pub mod basis;
 pub mod file_format;
 pub mod framing;
 pub mod light;
@@ -16,12 +17,15 @@ pub mod pose_f32;
 pub mod pose_f64;
 mod quantities;
 pub mod random;
+pub mod ray;
 pub mod render_scene;
 pub mod requires;
+pub mod sampling;
 pub mod shape;
 pub mod source;
 pub mod state;
 pub mod terrain;
+pub mod vector;
 pub mod yaml;
 
 pub use atomic_file::AtomicFile;
@@ -32,6 +36,7 @@ pub use pose::Pose;
 pub use pose_f32::PoseF32;
 pub use pose_f64::PoseF64;
 pub use random::Random;
+pub use ray::Ray;
 pub use render_scene::{Instance, RenderScene, RenderSceneError};
 pub use requires::Requires;
 pub use shape::{RenderMesh, Shape};

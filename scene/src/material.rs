@@ -227,7 +227,7 @@ impl Level {
 }
 
 /// Linear light of every sRGB byte.
-pub fn srgb_to_linear() -> &'static [f32; 256] {
+fn srgb_to_linear() -> &'static [f32; 256] {
     static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
     TABLE.get_or_init(|| std::array::from_fn(|k| decode_srgb(k as f32 / 255.0)))
 }

@@ -164,7 +164,7 @@ impl RenderScene {
     /// Ids that a shape without triangles occupies: one for each face of a box.
     pub const IDS_OF_PRIMITIVE: u32 = 8;
     /// The largest number of ids.
-    pub const MAX_IDS: u32 = u32::MAX / 2;
+    pub(crate) const MAX_IDS: u32 = u32::MAX / 2;
 
     /// A scene with the default lights: one from above and the headlight.
     ///
@@ -320,11 +320,7 @@ impl Instance {
 
     /// The triangles, for shapes that are made of them.
     pub fn mesh(&self) -> Option<&crate::RenderMesh> {
-        match &self.shape {
-            Shape::Mesh(shape) => Some(&shape.mesh),
-            Shape::HeightField(shape) => Some(shape.mesh()),
-            _ => None,
-        }
+        self.shape.mesh().map(Arc::as_ref)
     }
 }
 

@@ -7,10 +7,13 @@
 //! | [`image_check`] | comparison of images; a failure writes an image of the difference |
 //! | [`refusal`] | tables of mistakes and the errors that they must give |
 //! | [`needs`] | robots, models and programs that only some machines have |
+//! | [`opencv`] | numbers of OpenCV |
 //! | [`process`] | a test in a process of its own |
+//! | [`srgb`] | the transfer function of sRGB |
 //! | [`svg`] | plots in SVG, read back |
 //! | [`urdf`] | URDF snippets |
 //! | [`wait`] | waiting for what another thread or process does |
+//! | `scenes` (feature `scenes`) | scenes to draw |
 //! | `x_server` (feature `x_server`) | an X server without a screen |
 //! | `worlds` (feature `worlds`) | simulations, robots, objects and cameras |
 //!
@@ -22,8 +25,12 @@
 pub mod bits;
 pub mod image_check;
 pub mod needs;
+pub mod opencv;
 pub mod process;
 pub mod refusal;
+#[cfg(feature = "scenes")]
+pub mod scenes;
+pub mod srgb;
 pub mod svg;
 pub mod tolerance;
 pub mod urdf;

@@ -20,7 +20,7 @@ pub(crate) fn run(repo: &Repo, args: &BlessArgs) -> Outcome {
         ready.cargo().env(VARIABLE, "1").args(["test", "--workspace", &args.filter]).run()?;
     }
     let status = Cmd::new("git")
-        .args(["status", "--short", "--", "tests/data", "sensors/tests/data"])
+        .args(["status", "--short", "--", "tests/data", "render/tests/data"])
         .current_dir(&repo.root)
         .output()?;
     let status = String::from_utf8_lossy(&status);

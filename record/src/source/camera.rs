@@ -4,7 +4,7 @@ use super::{Number, Source, What, sim_error};
 use crate::error::Result;
 use crate::packet::Values;
 use crate::stream::{Distortion, Element, Kind};
-use kinetoscope_render::frame::{Albedo, Color, Depth, Distance, Flow, Mask, Normal, Position, ShadingNormal};
+use kinetoscope_render::frame::{self, Depth, Distance, Mask, Normal};
 use kinetoscope_sensors::camera::{
     CameraConvention, CameraError, Channel, DistortionModel, PixelIntrinsics, Rectification,
 };
@@ -140,15 +140,19 @@ pub(super) fn timed(sensor: &dyn Any) -> Option<&Camera> {
 
 /// Channels of a camera: their names, types and numbers per pixel, and how their pictures are copied.
 macro_rules! cameras {
-    ($($Channel:ident),*) => {
+    ($($(#[$doc:meta])* $field:ident :: $Channel:ident,)*) => {
         const CAMERA: &[(&str, Element, usize)] = &[$(
-            ($Channel::NAME, <<$Channel as Channel>::Number as Number>::ELEMENT, $Channel::COMPONENTS)
-        ),*];
+            (
+                frame::$Channel::NAME,
+                <<frame::$Channel as Channel>::Number as Number>::ELEMENT,
+                frame::$Channel::COMPONENTS,
+            ),
+        )*];
 
         fn copy(source: &Source, camera: &Camera, channel: &str, values: &mut Values) -> Result<()> {
             match channel {
-                $(_ if channel == $Channel::NAME => {
-                    source.put(values, &camera.arrived::<$Channel>().map_err(sim_error(source))?);
+                $(_ if channel == frame::$Channel::NAME => {
+                    source.put(values, &camera.arrived::<frame::$Channel>().map_err(sim_error(source))?);
                 })*
                 _ => return Err(source.changed()),
             }
@@ -157,7 +161,7 @@ macro_rules! cameras {
     };
 }
 
-cameras!(Color, Depth, Distance, Mask, Normal, ShadingNormal, Position, Albedo, Flow);
+kinetoscope_render::with_channels!(cameras);
 
 /// The same of ray casters that draw pictures.
 const RAY_CAMERA: [(&str, Element, usize); 4] = [

@@ -6,7 +6,7 @@ use ndarray::{Dimension, Ix3, Ix4};
 const LANES: usize = 16;
 
 /// Everything that is known of 8 x 2 pixels; what channels are made of.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct PixelGroup {
     /// Linear or final, as the stage says: final bytes.
     pub color: [[u8; 4]; LANES],
@@ -26,23 +26,6 @@ pub struct PixelGroup {
     pub position: [[f32; LANES]; 3],
     /// How far it has moved since the picture before \[pixels\]; +inf on a miss.
     pub flow: [[f32; LANES]; 2],
-}
-
-impl Default for PixelGroup {
-    fn default() -> Self {
-        let v = [[0.0; LANES]; 3];
-        Self {
-            color: [[0; 4]; LANES],
-            albedo: [[0; 4]; LANES],
-            depth: [0.0; LANES],
-            distance: [0.0; LANES],
-            mask: [0; LANES],
-            normal: v,
-            shading_normal: v,
-            position: v,
-            flow: [[0.0; LANES]; 2],
-        }
-    }
 }
 
 /// When a channel is known.

@@ -22,6 +22,34 @@ pub trait Listed: Channel {
 /// Pictures of one channel, shape (views, height, width) or (views, height, width, components).
 pub type PictureView<'a, C> = ArrayView<'a, <C as Channel>::Number, <C as Channel>::Layout>;
 
+/// Calls a macro with the list of channels: the documentation, the module and the type of each.
+#[macro_export]
+macro_rules! with_channels {
+    ($then:ident) => {
+        $then! {
+            /// Colour (sRGB) and opacity (always 255), u8, 4 per pixel.
+            color::Color,
+            /// Depth along the optical axis \[m\], f32; +inf where nothing was hit.
+            depth::Depth,
+            /// Distance from the camera \[m\], f32; +inf where nothing was hit.
+            distance::Distance,
+            /// Mask id, i32; 0 where nothing was hit.
+            mask::Mask,
+            /// Normal of the surface itself, turned to the camera, unit, world frame, f32, 3 per pixel; 0 where nothing was hit.
+            normal::Normal,
+            /// Normal that light sees (smooth), unit, world frame, f32, 3 per pixel; 0 where nothing was hit.
+            shading_normal::ShadingNormal,
+            /// Where the surface is, frame of the environment \[m\], f32, 3 per pixel; 0 where nothing was hit.
+            position::Position,
+            /// Colour of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
+            albedo::Albedo,
+            /// How far what is seen has moved since the image before (right, down) \[pixels\], f32, 2 per pixel; +inf where nothing
+            /// was hit and in the first image.
+            flow::Flow,
+        }
+    };
+}
+
 /// Declares the channels: a module with a type of its own each.
 macro_rules! channels {
     ($($(#[$doc:meta])* $field:ident :: $Name:ident,)*) => {
@@ -264,24 +292,4 @@ fn put<C: Channel>(buffer: &mut [C::Number], group: &PixelGroup, [x, y]: [usize;
     }
 }
 
-channels! {
-    /// Colour (sRGB) and opacity (always 255), u8, 4 per pixel.
-    color::Color,
-    /// Depth along the optical axis \[m\], f32; +inf where nothing was hit.
-    depth::Depth,
-    /// Distance from the camera \[m\], f32; +inf where nothing was hit.
-    distance::Distance,
-    /// Mask id, i32; 0 where nothing was hit.
-    mask::Mask,
-    /// Normal of the surface itself, turned to the camera, unit, world frame, f32, 3 per pixel; 0 where nothing was hit.
-    normal::Normal,
-    /// Normal that light sees (smooth), unit, world frame, f32, 3 per pixel; 0 where nothing was hit.
-    shading_normal::ShadingNormal,
-    /// Where the surface is, frame of the environment \[m\], f32, 3 per pixel; 0 where nothing was hit.
-    position::Position,
-    /// Colour of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
-    albedo::Albedo,
-    /// How far what is seen has moved since the picture before (right, down) \[pixels\], f32, 2 per pixel; +inf where nothing
-    /// was hit and in the first picture.
-    flow::Flow,
-}
+with_channels!(channels);

@@ -1,7 +1,7 @@
 //! The smooth normal and the texture coordinates at a point of a triangle.
 
-use super::vector::{V3, cross, dot, scale, sub, to_f64};
 use kinetoscope_scene::RenderMesh;
+use kinetoscope_scene::vector::{V3, cross, dot, scale, sub, to_f64};
 
 /// Points are lifted by this part of the size of their triangle, at most: those of a ball of eight sides are.
 const LIFT: f64 = 0.15;

@@ -10,15 +10,14 @@
 //! height fields look at the first cells in all lanes. Rays that run apart are cast one by one.
 
 pub mod assets;
-pub(crate) mod basis;
-pub mod bvh;
+pub(crate) mod bvh;
 pub(crate) mod corner;
 pub mod packet;
-pub mod ray;
-pub mod shape;
-pub mod triangle;
-pub mod vector;
+pub(crate) mod shape;
+pub(crate) mod triangle;
 pub mod world;
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::Dice;

@@ -1,9 +1,9 @@
 //! Rays that are cast together, one in each lane.
 
-use super::vector::V3;
-use crate::geometry::ray::Ray;
 use crate::simd::{D, D3, DOUBLES, Simd, axes, dot_3, load_3};
 use kinetoscope_scene::PoseF64;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::V3;
 
 /// Rays of a packet.
 pub const WIDTH: usize = DOUBLES;

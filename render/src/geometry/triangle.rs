@@ -1,9 +1,9 @@
 //! A ray against a triangle, without gaps between neighbours.
 
 use super::packet::{ALL, Packet, WIDTH};
-use super::vector::{V3, cross, dot, sub, to_f64, unit};
-use crate::geometry::ray::Ray;
 use crate::simd::{D, D3, N, Simd, axes, dot_3};
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::{V3, cross, dot, sub, to_f64, unit};
 
 /// Corners of a triangle \[m\].
 pub(crate) type Triangle = [[f32; 3]; 3];

@@ -2,12 +2,13 @@
 
 use super::bvh::{Beam, Bvh, Stack, Walked};
 use super::packet::{Packet, WIDTH};
-use super::shape::{ForShape, RayShape, Solid, Touch};
+use super::shape::{ForShape, RayShape, Solid};
 use super::triangle::ShearPacket;
-use super::vector::{V3, dot};
 use crate::geometry::assets::RayAssets;
-use crate::geometry::ray::Ray;
 use crate::simd::{D, Level, Simd, at_level};
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::shape::Intersection;
+use kinetoscope_scene::vector::{V3, dot};
 use kinetoscope_scene::{PoseF64, RenderScene};
 use std::ops::Range;
 use std::sync::Arc;
@@ -439,7 +440,7 @@ impl<S: Simd> ForShape for Sweep<'_, S> {
 
 /// Keeps a touch that is nearer than the hit, or as near and of an instance that comes before.
 #[inline(always)]
-fn keep(hit: &mut RayHit, direction: V3, target: &Target, placed: &Placed, touch: Touch) {
+fn keep(hit: &mut RayHit, direction: V3, target: &Target, placed: &Placed, touch: Intersection) {
     if touch.t < hit.distance || touch.t == hit.distance && target.instance < hit.instance {
         let normal = placed.world_from_target.rotate(touch.normal);
         let normal = if dot(normal, direction) > 0.0 { normal.map(|x| 0.0 - x) } else { normal };

@@ -2,12 +2,12 @@
 
 use super::point::Point;
 use super::{Path, Paths, SCATTERED, above, times};
-use crate::geometry::basis::Basis;
-use crate::geometry::ray::Ray;
-use crate::geometry::vector::{V3, along, dot, sub, unit};
 use crate::shade::shadow_rays::REACH;
 use crate::simd::Simd;
 use crate::trace::Hit;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::basis::Basis;
+use kinetoscope_scene::vector::{V3, along, dot, sub, unit};
 use std::f64::consts::PI;
 
 /// Pairs of numbers of what glows, two at each surface: far beyond those of paths.
@@ -60,8 +60,8 @@ impl Paths<'_> {
         };
         let (from, [_, side]) = (above(point, 1.0), pair(0));
         let Some(pose) = self.tracer.pose_of(emitter.instance, path.time) else { return none };
-        let Some(chosen) = emitter.choose(pose.apply_inverse(from), side, pair(1)) else { return none };
-        let to = sub(pose.apply(chosen.at), from);
+        let Some((chosen, density)) = emitter.choose(pose.apply_inverse(from), side, pair(1)) else { return none };
+        let to = sub(pose.apply(chosen.position), from);
         let (distance, Some(direction)) = (dot(to, to).sqrt(), unit(to)) else { return none };
         let basis = Basis::of(point.normal);
         let (local, i) = (basis.to_local(o), basis.to_local(direction));
@@ -83,7 +83,7 @@ impl Paths<'_> {
         if there.alpha < 1.0 && !there.front {
             return none;
         }
-        let likely = chosen.density * emitter.share();
+        let likely = density * emitter.share();
         let share = self.ways.looking(likely, point.lobe.likely(local, i));
         let scatter = point.lobe.scatter(local, i);
         let by = share * passes * there.alpha * (1.0 - there.lobe.mirror) / likely;

@@ -1,14 +1,14 @@
 //! Where a camera's paths begin, and which way they go.
 
-use crate::geometry::basis::Basis;
+use kinetoscope_scene::basis::Basis;
 
 use crate::aperture::Aperture;
-use crate::geometry::ray::Ray;
-use crate::geometry::vector::{along, dot, scale, sub};
 use crate::lens::rays::LensRays;
-use crate::path::disc::on_disc;
 use crate::visibility::Projection;
 use kinetoscope_scene::PoseF64;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::sampling::on_disc;
+use kinetoscope_scene::vector::{along, dot, scale, sub};
 
 /// A camera, as paths see it.
 #[derive(Clone, Copy, Debug)]

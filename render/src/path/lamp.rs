@@ -1,11 +1,11 @@
 //! Lamps, as paths see them.
 
-use crate::geometry::basis::Basis;
+use kinetoscope_scene::basis::Basis;
 
-use crate::geometry::vector::{V3, along, dot, scale, sub, to_f64, unit};
-use crate::path::disc::on_disc;
 use crate::shade::light::{cos_deg, whole_exponent};
 use crate::visibility::Projection;
+use kinetoscope_scene::sampling::on_disc;
+use kinetoscope_scene::vector::{V3, along, dot, scale, sub, to_f64, unit};
 use kinetoscope_scene::{Light, LightKind};
 
 /// A lamp of a frame.

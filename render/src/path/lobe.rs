@@ -5,9 +5,9 @@
 //! Schlick, 1994; Lagarde and de Rousiers, Moving Frostbite to physically based rendering, 2014 (F90).
 
 use super::brightness;
-use super::disc::{cosine, turn};
-use crate::geometry::vector::{V3, dot, scale};
 use kinetoscope_scene::Material;
+use kinetoscope_scene::sampling::{cosine, turn};
+use kinetoscope_scene::vector::{V3, dot, scale};
 use std::f64::consts::PI;
 
 /// How a point scatters.

@@ -7,7 +7,6 @@
 //! light are those of [`Renderer`](crate::renderer::Renderer).
 
 mod direct;
-pub(crate) mod disc;
 mod emitter;
 pub(crate) mod eye;
 pub mod film;
@@ -21,10 +20,7 @@ mod texel;
 #[cfg(test)]
 mod tests;
 
-use crate::geometry::basis::Basis;
 use crate::geometry::bvh::Stack;
-use crate::geometry::ray::Ray;
-use crate::geometry::vector::{V3, along, dot, scale, to_f64};
 use crate::shade::tone;
 use crate::shutter::Clock;
 use crate::simd::Simd;
@@ -33,6 +29,9 @@ use crate::trace::{Hit, Tracer};
 use crate::visibility::Projection;
 use emitter::{Emitters, power_heuristic};
 use eye::Eye;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::basis::Basis;
+use kinetoscope_scene::vector::{V3, along, dot, scale, to_f64};
 use kinetoscope_scene::{Light, LightSum, PoseF64, RenderScene, Texture};
 use lamp::Lamp;
 use point::Point;

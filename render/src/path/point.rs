@@ -3,9 +3,9 @@
 use super::lobe::Lobe;
 use super::texel;
 use crate::geometry::corner::in_triangle;
-use crate::geometry::ray::Ray;
-use crate::geometry::vector::{V3, along, dot, scale, sub, unit};
 use crate::trace::Hit;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::{V3, along, dot, scale, sub, unit};
 use kinetoscope_scene::{Instance, RenderScene, Shape, TextureKind};
 
 /// A point of a surface.

@@ -7,11 +7,11 @@ mod shadows;
 
 use super::*;
 use crate::geometry::assets::RayAssets;
-use crate::geometry::vector::sub;
 use crate::raster::Layer;
 use crate::simd::Scalar;
 use crate::visibility::View;
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
+use kinetoscope_scene::vector::sub;
 use kinetoscope_scene::{Headlight, Hemisphere, Instance, LightKind, Material, PoseF32, Shape, Sky};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
 use std::f64::consts::PI;
@@ -206,7 +206,7 @@ fn lights() {
     let square = dot(to, to);
     let down = [-0.7, -0.5, -1.5];
     let spot = LightKind::Spot { cutoff_deg: 30.0, exponent: 3.0 };
-    let axis = crate::geometry::vector::unit(down.map(f64::from)).unwrap();
+    let axis = kinetoscope_scene::vector::unit(down.map(f64::from)).unwrap();
     let inside = -dot(axis, to) / square.sqrt();
     for (light, part) in [
         (lamp(LightKind::Directional, place, down), -axis[2]),
@@ -323,8 +323,8 @@ fn ggx_highlights() {
         // The first is the direction of the mirror.
         let all = [[-1.6f32, 0.0, 1.2], [-1.5, 0.3, 1.2], [-1.0, 0.5, 2.0], [0.0, 0.0, 2.0]].map(|eye| {
             let (mean, _) = seen(&scene, &ONE, &looking(eye, [0.0; 3]), 1, 0);
-            let o = crate::geometry::vector::unit(eye.map(f64::from)).unwrap();
-            let h = crate::geometry::vector::unit(add(o, toward_light)).unwrap();
+            let o = kinetoscope_scene::vector::unit(eye.map(f64::from)).unwrap();
+            let h = kinetoscope_scene::vector::unit(add(o, toward_light)).unwrap();
             let alpha2 = 2.0 / ((128.0 * f64::from(shininess)).max(1.0) + 2.0);
             let d = alpha2 / (PI * (h[2] * h[2] * (alpha2 - 1.0) + 1.0).powi(2));
             let lambda = |cos: f64| ((1.0 + alpha2 * (1.0 / (cos * cos) - 1.0)).sqrt() - 1.0) / 2.0;

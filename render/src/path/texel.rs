@@ -1,8 +1,8 @@
 //! Colours of textures at one point: bilinear within the level that is as fine as asked.
 
-use crate::geometry::vector::V3;
 use kinetoscope_scene::Texture;
 use kinetoscope_scene::material::Level;
+use kinetoscope_scene::vector::V3;
 
 /// Linear colour at (u, v), v upward, where `footprint` texture coordinates are seen together.
 pub(super) fn at(texture: &Texture, [u, v]: [f64; 2], footprint: f64) -> V3 {

@@ -10,7 +10,7 @@ use kinetoscope_scene::{Instance, Marker, PoseF32, RenderMesh, RenderScene};
 
 /// A primitive or a cluster that may be seen.
 #[derive(Clone, Copy, Debug)]
-pub struct Item {
+pub(crate) struct Item {
     pub(crate) instance: u32,
     /// `None` for shapes with a closed form.
     pub(crate) cluster: Option<u32>,
@@ -24,7 +24,7 @@ pub struct Item {
 
 /// An instance as the camera sees it.
 #[derive(Clone, Copy, Debug)]
-pub struct Placed {
+pub(crate) struct Placed {
     pub(crate) camera_from_instance: PoseF32,
     pub(crate) local: LocalCamera,
     /// Whether the camera is outside of the instance's bounds, far enough that nothing is cut off in front.
@@ -79,7 +79,7 @@ impl Layer {
 
 /// In which parts instances are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Parts {
+pub(crate) enum Parts {
     /// Meshes by cluster, each as coarse as it may be.
     Levels,
     /// Meshes by cluster, as they are.
@@ -90,7 +90,7 @@ pub enum Parts {
 
 /// Everything that may be seen in a frame.
 #[derive(Clone, Debug, Default)]
-pub struct DrawList {
+pub(crate) struct DrawList {
     pub(crate) placed: Vec<Placed>,
     /// Opaque things, the nearest first.
     pub(crate) opaque: Vec<Item>,

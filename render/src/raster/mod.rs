@@ -7,7 +7,7 @@
 mod cluster;
 mod detail;
 mod draw_list;
-pub mod tile;
+pub(crate) mod tile;
 mod triangle;
 
 use crate::simd::{COLUMN, F, LANES, M, ROW, Simd, U};
@@ -15,7 +15,8 @@ use crate::simd::{load, load_u, select, select_u, splat, splat_u, store, store_u
 use crate::visibility::{Projection, primitive};
 use cluster::{Pass, Vertices};
 pub(crate) use detail::level;
-pub use draw_list::{DrawList, Item, Layer, Parts, Placed};
+pub use draw_list::Layer;
+pub(crate) use draw_list::{DrawList, Item, Parts, Placed};
 use kinetoscope_scene::{RenderScene, Shape};
 use tile::{BLOCK, NOTHING, SAMPLES, Tile};
 

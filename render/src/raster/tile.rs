@@ -9,7 +9,7 @@ pub(crate) const NOTHING: u32 = u32::MAX;
 
 /// Where the samples of a pixel are, from its centre, in 1/256 pixel. The first is the centre, which all channels but the
 /// colour see; the other four are the rotated grid that graphics cards use.
-pub const SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, -96], [96, -32], [-96, 32], [32, 96]];
+pub(crate) const SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, -96], [96, -32], [-96, 32], [32, 96]];
 /// The largest offset of a sample.
 pub(crate) const REACH: i32 = 96;
 

@@ -8,11 +8,11 @@ use super::surface::{Source, Surface};
 use super::tone::{decode_bytes, to_bytes};
 use crate::geometry::bvh::Stack;
 use crate::geometry::corner::in_triangle;
-use crate::geometry::ray::Ray;
-use crate::geometry::vector::{along, dot, scale, sub, to_f64};
 use crate::simd::{F, LANES, M, Simd, V3, load, max, min, splat};
 use crate::trace::motion::NOW;
 use crate::trace::{Hit, Tracer};
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::{along, dot, scale, sub, to_f64};
 use kinetoscope_scene::{Instance, LightSum, RenderScene, Shape};
 use std::cell::RefCell;
 

@@ -1,14 +1,14 @@
 //! Shadows and ambient occlusion by rays, for pictures that are shaded without paths.
 
-use crate::geometry::basis::Basis;
 use crate::geometry::bvh::Stack;
-use crate::geometry::ray::Ray;
-use crate::geometry::vector::{along, dot, scale, sub, to_f64};
-use crate::path::disc::cosine;
 use crate::path::sobol::Sequence;
 use crate::simd::{F, LANES, M, Simd, V3, load, splat};
 use crate::trace::Tracer;
 use crate::trace::motion::NOW;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::basis::Basis;
+use kinetoscope_scene::sampling::cosine;
+use kinetoscope_scene::vector::{along, dot, scale, sub, to_f64};
 use kinetoscope_scene::{Light, LightKind};
 use std::cell::RefCell;
 

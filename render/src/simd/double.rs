@@ -145,7 +145,7 @@ pub(crate) fn load_3<S: Simd>(s: S, x: &[[f64; DOUBLES]; 3]) -> D3<S> {
     [D::load(s, &x[0]), D::load(s, &x[1]), D::load(s, &x[2])]
 }
 
-/// As [`dot`](crate::geometry::vector::dot), to the bit.
+/// As [`dot`](kinetoscope_scene::vector::dot), to the bit.
 #[inline(always)]
 pub(crate) fn dot_3<S: Simd>(a: D3<S>, b: D3<S>) -> D<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

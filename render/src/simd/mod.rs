@@ -11,12 +11,12 @@ mod vector;
 
 pub(crate) use double::{D3, axes, dot_3, load_3};
 pub(crate) use fearless_simd::Level as SimdLevel;
-pub use scalar::Scalar;
+pub(crate) use scalar::Scalar;
 pub(crate) use vector::{D, F, F4, F8, I, M, N, Simd, U};
 
 /// An instruction set that this machine has.
 #[derive(Clone, Copy, Debug)]
-pub enum Level {
+pub(crate) enum Level {
     /// Plain loops.
     Scalar,
     /// What the SIMD library found.
@@ -25,7 +25,7 @@ pub enum Level {
 
 impl Level {
     /// The best one.
-    pub fn best() -> Self {
+    pub(crate) fn best() -> Self {
         let level = SimdLevel::new();
         if level.is_fallback() { Self::Scalar } else { Self::Simd(level) }
     }
@@ -275,7 +275,8 @@ impl<S: Simd> V3<S> {
 }
 
 /// Every level that this machine has, the scalar one first: for tests that all of them give the same bits.
-pub fn levels() -> Vec<Level> {
+#[cfg(test)]
+pub(crate) fn levels() -> Vec<Level> {
     let mut levels = vec![Level::Scalar];
     let best = SimdLevel::new();
     #[cfg(target_arch = "x86_64")]

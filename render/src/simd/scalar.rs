@@ -4,7 +4,7 @@ use super::{DOUBLES, LANES, Simd};
 
 /// No instruction set but what every machine has.
 #[derive(Clone, Copy, Debug)]
-pub struct Scalar;
+pub(crate) struct Scalar;
 
 // One copy of each loop: inlined into the kernels they would make functions of a hundred thousand instructions.
 #[inline(never)]

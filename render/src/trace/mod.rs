@@ -17,15 +17,14 @@ use super::raster::{Item, Layer, Placed};
 use crate::geometry::assets::{Assets, RayAssets};
 use crate::geometry::bvh::Stack;
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::ray::Ray;
-use crate::geometry::shape::Solid;
 use crate::geometry::shape::mesh::MeshTree;
 use crate::geometry::triangle::ShearPacket;
-use crate::geometry::vector::{V3, along, dot, scale};
 use crate::lens::Sight;
 use crate::lens::rays::LensRays;
 use crate::simd::Simd;
 use crate::visibility::Projection;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::{V3, along, dot, scale};
 use kinetoscope_scene::{Instance, Marker, PoseF32, PoseF64, RenderMesh, RenderScene, Shape};
 use motion::{Motion, rigid, wide};
 use std::sync::Arc;
@@ -49,7 +48,7 @@ enum Body {
     /// Triangles, and the mesh that they are of.
     Mesh(Arc<RenderMesh>, Arc<MeshTree>),
     /// A closed form.
-    Closed(Solid),
+    Closed(Shape),
 }
 
 /// A body in the world.
@@ -92,11 +91,7 @@ pub(crate) struct Tracer {
 
 impl Body {
     fn of(instance: &Instance, known: Option<Self>, assets: &mut Assets) -> Self {
-        let mesh = match &instance.shape {
-            Shape::Mesh(shape) => &shape.mesh,
-            Shape::HeightField(shape) => shape.mesh(),
-            shape => return Self::Closed(Solid::of(shape, assets)),
-        };
+        let Some(mesh) = instance.shape.mesh() else { return Self::Closed(instance.shape.clone()) };
         match known {
             Some(Self::Mesh(of, tree)) if Arc::ptr_eq(&of, mesh) => Self::Mesh(of, tree),
             _ => Self::Mesh(Arc::clone(mesh), assets.mesh(mesh)),
@@ -107,7 +102,7 @@ impl Body {
     fn bounds(&self) -> Option<[V3; 2]> {
         match self {
             Self::Mesh(_, tree) => Some(tree.bounds()),
-            Self::Closed(solid) => solid.bounds(),
+            Self::Closed(shape) => shape.bounds(),
         }
     }
 }
@@ -220,10 +215,10 @@ impl Tracer {
                             left *= (1.0 - alpha).powi(self.fronts(thing, ray, limit, time, stack));
                             return limit;
                         }
-                        let local = seen_from(ray, &placed.at(time));
+                        let local = ray.seen_from(&placed.at(time));
                         let blocked = match &self.bodies[*instance as usize] {
                             Some(Body::Mesh(_, tree)) => tree.blocks(&local, limit, stack),
-                            Some(Body::Closed(solid)) => solid.touch(&local, limit, stack).is_some(),
+                            Some(Body::Closed(shape)) => shape.intersect(&local, limit).is_some(),
                             None => false,
                         };
                         if !blocked {
@@ -266,19 +261,19 @@ impl Tracer {
     #[inline(always)]
     fn meet(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Found> {
         let placed @ Thing { instance, .. } = &self.things[thing as usize];
-        let local = seen_from(ray, &placed.at(time));
+        let local = ray.seen_from(&placed.at(time));
         match self.bodies[*instance as usize].as_ref()? {
             Body::Mesh(_, tree) => {
                 let (distance, index) = tree.nearest(&local, limit, None, stack)?;
                 Some(Found { thing, distance, index, normal: [0.0; 3] })
             }
-            Body::Closed(solid) => {
-                let touch = solid.touch(&local, limit, stack)?;
+            Body::Closed(shape) => {
+                let at = shape.intersect(&local, limit)?;
                 // These bodies are convex, about their origin: outward is where the surface is. A plane's points are level
                 // with it.
-                let inward = dot(touch.normal, local.at(touch.t)) < 0.0 && !matches!(solid, Solid::Plane(_));
-                let normal = scale(touch.normal, if inward { -1.0 } else { 1.0 });
-                Some(Found { thing, distance: touch.t, index: 0, normal })
+                let inward = dot(at.normal, local.at(at.t)) < 0.0 && !shape.is_one_sided();
+                let normal = scale(at.normal, if inward { -1.0 } else { 1.0 });
+                Some(Found { thing, distance: at.t, index: 0, normal })
             }
         }
     }
@@ -360,12 +355,6 @@ struct Found {
     index: usize,
     /// Of a closed form, out of it, in its own frame.
     normal: V3,
-}
-
-/// The ray in the frame that a pose maps from.
-#[inline(always)]
-fn seen_from(ray: &Ray, pose: &PoseF64) -> Ray {
-    Ray { origin: pose.apply_inverse(ray.origin), direction: pose.rotate_inverse(ray.direction) }
 }
 
 /// Where a thing with bounds in its own frame may be seen.
@@ -456,10 +445,10 @@ impl Lens {
                     *index = tree.number(*index) as usize;
                 }
             }
-            Body::Closed(solid) => {
+            Body::Closed(shape) => {
                 for k in (0..WIDTH).filter(|&k| packet.has(k)) {
-                    let touch = solid.touch(&rays[k], packet.limit(k), stack);
-                    found[k] = touch.map(|touch| (touch.t, solid.face(&touch, &rays[k])));
+                    let at = shape.intersect(&rays[k], packet.limit(k));
+                    found[k] = at.map(|at| (at.t, shape.face(&at, &rays[k])));
                 }
             }
         }

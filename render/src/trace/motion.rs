@@ -1,6 +1,6 @@
 //! Where something is at times between two poses.
 
-use crate::geometry::vector::{V3, along, sub};
+use kinetoscope_scene::vector::{V3, along, sub};
 use kinetoscope_scene::{PoseF32, PoseF64};
 
 /// The time of the second pose; that of the first is 0.

@@ -4,9 +4,9 @@
 //! Source: Goldsmith and Salmon, Automatic creation of object hierarchies for ray tracing, 1987.
 
 use super::motion::Motion;
-use crate::geometry::ray::Ray;
-use crate::geometry::vector::{V3, scale};
 use kinetoscope_scene::PoseF64;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::{V3, scale};
 
 /// How much larger boxes are: more than the rounding of the test.
 const LARGER: f64 = 1.0 + 1e-6;

@@ -1,7 +1,7 @@
 //! URDF files: read and checked, meshes resolved, components merged into one robot, and written back.
 //!
-//! [`parse`] checks one file and keeps where everything was said; [`resolve`] finds mesh files; [`merge`] turns one or
-//! several files into a [`RobotDescription`](crate::description::RobotDescription); [`mod@write`] goes the other way. No walk over a tree
+//! `parse` checks one file and keeps where everything was said; `resolve` finds mesh files; `merge` turns one or
+//! several files into a [`RobotDescription`](crate::description::RobotDescription); `write` goes the other way. No walk over a tree
 //! recurses, so that neither depth nor size of a file can exhaust the stack.
 
 mod components;
@@ -11,15 +11,15 @@ mod file;
 mod inertial;
 mod joint;
 mod link;
-pub mod merge;
+mod merge;
 mod names;
 mod number;
-pub mod parse;
-pub mod resolve;
+mod parse;
+mod resolve;
 mod rotation;
 mod shapes;
 mod tree;
-pub mod write;
+mod write;
 mod xml;
 
 pub use config::{ComponentCfg, MissingInertia, NameCase, NameCaseCfg, Strictness, UrdfCfg};
@@ -27,6 +27,5 @@ pub use error::UrdfError;
 pub use file::{JointNotes, LimitNotes, LinkNotes, UrdfFile, VisualNotes};
 pub use merge::{Assembly, assemble};
 pub use parse::{parse_file, parse_file_with, parse_str, parse_str_with};
-pub use resolve::{Resolved, Resolver};
 pub use tree::Tree;
 pub use write::{write_urdf, write_urdf_with};

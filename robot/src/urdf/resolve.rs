@@ -27,7 +27,7 @@ const FOLDER_LIMIT: usize = 4096;
 /// What became of a URI.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Resolved {
+pub(super) enum Resolved {
     /// The file exists.
     Found(PathBuf),
     /// The place is known and has no such file.
@@ -59,7 +59,7 @@ pub enum Resolved {
 
 /// Finds the files that a URDF names. Asking twice for the same URI costs nothing.
 #[derive(Debug)]
-pub struct Resolver<'c> {
+pub(super) struct Resolver<'c> {
     packages: &'c BTreeMap<String, PathBuf>,
     folder: PathBuf,
     meshdir: Option<String>,
@@ -83,7 +83,7 @@ struct Search {
 impl<'c> Resolver<'c> {
     /// A resolver for the URDF at `urdf`, with folders of packages by name. Reads `ROS_PACKAGE_PATH` and
     /// `AMENT_PREFIX_PATH`.
-    pub fn new(urdf: &Path, packages: &'c BTreeMap<String, PathBuf>, meshdir: Option<&str>) -> Self {
+    pub(super) fn new(urdf: &Path, packages: &'c BTreeMap<String, PathBuf>, meshdir: Option<&str>) -> Self {
         let paths = |name: &str| {
             let value = std::env::var_os(name).unwrap_or_default();
             std::env::split_paths(&value).filter(|p| !p.as_os_str().is_empty()).collect::<Vec<_>>()
@@ -92,7 +92,7 @@ impl<'c> Resolver<'c> {
     }
 
     /// As [`Resolver::new`], with the two search paths given instead of read from the environment.
-    pub fn with_paths(
+    pub(super) fn with_paths(
         urdf: &Path,
         packages: &'c BTreeMap<String, PathBuf>,
         meshdir: Option<&str>,
@@ -116,19 +116,19 @@ impl<'c> Resolver<'c> {
 
     /// The same resolver with the folder in which it searches what is not found from the URDF.
     #[must_use]
-    pub fn with_asset_root(self, asset_root: Option<&Path>) -> Self {
+    pub(super) fn with_asset_root(self, asset_root: Option<&Path>) -> Self {
         let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
         Self { asset_root: asset_root.map(absolute), ..self }
     }
 
     /// The same resolver with another handling of addresses that are not valid.
     #[must_use]
-    pub fn with_strictness(self, strictness: Strictness) -> Self {
+    pub(super) fn with_strictness(self, strictness: Strictness) -> Self {
         Self { strictness, ..self }
     }
 
     /// The file of a URI.
-    pub fn resolve(&mut self, uri: &str) -> Resolved {
+    pub(super) fn resolve(&mut self, uri: &str) -> Resolved {
         if let Some(known) = self.resolved.get(uri) {
             return known.clone();
         }

@@ -14,6 +14,7 @@ use super::affine::{Affine, IDENTITY, Placement, product, rotation};
 use super::builder::{Builder, Corner};
 use super::dae_material::Binding;
 use super::error::Ctx;
+use super::format::{Format, begins_with_word};
 use super::polygon::triangulate;
 use super::{DaeUpAxis, MeshError, TriMesh};
 
@@ -58,7 +59,17 @@ struct Inputs {
     columns: usize,
 }
 
-pub(super) fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+/// COLLADA.
+pub(super) const FORMAT: Format = Format {
+    code: 2,
+    extensions: &["dae"],
+    is_one_file: true,
+    is_certain: |_| false,
+    likelihood: |bytes| if begins_with_word(bytes, b"<COLLADA") { 4 } else { 0 },
+    read,
+};
+
+fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     let text = decoded(ctx, bytes)?;
     let document = Document::parse(&text).map_err(|e| {
         let pos = e.pos();

@@ -18,10 +18,12 @@ pub enum MeshError {
         source: std::io::Error,
     },
     /// Neither the extension nor the first bytes tell the format.
-    #[error("{}: unknown mesh format; expected .stl, .obj, .dae, .glb or .gltf", path.display())]
+    #[error("{}: unknown mesh format; expected {expected}", path.display())]
     UnknownFormat {
         /// The mesh file.
         path: PathBuf,
+        /// The extensions of the known formats.
+        expected: String,
     },
     /// The file ends before the data it announces.
     #[error("{}: {at} ends early: expected {expected} bytes, found {found}", path.display())]

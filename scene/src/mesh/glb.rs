@@ -9,6 +9,7 @@ use serde_json::Value;
 use super::affine::{Affine, IDENTITY, Placement, product};
 use super::builder::{Builder, Corner};
 use super::error::{Ctx, percent_decoded};
+use super::format::{Format, begins_with_word};
 use super::glb_buffers::{Gltf, item, len};
 use super::{MeshError, MeshMaterial, TextureSource, TriMesh};
 
@@ -20,7 +21,27 @@ const MAX_NODES: usize = 100_000;
 /// Required extensions that change nothing this reader looks at, or that it implements (quantized accessors).
 const HARMLESS: [&str; 3] = ["KHR_mesh_quantization", "KHR_lights_punctual", "KHR_xmp_json_ld"];
 
-pub(super) fn read_glb(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+/// Binary glTF.
+pub(super) const GLB: Format = Format {
+    code: 3,
+    extensions: &["glb"],
+    is_one_file: true,
+    is_certain: |bytes| bytes.starts_with(b"glTF"),
+    likelihood: |_| 0,
+    read: read_glb,
+};
+
+/// glTF.
+pub(super) const GLTF: Format = Format {
+    code: 4,
+    extensions: &["gltf"],
+    is_one_file: false,
+    is_certain: |_| false,
+    likelihood: |bytes| if begins_with_word(bytes, b"\"asset\"") { 3 } else { 0 },
+    read: read_gltf,
+};
+
+fn read_glb(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     let word = |at: usize| {
         let b = bytes.get(at..at + 4).ok_or_else(|| ctx.truncated("GLB header", at as u64 + 4, bytes.len() as u64))?;
         Ok(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
@@ -54,7 +75,7 @@ pub(super) fn read_glb(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError
     read_json(ctx, json, bin)
 }
 
-pub(super) fn read_gltf(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+fn read_gltf(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     read_json(ctx, bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), None)
 }
 

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::load::{Format, read};
+use super::format::Format;
+use super::load::{format_of, read};
 use super::{DaeUpAxis, HullCfg, MeshError, MeshOptions, TriMesh, convex_hull, hull, load_bytes};
 use crate::atomic_file::AtomicFile;
 
@@ -73,7 +74,7 @@ impl HullCache {
         }
         let bytes = read(path)?;
         // The vertices of a plain glTF are in other files, which the key does not cover.
-        let format = Format::of(path, &bytes).filter(|f| *f != Format::Gltf);
+        let format = format_of(path, &bytes).filter(|format| format.is_one_file);
         let entry = self.dir.as_ref().zip(format).map(|(dir, format)| {
             let key = key(&bytes, format, options, scale, cfg);
             let mut name = String::with_capacity(2 * KEY + 5);
@@ -97,14 +98,14 @@ impl HullCache {
     }
 }
 
-pub(super) fn key(bytes: &[u8], format: Format, options: &MeshOptions, scale: [f64; 3], cfg: &HullCfg) -> [u8; KEY] {
+pub(super) fn key(bytes: &[u8], format: &Format, options: &MeshOptions, scale: [f64; 3], cfg: &HullCfg) -> [u8; KEY] {
     let HullCfg { max_vertices, tolerance, min_thickness } = *cfg;
     let MeshOptions { dae_up_axis } = *options;
     let mut hasher = Sha256::new();
     hasher.update(MAGIC);
     hasher.update(hull::ALGORITHM.to_le_bytes());
     hasher.update(READERS.to_le_bytes());
-    hasher.update([format as u8, u8::from(dae_up_axis == DaeUpAxis::Apply), u8::from(min_thickness.is_some())]);
+    hasher.update([format.code, u8::from(dae_up_axis == DaeUpAxis::Apply), u8::from(min_thickness.is_some())]);
     for number in scale.into_iter().chain([tolerance, min_thickness.unwrap_or(0.0)]) {
         hasher.update(number.to_bits().to_le_bytes());
     }
@@ -158,7 +159,7 @@ mod tests {
 
     use super::*;
     use crate::mesh::dae::tests::document;
-    use crate::mesh::write_binary_stl;
+    use crate::mesh::{obj, stl, write_binary_stl};
 
     const TETRAHEDRON: &str = r##"<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
         <p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>"##;
@@ -243,11 +244,11 @@ mod tests {
         let mut keys = std::collections::BTreeSet::new();
         let [ignore, apply] = [DaeUpAxis::Ignore, DaeUpAxis::Apply].map(|dae_up_axis| MeshOptions { dae_up_axis });
         for (bytes, format, options, scale) in [
-            (&b"a"[..], Format::Stl, &ignore, [1.0; 3]),
-            (b"b", Format::Stl, &ignore, [1.0; 3]),
-            (b"a", Format::Obj, &ignore, [1.0; 3]),
-            (b"a", Format::Stl, &apply, [1.0; 3]),
-            (b"a", Format::Stl, &ignore, [1.0, 1.0, -1.0]),
+            (&b"a"[..], &stl::FORMAT, &ignore, [1.0; 3]),
+            (b"b", &stl::FORMAT, &ignore, [1.0; 3]),
+            (b"a", &obj::FORMAT, &ignore, [1.0; 3]),
+            (b"a", &stl::FORMAT, &apply, [1.0; 3]),
+            (b"a", &stl::FORMAT, &ignore, [1.0, 1.0, -1.0]),
         ] {
             keys.extend(configurations.map(|cfg| key(bytes, format, options, scale, &cfg)));
         }

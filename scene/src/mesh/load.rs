@@ -1,51 +1,31 @@
-//! Which reader a file gets.
+//! The list of mesh formats, and which of them a file has.
 
 use std::path::Path;
 
 use super::error::Ctx;
+use super::format::Format;
 use super::{MeshError, MeshOptions, TriMesh, dae, glb, obj, stl};
 
-/// The formats; the hull cache keys by it, because the same bytes under two formats are two meshes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Format {
-    Stl,
-    Obj,
-    Dae,
-    Glb,
-    Gltf,
+/// All formats.
+const FORMATS: [&Format; 5] = [&stl::FORMAT, &obj::FORMAT, &dae::FORMAT, &glb::GLB, &glb::GLTF];
+
+/// The format of a file: by what the first bytes prove, then by extension, then by what the first bytes suggest.
+pub(super) fn format_of(path: &Path, bytes: &[u8]) -> Option<&'static Format> {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let certain = FORMATS.into_iter().find(|format| (format.is_certain)(bytes));
+    let named = || FORMATS.into_iter().find(|format| format.extensions.contains(&extension.as_str()));
+    let likely = || {
+        let all = FORMATS.into_iter().map(|format| ((format.likelihood)(bytes), format));
+        all.filter(|(likelihood, _)| *likelihood > 0).max_by_key(|(likelihood, _)| *likelihood)
+    };
+    certain.or_else(named).or_else(|| likely().map(|(_, format)| format))
 }
 
-impl Format {
-    /// By what the first bytes prove, then by extension, then by what the first bytes suggest.
-    pub(super) fn of(path: &Path, bytes: &[u8]) -> Option<Self> {
-        if bytes.starts_with(b"glTF") {
-            return Some(Self::Glb);
-        }
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-        match extension.as_str() {
-            "stl" | "stlb" => return Some(Self::Stl),
-            "obj" => return Some(Self::Obj),
-            "dae" => return Some(Self::Dae),
-            "glb" => return Some(Self::Glb),
-            "gltf" => return Some(Self::Gltf),
-            _ => {}
-        }
-        let head = &bytes[..bytes.len().min(4096)];
-        let has = |needle: &[u8]| head.windows(needle.len()).any(|w| w == needle);
-        if stl::binary_length(bytes) == Some(bytes.len() as u64) {
-            Some(Self::Stl)
-        } else if has(b"<COLLADA") {
-            Some(Self::Dae)
-        } else if has(b"\"asset\"") {
-            Some(Self::Gltf)
-        } else if head.starts_with(b"solid") && has(b"facet") {
-            Some(Self::Stl)
-        } else if head.starts_with(b"v ") || has(b"\nv ") {
-            Some(Self::Obj)
-        } else {
-            None
-        }
-    }
+/// The extensions of all formats, for a message.
+fn extensions() -> String {
+    let all = FORMATS.map(|format| format!(".{}", format.extensions[0]));
+    let (last, others) = all.split_last().map_or(("", &all[..]), |(last, others)| (last, others));
+    format!("{} or {last}", others.join(", "))
 }
 
 /// Reads a mesh file: STL (binary or ASCII), OBJ with MTL, COLLADA, GLB or glTF.
@@ -67,14 +47,9 @@ pub fn load_with(path: &Path, options: &MeshOptions) -> Result<TriMesh, MeshErro
 /// Reads a mesh from the content of a file; `path` serves the extension, error messages and files beside it.
 pub fn load_bytes(path: &Path, bytes: &[u8], options: &MeshOptions) -> Result<TriMesh, MeshError> {
     let ctx = Ctx { path, options };
-    match Format::of(path, bytes) {
-        Some(Format::Stl) => stl::read(&ctx, bytes),
-        Some(Format::Obj) => obj::read(&ctx, bytes),
-        Some(Format::Dae) => dae::read(&ctx, bytes),
-        Some(Format::Glb) => glb::read_glb(&ctx, bytes),
-        Some(Format::Gltf) => glb::read_gltf(&ctx, bytes),
-        None => Err(MeshError::UnknownFormat { path: path.to_owned() }),
-    }
+    let format = format_of(path, bytes)
+        .ok_or_else(|| MeshError::UnknownFormat { path: path.to_owned(), expected: extensions() })?;
+    (format.read)(&ctx, bytes)
 }
 
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {

@@ -6,6 +6,7 @@ mod cell;
 mod dae;
 mod dae_material;
 mod error;
+mod format;
 mod glb;
 mod glb_buffers;
 mod hull;

@@ -7,8 +7,19 @@ use std::collections::HashMap;
 
 use super::builder::{Builder, Corner};
 use super::error::{Ctx, beside};
+use super::format::{Format, begins_with_word};
 use super::polygon::triangulate;
 use super::{MeshError, TriMesh, mtl};
+
+/// Wavefront OBJ.
+pub(super) const FORMAT: Format = Format {
+    code: 1,
+    extensions: &["obj"],
+    is_one_file: true,
+    is_certain: |_| false,
+    likelihood: |bytes| u8::from(bytes.starts_with(b"v ") || begins_with_word(bytes, b"\nv ")),
+    read,
+};
 
 #[derive(Default)]
 struct Reader {
@@ -21,7 +32,7 @@ struct Reader {
     material: Option<usize>,
 }
 
-pub(super) fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     let mut reader = Reader::default();
     let mut lines = text.lines().enumerate();

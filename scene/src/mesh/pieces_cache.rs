@@ -1,7 +1,7 @@
 //! Convex pieces of mesh files, kept on disk between runs.
 
 use super::hull_cache::{KEY, decoded, encoded, key, store};
-use super::load::{Format, read};
+use super::load::{format_of, read};
 use super::{HullCache, HullCfg, MeshError, MeshOptions, Pieces, PiecesCfg, convex_pieces, load_bytes, pieces};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
@@ -23,7 +23,7 @@ impl HullCache {
         // The scale is checked there.
         self.hull_of_file(path, scale, hull)?;
         let (bytes, options) = (read(path)?, MeshOptions::default());
-        let format = Format::of(path, &bytes).filter(|format| *format != Format::Gltf);
+        let format = format_of(path, &bytes).filter(|format| format.is_one_file);
         let entry = self.dir().zip(format).map(|(dir, format)| {
             let key = pieces_key(&key(&bytes, format, &options, scale, hull), cfg);
             let mut name = String::with_capacity(2 * KEY + 7);
@@ -118,7 +118,8 @@ mod tests {
         let file = files().find(|file| file.extension().is_some_and(|end| end == "pieces")).unwrap();
         let good = fs::read(&file).unwrap();
         // A hit does not cut again: what is planted under the right key comes back.
-        let base = key(&read(&path).unwrap(), Format::Stl, &MeshOptions::default(), [1.0, 2.0, 1.0], &hull);
+        let base =
+            key(&read(&path).unwrap(), &crate::mesh::stl::FORMAT, &MeshOptions::default(), [1.0, 2.0, 1.0], &hull);
         let key = pieces_key(&base, &cfg);
         let planted = Pieces { hulls: fresh.hulls[..1].to_vec(), depth: 0.25 };
         fs::write(&file, bytes_of(&planted, &key)).unwrap();

@@ -5,19 +5,34 @@
 
 use super::builder::{Builder, Corner};
 use super::error::Ctx;
+use super::format::{Format, begins_with_word};
 use super::{MeshError, TriMesh};
+
+/// STL.
+pub(super) const FORMAT: Format = Format {
+    code: 0,
+    extensions: &["stl", "stlb"],
+    is_one_file: true,
+    is_certain: |_| false,
+    likelihood: |bytes| match () {
+        () if binary_length(bytes) == Some(bytes.len() as u64) => 5,
+        () if bytes.starts_with(b"solid") && begins_with_word(bytes, b"facet") => 2,
+        () => 0,
+    },
+    read,
+};
 
 const HEADER: u64 = 84;
 const RECORD: u64 = 50;
 
 /// The length of a binary STL with the triangle count that `bytes` announces; `None` without a whole header.
-pub(super) fn binary_length(bytes: &[u8]) -> Option<u64> {
+fn binary_length(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(80..84)?;
     let count = u32::from_le_bytes([count[0], count[1], count[2], count[3]]);
     Some(HEADER + RECORD * u64::from(count))
 }
 
-pub(super) fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
+fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     let found = bytes.len() as u64;
     let announced = binary_length(bytes);
     // Many exporters begin binary files with "solid", so that the length decides first and the words second.

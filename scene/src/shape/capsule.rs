@@ -1,8 +1,12 @@
 //! A cylinder with round ends.
 
+use super::area_sampling::AreaSampling;
+use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
 use super::grid::{arc, revolve};
-use super::{ShapeImpl, norm};
+use super::interval::{Interval, ball, slab, tube};
+use crate::Ray;
 use crate::mesh::TriMesh;
+use crate::vector::{V3, along, unit};
 
 /// A cylinder along z with half a ball on each end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,7 +17,17 @@ pub struct Capsule {
     pub half_length: f32,
 }
 
-impl ShapeImpl for Capsule {
+impl ClosedForm for Capsule {
+    fn sizes(&self) -> Vec<f32> {
+        vec![self.radius, self.half_length]
+    }
+
+    fn bounds(&self) -> [V3; 2] {
+        let r = f64::from(self.radius);
+        let z = r + f64::from(self.half_length);
+        [[-r, -r, -z], [r, r, z]]
+    }
+
     fn tessellate(&self, segments: usize) -> TriMesh {
         let (r, h) = (f64::from(self.radius), f64::from(self.half_length));
         let (quarter, steps) = (std::f64::consts::FRAC_PI_2, segments.div_ceil(4));
@@ -22,16 +36,33 @@ impl ShapeImpl for Capsule {
         revolve(&profile, segments)
     }
 
-    fn aabb(&self) -> [[f32; 3]; 2] {
-        let (r, z) = (self.radius, self.radius + self.half_length);
-        [[-r, -r, -z], [r, r, z]]
-    }
-
-    fn support(&self, direction: [f64; 3]) -> f64 {
+    fn support(&self, direction: V3) -> f64 {
         f64::from(self.radius) * norm(direction) + f64::from(self.half_length) * direction[2].abs()
     }
 
-    fn sizes(&self) -> Vec<f32> {
-        vec![self.radius, self.half_length]
+    fn hull(&self, add: &mut dyn FnMut(HullPart)) {
+        let (r, h) = (f64::from(self.radius), f64::from(self.half_length));
+        [-h, h].into_iter().for_each(|z| add(HullPart::Ellipsoid { center: [0.0, 0.0, z], radii: [r; 3] }));
+    }
+
+    #[inline(always)]
+    fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
+        let (o, d) = (ray.origin, ray.direction);
+        let (r, h) = (f64::from(self.radius), f64::from(self.half_length));
+        let side = tube(o, d, r);
+        // The balls at the ends are inside of the tube.
+        if side.is_empty() {
+            return None;
+        }
+        let middle = side.and(slab(o[2], d[2], h));
+        let middle = if middle.is_empty() { Interval::EMPTY } else { middle };
+        let whole = [h, -h].iter().fold(middle, |all, end| all.or(ball([o[0], o[1], o[2] - end], d, r)));
+        let t = whole.first(limit)?;
+        let [x, y, z] = along(o, t, d);
+        Some(Intersection { t, normal: unit([x, y, z - z.clamp(-h, h)])? })
+    }
+
+    fn area_sampling(&self) -> Option<&dyn AreaSampling> {
+        None
     }
 }

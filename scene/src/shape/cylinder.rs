@@ -1,8 +1,14 @@
 //! A cylinder.
 
-use super::ShapeImpl;
+use super::area_sampling::{AreaSampling, SurfacePoint};
+use super::closed_form::{ClosedForm, HullPart, Intersection};
 use super::grid::revolve;
+use super::interval::{slab, tube};
+use crate::Ray;
 use crate::mesh::TriMesh;
+use crate::sampling::{on_disc, turn};
+use crate::vector::{V3, along, unit};
+use std::f64::consts::PI;
 
 /// A cylinder along z with flat ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,23 +19,80 @@ pub struct Cylinder {
     pub half_length: f32,
 }
 
-impl ShapeImpl for Cylinder {
-    fn tessellate(&self, segments: usize) -> TriMesh {
-        let (r, h) = (f64::from(self.radius), f64::from(self.half_length));
-        revolve(&[[0., -h], [r, -h], [r, h], [0., h]], segments)
+impl Cylinder {
+    /// Radius and half length \[m\].
+    #[inline(always)]
+    fn size(&self) -> [f64; 2] {
+        [self.radius.into(), self.half_length.into()]
+    }
+}
+
+impl ClosedForm for Cylinder {
+    fn sizes(&self) -> Vec<f32> {
+        vec![self.radius, self.half_length]
     }
 
-    fn aabb(&self) -> [[f32; 3]; 2] {
-        let (r, h) = (self.radius, self.half_length);
+    fn bounds(&self) -> [V3; 2] {
+        let [r, h] = self.size();
         [[-r, -r, -h], [r, r, h]]
     }
 
-    fn support(&self, direction: [f64; 3]) -> f64 {
-        let [x, y, z] = direction;
-        f64::from(self.radius) * x.hypot(y) + f64::from(self.half_length) * z.abs()
+    fn tessellate(&self, segments: usize) -> TriMesh {
+        let [r, h] = self.size();
+        revolve(&[[0., -h], [r, -h], [r, h], [0., h]], segments)
     }
 
-    fn sizes(&self) -> Vec<f32> {
-        vec![self.radius, self.half_length]
+    fn support(&self, direction: V3) -> f64 {
+        let ([x, y, z], [r, h]) = (direction, self.size());
+        r * x.hypot(y) + h * z.abs()
+    }
+
+    fn hull(&self, add: &mut dyn FnMut(HullPart)) {
+        let [r, h] = self.size();
+        [-h, h].into_iter().for_each(|z| add(HullPart::Ellipsoid { center: [0.0, 0.0, z], radii: [r, r, 0.0] }));
+    }
+
+    #[inline(always)]
+    fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
+        let (o, d, [radius, half_length]) = (ray.origin, ray.direction, self.size());
+        let (side, ends) = (tube(o, d, radius), slab(o[2], d[2], half_length));
+        let t = side.and(ends).first(limit)?;
+        // The end that decided, if one did.
+        let flat = if t == ends.enter || t == ends.leave { t != side.enter && t != side.leave } else { false };
+        let [x, y, _] = along(o, t, d);
+        let normal = if flat { [0.0, 0.0, 1.0] } else { unit([x, y, 0.0])? };
+        Some(Intersection { t, normal })
+    }
+
+    /// The side, the lower end, the upper one.
+    fn face(&self, intersection: &Intersection, ray: &Ray) -> usize {
+        match intersection.normal {
+            [0.0, 0.0, _] => 1 + usize::from(ray.at(intersection.t)[2] >= 0.0),
+            _ => 0,
+        }
+    }
+
+    fn area_sampling(&self) -> Option<&dyn AreaSampling> {
+        Some(self)
+    }
+}
+
+impl AreaSampling for Cylinder {
+    fn area(&self) -> f64 {
+        let [r, h] = self.size();
+        2.0 * PI * r * (r + 2.0 * h)
+    }
+
+    fn sample(&self, side: f64, [a, b]: [f64; 2]) -> SurfacePoint {
+        let [r, h] = self.size();
+        let round = 2.0 * h / (r + 2.0 * h);
+        if side < round {
+            let [cos, sin] = turn(a);
+            let position = [r * cos, r * sin, h * (2.0 * b - 1.0)];
+            return SurfacePoint { position, normal: [cos, sin, 0.0], triangle: 0 };
+        }
+        let sign = if side - round < 0.5 * (1.0 - round) { 1.0 } else { -1.0 };
+        let [x, y] = on_disc([a, b]);
+        SurfacePoint { position: [r * x, r * y, sign * h], normal: [0.0, 0.0, sign], triangle: 0 }
     }
 }

@@ -1,8 +1,12 @@
 //! A stretched ball.
 
+use super::area_sampling::AreaSampling;
+use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
+use super::interval::ball;
 use super::sphere::Sphere;
-use super::{ShapeImpl, norm};
+use crate::Ray;
 use crate::mesh::TriMesh;
+use crate::vector::{V3, along, to_f64, unit};
 
 /// A ball stretched along its axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,20 +15,39 @@ pub struct Ellipsoid {
     pub radii: [f32; 3],
 }
 
-impl ShapeImpl for Ellipsoid {
+impl ClosedForm for Ellipsoid {
+    fn sizes(&self) -> Vec<f32> {
+        self.radii.to_vec()
+    }
+
+    fn bounds(&self) -> [V3; 2] {
+        let radii = to_f64(self.radii);
+        [radii.map(|r| -r), radii]
+    }
+
     fn tessellate(&self, segments: usize) -> TriMesh {
-        Sphere { radius: 1.0 }.tessellate(segments).scaled(self.radii.map(f64::from))
+        Sphere { radius: 1.0 }.tessellate(segments).scaled(to_f64(self.radii))
     }
 
-    fn aabb(&self) -> [[f32; 3]; 2] {
-        [self.radii.map(|r| -r), self.radii]
-    }
-
-    fn support(&self, direction: [f64; 3]) -> f64 {
+    fn support(&self, direction: V3) -> f64 {
         norm([0, 1, 2].map(|k| f64::from(self.radii[k]) * direction[k]))
     }
 
-    fn sizes(&self) -> Vec<f32> {
-        self.radii.to_vec()
+    fn hull(&self, add: &mut dyn FnMut(HullPart)) {
+        add(HullPart::Ellipsoid { center: [0.0; 3], radii: to_f64(self.radii) });
+    }
+
+    #[inline(always)]
+    fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
+        let radii = to_f64(self.radii);
+        let round = |v: V3| [0, 1, 2].map(|k| v[k] / radii[k]);
+        let t = ball(round(ray.origin), round(ray.direction), 1.0).first(limit)?;
+        // The gradient of x²/a² + y²/b² + z²/c².
+        let normal = unit(round(round(along(ray.origin, t, ray.direction))))?;
+        Some(Intersection { t, normal })
+    }
+
+    fn area_sampling(&self) -> Option<&dyn AreaSampling> {
+        None
     }
 }

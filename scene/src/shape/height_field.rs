@@ -1,6 +1,7 @@
 //! Terrain.
 
-use super::{RenderMesh, ShapeImpl, largest};
+use super::render_mesh::RenderMesh;
+use super::triangulated::{TriangleSampling, Triangulated};
 use crate::mesh::TriMesh;
 use std::sync::Arc;
 
@@ -90,20 +91,16 @@ impl HeightField {
     }
 }
 
-impl ShapeImpl for HeightField {
-    fn tessellate(&self, _segments: usize) -> TriMesh {
-        self.mesh.to_tri_mesh()
-    }
-
-    fn aabb(&self) -> [[f32; 3]; 2] {
-        self.mesh.bounds()
-    }
-
-    fn support(&self, direction: [f64; 3]) -> f64 {
-        largest(self.mesh.positions(), direction)
+impl Triangulated for HeightField {
+    fn mesh(&self) -> &Arc<RenderMesh> {
+        &self.mesh
     }
 
     fn sizes(&self) -> Vec<f32> {
         self.size.iter().map(|&x| x as f32).collect()
+    }
+
+    fn area_sampling(&self) -> Option<TriangleSampling> {
+        None
     }
 }

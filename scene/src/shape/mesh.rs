@@ -1,7 +1,7 @@
 //! Triangles as a shape.
 
-use super::{RenderMesh, ShapeImpl, largest};
-use crate::mesh::TriMesh;
+use super::render_mesh::RenderMesh;
+use super::triangulated::{TriangleSampling, Triangulated};
 use std::sync::Arc;
 
 /// Triangles, prepared for drawing once and shared.
@@ -11,20 +11,16 @@ pub struct Mesh {
     pub mesh: Arc<RenderMesh>,
 }
 
-impl ShapeImpl for Mesh {
-    fn tessellate(&self, _segments: usize) -> TriMesh {
-        self.mesh.to_tri_mesh()
-    }
-
-    fn aabb(&self) -> [[f32; 3]; 2] {
-        self.mesh.bounds()
-    }
-
-    fn support(&self, direction: [f64; 3]) -> f64 {
-        largest(self.mesh.positions(), direction)
+impl Triangulated for Mesh {
+    fn mesh(&self) -> &Arc<RenderMesh> {
+        &self.mesh
     }
 
     fn sizes(&self) -> Vec<f32> {
         Vec::new()
+    }
+
+    fn area_sampling(&self) -> Option<TriangleSampling> {
+        Some(TriangleSampling::new(&self.mesh))
     }
 }

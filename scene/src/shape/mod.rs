@@ -1,61 +1,72 @@
-//! What can be drawn: one shape per file, all of them in one list.
+//! Shapes: one file for the geometry of each, all of them in one list.
 //!
-//! Sizes have MuJoCo's meaning: half lengths, the axis of round things along z, the centre at the origin.
+//! Sizes have MuJoCo's meaning: half lengths, the axis of round things along z, the centre at the origin. A shape has a
+//! [closed form](ClosedForm) or is [made of triangles](Triangulated).
 
+mod area_sampling;
+mod closed_form;
 mod crease;
 mod deformation;
 mod grid;
+mod interval;
 mod lod;
 pub mod render_mesh;
-mod shape_impl;
+mod triangulated;
 
+use crate::Ray;
 use crate::mesh::TriMesh;
+use crate::vector::{V3, to_f64};
+pub use area_sampling::{AreaSampling, SurfacePoint};
+pub use closed_form::{ClosedForm, ForClosedForm, HullPart, Intersection};
 pub use deformation::smooth_normals;
 pub(crate) use grid::revolve;
 pub use lod::Level;
 pub use render_mesh::{Cluster, RenderMesh};
-use shape_impl::{ShapeImpl, largest, norm};
+use std::sync::Arc;
+pub use triangulated::{TriangleSampling, Triangulated};
 
 /// Declares the shapes: a module with a type of its own each.
 macro_rules! shapes {
-    ($($(#[$doc:meta])* $module:ident :: $Name:ident,)*) => {
+    (
+        closed_forms { $($(#[$doc:meta])* $module:ident :: $Name:ident,)* }
+        triangulated { $($(#[$triangles_doc:meta])* $triangles_module:ident :: $TrianglesName:ident,)* }
+    ) => {
         $(mod $module; pub use $module::$Name;)*
+        $(mod $triangles_module; pub use $triangles_module::$TrianglesName;)*
 
         /// The surface of something, in its own frame.
         #[derive(Clone, Debug)]
         pub enum Shape {
             $($(#[$doc])* $Name($Name),)*
+            $($(#[$triangles_doc])* $TrianglesName($TrianglesName),)*
         }
 
         impl Shape {
             /// The module of every kind of shape.
-            pub const MODULES: &'static [&'static str] = &[$(stringify!($module)),*];
+            pub const MODULES: &'static [&'static str] = &[$(stringify!($module),)* $(stringify!($triangles_module)),*];
 
             /// The name of the kind.
             pub fn name(&self) -> &'static str {
-                match self { $(Self::$Name(_) => stringify!($module).trim_end_matches('_'),)* }
+                match self {
+                    $(Self::$Name(_) => stringify!($module).trim_end_matches('_'),)*
+                    $(Self::$TrianglesName(_) => stringify!($triangles_module).trim_end_matches('_'),)*
+                }
             }
 
-            /// Triangles of the surface, counter-clockwise seen from outside, with about `segments` edges around a circle.
-            /// Infinite planes become 200 m wide.
-            pub fn tessellate(&self, segments: usize) -> TriMesh {
-                match self { $(Self::$Name(shape) => ShapeImpl::tessellate(shape, segments.clamp(3, 1024)),)* }
+            fn geometry(&self) -> Geometry<'_> {
+                match self {
+                    $(Self::$Name(shape) => Geometry::ClosedForm(shape),)*
+                    $(Self::$TrianglesName(shape) => Geometry::Triangulated(shape),)*
+                }
             }
 
-            /// Smallest and largest coordinates \[m\]; infinite where the shape is.
-            pub fn aabb(&self) -> [[f32; 3]; 2] {
-                match self { $(Self::$Name(shape) => ShapeImpl::aabb(shape),)* }
-            }
-
-            /// The largest coordinate along a direction, times the length of the direction \[m\]; infinite where the shape is.
-            pub fn support(&self, direction: [f64; 3]) -> f64 {
-                match self { $(Self::$Name(shape) => ShapeImpl::support(shape, direction),)* }
-            }
-
-            /// The first size that is not a positive finite number.
-            pub fn bad_size(&self) -> Option<f32> {
-                let sizes = match self { $(Self::$Name(shape) => ShapeImpl::sizes(shape),)* };
-                sizes.into_iter().find(|s| !(s.is_finite() && *s > 0.0))
+            /// Does work on a shape with a closed form, compiled for each kind; `None` for triangles.
+            #[inline(always)]
+            pub fn with_closed_form<W: ForClosedForm>(&self, work: W) -> Option<W::Output> {
+                match self {
+                    $(Self::$Name(shape) => Some(work.run(shape)),)*
+                    $(Self::$TrianglesName(_) => None,)*
+                }
             }
         }
 
@@ -64,26 +75,168 @@ macro_rules! shapes {
                 Self::$Name(shape)
             }
         })*
+        $(impl From<$TrianglesName> for Shape {
+            fn from(shape: $TrianglesName) -> Self {
+                Self::$TrianglesName(shape)
+            }
+        })*
     };
 }
 
 shapes! {
-    /// A plane, seen from +z only.
-    plane::Plane,
-    /// A ball.
-    sphere::Sphere,
-    /// A cylinder with round ends.
-    capsule::Capsule,
-    /// A ball stretched along its axes.
-    ellipsoid::Ellipsoid,
-    /// A cylinder with flat ends.
-    cylinder::Cylinder,
-    /// A box.
-    box_::Box,
-    /// Triangles.
-    mesh::Mesh,
-    /// Terrain over a grid.
-    height_field::HeightField,
+    closed_forms {
+        /// A plane, seen from +z only.
+        plane::Plane,
+        /// A ball.
+        sphere::Sphere,
+        /// A cylinder with round ends.
+        capsule::Capsule,
+        /// A ball stretched along its axes.
+        ellipsoid::Ellipsoid,
+        /// A cylinder with flat ends.
+        cylinder::Cylinder,
+        /// A box.
+        box_::Box,
+    }
+    triangulated {
+        /// Triangles.
+        mesh::Mesh,
+        /// Terrain over a grid.
+        height_field::HeightField,
+    }
+}
+
+/// The two kinds of geometry.
+enum Geometry<'a> {
+    ClosedForm(&'a dyn ClosedForm),
+    Triangulated(&'a dyn Triangulated),
+}
+
+impl Shape {
+    /// Triangles of the surface, counter-clockwise seen from outside, with about `segments` edges around a circle.
+    /// Infinite planes become 200 m wide.
+    pub fn tessellate(&self, segments: usize) -> TriMesh {
+        match self.geometry() {
+            Geometry::ClosedForm(shape) => shape.tessellate(segments.clamp(3, 1024)),
+            Geometry::Triangulated(shape) => shape.mesh().to_tri_mesh(),
+        }
+    }
+
+    /// The prepared triangles of a shape that is made of them.
+    pub fn mesh(&self) -> Option<&Arc<RenderMesh>> {
+        match self.geometry() {
+            Geometry::ClosedForm(_) => None,
+            Geometry::Triangulated(shape) => Some(shape.mesh()),
+        }
+    }
+
+    /// Smallest and largest coordinates \[m\]; infinite where the shape is.
+    pub fn aabb(&self) -> [[f32; 3]; 2] {
+        match self.geometry() {
+            // A sum of two numbers of single precision has the same rounding in double precision and then in single.
+            Geometry::ClosedForm(shape) => shape.bounds().map(|corner| corner.map(|x| x as f32)),
+            Geometry::Triangulated(shape) => shape.mesh().bounds(),
+        }
+    }
+
+    /// Smallest and largest coordinates \[m\]; `None` for a shape without an end.
+    pub fn bounds(&self) -> Option<[V3; 2]> {
+        let bounds = match self.geometry() {
+            Geometry::ClosedForm(shape) => shape.bounds(),
+            Geometry::Triangulated(shape) => shape.mesh().bounds().map(to_f64),
+        };
+        bounds.as_flattened().iter().all(|x| x.is_finite()).then_some(bounds)
+    }
+
+    /// The largest coordinate along a direction, times the length of the direction \[m\]; infinite where the shape is.
+    pub fn support(&self, direction: V3) -> f64 {
+        match self.geometry() {
+            Geometry::ClosedForm(shape) => shape.support(direction),
+            Geometry::Triangulated(shape) => extent(shape.mesh().positions(), direction)[1],
+        }
+    }
+
+    /// The smallest and the largest coordinate along a direction, times the length of the direction \[m\]; infinite where the
+    /// shape is.
+    pub fn extent(&self, direction: V3) -> [f64; 2] {
+        match self.geometry() {
+            Geometry::ClosedForm(shape) => [-shape.support(direction.map(|x| -x)), shape.support(direction)],
+            Geometry::Triangulated(shape) => extent(shape.mesh().positions(), direction),
+        }
+    }
+
+    /// Calls `add` with the parts of a shape whose convex hull is that of the shape.
+    pub fn hull(&self, add: &mut dyn FnMut(HullPart)) {
+        match self.geometry() {
+            Geometry::ClosedForm(shape) => shape.hull(add),
+            Geometry::Triangulated(shape) => {
+                shape.mesh().positions().iter().for_each(|p| add(HullPart::Point(to_f64(*p))));
+            }
+        }
+    }
+
+    /// The nearest intersection of a ray and a shape with a closed form at a distance from 0 to `limit`, both included;
+    /// `None` for triangles.
+    #[inline]
+    pub fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
+        self.with_closed_form(Intersect(ray, limit)).flatten()
+    }
+
+    /// Number of the smooth part of the surface at an intersection of a shape with a closed form.
+    pub fn face(&self, intersection: &Intersection, ray: &Ray) -> usize {
+        match self.geometry() {
+            Geometry::ClosedForm(shape) => shape.face(intersection, ray),
+            Geometry::Triangulated(_) => 0,
+        }
+    }
+
+    /// True if the surface is seen from +z only.
+    pub fn is_one_sided(&self) -> bool {
+        matches!(self.geometry(), Geometry::ClosedForm(shape) if shape.is_one_sided())
+    }
+
+    /// Sampling of points of the surface of a shape with a closed form; `None` if only chance finds its light.
+    pub fn area_sampling(&self) -> Option<&dyn AreaSampling> {
+        match self.geometry() {
+            Geometry::ClosedForm(shape) => shape.area_sampling(),
+            Geometry::Triangulated(_) => None,
+        }
+    }
+
+    /// Sampling of points of the triangles of a shape that is made of them; `None` if only chance finds its light.
+    pub fn triangle_sampling(&self) -> Option<TriangleSampling> {
+        match self.geometry() {
+            Geometry::ClosedForm(_) => None,
+            Geometry::Triangulated(shape) => shape.area_sampling(),
+        }
+    }
+
+    /// The first size that is not a positive finite number.
+    pub fn bad_size(&self) -> Option<f32> {
+        let sizes = match self.geometry() {
+            Geometry::ClosedForm(shape) => shape.sizes(),
+            Geometry::Triangulated(shape) => shape.sizes(),
+        };
+        sizes.into_iter().find(|s| !(s.is_finite() && *s > 0.0))
+    }
+}
+
+/// The nearest intersection of a ray up to a distance.
+struct Intersect<'a>(&'a Ray, f64);
+
+impl ForClosedForm for Intersect<'_> {
+    type Output = Option<Intersection>;
+
+    #[inline(always)]
+    fn run<T: ClosedForm>(self, shape: &T) -> Self::Output {
+        shape.intersect(self.0, self.1)
+    }
+}
+
+/// Smallest and largest coordinate of points along a direction, times its length; without points, +inf and -inf.
+fn extent(points: &[[f32; 3]], [x, y, z]: V3) -> [f64; 2] {
+    let along = points.iter().map(|p| x * f64::from(p[0]) + y * f64::from(p[1]) + z * f64::from(p[2]));
+    along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }
 
 #[cfg(test)]

@@ -1,8 +1,15 @@
 //! A ball.
 
+use super::area_sampling::{AreaSampling, SurfacePoint};
+use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
 use super::grid::{arc, revolve};
-use super::{ShapeImpl, norm};
+use super::interval::ball;
+use crate::Ray;
+use crate::basis::Basis;
 use crate::mesh::TriMesh;
+use crate::sampling::turn;
+use crate::vector::{V3, along, dot, scale, unit};
+use std::f64::consts::PI;
 
 /// A ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,21 +18,82 @@ pub struct Sphere {
     pub radius: f32,
 }
 
-impl ShapeImpl for Sphere {
+impl ClosedForm for Sphere {
+    fn sizes(&self) -> Vec<f32> {
+        vec![self.radius]
+    }
+
+    fn bounds(&self) -> [V3; 2] {
+        let r = f64::from(self.radius);
+        [[-r; 3], [r; 3]]
+    }
+
     fn tessellate(&self, segments: usize) -> TriMesh {
         let quarter = std::f64::consts::FRAC_PI_2;
         revolve(&arc(self.radius.into(), 0.0, -quarter, quarter, segments.div_ceil(2)), segments)
     }
 
-    fn aabb(&self) -> [[f32; 3]; 2] {
-        [[-self.radius; 3], [self.radius; 3]]
-    }
-
-    fn support(&self, direction: [f64; 3]) -> f64 {
+    fn support(&self, direction: V3) -> f64 {
         f64::from(self.radius) * norm(direction)
     }
 
-    fn sizes(&self) -> Vec<f32> {
-        vec![self.radius]
+    fn hull(&self, add: &mut dyn FnMut(HullPart)) {
+        add(HullPart::Ellipsoid { center: [0.0; 3], radii: [self.radius.into(); 3] });
+    }
+
+    #[inline(always)]
+    fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
+        let radius = f64::from(self.radius);
+        let t = ball(ray.origin, ray.direction, radius).first(limit)?;
+        Some(Intersection { t, normal: scale(along(ray.origin, t, ray.direction), 1.0 / radius) })
+    }
+
+    fn area_sampling(&self) -> Option<&dyn AreaSampling> {
+        Some(self)
+    }
+}
+
+impl Sphere {
+    /// The radius, and the square of the distance of a point outside; `None` for a point inside.
+    fn seen_from_outside(&self, from: V3) -> Option<(f64, f64)> {
+        let (radius, square) = (f64::from(self.radius), dot(from, from));
+        (square > radius * radius * (1.0 + 1e-9)).then_some((radius, square))
+    }
+}
+
+/// From outside, directions in the cone around the ball are sampled. Source: Shirley, Wang and Zimmerman, Monte Carlo
+/// techniques for direct lighting calculations, 1996.
+impl AreaSampling for Sphere {
+    fn area(&self) -> f64 {
+        let r = f64::from(self.radius);
+        4.0 * PI * r * r
+    }
+
+    fn sample(&self, _side: f64, [a, b]: [f64; 2]) -> SurfacePoint {
+        let z = 2.0 * a - 1.0;
+        let ([cos, sin], flat) = (turn(b), (1.0 - z * z).max(0.0).sqrt());
+        let normal = [flat * cos, flat * sin, z];
+        SurfacePoint { position: scale(normal, self.radius.into()), normal, triangle: 0 }
+    }
+
+    fn sample_from(&self, from: V3, side: f64, at: [f64; 2]) -> Option<(SurfacePoint, Option<f64>)> {
+        let Some((radius, square)) = self.seen_from_outside(from) else { return Some((self.sample(side, at), None)) };
+        let (distance, sine2) = (square.sqrt(), radius * radius / square);
+        let lost = sine2 / (1.0 + (1.0 - sine2).max(0.0).sqrt());
+        let low = at[0] * lost;
+        let (cos, sin2) = (1.0 - low, (low * (2.0 - low)).max(0.0));
+        let ([c, s], sin) = (turn(at[1]), sin2.sqrt());
+        let basis = Basis::of(scale(from, -1.0 / distance));
+        let direction = basis.to_world([sin * c, sin * s, cos]);
+        let far = distance * cos - (radius * radius - square * sin2).max(0.0).sqrt();
+        let normal = unit(along(from, far, direction))?;
+        let point = SurfacePoint { position: scale(normal, radius), normal, triangle: 0 };
+        Some((point, Some(1.0 / (2.0 * PI * lost))))
+    }
+
+    fn density_from(&self, from: V3) -> Option<f64> {
+        let (radius, square) = self.seen_from_outside(from)?;
+        let sine2 = radius * radius / square;
+        Some((1.0 + (1.0 - sine2).max(0.0).sqrt()) / (2.0 * PI * sine2))
     }
 }

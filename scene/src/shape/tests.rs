@@ -1,6 +1,7 @@
 //! Properties of every shape.
+use super::closed_form::norm;
 use super::*;
-use std::sync::Arc;
+use crate::vector::{along, cross, dot, sub};
 
 fn all() -> Vec<Shape> {
     let tetrahedron = Sphere { radius: 0.3 }.tessellate(12);
@@ -140,7 +141,7 @@ fn corner_normals() {
     let height = |k: usize| (k.wrapping_mul(2_654_435_761) >> 7 & 1023) as f32 / 1023.0;
     let terrain = |size| {
         let elevation: Vec<f32> = (0..14 * 17).map(height).collect();
-        HeightField::new(size, 14, 17, &elevation).unwrap().tessellate(0)
+        Shape::from(HeightField::new(size, 14, 17, &elevation).unwrap()).tessellate(0)
     };
     let mut flat = Sphere { radius: 1.0 }.tessellate(16);
     flat.positions[7] = flat.positions[8];
@@ -231,4 +232,65 @@ fn mesh_of_a_render_mesh() {
         // Edges of a box are sharp: each vertex has the normal of its face.
         assert!(triangle.iter().all(|&i| (nalgebra::Vector3::from(normals[i as usize]) - normal).norm() < 1e-6));
     }
+}
+
+/// Directions all around, by a spiral.
+fn directions(count: u32) -> impl Iterator<Item = V3> {
+    (0..count).map(move |k| {
+        let z = 1.0 - 2.0 * (f64::from(k) + 0.5) / f64::from(count);
+        let (sin, cos) = (2.4 * f64::from(k)).sin_cos();
+        [(1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z]
+    })
+}
+
+/// Support, extent and convex hull of a shape are those of its triangles, which are inside by 1 - cos(pi / 512) of a radius.
+#[test]
+fn supports_and_hulls() {
+    for shape in all() {
+        let mesh = shape.tessellate(512);
+        for direction in directions(60) {
+            let [low, high] = shape.extent(direction);
+            let [least, most] = extent(&mesh.positions, direction);
+            assert_eq!(high, shape.support(direction), "{}", shape.name());
+            let inside = |x: f64| (-1e-6..1e-4).contains(&x);
+            assert!(inside(high - most) && inside(least - low), "{}: {low} {high}, {least} {most}", shape.name());
+            let mut hull = f64::NEG_INFINITY;
+            shape.hull(&mut |part| {
+                let reach = |at: V3, radii: V3| dot(at, direction) + norm([0, 1, 2].map(|k| radii[k] * direction[k]));
+                hull = hull.max(match part {
+                    HullPart::Point(at) => reach(at, [0.0; 3]),
+                    HullPart::Ellipsoid { center, radii } => reach(center, radii),
+                });
+            });
+            assert!((hull - high).abs() < 1e-9, "{}: {hull} {high}", shape.name());
+        }
+    }
+}
+
+/// Sampled points are on the surface, where a ray against their normal meets it; the area is that of the triangles.
+#[test]
+fn area_samplings() {
+    let mut sampled = 0;
+    for shape in all() {
+        let mesh = shape.tessellate(256);
+        let corners = |t: &[u32; 3]| t.map(|i| to_f64(mesh.positions[i as usize]));
+        let areas = mesh.triangles.iter().map(corners).map(|[a, b, c]| norm(cross(sub(b, a), sub(c, a))) / 2.0);
+        let expected: f64 = areas.sum();
+        if let Some(triangles) = shape.triangle_sampling() {
+            assert!((triangles.area() / expected - 1.0).abs() < 1e-6, "{}", shape.name());
+        }
+        let Some(sampling) = shape.area_sampling() else { continue };
+        sampled += 1;
+        assert!((sampling.area() / expected - 1.0).abs() < 1e-3, "{}: {} {expected}", shape.name(), sampling.area());
+        for (k, [x, y, z]) in directions(500).enumerate() {
+            let [side, a, b] = [(k as f64 + 0.5) / 500.0, 0.5 + 0.499 * x, 0.5 + 0.499 * y.max(z)];
+            let SurfacePoint { position, normal, .. } = sampling.sample(side, [a, b]);
+            let ray = Ray { origin: along(position, 0.01, normal), direction: normal.map(|x| -x) };
+            let found = shape.intersect(&ray, 1.0).unwrap();
+            assert!((found.t - 0.01).abs() < 1e-9, "{}: {position:?} {normal:?} {found:?}", shape.name());
+            assert!(dot(found.normal, normal).abs() > 1.0 - 1e-9, "{}: {normal:?} {found:?}", shape.name());
+            assert!(shape.face(&found, &ray) < crate::RenderScene::IDS_OF_PRIMITIVE as usize);
+        }
+    }
+    assert_eq!(sampled, 4, "planes, balls, cylinders and boxes");
 }

@@ -14,7 +14,7 @@ pub use caster::{RayAlignment, RayCaster, RayCasterCfg};
 pub use error::RayError;
 pub use kinetoscope_render::geometry::assets::Assets;
 pub use kinetoscope_render::geometry::assets::RayAssets;
-pub use kinetoscope_render::geometry::ray::Ray;
 pub use kinetoscope_render::geometry::world::{RayHit, RayTargets, RayWorld};
+pub use kinetoscope_scene::Ray;
 pub use pattern::RayPattern;
 pub use targets::HitTargets;

@@ -4,21 +4,21 @@ use super::Mutation;
 
 pub(super) const RENDERER: &[Mutation] = &[
     Mutation::of(
-        "kinetoscope-sensors",
+        "kinetoscope-render",
         "tangential coefficients of a lens exchanged",
         "render/src/lens/open_cv.rs",
         [
             "x * g + 2.0 * p1 * x * y + p2 * (r + 2.0 * x * x) + r * (s1 + r * s2),",
             "x * g + 2.0 * p2 * x * y + p1 * (r + 2.0 * x * x) + r * (s1 + r * s2),",
         ],
-        &["camera::tests::lenses::opencv_numbers"],
+        &["tests::lenses::opencv_numbers"],
     ),
     Mutation::of(
-        "kinetoscope-sensors",
+        "kinetoscope-render",
         "optical flow to the left, not to the right",
         "render/src/shade/moves.rs",
         ["let right = u - (there.x * nearness * fx + cx);", "let right = (there.x * nearness * fx + cx) - u;"],
-        &["camera::tests::flow::homography", "camera::tests::flow::random_scenes"],
+        &["tests::flow::homography", "tests::flow::random_scenes"],
     ),
     Mutation::of(
         "kinetoscope-sensors",
@@ -28,11 +28,11 @@ pub(super) const RENDERER: &[Mutation] = &[
         &["camera::tests::stereo::opencv_pairs"],
     ),
     Mutation::of(
-        "kinetoscope-sensors",
+        "kinetoscope-render",
         "rolling shutter from the bottom up",
         "render/src/shutter.rs",
         ["self.last_row.saturating_sub(row) as f64 * self.row", "row as f64 * self.row"],
-        &["camera::tests::shutter::shear"],
+        &["tests::shutter::shear"],
     ),
     Mutation::of(
         "kinetoscope-scene",

@@ -7,9 +7,9 @@
 //! on GPUs, 2009; Ganestam et al., Bonsai: rapid bounding volume hierarchy generation using mini trees, JCGT 4(3), 2015.
 
 use super::{Aabb, Bvh, Node, PAD, WIDE};
-use crate::geometry::vector::to_f64;
 use crate::simd::{F4, Level, Simd, at_level};
 use curve::Curve;
+use kinetoscope_scene::vector::to_f64;
 use leaves::Costs;
 
 mod curve;
@@ -349,7 +349,7 @@ impl Builder {
 mod tests {
     use super::*;
     use crate::geometry::bvh::Stack;
-    use crate::geometry::ray::Ray;
+    use kinetoscope_scene::Ray;
 
     /// Mean number of boxes that a ray down into the unit square tests.
     fn tested(boxes: &[Aabb]) -> f64 {

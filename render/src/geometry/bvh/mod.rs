@@ -9,8 +9,8 @@ mod build;
 pub(crate) use beam::{Beam, FAR, Walked};
 pub(crate) use build::Builder;
 
-use super::vector::{V3, along};
-use crate::geometry::ray::Ray;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::vector::{V3, along};
 use std::ops::Range;
 
 /// Children of a node.

@@ -8,13 +8,14 @@
 
 mod packet;
 
-use super::{RayShape, Touch, Touches};
-use crate::simd::Simd;
+use super::{RayShape, Touches};
+use crate::geometry::assets::Assets;
 use crate::geometry::bvh::Stack;
 use crate::geometry::packet::{ALL, Packet};
-use crate::geometry::vector::{V3, along, unit};
-use crate::geometry::assets::Assets;
-use crate::geometry::ray::Ray;
+use crate::simd::Simd;
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::shape::Intersection;
+use kinetoscope_scene::vector::{V3, along, unit};
 use std::sync::Arc;
 
 /// Cells that a walk looks at one by one before it looks at blocks: rays from above mostly hit in the first or the second.
@@ -136,7 +137,7 @@ impl Field {
 
     /// The surface met in a cell between distances `from` and `to`.
     #[inline(always)]
-    fn cross(&self, walk: &Walk, cell: [usize; 2], from: f64, to: f64) -> Option<Touch> {
+    fn cross(&self, walk: &Walk, cell: [usize; 2], from: f64, to: f64) -> Option<Intersection> {
         let corners = self.corners(cell);
         let [x, y] = [0, 1].map(|k| walk.origin[k] - cell[k] as f64);
         let [dx, dy] = walk.direction;
@@ -153,10 +154,10 @@ impl Field {
             let (gap, closing) = (walk.z - (h + hx * x + hy * y), walk.dz - (hx * dx + hy * dy));
             let normal = || unit([-hx * self.per_metre[0], -hy * self.per_metre[1], 1.0]);
             if (gap + closing * from) * walk.side <= 0.0 {
-                return Some(Touch { t: from, normal: normal()? });
+                return Some(Intersection { t: from, normal: normal()? });
             }
             if (gap + closing * to) * walk.side <= 0.0 {
-                return Some(Touch { t: (-gap / closing).clamp(from, to), normal: normal()? });
+                return Some(Intersection { t: (-gap / closing).clamp(from, to), normal: normal()? });
             }
         }
         None
@@ -164,7 +165,7 @@ impl Field {
 
     /// Walks from distance `from` to distance `to`.
     #[inline(always)]
-    fn walk(&self, walk: &Walk, mut from: f64, to: f64) -> Option<Touch> {
+    fn walk(&self, walk: &Walk, mut from: f64, to: f64) -> Option<Intersection> {
         let position = |t: f64, k: usize| walk.origin[k] + t * walk.direction[k];
         let clamped = |p: f64, lo: usize, hi: usize| (p.max(0.0) as usize).clamp(lo, hi);
         let mut cell = [0, 1].map(|k| clamped(position(from, k), 0, self.cells[k] - 1));
@@ -223,7 +224,7 @@ impl Field {
     /// A ray straight down from above the surface, as height scanners cast them: it crosses one cell, and nothing else must
     /// be known of it. `None` for other rays, for those that begin below the surface, and where it misses the footprint.
     #[inline(always)]
-    fn plumb(&self, ray: &Ray) -> Option<Touch> {
+    fn plumb(&self, ray: &Ray) -> Option<Intersection> {
         let (o, d) = (ray.origin, ray.direction);
         if d[0] != 0.0 || d[1] != 0.0 || d[2] >= 0.0 || o[0].abs() > self.half[0] || o[1].abs() > self.half[1] {
             return None;
@@ -231,11 +232,11 @@ impl Field {
         let [h, hx, hy] = self.surface(o[0], o[1]);
         let t = (o[2] - h) / -d[2];
         let normal = unit([-hx * self.per_metre[0], -hy * self.per_metre[1], 1.0])?;
-        (t >= 0.0).then_some(Touch { t, normal })
+        (t >= 0.0).then_some(Intersection { t, normal })
     }
 
     #[inline(always)]
-    fn touch(&self, ray: &Ray, limit: f64) -> Option<Touch> {
+    fn touch(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
         if let Some(touch) = self.plumb(ray) {
             return (touch.t <= limit).then_some(touch);
         }
@@ -265,7 +266,7 @@ impl Field {
         }
         let wall = |t: f64, axis: usize| {
             let normal = [0, 1, 2].map(|k| if k == axis { 1.0 } else { 0.0 });
-            (t <= limit).then_some(Touch { t, normal })
+            (t <= limit).then_some(Intersection { t, normal })
         };
         let origin = [0, 1].map(|k| (o[k] + self.half[k]) * self.per_metre[k]);
         let direction = [0, 1].map(|k| d[k] * self.per_metre[k]);
@@ -315,11 +316,17 @@ impl HeightField {
     pub(super) fn of(shape: &kinetoscope_scene::shape::HeightField, assets: &mut Assets) -> Self {
         Self { field: assets.height_field(shape) }
     }
+
+    /// Smallest and largest coordinates.
+    pub(super) fn bounds(&self) -> [V3; 2] {
+        let Field { half, floor, top, .. } = &*self.field;
+        [[-half[0], -half[1], *floor], [half[0], half[1], *top]]
+    }
 }
 
 impl RayShape for HeightField {
     #[inline(always)]
-    fn touch(&self, ray: &Ray, limit: f64, _stack: &mut Stack) -> Option<Touch> {
+    fn touch(&self, ray: &Ray, limit: f64, _stack: &mut Stack) -> Option<Intersection> {
         self.field.touch(ray, limit)
     }
 
@@ -331,10 +338,5 @@ impl RayShape for HeightField {
         for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| done >> k & 1 == 0 && packet.has(*k)) {
             *touch = field.touch(&packet.ray(k), packet.limit(k));
         }
-    }
-
-    fn bounds(&self) -> Option<[V3; 2]> {
-        let Field { half, floor, top, .. } = &*self.field;
-        Some([[-half[0], -half[1], *floor], [half[0], half[1], *top]])
     }
 }

@@ -2,16 +2,17 @@
 
 pub(crate) mod columns;
 
-use super::{RayShape, Touch, Touches, touch_each};
-use crate::simd::{D, Level, Simd};
+use super::{RayShape, Touches, touch_each};
+use crate::geometry::assets::Assets;
 use crate::geometry::bvh::{Beam, Builder, Bvh, Stack, Walked};
 use crate::geometry::packet::{Packet, WIDTH};
 use crate::geometry::triangle::{Shear, ShearPacket, Triangle, has_area, normal};
-use crate::geometry::vector::{V3, to_f64};
-use crate::geometry::assets::Assets;
-use crate::geometry::ray::Ray;
+use crate::simd::{D, Level, Simd};
 use columns::Columns;
+use kinetoscope_scene::Ray;
 use kinetoscope_scene::RenderMesh;
+use kinetoscope_scene::shape::Intersection;
+use kinetoscope_scene::vector::{V3, to_f64};
 use std::sync::{Arc, OnceLock};
 
 /// Triangles that a packet tests against all of its rays; where there are more in its way, rays go on one by one. That costs
@@ -78,10 +79,7 @@ impl MeshBuilder {
         let smaller = |a: f32, b: f32| if a < b { a } else { b };
         let larger = |a: f32, b: f32| if a > b { a } else { b };
         let around = |[a, b, c]: &Triangle| {
-            [
-                [0, 1, 2].map(|k| smaller(smaller(a[k], b[k]), c[k])),
-                [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k])),
-            ]
+            [[0, 1, 2].map(|k| smaller(smaller(a[k], b[k]), c[k])), [0, 1, 2].map(|k| larger(larger(a[k], b[k]), c[k]))]
         };
         let (bvh, numbers) = self.builder.build(self.triangles.iter().map(around));
         let triangles = numbers.iter().map(|&number| self.triangles[number as usize]).collect();
@@ -90,8 +88,13 @@ impl MeshBuilder {
 }
 
 impl Mesh {
-    pub(super) fn of(shape: &kinetoscope_scene::shape::Mesh, assets: &mut Assets) -> Self {
-        Self { tree: assets.mesh(&shape.mesh) }
+    pub(super) fn of(mesh: &Arc<RenderMesh>, assets: &mut Assets) -> Self {
+        Self { tree: assets.mesh(mesh) }
+    }
+
+    /// Smallest and largest coordinates.
+    pub(crate) fn bounds(&self) -> [V3; 2] {
+        self.tree.bounds()
     }
 
     #[cfg(test)]
@@ -247,14 +250,14 @@ impl MeshTree {
     }
 
     #[inline(always)]
-    fn touch(&self, (t, index): (f64, usize)) -> Option<Touch> {
-        Some(Touch { t: t + 0.0, normal: normal(&self.triangles[index])? })
+    fn touch(&self, (t, index): (f64, usize)) -> Option<Intersection> {
+        Some(Intersection { t: t + 0.0, normal: normal(&self.triangles[index])? })
     }
 }
 
 impl RayShape for Mesh {
     #[inline(always)]
-    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch> {
+    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Intersection> {
         self.tree.touch(self.tree.nearest(ray, limit, None, stack)?)
     }
 
@@ -276,9 +279,5 @@ impl RayShape for Mesh {
         for k in (0..WIDTH).filter(|&k| packet.has(k)) {
             touches[k] = found[k].and_then(|found| tree.touch(found));
         }
-    }
-
-    fn bounds(&self) -> Option<[V3; 2]> {
-        Some(self.tree.bounds())
     }
 }

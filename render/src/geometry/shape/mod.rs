@@ -1,67 +1,84 @@
-//! What rays hit: one shape per file, all of them in one list.
+//! The geometry that rays hit, in the frame of each shape.
 //!
-//! The shapes are those of [`kinetoscope_scene::Shape`], in their own frames. Planes are seen from the front, solids from both sides: a
-//! ray that begins inside hits the way out. The rasterizer and MuJoCo's `mj_ray` see the same.
+//! Shapes with a closed form come with their intersections ([`ClosedForm`]); triangles get a tree, height fields a pyramid.
+//! Planes are seen from the front, solids from both sides: a ray that begins inside hits the way out. The rasterizer and
+//! MuJoCo's `mj_ray` see the same.
 
-mod interval;
+pub(crate) mod height_field;
+pub(crate) mod mesh;
 mod ray_shape;
 
-use super::bvh::Stack;
-use super::vector::V3;
 use crate::geometry::assets::Assets;
-use crate::geometry::ray::Ray;
+#[cfg(test)]
+use crate::geometry::bvh::Stack;
+use height_field::HeightField;
 use kinetoscope_scene::Shape;
+use kinetoscope_scene::shape::{ClosedForm, ForClosedForm};
+use kinetoscope_scene::vector::V3;
+#[cfg(test)]
+use kinetoscope_scene::{Ray, shape::Intersection};
+use mesh::Mesh;
 use ray_shape::touch_each;
-pub(crate) use ray_shape::{ForShape, RayShape, Touch, Touches};
+pub(crate) use ray_shape::{ForShape, RayShape, Touches};
 
-/// Declares the shapes: a module with a type of its own each, made from the scene's shape of the same name.
-macro_rules! ray_shapes {
-    ($($module:ident :: $Name:ident,)*) => {
-        $(pub(crate) mod $module;)*
-
-        /// A shape, ready for rays.
-        #[derive(Clone, Debug)]
-        pub(crate) enum Solid {
-            $($Name($module::$Name),)*
-        }
-
-        impl Solid {
-            /// The shape of a scene; what is built once for an asset comes from `assets`.
-            pub(crate) fn of(shape: &Shape, assets: &mut Assets) -> Self {
-                match shape { $(Shape::$Name(shape) => Self::$Name($module::$Name::of(shape, assets)),)* }
-            }
-
-            /// Smallest and largest coordinates; `None` for a shape without an end.
-            pub(crate) fn bounds(&self) -> Option<[V3; 2]> {
-                match self { $(Self::$Name(shape) => shape.bounds(),)* }
-            }
-
-            /// Does the work with the shape itself.
-            #[inline(always)]
-            pub(crate) fn with<W: ForShape>(&self, work: W) {
-                match self { $(Self::$Name(shape) => work.run(shape),)* }
-            }
-
-            /// Which smooth part of the surface a ray touches.
-            pub(crate) fn face(&self, touch: &Touch, ray: &Ray) -> usize {
-                match self { $(Self::$Name(shape) => shape.face(touch, ray),)* }
-            }
-
-            /// The nearest surface at a distance from 0 to `limit`, both included.
-            pub(crate) fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch> {
-                match self { $(Self::$Name(shape) => shape.touch(ray, limit, stack),)* }
-            }
-        }
-    };
+/// A shape, ready for rays.
+#[derive(Clone, Debug)]
+pub(crate) enum Solid {
+    ClosedForm(Shape),
+    Mesh(Mesh),
+    HeightField(HeightField),
 }
 
-ray_shapes! {
-    plane::Plane,
-    sphere::Sphere,
-    capsule::Capsule,
-    ellipsoid::Ellipsoid,
-    cylinder::Cylinder,
-    box_::Box,
-    mesh::Mesh,
-    height_field::HeightField,
+impl Solid {
+    /// The shape of a scene; trees and pyramids are shared through `assets`.
+    pub(crate) fn of(shape: &Shape, assets: &mut Assets) -> Self {
+        match (shape, shape.mesh()) {
+            (Shape::HeightField(field), _) => Self::HeightField(HeightField::of(field, assets)),
+            (_, Some(mesh)) => Self::Mesh(Mesh::of(mesh, assets)),
+            (_, None) => Self::ClosedForm(shape.clone()),
+        }
+    }
+
+    /// Smallest and largest coordinates; `None` for a shape without an end.
+    pub(crate) fn bounds(&self) -> Option<[V3; 2]> {
+        match self {
+            Self::ClosedForm(shape) => shape.bounds(),
+            Self::Mesh(shape) => Some(shape.bounds()),
+            Self::HeightField(shape) => Some(shape.bounds()),
+        }
+    }
+
+    /// The nearest surface at a distance from 0 to `limit`, both included, by a ray alone.
+    #[cfg(test)]
+    pub(crate) fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Intersection> {
+        match self {
+            Self::ClosedForm(shape) => shape.intersect(ray, limit),
+            Self::Mesh(shape) => shape.touch(ray, limit, stack),
+            Self::HeightField(shape) => shape.touch(ray, limit, stack),
+        }
+    }
+
+    /// Does the work with the shape itself.
+    #[inline(always)]
+    pub(crate) fn with<W: ForShape>(&self, work: W) {
+        match self {
+            Self::ClosedForm(shape) => {
+                shape.with_closed_form(OfClosedForm(work));
+            }
+            Self::Mesh(shape) => work.run(shape),
+            Self::HeightField(shape) => work.run(shape),
+        }
+    }
+}
+
+/// Work on a shape that has a closed form.
+struct OfClosedForm<W>(W);
+
+impl<W: ForShape> ForClosedForm for OfClosedForm<W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: ClosedForm>(self, shape: &T) {
+        self.0.run(shape);
+    }
 }

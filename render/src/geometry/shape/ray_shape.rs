@@ -2,26 +2,17 @@
 
 use crate::geometry::bvh::Stack;
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::ray::Ray;
-use crate::geometry::vector::V3;
 use crate::simd::Simd;
-
-/// An intersection of a ray and a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Touch {
-    /// Distance along the ray \[m\].
-    pub(crate) t: f64,
-    /// Unit normal of the surface, of either sign.
-    pub(crate) normal: V3,
-}
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::shape::{ClosedForm, Intersection};
 
 /// Intersections of the rays of a packet, lane by lane.
-pub(crate) type Touches = [Option<Touch>; WIDTH];
+pub(crate) type Touches = [Option<Intersection>; WIDTH];
 
 /// The operations of a shape.
 pub(crate) trait RayShape {
     /// The nearest surface at a distance from 0 to `limit`, both included.
-    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Touch>;
+    fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Intersection>;
 
     /// The same for every ray of a packet, up to its limit, to the bit. Of what `touches` were before only those of lanes
     /// without a ray may stay.
@@ -32,14 +23,13 @@ pub(crate) trait RayShape {
     {
         touch_each(self, packet, stack, touches);
     }
+}
 
-    /// Which smooth part of the surface a ray touches, of shapes with a closed form: numbered as the rasterizer's.
-    fn face(&self, _touch: &Touch, _ray: &Ray) -> usize {
-        0
+impl<T: ClosedForm> RayShape for T {
+    #[inline(always)]
+    fn touch(&self, ray: &Ray, limit: f64, _stack: &mut Stack) -> Option<Intersection> {
+        self.intersect(ray, limit)
     }
-
-    /// Smallest and largest coordinates; `None` for a shape without an end.
-    fn bounds(&self) -> Option<[V3; 2]>;
 }
 
 /// One ray after the other.

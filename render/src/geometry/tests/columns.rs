@@ -5,15 +5,15 @@ use super::trees::soup;
 use super::{Dice, bits};
 use crate::geometry::bvh::Stack;
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::ray::Ray;
 use crate::geometry::shape::mesh::columns::{Columns, are_steep};
 use crate::geometry::shape::mesh::{Mesh, MeshTree};
 use crate::geometry::shape::{ForShape, RayShape, Touches};
 use crate::geometry::triangle::{Shear, ShearPacket, Triangle};
-use crate::geometry::vector::{along, cross, dot, scale, sub, to_f64, unit};
 use crate::geometry::world::{RayHit, RayWorld};
 use crate::simd::{Scalar, at_level, levels};
+use kinetoscope_scene::Ray;
 use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::vector::{along, cross, dot, scale, sub, to_f64, unit};
 use kinetoscope_scene::{PoseF64, RenderMesh, Shape, pose};
 use std::sync::Arc;
 

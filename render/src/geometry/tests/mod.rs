@@ -6,32 +6,32 @@ mod shapes;
 mod terrain;
 mod trees;
 
-use crate::geometry::ray::Ray;
-use crate::geometry::shape::Touch;
-use crate::geometry::vector::{V3, unit};
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::shape::Intersection;
+use kinetoscope_scene::vector::{V3, unit};
 
-fn bits(touch: &Option<Touch>) -> Option<(u64, [u64; 3])> {
+fn bits(touch: &Option<Intersection>) -> Option<(u64, [u64; 3])> {
     touch.as_ref().map(|touch| (touch.t.to_bits(), touch.normal.map(f64::to_bits)))
 }
 
 /// Numbers that are the same in every run (PCG's generator of 32 bits, the upper ones).
-pub(super) struct Dice(pub(super) u64);
+pub(crate) struct Dice(pub(crate) u64);
 
 impl Dice {
     /// Between `low` and `high`.
-    pub(super) fn number(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn number(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         low + (high - low) * (self.0 >> 33) as f64 / f64::from(1u32 << 31)
     }
 
-    pub(super) fn point(&mut self, size: f64) -> V3 {
+    pub(crate) fn point(&mut self, size: f64) -> V3 {
         [0; 3].map(|_| self.number(-size, size))
     }
 
     pub(super) fn direction(&mut self) -> V3 {
         loop {
             let p = self.point(1.0);
-            if crate::geometry::vector::dot(p, p) < 1.0
+            if kinetoscope_scene::vector::dot(p, p) < 1.0
                 && let Some(d) = unit(p)
             {
                 return d;
@@ -42,7 +42,7 @@ impl Dice {
     /// A ray from somewhere within `far` of the origin to somewhere within `near` of it.
     pub(super) fn ray(&mut self, far: f64, near: f64) -> Ray {
         let (origin, target) = (self.point(far), self.point(near));
-        let direction = unit(crate::geometry::vector::sub(target, origin)).unwrap();
+        let direction = unit(kinetoscope_scene::vector::sub(target, origin)).unwrap();
         Ray { origin, direction }
     }
 }

@@ -5,14 +5,15 @@ use super::{Dice, bits};
 use crate::geometry::assets::{Assets, RayAssets};
 use crate::geometry::bvh::{Beam, Stack, Walked};
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::ray::Ray;
 use crate::geometry::shape::mesh::{Mesh, MeshTree};
-use crate::geometry::shape::{ForShape, RayShape, Solid, Touch};
+use crate::geometry::shape::{ForShape, RayShape, Solid};
 use crate::geometry::triangle::{ShearPacket, Triangle};
-use crate::geometry::vector::{along, unit};
 use crate::geometry::world::{RayHit, RayTargets, RayWorld};
 use crate::simd::{at_level, levels};
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::shape::Intersection;
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Plane, Sphere};
+use kinetoscope_scene::vector::{along, unit};
 use kinetoscope_scene::{Instance, Material, PoseF64, RenderScene, Shape};
 use std::sync::Arc;
 
@@ -29,7 +30,7 @@ impl ForShape for Compare<'_> {
         let mut stack = Stack::default();
         for (index, rays) in self.rays.chunks(WIDTH).enumerate() {
             let packet = Packet::of(rays, self.max_distance);
-            let alone: [Option<Touch>; WIDTH] = std::array::from_fn(|k| {
+            let alone: [Option<Intersection>; WIDTH] = std::array::from_fn(|k| {
                 let ray = rays.get(k).filter(|ray| ray.is_finite())?;
                 shape.touch(ray, self.max_distance, &mut stack)
             });

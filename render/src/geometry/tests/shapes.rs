@@ -1,18 +1,14 @@
 //! Shapes against closed forms: points on the surface are where rays say they are.
 
 use super::Dice;
-use crate::geometry::assets::Assets;
-use crate::geometry::bvh::Stack;
-use crate::geometry::ray::Ray;
-use crate::geometry::shape::Solid;
-use crate::geometry::vector::{along, dot};
+use kinetoscope_scene::Ray;
 use kinetoscope_scene::Shape;
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
+use kinetoscope_scene::vector::{along, dot};
 
 fn touch(shape: impl Into<Shape>, origin: [f64; 3], direction: [f64; 3]) -> Option<(f64, [f64; 3])> {
-    let direction = crate::geometry::vector::unit(direction).unwrap();
-    let solid = Solid::of(&shape.into(), &mut Assets::default());
-    solid.touch(&Ray { origin, direction }, f64::INFINITY, &mut Stack::default()).map(|t| (t.t, t.normal))
+    let direction = kinetoscope_scene::vector::unit(direction).unwrap();
+    shape.into().intersect(&Ray { origin, direction }, f64::INFINITY).map(|t| (t.t, t.normal))
 }
 
 /// How far outside of the shape a point is: 0 on the surface, negative inside, near the surface a distance \[m\].

@@ -4,13 +4,13 @@ use super::Dice;
 use super::trees::nearest;
 use crate::geometry::assets::Assets;
 use crate::geometry::bvh::Stack;
-use crate::geometry::ray::Ray;
 use crate::geometry::shape::Solid;
 use crate::geometry::shape::height_field::Field;
 use crate::geometry::triangle::Triangle;
-use crate::geometry::vector::unit;
+use kinetoscope_scene::Ray;
 use kinetoscope_scene::Shape;
 use kinetoscope_scene::shape::HeightField;
+use kinetoscope_scene::vector::unit;
 
 /// The field's triangles. Points are a quarter of a metre apart; where single precision has missed that, it is put right.
 fn triangles(field: &HeightField) -> Vec<Triangle> {

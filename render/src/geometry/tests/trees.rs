@@ -2,13 +2,13 @@
 
 use super::Dice;
 use crate::geometry::bvh::{Builder, Bvh, Stack};
-use crate::geometry::ray::Ray;
 use crate::geometry::shape::RayShape;
 use crate::geometry::shape::mesh::{Mesh, MeshBuilder, MeshTree};
 use crate::geometry::triangle::{Shear, Triangle, normal};
-use crate::geometry::vector::{V3, cross, dot, sub, to_f64, unit};
 use crate::simd::levels;
+use kinetoscope_scene::Ray;
 use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::vector::{V3, cross, dot, sub, to_f64, unit};
 use kinetoscope_scene::{RenderMesh, Shape};
 use std::sync::Arc;
 
@@ -146,7 +146,7 @@ fn lost_triangle() {
     let [a, b, c] = triangles[0].map(|p| p.map(f64::from));
     let middle = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
     let n = normal(&triangles[0]).unwrap();
-    let ray = Ray { origin: crate::geometry::vector::along(middle, 1e-4, n), direction: n.map(|x| -x) };
+    let ray = Ray { origin: kinetoscope_scene::vector::along(middle, 1e-4, n), direction: n.map(|x| -x) };
     assert!(nearest_watertight(&ray, &triangles).is_some_and(|t| (t - 1e-4).abs() < 1e-6));
     assert_ne!(distance(&mesh, &ray, f64::INFINITY), nearest_watertight(&ray, &triangles));
 }
@@ -167,7 +167,7 @@ fn degenerate() {
     let nothing = tree(&[]);
     let ray = Ray { origin: [0.0, 0.0, 1.0], direction: [0.0, 0.0, -1.0] };
     assert_eq!(distance(&nothing, &ray, 10.0), None);
-    assert_eq!(nothing.bounds(), Some([[0.0; 3]; 2]));
+    assert_eq!(nothing.bounds(), [[0.0; 3]; 2]);
     // Triangles without an area are left out; the others are hit.
     let flat = [[0u32, 0, 1], [0, 1, 1], [0, 1, 2]];
     let mesh = TriMesh::from_triangles(vec![[-1., -1., 0.], [1., -1., 0.], [0., 2., 0.]], flat.to_vec());

@@ -5,7 +5,6 @@ mod flat;
 mod occlusion;
 mod outline;
 mod solid;
-mod support;
 
 pub use flat::{Box2d, PixelBox};
 pub use occlusion::Occlusion;

@@ -1,8 +1,7 @@
 //! Where in the picture a thing is, as if nothing else were there.
 
-use super::support::reach;
 use kinetoscope_render::visibility::View;
-use kinetoscope_scene::shape::Plane;
+use kinetoscope_scene::shape::{HullPart, Plane};
 use kinetoscope_scene::{Instance, PoseF32, Shape};
 
 /// Edges around a circle of what is cut by a side of the frustum and has no corners of its own: the polygon is inside of
@@ -67,21 +66,25 @@ pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &Po
     let seen =
         Seen { rotation: pose.rotation.map(|row| row.map(f64::from)), translation: pose.translation.map(f64::from) };
     let shape = &instance.shape;
-    if matches!(shape, Shape::Plane(_)) && !is_before(&seen) {
+    if shape.is_one_sided() && !is_before(&seen) {
         return None;
     }
     let (near, far) = (f64::from(view.near), f64::from(view.far));
-    let [low, high] = reach(shape, seen.rotation[2]).map(|z| z + seen.translation[2]);
+    let [low, high] = shape.extent(seen.rotation[2]).map(|z| z + seen.translation[2]);
     if !(high >= near && low <= far) {
         return None;
     }
     let ([fx, fy], [cx, cy]) = ([view.fx, view.fy].map(f64::from), [view.cx, view.cy].map(f64::from));
     let size = [view.width as f64, view.height as f64];
     let pixels = |Extent([x, y]): Extent| [x.map(|x| fx * x + cx), y.map(|y| fy * y + cy)];
-    let endless = matches!(shape, Shape::Plane(Plane { half }) if half.contains(&0.0));
+    let endless = shape.bounds().is_none();
     if low > near && high < far && !endless {
         let mut extent = Extent::NONE;
-        whole(&mut extent, shape, &seen);
+        // x / z has its extremes over a convex hull among those over its parts.
+        shape.hull(&mut |part| match part {
+            HullPart::Point(at) => extent.point(seen.point(at)),
+            HullPart::Ellipsoid { center, radii } => extent.ellipsoid(&seen, center, radii),
+        });
         let found = pixels(extent);
         let beside = |axis: usize| !(found[axis][0] < size[axis] && found[axis][1] > 0.0);
         if beside(0) || beside(1) {
@@ -122,44 +125,6 @@ fn is_before(seen: &Seen) -> bool {
     (0..3).map(|i| seen.rotation[i][2] * seen.translation[i]).sum::<f64>() < 0.0
 }
 
-/// A shape between the near and the far plane. x / z has its extremes over a convex hull among those over its parts.
-fn whole(extent: &mut Extent, shape: &Shape, seen: &Seen) {
-    let wide = f64::from;
-    match shape {
-        Shape::Sphere(s) => extent.ellipsoid(seen, [0.0; 3], [wide(s.radius); 3]),
-        Shape::Ellipsoid(s) => extent.ellipsoid(seen, [0.0; 3], s.radii.map(wide)),
-        Shape::Capsule(s) => {
-            for z in [-wide(s.half_length), wide(s.half_length)] {
-                extent.ellipsoid(seen, [0.0, 0.0, z], [wide(s.radius); 3]);
-            }
-        }
-        Shape::Cylinder(s) => {
-            for z in [-wide(s.half_length), wide(s.half_length)] {
-                extent.ellipsoid(seen, [0.0, 0.0, z], [wide(s.radius), wide(s.radius), 0.0]);
-            }
-        }
-        Shape::Box(s) => {
-            for corner in 0..8 {
-                let side = |k: usize| if corner >> k & 1 == 1 { wide(s.half[k]) } else { -wide(s.half[k]) };
-                extent.point(seen.point([side(0), side(1), side(2)]));
-            }
-        }
-        Shape::Plane(s) => rectangle(s.half.map(wide)).into_iter().for_each(|p| extent.point(seen.point(p))),
-        Shape::Mesh(s) => points(extent, s.mesh.positions(), seen),
-        Shape::HeightField(s) => points(extent, s.mesh().positions(), seen),
-    }
-}
-
-fn points(extent: &mut Extent, positions: &[[f32; 3]], seen: &Seen) {
-    for p in positions {
-        extent.point(seen.point(p.map(f64::from)));
-    }
-}
-
-fn rectangle([x, y]: [f64; 2]) -> [[f64; 3]; 4] {
-    [[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]]
-}
-
 /// Cuts what is on the surface of shapes to the frustum, and measures it.
 struct Cutter {
     sides: [[f64; 4]; 6],
@@ -175,14 +140,16 @@ impl Cutter {
             Shape::Plane(Plane { half }) => {
                 let far = f64::from(view.far);
                 let half = half.map(|half| if half == 0.0 { horizon(view, seen, far) } else { f64::from(half) });
-                self.polygon(&rectangle(half).map(|p| seen.point(p)));
+                let [x, y] = half;
+                self.polygon(&[[-x, -y], [x, -y], [x, y], [-x, y]].map(|[x, y]| seen.point([x, y, 0.0])));
             }
-            Shape::Mesh(s) => self.triangles(s.mesh.positions(), s.mesh.triangles(), seen),
-            Shape::HeightField(s) => self.triangles(s.mesh().positions(), s.mesh().triangles(), seen),
-            _ => {
-                let mesh = shape.tessellate(SEGMENTS);
-                self.triangles(&mesh.positions, &mesh.triangles, seen);
-            }
+            _ => match shape.mesh() {
+                Some(mesh) => self.triangles(mesh.positions(), mesh.triangles(), seen),
+                None => {
+                    let mesh = shape.tessellate(SEGMENTS);
+                    self.triangles(&mesh.positions, &mesh.triangles, seen);
+                }
+            },
         }
     }
 

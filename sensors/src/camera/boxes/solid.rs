@@ -1,6 +1,5 @@
 //! Boxes in the environment.
 
-use super::support::reach;
 use crate::camera::error::CameraError;
 use crate::camera::segmentation::{SegmentLevel, Segmentation};
 use crate::camera::sensor::Camera;
@@ -104,6 +103,6 @@ fn extent(frame: &Pose, instance: &Instance, world_from_instance: &PoseF32) -> [
     let rotation = relative.rotation.to_rotation_matrix();
     [0, 1, 2].map(|axis| {
         let row = rotation.matrix().row(axis);
-        reach(&instance.shape, [row[0], row[1], row[2]]).map(|x| x + relative.translation.vector[axis])
+        instance.shape.extent([row[0], row[1], row[2]]).map(|x| x + relative.translation.vector[axis])
     })
 }

@@ -4,12 +4,12 @@ use super::super::{
     Box2d, Camera, CameraCfg, CameraError, Channels, Extrinsics, Intrinsics, Lens, Occlusion, PixelBox, Placement,
     RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg, Shutter, Thing,
 };
-use super::harness::{Still, at, point, things};
-use super::scenes::{Random, every_shape, random};
+use super::stage::point;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use kinetoscope_scene::pose::from_xyz_rpy;
 use kinetoscope_scene::shape::{Box, Capsule, Ellipsoid, Plane, Sphere};
 use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderScene, SceneState, Shape, VisibleState};
+use kinetoscope_testkit::scenes::{Random, at, every_shape, random, things};
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 use ndarray::Array2;
 use std::collections::BTreeMap;
@@ -127,8 +127,10 @@ fn brute_force() {
                         *x *= k as f32;
                     }
                     let channels = Channels { mask: true, ..Channels::default() };
-                    let image = Still { channels, cfg: cfg.raster, ..Still::new(only(&scene, is), view) }.draw();
-                    around(image.mask(), k * SIZE[0], is)
+                    let (scene, poses) = only(&scene, is);
+                    let by = (Renderer::Raster, Shutter::default());
+                    let frame = super::stage::frame_of(cfg.raster, by, channels, (&scene, &poses, &view), None);
+                    around(frame.mask.as_ref().unwrap(), k * SIZE[0], is)
                 };
                 let [by_itself, fine] = *images.entry(segment.mask_ids.clone()).or_insert_with(|| match lens {
                     true => [around_in(&seen(&cfg, &only(&scene, is)), is), None],

@@ -4,11 +4,11 @@ use super::super::{
     CalibrationError, CameraCfg, CameraInfo, DistortionModel, Intrinsics, Lens, LensRays, Optics, PixelIntrinsics,
     Renderer,
 };
-use super::harness::{opencv, point};
-use super::stage::{built, cfg, context, pose_of};
+use super::stage::{built, cfg, context, point, pose_of};
 use kinetoscope_render::lens::{
     Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
 };
+use kinetoscope_testkit::opencv::opencv;
 use kinetoscope_testkit::urdf::Files;
 
 /// As `cameracalibrator` writes it, with what some drivers add.

@@ -1,34 +1,25 @@
-//! Images through lenses: against closed forms, and against images without a lens of the same rays.
+//! Cameras behind lenses, against closed forms.
 
 use super::super::{
-    Camera, CameraCfg, CameraError, CameraPlacement, Channels, DepthMiss, Intrinsics, Lens, LensRays, PixelIntrinsics,
-    PointFrame, RasterCfg, Renderer,
+    Camera, CameraCfg, CameraError, CameraPlacement, Channels, DepthMiss, Intrinsics, Lens, LensRays, Optics,
+    PixelIntrinsics, PointFrame, Renderer,
 };
-use super::harness::{Still, at, far_apart, look, matt, point, things, unlit};
-use super::lenses::{FISHEYE, WARPED, all, bent, rays_of};
-use super::scenes::{Random, figure, random};
-use super::stage::{self, BALL, GROUND, RADIUS, built, context};
-use super::traced::{Comparison, compare};
+use super::lenses::{WARPED, all};
+use super::stage;
+use super::stage::{BALL, GROUND, RADIUS, built, context, point};
 use crate::SensorError;
 use crate::camera::OpticsError;
 use crate::sensor::{Sensor, SensorCfg};
 use kinetoscope_render::lens::{Equidistant, OpenCv, Panorama};
-use kinetoscope_render::raster::tile::SAMPLES;
-use kinetoscope_render::simd::Level;
-use kinetoscope_render::visibility::{RenderError, View};
-use kinetoscope_scene::shape::{Plane, Sphere};
-use kinetoscope_scene::{Material, Pose, PoseF32, Sky};
+use kinetoscope_render::visibility::RenderError;
+use kinetoscope_scene::Pose;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 1, denoise: false, seed: 3 };
 const SIZE: [usize; 2] = [64, 48];
-
-/// The full figure through a lens.
-fn figure_through(rays: &LensRays) -> Still {
-    let view = look(SIZE, 0.9, [1.6, -0.9, 1.0], [0.1, 0., 0.7]);
-    Still { lens: Some(rays.clone()), ..Still::new(figure(), view) }
-}
+/// Samples of colours, beside the middle of a pixel \[1/256 pixel\].
+const SAMPLES: [[i32; 2]; 4] = [[-32, -96], [96, -32], [-96, 32], [32, 96]];
 
 /// The stage's camera behind a lens.
 fn cfg_of(lens: impl Into<Lens>, pixels: PixelIntrinsics) -> CameraCfg {
@@ -81,7 +72,7 @@ fn channels() {
             let missed = id == 0 && [depth, distance] == [f32::INFINITY; 2] && cloud.x == f64::INFINITY;
             let Some(ray) = optics.ray([x as f64 + 0.5, y as f64 + 0.5]).map(Vector3::from) else {
                 assert!(missed, "{what}");
-                let mut samples = SAMPLES[1..].iter().map(|offset| offset.map(|o| f64::from(o) / 256.0 + 0.5));
+                let mut samples = SAMPLES.iter().map(|offset| offset.map(|o| f64::from(o) / 256.0 + 0.5));
                 if samples.all(|[dx, dy]| optics.ray([x as f64 + dx, y as f64 + dy]).is_none()) {
                     assert_eq!([0, 1, 2, 3].map(|c| color[(0, y, x, c)]), [0, 0, 0, 255], "{what}");
                 }
@@ -124,44 +115,6 @@ fn channels() {
     }
 }
 
-/// A pixel shows what an image of one pixel of a pinhole shows that looks the same way: of meshes, boxes and all else.
-#[test]
-fn single_pixels() {
-    let (mut compared, mut different, mut seen) = (0, 0, 0);
-    for (k, (lens, pixels)) in all().into_iter().enumerate() {
-        let scene = if k % 2 == 0 { figure() } else { random(&mut Random(k as u64), 1.5) };
-        let rays = rays_of(lens, pixels, SIZE);
-        let still = Still::new(scene, look(SIZE, 0.9, [1.3, -0.8, 0.9], [0.1, 0., 0.4]));
-        let mut still = Still { renderer: Renderer::FastRayTraced, lens: Some(rays.clone()), ..still };
-        let mut rasterizer = still.rasterizer(Level::best());
-        let image = still.draw_by(&mut rasterizer).unwrap();
-        let view = still.view;
-        let camera = view.world_from_camera;
-        still.lens = None;
-        for at in (0..SIZE[0] * SIZE[1]).step_by(13) {
-            let Some(ray) = rays.optics().unproject([(at % SIZE[0]) as f64 + 0.5, (at / SIZE[0]) as f64 + 0.5]) else {
-                continue;
-            };
-            let z = Vector3::from(camera.rotation.map(|r| Vector3::from(r.map(f64::from)).dot(&Vector3::from(ray))));
-            let x = z.cross(&if z.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() }).normalize();
-            let y = z.cross(&x);
-            let rotation = [0, 1, 2].map(|i| [x[i] as f32, y[i] as f32, z[i] as f32]);
-            let world_from_camera = PoseF32 { rotation, ..camera };
-            let one = View { width: 1, height: 1, fx: 1e6, fy: 1e6, cx: 0.5, cy: 0.5, world_from_camera, ..view };
-            let alone = Still { view: one, ..still.clone() }.draw_by(&mut rasterizer).unwrap();
-            let (a, b) = (image.distance()[at], alone.depth()[0]);
-            let cosine = Vector3::from(image.normal()[at]).dot(&Vector3::from(alone.normal()[0]));
-            // Forward lenses have near and far along their axis: nothing here is near either.
-            let near = a == b || (a - b).abs() <= 1e-4 * b && cosine > 0.9999;
-            compared += 1;
-            seen += usize::from(alone.mask()[0] != 0);
-            different += usize::from(image.mask()[at] != alone.mask()[0] || !near);
-        }
-    }
-    // Rays that are 1e-7 apart see different triangles within that of an edge: one pixel in thousands.
-    assert!(compared > 1500 && seen > compared / 4 && different * 500 <= compared, "{different} of {compared}");
-}
-
 #[test]
 fn lens_without_distortion() {
     let bits = |lens, renderer| stage::bits(&built(&CameraCfg { lens, renderer, ..stage::cfg() }, &context(1)), 0..1);
@@ -171,142 +124,17 @@ fn lens_without_distortion() {
     // A control: a little bends.
     let little = OpenCv { k1: 1e-3, ..OpenCv::default() }.into();
     assert!(bits(Lens::default(), Renderer::FastRayTraced) != bits(little, Renderer::FastRayTraced));
-    // Its rays from a table show the same too, where no silhouette is.
-    let (mut compared, mut different) = (0, 0);
-    for seed in 0..6 {
-        let view = View { cx: 44.25, fy: 80.5, ..look([101, 75], 1.0, [2.0, 0.5, 1.0], [0.; 3]) };
-        let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
-        let rays = rays_of(OpenCv::default().into(), PixelIntrinsics { fx, fy, cx, cy }, [101, 75]);
-        let still = Still::new(random(&mut Random(seed), 1.2), view);
-        for renderer in [Renderer::FastRayTraced, Renderer::Hybrid] {
-            // Shadow maps cover what a pinhole sees, and everything behind a lens: their edges are not the same.
-            let still = still.with(|still| still.cfg.shadows = renderer == Renderer::Hybrid);
-            let (a, b) = (still.by(renderer), Still { lens: Some(rays.clone()), ..still.clone() }.by(renderer));
-            let Comparison { compared: all, different: other, .. } = compare(&a, &b);
-            (compared, different) = (compared + all, different + other);
-            let differ = far_apart(&a, &b, 3);
-            assert!(differ * 100 < 101 * 75, "{differ} pixels look different by {renderer:?}");
-        }
-    }
-    assert!(compared > 2 * 6 * 101 * 75 / 2 && different * 1000 <= compared, "{different} of {compared}");
 }
 
-/// Samples of colours go through the lens, each where it is in the pixel.
+/// The rasterizer draws straight lines; a lens that folds has two rays for a point.
 #[test]
-fn sample_rays() {
-    let pixels = PixelIntrinsics { fx: 20.0, fy: 22.0, cx: 30.25, cy: 25.5 };
-    let rays = rays_of(FISHEYE.into(), pixels, SIZE);
-    for (k, offset) in SAMPLES.iter().enumerate() {
-        let at = [31.5 + offset[0] as f32 / 256.0, 17.5 + offset[1] as f32 / 256.0];
-        let expected = rays.optics().ray(at.map(f64::from)).unwrap().map(|x| x as f32);
-        assert_eq!(rays.direction(k, [31, 17]), expected);
-    }
-    // A white ball before a black sky: a bright pixel, a dark one, or as many quarters as samples see the ball.
-    let white = Material { emission: 1.0, ..matt([1.0; 3]) };
-    let (scene, poses) = things([(Sphere { radius: 0.4 }, white, PoseF32::IDENTITY)]);
-    let mut scene = unlit(scene);
-    scene.sky = Sky::uniform([0.0; 3]);
-    let view = look(SIZE, 0.9, [1.0, 0.2, 0.3], [0.0; 3]);
-    let still = Still { lens: Some(rays.clone()), ..Still::new((scene, poses), view) };
-    let image = still.by(Renderer::FastRayTraced);
-    let shades: std::collections::BTreeSet<u8> = image.color().iter().map(|c| c[0]).collect();
-    assert_eq!(shades.len(), 5, "{shades:?}");
-    let eye = Vector3::from(view.world_from_camera.translation.map(f64::from));
-    for (k, color) in image.color().iter().enumerate() {
-        let mut margin = f64::INFINITY;
-        let hits = SAMPLES[1..].iter().filter(|offset| {
-            let [dx, dy] = offset.map(|o| f64::from(o) / 256.0 + 0.5);
-            let ray = rays.optics().unproject([(k % SIZE[0]) as f64 + dx, (k / SIZE[0]) as f64 + dy]);
-            let Some(ray) = ray.map(Vector3::from) else { return false };
-            let d = Vector3::from(view.world_from_camera.rotation.map(|r| Vector3::from(r.map(f64::from)).dot(&ray)));
-            let beside = (eye - d * eye.dot(&d)).norm() - 0.4;
-            margin = margin.min(beside.abs());
-            beside < 0.0 && eye.dot(&d) < 0.0
-        });
-        let hits = hits.count();
-        let rank = shades.iter().position(|s| *s == color[0]).unwrap();
-        assert!(rank == hits || margin < 1e-5, "pixel {k}: {hits} samples, shade {rank}");
-    }
-}
-
-/// Paths change no channel but the colour, and leave black what is outside of the image circle; the sky is as bright as
-/// without a lens.
-#[test]
-fn paths() {
-    let pixels = PixelIntrinsics { fx: 16.0, fy: 16.0, cx: 32.0, cy: 24.0 };
-    let rays = rays_of(Equidistant { max_angle: 1.2 }.into(), pixels, SIZE);
-    let still = figure_through(&rays);
-    let [fast, paths] = [Renderer::FastRayTraced, FEW_PATHS].map(|renderer| still.by(renderer));
-    assert!(fast.bits_but_color() == paths.bits_but_color() && fast.color() != paths.color());
-    let (mut scene, poses) = things([(Plane { half: [1e-3; 2] }, Material::default(), at(0.0, 0.0, -50.0))]);
-    scene.sky = Sky::uniform([0.25, 0.5, 0.75]);
-    let empty = Still { scene, poses, ..still };
-    let plain = Still { lens: None, ..empty.clone() }.by(FEW_PATHS).color()[0];
-    for renderer in [Renderer::FastRayTraced, FEW_PATHS] {
-        for (k, color) in empty.by(renderer).color().iter().enumerate() {
-            let at = [(k % SIZE[0]) as f64 + 0.5 - 32.0, (k / SIZE[0]) as f64 + 0.5 - 24.0];
-            let radius = at[0].hypot(at[1]) / 16.0;
-            // A pixel's corners are 0.71 pixels from its middle.
-            if (radius - 1.2).abs() > 0.75 / 16.0 {
-                assert_eq!(*color, if radius < 1.2 { plain } else { [0, 0, 0, 255] }, "{renderer:?} {k}");
-            }
-        }
-    }
-}
-
-/// Behind lenses, the hybrid's rays see what all rays see. Its shadows are sharp: the light of pixels with no shadow's edge and
-/// no silhouette beside them is that of shadow maps too.
-#[test]
-fn hybrid() {
-    const BESIDE: usize = 2;
-    let mut all_shadowed = 0;
-    for (lens, rays) in bent() {
-        let still = figure_through(&rays);
-        let [fast, hybrid] = [Renderer::FastRayTraced, Renderer::Hybrid].map(|renderer| still.by(renderer));
-        assert!(fast.bits_but_color() == hybrid.bits_but_color(), "{}", lens.name());
-        let cfg = RasterCfg { shadows: false, ..RasterCfg::default() };
-        let lit = Still { cfg, ..still }.by(Renderer::Hybrid);
-        let shadow = |k: usize| hybrid.color()[k] != lit.color()[k];
-        let kind = |k: usize| (hybrid.mask()[k], shadow(k));
-        let (mut judged, mut shadowed, mut other) = (0, 0, 0);
-        for k in 0..SIZE[0] * SIZE[1] {
-            let (a, b) = (fast.color()[k], hybrid.color()[k]);
-            let different = a.iter().zip(b).any(|(a, b)| a.abs_diff(b) > 2);
-            other += usize::from(different);
-            let around = |size: usize, at: usize| at.saturating_sub(BESIDE)..(at + BESIDE + 1).min(size);
-            let (x, y) = (k % SIZE[0], k / SIZE[0]);
-            let mut beside = around(SIZE[1], y).flat_map(|y| around(SIZE[0], x).map(move |x| y * SIZE[0] + x));
-            if beside.all(|there| kind(there) == kind(k)) {
-                assert!(!different, "{} {x} {y}: {a:?} {b:?}", lens.name());
-                judged += 1;
-                shadowed += usize::from(shadow(k));
-            }
-        }
-        // Edges of shadows are others: the control.
-        assert!(judged > 500 && other > 0, "{}: {judged} {other}", lens.name());
-        all_shadowed += shadowed;
-    }
-    assert!(all_shadowed > 0);
-}
-
-/// The rasterizer draws straight lines; other renderers refuse rays of another image, or of too few samples.
-#[test]
-fn refused_rays() {
+fn refused_lenses() {
     let pixels = PixelIntrinsics { fx: 50.0, fy: 50.0, cx: 32.0, cy: 24.0 };
     let raster = CameraCfg { renderer: Renderer::Raster, ..cfg_of(WARPED, pixels) };
     let error = raster.build(&context(1)).unwrap_err();
     let expected = RenderError::LensRenderer { lens: "opencv", renderer: "raster" };
-    assert_eq!(error, SensorError::Camera(CameraError::View(expected.clone())));
+    assert_eq!(error, SensorError::Camera(CameraError::View(expected)));
     assert!(error.to_string().contains("renderer: FastRayTraced"), "{error}");
-    let rays = rays_of(WARPED.into(), pixels, SIZE);
-    assert_eq!(figure_through(&rays).try_draw().unwrap_err(), expected);
-    for renderer in [Renderer::FastRayTraced, Renderer::Hybrid] {
-        for (found, found_samples) in [(SIZE, 1), ([32, 48], 4)] {
-            let other = LensRays::new(rays.optics(), found, found_samples).unwrap();
-            let error = Still { renderer, ..figure_through(&other) }.try_draw().unwrap_err();
-            assert_eq!(error, RenderError::LensRays { expected: SIZE, samples: 4, found, found_samples });
-        }
-    }
     let error = cfg_of(OpenCv { k1: -0.9, ..OpenCv::default() }, pixels).build(&context(1)).unwrap_err();
     assert!(matches!(error, SensorError::Camera(CameraError::Optics(OpticsError::LensFolds { .. }))), "{error}");
 }
@@ -319,7 +147,11 @@ fn own_intrinsics() {
     let mut camera = built(&cfg, &context(3));
     let rows = |camera: &Camera| [0, 1, 2].map(|row| stage::bits(camera, [row]));
     let (before, bytes) = (rows(&camera), camera.lens_bytes());
-    assert_eq!(bytes, rays_of(cfg.lens, pixels, SIZE).bytes(), "all environments share one table");
+    assert_eq!(
+        bytes,
+        LensRays::new(&Optics::new(cfg.lens, pixels).unwrap(), SIZE, 4).unwrap().bytes(),
+        "all environments share one table"
+    );
     let other = Intrinsics::Pixels { fx: 25.0, fy: 22.0, cx: 30.0, cy: 20.0 };
     camera.set_intrinsics(&[other], Some(&[1])).unwrap();
     assert_eq!(camera.lens_bytes(), 2 * bytes);

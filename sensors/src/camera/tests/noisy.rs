@@ -3,11 +3,15 @@
 //! Means of n numbers scatter by sigma / sqrt(n), variances by sqrt(2 / n) of themselves, correlations by 1 / sqrt(n): bounds
 //! are six times that, which fails once in 5e8 seeds, and the seeds here are fixed.
 
-use super::super::imperfection::{DepthNoise, ReadNoise, ShotNoise};
-use super::super::{Camera, CameraCfg, DepthMiss, Extrinsics, Imperfections, Lens, Placement, PointFrame, Renderer};
+use super::super::imperfection::{DepthNoise, Exposure, ReadNoise, ShotNoise};
+use super::super::{
+    Camera, CameraCfg, DepthMiss, Extrinsics, Imperfections, Lens, Placement, PointFrame, RasterCfg, Renderer,
+    ToneCurve,
+};
 use super::stage::{BALL, DT, GROUND, SIZE, bits, built, cfg, context, state};
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorContext};
+use kinetoscope_testkit::srgb::{linear, srgb};
 use ndarray::Axis;
 
 const PIXELS: f64 = (SIZE[0] * SIZE[1]) as f64;
@@ -269,4 +273,36 @@ fn zero() {
     let nothing = ["depth", "distance", "color"].map(|name| (name.to_string(), NoiseCfg::white(0.0)));
     let camera = built(&CameraCfg { noise: nothing.into(), ..cfg() }, &context(1));
     assert_eq!(bits(&camera, [0]), bits(&built(&cfg(), &context(1)), [0]));
+}
+
+/// A camera's exposure is that of its renderer: the sky, 0.8 on the screen, is taken twice as long and half as long.
+#[test]
+fn camera_exposure() {
+    let context = context(1);
+    let sky = |stops: Option<f64>| {
+        let imperfections = Imperfections { exposure: stops.map(|stops| Exposure { stops }), ..Default::default() };
+        let raster = RasterCfg { tone: ToneCurve::Clip, ..RasterCfg::default() };
+        let camera = built(&CameraCfg { imperfections, raster, ..cfg() }, &context);
+        camera.color().unwrap().iter().copied().collect::<Vec<u8>>()
+    };
+    let plain = sky(None);
+    assert_eq!(sky(Some(0.0)), plain);
+    for stops in [-1.0, 1.0] {
+        let mut changed = 0;
+        for (k, (found, before)) in sky(Some(stops)).into_iter().zip(&plain).enumerate() {
+            if k % 4 == 3 {
+                assert_eq!(found, 255);
+                continue;
+            }
+            // A byte of the plain image stands for light that is half a byte more or less; white may be brighter. 1.5 as in `close`.
+            let [low, high] = [-0.5, 0.5].map(|half| {
+                let byte = (f64::from(*before) + half).clamp(0.0, 255.0);
+                srgb((linear((byte / 255.0) as f32) * f64::exp2(stops)).min(1.0))
+            });
+            let high = if *before == 255 { 255.0 } else { high };
+            assert!((low - 1.5..=high + 1.5).contains(&f64::from(found)), "{before} becomes {found} at {stops}");
+            changed += usize::from(found.abs_diff(*before) > 8);
+        }
+        assert!(changed > plain.len() * 3 / 16, "{changed} of {}", plain.len());
+    }
 }

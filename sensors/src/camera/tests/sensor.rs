@@ -586,3 +586,8 @@ fn bad_setters() {
     assert!(unborn.pose_w(ROS).iter().all(|x| x.is_nan()));
     unborn.set_local_pose(&good, None, ROS).unwrap();
 }
+
+#[test]
+fn levels_of_detail() {
+    assert!(CameraCfg::default().raster.lod, "levels are the default");
+}

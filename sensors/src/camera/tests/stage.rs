@@ -1,10 +1,15 @@
 //! A scene for the camera as a sensor: a ground and a ball that is elsewhere in every environment.
 
-use super::super::{Camera, CameraCfg, CameraConvention, Channels, Extrinsics, Intrinsics, Placement};
+use super::super::{
+    Camera, CameraCfg, CameraConvention, Channels, Extrinsics, Frame, Intrinsics, Opened, Placement, RasterCfg,
+    Rasterizer, Renderer, Shot, Shutter, Take,
+};
 use crate::sensor::{SensorCfg, SensorContext};
+use kinetoscope_render::visibility::View;
 use kinetoscope_scene::pose::{from_row, to_row};
 use kinetoscope_scene::shape::{Plane, Sphere};
 use kinetoscope_scene::{Instance, Light, Material, Pose, PoseF32, RenderScene, SceneState, VisibleState};
+use nalgebra::Point3;
 use ndarray::{Array2, Array3};
 use std::sync::Arc;
 
@@ -111,4 +116,32 @@ pub(super) fn bits(camera: &Camera, rows: impl IntoIterator<Item = usize>) -> Ve
         }
     }
     out
+}
+
+/// The pixel of a point in the frame of a camera without a lens.
+pub(super) fn pinhole(camera: &Camera, row: usize, p: Point3<f64>) -> [f64; 2] {
+    let k = camera.intrinsic_matrices();
+    [0, 1].map(|axis| k[(row, axis, axis)] * p[axis] / p.z + k[(row, axis, 2)])
+}
+
+/// The point that a pixel of a camera shows.
+pub(super) fn point(camera: &Camera, [row, v, u]: [usize; 3]) -> Point3<f64> {
+    let position = camera.position().unwrap();
+    Point3::from([0, 1, 2].map(|axis| f64::from(position[(row, v, u, axis)])))
+}
+
+/// The frame of a shot by a rasterizer alone.
+pub(super) fn frame_of(
+    cfg: RasterCfg,
+    (renderer, shutter): (Renderer, Shutter),
+    channels: Channels,
+    (scene, poses, view): (&RenderScene, &[PoseF32], &View),
+    opened: Option<Opened<'_>>,
+) -> Frame {
+    let mut rasterizer = Rasterizer::new(cfg);
+    (rasterizer.renderer, rasterizer.shutter) = (renderer, shutter);
+    let mut frame = Frame::new(view.width, view.height, channels);
+    let shot = Shot { scene, poses, view, lights: None, lens: None, before: None };
+    rasterizer.render_take(&shot, &Take { noise: 0, opened }, &mut frame.as_mut()).unwrap();
+    frame
 }

@@ -5,8 +5,9 @@ use super::super::{
     DepthMiss, DistortionModel, Extrinsics, Imperfections, Intrinsics, Lens, Optics, PixelIntrinsics, Placement,
     Rectification, Renderer, StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
 };
-use super::harness::{opencv, pinhole, point};
-use super::stage::{BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
+use super::stage::{
+    BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pinhole, point, pose_of, state, tip,
+};
 use crate::camera::OpticsError;
 use crate::camera::imperfection::{DepthNoise, Holes, ReadNoise};
 use crate::error::SensorError;
@@ -15,6 +16,7 @@ use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use kinetoscope_render::lens::{Equisolid, OpenCv, OpenCvFisheye};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
+use kinetoscope_testkit::opencv::opencv;
 use nalgebra::{Matrix3, Matrix3x4, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use ndarray::{Axis, array};
 use std::collections::BTreeMap;

@@ -8,7 +8,7 @@ pub use grid::GridOrder;
 use pattern_impl::{Line, PatternImpl};
 
 use super::{Ray, RayError};
-use kinetoscope_render::geometry::vector::unit;
+use kinetoscope_scene::vector::unit;
 use serde::{Deserialize, Serialize};
 
 /// Declares the patterns: a module with a type of its own each.

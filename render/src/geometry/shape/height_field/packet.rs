@@ -1,9 +1,10 @@
 //! Packets of rays from above: the first steps of the walk, for all lanes at once, by the operations of the single ray.
 
 use super::{FIRST_CELLS, Field, SLACK};
-use crate::simd::{D, D3, N, Simd, axes, dot_3};
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::shape::{Touch, Touches};
+use crate::geometry::shape::Touches;
+use crate::simd::{D, D3, N, Simd, axes, dot_3};
+use kinetoscope_scene::shape::Intersection;
 
 /// Heights of the corners of a cell in each lane, and where the cell is.
 #[derive(Clone, Copy)]
@@ -38,7 +39,7 @@ impl Field {
         Cells { corners, at: [D::load(s, &cells[0]), D::load(s, &cells[1])] }
     }
 
-    /// As [`unit`](crate::geometry::vector::unit) of the surface's normal; false in lanes where there is none.
+    /// As [`unit`](kinetoscope_scene::vector::unit) of the surface's normal; false in lanes where there is none.
     #[inline(always)]
     fn normals<S: Simd>(&self, s: S, hx: D<S>, hy: D<S>) -> ([[f64; WIDTH]; 3], N<S>) {
         let one = D::splat(s, 1.0);
@@ -193,6 +194,6 @@ fn cross<S: Simd>(
 fn write<S: Simd>(touches: &mut Touches, t: D<S>, normal: &[[f64; WIDTH]; 3], lanes: u64) {
     let t = t.array();
     for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| lanes >> k & 1 == 1) {
-        *touch = Some(Touch { t: t[k], normal: [normal[0][k], normal[1][k], normal[2][k]] });
+        *touch = Some(Intersection { t: t[k], normal: [normal[0][k], normal[1][k], normal[2][k]] });
     }
 }

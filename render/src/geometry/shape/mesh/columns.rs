@@ -15,12 +15,13 @@
 //! coordinates become columns, so intervals that meet have columns in common, and both have all columns of a rectangle.
 
 use super::MeshTree;
-use crate::simd::{D, D3, Simd};
 use crate::geometry::bvh::FAR;
 use crate::geometry::packet::{Packet, WIDTH};
-use crate::geometry::shape::{Touch, Touches};
+use crate::geometry::shape::Touches;
 use crate::geometry::triangle::{ShearPacket, Triangle, distances, normals};
-use crate::geometry::vector::V3;
+use crate::simd::{D, D3, Simd};
+use kinetoscope_scene::shape::Intersection;
+use kinetoscope_scene::vector::V3;
 
 /// Meshes of fewer triangles have no columns: their trees are small.
 const FEWEST: usize = 256;
@@ -70,7 +71,8 @@ impl Columns {
         }
         let count = triangles.len() as f64;
         let size = [0, 1].map(|axis| {
-            let mean = triangles.iter().map(|t| extent(t, axes[axis])).map(|[low, high]| high - low).sum::<f64>() / count;
+            let mean =
+                triangles.iter().map(|t| extent(t, axes[axis])).map(|[low, high]| high - low).sum::<f64>() / count;
             (bounds[1][axes[axis]] - bounds[0][axes[axis]]) / (NARROW * mean)
         });
         // No more than are worth the memory.
@@ -365,8 +367,10 @@ impl MeshTree {
         );
         let known = known.to_bitmask();
         for lane in 0..WIDTH {
-            touches[lane] = (best[lane] != NONE && known >> lane & 1 == 1)
-                .then(|| Touch { t: limit[lane] + 0.0, normal: [normal[0][lane], normal[1][lane], normal[2][lane]] });
+            touches[lane] = (best[lane] != NONE && known >> lane & 1 == 1).then(|| Intersection {
+                t: limit[lane] + 0.0,
+                normal: [normal[0][lane], normal[1][lane], normal[2][lane]],
+            });
         }
     }
 }

@@ -1,10 +1,14 @@
 //! Albedo, textures and planes, against materials, texels and closed forms.
 
-use super::super::{Channels, RasterCfg, Renderer};
-use super::harness::{Still, at, linear, look, matt, srgb, things, unlit};
-use kinetoscope_render::visibility::View;
+use super::harness::{Still, look};
+use crate::frame::Channels;
+use crate::renderer::Renderer;
+use crate::request::RasterCfg;
+use crate::visibility::View;
 use kinetoscope_scene::shape::{Box, Cylinder, Mesh, Plane, Sphere};
 use kinetoscope_scene::{Hemisphere, Light, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture, TextureKind};
+use kinetoscope_testkit::scenes::{at, matt, things, unlit};
+use kinetoscope_testkit::srgb::{linear, srgb};
 use std::sync::Arc;
 
 const ALBEDO: Channels = Channels { albedo: true, mask: true, ..Channels::NONE };

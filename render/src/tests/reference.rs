@@ -1,13 +1,14 @@
 //! The rasterizer, every pixel against rays in double precision: textbook formulas for shapes, Möller-Trumbore for triangles;
 //! and triangles that share an edge.
 
-use super::super::{Channels, RasterCfg};
-use super::harness::{Still, look, things};
-use super::scenes::{Random, every_shape, random};
-use kinetoscope_render::visibility::View;
+use super::harness::{Still, look};
+use crate::frame::Channels;
+use crate::request::RasterCfg;
+use crate::visibility::View;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::Mesh;
 use kinetoscope_scene::{Material, PoseF32, RenderMesh, RenderScene, Shape};
+use kinetoscope_testkit::scenes::{Random, every_shape, random, things};
 use nalgebra::{Matrix3, Vector3};
 use std::cell::Cell;
 use std::f64::consts::FRAC_PI_8;

@@ -1,15 +1,15 @@
 //! Scenes for tests, the same on every run.
 
-use super::super::{RasterCfg, ToneCurve};
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
-use kinetoscope_scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture};
+use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture};
 use std::sync::Arc;
 
-/// A small generator (xorshift64*) so that every run tests the same.
-pub(super) struct Random(pub(super) u64);
+/// Random numbers (xorshift64*) that are the same in every run, from a seed that is not 0.
+#[derive(Clone, Debug)]
+pub struct Random(pub u64);
 
 impl Random {
-    pub(super) fn next(&mut self) -> u64 {
+    fn next(&mut self) -> u64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
         self.0 ^= self.0 >> 27;
@@ -17,15 +17,17 @@ impl Random {
     }
 
     /// Uniform in lo..hi.
-    pub(super) fn within(&mut self, lo: f64, hi: f64) -> f64 {
+    pub fn within(&mut self, lo: f64, hi: f64) -> f64 {
         lo + (hi - lo) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    pub(super) fn vector(&mut self, lo: f64, hi: f64) -> [f64; 3] {
+    /// Three numbers, uniform in lo..hi.
+    pub fn vector(&mut self, lo: f64, hi: f64) -> [f64; 3] {
         [self.within(lo, hi), self.within(lo, hi), self.within(lo, hi)]
     }
 
-    pub(super) fn pose(&mut self, reach: f64) -> PoseF32 {
+    /// A random rotation, at a place within `reach` of the origin along each axis \[m\].
+    pub fn pose(&mut self, reach: f64) -> PoseF32 {
         let q = nalgebra::Quaternion::new(
             self.within(-1., 1.),
             self.within(-1., 1.),
@@ -41,20 +43,8 @@ impl Random {
     }
 }
 
-/// Every geom group, and meshes as they are: what all renderers draw alike.
-pub(super) const EXACT: RasterCfg = RasterCfg {
-    samples: 4,
-    reflections: true,
-    shadows: true,
-    shadow_size: 0,
-    occlusion_rays: 0,
-    tone: ToneCurve::Soft,
-    groups: u32::MAX,
-    lod: false,
-};
-
 /// Two of every shape, each somewhere within `reach` \[m\].
-pub(super) fn random(random: &mut Random, reach: f64) -> (RenderScene, Vec<PoseF32>) {
+pub fn random(random: &mut Random, reach: f64) -> (RenderScene, Vec<PoseF32>) {
     let shapes = every_shape().into_iter().chain(every_shape());
     let mut color = || random.within(0.1, 1.0) as f32;
     let mut instances: Vec<Instance> = shapes
@@ -67,7 +57,8 @@ pub(super) fn random(random: &mut Random, reach: f64) -> (RenderScene, Vec<PoseF
     (RenderScene::new(instances).unwrap(), poses)
 }
 
-pub(super) fn checker_plane() -> Instance {
+/// An infinite ground with a checker texture, mask id 100.
+pub fn checker_plane() -> Instance {
     let checker = Texture::checker(64, [110, 120, 130], [140, 150, 160]);
     let material = Material {
         rgba: [1.0; 4],
@@ -81,7 +72,7 @@ pub(super) fn checker_plane() -> Instance {
 }
 
 /// A bumpy ball of triangles.
-pub(super) fn bumpy(segments: usize) -> Arc<RenderMesh> {
+pub fn bumpy(segments: usize) -> Arc<RenderMesh> {
     let mut mesh = Shape::from(Sphere { radius: 0.3 }).tessellate(segments);
     for p in &mut mesh.positions {
         let k = 1.0 + 0.15 * (20.0 * p[0]).sin() * (17.0 * p[1]).cos() * (15.0 * p[2]).sin();
@@ -91,7 +82,7 @@ pub(super) fn bumpy(segments: usize) -> Arc<RenderMesh> {
 }
 
 /// One of every kind of shape.
-pub(super) fn every_shape() -> Vec<Shape> {
+pub fn every_shape() -> Vec<Shape> {
     let elevation: Vec<f32> = (0..12 * 9).map(|k| ((k * 37 % 23) as f32) / 23.0).collect();
     vec![
         Plane { half: [0.6, 0.4] }.into(),
@@ -106,7 +97,7 @@ pub(super) fn every_shape() -> Vec<Shape> {
 }
 
 /// About 25 primitives that stand like a person, on a checkered ground.
-pub(super) fn figure() -> (RenderScene, Vec<PoseF32>) {
+pub fn figure() -> (RenderScene, Vec<PoseF32>) {
     let skin = Material { rgba: [0.8, 0.6, 0.4, 1.0], ..Material::default() };
     let mut instances = vec![checker_plane()];
     let mut poses = vec![PoseF32::IDENTITY];
@@ -157,4 +148,30 @@ pub(super) fn figure() -> (RenderScene, Vec<PoseF32>) {
     let mut scene = RenderScene::new(instances).unwrap();
     scene.lights[0].direction = [0.3, 0.7, -1.0];
     (scene, poses)
+}
+
+/// A place without rotation \[m\].
+pub fn at(x: f32, y: f32, z: f32) -> PoseF32 {
+    PoseF32::from_translation([x, y, z])
+}
+
+/// Things with mask ids from 1 on.
+pub fn things(all: impl IntoIterator<Item = (impl Into<Shape>, Material, PoseF32)>) -> (RenderScene, Vec<PoseF32>) {
+    let thing =
+        |((shape, material, pose), id): ((_, Material, PoseF32), i32)| (Instance::new(shape, material, id), pose);
+    let (instances, poses) = all.into_iter().zip(1..).map(thing).unzip();
+    (RenderScene::new(instances).unwrap(), poses)
+}
+
+/// A scene without lights and ambient light; the sky stays.
+pub fn unlit(mut scene: RenderScene) -> RenderScene {
+    scene.lights.clear();
+    scene.headlight.active = false;
+    scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
+    scene
+}
+
+/// A material without highlights.
+pub fn matt([r, g, b]: [f32; 3]) -> Material {
+    Material { specular: 0.0, ..Material::from_rgba([r, g, b, 1.0]) }
 }

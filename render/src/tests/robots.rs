@@ -1,11 +1,11 @@
 //! Robots of vendors, drawn from their own meshes.
 
 use super::harness::{Still, look};
-use super::scenes::checker_plane;
-use kinetoscope_render::visibility::View;
+use crate::visibility::View;
 use kinetoscope_scene::mesh::{TextureSource, load};
 use kinetoscope_scene::shape::Mesh;
 use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderMesh, RenderScene, Texture, TextureKind};
+use kinetoscope_testkit::scenes::checker_plane;
 use std::sync::{Arc, LazyLock};
 
 /// The joint frames of the vendor's SR5 at rest, bent a little: (mesh, translation and rotation about an axis from the link before).

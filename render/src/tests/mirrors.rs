@@ -1,11 +1,14 @@
 //! Planar mirrors, against closed forms: a mirror shows the scene that is reflected at its plane.
 
-use super::super::{RasterCfg, Renderer, ToneCurve};
-use super::harness::{Image, Still, linear, look, matt, srgb, things, unlit};
-use super::scenes::{EXACT, Random, random};
-use kinetoscope_render::visibility::View;
+use super::harness::{EXACT, Image, Still, look};
+use crate::renderer::Renderer;
+use crate::request::RasterCfg;
+use crate::shade::tone::ToneCurve;
+use crate::visibility::View;
 use kinetoscope_scene::shape::{Box, Plane, Sphere};
 use kinetoscope_scene::{Instance, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Shape, Sky};
+use kinetoscope_testkit::scenes::{Random, matt, random, things, unlit};
+use kinetoscope_testkit::srgb::{linear, srgb};
 
 const RENDERERS: [Renderer; 3] = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced];
 /// Mirrored paths that scatter nothing: there is no other light than emission.

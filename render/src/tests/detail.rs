@@ -1,13 +1,14 @@
 //! Images with level of detail against images of the meshes themselves, in eight times as many rows and columns.
 
-use super::super::{CameraCfg, Channels, RasterCfg};
-use super::harness::{Image, Still, look};
+use super::harness::{EXACT, Image, Still, look};
 use super::robots::{sr5, sr5_view};
-use super::scenes::{EXACT, checker_plane};
-use kinetoscope_render::visibility::View;
+use crate::frame::Channels;
+use crate::request::RasterCfg;
+use crate::visibility::View;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Cylinder, Mesh, Sphere};
 use kinetoscope_scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
+use kinetoscope_testkit::scenes::checker_plane;
 use nalgebra::Vector3;
 use std::sync::{Arc, LazyLock};
 
@@ -237,5 +238,5 @@ fn textured_meshes() {
     let expected = draw(&plain, OFF);
     assert!(draw(&textured, OFF) == expected && draw(&textured, ON) == expected);
     assert!(draw(&plain, ON) != expected, "levels are in use");
-    assert!(CameraCfg::default().raster.lod, "levels are the default");
+    assert!(RasterCfg::default().lod, "levels are the default");
 }

@@ -1,34 +1,39 @@
-//! Three numbers.
+//! Vectors of three numbers in double precision.
 
-pub(crate) type V3 = [f64; 3];
+/// Three coordinates.
+pub type V3 = [f64; 3];
 
+/// Dot product.
 #[inline(always)]
-pub(crate) fn dot(a: V3, b: V3) -> f64 {
+pub fn dot(a: V3, b: V3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// Cross product.
 #[inline(always)]
-pub(crate) fn cross(a: V3, b: V3) -> V3 {
+pub fn cross(a: V3, b: V3) -> V3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+/// Difference.
 #[inline(always)]
-pub(crate) fn sub(a: V3, b: V3) -> V3 {
+pub fn sub(a: V3, b: V3) -> V3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// `a + k b`.
 #[inline(always)]
-pub(crate) fn along(a: V3, k: f64, b: V3) -> V3 {
+pub fn along(a: V3, k: f64, b: V3) -> V3 {
     [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]]
 }
 
+/// `k a`.
 #[inline(always)]
-pub(crate) fn scale(a: V3, k: f64) -> V3 {
+pub fn scale(a: V3, k: f64) -> V3 {
     a.map(|x| x * k)
 }
 
-/// Length 1; `None` where there is no direction.
+/// The vector scaled to length 1; `None` for a zero vector and for numbers that are not finite.
 #[inline(always)]
 pub fn unit(a: V3) -> Option<V3> {
     // The largest component first: squares of tiny or huge numbers leave the range.
@@ -40,7 +45,8 @@ pub fn unit(a: V3) -> Option<V3> {
     Some(scale(a, 1.0 / dot(a, a).sqrt()))
 }
 
+/// The same vector in double precision.
 #[inline(always)]
-pub(crate) fn to_f64(a: [f32; 3]) -> V3 {
+pub fn to_f64(a: [f32; 3]) -> V3 {
     a.map(f64::from)
 }

@@ -1,14 +1,31 @@
 //! A scene, drawn by a renderer, and its image pixel by pixel, to compare with an analytic answer or another renderer.
 
-use super::super::{
-    Aperture, Before, Camera, Channels, Frame, LensRays, Opened, ParallelRasterizer, RasterCfg, Rasterizer, Renderer,
-    Shot, Shutter, Take,
-};
-use kinetoscope_render::simd::{Level, levels};
-use kinetoscope_render::visibility::{RenderError, View};
-use kinetoscope_scene::{Hemisphere, Instance, Material, Pose, PoseF32, RenderScene, Shape};
+use crate::aperture::Aperture;
+use crate::frame::{Channels, Frame};
+use crate::lens::LensRays;
+use crate::parallel::ParallelRasterizer;
+use crate::rasterizer::Rasterizer;
+use crate::renderer::Renderer;
+use crate::request::{Before, RasterCfg, Shot};
+use crate::shade::tone::ToneCurve;
+use crate::shutter::{Opened, Shutter, Take};
+use crate::simd::{Level, levels};
+use crate::visibility::{RenderError, View};
+use kinetoscope_scene::{Pose, PoseF32, RenderScene};
 use kinetoscope_testkit::image_check::ImageCheck;
-use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+
+/// Every geom group, and meshes as they are: what all renderers draw alike.
+pub(super) const EXACT: RasterCfg = RasterCfg {
+    samples: 4,
+    reflections: true,
+    shadows: true,
+    shadow_size: 0,
+    occlusion_rays: 0,
+    tone: ToneCurve::Soft,
+    groups: u32::MAX,
+    lod: false,
+};
 
 /// Everything that an image depends on.
 #[derive(Clone, Debug)]
@@ -282,69 +299,10 @@ pub(super) fn look(size: [usize; 2], fovy: f32, eye: [f32; 3], target: [f32; 3])
     View::look_at(size, fovy, eye, target, [0.0, 0.0, 1.0]).unwrap()
 }
 
-pub(super) fn at(x: f32, y: f32, z: f32) -> PoseF32 {
-    PoseF32::from_translation([x, y, z])
-}
-
-/// Things with mask ids from 1 on.
-pub(super) fn things(
-    all: impl IntoIterator<Item = (impl Into<Shape>, Material, PoseF32)>,
-) -> (RenderScene, Vec<PoseF32>) {
-    let thing =
-        |((shape, material, pose), id): ((_, Material, PoseF32), i32)| (Instance::new(shape, material, id), pose);
-    let (instances, poses) = all.into_iter().zip(1..).map(thing).unzip();
-    (RenderScene::new(instances).unwrap(), poses)
-}
-
-/// A scene without lights and ambient light; the sky stays.
-pub(super) fn unlit(mut scene: RenderScene) -> RenderScene {
-    scene.lights.clear();
-    scene.headlight.active = false;
-    scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
-    scene
-}
-
-/// A material without highlights.
-pub(super) fn matt([r, g, b]: [f32; 3]) -> Material {
-    Material { specular: 0.0, ..Material::from_rgba([r, g, b, 1.0]) }
-}
-
-/// The byte of this light: the transfer function of the sRGB standard.
-pub(super) fn srgb(light: f64) -> f64 {
-    255.0 * if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
-}
-
-/// The light of an sRGB number from 0 to 1.
-pub(super) fn linear(x: f32) -> f64 {
-    let x = f64::from(x);
-    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
-}
-
 /// A pose in double precision.
 pub(super) fn wide(pose: &PoseF32) -> Pose {
     let r = pose.rotation.map(|row| row.map(f64::from));
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_fn(|i, j| r[i][j]));
     let translation = Vector3::from(pose.translation.map(f64::from));
     Pose::from_parts(translation.into(), UnitQuaternion::from_rotation_matrix(&rotation))
-}
-
-/// Numbers of OpenCV: the rows of this name in `tests/data/opencv.txt`.
-pub(super) fn opencv<const N: usize>(name: &str) -> impl Iterator<Item = [f64; N]> {
-    let row = move |line: &str| {
-        let numbers = line.strip_prefix(name)?.strip_prefix(": ")?;
-        Some(numbers.split(' ').map(|x| x.parse().unwrap()).collect::<Vec<f64>>().try_into().unwrap())
-    };
-    include_str!("../../../tests/data/opencv.txt").lines().filter_map(row)
-}
-
-/// The pixel of a point in the frame of a camera without a lens.
-pub(super) fn pinhole(camera: &Camera, row: usize, p: Point3<f64>) -> [f64; 2] {
-    let k = camera.intrinsic_matrices();
-    [0, 1].map(|axis| k[(row, axis, axis)] * p[axis] / p.z + k[(row, axis, 2)])
-}
-
-/// The point that a pixel of a camera shows.
-pub(super) fn point(camera: &Camera, [row, v, u]: [usize; 3]) -> Point3<f64> {
-    let position = camera.position().unwrap();
-    Point3::from([0, 1, 2].map(|axis| f64::from(position[(row, v, u, axis)])))
 }

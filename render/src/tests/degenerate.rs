@@ -1,12 +1,15 @@
 //! Bad input and odd scenes.
 
-use super::super::{FrameMut, RasterCfg, Rasterizer, Renderer};
-use super::harness::{Still, at, look, things};
-use super::scenes::every_shape;
-use kinetoscope_render::visibility::{RenderError, View};
+use super::harness::{Still, look};
+use crate::frame::FrameMut;
+use crate::rasterizer::Rasterizer;
+use crate::renderer::Renderer;
+use crate::request::RasterCfg;
+use crate::visibility::{RenderError, View};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Box, Mesh, Plane, Sphere};
 use kinetoscope_scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, RenderSceneError, Shape};
+use kinetoscope_testkit::scenes::{at, every_shape, things};
 use std::sync::Arc;
 
 fn view() -> View {

@@ -1,11 +1,13 @@
 //! Images around everything, and haze at the end of the ground.
 
-use super::super::{RasterCfg, Renderer, ToneCurve};
-use super::harness::{Still, look, matt, things, unlit};
-use super::scenes::EXACT;
-use kinetoscope_render::visibility::View;
+use super::harness::{EXACT, Still, look};
+use crate::renderer::Renderer;
+use crate::request::RasterCfg;
+use crate::shade::tone::ToneCurve;
+use crate::visibility::View;
 use kinetoscope_scene::shape::Plane;
 use kinetoscope_scene::{HorizonHaze, LightSum, Material, PoseF32, RenderScene, Texture, TextureKind};
+use kinetoscope_testkit::scenes::{matt, things, unlit};
 use std::sync::Arc;
 
 const CLIP: RasterCfg = RasterCfg { samples: 1, tone: ToneCurve::Clip, ..EXACT };

@@ -1,8 +1,9 @@
 //! Distortions of real calibrations that OpenCV itself cannot invert everywhere: with poles, and with folds.
 
-use super::super::{Intrinsics, Lens, LensRays, Optics, OpticsError, PixelIntrinsics};
-use super::harness::opencv;
-use kinetoscope_render::lens::OpenCv;
+use crate::intrinsics::{Intrinsics, PixelIntrinsics};
+use crate::lens::{Lens, LensRays, OpenCv, Optics};
+use crate::optics_error::OpticsError;
+use kinetoscope_testkit::opencv::opencv;
 
 /// A factory's calibration of an OAK-D's colour camera on a TurtleBot 4, 250 x 250 pixels, rounded to five digits. Its radial
 /// factor has a pole at 33.965 degrees and a zero at 33.970.

@@ -1,6 +1,6 @@
-//! Over which part of a ray a convex body is.
+//! The part of a ray that is inside a convex body.
 
-use crate::geometry::vector::{V3, along, dot};
+use crate::vector::{V3, along, dot};
 
 /// Where a ray enters a convex body and where it leaves it; nothing where it leaves before it enters.
 #[derive(Clone, Copy, Debug)]

@@ -1,20 +1,22 @@
 //! Shadows, ambient occlusion, metals, own light and tone curves, against closed forms.
 
-use super::super::imperfection::Exposure;
-use super::super::{CameraCfg, Imperfections, RasterCfg, Renderer, ToneCurve};
-use super::harness::{Image, Still, at, linear, look, matt, srgb, things, unlit};
-use super::scenes::EXACT;
+use super::harness::{EXACT, Image, Still, look};
+use crate::renderer::Renderer;
+use crate::request::RasterCfg;
+use crate::shade::tone::ToneCurve;
 use kinetoscope_scene::shape::{Box, Plane, Sphere};
 use kinetoscope_scene::{
     Headlight, Hemisphere, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Shape, Sky,
 };
+use kinetoscope_testkit::scenes::{at, matt, things, unlit};
+use kinetoscope_testkit::srgb::{linear, srgb};
 use nalgebra::Vector3;
 
 /// sRGB number of the gray that floors have here.
 const GRAY: f32 = 0.7;
 
 /// A gray floor, and a gray box of these half sizes, by the hybrid.
-fn floor_and_box(half: [f32; 3], place: PoseF32, ambient: f32, view: kinetoscope_render::visibility::View) -> Still {
+fn floor_and_box(half: [f32; 3], place: PoseF32, ambient: f32, view: crate::visibility::View) -> Still {
     let gray = matt([GRAY; 3]);
     let (mut scene, poses) =
         things([(Shape::from(Plane::INFINITE), gray.clone(), PoseF32::IDENTITY), (Box { half }.into(), gray, place)]);
@@ -190,7 +192,7 @@ fn shadow_maps() {
 }
 
 /// A cube of 5 cm and an arm of boxes on a plane of half size `ground`, in the light of a simulation, from a camera above.
-fn tabletop(ground: f32, view: kinetoscope_render::visibility::View) -> Still {
+fn tabletop(ground: f32, view: crate::visibility::View) -> Still {
     let gray = || matt([GRAY; 3]);
     let cuboid = |half: [f32; 3], pose| (Shape::from(Box { half }), gray(), pose);
     // The cube sinks in by what a contact does.
@@ -272,6 +274,7 @@ fn plane_above() {
 }
 
 const PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: false, seed: 1 };
+
 const DARK: Headlight = Headlight { ambient: [0.0; 3], diffuse: [0.0; 3], specular: [0.0; 3], active: false };
 
 /// The colour in the middle of an image of a plane, from straight above.
@@ -279,8 +282,7 @@ fn middle(material: Material, headlight: Headlight, sky: [f32; 3], tone: ToneCur
     let (scene, poses) = things([(Plane::INFINITE, material, PoseF32::IDENTITY)]);
     let mut scene = unlit(scene);
     (scene.headlight, scene.sky) = (headlight, Sky::uniform(sky));
-    let view = kinetoscope_render::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0])
-        .unwrap();
+    let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
     let still = Still { stops: by.1, ..Still::new((scene, poses), view) };
     still.with(|still| still.cfg.tone = tone).by(by.0).color()[16 * 33 + 16]
 }
@@ -363,38 +365,6 @@ fn stops() {
     }
 }
 
-/// A camera's exposure is that of its renderer: the sky, 0.8 on the screen, is taken twice as long and half as long.
-#[test]
-fn camera_exposure() {
-    let context = super::stage::context(1);
-    let sky = |stops: Option<f64>| {
-        let imperfections = Imperfections { exposure: stops.map(|stops| Exposure { stops }), ..Default::default() };
-        let raster = RasterCfg { tone: ToneCurve::Clip, ..RasterCfg::default() };
-        let camera = super::stage::built(&CameraCfg { imperfections, raster, ..super::stage::cfg() }, &context);
-        camera.color().unwrap().iter().copied().collect::<Vec<u8>>()
-    };
-    let plain = sky(None);
-    assert_eq!(sky(Some(0.0)), plain);
-    for stops in [-1.0, 1.0] {
-        let mut changed = 0;
-        for (k, (found, before)) in sky(Some(stops)).into_iter().zip(&plain).enumerate() {
-            if k % 4 == 3 {
-                assert_eq!(found, 255);
-                continue;
-            }
-            // A byte of the plain image stands for light that is half a byte more or less; white may be brighter. 1.5 as in `close`.
-            let [low, high] = [-0.5, 0.5].map(|half| {
-                let byte = (f64::from(*before) + half).clamp(0.0, 255.0);
-                srgb((linear((byte / 255.0) as f32) * f64::exp2(stops)).min(1.0))
-            });
-            let high = if *before == 255 { 255.0 } else { high };
-            assert!((low - 1.5..=high + 1.5).contains(&f64::from(found)), "{before} becomes {found} at {stops}");
-            changed += usize::from(found.abs_diff(*before) > 8);
-        }
-        assert!(changed > plain.len() * 3 / 16, "{changed} of {}", plain.len());
-    }
-}
-
 /// Light that is added up as MuJoCo's renderer does: the byte of a matt plane is 255 times its sRGB colour times the sum of
 /// the lights, each times its cosine; the sum ends at white. Root cause once: lamps were added in linear light, and four of
 /// them were darker than in MuJoCo; then the soft tone curve made white of MuJoCo's a grey of 237.
@@ -408,9 +378,7 @@ fn display_sum() {
         scene.light_sum = LightSum::Display;
         let lamp = |direction| Light { direction, diffuse: [light; 3], cast_shadow: false, ..Light::default() };
         scene.lights = directions.map(lamp).to_vec();
-        let view =
-            kinetoscope_render::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0])
-                .unwrap();
+        let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
         let still = Still::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
         let renderers = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced];
         // The sum has its end already: the soft curve bends nothing.
@@ -438,8 +406,7 @@ fn display_headlight() {
     let mut scene = unlit(scene);
     scene.light_sum = LightSum::Display;
     scene.headlight = Headlight { ambient: [0.1; 3], diffuse: [0.5; 3], specular: [0.0; 3], active: true };
-    let view = kinetoscope_render::visibility::View::look_at([33, 33], 1.2, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0])
-        .unwrap();
+    let view = crate::visibility::View::look_at([33, 33], 1.2, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
     let still = Still::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
     let expected = 255.0 * 0.8 * (0.1 + 0.5);
     let corners = |image: &Image| [0, 32, 16 * 33 + 16].map(|k| f32::from(image.color()[k][0]));

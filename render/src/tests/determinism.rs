@@ -1,14 +1,19 @@
 //! The same image, bit for bit, with every instruction set, on any number of threads, and with any channels.
 
-use super::super::{Aperture, Channels, Frame, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot, Shutter};
-use super::detail;
-use super::harness::{Image, Still, assert_same_bits, look};
-use super::lenses;
-use super::scenes::{EXACT, Random, figure, random};
+use super::harness::{EXACT, Image, Still, assert_same_bits, look};
 use super::shutter::{bar, bar_at};
-use kinetoscope_render::simd::levels;
-use kinetoscope_render::visibility::View;
+use super::{detail, lenses};
+use crate::aperture::Aperture;
+use crate::frame::{Channels, Frame};
+use crate::parallel::ParallelRasterizer;
+use crate::rasterizer::Rasterizer;
+use crate::renderer::Renderer;
+use crate::request::{RasterCfg, Shot};
+use crate::shutter::Shutter;
+use crate::simd::levels;
+use crate::visibility::View;
 use kinetoscope_scene::{Haze, Light, LightKind, PoseF32, RenderScene};
+use kinetoscope_testkit::scenes::{Random, figure, random};
 
 const RENDERERS: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS];
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };

@@ -1,11 +1,12 @@
 //! Small images that were inspected once. `KINETOSCOPE_BLESS=1` writes them anew.
 
-use super::super::{Channels, Renderer};
-use super::harness::{Image, Still, at, look, matt, things, unlit};
-use super::scenes::{checker_plane, every_shape, figure};
+use super::harness::{Image, Still, look};
+use crate::frame::Channels;
+use crate::renderer::Renderer;
 use image::RgbaImage;
 use kinetoscope_scene::shape::{Box, Plane};
 use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, Shape, Sky};
+use kinetoscope_testkit::scenes::{at, checker_plane, every_shape, figure, matt, things, unlit};
 use std::path::{Path, PathBuf};
 
 fn file(name: &str) -> PathBuf {

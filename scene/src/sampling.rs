@@ -1,10 +1,11 @@
-//! Points of a disc and directions of a hemisphere, from even random numbers.
+//! Sampling: points of a disc and directions of a hemisphere, from uniform random numbers.
 
-use crate::geometry::vector::V3;
+use crate::vector::V3;
 use std::f64::consts::PI;
 
 /// Cosine and sine of a part of a turn, 0..=1, by their series: those of the library differ from machine to machine.
-pub(crate) fn turn(part: f64) -> [f64; 2] {
+#[inline]
+pub fn turn(part: f64) -> [f64; 2] {
     let quarter = (4.0 * part + 0.5) as i64;
     let x = (part - quarter as f64 / 4.0) * (2.0 * PI);
     let (mut cos, mut sin, mut term) = (1.0, x, 1.0);
@@ -24,13 +25,15 @@ pub(crate) fn turn(part: f64) -> [f64; 2] {
 }
 
 /// A point of a disc of radius 1, evenly.
-pub(crate) fn on_disc([a, b]: [f64; 2]) -> [f64; 2] {
+#[inline]
+pub fn on_disc([a, b]: [f64; 2]) -> [f64; 2] {
     let (r, [cos, sin]) = (a.sqrt(), turn(b));
     [r * cos, r * sin]
 }
 
 /// A direction by the cosine law.
-pub(crate) fn cosine(at: [f64; 2]) -> V3 {
+#[inline]
+pub fn cosine(at: [f64; 2]) -> V3 {
     let [x, y] = on_disc(at);
     [x, y, (1.0 - at[0]).max(0.0).sqrt()]
 }

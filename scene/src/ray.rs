@@ -1,5 +1,8 @@
 //! [`Ray`]: a half-line.
 
+use crate::PoseF64;
+use crate::vector::along;
+
 /// A half-line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
@@ -13,22 +16,23 @@ impl Ray {
     /// The point at a distance \[m\].
     #[inline]
     pub fn at(&self, distance: f64) -> [f64; 3] {
-        super::vector::along(self.origin, distance, self.direction)
+        along(self.origin, distance, self.direction)
     }
 
     /// The ray in the frame that `pose` maps from.
     #[inline(always)]
-    #[cfg(test)]
-    pub(crate) fn seen_from(&self, pose: &kinetoscope_scene::PoseF64) -> Self {
+    pub fn seen_from(&self, pose: &PoseF64) -> Self {
         Self { origin: pose.apply_inverse(self.origin), direction: pose.rotate_inverse(self.direction) }
     }
 
     /// The ray of this frame in the frame that `pose` maps to.
-    pub fn mapped_by(&self, pose: &kinetoscope_scene::PoseF64) -> Self {
+    pub fn mapped_by(&self, pose: &PoseF64) -> Self {
         Self { origin: pose.apply(self.origin), direction: pose.rotate(self.direction) }
     }
 
-    pub(crate) fn is_finite(&self) -> bool {
+    /// True when all numbers are finite.
+    #[inline]
+    pub fn is_finite(&self) -> bool {
         self.origin.iter().chain(&self.direction).all(|x| x.is_finite())
     }
 }

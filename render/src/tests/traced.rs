@@ -1,11 +1,15 @@
 //! Images by rays against the rasterizer's, and smoothing of paths against many paths.
 
-use super::super::{Channels, RasterCfg, Renderer, ToneCurve};
-use super::harness::{Image, Still, at, far_apart, look, matt, srgb, things, unlit};
-use super::scenes::{EXACT, Random, random};
-use kinetoscope_render::visibility::View;
+use super::harness::{EXACT, Image, Still, far_apart, look};
+use crate::frame::Channels;
+use crate::renderer::Renderer;
+use crate::request::RasterCfg;
+use crate::shade::tone::ToneCurve;
+use crate::visibility::View;
 use kinetoscope_scene::shape::{Box, Cylinder, Ellipsoid, Plane, Sphere};
 use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderScene, Shape, Sky};
+use kinetoscope_testkit::scenes::{Random, at, matt, random, things, unlit};
+use kinetoscope_testkit::srgb::srgb;
 use nalgebra::Vector3;
 
 /// Differences of two images off silhouettes.

@@ -1,0 +1,20 @@
+//! Images, compared with analytic answers and other renderers.
+
+mod degenerate;
+mod detail;
+mod determinism;
+mod flow;
+mod golden;
+mod harness;
+mod lens_images;
+mod lens_poles;
+mod lenses;
+mod light;
+mod mirrors;
+mod progress;
+mod reference;
+mod robots;
+mod shutter;
+mod skies;
+mod surfaces;
+mod traced;

@@ -1,0 +1,81 @@
+//! [`ClosedForm`]: the geometry of one kind of shape.
+
+use super::area_sampling::AreaSampling;
+use crate::Ray;
+use crate::mesh::TriMesh;
+use crate::vector::V3;
+
+/// An intersection of a ray and a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intersection {
+    /// Distance along the ray \[m\].
+    pub t: f64,
+    /// Unit normal of the surface, of either sign.
+    pub normal: V3,
+}
+
+/// A part of a shape. The shape is the convex hull of its parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum HullPart {
+    /// A point.
+    Point(V3),
+    /// An ellipsoid with axes along x, y and z; a disc if one of its radii is 0.
+    Ellipsoid {
+        /// The center \[m\].
+        center: V3,
+        /// Half lengths \[m\].
+        radii: V3,
+    },
+}
+
+/// The geometry of a shape with a closed form, in its own frame: a convex solid that contains the origin, or a plane.
+/// Shapes that are not convex are [made of triangles](super::Triangulated).
+pub trait ClosedForm {
+    /// Sizes that must be positive and finite.
+    fn sizes(&self) -> Vec<f32>;
+
+    /// Smallest and largest coordinates \[m\]; infinite for a shape without an end.
+    fn bounds(&self) -> [V3; 2];
+
+    /// Triangles of the surface, counter-clockwise seen from outside, with about `segments` edges around a circle.
+    fn tessellate(&self, segments: usize) -> TriMesh;
+
+    /// The largest coordinate along a direction, times the length of the direction \[m\].
+    fn support(&self, direction: V3) -> f64;
+
+    /// Calls `add` with the parts of which the shape is the convex hull.
+    fn hull(&self, add: &mut dyn FnMut(HullPart));
+
+    /// The nearest intersection at a distance from 0 to `limit`, both included. A ray that begins inside of a solid
+    /// intersects it where it leaves.
+    fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection>;
+
+    /// Number of the smooth part of the surface at an intersection, less than
+    /// [`IDS_OF_PRIMITIVE`](crate::RenderScene::IDS_OF_PRIMITIVE).
+    fn face(&self, _intersection: &Intersection, _ray: &Ray) -> usize {
+        0
+    }
+
+    /// Sampling of points of the surface by area, for shapes that emit light; `None` if only paths that hit the shape by
+    /// chance find its light, which is right but noisy.
+    fn area_sampling(&self) -> Option<&dyn AreaSampling>;
+
+    /// True if the surface is seen from +z only.
+    fn is_one_sided(&self) -> bool {
+        false
+    }
+}
+
+/// Work on a shape with a closed form, compiled for each kind.
+pub trait ForClosedForm {
+    /// The result.
+    type Output;
+
+    /// Does the work.
+    fn run<T: ClosedForm>(self, shape: &T) -> Self::Output;
+}
+
+/// Length of a vector.
+pub(super) fn norm(a: V3) -> f64 {
+    a.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
