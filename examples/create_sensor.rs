@@ -11,10 +11,9 @@ mod launcher;
 use clap::{Parser, ValueEnum};
 use kinetoscope::ndarray::{ArrayView1, Axis};
 use kinetoscope::prelude::*;
+use kinetoscope::render::RenderProgress;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
-use kinetoscope::sensors::camera::{
-    Camera, CameraConvention, RenderProgress, SegmentLevel, Segmentation, SegmentationCfg,
-};
+use kinetoscope::sensors::camera::{Camera, CameraConvention, SegmentLevel, Segmentation, SegmentationCfg};
 use launcher::arm::ArmWithHand;
 use launcher::panel::{self, Views, grid, tile};
 use launcher::views::SensorWindow;

@@ -11,10 +11,11 @@ mod launcher;
 use clap::Parser;
 use kinetoscope::ndarray::{ArrayView1, Axis};
 use kinetoscope::prelude::*;
+use kinetoscope::render::lens::Lens;
 use kinetoscope::render::lens::{
     Domain, Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
 };
-use kinetoscope::sensors::camera::{Camera, CameraInfo, Lens, PointFrame};
+use kinetoscope::sensors::camera::{Camera, CameraInfo, PointFrame};
 use launcher::panel::tile;
 use launcher::{Launcher, PathFlags, Progress, Renderer, picture};
 use serde_json::{Value, json};

@@ -19,8 +19,9 @@ mod launcher;
 
 use clap::Parser;
 use kinetoscope::prelude::*;
+use kinetoscope::robot::kinematics::Tip;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
-use kinetoscope::sim::{Cone, ObjectId, Tip};
+use kinetoscope::sim::{Cone, ObjectId};
 use launcher::motion::Motion;
 use launcher::trial::{self, Album, Count};
 use launcher::{Launcher, Progress, grip};

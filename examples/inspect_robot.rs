@@ -9,8 +9,9 @@ mod launcher;
 
 use clap::Parser;
 use kinetoscope::prelude::*;
+use kinetoscope::robot::urdf::Strictness;
+use kinetoscope::sim::DriveType;
 use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
-use kinetoscope::sim::{DriveType, Strictness};
 use launcher::still::StillFlags;
 use std::ffi::OsString;
 use std::io::Write;

@@ -14,8 +14,9 @@ mod launcher;
 
 use clap::Parser;
 use kinetoscope::prelude::*;
+use kinetoscope::robot::kinematics::Tip;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
-use kinetoscope::sim::{ArticulationId, Tip};
+use kinetoscope::sim::ArticulationId;
 use launcher::motion::Motion;
 use launcher::trial::{self, Album, Count};
 use launcher::{Launcher, Progress, grip, user_or_asset};

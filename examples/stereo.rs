@@ -134,7 +134,7 @@ fn run(args: &Args) -> launcher::Result {
 }
 
 /// Eyes in front of the robot, above the things.
-fn stereo_cfg(args: &Args, renderer: kinetoscope::sensors::camera::Renderer) -> StereoCameraCfg {
+fn stereo_cfg(args: &Args, renderer: kinetoscope::render::Renderer) -> StereoCameraCfg {
     let f = 500.0 * args.width as f64 / 640.0;
     let placement = Placement::LookAt { eye: [1.9, 0.25, 0.95], target: [0.35, 0.0, 0.25], up: [0.0, 0.0, 1.0] };
     let camera = CameraCfg {

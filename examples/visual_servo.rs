@@ -16,10 +16,12 @@ mod launcher;
 
 use clap::Parser;
 use kinetoscope::prelude::*;
+use kinetoscope::render::PixelIntrinsics;
+use kinetoscope::robot::kinematics::Tip;
 use kinetoscope::scene::pose::{from_xyz_rpy, to_row};
 use kinetoscope::sensors::NoiseCfg;
-use kinetoscope::sensors::camera::{Camera, PixelIntrinsics};
-use kinetoscope::sim::{ObjectId, Tip};
+use kinetoscope::sensors::camera::Camera;
+use kinetoscope::sim::ObjectId;
 use launcher::motion::Motion;
 use launcher::panel::{self, Views};
 use launcher::trial::{self, Album, Count};

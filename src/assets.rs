@@ -9,9 +9,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use kinetoscope_robot::urdf::{ComponentCfg, UrdfCfg};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::from_xyz_rpy;
-use kinetoscope_sim::{ComponentCfg, DriveCfg, RobotCfg, UrdfCfg};
+use kinetoscope_sim::{DriveCfg, RobotCfg};
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 

@@ -41,16 +41,17 @@ pub mod prelude {
     pub use crate::assets;
     #[cfg(feature = "record")]
     pub use kinetoscope_record::Record;
+    pub use kinetoscope_render::frame::Channels;
+    pub use kinetoscope_render::{Intrinsics, RasterCfg, Renderer};
+    pub use kinetoscope_robot::urdf::{ComponentCfg, UrdfCfg};
     pub use kinetoscope_scene::Pose;
-    pub use kinetoscope_sensors::camera::{
-        CameraCfg, CameraPlacement, Channels, Extrinsics, Intrinsics, Placement, RasterCfg, Renderer,
-    };
+    pub use kinetoscope_sensors::camera::{CameraCfg, CameraPlacement, Extrinsics, Placement};
     pub use kinetoscope_sensors::ray::{RayCasterCfg, RayPattern};
     pub use kinetoscope_sensors::{ContactSensorCfg, ImuCfg, Sampled, SamplingCfg};
     pub use kinetoscope_sim::{
-        ArticulationCfg, BodyType, ComponentCfg, Draw, DriveCfg, EntityCfg, EnvId, GroundCfg, InteractiveScene,
-        JointIndex, LightCfg, MjcfCfg, MjcfFile, ObjectShape, Property, Randomization, RigidObjectCfg, RobotCfg,
-        RobotId, SceneCfg, SensorId, SimulationManager, SimulationManagerCfg, TerrainCfg, UrdfCfg,
+        ArticulationCfg, BodyType, Draw, DriveCfg, EntityCfg, EnvId, GroundCfg, InteractiveScene, JointIndex, LightCfg,
+        MjcfCfg, MjcfFile, ObjectShape, Property, Randomization, RigidObjectCfg, RobotCfg, RobotId, SceneCfg, SensorId,
+        SimulationManager, SimulationManagerCfg, TerrainCfg,
     };
     #[cfg(feature = "viewer")]
     pub use kinetoscope_viewer::{OpenWindow, Screenshot, Serve};

@@ -3,13 +3,13 @@
 use kinetoscope_record::Film;
 use kinetoscope_sim::SimulationManager;
 
-/// A recording for the viewers of a simulation: what [`Play::play`](kinetoscope_viewer::control::Play::play) takes.
+/// A recording for the viewers of a simulation: what [`Play::play`](kinetoscope_viewer::Play::play) takes.
 ///
 /// ```no_run
 /// use kinetoscope::RecordedFilm;
 /// use kinetoscope::prelude::*;
 /// use kinetoscope::record::{Film, Recording};
-/// use kinetoscope::viewer::control::Play;
+/// use kinetoscope::viewer::Play;
 ///
 /// let (film, mut sim) = Film::of(&Recording::open("run.mcap")?, None)?;
 /// let window = sim.open_window()?;
@@ -19,7 +19,7 @@ use kinetoscope_sim::SimulationManager;
 #[derive(Debug)]
 pub struct RecordedFilm(pub Film);
 
-impl kinetoscope_viewer::control::Film for RecordedFilm {
+impl kinetoscope_viewer::Film for RecordedFilm {
     fn times(&self) -> &[f64] {
         self.0.times()
     }

@@ -11,11 +11,12 @@ use crate::row::Row;
 use crate::settings::{Outcome, Settings};
 use kinetoscope::mujoco::release_freed;
 use kinetoscope::prelude::*;
-use kinetoscope::render::visibility::View;
+use kinetoscope::render::View;
+use kinetoscope::render::frame::Frame;
+use kinetoscope::render::geometry::{RayAssets, RayTargets};
+use kinetoscope::render::{ParallelRasterizer, Shot};
 use kinetoscope::scene::shape::Plane;
 use kinetoscope::scene::{Instance, Light, LightKind, Material, PoseF32, RenderScene};
-use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot};
-use kinetoscope::sensors::ray::{RayAssets, RayTargets};
 use std::time::{Duration, Instant};
 
 const SIZE: [usize; 2] = [640, 480];

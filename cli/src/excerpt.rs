@@ -3,7 +3,7 @@
 //! A message that has a place begins with it, `arm.urdf:12: ...`: a rule of all errors and diagnostics of the library.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
-use kinetoscope::sim::Diagnostic;
+use kinetoscope::robot::diagnostic::Diagnostic;
 use std::io::{IsTerminal, Write};
 use std::ops::Range;
 use std::path::Path;

@@ -5,7 +5,9 @@ use crate::excerpt;
 use crate::file_kind::FileKind;
 use kinetoscope::assets;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{Error, LinkId, MjcfId, RobotFileError, Strictness};
+use kinetoscope::robot::description::LinkId;
+use kinetoscope::robot::urdf::Strictness;
+use kinetoscope::sim::{Error, MjcfId, RobotFileError};
 use std::path::{Path, PathBuf};
 
 /// The files of a model.

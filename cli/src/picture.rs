@@ -2,7 +2,7 @@
 
 use crate::ending::Result;
 use image::{Rgb, RgbImage};
-use kinetoscope::sensors::camera::Frame;
+use kinetoscope::render::frame::Frame;
 use kinetoscope::sensors::camera::colormap::{depth_color, mask_color, normal_color};
 use std::path::Path;
 

@@ -6,8 +6,8 @@ use kinetoscope::RecordedFilm;
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Film, Recording, replay};
 use kinetoscope::sim::Still;
-use kinetoscope::viewer::control::{Play, Speed};
 use kinetoscope::viewer::{Closed, Eye, ScreenshotCfg, ServeCfg, WindowCfg};
+use kinetoscope::viewer::{Play, Speed};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 

@@ -195,8 +195,8 @@ impl Renderer {
     ///
     /// # Errors
     /// Numbers of paths or bounces that are not possible, or any without path tracing.
-    pub(crate) fn of_cameras(self, flags: PathFlags) -> Result<kinetoscope::sensors::camera::Renderer> {
-        use kinetoscope::sensors::camera::Renderer as Known;
+    pub(crate) fn of_cameras(self, flags: PathFlags) -> Result<kinetoscope::render::Renderer> {
+        use kinetoscope::render::Renderer as Known;
         let PathFlags { rt_samples, rt_bounces, rt_noisy } = flags;
         if self != Self::Rt && (rt_samples.is_some() || rt_bounces.is_some() || rt_noisy) {
             return Err(

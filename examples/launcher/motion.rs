@@ -3,7 +3,7 @@
 use super::{Progress, Result, trial};
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{IkCfg, Tip};
+use kinetoscope::robot::kinematics::{IkCfg, Tip};
 
 /// Distance of points on a straight line that inverse kinematics are solved for \[m\].
 const SPACING: f64 = 0.02;

@@ -2,9 +2,11 @@
 
 use super::{Result, picture};
 use kinetoscope::prelude::*;
-use kinetoscope::render::visibility::View;
+use kinetoscope::render::ParallelRasterizer;
+use kinetoscope::render::View;
+use kinetoscope::render::frame::Frame;
 use kinetoscope::scene::{Marker, PoseF32};
-use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, look_at_pose};
+use kinetoscope::sensors::camera::look_at_pose;
 use kinetoscope::sim::Still;
 use std::path::Path;
 

@@ -2,7 +2,7 @@
 
 use super::LINE;
 use indicatif::{ProgressBar, ProgressStyle};
-use kinetoscope::sensors::camera::RenderProgress;
+use kinetoscope::render::RenderProgress;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 

@@ -220,7 +220,8 @@ mod tests {
     use super::*;
     use crate::cfg::RecorderCfg;
     use crate::tests::{falling, record, scratch};
-    use kinetoscope_sensors::camera::{CameraCfg, Channels};
+    use kinetoscope_render::frame::Channels;
+    use kinetoscope_sensors::camera::CameraCfg;
     use std::io::{Read, Seek, SeekFrom};
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};

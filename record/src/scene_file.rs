@@ -7,9 +7,8 @@
 use crate::error::{RecordError, Result};
 use crate::zip;
 use kinetoscope_mujoco::{TARGET, Target};
-use kinetoscope_sim::{
-    Diagnostic, DiagnosticKind, GroundCfg, MjcfCfg, MjcfId, SimulationManager, SimulationManagerCfg,
-};
+use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
+use kinetoscope_sim::{GroundCfg, MjcfCfg, MjcfId, SimulationManager, SimulationManagerCfg};
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{self, Cursor};

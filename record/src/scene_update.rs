@@ -2,10 +2,11 @@
 
 use crate::error::Result;
 use crate::stream::{Kind, Stream};
+use kinetoscope_render::RasterCfg;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::RenderMesh;
-use kinetoscope_scene::{Instance, Pose, RenderScene, Shape, Texture};
-use kinetoscope_sensors::camera::RasterCfg;
+use kinetoscope_scene::shape::Shape;
+use kinetoscope_scene::{Instance, Pose, RenderScene, Texture};
 use kinetoscope_sim::{EnvId, Look, SimulationManager};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

@@ -7,7 +7,9 @@ use crate::packet::{Block, Values};
 use crate::stage::{Painter, StageCfg};
 use crate::stream::{Element, Kind, Part, Stream};
 use camera::{DISPARITY, Eye, timed};
-use kinetoscope_sensors::{Imu, RayCaster, Sampled, Sensor, StereoCamera};
+use kinetoscope_sensors::camera::StereoCamera;
+use kinetoscope_sensors::ray::RayCaster;
+use kinetoscope_sensors::{Imu, Sampled, Sensor};
 use kinetoscope_sim::{MjcfId, ObjectId, RobotId, SimulationManager, StepResult};
 use ndarray::{Array2, ArrayBase, ArrayView2, Axis, Data, Dimension};
 use std::any::Any;
@@ -212,8 +214,7 @@ impl Source {
             return Self::of_eye(sim, uid, Eye::Left, DISPARITY, envs);
         }
         // Aliases are the cameras' own.
-        let own =
-            kinetoscope_sensors::camera::Channels::from_names(&[asked]).map(|one| one.names()).unwrap_or_default();
+        let own = kinetoscope_render::frame::Channels::from_names(&[asked]).map(|one| one.names()).unwrap_or_default();
         let known = eye.channels(any);
         match known.iter().find(|(name, ..)| own.contains(name)) {
             Some((name, ..)) => Self::of_eye(sim, uid, eye, name, envs),

@@ -1,10 +1,12 @@
 //! Pictures of all environments side by side, as a viewer that stands still sees them.
 
 use crate::error::{RecordError, Result};
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
+use kinetoscope_render::frame::{Channels, Frame};
+use kinetoscope_render::{Intrinsics, ParallelRasterizer, RasterCfg};
 use kinetoscope_scene::PoseF32;
 use kinetoscope_scene::framing::Framing;
-use kinetoscope_sensors::camera::{Channels, Frame, Intrinsics, ParallelRasterizer, RasterCfg, look_at_pose};
+use kinetoscope_sensors::camera::look_at_pose;
 use kinetoscope_sim::{SimulationManager, Still};
 
 /// How the stage is drawn.

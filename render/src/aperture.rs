@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Fields of view stay those of [`Intrinsics`](crate::intrinsics::Intrinsics), whatever the lens is focused on.
 ///
 /// ```
-/// use kinetoscope_render::aperture::Aperture;
+/// use kinetoscope_render::Aperture;
 ///
 /// // A lens of 50 mm at f/2, focused on what is 2 m away, in a camera whose focal length is 1000 pixels.
 /// let aperture = Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 };

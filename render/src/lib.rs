@@ -19,27 +19,44 @@
 //! | `simd` | lanes, chosen at run time |
 #![forbid(unsafe_code)]
 
-pub mod aperture;
+mod aperture;
 mod exposure;
 pub mod frame;
 pub mod geometry;
-pub mod intrinsics;
+mod intrinsics;
 pub mod lens;
-pub mod optics_error;
-pub mod parallel;
-pub mod path;
-pub mod progress;
-pub mod raster;
-pub mod rasterizer;
-pub mod renderer;
-pub mod request;
+mod optics_error;
+mod parallel;
+mod path;
+mod progress;
+mod raster;
+mod rasterizer;
+mod renderer;
+mod request;
 mod rolling;
-pub mod shade;
-pub mod shutter;
+mod shade;
+mod shutter;
 mod simd;
-pub mod ticket;
+mod ticket;
 mod trace;
-pub mod visibility;
+mod visibility;
 
 #[cfg(test)]
 mod tests;
+
+pub use aperture::Aperture;
+pub use intrinsics::{Intrinsics, PixelIntrinsics};
+pub use optics_error::OpticsError;
+pub use parallel::Job;
+pub use parallel::ParallelRasterizer;
+pub use path::film::Film;
+pub use progress::RenderProgress;
+pub use raster::Layer;
+pub use rasterizer::Rasterizer;
+pub use renderer::Renderer;
+pub use request::{Before, RasterCfg, Shot};
+pub use shade::plan::{check_light, check_occlusion};
+pub use shade::tone::ToneCurve;
+pub use shutter::{Opened, Shutter, Take};
+pub use ticket::{Stream, Ticket};
+pub use visibility::{RenderError, View};

@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 /// [`RenderError::Cancelled`](crate::visibility::RenderError::Cancelled).
 ///
 /// ```
-/// use kinetoscope_render::parallel::ParallelRasterizer;
-/// use kinetoscope_render::request::RasterCfg;
+/// use kinetoscope_render::ParallelRasterizer;
+/// use kinetoscope_render::RasterCfg;
 ///
 /// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 1);
 /// let progress = rasterizer.progress().clone();

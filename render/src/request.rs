@@ -31,7 +31,7 @@ pub struct RasterCfg {
     /// Draw dense meshes coarser where that is hardly seen (level of detail).
     ///
     /// The surface that is drawn instead of a mesh is joined to it by a continuous map that moves no point by more than
-    /// 1 mm, nor by more than half a pixel anywhere in the picture (both are proven, see [`kinetoscope_scene::RenderMesh::levels`];
+    /// 1 mm, nor by more than half a pixel anywhere in the picture (both are proven, see [`kinetoscope_scene::shape::RenderMesh::levels`];
     /// vertices are snapped to 1/256 pixel besides, with or without levels). So:
     /// - what is seen at a pixel is seen within half a pixel of it without levels; of things that are less than 2 mm
     ///   behind each other, either may be seen;

@@ -1,6 +1,6 @@
 //! Which picture it is: what its random numbers are looked up by.
 
-use kinetoscope_scene::random::Philox;
+use kinetoscope_scene::Philox;
 
 /// Which picture it is, of all that a camera ever took in an environment. With the place in the picture, every random number
 /// of the picture is a function of this: neither threads nor laziness nor the order of readings change one.

@@ -1,6 +1,7 @@
 //! Camera placement from which everything that is drawn fills an image.
 
-use crate::{Instance, PoseF32, RenderScene, Shape};
+use crate::shape::Shape;
+use crate::{Instance, PoseF32, RenderScene};
 
 /// Instances of a scene at their poses, moved by an offset.
 #[derive(Clone, Copy, Debug)]

@@ -241,14 +241,14 @@ impl RenderScene {
         (self.texture_scales[index], self.texture_offsets[index]) = instance.texture_map();
     }
 
-    /// Moves the vertices of an instance whose mesh is [deformable](crate::RenderMesh::deformable): `deform` changes the mesh,
+    /// Moves the vertices of an instance whose mesh is [deformable](crate::shape::RenderMesh::deformable): `deform` changes the mesh,
     /// which is copied first if something else holds it too. Returns false, and changes nothing, for other shapes.
     ///
     /// # Panics
     ///
     /// There is no such instance.
     #[track_caller]
-    pub fn deform(&mut self, index: usize, deform: impl FnOnce(&mut crate::RenderMesh)) -> bool {
+    pub fn deform(&mut self, index: usize, deform: impl FnOnce(&mut crate::shape::RenderMesh)) -> bool {
         let Shape::Mesh(shape) = &mut self.instances[index].shape else { return false };
         if !shape.mesh.is_deformable() {
             return false;
@@ -319,7 +319,7 @@ impl Instance {
     }
 
     /// The triangles, for shapes that are made of them.
-    pub fn mesh(&self) -> Option<&crate::RenderMesh> {
+    pub fn mesh(&self) -> Option<&crate::shape::RenderMesh> {
         self.shape.mesh().map(Arc::as_ref)
     }
 }
@@ -327,8 +327,8 @@ impl Instance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::RenderMesh;
     use crate::material::Texture;
+    use crate::shape::RenderMesh;
     use crate::shape::{Box, Mesh, Plane, Sphere};
 
     fn textured(kind: TextureKind, tex_uniform: bool) -> Material {

@@ -1,12 +1,12 @@
 //! What moves things: controls, forces and activations of actuators.
 
 use crate::error::SensorError;
-use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{Choice, at_least_one, read_columns, select_or_all};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
 use ndarray::{ArrayView2, ArrayView3};
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use crate::camera::{CalibrationError, CameraError};
 use crate::ray::RayError;
-use crate::requires::Requires;
+use kinetoscope_scene::Requires;
 
 /// Why a sensor cannot be built or updated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -205,8 +205,8 @@ impl From<kinetoscope_scene::pattern::UnknownName> for SensorError {
     }
 }
 
-impl From<crate::camera::OpticsError> for SensorError {
-    fn from(error: crate::camera::OpticsError) -> Self {
+impl From<kinetoscope_render::OpticsError> for SensorError {
+    fn from(error: kinetoscope_render::OpticsError) -> Self {
         Self::Camera(error.into())
     }
 }

@@ -1,8 +1,8 @@
 //! What a sensor expects of a state: that it has what the sensor needs, of the scene that it was built for.
 
 use crate::error::SensorError;
-use crate::requires::Requires;
 use crate::sensor::SensorContext;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::{Lengths, SceneState};
 
 /// What a sensor was built for.

@@ -2,12 +2,12 @@
 
 use crate::error::SensorError;
 use crate::frames::{check_offset, pose, put};
-use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::select::{Choice, at_least_one, matching};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::pose::{from_row, to_wxyz};
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use ndarray::{ArrayView2, ArrayView3};

@@ -2,11 +2,11 @@
 
 use crate::error::SensorError;
 use crate::frames::{check_offset, pose, put, vector};
-use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::pose::{from_row, to_wxyz};
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use nalgebra::Vector3;

@@ -4,12 +4,12 @@
 //! names for what can be read of it.
 
 use crate::error::SensorError;
-use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{Choice, at_least_one, read_columns, select_or_all};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
 use ndarray::{ArrayView1, ArrayView2, ArrayView3};
 use serde::{Deserialize, Serialize};

@@ -2,12 +2,12 @@
 
 use crate::error::SensorError;
 use crate::frames::{pose, put, vector};
-use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{Choice, at_least_one, select};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use nalgebra::Vector3;
 use ndarray::ArrayView3;

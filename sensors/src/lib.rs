@@ -9,31 +9,30 @@
 //! `split_at` and `slice_axis`.
 #![forbid(unsafe_code)]
 
-pub mod actuator_state;
+mod actuator_state;
 mod cached;
 pub mod camera;
-pub mod contact_sensor;
+mod contact_sensor;
 mod delay;
-pub mod error;
-pub mod expected;
-pub mod frame_transformer;
+mod error;
+mod expected;
+mod frame_transformer;
 mod frames;
-pub mod history;
-pub mod imu;
-pub mod joint_state;
-pub mod joint_wrench;
-pub mod mujoco_sensor;
-pub mod noise;
+mod history;
+mod imu;
+mod joint_state;
+mod joint_wrench;
+mod mujoco_sensor;
+mod noise;
 pub mod ray;
-pub mod sampling;
-pub mod schedule;
-pub mod select;
-pub mod sensor;
-pub mod slot;
+mod sampling;
+mod schedule;
+mod select;
+mod sensor;
+mod slot;
 mod summary;
 
 pub use actuator_state::{ActuatorState, ActuatorStateCfg};
-pub use camera::{Camera, CameraCfg, CameraError, StereoCamera, StereoCameraCfg};
 pub use contact_sensor::{ContactSensor, ContactSensorCfg};
 pub use error::SensorError;
 pub use expected::Expected;
@@ -42,10 +41,8 @@ pub use history::History;
 pub use imu::{Imu, ImuCfg};
 pub use joint_state::{JointState, JointStateCfg};
 pub use joint_wrench::{JointWrench, JointWrenchCfg};
-pub use kinetoscope_scene::requires::{self, Requires};
 pub use mujoco_sensor::{MujocoSensor, MujocoSensorCfg};
 pub use noise::NoiseCfg;
-pub use ray::{RayCaster, RayCasterCamera, RayCasterCameraCfg, RayCasterCfg};
 pub use sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 pub use schedule::{Phases, Schedule};
 pub use sensor::{EngineSensor, Sensor, SensorCfg, SensorContext};

@@ -1,12 +1,12 @@
 //! The physics engine's own sensors, as its models declare them: MuJoCo's `<sensor>` elements.
 
 use crate::error::SensorError;
-use crate::requires::Requires;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{Choice, at_least_one, select};
 use crate::sensor::{EngineSensor, Sensor, SensorCfg, SensorContext};
 use crate::summary;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
 use kinetoscope_scene::pattern::closest;
 use ndarray::{ArrayView2, ArrayView3, Axis, Slice};

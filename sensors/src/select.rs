@@ -12,7 +12,11 @@ use ndarray::Array2;
 /// # Errors
 ///
 /// A pattern that is no regular expression or matches nothing, and a name that two patterns match.
-pub fn select<P: AsRef<str>>(patterns: &[P], names: &[String], what: &'static str) -> Result<Vec<usize>, SensorError> {
+pub(crate) fn select<P: AsRef<str>>(
+    patterns: &[P],
+    names: &[String],
+    what: &'static str,
+) -> Result<Vec<usize>, SensorError> {
     let mut taken_by: Vec<Option<&str>> = vec![None; names.len()];
     let mut selected = Vec::new();
     for pattern in patterns {
@@ -77,7 +81,7 @@ pub(crate) fn at_least_one(count: usize, choice: Choice, names: &[String]) -> Re
 /// # Errors
 ///
 /// As [`select`].
-pub fn matching(pattern: &str, names: &[String], what: &'static str) -> Result<Vec<usize>, SensorError> {
+pub(crate) fn matching(pattern: &str, names: &[String], what: &'static str) -> Result<Vec<usize>, SensorError> {
     let pattern = in_every_env(pattern);
     let compiled = Pattern::new(pattern).map_err(|error| SensorError::Pattern(error.to_string()))?;
     let matches = |name: &str| compiled.matches(name) || compiled.matches(bare(name));

@@ -1,11 +1,11 @@
 //! The contract of every sensor.
 
 use crate::error::SensorError;
-use crate::ray::RayAssets;
-use crate::requires::Requires;
 use crate::sampling::Sampled;
 use crate::schedule::Schedule;
 use kinetoscope_exec::ThreadPool;
+use kinetoscope_render::geometry::RayAssets;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::pattern::{MAX_CANDIDATES, closest, in_every_env};
 use kinetoscope_scene::{Marker, OwnScene, Pose, RenderScene, SceneState};
 use nalgebra::Vector3;

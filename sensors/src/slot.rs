@@ -2,9 +2,9 @@
 
 use crate::cached::Cached;
 use crate::error::SensorError;
-use crate::requires::Requires;
 use crate::schedule::{Phases, Schedule};
 use crate::sensor::Sensor;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
 
 /// A sensor, eager or [lazy](crate::SensorCfg::lazy), as an owner keeps it: everything that happens is told to the slot, and

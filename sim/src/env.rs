@@ -18,7 +18,7 @@ use kinetoscope_mujoco;
 use kinetoscope_mujoco::{
     Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts, Weld,
 };
-use kinetoscope_scene::state::Contact;
+use kinetoscope_scene::Contact;
 use std::cell::Cell;
 use std::sync::Arc;
 

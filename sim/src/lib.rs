@@ -84,13 +84,7 @@ pub use ids::{EnvId, MjcfId, ObjectId, RobotId, TerrainId};
 pub use interactive_scene::{
     EntityCfg, EntityTypes, ExclusionCfg, InteractiveScene, SceneCfg, SensorEntity, SensorHandle,
 };
-pub use kinetoscope_robot::description::{LinkId, RobotDescription};
-pub use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-pub use kinetoscope_robot::inertia::{InertiaFault, RigidInertia};
-pub use kinetoscope_robot::kinematics::{IkCfg, IkTask, KinematicsError, Posture, Tip};
-pub use kinetoscope_robot::urdf::{ComponentCfg, MissingInertia, NameCase, NameCaseCfg, Strictness, UrdfCfg};
-pub use kinetoscope_scene::pattern;
-pub use kinetoscope_scene::source::Source;
+pub(crate) use kinetoscope_scene::pattern;
 pub use light_cfg::{LampKind, LightCfg};
 pub use look::{BodyMotion, JointAxis, Look};
 pub use manager::SimulationManager;

@@ -28,10 +28,11 @@ use crate::visible::{Visible, VisualCache};
 use crate::warnings::Warnings;
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco as mj;
+use kinetoscope_render::geometry::RayAssets;
 use kinetoscope_robot::diagnostic::Diagnostic;
 use kinetoscope_scene::OwnScene;
-use kinetoscope_sensors::ray::RayAssets;
-use kinetoscope_sensors::{Requires, Sensor, SensorCfg, SensorContext};
+use kinetoscope_scene::Requires;
+use kinetoscope_sensors::{Sensor, SensorCfg, SensorContext};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 

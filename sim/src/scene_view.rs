@@ -11,10 +11,11 @@ use crate::viewpoint::Viewpoint;
 use crate::visible::{MaskId, Visible};
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::Data;
-use kinetoscope_scene::state::Contact;
+use kinetoscope_scene::Contact;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::{Marker, Pose, PoseF32, RenderScene};
+use kinetoscope_sensors::Sensor;
 use kinetoscope_sensors::camera::{Segmentation, SegmentationCfg, Thing};
-use kinetoscope_sensors::{Requires, Sensor};
 use nalgebra::Vector3;
 use std::sync::Arc;
 

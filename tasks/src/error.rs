@@ -167,7 +167,7 @@ impl EnvError {
 
     /// There is no such name.
     pub(crate) fn unknown<'n>(what: &'static str, name: &str, names: impl IntoIterator<Item = &'n str>) -> Self {
-        let candidates = kinetoscope_sim::pattern::closest(name, names).into_iter().map(str::to_string).collect();
+        let candidates = kinetoscope_scene::pattern::closest(name, names).into_iter().map(str::to_string).collect();
         Self::UnknownName { what, name: name.into(), candidates }
     }
 }

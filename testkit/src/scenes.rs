@@ -1,7 +1,8 @@
 //! Scenes for tests, the same on every run.
 
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
-use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderMesh, RenderScene, Shape, Texture};
+use kinetoscope_scene::shape::{RenderMesh, Shape};
+use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderScene, Texture};
 use std::sync::Arc;
 
 /// Random numbers (xorshift64*) that are the same in every run, from a seed that is not 0.

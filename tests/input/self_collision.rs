@@ -3,7 +3,7 @@
 use super::support::{INERTIAL, robot, sim};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::DiagnosticKind;
+use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope_testkit::urdf::collision;
 
 /// A star of arms around a hub, with spheres of 0.05 m at 0.1 m from it; only neighbours overlap.

@@ -5,11 +5,12 @@
 //! ```
 #![allow(clippy::unwrap_used, reason = "a program for the maintainers")]
 
+use kinetoscope_render::Intrinsics;
+use kinetoscope_render::frame::Channels;
+use kinetoscope_robot::urdf::UrdfCfg;
 use kinetoscope_scene::Pose;
-use kinetoscope_sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
-use kinetoscope_sim::{
-    DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg,
-};
+use kinetoscope_sensors::camera::{CameraCfg, Extrinsics, Placement};
+use kinetoscope_sim::{DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, SimulationManager, SimulationManagerCfg};
 use kinetoscope_viewer::window::{App, Input, Key, Modifiers};
 use kinetoscope_viewer::{Canvas, Eye, Shown, Viewing, Wants};
 use std::path::{Path, PathBuf};

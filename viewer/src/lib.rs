@@ -11,14 +11,14 @@
 //! snapshot, on their own threads, and send commands. [`Screenshot`] is a picture in one call; [`plot`] draws numbers over time.
 #![forbid(unsafe_code)]
 
-pub mod control;
+mod control;
 mod file_extension;
 pub mod plot;
 #[cfg(test)]
 mod sample;
 mod screenshot;
-pub mod serve;
-pub mod stage;
+mod serve;
+mod stage;
 pub mod window;
 
 pub use control::{
@@ -26,5 +26,7 @@ pub use control::{
 };
 pub use screenshot::{Screenshot, ScreenshotCfg, ScreenshotError};
 pub use serve::{Serve, ServeCfg, ServeError, Served};
-pub use stage::{Canvas, Eye, Overlays, Painter, Shown, Snapshot};
+pub use stage::{
+    CameraView, Canvas, EnvStage, Eye, JointName, Look, Names, Overlays, Painter, Run, Shown, Snapshot, Timeline,
+};
 pub use window::{Closed, ImageWindow, ImageWindowCfg, OpenWindow, Window, WindowCfg, WindowError};

@@ -2,11 +2,13 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use crate::stage::Canvas;
+use kinetoscope_render::Intrinsics;
+use kinetoscope_render::frame::Channels;
+use kinetoscope_robot::urdf::UrdfCfg;
 use kinetoscope_scene::Pose;
-use kinetoscope_sensors::camera::{Camera, CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
+use kinetoscope_sensors::camera::{Camera, CameraCfg, Extrinsics, Placement};
 use kinetoscope_sim::{
     DriveCfg, ObjectShape, RigidObjectCfg, RobotCfg, RobotId, SensorId, SimulationManager, SimulationManagerCfg,
-    UrdfCfg,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

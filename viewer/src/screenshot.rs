@@ -3,7 +3,7 @@
 use crate::control::Wants;
 use crate::file_extension;
 use crate::stage::{Canvas, Eye, Look, Overlays, Painter, Pool, Run, Shown, Snapshot};
-use kinetoscope_render::visibility::{RenderError, View};
+use kinetoscope_render::{RenderError, View};
 use kinetoscope_scene::AtomicFile;
 use kinetoscope_sim::SimulationManager;
 use std::path::{Path, PathBuf};

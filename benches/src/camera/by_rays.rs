@@ -5,7 +5,7 @@ use super::sides::{Look, Renderer, Work};
 use super::{Contest, Rivals, VGA};
 use crate::row::Row;
 use crate::settings::{Outcome, Settings};
-use kinetoscope::sensors::camera::Renderer as OurRenderer;
+use kinetoscope::render::Renderer as OurRenderer;
 
 /// Pictures in a step.
 const ENVS: usize = 4;

@@ -23,7 +23,7 @@ use crate::interleave::{Plan, Side, Times, measure};
 use crate::rival::{can_run, python};
 use crate::row::Row;
 use crate::settings::{Outcome, Settings};
-use kinetoscope::sensors::camera::Renderer as OurRenderer;
+use kinetoscope::render::Renderer as OurRenderer;
 use limit::{Compute, Copying};
 use scene::Scenes;
 use sides::{Look, Ours, Renderer, Rival, Work};

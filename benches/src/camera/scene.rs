@@ -7,9 +7,11 @@ use crate::startup::robots;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{Data, Model, TARGET, Target};
 use kinetoscope::prelude::*;
-use kinetoscope::render::visibility::View;
-use kinetoscope::scene::{Instance, PoseF32, RenderScene, Shape};
-use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, Shot};
+use kinetoscope::render::View;
+use kinetoscope::render::frame::Frame;
+use kinetoscope::render::{ParallelRasterizer, Shot};
+use kinetoscope::scene::shape::Shape;
+use kinetoscope::scene::{Instance, PoseF32, RenderScene};
 use kinetoscope::sim::Visible;
 use std::path::{Path, PathBuf};
 

@@ -5,9 +5,10 @@ use crate::interleave::Side;
 use crate::rival::Process;
 use crate::settings::Outcome;
 use kinetoscope::exec::ThreadPool;
-use kinetoscope::render::visibility::View;
+use kinetoscope::render::View;
+use kinetoscope::render::frame::{Channels, Frame};
+use kinetoscope::render::{ParallelRasterizer, RasterCfg, Shot};
 use kinetoscope::scene::{Light, PoseF32};
-use kinetoscope::sensors::camera::{self, Channels, Frame, ParallelRasterizer, RasterCfg, Shot};
 use kinetoscope::sim::batch::Batch;
 use kinetoscope::sim::drive::table::DriveTable;
 use serde_json::json;
@@ -61,7 +62,7 @@ pub(super) struct Ours<'s> {
 }
 
 impl<'s> Ours<'s> {
-    pub(super) fn new(scene: &'s Scene, work: &Work, threads: usize, by: camera::Renderer) -> Outcome<Self> {
+    pub(super) fn new(scene: &'s Scene, work: &Work, threads: usize, by: kinetoscope::render::Renderer) -> Outcome<Self> {
         let full = work.look != Look::Plain;
         let groups = GROUPS.iter().fold(0, |mask, group| mask | 1 << group);
         let cfg = RasterCfg {

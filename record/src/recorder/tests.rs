@@ -6,12 +6,15 @@ use crate::packet::Values;
 use crate::recover::recover;
 use crate::tests::{falling, logs, names, numbers_of, record, rows, scratch};
 use crate::writer::Written;
+use kinetoscope_render::Intrinsics;
+use kinetoscope_render::frame::Channels;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::{Pose, SceneState};
-use kinetoscope_sensors::camera::{Camera, CameraCfg, Channels, Intrinsics};
+use kinetoscope_sensors::camera::{Camera, CameraCfg};
 use kinetoscope_sensors::ray::pattern::Grid;
 use kinetoscope_sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
 use kinetoscope_sensors::{
-    Channel, ImuCfg, Requires, Sampled, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError,
+    Channel, ImuCfg, Sampled, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError,
 };
 use kinetoscope_sim::{MjcfCfg, SensorId};
 use std::path::Path;

@@ -4,11 +4,12 @@ use super::{Number, Source, What, sim_error};
 use crate::error::Result;
 use crate::packet::Values;
 use crate::stream::{Distortion, Element, Kind};
+use kinetoscope_render::PixelIntrinsics;
+use kinetoscope_render::frame::Channel;
 use kinetoscope_render::frame::{self, Depth, Distance, Mask, Normal};
-use kinetoscope_sensors::camera::{
-    CameraConvention, CameraError, Channel, DistortionModel, PixelIntrinsics, Rectification,
-};
-use kinetoscope_sensors::{Camera, RayCasterCamera, StereoCamera};
+use kinetoscope_sensors::camera::{Camera, StereoCamera};
+use kinetoscope_sensors::camera::{CameraConvention, CameraError, DistortionModel, Rectification};
+use kinetoscope_sensors::ray::RayCasterCamera;
 use kinetoscope_sim::SimulationManager;
 use ndarray::{Array2, Array3, Axis};
 use std::any::Any;
@@ -210,7 +211,7 @@ impl Source {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kinetoscope_sensors::camera::Channels;
+    use kinetoscope_render::frame::Channels;
 
     /// Root cause: the list was written by hand beside that of the cameras, and lacked two of its channels.
     #[test]

@@ -18,10 +18,10 @@ pub(crate) use crate::{
     Format, Record, RecordError, Recorded, RecorderCfg, Recording, StageCfg, Topic, Wanted, recover, recover_to,
 };
 pub(crate) use crate::{npy, zip};
+pub(crate) use kinetoscope_render::frame::Channels;
+pub(crate) use kinetoscope_render::{Intrinsics, RasterCfg, Renderer};
 pub(crate) use kinetoscope_scene::Pose;
-pub(crate) use kinetoscope_sensors::camera::{
-    Camera, CameraCfg, CameraConvention, Channels, Intrinsics, RasterCfg, Renderer, StereoCameraCfg,
-};
+pub(crate) use kinetoscope_sensors::camera::{Camera, CameraCfg, CameraConvention, StereoCameraCfg};
 pub(crate) use kinetoscope_sensors::ray::RayCasterCfg;
 pub(crate) use kinetoscope_sensors::ray::pattern::Grid;
 pub(crate) use kinetoscope_sensors::{ContactSensorCfg, ImuCfg, JointStateCfg, Sampled};

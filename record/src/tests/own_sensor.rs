@@ -1,10 +1,9 @@
 //! A sensor of another crate, recorded with its own columns, units and stamps.
 
 use super::*;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
-use kinetoscope_sensors::{
-    Channel, Requires, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError, Stamp,
-};
+use kinetoscope_sensors::{Channel, Sampler, SamplingCfg, Sensor, SensorCfg, SensorContext, SensorError, Stamp};
 
 const STEPS: usize = 6;
 

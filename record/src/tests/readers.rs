@@ -1,8 +1,8 @@
 //! Independent readers: NumPy, the `mcap` package with its decoder of ROS 2 messages, Pillow, PyAV with FFmpeg.
 
 use super::*;
+use kinetoscope_render::lens::Lens;
 use kinetoscope_render::lens::{OpenCvFisheye, Panorama};
-use kinetoscope_sensors::camera::Lens;
 
 const STEPS: u32 = 4 * IMAGE_EVERY;
 

@@ -1,7 +1,8 @@
 //! Scenes for viewers in recordings, read by the package `mcap` and held against MuJoCo's geoms.
 
 use super::*;
-use kinetoscope_scene::{PoseF32, Shape};
+use kinetoscope_scene::PoseF32;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_sim::{Look, Property};
 use kinetoscope_testkit::worlds::{fixed, object};
 

@@ -2,8 +2,8 @@
 
 use super::shape::height_field::Field;
 use super::shape::mesh::{MeshBuilder, MeshTree};
-use kinetoscope_scene::RenderMesh;
 use kinetoscope_scene::shape::HeightField;
+use kinetoscope_scene::shape::RenderMesh;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// What ray casters have built, shared by all of a simulation: a second one over the same terrain builds nothing. What
@@ -63,7 +63,7 @@ mod tests {
 
     #[test]
     fn shared_assets() {
-        let ball = kinetoscope_scene::Shape::from(Sphere { radius: 1.0 }).tessellate(8);
+        let ball = kinetoscope_scene::shape::Shape::from(Sphere { radius: 1.0 }).tessellate(8);
         let [a, b] = [0, 1].map(|_| Arc::new(RenderMesh::new(&ball, RenderMesh::CREASE)));
         let assets = RayAssets::default();
         let tree = |mesh| assets.clone().with(|assets| assets.mesh(mesh));

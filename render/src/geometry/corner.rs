@@ -1,6 +1,6 @@
 //! The smooth normal and the texture coordinates at a point of a triangle.
 
-use kinetoscope_scene::RenderMesh;
+use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::vector::{V3, cross, dot, scale, sub, to_f64};
 
 /// Points are lifted by this part of the size of their triangle, at most: those of a ball of eight sides are.

@@ -9,13 +9,16 @@
 //! (`shape/mesh/columns`); for others they walk their tree once for a packet (`bvh/beam`) and test triangles in all lanes;
 //! height fields look at the first cells in all lanes. Rays that run apart are cast one by one.
 
-pub mod assets;
+pub(crate) mod assets;
 pub(crate) mod bvh;
 pub(crate) mod corner;
 pub mod packet;
 pub(crate) mod shape;
 pub(crate) mod triangle;
-pub mod world;
+pub(crate) mod world;
+
+pub use assets::{Assets, RayAssets};
+pub use world::{FixedWorld, RayHit, RayTargets, RayWorld};
 
 #[cfg(test)]
 mod tests;

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 /// A lens in front of pixels, checked: from directions to pixels and back.
 ///
 /// ```
-/// use kinetoscope_render::intrinsics::Intrinsics;
+/// use kinetoscope_render::Intrinsics;
 /// use kinetoscope_render::lens::{Lens, Optics};
 ///
 /// let intrinsics = Intrinsics::Pixels { fx: 300.0, fy: 300.0, cx: 320.0, cy: 240.0 };

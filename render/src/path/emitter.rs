@@ -7,9 +7,10 @@
 use super::brightness;
 use crate::trace::Tracer;
 use crate::trace::motion::NOW;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{AreaSampling, SurfacePoint, TriangleSampling};
 use kinetoscope_scene::vector::{V3, dot, sub, to_f64};
-use kinetoscope_scene::{Instance, RenderScene, Shape};
+use kinetoscope_scene::{Instance, RenderScene};
 use std::sync::Arc;
 
 /// The things that glow in a frame; keeps its memory.

@@ -9,7 +9,7 @@
 mod direct;
 mod emitter;
 pub(crate) mod eye;
-pub mod film;
+pub(crate) mod film;
 mod lamp;
 pub(super) mod lobe;
 pub(super) mod point;

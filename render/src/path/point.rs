@@ -5,8 +5,9 @@ use super::texel;
 use crate::geometry::corner::in_triangle;
 use crate::trace::Hit;
 use kinetoscope_scene::Ray;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::{V3, along, dot, scale, sub, unit};
-use kinetoscope_scene::{Instance, RenderScene, Shape, TextureKind};
+use kinetoscope_scene::{Instance, RenderScene, TextureKind};
 
 /// A point of a surface.
 #[derive(Clone, Copy, Debug)]

@@ -10,9 +10,10 @@ use crate::geometry::assets::RayAssets;
 use crate::raster::Layer;
 use crate::simd::Scalar;
 use crate::visibility::View;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
 use kinetoscope_scene::vector::sub;
-use kinetoscope_scene::{Headlight, Hemisphere, Instance, LightKind, Material, PoseF32, Shape, Sky};
+use kinetoscope_scene::{Headlight, Hemisphere, Instance, LightKind, Material, PoseF32, Sky};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
 use std::f64::consts::PI;
 
@@ -34,7 +35,7 @@ fn matt(linear: f32) -> Material {
 
 /// The albedo of [`matt`]: sRGB and back rounds.
 fn albedo(linear: f32) -> f64 {
-    f64::from(kinetoscope_scene::material::decode_srgb(matt(linear).rgba[0]))
+    f64::from(kinetoscope_scene::decode_srgb(matt(linear).rgba[0]))
 }
 
 /// A pixel of a millionth of a radian: the light of one ray.
@@ -278,7 +279,7 @@ fn mirrors() {
     assert_number("the ball", mean, albedo(0.4), TIGHT);
     // Past the ball: the sky 45 degrees up.
     let (mean, _) = seen(&scene, &poses, &looking([1.0, 2.0, 1.0], [0.0, 2.0, 0.0]), 4, 2);
-    let linear = |x: f32| f64::from(kinetoscope_scene::material::decode_srgb(x));
+    let linear = |x: f32| f64::from(kinetoscope_scene::decode_srgb(x));
     assert_number("the sky", mean, linear(0.9) + 0.5f64.sqrt().sqrt() * (linear(0.2) - linear(0.9)), SINGLE);
 }
 
@@ -357,6 +358,8 @@ fn bricks(halves: &[f32]) -> Shape {
 
 fn mesh(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, crease: f32) -> Shape {
     let mesh = kinetoscope_scene::mesh::TriMesh::from_triangles(positions, triangles);
-    kinetoscope_scene::shape::Mesh { mesh: std::sync::Arc::new(kinetoscope_scene::RenderMesh::new(&mesh, crease)) }
-        .into()
+    kinetoscope_scene::shape::Mesh {
+        mesh: std::sync::Arc::new(kinetoscope_scene::shape::RenderMesh::new(&mesh, crease)),
+    }
+    .into()
 }

@@ -1,7 +1,7 @@
 //! Colours of textures at one point: bilinear within the level that is as fine as asked.
 
+use kinetoscope_scene::Level;
 use kinetoscope_scene::Texture;
-use kinetoscope_scene::material::Level;
 use kinetoscope_scene::vector::V3;
 
 /// Linear colour at (u, v), v upward, where `footprint` texture coordinates are seen together.
@@ -84,7 +84,7 @@ mod tests {
         for byte in 0..=255u8 {
             let texture = Texture::new(TextureKind::TwoD, 1, 1, 3, &[byte; 3]).unwrap();
             let [light, ..] = at(&texture, [0.3, 0.7], 0.0);
-            let standard = f64::from(kinetoscope_scene::material::decode_srgb(f32::from(byte) / 255.0));
+            let standard = f64::from(kinetoscope_scene::decode_srgb(f32::from(byte) / 255.0));
             assert!((light - standard).abs() < 5e-4, "{byte}: {light}, not {standard}");
             for level in levels() {
                 let raster = at_level!(level, s => {

@@ -4,8 +4,9 @@ use super::tile::Tile;
 use super::triangle::{self, GUARD, Gradient, SUB};
 use crate::simd::{LANES, Simd, abs, load, select, splat, store, store_i};
 use crate::visibility::Projection;
+use kinetoscope_scene::PoseF32;
 use kinetoscope_scene::shape::Cluster;
-use kinetoscope_scene::{PoseF32, RenderMesh};
+use kinetoscope_scene::shape::RenderMesh;
 
 const MAX_VERTICES: usize = 3 * RenderMesh::CLUSTER;
 /// Adding and subtracting this rounds to an integer (of less than 2^22). `round()` would be a library call.

@@ -1,7 +1,8 @@
 //! How coarse a mesh may be drawn.
 
 use crate::visibility::Projection;
-use kinetoscope_scene::{Instance, PoseF32, Shape};
+use kinetoscope_scene::shape::Shape;
+use kinetoscope_scene::{Instance, PoseF32};
 
 /// A surface may be elsewhere by this much at most \[m\].
 const DISTANCE: f32 = 1e-3;

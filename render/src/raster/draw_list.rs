@@ -6,7 +6,8 @@ use crate::lens::rays::LensRays;
 use crate::visibility::Projection;
 use crate::visibility::projection::LocalCamera;
 use kinetoscope_scene::shape::Cluster;
-use kinetoscope_scene::{Instance, Marker, PoseF32, RenderMesh, RenderScene};
+use kinetoscope_scene::shape::RenderMesh;
+use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 
 /// A primitive or a cluster that may be seen.
 #[derive(Clone, Copy, Debug)]

@@ -17,7 +17,8 @@ use cluster::{Pass, Vertices};
 pub(crate) use detail::level;
 pub use draw_list::Layer;
 pub(crate) use draw_list::{DrawList, Item, Parts, Placed};
-use kinetoscope_scene::{RenderScene, Shape};
+use kinetoscope_scene::RenderScene;
+use kinetoscope_scene::shape::Shape;
 use tile::{BLOCK, NOTHING, SAMPLES, Tile};
 
 /// Draws things into a visibility buffer.

@@ -7,7 +7,8 @@
 
 use super::tone::{decode_bytes, to_bytes};
 use crate::simd::{F, M, Simd, V3, max, root, select, splat};
-use kinetoscope_scene::{Instance, PoseF32, RenderScene, Shape};
+use kinetoscope_scene::shape::Shape;
+use kinetoscope_scene::{Instance, PoseF32, RenderScene};
 
 /// The haze of a frame.
 #[derive(Clone, Copy, Debug)]

@@ -12,8 +12,9 @@ use crate::simd::{F, LANES, M, Simd, V3, load, max, min, splat};
 use crate::trace::motion::NOW;
 use crate::trace::{Hit, Tracer};
 use kinetoscope_scene::Ray;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::{along, dot, scale, sub, to_f64};
-use kinetoscope_scene::{Instance, LightSum, RenderScene, Shape};
+use kinetoscope_scene::{Instance, LightSum, RenderScene};
 use std::cell::RefCell;
 
 /// Surfaces that are not opaque that a mirrored ray goes through, at most.

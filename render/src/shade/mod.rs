@@ -9,13 +9,13 @@ pub(crate) mod light;
 pub(crate) mod mirror;
 pub(crate) mod moves;
 pub(crate) mod multisample;
-pub mod plan;
+pub(crate) mod plan;
 pub(crate) mod shadow;
 mod shadow_fit;
 pub(crate) mod shadow_rays;
 pub(crate) mod surface;
 pub(crate) mod texture;
-pub mod tone;
+pub(crate) mod tone;
 
 /// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
 pub(crate) const BAND: usize = 128 * 1024;

@@ -8,7 +8,8 @@ use crate::request::RasterCfg;
 use crate::simd::{F, Level};
 use crate::simd::{LANES, M, Simd, V3, at_level, load, max, min, select, splat};
 use crate::visibility::Projection;
-use kinetoscope_scene::{Instance, PoseF32, RenderScene, Shape};
+use kinetoscope_scene::shape::Shape;
+use kinetoscope_scene::{Instance, PoseF32, RenderScene};
 
 /// Depths from a lamp.
 #[derive(Clone, Debug)]

@@ -2,7 +2,8 @@
 
 use super::light::unit;
 use crate::visibility::Projection;
-use kinetoscope_scene::{Instance, Light, LightKind, PoseF32, RenderScene, Shape};
+use kinetoscope_scene::shape::Shape;
+use kinetoscope_scene::{Instance, Light, LightKind, PoseF32, RenderScene};
 
 /// Texels around the covered part: for the taps around a point and for its offset along the normal.
 const ROOM: f32 = 6.0;

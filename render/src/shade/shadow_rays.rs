@@ -143,8 +143,9 @@ mod tests {
     use crate::geometry::assets::RayAssets;
     use crate::raster::Layer;
     use crate::simd::{Level, at_level};
+    use kinetoscope_scene::shape::Shape;
     use kinetoscope_scene::shape::{Box, Plane, Sphere};
-    use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, Shape};
+    use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene};
 
     const UP: [f32; 3] = [0.0, 0.0, 1.0];
 

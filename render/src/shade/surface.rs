@@ -3,7 +3,8 @@
 use crate::raster::Placed;
 use crate::simd::{F, LANES, M, Simd, U, V3, load, max, min, select, splat};
 use crate::visibility::{Projection, primitive};
-use kinetoscope_scene::{Instance, PoseF32, RenderMesh, Shape};
+use kinetoscope_scene::shape::{RenderMesh, Shape};
+use kinetoscope_scene::{Instance, PoseF32};
 
 /// The surface at sixteen samples.
 #[derive(Clone, Copy)]

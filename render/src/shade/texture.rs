@@ -4,7 +4,7 @@
 //! averaged in linear light.
 
 use crate::simd::{F, LANES, M, Simd, V3, abs, halves, max, min, select, select_i, splat, splat_i};
-use kinetoscope_scene::material::Level;
+use kinetoscope_scene::Level;
 use kinetoscope_scene::{Texture, TextureKind};
 
 /// Adding and subtracting this rounds to an integer (of less than 2^22).

@@ -90,7 +90,7 @@ pub(crate) fn to_bytes<S: Simd>(s: S, x: F<S>) -> F<S> {
 
 /// A screen colour as linear light.
 pub(crate) fn decode(c: [f32; 3]) -> [f32; 3] {
-    c.map(kinetoscope_scene::material::decode_srgb)
+    c.map(kinetoscope_scene::decode_srgb)
 }
 
 #[cfg(test)]

@@ -8,7 +8,8 @@ use crate::request::RasterCfg;
 use crate::visibility::{RenderError, View};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Box, Mesh, Plane, Sphere};
-use kinetoscope_scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, RenderSceneError, Shape};
+use kinetoscope_scene::shape::{RenderMesh, Shape};
+use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, RenderSceneError};
 use kinetoscope_testkit::scenes::{at, every_shape, things};
 use std::sync::Arc;
 

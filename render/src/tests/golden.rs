@@ -4,8 +4,9 @@ use super::harness::{Image, Still, look};
 use crate::frame::Channels;
 use crate::renderer::Renderer;
 use image::RgbaImage;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Plane};
-use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, Shape, Sky};
+use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, Sky};
 use kinetoscope_testkit::scenes::{at, checker_plane, every_shape, figure, matt, things, unlit};
 use std::path::{Path, PathBuf};
 

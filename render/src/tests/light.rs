@@ -4,10 +4,9 @@ use super::harness::{EXACT, Image, Still, look};
 use crate::renderer::Renderer;
 use crate::request::RasterCfg;
 use crate::shade::tone::ToneCurve;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Plane, Sphere};
-use kinetoscope_scene::{
-    Headlight, Hemisphere, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Shape, Sky,
-};
+use kinetoscope_scene::{Headlight, Hemisphere, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Sky};
 use kinetoscope_testkit::scenes::{at, matt, things, unlit};
 use kinetoscope_testkit::srgb::{linear, srgb};
 use nalgebra::Vector3;

@@ -5,8 +5,9 @@ use crate::renderer::Renderer;
 use crate::request::RasterCfg;
 use crate::shade::tone::ToneCurve;
 use crate::visibility::View;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Plane, Sphere};
-use kinetoscope_scene::{Instance, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Shape, Sky};
+use kinetoscope_scene::{Instance, Light, LightKind, LightSum, Material, PoseF32, RenderScene, Sky};
 use kinetoscope_testkit::scenes::{Random, matt, random, things, unlit};
 use kinetoscope_testkit::srgb::{linear, srgb};
 

@@ -4,7 +4,8 @@ use super::harness::{Still, look};
 use crate::visibility::View;
 use kinetoscope_scene::mesh::{TextureSource, load};
 use kinetoscope_scene::shape::Mesh;
-use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderMesh, RenderScene, Texture, TextureKind};
+use kinetoscope_scene::shape::RenderMesh;
+use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderScene, Texture, TextureKind};
 use kinetoscope_testkit::scenes::checker_plane;
 use std::sync::{Arc, LazyLock};
 

@@ -6,8 +6,9 @@ use crate::renderer::Renderer;
 use crate::request::RasterCfg;
 use crate::shade::tone::ToneCurve;
 use crate::visibility::View;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Cylinder, Ellipsoid, Plane, Sphere};
-use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderScene, Shape, Sky};
+use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderScene, Sky};
 use kinetoscope_testkit::scenes::{Random, at, matt, random, things, unlit};
 use kinetoscope_testkit::srgb::srgb;
 use nalgebra::Vector3;
@@ -95,7 +96,7 @@ fn mask_of_paths() {
     let color_of = |k: usize| [k % 6, k / 6 % 6, k / 36 % 6].map(|x| 51 * x as u8);
     // Of what glows a hundred times as bright as its colour, only a hundredth more is the others' light.
     let glowing = |k: usize| {
-        let light = |x: u8| 0.01 * f64::from(kinetoscope_scene::material::decode_srgb(f32::from(x) / 255.0));
+        let light = |x: u8| 0.01 * f64::from(kinetoscope_scene::decode_srgb(f32::from(x) / 255.0));
         Material { emission: 100.0, ..matt(color_of(k).map(|x| (srgb(light(x)) / 255.0) as f32)) }
     };
     let mut numbers = Random(23);

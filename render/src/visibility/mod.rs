@@ -1,8 +1,8 @@
 //! What a camera sees: which surface at which pixel.
 
 pub(crate) mod primitive;
-pub mod projection;
-pub mod view;
+pub(crate) mod projection;
+pub(crate) mod view;
 
 pub(crate) use projection::Projection;
 pub use view::View;

@@ -7,8 +7,9 @@
 //! ray, in double precision.
 
 use crate::simd::{F, LANES, M, Simd, U, V3, abs, load, load_u, max, min, select, select_u, splat, splat_u};
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::{along, dot, scale};
-use kinetoscope_scene::{Ray, Shape};
 
 /// Where sixteen rays hit a shape.
 #[derive(Clone, Copy)]
@@ -294,7 +295,7 @@ mod tests {
     /// Triangles are found elsewhere.
     #[test]
     fn triangles() {
-        let ball = kinetoscope_scene::RenderMesh::new(&Shape::from(Sphere { radius: 0.5 }).tessellate(8), 0.5);
+        let ball = kinetoscope_scene::shape::RenderMesh::new(&Shape::from(Sphere { radius: 0.5 }).tessellate(8), 0.5);
         let shape = Shape::from(kinetoscope_scene::shape::Mesh { mesh: std::sync::Arc::new(ball) });
         for level in levels() {
             at_level!(level, s => {

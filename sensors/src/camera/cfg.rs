@@ -3,13 +3,13 @@
 use super::extrinsics::Extrinsics;
 use super::imperfection::Imperfections;
 use crate::noise::NoiseCfg;
-use kinetoscope_render::aperture::Aperture;
+use kinetoscope_render::Aperture;
+use kinetoscope_render::Intrinsics;
+use kinetoscope_render::RasterCfg;
+use kinetoscope_render::Renderer;
+use kinetoscope_render::Shutter;
 use kinetoscope_render::frame::Channels;
-use kinetoscope_render::intrinsics::Intrinsics;
 use kinetoscope_render::lens;
-use kinetoscope_render::renderer::Renderer;
-use kinetoscope_render::request::RasterCfg;
-use kinetoscope_render::shutter::Shutter;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -31,7 +31,9 @@ pub enum DepthMiss {
 /// Configuration of a [`Camera`](super::Camera).
 ///
 /// ```
-/// use kinetoscope_sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement};
+/// use kinetoscope_sensors::camera::{CameraCfg, Extrinsics, Placement};
+/// use kinetoscope_render::frame::Channels;
+/// use kinetoscope_render::Intrinsics;
 ///
 /// let cfg = CameraCfg {
 ///     width: 320,

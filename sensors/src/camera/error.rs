@@ -1,7 +1,7 @@
 //! What can be wrong with a camera.
 
-use kinetoscope_render::optics_error::OpticsError;
-use kinetoscope_render::visibility::RenderError;
+use kinetoscope_render::OpticsError;
+use kinetoscope_render::RenderError;
 
 /// Why a camera cannot be built, placed or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -6,9 +6,9 @@ use super::picture_noise::PictureNoise;
 use crate::error::SensorError;
 use crate::sensor::SensorContext;
 use kinetoscope_exec::ThreadPool;
-use kinetoscope_render::parallel::Job;
-use kinetoscope_render::shade::tone::ToneCurve;
-use kinetoscope_render::ticket::Ticket;
+use kinetoscope_render::Job;
+use kinetoscope_render::Ticket;
+use kinetoscope_render::ToneCurve;
 
 /// What happens to pictures after they were drawn. There is none of it for a perfect camera.
 #[derive(Clone, Debug)]

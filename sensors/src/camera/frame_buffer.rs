@@ -7,7 +7,7 @@ use crate::delay::{self, DelayLine};
 use crate::history::History;
 use crate::schedule::Schedule;
 use kinetoscope_render::lens::LensRays;
-use kinetoscope_render::ticket::{Stream, Ticket};
+use kinetoscope_render::{Stream, Ticket};
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::{Light, Marker, OwnScene, Pose, PoseF32, RenderScene, SceneState};
 use ndarray::{Array1, Array2, ArrayView1, ArrayViewMut1, Axis};

@@ -1,6 +1,6 @@
 //! What a camera shows of itself.
 
-use super::Optics;
+use kinetoscope_render::lens::Optics;
 use kinetoscope_scene::{Marker, Pose};
 use nalgebra::Vector3;
 

@@ -5,9 +5,9 @@ use super::cfg::CameraCfg;
 use super::error::CameraError;
 use super::frame_buffer::{CapturedFrame, Observation, copy_row};
 use crate::schedule::{Phases, Schedule};
-use kinetoscope_render::request::Before;
-use kinetoscope_render::shutter::Shutter;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::Before;
+use kinetoscope_render::Shutter;
+use kinetoscope_render::View;
 use kinetoscope_scene::{Pose, PoseF32, RenderScene};
 
 /// Steps may be a little shorter than the shutter's span, which is a sum: this part of one.

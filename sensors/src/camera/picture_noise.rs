@@ -4,8 +4,9 @@ use super::cfg::CameraCfg;
 use crate::error::SensorError;
 use crate::noise::{NoiseCfg, check};
 use crate::sampling::Channel;
-use kinetoscope_render::frame::{Channel as _, Channels, Color, Depth, Distance, FrameMut};
-use kinetoscope_render::ticket::{Stream, Ticket};
+use kinetoscope_render::frame::{Channel as _, Channels, FrameMut};
+use kinetoscope_render::frame::{Color, Depth, Distance};
+use kinetoscope_render::{Stream, Ticket};
 use std::collections::BTreeMap;
 
 /// The noise of each channel that has some.
@@ -119,7 +120,9 @@ fn own_name(name: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{Frame, Lens, Renderer};
+    use kinetoscope_render::Renderer;
+    use kinetoscope_render::frame::Frame;
+    use kinetoscope_render::lens::Lens;
 
     /// Root cause: depths were clamped to near and far, which of lenses that see backward are along the ray: objects beside the
     /// camera came out `near` away.

@@ -4,7 +4,7 @@ use super::env_rows::EnvRows;
 use super::extrinsics::{CameraConvention, Poses, look_at_pose};
 use super::viewpoints::one_each;
 use crate::error::SensorError;
-use kinetoscope_render::intrinsics::Intrinsics;
+use kinetoscope_render::Intrinsics;
 use kinetoscope_scene::Pose;
 use ndarray::Array2;
 

@@ -2,8 +2,8 @@
 
 use super::sensor::Camera;
 use crate::error::SensorError;
+use kinetoscope_render::PixelIntrinsics;
 use kinetoscope_render::frame::{Depth, Distance};
-use kinetoscope_render::intrinsics::PixelIntrinsics;
 use kinetoscope_scene::Pose;
 use ndarray::{Array2, Array3, ArrayView3, Axis};
 

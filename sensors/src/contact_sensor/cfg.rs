@@ -4,11 +4,11 @@ use super::air_time::AirTimes;
 use super::pairs::{Layout, Pairs, count};
 use super::sensor::ContactSensor;
 use crate::error::SensorError;
-use crate::requires::Requires;
 use crate::sampling::{Channel, Sampler, SamplingCfg, Stamp};
 use crate::schedule::Schedule;
 use crate::select::{matching, select};
 use crate::sensor::{SensorCfg, SensorContext};
+use kinetoscope_scene::Requires;
 use serde::{Deserialize, Serialize};
 
 /// Configuration of a [`ContactSensor`].

@@ -1,7 +1,7 @@
 //! From the list of contacts to forces per body and per pair.
 
+use kinetoscope_scene::Contact;
 use kinetoscope_scene::SceneState;
-use kinetoscope_scene::state::Contact;
 use ndarray::Axis;
 
 /// Which numbers a measurement has.

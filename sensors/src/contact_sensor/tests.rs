@@ -5,7 +5,7 @@ use crate::error::SensorError;
 use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
 use kinetoscope_scene::SceneState;
-use kinetoscope_scene::state::{Contact, Contacts};
+use kinetoscope_scene::{Contact, Contacts};
 use ndarray::{Array3, array};
 
 const NAMES: [&str; 4] = ["dog/base", "dog/LF_FOOT", "dog/RF_FOOT", "cube"];

@@ -1,6 +1,6 @@
 //! What can be wrong with a ray caster.
 
-use crate::camera::OpticsError;
+use kinetoscope_render::OpticsError;
 
 /// Why a ray caster cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

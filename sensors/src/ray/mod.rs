@@ -1,7 +1,7 @@
 //! Ray casters, and cameras made of rays. The geometry is in [`kinetoscope_render::geometry`].
 
-pub mod camera;
-pub mod caster;
+mod camera;
+mod caster;
 mod error;
 mod order;
 pub mod pattern;
@@ -12,9 +12,5 @@ mod targets;
 pub use camera::{RayCasterCamera, RayCasterCameraCfg, RayPictures};
 pub use caster::{RayAlignment, RayCaster, RayCasterCfg};
 pub use error::RayError;
-pub use kinetoscope_render::geometry::assets::Assets;
-pub use kinetoscope_render::geometry::assets::RayAssets;
-pub use kinetoscope_render::geometry::world::{RayHit, RayTargets, RayWorld};
-pub use kinetoscope_scene::Ray;
 pub use pattern::RayPattern;
 pub use targets::HitTargets;

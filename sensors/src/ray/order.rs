@@ -1,7 +1,7 @@
 //! The order in which rays are cast: those that run side by side in one packet, whatever the order of the pattern.
 
-use crate::ray::Ray;
 use kinetoscope_render::geometry::packet::WIDTH;
+use kinetoscope_scene::Ray;
 
 /// What a difference of directions counts, in metres of difference between starts: rays of a fan are that far apart where
 /// they are likely to hit.

@@ -2,11 +2,12 @@
 //! share it.
 
 use super::scan::{Rays, Scan};
-use super::{HitTargets, RayError, RayTargets};
+use super::{HitTargets, RayError};
 use crate::error::SensorError;
-use crate::requires::Requires;
 use crate::sampling::{Channel, Sampler, SamplingCfg};
 use crate::sensor::SensorContext;
+use kinetoscope_render::geometry::RayTargets;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
 
 /// The most memory that the rays of a sensor may take \[bytes\].

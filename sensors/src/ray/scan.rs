@@ -1,10 +1,11 @@
 //! Rays of many environments at once, on several threads.
 
 use super::order::neighbours_together;
-use crate::ray::{Ray, RayAssets, RayHit, RayTargets, RayWorld};
 use crate::sensor::SensorContext;
 use kinetoscope_exec::ThreadPool;
-use kinetoscope_render::geometry::world::FixedWorld;
+use kinetoscope_render::geometry::FixedWorld;
+use kinetoscope_render::geometry::{RayAssets, RayHit, RayTargets, RayWorld};
+use kinetoscope_scene::Ray;
 use kinetoscope_scene::{OwnScene, PoseF64};
 use ndarray::Array2;
 use std::fmt;

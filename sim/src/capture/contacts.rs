@@ -1,7 +1,7 @@
 //! MuJoCo's contacts as pairs of links with forces in world axes.
 
 use kinetoscope_mujoco::Data;
-use kinetoscope_scene::state::Contact;
+use kinetoscope_scene::Contact;
 use nalgebra::{Matrix3, Vector3};
 
 /// Writes the contacts that the last solve found forces for; what is only near is not among them.

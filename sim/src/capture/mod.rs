@@ -9,9 +9,9 @@ mod motion;
 
 use crate::index::{FreeIndex, PartIndex, RobotIndex};
 use kinetoscope_mujoco::{Data, EngineError, Model};
+use kinetoscope_scene::Contact;
 use kinetoscope_scene::Pose;
-use kinetoscope_scene::state::Contact;
-use kinetoscope_sensors::Requires;
+use kinetoscope_scene::Requires;
 use std::sync::Arc;
 
 pub(crate) use motion::{body_velocity, link_pose};

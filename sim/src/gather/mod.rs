@@ -15,8 +15,9 @@ mod visible;
 
 use crate::env::{Env, EnvStatus};
 use crate::simulation::Simulation;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::{Lengths, SceneState};
-use kinetoscope_sensors::{Phases, Requires};
+use kinetoscope_sensors::Phases;
 
 /// Fills the rows of an environment, with its number, in the arrays of a quantity.
 type Fill = fn(&Simulation, &Env, usize, &mut SceneState);

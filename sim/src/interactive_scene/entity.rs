@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn names_of_types() {
-        assert_eq!(short_name::<kinetoscope_sensors::Camera>(), "Camera");
+        assert_eq!(short_name::<kinetoscope_sensors::camera::Camera>(), "Camera");
         assert_eq!(short_name::<Vec<std::cell::Cell<u8>>>(), "Vec<core::cell::Cell<u8>>");
     }
 }

@@ -9,9 +9,10 @@ use crate::objects::rigid_object_data::RigidObjectCfg;
 use crate::objects::robot::RobotCfg;
 use crate::objects::terrain::TerrainCfg;
 use crate::objects::weld_data::WeldCfg;
+use kinetoscope_sensors::camera::{CameraCfg, StereoCameraCfg};
+use kinetoscope_sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
 use kinetoscope_sensors::{
-    ActuatorStateCfg, CameraCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg,
-    MujocoSensorCfg, RayCasterCameraCfg, RayCasterCfg, StereoCameraCfg,
+    ActuatorStateCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
 };
 use serde::de::DeserializeOwned;
 use serde::{Deserialize as _, Serialize};

@@ -175,7 +175,9 @@ impl Robot<'_> {
     ///
     /// ```
     /// use ndarray::array;
-    /// use kinetoscope_sim::{IkCfg, RobotCfg, SimulationManager, SimulationManagerCfg, Tip, UrdfCfg};
+    /// use kinetoscope_robot::kinematics::{IkCfg, Tip};
+    /// use kinetoscope_sim::{RobotCfg, SimulationManager, SimulationManagerCfg};
+    /// use kinetoscope_robot::urdf::UrdfCfg;
     /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-arm-{}.urdf", std::process::id()));
     /// # let link = |name: &str| format!("<link name='{name}'><inertial><mass value='1'/>
     /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link>");

@@ -62,7 +62,8 @@ impl RobotMut<'_> {
     ///
     /// ```
     /// use ndarray::array;
-    /// use kinetoscope_sim::{EnvId, RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg};
+    /// use kinetoscope_sim::{EnvId, RobotCfg, SimulationManager, SimulationManagerCfg};
+    /// use kinetoscope_robot::urdf::UrdfCfg;
     /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-drives-{}.urdf", std::process::id()));
     /// # let link = |name: &str| format!("<link name='{name}'><inertial><mass value='1'/>
     /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link>");

@@ -58,7 +58,8 @@ impl RobotMut<'_> {
     ///
     /// ```
     /// use ndarray::array;
-    /// use kinetoscope_sim::{ArticulationCfg, EnvId, SimulationManager, SimulationManagerCfg, UrdfCfg};
+    /// use kinetoscope_sim::{ArticulationCfg, EnvId, SimulationManager, SimulationManagerCfg};
+    /// use kinetoscope_robot::urdf::UrdfCfg;
     /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-joints-{}.urdf", std::process::id()));
     /// # std::fs::write(&urdf, "<robot name='r'><link name='a'/><link name='b'><inertial><mass value='1'/>
     /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link><joint name='slide' type='prismatic'>

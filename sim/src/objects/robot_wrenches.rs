@@ -53,7 +53,8 @@ impl RobotMut<'_> {
     ///
     /// ```
     /// use ndarray::array;
-    /// use kinetoscope_sim::{RobotCfg, SimulationManager, SimulationManagerCfg, UrdfCfg, WrenchFrame};
+    /// use kinetoscope_sim::{RobotCfg, SimulationManager, SimulationManagerCfg, WrenchFrame};
+    /// use kinetoscope_robot::urdf::UrdfCfg;
     /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-wrench-{}.urdf", std::process::id()));
     /// # std::fs::write(&urdf, "<robot name='r'><link name='puck'><inertial><mass value='2'/>
     /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link></robot>")?;

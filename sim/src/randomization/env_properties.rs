@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::ids::{EnvId, env_mask};
 use crate::manager::SimulationManager;
 use crate::snapshot::Snapshot;
-use kinetoscope_scene::random::Random;
+use kinetoscope_scene::Random;
 
 /// Properties of environments: masses, frictions, sizes, gains; see [`SimulationManager::properties`].
 #[derive(Clone, Copy, Debug)]

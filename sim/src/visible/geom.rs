@@ -7,7 +7,8 @@ use kinetoscope_mujoco::Model;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
-use kinetoscope_scene::{Instance, Material, RenderMesh, Shape};
+use kinetoscope_scene::shape::{RenderMesh, Shape};
+use kinetoscope_scene::{Instance, Material};
 use std::collections::HashMap;
 use std::sync::Arc;
 

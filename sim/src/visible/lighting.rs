@@ -6,7 +6,7 @@ use crate::light_cfg::{LampKind, LightCfg};
 use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_mujoco::{Data, LightType, Model, ObjectKind, TextureType};
-use kinetoscope_scene::material::decode_srgb;
+use kinetoscope_scene::decode_srgb;
 use kinetoscope_scene::{Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightSum, RenderScene, Sky};
 
 /// The light of a scene besides its lamps.

@@ -32,8 +32,9 @@ use crate::simulation_cfg::GroundCfg;
 use kinetoscope_mujoco::{Data, Model, ObjectKind};
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::shape::Plane;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{
-    Hemisphere, Instance, Light, Material, OwnScene, Pose, PoseF32, PoseF64, RenderScene, Shape, Texture,
+    Hemisphere, Instance, Light, Material, OwnScene, Pose, PoseF32, PoseF64, RenderScene, Texture,
 };
 use std::sync::Arc;
 

@@ -7,9 +7,10 @@ use kinetoscope_robot::description::{Geometry, Visual};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_scene::mesh::{MeshMaterial, TextureSource, TriMesh};
+use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Mesh, Sphere};
 use kinetoscope_scene::source::Source;
-use kinetoscope_scene::{Material, RenderMesh, Texture, TextureKind};
+use kinetoscope_scene::{Material, Texture, TextureKind};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
@@ -28,7 +29,7 @@ pub(crate) struct VisualCache {
 /// A part of a mesh file, and its material where the file has one.
 #[derive(Clone, Debug)]
 struct MeshPart {
-    shape: kinetoscope_scene::Shape,
+    shape: kinetoscope_scene::shape::Shape,
     material: Option<Material>,
 }
 
@@ -84,7 +85,7 @@ impl VisualCache {
             let base = Material::default();
             Material { rgba: rgba.unwrap_or(base.rgba), texture, ..base }
         };
-        let one = |shape: kinetoscope_scene::Shape| vec![Part { shape, material: plain() }];
+        let one = |shape: kinetoscope_scene::shape::Shape| vec![Part { shape, material: plain() }];
         match &visual.geometry {
             Geometry::Box { size } => one(Cuboid { half: [0, 1, 2].map(|i| (size[i] / 2.0) as f32) }.into()),
             Geometry::Cylinder { radius, length } => {

@@ -1,17 +1,21 @@
 //! Sensors allocate nothing after they were built, whatever is configured.
 
 use crate::{Counting, allocations, assert_settles};
+use kinetoscope_render::Intrinsics;
+use kinetoscope_render::frame::Channels;
 use kinetoscope_render::frame::{Color, Depth};
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::shape::{Plane, Sphere};
-use kinetoscope_scene::state::{Contact, Contacts};
+use kinetoscope_scene::{Contact, Contacts};
 use kinetoscope_scene::{Instance, Light, Material, PoseF32, PoseF64, RenderScene, SceneState, VisibleState};
-use kinetoscope_sensors::camera::{Channels, Extrinsics, Imperfections, Intrinsics, Placement};
+use kinetoscope_sensors::camera::CameraCfg;
+use kinetoscope_sensors::camera::{Extrinsics, Imperfections, Placement};
 use kinetoscope_sensors::ray::HitTargets;
 use kinetoscope_sensors::ray::pattern::Lidar;
+use kinetoscope_sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
 use kinetoscope_sensors::{
-    CameraCfg, ContactSensorCfg, EngineSensor, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg, NoiseCfg,
-    RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, Schedule, Sensor, SensorCfg, SensorContext, SensorError,
-    SensorSlot, TargetFrameCfg,
+    ContactSensorCfg, EngineSensor, FrameTransformerCfg, ImuCfg, JointWrenchCfg, MujocoSensorCfg, NoiseCfg,
+    SamplingCfg, Schedule, Sensor, SensorCfg, SensorContext, SensorError, SensorSlot, TargetFrameCfg,
 };
 use ndarray::{Array2, Array3};
 use std::sync::Arc;

@@ -1,15 +1,17 @@
 //! After the first frame, drawing allocates nothing, and keeps little.
 
 use crate::{Counting, allocations, assert_settles};
+use kinetoscope_render::View;
+use kinetoscope_render::frame::{Channels, Frame};
 use kinetoscope_render::lens::Equidistant;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::lens::{LensRays, Optics};
+use kinetoscope_render::{
+    Aperture, Before, Opened, ParallelRasterizer, RasterCfg, Rasterizer, Renderer, Shot, Shutter, Take,
+};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Capsule, Mesh, Plane, Sphere};
-use kinetoscope_scene::{Instance, Light, LightKind, Material, PoseF32, RenderMesh, RenderScene, Shape};
-use kinetoscope_sensors::camera::{
-    Aperture, Before, Channels, Frame, LensRays, Opened, Optics, ParallelRasterizer, RasterCfg, Rasterizer, Renderer,
-    Shot, Shutter, Take,
-};
+use kinetoscope_scene::shape::{RenderMesh, Shape};
+use kinetoscope_scene::{Instance, Light, LightKind, Material, PoseF32, RenderScene};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -69,7 +71,7 @@ fn renderers() {
     let (scene, poses) = scene();
     let moved: Vec<PoseF32> = poses.iter().map(|_| PoseF32::from_translation([0.1, 0.0, 0.0])).collect();
     let (small, wide) = (view([96, 64]), view([320, 240]));
-    let pixels = kinetoscope_sensors::camera::PixelIntrinsics { fx: 90.0, fy: 90.0, cx: 160.0, cy: 120.0 };
+    let pixels = kinetoscope_render::PixelIntrinsics { fx: 90.0, fy: 90.0, cx: 160.0, cy: 120.0 };
     let optics = Optics::new(Equidistant { max_angle: 1.9 }.into(), pixels).unwrap();
     let rays = LensRays::new(&optics, [320, 240], 4).unwrap();
     // A cone of less than 80 bytes for each block of 64 pixels, and five samples of 12 bytes.

@@ -1,11 +1,13 @@
 //! After the first steps, stepping and measuring allocates nothing on the calling thread.
 
 use crate::{allocations, assert_settles};
+use kinetoscope_scene::Requires;
 use kinetoscope_sensors::camera::{CameraCfg, Extrinsics, Placement};
 use kinetoscope_sensors::ray::pattern::Grid;
+use kinetoscope_sensors::ray::{RayCasterCameraCfg, RayCasterCfg};
 use kinetoscope_sensors::{
     ActuatorStateCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
-    RayCasterCameraCfg, RayCasterCfg, Requires, SamplingCfg, SensorCfg, TargetFrameCfg,
+    SamplingCfg, SensorCfg, TargetFrameCfg,
 };
 use kinetoscope_sim::{MjcfCfg, ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
 
@@ -135,7 +137,7 @@ fn actuator_models() {
     };
     let mut sim = world(1);
     sim.add_robot(kinetoscope_sim::RobotCfg {
-        urdf: kinetoscope_sim::UrdfCfg::single(&path),
+        urdf: kinetoscope_robot::urdf::UrdfCfg::single(&path),
         drive,
         ..Default::default()
     })

@@ -22,7 +22,8 @@
 use crate::drives::worlds::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{DiagnosticKind, DriveModel, DriveType};
+use kinetoscope::robot::diagnostic::DiagnosticKind;
+use kinetoscope::sim::{DriveModel, DriveType};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 pub(crate) const EXACT: Tolerance =

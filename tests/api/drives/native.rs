@@ -9,7 +9,8 @@ use crate::drives::law::EXACT;
 use crate::drives::worlds::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{DiagnosticKind, Error, IdealPd, Integrator};
+use kinetoscope::robot::diagnostic::DiagnosticKind;
+use kinetoscope::sim::{Error, IdealPd, Integrator};
 
 /// Largest speed after 3000 steps of plain MuJoCo from a slight motion, relative to it.
 fn growth(xml: &str, h: f64) -> f64 {

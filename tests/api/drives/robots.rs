@@ -22,8 +22,9 @@
 use crate::drives::worlds::*;
 use kinetoscope::ndarray::Array3;
 use kinetoscope::prelude::*;
+use kinetoscope::robot::description::LinkId;
 use kinetoscope::scene::pose::from_xyz_rpy;
-use kinetoscope::sim::{DriveModel, LinkId, WrenchFrame};
+use kinetoscope::sim::{DriveModel, WrenchFrame};
 use kinetoscope_testkit::needs;
 use kinetoscope_testkit::worlds::{cfg, urdf_robot};
 use nalgebra::Vector3;

@@ -3,7 +3,7 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use kinetoscope::sim::{IkCfg, Posture, Tip};
+use kinetoscope::robot::kinematics::{IkCfg, Posture, Tip};
 use kinetoscope_testkit::urdf::joint;
 use nalgebra::DMatrix;
 use std::f64::consts::{PI, TAU};

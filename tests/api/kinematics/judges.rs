@@ -8,7 +8,7 @@ use super::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::{Data, ObjectKind};
 use kinetoscope::ndarray::{Array3, s};
-use kinetoscope::sim::Tip;
+use kinetoscope::robot::kinematics::Tip;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 use kinetoscope_testkit::urdf::joint;
 use nalgebra::Vector3;

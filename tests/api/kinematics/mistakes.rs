@@ -2,7 +2,8 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use kinetoscope::sim::{IkCfg, Posture, Result, Tip};
+use kinetoscope::robot::kinematics::{IkCfg, Posture, Tip};
+use kinetoscope::sim::Result;
 use kinetoscope_testkit::refusal::assert_error;
 
 #[track_caller]

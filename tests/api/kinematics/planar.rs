@@ -2,7 +2,7 @@
 
 use super::*;
 use kinetoscope::robot::kinematics::{Chain, IkSolver};
-use kinetoscope::sim::{IkCfg, IkTask, Tip};
+use kinetoscope::robot::kinematics::{IkCfg, IkTask, Tip};
 use kinetoscope_testkit::urdf::joint;
 
 const L1: f64 = 0.5;

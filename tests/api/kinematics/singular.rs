@@ -2,8 +2,9 @@
 
 use super::*;
 use kinetoscope::ndarray::ArrayView2;
+use kinetoscope::robot::kinematics::{IkCfg, Tip};
 use kinetoscope::scene::pose::to_row;
-use kinetoscope::sim::{IkCfg, Robot, Tip};
+use kinetoscope::sim::Robot;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::{FRAC_PI_2, PI};
 

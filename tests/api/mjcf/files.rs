@@ -3,8 +3,9 @@
 use super::*;
 use kinetoscope::mujoco::{TARGET, Target, compile_file};
 use kinetoscope::ndarray::{Array2, array};
+use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::sensors::{MujocoSensor, MujocoSensorCfg};
-use kinetoscope::sim::{DiagnosticKind, EntityTypes};
+use kinetoscope::sim::EntityTypes;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::count_diagnostics;

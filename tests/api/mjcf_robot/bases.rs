@@ -2,7 +2,8 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use kinetoscope::sim::{DiagnosticKind, Error};
+use kinetoscope::robot::diagnostic::DiagnosticKind;
+use kinetoscope::sim::Error;
 use kinetoscope_testkit::refusal::assert_error;
 use std::f64::consts::FRAC_PI_2;
 

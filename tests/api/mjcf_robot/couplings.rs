@@ -2,7 +2,9 @@
 
 use super::*;
 use kinetoscope::ndarray::array;
-use kinetoscope::sim::{DiagnosticKind, Error, IkCfg, KinematicsError, Tip};
+use kinetoscope::robot::diagnostic::DiagnosticKind;
+use kinetoscope::robot::kinematics::{IkCfg, KinematicsError, Tip};
+use kinetoscope::sim::Error;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::worlds::count_diagnostics;
 

@@ -3,7 +3,8 @@
 use super::*;
 use kinetoscope::mujoco::{TARGET, Target, compile_file};
 use kinetoscope::ndarray::array;
-use kinetoscope::sim::{DiagnosticKind, Error};
+use kinetoscope::robot::diagnostic::DiagnosticKind;
+use kinetoscope::sim::Error;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{errors, gains, pose_in, urdf_robot};

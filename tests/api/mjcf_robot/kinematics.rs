@@ -4,8 +4,8 @@ use super::*;
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Axis, s};
+use kinetoscope::robot::kinematics::{IkCfg, Tip};
 use kinetoscope::scene::pose::{from_row, from_xyz_rpy, to_row};
-use kinetoscope::sim::{IkCfg, Tip};
 use kinetoscope_testkit::worlds::{errors, pose_in};
 
 /// A body or a site, as MuJoCo has it.

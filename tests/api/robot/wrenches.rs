@@ -6,7 +6,8 @@
 use super::ENVS;
 use kinetoscope::ndarray::{Array2, Array3, array};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::{LinkId, WrenchFrame};
+use kinetoscope::robot::description::LinkId;
+use kinetoscope::sim::WrenchFrame;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use kinetoscope_testkit::urdf::{Files, joint, link, robot};

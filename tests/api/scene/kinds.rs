@@ -2,14 +2,13 @@
 
 use crate::sensors::custom::{Speed, SpeedCfg};
 use kinetoscope::prelude::*;
+use kinetoscope::robot::urdf::{NameCase, NameCaseCfg};
 use kinetoscope::sensors::camera::imperfection::{Holes, ReadNoise, ShotNoise, Vignetting};
 use kinetoscope::sensors::camera::{CameraConvention, DepthMiss, Imperfections, StereoCameraCfg, StereoOrigin};
 use kinetoscope::sensors::ray::pattern::{Bpearl, Custom, Grid, GridOrder, Lidar, Pinhole};
 use kinetoscope::sensors::ray::{HitTargets, RayAlignment, RayPattern};
 use kinetoscope::sensors::{FrameTransformerCfg, JointStateCfg, JointWrenchCfg, NoiseCfg, TargetFrameCfg};
-use kinetoscope::sim::{
-    DcMotor, DelayedPd, DriveModel, DriveType, EntityTypes, Error, Integrator, NameCase, NameCaseCfg, PerJoint,
-};
+use kinetoscope::sim::{DcMotor, DelayedPd, DriveModel, DriveType, EntityTypes, Error, Integrator, PerJoint};
 use std::path::Path;
 
 fn read(text: &str) -> SceneCfg {

@@ -3,8 +3,9 @@
 use super::worlds::{ball, sim, sr5};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::scene::Requires;
 use kinetoscope::scene::SceneState;
-use kinetoscope::sensors::{Channel, Requires, Sampler, Schedule, Sensor, SensorCfg, SensorContext, SensorError};
+use kinetoscope::sensors::{Channel, Sampler, Schedule, Sensor, SensorCfg, SensorContext, SensorError};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -2,8 +2,10 @@
 
 use super::view;
 use kinetoscope::prelude::*;
-use kinetoscope::render::visibility::View;
-use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
+use kinetoscope::render::Rasterizer;
+use kinetoscope::render::View;
+use kinetoscope::render::frame::Frame;
+use kinetoscope::sensors::camera::look_at_pose;
 use kinetoscope::sim::{FreeCamera, Still};
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{sr5, text_robot, urdf_robot};

@@ -1,9 +1,12 @@
 //! Markers of sensors, in the colours of cameras that draw them.
 
 use kinetoscope::prelude::*;
+use kinetoscope::render::frame::Channels;
+use kinetoscope::render::{RasterCfg, Renderer, Shutter};
+use kinetoscope::scene::Requires;
 use kinetoscope::scene::{Marker, SceneState};
-use kinetoscope::sensors::camera::{Camera, Channels, RasterCfg, Renderer, Shutter};
-use kinetoscope::sensors::{Requires, Sensor, SensorCfg, SensorContext, SensorError};
+use kinetoscope::sensors::camera::Camera;
+use kinetoscope::sensors::{Sensor, SensorCfg, SensorContext, SensorError};
 use kinetoscope_testkit::worlds::{cfg, fixed, look_at, object};
 
 const SIDE: usize = 64;

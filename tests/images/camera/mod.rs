@@ -15,7 +15,7 @@ mod stereo;
 mod surfaces;
 
 use kinetoscope::prelude::*;
-use kinetoscope::render::visibility::View;
+use kinetoscope::render::View;
 use kinetoscope::scene::PoseF32;
 
 /// A view with this vertical field of view \[rad\] and near and far planes \[m\].

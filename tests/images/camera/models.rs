@@ -3,7 +3,9 @@
 use super::view;
 use kinetoscope::mujoco as mj;
 use kinetoscope::prelude::*;
-use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
+use kinetoscope::render::Rasterizer;
+use kinetoscope::render::frame::Frame;
+use kinetoscope::sensors::camera::look_at_pose;
 use kinetoscope::sim::{Result, Still};
 use kinetoscope_testkit::needs::{files_below, sample_model};
 use kinetoscope_testkit::urdf::Files;

@@ -2,9 +2,11 @@
 
 use kinetoscope::exec::ThreadPool;
 use kinetoscope::prelude::*;
-use kinetoscope::render::visibility::View;
+use kinetoscope::render::View;
+use kinetoscope::render::frame::Frame;
+use kinetoscope::render::{ParallelRasterizer, RasterCfg, Rasterizer};
 use kinetoscope::scene::{Marker, PoseF32};
-use kinetoscope::sensors::camera::{Frame, ParallelRasterizer, RasterCfg, Rasterizer, look_at_pose};
+use kinetoscope::sensors::camera::look_at_pose;
 use kinetoscope::sim::Still;
 use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object};
 

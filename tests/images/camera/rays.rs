@@ -8,9 +8,11 @@ use crate::rays::judge::{Dice, FAN, GROUPS, at_rest, data_of, data_with, height_
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::Data;
 use kinetoscope::prelude::*;
-use kinetoscope::render::visibility::View;
+use kinetoscope::render::Rasterizer;
+use kinetoscope::render::View;
+use kinetoscope::render::frame::Frame;
 use kinetoscope::scene::PoseF32;
-use kinetoscope::sensors::camera::{Frame, Rasterizer, look_at_pose};
+use kinetoscope::sensors::camera::look_at_pose;
 use kinetoscope::sim::Visible;
 use nalgebra::Vector3;
 

@@ -2,8 +2,10 @@
 
 use super::view;
 use kinetoscope::prelude::*;
+use kinetoscope::render::ParallelRasterizer;
+use kinetoscope::render::frame::Frame;
 use kinetoscope::scene::pose::{from_wxyz, from_xyz_rpy};
-use kinetoscope::sensors::camera::{Camera, CameraConvention, Frame, ParallelRasterizer, look_at_pose};
+use kinetoscope::sensors::camera::{Camera, CameraConvention, look_at_pose};
 use kinetoscope::sim::Still;
 use kinetoscope_testkit::worlds::{cfg, look_at, object, sr5};
 use std::f64::consts::FRAC_PI_2;

@@ -1,7 +1,7 @@
 //! Surfaces and lights of a configuration are those of the scene that is drawn, on both versions of MuJoCo.
 
 use kinetoscope::prelude::*;
-use kinetoscope::scene::material::decode_srgb;
+use kinetoscope::scene::decode_srgb;
 use kinetoscope::scene::{LightKind, Material};
 use kinetoscope::sim::{EntityTypes, Error, LampKind, SurfaceCfg};
 use kinetoscope_testkit::worlds::{cfg, object, sim, sr5};

@@ -2,8 +2,9 @@
 
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::Data;
+use kinetoscope::render::geometry::{RayAssets, RayHit, RayTargets, RayWorld};
 use kinetoscope::scene::PoseF64;
-use kinetoscope::sensors::ray::{Ray, RayAssets, RayHit, RayTargets, RayWorld};
+use kinetoscope::scene::Ray;
 use kinetoscope::sim::Visible;
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! Random scenes of every kind of geom: distances and geoms are those of `mj_ray`.
 
 use crate::rays::judge::{Dice, FAN, check, compare, data_of, data_with, height_field, ray_through};
-use kinetoscope::sensors::ray::Ray;
+use kinetoscope::scene::Ray;
 
 const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
 

@@ -5,8 +5,8 @@ use crate::support::exported;
 use crate::urdf::assert_same;
 use kinetoscope::mujoco::{Data, Model, ObjectKind};
 use kinetoscope::prelude::*;
+use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::robot::urdf::assemble;
-use kinetoscope::sim::DiagnosticKind;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -1,8 +1,9 @@
 //! Several URDF files become one robot: who hangs from whom, names, and refusals.
 
 use kinetoscope::prelude::*;
+use kinetoscope::robot::description::RobotDescription;
+use kinetoscope::robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope::robot::urdf::{NameCase, NameCaseCfg, UrdfError, assemble, parse_str, write_urdf, write_urdf_with};
-use kinetoscope::sim::{Diagnostic, DiagnosticKind, RobotDescription};
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf::{Files, joint, limit};
 use nalgebra::{Translation3, UnitQuaternion};

@@ -1,9 +1,9 @@
 //! Bad URDF files: each gives a typed error that names the place, the element, and what would be right.
 
+use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::robot::urdf::{
     Strictness, UrdfCfg, UrdfError, UrdfFile, assemble, parse_file, parse_str, parse_str_with,
 };
-use kinetoscope::sim::DiagnosticKind;
 use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::urdf::Files;
 use std::path::Path;
@@ -403,7 +403,7 @@ fn lenient_reading() {
     // Several declarations, with characters of several bytes.
     let file =
         read("\n<?xml é?>\n<!-- ü --><?xml üü?>\n<?xml é?><robot a:b=\"c\"><link name=\"l\"/></robot>".to_owned());
-    let places = |d: &kinetoscope::sim::Diagnostic| (d.kind, d.source.as_ref().unwrap().line);
+    let places = |d: &kinetoscope::robot::diagnostic::Diagnostic| (d.kind, d.source.as_ref().unwrap().line);
     let expected =
         [(DeclarationMisplaced, 2), (DeclarationMisplaced, 3), (DeclarationMisplaced, 4), (NamespaceUnbound, 4)];
     assert_eq!(file.diagnostics.iter().map(places).collect::<Vec<_>>(), expected);

@@ -6,8 +6,10 @@
 use kinetoscope::mujoco::compile;
 use kinetoscope::prelude::*;
 use kinetoscope::robot::description::Inertial;
+use kinetoscope::robot::diagnostic::DiagnosticKind;
+use kinetoscope::robot::urdf::MissingInertia;
 use kinetoscope::robot::urdf::write_urdf;
-use kinetoscope::sim::{DiagnosticKind, MissingInertia, Still};
+use kinetoscope::sim::Still;
 use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::urdf::{Files, collision, joint, limit, robot};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};

@@ -2,9 +2,10 @@
 
 use super::assert_same;
 use kinetoscope::prelude::*;
+use kinetoscope::robot::description::RobotDescription;
 use kinetoscope::robot::description::{Geometry, JointKind, Material};
+use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::robot::urdf::{Assembly, assemble, parse_file, write_urdf};
-use kinetoscope::sim::{DiagnosticKind, RobotDescription};
 use kinetoscope_testkit::needs::{files_below, robot, robots_dir};
 use kinetoscope_testkit::worlds::{cfg, sim, urdf_robot};
 

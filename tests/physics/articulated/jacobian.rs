@@ -6,8 +6,8 @@
 use super::subjects::{EARTH, KINDS, Kind, Subject};
 use crate::lab::row;
 use crate::law::{law, worse};
+use kinetoscope::robot::kinematics::Tip;
 use kinetoscope::scene::pose::from_row;
-use kinetoscope::sim::Tip;
 
 const STEP: f64 = 1e-5;
 

@@ -7,7 +7,7 @@
 use super::subjects::{KINDS, Kind, Subject, apart};
 use crate::lab::row;
 use crate::law::{law, worse};
-use kinetoscope::sim::Tip;
+use kinetoscope::robot::kinematics::Tip;
 use nalgebra::Vector3;
 
 /// The largest acceleration; `part` of the efforts are applied.

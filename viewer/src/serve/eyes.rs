@@ -10,7 +10,7 @@ use crate::stage::{
 };
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
 use kinetoscope_sim::EnvId;
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicUsize, Ordering};

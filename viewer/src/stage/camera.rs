@@ -1,9 +1,10 @@
 //! The camera sensors of a simulation, of every kind, and what they look at.
 
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
+use kinetoscope_render::lens::Lens;
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::{Marker, PoseF32};
-use kinetoscope_sensors::camera::{Camera, CameraConvention, Lens, StereoCamera};
+use kinetoscope_sensors::camera::{Camera, CameraConvention, StereoCamera};
 use kinetoscope_sensors::ray::RayCasterCamera;
 use kinetoscope_sim::{EnvId, SensorId, SimulationManager};
 

@@ -1,7 +1,7 @@
 //! Where a viewer looks from.
 
 use super::snapshot::Snapshot;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
 use kinetoscope_scene::framing::{FILL, Framing, Placed, REACH};
 use nalgebra::Vector3;
 

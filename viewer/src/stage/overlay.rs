@@ -8,9 +8,9 @@ use super::color;
 use super::eye::project;
 use super::snapshot::{EnvStage, Shown, Snapshot};
 use embedded_graphics::mono_font::ascii::FONT_6X10;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
+use kinetoscope_scene::Contact;
 use kinetoscope_scene::Marker;
-use kinetoscope_scene::state::Contact;
 use kinetoscope_sim::JointAxis;
 use nalgebra::Vector3;
 

@@ -7,9 +7,10 @@ use super::overlay::{Overlays, in_overview};
 use super::pick::Picked;
 use super::snapshot::{Shown, Snapshot};
 use super::trail::Trails;
-use kinetoscope_render::visibility::{RenderError, View};
+use kinetoscope_render::frame::FrameMut;
+use kinetoscope_render::{ParallelRasterizer, RasterCfg, Shot};
+use kinetoscope_render::{RenderError, View};
 use kinetoscope_scene::Marker;
-use kinetoscope_sensors::camera::{FrameMut, ParallelRasterizer, RasterCfg, Shot};
 
 /// Radius of the ball where something was clicked on \[pixels\].
 const BALL: f32 = 4.0;

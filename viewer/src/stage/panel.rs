@@ -4,18 +4,18 @@ use super::assembly::MARKERS;
 use super::canvas::Canvas;
 use super::snapshot::Snapshot;
 use embedded_graphics::mono_font::ascii::FONT_6X10;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
+use kinetoscope_render::frame::{Channels, Frame, FrameMut};
+use kinetoscope_render::lens::{Lens, LensRays, Optics};
+use kinetoscope_render::{ParallelRasterizer, PixelIntrinsics, RasterCfg, Renderer, Shot};
 use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 use kinetoscope_sensors::camera::colormap::{depth_color, mask_color, normal_color};
-use kinetoscope_sensors::camera::{
-    Channels, Frame, FrameMut, Lens, LensRays, Optics, ParallelRasterizer, PixelIntrinsics, RasterCfg, Renderer, Shot,
-};
 
 /// Draws what camera sensors see from snapshots, without asking the sensors for anything: with the pose and the lens of the
 /// camera at its last measurement, and everything else where it is now. Behind a lens that bends them, rays are followed; what
 /// other sensors show is in the colours of cameras that draw it.
 #[derive(Debug)]
-pub struct Panel {
+pub(crate) struct Panel {
     rasterizer: ParallelRasterizer,
     frame: Frame,
     size: [usize; 2],
@@ -30,14 +30,14 @@ fn cfg() -> RasterCfg {
 
 impl Panel {
     /// Draws on `threads` threads.
-    pub fn new(threads: usize) -> Self {
+    pub(crate) fn new(threads: usize) -> Self {
         let rasterizer = ParallelRasterizer::new(cfg(), threads);
         Self { rasterizer, frame: Frame::default(), size: [0; 2], rays: None }
     }
 
     /// Draws camera `camera` of environment `env` in a grid, each picture at most `width` pixels wide. `false`, and nothing is
     /// drawn, where that camera does not look at that environment.
-    pub fn draw(&mut self, snapshot: &Snapshot, camera: usize, env: usize, width: usize, canvas: &mut Canvas) -> bool {
+    pub(crate) fn draw(&mut self, snapshot: &Snapshot, camera: usize, env: usize, width: usize, canvas: &mut Canvas) -> bool {
         let Some(stage) = snapshot.envs.get(env) else { return false };
         let looks = stage.views.get(camera).and_then(Option::as_ref);
         let Some((looks, scene)) = looks.zip(snapshot.scene_of(stage)) else {

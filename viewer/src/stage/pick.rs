@@ -73,7 +73,7 @@ impl Picked {
 }
 
 /// What there is to say of something that was clicked on: name, pose, the contact forces on it.
-pub fn describe(picked: &Picked, snapshot: &Snapshot) -> Vec<String> {
+pub(crate) fn describe(picked: &Picked, snapshot: &Snapshot) -> Vec<String> {
     let mut lines = vec![format!("{}  (environment {}, mask id {})", picked.name, picked.env, picked.mask_id)];
     let Some(pose) = picked.pose(snapshot) else {
         let [x, y, z] = picked.point;

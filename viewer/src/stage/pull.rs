@@ -4,7 +4,7 @@ use super::painter::{Look, Painter};
 use super::pick::Picked;
 use super::snapshot::{Names, Snapshot};
 use crate::control::Command;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
 use kinetoscope_sim::EnvId;
 
 /// A body that is held in a point of it, and where it is pulled to: in the plane through that point that is parallel to the

@@ -3,7 +3,7 @@
 use super::camera::{self, CameraId, CameraView};
 use crate::control::{RecordingState, Speed, Wants};
 use kinetoscope_robot::description::{Joint, JointKind};
-use kinetoscope_scene::state::Contact;
+use kinetoscope_scene::Contact;
 use kinetoscope_scene::{Marker, RenderScene};
 use kinetoscope_sim::{EnvId, JointIndex, Look, MaskId, RobotId, SimulationManager, Viewpoint};
 use std::sync::Arc;

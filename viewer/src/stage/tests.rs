@@ -3,10 +3,12 @@
 use super::*;
 use crate::control::{Viewing, Wants};
 use crate::sample::{HALF, MASS, Sample, sample, unlike};
+use kinetoscope_render::View;
+use kinetoscope_render::frame::Channels;
 use kinetoscope_render::lens::Equidistant;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::{Intrinsics, Renderer};
 use kinetoscope_sensors::camera::colormap::{depth_color, mask_color, normal_color};
-use kinetoscope_sensors::camera::{CameraCfg, Channels, Extrinsics, Intrinsics, Placement, Renderer, StereoCameraCfg};
+use kinetoscope_sensors::camera::{CameraCfg, Extrinsics, Placement, StereoCameraCfg};
 use kinetoscope_sensors::ray::RayCasterCameraCfg;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeSet;

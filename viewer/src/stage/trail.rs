@@ -6,7 +6,7 @@ use super::eye::project;
 use super::overlay::in_overview;
 use super::snapshot::{Shown, Snapshot};
 use embedded_graphics::mono_font::ascii::FONT_6X10;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
 use std::collections::VecDeque;
 
 /// Places that are kept of each body.

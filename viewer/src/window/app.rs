@@ -8,7 +8,7 @@ use crate::control::{Command, Speed, TAKES_NONE, Wants};
 use crate::stage::{
     Canvas, Eye, Look, Overlays, Painter, Panel, Picked, Pull, Shown, Snapshot, Trails, contacts_wanted, describe,
 };
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
 use kinetoscope_sim::EnvId;
 use nalgebra::Vector3;
 use std::collections::HashSet;

@@ -11,7 +11,7 @@ use crate::Screenshot;
 use crate::control::{Recording, RecordingState};
 use crate::sample::{HALF, Sample, sample, unlike};
 use crate::stage::{Eye, Look, Overlays, Painter, Panel, Shown, Snapshot};
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
 use kinetoscope_sim::EnvId;
 use nalgebra::Vector3;
 

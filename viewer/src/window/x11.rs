@@ -5,7 +5,7 @@ use super::enlarge::{self, Enlarged};
 use super::keys::Key;
 use super::watch::{PATIENCE, Watch};
 use crate::stage::Canvas;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
 use std::os::fd::AsFd as _;
 use x11rb::connection::{Connection, RequestConnection as _};
 use x11rb::errors::{ConnectionError, ReplyError, ReplyOrIdError};

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{Recording, Wanted};
-use kinetoscope_sensors::StereoCameraCfg;
+use kinetoscope_sensors::camera::StereoCameraCfg;
 use kinetoscope_sensors::camera::{CameraPlacement, StereoCamera};
 
 /// A pair of small eyes, the right one turned and askew.

@@ -10,8 +10,8 @@ use crate::geometry::triangle::{Shear, ShearPacket, Triangle, has_area, normal};
 use crate::simd::{D, Level, Simd};
 use columns::Columns;
 use kinetoscope_scene::Ray;
-use kinetoscope_scene::RenderMesh;
 use kinetoscope_scene::shape::Intersection;
+use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::vector::{V3, to_f64};
 use std::sync::{Arc, OnceLock};
 

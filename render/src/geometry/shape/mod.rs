@@ -12,7 +12,7 @@ use crate::geometry::assets::Assets;
 #[cfg(test)]
 use crate::geometry::bvh::Stack;
 use height_field::HeightField;
-use kinetoscope_scene::Shape;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{ClosedForm, ForClosedForm};
 use kinetoscope_scene::vector::V3;
 #[cfg(test)]

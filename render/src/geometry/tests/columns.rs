@@ -13,8 +13,9 @@ use crate::geometry::world::{RayHit, RayWorld};
 use crate::simd::{Scalar, at_level, levels};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::vector::{along, cross, dot, scale, sub, to_f64, unit};
-use kinetoscope_scene::{PoseF64, RenderMesh, Shape, pose};
+use kinetoscope_scene::{PoseF64, pose};
 use std::sync::Arc;
 
 /// The axes of columns along z.

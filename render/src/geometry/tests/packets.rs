@@ -12,9 +12,10 @@ use crate::geometry::world::{RayHit, RayTargets, RayWorld};
 use crate::simd::{at_level, levels};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Intersection;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Plane, Sphere};
 use kinetoscope_scene::vector::{along, unit};
-use kinetoscope_scene::{Instance, Material, PoseF64, RenderScene, Shape};
+use kinetoscope_scene::{Instance, Material, PoseF64, RenderScene};
 use std::sync::Arc;
 
 /// Casts every packet of the rays together, at every level, and each ray alone; counts hits.

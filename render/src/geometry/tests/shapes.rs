@@ -2,7 +2,7 @@
 
 use super::Dice;
 use kinetoscope_scene::Ray;
-use kinetoscope_scene::Shape;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
 use kinetoscope_scene::vector::{along, dot};
 

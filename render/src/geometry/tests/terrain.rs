@@ -8,8 +8,8 @@ use crate::geometry::shape::Solid;
 use crate::geometry::shape::height_field::Field;
 use crate::geometry::triangle::Triangle;
 use kinetoscope_scene::Ray;
-use kinetoscope_scene::Shape;
 use kinetoscope_scene::shape::HeightField;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::unit;
 
 /// The field's triangles. Points are a quarter of a metre apart; where single precision has missed that, it is put right.

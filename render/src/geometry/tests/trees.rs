@@ -8,8 +8,8 @@ use crate::geometry::triangle::{Shear, Triangle, normal};
 use crate::simd::levels;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::mesh::TriMesh;
+use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::vector::{V3, cross, dot, sub, to_f64, unit};
-use kinetoscope_scene::{RenderMesh, Shape};
 use std::sync::Arc;
 
 /// Distance of a triangle along a ray, from either side. Source: Möller, Trumbore: Fast, minimum storage ray/triangle

@@ -23,7 +23,8 @@ fn shiny() -> Material {
 /// A box as a mesh.
 fn brick(half: [f32; 3]) -> Shape {
     let mesh = Shape::from(Box { half }).tessellate(8);
-    kinetoscope_scene::shape::Mesh { mesh: std::sync::Arc::new(kinetoscope_scene::RenderMesh::new(&mesh, 0.1)) }.into()
+    kinetoscope_scene::shape::Mesh { mesh: std::sync::Arc::new(kinetoscope_scene::shape::RenderMesh::new(&mesh, 0.1)) }
+        .into()
 }
 
 /// The light found by both ways together and by each alone: mean and standard deviation.

@@ -137,7 +137,10 @@ fn light_on_a_ceiling() {
         assert_number(&format!("inside, {at:?}"), inside, 0.0, SINGLE);
     }
     let ball = Shape::from(Sphere { radius: 0.4 }).tessellate(12);
-    let mesh = std::sync::Arc::new(kinetoscope_scene::RenderMesh::new(&ball, kinetoscope_scene::RenderMesh::CREASE));
+    let mesh = std::sync::Arc::new(kinetoscope_scene::shape::RenderMesh::new(
+        &ball,
+        kinetoscope_scene::shape::RenderMesh::CREASE,
+    ));
     let ball = || Instance::new(kinetoscope_scene::shape::Mesh { mesh: mesh.clone() }, matt(0.6), 1);
     let mut lit = 0;
     for k in 0..60 {

@@ -2,10 +2,10 @@
 //!
 //! They are of the instants that the camera's own pictures are of: with a shutter that takes time each row is of its own.
 
-use crate::camera::Shot;
 use crate::camera::error::CameraError;
 use crate::camera::segmentation::Segment;
 use crate::camera::sensor::Camera;
+use kinetoscope_render::Shot;
 use kinetoscope_render::frame::{Channels, Frame};
 use kinetoscope_scene::RenderScene;
 

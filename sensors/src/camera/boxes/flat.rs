@@ -5,7 +5,7 @@ use super::outline::outline;
 use crate::camera::segmentation::{SegmentLevel, Segmentation};
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;
-use kinetoscope_render::raster::Layer;
+use kinetoscope_render::Layer;
 use ndarray::Axis;
 
 /// A rectangle of a picture \[pixels\]: from the edge where its first pixel begins to the edge where its last one ends, u to

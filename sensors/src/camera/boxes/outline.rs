@@ -1,8 +1,9 @@
 //! Where in the picture a thing is, as if nothing else were there.
 
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{HullPart, Plane};
-use kinetoscope_scene::{Instance, PoseF32, Shape};
+use kinetoscope_scene::{Instance, PoseF32};
 
 /// Edges around a circle of what is cut by a side of the frustum and has no corners of its own: the polygon is inside of
 /// the circle by 1 - cos(pi / 256) of its radius at most, 7.5e-5.

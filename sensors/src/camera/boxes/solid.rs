@@ -4,7 +4,7 @@ use crate::camera::error::CameraError;
 use crate::camera::segmentation::{SegmentLevel, Segmentation};
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;
-use kinetoscope_render::raster::Layer;
+use kinetoscope_render::Layer;
 use kinetoscope_scene::{Instance, Pose, PoseF32};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 

@@ -1,7 +1,7 @@
 //! Noise that grows with the square of the depth.
 
 use super::{OfDepth, Picture, within};
-use kinetoscope_render::ticket::Stream;
+use kinetoscope_render::Stream;
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 

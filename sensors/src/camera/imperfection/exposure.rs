@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Longer or shorter exposure than that in which a white surface in full light is 1.
 ///
-/// The renderers multiply light by it before the tone curve ([`Rasterizer::stops`](crate::camera::Rasterizer::stops)): what is
+/// The renderers multiply light by it before the tone curve ([`Rasterizer::stops`](kinetoscope_render::Rasterizer::stops)): what is
 /// white on the screen at 0 stops is told apart at less. All other imperfections come after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

@@ -1,9 +1,9 @@
 //! The traits of imperfections, and the image and pixel that they are told of.
 
 use crate::error::SensorError;
+use kinetoscope_render::Ticket;
+use kinetoscope_render::View;
 use kinetoscope_render::lens::LensRays;
-use kinetoscope_render::ticket::Ticket;
-use kinetoscope_render::visibility::View;
 
 /// An imperfection of light.
 pub(super) trait OfLight {

@@ -16,8 +16,9 @@ use super::error::CameraError;
 use crate::error::SensorError;
 pub(super) use kinds::Picture;
 use kinds::{OfDepth, OfLight, Place, within};
-use kinetoscope_render::frame::{Channel, Channels, Color, Depth, FrameMut};
-use kinetoscope_render::shade::tone::ToneCurve;
+use kinetoscope_render::ToneCurve;
+use kinetoscope_render::frame::{Channel, Channels, FrameMut};
+use kinetoscope_render::frame::{Color, Depth};
 use serde::{Deserialize, Serialize};
 use tone::Tone;
 

@@ -1,7 +1,7 @@
 //! Noise of the light itself.
 
 use super::{OfLight, Place, within};
-use kinetoscope_render::ticket::Stream;
+use kinetoscope_render::Stream;
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 

@@ -1,11 +1,13 @@
 //! Every imperfection against its law.
 
 use super::*;
-use crate::camera::{Frame, Lens, Optics, PixelIntrinsics};
+use kinetoscope_render::PixelIntrinsics;
+use kinetoscope_render::Ticket;
+use kinetoscope_render::View;
+use kinetoscope_render::frame::Frame;
 use kinetoscope_render::lens::LensRays;
 use kinetoscope_render::lens::{Equidistant, FTheta, OpenCv};
-use kinetoscope_render::ticket::Ticket;
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::lens::{Lens, Optics};
 use kinetoscope_scene::PoseF32;
 use std::f64::consts::FRAC_PI_2;
 

@@ -1,6 +1,6 @@
 //! Bytes of the screen as linear light, and back: the inverse of the renderers' own curve.
 
-use kinetoscope_render::shade::tone::ToneCurve;
+use kinetoscope_render::ToneCurve;
 use std::sync::LazyLock;
 
 /// The curves, read backwards once.

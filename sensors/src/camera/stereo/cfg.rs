@@ -8,13 +8,13 @@ use crate::camera::imperfection::Imperfections;
 use crate::camera::picture_noise::of_channels;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
-use crate::requires::Requires;
 use crate::sensor::{SensorCfg, SensorContext};
+use kinetoscope_render::Intrinsics;
+use kinetoscope_render::Renderer;
 use kinetoscope_render::frame::Channels;
-use kinetoscope_render::intrinsics::Intrinsics;
 use kinetoscope_render::lens::Lens;
-use kinetoscope_render::renderer::Renderer;
 use kinetoscope_scene::Pose;
+use kinetoscope_scene::Requires;
 use nalgebra::{Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -33,7 +33,8 @@ pub enum StereoOrigin {
 /// Configuration of a [`StereoCamera`]: a camera, and how its right eye differs from its left one.
 ///
 /// ```
-/// use kinetoscope_sensors::camera::{CameraCfg, Channels, StereoCameraCfg};
+/// use kinetoscope_sensors::camera::{CameraCfg, StereoCameraCfg};
+/// use kinetoscope_render::frame::Channels;
 ///
 /// let cfg = StereoCameraCfg {
 ///     camera: CameraCfg { channels: Channels::from_names(&["rgb", "depth"])?, ..CameraCfg::default() },

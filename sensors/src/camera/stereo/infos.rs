@@ -7,7 +7,7 @@ use crate::camera::calibration::CameraInfo;
 use crate::camera::cfg::CameraCfg;
 use crate::camera::error::CameraError;
 use crate::error::SensorError;
-use kinetoscope_render::renderer::Renderer;
+use kinetoscope_render::Renderer;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, UnitQuaternion, Vector3};
 
 /// How far R may be from a rotation: files have six digits or more.

@@ -5,7 +5,7 @@ use super::sensor::StereoCamera;
 use crate::camera::error::CameraError;
 use crate::camera::extrinsics::Poses;
 use crate::error::SensorError;
-use kinetoscope_render::intrinsics::{Intrinsics, PixelIntrinsics};
+use kinetoscope_render::{Intrinsics, PixelIntrinsics};
 use kinetoscope_scene::Pose;
 use nalgebra::{Matrix3, Matrix3x4, Unit, UnitQuaternion, Vector3};
 

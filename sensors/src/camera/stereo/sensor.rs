@@ -9,7 +9,7 @@ use crate::camera::placement::{CameraPlacement, PlaceRows, PoseFrame};
 use crate::camera::sensor::Camera;
 use crate::error::SensorError;
 use crate::sensor::Sensor;
-use kinetoscope_render::intrinsics::Intrinsics;
+use kinetoscope_render::Intrinsics;
 use kinetoscope_scene::pose::{from_row, to_row};
 use kinetoscope_scene::{Marker, Pose, SceneState};
 use ndarray::Array2;

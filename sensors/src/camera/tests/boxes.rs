@@ -1,14 +1,18 @@
 //! Boxes around things and occlusions, against brute force over images of each thing alone and against closed forms.
 
 use super::super::{
-    Box2d, Camera, CameraCfg, CameraError, Channels, Extrinsics, Intrinsics, Lens, Occlusion, PixelBox, Placement,
-    RasterCfg, Renderer, SegmentLevel, Segmentation, SegmentationCfg, Shutter, Thing,
+    Box2d, Camera, CameraCfg, CameraError, Extrinsics, Occlusion, PixelBox, Placement, SegmentLevel, Segmentation,
+    SegmentationCfg, Thing,
 };
 use super::stage::point;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use kinetoscope_render::frame::Channels;
+use kinetoscope_render::lens::Lens;
+use kinetoscope_render::{Intrinsics, RasterCfg, Renderer, Shutter};
 use kinetoscope_scene::pose::from_xyz_rpy;
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Capsule, Ellipsoid, Plane, Sphere};
-use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderScene, SceneState, Shape, VisibleState};
+use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderScene, SceneState, VisibleState};
 use kinetoscope_testkit::scenes::{Random, at, every_shape, random, things};
 use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
 use ndarray::Array2;

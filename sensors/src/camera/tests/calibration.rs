@@ -1,13 +1,12 @@
 //! Calibration files: real ones of each model, all the ways in which they are written, and errors of broken ones.
 
-use super::super::{
-    CalibrationError, CameraCfg, CameraInfo, DistortionModel, Intrinsics, Lens, LensRays, Optics, PixelIntrinsics,
-    Renderer,
-};
+use super::super::{CalibrationError, CameraCfg, CameraInfo, DistortionModel};
 use super::stage::{built, cfg, context, point, pose_of};
 use kinetoscope_render::lens::{
     Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
 };
+use kinetoscope_render::lens::{Lens, LensRays, Optics};
+use kinetoscope_render::{Intrinsics, PixelIntrinsics, Renderer};
 use kinetoscope_testkit::opencv::opencv;
 use kinetoscope_testkit::urdf::Files;
 

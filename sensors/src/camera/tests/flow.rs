@@ -1,13 +1,13 @@
 //! Optical flow, against projections at both instants.
 
 use super::super::imperfection::{DepthNoise, Vignetting};
-use super::super::{
-    Camera, CameraCfg, CameraConvention, CameraPlacement, Channels, Extrinsics, Intrinsics, Placement, Renderer,
-};
+use super::super::{Camera, CameraCfg, CameraConvention, CameraPlacement, Extrinsics, Placement};
 use super::stage::{BALL, GROUND, SIZE, ball, built, cfg, context, pinhole, point, state, tip};
 use crate::sensor::Sensor;
+use kinetoscope_render::frame::Channels;
 use kinetoscope_render::frame::Flow;
 use kinetoscope_render::lens::Equidistant;
+use kinetoscope_render::{Intrinsics, Renderer};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
 use nalgebra::{Point3, Vector3};

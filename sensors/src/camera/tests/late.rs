@@ -1,14 +1,14 @@
 //! Images that come late, get lost or are kept in the history, against those of a perfect camera.
 
 use super::super::imperfection::{Exposure, Holes, Imperfections, ShotNoise};
-use super::super::{
-    Camera, CameraCfg, CameraConvention, CameraError, CameraPlacement, Channels, Extrinsics, Intrinsics,
-};
+use super::super::{Camera, CameraCfg, CameraConvention, CameraError, CameraPlacement, Extrinsics};
 use super::stage::{DT, bits, built, cfg, context, state};
 use crate::SensorContext;
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorCfg};
+use kinetoscope_render::Intrinsics;
+use kinetoscope_render::frame::Channels;
 use kinetoscope_render::frame::{Color, Depth, Distance, Listed, Mask, Normal, Position, ShadingNormal};
 use ndarray::{Axis, array};
 

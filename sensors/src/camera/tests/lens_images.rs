@@ -1,17 +1,17 @@
 //! Cameras behind lenses, against closed forms.
 
-use super::super::{
-    Camera, CameraCfg, CameraError, CameraPlacement, Channels, DepthMiss, Intrinsics, Lens, LensRays, Optics,
-    PixelIntrinsics, PointFrame, Renderer,
-};
+use super::super::{Camera, CameraCfg, CameraError, CameraPlacement, DepthMiss, PointFrame};
 use super::lenses::{WARPED, all};
 use super::stage;
 use super::stage::{BALL, GROUND, RADIUS, built, context, point};
 use crate::SensorError;
-use crate::camera::OpticsError;
 use crate::sensor::{Sensor, SensorCfg};
+use kinetoscope_render::OpticsError;
+use kinetoscope_render::RenderError;
+use kinetoscope_render::frame::Channels;
 use kinetoscope_render::lens::{Equidistant, OpenCv, Panorama};
-use kinetoscope_render::visibility::RenderError;
+use kinetoscope_render::lens::{Lens, LensRays, Optics};
+use kinetoscope_render::{Intrinsics, PixelIntrinsics, Renderer};
 use kinetoscope_scene::Pose;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::FRAC_PI_2;

@@ -1,6 +1,8 @@
 //! Lenses of cameras: one of each kind, and how files name them.
 
-use super::super::{CameraCfg, Lens, PixelIntrinsics};
+use super::super::CameraCfg;
+use kinetoscope_render::PixelIntrinsics;
+use kinetoscope_render::lens::Lens;
 use kinetoscope_render::lens::{
     Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
 };

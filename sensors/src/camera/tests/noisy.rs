@@ -4,13 +4,12 @@
 //! are six times that, which fails once in 5e8 seeds, and the seeds here are fixed.
 
 use super::super::imperfection::{DepthNoise, Exposure, ReadNoise, ShotNoise};
-use super::super::{
-    Camera, CameraCfg, DepthMiss, Extrinsics, Imperfections, Lens, Placement, PointFrame, RasterCfg, Renderer,
-    ToneCurve,
-};
+use super::super::{Camera, CameraCfg, DepthMiss, Extrinsics, Imperfections, Placement, PointFrame};
 use super::stage::{BALL, DT, GROUND, SIZE, bits, built, cfg, context, state};
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorContext};
+use kinetoscope_render::lens::Lens;
+use kinetoscope_render::{RasterCfg, Renderer, ToneCurve};
 use kinetoscope_testkit::srgb::{linear, srgb};
 use ndarray::Axis;
 

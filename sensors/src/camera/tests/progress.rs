@@ -1,11 +1,12 @@
 //! Long renderings report their progress and can be cancelled.
 
-use super::super::{Channels, RenderProgress, Renderer};
 use super::stage::{built, cfg, context, state};
 use crate::camera::{CameraCfg, CameraError};
 use crate::sensor::{Sensor, SensorCfg};
+use kinetoscope_render::RenderError;
+use kinetoscope_render::frame::Channels;
 use kinetoscope_render::frame::Color;
-use kinetoscope_render::visibility::RenderError;
+use kinetoscope_render::{RenderProgress, Renderer};
 use kinetoscope_scene::Marker;
 
 fn paths(samples: u32) -> Renderer {

@@ -2,12 +2,15 @@
 
 use super::super::*;
 use super::stage::{BALL, DT, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
-use crate::camera::OpticsError;
 use crate::error::SensorError;
-use crate::requires::Requires;
 use crate::sensor::{Sensor, SensorCfg};
+use kinetoscope_render::OpticsError;
+use kinetoscope_render::RenderError;
+use kinetoscope_render::frame::Channels;
 use kinetoscope_render::frame::Depth;
-use kinetoscope_render::visibility::RenderError;
+use kinetoscope_render::lens::Lens;
+use kinetoscope_render::{Intrinsics, Renderer};
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::pose::{from_row, from_wxyz, from_xyz_rpy, to_row};
 use kinetoscope_scene::{Pose, PoseF32, SceneState};
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, UnitQuaternion, Vector3};

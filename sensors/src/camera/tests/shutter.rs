@@ -1,11 +1,13 @@
 //! Rolling shutters and motion blur, against closed forms.
 
-use super::super::{Aperture, Camera, CameraCfg, CameraError, Channels, Opened, RasterCfg, Renderer, Shutter};
+use super::super::{Camera, CameraCfg, CameraError};
 use super::stage::{DT, SIZE, ball, bits, built, cfg, context, state};
 use crate::error::SensorError;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use kinetoscope_render::RenderError;
+use kinetoscope_render::frame::Channels;
 use kinetoscope_render::frame::Mask;
-use kinetoscope_render::visibility::RenderError;
+use kinetoscope_render::{Aperture, Opened, RasterCfg, Renderer, Shutter};
 use kinetoscope_scene::PoseF32;
 use ndarray::Axis;
 

@@ -1,11 +1,10 @@
 //! A scene for the camera as a sensor: a ground and a ball that is elsewhere in every environment.
 
-use super::super::{
-    Camera, CameraCfg, CameraConvention, Channels, Extrinsics, Frame, Intrinsics, Opened, Placement, RasterCfg,
-    Rasterizer, Renderer, Shot, Shutter, Take,
-};
+use super::super::{Camera, CameraCfg, CameraConvention, Extrinsics, Placement};
 use crate::sensor::{SensorCfg, SensorContext};
-use kinetoscope_render::visibility::View;
+use kinetoscope_render::View;
+use kinetoscope_render::frame::{Channels, Frame};
+use kinetoscope_render::{Intrinsics, Opened, RasterCfg, Rasterizer, Renderer, Shot, Shutter, Take};
 use kinetoscope_scene::pose::{from_row, to_row};
 use kinetoscope_scene::shape::{Plane, Sphere};
 use kinetoscope_scene::{Instance, Light, Material, Pose, PoseF32, RenderScene, SceneState, VisibleState};

@@ -1,19 +1,22 @@
 //! Pairs of eyes, against cameras that stand alone, the geometry of pairs, and OpenCV's rectification.
 
 use super::super::{
-    CalibrationError, Camera, CameraCfg, CameraConvention, CameraError, CameraInfo, CameraPlacement, Channels,
-    DepthMiss, DistortionModel, Extrinsics, Imperfections, Intrinsics, Lens, Optics, PixelIntrinsics, Placement,
-    Rectification, Renderer, StereoCamera, StereoCameraCfg, StereoOrigin, look_at_pose,
+    CalibrationError, Camera, CameraCfg, CameraConvention, CameraError, CameraInfo, CameraPlacement, DepthMiss,
+    DistortionModel, Extrinsics, Imperfections, Placement, Rectification, StereoCamera, StereoCameraCfg, StereoOrigin,
+    look_at_pose,
 };
 use super::stage::{
     BALL, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pinhole, point, pose_of, state, tip,
 };
-use crate::camera::OpticsError;
 use crate::camera::imperfection::{DepthNoise, Holes, ReadNoise};
 use crate::error::SensorError;
 use crate::noise::NoiseCfg;
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
+use kinetoscope_render::OpticsError;
+use kinetoscope_render::frame::Channels;
 use kinetoscope_render::lens::{Equisolid, OpenCv, OpenCvFisheye};
+use kinetoscope_render::lens::{Lens, Optics};
+use kinetoscope_render::{Intrinsics, PixelIntrinsics, Renderer};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
 use kinetoscope_testkit::opencv::opencv;

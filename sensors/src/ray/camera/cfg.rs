@@ -4,15 +4,17 @@ use super::pixels::Pixels;
 use super::sensor::RayCasterCamera;
 use crate::camera::env_rows::EnvRows;
 use crate::camera::viewpoints::{Viewpoint, Viewpoints};
-use crate::camera::{CameraError, DepthMiss, Extrinsics, Intrinsics, Lens};
+use crate::camera::{CameraError, DepthMiss, Extrinsics};
 use crate::error::SensorError;
 use crate::ray::sampler::{RaySampler, RaySamplerCfg, check_memory};
 use crate::ray::{HitTargets, RayError, RayPattern};
-use crate::requires::Requires;
 use crate::sampling::{Channel, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{SensorCfg, SensorContext};
+use kinetoscope_render::Intrinsics;
+use kinetoscope_render::lens::Lens;
 use kinetoscope_render::lens::RaysOfRows;
+use kinetoscope_scene::Requires;
 use serde::{Deserialize, Serialize};
 
 /// A hit of 40 bytes; five numbers of the sampler; depth, distance, normal and mask.

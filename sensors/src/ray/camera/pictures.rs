@@ -2,7 +2,8 @@
 
 use super::pixels::Pixels;
 use super::sensor::Taken;
-use crate::camera::{CameraConvention, PixelIntrinsics};
+use crate::camera::CameraConvention;
+use kinetoscope_render::PixelIntrinsics;
 use kinetoscope_scene::pose::{from_row, to_row};
 use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, ArrayView4};
 

@@ -1,9 +1,9 @@
 //! The rays of a camera: one through the centre of every pixel.
 
-use crate::camera::PixelIntrinsics;
-use crate::ray::Ray;
 use crate::ray::scan::Rays;
+use kinetoscope_render::PixelIntrinsics;
 use kinetoscope_scene::PoseF64;
+use kinetoscope_scene::Ray;
 use nalgebra::Vector3;
 
 /// The pixels of a picture, row by row. Rays are made when they are cast: every environment may have a lens of its own.

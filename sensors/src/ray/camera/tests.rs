@@ -1,12 +1,14 @@
 //! Images of a floor and a ball, against closed forms.
 
 use super::{RayCasterCamera, RayCasterCameraCfg};
-use crate::camera::OpticsError;
-use crate::camera::{CameraConvention, CameraPlacement, DepthMiss, Extrinsics, Intrinsics, Placement, PointFrame};
+use crate::SensorError;
+use crate::camera::CameraError;
+use crate::camera::{CameraConvention, CameraPlacement, DepthMiss, Extrinsics, Placement, PointFrame};
 use crate::noise::NoiseCfg;
 use crate::sampling::{Sampled, SamplingCfg};
 use crate::sensor::{Sensor, SensorCfg, SensorContext};
-use crate::{CameraError, SensorError};
+use kinetoscope_render::Intrinsics;
+use kinetoscope_render::OpticsError;
 use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
 use kinetoscope_scene::shape::{Plane, Sphere};
 use kinetoscope_scene::{Instance, Material, Pose, PoseF64, RenderScene, SceneState};

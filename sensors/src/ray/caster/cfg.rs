@@ -5,11 +5,12 @@ use super::sensor::RayCaster;
 use crate::error::SensorError;
 use crate::ray::pattern::Grid;
 use crate::ray::sampler::{RaySampler, RaySamplerCfg, check_memory};
-use crate::ray::{HitTargets, Ray, RayError, RayPattern};
-use crate::requires::Requires;
+use crate::ray::{HitTargets, RayError, RayPattern};
 use crate::sampling::{Channel, SamplingCfg};
 use crate::schedule::Schedule;
 use crate::sensor::{SensorCfg, SensorContext};
+use kinetoscope_scene::Ray;
+use kinetoscope_scene::Requires;
 use kinetoscope_scene::{Pose, PoseF64};
 use serde::{Deserialize, Serialize};
 

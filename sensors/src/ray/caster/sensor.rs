@@ -3,11 +3,11 @@
 use super::RayAlignment;
 use super::cfg::RayCasterCfg;
 use crate::error::SensorError;
-use crate::ray::Ray;
 use crate::ray::sampler::{RayModel, RaySampler};
 use crate::sampling::{Sampled, Sampler};
 use crate::sensor::{Sensor, SensorContext};
 use crate::summary;
+use kinetoscope_scene::Ray;
 use kinetoscope_scene::pose::{from_row, to_row};
 use kinetoscope_scene::{Marker, Pose, PoseF64, Random, SceneState};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};

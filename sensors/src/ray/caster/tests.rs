@@ -21,8 +21,9 @@ const BALL: i32 = 5;
 
 /// Ground at z = 0, a block 0.25 m high for x > 1, a robot's base (a box) with a foot fused to it, a ball.
 fn context(num_envs: usize, threads: usize) -> SensorContext {
-    let instance =
-        |shape: kinetoscope_scene::Shape, id, name: &str| Instance::new(shape, Material::default(), id).named(name);
+    let instance = |shape: kinetoscope_scene::shape::Shape, id, name: &str| {
+        Instance::new(shape, Material::default(), id).named(name)
+    };
     let instances = vec![
         instance(Plane::INFINITE.into(), GROUND, "ground").fixed(),
         instance(Box { half: [5.0, 5.0, 0.125] }.into(), STEP, "step").fixed(),

@@ -7,7 +7,8 @@ mod pattern_impl;
 pub use grid::GridOrder;
 use pattern_impl::{Line, PatternImpl};
 
-use super::{Ray, RayError};
+use super::RayError;
+use kinetoscope_scene::Ray;
 use kinetoscope_scene::vector::unit;
 use serde::{Deserialize, Serialize};
 

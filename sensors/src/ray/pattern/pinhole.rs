@@ -1,7 +1,7 @@
 //! A ray through every pixel of a camera.
 
 use super::{Line, PatternImpl};
-use crate::camera::Intrinsics;
+use kinetoscope_render::Intrinsics;
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,7 @@
 //! Counts and orders are those of Isaac Lab.
 
 use super::*;
-use crate::camera::Intrinsics;
+use kinetoscope_render::Intrinsics;
 
 fn rays(pattern: impl Into<RayPattern>) -> Vec<Ray> {
     pattern.into().rays().unwrap()

@@ -18,8 +18,9 @@ use super::identity::Drawable;
 use super::shown::is_shown;
 use super::surface::{Surfaces, color};
 use kinetoscope_mujoco::{Data, Model};
+use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::shape::{Capsule, Mesh};
-use kinetoscope_scene::{Instance, Material, PoseF32, RenderMesh, RenderScene, RenderSceneError};
+use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, RenderSceneError};
 use std::sync::Arc;
 
 /// The instances of a model whose shapes change.
@@ -132,7 +133,7 @@ impl Deforming {
         like: &Instance,
         instances: &mut Vec<Instance>,
     ) -> Result<(), RenderSceneError> {
-        let instance = |shape: kinetoscope_scene::Shape, material: Material, group: i32| Instance {
+        let instance = |shape: kinetoscope_scene::shape::Shape, material: Material, group: i32| Instance {
             shape,
             material,
             // A negative group counts as the first one, as in MuJoCo's viewers.

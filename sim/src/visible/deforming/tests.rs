@@ -4,7 +4,8 @@ use super::super::Visible;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco;
 use kinetoscope_mujoco::{Data, Model};
-use kinetoscope_scene::{Instance, PoseF32, RenderScene, Shape};
+use kinetoscope_scene::shape::Shape;
+use kinetoscope_scene::{Instance, PoseF32, RenderScene};
 use std::sync::Arc;
 
 /// A model and its state, moved to `qpos`.
