@@ -133,14 +133,17 @@ fn raw_calls() {
     let mut data = Data::new(&model).expect("small");
     data.forward().expect("computes");
     // SAFETY: an engine function, which writes the energy of the data.
-    let energy = unsafe {
-        data.with_raw(|model, data| {
-            crate::sys::mj_energyPos(model, data);
-            (*data).energy[0]
-        })
-    };
-    assert!((energy.expect("computes") - 2.0 * 10.0 * 0.3).abs() < 1e-12);
+    let compute = |model, data| unsafe { crate::sys::mj_energyPos(model, data) };
+    // SAFETY: the pointer is valid in the call.
+    let read = |_, data: *mut crate::sys::mjData| unsafe { (*data).energy[0] };
     // SAFETY: the error handler ends the call, in which nothing has a destructor.
-    let stopped = unsafe { data.with_raw(|_, _| crate::sys::mju_error(c"on purpose".as_ptr())) };
+    let stop = |_, _| unsafe { crate::sys::mju_error(c"on purpose".as_ptr()) };
+    // SAFETY: `compute` calls an engine function with the pointers and keeps none.
+    unsafe { data.with_raw(compute) }.expect("computes");
+    // SAFETY: `read` only reads.
+    let energy = unsafe { data.with_raw(read) }.expect("reads");
+    assert!((energy - 2.0 * 10.0 * 0.3).abs() < 1e-12);
+    // SAFETY: `stop` only raises an error.
+    let stopped = unsafe { data.with_raw(stop) };
     assert!(stopped.expect_err("an error").to_string().contains("on purpose"));
 }

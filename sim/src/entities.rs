@@ -12,6 +12,13 @@ use kinetoscope_sensors::Sensor;
 use ndarray::Array2;
 use std::sync::Arc;
 
+impl SimulationManager {
+    /// What the simulation contains, by name.
+    pub fn entities(&self) -> Entities<'_> {
+        Entities::new(self)
+    }
+}
+
 /// Contents of a simulation by name; see [`SimulationManager::entities`].
 #[derive(Clone, Copy, Debug)]
 pub struct Entities<'a> {

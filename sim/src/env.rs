@@ -14,7 +14,6 @@ use crate::capture::{Capture, Solved};
 use crate::drive::table::{DriveState, DriveTable};
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::{
     Buffers, Data, EngineError, Inputs, Model, Motion, Overflow, RawQuats, Warning, WarningCounts, Weld,
 };

@@ -4,7 +4,6 @@ use crate::batch::Batch;
 use crate::compile::compile;
 use crate::contents::Contents;
 use crate::diverged::DivergedEnv;
-use crate::entities::Entities;
 use crate::env::{Env, EnvStatus};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, MjcfId, ObjectId, RobotId, TerrainId, env_mask};
@@ -17,15 +16,12 @@ use crate::objects::rigid_object_data::{RigidObjectCfg, RigidObjectData};
 use crate::objects::robot::{Robot, RobotCfg, RobotMut};
 use crate::objects::robot_data::{RobotData, Role};
 use crate::objects::terrain::{Terrain, TerrainCfg};
-use crate::observer::{Moment, ObserverSlots, Observers, ObserversMut};
-use crate::randomization::{EnvProperties, EnvPropertiesMut};
-use crate::scene_view::{SceneView, SceneViewMut};
+use crate::observer::{Moment, ObserverSlots};
 use crate::sensor_list::{SensorId, SensorList};
 use crate::simulation::Simulation;
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::viewpoint::Viewpoint;
 use crate::visible::{Visible, VisualCache};
-use crate::warnings::Warnings;
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco as mj;
 use kinetoscope_render::geometry::RayAssets;
@@ -376,46 +372,6 @@ impl SimulationManager {
     pub fn with_mujoco<T>(&self, env: EnvId, read: impl FnOnce(&mj::Model, &mj::Data) -> T) -> Result<T> {
         env_mask(Some(&[env]), self.num_envs())?;
         Ok(self.simulation.batch.read(env.0, |env| read(env.data().model(), env.data())))
-    }
-
-    /// What the simulation contains, by name.
-    pub fn entities(&self) -> Entities<'_> {
-        Entities::new(self)
-    }
-
-    /// The simulation as viewers and renderers see it.
-    pub fn scene(&self) -> SceneView<'_> {
-        SceneView::new(self)
-    }
-
-    /// The simulation as viewers and renderers see it, to change.
-    pub fn scene_mut(&mut self) -> SceneViewMut<'_> {
-        SceneViewMut::new(self)
-    }
-
-    /// Observers of the simulation.
-    pub fn observers(&self) -> Observers<'_> {
-        Observers::new(self)
-    }
-
-    /// Observers of the simulation, to add and to remove.
-    pub fn observers_mut(&mut self) -> ObserversMut<'_> {
-        ObserversMut::new(self)
-    }
-
-    /// Properties of environments: masses, frictions, sizes, gains.
-    pub fn properties(&self) -> EnvProperties<'_> {
-        EnvProperties::new(self)
-    }
-
-    /// Properties of environments, to draw and to reset.
-    pub fn properties_mut(&mut self) -> EnvPropertiesMut<'_> {
-        EnvPropertiesMut::new(self)
-    }
-
-    /// Warnings since the simulation was made.
-    pub fn warnings(&self) -> Warnings<'_> {
-        Warnings::new(self)
     }
 
     /// Of those robots that are `wanted`, the one called `uid`.

@@ -96,6 +96,18 @@ impl fmt::Debug for ObserverSlots {
     }
 }
 
+impl SimulationManager {
+    /// Observers of the simulation.
+    pub fn observers(&self) -> Observers<'_> {
+        Observers::new(self)
+    }
+
+    /// Observers of the simulation, to add and to remove.
+    pub fn observers_mut(&mut self) -> ObserversMut<'_> {
+        ObserversMut::new(self)
+    }
+}
+
 /// Observers of a simulation; see [`SimulationManager::observers`].
 #[derive(Clone, Copy, Debug)]
 pub struct Observers<'a> {

@@ -12,7 +12,6 @@ use crate::manager::SimulationManager;
 use crate::simulation::Simulation;
 use crate::snapshot::{Entry, Snapshot};
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use ndarray::{Array3, ArrayView2, ArrayView3, ArrayViewMut2, AsArray, Ix3};
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -19,6 +19,18 @@ use kinetoscope_sensors::camera::{Segmentation, SegmentationCfg, Thing};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
+impl SimulationManager {
+    /// The simulation as viewers and renderers see it.
+    pub fn scene(&self) -> SceneView<'_> {
+        SceneView::new(self)
+    }
+
+    /// The simulation as viewers and renderers see it, to change.
+    pub fn scene_mut(&mut self) -> SceneViewMut<'_> {
+        SceneViewMut::new(self)
+    }
+}
+
 /// The simulation as viewers and renderers see it; see [`SimulationManager::scene`].
 #[derive(Clone, Copy, Debug)]
 pub struct SceneView<'a> {

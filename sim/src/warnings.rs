@@ -8,6 +8,13 @@ use kinetoscope_mujoco as mj;
 use kinetoscope_robot::diagnostic::count_by_name;
 use std::collections::BTreeMap;
 
+impl SimulationManager {
+    /// Warnings since the simulation was made.
+    pub fn warnings(&self) -> Warnings<'_> {
+        Warnings::new(self)
+    }
+}
+
 /// Warnings since the simulation was made; see [`SimulationManager::warnings`].
 #[derive(Clone, Copy, Debug)]
 pub struct Warnings<'a> {

@@ -62,7 +62,12 @@ pub(super) struct Ours<'s> {
 }
 
 impl<'s> Ours<'s> {
-    pub(super) fn new(scene: &'s Scene, work: &Work, threads: usize, by: kinetoscope::render::Renderer) -> Outcome<Self> {
+    pub(super) fn new(
+        scene: &'s Scene,
+        work: &Work,
+        threads: usize,
+        by: kinetoscope::render::Renderer,
+    ) -> Outcome<Self> {
         let full = work.look != Look::Plain;
         let groups = GROUPS.iter().fold(0, |mask, group| mask | 1 << group);
         let cfg = RasterCfg {

@@ -112,8 +112,7 @@ fn cancel() {
     clone.render(&mut [(shot, frame.as_mut())]).unwrap();
     assert_eq!((clone.progress().samples(), progress.samples()), (2 * 64 * 64, 64 * 64));
     assert!(rasterizer.render(&mut [(shot, frame.as_mut())]).is_err());
-    let mut single = Rasterizer::default();
-    single.renderer = paths(4);
+    let single = Rasterizer { renderer: paths(4), ..Rasterizer::default() };
     let clone = single.clone();
     single.progress.cancel();
     assert!(!clone.progress.is_cancelled() && clone.renderer == single.renderer);

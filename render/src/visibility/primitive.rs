@@ -222,8 +222,8 @@ fn ray_by_ray<S: Simd>(s: S, shape: &Shape, o: &V3<S>, d: &V3<S>, near: f32) -> 
                 let Some(found) = found else { continue };
                 let inward = dot(found.normal, ray.at(found.t)) < 0.0 && !shape.is_one_sided();
                 ts[k] = (f64::from(near) + found.t / length) as f32;
-                for axis in 0..3 {
-                    normals[axis][k] = (if inward { -found.normal[axis] } else { found.normal[axis] }) as f32;
+                for (lanes, component) in normals.iter_mut().zip(found.normal) {
+                    lanes[k] = (if inward { -component } else { component }) as f32;
                 }
                 faces[k] = shape.face(&found, &ray) as u32;
             }
@@ -258,11 +258,9 @@ mod tests {
             for packet in 0..300 {
                 // From outside, and from inside; some directions are not of unit length.
                 let from = dice.point(if packet % 3 == 0 { 0.15 } else { 2.0 }).map(|x| x as f32);
-                let mut directions = [[0.0f32; LANES]; 3];
-                for k in 0..LANES {
-                    let to = dice.point(0.5);
-                    (0..3).for_each(|axis| directions[axis][k] = to[axis] as f32 - from[axis]);
-                }
+                let to: [[f64; 3]; LANES] = std::array::from_fn(|_| dice.point(0.5));
+                let directions: [[f32; LANES]; 3] =
+                    std::array::from_fn(|axis| to.map(|to| to[axis] as f32 - from[axis]));
                 for level in levels() {
                     at_level!(level, s => {
                         let [x, y, z] = directions.each_ref().map(|d| load(s, d));

@@ -10,7 +10,6 @@ use crate::objects::rows::{Rows, Table, check_distinct, distinct_envs};
 use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::{Model, words};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};

@@ -8,7 +8,6 @@ use crate::objects::robot::Robot;
 use crate::objects::robot_data::RobotData;
 use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_robot::description::LinkId;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};

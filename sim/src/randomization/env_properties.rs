@@ -7,6 +7,18 @@ use crate::manager::SimulationManager;
 use crate::snapshot::Snapshot;
 use kinetoscope_scene::Random;
 
+impl SimulationManager {
+    /// Properties of environments: masses, frictions, sizes, gains.
+    pub fn properties(&self) -> EnvProperties<'_> {
+        EnvProperties::new(self)
+    }
+
+    /// Properties of environments, to draw and to reset.
+    pub fn properties_mut(&mut self) -> EnvPropertiesMut<'_> {
+        EnvPropertiesMut::new(self)
+    }
+}
+
 /// Properties of environments: masses, frictions, sizes, gains; see [`SimulationManager::properties`].
 #[derive(Clone, Copy, Debug)]
 pub struct EnvProperties<'a> {

@@ -3,7 +3,6 @@
 use super::Property;
 use crate::drive::table::{Drive, DriveTable, Realization};
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::{Model, ObjectKind};
 use std::collections::BTreeMap;
 

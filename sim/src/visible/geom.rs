@@ -2,7 +2,6 @@
 
 use super::identity::GeomIdentity;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::Model;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::pose::from_row;

@@ -11,7 +11,6 @@ pub(super) fn is_shown(group: i32, rgba: &[f32]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::Visible;
-    use kinetoscope_mujoco;
     use kinetoscope_mujoco as mj;
     use kinetoscope_mujoco::Data;
     use kinetoscope_scene::{Hemisphere, LightSum, PoseF32, Sky};

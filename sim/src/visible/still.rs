@@ -6,7 +6,6 @@ use crate::ids::{EnvId, env_list, env_mask};
 use crate::manager::SimulationManager;
 use crate::pattern;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::{Data, Model, ObjectKind};
 use kinetoscope_render::Shot;
 use kinetoscope_render::View;

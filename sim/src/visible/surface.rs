@@ -1,7 +1,6 @@
 //! Materials and textures of MuJoCo models.
 
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::{Model, TextureType};
 use kinetoscope_scene::{Material, Texture, TextureKind};
 use std::sync::Arc;

@@ -37,7 +37,14 @@ impl Panel {
 
     /// Draws camera `camera` of environment `env` in a grid, each picture at most `width` pixels wide. `false`, and nothing is
     /// drawn, where that camera does not look at that environment.
-    pub(crate) fn draw(&mut self, snapshot: &Snapshot, camera: usize, env: usize, width: usize, canvas: &mut Canvas) -> bool {
+    pub(crate) fn draw(
+        &mut self,
+        snapshot: &Snapshot,
+        camera: usize,
+        env: usize,
+        width: usize,
+        canvas: &mut Canvas,
+    ) -> bool {
         let Some(stage) = snapshot.envs.get(env) else { return false };
         let looks = stage.views.get(camera).and_then(Option::as_ref);
         let Some((looks, scene)) = looks.zip(snapshot.scene_of(stage)) else {

@@ -5,7 +5,6 @@
 
 use super::{Segment, catenary};
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::{Data, Model};
 
 /// A tendon, and the most that its path can be.

@@ -2,7 +2,6 @@
 
 use super::super::Visible;
 use kinetoscope_mujoco as mj;
-use kinetoscope_mujoco;
 use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{Instance, PoseF32, RenderScene};
