@@ -151,7 +151,7 @@ pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires,
         {
             visible.read(env.data(), poses, lights);
             if let Some(scene) = seen.scenes.get_mut(i) {
-                visible.shape(env.data(), (i, simulation.own_scenes.get(i).unwrap_or(&AS_ALL)), scene);
+                visible.shape(env.data(), i, simulation.own_scenes.get(i).unwrap_or(&AS_ALL), scene);
             }
         }
         if wants(Requires::INSTANCES)
