@@ -250,12 +250,12 @@ impl McapFile {
                     if let Some(ids) = small(&block.values, range.clone()) {
                         let put =
                             |bytes: &mut Vec<u8>| ids.iter().for_each(|id| bytes.extend_from_slice(&id.to_le_bytes()));
-                        ros::image(cdr, stamp, "16UC1", (*height, *width, 2 * *width), put);
+                        ros::image(cdr, stamp, "16UC1", *height, *width, 2 * *width, put);
                     } else {
                         let kind = if stream.element == Element::I32 { "32SC" } else { "32FC" };
-                        let shape = (*height, *width, 4 * components * *width);
+                        let (encoding, row_bytes) = (format!("{kind}{components}"), 4 * components * *width);
                         let put = |bytes: &mut Vec<u8>| block.values.put(range, bytes);
-                        ros::image(cdr, stamp, &format!("{kind}{components}"), shape, put);
+                        ros::image(cdr, stamp, &encoding, *height, *width, row_bytes, put);
                     }
                 }
             }
@@ -268,9 +268,9 @@ impl McapFile {
                 self.channels.write(writer, channels[1], at, cdr.bytes())?;
                 cdr.begin();
                 let frame = seen_by(camera);
-                let size = (*height, *width);
+                let stamp = Stamp { nanos: at, frame: &frame };
                 let matrices = ["intrinsics", "rectification", "projection"].map(part);
-                ros::camera_info(cdr, Stamp { nanos: at, frame: &frame }, size, matrices, distortion);
+                ros::camera_info(cdr, stamp, *height, *width, matrices, distortion);
             }
             Kind::Imu => {
                 let part = |name| stream.part(states, name);

@@ -4,7 +4,7 @@ use super::lens::LensRays;
 use super::rasterizer::Rasterizer;
 use super::renderer::Renderer;
 use super::request::Shot;
-use super::shutter::{Clock, Take};
+use super::shutter::{ShutterInterval, Take};
 use crate::frame::FrameMut;
 use crate::path::eye::{Eye, Pupil};
 use crate::path::film::{Film, develop};
@@ -21,23 +21,34 @@ use std::sync::{Mutex, PoisonError};
 /// Rows of pixels that a thread takes at once: a row of blocks.
 const ROWS: usize = BLOCK;
 
+/// A frame whose shot is prepared.
+struct Exposure<'a> {
+    shot: &'a Shot<'a>,
+    plan: &'a Plan,
+    /// `None` if the frame is of one instant.
+    interval: Option<ShutterInterval<'a>>,
+    /// [`Take::noise`].
+    noise: u32,
+}
+
 /// Draws a shot with the threads of some rasterizers. The bits do not depend on their number.
 pub(super) fn expose(
     pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
-    (shot, take): (&Shot<'_>, &Take<'_>),
+    shot: &Shot<'_>,
+    take: &Take<'_>,
     frame: &mut FrameMut<'_>,
 ) -> Result<(), RenderError> {
     let Some(first) = rasterizers.first_mut() else { return Ok(()) };
     let (mut plan, mut film) = (std::mem::take(&mut first.plan), std::mem::take(&mut first.film));
-    let ready = plan.prepare(first.style(), shot, frame).and_then(|()| first.shutter.clock(shot, take));
-    let result = ready.and_then(|clock| {
-        let opened = take.opened.filter(|_| clock.is_some());
-        if let Some(opened) = opened.filter(|_| frame.color.is_some()) {
-            plan.tracer.place(shot.scene, shot.poses, Some(opened.poses));
+    let ready = plan.prepare(first.style(), shot, frame).and_then(|()| first.shutter.interval(shot, take));
+    let result = ready.and_then(|interval| {
+        if let Some(interval) = interval.filter(|_| frame.color.is_some()) {
+            plan.tracer.place(shot.scene, shot.poses, Some(interval.opened.poses));
         }
-        draw_colors(pool, rasterizers, (&plan, clock.as_ref()), &mut film, (shot, take), frame)?;
-        draw_others(pool, rasterizers, (&plan, clock.as_ref()), (shot, take), frame)?;
+        let exposure = Exposure { shot, plan: &plan, interval, noise: take.noise };
+        draw_colors(pool, rasterizers, &exposure, &mut film, frame)?;
+        draw_others(pool, rasterizers, &exposure, frame)?;
         show(pool, rasterizers, &plan, &film, frame);
         Ok(())
     });
@@ -51,11 +62,11 @@ pub(super) fn expose(
 fn draw_colors(
     pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
-    (plan, clock): (&Plan, Option<&Clock>),
+    exposure: &Exposure<'_>,
     film: &mut Film,
-    (shot, take): (&Shot<'_>, &Take<'_>),
     frame: &FrameMut<'_>,
 ) -> Result<(), RenderError> {
+    let &Exposure { shot, plan, interval, noise } = exposure;
     let (Some(projection), Some(first)) = (&plan.projection, rasterizers.first()) else { return Ok(()) };
     let Renderer::RayTraced { samples, max_bounces, denoise, seed } = plan.renderer else { return Ok(()) };
     if frame.color.is_none() {
@@ -67,21 +78,21 @@ fn draw_colors(
     let (tracer, lens) = (&plan.tracer, shot.lens);
     let forward = lens.is_none_or(LensRays::is_forward);
     let lights = shot.lights.unwrap_or(&shot.scene.lights);
-    film.lamps.prepare((shot.scene, tracer), lights, cfg.shadows, (projection, forward));
-    let moving = clock.zip(take.opened).map(|(clock, opened)| Moving {
-        clock: *clock,
+    film.lamps.prepare(shot.scene, tracer, lights, cfg.shadows, projection, forward);
+    let moving = interval.map(|ShutterInterval { opened, clock }| Moving {
+        clock,
         camera: Motion::between(&opened.world_from_camera, &shot.view.world_from_camera),
     });
     let eye = Eye { projection, lens, pupil: first.aperture.as_ref().and_then(Pupil::of) };
     let (lamps, rows) = film.rows(ROWS);
     // Takes of number 0 are as they were without.
-    let seed = seed ^ take.noise;
+    let seed = seed ^ noise;
     let (scene, moving) = (shot.scene, moving.as_ref());
     let paths = Paths { scene, tracer, eye, moving, samples, max_bounces, seed, lamps, ways: Ways::Both };
     // Not what the progress says afterwards: it may have been resumed meanwhile, and rows be missing.
     let broken_off = AtomicBool::new(false);
     pool.for_each(rasterizers, rows, |rasterizer, mut rows| {
-        let level = rasterizer.level;
+        let level = rasterizer.brush.level;
         if !rows.expose(level, &paths, denoise, rasterizer.brush.stack(), &progress) {
             broken_off.store(true, Ordering::Relaxed);
         }
@@ -102,7 +113,7 @@ fn draw_colors(
         let Film { pixels, next, guides, .. } = &mut *film;
         let (pixels, guides) = (&*pixels, &*guides);
         pool.for_each(rasterizers, next.chunks_mut(size).enumerate(), |_, (k, to)| {
-            smooth::pass([width, k * ROWS], (pass, plan.exposure), pixels, guides, to);
+            smooth::pass([width, k * ROWS], pass, plan.exposure, pixels, guides, to);
         });
         std::mem::swap(&mut film.pixels, &mut film.next);
     }
@@ -113,21 +124,21 @@ fn draw_colors(
 fn draw_others(
     pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
-    (plan, clock): (&Plan, Option<&Clock>),
-    (shot, take): (&Shot<'_>, &Take<'_>),
+    exposure: &Exposure<'_>,
     frame: &mut FrameMut<'_>,
 ) -> Result<(), RenderError> {
+    let &Exposure { shot, plan, interval, .. } = exposure;
     let Some(projection) = &plan.projection else { return Ok(()) };
     let (width, height) = (projection.width, projection.height);
     let color = frame.color.take();
     let mut failure = Ok(());
     if frame.channels() != Default::default() {
         let mut rest = frame.reborrow();
-        if let Some((clock, opened)) = clock.zip(take.opened) {
+        if let Some(interval) = interval {
             let first = Mutex::new(&mut failure);
             let rows = (0..height).map(move |y| (y, rest.split_off_first(width)));
             pool.for_each(rasterizers, rows, |rasterizer, (y, mut row)| {
-                if let Err(error) = rasterizer.draw_row(shot, (&opened, clock), y, &mut row) {
+                if let Err(error) = rasterizer.draw_row(shot, &interval, y, &mut row) {
                     **first.lock().unwrap_or_else(PoisonError::into_inner) = Err(error);
                 }
             });
@@ -137,7 +148,7 @@ fn draw_others(
                 (row / BLOCK, rest.split_off_first(width * rows))
             });
             pool.for_each(rasterizers, bands, |rasterizer, (block, mut frame)| {
-                rasterizer.brush.paint(rasterizer.level, plan, shot, &mut frame, block..block + 1);
+                rasterizer.brush.paint(plan, shot, &mut frame, block..block + 1);
             });
         }
     }
@@ -153,6 +164,6 @@ fn show(pool: &ThreadPool, rasterizers: &mut [Rasterizer], plan: &Plan, film: &F
     let parts = film.pixels.chunks(size).zip(color.chunks_mut(4 * size)).enumerate();
     pool.for_each(rasterizers, parts, |rasterizer, (k, (pixels, out))| {
         let guides = if denoise { &film.guides[k * size..k * size + pixels.len()] } else { &[] };
-        develop(rasterizer.level, (plan.exposure, plan.tone), pixels, guides, out);
+        develop(rasterizer.brush.level, plan.exposure, plan.tone, pixels, guides, out);
     });
 }

@@ -164,7 +164,7 @@ impl ParallelRasterizer {
             for (index, (shot, frame)) in jobs.iter_mut().enumerate() {
                 let take = takes.get(index).copied().unwrap_or_default();
                 let (before, paths) = (progress.samples(), renderer.paths(shot, frame));
-                let result = expose(pool, rasterizers, (shot, &take), frame);
+                let result = expose(pool, rasterizers, shot, &take, frame);
                 if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Cancelled { .. })) {
                     progress.refuse(paths.saturating_sub(progress.samples().saturating_sub(before)));
                 }
@@ -240,7 +240,7 @@ fn draw_together(
         let maps = plans.iter_mut().zip(&*jobs);
         let bands = maps.flat_map(|(plan, (shot, _))| plan.shadow_bands().map(move |band| (shot.scene, band)));
         pool.for_each(rasterizers, bands, |rasterizer, (scene, band)| {
-            rasterizer.brush.shadow(rasterizer.level, scene, band);
+            rasterizer.brush.shadow(scene, band);
         });
     }
     let bands = plans.iter().zip(jobs).flat_map(|(plan, job)| {
@@ -249,7 +249,7 @@ fn draw_together(
         bands.map(move |band| (plan, shot, band))
     });
     pool.for_each(rasterizers, bands, |rasterizer, (plan, shot, (first, rows, mut frame))| {
-        rasterizer.brush.paint(rasterizer.level, plan, &shot, &mut frame, first..first + rows);
+        rasterizer.brush.paint(plan, &shot, &mut frame, first..first + rows);
     });
 }
 

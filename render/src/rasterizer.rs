@@ -5,7 +5,7 @@ use super::exposure::expose;
 use super::progress::RenderProgress;
 use super::renderer::Renderer;
 use super::rolling::Roll;
-use super::shutter::{Clock, Opened, Shutter, Take};
+use super::shutter::{Shutter, ShutterInterval, Take};
 use crate::frame::{Frame, FrameMut};
 use crate::geometry::assets::RayAssets;
 use crate::path::film::Film;
@@ -41,7 +41,6 @@ pub struct Rasterizer {
     /// How far the paths of a picture are.
     pub progress: RenderProgress,
     pub(super) assets: RayAssets,
-    pub(super) level: Level,
     pub(super) plan: Plan,
     pub(super) brush: Brush,
     /// Of pictures by path tracing.
@@ -53,8 +52,7 @@ pub struct Rasterizer {
 /// Draws as the other does, and counts its own progress.
 impl Clone for Rasterizer {
     fn clone(&self) -> Self {
-        let Self { cfg, renderer, aperture, shutter, stops, progress: _, assets, level, plan, brush, film, roll } =
-            self;
+        let Self { cfg, renderer, aperture, shutter, stops, progress: _, assets, plan, brush, film, roll } = self;
         Self {
             cfg: *cfg,
             renderer: *renderer,
@@ -63,7 +61,6 @@ impl Clone for Rasterizer {
             stops: *stops,
             progress: RenderProgress::default(),
             assets: assets.clone(),
-            level: *level,
             plan: plan.clone(),
             brush: brush.clone(),
             film: film.clone(),
@@ -94,9 +91,8 @@ impl Rasterizer {
             stops: 0.0,
             progress: RenderProgress::default(),
             assets: RayAssets::default(),
-            level,
             plan: Plan::default(),
-            brush: Brush::default(),
+            brush: Brush::new(level),
             film: Film::default(),
             roll: Roll::default(),
         }
@@ -152,19 +148,19 @@ impl Rasterizer {
         let paths = self.renderer.paths(shot, frame);
         self.progress.begin(paths);
         if self.renderer.follows_paths() {
-            let result = expose(&ThreadPool::serial(), std::slice::from_mut(self), (shot, take), frame);
+            let result = expose(&ThreadPool::serial(), std::slice::from_mut(self), shot, take, frame);
             if result.as_ref().is_err_and(|error| !matches!(error, RenderError::Cancelled { .. })) {
                 self.progress.refuse(paths.saturating_sub(self.progress.samples()));
             }
             return result;
         }
-        let Self { cfg, renderer, aperture, shutter, stops, assets, level, plan, brush, .. } = self;
+        let Self { cfg, renderer, aperture, shutter, stops, assets, plan, brush, .. } = self;
         let (aperture, shutter) = (aperture.as_ref(), *shutter);
         plan.prepare(Style { cfg: *cfg, renderer: *renderer, aperture, shutter, stops: *stops, assets }, shot, frame)?;
         for band in plan.shadow_bands() {
-            brush.shadow(*level, shot.scene, band);
+            brush.shadow(shot.scene, band);
         }
-        brush.paint(*level, plan, shot, frame, 0..shot.view.height.div_ceil(BLOCK));
+        brush.paint(plan, shot, frame, 0..shot.view.height.div_ceil(BLOCK));
         Ok(())
     }
 
@@ -172,13 +168,13 @@ impl Rasterizer {
     pub(super) fn draw_row(
         &mut self,
         shot: &Shot<'_>,
-        when: (&Opened<'_>, &Clock),
+        interval: &ShutterInterval<'_>,
         y: usize,
         row: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
-        let Self { cfg, renderer, aperture, shutter, stops, assets, level, brush, roll, .. } = self;
+        let Self { cfg, renderer, aperture, shutter, stops, assets, brush, roll, .. } = self;
         let (aperture, shutter) = (aperture.as_ref(), *shutter);
         let style = Style { cfg: *cfg, renderer: *renderer, aperture, shutter, stops: *stops, assets };
-        roll.draw((brush, style, *level), shot, when, y, row)
+        roll.draw(brush, style, shot, interval, y, row)
     }
 }

@@ -1,12 +1,11 @@
 //! Draws rows of pictures, each at an instant of its own: all channels but colours, which paths draw.
 
 use super::request::Shot;
-use super::shutter::{Clock, Opened};
+use super::shutter::ShutterInterval;
 use crate::frame::{Channels, Frame, FrameMut};
 use crate::raster::tile::BLOCK;
 use crate::shade::band::Brush;
 use crate::shade::plan::{Plan, Style};
-use crate::simd::Level;
 use crate::trace::motion::Motion;
 use crate::visibility::{RenderError, View};
 use kinetoscope_scene::PoseF32;
@@ -31,13 +30,15 @@ impl Roll {
     /// Draws row `y` of a picture, as it is in the middle of its exposure, into a frame of that row.
     pub(super) fn draw(
         &mut self,
-        (brush, style, level): (&mut Brush, Style<'_>, Level),
+        brush: &mut Brush,
+        style: Style<'_>,
         shot: &Shot<'_>,
-        (opened, clock): (&Opened<'_>, &Clock),
+        interval: &ShutterInterval<'_>,
         y: usize,
         row: &mut FrameMut<'_>,
     ) -> Result<(), RenderError> {
         let Self { plan, poses, frame, size } = self;
+        let ShutterInterval { opened, clock } = interval;
         let wanted = (shot.view.width, row.channels());
         if *size != wanted {
             (*frame, *size) = (Frame::new(wanted.0, BLOCK, wanted.1), wanted);
@@ -50,7 +51,7 @@ impl Roll {
         let shot = Shot { poses, view: &View { world_from_camera, ..*shot.view }, ..*shot };
         plan.prepare_row(style, &shot, &frame.as_mut(), y)?;
         let block = y / BLOCK;
-        brush.paint(level, plan, &shot, &mut frame.as_mut(), block..block + 1);
+        brush.paint(plan, &shot, &mut frame.as_mut(), block..block + 1);
         row.take_row(frame, y % BLOCK, wanted.0);
         Ok(())
     }

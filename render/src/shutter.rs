@@ -44,6 +44,13 @@ pub struct Opened<'a> {
     pub before: f64,
 }
 
+/// The time in which the shutter of a frame is open: the poses at its beginning, and the instants of rows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShutterInterval<'a> {
+    pub(crate) opened: Opened<'a>,
+    pub(crate) clock: Clock,
+}
+
 /// When rows see what they see, in parts of the time from where things were (0) to where they are (1).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clock {
@@ -81,15 +88,18 @@ impl Shutter {
         Ok(())
     }
 
-    /// When rows of a picture see what they see; `None` where that is one instant.
+    /// The time in which the shutter of a frame is open; `None` where that is one instant.
     ///
     /// # Errors
     ///
     /// Poses from when the shutter opened that are no good, or not old enough.
-    pub(crate) fn clock(&self, shot: &Shot<'_>, take: &Take<'_>) -> Result<Option<Clock>, RenderError> {
-        let Some(Opened { poses, world_from_camera, before }) = take.opened.filter(|_| !self.is_instant()) else {
-            return Ok(None);
-        };
+    pub(crate) fn interval<'a>(
+        &self,
+        shot: &Shot<'_>,
+        take: &Take<'a>,
+    ) -> Result<Option<ShutterInterval<'a>>, RenderError> {
+        let Some(opened) = take.opened.filter(|_| !self.is_instant()) else { return Ok(None) };
+        let Opened { poses, world_from_camera, before } = opened;
         let expected = shot.scene.instances().len();
         if poses.len() != expected {
             return Err(RenderError::PoseCount { expected, found: poses.len() });
@@ -106,6 +116,7 @@ impl Shutter {
             return Err(RenderError::Opened { before, span });
         }
         let last_row = shot.view.height.saturating_sub(1);
-        Ok(Some(Clock { last_row, row: self.row_time / before, exposure: self.exposure_time / before }))
+        let clock = Clock { last_row, row: self.row_time / before, exposure: self.exposure_time / before };
+        Ok(Some(ShutterInterval { opened, clock }))
     }
 }

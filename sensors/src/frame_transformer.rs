@@ -62,12 +62,20 @@ impl FrameTransformerCfg {
     }
 }
 
+/// A frame on a body.
+#[derive(Clone, Copy, Debug)]
+struct BodyFrame {
+    /// Index of the body in [`SceneState`].
+    body: usize,
+    body_from_frame: Pose,
+}
+
 /// Poses of target frames in the world and in the source frame, in all environments. N environments, M targets.
 #[derive(Clone, Debug)]
 pub struct FrameTransformer {
     source_name: String,
-    source: (usize, Pose),
-    targets: Vec<(usize, Pose)>,
+    source: BodyFrame,
+    targets: Vec<BodyFrame>,
     names: Vec<String>,
     sampler: Sampler,
 }
@@ -111,7 +119,7 @@ impl SensorCfg for FrameTransformerCfg {
                     return Err(SensorError::NameTaken { what: "target frame", name });
                 }
                 names.push(name);
-                targets.push((body, target.offset));
+                targets.push(BodyFrame { body, body_from_frame: target.offset });
             }
         }
         check_offset("source_offset", &self.source_offset)?;
@@ -129,7 +137,7 @@ impl SensorCfg for FrameTransformerCfg {
         ];
         Ok(FrameTransformer {
             source_name: context.bodies[source].clone(),
-            source: (source, self.source_offset),
+            source: BodyFrame { body: source, body_from_frame: self.source_offset },
             targets,
             names,
             sampler: Sampler::new("frame transformer", self.requires(), context, &self.sampling, &channels)?,
@@ -138,10 +146,10 @@ impl SensorCfg for FrameTransformerCfg {
 }
 
 /// Writes what the sensor measures in environment `env` to `row`.
-fn read(source: &(usize, Pose), targets: &[(usize, Pose)], state: &SceneState, env: usize, row: &mut [f64]) {
+fn read(source: &BodyFrame, targets: &[BodyFrame], state: &SceneState, env: usize, row: &mut [f64]) {
     let Some(poses) = &state.body_poses else { return };
-    let frame = |(body, body_from_frame): &(usize, Pose)| pose(poses, env, *body) * body_from_frame;
-    let world_from_source = frame(source);
+    let world_from = |frame: &BodyFrame| pose(poses, env, frame.body) * frame.body_from_frame;
+    let world_from_source = world_from(source);
     let source_from_world = world_from_source.inverse();
     let row = put(row, world_from_source.translation.vector.as_slice());
     let row = put(row, &to_wxyz(&world_from_source.rotation));
@@ -149,7 +157,7 @@ fn read(source: &(usize, Pose), targets: &[(usize, Pose)], state: &SceneState, e
     let (mut rotations, row) = row.split_at_mut(4 * targets.len());
     let (mut seen_positions, mut seen_rotations) = row.split_at_mut(3 * targets.len());
     for target in targets {
-        let world_from_target = frame(target);
+        let world_from_target = world_from(target);
         let source_from_target = source_from_world * world_from_target;
         positions = put(positions, world_from_target.translation.vector.as_slice());
         rotations = put(rotations, &to_wxyz(&world_from_target.rotation));

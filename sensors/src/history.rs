@@ -16,7 +16,7 @@ pub struct History<T> {
 impl<T: Copy + Default> History<T> {
     /// Room for `length` rows of `width` numbers in each of `num_envs` environments. A length of 0 remembers nothing.
     pub fn new(num_envs: usize, length: usize, width: usize) -> Self {
-        Self::of((num_envs, length, width), T::default())
+        Self::of(num_envs, length, width, T::default())
     }
 
     /// Adds the newest row of environment `env`; the oldest one falls out where the history is full.
@@ -50,9 +50,9 @@ impl<T: Copy + Default> History<T> {
 }
 
 impl<T: Clone> History<T> {
-    /// Rows of `(num_envs, length, width)` values, which are `value` first.
-    pub(crate) fn of(shape: (usize, usize, usize), value: T) -> Self {
-        Self { rows: Array3::from_elem(shape, value), filled: vec![0; shape.0] }
+    /// Rows as in [`new`](Self::new), filled with `value`.
+    pub(crate) fn of(num_envs: usize, length: usize, width: usize, value: T) -> Self {
+        Self { rows: Array3::from_elem((num_envs, length, width), value), filled: vec![0; num_envs] }
     }
 
     /// The newest row of environment `env`, to be written: it holds what the row that fell out held. `None` where the history

@@ -1,8 +1,27 @@
-//! Poses of MuJoCo's bodies.
+//! Poses of MuJoCo's bodies and of frames on them.
 
 use kinetoscope_mujoco as mj;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::from_row;
+
+/// A frame on a MuJoCo body, such as that of a link.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BodyFrame {
+    pub(crate) body: usize,
+    pub(crate) body_from_frame: Pose,
+}
+
+impl BodyFrame {
+    /// The frame of the body itself.
+    pub(crate) fn of_body(body: usize) -> Self {
+        Self { body, body_from_frame: Pose::identity() }
+    }
+
+    /// Pose in the environment.
+    pub(crate) fn pose(&self, data: &mj::Data) -> Pose {
+        body_pose(data, self.body) * self.body_from_frame
+    }
+}
 
 /// Pose of a MuJoCo body in the environment.
 pub(crate) fn body_pose(data: &mj::Data, body: usize) -> Pose {

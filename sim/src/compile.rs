@@ -1,6 +1,7 @@
 //! From robots to a running simulation: document, MuJoCo model, drives, batch.
 
 use crate::batch::Batch;
+use crate::body_pose::BodyFrame;
 use crate::capture::Plan;
 use crate::contents::{Contents, GROUND_MASK_ID};
 use crate::drive::gains::Gains;
@@ -235,7 +236,9 @@ fn find_part(model: &mj::Model, part: &MjcfData) -> Result<PartIndex> {
         qpos.extend((0..nq).map(|k| model.jnt_qposadr()[here] as usize + k));
         dofs.extend((0..nv).map(|k| model.jnt_dofadr()[here] as usize + k));
     }
-    let frames = part.frames().iter().map(|frame| (bodies[frame.body], frame.body_from_frame)).collect();
+    let frames = part.frames().iter();
+    let frames =
+        frames.map(|frame| BodyFrame { body: bodies[frame.body], body_from_frame: frame.body_from_frame }).collect();
     let mocaps = (0..file.nbody()).filter(|&body| file.body_mocapid()[body] >= 0).map(|body| bodies[body]).collect();
     Ok(PartIndex {
         geoms: all(ObjectKind::Geom, "geom", &names.geoms)?,
@@ -357,7 +360,7 @@ fn set_up_drives(
             .iter()
             .map(|frame| {
                 let body = compiled.id(ObjectKind::Body, &frame.body).ok_or_else(|| missing("body", &frame.body))?;
-                Ok((body, frame.body_from_link))
+                Ok(BodyFrame { body, body_from_frame: frame.body_from_link })
             })
             .collect::<Result<Vec<_>>>()?;
         let geoms = layout
@@ -369,7 +372,7 @@ fn set_up_drives(
             })
             .collect::<Result<_>>()?;
         let root = FreeIndex {
-            body: links[data.description().root.0].0,
+            body: links[data.description().root.0].body,
             joint: layout.free_joint.as_ref().and_then(|joint| compiled.joint_address(joint)),
             mocap: None,
         };

@@ -1,15 +1,15 @@
 //! Places of entities in MuJoCo's arrays.
 
+use crate::body_pose::BodyFrame;
 use kinetoscope_mujoco as mj;
-use kinetoscope_scene::Pose;
 
 /// Places of one robot in MuJoCo's arrays.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotIndex {
     /// Position and velocity address of each drivable joint.
     pub joints: Vec<JointIndexing>,
-    /// Body and frame of each link.
-    pub links: Vec<(usize, Pose)>,
+    /// Frame of each link.
+    pub links: Vec<BodyFrame>,
     /// The body of its root link.
     pub root: FreeIndex,
     /// Its geoms.
@@ -75,7 +75,7 @@ pub(crate) struct PartIndex {
     /// Bodies of the file that are moved by hand.
     pub mocaps: Vec<usize>,
     /// Bodies and sites as sensors see them.
-    pub frames: Vec<(usize, Pose)>,
+    pub frames: Vec<BodyFrame>,
 }
 
 /// Which equality a weld is, and MuJoCo's bodies that it holds together.

@@ -131,8 +131,9 @@ impl SimulationManager {
             return Err(Error::TooManyRobots(MAX_ROBOTS));
         }
         let mut diagnostics = Vec::new();
-        let so_far = (self.contents.robots.len(), self.simulation.batch.model());
-        let robot = RobotData::load(cfg, role, &self.cfg, so_far, self.contents.next_mask_id(), &mut diagnostics)?;
+        let (index, mask_id) = (self.contents.robots.len(), self.contents.next_mask_id());
+        let scene = self.simulation.batch.model();
+        let robot = RobotData::load(cfg, role, &self.cfg, index, scene, mask_id, &mut diagnostics)?;
         let robot = robot.with_clearance(&self.cfg, &self.contents, &mut diagnostics)?;
         let mut contents = self.contents.clone();
         contents.robots.push(Arc::new(robot));

@@ -1,6 +1,7 @@
 //! The simulation as viewers and renderers see it.
 
-use crate::capture::{Capture, body_velocity, link_pose};
+use crate::body_pose::BodyFrame;
+use crate::capture::{Capture, body_velocity};
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list, env_mask};
@@ -13,7 +14,7 @@ use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::Data;
 use kinetoscope_scene::Contact;
 use kinetoscope_scene::Requires;
-use kinetoscope_scene::{Marker, Pose, PoseF32, RenderScene};
+use kinetoscope_scene::{Marker, PoseF32, RenderScene};
 use kinetoscope_sensors::Sensor;
 use kinetoscope_sensors::camera::{Segmentation, SegmentationCfg, Thing};
 use nalgebra::Vector3;
@@ -101,16 +102,16 @@ impl<'a> SceneView<'a> {
     /// There is no such environment or body.
     pub fn body_motion(&self, env: EnvId, body: usize) -> Result<BodyMotion> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
-        let place = place_of(self.sim, body)?;
+        let frame = frame_of(self.sim, body)?;
         Ok(self.sim.simulation.batch.read(env.0, |env| {
-            let (data, pose) = (env.data(), link_pose(env.data(), place));
-            let [linear, angular] = body_velocity(data, place.0, &pose.translation.vector);
+            let (data, pose) = (env.data(), frame.pose(env.data()));
+            let [linear, angular] = body_velocity(data, frame.body, &pose.translation.vector);
             BodyMotion {
                 pose,
                 linear: linear.into(),
                 angular: angular.into(),
-                carried_mass: data.model().body_subtreemass()[place.0],
-                is_fixed: data.model().body_weldid()[place.0] == 0,
+                carried_mass: data.model().body_subtreemass()[frame.body],
+                is_fixed: data.model().body_weldid()[frame.body] == 0,
             }
         }))
     }
@@ -168,9 +169,9 @@ impl<'a> SceneViewMut<'a> {
             look.instances.resize(visible.scene().instances().len(), PoseF32::IDENTITY);
             look.lights.clone_from(&visible.scene().lights);
             visible.read(data, &mut look.instances, &mut look.lights);
-            visible.shape(data, (index, &own), &mut look.own_scene);
+            visible.shape(data, index, &own, &mut look.own_scene);
             look.bodies.clear();
-            look.bodies.extend(plan.bodies().iter().map(|place| link_pose(data, place)));
+            look.bodies.extend(plan.bodies().iter().map(|frame| frame.pose(data)));
             look.masses.clear();
             let masses = data.xipos().as_chunks::<3>().0.iter().zip(data.model().body_mass());
             look.masses.extend(masses.skip(1).filter(|(_, mass)| **mass > 0.0).map(|(at, mass)| (*at, *mass)));
@@ -220,7 +221,7 @@ impl<'a> SceneViewMut<'a> {
     /// There is no such environment or body, or a number is not finite; then nothing has changed.
     pub fn pull(&mut self, env: EnvId, body: usize, forces: &[([f64; 3], [f64; 3])]) -> Result<()> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
-        let &(mujoco_body, _) = place_of(self.sim, body)?;
+        let mujoco_body = frame_of(self.sim, body)?.body;
         for (of, numbers) in forces.iter().flat_map(|(point, force)| [("the point", point), ("the force", force)]) {
             if let Some(column) = numbers.iter().position(|x| !x.is_finite()) {
                 let (of, value) = (of.to_string(), numbers[column]);
@@ -275,8 +276,8 @@ impl<'a> SceneViewMut<'a> {
     }
 }
 
-/// MuJoCo's body of a body, and the frame in it.
-fn place_of(sim: &SimulationManager, body: usize) -> Result<&(usize, Pose)> {
+/// The frame of a body.
+fn frame_of(sim: &SimulationManager, body: usize) -> Result<&BodyFrame> {
     let bodies = sim.simulation.plan.bodies();
     bodies.get(body).ok_or(Error::UnknownIndex { what: "body", index: body, count: bodies.len() })
 }

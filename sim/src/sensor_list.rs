@@ -1,6 +1,6 @@
 //! The sensors of a simulation: built from their configurations, ticked after every step, read by typed handles.
 
-use crate::capture::{Capture, link_pose};
+use crate::capture::Capture;
 use crate::contents::check_usable;
 use crate::env::EnvStatus;
 use crate::error::{Error, Result};
@@ -287,8 +287,8 @@ impl SensorList {
         }
         simulation.batch.for_each(|i, env| {
             let pose = |body: usize| {
-                let place = simulation.plan.bodies().get(body);
-                place.map_or_else(Pose::identity, |place| link_pose(env.data(), place))
+                let frame = simulation.plan.bodies().get(body);
+                frame.map_or_else(Pose::identity, |frame| frame.pose(env.data()))
             };
             markers[i].extend(shown.iter().flat_map(|sensor| sensor.markers(i, &pose)));
         });

@@ -56,17 +56,17 @@ impl Wrench {
 }
 
 impl Wrenches {
-    /// Replaces the wrench of a link; `None` for none.
-    pub(crate) fn replace(&mut self, of: (usize, usize), wrench: Option<Wrench>) {
-        self.list.retain(|old| old.of != of);
-        self.list.extend(wrench);
+    /// Replaces the wrench of the same owner; a wrench of zeros ends it.
+    pub(crate) fn replace(&mut self, wrench: Wrench) {
+        self.list.retain(|old| old.of != wrench.of);
+        if wrench.force != Vector3::zeros() || wrench.torque != Vector3::zeros() {
+            self.list.push(wrench);
+        }
     }
 
     /// Pulls at a body, whatever else acts on it; nothing at all ends it.
     pub(crate) fn pull(&mut self, body: usize, mujoco_body: usize, force: Vector3<f64>, torque: Vector3<f64>) {
-        let wrench = Wrench { of: (PULLED, body), body: mujoco_body, axes: None, force, torque };
-        let pulls = force != Vector3::zeros() || torque != Vector3::zeros();
-        self.replace((PULLED, body), pulls.then_some(wrench));
+        self.replace(Wrench { of: (PULLED, body), body: mujoco_body, axes: None, force, torque });
     }
 
     /// Gives bodies their weight, or takes it.

@@ -16,6 +16,13 @@ pub(crate) struct Features {
     pub(crate) outcome: Option<usize>,
 }
 
+/// Some numbers of the rows of a stream.
+#[derive(Clone, Debug, PartialEq)]
+struct StreamPart {
+    stream: usize,
+    range: Range<usize>,
+}
+
 /// Numbers of a frame.
 pub(crate) struct Feature {
     pub(crate) role: Role,
@@ -23,8 +30,8 @@ pub(crate) struct Feature {
     pub(crate) name: String,
     /// What each of the numbers is.
     pub(crate) names: Vec<String>,
-    /// Streams, and which numbers of their rows.
-    parts: Vec<(usize, Range<usize>)>,
+    /// Sources of the numbers.
+    parts: Vec<StreamPart>,
 }
 
 /// Pictures of frames.
@@ -143,7 +150,7 @@ impl Features {
                     None if stream.kind == Kind::EngineState => Role::EngineState,
                     None => Role::Sensor { stream: stream.name.clone(), channel: part.name.clone() },
                 };
-                all.append(role, name, names, (s, range));
+                all.append(role, name, names, StreamPart { stream: s, range });
             }
         }
         all.numbers.retain(|feature| !feature.names.is_empty());
@@ -161,7 +168,7 @@ impl Features {
     }
 
     /// Joints of several robots are one feature.
-    fn append(&mut self, role: Role, name: fn(&Role) -> String, names: Vec<String>, part: (usize, Range<usize>)) {
+    fn append(&mut self, role: Role, name: fn(&Role) -> String, names: Vec<String>, part: StreamPart) {
         let joins = !matches!(role, Role::Sensor { .. });
         match self.numbers.iter_mut().find(|feature| joins && feature.role == role) {
             Some(feature) => {
@@ -186,7 +193,7 @@ impl Feature {
     /// Its numbers among the rows of all streams, if they are all there.
     pub(crate) fn values(&self, rows: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
         let mut values = Vec::with_capacity(self.names.len());
-        for (stream, range) in &self.parts {
+        for StreamPart { stream, range } in &self.parts {
             values.extend_from_slice(rows.get(*stream)?.as_ref()?.get(range.clone())?);
         }
         Some(values)

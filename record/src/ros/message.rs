@@ -66,12 +66,14 @@ pub(crate) fn compressed_image(to: &mut Cdr, stamp: Stamp<'_>, png: &[u8]) {
     to.blob(png);
 }
 
-/// `sensor_msgs/msg/Image` of `bytes` bytes per row that `put` appends.
+/// `sensor_msgs/msg/Image` of `row_bytes` bytes per row that `put` appends.
 pub(crate) fn image(
     to: &mut Cdr,
     stamp: Stamp<'_>,
     encoding: &str,
-    (height, width, bytes): (usize, usize, usize),
+    height: usize,
+    width: usize,
+    row_bytes: usize,
     put: impl FnOnce(&mut Vec<u8>),
 ) {
     header(to, stamp);
@@ -79,8 +81,8 @@ pub(crate) fn image(
     to.count(width);
     to.text(encoding);
     to.u8(0);
-    to.count(bytes);
-    to.blob_of(height * bytes, put);
+    to.count(row_bytes);
+    to.blob_of(height * row_bytes, put);
 }
 
 /// `sensor_msgs/msg/CameraInfo`; `k` are the nine numbers of the camera's matrix, `r` and `p` the nine and twelve of what rectifies an eye
@@ -89,7 +91,8 @@ pub(crate) fn image(
 pub(crate) fn camera_info(
     to: &mut Cdr,
     stamp: Stamp<'_>,
-    (height, width): (usize, usize),
+    height: usize,
+    width: usize,
     [k, r, p]: [&[f64]; 3],
     distortion: &Distortion,
 ) {

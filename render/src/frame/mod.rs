@@ -151,15 +151,15 @@ macro_rules! channels {
                 })*
             }
 
-            /// Copies a view of others, which have the same channels and size; of both it is said how many views there are, and
-            /// which.
-            pub fn copy_view(&mut self, (all, view): (usize, usize), others: &Self, (count, from): (usize, usize)) {
+            /// Copies view `from` of `other_count` views of others, which have the same channels and size, to view `to` of
+            /// `count`.
+            pub fn copy_view(&mut self, count: usize, to: usize, others: &Self, other_count: usize, from: usize) {
                 $(if let (Some(numbers), Some(others)) = (
                     self.$field.as_mut().and_then(|array| array.as_slice_mut()),
                     others.$field.as_ref().and_then(|array| array.as_slice()),
                 ) {
-                    let (each, other) = (numbers.len() / all.max(1), others.len() / count.max(1));
-                    numbers[view * each..(view + 1) * each].copy_from_slice(&others[from * other..(from + 1) * other]);
+                    let (each, other) = (numbers.len() / count.max(1), others.len() / other_count.max(1));
+                    numbers[to * each..(to + 1) * each].copy_from_slice(&others[from * other..(from + 1) * other]);
                 })*
             }
 

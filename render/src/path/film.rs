@@ -123,21 +123,16 @@ impl Rows<'_> {
 /// Light is multiplied by `exposure` before the tone curve.
 pub(crate) fn develop(
     level: Level,
-    (exposure, curve): (f32, ToneCurve),
+    exposure: f32,
+    curve: ToneCurve,
     pixels: &[Pixel],
     guides: &[Guide],
     out: &mut [u8],
 ) {
-    at_level!(level, s => develop_lanes(s, (exposure, curve), pixels, guides, out));
+    at_level!(level, s => develop_lanes(s, exposure, curve, pixels, guides, out));
 }
 
-fn develop_lanes<S: Simd>(
-    s: S,
-    (exposure, curve): (f32, ToneCurve),
-    pixels: &[Pixel],
-    guides: &[Guide],
-    out: &mut [u8],
-) {
+fn develop_lanes<S: Simd>(s: S, exposure: f32, curve: ToneCurve, pixels: &[Pixel], guides: &[Guide], out: &mut [u8]) {
     for (group, (pixels, out)) in pixels.chunks(LANES).zip(out.chunks_mut(4 * LANES)).enumerate() {
         for c in 0..3 {
             let mut linear = [0.0f32; LANES];

@@ -135,10 +135,12 @@ impl Lamps {
     /// along its axis.
     pub(crate) fn prepare(
         &mut self,
-        (scene, tracer): (&RenderScene, &Tracer),
+        scene: &RenderScene,
+        tracer: &Tracer,
         lights: &[Light],
         shadows: bool,
-        (view, forward): (&Projection, bool),
+        view: &Projection,
+        forward: bool,
     ) {
         let linear = |c: [f32; 3]| to_f64(tone::decode(c));
         let Self { lamps, emitters, dome, sky, skybox, haze } = self;

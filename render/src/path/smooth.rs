@@ -72,7 +72,8 @@ pub(crate) fn guess([width, first]: [usize; 2], from: &[Pixel], guides: &[Guide]
 /// One pass over some rows, of which the first is `first`; `pass` counts from 0, light will be multiplied by `exposure`.
 pub(crate) fn pass(
     [width, first]: [usize; 2],
-    (pass, exposure): (u32, f32),
+    pass: u32,
+    exposure: f32,
     from: &[Pixel],
     guides: &[Guide],
     to: &mut [Pixel],

@@ -57,7 +57,7 @@ impl<'a> Studio<'a> {
         tracer.find_bodies(scene, &RayAssets::default(), |i| Layer::of(i, u32::MAX));
         tracer.place(scene, poses, None);
         let (mut lamps, projection) = (Lamps::default(), Projection::from(view));
-        lamps.prepare((scene, &tracer), &scene.lights, true, (&projection, true));
+        lamps.prepare(scene, &tracer, &scene.lights, true, &projection, true);
         Self { scene, tracer, lamps, projection }
     }
 

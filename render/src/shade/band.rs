@@ -11,14 +11,16 @@ use crate::raster::tile::{BLOCK, Tile};
 use crate::raster::{Item, Painter};
 use crate::request::Shot;
 use crate::simd::{LANES, Level, Simd, at_level, first, load, splat_i};
+use crate::trace::CameraView;
 use crate::visibility::Projection;
 use kinetoscope_scene::RenderScene;
 use std::cell::RefCell;
 use std::ops::Range;
 
 /// What a thread needs to draw; keeps its memory.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Brush {
+    pub(crate) level: Level,
     tile: Tile,
     layer: Tile,
     veiled: Tile,
@@ -31,6 +33,20 @@ pub(crate) struct Brush {
 }
 
 impl Brush {
+    pub(crate) fn new(level: Level) -> Self {
+        Self {
+            level,
+            tile: Tile::default(),
+            layer: Tile::default(),
+            veiled: Tile::default(),
+            painter: Painter::default(),
+            stack: Stack::default(),
+            shade_stack: Stack::default(),
+            colors: Vec::new(),
+            edges: Edges::default(),
+        }
+    }
+
     pub(crate) fn bytes(&self) -> usize {
         self.tile.bytes()
             + self.layer.bytes()
@@ -48,22 +64,15 @@ impl Brush {
     }
 
     /// Draws a part of a shadow map.
-    pub(crate) fn shadow(&mut self, level: Level, scene: &RenderScene, band: ShadowBand<'_>) {
-        band.draw(level, scene, &mut self.tile, &mut self.painter);
+    pub(crate) fn shadow(&mut self, scene: &RenderScene, band: ShadowBand<'_>) {
+        band.draw(self.level, scene, &mut self.tile, &mut self.painter);
     }
 
     /// Draws rows of blocks of a prepared shot, a band at a time. `frame` begins with the first of them.
-    pub(crate) fn paint(
-        &mut self,
-        level: Level,
-        plan: &Plan,
-        shot: &Shot<'_>,
-        frame: &mut FrameMut<'_>,
-        rows: Range<usize>,
-    ) {
+    pub(crate) fn paint(&mut self, plan: &Plan, shot: &Shot<'_>, frame: &mut FrameMut<'_>, rows: Range<usize>) {
         let Some(projection) = &plan.projection else { return };
         let wide = projection.width.div_ceil(BLOCK);
-        let (step, top) = (plan.rows(), rows.start * BLOCK);
+        let (level, step, top) = (self.level, plan.rows(), rows.start * BLOCK);
         // Shadows may come later: memory is taken once.
         self.tile.reserve(plan.most_of_shadow_bands());
         self.tile.only = plan.only;
@@ -92,12 +101,12 @@ impl Brush {
         frame: &mut FrameMut<'_>,
         top: usize,
     ) {
-        let Self { tile, layer, veiled, painter, stack, shade_stack, colors, edges } = self;
+        let Self { tile, layer, veiled, painter, stack, shade_stack, colors, edges, .. } = self;
         let list = &plan.list;
+        let view = CameraView { projection, lens: shot.lens, placed: &list.placed, first_ids: shot.scene.first_ids() };
         let mut draw = |tile: &mut Tile, item: &Item| {
             if plan.sees_by_rays {
-                let what = (&*list.placed, shot.scene.first_ids());
-                plan.tracer.draw(s, stack, tile, (projection, shot.lens), what, item);
+                plan.tracer.draw(s, stack, tile, &view, item);
             } else {
                 painter.draw(s, tile, projection, shot.scene, &list.placed, item);
             }

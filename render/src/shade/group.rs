@@ -1,11 +1,9 @@
 //! Sixteen samples: which instances they see, and what each channel makes of it.
 
-use super::light::{Lighting, albedo, shade, sky};
-use super::mirror::Mirrors;
+use super::light::{ShadeContext, ViewRays, albedo, shade, sky};
+use super::mirror::{MirrorSamples, Mirrors};
 use super::moves::Moves;
-use super::shadow::ShadowMap;
-use super::shadow_rays::ShadowRays;
-use super::surface::{Ray, Source, surface};
+use super::surface::{CameraRays, Ray, Source, surface};
 use super::tone::to_srgb;
 use crate::frame::PixelGroup;
 use crate::lens::rays::LensRays;
@@ -15,7 +13,7 @@ use crate::simd::{
     COLUMN, F, LANES, M, ROW, Simd, U, V3, load, load_u, max, min, select, select_i, splat, splat_i, splat_u, store,
 };
 use crate::visibility::Projection;
-use kinetoscope_scene::{PoseF32, RenderScene};
+use kinetoscope_scene::PoseF32;
 
 /// What the pixels of a frame have in common.
 #[derive(Clone, Copy, Debug)]
@@ -23,17 +21,11 @@ pub(crate) struct Context<'a> {
     pub(crate) projection: &'a Projection,
     /// The rays, where a lens bends them.
     pub(crate) lens: Option<&'a LensRays>,
-    pub(crate) scene: &'a RenderScene,
     pub(crate) poses: &'a [PoseF32],
     pub(crate) placed: &'a [Placed],
-    pub(crate) lighting: &'a Lighting,
-    pub(crate) shadows: &'a [ShadowMap],
-    /// Instead of maps.
-    pub(crate) shadow_rays: Option<ShadowRays<'a>>,
+    pub(crate) shade: ShadeContext<'a>,
     /// Surfaces that mirror, where there are some.
     pub(crate) mirrors: Option<Mirrors<'a>>,
-    /// Width of a pixel at depth 1 (behind lenses whose rays go aside, at distance 1).
-    pub(crate) pixel: f32,
     /// Whether channels of [`Stage::Detail`](crate::frame::Stage::Detail) are wanted.
     pub(crate) detail: bool,
     /// Whether channels of [`Stage::Albedo`](crate::frame::Stage::Albedo) are wanted.
@@ -46,7 +38,7 @@ impl<'a> Context<'a> {
     /// The instance that an id belongs to.
     #[inline(always)]
     pub(crate) fn instance(&self, id: u32, last: usize) -> usize {
-        let first = self.scene.first_ids();
+        let first = self.shade.scene.first_ids();
         if id >= first[last] && id < first[last + 1] {
             return last;
         }
@@ -56,13 +48,13 @@ impl<'a> Context<'a> {
     #[inline(always)]
     pub(crate) fn source(&self, index: usize) -> Source<'a> {
         Source {
-            instance: &self.scene.instances()[index],
+            instance: &self.shade.scene.instances()[index],
             world_from_instance: &self.poses[index],
             placed: &self.placed[index],
-            first_id: self.scene.first_ids()[index],
-            color: self.scene.linear_colors()[index],
-            texture_scale: self.scene.texture_scales()[index],
-            texture_offset: self.scene.texture_offsets()[index],
+            first_id: self.shade.scene.first_ids()[index],
+            color: self.shade.scene.linear_colors()[index],
+            texture_scale: self.shade.scene.texture_scales()[index],
+            texture_offset: self.shade.scene.texture_offsets()[index],
         }
     }
 }
@@ -110,7 +102,7 @@ pub(crate) fn resolve<S: Simd>(
                 At::Pixels(first) => lens.of_pixels(s, first),
                 At::Points(_) => lens.of_points(s, uv[0], uv[1]),
             });
-            resolve_lanes(s, context, load_u(s, ids), (uv, bent), pixels, colors);
+            resolve_lanes(s, context, load_u(s, ids), uv, bent, pixels, colors);
         },
     );
 }
@@ -120,7 +112,8 @@ fn resolve_lanes<S: Simd>(
     s: S,
     context: &Context<'_>,
     ids: U<S>,
-    ([u, v], bent): ([F<S>; 2], Option<V3<S>>),
+    uv @ [u, v]: [F<S>; 2],
+    bent: Option<V3<S>>,
     mut pixels: Option<&mut PixelGroup>,
     mut colors: Option<&mut Colors>,
 ) {
@@ -138,6 +131,7 @@ fn resolve_lanes<S: Simd>(
     // What a number along a ray means for depths.
     let forward = context.lens.is_none_or(LensRays::is_forward);
     let ray = bent.map(|ray| Ray { direction: ray, forward });
+    let rays = CameraRays { uv, bent: ray, direction };
     let view = if colors.is_some() || context.albedo { direction.scale(1.0 / length) } else { direction };
     let nothing = splat_u(s, NOTHING);
     let missed = ids.simd_eq(nothing);
@@ -147,8 +141,8 @@ fn resolve_lanes<S: Simd>(
     let mut color = none;
     let mut mask = splat_i(s, 0);
     if colors.is_some() && missed.any_true() {
-        color = sky(s, context.lighting, view, context.pixel);
-        if let Some(horizon) = &context.lighting.ground_haze {
+        color = sky(s, context.shade.lighting, view, context.shade.pixel);
+        if let Some(horizon) = &context.shade.lighting.ground_haze {
             color = horizon.over_sky(s, view, color);
         }
     }
@@ -166,11 +160,11 @@ fn resolve_lanes<S: Simd>(
         let lane = left.trailing_zeros() as usize;
         last = context.instance(list[lane], last);
         let source = context.source(last);
-        let end = context.scene.first_ids()[last + 1];
+        let end = context.shade.scene.first_ids()[last + 1];
         let here: M<S> = ids.simd_ge(splat_u(s, source.first_id)) & ids.simd_lt(splat_u(s, end));
         let bits = here.to_bitmask();
         left &= !bits;
-        let at = surface(s, projection, &source, ids, here, ([u, v], ray), direction);
+        let at = surface(s, projection, &source, ids, here, rays);
         if pixels.is_some() {
             along = select(here, at.along, along);
             normal = V3::select(here, at.normal, normal);
@@ -181,22 +175,21 @@ fn resolve_lanes<S: Simd>(
             }
         }
         if let (Some(pixels), Some(moves)) = (&mut pixels, context.moves) {
-            let [right, down] = moves.of(s, last, at.local, [u, v], here);
+            let [right, down] = moves.of(s, last, at.local, uv, here);
             store(select(here, right, load(s, &pixels.flow[0])), &mut pixels.flow[0]);
             store(select(here, down, load(s, &pixels.flow[1])), &mut pixels.flow[1]);
         }
         if let Some(pixels) = pixels.as_mut().filter(|_| context.albedo) {
-            let base = albedo(s, &source, &at, view, context.pixel, here);
+            let base = albedo(s, &source, &at, view, context.shade.pixel, here);
             store_bytes(s, base, here, &mut pixels.albedo);
         }
         if colors.is_some() {
-            let Context { scene, lighting, pixel, .. } = *context;
-            let shadows = (context.shadows, context.shadow_rays);
-            let distance = at.along * length;
-            let mut seen = shade(s, scene, lighting, shadows, &source, &at, view, distance, (pixel, 1.0), here);
+            let ShadeContext { lighting, pixel, .. } = context.shade;
+            let rays = ViewRays { direction: view, distance: at.along * length };
+            let mut seen = shade(s, &context.shade, &source, &at, rays, 1.0, here);
             if let Some(mirrors) = context.mirrors.filter(|mirrors| mirrors.has(last, source.instance)) {
-                let from = (at.position, at.normal, at.along);
-                seen = mirrors.reflect(s, context, &source, from, (view, length), (seen, here));
+                let samples = MirrorSamples { point: at.point(), view, length, color: seen };
+                seen = mirrors.reflect(s, context, &source, samples, here);
             }
             if let Some(horizon) = lighting.ground_haze.as_ref().filter(|horizon| horizon.ground == last) {
                 seen = horizon.over_ground(s, view, seen, || sky(s, lighting, view, pixel));

@@ -38,6 +38,27 @@ pub(crate) struct Lighting {
     headlight_is_lamp: bool,
 }
 
+/// What the colours of a frame need besides surfaces.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShadeContext<'a> {
+    pub(crate) scene: &'a RenderScene,
+    pub(crate) lighting: &'a Lighting,
+    pub(crate) shadows: &'a [ShadowMap],
+    /// Instead of maps.
+    pub(crate) shadow_rays: Option<ShadowRays<'a>>,
+    /// Width of a pixel at depth 1 (behind lenses whose rays go aside, at distance 1).
+    pub(crate) pixel: f32,
+}
+
+/// Rays on which surfaces are seen.
+#[derive(Clone, Copy)]
+pub(crate) struct ViewRays<S: Simd> {
+    /// Unit vector away from the camera, world frame.
+    pub(crate) direction: V3<S>,
+    /// Distance of the surface \[m\].
+    pub(crate) distance: F<S>,
+}
+
 pub(crate) fn unit(v: [f32; 3]) -> [f32; 3] {
     let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     if length > 0.0 && length.is_finite() { v.map(|x| x / length) } else { [0., 0., -1.] }
@@ -238,22 +259,19 @@ fn skybox<S: Simd>(s: S, image: &Texture, direction: V3<S>, pixel: f32) -> V3<S>
     )
 }
 
-/// The colour of a surface, linear, seen along `view` (unit, away from the camera) from a distance. `pixel` is the width of
-/// a pixel at depth 1; `tint` multiplies the colour of the surface, but not its highlights.
+/// The colour of a surface, linear. `tint` multiplies the colour of the surface, but not its highlights.
 #[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "inlined into its few callers")]
 pub(crate) fn shade<S: Simd>(
     s: S,
-    scene: &RenderScene,
-    lighting: &Lighting,
-    (shadows, shadow_rays): (&[ShadowMap], Option<ShadowRays<'_>>),
+    context: &ShadeContext<'_>,
     source: &Source<'_>,
     at: &Surface<S>,
-    view: V3<S>,
-    distance: F<S>,
-    (pixel, tint): (f32, f32),
+    rays: ViewRays<S>,
+    tint: f32,
     lanes: M<S>,
 ) -> V3<S> {
+    let ShadeContext { scene, lighting, shadows, shadow_rays, pixel } = *context;
+    let ViewRays { direction: view, distance } = rays;
     let material = &source.instance.material;
     let display = scene.light_sum == LightSum::Display;
     let base = if display {
@@ -273,7 +291,7 @@ pub(crate) fn shade<S: Simd>(
     };
     let mut diffuse = [ambient(0), ambient(1), ambient(2)];
     if let Some(rays) = shadow_rays.filter(|rays| rays.occlusion_rays > 0) {
-        let [above, below] = rays.blocked(s, (at.position, at.normal, n, at.along), lanes);
+        let [above, below] = rays.blocked(s, at.point(), n, lanes);
         // What is counted with rays may be more than there is: light is never taken twice.
         let (above, below) = (min(above, up), min(below, splat(s, 1.0) - up));
         for (k, diffuse) in diffuse.iter_mut().enumerate() {
@@ -310,8 +328,7 @@ pub(crate) fn shade<S: Simd>(
         if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow) {
             let matters = lanes & (facing * strength).simd_gt(splat(s, 1e-4));
             if matters.any_true() {
-                let from = (at.position, at.normal, at.along);
-                lit = lit * rays.light(s, light, lamp.along.map(|x| -x), from, matters);
+                lit = lit * rays.light(s, light, lamp.along.map(|x| -x), at.point(), matters);
             }
         }
         for (k, diffuse) in diffuse.iter_mut().enumerate() {

@@ -2,9 +2,9 @@
 //! the rasterizer where it ends. Mirrors in mirrors show their own colour.
 
 use super::group::{Colors, Context};
-use super::light::{shade, sky};
+use super::light::{ViewRays, shade, sky};
 use super::shadow_rays::{Points, arrays, lanes_of};
-use super::surface::{Source, Surface};
+use super::surface::{Source, Surface, SurfacePoint};
 use super::tone::{decode_bytes, to_bytes};
 use crate::geometry::bvh::Stack;
 use crate::geometry::corner::in_triangle;
@@ -42,6 +42,18 @@ pub(crate) fn reflectance(instance: &Instance) -> f32 {
         Shape::Plane(_) | Shape::Box(_) if material.rgba[3] >= 1.0 => material.reflectance.clamp(0.0, 1.0),
         _ => 0.0,
     }
+}
+
+/// Samples that show a mirror.
+#[derive(Clone, Copy)]
+pub(crate) struct MirrorSamples<S: Simd> {
+    pub(crate) point: SurfacePoint<S>,
+    /// Unit vector of the ray from the camera, world frame.
+    pub(crate) view: V3<S>,
+    /// Metres along the ray for each unit of the point's depth.
+    pub(crate) length: F<S>,
+    /// The mirror's own colour.
+    pub(crate) color: V3<S>,
 }
 
 /// A mirrored ray, and how far it was followed \[m\].
@@ -126,8 +138,7 @@ impl Mirrors<'_> {
         index == self.first || index > self.first && !self.only_first && reflectance(instance) > 0.0
     }
 
-    /// The colour of a mirror with what it reflects: `color` is its own, `position`, `normal` and `depth` are those of the
-    /// sample, `view` the direction of its ray, of which a number along it is `length` metres.
+    /// The colour of a mirror with what it reflects.
     ///
     /// Of linear light, `(1 - r) color + r mirrored`; the sky is mirrored, too. Of MuJoCo's, `color + mirrored` in numbers of the
     /// screen, where the colours of surfaces, but not their highlights, are multiplied by r before they are lit; the sky is not
@@ -138,20 +149,21 @@ impl Mirrors<'_> {
         s: S,
         context: &Context<'_>,
         source: &Source<'_>,
-        (position, normal, depth): (V3<S>, V3<S>, F<S>),
-        (view, length): (V3<S>, F<S>),
-        (color, lanes): (V3<S>, M<S>),
+        samples: MirrorSamples<S>,
+        lanes: M<S>,
     ) -> V3<S> {
         s.vectorize(
             #[inline(always)]
             || {
+                let MirrorSamples { point, view, length, color } = samples;
+                let SurfacePoint { normal, depth, .. } = point;
                 let up = source.world_from_instance.rotation.map(|row| row[2]);
                 let lanes = lanes & normal.dot(V3::splat(s, up)).simd_gt(splat(s, 0.5));
                 let wanted = lanes.to_bitmask();
                 if wanted == 0 {
                     return color;
                 }
-                let points = Points::new(position, normal, depth);
+                let points = Points::new(point);
                 let (directions, lengths, depths) = (arrays(view), length.array(), depth.array());
                 let mut rays = [None; LANES];
                 for k in lanes_of(wanted) {
@@ -163,9 +175,10 @@ impl Mirrors<'_> {
                     rays[k] = Some(Reflected { ray, travelled, left: 1.0 });
                 }
                 let r = reflectance(source.instance);
-                let display = context.scene.light_sum == LightSum::Display;
+                let display = context.shade.scene.light_sum == LightSum::Display;
+                let tint = if display { r } else { 1.0 };
                 let mut sum: Colors = [[0.0; LANES]; 3];
-                let met = self.follow(s, context, &mut rays, (r, display), length, &mut sum);
+                let met = self.follow(s, context, &mut rays, tint, length, &mut sum);
                 let mut left = [0.0f32; LANES];
                 for (left, ray) in left.iter_mut().zip(&rays) {
                     *left = ray.map_or(0.0, |ray| ray.left);
@@ -180,7 +193,8 @@ impl Mirrors<'_> {
                     let lit = V3 { x: add(s, color.x, sum.x), y: add(s, color.y, sum.y), z: add(s, color.z, sum.z) };
                     return V3::select(hit, lit, color);
                 }
-                let beyond = sky(s, context.lighting, view.sub(normal.scale(view.dot(normal) * 2.0)), context.pixel);
+                let mirrored_view = view.sub(normal.scale(view.dot(normal) * 2.0));
+                let beyond = sky(s, context.shade.lighting, mirrored_view, context.shade.pixel);
                 let mirrored = sum.add(beyond.scale(load(s, &left)));
                 V3::select(lanes, color.scale(splat(s, 1.0 - r)).add(mirrored.scale(splat(s, r))), color)
             },
@@ -188,18 +202,19 @@ impl Mirrors<'_> {
     }
 
     /// Adds up what mirrored rays meet, as linear light or as bytes of a display; returns the lanes that meet something.
+    /// `tint` is that of [`shade`].
     #[inline(always)]
     fn follow<S: Simd>(
         &self,
         s: S,
         context: &Context<'_>,
         rays: &mut [Option<Reflected>; LANES],
-        (reflectance, display): (f32, bool),
+        tint: f32,
         length: F<S>,
         sum: &mut Colors,
     ) -> u64 {
-        let (scene, mut at) = (context.scene, Lanes::EMPTY);
-        let tint = if display { reflectance } else { 1.0 };
+        let (scene, mut at) = (context.shade.scene, Lanes::EMPTY);
+        let display = scene.light_sum == LightSum::Display;
         let mut met = 0;
         for _ in 0..MAX_PASSES {
             let mut hits = [None; LANES];
@@ -235,10 +250,9 @@ impl Mirrors<'_> {
                 let distance = load(s, &at.distances);
                 let here = at.surface(s, distance / length);
                 let [x, y, z] = &directions;
-                let view = V3 { x: load(s, x), y: load(s, y), z: load(s, z) };
-                let shadows = (context.shadows, context.shadow_rays);
-                let (lighting, by) = (context.lighting, (context.pixel, tint));
-                let seen = shade(s, scene, lighting, shadows, &source, &here, view, distance, by, mask(s, bits));
+                let direction = V3 { x: load(s, x), y: load(s, y), z: load(s, z) };
+                let seen =
+                    shade(s, &context.shade, &source, &here, ViewRays { direction, distance }, tint, mask(s, bits));
                 let seen = if display {
                     V3 { x: to_bytes(s, seen.x), y: to_bytes(s, seen.y), z: to_bytes(s, seen.z) }
                 } else {

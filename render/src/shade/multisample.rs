@@ -35,11 +35,11 @@ fn differ(context: &Context<'_>, a: u32, b: u32, qa: f32, qb: f32, last: &mut us
         return true;
     }
     *last = context.instance(a, *last);
-    let first = context.scene.first_ids();
+    let first = context.shade.scene.first_ids();
     if b < first[*last] || b >= first[*last + 1] {
         return true;
     }
-    let Some(mesh) = context.placed[*last].mesh(&context.scene.instances()[*last]) else { return true };
+    let Some(mesh) = context.placed[*last].mesh(&context.shade.scene.instances()[*last]) else { return true };
     // Neighbouring triangles of a smooth surface look the same: same normal, same distance.
     let corner = |id: u32| mesh.normals()[mesh.triangles()[(id - first[*last]) as usize][0] as usize];
     let (na, nb) = (corner(a), corner(b));

@@ -3,7 +3,7 @@
 use super::BAND;
 use super::group::Context;
 use super::horizon::Horizon;
-use super::light::{Lighting, MAX_LIGHTS};
+use super::light::{Lighting, MAX_LIGHTS, ShadeContext};
 use super::mirror::{self, Mirrors};
 use super::moves::Moves;
 use super::shadow::{ShadowBand, ShadowMap};
@@ -205,7 +205,7 @@ impl Plan {
                 if self.shadows.len() == self.maps {
                     self.shadows.push(ShadowMap::empty());
                 }
-                if self.shadows[self.maps].prepare((lamp, receivers), scene, poses, cfg, side) {
+                if self.shadows[self.maps].prepare(lamp, receivers, scene, poses, cfg, side) {
                     maps[k] = Some(self.maps);
                     self.maps += 1;
                 }
@@ -254,16 +254,18 @@ impl Plan {
         let only_first = shot.scene.light_sum == LightSum::Display;
         let mirrors = self.first_mirror.map(|first| Mirrors { tracer: &self.tracer, stack, first, only_first });
         Context {
-            shadow_rays: (shadows || occlusion_rays > 0).then_some(rays),
-            mirrors,
             projection,
-            scene: shot.scene,
+            lens: shot.lens,
             poses: shot.poses,
             placed: &self.list.placed,
-            lighting: &self.lighting,
-            shadows: &self.shadows[..self.maps],
-            pixel: shot.lens.map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel() as f32),
-            lens: shot.lens,
+            shade: ShadeContext {
+                scene: shot.scene,
+                lighting: &self.lighting,
+                shadows: &self.shadows[..self.maps],
+                shadow_rays: (shadows || occlusion_rays > 0).then_some(rays),
+                pixel: shot.lens.map_or(1.0 / projection.fx.min(projection.fy), |lens| lens.pixel() as f32),
+            },
+            mirrors,
             detail,
             albedo,
             moves: flow.then_some(&self.moves),

@@ -87,7 +87,8 @@ impl ShadowMap {
     /// `false` where none of them is shaded.
     pub(super) fn prepare(
         &mut self,
-        (lamp, receivers): (&LampView, &Extent),
+        lamp: &LampView,
+        receivers: &Extent,
         scene: &RenderScene,
         poses: &[PoseF32],
         cfg: RasterCfg,

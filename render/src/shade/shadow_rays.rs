@@ -1,5 +1,6 @@
 //! Shadows and ambient occlusion by rays, for pictures that are shaded without paths.
 
+use super::surface::SurfacePoint;
 use crate::geometry::bvh::Stack;
 use crate::path::sobol::Sequence;
 use crate::simd::{F, LANES, M, Simd, V3, load, splat};
@@ -38,7 +39,8 @@ pub(super) struct Points {
 
 impl Points {
     #[inline(always)]
-    pub(super) fn new<S: Simd>(position: V3<S>, normal: V3<S>, depth: F<S>) -> Self {
+    pub(super) fn new<S: Simd>(point: SurfacePoint<S>) -> Self {
+        let SurfacePoint { position, normal, depth } = point;
         Self { positions: arrays(position), normals: arrays(normal), depths: depth.array() }
     }
 
@@ -70,17 +72,17 @@ pub(super) fn lanes_of(mut bits: u64) -> impl Iterator<Item = usize> {
 
 impl ShadowRays<'_> {
     /// The part of a lamp's light that reaches each point; 1 where it is not asked for. `toward` is the lamp's direction if
-    /// it is parallel, `depth` how far the camera is.
+    /// it is parallel.
     #[inline(never)]
     pub(crate) fn light<S: Simd>(
         &self,
         s: S,
         light: &Light,
         toward: [f32; 3],
-        (position, normal, depth): (V3<S>, V3<S>, F<S>),
+        point: SurfacePoint<S>,
         lanes: M<S>,
     ) -> F<S> {
-        let points = Points::new(position, normal, depth);
+        let points = Points::new(point);
         let mut out = [1.0f32; LANES];
         let mut stack = self.stack.borrow_mut();
         for k in lanes_of(lanes.to_bitmask()) {
@@ -101,16 +103,10 @@ impl ShadowRays<'_> {
     }
 
     /// The parts of the light from above and from below the horizon that do not reach each point of a matt surface, of what
-    /// would come from everywhere; 0 where it is not asked for. `normal` is that of the surface, `smooth` the one that light
-    /// sees, `depth` how far the camera is.
+    /// would come from everywhere; 0 where it is not asked for. `smooth` is the normal that light sees.
     #[inline(never)]
-    pub(crate) fn blocked<S: Simd>(
-        &self,
-        s: S,
-        (position, normal, smooth, depth): (V3<S>, V3<S>, V3<S>, F<S>),
-        lanes: M<S>,
-    ) -> [F<S>; 2] {
-        let (points, smooth) = (Points::new(position, normal, depth), arrays(smooth));
+    pub(crate) fn blocked<S: Simd>(&self, s: S, point: SurfacePoint<S>, smooth: V3<S>, lanes: M<S>) -> [F<S>; 2] {
+        let (points, smooth) = (Points::new(point), arrays(smooth));
         let mut out = [[0.0f32; LANES]; 2];
         let mut stack = self.stack.borrow_mut();
         for k in lanes_of(lanes.to_bitmask()) {
@@ -164,7 +160,8 @@ mod tests {
         at_level!(Level::best(), s => {
             let [at, normal, smooth] = [at, normals[0], normals[1]].map(|v| V3::splat(s, v));
             let lanes = splat(s, 0.0f32).simd_gt(splat(s, -1.0));
-            let parts = rays.blocked(s, (at, normal, smooth, splat(s, 1.0)), lanes);
+            let point = SurfacePoint { position: at, normal, depth: splat(s, 1.0) };
+            let parts = rays.blocked(s, point, smooth, lanes);
             parts.map(|part| f64::from(part.array()[3]))
         })
     }

@@ -24,6 +24,24 @@ pub(crate) struct Surface<S: Simd> {
     pub(crate) uv_density: F<S>,
 }
 
+/// Points of surfaces, as far as rays that begin there need them.
+#[derive(Clone, Copy)]
+pub(crate) struct SurfacePoint<S: Simd> {
+    /// World frame \[m\].
+    pub(crate) position: V3<S>,
+    /// Normal of the surface itself, towards the camera, world frame.
+    pub(crate) normal: V3<S>,
+    /// Distance from the camera, as [`Surface::along`].
+    pub(crate) depth: F<S>,
+}
+
+impl<S: Simd> Surface<S> {
+    #[inline(always)]
+    pub(crate) fn point(&self) -> SurfacePoint<S> {
+        SurfacePoint { position: self.position, normal: self.normal, depth: self.along }
+    }
+}
+
 /// What all samples of an instance have in common.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
@@ -48,8 +66,18 @@ pub(crate) struct Ray<S: Simd> {
     pub(crate) forward: bool,
 }
 
-/// The surface at the points (u, v) of the picture where `lanes` says that this instance is seen, with the ids that the
-/// visibility buffer has; `direction` is that of the rays in the world frame.
+/// Sixteen rays from the camera.
+#[derive(Clone, Copy)]
+pub(crate) struct CameraRays<S: Simd> {
+    /// Points (u, v) of the picture.
+    pub(crate) uv: [F<S>; 2],
+    /// The rays behind a lens; `None` for a pinhole.
+    pub(crate) bent: Option<Ray<S>>,
+    /// World frame.
+    pub(crate) direction: V3<S>,
+}
+
+/// The surface at some rays where `lanes` says that this instance is seen, with the ids that the visibility buffer has.
 #[inline(always)]
 pub(crate) fn surface<S: Simd>(
     s: S,
@@ -57,9 +85,9 @@ pub(crate) fn surface<S: Simd>(
     source: &Source<'_>,
     ids: U<S>,
     lanes: M<S>,
-    ([u, v], bent): ([F<S>; 2], Option<Ray<S>>),
-    direction: V3<S>,
+    rays: CameraRays<S>,
 ) -> Surface<S> {
+    let CameraRays { uv: [u, v], bent, direction } = rays;
     let camera = &source.placed.local.instance_from_camera;
     let (o, d) = match bent {
         None => projection.rays(s, &source.placed.local, u, v),

@@ -79,6 +79,17 @@ pub(crate) struct Hit {
     pub(crate) world_from_instance: PoseF64,
 }
 
+/// A camera whose rays are cast, and the instances before it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CameraView<'a> {
+    pub(crate) projection: &'a Projection,
+    /// The rays, where a lens bends them.
+    pub(crate) lens: Option<&'a LensRays>,
+    pub(crate) placed: &'a [Placed],
+    /// Of each instance, the first id in the visibility buffer.
+    pub(crate) first_ids: &'a [u32],
+}
+
 /// What rays meet in a frame; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tracer {
@@ -292,18 +303,11 @@ impl Tracer {
 
     /// Casts the rays of all samples where an instance may be seen, into a visibility buffer. One copy per instruction set.
     #[inline(never)]
-    pub(crate) fn draw<S: Simd>(
-        &self,
-        s: S,
-        stack: &mut Stack,
-        tile: &mut Tile,
-        (projection, lens_rays): (&Projection, Option<&LensRays>),
-        (placed, first_ids): (&[Placed], &[u32]),
-        item: &Item,
-    ) {
+    pub(crate) fn draw<S: Simd>(&self, s: S, stack: &mut Stack, tile: &mut Tile, view: &CameraView<'_>, item: &Item) {
         let Some(area) = tile.overlap(item.rect) else { return };
         let index = item.instance as usize;
         let Some(body) = &self.bodies[index] else { return };
+        let &CameraView { projection, lens: lens_rays, placed, first_ids } = view;
         let lens = Lens::new(projection, &placed[index]);
         let sight = lens_rays.zip(body.bounds()).map_or(Sight::Everywhere, |(_, bounds)| sight(&placed[index], bounds));
         s.vectorize(
@@ -333,8 +337,9 @@ impl Tracer {
                                     None => lens.pinhole([first[0] as f64 + dx, first[1] as f64 + dy], side),
                                     Some(rays) => lens.bent(rays, plane, first, side),
                                 };
-                                let (near, ids) = (&mut tile.nearness, &mut tile.id);
-                                drawn |= lens.cast(s, body, rays, stack, (near, ids, at), first_ids[index]);
+                                let (nearness, ids) = (&mut *tile.nearness, &mut *tile.id);
+                                let samples = TileSamples { nearness, ids, at };
+                                drawn |= lens.cast(s, body, rays, stack, samples, first_ids[index]);
                             }
                         }
                         if drawn {
@@ -365,6 +370,16 @@ fn sight(placed: &Placed, [lo, hi]: [V3; 2]) -> Sight {
     // Poses are single precision.
     let size = lo.iter().chain(&hi).chain(&pose.translation).fold(0.0f64, |m, x| m.max(x.abs()));
     Sight::of_ball(pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]))), dot(half, half).sqrt() + 1e-6 * size)
+}
+
+/// Eight samples of a tile.
+struct TileSamples<'a> {
+    /// Nearness of all samples of the tile.
+    nearness: &'a mut [f32],
+    /// Ids of all samples of the tile.
+    ids: &'a mut [u32],
+    /// Indices of the eight.
+    at: [usize; WIDTH],
 }
 
 /// A camera's rays in the frame of an instance.
@@ -408,8 +423,7 @@ impl Lens {
         out
     }
 
-    /// Casts the rays of eight samples, and keeps what is nearer than what is there, `at` some places of the tile. Whether there
-    /// is any.
+    /// Casts the rays of eight samples, and keeps what is nearer than what the samples hold. Returns true if there is any.
     #[inline(always)]
     fn cast<S: Simd>(
         &self,
@@ -417,9 +431,10 @@ impl Lens {
         body: &Body,
         directions: [V3; WIDTH],
         stack: &mut Stack,
-        (nearness, ids, at): (&mut [f32], &mut [u32], [usize; WIDTH]),
+        samples: TileSamples<'_>,
         first_id: u32,
     ) -> bool {
+        let TileSamples { nearness, ids, at } = samples;
         // Distances along a ray for a metre of depth.
         let mut length = [1.0; WIDTH];
         let mut rays = [Ray { origin: self.origin, direction: [0.0, 0.0, 1.0] }; WIDTH];

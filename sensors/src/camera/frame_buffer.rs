@@ -205,8 +205,8 @@ impl FrameBuffer {
             dropout: cfg.dropout,
             arrived: Arrived {
                 counts: Array1::zeros(rows),
-                latest: History::of((rows, usize::from(latency > 0), 1), arrived.clone()),
-                history: History::of((rows, cfg.history_length, 1), arrived),
+                latest: History::of(rows, usize::from(latency > 0), 1, arrived.clone()),
+                history: History::of(rows, cfg.history_length, 1, arrived),
                 stamps: History::new(rows, cfg.history_length, 1),
             },
             shows_latest: vec![false; rows],

@@ -12,7 +12,7 @@ const COLOR: [f32; 4] = [0.95, 0.8, 0.1, 1.0];
 
 /// The optical frame (blue is where it looks), and arrows from the eye along the four edges of what the picture shows, to a
 /// depth of 0.3 m, or as long where rays go aside or back. Corners that show nothing have none.
-pub(crate) fn frustum(world_from_camera: &Pose, optics: &Optics, (height, width): (usize, usize)) -> Vec<Marker> {
+pub(crate) fn frustum(world_from_camera: &Pose, optics: &Optics, height: usize, width: usize) -> Vec<Marker> {
     let (w, h) = (width as f64, height as f64);
     let eye = world_from_camera.translation.vector;
     let edge = |corner: [f64; 2]| {

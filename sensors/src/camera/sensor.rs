@@ -158,7 +158,8 @@ impl Sensor for Camera {
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let row = self.viewpoints.envs.of(env);
         let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.optics_of(row)?)));
-        placed.map_or_else(Vec::new, |(pose, optics)| frustum(&pose, &optics, self.image_shape()))
+        let (height, width) = self.image_shape();
+        placed.map_or_else(Vec::new, |(pose, optics)| frustum(&pose, &optics, height, width))
     }
 }
 

@@ -7,22 +7,22 @@
 mod contacts;
 mod motion;
 
+use crate::body_pose::BodyFrame;
 use crate::index::{FreeIndex, PartIndex, RobotIndex};
 use kinetoscope_mujoco::{Data, EngineError, Model};
 use kinetoscope_scene::Contact;
-use kinetoscope_scene::Pose;
 use kinetoscope_scene::Requires;
 use std::sync::Arc;
 
-pub(crate) use motion::{body_velocity, link_pose};
+pub(crate) use motion::body_velocity;
 
 /// Where what is captured is in MuJoCo's arrays: the same for all environments.
 #[derive(Debug)]
 pub(crate) struct Plan {
     /// Index on the body axis of what each geom belongs to; `None` is the world.
     owners: Vec<Option<u32>>,
-    /// MuJoCo's body of everything on the body axis, and the frame of the link in it.
-    bodies: Vec<(usize, Pose)>,
+    /// The frame of everything on the body axis.
+    bodies: Vec<BodyFrame>,
     /// Whether a body of the axis is a MuJoCo body of its own, not one that is fused to another.
     carries: Vec<bool>,
 }
@@ -60,8 +60,8 @@ impl Plan {
         carriers: &[usize],
     ) -> Self {
         let links = robots.iter().flat_map(|robot| robot.links.iter().copied());
-        let bodies: Vec<(usize, Pose)> = links
-            .chain(objects.iter().map(|object| (object.body, Pose::identity())))
+        let bodies: Vec<BodyFrame> = links
+            .chain(objects.iter().map(|object| BodyFrame::of_body(object.body)))
             .chain(parts.iter().flat_map(|part| part.frames.iter().copied()))
             .collect();
         let mut owners = vec![None; model.ngeom()];
@@ -91,8 +91,8 @@ impl Plan {
         Self { owners, bodies, carries }
     }
 
-    /// MuJoCo's body of everything on the body axis, and the frame of the link in it.
-    pub(crate) fn bodies(&self) -> &[(usize, Pose)] {
+    /// The frame of everything on the body axis.
+    pub(crate) fn bodies(&self) -> &[BodyFrame] {
         &self.bodies
     }
 }

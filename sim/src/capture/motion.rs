@@ -6,16 +6,10 @@
 //! MuJoCo accelerates the world by minus gravity, so gravity is added: 0 at rest, gravity in free fall.
 
 use super::{Plan, Solved};
-use crate::body_pose::body_pose;
+use crate::body_pose::BodyFrame;
 use kinetoscope_mujoco::Data;
-use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;
-
-/// Pose of a link in the environment.
-pub(crate) fn link_pose(data: &Data, (body, body_from_link): &(usize, Pose)) -> Pose {
-    body_pose(data, *body) * body_from_link
-}
 
 fn vector(values: &[f64], first: usize) -> Vector3<f64> {
     Vector3::new(values[first], values[first + 1], values[first + 2])
@@ -33,14 +27,14 @@ pub(crate) fn body_velocity(data: &Data, body: usize, point: &Vector3<f64>) -> [
 }
 
 /// Poses, velocities and accelerations of all links.
-pub(super) fn capture(bodies: &[(usize, Pose)], data: &Data, solved: &mut Solved) {
+pub(super) fn capture(bodies: &[BodyFrame], data: &Data, solved: &mut Solved) {
     let Solved { poses, velocities, accelerations, .. } = solved;
     for values in [&mut *poses, &mut *velocities, &mut *accelerations] {
         values.clear();
     }
     let gravity = Vector3::from(data.model().gravity());
     for link in bodies {
-        let (body, pose) = (link.0, link_pose(data, link));
+        let (body, pose) = (link.body, link.pose(data));
         let point = pose.translation.vector;
         let [velocity, turning] = body_velocity(data, body, &point);
         let alpha = vector(data.cacc(), 6 * body);
@@ -60,7 +54,7 @@ pub(super) fn capture_wrenches(plan: &Plan, data: &Data, wrenches: &mut Vec<f64>
             wrenches.extend([f64::NAN; 6]);
             continue;
         }
-        let (body, pose) = (link.0, link_pose(data, link));
+        let (body, pose) = (link.body, link.pose(data));
         let force = vector(data.cfrc_int(), 6 * body + 3);
         let arm = reference(data, body) - pose.translation.vector;
         let torque = vector(data.cfrc_int(), 6 * body) + arm.cross(&force);

@@ -1,6 +1,5 @@
 //! Poses of links and objects.
 
-use crate::capture::link_pose;
 use crate::env::Env;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
@@ -16,7 +15,7 @@ pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut Sce
 pub(super) fn rows(simulation: &Simulation, env: &Env, i: usize, array: &mut Option<Array3<f64>>) {
     let Some(array) = array else { return };
     for (b, link) in simulation.plan.bodies().iter().enumerate() {
-        for (k, value) in to_row(&link_pose(env.data(), link)).into_iter().enumerate() {
+        for (k, value) in to_row(&link.pose(env.data())).into_iter().enumerate() {
             array[(i, b, k)] = value;
         }
     }

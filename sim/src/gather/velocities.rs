@@ -1,6 +1,6 @@
 //! Velocities of links and objects.
 
-use crate::capture::{body_velocity, link_pose};
+use crate::capture::body_velocity;
 use crate::env::Env;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
@@ -15,8 +15,8 @@ pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut Sce
 pub(super) fn rows(simulation: &Simulation, env: &Env, i: usize, array: &mut Option<Array3<f64>>) {
     let Some(array) = array else { return };
     for (b, link) in simulation.plan.bodies().iter().enumerate() {
-        let origin = link_pose(env.data(), link).translation.vector;
-        let [velocity, turning] = body_velocity(env.data(), link.0, &origin);
+        let origin = link.pose(env.data()).translation.vector;
+        let [velocity, turning] = body_velocity(env.data(), link.body, &origin);
         for (k, value) in velocity.iter().chain(&turning).enumerate() {
             array[(i, b, k)] = *value;
         }

@@ -24,7 +24,7 @@ pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut Sce
     {
         visible.read(env.data(), poses, lights);
         if let Some(scene) = seen.scenes.get_mut(i) {
-            visible.shape(env.data(), (i, simulation.own_scenes.get(i).unwrap_or(&AS_ALL)), scene);
+            visible.shape(env.data(), i, simulation.own_scenes.get(i).unwrap_or(&AS_ALL), scene);
         }
     }
 }

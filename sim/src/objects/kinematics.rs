@@ -1,6 +1,5 @@
 //! Kinematics of robots in a simulation: where frames would be, how joints move them, and how to get them somewhere.
 
-use crate::body_pose::body_pose;
 use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list};
@@ -395,8 +394,7 @@ impl Robot<'_> {
     }
 
     fn link_in(&self, env: &Env, link: LinkId) -> Pose {
-        let (body, body_from_link) = self.indexing().links[link.0];
-        body_pose(env.data(), body) * body_from_link
+        self.indexing().links[link.0].pose(env.data())
     }
 
     /// Checks positions of the joints `columns`.

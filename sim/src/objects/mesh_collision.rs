@@ -64,7 +64,8 @@ impl MeshCollision {
     /// The convex shapes of a mesh file, whose triangles are `mesh`.
     pub(super) fn shapes(
         &self,
-        (uid, path): (&str, &Path),
+        uid: &str,
+        path: &Path,
         mesh: &TriMesh,
         scale: [f64; 3],
         hull: &HullCfg,

@@ -1,7 +1,7 @@
 //! MJCF files as parts of a scene: configuration, the loaded file, and its views of a running simulation.
 
 use super::mjcf_part_data::{ActuatorIndex, MjcfCfg, MjcfData};
-use crate::capture::link_pose;
+use crate::body_pose::BodyFrame;
 use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
@@ -11,7 +11,6 @@ use crate::pattern;
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
 use kinetoscope_mujoco::{Model, words};
-use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::ops::Range;
@@ -161,7 +160,7 @@ impl<'a> MjcfPart<'a> {
     /// There is no such body; the error lists the nearest names.
     pub fn body_pose(&self, name: &str) -> Result<Array2<f64>> {
         let body = self.find("body", name, self.body_names())? + 1;
-        Ok(self.poses(&(self.places().bodies[body], Pose::identity())))
+        Ok(self.poses(&BodyFrame::of_body(self.places().bodies[body])))
     }
 
     /// Pose of a site in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
@@ -172,7 +171,8 @@ impl<'a> MjcfPart<'a> {
         let site = self.find("site", name, self.site_names())?;
         let (p, q) = (&self.model().site_pos()[3 * site..], &self.model().site_quat()[4 * site..]);
         let body = self.places().bodies[self.model().site_bodyid()[site] as usize];
-        Ok(self.poses(&(body, from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]))))
+        let body_from_frame = from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]);
+        Ok(self.poses(&BodyFrame { body, body_from_frame }))
     }
 
     fn find(&self, what: &'static str, name: &str, names: &[String]) -> Result<usize> {
@@ -186,10 +186,10 @@ impl<'a> MjcfPart<'a> {
         })
     }
 
-    fn poses(&self, frame: &(usize, Pose)) -> Array2<f64> {
+    fn poses(&self, frame: &BodyFrame) -> Array2<f64> {
         let mut poses = Array2::zeros((self.simulation.batch.num_envs(), 7));
         self.simulation.batch.for_each(|i, env| {
-            for (k, value) in to_row(&link_pose(env.data(), frame)).into_iter().enumerate() {
+            for (k, value) in to_row(&frame.pose(env.data())).into_iter().enumerate() {
                 poses[(i, k)] = value;
             }
         });

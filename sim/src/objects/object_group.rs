@@ -102,7 +102,7 @@ impl<'a> RigidObjectGroupMut<'a> {
     /// of objects before it in the group are written.
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix3>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let (argument, poses): (_, ArrayView3<'_, f64>) = ("write_pose", poses.into());
-        let envs = self.check_shape(argument, poses, (7, "environments, objects, x y z qw qx qy qz"), env_ids)?;
+        let envs = self.check_shape(argument, poses, 7, "environments, objects, x y z qw qx qy qz", env_ids)?;
         let mut checked = Vec::new();
         for k in 0..self.data.objects.len() {
             checked.push(self.body(k).check_poses(argument, poses.index_axis(Axis(1), k), env_ids)?);
@@ -124,7 +124,7 @@ impl<'a> RigidObjectGroupMut<'a> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         let (argument, velocities): (_, ArrayView3<'_, f64>) = ("write_velocity", velocities.into());
-        let envs = self.check_shape(argument, velocities, (6, "environments, objects, vx vy vz wx wy wz"), env_ids)?;
+        let envs = self.check_shape(argument, velocities, 6, "environments, objects, vx vy vz wx wy wz", env_ids)?;
         let mut checked = Vec::new();
         for k in 0..self.data.objects.len() {
             checked.push(self.body(k).check_velocities(argument, velocities.index_axis(Axis(1), k), env_ids)?);
@@ -141,7 +141,8 @@ impl<'a> RigidObjectGroupMut<'a> {
         &self,
         argument: &'static str,
         values: ArrayView3<'_, f64>,
-        (numbers, meaning): (usize, &'static str),
+        numbers: usize,
+        meaning: &'static str,
         env_ids: Option<&[EnvId]>,
     ) -> Result<Vec<usize>> {
         let envs = distinct_envs(argument, env_ids, self.simulation.batch.num_envs())?;

@@ -36,7 +36,7 @@ impl ObjectMesh {
         let failed = |error| Error::ObjectMesh { object: uid.clone(), error: Box::new(error) };
         let seen = kinetoscope_scene::mesh::load(path).map_err(failed)?.scaled(scale);
         let hull = HullCache::default_location().hull_of_file(path, scale, cfg).map_err(failed)?;
-        let shapes = collision.shapes((uid.as_str(), path.as_path()), &seen, scale, cfg, diagnostics)?;
+        let shapes = collision.shapes(uid, path, &seen, scale, cfg, diagnostics)?;
         let solid = match seen.solid() {
             Some(solid) => Some(solid),
             None => {

@@ -214,10 +214,9 @@ impl RigidObjectMut<'_> {
         for ((env, force), (_, torque)) in forces.arrays::<3>().zip(torques.arrays::<3>()) {
             let (force, torque) = (Vector3::from(force), Vector3::from(torque));
             let axes = (frame == WrenchFrame::Link).then(UnitQuaternion::identity);
-            let acts = force != Vector3::zeros() || torque != Vector3::zeros();
             self.simulation.batch.write(env, |env| {
                 env.set_wrenches(|wrenches| {
-                    wrenches.replace(of, acts.then_some(Wrench { of, body, axes, force, torque }));
+                    wrenches.replace(Wrench { of, body, axes, force, torque });
                 });
             });
         }

@@ -3,7 +3,6 @@
 pub use super::robot_cfg::RobotCfg;
 
 use super::robot_data::{JointIndex, RobotData, unknown};
-use crate::body_pose::body_pose;
 use crate::drive::plan::JointPlan;
 use crate::drive::table::DriveState;
 use crate::error::{Error, Result};
@@ -213,8 +212,8 @@ impl<'a> Robot<'a> {
     /// There is no such link; the error lists the nearest names.
     pub fn link_pose(&self, name: &str) -> Result<Array2<f64>> {
         let link = self.link_id(name)?;
-        let (body, body_from_link) = self.indexing().links[link.0];
-        Ok(self.simulation.batch.gather_rows(|env| to_row(&(body_pose(env.data(), body) * body_from_link))))
+        let frame = self.indexing().links[link.0];
+        Ok(self.simulation.batch.gather_rows(|env| to_row(&frame.pose(env.data()))))
     }
 
     pub(super) fn gather(&self, read: impl Fn(&crate::env::Env, &JointIndexing) -> f64) -> Array2<f64> {

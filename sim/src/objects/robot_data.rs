@@ -70,7 +70,8 @@ impl RobotData {
         cfg: RobotCfg,
         role: Role,
         manager: &SimulationManagerCfg,
-        (index, scene): (usize, &mj::Model),
+        index: usize,
+        scene: &mj::Model,
         first_mask_id: i32,
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Self> {

@@ -43,9 +43,8 @@ impl Robot<'_> {
     /// There is no such link.
     pub fn is_link_fixed(&self, link: LinkId) -> Result<bool> {
         let links = &self.indexing().links;
-        let (body, _) =
-            links.get(link.0).ok_or(Error::UnknownIndex { what: "link", index: link.0, count: links.len() })?;
-        Ok(self.simulation.batch.model().is_fixed(*body))
+        let frame = links.get(link.0).ok_or(Error::UnknownIndex { what: "link", index: link.0, count: links.len() })?;
+        Ok(self.simulation.batch.model().is_fixed(frame.body))
     }
 }
 

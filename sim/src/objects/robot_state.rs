@@ -1,7 +1,7 @@
 //! The state of a robot beside its joints' positions: accelerations, targets, root and links, and what is called how.
 
-use crate::body_pose::body_pose;
-use crate::capture::{body_velocity, link_pose};
+use crate::body_pose::{BodyFrame, body_pose};
+use crate::capture::body_velocity;
 use crate::env::Env;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
@@ -207,7 +207,7 @@ impl Robot<'_> {
     /// `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, links, 7).
     #[doc(alias = "get_link_poses")]
     pub fn link_poses(&self) -> Array3<f64> {
-        self.of_links(|env, link| to_row(&link_pose(env.data(), link)))
+        self.of_links(|env, link| to_row(&link.pose(env.data())))
     }
 
     /// Velocities of the frames of all links, fused ones too, then their angular velocities, in world axes \[m/s, rad/s\],
@@ -227,13 +227,13 @@ impl Robot<'_> {
         Ok(self.rows(|env, robot| link_velocity(env, &robot.links[link.0])))
     }
 
-    fn of_links<const K: usize>(&self, read: impl Fn(&Env, &(usize, Pose)) -> [f64; K]) -> Array3<f64> {
+    fn of_links<const K: usize>(&self, read: impl Fn(&Env, &BodyFrame) -> [f64; K]) -> Array3<f64> {
         self.simulation.batch.gather_rows_of(&self.indexing().links, read)
     }
 }
 
-fn link_velocity(env: &Env, link: &(usize, Pose)) -> [f64; 6] {
-    let [v, w] = body_velocity(env.data(), link.0, &link_pose(env.data(), link).translation.vector);
+fn link_velocity(env: &Env, link: &BodyFrame) -> [f64; 6] {
+    let [v, w] = body_velocity(env.data(), link.body, &link.pose(env.data()).translation.vector);
     [v.x, v.y, v.z, w.x, w.y, w.z]
 }
 

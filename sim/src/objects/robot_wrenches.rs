@@ -1,5 +1,6 @@
 //! Forces and torques on links of a robot, and gravity compensation, per environment.
 
+use crate::body_pose::BodyFrame;
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::objects::robot::{Robot, RobotMut};
@@ -34,8 +35,8 @@ impl Robot<'_> {
         let links = &self.indexing().links;
         let mut weightless = Array2::from_elem((self.simulation.batch.num_envs(), links.len()), false);
         self.simulation.batch.for_each(|i, env| {
-            for (l, (body, _)) in links.iter().enumerate() {
-                weightless[(i, l)] = env.wrenches().weightless.contains(body);
+            for (l, link) in links.iter().enumerate() {
+                weightless[(i, l)] = env.wrenches().weightless.contains(&link.body);
             }
         });
         weightless
@@ -88,7 +89,7 @@ impl RobotMut<'_> {
         let forces = self.vectors("set_external_wrench (forces)", forces.into(), &links, env_ids)?;
         let torques = self.vectors("set_external_wrench (torques)", torques.into(), &links, env_ids)?;
         let robot = self.index;
-        let bodies = &self.simulation.robots[robot].links;
+        let frames = &self.simulation.robots[robot].links;
         let vector = |row: &[f64], k: usize| Vector3::new(row[3 * k], row[3 * k + 1], row[3 * k + 2]);
         for (i, env) in envs.into_iter().enumerate() {
             // A single row is for all environments.
@@ -96,12 +97,10 @@ impl RobotMut<'_> {
             self.simulation.batch.write(env, |env| {
                 env.set_wrenches(|wrenches| {
                     for (k, &link) in links.iter().enumerate() {
-                        let (body, body_from_link) = bodies[link];
-                        let axes = (frame == WrenchFrame::Link).then_some(body_from_link.rotation);
+                        let BodyFrame { body, body_from_frame } = frames[link];
+                        let axes = (frame == WrenchFrame::Link).then_some(body_from_frame.rotation);
                         let (force, torque) = (vector(force_row, k), vector(torque_row, k));
-                        let wrench = Wrench { of: (robot, link), body, axes, force, torque };
-                        let acts = force != Vector3::zeros() || torque != Vector3::zeros();
-                        wrenches.replace((robot, link), acts.then_some(wrench));
+                        wrenches.replace(Wrench { of: (robot, link), body, axes, force, torque });
                     }
                 });
             });
@@ -127,7 +126,7 @@ impl RobotMut<'_> {
         let argument = "set_gravity_compensation";
         let links = self.links(argument, link_ids)?;
         let mut bodies: Vec<usize> =
-            links.iter().map(|&link| self.simulation.robots[self.index].links[link].0).collect();
+            links.iter().map(|&link| self.simulation.robots[self.index].links[link].body).collect();
         bodies.sort_unstable();
         bodies.dedup();
         for env in distinct_envs(argument, env_ids, self.simulation.batch.num_envs())? {

@@ -121,7 +121,7 @@ impl SimulationManager {
         let model = self.simulation.batch.model();
         let body = |name: &str| match self.contents.bodies_called(name)?.as_deref() {
             None => Ok(0),
-            Some(&[one]) => Ok(self.simulation.plan.bodies()[one].0),
+            Some(&[one]) => Ok(self.simulation.plan.bodies()[one].body),
             Some(_) => Err(Error::Config {
                 field: "weld",
                 value: format!("{name:?}"),

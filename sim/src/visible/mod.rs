@@ -26,6 +26,7 @@ pub use still::{FreeCamera, ModelCamera, Still};
 pub(crate) use surface::color_of;
 pub(crate) use urdf_visual::{Replacements, VisualCache};
 
+use crate::body_pose::BodyFrame;
 use crate::light_cfg::LightCfg;
 use crate::mjcf::scene_names::light_name;
 use crate::simulation_cfg::GroundCfg;
@@ -66,12 +67,12 @@ pub(crate) struct Part {
     pub(crate) material: Material,
 }
 
-/// Where a geom is in the frame of what it belongs to: that of the link, given with MuJoCo's body of it; that of its body
-/// where nobody gives one, and its own in the world.
-fn frame_from_geom(model: &Model, geom: usize, link: Option<&(usize, Pose)>) -> Pose {
+/// Pose of a geom in the frame of the link that it belongs to; in the frame of its body if there is no link, and the identity
+/// in the world.
+fn frame_from_geom(model: &Model, geom: usize, link: Option<&BodyFrame>) -> Pose {
     let body = model.geom_bodyid()[geom] as usize;
     let body_from_frame = match link {
-        Some((of, body_from_link)) if *of == body => *body_from_link,
+        Some(link) if link.body == body => link.body_from_frame,
         None if body > 0 => Pose::identity(),
         _ => return Pose::identity(),
     };
@@ -123,13 +124,13 @@ impl Visible {
         Self::extract(model, identities, &Replacements::new(), &[], &Surfaces::new(), &Look::Mujoco { file: model })
     }
 
-    /// What can be seen of `model`, with the geoms in `replacements` drawn as these parts. `frames` are MuJoCo's body of
-    /// everything on the body axis of sensors, and the frame of the link in it; `painted` is what is known of surfaces besides, `look` the light.
+    /// What can be seen of `model`, with the geoms in `replacements` drawn as these parts. `frames` are those of
+    /// everything on the body axis of sensors; `painted` is what is known of surfaces besides, `look` the light.
     pub(crate) fn extract(
         model: &Model,
         identities: &Identities,
         replacements: &Replacements,
-        frames: &[(usize, Pose)],
+        frames: &[BodyFrame],
         painted: &Surfaces,
         look: &Look<'_>,
     ) -> Self {
@@ -251,7 +252,7 @@ impl Visible {
     /// The scene with the shapes that tendons, skins and flexes have in `data`; [`scene`](Self::scene) if there are none.
     pub fn scene_at(&self, data: &Data) -> Arc<RenderScene> {
         let mut out = OwnScene(None);
-        self.shape(data, (0, &OwnScene(None)), &mut out);
+        self.shape(data, 0, &OwnScene(None), &mut out);
         out.0.unwrap_or_else(|| Arc::clone(&self.scene))
     }
 
@@ -262,10 +263,10 @@ impl Visible {
 
     /// Puts the scene of environment `env`, whose own scene is `own`, into `out` with the shapes of `data`; `own` where no shape
     /// changes. The memory of scenes that nothing holds any more is used again.
-    pub(crate) fn shape(&self, data: &Data, (env, own): (usize, &OwnScene), out: &mut OwnScene) {
+    pub(crate) fn shape(&self, data: &Data, env: usize, own: &OwnScene, out: &mut OwnScene) {
         if self.deforms() {
             let scene = own.0.as_ref().unwrap_or(&self.scene);
-            self.buffers.fill(&self.deforming, (env, scene), data, out);
+            self.buffers.fill(&self.deforming, env, scene, data, out);
         } else {
             out.clone_from(own);
         }

@@ -8,7 +8,7 @@ pub use playback::{Film, Play, PlayError};
 use super::hub::{Hub, Mail, Viewer};
 use super::pace::Pace;
 use super::recording::{RecordButton, RecordingState};
-use super::spring::{self, Spring};
+use super::spring::{self, HeldBody, Spring};
 use super::{Command, Speed, Wants};
 use crate::stage::{Pool, Run};
 use kinetoscope_sim::{EnvId, Moment, Observer, SimulationManager};
@@ -47,7 +47,7 @@ pub struct Conductor {
     dirty: bool,
     springs: BTreeMap<u64, Spring>,
     /// Bodies that springs pulled at last.
-    pulled: Vec<(EnvId, usize)>,
+    pulled: Vec<HeldBody>,
     button: Option<RecordButton>,
     /// How the recording stood when that was asked last.
     recording: Option<RecordingState>,
@@ -262,7 +262,7 @@ impl Conductor {
     /// Springs pull for the next step; those of several viewers at one body, together.
     fn pull(&mut self, sim: &mut SimulationManager) {
         let Self { springs, refusals, pulled, .. } = self;
-        let mut forces: Vec<((EnvId, usize), Vec<_>)> = Vec::new();
+        let mut forces: Vec<(HeldBody, Vec<_>)> = Vec::new();
         springs.retain(|_, spring| match spring.force_now(sim) {
             Ok(force) => {
                 match forces.iter_mut().find(|(held, _)| *held == spring.held()) {
@@ -280,7 +280,7 @@ impl Conductor {
             spring::release(sim, let_go);
         }
         for (held, forces) in forces {
-            match sim.scene_mut().pull(held.0, held.1, &forces) {
+            match sim.scene_mut().pull(held.env, held.body, &forces) {
                 Ok(()) => pulled.push(held),
                 Err(error) => {
                     refusals.note(Kind::Spring, Some(error.to_string()));

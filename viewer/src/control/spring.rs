@@ -6,6 +6,13 @@ use nalgebra::{Point3, Vector3};
 /// Angular frequency of a free body on the spring \[rad/s\]: it comes within 2 % of where it is pulled in 0.7 s.
 const FREQUENCY: f64 = 8.0;
 
+/// A body in an environment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct HeldBody {
+    pub(super) env: EnvId,
+    pub(super) body: usize,
+}
+
 /// A spring between a point of a body and a point of its environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spring {
@@ -29,8 +36,8 @@ impl Spring {
     }
 
     /// What it holds.
-    pub(super) fn held(&self) -> (EnvId, usize) {
-        (self.env, self.body)
+    pub(super) fn held(&self) -> HeldBody {
+        HeldBody { env: self.env, body: self.body }
     }
 
     /// Where it pulls with which force now; nowhere at what cannot move.
@@ -53,7 +60,7 @@ impl Spring {
 }
 
 /// Lets go of a body.
-pub(super) fn release(sim: &mut SimulationManager, (env, body): (EnvId, usize)) {
+pub(super) fn release(sim: &mut SimulationManager, HeldBody { env, body }: HeldBody) {
     // Of a body that is gone nothing has to be let go.
     let _ = sim.scene_mut().pull(env, body, &[]);
 }

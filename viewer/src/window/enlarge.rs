@@ -43,7 +43,8 @@ impl Enlarged {
     pub(super) fn new(
         connection: &RustConnection,
         window: Window,
-        (depth, format): (u8, Pictformat),
+        depth: u8,
+        format: Pictformat,
         size: [usize; 2],
         factor: usize,
     ) -> Result<Self, Failure> {

@@ -268,8 +268,8 @@ impl Screened {
             self.watch.request(|| old.free(&self.connection))?;
         }
         if let (true, None, Some(format)) = (k > 1, &self.enlarged, self.format) {
-            let of = (self.depth, format);
-            let enlarged = self.watch.request(|| Enlarged::new(&self.connection, self.window, of, picture, k))?;
+            let enlarged =
+                self.watch.request(|| Enlarged::new(&self.connection, self.window, self.depth, format, picture, k))?;
             self.enlarged = Some(enlarged);
         }
         match self.enlarged.take() {

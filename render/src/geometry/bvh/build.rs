@@ -141,6 +141,15 @@ impl Part {
     }
 }
 
+/// A child of a node: a node, or the things of a leaf.
+#[derive(Clone, Copy, Debug)]
+struct Child {
+    /// The node, or the first thing.
+    index: u32,
+    /// How many things; 0 if it is a node.
+    count: u32,
+}
+
 /// Builds trees, one after the other: what building takes of memory is kept from one to the next.
 #[derive(Debug)]
 pub(crate) struct Builder {
@@ -150,8 +159,8 @@ pub(crate) struct Builder {
     /// Where each group begins on the curve, and where the last one ends.
     starts: Vec<u32>,
     groups: Vec<Item>,
-    /// What each group is in a node above it: a node, or the first thing of a leaf and how many things those are.
-    children: Vec<(u32, u32)>,
+    /// Each group as a child of a node above it.
+    children: Vec<Child>,
     /// What a cut moves.
     aside: Vec<Item>,
     nodes: Vec<Node>,
@@ -166,12 +175,12 @@ impl Node {
     };
 
     #[inline(always)]
-    fn set(&mut self, k: usize, Bounds { lo, hi }: &Bounds, pad: f32, (child, count): (u32, u32)) {
+    fn set(&mut self, k: usize, Bounds { lo, hi }: &Bounds, pad: f32, child: Child) {
         for axis in 0..3 {
             self.sides[axis][k] = lo[axis] - pad;
             self.sides[axis + 3][k] = hi[axis] + pad;
         }
-        (self.child[k], self.count[k]) = (child, count);
+        (self.child[k], self.count[k]) = (child.index, child.count);
     }
 }
 
@@ -260,7 +269,7 @@ impl Builder {
     fn add_group<S: Simd>(&mut self, s: S, things: &[Item], start: u32, alone: bool) {
         let count = things.len() as u32;
         let (around, child) = if things.len() <= SINGLE_LEAF && !alone {
-            (bounds_of(s, things), (start, count))
+            (bounds_of(s, things), Child { index: start, count })
         } else {
             let (ends, leaves) = leaves::ends(s, things, &mut self.costs);
             // Filled where it stays.
@@ -269,10 +278,11 @@ impl Builder {
             let (mut around, mut first) = (NOTHING, 0);
             for (k, end) in ends.into_iter().map(usize::from).enumerate().take(leaves) {
                 let leaf = bounds_of(s, &things[first..end]);
-                node.set(k, &leaf, self.pad, (start + first as u32, (end - first) as u32));
+                let child = Child { index: start + first as u32, count: (end - first) as u32 };
+                node.set(k, &leaf, self.pad, child);
                 (around, first) = (around.with(&leaf), end);
             }
-            (around, (index, 0))
+            (around, Child { index, count: 0 })
         };
         let ([a, b, c, _], [d, e, f, _]) = (around.lo, around.hi);
         self.groups.push(Item::item([a, b, c], [d, e, f], self.children.len() as u32, count));
@@ -312,10 +322,10 @@ impl Builder {
             let child = if part.len() == 1 {
                 self.children[self.groups[part.start as usize].number() as usize]
             } else if part.len() <= WIDE {
-                (self.add_few(part), 0)
+                Child { index: self.add_few(part), count: 0 }
             } else {
                 let halves = self.open(part);
-                (self.add(halves, 2), 0)
+                Child { index: self.add(halves, 2), count: 0 }
             };
             node.set(k, &part.bounds, self.pad, child);
         }

@@ -48,7 +48,7 @@ impl DrawnImages {
 
     /// Copies image `from` of `count` others.
     pub(in crate::camera) fn copy(&mut self, image: usize, others: &Pictures, count: usize, from: usize) {
-        self.pictures.copy_view((self.stale.len(), image), others, (count, from));
+        self.pictures.copy_view(self.stale.len(), image, others, count, from);
         self.stale[image] = false;
     }
 

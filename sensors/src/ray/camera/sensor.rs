@@ -263,7 +263,8 @@ impl Sensor for RayCasterCamera {
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let taken = self.images.pictures.taken.get(env);
         let placed = taken.and_then(|taken| Some((taken, Optics::new(Lens::default(), taken.lens).ok()?)));
-        placed.map_or_else(Vec::new, |(taken, optics)| frustum(&taken.world_from_camera, &optics, self.image_shape()))
+        let (height, width) = self.image_shape();
+        placed.map_or_else(Vec::new, |(taken, optics)| frustum(&taken.world_from_camera, &optics, height, width))
     }
 }
 

@@ -31,7 +31,8 @@ impl Buffers {
     pub(in crate::visible) fn fill(
         &self,
         deforming: &Deforming,
-        (env, scene): (usize, &Arc<RenderScene>),
+        env: usize,
+        scene: &Arc<RenderScene>,
         data: &Data,
         out: &mut OwnScene,
     ) {

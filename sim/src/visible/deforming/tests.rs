@@ -195,7 +195,7 @@ fn memory_of_scenes() {
     let mut shape = |z: f64, held: &mut OwnScene, own: &OwnScene| {
         data.qpos_mut()[0] = z;
         data.forward().expect("forward");
-        visible.shape(&data, (3, own), held);
+        visible.shape(&data, 3, own, held);
         held.0.clone().expect("a scene")
     };
     let mut now = OwnScene(None);
