@@ -124,25 +124,26 @@ fn forces_before_integration() {
     assert!(far(&data) > 1.0, "{:?}", data.cfrc_int());
 }
 
-/// Potential energy m g h by a function that is not wrapped, and an error of MuJoCo as a value.
+/// Functions that are not wrapped read the model and write to the data, and an error of MuJoCo is a value.
 #[test]
 fn raw_calls() {
     let model = model(
-        r#"<mujoco><option gravity="0 0 -10"/><worldbody><body pos="0 0 0.3"><freejoint/><geom size="0.1" mass="2"/></body></worldbody></mujoco>"#,
+        r#"<mujoco><worldbody><body pos="0 0 0.3"><freejoint/><geom size="0.1" mass="2"/></body></worldbody></mujoco>"#,
     );
     let mut data = Data::new(&model).expect("small");
-    data.forward().expect("computes");
-    // SAFETY: an engine function, which writes the energy of the data.
-    let compute = |model, data| unsafe { crate::sys::mj_energyPos(model, data) };
-    // SAFETY: the pointer is valid in the call.
-    let read = |_, data: *mut crate::sys::mjData| unsafe { (*data).energy[0] };
+    // SAFETY: a function that only reads the model.
+    let total_mass = |model, _| unsafe { crate::sys::mj_getTotalmass(model) };
+    // SAFETY: an engine function, which writes to the data.
+    let place = |model, data| unsafe { crate::sys::mj_kinematics(model, data) };
     // SAFETY: the error handler ends the call, in which nothing has a destructor.
     let stop = |_, _| unsafe { crate::sys::mju_error(c"on purpose".as_ptr()) };
-    // SAFETY: `compute` calls an engine function with the pointers and keeps none.
-    unsafe { data.with_raw(compute) }.expect("computes");
-    // SAFETY: `read` only reads.
-    let energy = unsafe { data.with_raw(read) }.expect("reads");
-    assert!((energy - 2.0 * 10.0 * 0.3).abs() < 1e-12);
+    // SAFETY: `total_mass` keeps no pointer.
+    let mass = unsafe { data.with_raw(total_mass) };
+    assert_eq!(mass.expect("reads"), 2.0);
+    assert_eq!(data.xpos()[5], 0.0, "nothing is computed yet");
+    // SAFETY: `place` calls an engine function with the pointers and keeps none.
+    unsafe { data.with_raw(place) }.expect("computes");
+    assert_eq!(data.xpos()[5], 0.3);
     // SAFETY: `stop` only raises an error.
     let stopped = unsafe { data.with_raw(stop) };
     assert!(stopped.expect_err("an error").to_string().contains("on purpose"));
