@@ -8,13 +8,13 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | [`rasterizer`], [`parallel`] | one frame, and many on several threads |
-//! | [`request`] | the scene, the view and the settings of a frame |
+//! | `rasterizer`, `parallel` | one frame, and many on several threads |
+//! | `request` | the scene, the view and the settings of a frame |
 //! | [`frame`] | channels (colour, depth, ...), one file each, and their images |
-//! | [`renderer`], [`aperture`], [`shutter`], [`progress`] | settings of a frame |
-//! | [`lens`], [`intrinsics`] | from pixels to rays |
-//! | [`visibility`] | views and the surface at each pixel; [`raster`] finds it by triangles, `trace` by rays |
-//! | [`shade`] | light: from what is seen to channels; [`path`] is the path tracer |
+//! | `renderer`, `aperture`, `shutter`, `progress` | settings of a frame |
+//! | [`lens`], `intrinsics` | from pixels to rays |
+//! | `visibility` | views and the surface at each pixel; `raster` finds it by triangles, `trace` by rays |
+//! | `shade` | light: from what is seen to channels; `path` is the path tracer |
 //! | [`geometry`] | rays, triangles, shapes, bounding volume hierarchies |
 //! | `simd` | lanes, chosen at run time |
 #![forbid(unsafe_code)]

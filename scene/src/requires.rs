@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
 
-/// The fields of a [`SceneState`](crate::SceneState) that a sensor needs. The flags are made from the list in [`state`](crate::state).
+/// The fields of a [`SceneState`](crate::SceneState) that a sensor needs. The flags are made from the list in `state.rs`.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Requires(pub(crate) u32);
 

@@ -1,8 +1,8 @@
 //! Sensors that have never heard of MuJoCo.
 //!
-//! One contract for all of them: a configuration ([`SensorCfg`]) says what it needs to see ([`Requires`]) and builds a
+//! One contract for all of them: a configuration ([`SensorCfg`]) says what it needs to see ([`kinetoscope_scene::Requires`]) and builds a
 //! sensor ([`Sensor`]), which turns each [`kinetoscope_scene::SceneState`] into buffers of its own. Sensors of numbers share a
-//! [`Sampler`]: rate, history, latency, lost samples and noise. A new sensor is one new file; [`joint_state`] is the
+//! [`Sampler`]: rate, history, latency, lost samples and noise. A new sensor is one new file; `joint_state` is the
 //! shortest example.
 //!
 //! Unsafe code is forbidden, which rules out ndarray's `s![]` (it expands to an `allow`): slice with `index_axis`,

@@ -38,7 +38,7 @@ pub trait SensorCfg {
     /// Give a schedule only where a measurement depends on the state at its instant and on nothing before, and where
     /// [`Sensor::update`] counts right with [`Phases::fallen_due`](crate::Phases::fallen_due), as a
     /// [`Sampler`](crate::Sampler) does: [`SamplingCfg::lazy_schedule`](crate::SamplingCfg::lazy_schedule) decides that for
-    /// sensors with one. The [`Camera`](crate::Camera) keeps and draws by itself.
+    /// sensors with one. The [`Camera`](crate::camera::Camera) keeps and draws by itself.
     fn lazy(&self, dt: f64) -> Option<Schedule> {
         let _ = dt;
         None

@@ -2,7 +2,7 @@
 
 use kinetoscope_scene::{Light, OwnScene, Pose, PoseF32};
 
-/// One environment as it is now; see [`SceneViewMut::look`]. Everything is in the frame of the environment.
+/// One environment as it is now; see [`SceneViewMut::look`](crate::SceneViewMut::look). Everything is in the frame of the environment.
 #[derive(Clone, Debug, Default)]
 pub struct Look {
     /// Simulation time \[s\].
@@ -15,7 +15,7 @@ pub struct Look {
     pub instances: Vec<PoseF32>,
     /// The lamps of that scene where they are now.
     pub lights: Vec<Light>,
-    /// Poses of links and objects, in the order of [`Entities::body_names`].
+    /// Poses of links and objects, in the order of [`Entities::body_names`](crate::Entities::body_names).
     pub bodies: Vec<Pose>,
     /// Centres of mass \[m\] of what moves as one piece, and its mass \[kg\]; without what has none.
     pub masses: Vec<([f64; 3], f64)>,
@@ -34,7 +34,7 @@ pub struct JointAxis {
     pub slides: bool,
 }
 
-/// How a link or an object moves; see [`SceneView::body_motion`].
+/// How a link or an object moves; see [`SceneView::body_motion`](crate::SceneView::body_motion).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyMotion {
     /// Pose of its frame.

@@ -19,7 +19,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 #[derive(Clone, Debug)]
 pub struct Rollout {
     /// Positions, then velocities, after every step, shape (N, T, nq + nv); the columns are called as
-    /// [`state_names`](Entities::state_names) says. A row that diverges stays in its last good state.
+    /// [`state_names`](crate::Entities::state_names) says. A row that diverges stays in its last good state.
     pub states: Array3<f64>,
     /// The states at the end; [`restore`](SimulationManager::restore) makes them the present ones.
     pub end: Snapshot,

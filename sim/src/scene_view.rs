@@ -65,7 +65,7 @@ impl<'a> SceneView<'a> {
     }
 
     /// What all sensors show of their last measurements, for [`Still::overview`](crate::Still::overview): those that are
-    /// configured to ([`SensorCfg::debug_vis`]), or told to since.
+    /// configured to ([`SensorCfg::debug_vis`](kinetoscope_sensors::SensorCfg::debug_vis)), or told to since.
     pub fn markers(&self) -> Vec<(EnvId, Marker)> {
         self.sim.sensors.markers(&self.sim.simulation, None)
     }
@@ -96,7 +96,7 @@ impl<'a> SceneView<'a> {
         self.sim.viewpoint
     }
 
-    /// How a body moves in an environment; `body` is its place in [`body_names`](Self::body_names).
+    /// How a body moves in an environment; `body` is its place in [`body_names`](crate::Entities::body_names).
     ///
     /// # Errors
     /// There is no such environment or body.
@@ -193,7 +193,7 @@ impl<'a> SceneViewMut<'a> {
     }
 
     /// The contacts of environments as they are now, with the forces that the engine solves for this instant: a list for each
-    /// of `env_ids` (all where `None`). Bodies are numbered as in [`body_names`](Self::body_names). An environment that
+    /// of `env_ids` (all where `None`). Bodies are numbered as in [`body_names`](crate::Entities::body_names). An environment that
     /// diverged has none. Nothing that a sensor measures changes, nor any later step.
     ///
     /// # Errors
@@ -215,7 +215,7 @@ impl<'a> SceneViewMut<'a> {
     /// spring pulls anew in every step. What [`RobotMut::set_external_wrench`](crate::RobotMut::set_external_wrench) applies acts
     /// besides.
     ///
-    /// `body` is its place in [`body_names`](Self::body_names).
+    /// `body` is its place in [`body_names`](crate::Entities::body_names).
     ///
     /// # Errors
     /// There is no such environment or body, or a number is not finite; then nothing has changed.

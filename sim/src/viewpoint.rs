@@ -7,6 +7,6 @@ pub struct Viewpoint {
     pub eye: [f64; 3],
     /// Point in the middle of the image.
     pub target: [f64; 3],
-    /// Number of calls of [`SceneViewMut::set_camera_view`] so far: open views follow a change.
+    /// Number of calls of [`SceneViewMut::set_camera_view`](crate::SceneViewMut::set_camera_view) so far: open views follow a change.
     pub changes: u64,
 }

@@ -35,8 +35,8 @@ pub trait PlaceRows {
 
 /// Placement of a camera sensor: its pose and its intrinsics in each environment, settable at any time.
 ///
-/// A [`Camera`](crate::Camera) and a [`StereoCamera`](crate::StereoCamera) show the captured instant from the new pose at the
-/// next read; a [`RayCasterCamera`](crate::RayCasterCamera) uses it from the next image on. A stereo camera is placed by the
+/// A [`Camera`](crate::camera::Camera) and a [`StereoCamera`](crate::camera::StereoCamera) show the captured instant from the new pose at the
+/// next read; a [`RayCasterCamera`](crate::ray::RayCasterCamera) uses it from the next image on. A stereo camera is placed by the
 /// [origin](super::StereoOrigin) of its rig. What was set stays over a reset, until [`restore`](Self::restore).
 pub trait CameraPlacement: PlaceRows {
     /// Poses in the frame of the parent (of the environment, for a free camera), rows `[x, y, z, qw, qx, qy, qz]` \[m\],

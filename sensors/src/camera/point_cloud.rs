@@ -19,7 +19,7 @@ pub enum PointFrame {
 
 impl Camera {
     /// The point at every pixel of environment `env` \[m\], shape (H, W, 3): the depth along the ray through the pixel's
-    /// centre, or the distance, of a lens whose rays do not all go forward ([`Lens::is_forward`](super::Lens::is_forward)).
+    /// centre, or the distance, of a lens whose rays do not all go forward ([`Lens::is_forward`](kinetoscope_render::lens::Lens::is_forward)).
     /// (+inf, +inf, +inf) where nothing was hit.
     ///
     /// # Errors

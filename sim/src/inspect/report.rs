@@ -100,7 +100,7 @@ pub struct MimicReport {
 /// Something that was repaired, ignored or missing.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Warning {
-    /// Stable name of the kind ([`DiagnosticKind::name`](crate::DiagnosticKind::name)).
+    /// Stable name of the kind ([`DiagnosticKind::name`](kinetoscope_robot::diagnostic::DiagnosticKind::name)).
     pub kind: &'static str,
     /// The file; `None` where it is in none.
     pub file: Option<String>,

@@ -181,9 +181,10 @@ impl InteractiveScene {
         self.sim.cfg().env_origins()
     }
 
-    /// Clears the buffers of environments, all of them where `env_ids` is `None`, as Isaac Lab's `reset` does: see
-    /// [`SimulationManager::reset_buffers`]. What was written to robots and objects stays;
-    /// [`reset_to_default`](Self::reset_to_default) puts them back.
+    /// Clears what environments remember beside their state, all of them where `env_ids` is `None`, as Isaac Lab's `reset` does:
+    /// sensors start anew from the present state, external wrenches end, and actuator models forget their past (delays, motor
+    /// states). Positions, velocities, targets and time stay; a diverged environment stays as it is.
+    /// [`reset_to_default`](Self::reset_to_default) puts robots and objects back.
     ///
     /// # Errors
     /// An environment does not exist; then none is reset.

@@ -151,12 +151,12 @@ impl Robot<'_> {
     ///
     /// The joints of the control part that `tip` names, or all of the robot, are found within the limits that the robot was
     /// added with (joints' own, narrowed by their followers'). Tighter ones of
-    /// [`set_qpos_limits`](crate::objects::robot::RobotMut::set_qpos_limits) are not looked at: a success may be outside of
+    /// [`set_qpos_limits`](crate::RobotMut::set_qpos_limits) are not looked at: a success may be outside of
     /// [`qpos_limits`](Self::qpos_limits), and `set_qpos_target` would clamp it. Other joints stay where they are in the
     /// environment. The search starts from `initial` \[rad or m\], with rows and columns as in
     /// [`compute_fk`](Self::compute_fk), or from where the joints are. How: [`IkSolver`], on the calling thread. Contacts
     /// are not considered, and the state does not change: give what comes out to
-    /// [`set_qpos_target`](crate::objects::robot::RobotMut::set_qpos_target), where [`success`](IkResult::success)
+    /// [`set_qpos_target`](crate::RobotMut::set_qpos_target), where [`success`](IkResult::success)
     /// says that it is right.
     ///
     /// No [`Property`](crate::Property) moves a joint or a link's frame, and neither masses nor sizes are looked at: what is

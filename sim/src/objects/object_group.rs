@@ -164,7 +164,7 @@ impl<'a> RigidObjectGroupMut<'a> {
 
 impl SimulationManager {
     /// Adds several rigid objects that are read and written together, compiled as [`add_robot`](Self::add_robot) does; by
-    /// [`rigid_object_id`](Self::rigid_object_id) each of them is an object as any other, called `group.object`.
+    /// [`rigid_object_id`](crate::Entities::rigid_object_id) each of them is an object as any other, called `group.object`.
     ///
     /// # Errors
     /// There are none, a name is taken or used twice, or something is wrong with one of them; then none is added.

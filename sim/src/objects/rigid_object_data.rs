@@ -25,7 +25,7 @@ pub enum BodyType {
     /// a place and no velocity: it pushes what it is put into, which sinks in by 0.04 s times the speed, and does not drag
     /// along what lies on it. It does not collide with what is fixed or moved by hand, too.
     Kinematic,
-    /// Stands fixed, and is in the way of others. Where it stands is a [property](crate::randomization) of the environment:
+    /// Stands fixed, and is in the way of others. Where it stands is a [property](crate::Property) of the environment:
     /// one in which it stands elsewhere has it there after resets, too.
     Static,
 }
@@ -55,7 +55,7 @@ pub struct RigidObjectCfg {
     /// filled evenly, where `None`.
     pub inertia: Option<[f64; 3]>,
     /// Force against the velocity of the object's frame \[N s/m\]: `-linear_damping v`. Of single environments, and later:
-    /// [`RigidObjectMut::set_damping`](crate::objects::rigid_object::RigidObjectMut::set_damping), or the [property](crate::Property).
+    /// [`RigidObjectMut::set_damping`](crate::RigidObjectMut::set_damping), or the [property](crate::Property).
     pub linear_damping: f64,
     /// Torque against its angular velocity \[N m s/rad\]: `-angular_damping w`.
     pub angular_damping: f64,

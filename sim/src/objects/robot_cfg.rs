@@ -54,7 +54,7 @@ pub struct RobotCfg {
     ///
     /// ```
     /// use kinetoscope_sim::{RobotCfg, SimulationManager, SimulationManagerCfg};
-    /// use kinetoscope_sim::objects::robot_file::MjcfFile;
+    /// use kinetoscope_sim::MjcfFile;
     ///
     /// let arm = r#"<mujoco><worldbody><body name="base"><geom size="0.1"/>
     ///     <body name="arm" pos="0 0 0.1"><joint name="elbow" axis="0 1 0" range="-90 90" limited="true"/>

@@ -47,7 +47,7 @@ impl RobotMut<'_> {
     /// of them), columns for `joint_ids` (all where `None`). A forward pass follows.
     ///
     /// It is a property of the environment: it stays through a reset, and, unlike
-    /// [`set_stiffness`](Self::set_stiffness), when a [snapshot](crate::snapshot) is restored (but with its properties);
+    /// [`set_stiffness`](Self::set_stiffness), when a [snapshot](crate::Snapshot) is restored (but with its properties);
     /// [`reset_properties`](crate::EnvPropertiesMut::reset) gives back what the robot was added with.
     ///
     /// All joints that no implicit drive moves may have some, those of passive articulations too. An implicit drive takes the

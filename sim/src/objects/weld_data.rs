@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Configuration of a weld. It holds nothing until it is [attached](crate::objects::weld::WeldMut::attach).
+/// Configuration of a weld. It holds nothing until it is [attached](crate::WeldMut::attach).
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WeldCfg {

@@ -1,20 +1,4 @@
 //! Properties of single environments: masses, friction, gravity, gains, sizes, colours and more, drawn at random or set.
-//!
-//! The environments of a simulation share one compiled model. One that has properties of its own gets a shallow copy of the
-//! model's struct, in which only the arrays that differ are its own memory; what follows from masses (MuJoCo's
-//! `mj_setConst`) is computed for it. Environments that were not touched share everything.
-//!
-//! Random numbers are keyed by the seed of the simulation, the global index of the environment, how often that environment
-//! was drawn for, and the property and name they are for. So they depend neither on the number of environments and
-//! processes, nor on what other environments do, nor on what else is random.
-//!
-//! Properties stay until they are drawn or set again: [`reset`](crate::SimulationManager::reset) and
-//! [`restore`](crate::SimulationManager::restore) leave them alone
-//! ([`EnvPropertiesMut::restore`] does not), gains of drives included, and when more is added to the scene they are carried over by
-//! name. A gain that was drawn and is then set at run time is that of the drive's setting again; one that is set to its
-//! nominal value, too. Cameras, ray casters and overviews see the sizes, colours and places of each
-//! environment. What sees the scene without MuJoCo keeps the nominal values: inverse kinematics and dynamics of descriptions,
-//! `total_mass` and `mass` of robots and objects, and the gravity that an `Imu` adds.
 
 mod apply;
 mod env_properties;

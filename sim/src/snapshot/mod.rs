@@ -1,26 +1,4 @@
 //! Snapshots: states of environments, to go back to, to go on from elsewhere, and to keep in a file.
-//!
-//! A snapshot holds everything that decides how an environment goes on: time, positions with quaternions as they were
-//! before they were normalised, velocities, activations, the solver's warm start, what users set (controls, applied forces,
-//! bodies moved by hand, welds that hold and how, active equalities), targets, gains, limits, efforts and delays of drives as they were set, wrenches
-//! on links, the count of steps, and whether and why it has diverged. Going on from it is bit-identical in any environment
-//! with the same properties, of any manager that was built by the same program with the same MuJoCo, for any number of
-//! threads.
-//!
-//! It also holds the [properties](crate::randomization) of each environment, by name: masses, friction, sizes, gains that were
-//! drawn, and how often it was drawn for. They belong to the environment, not to its state:
-//! [`restore`](SimulationManager::restore) leaves those of the environment it goes to alone (of a drive whose gain is drawn,
-//! what was set before is restored), as who resets to the same start after every draw wants it.
-//! [`EnvPropertiesMut::restore`](crate::EnvPropertiesMut::restore) restores them too.
-//!
-//! What it does not hold:
-//!
-//! * Sensors. Those of restored environments start again as after a reset: they show the restored state at once, histories
-//!   are empty, and their periods count from there. A sensor may be a type of the user's own, whose memory nobody else
-//!   knows; and measurements of one run would not belong to the other.
-//! * The model that all environments share. A snapshot of a scene with other steps, another integrator or other friction
-//!   cones is refused, as that of another scene.
-//! * What happened on the way: counts of warnings and of buffers that grew.
 
 mod bytes;
 mod error;
@@ -40,6 +18,28 @@ use crate::simulation::Simulation;
 use std::sync::Arc;
 
 /// States of environments. Cheap to clone.
+///
+/// A snapshot holds everything that decides how an environment goes on: time, positions with quaternions as they were
+/// before they were normalised, velocities, activations, the solver's warm start, what users set (controls, applied forces,
+/// bodies moved by hand, welds that hold and how, active equalities), targets, gains, limits, efforts and delays of drives as they were set, wrenches
+/// on links, the count of steps, and whether and why it has diverged. Going on from it is bit-identical in any environment
+/// with the same properties, of any manager that was built by the same program with the same MuJoCo, for any number of
+/// threads.
+///
+/// It also holds the [properties](crate::EnvProperties) of each environment, by name: masses, friction, sizes, gains that were
+/// drawn, and how often it was drawn for. They belong to the environment, not to its state:
+/// [`restore`](SimulationManager::restore) leaves those of the environment it goes to alone (of a drive whose gain is drawn,
+/// what was set before is restored), as who resets to the same start after every draw wants it.
+/// [`EnvPropertiesMut::restore`](crate::EnvPropertiesMut::restore) restores them too.
+///
+/// What it does not hold:
+///
+/// * Sensors. Those of restored environments start again as after a reset: they show the restored state at once, histories
+///   are empty, and their periods count from there. A sensor may be a type of the user's own, whose memory nobody else
+///   knows; and measurements of one run would not belong to the other.
+/// * The model that all environments share. A snapshot of a scene with other steps, another integrator or other friction
+///   cones is refused, as that of another scene.
+/// * What happened on the way: counts of warnings and of buffers that grew.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     layout: Arc<Layout>,
@@ -105,7 +105,7 @@ impl Snapshot {
 
 impl SimulationManager {
     /// The present state of environments, in the order given; of all where `env_ids` is `None`. What it holds and what not
-    /// stands with [`snapshot`](crate::snapshot).
+    /// is written at [`Snapshot`].
     ///
     /// # Errors
     /// An environment does not exist.

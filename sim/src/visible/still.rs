@@ -94,7 +94,7 @@ impl Still {
         Ok(sim.simulation.batch.read(env.0, |env| Self::of_data(&visible, env.data())))
     }
 
-    /// Several environments side by side, as [`SimulationManagerCfg::env_origins`] places them (all of them where `envs` is
+    /// Several environments side by side, as [`SimulationManagerCfg::env_origins`](crate::SimulationManagerCfg::env_origins) places them (all of them where `envs` is
     /// `None`), with markers in them. What belongs to the ground is drawn once; lamps and cameras are those of environment 0. Everything else is drawn in every environment: terrain that
     /// is larger than the space between them overlaps.
     ///

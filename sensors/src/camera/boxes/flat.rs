@@ -29,7 +29,7 @@ pub struct Box2d {
     /// Around all of it that is in the frustum (between the near and the far plane, within the edges of the picture),
     /// whatever hides it: of shapes and the triangles of meshes, not of pixels; level of detail is not looked at. Exact for
     /// what is wholly in the frustum; what is round and cut is a polyhedron with 256 edges around, inside by 7.5e-5 of its
-    /// radius at most. Behind a lens that bends lines, and of a camera whose [shutter](crate::CameraCfg::shutter) takes time:
+    /// radius at most. Behind a lens that bends lines, and of a camera whose [shutter](crate::camera::CameraCfg::shutter) takes time:
     /// around the pixels that would see it if it were alone, each row at its own instant, as
     /// [`Occlusion::alone_pixels`](super::Occlusion::alone_pixels) counts them. `None` where all of it is outside.
     pub loose: Option<PixelBox>,
@@ -46,8 +46,8 @@ impl Segmentation {
     ///
     /// # Errors
     ///
-    /// [`ChannelOff`](crate::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
-    /// an environment that the camera does not see; where segments are drawn, [`Draw`](crate::CameraError::Draw) for one that
+    /// [`ChannelOff`](crate::camera::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
+    /// an environment that the camera does not see; where segments are drawn, [`Draw`](crate::camera::CameraError::Draw) for one that
     /// cannot be.
     pub fn boxes_2d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box2d>, SensorError> {
         let row = camera.row(env)?;

@@ -35,8 +35,8 @@ impl Segmentation {
     ///
     /// # Errors
     ///
-    /// [`ChannelOff`](crate::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
-    /// an environment that the camera does not see; [`Draw`](crate::CameraError::Draw) where a segment cannot be drawn.
+    /// [`ChannelOff`](crate::camera::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
+    /// an environment that the camera does not see; [`Draw`](crate::camera::CameraError::Draw) where a segment cannot be drawn.
     pub fn occlusions(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Occlusion>, SensorError> {
         let row = camera.row(env)?;
         let mask = camera.mask()?;

@@ -23,7 +23,7 @@ impl StereoCamera {
     /// sees the same point, d = fx b / z with the focal length fx, the baseline b = `left_to_right_pos.x` and the depth z of
     /// the left eye (so that z = fx b / d). The point is at (u - d, v) in the right eye's picture, and at
     /// (u - d + cx_right - cx_left, v) where principal points differ. 0 where nothing was hit, which is where infinitely far
-    /// points are, whatever [`depth_miss`](crate::CameraCfg::depth_miss) says.
+    /// points are, whatever [`depth_miss`](crate::camera::CameraCfg::depth_miss) says.
     ///
     /// It is of the depth that the left eye measures, at every pixel: exact where that is, and with its noise, its holes and its
     /// imperfections where it has some (so an error of depth e is one of about d e / z of disparity). Nothing is matched: it says
@@ -46,7 +46,7 @@ impl StereoCamera {
         Ok(self.disparities.get_or_update(|| Ok(DisparityMap::default()), update)?.pixels.view())
     }
 
-    /// [`disparity`](Self::disparity) of the pictures that arrived last, as [`Camera::arrived`](crate::Camera::arrived) has their
+    /// [`disparity`](Self::disparity) of the pictures that arrived last, as [`Camera::arrived`](crate::camera::Camera::arrived) has their
     /// depth; made when asked.
     ///
     /// # Errors

@@ -148,7 +148,7 @@ impl StereoCamera {
     ///
     /// # Errors
     ///
-    /// As [`Camera::camera_info`](crate::Camera::camera_info), and [`CameraError::NotRectifiable`].
+    /// As [`Camera::camera_info`](crate::camera::Camera::camera_info), and [`CameraError::NotRectifiable`].
     pub fn camera_info(&self, name: &str, env: usize) -> Result<[CameraInfo; 2], SensorError> {
         let left = self.left().camera_info(&format!("{name}/left"), env)?;
         let right = self.right().camera_info(&format!("{name}/right"), env)?;

@@ -1,4 +1,4 @@
-//! Points of cameras of rays: as with [`Camera`](crate::Camera), by the same code.
+//! Points of cameras of rays: as with [`Camera`](crate::camera::Camera), by the same code.
 
 use super::sensor::RayCasterCamera;
 use crate::camera::PointFrame;
