@@ -8,7 +8,7 @@ use super::surface::{Source, Surface, SurfacePoint};
 use super::tone::{decode_bytes, to_bytes};
 use crate::geometry::bvh::Stack;
 use crate::geometry::corner::in_triangle;
-use crate::simd::{F, LANES, M, Simd, V3, load, max, min, splat};
+use crate::simd::{F, LANES, M, Simd, V3, abs, load, max, min, select, splat};
 use crate::trace::motion::NOW;
 use crate::trace::{Hit, Tracer};
 use kinetoscope_scene::Ray;
@@ -33,6 +33,42 @@ pub(crate) struct Mirrors<'a> {
     pub(crate) first: usize,
     /// True if no other instance mirrors, as in MuJoCo's renderer.
     pub(crate) only_first: bool,
+    /// A box around everything that mirrored rays may meet; `None` if they may meet something without an end.
+    pub(crate) reach: Option<Reach>,
+}
+
+/// A box around what mirrored rays may meet, larger by what single precision may miss: the rays of most of a floor miss it, and
+/// are not followed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reach([[f32; 3]; 2]);
+
+impl Reach {
+    /// Part of the size and of the coordinates by which the box is larger.
+    const MARGIN: f64 = 1e-3;
+
+    pub(crate) fn new([lo, hi]: [[f64; 3]; 2]) -> Self {
+        let pad = (0..3).map(|k| (hi[k] - lo[k]) + lo[k].abs().max(hi[k].abs())).fold(0.0, f64::max) * Self::MARGIN;
+        Self([lo.map(|x| (x - pad) as f32), hi.map(|x| (x + pad) as f32)])
+    }
+
+    /// Lanes whose rays, from `origin` in a direction of any length, may meet what is in the box.
+    #[inline(always)]
+    fn may_meet<S: Simd>(&self, s: S, origin: V3<S>, direction: V3<S>) -> M<S> {
+        let [lo, hi] = &self.0;
+        let (mut near, mut far) = (splat(s, 0.0), splat(s, f32::MAX));
+        for (o, d, lo, hi) in [
+            (origin.x, direction.x, lo[0], hi[0]),
+            (origin.y, direction.y, lo[1], hi[1]),
+            (origin.z, direction.z, lo[2], hi[2]),
+        ] {
+            // Directions along the faces would divide by zero.
+            let tiny = splat(s, 1e-12);
+            let inverse = splat(s, 1.0) / select(abs(d).simd_lt(tiny), tiny, d);
+            let (a, b) = ((splat(s, lo) - o) * inverse, (splat(s, hi) - o) * inverse);
+            (near, far) = (max(near, min(a, b)), min(far, max(a, b)));
+        }
+        near.simd_le(far)
+    }
 }
 
 /// Share that an instance mirrors where it is a planar mirror, 0..=1; 0 of other shapes and of what is not opaque.
@@ -159,8 +195,14 @@ impl Mirrors<'_> {
                 let SurfacePoint { normal, depth, .. } = point;
                 let up = source.world_from_instance.rotation.map(|row| row[2]);
                 let lanes = lanes & normal.dot(V3::splat(s, up)).simd_gt(splat(s, 0.5));
-                let wanted = lanes.to_bitmask();
-                if wanted == 0 {
+                let mirrored_view = view.sub(normal.scale(view.dot(normal) * 2.0));
+                let display = context.shade.scene.light_sum == LightSum::Display;
+                let followed = match &self.reach {
+                    Some(reach) => lanes & reach.may_meet(s, point.position, mirrored_view),
+                    None => lanes,
+                };
+                let wanted = followed.to_bitmask();
+                if lanes.to_bitmask() == 0 || display && wanted == 0 {
                     return color;
                 }
                 let points = Points::new(point);
@@ -175,13 +217,12 @@ impl Mirrors<'_> {
                     rays[k] = Some(Reflected { ray, travelled, left: 1.0 });
                 }
                 let r = reflectance(source.instance);
-                let display = context.shade.scene.light_sum == LightSum::Display;
                 let tint = if display { r } else { 1.0 };
                 let mut sum: Colors = [[0.0; LANES]; 3];
                 let met = self.follow(s, context, &mut rays, tint, length, &mut sum);
                 let mut left = [0.0f32; LANES];
                 for (left, ray) in left.iter_mut().zip(&rays) {
-                    *left = ray.map_or(0.0, |ray| ray.left);
+                    *left = ray.map_or(1.0, |ray| ray.left);
                 }
                 let sum = V3 { x: load(s, &sum[0]), y: load(s, &sum[1]), z: load(s, &sum[2]) };
                 if display {
@@ -193,7 +234,6 @@ impl Mirrors<'_> {
                     let lit = V3 { x: add(s, color.x, sum.x), y: add(s, color.y, sum.y), z: add(s, color.z, sum.z) };
                     return V3::select(hit, lit, color);
                 }
-                let mirrored_view = view.sub(normal.scale(view.dot(normal) * 2.0));
                 let beyond = sky(s, context.shade.lighting, mirrored_view, context.shade.pixel);
                 let mirrored = sum.add(beyond.scale(load(s, &left)));
                 V3::select(lanes, color.scale(splat(s, 1.0 - r)).add(mirrored.scale(splat(s, r))), color)

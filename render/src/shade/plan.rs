@@ -4,7 +4,7 @@ use super::BAND;
 use super::group::Context;
 use super::horizon::Horizon;
 use super::light::{Lighting, MAX_LIGHTS, ShadeContext};
-use super::mirror::{self, Mirrors};
+use super::mirror::{self, Mirrors, Reach};
 use super::moves::Moves;
 use super::shadow::{ShadowBand, ShadowMap};
 use super::shadow_fit::{self, LampView};
@@ -252,7 +252,12 @@ impl Plan {
         let (shadows, occlusion_rays) = (self.shadow_rays, self.occlusion_rays);
         let rays = ShadowRays { tracer: &self.tracer, stack, shadows, occlusion_rays };
         let only_first = shot.scene.light_sum == LightSum::Display;
-        let mirrors = self.first_mirror.map(|first| Mirrors { tracer: &self.tracer, stack, first, only_first });
+        let mirrors = self.first_mirror.map(|first| {
+            let tracer = &self.tracer;
+            let others = shot.scene.instances()[first + 1..].iter().any(|instance| mirror::reflectance(instance) > 0.0);
+            let reach = (only_first || !others).then(|| tracer.bounds_beside(first as u32)).flatten().map(Reach::new);
+            Mirrors { tracer, stack, first, only_first, reach }
+        });
         Context {
             projection,
             lens: shot.lens,

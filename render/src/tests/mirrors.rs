@@ -182,6 +182,38 @@ fn first_mirror() {
     assert!(left > 50 && right > 50, "{left} {right}");
 }
 
+/// Mirrored rays that miss the box around everything are not followed. A plane far below, which no mirrored ray meets, has no
+/// end: all rays are followed, and the mirror looks the same.
+#[test]
+fn rays_that_miss() {
+    for sum in [LightSum::Display, LightSum::Linear] {
+        let draw = |below: bool| {
+            let mirror = Material { reflectance: REFLECTANCE, ..glowing(FLOOR) };
+            let at = |x, y, z| PoseF32::from_translation([x, y, z]);
+            let mut all = vec![
+                (Shape::from(Plane { half: [3.0; 2] }), mirror, PoseF32::IDENTITY),
+                (Shape::from(Sphere { radius: RADIUS }), glowing(BALL), at(0.2, -0.1, 0.7)),
+                (Shape::from(Box { half: [0.1, 0.3, 0.2] }), glowing(BALL), at(-0.9, 0.4, 0.2)),
+            ];
+            if below {
+                all.push((Shape::from(Plane { half: [9.0; 2] }), glowing(FLOOR), at(0.0, 0.0, -50.0)));
+            }
+            let (scene, poses) = things(all);
+            let mut scene = unlit(scene);
+            (scene.sky, scene.light_sum) = (Sky::uniform([SKY; 3]), sum);
+            Still::new((scene, poses), look([160, 120], 0.9, [2.4, -1.2, 1.9], [0.1, 0.0, 0.3])).draw()
+        };
+        let (culled, followed) = (draw(false), draw(true));
+        let mirror = (0..culled.mask().len()).filter(|&k| culled.mask()[k] == 1);
+        let (mut pixels, mut colors) = (0, std::collections::BTreeSet::new());
+        for k in mirror {
+            assert_eq!(culled.color()[k], followed.color()[k], "{sum:?}, pixel {k}");
+            (pixels, _) = (pixels + 1, colors.insert(culled.color()[k]));
+        }
+        assert!(pixels > 5000 && colors.len() > 2, "{pixels} pixels of {} colours", colors.len());
+    }
+}
+
 /// A perfect mirror shows what a camera at the reflected eye sees without the mirror: shapes of every kind, smooth meshes,
 /// textures, several lights, and things that are not opaque, which are seen one behind the other.
 #[test]

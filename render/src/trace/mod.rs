@@ -174,6 +174,12 @@ impl Tracer {
         tree.build();
     }
 
+    /// A box around everything that a ray may meet beside `instance`; `None` if that has no end.
+    pub(crate) fn bounds_beside(&self, instance: u32) -> Option<[V3; 2]> {
+        let alone = self.endless.iter().all(|&thing| self.things[thing as usize].instance == instance);
+        alone.then(|| self.tree.bounds().unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]))
+    }
+
     /// Where an instance that is seen is at a time.
     pub(crate) fn pose_of(&self, instance: u32, time: f64) -> Option<PoseF64> {
         let thing = self.things.binary_search_by_key(&instance, |thing| thing.instance).ok()?;

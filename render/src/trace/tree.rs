@@ -62,6 +62,11 @@ impl Tree {
         self.boxes.push(([lo, hi], [0, 1, 2].map(|k| lo[k] + hi[k]), thing));
     }
 
+    /// A box around everything, after building; `None` for nothing.
+    pub(super) fn bounds(&self) -> Option<[V3; 2]> {
+        self.nodes.first().map(|node| node.bounds)
+    }
+
     /// Builds the tree over what was added.
     pub(super) fn build(&mut self) {
         let Self { boxes, nodes } = self;
