@@ -80,7 +80,7 @@ impl PartFile {
         }
         let begin = || {
             let mut file = AtomicFile::create_as(path, part.clone())?;
-            // Where another recorder was faster, the file is its own.
+            // If another recorder was faster, the file is its own.
             file.file().try_lock().inspect_err(|_| file.keep())?;
             Ok((file.file().try_clone()?, file))
         };

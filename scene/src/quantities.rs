@@ -68,11 +68,11 @@ macro_rules! quantities {
             /// Time of positions and velocities \[s\] since the last reset, shape \[num_envs\].
             pub time: Vec<f64>,
             /// Time of efforts, accelerations and contacts \[s\] since the last reset, shape \[num_envs\]: one step of the physics
-            /// engine earlier than [`time`](Self::time); the same right after a reset or after somebody wrote to the state, when
+            /// engine earlier than [`time`](Self::time); the same right after a reset or a write to the state, when
             /// accelerations and contacts are solved for the state as it is.
             pub force_time: Vec<f64>,
             $($($(#[$doc])* pub $field: Option<$Type>,)+)+
-            /// What can be seen where sizes or colours are the environment's own, shape \[num_envs\]; empty where all environments
+            /// Scenes of environments whose sizes or colours are their own, shape \[num_envs\]; empty where all environments
             /// look alike.
             pub own_scenes: Vec<OwnScene>,
         }

@@ -72,7 +72,7 @@ quantities! {
 
     /// [`SceneState::visible`], and the [`RenderScene`] that sensors are built for.
     VISIBLE = "visible" {
-        /// Where things are that can be seen.
+        /// Poses of instances that can be seen.
         visible: VisibleState,
     }
 
@@ -105,7 +105,7 @@ quantities! {
 
     /// [`SceneState::markers`], of all other sensors.
     MARKERS = "markers" {
-        /// What sensors show people of their measurements, shape \[num_envs\]: for cameras that draw it.
+        /// Markers by which sensors show their measurements, shape \[num_envs\]: for cameras that draw it.
         markers: Vec<Vec<Marker>>,
     }
 }

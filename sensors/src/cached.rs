@@ -32,7 +32,7 @@ impl<T> Cached<T> {
         self.current.get()
     }
 
-    /// The value, brought up to date by `update` where it is outdated, or made by `make` before where there is none.
+    /// The value, brought up to date by `update` if it is outdated, after `make` has made it if there was no value.
     ///
     /// # Errors
     ///
@@ -70,7 +70,7 @@ impl<T> Cached<T> {
         }
     }
 
-    /// The value, up to date or not; `None` where there is none.
+    /// The value, up to date or not; `None` before the first.
     pub(crate) fn value_mut(&mut self) -> Option<&mut T> {
         match self.current.get_mut() {
             Some(value) => Some(value),

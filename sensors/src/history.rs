@@ -66,7 +66,7 @@ impl<T: Clone> History<T> {
         Some(&mut flat[..width])
     }
 
-    /// The row of environment `env` that is `age` measurements old, as a slice; `None` where there is none.
+    /// The row of environment `env` that is `age` measurements old, as a slice; `None` if the history is shorter.
     #[track_caller]
     pub(crate) fn slice(&self, env: usize, age: usize) -> Option<&[T]> {
         let (_, length, width) = self.rows.dim();

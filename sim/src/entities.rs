@@ -13,7 +13,7 @@ use ndarray::Array2;
 use std::sync::Arc;
 
 impl SimulationManager {
-    /// What the simulation contains, by name.
+    /// Contents of the simulation, by name.
     pub fn entities(&self) -> Entities<'_> {
         Entities::new(self)
     }
@@ -33,12 +33,12 @@ impl<'a> Entities<'a> {
     /// The robot called `uid`.
     ///
     /// # Errors
-    /// There is none; the error lists those there are.
+    /// The uid is unknown; the error lists those there are.
     pub fn robot_id(&self, uid: &str) -> Result<RobotId> {
         self.sim.find_robot(uid, "robot", RobotData::is_robot)
     }
 
-    /// All robots with their uids, in the order in which they were added, and the articulations that are none.
+    /// All robots and articulations with their uids, in the order in which they were added.
     pub fn robot_ids(&self) -> Vec<(&'a str, RobotId)> {
         let robots = self.sim.contents.robots.iter().enumerate();
         robots.map(|(index, robot)| (robot.uid(), RobotId { manager: self.sim.serial, index })).collect()
@@ -47,7 +47,7 @@ impl<'a> Entities<'a> {
     /// The rigid object called `uid`.
     ///
     /// # Errors
-    /// There is none; the error lists those there are.
+    /// The uid is unknown; the error lists those there are.
     pub fn rigid_object_id(&self, uid: &str) -> Result<ObjectId> {
         let index = self.sim.contents.objects.iter().position(|o| o.uid() == uid);
         index.map(|index| ObjectId { manager: self.sim.serial, index }).ok_or_else(|| Error::UnknownName {
@@ -60,7 +60,7 @@ impl<'a> Entities<'a> {
     /// The MJCF file that is a part called `uid`.
     ///
     /// # Errors
-    /// There is none; the error lists those there are.
+    /// The uid is unknown; the error lists those there are.
     pub fn mjcf_id(&self, uid: &str) -> Result<MjcfId> {
         let index = self.sim.contents.parts.iter().position(|p| p.uid() == uid);
         index.map(|index| MjcfId { manager: self.sim.serial, index }).ok_or_else(|| Error::UnknownName {
@@ -73,12 +73,12 @@ impl<'a> Entities<'a> {
     /// The articulation called `uid`.
     ///
     /// # Errors
-    /// There is none; the error lists those there are.
+    /// The uid is unknown; the error lists those there are.
     pub fn articulation_id(&self, uid: &str) -> Result<ArticulationId> {
         self.sim.find_robot(uid, "articulation", |robot| !robot.is_robot()).map(ArticulationId)
     }
 
-    /// Names of all robots, then of all articulations that are none, each in the order in which they were added.
+    /// Names of all robots, then of all passive articulations, each in the order in which they were added.
     pub fn jointed_uids(&self) -> Vec<&'a str> {
         let of = |robots: bool| self.sim.contents.robots.iter().filter(move |data| data.is_robot() == robots);
         of(true).chain(of(false)).map(|data| data.uid()).collect()
@@ -87,7 +87,7 @@ impl<'a> Entities<'a> {
     /// The robot, or articulation, called `uid`: reading is the same for both.
     ///
     /// # Errors
-    /// There is none; the error lists those there are.
+    /// The uid is unknown; the error lists those there are.
     pub fn jointed_id(&self, uid: &str) -> Result<RobotId> {
         self.sim.find_robot(uid, "robot or articulation", |_: &RobotData| true)
     }
@@ -111,7 +111,7 @@ impl<'a> Entities<'a> {
     /// [`SimulationManager::sensor`], a lazy one measures now what was due.
     ///
     /// # Errors
-    /// There is none, or it failed, in an earlier step or now.
+    /// The uid is unknown, or the sensor failed, in an earlier step or now.
     pub fn sensor_called(&self, uid: &str) -> Result<&'a dyn Sensor> {
         self.sim.sensors.called(uid)
     }

@@ -291,7 +291,7 @@ impl SimulationManager {
         }
     }
 
-    /// What can be seen: made at the first call, which reads the visual meshes. What cannot be read is left out, with a
+    /// The visual scene, made at the first call, which reads the visual meshes. Meshes that cannot be read are left out, with a
     /// diagnostic.
     pub(crate) fn visible(&mut self) -> Arc<Visible> {
         let visible = self.simulation.make_visible(&self.cfg, &self.contents, &mut self.visuals);

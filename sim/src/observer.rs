@@ -180,7 +180,7 @@ impl<'a> ObserversMut<'a> {
 
     /// Adds an observer. It is told of what happens from now on.
     pub fn add<O: Observer>(&mut self, observer: O) -> ObserverId<O> {
-        // What was written before is told to those who were there.
+        // Earlier writes are reported to the observers that were there.
         self.sim.tell_written();
         let number = self.sim.observers.next;
         self.sim.observers.next += 1;

@@ -105,7 +105,7 @@ fn roll(
 }
 
 impl SimulationManager {
-    /// What would happen under `controls`, shape (N, T, columns of [`control_names`](crate::Entities::control_names)): N rows, each
+    /// Simulates copies of environments under `controls`, shape (N, T, columns of [`control_names`](crate::Entities::control_names)): N rows, each
     /// with the controls of T physics steps. The controls of a robot are its position targets \[rad or m\], clamped to the
     /// limits of the row's initial state as [`set_qpos_target`](crate::RobotMut::set_qpos_target) does (columns of joints that follow others or have no drive are
     /// ignored); those of an MJCF part are as [`set_ctrl`](crate::MjcfPartMut::set_ctrl) takes them. Other targets and

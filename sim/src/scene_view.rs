@@ -48,13 +48,13 @@ impl<'a> SceneView<'a> {
         &self.sim.simulation.xml
     }
 
-    /// What each number of the mask channel of cameras stands for, the same in every environment. Numbers stay when more
+    /// Meaning of each number of the mask channel of cameras, the same in every environment. Numbers stay when more
     /// is added.
     pub fn mask_ids(&self) -> &'a [MaskId] {
         self.sim.simulation.mask_ids()
     }
 
-    /// What each number of the mask channel is, by instance, link and semantic class, with labels by pattern: turns masks into
+    /// Numbers of the mask channel by instance, link and semantic class, with labels by pattern: turns masks into
     /// segmented pictures, and finds boxes around things. Make it anew when something was added.
     ///
     /// # Errors
@@ -64,7 +64,7 @@ impl<'a> SceneView<'a> {
         Segmentation::new(things, cfg).map_err(|error| Error::Labels(Box::new(error)))
     }
 
-    /// What all sensors show of their last measurements, for [`Still::overview`](crate::Still::overview): those that are
+    /// Markers of the last measurements of all sensors, for [`Still::overview`](crate::Still::overview): those that are
     /// configured to ([`SensorCfg::debug_vis`](kinetoscope_sensors::SensorCfg::debug_vis)), or told to since.
     pub fn markers(&self) -> Vec<(EnvId, Marker)> {
         self.sim.sensors.markers(&self.sim.simulation, None)
@@ -79,7 +79,7 @@ impl<'a> SceneView<'a> {
         self.sim.sensors.markers(&self.sim.simulation, Some(self.sim.sensors.index_of(id)))
     }
 
-    /// Whether the markers of a sensor are among [`markers`](Self::markers).
+    /// True if the markers of a sensor are among [`markers`](Self::markers).
     ///
     /// # Errors
     /// There is no such sensor.
@@ -143,7 +143,7 @@ impl<'a> SceneViewMut<'a> {
         Ok(result.expect("the closure was called"))
     }
 
-    /// What can be seen: made at the first call, which reads the visual meshes. What cannot be read is left out, with a
+    /// The visual scene, made at the first call, which reads the visual meshes. Meshes that cannot be read are left out, with a
     /// diagnostic.
     pub fn visible(&mut self) -> Arc<Visible> {
         self.sim.visible()
@@ -181,7 +181,7 @@ impl<'a> SceneViewMut<'a> {
         Ok(())
     }
 
-    /// What is drawn of an environment, in the order of [`Look::instances`]: the same value for all whose sizes and colours are not
+    /// The scene that is drawn of an environment, in the order of [`Look::instances`]: the same value for all whose sizes and colours are not
     /// their own, until something is added. Shapes that [change](kinetoscope_scene::Instance::deforms) are not those of now.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 /// Attributes that say where something is in the picture.
 const PLACES: [&str; 6] = ["x", "y", "cx", "cy", "d", "points"];
 
-/// Whether two pictures are the same but for places that differ by at most `most` pixels. What is written in them is the same
+/// True if two pictures are the same but for places that differ by at most `most` pixels. Text in them is the same
 /// to the letter: the numbers at the ticks say what the places mean.
 pub(crate) fn agree(a: &str, b: &str, most: f64) -> bool {
     // Outside and inside of quotation marks in turn.
@@ -15,7 +15,7 @@ pub(crate) fn agree(a: &str, b: &str, most: f64) -> bool {
     a.len() == b.len() && (0..a.len()).all(|k| a[k] == b[k] || k % 2 == 1 && is_place(k) && are_near(a[k], b[k], most))
 }
 
-/// Whether two texts are the same but for numbers that differ by at most `most`.
+/// True if two texts are the same but for numbers that differ by at most `most`.
 fn are_near(a: &str, b: &str, most: f64) -> bool {
     let split = |text: &str| -> (String, Vec<f64>) {
         let (mut rest, mut numbers, mut number) = (String::new(), Vec::new(), String::new());

@@ -22,7 +22,7 @@ pub struct PixelGroup {
     pub normal: [[f32; LANES]; 3],
     /// Smooth normal, world frame; 0 on a miss.
     pub shading_normal: [[f32; LANES]; 3],
-    /// Where the surface is, frame of the environment \[m\]; 0 on a miss.
+    /// Position of the surface, frame of the environment \[m\]; 0 on a miss.
     pub position: [[f32; LANES]; 3],
     /// How far it has moved since the picture before \[pixels\]; +inf on a miss.
     pub flow: [[f32; LANES]; 2],

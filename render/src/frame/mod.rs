@@ -39,7 +39,7 @@ macro_rules! with_channels {
             normal::Normal,
             /// Normal that light sees (smooth), unit, world frame, f32, 3 per pixel; 0 where nothing was hit.
             shading_normal::ShadingNormal,
-            /// Where the surface is, frame of the environment \[m\], f32, 3 per pixel; 0 where nothing was hit.
+            /// Position of the surface, frame of the environment \[m\], f32, 3 per pixel; 0 where nothing was hit.
             position::Position,
             /// Colour of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
             albedo::Albedo,

@@ -38,7 +38,7 @@ pub(crate) struct Lighting {
     headlight_is_lamp: bool,
 }
 
-/// What the colours of a frame need besides surfaces.
+/// Lighting and settings from which surfaces are shaded.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadeContext<'a> {
     pub(crate) scene: &'a RenderScene,

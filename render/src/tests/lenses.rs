@@ -191,7 +191,7 @@ fn folds() {
         assert!(matches!(error, OpticsError::LensFolds { radius, .. } if (radius - domain.radius).abs() < 1e-12));
         assert!(error.to_string().contains("at radius 0.8607 of the normalised picture"), "{error}");
     }
-    // Where it is to see farther than that it is refused at once; where it ends before, the rest is dark.
+    // To see farther than that is refused at once; if it ends before, the rest is dark.
     let short = |max_angle| Lens::from(OpenCv { k1: -0.2, max_angle: Some(max_angle), ..OpenCv::default() });
     assert!(matches!(short(1.2).domain(), Err(OpticsError::LensFolds { .. })));
     let rays = LensRays::new(&Optics::new(short(0.5), pixels).unwrap(), [200, 200], 1).unwrap();

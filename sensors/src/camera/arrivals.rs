@@ -53,7 +53,7 @@ impl PastImages {
 
 impl Camera {
     /// Time of the instant that the pictures show which arrived last \[s\], shape (N): as [`stamps`](Self::stamps), except with a
-    /// latency after somebody wrote to the state or moved the camera. Before the first one arrives, that of the reset.
+    /// latency after a write to the state or a move of the camera. Before the first one arrives, that of the reset.
     pub fn arrived_stamps(&self) -> Array1<f64> {
         let shown = self.stamps();
         Array1::from_shape_fn(shown.len(), |row| match self.frames.unseen(row) {
@@ -85,7 +85,7 @@ impl Camera {
     }
 
     /// The pictures of one channel that arrived last, in the shape of [`channel`](Self::channel). Those that are not shown are drawn
-    /// when somebody looks, with the noise that they would have been shown with.
+    /// when they are read, with the noise that they would have been shown with.
     ///
     /// # Errors
     ///
@@ -123,16 +123,16 @@ impl Camera {
         Ok(self.frames.stamp_history().filled(self.row(env)?))
     }
 
-    /// Times of past pictures \[s\], newest first, shape (N, history_length); 0 where there is none yet.
+    /// Times of past pictures \[s\], newest first, shape (N, history_length); 0 before the first ones.
     pub fn stamp_history(&self) -> ArrayView2<'_, f64> {
         self.frames.stamp_history().view().index_axis_move(Axis(2), 0)
     }
 
     /// The last pictures that arrived, of one channel, newest first: `camera.history::<Depth>()?`, shape
-    /// (N, history_length, H, W) or (N, history_length, H, W, components); zeros where there is none yet. Draws those that
-    /// nobody has looked at.
+    /// (N, history_length, H, W) or (N, history_length, H, W, components); zeros before the first ones. Draws those that
+    /// were not read before.
     ///
-    /// The newest is what [`channel`](Self::channel) shows, until somebody writes to the state or moves the camera.
+    /// The newest is what [`channel`](Self::channel) shows, until the state is written to or the camera moves.
     ///
     /// # Errors
     ///
@@ -167,7 +167,7 @@ impl Camera {
             || Ok(PastImages::new(&self.cfg, rows, filled)),
             |past| {
                 past.move_up();
-                // What is shown is drawn once.
+                // A shown image is drawn once.
                 let is_shown = |row: &usize| self.frames.shows_latest(*row);
                 let wants_shown = length > 0 && (0..rows).any(|row| is_shown(&row));
                 let shown = if wants_shown { self.pictures().ok() } else { None };

@@ -83,7 +83,7 @@ struct SlowShutter {
 }
 
 impl Motion {
-    /// What `cfg` asks for, in `rows` environments.
+    /// The history that `cfg` asks for, in `rows` environments.
     ///
     /// # Errors
     ///

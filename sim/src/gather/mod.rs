@@ -37,7 +37,7 @@ const QUANTITIES: [(Requires, Fill); 11] = [
     (Requires::INSTANCES, instances::fill),
 ];
 
-/// What sensors may ask for: what is gathered, and the markers of other sensors.
+/// Quantities that sensors may ask for: those that are gathered, and the markers of other sensors.
 pub(crate) const AVAILABLE: Requires = {
     let (mut all, mut k) = (Requires::MARKERS, 0);
     while k < QUANTITIES.len() {

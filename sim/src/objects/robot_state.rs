@@ -55,7 +55,7 @@ impl Robot<'_> {
         self.active_joints().count()
     }
 
-    /// Whether a joint has a drive, which [`set_qpos_target`](crate::RobotMut::set_qpos_target) gives a target; a passive joint and one that
+    /// True if a joint has a drive, which [`set_qpos_target`](crate::RobotMut::set_qpos_target) gives a target; a passive joint and one that
     /// follows another have none.
     ///
     /// # Errors

@@ -86,7 +86,7 @@ impl<'a> EnvPropertiesMut<'a> {
     /// are; a forward pass follows, when the environment is read or stepped.
     ///
     /// # Errors
-    /// An environment does not exist, a pattern matches nothing or one name twice, a range is none, or a value cannot be,
+    /// An environment does not exist, a pattern matches nothing or one name twice, a range is empty, or a value cannot be,
     /// such as a negative mass; then nothing changes.
     pub fn randomize(&mut self, randomization: &Randomization, env_ids: Option<&[EnvId]>) -> Result<()> {
         let resolved = randomization.resolve(&self.sim.properties().of(EnvId(0))?)?;

@@ -32,11 +32,11 @@ use std::sync::Arc;
 /// what was set before is restored), as who resets to the same start after every draw wants it.
 /// [`EnvPropertiesMut::restore`](crate::EnvPropertiesMut::restore) restores them too.
 ///
-/// What it does not hold:
+/// It does not hold:
 ///
 /// * Sensors. Those of restored environments start again as after a reset: they show the restored state at once, histories
-///   are empty, and their periods count from there. A sensor may be a type of the user's own, whose memory nobody else
-///   knows; and measurements of one run would not belong to the other.
+///   are empty, and their periods count from there. A sensor may be a type of the user's own, whose memory is unknown
+///   here; and measurements of one run would not belong to the other.
 /// * The model that all environments share. A snapshot of a scene with other steps, another integrator or other friction
 ///   cones is refused, as that of another scene.
 /// * What happened on the way: counts of warnings and of buffers that grew.

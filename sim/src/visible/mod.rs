@@ -124,7 +124,7 @@ impl Visible {
         Self::extract(model, identities, &Replacements::new(), &[], &Surfaces::new(), &Look::Mujoco { file: model })
     }
 
-    /// What can be seen of `model`, with the geoms in `replacements` drawn as these parts. `frames` are those of
+    /// The visual scene of `model`, with the geoms in `replacements` drawn as these parts. `frames` are those of
     /// everything on the body axis of sensors; `painted` is what is known of surfaces besides, `look` the light.
     pub(crate) fn extract(
         model: &Model,
