@@ -6,6 +6,7 @@ pub(crate) mod cloud;
 pub(crate) mod curve;
 pub(crate) mod grip;
 pub(crate) mod motion;
+pub(crate) mod npy;
 pub(crate) mod panel;
 pub(crate) mod picture;
 mod recording;

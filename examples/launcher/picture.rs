@@ -1,9 +1,8 @@
 //! Channels of cameras as files.
 
-use super::Result;
+use super::{Result, npy};
 use image::{Rgb, RgbImage};
 use kinetoscope::ndarray::{ArrayBase, Data, Dimension};
-use kinetoscope::record::npy;
 use kinetoscope::sensors::camera::colormap::{depth_color, mask_color, normal_color};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -16,7 +15,7 @@ const GAP: u32 = 8;
 pub(crate) fn write_npy<S, D>(path: &Path, array: &ArrayBase<S, D>) -> Result
 where
     S: Data,
-    S::Elem: npy::Number,
+    S::Elem: npy::Element,
     D: Dimension,
 {
     let write = || {

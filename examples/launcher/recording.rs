@@ -1,8 +1,10 @@
 //! What an example records, where the build can: the feature `record`.
 
 use super::{Launcher, Result};
+#[cfg(all(feature = "record", feature = "viewer"))]
 use kinetoscope::FileRecording;
 use kinetoscope::prelude::*;
+#[cfg(all(feature = "record", feature = "viewer"))]
 use kinetoscope::record::{RecorderCfg, Topic};
 
 #[cfg(all(feature = "record", feature = "viewer"))]

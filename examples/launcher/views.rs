@@ -2,6 +2,7 @@
 
 use super::{Launcher, Result};
 use kinetoscope::prelude::*;
+#[cfg(feature = "viewer")]
 use kinetoscope::viewer::{ImageWindow, ImageWindowCfg, RecordButton, ServeCfg, Window, WindowCfg};
 
 #[cfg(feature = "viewer")]
