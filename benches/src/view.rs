@@ -217,6 +217,6 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
         rows.push(row.against("real time", 1.0, factor).wanted(REAL));
     }
     let row = Row::new("view", case("drawn in 0.25 s each"), "env-steps/s", cores(), times.rate(0, ENVS));
-    rows.push(row.against("nobody watches", times.rate(1, ENVS), times.ratio(0, 1)).wanted(UNHINDERED));
+    rows.push(row.against("no view", times.rate(1, ENVS), times.ratio(0, 1)).wanted(UNHINDERED));
     Ok(rows)
 }

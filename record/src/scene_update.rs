@@ -39,7 +39,7 @@ pub(crate) struct Entity {
     pub(crate) instance: usize,
     /// Whose it is.
     pub(crate) name: Arc<str>,
-    /// What the mask channel of cameras says of it.
+    /// Value of the mask channel of cameras.
     pub(crate) mask_id: i32,
     /// Its frame, without the environment; `None` for that of the environment itself.
     pub(crate) frame: Option<String>,

@@ -19,7 +19,7 @@ pub struct RasterCfg {
     pub reflections: bool,
     /// Texels along the side of a shadow map; 0 chooses by the picture's size.
     pub shadow_size: usize,
-    /// Rays from each sample of a colour for ambient occlusion, of [`Renderer::Hybrid`](crate::renderer::Renderer::Hybrid) only; 0 is none. Ambient light is then
+    /// Rays from each sample of a colour for ambient occlusion, of [`Renderer::Hybrid`](crate::renderer::Renderer::Hybrid) only; 0 switches it off. Ambient light is then
     /// what arrives of [`RenderScene::ambient`] past what is in the way, as [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced) has it without bounces:
     /// exact where nothing is in the way of flat surfaces (of a mesh with smooth normals, what lies below a facet is in the way),
     /// with the noise of so many rays elsewhere, which depends on the point and nothing else.

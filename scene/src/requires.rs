@@ -11,8 +11,8 @@ impl Requires {
     /// Nothing.
     pub const NONE: Self = Self(0);
 
-    /// What the engine solves for the beginning of a step: it is gone when the step is done, so that the simulation must
-    /// know before the step that somebody wants it.
+    /// Quantities that the engine solves for the beginning of a step. They are gone when the step is done, so the simulation must
+    /// know before the step that a sensor needs them.
     pub const SOLVED: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
 
     /// True if all of `other` is in this set.

@@ -178,7 +178,7 @@ impl<'a> ObserversMut<'a> {
         self.sim.tell_each(|observer, sim| observer.receive(sim, event));
     }
 
-    /// Adds an observer. It is told of what happens from now on.
+    /// Adds an observer, which receives the events from now on.
     pub fn add<O: Observer>(&mut self, observer: O) -> ObserverId<O> {
         // Earlier writes are reported to the observers that were there.
         self.sim.tell_written();
@@ -188,7 +188,7 @@ impl<'a> ObserversMut<'a> {
         ObserverId { manager: self.sim.serial, number, observer: PhantomData }
     }
 
-    /// Takes an observer away and gives it back. It is told of what was written before.
+    /// Removes an observer and returns it, after reporting earlier writes to it.
     ///
     /// # Errors
     /// It was taken away before, or is the one that is being told right now.

@@ -27,7 +27,7 @@ pub(crate) struct Simulation {
     pub(crate) identities: Identities,
     /// Bodies and contacts as sensors see them.
     pub(crate) plan: Arc<Plan>,
-    /// What cameras draw; made when the first sensor asks for it.
+    /// The visual scene; made when the first sensor asks for it.
     pub(crate) visible: Option<Arc<Visible>>,
     pub(crate) xml: String,
     pub(crate) diagnostics: Vec<Diagnostic>,
@@ -40,7 +40,7 @@ pub(crate) struct Simulation {
     pub(crate) maker: Option<Maker>,
     /// Properties of each environment that differ from the model.
     pub(crate) own_values: Vec<Option<Box<OwnValues>>>,
-    /// What each environment looks like, where its sizes or colours are its own; empty where nobody's are, or nobody looks.
+    /// Scenes of environments whose sizes or colours are their own; empty without any, or before they are drawn.
     pub(crate) own_scenes: Vec<OwnScene>,
     /// True for each geom that only has a pose, for a mesh that is drawn in its place.
     pub(crate) proxies: Vec<bool>,
@@ -63,7 +63,7 @@ impl Simulation {
         self.identities.table()
     }
 
-    /// Makes what cameras draw, if nobody did before.
+    /// Makes the visual scene at the first call.
     pub(crate) fn make_visible(
         &mut self,
         cfg: &SimulationManagerCfg,
@@ -197,7 +197,7 @@ impl Simulation {
     }
 }
 
-/// What parts that were MJCF files, and objects that are moved by hand, have beside joints, from an old simulation to a new one: pairs of places.
+/// Places in the old and in the new simulation of the states, beside joints, of MJCF parts and of objects that are moved by hand.
 struct PartTransfer {
     controls: Vec<(usize, usize)>,
     activations: Vec<(usize, usize)>,

@@ -281,7 +281,7 @@ mod tests {
             ("b/src/lib.rs", "use a::x::X;"),
         ]);
         assert_eq!(circles(&tree), [["a/src/x.rs", "a/src/y/inner.rs", "a/src/y/mod.rs"]]);
-        // The control: without the path of y there is none.
+        // The control: without the path of y no circle is found.
         let mut open = tree;
         open[2].text = "mod inner;".into();
         assert!(circles(&open).is_empty());

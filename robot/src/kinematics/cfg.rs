@@ -33,7 +33,7 @@ pub enum TipName<'n> {
     Part(&'n str),
     /// A link.
     Link(&'n str),
-    /// A control part or, where there is none of that name, a link.
+    /// A control part or, if no part has that name, a link.
     Either(&'n str),
 }
 

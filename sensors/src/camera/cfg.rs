@@ -89,8 +89,8 @@ pub struct CameraCfg {
     /// Draw when somebody reads (and only then), not when the picture is due. The pictures are the same: what there is
     /// to see is kept when it is due.
     pub lazy: bool,
-    /// Pictures to remember, the newest included: see [`Camera::history`](super::Camera::history). Those of a lazy camera are drawn when somebody
-    /// looks at the history.
+    /// Pictures to remember, the newest included: see [`Camera::history`](super::Camera::history). Those of a lazy camera are drawn when the
+    /// history is read.
     pub history_length: usize,
     /// Physics steps from the capture of a picture until it can be read. It keeps the stamp of its capture. What somebody
     /// writes to the state of an environment is seen at once there, by every sensor: nothing stale is ever read.

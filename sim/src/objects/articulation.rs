@@ -52,7 +52,7 @@ pub struct ArticulationCfg {
     pub self_collision: bool,
     /// How collision meshes become convex hulls.
     pub hull: HullCfg,
-    /// What kind of thing it is, for the table of mask ids; `articulation` where `None`.
+    /// Semantic class, for the table of mask ids; `articulation` where `None`.
     pub semantic_class: Option<String>,
 }
 

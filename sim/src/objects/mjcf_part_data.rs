@@ -48,11 +48,11 @@ pub struct MjcfCfg {
     /// Pose of the file's world in the environment.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// What surfaces of bodies look like besides what the file says, by pattern of their names; `world` is what stands in the
+    /// Looks of surfaces of bodies besides those of the file, by pattern of their names; `world` is what stands in the
     /// file's world. No body may be matched twice.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
-    /// What kind of thing it is, for the table of mask ids; `mjcf` where `None`.
+    /// Semantic class, for the table of mask ids; `mjcf` where `None`.
     pub semantic_class: Option<String>,
 }
 
@@ -111,12 +111,12 @@ pub(crate) struct MjcfData {
     sensors: Vec<EngineSensor>,
     pub(super) sensor_names: Vec<String>,
     first_mask_id: i32,
-    /// What is known of the surfaces of some bodies besides.
+    /// Surfaces of some bodies, in addition to those of the file.
     surfaces: Vec<(usize, SurfaceCfg)>,
 }
 
 impl MjcfData {
-    /// What is known of the surfaces of some bodies besides.
+    /// Surfaces of some bodies, in addition to those of the file.
     pub(crate) fn surfaces(&self) -> &[(usize, SurfaceCfg)] {
         &self.surfaces
     }
@@ -216,7 +216,7 @@ impl MjcfData {
         format!("{}/{name}", self.cfg.uid)
     }
 
-    /// What the mask channel of cameras says of a body of the file; body 0 is what stands in its world.
+    /// Value of the mask channel of cameras for a body of the file; body 0 is what stands in its world.
     pub(crate) fn mask_id(&self, body: usize) -> i32 {
         self.first_mask_id + body as i32
     }

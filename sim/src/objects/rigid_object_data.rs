@@ -38,9 +38,9 @@ pub struct RigidObjectCfg {
     pub uid: String,
     /// Its shape.
     pub shape: ObjectShape,
-    /// What collides of a mesh file.
+    /// Collision shape of a mesh file.
     pub mesh_collision: MeshCollision,
-    /// Whether it moves.
+    /// Type of motion.
     pub body_type: BodyType,
     /// Mass \[kg\]; from `density` where `None`.
     pub mass: Option<f64>,
@@ -63,8 +63,8 @@ pub struct RigidObjectCfg {
     /// `None`.
     ///
     /// MuJoCo has no restitution: this is a contact that is a spring and a damper (`solref` below 0) for about ten steps.
-    /// What comes with v sinks in by up to `3.2 v dt` meanwhile, so that a ball that is to bounce wants a small time step.
-    /// Where in a step the surfaces meet makes up to 0.08 less or 0.04 more of it below 0.3, 0.06 less or 0.04 more at 0.5,
+    /// A body that arrives at speed v \[m/s\] sinks in by up to `3.2 v dt` meanwhile, so bouncing balls need a small time step.
+    /// The instant of the step at which the surfaces meet makes up to 0.08 less or 0.04 more of it below 0.3, 0.06 less or 0.04 more at 0.5,
     /// 0.02 less or 0.03 more at 0.8, and 0.003 at 1. It holds for an impact through the centre of mass. Of two such surfaces
     /// the one that bounces less counts; against one that has none, this one's.
     pub restitution: Option<f64>,
@@ -76,9 +76,9 @@ pub struct RigidObjectCfg {
     pub init_pose: Pose,
     /// Colour and opacity, 0..=1; of a mesh, where its file gives none.
     pub rgba: [f64; 4],
-    /// What else its surface looks like.
+    /// Look of its surface besides the colour.
     pub surface: SurfaceCfg,
-    /// What kind of thing it is, for the table of mask ids; `object` where `None`.
+    /// Semantic class, for the table of mask ids; `object` where `None`.
     pub semantic_class: Option<String>,
 }
 
@@ -194,7 +194,7 @@ impl RigidObjectData {
         &self.cfg
     }
 
-    /// What the mask channel of cameras says of it.
+    /// Value of the mask channel of cameras.
     pub(crate) fn mask_id(&self) -> i32 {
         self.mask_id
     }
@@ -203,7 +203,7 @@ impl RigidObjectData {
         &self.mass_properties
     }
 
-    /// What collides and is seen, where it is a mesh.
+    /// Geometry that collides and is seen, for a mesh.
     pub(crate) fn mesh(&self) -> Option<&ObjectMesh> {
         self.mesh.as_ref()
     }

@@ -39,7 +39,7 @@ pub(crate) struct RobotData {
     file: Option<RobotFile>,
     first_mask_id: i32,
     role: Role,
-    /// What is known of the surfaces of some links besides.
+    /// Surfaces of some links, in addition to those of the files.
     surfaces: Vec<(usize, SurfaceCfg)>,
 }
 
@@ -130,12 +130,12 @@ impl RobotData {
         &self.cfg
     }
 
-    /// What is known of the surfaces of some links besides.
+    /// Surfaces of some links, in addition to those of the files.
     pub(crate) fn surfaces(&self) -> &[(usize, SurfaceCfg)] {
         &self.surfaces
     }
 
-    /// What kind of thing it is, for the table of mask ids.
+    /// Semantic class, for the table of mask ids.
     pub(crate) fn semantic_class(&self) -> &str {
         match &self.role {
             Role::Robot => "robot",
@@ -168,7 +168,7 @@ impl RobotData {
         &self.joint_names
     }
 
-    /// What the mask channel of cameras says of a link.
+    /// Value of the mask channel of cameras for a link.
     pub(crate) fn mask_id(&self, link: usize) -> i32 {
         self.first_mask_id + link as i32
     }

@@ -51,7 +51,7 @@ pub struct TerrainCfg {
     pub friction: Option<[f64; 3]>,
     /// Colour and opacity, 0..=1.
     pub rgba: [f64; 4],
-    /// What else its surface looks like.
+    /// Look of its surface besides the colour.
     pub surface: SurfaceCfg,
 }
 

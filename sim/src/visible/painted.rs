@@ -3,5 +3,5 @@
 use crate::surface_cfg::SurfaceCfg;
 use std::collections::BTreeMap;
 
-/// What surfaces look like, by the name of what they are of: that of an instance.
+/// Looks of surfaces, by the name of their instance.
 pub(crate) type Surfaces = BTreeMap<String, SurfaceCfg>;

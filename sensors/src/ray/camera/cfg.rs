@@ -22,8 +22,8 @@ const BYTES_PER_RAY: usize = 40 + 40 + 24;
 
 /// Configuration of a [`RayCasterCamera`]: a pinhole camera that casts one ray through the centre of every pixel.
 ///
-/// Against [`CameraCfg`](crate::camera::CameraCfg) it measures only geometry, sees only what it is told to, and every number is
-/// that of an exact ray. Where all of a scene is to be seen, the rasterizer is faster.
+/// Unlike [`CameraCfg`](crate::camera::CameraCfg) it measures only geometry, of the chosen targets, and every number is that of
+/// an exact ray. Where all of a scene is to be seen, the rasterizer is faster.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RayCasterCameraCfg {

@@ -39,7 +39,7 @@ impl Field {
         Cells { corners, at: [D::load(s, &cells[0]), D::load(s, &cells[1])] }
     }
 
-    /// As [`unit`](kinetoscope_scene::vector::unit) of the surface's normal; false in lanes where there is none.
+    /// As [`unit`](kinetoscope_scene::vector::unit) of the surface's normal; false in lanes without a surface.
     #[inline(always)]
     fn normals<S: Simd>(&self, s: S, hx: D<S>, hy: D<S>) -> ([[f64; WIDTH]; 3], N<S>) {
         let one = D::splat(s, 1.0);
