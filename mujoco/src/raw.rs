@@ -1,4 +1,4 @@
-//! MuJoCo's own structs, for C functions that this crate does not wrap.
+//! Access to MuJoCo's structs, for C functions that this crate does not wrap.
 
 use super::data::Data;
 use super::error::EngineError;
@@ -6,8 +6,11 @@ use super::guard::guarded;
 use mujoco_sys as mj;
 
 impl Data {
-    /// Calls MuJoCo's C functions with model and data, whose declarations are in [`sys`](crate::sys). An error inside MuJoCo
-    /// (`mju_error`) ends `call` and becomes an `Err`; the data are incomplete then, until the next forward pass or reset.
+    /// Calls `call` with the raw model and data, for the C functions that are declared in [`sys`](crate::sys).
+    ///
+    /// An error inside MuJoCo (`mju_error`) ends `call` and becomes an `Err`. The data are then incomplete until the
+    /// next
+    /// forward pass or reset.
     ///
     /// # Errors
     /// MuJoCo's engine stopped.
