@@ -92,8 +92,7 @@ impl Installation {
         };
         let name = library.file_name().and_then(|n| n.to_str()).expect("find_library returns a UTF-8 file name");
         // Cargo adds only link-search folders below OUT_DIR to the library path of `cargo run` and `cargo test`. A
-        // symlink
-        // there lets tests and examples find a library outside the system's search path.
+        // symlink there lets tests and examples find a library outside the system's search path.
         let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
         let link = out.join(name);
         let _ = fs::remove_file(&link);
@@ -154,12 +153,10 @@ fn write_bindings(installation: &Installation, path: &Path) {
 }
 
 /// Writes accessors of all arrays of `mjModel` and `mjData`, generated from MuJoCo's own X-macros: no stride is typed
-/// by
-/// hand.
+/// by hand.
 ///
 /// `X(type, name, rows, cols)` becomes `pub unsafe fn name<'a>(..) -> &'a [type]` of `rows * cols` elements;
-/// `model::each`
-/// visits all arrays of a model.
+/// `model::each` visits all arrays of a model.
 fn write_fields(installation: &Installation, path: &Path) {
     let text = fs::read_to_string(installation.header("mjxmacro.h")).expect("mjxmacro.h stands beside mujoco.h");
     let lists = x_macros(&text);

@@ -1,8 +1,7 @@
 //! A thread pool with scoped borrows: persistent worker threads run jobs that borrow data of the caller.
 //!
 //! Physics, renderers and ray casters share one [`ThreadPool`]. Its threads start with the first job that needs them
-//! and
-//! then persist: a job costs no thread start and, after the first one, no allocation.
+//! and then persist: a job costs no thread start and, after the first one, no allocation.
 //!
 //! | file | content |
 //! |---|---|

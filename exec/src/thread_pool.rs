@@ -50,8 +50,7 @@ impl ThreadPool {
     /// threads.
     ///
     /// Each slot runs at most once. Returns when all calls have returned. Busy or missing workers are not waited for,
-    /// so
-    /// `work` must complete the job even if only slot 0 runs.
+    /// so `work` must complete the job even if only slot 0 runs.
     ///
     /// # Panics
     /// If `work` panics on any thread.

@@ -1,8 +1,7 @@
 //! Worker threads of a pool. Lending borrowed work to them is the only unsafe operation of this crate.
 //!
 //! Scoped threads of the standard library can borrow, too, but start and end with each job. That would cost about 0.05
-//! ms
-//! and a few allocations, several times per image.
+//! ms and a few allocations, several times per image.
 #![allow(unsafe_code, reason = "workers that outlive a job are lent what its caller borrows")]
 
 use crate::patience::Patience;
@@ -62,8 +61,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Workers {
     /// Runs a job; see [`ThreadPool::run`](crate::ThreadPool::run). If the workers are busy with another job, or the
-    /// pool has
-    /// no worker, the calling thread works alone.
+    /// pool has no worker, the calling thread works alone.
     pub(crate) fn run(&self, slots: usize, work: &(dyn Fn(usize) + Sync)) {
         if !self.post(slots, work) {
             return work(0);
@@ -86,9 +84,9 @@ impl Workers {
         if helpers == 0 || job.taken {
             return false;
         }
-        // SAFETY: the reference is not used after the borrow ends. It stays in `job.work` until `finish` removes it, and a
-        // worker that has read it counts in `active`, which `finish` waits for. `run`, the only caller, reaches `finish` on
-        // every path: its own share of the work cannot unwind past it, and nothing in between can panic.
+        // SAFETY: the reference is not used after the borrow ends. It stays in `job.work` until `finish` removes it,
+        // and a worker that has read it counts in `active`, which `finish` waits for. `run`, the only caller, reaches
+        // `finish` on every path: its own share of the work cannot unwind past it, and nothing in between can panic.
         let lent = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), Lent>(work) };
         job.taken = true;
         (job.work, job.slot, job.slots) = (Some(lent), 1, 1 + helpers);

@@ -25,9 +25,8 @@ include!(concat!(env!("OUT_DIR"), "/bindings.rs"));
 ///
 /// # Safety
 /// The contract of all functions: `m` points to a model made by MuJoCo, `d` to an `mjData` made from a model of the
-/// same
-/// sizes, both alive for `'a`; nothing writes to the array (shared) or accesses it (`_mut`) during `'a`. Constraint and
-/// contact arrays hold values only after the stage that fills them.
+/// same sizes, both alive for `'a`; nothing writes to the array (shared) or accesses it (`_mut`) during `'a`.
+/// Constraint and contact arrays hold values only after the stage that fills them.
 pub mod fields {
     unsafe fn slice<'a, T>(pointer: *const T, len: usize) -> &'a [T] {
         if len == 0 || pointer.is_null() { &[] } else { unsafe { std::slice::from_raw_parts(pointer, len) } }

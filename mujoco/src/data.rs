@@ -193,8 +193,7 @@ impl Data {
     }
 
     /// Computes everything that depends on positions and velocities (`mj_step1`): kinematics, contacts, constraints,
-    /// bias
-    /// forces.
+    /// bias forces.
     ///
     /// # Errors
     /// MuJoCo stopped (out of memory): reset or drop this data.
@@ -237,10 +236,8 @@ impl Data {
     /// Computes body accelerations and the forces between bodies (`cacc`, `cfrc_int`) with `mj_rnePostConstraint`.
     ///
     /// Accelerations and constraint forces are those of the last solve. `qvel` are the velocities of that solve: those
-    /// before
-    /// the integration, if the step is complete. Nothing that affects later steps changes. `spare` is scratch memory
-    /// for `nv`
-    /// numbers.
+    /// before the integration, if the step is complete. Nothing that affects later steps changes. `spare` is scratch
+    /// memory for `nv` numbers.
     ///
     /// # Errors
     /// MuJoCo stopped (out of memory): reset or drop this data.

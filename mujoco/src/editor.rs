@@ -98,7 +98,8 @@ impl Editor {
     /// MuJoCo cannot allocate a copy.
     pub fn new(model: &Model) -> Result<Self, EngineError> {
         let no_memory = || EngineError { message: "could not allocate memory for a copy of the model".into() };
-        // SAFETY: the compiled model is alive and one allocation, as mj_copyModel needs it; an engine function (guarded).
+        // SAFETY: the compiled model is alive and one allocation, as mj_copyModel needs it; an engine function
+        // (guarded).
         let copy = guarded(|| unsafe { mj::mj_copyModel(std::ptr::null_mut(), model.compiled()) })?;
         let mut copy = Storage(NonNull::new(copy).ok_or_else(no_memory)?);
         set_buffers(copy.header_mut(), model.small_buffers());
@@ -122,8 +123,8 @@ impl Editor {
         for field in &self.fields {
             // SAFETY: a field of models of these sizes; nothing writes to a shared model.
             let from = unsafe { bytes(model.header(), field) };
-            // SAFETY: the array of the copy has as many bytes, since both have the sizes of the compiled model; the copy is
-            // alive, and `self` is borrowed mutably.
+            // SAFETY: the array of the copy has as many bytes, since both have the sizes of the compiled model; the
+            // copy is alive, and `self` is borrowed mutably.
             let to = unsafe {
                 std::slice::from_raw_parts_mut(array_pointer(self.copy.header(), field).cast_mut(), field.bytes)
             };
@@ -221,8 +222,7 @@ impl Editor {
     }
 
     /// Updates the mean inertia and the mean mass in `stat`, as 2.2.2 does in mj_setConst; 4.0 keeps those of its
-    /// compiler.
-    /// The solver scales by the mean inertia.
+    /// compiler. The solver scales by the mean inertia.
     fn update_means(&mut self) {
         if cfg!(mj4) {
             // SAFETY: the copy is alive, and only `&mut self` writes to it.
@@ -263,8 +263,7 @@ impl Editor {
         // mj_setConst overwrites the rest of `stat`, too, including values that the file sets.
         (header.stat.meaninertia, header.stat.meanmass) = (copy.stat.meaninertia, copy.stat.meanmass);
         // SAFETY: sizes are those of `like`; all pointers lead to the compiled model, which `like` keeps alive, except
-        // those
-        // that were just set to `own`, each to memory of the size of its field.
+        // those that were just set to `own`, each to memory of the size of its field.
         unsafe { like.with_arrays(header, own) }
     }
 
@@ -294,8 +293,8 @@ fn of_body(bodies: &[i32], body: usize) -> impl Iterator<Item = usize> + '_ {
 /// Bytes of an array, which are plain numbers without padding.
 ///
 /// # Safety
-/// `field` is one of `fields::model::each` of a model of the same sizes, and not empty; nothing writes to the array while the
-/// bytes are in use.
+/// `field` is one of `fields::model::each` of a model of the same sizes, and not empty; nothing writes to the array
+/// while the bytes are in use.
 unsafe fn bytes<'m>(model: &'m mj::mjModel, field: &ModelArray) -> &'m [u8] {
     // SAFETY: the array has this size (contract), and lives as long as the model.
     unsafe { std::slice::from_raw_parts(array_pointer(model, field), field.bytes) }

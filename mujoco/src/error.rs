@@ -41,8 +41,7 @@ impl CompileError {
     }
 
     /// Returns the error with the position in `file` of the name that MuJoCo does not support, unless MuJoCo itself
-    /// names a
-    /// line of `file`.
+    /// names a line of `file`.
     pub(crate) fn placed_in(self, file: &std::path::Path) -> Self {
         // MuJoCo does not say whether a line belongs to the file itself or to an included file.
         if self.line.is_some() && !includes(file) {
@@ -86,8 +85,7 @@ fn newer(message: &str) -> String {
 }
 
 /// Line number in a message. MuJoCo writes `line 12` or `line = 12` (2.2.2 and 4.x, reader and compiler). For text that
-/// is
-/// not XML, the parser writes `Line number=12`.
+/// is not XML, the parser writes `Line number=12`.
 fn line_named_in(message: &str) -> Option<u32> {
     let number_after = |word: &str| {
         let after = &message[message.rfind(word)? + word.len()..];

@@ -23,9 +23,8 @@ impl Data {
     /// Computes the Jacobian of a point that moves with a body (`mj_jac`), row-major, shape (3, nv) each.
     ///
     /// `point` is in the world frame \[m\]. `linear` receives the velocity of the point, and `angular` the angular
-    /// velocity,
-    /// in world axes and per unit of each generalized velocity. Poses are those of the last forward pass or of
-    /// [`place`](Self::place).
+    /// velocity, in world axes and per unit of each generalized velocity. Poses are those of the last forward pass or
+    /// of [`place`](Self::place).
     ///
     /// # Errors
     /// MuJoCo's engine stopped.
@@ -45,8 +44,8 @@ impl Data {
         assert!(body < bodies, "body {body} of {bodies}");
         assert!(linear.len() == length && angular.len() == length, "arrays of {length} numbers");
         let (linear, angular) = (linear.as_mut_ptr(), angular.as_mut_ptr());
-        // SAFETY: model and data are alive and belong together; the body exists; the arrays have the lengths that mj_jac
-        // reads (3) and writes (3 nv each). It does not write to the data.
+        // SAFETY: model and data are alive and belong together; the body exists; the arrays have the lengths that
+        // mj_jac reads (3) and writes (3 nv each). It does not write to the data.
         guarded(|| unsafe { mj::mj_jac(model, data, linear, angular, point.as_ptr(), body as i32) })
     }
 }

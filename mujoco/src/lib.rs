@@ -5,8 +5,7 @@
 //!
 //! * No input makes MuJoCo end the process: its error handler unwinds to `guard`, which returns an [`EngineError`].
 //!   MuJoCo writes no log file and no warnings. (The hull library inside 2.2.2 prints to stderr for a flat mesh; the
-//! MJCF
-//!   writer passes it no flat mesh.)
+//!   MJCF writer passes it no flat mesh.)
 //! * A model never changes while it is shared. [`Data`] keeps its model alive.
 //! * A slice has the length that MuJoCo's own `mjxmacro.h` declares (`mujoco_sys::fields`).
 //!

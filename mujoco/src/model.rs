@@ -10,8 +10,8 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(super) struct Storage(pub(super) NonNull<mj::mjModel>);
 
-// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled` or `Editor`, which is
-// its only owner then.
+// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled` or `Editor`, which
+// is its only owner then.
 unsafe impl Send for Storage {}
 // SAFETY: once shared in a `Model`, nothing writes to it.
 unsafe impl Sync for Storage {}
@@ -67,8 +67,7 @@ impl Compiled {
 /// arrays.
 ///
 /// It is not one allocation. Functions that need one (`mj_copyModel`, `mj_saveModel`, `mj_deleteModel`) must not
-/// receive
-/// it. Functions that step or read follow its pointers and may.
+/// receive it. Functions that step or read follow its pointers and may.
 pub(super) struct Header {
     header: mj::mjModel,
     storage: Arc<Storage>,
@@ -122,8 +121,7 @@ pub struct Model(Arc<Header>);
 /// Buffer sizes of a [`Data`](super::Data) for contacts and constraints.
 ///
 /// On 2.2.2, memory grows with the square of `constraints`, so both sizes start small and grow on demand. On 4.x,
-/// contacts
-/// and constraints share one arena.
+/// contacts and constraints share one arena.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Buffers {
     /// Largest number of contacts (2.2.2).
@@ -136,8 +134,7 @@ pub struct Buffers {
 
 impl Buffers {
     /// Returns sizes with twice the capacity of the buffer that overflowed. Other buffers do not grow, because unused
-    /// rows
-    /// are expensive on 2.2.2.
+    /// rows are expensive on 2.2.2.
     #[must_use]
     pub fn enlarged(self, what: Overflow) -> Self {
         let twice = |n: usize| n.max(1).saturating_mul(2);
@@ -253,8 +250,7 @@ impl Model {
     }
 
     /// Small initial buffer sizes: room for all permanent constraints (equalities, drives, friction, limits) and for a
-    /// few
-    /// contacts.
+    /// few contacts.
     pub fn small_buffers(&self) -> Buffers {
         const CONTACTS: usize = 16;
         /// Rows of a contact with a pyramidal cone of dimension 3.
@@ -262,8 +258,7 @@ impl Model {
         let m = self.header();
         let always = 6 * m.neq as usize + 2 * m.nv as usize + 2 * m.ntendon as usize;
         // The arena holds Jacobians, the solver's Hessian and its stack. This size fits the bundled robots without
-        // growing.
-        // A scene that needs more grows at its first step.
+        // growing. A scene that needs more grows at its first step.
         let rows = always + CONTACTS * ROWS_PER_CONTACT;
         let nv = m.nv as usize;
         Buffers {

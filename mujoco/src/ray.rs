@@ -18,10 +18,8 @@ impl Data {
     /// Returns the nearest intersection of a ray with a geom (`mj_ray`).
     ///
     /// Bit k of `groups` includes the geoms of group k. Planes are hit from the front only, triangles from both sides,
-    /// and
-    /// fully transparent geoms never. Origin and direction are in the world frame \[m\]. Poses are those of the last
-    /// forward
-    /// pass.
+    /// and fully transparent geoms never. Origin and direction are in the world frame \[m\]. Poses are those of the
+    /// last forward pass.
     ///
     /// # Errors
     /// MuJoCo's engine stopped.
@@ -45,8 +43,7 @@ impl Data {
     /// Computes the nearest intersections of rays from one point (`mj_multiRay`), by the rules of [`ray`](Self::ray).
     ///
     /// `distances` receives distances in multiples of the rays' directions, -1 for a ray without a hit. MuJoCo culls
-    /// geoms
-    /// for all rays at once.
+    /// geoms for all rays at once.
     ///
     /// # Errors
     /// MuJoCo's engine stopped, or is of a version without `mj_multiRay`.
@@ -72,10 +69,8 @@ impl Data {
             let (from, along, groups) = (origin.as_ptr(), directions.as_ptr().cast(), groups.as_ptr());
             let (to, geoms, normals) = (distances.as_mut_ptr(), std::ptr::null_mut(), std::ptr::null_mut());
             // SAFETY: model and data are alive and belong together, and the data, whose stack it works on, is borrowed
-            // mutably;
-            // the arrays have the lengths that mj_multiRay reads and writes (3, 3 for each of `count` rays, mjNGROUP,
-            // and
-            // `count` distances); those for geoms and normals may be null.
+            // mutably; the arrays have the lengths that mj_multiRay reads and writes (3, 3 for each of `count` rays,
+            // mjNGROUP, and `count` distances); those for geoms and normals may be null.
             guarded(|| unsafe {
                 mj::mj_multiRay(model, data, from, along, groups, true, -1, geoms, to, normals, count, cutoff);
             })

@@ -13,8 +13,7 @@ pub struct Motion {
 /// Quaternions of `qpos` before the last forward pass.
 ///
 /// The forward pass of 2.2.2 normalizes the quaternions of free and ball joints in place, and a second pass would
-/// change
-/// their last bits. On 4.x positions do not change, so no quaternion is stored.
+/// change their last bits. On 4.x positions do not change, so no quaternion is stored.
 #[derive(Clone, Debug, Default)]
 pub struct RawQuats {
     /// First quaternion, stored without heap memory: a robot has at most one in the common case.

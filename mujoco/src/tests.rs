@@ -91,14 +91,11 @@ fn multi_ray() {
 }
 
 /// A mass m with moment I at radius r on a slide on a turntable, both without drives, turns with w and slides outward
-/// with
-/// u.
+/// with u.
 ///
 /// m r² w + I w is conserved, so the turntable accelerates by a = -2 m r w u / (I + m r²). The free slide accelerates
-/// by
-/// w² r. The world exerts mass times acceleration: m (r a + 2 w u) across the slide, the weight, and I a about the
-/// axis.
-/// After an integration, the velocities from before it must be given.
+/// by w² r. The world exerts mass times acceleration: m (r a + 2 w u) across the slide, the weight, and I a about the
+/// axis. After an integration, the velocities from before it must be given.
 #[test]
 fn forces_before_integration() {
     let (mass, moment, radius, turning, sliding, g) = (2.0, 0.7, 0.5, 3.0, 0.4, 9.81);

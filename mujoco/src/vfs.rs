@@ -130,7 +130,7 @@ pub fn compile_file(path: &Path) -> Result<Compiled, LoadError> {
 
 fn load(name: &CStr, vfs: *const mj::mjVFS) -> Result<Compiled, LoadError> {
     let mut error: [c_char; 1024] = [0; 1024];
-    // SAFETY: name and error buffer are alive and of the stated size; `vfs` is null or initialised. Errors inside are
+    // SAFETY: name and error buffer are alive and of the stated size; `vfs` is null or initialized. Errors inside are
     // reported through the buffer (both versions install a handler of their own while they compile).
     let raw = unsafe { mj::mj_loadXML(name.as_ptr(), vfs, error.as_mut_ptr(), error.len() as i32) };
     if let Some(raw) = NonNull::new(raw) {

@@ -69,8 +69,8 @@ impl Model {
             set_pointer(&mut header, &array.field, array.memory.as_ptr().cast());
         }
         // SAFETY: sizes are those of `self`; pointers lead to the compiled model, which `self` keeps alive, except
-        // those that
-        // were just set to `own`, each to memory of the size of its field: moving a box does not move its content.
+        // those that were just set to `own`, each to memory of the size of its field: moving a box does not move its
+        // content.
         unsafe { self.with_arrays(header, Arc::from(own)) }
     }
 }

@@ -118,8 +118,7 @@ pub fn bias(code: i32) -> Option<&'static str> {
 }
 
 /// Keyword of the kind of object that a sensor observes. MuJoCo's `body` is the frame at the center of mass, `xbody`
-/// the
-/// body's own frame.
+/// the body's own frame.
 pub fn observed(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjOBJ_BODY, "body"),

@@ -53,10 +53,8 @@ impl Framing {
     /// Returns the nearest placement with the whole scene in the image.
     ///
     /// Returns `None` if nothing of a finite size is drawn, or if the viewing direction is vertical. The smallest
-    /// distance
-    /// follows from four supporting planes of the instances, so it is exact. Planes are ignored, and so are static
-    /// instances
-    /// that are much larger than robots and objects, such as terrain and walls of a room.
+    /// distance follows from four supporting planes of the instances, so it is exact. Planes are ignored, and so are
+    /// static instances that are much larger than robots and objects, such as terrain and walls of a room.
     pub fn place(&self, placed: &[Placed<'_>]) -> Option<Placement> {
         let forward = unit(self.forward)?;
         let right = unit([forward[1], -forward[0], 0.0])?;
@@ -161,8 +159,7 @@ mod tests {
     }
 
     /// A ball of radius r at distance d has a half angle of asin(r / d). At `r / sin(atan(fill tan(fovy / 2)))` it
-    /// fills the
-    /// image.
+    /// fills the image.
     #[test]
     fn distance_of_a_ball() {
         let ball = Instance::new(Sphere { radius: 0.5 }, Material::default(), 1).of_body(0);

@@ -10,8 +10,7 @@
 //! | [`SceneState`], [`VisibleState`], [`Contacts`], [`Requires`] | state of all environments at one time |
 //! | [`Random`], [`Philox`], [`sampling`] | random numbers and sample warping |
 //! | [`Ray`], [`framing`] | rays, and camera placement around a scene |
-//! | [`file_format`], [`yaml`], [`pattern`], [`source`], [`AtomicFile`] | configuration files, name patterns, file
-//! access |
+//! | [`file_format`], [`yaml`], [`pattern`], [`source`], [`AtomicFile`] | configuration files, name patterns, files |
 //!
 //! ```
 //! use kinetoscope_scene::shape::Sphere;

@@ -12,8 +12,7 @@ pub enum LightKind {
         /// Half angle of the cone \[deg\], at most 90.
         cutoff_deg: f32,
         /// Exponent of the falloff from the axis: cos(angle) to this power. Renderers use the nearest whole number up
-        /// to
-        /// 128.
+        /// to 128.
         exponent: f32,
     },
     /// Uniform in all directions. The rasterizer draws no shadows of it.
@@ -38,8 +37,7 @@ pub struct Light {
     /// Constant, linear and quadratic attenuation: intensity is 1 / (c + l d + q d²). Unused for directional lights.
     pub attenuation: [f32; 3],
     /// Radius of the light's disc, for soft shadows in ray-traced images \[m\]. For a directional light, the radius at
-    /// a
-    /// distance of 1 m (the tangent of its angular radius). 0 is a point light with sharp shadows.
+    /// a distance of 1 m (the tangent of its angular radius). 0 is a point light with sharp shadows.
     pub radius: f32,
     /// True if instances in the light cast shadows.
     pub cast_shadow: bool,

@@ -21,8 +21,7 @@ pub struct Material {
     /// Sharpness of highlights in 0..=1: the exponent is 128 times this.
     pub shininess: f32,
     /// Mirror reflectance in 0..=1. Opaque planes and the +z faces of boxes reflect in all renderers, other shapes only
-    /// in
-    /// path-traced images.
+    /// in path-traced images.
     pub reflectance: f32,
     /// Metallic share in 0..=1. A metal has no diffuse reflection, and its specular reflection has its color.
     pub metallic: f32,
@@ -62,8 +61,7 @@ impl Material {
     }
 
     /// Exponent of the highlights in Blinn's and Phong's models, 1 to 128: 128 times `shininess`, or 2 / alpha² - 2 for
-    /// a
-    /// roughness. Source: Walter et al., Microfacet models for refraction through rough surfaces, 2007, section 5.2.
+    /// a roughness. Source: Walter et al., Microfacet models for refraction through rough surfaces, 2007, section 5.2.
     pub fn exponent(&self) -> f32 {
         let exponent = match self.roughness {
             Some(roughness) => 2.0 / roughness.clamp(0.0, 1.0).powi(4) - 2.0,
@@ -79,8 +77,7 @@ pub enum TextureKind {
     /// Mapped by texture coordinates, or by x and y of the shape.
     TwoD,
     /// Mapped by direction from the center of the shape. The image is six squares from top to bottom: +x, -x, +y, -y,
-    /// +z,
-    /// -z.
+    /// +z, -z.
     Cube,
 }
 
@@ -201,8 +198,7 @@ impl Level {
     /// Colors (sRGB) from the top left, four bytes each; the fourth byte is unused.
     ///
     /// A row has [`width`](Self::width) + 1 pixels, and there are [`height`](Self::height) + 1 rows. The last column
-    /// and the
-    /// last row repeat the first ones, so that the four pixels around any point are two pairs in memory.
+    /// and the last row repeat the first ones, so that the four pixels around any point are two pairs in memory.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -258,8 +254,7 @@ mod tests {
     use super::*;
 
     /// IEC 61966-2-1: a value on the linear segment and one beyond it, the ends, and byte 188, which is half of the
-    /// light
-    /// (0.5029).
+    /// light (0.5029).
     #[test]
     fn srgb() {
         let table = srgb_to_linear();
