@@ -1,7 +1,7 @@
 //! Worker threads of a pool. Lending borrowed work to them is the only unsafe operation of this crate.
 //!
-//! Scoped threads of the standard library can borrow, too, but start and end with each job. That would cost about 0.05
-//! ms and a few allocations, several times per image.
+//! Scoped threads of the standard library can borrow, too, but start and end with each job. That would cost about
+//! 0.05 ms and a few allocations, several times per image.
 #![allow(unsafe_code, reason = "workers that outlive a job are lent what its caller borrows")]
 
 use crate::patience::Patience;

@@ -123,9 +123,9 @@ impl WarningCounts {
 /// Buffer that was too small.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overflow {
-    /// Contacts.
+    /// The contact buffer.
     Contacts,
-    /// Constraint rows.
+    /// The buffer of constraint rows.
     Constraints,
     /// The solver's stack.
     Stack,
@@ -135,7 +135,7 @@ impl Data {
     /// Creates data in the model's initial state, with the model's buffer sizes.
     ///
     /// # Errors
-    /// MuJoCo cannot allocate it.
+    /// MuJoCo cannot allocate the data.
     pub fn new(model: &Model) -> Result<Self, EngineError> {
         // SAFETY: the model is alive; mj_makeData is an engine function (guarded).
         let raw = guarded(|| unsafe { mj::mj_makeData(model.raw()) })?;
@@ -145,7 +145,7 @@ impl Data {
         Ok(Self { raw, model: model.clone(), places })
     }
 
-    /// The model this data was made for.
+    /// The model of this data.
     pub fn model(&self) -> &Model {
         &self.model
     }

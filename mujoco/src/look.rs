@@ -71,7 +71,7 @@ pub struct MaterialValues {
     pub texture: Option<usize>,
     /// Number of repetitions of the texture along its two axes.
     pub tex_repeat: [f32; 2],
-    /// True if [`tex_repeat`](Self::tex_repeat) counts per meter.
+    /// True if [`tex_repeat`](Self::tex_repeat) is per length instead of per shape: per 2 m in MuJoCo's renderer.
     pub tex_uniform: bool,
     /// Emitted light, as a factor of the color.
     pub emission: f32,

@@ -158,7 +158,7 @@ mod tests {
         Framing { forward: [1.0, 0.0, 0.0], fovy: 45f64.to_radians(), aspect, fill: FILL }
     }
 
-    /// A ball of radius r at distance d has a half angle of asin(r / d). At `r / sin(atan(fill tan(fovy / 2)))` it
+    /// A sphere of radius r at distance d has a half angle of asin(r / d). At `r / sin(atan(fill tan(fovy / 2)))` it
     /// fills the image.
     #[test]
     fn distance_of_a_ball() {

@@ -15,7 +15,7 @@ pub enum LightKind {
         /// to 128.
         exponent: f32,
     },
-    /// Uniform in all directions. The rasterizer draws no shadows of it.
+    /// Uniform in all directions. The rasterizer draws no shadows of this type.
     Point,
 }
 
@@ -37,7 +37,7 @@ pub struct Light {
     /// Constant, linear and quadratic attenuation: intensity is 1 / (c + l d + q d²). Unused for directional lights.
     pub attenuation: [f32; 3],
     /// Radius of the light's disc, for soft shadows in ray-traced images \[m\]. For a directional light, the radius at
-    /// a distance of 1 m (the tangent of its angular radius). 0 is a point light with sharp shadows.
+    /// a distance of 1 m (the tangent of its angular radius). With 0, shadows are sharp.
     pub radius: f32,
     /// True if instances in the light cast shadows.
     pub cast_shadow: bool,

@@ -23,7 +23,7 @@ pub struct Marker {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MarkerKind {
-    /// A ball around the pose.
+    /// A sphere around the pose.
     Sphere {
         /// Radius \[m\].
         radius: f32,
@@ -48,7 +48,7 @@ impl Marker {
     /// Geom group that separates markers from other instances: MuJoCo's groups are 0 to 5.
     pub const GROUP: u8 = 31;
 
-    /// A ball at `center` \[m\].
+    /// A sphere at `center` \[m\].
     pub fn sphere(center: [f64; 3], radius: f32, rgba: [f32; 4]) -> Self {
         let [x, y, z] = center;
         Self { kind: MarkerKind::Sphere { radius }, pose: Pose::translation(x, y, z), rgba }

@@ -19,14 +19,15 @@ pub struct Instance {
     pub group: u8,
     /// True if the instance is drawn.
     pub visible: bool,
-    /// Name of its owner: `uid/link`, the uid of an object, or the name of a geom of the world (`ground`). Ray casters
-    /// select their targets by it; several instances may share a name.
+    /// Name of the instance's owner: `uid/link`, the uid of an object, or the name of a geom of the world (`ground`). Ray casters
+    /// select their targets by name; several instances may share a name.
     pub name: Arc<str>,
-    /// Index of its body, on the body axis of [`SceneState`](crate::SceneState); `None` for the world.
+    /// Index of the instance's body, on the body axis of [`SceneState`](crate::SceneState); `None` for the world.
     pub body: Option<u32>,
-    /// True if it is welded to the world: only a write to the state moves it.
+    /// True if the instance is welded to the world: only a write to the state moves the instance.
     pub fixed: bool,
-    /// True if its shape may differ in every frame, as for tendons and skins. Cameras draw it, ray casters ignore it.
+    /// True if the shape may differ in every frame, as for tendons and skins. Cameras draw such instances, ray casters
+    /// ignore them.
     pub deforms: bool,
     /// Pose in the frame of its owner (the link or object); the identity for a geom of the world.
     pub frame_from_instance: Pose,
@@ -62,7 +63,7 @@ impl Instance {
         Self { body: Some(body), ..self }
     }
 
-    /// Scale \[1/m\] and offset of texture coordinates along the axes of its frame, for a shape without its own
+    /// Scale \[1/m\] and offset of texture coordinates along the axes of the instance, for a shape without its own
     /// coordinates.
     ///
     /// A cube texture is mapped onto a box around the shape. Other textures are projected along z, as in MuJoCo's

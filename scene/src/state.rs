@@ -23,8 +23,7 @@ quantities! {
 
     /// Flag of [`SceneState::body_velocities`].
     VELOCITIES = "velocities" {
-        /// Velocities of body origins, then angular velocities \[m/s, rad/s\], in world axes, shape \[num_envs, bodies,
-        /// 6\].
+        /// Velocities of body origins, then angular velocities \[m/s, rad/s\], world axes, shape \[num_envs, bodies, 6\].
         body_velocities: Array3<f64> [bodies, 6],
     }
 
@@ -102,8 +101,10 @@ quantities! {
         /// Controls of actuators, shape \[num_envs, actuators\]: the position target of a drive \[rad or m\]; for an
         /// actuator of an MJCF file, its control in the unit of the file.
         actuator_controls: Array2<f64> [actuators],
-        /// Forces of actuators, shape \[num_envs, actuators\]: for drives as [`joint_efforts`](Self::joint_efforts) \[N
-        /// m or N\]; for actuators of MJCF files in the unit of the file, before the gear.
+        /// Forces of actuators, shape \[num_envs, actuators\].
+        ///
+        /// For drives, the values of [`joint_efforts`](Self::joint_efforts) \[N m or N\]; for actuators of MJCF files, the
+        /// force in the unit of the file, before the gear.
         actuator_forces: Array2<f64> [actuators],
         /// Activations of actuators, shape \[num_envs, actuators\]; 0 for actuators without activation. For actuators
         /// with several activations (MuJoCo 4.x: `actdim`), the last one, which determines their force.

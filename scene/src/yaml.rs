@@ -89,9 +89,9 @@ impl Value {
 struct Open {
     line: usize,
     content: Content,
-    /// Its anchor; 0 without one.
+    /// Number of the anchor; 0 without an anchor.
     anchor: usize,
-    /// Size of the file before it.
+    /// Size of the file before this value \[bytes\].
     begin: usize,
 }
 

@@ -18,7 +18,7 @@ pub trait AreaSampling {
     /// Area of the surface \[m²\].
     fn area(&self) -> f64;
 
-    /// Returns a surface point for three uniform numbers in 0..1: `side` selects the side, `at` the position on it.
+    /// Returns a surface point for three uniform numbers in 0..1: `side` selects a face, `at` a point on it.
     fn sample(&self, side: f64, at: [f64; 2]) -> SurfacePoint;
 
     /// Returns a point that may be visible from `from`, and the pdf of its direction \[1/sr\] if it was not sampled by

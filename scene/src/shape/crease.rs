@@ -92,8 +92,8 @@ fn smooth(around: &[u32], faces: &[[f32; 3]], limit: f32) -> bool {
     })
 }
 
-/// Corners of triangles at each vertex `v`: `corners[start[v]..start[v + 1]]`. Corner c of triangle k has the number 3
-/// k + c.
+/// Corners of triangles at each vertex `v`: `corners[start[v]..start[v + 1]]`. Corner c of triangle k has the number
+/// `3 * k + c`.
 struct Corners {
     start: Vec<u32>,
     corners: Vec<u32>,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Terrain with independent random heights at its points. Every multiple of `step` within the range is equally likely.
 ///
-/// Isaac calls this terrain random uniform.
+/// Isaac's name is random uniform terrain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RoughTerrain {
