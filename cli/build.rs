@@ -1,6 +1,7 @@
-//! Binaries that are linked to the MuJoCo of `MUJOCO_DIR` find it there when they start.
+//! Embeds the folder of the MuJoCo library in `MUJOCO_DIR` as an rpath in the binaries of this package.
 //!
-//! Cargo sets the library path of `cargo run` and `cargo test` alone, and passes no linker arguments of `mujoco-sys` on.
+//! Cargo sets the library search path only for `cargo run` and `cargo test`, and does not pass on linker arguments of
+//! `mujoco-sys`.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -8,7 +9,7 @@ use std::{env, fs};
 fn main() {
     println!("cargo::rerun-if-env-changed=MUJOCO_DIR");
     println!("cargo::rerun-if-changed=build.rs");
-    // Without the variable the library is where the linker of the system looks; a wrong one is an error of mujoco-sys.
+    // Without MUJOCO_DIR, the loader's default search path applies. mujoco-sys reports an invalid MUJOCO_DIR.
     let Some(folder) = env::var_os("MUJOCO_DIR").map(PathBuf::from).and_then(|folder| fs::canonicalize(folder).ok())
     else {
         return;

@@ -1,6 +1,6 @@
-//! Finds MuJoCo, checks that it is one of the two supported lines, and generates the bindings.
+//! Finds MuJoCo, checks that its version is supported (2.2.2 or 4.x), and generates the bindings.
 //!
-//! Where it looks: `MUJOCO_DIR` (a folder with `include/mujoco/mujoco.h` and `libmujoco.so*`, as in the PyPI wheel), else
+//! Search order: `MUJOCO_DIR` (a folder with `include/mujoco/mujoco.h` and `libmujoco.so*`, as in the PyPI wheel), then
 //! the system's include folders (Debian's `libmujoco-dev`).
 
 use std::collections::BTreeMap;
@@ -33,7 +33,7 @@ fn main() {
 
 struct Installation {
     include: PathBuf,
-    /// The library file, when `MUJOCO_DIR` names one; else the linker's default search finds it.
+    /// Library file in `MUJOCO_DIR`. `None` without `MUJOCO_DIR`: the linker's default search then finds the library.
     library: Option<PathBuf>,
     version_header: u32,
 }
@@ -80,7 +80,7 @@ impl Installation {
         self.include.join("mujoco").join(name)
     }
 
-    /// 222 is 2.2.2; since 3.5 the number is major * 10^6 + minor * 10^3 + patch.
+    /// Major version. `mjVERSION_HEADER` is 222 for 2.2.2; since 3.5 it is major * 10^6 + minor * 10^3 + patch.
     fn major(&self) -> u32 {
         if self.version_header < 1000 { self.version_header / 100 } else { self.version_header / 1_000_000 }
     }
@@ -91,8 +91,8 @@ impl Installation {
             return;
         };
         let name = library.file_name().and_then(|n| n.to_str()).expect("find_library returns a UTF-8 file name");
-        // Cargo puts link-search folders below OUT_DIR on the library path of `cargo run` and `cargo test`, other
-        // folders not: a symlink there makes tests and examples find a library that the system does not know.
+        // Cargo adds only link-search folders below OUT_DIR to the library path of `cargo run` and `cargo test`. A
+        // symlink there lets tests and examples find a library outside the system's search path.
         let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
         let link = out.join(name);
         let _ = fs::remove_file(&link);
@@ -119,7 +119,8 @@ fn find_library(dir: &Path) -> Option<PathBuf> {
 struct StripTrailingUnderscore;
 
 impl bindgen::callbacks::ParseCallbacks for StripTrailingUnderscore {
-    /// 2.2.2 writes `typedef struct mjModel_ {..} mjModel;`, 4.x `typedef struct mjModel {..} mjModel;`.
+    /// Removes the underscore of struct tags: 2.2.2 writes `typedef struct mjModel_ {..} mjModel;`, 4.x
+    /// `typedef struct mjModel {..} mjModel;`.
     fn item_name(&self, item: bindgen::callbacks::ItemInfo<'_>) -> Option<String> {
         (item.name.starts_with("mj") && item.name.ends_with('_')).then(|| item.name.trim_end_matches('_').to_string())
     }
@@ -133,7 +134,7 @@ fn write_bindings(installation: &Installation, path: &Path) {
         .allowlist_function("mj_.*|mju_.*")
         .allowlist_var("mj.*")
         .allowlist_type("mjt.*|mjModel|mjData|mjVFS|mjContact|mjOption")
-        // Values of C enums come from the library: a Rust enum would make an unknown one undefined behaviour.
+        // Enum values come from the library: a value unknown to a Rust enum would be undefined behavior.
         .default_enum_style(bindgen::EnumVariation::Consts)
         .prepend_enum_name(false)
         .default_macro_constant_type(bindgen::MacroTypeVariation::Signed)
@@ -143,7 +144,7 @@ fn write_bindings(installation: &Installation, path: &Path) {
         .generate_comments(false)
         .size_t_is_usize(true)
         .layout_tests(true)
-        // The error handler leaves engine functions by unwinding.
+        // The error handler unwinds out of engine functions.
         .override_abi(bindgen::Abi::CUnwind, ".*")
         .generate()
         .expect("bindgen on MuJoCo's headers")
@@ -151,10 +152,11 @@ fn write_bindings(installation: &Installation, path: &Path) {
         .expect("OUT_DIR is writable");
 }
 
-/// Accessors of all arrays of `mjModel` and `mjData`, generated from MuJoCo's own X-macros: no stride is typed by hand.
+/// Writes accessors of all arrays of `mjModel` and `mjData`, generated from MuJoCo's own X-macros: no stride is typed
+/// by hand.
 ///
-/// `X(type, name, rows, cols)` becomes `pub unsafe fn name<'a>(..) -> &'a [type]` of `rows * cols` elements; `model::each`
-/// goes through the arrays of a model.
+/// `X(type, name, rows, cols)` becomes `pub unsafe fn name<'a>(..) -> &'a [type]` of `rows * cols` elements;
+/// `model::each` visits all arrays of a model.
 fn write_fields(installation: &Installation, path: &Path) {
     let text = fs::read_to_string(installation.header("mjxmacro.h")).expect("mjxmacro.h stands beside mujoco.h");
     let lists = x_macros(&text);
@@ -213,7 +215,7 @@ fn write_fields(installation: &Installation, path: &Path) {
     fs::write(path, out).expect("OUT_DIR is writable");
 }
 
-/// The Rust spelling of a C element type; bindgen knows MuJoCo's own types.
+/// Rust spelling of a C element type. MuJoCo's own types keep their names, which bindgen declares.
 fn rust_type(c: &str) -> &str {
     match c {
         "int" => "::std::os::raw::c_int",
@@ -226,10 +228,11 @@ fn rust_type(c: &str) -> &str {
     }
 }
 
-/// A size in `mjxmacro.h`: a number, a constant, a size field of the model, or `MJ_D(..)`, a size field of the data.
+/// Rust expression of a size in `mjxmacro.h`: a number, a constant, a size field of the model, or `MJ_D(..)`, a size
+/// field of the data.
 ///
-/// Rows `njmax` and `nconmax` (2.2.2) are what is allocated; only the first `nefc` and `ncon` are filled, as in 4.x,
-/// where those are the sizes.
+/// `njmax` and `nconmax` (2.2.2) are allocated rows. Only the first `nefc` and `ncon` rows are filled, so the accessors
+/// return those, as 4.x declares.
 fn size_expression(c: &str) -> String {
     let inner = |c: &str| c[c.find('(').map_or(0, |i| i + 1)..c.rfind(')').unwrap_or(c.len())].trim().to_string();
     if let Some((a, b)) = c.split_once('*') {
@@ -246,7 +249,7 @@ fn size_expression(c: &str) -> String {
     }
 }
 
-/// `#define NAME \ X(a, b, ...) \ XMJV(a, ...)` -> (NAME, [[a, b, ...], ...]).
+/// Parses `#define NAME \ X(a, b, ...) \ XMJV(a, ...)` into (NAME, [[a, b, ...], ...]).
 fn x_macros(text: &str) -> BTreeMap<String, Vec<Vec<String>>> {
     let joined = text.replace("\\\r\n", " ").replace("\\\n", " ");
     let mut lists: BTreeMap<String, Vec<Vec<String>>> = BTreeMap::new();

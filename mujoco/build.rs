@@ -1,4 +1,4 @@
-//! Passes on which MuJoCo line mujoco-sys was built for.
+//! Sets `cfg(mj4)` if mujoco-sys was built for MuJoCo 4.x.
 
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(mj4)");

@@ -1,4 +1,4 @@
-//! Bundled robots: their files, and configurations that are ready to be added to a simulation.
+//! Bundled robots: their files, and configurations that can be added to a simulation directly.
 //!
 //! ```
 //! use kinetoscope::prelude::*;
@@ -16,12 +16,12 @@ use kinetoscope_sim::{DriveCfg, RobotCfg};
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
-/// An asset was not found.
+/// Error: an asset was not found.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AssetMissing {
-    /// The path asked for.
+    /// Requested path.
     pub asset: PathBuf,
-    /// Every place that was tried.
+    /// All paths that were tried.
     pub tried: Vec<PathBuf>,
 }
 
@@ -38,18 +38,20 @@ impl std::fmt::Display for AssetMissing {
 
 impl std::error::Error for AssetMissing {}
 
-/// The file of an asset such as `sr5/SR5.urdf`: an absolute path as it is, else below the folder `KINETOSCOPE_ASSETS`,
-/// else below the folder that comes with this crate.
+/// Returns the path of an asset such as `sr5/SR5.urdf`.
+///
+/// An absolute path is returned unchanged. Other paths are looked up below the folder `KINETOSCOPE_ASSETS`, then below
+/// the folder that comes with this crate.
 ///
 /// # Errors
-/// It is in none of these places; the error lists them.
+/// The asset is in none of these places; the error lists them.
 pub fn path(asset: impl AsRef<Path>) -> Result<PathBuf, AssetMissing> {
     resolve(asset.as_ref(), std::env::var_os("KINETOSCOPE_ASSETS").map(PathBuf::from))
 }
 
-/// The quadruped, which stands with bent knees 0.6 m up; drives of 80 N m/rad and 5 N m s/rad. Uid `quadruped`.
+/// Quadruped, standing with bent knees at a height of 0.6 m; drives of 80 N m/rad and 5 N m s/rad. Uid `quadruped`.
 ///
-/// Start pose: Isaac Lab's `ANYMAL_C_CFG`.
+/// The initial pose is that of Isaac Lab's `ANYMAL_C_CFG`.
 ///
 /// # Errors
 /// The asset is missing.
@@ -66,7 +68,7 @@ pub fn quadruped() -> Result<RobotCfg, AssetMissing> {
     })
 }
 
-/// The SR5 arm with the control part `arm`; drives of 10⁴ N m/rad and 10³ N m s/rad. Uid `sr5`.
+/// SR5 arm with the control part `arm`; drives of 10⁴ N m/rad and 10³ N m s/rad. Uid `sr5`.
 ///
 /// # Errors
 /// The asset is missing.
@@ -80,7 +82,7 @@ pub fn sr5() -> Result<RobotCfg, AssetMissing> {
     })
 }
 
-/// The left hand with the control part `hand`; drives of 10³ N m/rad and 10² N m s/rad. Uid `revo1_left`.
+/// Left hand with the control part `hand`; drives of 10³ N m/rad and 10² N m s/rad. Uid `revo1_left`.
 ///
 /// # Errors
 /// The asset is missing.
@@ -94,8 +96,9 @@ pub fn revo1_left() -> Result<RobotCfg, AssetMissing> {
     })
 }
 
-/// The arm with the hand on its flange, control parts and drives of both: the robot of EmbodiChain's tutorials. Uid
-/// `sr5_with_brainco`.
+/// SR5 arm with the left hand on its flange, with the control parts and drives of both. Uid `sr5_with_brainco`.
+///
+/// This is the robot of EmbodiChain's tutorials.
 ///
 /// # Errors
 /// An asset is missing.

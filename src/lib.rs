@@ -1,12 +1,12 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-/// The programs of the page are compiled as those of the README are.
+/// Compiles the examples of this page as doc tests.
 #[cfg(all(doctest, feature = "record"))]
 #[doc = include_str!("../docs/recording.md")]
 struct PageOfRecordings;
 
-/// So are those of this page.
+/// Compiles the examples of this page as doc tests.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/cameras.md")]
 struct PageOfCameras;
@@ -36,7 +36,7 @@ pub use record_button::FileRecording;
 #[cfg(all(feature = "record", feature = "viewer"))]
 pub use recorded_film::RecordedFilm;
 
-/// Names that most programs need, at most 45, and the traits whose methods they call: `use kinetoscope::prelude::*;`.
+/// Names that most programs need (at most 45), and the traits of their methods: `use kinetoscope::prelude::*;`.
 pub mod prelude {
     pub use crate::assets;
     #[cfg(feature = "record")]

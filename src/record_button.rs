@@ -1,13 +1,13 @@
-//! The record button of windows and browser views, joined to recordings.
+//! Recordings to files, for the record button of windows and browser views.
 
 use kinetoscope_record::{Record, RecordError, Recorded, Recorder, RecorderCfg, RecorderId};
 use kinetoscope_sim::SimulationManager;
 use kinetoscope_viewer::{Recording, RecordingState};
 use std::path::{Path, PathBuf};
 
-/// What a record button does in most programs: it records to a file, and to a new one each time it is pressed again.
+/// Recording to files for a record button: each recording that the button starts gets a new file.
 ///
-/// One is for one simulation. What is being recorded when the simulation is dropped is broken off: [`end`](Self::end) it
+/// A value belongs to one simulation. Dropping the simulation aborts the current recording, so call [`end`](Self::end)
 /// before.
 ///
 /// ```no_run
@@ -32,25 +32,27 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct FileRecording {
     cfg: RecorderCfg,
-    /// What records now, and to which file.
+    /// Recorder and file of the current recording.
     now: Option<(RecorderId, PathBuf)>,
-    /// How many files were begun.
+    /// Number of files that were started.
     begun: usize,
     done: Vec<Recorded>,
-    /// Why the first one was broken off that the button has ended, until [`end`](Self::end) says so.
+    /// First error of a recording that the button ended, until [`end`](Self::end) returns it.
     failed: Option<RecordError>,
-    /// What is said of the last one that ended.
+    /// Status text of the last recording that ended.
     said: String,
 }
 
 impl FileRecording {
-    /// Records as `cfg` says. The button never writes over what is there, unless `cfg` lets it: the file of `cfg`, `run.mcap`
-    /// say, is followed by `run-2.mcap`, and one that exists is passed over.
+    /// Creates a recording with the settings of `cfg`.
+    ///
+    /// The button never overwrites an existing file unless `cfg` allows it. After the file of `cfg`, for example
+    /// `run.mcap`, it writes `run-2.mcap` and so on, and skips existing files.
     pub fn new(cfg: RecorderCfg) -> Self {
         Self { cfg, now: None, begun: 0, done: Vec::new(), failed: None, said: String::new() }
     }
 
-    /// Begins to record to the very file of the configuration, as a program does that was told to record.
+    /// Starts a recording to exactly the file of the configuration, for programs that record without a button.
     ///
     /// # Errors
     /// As [`Record::record`].
@@ -58,17 +60,19 @@ impl FileRecording {
         self.begin_at(sim, self.cfg.path.clone())
     }
 
-    /// Ends what is being recorded, and gives all recordings that ended since this was asked last.
+    /// Ends the current recording, and returns all recordings that have ended since the last call.
     ///
     /// # Errors
-    /// As [`Record::finish_recording`], also of one that the button has ended. Asked again, this gives those that are whole.
+    /// As [`Record::finish_recording`], also for a recording that the button ended. The next call returns complete
+    /// recordings.
     pub fn end(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<Vec<Recorded>> {
         self.finish(sim)?;
         self.failed.take().map_or_else(|| Ok(std::mem::take(&mut self.done)), Err)
     }
 
-    /// Why what is being recorded has stopped, as soon as it is known: a full disk, say. `None` while it goes on, and where nothing
-    /// is recorded. [`end`](Self::end) says it too.
+    /// Reason why the current recording has stopped, for example a full disk, as soon as it is known.
+    ///
+    /// Returns `None` while the recording continues, and without a recording. [`end`](Self::end) returns the error too.
     pub fn failure(&self, sim: &SimulationManager) -> Option<String> {
         self.recorder(sim).and_then(|(recorder, _)| recorder.failure())
     }
@@ -83,7 +87,7 @@ impl FileRecording {
     fn finish(&mut self, sim: &mut SimulationManager) -> kinetoscope_record::Result<()> {
         let Some((recorder, path)) = self.now.take() else { return Ok(()) };
         if !sim.observers().contains(recorder) {
-            // Somebody else has ended it.
+            // The recorder was ended elsewhere.
             return Ok(());
         }
         let name = name(&path);
@@ -100,24 +104,24 @@ impl FileRecording {
         }
     }
 
-    /// The recorder that is at work, and its file.
+    /// Recorder of the current recording, and its file.
     fn recorder<'a>(&'a self, sim: &'a SimulationManager) -> Option<(&'a Recorder, &'a Path)> {
         let (id, path) = self.now.as_ref()?;
         let recorder = sim.observers().contains(*id).then(|| sim.observers().get(*id).ok()).flatten()?;
         Some((recorder, path.as_path()))
     }
 
-    /// The file of the next recording.
+    /// File of the next recording.
     fn next_path(&self) -> PathBuf {
         let is_there = |path: &Path| path.symlink_metadata().is_ok();
         let free = |path: &PathBuf| self.cfg.overwrite || !(is_there(path) || is_there(&with_end(path, ".part")));
         let mut names = (self.begun + 1..=self.begun + MOST).map(|k| numbered(&self.cfg.path, k));
-        // Where all are taken, the recorder says so of the first.
+        // If all names are taken, the recorder reports an error for the first one.
         names.find(free).unwrap_or_else(|| self.cfg.path.clone())
     }
 }
 
-/// Names that are tried.
+/// Largest number of names that are tried.
 const MOST: usize = 10_000;
 
 impl Recording for FileRecording {
@@ -146,7 +150,7 @@ impl Recording for FileRecording {
     }
 }
 
-/// The name of a file without its folder.
+/// File name without its folder.
 fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
@@ -157,7 +161,7 @@ fn with_end(path: &Path, end: &str) -> PathBuf {
     name.into()
 }
 
-/// `run.mcap`, `run-2.mcap`, `run-3.mcap`.
+/// Numbers a path: `run.mcap`, `run-2.mcap`, `run-3.mcap`.
 fn numbered(path: &Path, number: usize) -> PathBuf {
     let Some(stem) = path.file_stem().filter(|_| number > 1) else { return path.to_path_buf() };
     let mut name = stem.to_owned();

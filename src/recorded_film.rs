@@ -1,9 +1,9 @@
-//! Recordings as what viewers show.
+//! Playback of recordings in viewers.
 
 use kinetoscope_record::Film;
 use kinetoscope_sim::SimulationManager;
 
-/// A recording for the viewers of a simulation: what [`Play::play`](kinetoscope_viewer::Play::play) takes.
+/// A recording that viewers can play with [`Play::play`](kinetoscope_viewer::Play::play).
 ///
 /// ```no_run
 /// use kinetoscope::RecordedFilm;

@@ -1,12 +1,12 @@
-//! A pool of worker threads that work on what their caller borrows.
+//! A thread pool with scoped borrows: persistent worker threads run jobs that borrow data of the caller.
 //!
-//! Physics, renderers and ray casters share one [`ThreadPool`]. Its threads start when work first needs them and then
-//! stay: a job costs no thread start and, after the first one, no allocation.
+//! Physics, renderers and ray casters share one [`ThreadPool`]. Its threads start with the first job that needs them
+//! and then persist: a job costs no thread start and, after the first one, no allocation.
 //!
 //! | file | content |
 //! |---|---|
 //! | `thread_pool.rs` | [`ThreadPool`]: the interface |
-//! | `workers.rs` | the threads, and the one place of unsafe code in this crate |
+//! | `workers.rs` | the worker threads, and all unsafe code of this crate |
 //! | `patience.rs` | time for which an idle worker spins before it sleeps |
 //!
 //! ```

@@ -1,15 +1,15 @@
-//! [`ThreadPool`]: one job at a time, on several threads, with borrowed data.
+//! [`ThreadPool`]: runs one job at a time on several threads, with borrowed data.
 
 use crate::workers::Workers;
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Wraps the share of one slot: called with the slot, the number of slots and the work.
+/// Wrapper around the work of one slot. Arguments: slot, number of slots, work.
 type Hook = dyn Fn(usize, usize, &(dyn Fn(usize) + Sync)) + Send + Sync;
 
-/// Worker threads for one job at a time; clones share the same threads.
+/// Thread pool that runs one job at a time. Clones share the same threads.
 ///
-/// The threads end when the last clone is dropped.
+/// While a job runs, other callers do their work on their own thread. The threads end when the last clone is dropped.
 #[derive(Clone)]
 pub struct ThreadPool {
     workers: Option<Arc<Workers>>,
@@ -17,27 +17,28 @@ pub struct ThreadPool {
 }
 
 impl ThreadPool {
-    /// A pool whose threads start when a job first needs them.
+    /// Creates a pool whose threads start when a job first needs them.
     pub fn new() -> Self {
         Self { workers: Some(Arc::default()), hook: None }
     }
 
-    /// A pool without worker threads: the calling thread does all the work.
+    /// Creates a pool without worker threads: the calling thread does all the work.
     pub const fn serial() -> Self {
         Self { workers: None, hook: None }
     }
 
-    /// The same threads; the share of each slot runs inside `hook(slot, slots, work)`, which must call `work(slot)` once.
-    /// For measurements per thread, such as counting allocations.
+    /// Returns a pool on the same threads that runs the work of each slot inside `hook(slot, slots, work)`.
+    ///
+    /// The hook must call `work(slot)` once. It is meant for measurements per thread, such as allocation counts.
     pub fn with_hook(mut self, hook: impl Fn(usize, usize, &(dyn Fn(usize) + Sync)) + Send + Sync + 'static) -> Self {
         self.hook = Some(Arc::new(hook));
         self
     }
 
-    /// Starts the threads of jobs with `slots` slots now, instead of with the first job.
+    /// Starts the threads for jobs with `slots` slots now, instead of with the first job.
     ///
     /// # Errors
-    /// The operating system refuses a thread.
+    /// The operating system cannot start a thread.
     pub fn start(&self, slots: usize) -> std::io::Result<()> {
         match &self.workers {
             Some(workers) => workers.start(slots.saturating_sub(1)),
@@ -45,13 +46,14 @@ impl ThreadPool {
         }
     }
 
-    /// Calls `work(0)` on the calling thread and, at the same time, `work(slot)` for other slots below `slots` on worker
-    /// threads, each slot at most once; returns when all calls have returned.
+    /// Calls `work(0)` on the calling thread and, concurrently, `work(slot)` for other slots below `slots` on worker
+    /// threads.
     ///
-    /// Busy or missing workers are not waited for, so `work` must complete the job even if only slot 0 runs.
+    /// Each slot runs at most once. Returns when all calls have returned. Busy or missing workers are not waited for,
+    /// so `work` must complete the job even if only slot 0 runs.
     ///
     /// # Panics
-    /// If `work` panics, on whichever thread.
+    /// If `work` panics on any thread.
     pub fn run(&self, slots: usize, work: impl Fn(usize) + Sync) {
         match &self.hook {
             Some(hook) => self.run_unhooked(slots, &|slot| hook(slot, slots, &work)),
@@ -66,16 +68,17 @@ impl ThreadPool {
         }
     }
 
-    /// Calls `act(scratch, item)` once for each item, on as many threads as there are scratch values, the calling thread
-    /// included. Each thread takes the next item when it has finished one.
+    /// Calls `act(scratch, item)` once for each item, on at most `scratch.len()` threads, including the calling thread.
+    ///
+    /// Each thread takes the next item when it has finished one. Without scratch values, no item is processed.
     ///
     /// # Panics
-    /// If `act` or the iterator panics, on whichever thread.
+    /// If `act` or the iterator panics on any thread.
     pub fn for_each<W: Send, I>(&self, scratch: &mut [W], items: I, act: impl Fn(&mut W, I::Item) + Sync)
     where
         I: Iterator + Send,
     {
-        // No more threads than items, where their number is known.
+        // A job with a known number of items uses at most that many threads.
         let slots = match items.size_hint() {
             (least, Some(most)) if least == most => most.min(scratch.len()),
             _ => scratch.len(),
@@ -103,7 +106,7 @@ impl fmt::Debug for ThreadPool {
     }
 }
 
-/// The next item. A panic of the iterator is raised on the thread that met it; the other threads see what is left.
+/// Takes the next item. A panic of the iterator surfaces on this thread; the other threads get the remaining items.
 fn next<I: Iterator>(items: &Mutex<I>) -> Option<I::Item> {
     items.lock().unwrap_or_else(PoisonError::into_inner).next()
 }

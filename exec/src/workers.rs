@@ -1,7 +1,7 @@
-//! The threads of a pool. They are lent borrowed work, which needs the one unsafe operation of this crate.
+//! Worker threads of a pool. Lending borrowed work to them is the only unsafe operation of this crate.
 //!
-//! Scoped threads of the standard library may borrow, too, but start and end with each job: some 0.05 ms and a few
-//! allocations, several times an image.
+//! Scoped threads of the standard library can borrow, too, but start and end with each job. That would cost about
+//! 0.05 ms and a few allocations, several times per image.
 #![allow(unsafe_code, reason = "workers that outlive a job are lent what its caller borrows")]
 
 use crate::patience::Patience;
@@ -10,12 +10,12 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-/// The work of a caller that waits until no worker runs it.
+/// Borrowed work with an extended lifetime. Its caller waits until no worker runs it.
 type Lent = &'static (dyn Fn(usize) + Sync);
 
-/// Number of times a caller polls for its last worker before it yields its core, and then how often it yields before it
-/// sleeps.
+/// Number of times a waiting caller polls for its last worker before it yields its core.
 const SPINS_BEFORE_YIELD: u32 = 1_000;
+/// Number of times a waiting caller then yields before it sleeps.
 const YIELDS_BEFORE_SLEEP: u32 = 1_000;
 
 /// The worker threads of a pool. They start when first needed, sleep when idle, and end with their owner.
@@ -42,23 +42,25 @@ struct JobState {
     /// True while a job is in flight.
     taken: bool,
     work: Option<Lent>,
-    /// The next slot to take, and the number of slots.
+    /// Next slot to assign.
     slot: usize,
+    /// Number of slots.
     slots: usize,
-    /// Number of workers that sleep; true if the caller sleeps.
+    /// Number of sleeping workers.
     sleeping: usize,
+    /// True while the caller sleeps.
     caller_sleeps: bool,
     panicked: bool,
     stop: bool,
 }
 
-/// A panic of a job is raised again by its caller, after which the data under the lock are as good as before.
+/// Locks a mutex and ignores poisoning: the caller raises the panic of a job again, and the locked data stay valid.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Workers {
-    /// Runs a job: see [`ThreadPool::run`](crate::ThreadPool::run). Where the workers are busy with another job, or the
+    /// Runs a job; see [`ThreadPool::run`](crate::ThreadPool::run). If the workers are busy with another job, or the
     /// pool has no worker, the calling thread works alone.
     pub(crate) fn run(&self, slots: usize, work: &(dyn Fn(usize) + Sync)) {
         if !self.post(slots, work) {
@@ -72,18 +74,19 @@ impl Workers {
         assert!(!panicked, "work panicked on another thread of the pool");
     }
 
-    /// Posts a job; `false` where no worker can help. A caller that gets `true` must call `finish` before `work` ends.
+    /// Posts a job. Returns `false` if no worker can help. After `true`, the caller must call `finish` before `work`
+    /// ends.
     fn post(&self, slots: usize, work: &(dyn Fn(usize) + Sync)) -> bool {
-        // A pool that cannot have all its threads works with those it has.
+        // If the operating system refuses a thread, the job runs on the existing ones.
         let _ = self.start(slots - 1);
         let helpers = self.started().min(slots - 1);
         let mut job = lock(&self.shared.job);
         if helpers == 0 || job.taken {
             return false;
         }
-        // SAFETY: the reference is not used after the borrow ends. It stays in `job.work` until `finish` removes it, and a
-        // worker that has read it counts in `active`, which `finish` waits for. `run`, the only caller, reaches `finish` on
-        // every path: its own share of the work cannot unwind past it, and nothing in between can panic.
+        // SAFETY: the reference is not used after the borrow ends. It stays in `job.work` until `finish` removes it,
+        // and a worker that has read it counts in `active`, which `finish` waits for. `run`, the only caller, reaches
+        // `finish` on every path: its own share of the work cannot unwind past it, and nothing in between can panic.
         let lent = unsafe { std::mem::transmute::<&(dyn Fn(usize) + Sync), Lent>(work) };
         job.taken = true;
         (job.work, job.slot, job.slots) = (Some(lent), 1, 1 + helpers);
@@ -98,7 +101,7 @@ impl Workers {
         true
     }
 
-    /// Starts threads until there are `wanted`.
+    /// Starts threads until `wanted` threads exist.
     pub(crate) fn start(&self, wanted: usize) -> std::io::Result<()> {
         let mut threads = lock(&self.threads);
         while threads.len() < wanted {
@@ -118,7 +121,7 @@ impl Workers {
 impl Drop for Workers {
     fn drop(&mut self) {
         lock(&self.shared.job).stop = true;
-        // Workers that poll stop polling.
+        // Ends the polling of idle workers.
         self.shared.epoch.fetch_add(1, Ordering::Release);
         self.shared.wake.notify_all();
         for thread in lock(&self.threads).drain(..) {
@@ -128,8 +131,9 @@ impl Drop for Workers {
 }
 
 impl Shared {
-    /// Withdraws the work, waits for the workers that run it, and frees the pool for other callers; returns whether a worker
-    /// panicked. Workers that have not taken a slot by now are not waited for.
+    /// Withdraws the work, waits for the workers that run it, and frees the pool for other callers.
+    ///
+    /// Returns true if a worker panicked. Workers that have not taken a slot yet are not waited for.
     fn finish(&self) -> bool {
         lock(&self.job).work = None;
         let mut waited = 0;
@@ -146,7 +150,7 @@ impl Shared {
         std::mem::take(&mut job.panicked)
     }
 
-    /// The loop of a worker thread.
+    /// Runs the loop of a worker thread.
     fn work(&self) {
         let mut patience = Patience::LONGEST;
         let mut job = lock(&self.job);
@@ -160,7 +164,7 @@ impl Shared {
                 let result = catch_unwind(AssertUnwindSafe(|| work(slot)));
                 job = lock(&self.job);
                 job.panicked |= result.is_err();
-                // Release: what the worker wrote is seen by a caller that polls.
+                // Release: makes the writes of the worker visible to a polling caller.
                 if self.active.fetch_sub(1, Ordering::Release) == 1 && job.caller_sleeps {
                     self.done.notify_all();
                 }

@@ -1,21 +1,21 @@
-//! Arrays of models and data as checked slices. One list line each; sizes come from `mujoco_sys::fields`.
+//! Accessors of model and data arrays as checked slices. Sizes come from `mujoco_sys::fields`.
 
 use super::data::Data;
 use super::model::{Compiled, Model};
 use mujoco_sys::fields;
 
-/// MuJoCo's flags: bytes on 2.2.2, booleans on 4.x.
+/// Type of MuJoCo's flags: a byte on 2.2.2, a boolean on 4.x.
 #[cfg(not(mj4))]
 pub(super) type Flag = u8;
 #[cfg(mj4)]
 pub(super) type Flag = bool;
 
-/// A flag of either line.
+/// True if the flag is set.
 #[cfg(not(mj4))]
 pub(super) fn is_set(flag: Flag) -> bool {
     flag != 0
 }
-/// A flag of either line.
+/// True if the flag is set.
 #[cfg(mj4)]
 pub(super) fn is_set(flag: Flag) -> bool {
     flag

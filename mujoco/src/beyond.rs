@@ -1,26 +1,26 @@
-//! What a model of 4.x may have that is not written back as MJCF.
+//! Features of MuJoCo 4.x models that cannot be written back as MJCF.
 
 use super::model::Model;
 
-/// Something of a model.
+/// A feature of a model element that cannot be written back as MJCF.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Beyond {
-    /// The kind of element, as MJCF calls it.
+    /// MJCF name of the element.
     pub element: &'static str,
-    /// Its index among those of its kind.
+    /// Index of the element among those of its kind.
     pub index: usize,
-    /// What of it.
+    /// Name or description of the feature, for error messages.
     pub what: &'static str,
 }
 
 impl Model {
-    /// The first thing that 2.2.2 does not know and that nobody here writes back as MJCF.
+    /// Returns the first feature that 2.2.2 lacks and that cannot be written back as MJCF, if any.
     #[cfg(not(mj4))]
     pub fn beyond(&self) -> Option<Beyond> {
         None
     }
 
-    /// The first thing that 2.2.2 does not know and that nobody here writes back as MJCF.
+    /// Returns the first feature that 2.2.2 lacks and that cannot be written back as MJCF, if any.
     #[cfg(mj4)]
     pub fn beyond(&self) -> Option<Beyond> {
         use super::arrays::is_set;
@@ -54,7 +54,7 @@ impl Model {
             ("actuator", array!(actuator_armature), self.nactuator(), "armature"),
         ];
         for (element, values, count, what) in numbers {
-            // Infinite yields are none.
+            // An infinite `springyield` has no effect.
             if let Some(at) = values.iter().position(|x| *x != 0.0 && x.is_finite()) {
                 return Some(Beyond { element, index: at / (values.len() / count.max(1)).max(1), what });
             }
@@ -68,7 +68,7 @@ impl Model {
                 return Some(Beyond { element, index, what });
             }
         }
-        // One activation at most: `actdim` is not written.
+        // `actdim` is not written back, so an actuator may have one activation at most.
         if let Some(index) = array!(actuator_actnum).iter().position(|n| *n > 1) {
             return Some(Beyond { element: "actuator", index, what: "several activations" });
         }
@@ -87,7 +87,7 @@ impl Model {
         None
     }
 
-    /// What a sensor has that 2.2.2 does not know and that nobody here writes back as MJCF.
+    /// Returns a feature of a sensor that 2.2.2 lacks and that cannot be written back as MJCF, if any.
     ///
     /// # Panics
     /// There is no such sensor.
@@ -95,7 +95,7 @@ impl Model {
         #[cfg(mj4)]
         {
             use mujoco_sys::fields::model as fields;
-            /// The numbers of this sensor in an array of the model.
+            /// Values of this sensor in an array of the model.
             macro_rules! numbers {
                 ($name:ident) => {{
                     // SAFETY: the model is alive as long as `self` and nothing writes to a shared model.
@@ -113,7 +113,7 @@ impl Model {
             if numbers!(sensor_history)[0] > 0 {
                 return Some("nsample");
             }
-            // A rangefinder of 4.x may give more than a distance.
+            // A rangefinder of 4.x may output more than a distance.
             let word = super::words::sensor(self.sensor_type()[sensor]);
             let several = word.is_some_and(|word| word.word == "rangefinder") && self.sensor_dim()[sensor] != 1;
             several.then_some("rangefinder data other than a distance")
@@ -125,7 +125,7 @@ impl Model {
         }
     }
 
-    /// Gravity compensation of a body, 0..=1 and more (4.x).
+    /// Gravity compensation of a body (4.x): 1 cancels gravity; 0 on 2.2.2.
     ///
     /// # Panics
     /// There is no such body.
@@ -143,7 +143,7 @@ impl Model {
         }
     }
 
-    /// Largest forces of actuators on a joint \[N m or N\], where they are limited (4.x).
+    /// Range of the total actuator force on a joint \[N m or N\], if limited (4.x).
     ///
     /// # Panics
     /// There is no such joint.
@@ -163,7 +163,7 @@ impl Model {
         }
     }
 
-    /// Largest forces of actuators on a tendon \[N\], where they are limited (4.x).
+    /// Range of the total actuator force on a tendon \[N\], if limited (4.x).
     ///
     /// # Panics
     /// There is no such tendon.
@@ -183,7 +183,7 @@ impl Model {
         }
     }
 
-    /// Inertia of a tendon \[kg\] (4.x).
+    /// Armature of a tendon \[kg\], the inertia of its length changes (4.x); 0 on 2.2.2.
     ///
     /// # Panics
     /// There is no such tendon.

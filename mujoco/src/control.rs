@@ -1,4 +1,4 @@
-//! What the two lines of MuJoCo count differently: controls, activations, equalities, excluded bodies.
+//! Counts that differ between MuJoCo 2.2.2 and 4.x: controls, activations, equalities, excluded bodies.
 
 use super::model::Model;
 use mujoco_sys::fields::model as fields;
@@ -14,7 +14,7 @@ impl Model {
         count as usize
     }
 
-    /// The first control of an actuator; all that 2.2.2 knows have one.
+    /// Index of the first control of an actuator. Actuators of 2.2.2 have one control each.
     ///
     /// # Panics
     /// There is no such actuator.
@@ -32,7 +32,7 @@ impl Model {
         }
     }
 
-    /// Where the activation of an actuator is; empty where it has none.
+    /// Range of an actuator's activations in `act`; empty for an actuator without activation.
     ///
     /// # Panics
     /// There is no such actuator.
@@ -49,23 +49,23 @@ impl Model {
         #[cfg(not(mj4))]
         {
             assert!(actuator < self.nactuator(), "actuator {actuator} of {}", self.nactuator());
-            // Actuators with an activation stand last.
+            // MuJoCo 2.2.2 places actuators with an activation last.
             let without = self.nactuator() - self.na();
             let first = actuator.saturating_sub(without);
             first..first + usize::from(actuator >= without)
         }
     }
 
-    /// The two bodies of each pair that never collides.
+    /// Pairs of bodies that are excluded from collisions.
     pub fn excluded_bodies(&self) -> impl Iterator<Item = [usize; 2]> {
-        // The one body is in the upper half of the number; 2.2.2 counts them from 1.
+        // The upper half of a signature is the first body, the lower half the second. 2.2.2 counts bodies from 1.
         let first = u32::from(cfg!(not(mj4)));
         let body = move |number: u32| number.saturating_sub(first) as usize;
         let halves = |signature: &i32| (*signature as u32 >> 16, *signature as u32 & 0xffff);
         self.exclude_signature().iter().map(halves).map(move |(one, other)| [body(one), body(other)])
     }
 
-    /// Whether an equality acts at the start.
+    /// True if an equality constraint is active in the initial state.
     ///
     /// # Panics
     /// There is no such equality.
@@ -79,7 +79,7 @@ impl Model {
         super::arrays::is_set(active[equality])
     }
 
-    /// Whether an equality of bodies is between sites (4.x).
+    /// True if an equality of bodies couples sites (4.x); false on 2.2.2.
     ///
     /// # Panics
     /// There is no such equality.

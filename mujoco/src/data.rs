@@ -1,4 +1,4 @@
-//! The state and the work memory of one environment.
+//! State and working memory of one environment (`mjData`).
 
 use super::error::EngineError;
 use super::guard::guarded;
@@ -7,7 +7,7 @@ use super::prefetch::Places;
 use mujoco_sys as mj;
 use std::ptr::NonNull;
 
-/// One `mjData`, made for its model, which it keeps alive.
+/// One `mjData` with its model, which it keeps alive.
 #[derive(Debug)]
 pub struct Data {
     raw: NonNull<mj::mjData>,
@@ -36,13 +36,13 @@ pub enum Warning {
     ContactFull,
     /// The constraint buffer is full: constraints were dropped.
     ConstraintFull,
-    /// A position is not finite or huge.
+    /// A position is not finite or too large.
     BadPosition,
-    /// A velocity is not finite or huge.
+    /// A velocity is not finite or too large.
     BadVelocity,
-    /// An acceleration is not finite or huge.
+    /// An acceleration is not finite or too large.
     BadAcceleration,
-    /// A control is not finite or huge: it was replaced by zero.
+    /// A control is not finite or too large; MuJoCo replaces it by zero.
     BadControl,
 }
 
@@ -84,7 +84,7 @@ impl Warning {
     }
 }
 
-/// How often each [`Warning`] was raised, in the order of [`Warning::ALL`].
+/// Number of times each [`Warning`] was raised, in the order of [`Warning::ALL`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WarningCounts(pub [u64; Warning::ALL.len()]);
 
@@ -101,12 +101,14 @@ impl WarningCounts {
         }
     }
 
-    /// Any acceleration, position or velocity was bad: the first in the order of a step, which is the cause.
+    /// Returns the warning that indicates divergence: a bad acceleration, position or velocity, if any.
+    ///
+    /// The first one in the order of a step is the cause.
     pub fn diverged(&self) -> Option<Warning> {
         [Warning::BadAcceleration, Warning::BadPosition, Warning::BadVelocity].into_iter().find(|&w| self.get(w) > 0)
     }
 
-    /// A buffer was too small.
+    /// Returns the buffer that overflowed, if any.
     pub fn overflow(&self) -> Option<Overflow> {
         if self.get(Warning::ContactFull) > 0 {
             Some(Overflow::Contacts)
@@ -118,32 +120,32 @@ impl WarningCounts {
     }
 }
 
-/// Which buffer was too small.
+/// Buffer that was too small.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overflow {
-    /// Contacts.
+    /// The contact buffer.
     Contacts,
-    /// Constraint rows.
+    /// The buffer of constraint rows.
     Constraints,
     /// The solver's stack.
     Stack,
 }
 
 impl Data {
-    /// New data in the model's initial state, with the model's buffer sizes.
+    /// Creates data in the model's initial state, with the model's buffer sizes.
     ///
     /// # Errors
-    /// MuJoCo cannot allocate it.
+    /// MuJoCo cannot allocate the data.
     pub fn new(model: &Model) -> Result<Self, EngineError> {
         // SAFETY: the model is alive; mj_makeData is an engine function (guarded).
         let raw = guarded(|| unsafe { mj::mj_makeData(model.raw()) })?;
         let raw = NonNull::new(raw).ok_or_else(|| EngineError { message: "could not create mjData".into() })?;
-        // SAFETY: just made, and nothing else knows it yet.
+        // SAFETY: just made; no other reference to it exists yet.
         let places = Places::of(unsafe { raw.as_ref() });
         Ok(Self { raw, model: model.clone(), places })
     }
 
-    /// The model this data was made for.
+    /// The model of this data.
     pub fn model(&self) -> &Model {
         &self.model
     }
@@ -152,11 +154,12 @@ impl Data {
         &self.places
     }
 
-    /// Goes on with another model of the same sizes: one [edited](super::Editor) from what this one's model was compiled
-    /// as. What depends on the model is computed by the next forward pass.
+    /// Replaces the model by another one of the same sizes: one [edited](super::Editor) from the same compiled model.
+    ///
+    /// The next forward pass updates everything that depends on the model.
     ///
     /// # Panics
-    /// The model is another one, or its buffers have other sizes.
+    /// The model was compiled separately, or its buffers have other sizes.
     pub fn set_model(&mut self, model: Model) {
         assert!(model.fits(&self.model), "a model of other sizes");
         self.model = model;
@@ -180,7 +183,7 @@ impl Data {
         unsafe { self.raw.as_mut() }
     }
 
-    /// Back to the model's initial state; also clears what an engine error left behind.
+    /// Resets the state to the model's initial state. Also clears the effects of an engine error.
     pub fn reset(&mut self) {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together.
@@ -189,7 +192,8 @@ impl Data {
         debug_assert!(result.is_ok(), "{result:?}");
     }
 
-    /// Everything that depends on positions and velocities: kinematics, contacts, constraints, bias forces.
+    /// Computes everything that depends on positions and velocities (`mj_step1`): kinematics, contacts, constraints,
+    /// bias forces.
     ///
     /// # Errors
     /// MuJoCo stopped (out of memory): reset or drop this data.
@@ -199,7 +203,7 @@ impl Data {
         guarded(|| unsafe { mj::mj_step1(m, d) })
     }
 
-    /// Actuation, accelerations, constraint forces, integration over one time step.
+    /// Computes actuation, accelerations and constraint forces, and integrates one time step (`mj_step2`).
     ///
     /// # Errors
     /// MuJoCo stopped (out of memory): reset or drop this data.
@@ -209,7 +213,7 @@ impl Data {
         guarded(|| unsafe { mj::mj_step2(m, d) })
     }
 
-    /// One whole step, `mj_step`.
+    /// Runs one whole step (`mj_step`).
     ///
     /// # Errors
     /// MuJoCo stopped (out of memory): reset or drop this data.
@@ -219,7 +223,7 @@ impl Data {
         guarded(|| unsafe { mj::mj_step(m, d) })
     }
 
-    /// `mj_forward`: all quantities at the current state, without integration.
+    /// Computes all quantities at the current state, without integration (`mj_forward`).
     ///
     /// # Errors
     /// MuJoCo stopped (out of memory): reset or drop this data.
@@ -229,9 +233,11 @@ impl Data {
         guarded(|| unsafe { mj::mj_forward(m, d) })
     }
 
-    /// Accelerations of bodies and forces between them (`cacc`, `cfrc_int`), from the accelerations and constraint forces of
-    /// the last solve, which was done for the velocities `qvel`: those before the integration, where it is done already.
-    /// Nothing that decides a later step changes. `spare` is room for `nv` numbers.
+    /// Computes body accelerations and the forces between bodies (`cacc`, `cfrc_int`) with `mj_rnePostConstraint`.
+    ///
+    /// Accelerations and constraint forces are those of the last solve. `qvel` are the velocities of that solve: those
+    /// before the integration, if the step is complete. Nothing that affects later steps changes. `spare` is scratch
+    /// memory for `nv` numbers.
     ///
     /// # Errors
     /// MuJoCo stopped (out of memory): reset or drop this data.
@@ -248,13 +254,13 @@ impl Data {
         self.qvel_mut().copy_from_slice(spare);
         #[cfg(mj4)]
         {
-            // MuJoCo's own sensors of the next step would take these for theirs.
+            // Otherwise MuJoCo's own sensors would reuse these values in the next step.
             self.header_mut().flg_rnepost = false;
         }
         done
     }
 
-    /// The dense joint-space inertia matrix, row-major, (nv, nv), of the last forward pass.
+    /// Returns the dense joint-space inertia matrix of the last forward pass, row-major, shape (nv, nv).
     ///
     /// # Errors
     /// MuJoCo stopped.
@@ -298,17 +304,17 @@ impl Data {
         self.header_mut().time = time;
     }
 
-    /// Number of equality rows: they come first among the constraints.
+    /// Number of equality rows. They come first among the constraint rows.
     pub fn ne(&self) -> usize {
         self.header().ne.max(0) as usize
     }
 
-    /// Number of friction rows: they follow the equality rows, degrees of freedom in order, then tendons.
+    /// Number of friction rows. They follow the equality rows: degrees of freedom in order, then tendons.
     pub fn nf(&self) -> usize {
         self.header().nf.max(0) as usize
     }
 
-    /// Size of the struct, its buffer, and (4.x) its arena \[bytes\].
+    /// Memory of the data \[bytes\]: its struct, its buffer, and its arena (4.x) or stack (2.2.2).
     pub fn bytes(&self) -> usize {
         let d = self.header();
         #[cfg(mj4)]
@@ -318,7 +324,7 @@ impl Data {
         size_of::<mj::mjData>() + d.nbuffer as usize + extra
     }
 
-    /// Takes the warnings raised since the last call.
+    /// Returns the warning counts since the last call, and clears them.
     pub fn take_warnings(&mut self) -> WarningCounts {
         let mut counts = WarningCounts::default();
         let warnings = &mut self.header_mut().warning;

@@ -1,25 +1,25 @@
-//! Elements of a model whose shape changes: skins on both MuJoCo lines, flexes on 4.x.
+//! Elements of a model with changing shape: skins (2.2.2 and 4.x) and flexes (4.x).
 
 use super::look::{chunks, span};
 use super::model::Model;
 use mujoco_sys::fields::model as fields;
 
-/// A mesh whose vertices are moved by bodies.
+/// A skin: a mesh whose vertices follow bodies.
 #[derive(Clone, Copy, Debug)]
 pub struct SkinArrays<'a> {
     /// Material, -1 for none.
     pub material: i32,
     /// Group; viewers show 0 to 2.
     pub group: i32,
-    /// Colour and opacity, 0..=1.
+    /// Color and opacity, 0..=1.
     pub rgba: &'a [f32],
     /// Distance by which vertices are moved along their normals \[m\].
     pub inflate: f32,
-    /// Vertices in the bind pose \[m\], in the world frame.
+    /// Vertices in the bind pose, in the world frame \[m\].
     pub positions: &'a [[f32; 3]],
-    /// Texture coordinates of vertices, with v downward; empty where the skin has none.
+    /// Texture coordinates of vertices, with v downward; empty for a skin without texture coordinates.
     pub texcoords: &'a [[f32; 2]],
-    /// Vertices of each triangle.
+    /// Vertex indices of each triangle.
     pub faces: &'a [[i32; 3]],
     bones: [usize; 2],
     first_vertices: &'a [i32],
@@ -40,14 +40,14 @@ pub struct Bone<'a> {
     pub position: [f32; 3],
     /// Orientation of the body in the bind pose, wxyz.
     pub orientation: [f32; 4],
-    /// The vertices that it moves.
+    /// Indices of the vertices that the body moves.
     pub vertices: &'a [i32],
     /// The weight of the body for each of these vertices.
     pub weights: &'a [f32],
 }
 
 impl<'a> SkinArrays<'a> {
-    /// The bodies that move its vertices.
+    /// Bodies that move the vertices of the skin.
     pub fn bones(self) -> impl Iterator<Item = Bone<'a>> {
         let [first, count] = self.bones;
         (first..first + count).map(move |bone| {
@@ -72,25 +72,25 @@ pub struct FlexArrays<'a> {
     pub material: i32,
     /// Group; viewers show 0 to 2.
     pub group: i32,
-    /// Colour and opacity, 0..=1.
+    /// Color and opacity, 0..=1.
     pub rgba: &'a [f32],
-    /// Radius around its elements \[m\].
+    /// Radius around the elements \[m\].
     pub radius: f64,
     /// True if triangles are shaded flat.
     pub flat: bool,
-    /// First vertex among those of all flexes.
+    /// Index of the first vertex among the vertices of all flexes.
     pub first_vertex: usize,
     /// Number of vertices.
     pub vertices: usize,
-    /// Vertices of each element: `dimensions` + 1 for each.
+    /// Vertex indices of the elements, `dimensions` + 1 for each.
     pub elements: &'a [i32],
-    /// Vertices of each piece of the boundary: `dimensions` for each.
+    /// Vertex indices of the boundary elements, `dimensions` for each.
     pub shell: &'a [i32],
-    /// Texture coordinates, with v downward; empty where the flex has none.
+    /// Texture coordinates, with v downward; empty for a flex without texture coordinates.
     pub texcoords: &'a [[f32; 2]],
-    /// Texture coordinates of the elements' vertices, as [`elements`](Self::elements).
+    /// Indices of the texture coordinates of the elements' vertices, in the layout of [`elements`](Self::elements).
     pub element_texcoords: &'a [i32],
-    /// Vertices of each edge.
+    /// Vertex indices of each edge.
     pub edges: &'a [[i32; 2]],
 }
 
@@ -103,7 +103,7 @@ macro_rules! array {
 }
 
 impl Model {
-    /// A skin.
+    /// Arrays of a skin.
     ///
     /// # Panics
     /// There is no such skin.
@@ -132,7 +132,7 @@ impl Model {
         }
     }
 
-    /// True if a stiffness or a damping of a tendon is of higher order (4.x).
+    /// True if the stiffness or the damping of a tendon has terms of higher order (4.x).
     ///
     /// # Panics
     /// There is no such tendon.
@@ -143,19 +143,19 @@ impl Model {
         of(array!(self, tendon_stiffnesspoly)) || of(array!(self, tendon_dampingpoly))
     }
 
-    /// True if a stiffness or a damping of a tendon is of higher order (4.x).
+    /// True if the stiffness or the damping of a tendon has terms of higher order (4.x).
     #[cfg(not(mj4))]
     pub fn tendon_has_curves(&self, _tendon: usize) -> bool {
         false
     }
 
-    /// True if there is gravity, and it is not disabled.
+    /// True if gravity is nonzero and enabled.
     pub fn gravity_acts(&self) -> bool {
         let disabled = self.header().opt.disableflags as u32 & mujoco_sys::mjDSBL_GRAVITY;
         disabled == 0 && self.gravity().iter().map(|g| g * g).sum::<f64>().sqrt() > 1e-15
     }
 
-    /// A flex; `None` on 2.2.2, which has none.
+    /// Arrays of a flex; `None` on 2.2.2, which has no flexes.
     ///
     /// # Panics
     /// There is no such flex.
@@ -188,7 +188,7 @@ impl Model {
         })
     }
 
-    /// A flex; `None` on 2.2.2, which has none.
+    /// Arrays of a flex; `None` on 2.2.2, which has no flexes.
     #[cfg(not(mj4))]
     pub fn flex(&self, _flex: usize) -> Option<FlexArrays<'_>> {
         None
@@ -196,14 +196,14 @@ impl Model {
 }
 
 impl super::Data {
-    /// Positions of all flexes' vertices \[m\], (nflexvert, 3); empty on 2.2.2.
+    /// Vertex positions of all flexes \[m\], shape (nflexvert, 3); empty on 2.2.2.
     #[cfg(mj4)]
     pub fn flex_vertices(&self) -> &[[f64; 3]] {
         // SAFETY: model and data are alive as long as `self`; only `&mut self` writes.
         chunks(unsafe { mujoco_sys::fields::data::flexvert_xpos(self.model().raw(), self.raw()) })
     }
 
-    /// Positions of all flexes' vertices \[m\], (nflexvert, 3); empty on 2.2.2.
+    /// Vertex positions of all flexes \[m\], shape (nflexvert, 3); empty on 2.2.2.
     #[cfg(not(mj4))]
     pub fn flex_vertices(&self) -> &[[f64; 3]] {
         &[]

@@ -1,8 +1,8 @@
-//! Models that differ from a compiled one in a few arrays, and share all others with it.
+//! Models that differ from a compiled model in a few arrays and share all others with it.
 //!
-//! MuJoCo's model is one allocation, and `mj_setConst`, which follows a change of masses, writes to arrays that differ
-//! between versions. So changes are made to a whole copy, to which MuJoCo may write whatever it likes; what then differs
-//! from the compiled model, byte by byte, becomes the own memory of a shallow model.
+//! MuJoCo's model is one allocation. `mj_setConst`, which must follow a change of masses, writes to arrays that differ
+//! between versions. Changes are therefore made to a full copy, in which MuJoCo may write to any array. The arrays that
+//! then differ from the compiled model, byte by byte, become the own memory of a shallow model.
 
 use super::error::EngineError;
 use super::guard::guarded;
@@ -13,13 +13,14 @@ use mujoco_sys::fields::model::ModelArray;
 use std::ptr::NonNull;
 use std::sync::Arc;
 
-/// Arrays of shapes, pictures and texts, which no property is in: not looked at, for they may be large.
+/// Prefixes of arrays of shapes, images and texts. They hold no editable property and may be large, so they are not
+/// compared.
 const NOT_LOOKED_AT: [&str; 12] =
     ["mesh_", "skin_", "hfield_", "tex_", "mat_", "flex", "name", "text_", "numeric_", "tuple_", "key_", "oct_"];
 
-/// A whole copy of a model, to make models from that differ from it.
+/// An editor of model arrays, on a full copy of a compiled model.
 ///
-/// Nobody outside can write what says where things are in the other arrays:
+/// Arrays on which MuJoCo's memory accesses depend cannot be written from outside:
 ///
 /// ```
 /// # use kinetoscope_mujoco::{self as mj, Editor};
@@ -39,7 +40,7 @@ pub struct Editor {
     fields: Vec<ModelArray>,
 }
 
-/// What `mj_setConst` works in.
+/// The `mjData` that `mj_setConst` works in.
 #[derive(Debug)]
 struct Scratch(NonNull<mj::mjData>);
 
@@ -78,10 +79,10 @@ edited_arrays! {
     pub dof_armature_mut: f64;
     pub dof_frictionloss_mut: f64;
     pub tendon_frictionloss_mut: f64;
-    // What is around a shape follows from its size.
+    // The bounding radius must match the size, so both are written together.
     geom_size_mut: f64;
     geom_rbound_mut: f64;
-    // MuJoCo takes short cuts by these, to rows that then must be there: only what is right as a whole is written.
+    // MuJoCo takes shortcuts by these arrays, to rows that must then exist. They are only written consistently.
     body_ipos_mut: f64;
     body_sameframe_mut: u8;
     body_simple_mut: u8;
@@ -91,13 +92,14 @@ edited_arrays! {
 }
 
 impl Editor {
-    /// An editor of what `model` was compiled as, which is the model it starts with.
+    /// Creates an editor that starts with the compiled model of `model`.
     ///
     /// # Errors
     /// MuJoCo cannot allocate a copy.
     pub fn new(model: &Model) -> Result<Self, EngineError> {
         let no_memory = || EngineError { message: "could not allocate memory for a copy of the model".into() };
-        // SAFETY: the compiled model is alive and one allocation, as mj_copyModel needs it; an engine function (guarded).
+        // SAFETY: the compiled model is alive and one allocation, as mj_copyModel needs it; an engine function
+        // (guarded).
         let copy = guarded(|| unsafe { mj::mj_copyModel(std::ptr::null_mut(), model.compiled()) })?;
         let mut copy = Storage(NonNull::new(copy).ok_or_else(no_memory)?);
         set_buffers(copy.header_mut(), model.small_buffers());
@@ -112,17 +114,17 @@ impl Editor {
         Ok(Self { base: model.clone(), copy, scratch, fields })
     }
 
-    /// Goes on from `model`.
+    /// Loads the arrays of `model` as the new starting point.
     ///
     /// # Panics
-    /// It was not compiled with the model of this editor.
+    /// `model` comes from another compilation than the model of this editor.
     pub fn load(&mut self, model: &Model) {
         assert!(std::ptr::eq(model.compiled(), self.base.compiled()), "a model of another scene");
         for field in &self.fields {
             // SAFETY: a field of models of these sizes; nothing writes to a shared model.
             let from = unsafe { bytes(model.header(), field) };
-            // SAFETY: the array of the copy has as many bytes, since both have the sizes of the compiled model; the copy is
-            // alive, and `self` is borrowed mutably.
+            // SAFETY: the array of the copy has as many bytes, since both have the sizes of the compiled model; the
+            // copy is alive, and `self` is borrowed mutably.
             let to = unsafe {
                 std::slice::from_raw_parts_mut(array_pointer(self.copy.header(), field).cast_mut(), field.bytes)
             };
@@ -135,11 +137,13 @@ impl Editor {
         (copy.stat.meaninertia, copy.stat.meanmass) = (header.stat.meaninertia, header.stat.meanmass);
     }
 
-    /// Puts the centre of mass of a body elsewhere \[m, in the body's frame\]; [`set_constants`](Self::set_constants) is to
-    /// follow. MuJoCo takes short cuts where frames are the same, which ends here.
+    /// Moves the center of mass of a body to `com`, in the body's frame \[m\].
+    ///
+    /// Call [`set_constants`](Self::set_constants) afterwards. MuJoCo's shortcuts for coinciding frames end for this
+    /// body.
     ///
     /// # Errors
-    /// The inertia matrix of the body is diagonal, and MuJoCo 4.x keeps no room for what would no longer be zero.
+    /// The inertia matrix of the body is diagonal, and MuJoCo 4.x has no memory for its other elements.
     ///
     /// # Panics
     /// There is no such body.
@@ -149,7 +153,7 @@ impl Editor {
             return Err(DiagonalInertia);
         }
         self.body_ipos_mut()[3 * body..3 * body + 3].copy_from_slice(&com);
-        // 4.x finds out anew in mj_setConst.
+        // On 4.x, mj_setConst computes this flag.
         self.body_sameframe_mut()[body] = 0;
         let base = self.base.clone();
         for geom in of_body(base.geom_bodyid(), body) {
@@ -170,11 +174,12 @@ impl Editor {
         Ok(())
     }
 
-    /// Gives a geom that is a ball, a capsule, an ellipsoid, a cylinder or a box other sizes \[m\], MuJoCo's three numbers;
-    /// [`set_constants`](Self::set_constants) is to follow, which on 4.x finds the boxes around it anew. Others stay as they
-    /// are. Mass and moments do not follow.
+    /// Sets the size of a sphere, capsule, ellipsoid, cylinder or box geom \[m\], MuJoCo's three numbers.
     ///
-    /// Source of the bounding radius, which 2.2.2 leaves alone: the farthest point of each shape from its middle.
+    /// Other geoms stay unchanged, and so do mass and moments of inertia. Call [`set_constants`](Self::set_constants)
+    /// afterwards; on 4.x it updates the bounding boxes of the body.
+    ///
+    /// The bounding radius, which 2.2.2 does not update, is the distance of the shape's farthest point from its center.
     ///
     /// # Panics
     /// There is no such geom.
@@ -197,7 +202,8 @@ impl Editor {
         self.copy.header_mut().opt.gravity = gravity;
     }
 
-    /// `mj_setConst`: what follows from masses, inertias, centres of mass and armatures, sizes and places.
+    /// Updates everything that depends on masses, inertias, centers of mass, armatures, sizes and poses
+    /// (`mj_setConst`).
     ///
     /// # Errors
     /// MuJoCo stopped.
@@ -206,7 +212,7 @@ impl Editor {
         // SAFETY: the copy and its data are alive, and `self` is borrowed mutably; an engine function (guarded).
         let done = guarded(|| unsafe { mj::mj_setConst(m, d) });
         if done.is_err() {
-            // What the error left on the stack. It sets the positions that it looks at by itself.
+            // The reset clears the stack after the error. mj_setConst sets the positions that it needs itself.
             // SAFETY: as above.
             guarded(|| unsafe { mj::mj_resetData(m, d) })?;
         }
@@ -215,7 +221,8 @@ impl Editor {
         Ok(())
     }
 
-    /// 4.0 leaves `stat` as its compiler made it, where 2.2.2 computes it anew. The solver scales by the mean inertia.
+    /// Updates the mean inertia and the mean mass in `stat`, as 2.2.2 does in mj_setConst; 4.0 keeps those of its
+    /// compiler. The solver scales by the mean inertia.
     fn update_means(&mut self) {
         if cfg!(mj4) {
             // SAFETY: the copy is alive, and only `&mut self` writes to it.
@@ -230,10 +237,11 @@ impl Editor {
         }
     }
 
-    /// The model that was made, with the buffer sizes of `like`, which was compiled with the model of this editor.
+    /// Returns the edited model with the buffer sizes of `like`, which must come from the same compilation as this
+    /// editor.
     ///
     /// # Panics
-    /// `like` was compiled otherwise.
+    /// `like` comes from another compilation.
     pub fn model(&self, like: &Model) -> Model {
         assert!(std::ptr::eq(like.compiled(), self.base.compiled()), "a model of another scene");
         let changed = |field: &&ModelArray| {
@@ -252,10 +260,10 @@ impl Editor {
         }
         let copy = self.copy.header();
         header.opt.gravity = copy.opt.gravity;
-        // mj_setConst computes the rest of `stat` anew, too, over what the file may have said of it.
+        // mj_setConst overwrites the rest of `stat`, too, including values that the file sets.
         (header.stat.meaninertia, header.stat.meanmass) = (copy.stat.meaninertia, copy.stat.meanmass);
-        // SAFETY: sizes are those of `like`; all pointers lead to the compiled model, which `like` keeps alive, but for those
-        // that were just set to `own`, each to memory of the size of its field.
+        // SAFETY: sizes are those of `like`; all pointers lead to the compiled model, which `like` keeps alive, except
+        // those that were just set to `own`, each to memory of the size of its field.
         unsafe { like.with_arrays(header, own) }
     }
 
@@ -265,33 +273,34 @@ impl Editor {
     }
 }
 
-/// The centre of mass of a body cannot be moved: see [`Editor::set_center_of_mass`].
+/// Error of [`Editor::set_center_of_mass`]: the center of mass of a body with a diagonal inertia cannot be moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiagonalInertia;
 
-/// 1 says that a frame is the body's, 2 that it is that of the body's inertia (4.x: 4 that it has its axes).
+/// Clears a `sameframe` flag that refers to the inertia of the body: 2 for the inertia frame, 4 for its axes (4.x). A
+/// flag of 1 refers to the body frame.
 fn clear_if_inertial(sameframe: &mut u8) {
     if matches!(*sameframe, 2 | 4) {
         *sameframe = 0;
     }
 }
 
-/// Indices of the things of a body, given the body of each thing.
+/// Indices of the elements of a body; `bodies` has the body of each element.
 fn of_body(bodies: &[i32], body: usize) -> impl Iterator<Item = usize> + '_ {
     bodies.iter().enumerate().filter(move |(_, of)| **of as usize == body).map(|(index, _)| index)
 }
 
-/// The bytes of an array, which are plain numbers without gaps.
+/// Bytes of an array, which are plain numbers without padding.
 ///
 /// # Safety
-/// `field` is one of `fields::model::each` of a model of the same sizes, and not empty; nothing writes to the array while the
-/// bytes are in use.
+/// `field` is one of `fields::model::each` of a model of the same sizes, and not empty; nothing writes to the array
+/// while the bytes are in use.
 unsafe fn bytes<'m>(model: &'m mj::mjModel, field: &ModelArray) -> &'m [u8] {
     // SAFETY: the array has this size (contract), and lives as long as the model.
     unsafe { std::slice::from_raw_parts(array_pointer(model, field), field.bytes) }
 }
 
-/// Lets an array begin elsewhere.
+/// Sets the pointer of an array in a model header.
 pub(super) fn set_pointer(header: &mut mj::mjModel, field: &ModelArray, array: *const u8) {
     // SAFETY: the offset is that of a pointer inside of the struct.
     let pointer = unsafe { std::ptr::from_mut(header).byte_add(field.pointer) };
@@ -305,7 +314,7 @@ mod tests {
     use crate as mj;
     use crate::Data;
 
-    /// A chain with a tendon, a free body with a centre of mass of its own, and one whose inertia matrix is diagonal.
+    /// A chain with a tendon, a free body with its own center of mass, and a body with a diagonal inertia matrix.
     fn text(masses: [f64; 3], com: [f64; 3], moments: [f64; 3], armature: f64) -> String {
         let [upper, lower, free] = masses;
         let ([x, y, z], [a, b, c]) = (com, moments);
@@ -340,7 +349,7 @@ mod tests {
         compile(&base_text())
     }
 
-    /// Names of arrays, of all there are, in which two models of the same sizes differ by more than rounding.
+    /// Names of all arrays in which two models of the same sizes differ by more than rounding.
     fn differences(a: &Model, b: &Model) -> Vec<String> {
         let mut found = Vec::new();
         let mut compare = |field: ModelArray| {
@@ -378,7 +387,7 @@ mod tests {
     fn masses() {
         let model = base();
         let (com, moments) = ([0.13, -0.02, 0.05], [0.03, 0.035, 0.04]);
-        // The ball, whose rows MuJoCo takes a short cut through: 2.5 kg, and 2/5 m r² about any axis.
+        // The ball, for whose rows MuJoCo takes a shortcut: 2.5 kg, and 2/5 m r² about any axis.
         let heavy = r#"<freejoint/><geom size="0.1" mass="2.5"/>"#;
         let fresh = text([1.7, 0.9, 3.1], com, moments, 0.07).replace(r#"<freejoint/><geom size="0.1"/>"#, heavy);
         let fresh = compile(&fresh);
@@ -391,13 +400,13 @@ mod tests {
         editor.body_inertia_mut()[12..15].fill(0.01);
         editor.dof_armature_mut()[1] = 0.07;
         editor.set_center_of_mass(2, com).expect("not diagonal");
-        // Control: without the constants the model is another one.
+        // Control: without `set_constants`, the models differ.
         assert!(!differences(&editor.model(&model), &fresh).is_empty());
         editor.set_constants().expect("fits");
         let edited = editor.model(&model);
-        // Principal axes that MuJoCo sorts are those of the fresh one, for moments are in order in both.
+        // MuJoCo sorts principal axes. Moments are in order in both models, so the axes agree.
         assert_eq!(differences(&edited, &fresh), Vec::<String>::new());
-        // Nothing is left over for the next one.
+        // `load` leaves no changes behind.
         editor.load(&model);
         assert_eq!(editor.model(&model).own_arrays().count(), 0);
         editor.set_constants().expect("fits");
@@ -406,7 +415,7 @@ mod tests {
         assert_eq!(differences(&editor.model(&model), &edited), Vec::<String>::new());
     }
 
-    /// One of each kind that has sizes, several of them in one body, which 4.x keeps boxes around.
+    /// One geom of each type that has a size, several of them in one body, around which 4.x keeps bounding boxes.
     fn shapes(sizes: [&str; 5], at: &str) -> Model {
         let [ball, capsule, ellipsoid, cylinder, cuboid] = sizes;
         compile(&format!(
@@ -467,7 +476,7 @@ mod tests {
         assert_eq!(edited.own_arrays().collect::<Vec<_>>(), [("geom_friction", 8 * 3 * model.ngeom())]);
         assert_eq!((edited.gravity(), model.gravity()), ([0.0, 0.0, -1.6], [0.0, 0.0, -9.81]));
         assert_eq!((edited.geom_friction()[3], model.geom_friction()[3]), (0.4, 1.0));
-        // Through other buffer sizes, and after the editor and the model it began with are gone.
+        // With other buffer sizes, and after the editor and its first model are dropped.
         let buffers = mj::Buffers { contacts: 9, constraints: 70, arena_bytes: 1 << 20 };
         let larger = edited.with_buffers(buffers);
         assert!(larger.arrays_apart(&edited).is_empty());

@@ -1,48 +1,49 @@
-//! What MuJoCo can say no to.
+//! Errors of MuJoCo.
 
 use super::newer::Unknown;
 use super::version::{TARGET, Target, version_string};
 use kinetoscope_scene::source::Source;
 
-/// MuJoCo's engine stopped a call (`mju_error`). The data it was called on is to be reset or dropped.
+/// Error of an engine call (`mju_error`). The data of the call must be reset or dropped.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("MuJoCo stopped: {message}")]
 pub struct EngineError {
-    /// MuJoCo's own words.
+    /// MuJoCo's message.
     pub message: String,
 }
 
 impl EngineError {
-    /// More memory would help.
+    /// True if more memory would help.
     pub fn is_out_of_memory(&self) -> bool {
         let text = self.message.to_ascii_lowercase();
         ["stack", "arena", "memory"].iter().any(|word| text.contains(word))
     }
 }
 
-/// MuJoCo refused a model.
+/// MuJoCo rejected a model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct CompileError {
-    /// MuJoCo's own words.
+    /// MuJoCo's message.
     pub message: String,
     /// Line of the MJCF that MuJoCo names, counted from 1.
     pub line: Option<u32>,
-    /// Where that line comes from: the element of the user's file.
+    /// Origin of that line: the element of the user's file.
     pub source_line: Option<Source>,
 }
 
 impl CompileError {
     pub(crate) fn new(message: &str) -> Self {
-        // 2.2.2 ends lines with a semicolon and puts empty ones between.
+        // 2.2.2 ends lines with a semicolon and inserts empty lines.
         let lines =
             message.lines().map(|line| line.trim().trim_end_matches(';').trim()).filter(|line| !line.is_empty());
         let lines: Vec<&str> = lines.collect();
         Self { line: line_named_in(message), message: lines.join("; ") + &newer(message), source_line: None }
     }
 
-    /// The same error with the place of the word that MuJoCo does not know, where it names no line of `file` itself.
+    /// Returns the error with the position in `file` of the name that MuJoCo does not support, unless MuJoCo itself
+    /// names a line of `file`.
     pub(crate) fn placed_in(self, file: &std::path::Path) -> Self {
-        // Of a line, MuJoCo does not say whether it is of the file or of one that it includes.
+        // MuJoCo does not say whether a line belongs to the file itself or to an included file.
         if self.line.is_some() && !includes(file) {
             return self;
         }
@@ -64,7 +65,7 @@ fn includes(file: &std::path::Path) -> bool {
     std::fs::read_to_string(file).is_ok_and(|text| text.contains("<include"))
 }
 
-/// Hint after an error about a word that 2.2.2 does not know: a newer MuJoCo may know it.
+/// Hint for a name that 2.2.2 does not support: a newer MuJoCo may support it.
 fn newer(message: &str) -> String {
     if TARGET != Target::V2 {
         return String::new();
@@ -83,8 +84,8 @@ fn newer(message: &str) -> String {
     }
 }
 
-/// MuJoCo writes `line 12`, `line = 12` (2.2.2 and 4.x, reader and compiler); of text that is no XML the parser writes
-/// `Line number=12`.
+/// Line number in a message. MuJoCo writes `line 12` or `line = 12` (2.2.2 and 4.x, reader and compiler). For text that
+/// is not XML, the parser writes `Line number=12`.
 fn line_named_in(message: &str) -> Option<u32> {
     let number_after = |word: &str| {
         let after = &message[message.rfind(word)? + word.len()..];
@@ -112,7 +113,7 @@ mod tests {
         assert_eq!(line_named_in("Element 'joint', line 0\n"), None);
     }
 
-    /// 2.2.2's words were shown as `...'actuatorfrcrange'; ; Element 'joint', line 77`.
+    /// Regression test: messages of 2.2.2 were shown as `...'actuatorfrcrange'; ; Element 'joint', line 77`.
     #[test]
     fn one_line() {
         let error = CompileError::new("XML Error: Schema violation: 'a'\n\nElement 'joint', line 77\n");

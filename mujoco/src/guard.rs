@@ -1,8 +1,8 @@
-//! MuJoCo's errors as values: the error handler unwinds out of C to [`guarded`].
+//! Conversion of MuJoCo's errors to values: the error handler unwinds out of C to [`guarded`].
 //!
-//! Only calls whose C frames hold no C++ landing pads may be guarded: in the 4.x wheel, unwinding through such a frame
-//! crashes. Those are the engine functions (step, forward, makeData, ...); the XML and VFS functions report through
-//! buffers and are never guarded.
+//! Only calls without C++ landing pads in their C frames may be guarded: in the 4.x wheel, unwinding through such a
+//! frame crashes. These are the engine functions (step, forward, makeData, ...). The XML and VFS functions report
+//! through buffers and are never guarded.
 
 use super::error::EngineError;
 use mujoco_sys as mj;
@@ -24,8 +24,8 @@ unsafe extern "C-unwind" fn on_error(message: *const c_char) {
     if GUARDED.get() {
         resume_unwind(Box::new(EngineStopped(text)));
     }
-    // MuJoCo exits the process when a handler returns. Every engine call in this module is guarded, so a message that
-    // arrives here is a defect of ours; unwinding through unknown frames would be worse than stopping.
+    // MuJoCo exits the process when a handler returns. Every engine call of this crate is guarded, so a message that
+    // arrives here is a bug of this crate. Aborting is safer than unwinding through unknown frames.
     eprintln!("kinetoscope: MuJoCo error outside a guarded call: {text}");
     std::process::abort();
 }
@@ -41,7 +41,7 @@ pub(super) fn install_handlers() {
     unsafe { mj::mju_user_warning = Some(on_warning) };
 }
 
-/// Runs an engine call; an `mju_error` inside becomes an `Err`.
+/// Runs an engine call. An `mju_error` inside it becomes an `Err`.
 pub(super) fn guarded<T>(call: impl FnOnce() -> T) -> Result<T, EngineError> {
     let outer = GUARDED.replace(true);
     // AssertUnwindSafe: the caller treats the data it passed as lost when this returns an error.

@@ -1,4 +1,4 @@
-//! MuJoCo's own kinematics: a judge for ours.
+//! MuJoCo's kinematics and Jacobians: a reference for those of `kinetoscope-robot`.
 
 use super::data::Data;
 use super::error::EngineError;
@@ -6,8 +6,9 @@ use super::guard::guarded;
 use mujoco_sys as mj;
 
 impl Data {
-    /// Poses of bodies and centres of mass at the present positions, by `mj_kinematics` and `mj_comPos`: what
-    /// [`jacobian`](Self::jacobian) needs, and nothing else.
+    /// Computes poses and centers of mass of bodies at the current positions (`mj_kinematics`, `mj_comPos`).
+    ///
+    /// This is the part of a forward pass that [`jacobian`](Self::jacobian) needs.
     ///
     /// # Errors
     /// MuJoCo's engine stopped.
@@ -19,15 +20,17 @@ impl Data {
         guarded(|| unsafe { mj::mj_comPos(model, data) })
     }
 
-    /// The Jacobian of a point that moves with a body, by `mj_jac`, row-major, (3, nv) each: velocity of the point and
-    /// angular velocity in world axes per unit of each generalised velocity. Poses are those of the last forward pass
-    /// or of [`place`](Self::place).
+    /// Computes the Jacobian of a point that moves with a body (`mj_jac`), row-major, shape (3, nv) each.
+    ///
+    /// `point` is in the world frame \[m\]. `linear` receives the velocity of the point, and `angular` the angular
+    /// velocity, in world axes and per unit of each generalized velocity. Poses are those of the last forward pass or
+    /// of [`place`](Self::place).
     ///
     /// # Errors
     /// MuJoCo's engine stopped.
     ///
     /// # Panics
-    /// There is no such body; an array has not 3 nv numbers.
+    /// `body` is out of range, or an array does not have 3 nv numbers.
     #[track_caller]
     pub fn jacobian(
         &self,
@@ -41,8 +44,8 @@ impl Data {
         assert!(body < bodies, "body {body} of {bodies}");
         assert!(linear.len() == length && angular.len() == length, "arrays of {length} numbers");
         let (linear, angular) = (linear.as_mut_ptr(), angular.as_mut_ptr());
-        // SAFETY: model and data are alive and belong together; the body exists; the arrays have the lengths that mj_jac
-        // reads (3) and writes (3 nv each). It does not write to the data.
+        // SAFETY: model and data are alive and belong together; the body exists; the arrays have the lengths that
+        // mj_jac reads (3) and writes (3 nv each). It does not write to the data.
         guarded(|| unsafe { mj::mj_jac(model, data, linear, angular, point.as_ptr(), body as i32) })
     }
 }

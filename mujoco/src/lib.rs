@@ -1,14 +1,36 @@
-//! The unsafe wall: owned MuJoCo models and data with checked slices, for MuJoCo 2.2.2 and 4.x.
+//! Safe MuJoCo: owned models and data with bounds-checked slices, for MuJoCo 2.2.2 and 4.x.
 //!
-//! This is the only place of hand-written unsafe code and the only one that knows MuJoCo versions. What it guarantees:
+//! This is the only crate that depends on the MuJoCo version, and holds all hand-written unsafe code for MuJoCo. It
+//! guarantees:
 //!
-//! * No input makes MuJoCo end the process: its error handler unwinds to [`guard`](self), which returns an
-//!   [`EngineError`]; it writes no log file and no warnings. (The hull library inside 2.2.2 prints to stderr when a mesh is
-//!   flat; `mjcf` gives it none.)
-//! * A model never changes while it is shared; [`Data`] keeps its model alive.
+//! * No input makes MuJoCo end the process: its error handler unwinds to `guard`, which returns an [`EngineError`].
+//!   MuJoCo writes no log file and no warnings. (The hull library inside 2.2.2 prints to stderr for a flat mesh; the
+//!   MJCF writer passes it no flat mesh.)
+//! * A model never changes while it is shared. [`Data`] keeps its model alive.
 //! * A slice has the length that MuJoCo's own `mjxmacro.h` declares (`mujoco_sys::fields`).
 //!
-//! Names are MuJoCo's own (`qpos`, `geom`, `efc_aref`) in this module and in `mjcf` only.
+//! Names are MuJoCo's own (`qpos`, `geom`, `efc_aref`).
+//!
+//! | files | content |
+//! |---|---|
+//! | `vfs`, `plugins` | compilation of MJCF text and files with their assets |
+//! | `model`, `arrays`, `control`, `options`, `name`, `weld`, `raw` | [`Model`]: sizes, arrays, options, names |
+//! | `look`, `deforming` | meshes, textures, materials, lights, skins and flexes |
+//! | `data`, `state`, `ray`, `jacobian`, `prefetch` | [`Data`]: state, steps, contacts, rays, Jacobians |
+//! | `editor` | [`Editor`]: models that share most arrays with a compiled model |
+//! | `beyond`, `newer`, [`words`] | features by version, and MJCF keywords |
+//! | `version`, `guard`, `error`, `memory` | version check, error handler, error types, allocator |
+//!
+//! ```
+//! use kinetoscope_mujoco::{Data, compile};
+//!
+//! let mjcf = r#"<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
+//! let model = compile(mjcf, &[])?.into_model();
+//! let mut data = Data::new(&model)?;
+//! data.step()?;
+//! assert!(data.qpos()[2] < 0.0, "free fall");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![allow(unsafe_code, reason = "the wall to MuJoCo")]
 
 mod arrays;

@@ -1,139 +1,140 @@
-//! How a model looks: meshes, height fields, textures, materials, lights, cameras, the same for both MuJoCo lines.
+//! Visual elements of a model, in the same form for 2.2.2 and 4.x: meshes, height fields, textures, materials, lights,
+//! cameras.
 
 use super::arrays::is_set;
 use super::model::Model;
 use mujoco_sys as mj;
 use mujoco_sys::fields::model as fields;
 
-/// A compiled mesh. Corners of triangles index three arrays of their own.
+/// A compiled mesh. Triangle corners have separate indices of positions, normals and texture coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshArrays<'a> {
     /// Vertices in the geom's frame \[m\].
     pub positions: &'a [[f32; 3]],
     /// Unit normals: those of the file, or computed by MuJoCo.
     pub normals: &'a [[f32; 3]],
-    /// Texture coordinates, with v downward.
+    /// Texture coordinates, with v downward, if the mesh has any.
     pub texcoords: Option<&'a [[f32; 2]]>,
-    /// Vertices of each triangle.
+    /// Vertex indices of each triangle.
     pub faces: &'a [[i32; 3]],
-    /// Normals of each triangle's corners.
+    /// Normal indices of each triangle's corners.
     pub face_normals: &'a [[i32; 3]],
-    /// Texture coordinates of each triangle's corners.
+    /// Texture-coordinate indices of each triangle's corners.
     pub face_texcoords: &'a [[i32; 3]],
 }
 
 /// A height field.
 #[derive(Clone, Copy, Debug)]
 pub struct HeightFieldArrays<'a> {
-    /// Half length along x, half length along y, height of elevation 1, depth of the floor below zero \[m\].
+    /// Half length along x, half length along y, height of elevation 1, depth of the base below zero \[m\].
     pub size: [f64; 4],
-    /// Rows, along y.
+    /// Number of rows, along y.
     pub rows: usize,
-    /// Columns, along x.
+    /// Number of columns, along x.
     pub columns: usize,
     /// Elevation in 0..=1, row by row.
     pub elevation: &'a [f32],
 }
 
-/// What an image is for.
+/// Mapping of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextureType {
-    /// By texture coordinates.
+    /// Mapped by texture coordinates.
     TwoD,
-    /// On a cube around the shape: six squares, one below the other.
+    /// Mapped onto a cube around the shape: six square images, one below the other.
     Cube,
-    /// Around everything: as a cube.
+    /// Mapped onto the sky, with the layout of a cube.
     Skybox,
 }
 
-/// An image.
+/// A texture image.
 #[derive(Clone, Copy, Debug)]
 pub struct TextureArrays<'a> {
-    /// What it is for.
+    /// Mapping of the texture.
     pub kind: TextureType,
-    /// Pixels per row.
+    /// Width \[pixels\].
     pub width: usize,
-    /// Rows.
+    /// Height \[pixels\].
     pub height: usize,
     /// Bytes per pixel.
     pub channels: usize,
-    /// Pixels from the top left.
+    /// Pixels, row by row from the top left.
     pub pixels: &'a [u8],
 }
 
 /// A material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaterialValues {
-    /// Colour and opacity, 0..=1.
+    /// Color and opacity, 0..=1.
     pub rgba: [f32; 4],
-    /// The texture of its colour.
+    /// Index of the color texture.
     pub texture: Option<usize>,
-    /// How often the texture repeats.
+    /// Number of repetitions of the texture along its two axes.
     pub tex_repeat: [f32; 2],
-    /// Whether it repeats per metre.
+    /// True if [`tex_repeat`](Self::tex_repeat) is per length instead of per shape: per 2 m in MuJoCo's renderer.
     pub tex_uniform: bool,
-    /// Own light, times the colour.
+    /// Emitted light, as a factor of the color.
     pub emission: f32,
     /// Strength of highlights, 0..=1.
     pub specular: f32,
     /// Sharpness of highlights, 0..=1.
     pub shininess: f32,
-    /// Share that is mirrored, 0..=1.
+    /// Mirror reflectance, 0..=1.
     pub reflectance: f32,
-    /// Share that is metal, 0..=1 (4.x); `None` where the model does not say.
+    /// Metallic share, 0..=1 (4.x); `None` if the model does not set it.
     pub metallic: Option<f32>,
-    /// How rough it is, 0..=1 (4.x); `None` where the model does not say.
+    /// Roughness, 0..=1 (4.x); `None` if the model does not set it.
     pub roughness: Option<f32>,
 }
 
-/// Kinds of lights that both lines know.
+/// Light types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightType {
-    /// A cone.
+    /// A spotlight with a cone.
     Spot,
     /// Parallel rays.
     Directional,
-    /// In all directions (4.x).
+    /// A light in all directions (4.x).
     Point,
-    /// From an image all around (4.x).
+    /// An environment image (4.x).
     Image,
 }
 
-/// A light in its body's frame; [`Data::light_xpos`](super::Data::light_xpos) has where it is.
+/// Properties of a light. Its world position is in [`Data::light_xpos`](super::Data::light_xpos).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightValues {
-    /// What kind of light it is.
+    /// Light type.
     pub kind: LightType,
-    /// Whether it is on.
+    /// True if the light is on.
     pub active: bool,
-    /// Whether it casts shadows.
+    /// True if the light casts shadows.
     pub cast_shadow: bool,
     /// Constant, linear and quadratic attenuation.
     pub attenuation: [f32; 3],
     /// Half angle of a spot's cone \[deg\].
     pub cutoff_deg: f32,
-    /// How fast a spot falls off from its axis.
+    /// Exponent of a spotlight's falloff from its axis.
     pub exponent: f32,
-    /// Colours.
+    /// Ambient color.
     pub ambient: [f32; 3],
-    /// Colour that surfaces scatter.
+    /// Diffuse color.
     pub diffuse: [f32; 3],
-    /// Colour of highlights.
+    /// Specular color.
     pub specular: [f32; 3],
-    /// Radius of the lamp \[m\] (4.x, 0.02 where the file says nothing); 0 where the model does not say.
+    /// Radius of the bulb \[m\] (4.x, 0.02 by default); 0 on 2.2.2.
     pub radius: f32,
 }
 
-/// The light on every camera.
+/// The headlight: a light at every camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeadlightValues {
-    /// Whether it is on: "auto" of 4.x is on where the model has no light of its own.
+    /// True if the headlight is on; true for "auto" of 4.x.
     pub active: bool,
-    /// Colour that comes from everywhere.
+    /// Ambient color.
     pub ambient: [f32; 3],
-    /// Colour that surfaces scatter.
+    /// Diffuse color.
     pub diffuse: [f32; 3],
-    /// Colour of highlights.
+    /// Specular color.
     pub specular: [f32; 3],
 }
 
@@ -145,24 +146,24 @@ macro_rules! array {
     }};
 }
 
-/// Chunks of `N` numbers; arrays of the model are whole multiples.
+/// Splits an array into chunks of `N` numbers. Lengths of model arrays are multiples of `N`.
 pub(super) fn chunks<T, const N: usize>(values: &[T]) -> &[[T; N]] {
     values.as_chunks().0
 }
 
-/// `count` elements from `first`, both numbers of MuJoCo's; nothing where they do not fit.
+/// `count` elements from index `first`, both as MuJoCo gives them; empty if the range is invalid.
 pub(super) fn span<T>(values: &[T], first: i64, count: i64) -> &[T] {
     let (Ok(first), Ok(count)) = (usize::try_from(first), usize::try_from(count)) else { return &[] };
     first.checked_add(count).and_then(|end| values.get(first..end)).unwrap_or(&[])
 }
 
 impl Model {
-    /// Whether a body is a part of the world: no joint moves it, nor a hand.
+    /// True if a body is fixed to the world: neither a joint nor a mocap body moves it.
     ///
     /// # Panics
     /// There is no such body.
     pub fn is_fixed(&self, body: usize) -> bool {
-        // A body moved by hand counts as welded to the world, and so does what hangs on it.
+        // MuJoCo counts mocap bodies and their descendants as welded to the world.
         let by_hand = |body: usize| self.body_mocapid()[self.body_rootid()[body] as usize] >= 0;
         self.body_weldid()[body] == 0 && !by_hand(body)
     }
@@ -187,32 +188,32 @@ impl Model {
         self.header().ncam as usize
     }
 
-    /// Size of the model \[m\]: distances of the default camera and its clipping planes are multiples.
+    /// Extent of the model \[m\]. Distances of the default camera and its clipping planes are multiples of it.
     pub fn extent(&self) -> f64 {
         self.header().stat.extent
     }
 
-    /// Middle of the model \[m\].
+    /// Center of the model \[m\].
     pub fn center(&self) -> [f64; 3] {
         self.header().stat.center
     }
 
-    /// Nearest and farthest visible depth \[m\].
+    /// Distances of the near and far clipping planes \[m\].
     pub fn clip(&self) -> [f64; 2] {
         let (map, extent) = (&self.header().vis.map, self.extent());
         [f64::from(map.znear) * extent, f64::from(map.zfar) * extent]
     }
 
-    /// Vertical field of view of the default camera \[deg\], its azimuth and elevation \[deg\].
+    /// Vertical field of view, azimuth and elevation of the default camera \[deg\].
     pub fn free_camera(&self) -> [f64; 3] {
         let global = &self.header().vis.global;
         [global.fovy, global.azimuth, global.elevation].map(f64::from)
     }
 
-    /// The light on every camera.
+    /// The headlight.
     pub fn headlight(&self) -> HeadlightValues {
         let light = &self.header().vis.headlight;
-        // 4.x has 2 for "auto", which MuJoCo's OpenGL renderer takes for on, also in models with lights.
+        // 4.x has 2 for "auto". MuJoCo's OpenGL renderer treats it as on, also in models with lights.
         HeadlightValues {
             active: light.active != 0,
             ambient: light.ambient,
@@ -221,14 +222,14 @@ impl Model {
         }
     }
 
-    /// Colour of the haze at the end of endless planes, 0..=1, and the part of their radius over which they fade.
+    /// Haze color at the end of infinite planes, 0..=1, and the fraction of their radius over which they fade.
     pub fn haze(&self) -> ([f32; 3], f32) {
         let visual = &self.header().vis;
         let [r, g, b, _] = visual.rgba.haze;
         ([r, g, b], visual.map.haze)
     }
 
-    /// A mesh.
+    /// Arrays of a mesh.
     ///
     /// # Panics
     /// There is no such mesh.
@@ -250,7 +251,7 @@ impl Model {
                 span(chunks(array!(self, mesh_facetexcoord)), face, faces),
             )
         };
-        // 2.2.2 splits vertices instead: one index for all.
+        // 2.2.2 splits vertices instead: one index for all three arrays.
         #[cfg(not(mj4))]
         let (normals, face_normals, texcoords, face_texcoords) = (
             span(chunks(array!(self, mesh_normal)), vertex, vertices),
@@ -262,7 +263,7 @@ impl Model {
         MeshArrays { positions, normals, texcoords, faces: triangles, face_normals, face_texcoords }
     }
 
-    /// A height field.
+    /// Arrays of a height field.
     ///
     /// # Panics
     /// There is no such height field.
@@ -277,7 +278,7 @@ impl Model {
         }
     }
 
-    /// A texture; `None` where its pixels are not in the model.
+    /// Image of a texture; `None` if the model does not hold its pixels.
     ///
     /// # Panics
     /// There is no such texture.
@@ -304,7 +305,7 @@ impl Model {
         })
     }
 
-    /// A material.
+    /// Properties of a material.
     ///
     /// # Panics
     /// There is no such material.
@@ -312,7 +313,7 @@ impl Model {
         #[cfg(mj4)]
         let texture = {
             let roles = mj::mjNTEXROLE as usize;
-            // A material without a role for colour may have one with it in all channels.
+            // The color texture is in the RGB role or in the RGBA role.
             let textures = &array!(self, mat_texid)[material * roles..(material + 1) * roles];
             [mj::mjTEXROLE_RGB as usize, mj::mjTEXROLE_RGBA as usize].into_iter().map(|r| textures[r]).max()
         };
@@ -322,7 +323,7 @@ impl Model {
         let texture = Some(array!(self, mat_texid)[material]);
         #[cfg(not(mj4))]
         let [metallic, roughness] = [-1.0, -1.0];
-        // What is not said is -1.
+        // MuJoCo marks values that are not set with -1.
         let unless_negative = |x: f32| (x >= 0.0).then_some(x);
         MaterialValues {
             rgba: chunks(array!(self, mat_rgba))[material],
@@ -338,7 +339,7 @@ impl Model {
         }
     }
 
-    /// A light.
+    /// Properties of a light.
     ///
     /// # Panics
     /// There is no such light.

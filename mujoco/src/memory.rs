@@ -1,7 +1,9 @@
-//! Memory of environments that are gone.
+//! Memory of dropped environments.
 
-/// Gives freed memory back to the system. When a model is compiled again, all environments are made anew before the old
-/// ones go; the allocator would keep the old ones' pages, as much as a third of the new ones'.
+/// Returns freed memory to the operating system (Linux with glibc; no effect elsewhere).
+///
+/// When a model is compiled again, all new environments are made before the old ones are dropped. The allocator would
+/// keep the pages of the old ones, up to a third of the memory of the new ones.
 pub fn release_freed() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {

@@ -6,19 +6,19 @@ use mujoco_sys::fields::model::{ModelArray, each};
 use std::ptr::NonNull;
 use std::sync::Arc;
 
-/// Owns a model that MuJoCo allocated (`mj_loadXML`, `mj_copyModel`); freed when the last [`Model`] is gone.
+/// Owner of a model that MuJoCo allocated (`mj_loadXML`, `mj_copyModel`). The model is freed with the last [`Model`].
 #[derive(Debug)]
 pub(super) struct Storage(pub(super) NonNull<mj::mjModel>);
 
-// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled` or `Editor`, which is
-// its only owner then.
+// SAFETY: the model is plain memory without thread affinity; it is written only through `Compiled` or `Editor`, which
+// is its only owner then.
 unsafe impl Send for Storage {}
 // SAFETY: once shared in a `Model`, nothing writes to it.
 unsafe impl Sync for Storage {}
 
 impl Storage {
     pub(super) fn header(&self) -> &mj::mjModel {
-        // SAFETY: the model is alive as long as `self`; who writes to it borrows its owner mutably.
+        // SAFETY: the model is alive as long as `self`; every writer borrows its owner mutably.
         unsafe { self.0.as_ref() }
     }
 
@@ -41,7 +41,7 @@ pub struct Compiled(Storage);
 
 impl Compiled {
     /// # Safety
-    /// `raw` is a model made by MuJoCo that nobody else owns.
+    /// `raw` is a model made by MuJoCo, without another owner.
     pub(super) unsafe fn from_raw(raw: NonNull<mj::mjModel>) -> Self {
         Self(Storage(raw))
     }
@@ -54,7 +54,7 @@ impl Compiled {
         self.0.0.as_ptr()
     }
 
-    /// Ends editing.
+    /// Ends editing and returns the immutable model.
     pub fn into_model(self) -> Model {
         // SAFETY: a bitwise copy of the struct: its pointers lead into `storage`, which outlives it, and the copy is
         // never freed as a model (mjModel has no destructor of its own).
@@ -63,25 +63,27 @@ impl Compiled {
     }
 }
 
-/// A shallow `mjModel`: sizes and options of its own, arrays shared with the storage but for those that are its own. It is
-/// one allocation no longer, so nothing that takes a model to be one (`mj_copyModel`, `mj_saveModel`, `mj_deleteModel`) may
-/// see it; stepping and reading go through its pointers.
+/// A shallow `mjModel`: it has its own sizes and options, and shares its arrays with the storage except for its own
+/// arrays.
+///
+/// It is not one allocation. Functions that need one (`mj_copyModel`, `mj_saveModel`, `mj_deleteModel`) must not
+/// receive it. Functions that step or read follow its pointers and may.
 pub(super) struct Header {
     header: mj::mjModel,
     storage: Arc<Storage>,
     own: Arc<[OwnArray]>,
 }
 
-/// An array that a model has for itself. Nothing writes to it once the model is made.
+/// An array of one model alone. Nothing writes to it once the model is made.
 #[derive(Clone)]
 pub(super) struct OwnArray {
     pub(super) field: ModelArray,
-    /// In units that are aligned for every kind of element.
+    /// Content, in units that are aligned for every element type.
     pub(super) memory: Box<[u64]>,
 }
 
 impl OwnArray {
-    /// An array of these bytes, as many as the field has.
+    /// Creates an array from `field.bytes` bytes.
     pub(super) fn of_bytes(field: ModelArray, values: &[u8]) -> Self {
         let mut memory = vec![0_u64; field.bytes.div_ceil(8)];
         for (word, chunk) in memory.iter_mut().zip(values.chunks(8)) {
@@ -104,11 +106,11 @@ unsafe impl Send for Header {}
 // SAFETY: as above.
 unsafe impl Sync for Header {}
 
-/// Where an array of a model begins; null where it is empty. `field` is one of `fields::model::each`.
+/// Pointer to an array of a model; null for an empty array. `field` is one of `fields::model::each`.
 pub(super) fn array_pointer(model: &mj::mjModel, field: &ModelArray) -> *const u8 {
     // SAFETY: the offset is that of a pointer inside of the struct.
     let pointer = unsafe { std::ptr::from_ref(model).byte_add(field.pointer) };
-    // SAFETY: a pointer stands there, whatever it points to.
+    // SAFETY: the struct has a pointer at this offset; the pointer is read and not followed.
     unsafe { pointer.cast::<*const u8>().read() }
 }
 
@@ -116,26 +118,27 @@ pub(super) fn array_pointer(model: &mj::mjModel, field: &ModelArray) -> *const u
 #[derive(Clone, Debug)]
 pub struct Model(Arc<Header>);
 
-/// How much room a [`Data`](super::Data) has for contacts and constraints.
+/// Buffer sizes of a [`Data`](super::Data) for contacts and constraints.
 ///
-/// On 2.2.2 memory grows with the square of `constraints`, so both start small and grow on demand; on 4.x contacts and
-/// constraints share one arena.
+/// On 2.2.2, memory grows with the square of `constraints`, so both sizes start small and grow on demand. On 4.x,
+/// contacts and constraints share one arena.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Buffers {
-    /// Contacts (2.2.2).
+    /// Largest number of contacts (2.2.2).
     pub contacts: usize,
-    /// Constraint rows (2.2.2).
+    /// Largest number of constraint rows (2.2.2).
     pub constraints: usize,
-    /// Arena \[bytes\] (4.x).
+    /// Size of the arena \[bytes\] (4.x).
     pub arena_bytes: usize,
 }
 
 impl Buffers {
-    /// Twice as much of what was too small, and no more: on 2.2.2 rows that nobody needs are dear.
+    /// Returns sizes with twice the capacity of the buffer that overflowed. Other buffers do not grow, because unused
+    /// rows are expensive on 2.2.2.
     #[must_use]
     pub fn enlarged(self, what: Overflow) -> Self {
         let twice = |n: usize| n.max(1).saturating_mul(2);
-        // On 4.x all of them share the arena; on 2.2.2 the stack is made to fit the rows.
+        // On 4.x, all of them share the arena. On 2.2.2, the stack is sized for the rows.
         let larger = Self { arena_bytes: twice(self.arena_bytes), ..self };
         match what {
             Overflow::Contacts => Self { contacts: twice(self.contacts), ..larger },
@@ -153,12 +156,13 @@ impl Model {
         &self.0.header
     }
 
-    /// Whether this is the very same model, buffer sizes included.
+    /// True if both are the same model, including its buffer sizes.
     pub fn is(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
 
-    /// The same model with other buffer sizes, at least 1 of each: only the struct is copied, the arrays are shared.
+    /// Returns the same model with other buffer sizes, at least 1 each. Only the struct is copied; the arrays are
+    /// shared.
     #[must_use]
     pub fn with_buffers(&self, buffers: Buffers) -> Self {
         let mut header = self.copy_header();
@@ -166,13 +170,13 @@ impl Model {
         Self(Arc::new(Header { header, storage: Arc::clone(&self.0.storage), own: Arc::clone(&self.0.own) }))
     }
 
-    /// The struct alone; its pointers lead into what `self` keeps alive.
+    /// Copies the struct alone. Its pointers lead into memory that `self` keeps alive.
     pub(super) fn copy_header(&self) -> mj::mjModel {
         // SAFETY: bitwise copy of a plain C struct that is never freed as a model.
         unsafe { std::ptr::read(&self.0.header) }
     }
 
-    /// The same model with a changed struct and arrays of its own.
+    /// Returns the same model with a changed struct and its own arrays.
     ///
     /// # Safety
     /// Sizes of `header` are those of `self`; every array pointer leads into the storage of `self` or into `own`, where
@@ -181,17 +185,18 @@ impl Model {
         Self(Arc::new(Header { header, storage: Arc::clone(&self.0.storage), own }))
     }
 
-    /// The arrays that it has for itself.
+    /// Arrays that this model does not share with the compiled model.
     pub(super) fn own(&self) -> &[OwnArray] {
         &self.0.own
     }
 
-    /// The model as it was compiled: one allocation.
+    /// The compiled model, which is one allocation.
     pub(super) fn compiled(&self) -> &mj::mjModel {
         self.0.storage.header()
     }
 
-    /// Whether data of the one can be used with the other: made from one compiled model, with equal buffer sizes.
+    /// True if data of one model can be used with the other: both come from one compiled model, with equal buffer
+    /// sizes.
     pub(super) fn fits(&self, other: &Self) -> bool {
         let sizes = |m: &mj::mjModel| {
             #[cfg(mj4)]
@@ -203,13 +208,14 @@ impl Model {
         Arc::ptr_eq(&self.0.storage, &other.0.storage) && sizes(self.header()) == sizes(other.header())
     }
 
-    /// Names and sizes \[bytes\] of the arrays that this model does not share with the one it was compiled as.
+    /// Names and sizes \[bytes\] of the arrays that this model does not share with the compiled model.
     pub fn own_arrays(&self) -> impl Iterator<Item = (&'static str, usize)> {
         self.0.own.iter().map(|array| (array.field.name, array.field.bytes))
     }
 
-    /// Memory that this model has for itself: the struct and its own arrays \[bytes\]. Models that differ in buffer sizes
-    /// only share their own arrays.
+    /// Memory of the struct and of this model's own arrays \[bytes\].
+    ///
+    /// Models that differ only in buffer sizes share these arrays.
     pub fn own_bytes(&self) -> usize {
         let array = |array: &OwnArray| size_of::<OwnArray>() + size_of_val(&*array.memory);
         size_of::<Header>() + self.0.own.iter().map(array).sum::<usize>()
@@ -220,7 +226,7 @@ impl Model {
         self.header().nbuffer as usize
     }
 
-    /// Names of the arrays that are not the very same memory in both models.
+    /// Names of the arrays that are stored in different memory in the two models.
     pub fn arrays_apart(&self, other: &Self) -> Vec<&'static str> {
         let (mine, theirs) = (self.array_pointers(), other.array_pointers());
         mine.iter().zip(&theirs).filter(|(mine, theirs)| mine.1 != theirs.1).map(|(mine, _)| mine.0).collect()
@@ -233,7 +239,7 @@ impl Model {
         pointers
     }
 
-    /// The buffer sizes a [`Data`](super::Data) of this model is made with.
+    /// Buffer sizes of a new [`Data`](super::Data) of this model.
     pub fn buffers(&self) -> Buffers {
         let m = self.header();
         #[cfg(mj4)]
@@ -243,15 +249,15 @@ impl Model {
         Buffers { contacts: m.nconmax.max(0) as usize, constraints: m.njmax.max(0) as usize, arena_bytes }
     }
 
-    /// Small starting sizes: room for every constraint that is always there (equalities, drives, friction, limits) and
-    /// for a few contacts.
+    /// Small initial buffer sizes: room for all permanent constraints (equalities, drives, friction, limits) and for a
+    /// few contacts.
     pub fn small_buffers(&self) -> Buffers {
         const CONTACTS: usize = 16;
         /// Rows of a contact with a pyramidal cone of dimension 3.
         const ROWS_PER_CONTACT: usize = 4;
         let m = self.header();
         let always = 6 * m.neq as usize + 2 * m.nv as usize + 2 * m.ntendon as usize;
-        // The arena holds Jacobians, the solver's Hessian and its stack; found to fit the bundled robots without
+        // The arena holds Jacobians, the solver's Hessian and its stack. This size fits the bundled robots without
         // growing. A scene that needs more grows at its first step.
         let rows = always + CONTACTS * ROWS_PER_CONTACT;
         let nv = m.nv as usize;
@@ -262,7 +268,7 @@ impl Model {
         }
     }
 
-    /// Number of generalised positions.
+    /// Number of generalized positions.
     pub fn nq(&self) -> usize {
         self.header().nq as usize
     }
@@ -312,7 +318,7 @@ impl Model {
         self.header().na as usize
     }
 
-    /// Number of flexes; 0 on 2.2.2, which has none.
+    /// Number of flexes; 0 on 2.2.2.
     pub fn nflex(&self) -> usize {
         #[cfg(mj4)]
         return self.header().nflex as usize;
@@ -330,7 +336,7 @@ impl Model {
         self.header().neq as usize
     }
 
-    /// Number of pairs of geoms with contact parameters of their own.
+    /// Number of geom pairs with their own contact parameters.
     pub fn npair(&self) -> usize {
         self.header().npair as usize
     }
@@ -365,7 +371,7 @@ impl Model {
         self.header().opt.gravity
     }
 
-    /// The integrator's code (`mjINT_EULER`, ...).
+    /// Code of the integrator (`mjINT_EULER`, ...).
     pub fn integrator(&self) -> u32 {
         self.header().opt.integrator as u32
     }
@@ -373,18 +379,18 @@ impl Model {
 
 #[cfg(mj4)]
 pub(super) fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
-    // MuJoCo cannot allocate nothing.
+    // MuJoCo cannot allocate an arena of size 0.
     header.narena = buffers.arena_bytes.max(1) as i64;
 }
 
 #[cfg(not(mj4))]
 pub(super) fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
-    // With 0 MuJoCo leaves contacts or constraints out without a warning, drives among them.
+    // With size 0, MuJoCo omits contacts or constraints, drives among them, without a warning.
     let as_int = |n: usize| i32::try_from(n.max(1)).unwrap_or(i32::MAX);
     header.nconmax = as_int(buffers.contacts);
     header.njmax = as_int(buffers.constraints);
-    // MuJoCo's own rule for nstack (user_model.cc, 2.2.2): 5 squares of all rows and degrees of freedom, plus a linear
-    // part; in numbers of 8 bytes.
+    // MuJoCo's rule for nstack (user_model.cc, 2.2.2), in units of 8 bytes: 5 times the square of all rows and degrees
+    // of freedom, plus a linear part.
     let square = buffers.constraints.saturating_add(header.neq as usize + header.nv as usize);
     let linear = [
         header.nq,
@@ -407,8 +413,11 @@ pub(super) fn set_buffers(header: &mut mj::mjModel, buffers: Buffers) {
 }
 
 impl Compiled {
-    /// Never let MuJoCo reset a diverged environment by itself, and solve all constraints in one system: the drive rows
-    /// are rewritten there, and 4.x would otherwise solve a copy made before they are.
+    /// Disables MuJoCo's automatic reset of diverged environments and, if `has_drive_rows`, its constraint islands
+    /// (4.x).
+    ///
+    /// Drive rows are rewritten in the one system of all constraints. With islands, 4.x would solve a copy made before
+    /// that.
     pub fn prepare_for_stepping(&mut self, has_drive_rows: bool) {
         #[cfg(mj4)]
         {
@@ -429,7 +438,7 @@ impl Compiled {
         unsafe { self.0.0.as_ref() }.opt.timestep
     }
 
-    /// Gain and bias of `actuators` become zero and their controls are not clamped: they only hold targets.
+    /// Sets gain and bias of `actuators` to zero and removes their control limits, so that they only hold targets.
     pub fn clear_actuator_gains(&mut self, actuators: &[usize]) {
         let gains = mj::mjNGAIN as usize;
         let biases = mj::mjNBIAS as usize;
@@ -440,7 +449,7 @@ impl Compiled {
         self.unlimit_controls(actuators);
     }
 
-    /// `actuators` become plain sources of effort: the control is the force, and nothing is clamped.
+    /// Turns `actuators` into plain effort sources: the control is the force, without limits.
     pub fn make_effort_sources(&mut self, actuators: &[usize]) {
         self.clear_actuator_gains(actuators);
         for &i in actuators {
@@ -449,7 +458,8 @@ impl Compiled {
         }
     }
 
-    /// Controls of `actuators` are not clamped: the drive's targets are, and a control may also carry a feed-forward.
+    /// Removes the control limits of `actuators`. The drive limits its targets itself, and a control may also carry a
+    /// feed-forward effort.
     pub fn unlimit_controls(&mut self, actuators: &[usize]) {
         for &i in actuators {
             self.actuator_ctrllimited_mut()[i] = Default::default();

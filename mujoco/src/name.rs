@@ -46,7 +46,7 @@ impl ObjectKind {
             Self::Skin => mj::mjOBJ_SKIN,
             #[cfg(mj4)]
             Self::Flex => mj::mjOBJ_FLEX,
-            // Nothing of this kind has a name in 2.2.2.
+            // 2.2.2 has no flexes.
             #[cfg(not(mj4))]
             Self::Flex => mj::mjOBJ_UNKNOWN,
         }) as i32
@@ -63,13 +63,13 @@ unsafe fn id(model: *const mj::mjModel, kind: ObjectKind, name: &str) -> Option<
 }
 
 impl Compiled {
-    /// Index of the object called `name`.
+    /// Index of the object called `name`, if it exists.
     pub fn id(&self, kind: ObjectKind, name: &str) -> Option<usize> {
         // SAFETY: the model is alive as long as `self`.
         unsafe { id(self.raw(), kind, name) }
     }
 
-    /// First position and first degree of freedom of the joint called `name`.
+    /// Indices of the first position and the first degree of freedom of the joint called `name`.
     pub fn joint_address(&self, name: &str) -> Option<(usize, usize)> {
         let joint = self.id(ObjectKind::Joint, name)?;
         // SAFETY: the model is alive and nothing writes to it while `self` is borrowed.
@@ -81,13 +81,13 @@ impl Compiled {
 }
 
 impl Model {
-    /// Index of the object called `name`.
+    /// Index of the object called `name`, if it exists.
     pub fn id(&self, kind: ObjectKind, name: &str) -> Option<usize> {
         // SAFETY: the model is alive as long as `self`.
         unsafe { id(self.raw(), kind, name) }
     }
 
-    /// Name of object `id`; `None` for an unnamed one or an index out of range.
+    /// Name of object `id`; `None` for an unnamed object or an index out of range.
     pub fn name(&self, kind: ObjectKind, id: usize) -> Option<String> {
         let id = i32::try_from(id).ok()?;
         // SAFETY: the model is alive; MuJoCo returns null for an index out of range.

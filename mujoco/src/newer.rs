@@ -1,20 +1,20 @@
-//! Words of MJCF that an old MuJoCo refuses: since which version there are, and where a file has them.
+//! MJCF names that an old MuJoCo rejects: the version that introduced them, and their position in a file.
 
 use kinetoscope_scene::source::Source;
 use std::path::{Path, PathBuf};
 
-/// A word that the schema of a MuJoCo has not.
+/// A name that the schema of a MuJoCo version does not contain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Unknown<'m> {
-    /// The element.
+    /// Name of the element.
     pub(super) element: &'m str,
-    /// Its attribute, or the value of one; `None` where the element itself is unknown.
+    /// Attribute of the element, or the value of an attribute; `None` if the element itself is unknown.
     pub(super) word: Option<&'m str>,
-    /// True if the word is a value.
+    /// True if `word` is a value.
     is_value: bool,
 }
 
-/// Attributes and values (with their element) and elements that came after 2.2.2, with the version that had them first.
+/// Elements, attributes and values that 2.2.2 does not have: element (`*` for any), attribute or value, first version.
 /// Source: MuJoCo's changelog.
 const SINCE: &[(&str, &str, &str)] = &[
     ("*", "gravcomp", "2.3.1"),
@@ -93,7 +93,7 @@ const SINCE: &[(&str, &str, &str)] = &[
 ];
 
 impl<'m> Unknown<'m> {
-    /// The word that a message of the reader complains of.
+    /// Parses the unknown name in a message of MuJoCo's XML reader.
     pub(super) fn of_message(message: &'m str) -> Option<Self> {
         let quoted = |text: &'m str| text.split('\'').nth(1);
         let element = quoted(&message[message.find("Element '")?..])?;
@@ -107,7 +107,7 @@ impl<'m> Unknown<'m> {
         message.contains("unrecognized element").then_some(Self { element, word: None, is_value: false })
     }
 
-    /// The first version of MuJoCo that has it, where that is known and later than 2.2.2.
+    /// First MuJoCo version with this name, if it is known and later than 2.2.2.
     pub(super) fn since(&self) -> Option<&'static str> {
         let word = self.word.unwrap_or_default();
         let is_it = |(element, known, _): &&(&str, &str, &str)| {
@@ -116,7 +116,7 @@ impl<'m> Unknown<'m> {
         SINCE.iter().find(is_it).map(|(.., since)| *since)
     }
 
-    /// The first place of a file, or of those it includes, that has it.
+    /// First position of this name in a file and the files that it includes.
     pub(super) fn find_in(&self, file: &Path) -> Option<Source> {
         self.search(file, file.parent().unwrap_or(Path::new("")), &mut Vec::new())
     }
@@ -173,7 +173,7 @@ mod tests {
         assert_eq!(Unknown::of_message("Error: mass\nObject name = a, id = 1"), None);
     }
 
-    /// The place is found in included files too, and a file that includes itself ends the search.
+    /// Included files are searched too, and a file that includes itself ends the search.
     #[test]
     fn places() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,20 +1,20 @@
-//! `<option>` of a model, to compare it with another's.
+//! Comparison of the `<option>` settings of two models.
 
 use super::model::Model;
 use mujoco_sys as mj;
 
-/// A setting of the whole model in which two models differ.
+/// A global setting that differs between two models.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OptionDifference {
-    /// MJCF's name of it: an attribute of `<option>`, or one of its `<flag>`.
+    /// MJCF name of the setting: an attribute of `<option>`, or one of its `<flag>`.
     pub name: &'static str,
-    /// The value in the one model.
+    /// Value in the first model.
     pub here: String,
-    /// The value in the other.
+    /// Value in the second model.
     pub there: String,
 }
 
-/// Words of a code of `<option>`.
+/// Keyword of an `<option>` code.
 fn word(words: &[(u32, &str)], code: i32) -> String {
     words.iter().find(|(known, _)| *known as i32 == code).map_or_else(|| code.to_string(), |(_, word)| (*word).into())
 }
@@ -23,7 +23,7 @@ fn numbers(values: &[f64]) -> String {
     values.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// Flags that are on unless disabled. `autoreset` and `island` of 4.x are not here: what drives of robots need decides them
+/// Flags that are on unless disabled. `autoreset` and `island` of 4.x are excluded, because robot drives determine them
 /// ([`Compiled::prepare_for_stepping`](super::Compiled::prepare_for_stepping)).
 const DISABLED: &[(u32, &str)] = &[
     (mj::mjDSBL_CONSTRAINT, "flag constraint"),
@@ -54,7 +54,7 @@ const DISABLED: &[(u32, &str)] = &[
     (mj::mjDSBL_MULTICCD, "flag multiccd"),
 ];
 
-/// Flags that are off unless enabled. What only counts energies or statistics decides no step, and is not here.
+/// Flags that are off unless enabled. Flags that only compute energies or statistics are excluded: they affect no step.
 const ENABLED: &[(u32, &str)] = &[
     (mj::mjENBL_OVERRIDE, "flag override"),
     #[cfg(not(mj4))]
@@ -72,7 +72,7 @@ const ENABLED: &[(u32, &str)] = &[
 ];
 
 impl Model {
-    /// Every setting of `<option>` and its name, as text.
+    /// Names of all `<option>` settings and their values as text.
     pub fn options(&self) -> Vec<(&'static str, String)> {
         let opt = &self.header().opt;
         let integrators = [
@@ -126,7 +126,7 @@ impl Model {
         options
     }
 
-    /// Settings of `<option>` that are not those of `other`.
+    /// Settings of `<option>` that differ from those of `other`.
     pub fn option_differences(&self, other: &Self) -> Vec<OptionDifference> {
         let pairs = self.options().into_iter().zip(other.options());
         pairs

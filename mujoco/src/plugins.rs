@@ -1,10 +1,10 @@
 //! Plugins that ship with MuJoCo 4: shared libraries in a folder beside the library.
 
-/// Loads the plugins beside the MuJoCo library of this process; 2.2.2 has none.
+/// Does nothing, because 2.2.2 has no plugins.
 #[cfg(not(mj4))]
 pub(super) fn load() {}
 
-/// Loads the plugins beside the MuJoCo library of this process: of a wheel in `plugin`, of a release in `bin/mujoco_plugin`.
+/// Loads the plugins beside the MuJoCo library of this process: in `plugin` (wheel) and `bin/mujoco_plugin` (release).
 #[cfg(mj4)]
 pub(super) fn load() {
     use std::ffi::CString;
@@ -14,12 +14,12 @@ pub(super) fn load() {
     let folders = [folder.join("plugin"), folder.join("../bin/mujoco_plugin")];
     for folder in folders.into_iter().filter(|folder| folder.is_dir()) {
         let Ok(folder) = CString::new(folder.as_os_str().as_bytes()) else { continue };
-        // SAFETY: the path is NUL-terminated and alive; without a callback MuJoCo calls nothing of ours.
+        // SAFETY: the path is NUL-terminated and alive; without a callback, MuJoCo calls no function of this crate.
         unsafe { mujoco_sys::mj_loadAllPluginLibraries(folder.as_ptr(), None) };
     }
 }
 
-/// The folder of the MuJoCo library that this process has loaded, as the kernel lists it.
+/// Folder of the MuJoCo library that this process has loaded, from the kernel's list.
 #[cfg(mj4)]
 fn library_folder() -> Option<std::path::PathBuf> {
     let maps = std::fs::read_to_string("/proc/self/maps").ok()?;

@@ -1,34 +1,35 @@
-//! Memory of an environment that is stepped next, asked for while another one is stepped.
+//! Prefetching of an environment's memory while the previous environment is stepped.
 //!
-//! With many environments each has left the core's own cache when its turn comes, and a step reads it in an order that
-//! the processor does not foresee: it would wait for most lines one after the other.
+//! With many environments, the core's own caches have dropped each one when its turn comes. A step reads memory in an
+//! order that the processor does not predict, so it would wait for most cache lines one after the other.
 
 use super::data::Data;
 use mujoco_sys as mj;
 use std::mem::offset_of;
 
-/// A line of the cache \[bytes\].
+/// Size of a cache line \[bytes\].
 const LINE: usize = 64;
 
-/// Of `mjData`'s buffer: the state, kinematics, inertias. More would push out what the present step needs \[bytes\].
+/// Prefetched part of `mjData`'s buffer: state, kinematics, inertias \[bytes\]. More would evict data of the current
+/// step.
 const BUFFER: usize = 32 << 10;
 
-/// Of its arena: contacts and the first constraint rows \[bytes\].
+/// Prefetched part of the arena: contacts and the first constraint rows \[bytes\].
 const ARENA: usize = 8 << 10;
 
-/// The solver's statistics, most of `mjData` itself and hardly touched, end here on both lines of MuJoCo.
+/// End of the solver's statistics, which fill most of `mjData` itself and are rarely accessed (2.2.2 and 4.x).
 const AFTER_STATISTICS: usize = offset_of!(mj::mjData, solver_fwdinv);
 
-/// Which caches the memory is to come to.
+/// Cache levels that memory is prefetched into.
 #[derive(Clone, Copy)]
 enum Level {
-    /// All: what is needed at once.
+    /// All levels: the memory is needed at once.
     First,
-    /// The second and beyond: the first still serves the present step.
+    /// The second level and beyond: the first level still serves the current step.
     Second,
 }
 
-/// Asks for the first `bytes` bytes from `start` on and waits for none of them.
+/// Prefetches `bytes` bytes from `start` without waiting for them.
 fn ask(start: *const u8, bytes: usize, level: Level) {
     #[cfg(target_arch = "x86_64")]
     for offset in (0..bytes).step_by(LINE) {
@@ -41,17 +42,18 @@ fn ask(start: *const u8, bytes: usize, level: Level) {
             Level::Second => unsafe { _mm_prefetch::<_MM_HINT_T1>(line) },
         }
     }
-    // Elsewhere Rust has no stable prefetch.
+    // Rust has no stable prefetch for other architectures.
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (start, bytes, level);
 }
 
-/// Asks for the memory of `values`, which should be few.
+/// Prefetches the memory of `values`, which should be a short slice.
 pub fn prefetch<T>(values: &[T]) {
     ask(values.as_ptr().cast(), size_of_val(values), Level::First);
 }
 
-/// The addresses where a step finds its data, kept apart from it: to follow its pointers would be to wait for them.
+/// Addresses of the memory that a step reads. They are stored outside of the data, because following its pointers would
+/// wait for that memory.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Places {
     header: *const u8,
@@ -62,7 +64,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Those of the data with this header.
+    /// Addresses of the data with this header.
     pub(super) fn of(header: &mj::mjData) -> Self {
         #[cfg(mj4)]
         let (arena, arena_bytes) = (header.arena, header.narena as usize);
@@ -79,14 +81,14 @@ impl Places {
 }
 
 impl Data {
-    /// Asks for what every step of this data reads first, counters and pointers, and waits for nothing.
+    /// Prefetches the counters and pointers that every step of this data reads first, without waiting for them.
     pub fn prefetch(&self) {
         let header = self.places().header;
         ask(header, 2 * LINE, Level::First);
         ask(header.wrapping_add(AFTER_STATISTICS), size_of::<mj::mjData>() - AFTER_STATISTICS, Level::First);
     }
 
-    /// As [`prefetch`](Self::prefetch), and for the state and the work memory.
+    /// Prefetches the same memory as [`prefetch`](Self::prefetch), and the state and working memory.
     pub fn prefetch_arrays(&self) {
         self.prefetch();
         let places = self.places();
@@ -94,7 +96,7 @@ impl Data {
         ask(places.arena, places.arena_bytes, Level::Second);
     }
 
-    /// How much [`prefetch_arrays`](Self::prefetch_arrays) asks for \[bytes\].
+    /// Size of the memory that [`prefetch_arrays`](Self::prefetch_arrays) prefetches \[bytes\].
     pub fn prefetched_bytes(&self) -> usize {
         let places = self.places();
         size_of::<mj::mjData>() - AFTER_STATISTICS + places.buffer_bytes + places.arena_bytes

@@ -1,23 +1,25 @@
-//! MuJoCo's own ray casting: a judge for ours.
+//! MuJoCo's ray casting: a reference for that of `kinetoscope-render`.
 
 use super::data::Data;
 use super::error::EngineError;
 use super::guard::guarded;
 use mujoco_sys as mj;
 
-/// What a ray hits.
+/// Intersection of a ray with a geom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
-    /// Distance in multiples of the ray's direction.
+    /// Distance along the ray, in multiples of its direction.
     pub distance: f64,
-    /// The geom.
+    /// Index of the geom.
     pub geom: usize,
 }
 
 impl Data {
-    /// The nearest geom of the groups in `groups` (bit k is group k) along a ray, by `mj_ray`. It sees planes from the
-    /// front only, triangles from both sides, and nothing that is fully transparent. Poses are those of the last forward
-    /// pass.
+    /// Returns the nearest intersection of a ray with a geom (`mj_ray`).
+    ///
+    /// Bit k of `groups` includes the geoms of group k. Planes are hit from the front only, triangles from both sides,
+    /// and fully transparent geoms never. Origin and direction are in the world frame \[m\]. Poses are those of the
+    /// last forward pass.
     ///
     /// # Errors
     /// MuJoCo's engine stopped.
@@ -38,14 +40,16 @@ impl Data {
         Ok(usize::try_from(geom).ok().filter(|_| distance >= 0.0).map(|geom| RayHit { distance, geom }))
     }
 
-    /// The nearest geoms along rays from one point, by `mj_multiRay`, as [`ray`](Self::ray) has them: writes distances in
-    /// multiples of the rays' directions to `distances`, -1 for a ray that hits nothing. It culls geoms for all rays at once.
+    /// Computes the nearest intersections of rays from one point (`mj_multiRay`), by the rules of [`ray`](Self::ray).
+    ///
+    /// `distances` receives distances in multiples of the rays' directions, -1 for a ray without a hit. MuJoCo culls
+    /// geoms for all rays at once.
     ///
     /// # Errors
     /// MuJoCo's engine stopped, or is of a version without `mj_multiRay`.
     ///
     /// # Panics
-    /// There are not as many distances as directions.
+    /// `directions` and `distances` have different lengths.
     #[track_caller]
     pub fn multi_ray(
         &mut self,
@@ -59,14 +63,14 @@ impl Data {
         {
             let groups: [u8; mj::mjNGROUP as usize] = std::array::from_fn(|k| u8::from(groups >> k & 1 == 1));
             let count = i32::try_from(directions.len()).unwrap_or(i32::MAX);
-            // Where MuJoCo's numbers end: nothing is left out.
+            // MuJoCo's largest number: the cutoff excludes no hit.
             let cutoff = 1e10;
             let (data, model) = (self.raw_mut(), self.model().raw());
             let (from, along, groups) = (origin.as_ptr(), directions.as_ptr().cast(), groups.as_ptr());
             let (to, geoms, normals) = (distances.as_mut_ptr(), std::ptr::null_mut(), std::ptr::null_mut());
-            // SAFETY: model and data are alive and belong together, and nobody else uses the data, whose stack it works on;
-            // the arrays have the lengths that mj_multiRay reads and writes (3, 3 for each of `count` rays, mjNGROUP, and
-            // `count` distances); those for geoms and normals may be null.
+            // SAFETY: model and data are alive and belong together, and the data, whose stack it works on, is borrowed
+            // mutably; the arrays have the lengths that mj_multiRay reads and writes (3, 3 for each of `count` rays,
+            // mjNGROUP, and `count` distances); those for geoms and normals may be null.
             guarded(|| unsafe {
                 mj::mj_multiRay(model, data, from, along, groups, true, -1, geoms, to, normals, count, cutoff);
             })

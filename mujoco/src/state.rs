@@ -1,41 +1,43 @@
-//! What decides the next step, saved and restored: continuing from it is bit-identical.
+//! State that determines the next step. Restoring it continues a simulation bit-identically.
 
 use super::data::Data;
 use super::model::Model;
 use mujoco_sys::fields::data as arrays;
 
-/// What a step changes: time, positions, velocities, activations and the solver's warm start.
+/// State that a step changes: time, positions, velocities, activations and the solver's warm start.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
     values: Vec<f64>,
 }
 
-/// Quaternions of `qpos` as they were before the last forward pass. The pass of 2.2.2 normalises those of free and ball
-/// joints in place, and a second one would change their last bits. 4.x leaves positions alone: there are none to keep.
+/// Quaternions of `qpos` before the last forward pass.
+///
+/// The forward pass of 2.2.2 normalizes the quaternions of free and ball joints in place, and a second pass would
+/// change their last bits. On 4.x positions do not change, so no quaternion is stored.
 #[derive(Clone, Debug, Default)]
 pub struct RawQuats {
-    /// The first one is not on the heap: a robot has one, or none.
+    /// First quaternion, stored without heap memory: a robot has at most one in the common case.
     first: Option<RawQuat>,
     others: Box<[RawQuat]>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct RawQuat {
-    /// Where it is in `qpos`.
+    /// Index in `qpos`.
     address: usize,
     value: [f64; 4],
 }
 
-/// What a user sets and a step only reads: controls, applied forces, mocap poses, user data.
+/// Inputs that a user sets and a step only reads: controls, applied forces, mocap poses, user data.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inputs {
     values: Vec<f64>,
-    /// Active equalities: part of the data on 4.x, of the model on 2.2.2.
+    /// Active flags of equalities. They belong to the data on 4.x, and to the model on 2.2.2.
     #[cfg(mj4)]
     active: Vec<bool>,
 }
 
-/// Implements `save` and `restore` of a list of `mjData` arrays, in order.
+/// Implements `save_arrays` and `restore_arrays` for a list of `mjData` arrays, in order.
 macro_rules! copied_arrays {
     ($owner:ident: $($array:ident / $array_mut:ident),* $(,)?) => {
         impl $owner {
@@ -73,17 +75,17 @@ copied_arrays!(
 );
 
 impl Motion {
-    /// No state at all.
+    /// Empty state, which restores nothing.
     pub const EMPTY: Self = Self { values: Vec::new() };
 
-    /// Takes the values from `data`, reusing this memory.
+    /// Copies the state of `data`, reusing memory.
     pub fn save(&mut self, data: &Data) {
         self.values.clear();
         self.values.push(data.time());
         self.save_arrays(data);
     }
 
-    /// Puts the quaternions back to what they were before the forward pass of the data that was saved.
+    /// Resets the quaternions to their values before the forward pass of the saved data.
     pub fn undo_normalization(&mut self, raw: &RawQuats) {
         for quat in raw.iter() {
             let first = 1 + quat.address;
@@ -91,12 +93,12 @@ impl Motion {
         }
     }
 
-    /// The positions of what was saved from a data of `model`.
+    /// Saved positions, shape (nq,). `model` is the model of the saved data.
     pub fn qpos(&self, model: &Model) -> &[f64] {
         &self.values[1..1 + model.nq()]
     }
 
-    /// The velocities of what was saved from a data of `model`.
+    /// Saved velocities, shape (nv,). `model` is the model of the saved data.
     pub fn qvel(&self, model: &Model) -> &[f64] {
         &self.values[1 + model.nq()..1 + model.nq() + model.nv()]
     }
@@ -106,12 +108,12 @@ impl Motion {
         &self.values
     }
 
-    /// What [`values`](Self::values) gave.
+    /// Creates a state from the numbers of [`values`](Self::values).
     pub fn from_values(values: Vec<f64>) -> Self {
         Self { values }
     }
 
-    /// Puts the values into `data`, which is of the same model (its buffers may be larger).
+    /// Copies the state into `data`, which must have the same model. Its buffers may be larger.
     pub fn restore(&self, data: &mut Data) {
         if let Some((&time, values)) = self.values.split_first() {
             data.set_time(time);
@@ -121,7 +123,7 @@ impl Motion {
 }
 
 impl RawQuats {
-    /// Room for the quaternions that a forward pass over `model` normalises.
+    /// Allocates storage for the quaternions that a forward pass over `model` normalizes.
     pub fn new(model: &Model) -> Self {
         if cfg!(mj4) {
             return Self::default();
@@ -141,7 +143,7 @@ impl RawQuats {
         self.first.iter().chain(&self.others)
     }
 
-    /// Takes the values from `data`, before its forward pass.
+    /// Copies the quaternions of `data`. Call this before its forward pass.
     pub fn save(&mut self, data: &Data) {
         let qpos = data.qpos();
         for quat in self.first.iter_mut().chain(&mut self.others) {
@@ -149,7 +151,7 @@ impl RawQuats {
         }
     }
 
-    /// Puts the values into `data`, to do its forward pass again.
+    /// Copies the quaternions back into `data`, so that its forward pass can be repeated.
     pub fn restore(&self, data: &mut Data) {
         let qpos = data.qpos_mut();
         for quat in self.iter() {
@@ -159,7 +161,7 @@ impl RawQuats {
 }
 
 impl Inputs {
-    /// All numbers; and which equalities are active, where that is part of the data.
+    /// All numbers, and the active flags of equalities (4.x; empty on 2.2.2).
     pub fn values(&self) -> (&[f64], &[bool]) {
         #[cfg(mj4)]
         let active = &self.active[..];
@@ -168,7 +170,7 @@ impl Inputs {
         (&self.values, active)
     }
 
-    /// What [`values`](Self::values) gave.
+    /// Creates inputs from the result of [`values`](Self::values).
     pub fn from_values(values: Vec<f64>, active: Vec<bool>) -> Self {
         #[cfg(not(mj4))]
         let _ = active;
@@ -179,7 +181,7 @@ impl Inputs {
         }
     }
 
-    /// Takes the values from `data`, reusing this memory.
+    /// Copies the inputs of `data`, reusing memory.
     pub fn save(&mut self, data: &Data) {
         self.values.clear();
         self.save_arrays(data);
@@ -192,7 +194,7 @@ impl Inputs {
         }
     }
 
-    /// Puts the values into `data`, which is of the same model (its buffers may be larger).
+    /// Copies the inputs into `data`, which must have the same model. Its buffers may be larger.
     pub fn restore(&self, data: &mut Data) {
         self.restore_arrays(data, &self.values);
         #[cfg(mj4)]
@@ -209,7 +211,7 @@ mod tests {
     use super::*;
     use crate as mj;
 
-    /// A forward pass changes no more than [`RawQuats`] keeps, on either line of MuJoCo.
+    /// A forward pass changes no more than [`RawQuats`] keeps, on 2.2.2 and on 4.x.
     #[test]
     fn raw_quaternions() {
         const JOINTS: &str = r#"<mujoco><worldbody>

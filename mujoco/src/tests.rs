@@ -1,4 +1,4 @@
-//! Counts of models, hits of rays and forces on bodies, by MuJoCo's own arrays and by closed forms.
+//! Tests of model counts, ray hits and forces on bodies, against MuJoCo's own arrays and closed forms.
 
 use super::{Buffers, Data, Model, compile};
 
@@ -8,9 +8,9 @@ fn model(text: &str) -> Model {
     compile(text, &[]).expect("compiles").into_model()
 }
 
-/// Some of everything that is counted.
+/// A model with several of each counted element.
 fn counted() -> Model {
-    // 2.2.2 has skins among assets.
+    // 2.2.2 declares skins among the assets.
     let section = if cfg!(mj4) { "deformable" } else { "asset" };
     model(
         &r#"<mujoco><asset><material name="red"/><material name="blue"/></asset><worldbody>
@@ -43,7 +43,8 @@ fn control_of_no_actuator() {
     let _ = counted().actuator_control(3);
 }
 
-/// Room for an equality of six rows, two for each of three degrees of freedom and for the tendon, and 16 contacts of four.
+/// Rows: six for an equality, two for each of three degrees of freedom and for the tendon, four for each of 16
+/// contacts.
 #[test]
 fn small_buffers() {
     let model = counted();
@@ -83,16 +84,18 @@ fn multi_ray() {
     for (direction, distance) in directions.iter().zip(distances) {
         let one = data.ray(origin, *direction, 1).expect("a ray");
         hits += usize::from(one.is_some());
-        // The same arithmetic on the same geoms.
+        // Both functions use the same arithmetic on the same geoms.
         assert!((one.map_or(-1.0, |hit| hit.distance) - distance).abs() < 1e-12, "{direction:?}");
     }
     assert!((10..60).contains(&hits), "{hits}");
 }
 
-/// A mass m, of moment I, at r on a slide on a turntable, both without a drive, turning with w and sliding outward with u: the
-/// turntable slows by a = -2 m r w u / (I + m r²), since m r² w + I w stays, and the slide accelerates by w² r, since nothing
-/// holds it. What the world exerts on it is its mass times its acceleration, across the slide r a + 2 w u, its weight, and I a
-/// about the axis. Where MuJoCo has integrated already, the velocities before that are to be given.
+/// A mass m with moment I at radius r on a slide on a turntable, both without drives, turns with w and slides outward
+/// with u.
+///
+/// m r² w + I w is conserved, so the turntable accelerates by a = -2 m r w u / (I + m r²). The free slide accelerates
+/// by w² r. The world exerts mass times acceleration: m (r a + 2 w u) across the slide, the weight, and I a about the
+/// axis. After an integration, the velocities from before it must be given.
 #[test]
 fn forces_before_integration() {
     let (mass, moment, radius, turning, sliding, g) = (2.0, 0.7, 0.5, 3.0, 0.4, 9.81);
@@ -119,12 +122,12 @@ fn forces_before_integration() {
     data.solve_accelerations(&now, &mut spare).expect("solves");
     assert!(far(&data) < 1e-12, "{:?} instead of {expected:?}", data.cfrc_int());
     assert_eq!(data.qvel(), later, "what it was given is left as it was");
-    // The control: velocities of another time are wrong.
+    // Control: velocities of another time give wrong forces.
     data.solve_accelerations(&later, &mut spare).expect("solves");
     assert!(far(&data) > 1.0, "{:?}", data.cfrc_int());
 }
 
-/// Functions that are not wrapped read the model and write to the data, and an error of MuJoCo is a value.
+/// Unwrapped functions read the model and write to the data, and an error of MuJoCo becomes a value.
 #[test]
 fn raw_calls() {
     let model = model(

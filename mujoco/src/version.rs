@@ -1,25 +1,25 @@
-//! Which MuJoCo this build is for, and whether the library that was loaded is that one.
+//! MuJoCo version of this build, and the check that the loaded library has the same version.
 
 use mujoco_sys as mj;
 use std::sync::OnceLock;
 
-/// The two supported lines of MuJoCo: they differ in the MJCF they accept.
+/// Supported MuJoCo versions. They differ in the MJCF that they accept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Target {
-    /// 2.2.2, Debian 12.
+    /// 2.2.2, as in Debian 12.
     V2,
     /// 4.x.
     V4,
 }
 
-/// The line whose headers this build was made with.
+/// MuJoCo version of the headers of this build.
 #[cfg(not(mj4))]
 pub const TARGET: Target = Target::V2;
-/// The line whose headers this build was made with.
+/// MuJoCo version of the headers of this build.
 #[cfg(mj4)]
 pub const TARGET: Target = Target::V4;
 
-/// The library that was loaded is not of the version of the headers.
+/// The loaded library has another version than the headers.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the MuJoCo library that was loaded is version {library}, but this program was built with the headers of {headers}; \
@@ -32,10 +32,12 @@ pub struct VersionError {
     pub library: String,
 }
 
-/// Compares header and library version and silences MuJoCo's console and log file. Every other entry calls it first.
+/// Compares the versions of headers and library, silences MuJoCo's console output and log file, and loads its plugins.
+///
+/// Every other entry point calls this function first.
 ///
 /// # Errors
-/// The library is not of the version of the headers.
+/// The library has another version than the headers.
 pub fn check_version() -> Result<(), VersionError> {
     static CHECKED: OnceLock<Result<(), VersionError>> = OnceLock::new();
     CHECKED
@@ -52,12 +54,12 @@ pub fn check_version() -> Result<(), VersionError> {
         .clone()
 }
 
-/// The version of the headers, such as `2.2.2`.
+/// Version of the headers, for example `2.2.2`.
 pub fn version_string() -> String {
     dotted(mj::mjVERSION_HEADER)
 }
 
-/// 222 is 2.2.2; since 3.5 the number is major * 10^6 + minor * 10^3 + patch.
+/// Dotted version of a version number. 222 is 2.2.2; since 3.5 it is major * 10^6 + minor * 10^3 + patch.
 fn dotted(version: i32) -> String {
     if version < 1000 {
         format!("{}.{}.{}", version / 100, version / 10 % 10, version % 10)

@@ -1,4 +1,4 @@
-//! From MJCF text and asset bytes to a compiled model, without touching the disk.
+//! Compilation of MJCF: text with assets in memory, or files on disk.
 
 use super::error::CompileError;
 use super::model::Compiled;
@@ -12,27 +12,27 @@ use std::ptr::NonNull;
 /// A file that the MJCF refers to, held in memory.
 #[derive(Clone, Debug)]
 pub struct Asset {
-    /// Base name, lower case and unique: 2.2.2 strips folders and lower-cases names.
+    /// Base name, lower case and unique, because 2.2.2 strips folders and lower-cases names.
     pub name: String,
     /// Content.
     pub bytes: Vec<u8>,
 }
 
-/// An error of [`compile`].
+/// Error of [`compile`] and [`compile_file`].
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum LoadError {
     /// Header and library versions differ.
     #[error(transparent)]
     Version(#[from] VersionError),
-    /// MuJoCo refused the model.
+    /// MuJoCo rejected the model.
     #[error(transparent)]
     Compile(#[from] CompileError),
 }
 
-/// MuJoCo's virtual file system. On 2.2.2 the struct is 2 MB: it lives on the heap, never on a stack.
+/// MuJoCo's virtual file system. On 2.2.2 the struct has 2 MB, so it lives on the heap.
 struct Vfs(NonNull<mj::mjVFS>);
 
-/// Longest name of a file \[bytes\]: 2.2.2 has room for so many and a NUL.
+/// Longest name of a file \[bytes\]: 2.2.2 stores this many and a NUL.
 const LONGEST_NAME: usize = 999;
 
 impl Vfs {
@@ -46,7 +46,7 @@ impl Vfs {
         Self(raw)
     }
 
-    /// Returns false if MuJoCo does not take the file (name used twice, table full).
+    /// Returns false if MuJoCo rejects the file (name used twice, table full).
     fn add(&mut self, asset: &Asset) -> bool {
         let (Ok(name), Ok(size)) = (CString::new(asset.name.as_str()), i32::try_from(asset.bytes.len())) else {
             return false;
@@ -56,20 +56,20 @@ impl Vfs {
 
     #[cfg(mj4)]
     fn add_bytes(&mut self, name: &CStr, bytes: &[u8], size: i32) -> bool {
-        // SAFETY: the VFS is initialised; name and buffer are alive; MuJoCo copies the bytes.
+        // SAFETY: the VFS is initialized; name and buffer are alive; MuJoCo copies the bytes.
         unsafe { mj::mj_addBufferVFS(self.0.as_ptr(), name.as_ptr(), bytes.as_ptr().cast(), size) == 0 }
     }
 
     #[cfg(not(mj4))]
     fn add_bytes(&mut self, name: &CStr, bytes: &[u8], size: i32) -> bool {
-        // SAFETY: the VFS is initialised and the name is NUL-terminated; on success MuJoCo has allocated `size` bytes.
+        // SAFETY: the VFS is initialized and the name is NUL-terminated; on success MuJoCo has allocated `size` bytes.
         if unsafe { mj::mj_makeEmptyFileVFS(self.0.as_ptr(), name.as_ptr(), size) } != 0 {
             return false;
         }
         // SAFETY: as above.
         let index = unsafe { mj::mj_findFileVFS(self.0.as_ptr(), name.as_ptr()) };
         let Ok(index) = usize::try_from(index) else { return false };
-        // SAFETY: `self.0` is a valid, initialised VFS that nobody else refers to.
+        // SAFETY: `self.0` is a valid, initialized VFS without other references.
         let vfs = unsafe { self.0.as_mut() };
         let destination = vfs.filedata[index].cast::<u8>();
         // SAFETY: the file was just made with `bytes.len()` bytes; source and destination are different allocations.
@@ -80,23 +80,23 @@ impl Vfs {
 
 impl Drop for Vfs {
     fn drop(&mut self) {
-        // SAFETY: the VFS was initialised in `new`.
+        // SAFETY: the VFS was initialized in `new`.
         unsafe { mj::mj_deleteVFS(self.0.as_ptr()) };
         // SAFETY: allocated in `new` with the same layout.
         unsafe { dealloc(self.0.as_ptr().cast(), Layout::new::<mj::mjVFS>()) };
     }
 }
 
-/// Compiles MJCF text; files it names are looked up in `assets` first.
+/// Compiles MJCF text. Files that it names are looked up in `assets` first.
 ///
 /// # Errors
-/// MuJoCo's version does not match, or MuJoCo refuses the model (its words, and the line it names).
+/// MuJoCo's version does not match, or MuJoCo rejects the model (its message, and the line that it names).
 pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
     check_version()?;
     let mut vfs = Vfs::new();
     let model = Asset { name: "model.xml".into(), bytes: mjcf.as_bytes().to_vec() };
     for asset in std::iter::once(&model).chain(assets) {
-        // 2.2.2 would stop the process.
+        // 2.2.2 would end the process.
         let base_name = (1..=LONGEST_NAME).contains(&asset.name.len()) && !asset.name.contains(['/', '\\']);
         if asset.bytes.is_empty() || !base_name {
             let message = format!(
@@ -114,10 +114,10 @@ pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
     load(c"model.xml", vfs.0.as_ptr())
 }
 
-/// Compiles an MJCF file; files it names are looked up on disk.
+/// Compiles an MJCF file. Files that it names are looked up on disk.
 ///
 /// # Errors
-/// MuJoCo's version does not match, or MuJoCo refuses the file.
+/// MuJoCo's version does not match, or MuJoCo rejects the file.
 pub fn compile_file(path: &Path) -> Result<Compiled, LoadError> {
     check_version()?;
     let name = CString::new(path.to_string_lossy().as_bytes())
@@ -130,11 +130,11 @@ pub fn compile_file(path: &Path) -> Result<Compiled, LoadError> {
 
 fn load(name: &CStr, vfs: *const mj::mjVFS) -> Result<Compiled, LoadError> {
     let mut error: [c_char; 1024] = [0; 1024];
-    // SAFETY: name and error buffer are alive and of the stated size; `vfs` is null or initialised. Errors inside are
+    // SAFETY: name and error buffer are alive and of the stated size; `vfs` is null or initialized. Errors inside are
     // reported through the buffer (both versions install a handler of their own while they compile).
     let raw = unsafe { mj::mj_loadXML(name.as_ptr(), vfs, error.as_mut_ptr(), error.len() as i32) };
     if let Some(raw) = NonNull::new(raw) {
-        // SAFETY: a fresh model that nobody else owns.
+        // SAFETY: a new model without another owner.
         return Ok(unsafe { Compiled::from_raw(raw) });
     }
     // SAFETY: MuJoCo terminates the message within the buffer, which started as zeros.

@@ -1,7 +1,7 @@
-//! Welds of an environment: which of the model's hold, and how the bodies then lie.
+//! Welds of an environment: the active welds and the relative poses of their bodies.
 //!
-//! The pose that a weld keeps is in the model on both lines (`eq_data`), whether it holds in the model on 2.2.2 and in the
-//! data on 4.x. So an environment with welds gets a shallow model in which these arrays are its own.
+//! The pose of a weld is in the model (`eq_data`). Its active flag is in the model on 2.2.2 and in the data on 4.x. An
+//! environment with welds therefore gets a shallow model with its own copies of these arrays.
 
 use super::data::Data;
 use super::editor::set_pointer;
@@ -10,29 +10,30 @@ use mujoco_sys as mj;
 use mujoco_sys::fields::model::{ModelArray, each};
 use std::sync::Arc;
 
-/// A weld that holds.
+/// An active weld.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weld {
-    /// Which equality it is.
+    /// Index of the equality.
     pub equality: usize,
     /// Pose of the second body in the frame of the first: x, y, z \[m\], unit quaternion w, x, y, z.
     pub pose: [f64; 7],
 }
 
-/// Numbers of an equality.
+/// Number of values of an equality in `eq_data`.
 const WIDTH: usize = mj::mjNEQDATA as usize;
 
 impl Model {
-    /// Whether equality `index` is there, and is a weld.
+    /// True if equality `index` exists and is a weld.
     pub fn is_weld(&self, index: usize) -> bool {
         self.eq_type().get(index).is_some_and(|&kind| kind as u32 == mj::mjEQ_WELD)
     }
 
-    /// The same model in which these welds, and no others but those that hold from the start, hold: on 4.x that they do is to
-    /// be told to the data, too.
+    /// Returns the model with these welds active, besides those that are active from the start.
+    ///
+    /// On 4.x, the active flags are in the data: call [`Data::set_equality_active`] too.
     ///
     /// # Panics
-    /// One of them is no weld of this model.
+    /// One of the equalities is not a weld of this model.
     #[must_use]
     pub fn with_welds(&self, welds: &[Weld]) -> Self {
         let own_of = |field: &ModelArray| matches!(field.name, "eq_data" | "eq_active");
@@ -57,7 +58,7 @@ impl Model {
                     continue;
                 }
                 let numbers = weld.pose.iter().flat_map(|number| number.to_ne_bytes());
-                // Anchor in the second body (its origin), then that body in the first.
+                // Anchor in the second body (its origin), then the pose of that body in the first.
                 let row = &mut values[8 * WIDTH * weld.equality..8 * WIDTH * (weld.equality + 1)];
                 row[..24].fill(0);
                 row[24..80].iter_mut().zip(numbers).for_each(|(to, byte)| *to = byte);
@@ -67,14 +68,15 @@ impl Model {
         for array in &own {
             set_pointer(&mut header, &array.field, array.memory.as_ptr().cast());
         }
-        // SAFETY: sizes are those of `self`; pointers lead to the compiled model, which `self` keeps alive, but for those that
-        // were just set to `own`, each to memory of the size of its field: moving a box does not move what it points to.
+        // SAFETY: sizes are those of `self`; pointers lead to the compiled model, which `self` keeps alive, except
+        // those that were just set to `own`, each to memory of the size of its field: moving a box does not move its
+        // content.
         unsafe { self.with_arrays(header, Arc::from(own)) }
     }
 }
 
 impl Data {
-    /// Lets an equality hold, or not, where that is a thing of the data (4.x).
+    /// Activates or deactivates an equality on 4.x, where the flag is in the data. Has no effect on 2.2.2.
     ///
     /// # Panics
     /// There is no such equality.
@@ -108,7 +110,7 @@ mod tests {
         mj::compile(&TWO.replace("ACTIVE", active), &[]).expect("compiles").into_model()
     }
 
-    /// The numbers stand where MuJoCo's compiler puts them, and nothing else differs.
+    /// The numbers are at the positions where MuJoCo's compiler puts them, and nothing else differs.
     #[test]
     fn compiled() {
         let (off, on) = (model("false"), model("true"));
@@ -123,14 +125,14 @@ mod tests {
         assert_eq!(apart, expected);
         #[cfg(not(mj4))]
         assert!(welded.equality_is_active(0) && !off.equality_is_active(0));
-        // Another one, and none.
+        // Another pose, then no weld.
         let moved = welded.with_welds(&[Weld { equality: 0, pose: [9.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0] }]);
         assert_eq!(moved.eq_data()[3..10], [9.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
         assert!(moved.with_welds(&[]).arrays_apart(&off).is_empty());
         assert!(off.is_weld(0) && !off.is_weld(1));
     }
 
-    /// Arrays that an environment has for something else stay.
+    /// Other own arrays of an environment are kept.
     #[test]
     fn other_arrays() {
         let off = model("false");

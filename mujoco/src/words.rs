@@ -1,20 +1,20 @@
-//! MuJoCo's codes as the words that MJCF has for them; `None` for what is not written back as MJCF.
+//! MJCF keywords of MuJoCo's codes; `None` for codes that are not written back as MJCF.
 
 use mujoco_sys as mj;
 
-/// The word of a code in a list of both.
+/// Keyword of a code in a list of codes and keywords.
 fn word(list: &[(u32, &'static str)], code: i32) -> Option<&'static str> {
     list.iter().find(|(known, _)| *known as i32 == code).map(|(_, word)| *word)
 }
 
-/// Type of a joint.
+/// Keyword of a joint type.
 pub fn joint(code: i32) -> Option<&'static str> {
     let list =
         [(mj::mjJNT_FREE, "free"), (mj::mjJNT_BALL, "ball"), (mj::mjJNT_SLIDE, "slide"), (mj::mjJNT_HINGE, "hinge")];
     word(&list, code)
 }
 
-/// Type of a geom or a site, and how many sizes it has.
+/// Keyword of a geom or site type, and its number of sizes.
 pub fn geom(code: i32) -> Option<(&'static str, usize)> {
     let list = [
         (mj::mjGEOM_PLANE, "plane", 3),
@@ -29,7 +29,7 @@ pub fn geom(code: i32) -> Option<(&'static str, usize)> {
     list.into_iter().find(|(known, _, _)| *known as i32 == code).map(|(_, word, sizes)| (word, sizes))
 }
 
-/// How a camera or a light follows.
+/// Keyword of the tracking mode of a camera or light.
 pub fn follow(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjCAMLIGHT_FIXED, "fixed"),
@@ -41,7 +41,7 @@ pub fn follow(code: i32) -> Option<&'static str> {
     word(&list, code)
 }
 
-/// What an equality couples.
+/// Keyword of an equality type.
 pub fn equality(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjEQ_CONNECT, "connect"),
@@ -55,13 +55,13 @@ pub fn equality(code: i32) -> Option<&'static str> {
 /// A point of a tendon's path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathPoint {
-    /// A joint, with a coefficient.
+    /// A joint with a coefficient.
     Joint,
-    /// A pulley, with a divisor.
+    /// A pulley with a divisor.
     Pulley,
     /// A site.
     Site,
-    /// A geom that the tendon goes around, with a site or -1.
+    /// A geom that the tendon wraps around, with a side site or -1.
     Geom,
 }
 
@@ -77,7 +77,7 @@ pub fn path_point(code: i32) -> Option<PathPoint> {
     list.into_iter().find(|(known, _)| *known as i32 == code).map(|(_, point)| point)
 }
 
-/// What an actuator acts on: the attribute that names it.
+/// Attribute that names the target of an actuator's transmission.
 pub fn transmission(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjTRN_JOINT, "joint"),
@@ -90,7 +90,7 @@ pub fn transmission(code: i32) -> Option<&'static str> {
     word(&list, code)
 }
 
-/// Activation dynamics of an actuator.
+/// Keyword of the activation dynamics of an actuator.
 pub fn dynamics(code: i32) -> Option<&'static str> {
     #[cfg(mj4)]
     if code == mj::mjDYN_FILTEREXACT as i32 {
@@ -105,19 +105,20 @@ pub fn dynamics(code: i32) -> Option<&'static str> {
     word(&list, code)
 }
 
-/// Gain of an actuator.
+/// Keyword of the gain of an actuator.
 pub fn gain(code: i32) -> Option<&'static str> {
     let list = [(mj::mjGAIN_FIXED, "fixed"), (mj::mjGAIN_AFFINE, "affine"), (mj::mjGAIN_MUSCLE, "muscle")];
     word(&list, code)
 }
 
-/// Bias of an actuator.
+/// Keyword of the bias of an actuator.
 pub fn bias(code: i32) -> Option<&'static str> {
     let list = [(mj::mjBIAS_NONE, "none"), (mj::mjBIAS_AFFINE, "affine"), (mj::mjBIAS_MUSCLE, "muscle")];
     word(&list, code)
 }
 
-/// Kind of an object that a sensor observes: MuJoCo's `body` is the frame in the centre of mass, `xbody` the body's own.
+/// Keyword of the kind of object that a sensor observes. MuJoCo's `body` is the frame at the center of mass, `xbody`
+/// the body's own frame.
 pub fn observed(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjOBJ_BODY, "body"),
@@ -132,31 +133,31 @@ pub fn observed(code: i32) -> Option<&'static str> {
     word(&list, code)
 }
 
-/// How MJCF says what a sensor observes.
+/// Form in which MJCF names the object of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorObjects {
-    /// Nothing.
+    /// No object.
     None,
-    /// An attribute called as the kind of the object.
+    /// An attribute with the name of the object's kind.
     Named,
-    /// `objtype` and `objname`, perhaps `reftype` and `refname`.
+    /// `objtype` and `objname`, optionally `reftype` and `refname`.
     Frame,
 }
 
 /// A type of MuJoCo's own sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SensorWord {
-    /// MJCF's word.
+    /// MJCF keyword.
     pub word: &'static str,
-    /// How MJCF says what it observes.
+    /// Form in which MJCF names the object.
     pub objects: SensorObjects,
-    /// Unit; `None` where it depends on what is observed.
+    /// Unit; `None` if it depends on the object.
     pub unit: Option<&'static str>,
-    /// Whether the values are a quaternion.
+    /// True if the values are a quaternion.
     pub quaternion: bool,
 }
 
-/// A type of MuJoCo's own sensors.
+/// Type of one of MuJoCo's own sensors; `None` if it is not supported.
 pub fn sensor(code: i32) -> Option<SensorWord> {
     use SensorObjects::{Frame, Named, None as Nothing};
     let list = [
@@ -213,7 +214,7 @@ pub fn sensor(code: i32) -> Option<SensorWord> {
     })
 }
 
-/// MJCF's word for a type of sensor that [`sensor`] does not give.
+/// MJCF keyword of a sensor type that [`sensor`] does not support.
 pub fn other_sensor(code: i32) -> Option<&'static str> {
     let list = [
         (mj::mjSENS_USER, "user"),
@@ -237,7 +238,7 @@ pub fn other_sensor(code: i32) -> Option<&'static str> {
     word(&list, code)
 }
 
-/// Whether a sensor's value is of what MuJoCo solves for a step (`mjSTAGE_ACC`), not of positions and velocities.
+/// True if a sensor measures results of the constraint solver (`mjSTAGE_ACC`), not only positions and velocities.
 pub fn is_solved(stage: i32) -> bool {
     stage == mj::mjSTAGE_ACC as i32
 }

@@ -1,4 +1,4 @@
-//! Files that have their name only when they are complete.
+//! Atomic files: a file gets its name when it is complete.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -7,8 +7,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A file that is written under a temporary name in its folder and renamed when it is complete.
 ///
-/// A process that stops in between leaves what was at the path before. [`file`](Self::file) synchronizes the content with the
-/// disk where that matters. Dropping it before [`persist`](Self::persist) or [`persist_noclobber`](Self::persist_noclobber) deletes the
+/// A process that stops early leaves the previous file in place. Call `sync_all` on [`file`](Self::file) if the content
+/// must be on the disk before the renaming.
+///
+/// Dropping this value before [`persist`](Self::persist) or [`persist_noclobber`](Self::persist_noclobber) deletes the
 /// temporary file, unless [`keep`](Self::keep) was called.
 #[derive(Debug)]
 pub struct AtomicFile {
@@ -19,7 +21,8 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Creates a temporary file beside `path`, with a name of its own: concurrent writers of one path do not disturb each other.
+    /// Creates a temporary file beside `path` with a unique name, so that concurrent writers of one path do not
+    /// interfere.
     ///
     /// # Errors
     /// The temporary file cannot be created.
@@ -29,14 +32,14 @@ impl AtomicFile {
             let mut part = path.as_os_str().to_owned();
             part.push(format!(".{}-{}.part", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
             match Self::create_as(path, part.into()) {
-                // Left by a process with the same number that was killed.
+                // Left by a killed process with the same process id.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 created => return created,
             }
         }
     }
 
-    /// Creates a temporary file called `part`, which must be in the folder of `path`.
+    /// Creates a temporary file at `part`, which must be in the folder of `path`.
     ///
     /// # Errors
     /// The temporary file cannot be created, or exists already.
@@ -45,42 +48,42 @@ impl AtomicFile {
         Ok(Self { path: path.into(), part, file, keep: false })
     }
 
-    /// Writes a complete file, in place of one that has its name.
+    /// Writes a complete file and replaces a previous file at `path`.
     ///
     /// # Errors
-    /// The file cannot be written; what was at `path` stays.
+    /// The file cannot be written. A previous file at `path` stays.
     pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
         let mut file = Self::create(path)?;
         file.file.write_all(bytes)?;
         file.persist()
     }
 
-    /// The file, open for writing.
+    /// The temporary file, open for writing.
     pub fn file(&self) -> &File {
         &self.file
     }
 
-    /// Name of the complete file.
+    /// Path of the complete file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Name until the file is complete.
+    /// Path of the temporary file.
     pub fn part(&self) -> &Path {
         &self.part
     }
 
-    /// Leaves the temporary file on the disk when this is dropped.
+    /// Keeps the temporary file on the disk when this value is dropped.
     pub fn keep(&mut self) {
         self.keep = true;
     }
 
-    /// Returns true after [`keep`](Self::keep).
+    /// True after [`keep`](Self::keep), [`persist`](Self::persist) or [`persist_noclobber`](Self::persist_noclobber).
     pub fn is_kept(&self) -> bool {
         self.keep
     }
 
-    /// Gives the file its name, in place of a file that has it.
+    /// Renames the temporary file to its final path and replaces a previous file.
     ///
     /// # Errors
     /// The file cannot be renamed.
@@ -90,16 +93,16 @@ impl AtomicFile {
         Ok(())
     }
 
-    /// Gives the file its name, which must be free.
+    /// Renames the temporary file to its final path, which must be free.
     ///
     /// # Errors
-    /// The name is taken, or the file cannot be renamed.
+    /// The path is taken, or the file cannot be renamed.
     pub fn persist_noclobber(&mut self) -> io::Result<()> {
         let exists = || io::Error::new(io::ErrorKind::AlreadyExists, "a file of that name has appeared meanwhile");
         match fs::hard_link(&self.part, &self.path) {
             Ok(()) => fs::remove_file(&self.part)?,
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Err(exists()),
-            // A file system without links: the file may still appear between this check and the renaming.
+            // A file system without hard links: a file may still appear between this check and the renaming.
             Err(_) if self.path.symlink_metadata().is_ok() => return Err(exists()),
             Err(_) => fs::rename(&self.part, &self.path)?,
         }
@@ -111,7 +114,7 @@ impl AtomicFile {
 impl Drop for AtomicFile {
     fn drop(&mut self) {
         if !self.keep {
-            // The error that led here is more important than one of this deletion.
+            // The error that led here matters more than an error of this deletion.
             let _ = fs::remove_file(&self.part);
         }
     }
@@ -133,7 +136,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("state");
         AtomicFile::write(&path, b"old").unwrap();
-        // Two writers at once; one of them gives up.
+        // Two concurrent writers, one of which gives up.
         let mut first = AtomicFile::create(&path).unwrap();
         let second = AtomicFile::create(&path).unwrap();
         first.file().write_all(b"new").unwrap();

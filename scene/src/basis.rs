@@ -1,4 +1,4 @@
-//! [`Basis`]: axes around a normal.
+//! [`Basis`]: an orthonormal basis around a normal.
 
 use crate::vector::{V3, dot};
 
@@ -7,7 +7,8 @@ use crate::vector::{V3, dot};
 pub struct Basis([V3; 3]);
 
 impl Basis {
-    /// A basis around a unit normal. Source: Duff et al., Building an orthonormal basis, revisited, JCGT 6(1), 2017.
+    /// Creates a basis around a unit normal. Source: Duff et al., Building an orthonormal basis, revisited, JCGT 6(1),
+    /// 2017.
     #[inline]
     pub fn of(n: V3) -> Self {
         let sign = if n[2] < 0.0 { -1.0 } else { 1.0 };
@@ -16,13 +17,13 @@ impl Basis {
         Self([[1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]], [b, sign + n[1] * n[1] * a, -n[1]], n])
     }
 
-    /// Maps a vector from the basis to the frame of the normal.
+    /// Maps a vector from the basis to the frame in which the normal is given.
     #[inline]
     pub fn to_world(self, v: V3) -> V3 {
         [0, 1, 2].map(|k| self.0[0][k] * v[0] + self.0[1][k] * v[1] + self.0[2][k] * v[2])
     }
 
-    /// Maps a vector from the frame of the normal to the basis.
+    /// Maps a vector from the frame in which the normal is given to the basis.
     #[inline]
     pub fn to_local(self, v: V3) -> V3 {
         self.0.map(|axis| dot(axis, v))

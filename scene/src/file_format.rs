@@ -1,12 +1,12 @@
-//! How values of other crates stand in configuration files: modules for serde's `with`.
+//! Representations of values in configuration files: modules for serde's `with`.
 //!
 //! | value | in a file |
 //! |---|---|
 //! | pose | `[x, y, z, qw, qx, qy, qz]`, or `{ pos = [x, y, z], rpy_deg = [r, p, y] }`, or with `quat_wxyz` |
 //! | rotation | `[w, x, y, z]`, or `{ rpy_deg = [r, p, y] }` |
 //! | vector | `[x, y, z]` |
-//! | list of pairs | a table, its order kept |
-//! | something that may be left out on purpose | itself, or `false` |
+//! | list of pairs | a table that keeps its order |
+//! | optional value with a default | the value, or `false` |
 
 use nalgebra::UnitQuaternion;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
@@ -15,7 +15,8 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt;
 use std::marker::PhantomData;
 
-/// A rotation of a quaternion `[w, x, y, z]`; one of length 1 keeps its bits, so that what was written is read again.
+/// Rotation of a quaternion `[w, x, y, z]`. A unit quaternion keeps its bits, so that a written value is read back
+/// exactly.
 fn quaternion<E: Error>([w, x, y, z]: [f64; 4]) -> Result<UnitQuaternion<f64>, E> {
     let quaternion = nalgebra::Quaternion::new(w, x, y, z);
     let length = quaternion.norm();
@@ -24,25 +25,25 @@ fn quaternion<E: Error>([w, x, y, z]: [f64; 4]) -> Result<UnitQuaternion<f64>, E
             "[{w}, {x}, {y}, {z}] is no rotation: a quaternion w, x, y, z must be finite and not zero"
         )));
     }
-    // Normalising leaves an error of a few units in the last place, which normalising again would not keep.
+    // Normalizing leaves an error of a few units in the last place. Normalizing again would change these bits.
     let is_unit = (length - 1.0).abs() < 8.0 * f64::EPSILON;
     Ok(if is_unit { UnitQuaternion::new_unchecked(quaternion) } else { UnitQuaternion::new_normalize(quaternion) })
 }
 
-/// A rotation of roll, pitch and yaw \[deg\] about fixed axes, as URDF has them.
+/// Rotation of roll, pitch and yaw \[deg\] about fixed axes, as in URDF.
 fn roll_pitch_yaw(degrees: [f64; 3]) -> UnitQuaternion<f64> {
     let [roll, pitch, yaw] = degrees.map(f64::to_radians);
     UnitQuaternion::from_euler_angles(roll, pitch, yaw)
 }
 
-/// [`Pose`](crate::Pose).
+/// Representation of [`Pose`](crate::Pose).
 pub mod pose {
     use super::*;
     use crate::Pose;
     use crate::pose::to_row;
     use nalgebra::Translation3;
 
-    /// Writes the row.
+    /// Writes `[x, y, z, qw, qx, qy, qz]`.
     ///
     /// # Errors
     /// Those of the format.
@@ -50,10 +51,10 @@ pub mod pose {
         to_row(pose).serialize(serializer)
     }
 
-    /// Reads a row or a table.
+    /// Reads an array or a table.
     ///
     /// # Errors
-    /// Another form, two rotations, and a rotation that is none.
+    /// The value has another form, two rotations, or an invalid rotation.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Pose, D::Error> {
         deserializer.deserialize_any(Row)
     }
@@ -99,7 +100,7 @@ pub mod pose {
     }
 }
 
-/// [`UnitQuaternion`].
+/// Representation of [`UnitQuaternion`].
 pub mod rotation {
     use super::*;
     use crate::pose::to_wxyz;
@@ -115,7 +116,7 @@ pub mod rotation {
     /// Reads `[w, x, y, z]` or roll, pitch and yaw.
     ///
     /// # Errors
-    /// Another form, and a rotation that is none.
+    /// The value has another form, or is not a rotation.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<UnitQuaternion<f64>, D::Error> {
         deserializer.deserialize_any(Wxyz)
     }
@@ -145,7 +146,7 @@ pub mod rotation {
     }
 }
 
-/// [`nalgebra::Vector3`].
+/// Representation of [`nalgebra::Vector3`].
 pub mod vector {
     use super::*;
     use nalgebra::Vector3;
@@ -167,7 +168,7 @@ pub mod vector {
     }
 }
 
-/// `Option<Vector3>`; add `default` beside it where it may be left out.
+/// Representation of `Option<Vector3>`. Combine it with serde's `default` if the key may be absent.
 pub mod optional_vector {
     use super::*;
     use nalgebra::Vector3;
@@ -189,7 +190,7 @@ pub mod optional_vector {
     }
 }
 
-/// `Vec<(String, T)>`, a table whose order matters.
+/// Representation of `Vec<(String, T)>`: a table that keeps its order.
 pub mod pairs {
     use super::*;
 
@@ -236,7 +237,7 @@ pub mod pairs {
     }
 }
 
-/// `Option<T>` of something that is there by default: `false` leaves it out.
+/// Representation of `Option<T>` for a value that is present by default: `false` removes it.
 pub mod or_false {
     use super::*;
     use serde::de::IntoDeserializer;
@@ -252,10 +253,10 @@ pub mod or_false {
         }
     }
 
-    /// Reads a table or a number, or `false`.
+    /// Reads a table, a number or `false`.
     ///
     /// # Errors
-    /// Those of the format and of the value; `true`, which would not say what.
+    /// Those of the format and of the value. `true` is an error.
     pub fn deserialize<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>
     where
         T: Deserialize<'de>,
@@ -336,7 +337,7 @@ mod tests {
                 pairs: vec![("z.*".into(), 1), ("a".into(), 2)],
                 thickness: (k % 3 == 0).then_some(angle),
             };
-            // serde_json reads numbers to the last digit but one.
+            // TOML, because serde_json reads numbers to the last digit but one.
             assert_eq!(toml::from_str::<All>(&toml::to_string(&all).unwrap()).unwrap(), all);
         }
     }
@@ -347,7 +348,7 @@ mod tests {
             read(r#"{"pose": {"pos": [1, 2, 3], "rpy_deg": [0, 0, 90]}, "rotation": {"rpy_deg": [0, 0, 90]}}"#);
         let row = read(r#"{"pose": [1, 2, 3, 2, 0, 0, 2], "rotation": [3, 0, 0, 3]}"#);
         assert_eq!(turned.pose.translation, row.pose.translation);
-        // Half the angle's cosine is known to 1e-16, the angle from it to the root of that.
+        // The cosine of half the angle is known to 1e-16, the angle therefore to the square root of that.
         assert!(turned.pose.rotation.angle_to(&row.pose.rotation) < 1e-7);
         assert!((turned.rotation * Vector3::x() - Vector3::y()).norm() < 1e-15);
         assert!((row.rotation * Vector3::x() - Vector3::y()).norm() < 1e-15);

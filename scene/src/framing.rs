@@ -1,31 +1,31 @@
-//! Camera placement from which everything that is drawn fills an image.
+//! Camera placement in which the drawn scene fills the image.
 
 use crate::shape::Shape;
 use crate::{Instance, PoseF32, RenderScene};
 
-/// Instances of a scene at their poses, moved by an offset.
+/// Instances of a scene at their poses, shifted by an offset.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<'a> {
-    /// Scene that is drawn.
+    /// Scene to draw.
     pub scene: &'a RenderScene,
-    /// World from instance, one for each instance of the scene.
+    /// World-from-instance poses, one for each instance of the scene.
     pub poses: &'a [PoseF32],
-    /// Added to all positions \[m\].
+    /// Offset of all positions \[m\].
     pub origin: [f64; 3],
-    /// Movable instances with a coordinate beyond this have flown away, and are left out \[m\].
+    /// Largest coordinate of movable instances \[m\]. Instances beyond it have flown away and are ignored.
     pub reach: f32,
 }
 
-/// The image that is to be filled.
+/// View direction and image that the scene must fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Framing {
-    /// Direction that the camera looks in, of any length; not straight up or down.
+    /// Viewing direction of the camera, of any length; not vertical.
     pub forward: [f64; 3],
     /// Vertical field of view \[rad\].
     pub fovy: f64,
-    /// Width of the image over its height.
+    /// Aspect ratio of the image: width over height.
     pub aspect: f64,
-    /// Share of the image that is filled in the direction that limits the distance, above 0 and at most 1.
+    /// Filled fraction of the image in the limiting direction, above 0 and at most 1.
     pub fill: f64,
 }
 
@@ -34,26 +34,27 @@ pub struct Framing {
 pub struct Placement {
     /// Position of the camera \[m\].
     pub eye: [f64; 3],
-    /// Point on its optical axis, in the middle of the depths of what is drawn \[m\].
+    /// Point on the optical axis, at the middle depth of the drawn scene \[m\].
     pub target: [f64; 3],
-    /// Longest side of the box around what is drawn \[m\].
+    /// Longest side of the bounding box of the drawn scene \[m\].
     pub extent: f64,
 }
 
-/// Share of the image that first views fill.
+/// Filled fraction of the image for initial views.
 pub const FILL: f64 = 0.9;
-/// Reach of an environment \[m\]: what is farther from its origin has flown away.
+/// Reach of an environment \[m\]: movable instances farther from its origin have flown away.
 pub const REACH: f32 = 20.0;
-/// Static things that are larger than the moving ones by this factor are a room or terrain around them.
+/// Ratio of sizes above which a static instance is a room or terrain around the moving ones.
 const SURROUNDINGS: f64 = 2.0;
-/// Groups that are drawn, as in MuJoCo's viewers.
+/// Geom groups that are drawn, as in MuJoCo's viewers.
 const GROUPS: std::ops::Range<u8> = 0..3;
 
 impl Framing {
-    /// The nearest placement with everything in the image; `None` where nothing of a finite size is drawn.
+    /// Returns the nearest placement with the whole scene in the image.
     ///
-    /// The smallest distance follows from four supporting planes of the instances, so it is exact. Planes are left out, and so
-    /// is what stands in the world and is much larger than robots and objects: terrain, walls of a room.
+    /// Returns `None` if nothing of a finite size is drawn, or if the viewing direction is vertical. The smallest
+    /// distance follows from four supporting planes of the instances, so it is exact. Planes are ignored, and so are
+    /// static instances that are much larger than robots and objects, such as terrain and walls of a room.
     pub fn place(&self, placed: &[Placed<'_>]) -> Option<Placement> {
         let forward = unit(self.forward)?;
         let right = unit([forward[1], -forward[0], 0.0])?;
@@ -62,7 +63,7 @@ impl Framing {
         let support = |direction: [f64; 3]| support(&framed, direction);
         let [low, high] = bounds(&framed)?;
         let half = (0.5 * self.fovy).tan() * self.fill;
-        // Of the points (x, y, z) in the axes of the image, x - slope z and -x - slope z are at most these.
+        // Upper bounds of x - slope z and of -x - slope z over all points (x, y, z) in image axes.
         let limits = |across: [f64; 3], slope: f64| {
             let along = |sign: f64| support([0, 1, 2].map(|k| sign * across[k] - slope * forward[k]));
             (along(1.0), along(-1.0))
@@ -72,7 +73,7 @@ impl Framing {
         let nearest = -support(forward.map(|x| -x));
         let farthest = support(forward);
         let depth = (-(right_of + left_of) / (2.0 * slopes[0])).min(-(above + below) / (2.0 * slopes[1]));
-        // Not inside of a flat thing that is seen edge on.
+        // The camera stays outside of a flat object that is seen edge-on.
         let extent = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
         let depth = depth.min(nearest - 1e-3 * extent.max(1e-6));
         let (x, y) = (0.5 * (right_of - left_of), 0.5 * (above - below));
@@ -82,10 +83,10 @@ impl Framing {
     }
 }
 
-/// An instance where it is drawn.
+/// A drawn instance: the instance, its pose and its offset.
 type Framed<'a> = (&'a Instance, &'a PoseF32, [f64; 3]);
 
-/// The instances that a first view shows.
+/// Instances that an initial view shows.
 fn framed<'a>(placed: &[Placed<'a>]) -> Vec<Framed<'a>> {
     let each = |placed: &Placed<'a>| {
         let Placed { scene, poses, origin, reach } = *placed;
@@ -105,13 +106,13 @@ fn is_drawn(instance: &Instance) -> bool {
     seen && !matches!(instance.shape, Shape::Plane(_))
 }
 
-/// True if an instance has a finite position, and is fixed or within `reach` of the origin.
+/// True if an instance has a finite pose, and is fixed or within `reach` of the origin.
 fn is_here(instance: &Instance, pose: &PoseF32, reach: f32) -> bool {
     let near = |x: &f32| x.is_finite() && (instance.fixed || x.abs() < reach);
     pose.translation.iter().all(near) && pose.rotation.iter().flatten().all(|x| x.is_finite())
 }
 
-/// The largest coordinate along a direction.
+/// Largest coordinate of the instances along a direction.
 fn support(framed: &[Framed<'_>], direction: [f64; 3]) -> f64 {
     let of = |(instance, pose, origin): &Framed<'_>| {
         let rotation = pose.rotation.map(|row| row.map(f64::from));
@@ -122,7 +123,7 @@ fn support(framed: &[Framed<'_>], direction: [f64; 3]) -> f64 {
     framed.iter().map(of).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The box around instances \[m\]; `None` without any.
+/// Bounding box of instances \[m\]; `None` without instances or for an infinite box.
 fn bounds(framed: &[Framed<'_>]) -> Option<[[f64; 3]; 2]> {
     if framed.is_empty() {
         return None;
@@ -157,7 +158,8 @@ mod tests {
         Framing { forward: [1.0, 0.0, 0.0], fovy: 45f64.to_radians(), aspect, fill: FILL }
     }
 
-    /// A ball of radius r is seen under the half angle asin(r / d): from `r / sin(atan(fill tan(fovy / 2)))` it fills the image.
+    /// A sphere of radius r at distance d has a half angle of asin(r / d). At `r / sin(atan(fill tan(fovy / 2)))` it
+    /// fills the image.
     #[test]
     fn distance_of_a_ball() {
         let ball = Instance::new(Sphere { radius: 0.5 }, Material::default(), 1).of_body(0);
@@ -174,13 +176,13 @@ mod tests {
             assert!((0..3).all(|k| (found.eye[k] - expected[k]).abs() < 1e-6), "{aspect}: {found:?} {expected:?}");
             assert!((found.target[0] - 11.0).abs() < 1e-6 && (found.extent - 1.0).abs() < 1e-6, "{found:?}");
         }
-        // The control: a wall alone is what is drawn.
+        // Control: a wall alone is framed.
         let alone = RenderScene::new(vec![scene.instances()[2].clone()]).unwrap();
         let wall = Placed { scene: &alone, poses: &poses[2..], origin: [0.0; 3], reach: REACH };
         assert!((framing(1.0).place(&[wall]).unwrap().extent - 100.0).abs() < 1e-3);
     }
 
-    /// The support of every shape is that of its triangles.
+    /// The support function of every shape agrees with its triangles.
     #[test]
     fn supports() {
         let shapes: [Shape; 3] = [
@@ -202,7 +204,7 @@ mod tests {
         }
     }
 
-    /// Nothing to see: no placement.
+    /// Scenes without a drawn instance, and a vertical viewing direction, have no placement.
     #[test]
     fn nothing() {
         let plane = RenderScene::new(vec![Instance::new(Plane::INFINITE, Material::default(), 1)]).unwrap();

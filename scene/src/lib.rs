@@ -1,6 +1,26 @@
-//! Plain data that both the simulation and the sensors agree on: poses, meshes, materials, shapes, random numbers.
+//! Plain data shared by simulation, renderer and sensors: poses, shapes, meshes, materials, lights, random numbers.
 //!
-//! Nothing here knows of MuJoCo. Units are SI, angles radians, quaternions w, x, y, z.
+//! This crate is independent of MuJoCo. Units are SI, angles are in radians, and quaternions are ordered w, x, y, z.
+//!
+//! | item | content |
+//! |---|---|
+//! | [`Pose`], [`PoseF64`], [`PoseF32`], [`pose`], [`vector`], [`basis`] | poses, vectors and bases |
+//! | [`shape`], [`mesh`], [`terrain`] | shapes, mesh files and their convex decomposition, generated terrain |
+//! | [`RenderScene`], [`Instance`], [`Material`], [`Texture`], [`Light`], [`Sky`], [`Marker`] | a scene to render |
+//! | [`SceneState`], [`VisibleState`], [`Contacts`], [`Requires`] | state of all environments at one time |
+//! | [`Random`], [`Philox`], [`sampling`] | random numbers and sample warping |
+//! | [`Ray`], [`framing`] | rays, and camera placement around a scene |
+//! | [`file_format`], [`yaml`], [`pattern`], [`source`], [`AtomicFile`] | configuration files, name patterns, files |
+//!
+//! ```
+//! use kinetoscope_scene::shape::Sphere;
+//! use kinetoscope_scene::{Instance, Material, RenderScene};
+//!
+//! let ball = Instance::new(Sphere { radius: 0.5 }, Material::default(), 1);
+//! let scene = RenderScene::new(vec![ball])?;
+//! assert_eq!(scene.instances().len(), 1);
+//! # Ok::<(), kinetoscope_scene::RenderSceneError>(())
+//! ```
 #![forbid(unsafe_code)]
 
 mod atomic_file;

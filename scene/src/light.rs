@@ -1,8 +1,8 @@
-//! Light, sky and haze.
+//! Lights, sky and haze.
 //!
-//! Light colours are linear intensities, surface colours are meant for the screen (sRGB): see the colour channel.
+//! Light colors are linear intensities. Surface colors are display colors (sRGB).
 
-/// What kind of lamp a light is.
+/// Type of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightKind {
     /// Parallel rays along [`Light::direction`].
@@ -11,42 +11,42 @@ pub enum LightKind {
     Spot {
         /// Half angle of the cone \[deg\], at most 90.
         cutoff_deg: f32,
-        /// How fast the light falls off from the axis: cos(angle) to this power, of which the nearest whole number up to 128 is
-        /// drawn.
+        /// Exponent of the falloff from the axis: cos(angle) to this power. Renderers use the nearest whole number up
+        /// to 128.
         exponent: f32,
     },
-    /// The same in all directions; the rasterizer draws no shadow of it.
+    /// Uniform in all directions. The rasterizer draws no shadows of this type.
     Point,
 }
 
-/// A lamp, with MuJoCo's parameters.
+/// A light, with MuJoCo's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
-    /// What kind of lamp it is.
+    /// Type of the light.
     pub kind: LightKind,
-    /// Where it is, world frame \[m\].
+    /// Position, world frame \[m\].
     pub position: [f32; 3],
-    /// Where it shines, world frame; need not be a unit vector.
+    /// Direction of the emitted light, world frame; need not be a unit vector.
     pub direction: [f32; 3],
-    /// Colour of the light that comes from everywhere.
+    /// Ambient color.
     pub ambient: [f32; 3],
-    /// Colour of the light that surfaces scatter.
+    /// Diffuse color.
     pub diffuse: [f32; 3],
-    /// Colour of highlights.
+    /// Specular color.
     pub specular: [f32; 3],
-    /// Constant, linear and quadratic attenuation: intensity is 1 / (c + l d + q d²). Not for directional lights.
+    /// Constant, linear and quadratic attenuation: intensity is 1 / (c + l d + q d²). Unused for directional lights.
     pub attenuation: [f32; 3],
-    /// How large it is, for soft shadows in ray-traced pictures: the radius of its disc \[m\]; of a directional lamp, at a
-    /// distance of 1 m (the tangent of its angular radius). 0 is a point, whose shadows are sharp.
+    /// Radius of the light's disc, for soft shadows in ray-traced images \[m\]. For a directional light, the radius at
+    /// a distance of 1 m (the tangent of its angular radius). With 0, shadows are sharp.
     pub radius: f32,
-    /// Whether things in the light cast a shadow.
+    /// True if instances in the light cast shadows.
     pub cast_shadow: bool,
-    /// Whether it is on.
+    /// True if the light is on.
     pub active: bool,
 }
 
 impl Default for Light {
-    /// Straight down from 3 m, MuJoCo's defaults.
+    /// A directional light straight down, at a height of 3 m: MuJoCo's defaults.
     fn default() -> Self {
         Self {
             kind: LightKind::Directional,
@@ -63,34 +63,39 @@ impl Default for Light {
     }
 }
 
-/// How the light of several lamps is added up, and multiplied by the colour of a surface.
+/// Rule by which light is added up and multiplied by the color of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightSum {
-    /// As physics does it: light is linear, and colours are taken from sRGB to linear.
+    /// Physical rule: light is linear, and surface colors are converted from sRGB to linear.
     #[default]
     Linear,
-    /// As OpenGL and MuJoCo's renderer do it: sRGB numbers of light and surfaces are added and multiplied as they are, and the
-    /// sum ends at 1. Colours of lamps are sRGB numbers, and metals are no different. Path-traced frames take colours of lamps
-    /// to linear light and add that.
+    /// Rule of OpenGL and MuJoCo's renderer: sRGB values of lights and surfaces are added and multiplied directly, and
+    /// the sum is clamped to 1.
+    ///
+    /// Light colors are sRGB values, and metals are not treated separately. The path tracer converts light colors to
+    /// linear light and adds that.
     Display,
 }
 
-/// The lamp on every camera.
+/// The headlight: a light at every camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Headlight {
-    /// Colour of the light that comes from everywhere.
+    /// Ambient color.
     pub ambient: [f32; 3],
-    /// Colour of the light that surfaces scatter.
+    /// Diffuse color.
     pub diffuse: [f32; 3],
-    /// Colour of highlights.
+    /// Specular color.
     pub specular: [f32; 3],
-    /// Whether it is on.
+    /// True if the headlight is on.
     pub active: bool,
 }
 
 impl Headlight {
-    /// The headlight as a directional light along the camera's viewing direction `forward`, as MuJoCo's renderer has it; `None`
-    /// where it is off, or shines from the camera's position: in our own light, and of cameras that look everywhere.
+    /// Returns the headlight as a directional light along the camera's viewing direction `forward`, as in MuJoCo's
+    /// renderer.
+    ///
+    /// Returns `None` if the headlight is off, for [`LightSum::Linear`], and for omnidirectional cameras (`forward` is
+    /// `None`). In the last two cases, the headlight shines from the camera's position.
     pub fn along(&self, sum: LightSum, forward: Option<[f32; 3]>) -> Option<Light> {
         let direction = forward.filter(|_| self.active && sum == LightSum::Display)?;
         Some(Light {
@@ -106,18 +111,18 @@ impl Headlight {
 }
 
 impl Default for Headlight {
-    /// Dimmer than MuJoCo's (0.1, 0.4, 0.5), because [`Hemisphere`] fills the shadows.
+    /// Dimmer than MuJoCo's headlight (0.1, 0.4, 0.5), because [`Hemisphere`] fills the shadows.
     fn default() -> Self {
         Self { ambient: [0.0; 3], diffuse: [0.2; 3], specular: [0.1; 3], active: true }
     }
 }
 
-/// Ambient light that depends on which way a surface looks.
+/// Ambient light that depends on the orientation of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hemisphere {
-    /// On surfaces that look up (+z).
+    /// Color on surfaces that face up (+z).
     pub sky: [f32; 3],
-    /// On surfaces that look down.
+    /// Color on surfaces that face down.
     pub ground: [f32; 3],
 }
 
@@ -127,19 +132,19 @@ impl Default for Hemisphere {
     }
 }
 
-/// What is seen where nothing is: a gradient over the elevation, screen colours (sRGB, 0..=1).
+/// Background: a gradient over the elevation, in display colors (sRGB, 0..=1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sky {
-    /// Straight up.
+    /// Color straight up.
     pub zenith: [f32; 3],
-    /// At the horizon.
+    /// Color at the horizon.
     pub horizon: [f32; 3],
-    /// Straight down.
+    /// Color straight down.
     pub nadir: [f32; 3],
 }
 
 impl Sky {
-    /// The same colour everywhere.
+    /// A sky of one color.
     pub const fn uniform(color: [f32; 3]) -> Self {
         Self { zenith: color, horizon: color, nadir: color }
     }
@@ -151,25 +156,27 @@ impl Default for Sky {
     }
 }
 
-/// Far things fade into a colour.
+/// Haze: distant surfaces fade into a color.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Haze {
-    /// The colour of the distance; `None` is the sky behind it.
+    /// Color of the haze; `None` is the sky behind the surface.
     pub color: Option<[f32; 3]>,
-    /// Distance from the camera where it begins \[m\].
+    /// Distance from the camera at which the haze begins \[m\].
     pub start: f32,
-    /// Distance where only haze is left \[m\].
+    /// Distance from the camera beyond which only haze is visible \[m\].
     pub end: f32,
 }
 
-/// Haze where an endless ground ends, as MuJoCo's renderer draws it: the ground fades into a colour, and the colour into what
-/// is behind, up to the height of the camera. It acts on the first endless plane, of cameras above it, and on colours only.
+/// Haze at the end of an infinite ground, as in MuJoCo's renderer.
+///
+/// The ground fades into a color, and this color into the background, up to the height of the camera. The haze acts on
+/// the first infinite plane, for cameras above it, and on the color channel only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HorizonHaze {
-    /// Colour (sRGB, 0..=1).
+    /// Color (sRGB, 0..=1).
     pub color: [f32; 3],
-    /// Distance along the ground, from below the camera, where nothing of the ground is left \[m\].
+    /// Distance along the ground, from below the camera, beyond which no ground is visible \[m\].
     pub radius: f32,
-    /// Part of the radius over which the ground fades, 0..=1.
+    /// Fraction of the radius over which the ground fades, 0..=1.
     pub width: f32,
 }

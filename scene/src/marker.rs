@@ -1,4 +1,4 @@
-//! Markers: what sensors show of what they measure. They are drawn for people and never measured.
+//! Markers: visualizations of sensor measurements. Markers are drawn for users and never measured.
 
 use crate::material::Material;
 use crate::mesh::TriMesh;
@@ -8,14 +8,14 @@ use crate::{Pose, PoseF32};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// A coloured thing at a place of an environment.
+/// A colored marker in an environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Marker {
-    /// What it is.
+    /// Kind and size.
     pub kind: MarkerKind,
-    /// Where it is in the environment.
+    /// Pose in the environment frame.
     pub pose: Pose,
-    /// Colour and opacity, 0..=1; axes have their own colours.
+    /// Color and opacity, 0..=1; axes have their own colors.
     pub rgba: [f32; 4],
 }
 
@@ -23,7 +23,7 @@ pub struct Marker {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MarkerKind {
-    /// A ball around the pose.
+    /// A sphere around the pose.
     Sphere {
         /// Radius \[m\].
         radius: f32,
@@ -43,19 +43,21 @@ pub enum MarkerKind {
 }
 
 impl Marker {
-    /// What the mask channel says of markers, where they are drawn.
+    /// Value of drawn markers in the mask channel.
     pub const MASK_ID: i32 = -1;
-    /// A geom group for markers among other things, where they are to be told apart: MuJoCo's groups are 0 to 5.
+    /// Geom group that separates markers from other instances: MuJoCo's groups are 0 to 5.
     pub const GROUP: u8 = 31;
 
-    /// A ball.
+    /// A sphere at `center` \[m\].
     pub fn sphere(center: [f64; 3], radius: f32, rgba: [f32; 4]) -> Self {
         let [x, y, z] = center;
         Self { kind: MarkerKind::Sphere { radius }, pose: Pose::translation(x, y, z), rgba }
     }
 
-    /// An arrow from `tail` that is `vector` long \[m\]; its shaft is a twentieth of that thick. `None` for a vector that has
-    /// no direction.
+    /// An arrow from `tail` with the direction and length of `vector` \[m\]; the diameter of its shaft is 1/20 of its
+    /// length.
+    ///
+    /// Returns `None` for a vector without a direction.
     pub fn arrow(tail: [f64; 3], vector: [f64; 3], rgba: [f32; 4]) -> Option<Self> {
         let vector = Vector3::from(vector);
         let length = vector.norm();
@@ -68,13 +70,12 @@ impl Marker {
         Some(Self { kind, pose: Pose::from_parts(Translation3::from(Vector3::from(tail)), rotation), rgba })
     }
 
-    /// Axes of a frame.
+    /// The axes of a frame, each of `length` \[m\].
     pub fn axes(pose: Pose, length: f32) -> Self {
         Self { kind: MarkerKind::Axes { length }, pose, rgba: [1.0; 4] }
     }
 
-    /// What is drawn for it, each thing with its pose in the environment. Sizes and places that cannot be drawn give
-    /// nothing.
+    /// Instances that draw the marker, with their poses in the environment. Invalid sizes and poses give no instances.
     pub fn instances(&self) -> Vec<(Instance, PoseF32)> {
         let drawn = match self.kind {
             MarkerKind::Sphere { radius } => vec![(shape::Shape::from(Sphere { radius }), Pose::identity(), self.rgba)],
@@ -91,7 +92,7 @@ impl Marker {
             }
         };
         let place = |(shape, local, rgba): (shape::Shape, Pose, [f32; 4])| {
-            // Their own light: a marker is as bright in the shade.
+            // Emission keeps markers bright in shadow.
             let material = Material { emission: 0.4, specular: 0.1, ..Material::from_rgba(rgba) };
             (Instance::new(shape, material, Self::MASK_ID), PoseF32::from(&(self.pose * local)))
         };
@@ -100,7 +101,7 @@ impl Marker {
     }
 }
 
-/// A shaft along z with a cone at its end, of 12 sides.
+/// A shaft along z with a cone at its end, with 12 sides.
 fn arrow(length: f32, radius: f32) -> shape::Shape {
     let (r, head) = (f64::from(radius), f64::from(length) * 0.25);
     let (neck, tip) = (f64::from(length) - head, f64::from(length));
@@ -112,7 +113,7 @@ fn arrow(length: f32, radius: f32) -> shape::Shape {
 mod tests {
     use super::*;
 
-    /// The instances' corners in the environment.
+    /// Bounding box of the marker's instances in the environment.
     fn extent(marker: &Marker) -> [[f32; 3]; 2] {
         let (mut lo, mut hi) = ([f32::MAX; 3], [f32::MIN; 3]);
         for (instance, pose) in marker.instances() {

@@ -1,41 +1,41 @@
-//! How surfaces look.
+//! Surface materials and textures.
 
 use std::sync::Arc;
 use std::sync::OnceLock;
 
-/// The look of a surface, with MuJoCo's parameters.
+/// A surface material, with MuJoCo's parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// Colour and opacity in 0..=1, the colour meant for the screen as it is (sRGB); it multiplies the texture.
+    /// Color and opacity in 0..=1. The color is a display color (sRGB) and multiplies the texture.
     pub rgba: [f32; 4],
-    /// Image on the surface.
+    /// Texture on the surface.
     pub texture: Option<Arc<Texture>>,
-    /// How often a 2D texture repeats over the shape, or over 2 m with `tex_uniform`, as MuJoCo's renderer draws it.
+    /// Repetitions of a 2D texture over the shape, or over 2 m with `tex_uniform`, as in MuJoCo's renderer.
     pub tex_repeat: [f32; 2],
     /// True if `tex_repeat` is per 2 m instead of per shape.
     pub tex_uniform: bool,
-    /// Own light, as a multiple of the colour.
+    /// Emitted light, as a multiple of the color.
     pub emission: f32,
     /// Strength of highlights in 0..=1.
     pub specular: f32,
     /// Sharpness of highlights in 0..=1: the exponent is 128 times this.
     pub shininess: f32,
-    /// Share that is mirrored perfectly, in 0..=1: by opaque planes and by the +z face of boxes, in all renderers; by other
-    /// shapes in path-traced frames only.
+    /// Mirror reflectance in 0..=1. Opaque planes and the +z faces of boxes reflect in all renderers, other shapes only
+    /// in path-traced images.
     pub reflectance: f32,
-    /// How much of the surface is metal, in 0..=1: light does not get below it, and what it mirrors has its colour.
+    /// Metallic share in 0..=1. A metal has no diffuse reflection, and its specular reflection has its color.
     pub metallic: f32,
-    /// How rough it is, in 0..=1, instead of `shininess`: alpha of the GGX law is its square.
+    /// Roughness in 0..=1, instead of `shininess`: alpha of the GGX distribution is its square.
     pub roughness: Option<f32>,
-    /// How much of the light goes through, bent as by glass, in 0..=1. Of closed shapes, and of paths only: other renderers
-    /// draw the surface. See-through without bending is the opacity of `rgba`.
+    /// Share of transmitted light in 0..=1, refracted as by glass. Only the path tracer transmits light, through closed
+    /// shapes; other renderers draw the surface. The opacity of `rgba` is transparency without refraction.
     pub transmission: f32,
-    /// Refractive index of what is inside, at least 1: 1.5 for glass, 1.33 for water.
+    /// Refractive index of the interior, at least 1: 1.5 for glass, 1.33 for water.
     pub refractive_index: f32,
 }
 
 impl Default for Material {
-    /// MuJoCo's defaults for a geom without a material: grey, half glossy.
+    /// MuJoCo's defaults for a geom without a material: gray, half glossy.
     fn default() -> Self {
         Self {
             rgba: [0.5, 0.5, 0.5, 1.0],
@@ -55,13 +55,13 @@ impl Default for Material {
 }
 
 impl Material {
-    /// A plain colour.
+    /// A material with a plain color.
     pub fn from_rgba(rgba: [f32; 4]) -> Self {
         Self { rgba, ..Self::default() }
     }
 
-    /// The exponent of its highlights in Blinn's and Phong's law, 1 to 128: 128 times `shininess`, or that of a roughness,
-    /// 2 / alpha² - 2. Source: Walter et al., Microfacet models for refraction through rough surfaces, 2007, section 5.2.
+    /// Exponent of the highlights in Blinn's and Phong's models, 1 to 128: 128 times `shininess`, or 2 / alpha² - 2 for
+    /// a roughness. Source: Walter et al., Microfacet models for refraction through rough surfaces, 2007, section 5.2.
     pub fn exponent(&self) -> f32 {
         let exponent = match self.roughness {
             Some(roughness) => 2.0 / roughness.clamp(0.0, 1.0).powi(4) - 2.0,
@@ -71,23 +71,24 @@ impl Material {
     }
 }
 
-/// How an image lies on a surface.
+/// Mapping of a texture onto a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextureKind {
-    /// By texture coordinates, or by x and y of the shape.
+    /// Mapped by texture coordinates, or by x and y of the shape.
     TwoD,
-    /// By direction from the middle of the shape. The image is six squares from top to bottom: +x, -x, +y, -y, +z, -z.
+    /// Mapped by direction from the center of the shape. The image is six squares from top to bottom: +x, -x, +y, -y,
+    /// +z, -z.
     Cube,
 }
 
-/// An image for surfaces, with all its smaller versions (a mip chain, averaged in linear light).
+/// A texture with its mip chain, which is averaged in linear light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     kind: TextureKind,
     levels: Vec<Level>,
 }
 
-/// One size of a texture.
+/// A mip level of a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
     width: u32,
@@ -95,38 +96,38 @@ pub struct Level {
     bytes: Vec<u8>,
 }
 
-/// Why pixels do not make a texture.
+/// Error of [`Texture::new`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TextureError {
     /// The sizes are zero, too large or do not fit the number of bytes.
     #[error("a texture of {width} x {height} pixels with {channels} channels cannot have {bytes} bytes")]
     Size {
-        /// Pixels per row.
+        /// Width \[pixels\].
         width: u32,
-        /// Rows.
+        /// Height \[pixels\].
         height: u32,
-        /// Bytes per pixel; 3 or 4 are allowed.
+        /// Bytes per pixel: 3 or 4 are allowed.
         channels: u32,
-        /// Bytes given.
+        /// Number of bytes given.
         bytes: usize,
     },
     /// A cube texture is not six squares.
     #[error("a cube texture is six squares from top to bottom, not {width} x {height}")]
     NotSixSquares {
-        /// Pixels per row.
+        /// Width \[pixels\].
         width: u32,
-        /// Rows.
+        /// Height \[pixels\].
         height: u32,
     },
 }
 
 impl Texture {
-    /// A texture of `channels` (3 or 4) bytes per pixel (sRGB) from the top left. Opacity is not used.
+    /// Creates a texture from sRGB pixels of `channels` (3 or 4) bytes, from the top left. Opacity is ignored.
     ///
     /// # Errors
     ///
-    /// Where the sizes do not fit the bytes, or a cube is not six squares.
+    /// The sizes are zero, above 65536 or do not fit the number of bytes, or a cube texture is not six squares.
     pub fn new(kind: TextureKind, width: u32, height: u32, channels: u32, data: &[u8]) -> Result<Self, TextureError> {
         let expected = u64::from(width) * u64::from(height) * u64::from(channels);
         if !(3..=4).contains(&channels) || expected == 0 || expected != data.len() as u64 || width.max(height) > 1 << 16
@@ -138,7 +139,7 @@ impl Texture {
         }
         let pixels: Vec<_> = data.chunks_exact(channels as usize).map(|p| [p[0], p[1], p[2], 255]).collect();
         let mut levels = vec![Level::new(width, height, &pixels)];
-        // The faces of a cube must not mix: halve only while a face has an even side.
+        // The faces of a cube must not mix, so only levels with an even side are halved.
         let shrinks = |l: &Level| match kind {
             TextureKind::TwoD => l.width > 1 || l.height > 1,
             TextureKind::Cube => l.width.is_multiple_of(2),
@@ -150,7 +151,9 @@ impl Texture {
         Ok(Self { kind, levels })
     }
 
-    /// Squares of two colours, as MuJoCo's builtin "checker": two by two of them, `size` pixels in all.
+    /// A checkerboard of 2 x 2 squares in two colors, as MuJoCo's builtin "checker".
+    ///
+    /// `size` is the side of the image \[pixels\], clamped to 2..=4096 and rounded down to an even number.
     pub fn checker(size: u32, a: [u8; 3], b: [u8; 3]) -> Self {
         let size = size.clamp(2, 4096) & !1;
         let pick = |k: u32| if (k % size < size / 2) == (k / size < size / 2) { a } else { b };
@@ -164,12 +167,12 @@ impl Texture {
         Self { kind: TextureKind::TwoD, levels }
     }
 
-    /// How the image lies on a surface.
+    /// Mapping of the texture onto a surface.
     pub fn kind(&self) -> TextureKind {
         self.kind
     }
 
-    /// The image in all its sizes, the largest first.
+    /// Mip levels, the largest first.
     pub fn levels(&self) -> &[Level] {
         &self.levels
     }
@@ -182,28 +185,29 @@ impl Level {
         Self { width, height, bytes: bytes.collect() }
     }
 
-    /// Pixels per row.
+    /// Width \[pixels\].
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows.
+    /// Height \[pixels\].
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// Colours (sRGB) from the top left, four bytes each, of which the fourth is not used. A row has
-    /// [`width`](Self::width) + 1 pixels, and there is a row more than [`height`](Self::height): the last column and the
-    /// last row repeat the first, so that the four pixels around a point are two pairs in memory wherever it lies.
+    /// Colors (sRGB) from the top left, four bytes each; the fourth byte is unused.
+    ///
+    /// A row has [`width`](Self::width) + 1 pixels, and there are [`height`](Self::height) + 1 rows. The last column
+    /// and the last row repeat the first ones, so that the four pixels around any point are two pairs in memory.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// The colour of a pixel inside of the image.
+    /// Color of a pixel inside the image, as sRGB bytes; the fourth byte is unused.
     ///
     /// # Panics
     ///
-    /// Where there is no such pixel.
+    /// If the pixel is out of range.
     #[track_caller]
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
         assert!(x < self.width && y < self.height, "pixel ({x}, {y}) of {} x {}", self.width, self.height);
@@ -211,7 +215,7 @@ impl Level {
         [0, 1, 2, 3].map(|k| self.bytes[at + k])
     }
 
-    /// Half the size, each pixel the mean of four in linear light.
+    /// Level of half the size; each pixel is the mean of four in linear light.
     fn half(&self) -> Self {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let table = srgb_to_linear();
@@ -226,19 +230,19 @@ impl Level {
     }
 }
 
-/// Linear light of every sRGB byte.
+/// Linear light of each sRGB byte.
 fn srgb_to_linear() -> &'static [f32; 256] {
     static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
     TABLE.get_or_init(|| std::array::from_fn(|k| decode_srgb(k as f32 / 255.0)))
 }
 
-/// Linear light of an sRGB value in 0..=1. Source: IEC 61966-2-1.
+/// Converts an sRGB value, clamped to 0..=1, to linear light. Source: IEC 61966-2-1.
 pub fn decode_srgb(x: f32) -> f32 {
     let x = f64::from(x.clamp(0.0, 1.0));
     (if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }) as f32
 }
 
-/// The sRGB byte of linear light in 0..=1. Source: IEC 61966-2-1.
+/// Converts linear light, clamped to 0..=1, to an sRGB byte. Source: IEC 61966-2-1.
 fn linear_to_srgb8(x: f32) -> u8 {
     let x = f64::from(x.clamp(0.0, 1.0));
     let y = if x <= 0.003_130_8 { x * 12.92 } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
@@ -249,8 +253,8 @@ fn linear_to_srgb8(x: f32) -> u8 {
 mod tests {
     use super::*;
 
-    /// IEC 61966-2-1: a tenth of the scale on the line and beyond it, the ends, and the well known middle, where byte 188 is
-    /// half of the light (0.5029).
+    /// IEC 61966-2-1: a value on the linear segment and one beyond it, the ends, and byte 188, which is half of the
+    /// light (0.5029).
     #[test]
     fn srgb() {
         let table = srgb_to_linear();
@@ -259,7 +263,7 @@ mod tests {
         assert!((table[10] - 10.0 / 255.0 / 12.92).abs() < 1e-9, "on the line: {}", table[10]);
         assert!((decode_srgb(0.5) - 0.214_041).abs() < 1e-6, "{}", decode_srgb(0.5));
         assert_eq!((decode_srgb(-1.0), decode_srgb(7.0)), (0.0, 1.0), "held within the scale");
-        // There and back: every byte is itself.
+        // Round trip of every byte.
         assert!((0..=255).all(|byte: u8| linear_to_srgb8(table[byte as usize]) == byte));
         assert!(table.windows(2).all(|pair| pair[0] < pair[1]), "brighter is more");
     }

@@ -1,7 +1,7 @@
 //! Name patterns: regular expressions that must match a whole name.
 //!
-//! The dialect is the `regex` crate's, matching is case-sensitive and always against the full name, as Python's
-//! `re.fullmatch` does. A pattern that matches nothing is an error, and so is a name claimed twice: a typing error in a
+//! The dialect is that of the `regex` crate. Matching is case-sensitive and against the full name, as in Python's
+//! `re.fullmatch`. A pattern without a match is an error, and so is a name that is matched twice: a typing error in a
 //! script must never silently drive fewer joints than the user meant.
 
 use regex::Regex;
@@ -12,9 +12,9 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("there is no {what} {name:?}; {}", known(.candidates))]
 pub struct UnknownName {
-    /// Kind of thing that was looked for.
+    /// Kind of the name, such as `joint`.
     pub what: &'static str,
-    /// The name given.
+    /// The given name.
     pub name: String,
     /// Known names, the most similar first.
     pub candidates: Vec<String>,
@@ -25,21 +25,21 @@ fn known(candidates: &[String]) -> String {
     if quoted.is_empty() { "there are none".into() } else { format!("known are {}", quoted.join(", ")) }
 }
 
-/// Why a list of patterns could not be applied to a list of names.
+/// Error in the application of patterns to a list of names.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PatternError {
-    /// The pattern is no regular expression.
+    /// The pattern is not a regular expression.
     #[error("pattern \"{pattern}\" is not a regular expression: {reason}")]
     Invalid {
         /// The pattern as written.
         pattern: String,
-        /// What is wrong with it.
+        /// Reason.
         reason: String,
-        /// The engine's own error.
+        /// Error of the regex engine.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// The pattern uses look-around or back-references, which this dialect does not have.
+    /// The pattern uses look-around or back-references, which this dialect does not support.
     #[error(
         "pattern \"{pattern}\" uses {feature}, which name patterns do not support; list the names instead, such as \
          \"(joint1|joint2)\""
@@ -47,27 +47,27 @@ pub enum PatternError {
     Unsupported {
         /// The pattern as written.
         pattern: String,
-        /// The feature that is not there.
+        /// The unsupported feature.
         feature: &'static str,
-        /// The engine's own error.
+        /// Error of the regex engine.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// The pattern matches none of the names.
+    /// The pattern matches no name.
     #[error("pattern \"{pattern}\" matches no {what} (the whole name must match, case counts); {}", list(.candidates, *.total))]
     NoMatch {
         /// The pattern as written.
         pattern: String,
-        /// What the names are, such as `joint`.
+        /// Kind of the names, such as `joint`.
         what: &'static str,
-        /// The names, the closest first; at most [`MAX_CANDIDATES`].
+        /// Names, the closest first; at most [`MAX_CANDIDATES`].
         candidates: Vec<String>,
-        /// How many names there are.
+        /// Number of names.
         total: usize,
     },
     /// Two patterns match the same name.
     #[error("{what} \"{name}\" is matched by both \"{first}\" and \"{second}\"; make the two disjoint")]
     MatchedTwice {
-        /// What the name is, such as `joint`.
+        /// Kind of the name, such as `joint`.
         what: &'static str,
         /// The name.
         name: String,
@@ -78,7 +78,7 @@ pub enum PatternError {
     },
 }
 
-/// How many candidates an error lists at most.
+/// Largest number of candidates in an error.
 pub const MAX_CANDIDATES: usize = 12;
 
 /// A compiled name pattern.
@@ -93,9 +93,9 @@ impl Pattern {
     /// # Errors
     /// [`PatternError::Invalid`] or [`PatternError::Unsupported`].
     pub fn new(pattern: &str) -> Result<Self, PatternError> {
-        // The bare pattern is compiled first: wrapping could turn nonsense such as `a)|(b` into something valid.
+        // The bare pattern is compiled first, because wrapping could make nonsense such as `a)|(b` valid.
         let compiled = Regex::new(pattern).and_then(|_| {
-            // A trailing comment of `(?x)` would swallow the closing parenthesis, hence the second form.
+            // A trailing comment of `(?x)` would include the closing parenthesis, hence the second form.
             Regex::new(&format!(r"\A(?:{pattern})\z")).or_else(|_| Regex::new(&format!("\\A(?:{pattern}\n)\\z")))
         });
         match compiled {
@@ -104,7 +104,7 @@ impl Pattern {
         }
     }
 
-    /// Whether the whole of `name` matches.
+    /// True if the whole of `name` matches.
     pub fn matches(&self, name: &str) -> bool {
         self.regex.is_match(name)
     }
@@ -130,12 +130,13 @@ fn explain(pattern: &str, error: regex::Error) -> PatternError {
     }
 }
 
-/// Indices of the names that the patterns match: names in their order within a pattern, patterns one after the other.
+/// Returns the indices of the names that the patterns match: pattern by pattern, in the order of names within a
+/// pattern.
 ///
-/// `what` says what the names are, such as `joint`.
+/// `what` is the kind of the names, such as `joint`.
 ///
 /// # Errors
-/// A pattern that does not compile or matches nothing, and a name matched by two patterns.
+/// A pattern does not compile or matches no name, or two patterns match the same name.
 pub fn select<P: AsRef<str>, N: AsRef<str>>(
     patterns: &[P],
     names: &[N],
@@ -153,12 +154,13 @@ pub fn select<P: AsRef<str>, N: AsRef<str>>(
     Ok(selected)
 }
 
-/// The value that `{pattern: value}` entries give to each name; `None` where no entry matches.
+/// Returns the value of the `{pattern: value}` entry that matches each name; `None` for names without an entry.
 ///
-/// A key that equals the name of a group (a control part) means the members of that group and is not read as a pattern.
+/// A key that equals the name of a group (a control part) selects the members of that group and is not read as a
+/// pattern.
 ///
 /// # Errors
-/// A key that does not compile or matches nothing, and a name reached by two keys.
+/// A key does not compile or matches no name, or two keys select the same name.
 ///
 /// # Panics
 /// If a group holds an index outside of `names`.
@@ -211,13 +213,14 @@ fn claim<'k, N: AsRef<str>>(
     }
 }
 
-/// A name or pattern without what says "in every environment" before it, `{ENV}/` or Isaac's `{ENV_REGEX_NS}/`: whatever is
-/// named is named in all of them.
+/// Removes a prefix that means "in every environment" from a name or pattern: `{ENV}/`, or Isaac's `{ENV_REGEX_NS}/`.
+///
+/// Names refer to all environments even without it.
 pub fn in_every_env(name: &str) -> &str {
     ["{ENV}/", "{ENV_REGEX_NS}/"].into_iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name)
 }
 
-/// The candidates most like `name`, best first, at most [`MAX_CANDIDATES`]; case counts little.
+/// Candidates most similar to `name`, best first, at most [`MAX_CANDIDATES`]. Case has little weight.
 pub fn closest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) -> Vec<&'c str> {
     let mut ranked: Vec<(usize, &str)> = candidates.into_iter().map(|c| (edit_distance(name, c), c)).collect();
     ranked.sort_by_key(|&(distance, _)| distance);
@@ -225,8 +228,8 @@ pub fn closest<'c>(name: &str, candidates: impl IntoIterator<Item = &'c str>) ->
     ranked.into_iter().map(|(_, c)| c).collect()
 }
 
-/// Twice the number of insertions, deletions and replacements between the lower-case names, plus one if only case
-/// differs. Only the first 64 characters count, so that a hostile name stays cheap.
+/// Twice the edit distance (insertions, deletions, replacements) of the lower-case names, plus one if the names differ.
+/// Only the first 64 characters count, which bounds the cost of malicious names.
 fn edit_distance(a: &str, b: &str) -> usize {
     let lower = |s: &str| s.chars().take(64).flat_map(char::to_lowercase).collect::<Vec<char>>();
     let (left, right) = (lower(a), lower(b));
@@ -243,7 +246,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
     2 * row[right.len()] + usize::from(a != b)
 }
 
-/// `candidates: "a", "b"`, or `closest of 240: "a", "b"` when the list was cut.
+/// Formats `candidates: "a", "b"`, or `closest of 240: "a", "b"` if the list was cut.
 pub fn list(candidates: &[String], total: usize) -> String {
     let quoted = candidates.iter().map(|c| format!("\"{c}\"")).collect::<Vec<_>>().join(", ");
     match total {
@@ -336,7 +339,7 @@ mod tests {
             ("robot", "robot"),
             ("{ENV}", "{ENV}"),
             ("a/{ENV}/robot", "a/{ENV}/robot"),
-            // Once: what is left is a name.
+            // Only one prefix is removed; the rest is a name.
             ("{ENV}/{ENV}/robot", "{ENV}/robot"),
         ] {
             assert_eq!(in_every_env(name), expected);

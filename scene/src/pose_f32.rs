@@ -1,9 +1,11 @@
-//! Poses as the renderer uses them: a rotation matrix and a translation in single precision.
+//! Poses of the renderer: a rotation matrix and a translation in single precision.
 
 use crate::Pose;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// A rigid transform in `f32`, row-major: `x -> rotation * x + translation`. Named as algebra: `world_from_instance`.
+/// A rigid transform in `f32`, row-major: `x -> rotation * x + translation`.
+///
+/// Variable names follow the algebra: `world_from_instance`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseF32 {
     /// Rows of the rotation matrix.
@@ -23,7 +25,7 @@ impl From<&PoseF32> for Pose {
         let rows = pose.rotation.map(|row| row.map(f64::from));
         let rotation = Matrix3::from_fn(|row, column| rows[row][column]);
         let translation = Vector3::from(pose.translation.map(f64::from));
-        // Of length 1 to double precision, though its numbers are single.
+        // Normalized in double precision, because the matrix is in single precision.
         let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
         Self::from_parts(translation.into(), UnitQuaternion::new_normalize(rotation.into_inner()))
     }
@@ -40,7 +42,7 @@ impl From<&Pose> for PoseF32 {
 }
 
 impl PoseF32 {
-    /// No rotation, no translation.
+    /// The identity.
     pub const IDENTITY: Self = Self { rotation: [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]], translation: [0., 0., 0.] };
 
     /// A pure translation \[m\].
@@ -71,7 +73,7 @@ impl PoseF32 {
         self.rotate_inverse([p[0] - t[0], p[1] - t[1], p[2] - t[2]])
     }
 
-    /// `self⁻¹ * other`, computed in double precision: two poses far from the origin but close to each other keep their
+    /// Returns `self⁻¹ * other`, computed in double precision, so that close poses far from the origin keep their
     /// digits.
     pub fn inverse_times(&self, other: &Self) -> Self {
         let a = self.rotation.map(|r| r.map(f64::from));
@@ -84,7 +86,7 @@ impl PoseF32 {
         }
     }
 
-    /// Whether every number is finite and the matrix is a rotation up to rounding.
+    /// True if every number is finite and the matrix is a rotation up to rounding.
     pub fn is_rigid(&self) -> bool {
         let r = &self.rotation;
         let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -108,7 +110,8 @@ mod tests {
     use crate::pose::from_xyz_rpy;
     use nalgebra::Point3;
 
-    /// The same maps in double precision judge; numbers of size 5 rounded to 6e-8 of themselves, a few times.
+    /// Agreement with the same maps in double precision. Numbers of size 5 are rounded to 6e-8 of themselves, a few
+    /// times.
     #[test]
     fn maps() {
         let pose = from_xyz_rpy([2.0, -3.0, 0.5], [0.3, -1.1, 2.0]);
@@ -127,7 +130,7 @@ mod tests {
 
     #[test]
     fn round_trip() {
-        // Half turns too, which have no trace to take a root of.
+        // Half turns too, whose quaternions have w = 0 and do not follow from the trace.
         for turn in [[0.3, -1.1, 2.0], [std::f64::consts::PI, 0.0, 0.0], [0.0, 0.0, std::f64::consts::PI], [0.0; 3]] {
             let pose = from_xyz_rpy([2.0, -3.0, 0.5], turn);
             let again = Pose::from(&PoseF32::from(&pose));
@@ -138,7 +141,7 @@ mod tests {
         }
     }
 
-    /// Two poses 100 km out and 2 m apart: one number in f32 there is 8 mm wide, their difference is exact.
+    /// Two poses 100 km from the origin and 2 m apart: the spacing of f32 there is 8 mm, but their difference is exact.
     #[test]
     fn far_out() {
         let turn = from_xyz_rpy([0.0; 3], [0.4, 0.2, -0.9]);

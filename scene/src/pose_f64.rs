@@ -1,8 +1,10 @@
-//! Poses as ray casters use them: a rotation matrix and a translation in double precision.
+//! Poses of ray casters: a rotation matrix and a translation in double precision.
 
 use crate::{Pose, PoseF32};
 
-/// A rigid transform in `f64`, row-major: `x -> rotation * x + translation`. Named as algebra: `world_from_instance`.
+/// A rigid transform in `f64`, row-major: `x -> rotation * x + translation`.
+///
+/// Variable names follow the algebra: `world_from_instance`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseF64 {
     /// Rows of the rotation matrix.
@@ -34,7 +36,7 @@ impl From<&PoseF64> for PoseF32 {
 }
 
 impl PoseF64 {
-    /// No rotation, no translation.
+    /// The identity.
     pub const IDENTITY: Self = Self { rotation: [[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]], translation: [0., 0., 0.] };
 
     /// A pure translation \[m\].
@@ -69,7 +71,7 @@ impl PoseF64 {
         self.rotate_inverse([p[0] - t[0], p[1] - t[1], p[2] - t[2]])
     }
 
-    /// Whether every number is finite.
+    /// True if every number is finite.
     pub fn is_finite(&self) -> bool {
         self.rotation.iter().flatten().chain(&self.translation).all(|x| x.is_finite())
     }

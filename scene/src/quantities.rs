@@ -1,17 +1,17 @@
-//! The macro behind the list of quantities in [`state`](crate::state): it makes the fields of `SceneState`, the flags of
-//! `Requires`, and everything that is done field by field.
+//! The macro behind the list of quantities in [`state`](crate::state). It generates the fields of `SceneState`, the
+//! flags of `Requires`, and all code that handles each field.
 
 use ndarray::{Array, Axis, RemoveAxis};
 
 /// Values of a quantity in all environments.
 pub(crate) trait PerEnv: Clone {
-    /// Values with `shape` in each environment, for lists without any entry.
+    /// Creates default values of `shape` in each environment; empty lists for quantities without a fixed size.
     fn with_room(num_envs: usize, shape: &[usize]) -> Self;
 
-    /// True if `other` has as many of everything, in `num_envs` environments.
+    /// True if `other` has the same sizes, in `num_envs` environments.
     fn fits(&self, other: &Self, num_envs: usize) -> bool;
 
-    /// Takes over the environments where `chosen` is true from values that [fit](Self::fits).
+    /// Copies the environments where `chosen` is true from values that [fit](Self::fits).
     fn take_over(&mut self, other: &Self, chosen: &[bool]);
 }
 
@@ -34,7 +34,7 @@ impl<T: Clone + Default, D: RemoveAxis> PerEnv for Array<T, D> {
     }
 }
 
-/// Lists of any length, one for each environment.
+/// Lists of variable length, one for each environment.
 impl<T: Clone> PerEnv for Vec<Vec<T>> {
     fn with_room(num_envs: usize, _shape: &[usize]) -> Self {
         vec![Vec::new(); num_envs]
@@ -51,8 +51,10 @@ impl<T: Clone> PerEnv for Vec<Vec<T>> {
     }
 }
 
-/// Takes a list of flags of `Requires`, each with its name in messages and the fields of `SceneState` that it stands for. A field
-/// has a type that is [`PerEnv`], and its shape in an environment: an axis of `Lengths`, and the width where there is another axis.
+/// Takes a list of flags of `Requires`, each with its name in messages and its fields of `SceneState`.
+///
+/// A field has a type that implements [`PerEnv`], and its shape in an environment: an axis of `Lengths`, and the width
+/// of a second axis.
 macro_rules! quantities {
     ($(
         $(#[$about:meta])*
@@ -67,17 +69,18 @@ macro_rules! quantities {
             pub step: Vec<u64>,
             /// Time of positions and velocities \[s\] since the last reset, shape \[num_envs\].
             pub time: Vec<f64>,
-            /// Time of efforts, accelerations and contacts \[s\] since the last reset, shape \[num_envs\]: one step of the physics
-            /// engine earlier than [`time`](Self::time); the same right after a reset or a write to the state, when
-            /// accelerations and contacts are solved for the state as it is.
+            /// Time of efforts, accelerations and contacts \[s\] since the last reset, shape \[num_envs\].
+            ///
+            /// It is one step of the physics engine earlier than [`time`](Self::time). Right after a reset or a write
+            /// to the state, both are equal, because accelerations and contacts are then solved for the current state.
             pub force_time: Vec<f64>,
             $($($(#[$doc])* pub $field: Option<$Type>,)+)+
-            /// Scenes of environments whose sizes or colours are their own, shape \[num_envs\]; empty where all environments
-            /// look alike.
+            /// Render scenes of environments with their own sizes or colors, shape \[num_envs\]; empty if all
+            /// environments share one scene.
             pub own_scenes: Vec<OwnScene>,
         }
 
-        /// Numbers of the flags.
+        /// Bit numbers of the flags.
         #[allow(non_camel_case_types, clippy::upper_case_acronyms, reason = "named as the flags")]
         enum Bit {
             $($FLAG,)+
@@ -89,7 +92,7 @@ macro_rules! quantities {
             /// All flags, with their names in messages.
             pub(crate) const NAMES: &'static [(Self, &'static str)] = &[$((Self::$FLAG, $name),)+];
 
-            /// The fields that `state` has.
+            /// Flags of the quantities that `state` has.
             pub fn present_in(state: &SceneState) -> Self {
                 let mut present = Self::NONE;
                 $(if [$(state.$field.is_some()),+].iter().all(|is| *is) {
@@ -98,7 +101,7 @@ macro_rules! quantities {
                 present
             }
 
-            /// The part of `state` that is in the set, with its steps and times.
+            /// Copies the part of `state` that is in the set, with its steps and times.
             pub fn part_of(self, state: &SceneState) -> SceneState {
                 let sees = self.contains(Self::VISIBLE) || self.contains(Self::INSTANCES);
                 SceneState {
@@ -112,7 +115,7 @@ macro_rules! quantities {
         }
 
         impl SceneState {
-            /// A state at step 0 with room for the quantities of `requires`.
+            /// Creates a state at step 0 with default values of the quantities of `requires`.
             pub fn with_room(requires: Requires, lengths: &Lengths) -> Self {
                 let n = lengths.num_envs;
                 let wants = |flag| requires.contains(flag);
@@ -123,8 +126,8 @@ macro_rules! quantities {
                 }
             }
 
-            /// The first array of `requires` that has another number of something than `lengths` says: of what, the number
-            /// that it should have, and the one it has.
+            /// Returns the first array of `requires` with a size other than in `lengths`, if any: name of the axis,
+            /// expected size, found size.
             pub fn misfit(&self, requires: Requires, lengths: &Lengths) -> Option<(&'static str, usize, usize)> {
                 $($($(if let Some([envs, count, ..]) = self.$field.as_ref().map(|array| array.shape())
                     && requires.contains(Requires::$FLAG)
@@ -140,7 +143,7 @@ macro_rules! quantities {
                 None
             }
 
-            /// True if `other` has every quantity of this state, with as many of everything.
+            /// True if `other` has every quantity of this state, in the same sizes.
             fn has_quantities_of(&self, other: &Self) -> bool {
                 let n = self.num_envs();
                 [$($(match (&self.$field, &other.$field) {
@@ -150,7 +153,7 @@ macro_rules! quantities {
                 },)+)+].iter().all(|fits| *fits)
             }
 
-            /// Takes over the quantities of this state in the environments where `chosen` is true.
+            /// Copies the quantities of this state from `other`, in the environments where `chosen` is true.
             fn take_over_quantities(&mut self, other: &Self, chosen: &[bool]) {
                 $($(if let (Some(mine), Some(others)) = (&mut self.$field, &other.$field) {
                     mine.take_over(others, chosen);

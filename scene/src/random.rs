@@ -1,8 +1,8 @@
-//! Random numbers that depend on what they are for, and on nothing else.
+//! Random numbers that depend only on their use.
 //!
-//! Every use has a generator of its own, keyed by the seed of the simulation, the global index of the environment and a
-//! name. Threads, the number of environments and what else is random do not change what comes out. [`Random`] draws one number
-//! after the other; [`Philox`] computes the numbers of any place.
+//! Every use has its own generator, keyed by the seed of the simulation, the global index of the environment and a
+//! name. Its numbers do not depend on threads, the number of environments or other random quantities. [`Random`]
+//! generates a sequence of numbers; [`Philox`] computes the numbers at any counter.
 
 mod philox;
 
@@ -17,8 +17,9 @@ use sha2::{Digest, Sha256};
 pub struct Random(Pcg64);
 
 impl Random {
-    /// The generator of the thing called `name` in the environment of global index `env`. Its state is the SHA-256 sum of
-    /// all three, so that keys that are alike give numbers that are not.
+    /// Creates the generator of the use `name` in the environment with global index `env`.
+    ///
+    /// Its state is the SHA-256 sum of all three arguments, so that similar keys give independent numbers.
     pub fn keyed(seed: u64, env: u64, name: &str) -> Self {
         let mut key = Sha256::new();
         key.update(seed.to_le_bytes());
@@ -27,17 +28,17 @@ impl Random {
         Self(Pcg64::from_seed(key.finalize().into()))
     }
 
-    /// Uniform in 0 (included) to 1 (excluded).
+    /// Uniform number in 0 (included) to 1 (excluded).
     pub fn uniform(&mut self) -> f64 {
         StandardUniform.sample(&mut self.0)
     }
 
-    /// Uniform from `low` to `high`.
+    /// Uniform number from `low` to `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }
 
-    /// Of the normal distribution with mean 0 and standard deviation 1.
+    /// Normal number with mean 0 and standard deviation 1.
     pub fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.0)
     }
@@ -61,7 +62,7 @@ mod tests {
     }
 
     /// Means of n numbers scatter by sigma / sqrt(n), variances of normal ones by sqrt(2 / n), those of uniform ones by
-    /// sqrt(1/180 / n): six times that fails once in 5e8 seeds, and the seeds here are fixed.
+    /// sqrt(1/180 / n). Limits of six times that fail once in 5e8 seeds, and the seeds here are fixed.
     #[test]
     fn moments() {
         let n = 100_000;
@@ -80,7 +81,7 @@ mod tests {
         assert!((variance - 1.0 / 12.0).abs() < 6.0 * (1.0_f64 / 180.0).sqrt() / root, "{variance}");
     }
 
-    /// Neighbouring environments: the correlation of n independent pairs scatters by 1 / sqrt(n).
+    /// Neighboring environments are independent: the correlation of n independent pairs scatters by 1 / sqrt(n).
     #[test]
     fn correlation() {
         let n = 100_000;

@@ -3,7 +3,7 @@
 use crate::PoseF64;
 use crate::vector::along;
 
-/// A half-line.
+/// A half-line with a unit direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Origin \[m\].
@@ -13,24 +13,24 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// The point at a distance \[m\].
+    /// Point at a distance \[m\] along the ray.
     #[inline]
     pub fn at(&self, distance: f64) -> [f64; 3] {
         along(self.origin, distance, self.direction)
     }
 
-    /// The ray in the frame that `pose` maps from.
+    /// Returns the ray in the frame that `pose` maps from.
     #[inline(always)]
     pub fn seen_from(&self, pose: &PoseF64) -> Self {
         Self { origin: pose.apply_inverse(self.origin), direction: pose.rotate_inverse(self.direction) }
     }
 
-    /// The ray of this frame in the frame that `pose` maps to.
+    /// Returns the ray in the frame that `pose` maps to.
     pub fn mapped_by(&self, pose: &PoseF64) -> Self {
         Self { origin: pose.apply(self.origin), direction: pose.rotate(self.direction) }
     }
 
-    /// True when all numbers are finite.
+    /// True if all numbers are finite.
     #[inline]
     pub fn is_finite(&self) -> bool {
         self.origin.iter().chain(&self.direction).all(|x| x.is_finite())

@@ -1,4 +1,4 @@
-//! Everything that can be seen, without the poses.
+//! Scenes to render, without poses.
 
 use crate::Pose;
 use crate::light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightSum, Sky};
@@ -6,34 +6,35 @@ use crate::material::{Material, Texture, TextureKind};
 use crate::shape::Shape;
 use std::sync::Arc;
 
-/// A thing to draw: a shape with a look and an identity.
+/// An instance of a shape, with a material and an identity.
 #[derive(Clone, Debug)]
 pub struct Instance {
-    /// Its surface.
+    /// Shape.
     pub shape: Shape,
-    /// Its look. With alpha 0 it is not drawn at all.
+    /// Material. An instance with alpha 0 is not drawn.
     pub material: Material,
-    /// What the mask channel says of it; never 0, which means nothing.
+    /// Value in the mask channel; never 0, which means no instance.
     pub mask_id: i32,
-    /// The geom group; a view may leave groups out.
+    /// Geom group; views may hide groups.
     pub group: u8,
-    /// Whether it is drawn.
+    /// True if the instance is drawn.
     pub visible: bool,
-    /// Whose it is: `uid/link`, the uid of an object, the name of a geom of the world (`ground`). Ray casters choose what
-    /// they hit by it; several instances may share it.
+    /// Name of the instance's owner: `uid/link`, the uid of an object, or the name of a geom of the world (`ground`). Ray casters
+    /// select their targets by name; several instances may share a name.
     pub name: Arc<str>,
-    /// The body that it belongs to, on the body axis of [`SceneState`](crate::SceneState); `None` for the world.
+    /// Index of the instance's body, on the body axis of [`SceneState`](crate::SceneState); `None` for the world.
     pub body: Option<u32>,
-    /// Whether it is welded to the world: it never moves but by a write to the state.
+    /// True if the instance is welded to the world: only a write to the state moves the instance.
     pub fixed: bool,
-    /// True if its shape may differ in every frame, as those of tendons and skins. Cameras draw it, ray casters do not meet it.
+    /// True if the shape may differ in every frame, as for tendons and skins. Cameras draw such instances, ray casters
+    /// ignore them.
     pub deforms: bool,
-    /// Where it is in the frame of what it belongs to: the link, the object; the identity for a geom of the world.
+    /// Pose in the frame of its owner (the link or object); the identity for a geom of the world.
     pub frame_from_instance: Pose,
 }
 
 impl Instance {
-    /// A visible instance in group 0, without a name, that may move.
+    /// Creates a visible, movable instance in group 0, without a name.
     pub fn new(shape: impl Into<Shape>, material: Material, mask_id: i32) -> Self {
         let name = Arc::from("");
         Self {
@@ -50,22 +51,24 @@ impl Instance {
         }
     }
 
-    /// The same instance with a name.
+    /// Returns the instance with a name.
     #[must_use]
     pub fn named(self, name: &str) -> Self {
         Self { name: Arc::from(name), ..self }
     }
 
-    /// The same instance as a part of a body.
+    /// Returns the instance as a part of a body.
     #[must_use]
     pub fn of_body(self, body: u32) -> Self {
         Self { body: Some(body), ..self }
     }
 
-    /// Scale \[1/m\] and offset of texture coordinates along the axes of its frame, for a shape without its own. A cube texture
-    /// is on a box around the shape. Others are projected along z, as MuJoCo's renderer does it: `tex_repeat` images over the
-    /// shape's size, or over 2 m with `tex_uniform` and on endless planes. An image begins at the corner of a finite plane,
-    /// and has its middle in the middle of other shapes.
+    /// Scale \[1/m\] and offset of texture coordinates along the axes of the instance, for a shape without its own
+    /// coordinates.
+    ///
+    /// A cube texture is mapped onto a box around the shape. Other textures are projected along z, as in MuJoCo's
+    /// renderer: `tex_repeat` images over the size of the shape, or over 2 m with `tex_uniform` and on infinite planes.
+    /// An image begins at the corner of a finite plane, and is centered on other shapes.
     fn texture_map(&self) -> ([f32; 3], [f32; 2]) {
         let material = &self.material;
         let [lo, hi] = self.shape.aabb();
@@ -80,7 +83,7 @@ impl Instance {
         let scale = [along(0), along(1), 0.0];
         let middle = [-0.5, 0.5];
         let offset = match &self.shape {
-            // Source: `makePlane` and `settexture` of MuJoCo 4. Whole numbers are left out: images repeat.
+            // Source: `makePlane` and `settexture` of MuJoCo 4. Whole numbers are dropped, because images repeat.
             Shape::Plane(_) => {
                 let begin = if endless(0) || endless(1) { middle } else { [0.0; 2] };
                 let corner = |k: usize, sign: f32| if endless(k) { 0.0 } else { sign * (scale[k] * half[k]).fract() };
@@ -91,15 +94,16 @@ impl Instance {
         (scale, offset)
     }
 
-    /// The same instance, welded to the world.
+    /// Returns the instance, welded to the world.
     #[must_use]
     pub fn fixed(self) -> Self {
         Self { fixed: true, ..self }
     }
 }
 
-/// What can be seen in an environment, without the poses: immutable, shared by all environments and threads. Each
-/// frame brings one pose per instance.
+/// Instances, lights and background of an environment, without poses.
+///
+/// A scene is shared by environments and threads. Each frame supplies one pose per instance.
 #[derive(Clone, Debug)]
 pub struct RenderScene {
     instances: Vec<Instance>,
@@ -107,70 +111,70 @@ pub struct RenderScene {
     linear_colors: Vec<[f32; 3]>,
     texture_scales: Vec<[f32; 3]>,
     texture_offsets: Vec<[f32; 2]>,
-    /// The lamps.
+    /// Lights.
     pub lights: Vec<Light>,
-    /// The lamp on every camera.
+    /// Headlight of every camera.
     pub headlight: Headlight,
-    /// Light from all around.
+    /// Ambient light from all directions.
     pub ambient: Hemisphere,
-    /// How the light of lamps is added up.
+    /// Rule by which light is added up.
     pub light_sum: LightSum,
-    /// What is behind everything.
+    /// Background.
     pub sky: Sky,
-    /// Image behind everything instead of `sky`, a [cube](TextureKind::Cube) around the camera in MuJoCo's axes: its faces are
-    /// those towards +x, -x, +z, -z, -y, +y.
+    /// Background image instead of `sky`: a [cube](TextureKind::Cube) around the camera in MuJoCo's axes, with faces
+    /// toward +x, -x, +z, -z, -y, +y.
     pub skybox: Option<Arc<Texture>>,
-    /// Far things fade.
+    /// Haze over distant surfaces.
     pub haze: Option<Haze>,
-    /// The end of an endless ground fades.
+    /// Haze at the end of an infinite ground.
     pub horizon: Option<HorizonHaze>,
 }
 
-/// What is wrong with a scene.
+/// Error of a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderSceneError {
     /// A mask id is 0.
     #[error("instance {instance} has mask id 0, which means that nothing was hit")]
     ZeroMaskId {
-        /// Which instance.
+        /// Index of the instance.
         instance: usize,
     },
     /// A size is not positive and finite.
     #[error("instance {instance}, a {shape}, has a size of {size}; sizes are positive and finite")]
     Size {
-        /// Which instance.
+        /// Index of the instance.
         instance: usize,
-        /// The kind of shape.
+        /// Name of the shape.
         shape: &'static str,
-        /// The size.
+        /// The size \[m\].
         size: f32,
     },
-    /// A colour or another number of a material is not finite.
+    /// A number of a material is not finite, or its refractive index is outside of 1 to 10.
     #[error("the material of instance {instance} has a number that is not finite")]
     Material {
-        /// Which instance.
+        /// Index of the instance.
         instance: usize,
     },
-    /// There are more triangles than ids.
+    /// The scene has more triangles than ids.
     #[error("the scene has more than {limit} triangles")]
     TooManyTriangles {
-        /// The limit.
+        /// Largest number of ids.
         limit: u32,
     },
 }
 
 impl RenderScene {
-    /// Ids that a shape without triangles occupies: one for each face of a box.
+    /// Number of ids of a shape without triangles: enough for one for each face of a box.
     pub const IDS_OF_PRIMITIVE: u32 = 8;
-    /// The largest number of ids.
+    /// Largest number of ids.
     pub(crate) const MAX_IDS: u32 = u32::MAX / 2;
 
-    /// A scene with the default lights: one from above and the headlight.
+    /// Creates a scene with the default lights: one from above and the headlight.
     ///
     /// # Errors
     ///
-    /// Sizes that are not positive, numbers that are not finite, mask ids of 0.
+    /// A size is not positive, a number is not finite, a mask id is 0, or there are too many triangles.
     pub fn new(instances: Vec<Instance>) -> Result<Self, RenderSceneError> {
         let mut first_ids = vec![0u32];
         let mut next = 0u32;
@@ -193,7 +197,7 @@ impl RenderScene {
         Ok(Self { linear_colors, texture_scales, texture_offsets, instances, first_ids, ..Self::empty() })
     }
 
-    /// Other things in the same light.
+    /// Creates a scene of other instances with the lights and the background of this one.
     ///
     /// # Errors
     ///
@@ -204,7 +208,7 @@ impl RenderScene {
         Ok(Self { lights, headlight, ambient, light_sum, sky, skybox, haze, horizon, ..Self::new(instances)? })
     }
 
-    /// Nothing but sky.
+    /// Creates a scene without instances, with the default lights and sky.
     pub fn empty() -> Self {
         Self {
             linear_colors: Vec::new(),
@@ -223,11 +227,11 @@ impl RenderScene {
         }
     }
 
-    /// Replaces the shape of an instance by one of the same kind, for one frame, and shows or hides the instance.
+    /// Replaces the shape of an instance by one of the same kind, and shows or hides the instance.
     ///
     /// # Panics
     ///
-    /// There is no such instance, its shape is of another kind, or a mesh has another number of triangles.
+    /// `index` is out of range, the shape is of another kind, or a mesh has another number of triangles.
     #[track_caller]
     pub fn set_shape(&mut self, index: usize, shape: Shape, visible: bool) {
         let instance = &mut self.instances[index];
@@ -241,12 +245,14 @@ impl RenderScene {
         (self.texture_scales[index], self.texture_offsets[index]) = instance.texture_map();
     }
 
-    /// Moves the vertices of an instance whose mesh is [deformable](crate::shape::RenderMesh::deformable): `deform` changes the mesh,
-    /// which is copied first if something else holds it too. Returns false, and changes nothing, for other shapes.
+    /// Moves the vertices of an instance whose mesh is [deformable](crate::shape::RenderMesh::deformable).
+    ///
+    /// `deform` changes the mesh, which is copied first if it is shared. Returns false, and changes nothing, for other
+    /// shapes.
     ///
     /// # Panics
     ///
-    /// There is no such instance.
+    /// `index` is out of range.
     #[track_caller]
     pub fn deform(&mut self, index: usize, deform: impl FnOnce(&mut crate::shape::RenderMesh)) -> bool {
         let Shape::Mesh(shape) = &mut self.instances[index].shape else { return false };
@@ -258,28 +264,29 @@ impl RenderScene {
         true
     }
 
-    /// The instances; poses come in the same order.
+    /// Instances, in the order of poses.
     pub fn instances(&self) -> &[Instance] {
         &self.instances
     }
 
-    /// Ids of each instance: `first_ids()[k]..first_ids()[k + 1]`. A mesh has one per triangle.
+    /// First id of each instance: instance k has the ids `first_ids()[k]..first_ids()[k + 1]`. A mesh has one per
+    /// triangle.
     pub fn first_ids(&self) -> &[u32] {
         &self.first_ids
     }
 
-    /// The colour of each instance's material in linear light.
+    /// Material color of each instance, in linear light.
     pub fn linear_colors(&self) -> &[[f32; 3]] {
         &self.linear_colors
     }
 
-    /// Texture coordinates per metre along the axes of each instance's frame, for shapes without their own: of a cube
-    /// texture, those of a cube of half length 1; of others, u and v.
+    /// Texture coordinates per meter along the axes of each instance's frame, for shapes without their own coordinates:
+    /// u and v, or for a cube texture the coordinates of a cube of half length 1.
     pub fn texture_scales(&self) -> &[[f32; 3]] {
         &self.texture_scales
     }
 
-    /// Texture coordinates u and v at the origin of each instance's frame, for shapes without their own.
+    /// Texture coordinates u and v at the origin of each instance's frame, for shapes without their own coordinates.
     pub fn texture_offsets(&self) -> &[[f32; 2]] {
         &self.texture_offsets
     }
@@ -295,7 +302,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// The first that is no good; the instance is called 0 there.
+    /// The first invalid value. The error gives the index of the instance as 0.
     pub fn validate(&self) -> Result<(), RenderSceneError> {
         self.validate_as(0)
     }
@@ -310,7 +317,7 @@ impl Instance {
         let m = &self.material;
         let numbers = [m.emission, m.specular, m.shininess, m.reflectance, m.tex_repeat[0], m.tex_repeat[1]];
         let numbers = numbers.into_iter().chain([m.metallic, m.roughness.unwrap_or_default(), m.transmission]);
-        // The largest of all that is known is 4, of germanium.
+        // The largest known refractive index is 4, of germanium.
         let bends = (1.0..=10.0).contains(&m.refractive_index);
         if !bends || m.rgba.into_iter().chain(numbers).any(|x| !x.is_finite()) {
             return Err(RenderSceneError::Material { instance });
@@ -318,7 +325,7 @@ impl Instance {
         Ok(())
     }
 
-    /// The triangles, for shapes that are made of them.
+    /// Triangles of the shape, if it is a mesh.
     pub fn mesh(&self) -> Option<&crate::shape::RenderMesh> {
         self.shape.mesh().map(Arc::as_ref)
     }
@@ -337,9 +344,10 @@ mod tests {
         Material { texture: Some(Arc::new(texture)), tex_repeat: [3.0, 5.0], tex_uniform, ..Material::default() }
     }
 
-    /// A box has an id for each face and room for 8, as a sphere; a mesh one for each triangle. A colour of the screen is
-    /// linear light by the law of sRGB: c / 12.92 up to 0.04045, ((c + 0.055) / 1.055)^2.4 above. A cube texture is on a cube
-    /// of half length 1 around the shape; another one repeats so often over the shape's size, or over 2 m.
+    /// A box has one id for each face and reserves 8, like a sphere; a mesh has one for each triangle. A display color
+    /// becomes linear light by the law of sRGB: c / 12.92 up to 0.04045, ((c + 0.055) / 1.055)^2.4 above. A cube
+    /// texture is on a cube of half length 1 around the shape. Other textures repeat over the size of the shape, or
+    /// over 2 m.
     #[test]
     fn instances() {
         let half = [0.5, 0.25, 2.0];
@@ -359,18 +367,18 @@ mod tests {
         assert_eq!(scene.triangle_count(), 12);
         let linear = [0.02 / 12.92, ((0.5 + 0.055) / 1.055_f32).powf(2.4), 1.0];
         let far = scene.linear_colors()[0].iter().zip(linear).map(|(found, expected)| (found - expected).abs());
-        // Single precision, and the eight bits of a screen are not asked for.
+        // Single precision, without the rounding to eight bits.
         assert!(far.fold(0.0, f32::max) < 1e-6, "{:?}", scene.linear_colors()[0]);
         let expected = [[2.0, 4.0, 0.5], [1.5, 2.5, 0.0], [3.0, 10.0, 0.0], [1.5, 1.25, 0.0]];
         assert_eq!(scene.texture_scales()[1..], expected);
         assert_eq!((RenderScene::empty().first_ids(), RenderScene::empty().linear_colors().len()), (&[0][..], 0));
     }
 
-    /// Texture coordinates of planes by the formulas of MuJoCo 4's renderer: `makePlane` gives each corner a coordinate,
-    /// `settexture` scales it by the repeats, by the half size too with `texuniform`, and moves that of an endless plane.
-    /// The image's rows run down there, and up here.
+    /// Texture coordinates of planes by the formulas of MuJoCo 4's renderer: `makePlane` gives each corner a
+    /// coordinate. `settexture` scales it by the repeats, by the half size too with `texuniform`, and shifts that of an
+    /// infinite plane. Image rows run downward in MuJoCo, and upward here.
     ///
-    /// Root cause once: with `tex_uniform` an image repeated once a metre, where MuJoCo repeats it once in 2 m.
+    /// Regression test: with `tex_uniform`, an image repeated once per meter, where MuJoCo repeats it once in 2 m.
     #[test]
     fn planes_are_textured_as_by_mujoco() {
         for (half, uniform) in

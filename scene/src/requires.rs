@@ -3,34 +3,37 @@
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
 
-/// The fields of a [`SceneState`](crate::SceneState) that a sensor needs. The flags are made from the list in `state.rs`.
+/// Set of the fields of a [`SceneState`](crate::SceneState) that a sensor needs.
+///
+/// The flags are generated from the list in `state.rs`.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub struct Requires(pub(crate) u32);
 
 impl Requires {
-    /// Nothing.
+    /// The empty set.
     pub const NONE: Self = Self(0);
 
-    /// Quantities that the engine solves for the beginning of a step. They are gone when the step is done, so the simulation must
-    /// know before the step that a sensor needs them.
+    /// Quantities that the engine solves for the beginning of a step.
+    ///
+    /// They are lost when the step is done, so a simulation must know before the step that a sensor needs them.
     pub const SOLVED: Self = Self::ACCELERATIONS.union(Self::CONTACTS).union(Self::JOINT_WRENCHES);
 
-    /// True if all of `other` is in this set.
+    /// True if this set contains all of `other`.
     pub const fn contains(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// The fields of both sets.
+    /// Fields that are in both sets.
     pub const fn intersection(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 
-    /// Both sets together.
+    /// Union of both sets.
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// This set without `other`.
+    /// Returns this set without `other`.
     pub const fn without(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }
@@ -40,7 +43,7 @@ impl Requires {
         self.0 == 0
     }
 
-    /// The names of the fields in the set.
+    /// Names of the fields in the set.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
         Self::NAMES.iter().filter(move |(field, _)| self.contains(*field)).map(|(_, name)| *name)
     }
@@ -60,7 +63,7 @@ impl BitOrAssign for Requires {
     }
 }
 
-/// `poses, contacts`; `nothing` for the empty set.
+/// Writes `poses, contacts`, or `nothing` for the empty set.
 impl fmt::Display for Requires {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_empty() {

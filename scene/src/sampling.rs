@@ -1,15 +1,15 @@
-//! Sampling: points of a disc and directions of a hemisphere, from uniform random numbers.
+//! Sample warping: points of a disc and directions of a hemisphere from uniform random numbers.
 
 use crate::vector::V3;
 use std::f64::consts::PI;
 
-/// Cosine and sine of a part of a turn, 0..=1, by their series: those of the library differ from machine to machine.
+/// Cosine and sine of a fraction of a turn, 0..=1, by their series. The library's functions differ between machines.
 #[inline]
 pub fn turn(part: f64) -> [f64; 2] {
     let quarter = (4.0 * part + 0.5) as i64;
     let x = (part - quarter as f64 / 4.0) * (2.0 * PI);
     let (mut cos, mut sin, mut term) = (1.0, x, 1.0);
-    // Up to an eighth of a turn: the last terms are below 1e-15.
+    // Up to an eighth of a turn, the last terms are below 1e-15.
     for k in 1..9 {
         let k = f64::from(k);
         term *= -(x * x) / ((2.0 * k - 1.0) * (2.0 * k));
@@ -24,14 +24,14 @@ pub fn turn(part: f64) -> [f64; 2] {
     }
 }
 
-/// A point of a disc of radius 1, evenly.
+/// Uniformly distributed point of a disc of radius 1.
 #[inline]
 pub fn on_disc([a, b]: [f64; 2]) -> [f64; 2] {
     let (r, [cos, sin]) = (a.sqrt(), turn(b));
     [r * cos, r * sin]
 }
 
-/// A direction by the cosine law.
+/// Cosine-distributed direction of the hemisphere around +z.
 #[inline]
 pub fn cosine(at: [f64; 2]) -> V3 {
     let [x, y] = on_disc(at);

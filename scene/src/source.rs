@@ -1,20 +1,20 @@
-//! Where a thing was said: file and line, carried from the URDF to MuJoCo's compile errors.
+//! Source positions: file and line, carried from the URDF to MuJoCo's compile errors.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A place in a user's file.
+/// A position in a user's file.
 #[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Source {
-    /// The file as the user named it.
+    /// Path of the file as the user gave it.
     pub file: Arc<PathBuf>,
     /// Line, counted from 1.
     pub line: u32,
 }
 
 impl Source {
-    /// A place in `file`.
+    /// Creates a position in `file`.
     pub fn new(file: impl AsRef<Path>, line: u32) -> Self {
         Self { file: Arc::new(file.as_ref().to_path_buf()), line }
     }

@@ -1,10 +1,11 @@
-//! `SceneState`: what the simulation measured in all environments, as plain arrays.
+//! `SceneState`: the state of all environments that sensors measure, as plain arrays.
 //!
-//! The simulation fills it after every physics step, sensors read it. The first axis is the environment; arrays are in C
-//! order, f64, environment-local world frame, SI. Only what somebody asked for is present.
+//! The simulation fills the state after every physics step, and sensors read it. The first axis is the environment.
+//! Arrays are in C order, f64, in the environment-local world frame and SI units. Only requested quantities are
+//! present.
 //!
-//! Two instants meet in one step from t_k to t_(k+1): contacts, efforts and accelerations are solved for t_k, positions
-//! and velocities are those of t_(k+1). Both times are given.
+//! A step from t_k to t_(k+1) involves two times: contacts, efforts and accelerations are solved for t_k, positions and
+//! velocities are those of t_(k+1). The state has both times.
 
 use crate::quantities::{PerEnv, quantities};
 use crate::requires::Requires;
@@ -12,51 +13,54 @@ use crate::{Light, Marker, PoseF32, PoseF64, RenderScene};
 use ndarray::{Array2, Array3};
 use std::sync::Arc;
 
-// All quantities that sensors may ask for; the simulation fills each by a file of its own.
+// All quantities that sensors may request. The simulation fills each one in its own file.
 quantities! {
-    /// [`SceneState::body_poses`].
+    /// Flag of [`SceneState::body_poses`].
     POSES = "poses" {
         /// Poses of bodies `[x, y, z, qw, qx, qy, qz]` \[m\], shape \[num_envs, bodies, 7\].
         body_poses: Array3<f64> [bodies, 7],
     }
 
-    /// [`SceneState::body_velocities`].
+    /// Flag of [`SceneState::body_velocities`].
     VELOCITIES = "velocities" {
-        /// Velocities of body origins, then angular velocities \[m/s, rad/s\], in world axes, shape \[num_envs, bodies, 6\].
+        /// Velocities of body origins, then angular velocities \[m/s, rad/s\], world axes, shape \[num_envs, bodies, 6\].
         body_velocities: Array3<f64> [bodies, 6],
     }
 
-    /// [`SceneState::body_accelerations`], [`SceneState::force_poses`] and [`SceneState::force_velocities`]; costs the
-    /// engine a pass of its own.
+    /// Flag of [`SceneState::body_accelerations`], [`SceneState::force_poses`] and [`SceneState::force_velocities`];
+    /// costs the engine an extra pass.
     ACCELERATIONS = "accelerations" {
-        /// Accelerations of body origins, then angular accelerations \[m/s², rad/s²\], in world axes, without gravity (0 at
-        /// rest, -9.81 along z in free fall), shape \[num_envs, bodies, 6\]. They are what the engine solved for; where it damps
-        /// joints implicitly after that (the `damping` of joints with native actuators), velocities change by a little less.
+        /// Accelerations of body origins, then angular accelerations \[m/s², rad/s²\], in world axes, without gravity
+        /// (0 at rest, -9.81 along z in free fall), shape \[num_envs, bodies, 6\].
+        ///
+        /// They are the solution of the engine. If the engine then damps joints implicitly (the `damping` of joints
+        /// with native actuators), velocities change slightly less.
         body_accelerations: Array3<f64> [bodies, 6],
-        /// Poses of bodies at [`force_time`](Self::force_time), as in [`body_poses`](Self::body_poses); there where
-        /// [`body_accelerations`](Self::body_accelerations) is.
+        /// Poses of bodies at [`force_time`](Self::force_time), as in [`body_poses`](Self::body_poses); present with
+        /// [`body_accelerations`](Self::body_accelerations).
         force_poses: Array3<f64> [bodies, 7],
-        /// Velocities of bodies at [`force_time`](Self::force_time), as in [`body_velocities`](Self::body_velocities); there
-        /// where [`body_accelerations`](Self::body_accelerations) is.
+        /// Velocities of bodies at [`force_time`](Self::force_time), as in [`body_velocities`](Self::body_velocities);
+        /// present with [`body_accelerations`](Self::body_accelerations).
         force_velocities: Array3<f64> [bodies, 6],
     }
 
-    /// [`SceneState::contacts`].
+    /// Flag of [`SceneState::contacts`].
     CONTACTS = "contacts" {
         /// Contacts with forces.
         contacts: Contacts,
     }
 
-    /// [`SceneState::joint_efforts`].
+    /// Flag of [`SceneState::joint_efforts`].
     JOINT_EFFORTS = "joint_efforts" {
-        /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\]. For joints of
-        /// MJCF files, MuJoCo's `qfrc_actuator`: the sum of what the file's actuators exert on the joint, with the compensation of
-        /// gravity that is the actuators' (`actuatorgravcomp`), within the joint's `actuatorfrcrange` (MuJoCo 2.2.2 has neither of
-        /// these two); after a reset, on the state as it is.
+        /// Efforts of the joint drives in the last step \[N m or N\], 0 after a reset, shape \[num_envs, joints\].
+        ///
+        /// For joints of MJCF files, MuJoCo's `qfrc_actuator`: the sum of the actuators' efforts on the joint, with
+        /// gravity compensation by actuators (`actuatorgravcomp`), clamped to the joint's `actuatorfrcrange` (MuJoCo
+        /// 2.2.2 has neither of these two). After a reset, it is computed for the current state.
         joint_efforts: Array2<f64> [joints],
     }
 
-    /// [`SceneState::joint_positions`] and [`SceneState::joint_velocities`].
+    /// Flag of [`SceneState::joint_positions`] and [`SceneState::joint_velocities`].
     JOINT_STATE = "joint_state" {
         /// Joint positions \[rad or m\], shape \[num_envs, joints\]: one for each joint with one degree of freedom.
         joint_positions: Array2<f64> [joints],
@@ -64,48 +68,52 @@ quantities! {
         joint_velocities: Array2<f64> [joints],
     }
 
-    /// [`SceneState::sensordata`].
+    /// Flag of [`SceneState::sensordata`].
     SENSORDATA = "sensordata" {
         /// Values of the physics engine's own sensors, shape \[num_envs, values\].
         sensordata: Array2<f64> [engine_values],
     }
 
-    /// [`SceneState::visible`], and the [`RenderScene`] that sensors are built for.
+    /// Flag of [`SceneState::visible`], and of the [`RenderScene`] that sensors are built for.
     VISIBLE = "visible" {
-        /// Poses of instances that can be seen.
+        /// Poses of visible instances.
         visible: VisibleState,
     }
 
-    /// [`SceneState::joint_wrenches`]; costs the engine a pass of its own.
+    /// Flag of [`SceneState::joint_wrenches`]; costs the engine an extra pass.
     JOINT_WRENCHES = "joint_wrenches" {
-        /// Forces, then torques that the joint of each link exerts on it \[N, N m\], about the origin of the link and in the
-        /// link's own axes, shape \[num_envs, bodies, 6\]. NaN for links that are fused to others: no joint of theirs moves.
+        /// Forces, then torques that the joint of each link exerts on the link \[N, N m\], about the origin of the link
+        /// and in its axes, shape \[num_envs, bodies, 6\]. NaN for links that are fused to other links, because their
+        /// joint does not move.
         joint_wrenches: Array3<f64> [bodies, 6],
     }
 
-    /// [`SceneState::instance_poses`], and the [`RenderScene`] that sensors are built for.
+    /// Flag of [`SceneState::instance_poses`], and of the [`RenderScene`] that sensors are built for.
     INSTANCES = "instances" {
-        /// World from instance, in the order of [`RenderScene::instances`], in double precision
-        /// (what ray casters work with), shape \[num_envs, instances\].
+        /// World-from-instance poses, in the order of [`RenderScene::instances`], in double precision for ray casters,
+        /// shape \[num_envs, instances\].
         instance_poses: Array2<PoseF64> [instances],
     }
 
-    /// [`SceneState::actuator_controls`], [`SceneState::actuator_forces`] and [`SceneState::actuator_activations`].
+    /// Flag of [`SceneState::actuator_controls`], [`SceneState::actuator_forces`] and
+    /// [`SceneState::actuator_activations`].
     ACTUATORS = "actuators" {
-        /// Controls of actuators, shape \[num_envs, actuators\]: the target of a drive's position \[rad or m\], what an actuator
-        /// of an MJCF file is told, in the unit that the file gives it.
+        /// Controls of actuators, shape \[num_envs, actuators\]: the position target of a drive \[rad or m\]; for an
+        /// actuator of an MJCF file, its control in the unit of the file.
         actuator_controls: Array2<f64> [actuators],
-        /// Forces of actuators \[N m or N\], as [`joint_efforts`](Self::joint_efforts) for drives, in the unit of the file for
-        /// those of MJCF files (before the gear), shape \[num_envs, actuators\].
+        /// Forces of actuators, shape \[num_envs, actuators\].
+        ///
+        /// For drives, the values of [`joint_efforts`](Self::joint_efforts) \[N m or N\]; for actuators of MJCF files, the
+        /// force in the unit of the file, before the gear.
         actuator_forces: Array2<f64> [actuators],
-        /// Activations of actuators, shape \[num_envs, actuators\]; 0 for those that have none. Of those that have several (MuJoCo
-        /// 4.x: `actdim`), the last one, which is what their force is made of.
+        /// Activations of actuators, shape \[num_envs, actuators\]; 0 for actuators without activation. For actuators
+        /// with several activations (MuJoCo 4.x: `actdim`), the last one, which determines their force.
         actuator_activations: Array2<f64> [actuators],
     }
 
-    /// [`SceneState::markers`], of all other sensors.
+    /// Flag of [`SceneState::markers`], the markers of all other sensors.
     MARKERS = "markers" {
-        /// Markers by which sensors show their measurements, shape \[num_envs\]: for cameras that draw it.
+        /// Markers that visualize sensor measurements, shape \[num_envs\], for cameras that draw them.
         markers: Vec<Vec<Marker>>,
     }
 }
@@ -128,15 +136,16 @@ pub struct Lengths {
 }
 
 impl Lengths {
-    /// The entries of an axis in messages.
+    /// Name of the entries of an axis, for messages.
     fn label(axis: &'static str) -> &'static str {
         if axis == "engine_values" { "values of the engine's sensors" } else { axis }
     }
 }
 
-/// What can be seen in one environment instead of the scene of all: the same instances in the same order and of the same
-/// kinds, with sizes or colours of their own; nothing where it looks as all do. Two are equal where they are the same in
-/// memory.
+/// Render scene of one environment; `None` if the environment uses the shared scene.
+///
+/// An own scene has the instances of the shared scene, in the same order and of the same kinds, with its own sizes or
+/// colors. Two values are equal if they are the same object in memory.
 #[derive(Clone, Debug, Default)]
 pub struct OwnScene(pub Option<Arc<RenderScene>>);
 
@@ -150,48 +159,49 @@ impl PartialEq for OwnScene {
     }
 }
 
-/// Where everything of a [`RenderScene`] is in all environments.
+/// Poses of the instances and lights of a [`RenderScene`] in all environments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VisibleState {
-    /// World from instance, in the order of [`RenderScene::instances`], shape
-    /// \[num_envs, instances\]. Single precision: what the renderer works with.
+    /// World-from-instance poses, in the order of [`RenderScene::instances`], in single precision for the renderer,
+    /// shape \[num_envs, instances\].
     pub instance_poses: Array2<PoseF32>,
-    /// The scene's lamps where they are now, shape \[num_envs, lamps\].
+    /// Lights of the scene at their current poses, shape \[num_envs, lights\].
     pub lights: Array2<Light>,
-    /// The scenes with the shapes of this moment, sizes and colours of the environments' own included, shape \[num_envs\];
-    /// empty for a scene in which no shape [changes](crate::Instance::deforms).
+    /// Scenes with their current shapes, including own sizes and colors of environments, shape \[num_envs\]; empty for
+    /// a scene whose shapes do not [change](crate::Instance::deforms).
     pub scenes: Vec<OwnScene>,
 }
 
-/// Contacts of all environments in one list, environment after environment.
+/// Contacts of all environments in one list, ordered by environment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contacts {
-    /// Environment `e` owns the contacts `first[e]..first[e + 1]`, shape \[num_envs + 1\].
+    /// Offsets in the list, shape \[num_envs + 1\]: environment `e` owns the contacts `first[e]..first[e + 1]`.
     pub first: Vec<usize>,
     /// The contacts.
     pub list: Vec<Contact>,
 }
 
-/// Two bodies that touch.
+/// A contact of two bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// The bodies that touch, as indices of the body axis of [`SceneState`]; `None` is the world. Links that were fused
-    /// keep their own index.
+    /// The two bodies, as indices of the body axis of [`SceneState`]; `None` is the world. Fused links keep their own
+    /// index.
     pub bodies: [Option<u32>; 2],
-    /// Where \[m\].
+    /// Position \[m\].
     pub point: [f64; 3],
     /// Unit vector from the first body to the second.
     pub normal: [f64; 3],
-    /// Gap \[m\]; negative where they overlap.
+    /// Gap \[m\]; negative for penetration.
     pub distance: f64,
-    /// Force on the second body \[N\], friction included; the first one gets its negative.
+    /// Force on the second body \[N\], including friction. The force on the first body is its negative.
     pub force: [f64; 3],
-    /// Its part along [`normal`](Self::normal) \[N\], not negative where bodies do not stick; the rest is friction.
+    /// Component of the force along [`normal`](Self::normal) \[N\], not negative unless bodies adhere; the rest is
+    /// friction.
     pub normal_force: f64,
 }
 
 impl SceneState {
-    /// A state at step 0 with nothing in it.
+    /// Creates a state at step 0 without quantities.
     pub fn new(num_envs: usize) -> Self {
         Self { step: vec![0; num_envs], time: vec![0.0; num_envs], force_time: vec![0.0; num_envs], ..Self::default() }
     }
@@ -201,22 +211,23 @@ impl SceneState {
         self.step.len()
     }
 
-    /// What can be seen in environment `env`, where that is the environment's own.
+    /// Own render scene of environment `env`, if it does not use the shared scene.
     pub fn own_scene(&self, env: usize) -> &OwnScene {
         static AS_ALL: OwnScene = OwnScene(None);
         self.own_scenes.get(env).unwrap_or(&AS_ALL)
     }
 
-    /// What cameras see in environment `env`, where that is not the scene of all: with the shapes of this moment.
+    /// Scene that cameras see in environment `env`, with its current shapes, if it is not the shared scene.
     pub fn seen_scene(&self, env: usize) -> &OwnScene {
         let shaped = self.visible.as_ref().and_then(|visible| visible.scenes.get(env));
         shaped.unwrap_or_else(|| self.own_scene(env))
     }
 
-    /// Takes over from `other` the environments where `chosen` is true: steps, times, and the fields that this state has.
-    /// `false`, and nothing is taken over, where `other` is not of the same scene: it lacks a field of this one, or has
-    /// another number of anything. Allocates only where the list of contacts has no room for those of before and those of after
-    /// together: the new list is made behind the old one, and the room stays.
+    /// Copies the environments where `chosen` is true from `other`: steps, times, and the fields that this state has.
+    ///
+    /// Returns `false` and changes nothing if `other` is not of the same scene: it lacks a field of this state, or has
+    /// other sizes. Allocates only if the capacity of the contact list does not suffice for old and new contacts
+    /// together: the new list is built behind the old one, and the capacity is kept.
     #[must_use]
     pub fn take_over(&mut self, other: &Self, chosen: &[bool]) -> bool {
         if !(chosen.len() == self.num_envs() && self.fits(other)) {
@@ -239,7 +250,7 @@ impl SceneState {
         true
     }
 
-    /// True if `other` has every field of this state, with as many of everything.
+    /// True if `other` has every field of this state, in the same sizes.
     fn fits(&self, other: &Self) -> bool {
         let n = self.num_envs();
         [other.step.len(), other.time.len(), other.force_time.len()] == [n; 3] && self.has_quantities_of(other)
@@ -247,7 +258,7 @@ impl SceneState {
 }
 
 impl PerEnv for VisibleState {
-    /// No instance and no lamp: a [`RenderScene`] says how many there are.
+    /// Empty arrays, because the numbers of instances and lights come from a [`RenderScene`].
     fn with_room(_num_envs: usize, _shape: &[usize]) -> Self {
         Self::default()
     }
@@ -277,7 +288,8 @@ impl PerEnv for Contacts {
     }
 
     fn take_over(&mut self, other: &Self, chosen: &[bool]) {
-        // The new list grows behind the old one, which then goes: it allocates only while both together are more than ever.
+        // The new list is built behind the old one, which is then removed. This allocates only if both exceed the
+        // capacity.
         let old = self.list.len();
         for (env, chosen) in chosen.iter().enumerate() {
             let mine = self.first[env]..self.first[env + 1];
@@ -300,7 +312,7 @@ impl Contacts {
     ///
     /// # Panics
     ///
-    /// If there is no such environment.
+    /// If `env` is out of range.
     #[track_caller]
     pub fn of(&self, env: usize) -> &[Contact] {
         &self.list[self.first[env]..self.first[env + 1]]
@@ -331,7 +343,7 @@ mod tests {
         assert_eq!(SceneState::new(3).num_envs(), 3);
     }
 
-    /// A state of 3 environments, every number of which says the environment and whose it is.
+    /// A state of 3 environments, in which every number identifies the environment and `who`.
     fn state(who: f64, contacts: [usize; 3]) -> SceneState {
         let first = (0..=3).map(|env| contacts[..env].iter().sum()).collect();
         let list = (0..3).flat_map(|env| vec![contact(env as f64, who); contacts[env]]).collect();
@@ -368,7 +380,7 @@ mod tests {
         }
     }
 
-    /// Every field of an environment is taken over or none is: the judge is a state made of the numbers of both.
+    /// All fields of the chosen environments are copied, and no others. Reference: a state made of the numbers of both.
     #[test]
     fn take_over() {
         let mut kept = state(100.0, [1, 0, 2]);
@@ -393,7 +405,7 @@ mod tests {
         }
         assert!(kept.take_over(&state(300.0, [2, 2, 2]), &[true; 3]));
         assert_eq!(kept, state(300.0, [2, 2, 2]));
-        // The control: no environment is chosen.
+        // Control: no environment is chosen.
         assert!(kept.take_over(&state(400.0, [1, 1, 1]), &[false; 3]));
         assert_eq!(kept, state(300.0, [2, 2, 2]));
     }
@@ -412,10 +424,10 @@ mod tests {
         assert_eq!(kept.own_scenes, [red.clone(), nothing.clone(), nothing.clone()]);
         assert!(kept.take_over(&with([&nothing, &large, &red]), &[false, true, true]));
         assert_eq!(kept.own_scenes, [red.clone(), large, red]);
-        // Back to what all look like.
+        // Back to the shared scene.
         assert!(kept.take_over(&state(300.0, [1, 1, 1]), &[true; 3]));
         assert!((0..3).all(|env| kept.own_scene(env) == &nothing));
-        // Without a visual scene nothing is kept.
+        // Without a visual quantity, no own scene is kept.
         let mut blind = SceneState::new(3);
         assert!(blind.take_over(&with([&nothing, &own(), &nothing]), &[true; 3]) && blind.own_scenes.is_empty());
     }
@@ -431,7 +443,7 @@ mod tests {
         assert!(!kept.take_over(&state(200.0, [1, 0, 2]), &[true; 2]));
         assert!(!kept.take_over(&SceneState::new(2), &[true; 3]));
         assert_eq!(kept, state(100.0, [1, 0, 2]), "nothing was changed");
-        // More than what is kept may be there.
+        // The other state may have more fields.
         assert!(SceneState::new(3).take_over(&state(200.0, [1, 0, 2]), &[true; 3]));
     }
 }

@@ -1,4 +1,4 @@
-//! Vectors of three numbers in double precision.
+//! Three-dimensional vectors in double precision.
 
 /// Three coordinates.
 pub type V3 = [f64; 3];
@@ -15,7 +15,7 @@ pub fn cross(a: V3, b: V3) -> V3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Difference.
+/// Difference `a - b`.
 #[inline(always)]
 pub fn sub(a: V3, b: V3) -> V3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
@@ -33,10 +33,10 @@ pub fn scale(a: V3, k: f64) -> V3 {
     a.map(|x| x * k)
 }
 
-/// The vector scaled to length 1; `None` for a zero vector and for numbers that are not finite.
+/// Vector scaled to length 1; `None` for a zero vector and for numbers that are not finite.
 #[inline(always)]
 pub fn unit(a: V3) -> Option<V3> {
-    // The largest component first: squares of tiny or huge numbers leave the range.
+    // Divided by the largest component first, because squares of tiny or huge numbers leave the range.
     let largest = a.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     if !(largest > 0.0 && largest.is_finite()) {
         return None;
@@ -45,7 +45,7 @@ pub fn unit(a: V3) -> Option<V3> {
     Some(scale(a, 1.0 / dot(a, a).sqrt()))
 }
 
-/// The same vector in double precision.
+/// Converts a vector to double precision.
 #[inline(always)]
 pub fn to_f64(a: [f32; 3]) -> V3 {
     a.map(f64::from)

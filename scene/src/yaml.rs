@@ -1,26 +1,26 @@
-//! YAML as a tree of values that know their lines, for calibration and scene files.
+//! YAML parser for calibration and scene files: a tree of values with their lines.
 
 use saphyr_parser::{Event, Parser, ScalarStyle, Tag};
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-/// Lists and tables within each other, at most.
+/// Largest depth of nested lists and tables.
 const DEPTH: usize = 48;
-/// Bytes at most, with everything that aliases stand for: aliases of aliases grow without end.
+/// Largest size with all aliases expanded \[bytes\]: aliases of aliases grow exponentially.
 const LARGEST: usize = 64 << 20;
 
-/// A kind of YAML files.
+/// Features that a kind of YAML file may use.
 #[derive(Clone, Copy, Debug)]
 pub struct Dialect {
     /// Name of these files in errors.
     pub files: &'static str,
-    /// Accepts aliases. They are refused otherwise.
+    /// True if aliases are accepted. Otherwise they are errors.
     pub aliases: bool,
-    /// Ignores tags. Tags other than `!!str` are refused otherwise.
+    /// True if tags are ignored. Otherwise, tags other than `!!str` are errors.
     pub tags: bool,
 }
 
-/// A value and its line, counted from 1; in a table, the line of its key.
+/// A value with its line; for an entry of a table, the line of its key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// Line, counted from 1.
@@ -29,21 +29,21 @@ pub struct Node {
     pub value: Value,
 }
 
-/// A value. Aliases share what they stand for.
+/// A value. Aliases share the value of their anchor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Neither a list nor a table.
+    /// A value that is neither a list nor a table.
     Scalar(Scalar),
     /// A list.
     List(Rc<[Node]>),
-    /// Keys and values, in the order of the file. Each key is there once.
+    /// Keys and values, in the order of the file. Keys are unique.
     Table(Rc<[(String, Node)]>),
 }
 
 /// A word, a number, or a text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scalar {
-    /// As in the file, without quotes.
+    /// Text as in the file, without quotes.
     pub text: String,
     /// Type by YAML 1.2's core schema.
     pub kind: ScalarKind,
@@ -52,17 +52,17 @@ pub struct Scalar {
 /// Types of YAML 1.2's core schema.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ScalarKind {
-    /// Nothing, `~` or `null`.
+    /// An empty value, `~` or `null`.
     Null,
     /// `true` or `false`.
     Bool(bool),
-    /// A number as TOML writes it: without superfluous zeros and signs, with a digit on both sides of a point.
+    /// A number in TOML's notation: without superfluous zeros and signs, with a digit on both sides of a point.
     Number(String),
-    /// All others, and everything in quotes.
+    /// Any other text, and everything in quotes.
     Text,
 }
 
-/// Error in a file, with its place.
+/// Error in a file, with its position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct YamlError {
     /// Line, counted from 1.
@@ -84,13 +84,14 @@ impl Value {
     }
 }
 
-/// A list or a table that has not ended.
+/// A list or table that is not complete yet.
 #[derive(Debug)]
 struct Open {
     line: usize,
     content: Content,
-    /// Its anchor, and the size of the file before it.
+    /// Number of the anchor; 0 without an anchor.
     anchor: usize,
+    /// Size of the file before this value \[bytes\].
     begin: usize,
 }
 
@@ -100,16 +101,16 @@ enum Content {
     Table {
         entries: Vec<(String, Node)>,
         names: HashSet<String>,
-        /// A key without its value, and its line.
+        /// A key whose value is still missing, and its line.
         key: Option<(String, usize)>,
     },
 }
 
-/// Reads the only document of a text; `None` without one.
+/// Parses the only document of a text; `None` for an empty text.
 ///
 /// # Errors
-/// No YAML, several documents, keys that are there twice, aliases and tags that `dialect` refuses, and more than this reader's
-/// limits of depth and size.
+/// The text is not YAML, has several documents or duplicate keys, uses aliases or tags that `dialect` rejects, or
+/// exceeds this parser's limits of depth and size.
 pub fn parse(text: &str, dialect: &Dialect) -> Result<Option<Node>, YamlError> {
     let mut builder = Builder { dialect, open: Vec::new(), root: None, anchors: HashMap::new(), size: 0 };
     let mut parser = Parser::new_from_str(text);
@@ -131,7 +132,7 @@ struct Builder<'a> {
     root: Option<Node>,
     /// Values of anchors, and their sizes.
     anchors: HashMap<usize, (Value, usize)>,
-    /// About as many bytes as the file has with everything that aliases stand for.
+    /// Approximate size of the file with all aliases expanded \[bytes\].
     size: usize,
 }
 
@@ -176,7 +177,7 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// Returns true for the tag of texts.
+    /// True for the tag `!!str`. A tag that the dialect rejects is an error.
     fn is_text(&self, tag: Option<&Tag>) -> Result<bool, String> {
         match tag {
             Some(tag) if tag.is_yaml_core_schema() && tag.suffix == "str" => Ok(true),
@@ -202,10 +203,10 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// Counts a value of `bytes`. Returns the size before it.
+    /// Counts a value of `bytes` bytes, and returns the size before it.
     fn grow(&mut self, bytes: usize) -> Result<usize, String> {
         let begin = self.size;
-        // Two for brackets, commas and colons.
+        // Two more for brackets, commas and colons.
         self.size += bytes + 2;
         if self.size > LARGEST {
             return Err("with all its aliases the file is larger than 64 MiB".into());
@@ -213,7 +214,7 @@ impl Builder<'_> {
         Ok(begin)
     }
 
-    /// Refuses values other than words in place of a key.
+    /// Returns an error for a list or table in place of a key.
     fn no_key(&self) -> Result<(), String> {
         match self.open.last() {
             Some(Open { content: Content::Table { key: None, .. }, .. }) => {
@@ -223,7 +224,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Places a complete value, and keeps it for aliases.
+    /// Places a complete value, and stores it for aliases.
     fn close(&mut self, node: Node, anchor: usize, begin: usize) -> Result<(), String> {
         if anchor > 0 && self.dialect.aliases {
             self.anchors.insert(anchor, (node.value.clone(), self.size - begin));
@@ -243,7 +244,7 @@ impl Builder<'_> {
                     }
                     *key = Some((text, node.line));
                 }
-                // `no_key` has refused it.
+                // `no_key` has rejected it.
                 (None, _) => {}
             },
         }
@@ -251,7 +252,7 @@ impl Builder<'_> {
     }
 }
 
-/// Returns the type of a word without quotes.
+/// Type of a word without quotes.
 fn kind_of(text: &str) -> ScalarKind {
     let number = |text: String| ScalarKind::Number(text);
     match text {
@@ -281,13 +282,13 @@ fn kind_of(text: &str) -> ScalarKind {
     {
         return number(text.into());
     }
-    // Rust's other numbers (`inf`, `nan`, `infinity`) are texts in YAML.
+    // Rust also parses `inf`, `nan` and `infinity`, which are texts in YAML.
     let is_number = digits.bytes().any(|byte| byte.is_ascii_digit())
         && digits.bytes().all(|byte| byte.is_ascii_digit() || b".eE+-".contains(&byte))
         && !digits.starts_with(['+', '-', 'e', 'E']);
     match digits.parse::<f64>() {
         Ok(value) if is_number && value.is_finite() => number(format!("{sign}{value:?}")),
-        // Larger than every number: refused when it is read.
+        // Larger than every finite number, which is an error when the number is used.
         Ok(_) if is_number => number(format!("{sign}1e999")),
         _ => ScalarKind::Text,
     }

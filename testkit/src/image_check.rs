@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-/// An image under test, and how much of it may differ.
+/// An image under test, with its tolerances.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageCheck<'a> {
-    /// Names the file of the difference.
+    /// Name of the image, which names the file of the difference.
     pub name: &'a str,
     /// Width and height \[pixels\].
     pub size: [usize; 2],
@@ -16,7 +16,8 @@ pub struct ImageCheck<'a> {
 }
 
 impl ImageCheck<'_> {
-    /// Compares with an answer for each pixel `(column, row)`; pixels without an answer (`None`) are left out.
+    /// Asserts that an image has the expected value of each pixel `(column, row)`; pixels without one (`None`) are
+    /// skipped.
     #[track_caller]
     pub fn assert_matches(&self, found: &[f32], expected: impl Fn(usize, usize) -> Option<f64>) {
         let [width, height] = self.size;
@@ -51,7 +52,7 @@ impl ImageCheck<'_> {
         );
     }
 
-    /// Counts the pixels that differ by more than the tolerance, and those that have an expected value: for controls.
+    /// Counts the pixels that differ by more than the tolerance, and those that have an expected value. For controls.
     pub fn count(&self, found: &[f32], expected: impl Fn(usize, usize) -> Option<f64>) -> [usize; 2] {
         let of_pixel = |(k, &found): (usize, &f32)| {
             let expected = expected(k % self.size[0], k / self.size[0])?;
@@ -62,7 +63,7 @@ impl ImageCheck<'_> {
         [compared.iter().filter(|wrong| **wrong).count(), compared.len()]
     }
 
-    /// Compares with another image.
+    /// Asserts that an image equals another image within the tolerances.
     #[track_caller]
     pub fn assert_same(&self, found: &[f32], expected: &[f32]) {
         assert_eq!(found.len(), expected.len(), "{}: number of pixels", self.name);

@@ -1,24 +1,24 @@
-//! Shared parts of the tests. Only tests depend on this crate.
+//! Test utilities that all crates share. Only tests depend on this crate.
 //!
 //! | module | provides |
 //! |---|---|
 //! | [`bits`] | bit-for-bit comparison of numbers |
 //! | [`tolerance`] | comparison within a tolerance that carries its derivation |
 //! | [`image_check`] | comparison of images; a failure writes an image of the difference |
-//! | [`refusal`] | tables of mistakes and the errors that they must give |
+//! | [`refusal`] | tables of invalid inputs and their expected errors |
 //! | [`needs`] | robots, models and programs that only some machines have |
-//! | [`opencv`] | numbers of OpenCV |
-//! | [`process`] | a test in a process of its own |
+//! | [`opencv`] | reference values of OpenCV |
+//! | [`process`] | tests in their own process |
 //! | [`srgb`] | the transfer function of sRGB |
-//! | [`svg`] | plots in SVG, read back |
+//! | [`svg`] | reading of SVG plots |
 //! | [`urdf`] | URDF snippets |
-//! | [`wait`] | waiting for what another thread or process does |
-//! | `scenes` (feature `scenes`) | scenes to draw |
+//! | [`wait`] | waiting for other threads or processes |
+//! | `scenes` (feature `scenes`) | scenes to render |
 //! | `x_server` (feature `x_server`) | an X server without a screen |
 //! | `worlds` (feature `worlds`) | simulations, robots, objects and cameras |
 //!
-//! Functions panic where a test should fail; the message says what was expected. Without its features nothing here depends
-//! on another crate of the workspace, so that unit tests of every crate can use it.
+//! Functions panic where a test should fail; the message contains the expected value. Without its features, this crate
+//! depends on no other crate of the workspace, so that unit tests of every crate can use it.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 #![forbid(unsafe_code)]
 

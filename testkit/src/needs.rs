@@ -1,16 +1,17 @@
-//! Robots, models and programs that only some machines have.
+//! Test resources that only some machines have: robots, models and programs.
 //!
-//! A test that needs one is marked `#[ignore = "needs ..."]`, so that plain `cargo test` lists it as ignored with the
-//! reason. `cargo xtask test` installs the needs and runs these tests too. A need that is absent then is a failure.
+//! A test that needs a resource is marked `#[ignore = "needs ..."]`, so that plain `cargo test` lists it as ignored
+//! with the reason. `cargo xtask test` installs the resources and runs these tests too. A missing resource is then a
+//! failure.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Names the folder of real robots.
+/// Environment variable with the folder of real robots.
 pub const ROBOTS: &str = "KINETOSCOPE_ROBOTS";
-/// Names a Python with readers of recordings (`mcap`, NumPy, Pillow, PyAV, h5py).
+/// Environment variable with a Python that has readers of recordings (`mcap`, NumPy, Pillow, PyAV, h5py).
 pub const READERS: &str = "KINETOSCOPE_PYTHON_READERS";
-/// Names a Python with MuJoCo 4 and OpenGL.
+/// Environment variable with a Python that has MuJoCo 4 and OpenGL.
 pub const RENDERER: &str = "KINETOSCOPE_PYTHON4";
 
 /// Folders that may hold real robots: [`ROBOTS`], `shared/robots` beside the repository or above it, and the one that
@@ -21,14 +22,14 @@ fn robot_folders() -> impl Iterator<Item = PathBuf> {
     std::env::var_os(ROBOTS).map(PathBuf::from).into_iter().chain(above).chain([root.join("target/robots")])
 }
 
-/// A folder with URDF files of real robots.
+/// Folder with URDF files of real robots.
 pub fn robots_dir() -> PathBuf {
     robot_folders()
         .find(|dir| dir.is_dir())
         .unwrap_or_else(|| panic!("no folder of real robots: run `cargo xtask test`, or set {ROBOTS}"))
 }
 
-/// A file of a real robot, its path relative to the folder of robots.
+/// File of a real robot; `path` is relative to the folder of robots.
 pub fn robot(path: &str) -> PathBuf {
     robot_folders()
         .map(|dir| dir.join(path))
@@ -36,14 +37,14 @@ pub fn robot(path: &str) -> PathBuf {
         .unwrap_or_else(|| panic!("no folder of real robots has {path}: run `cargo xtask test`, or set {ROBOTS}"))
 }
 
-/// A model that comes with MuJoCo, for example `humanoid/humanoid.xml`, or their folder for an empty path.
+/// A model that comes with MuJoCo, for example `humanoid/humanoid.xml`, or the folder of models for an empty path.
 pub fn sample_model(path: &str) -> PathBuf {
     let found = Path::new("/usr/share/mujoco/model").join(path);
     assert!(found.exists(), "{} is absent: apt-get install libmujoco-samples", found.display());
     found
 }
 
-/// All files below `folder` with this extension, in any case, sorted by path.
+/// All files below `folder` with this extension (case-insensitive), sorted by path.
 pub fn files_below(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let (mut folders, mut files) = (vec![folder.to_path_buf()], Vec::new());
     while let Some(folder) = folders.pop() {
@@ -65,12 +66,12 @@ fn python(variable: &str) -> PathBuf {
         .unwrap_or_else(|| panic!("{variable} names no Python: run `cargo xtask test`, which makes one"))
 }
 
-/// The Python that reads recordings.
+/// Python interpreter that reads recordings.
 pub fn python_readers() -> PathBuf {
     python(READERS)
 }
 
-/// The Python that draws with MuJoCo's own renderer.
+/// Python interpreter that renders with MuJoCo's own renderer.
 pub fn python_renderer() -> PathBuf {
     python(RENDERER)
 }
@@ -82,7 +83,7 @@ pub fn read_json(python: &Path, script: &Path, file: &Path) -> serde_json::Value
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// The browser.
+/// Path of a browser: Chromium or Chrome.
 pub fn chromium() -> PathBuf {
     let folders: Vec<PathBuf> = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
     let names = ["chromium", "chromium-browser", "google-chrome"];

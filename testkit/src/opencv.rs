@@ -1,6 +1,6 @@
-//! Numbers of OpenCV, kept in `data/opencv.txt`.
+//! Reference values of OpenCV, stored in `data/opencv.txt`.
 
-/// Numbers of OpenCV: the rows of this name in `data/opencv.txt`.
+/// Reference values of OpenCV: the rows called `name` in `data/opencv.txt`.
 pub fn opencv<const N: usize>(name: &str) -> impl Iterator<Item = [f64; N]> {
     let row = move |line: &str| {
         let numbers = line.strip_prefix(name)?.strip_prefix(": ")?;

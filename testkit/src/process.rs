@@ -1,13 +1,12 @@
-//! A test in a process of its own: for what counts threads, memory and files of the process, sets its variables, or may end
-//! it.
+//! Tests in their own process, which count its threads, memory and files, set its variables, or may end it.
 //!
-//! The scenario is a test marked `#[ignore = "runs in a process of its own"]` that returns at once unless [`is_child`]; the
-//! test that judges it calls [`run`].
+//! The scenario is a test marked `#[ignore = "runs in a process of its own"]` that returns at once unless [`is_child`].
+//! The test that checks the scenario calls [`run`].
 
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Set in child processes only.
+/// Environment variable that is set in child processes only.
 const VARIABLE: &str = "KINETOSCOPE_TEST_CHILD";
 
 /// True in a process that [`run`] or [`command`] started.
@@ -15,7 +14,7 @@ pub fn is_child() -> bool {
     std::env::var_os(VARIABLE).is_some()
 }
 
-/// The command that runs one test of this binary alone. `module` is `module_path!()` of the test, `test` its name.
+/// Command that runs one test of this binary alone. `module` is `module_path!()` of the test, `test` its name.
 pub fn command(module: &str, test: &str) -> Command {
     // Names of tests lack the name of the binary.
     let name = module.split_once("::").map_or_else(|| test.to_string(), |(_, path)| format!("{path}::{test}"));
@@ -34,7 +33,7 @@ pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Runs one test of this binary and asserts that it passes; its output is the message otherwise.
+/// Runs one test of this binary and asserts that it passes. Otherwise, its output is the panic message.
 #[track_caller]
 pub fn assert_passes(module: &str, test: &str, variables: &[(&str, &str)]) {
     let output = run(module, test, &std::env::temp_dir(), variables);

@@ -1,8 +1,8 @@
-//! Tables of mistakes: each row must be refused with an error that helps, and must change nothing.
+//! Tables of invalid inputs: each row must be rejected with a helpful error, and must change nothing.
 
 use std::fmt::{Debug, Display};
 
-/// Report on one row: the mistake was accepted, or the error differs from the expected one.
+/// Report on one row, if the input was accepted or the error differs from the expected one.
 fn finding<T, E: Debug + Display>(result: Result<T, E>, variant: &str, parts: &[&str]) -> Option<String> {
     let Err(error) = result else { return Some(format!("accepted, expected {variant} {parts:?}")) };
     let (shown, text) = (format!("{error:?}"), error.to_string());
@@ -16,8 +16,8 @@ fn assert_none(findings: &[String]) {
     assert!(findings.is_empty(), "{} wrong rows:\n  {}", findings.len(), findings.join("\n  "));
 }
 
-/// Asserts that every row `(what, result, variant, parts)` is an error that `Debug` shows with `variant` at its beginning, and
-/// whose message contains each of `parts`. Rows may be lazy: the mistakes are made in their order.
+/// Asserts that every row `(what, result, variant, parts)` is an error whose `Debug` output begins with `variant`, and
+/// whose message contains each of `parts`. Rows may be lazy: they are evaluated in order.
 #[track_caller]
 pub fn assert_refused<'a, W: Display, T, E: Debug + Display, V: AsRef<str>, P: AsRef<[&'a str]>>(
     rows: impl IntoIterator<Item = (W, Result<T, E>, V, P)>,
@@ -28,8 +28,8 @@ pub fn assert_refused<'a, W: Display, T, E: Debug + Display, V: AsRef<str>, P: A
     assert_none(&rows.collect::<Vec<_>>());
 }
 
-/// As [`assert_refused`] for rows `(what, mistake, variant, parts)`: `make` makes each mistake, and what `fingerprint` returns
-/// must stay the same.
+/// Asserts the errors of rows `(what, mistake, variant, parts)` as [`assert_refused`] does. `make` makes each mistake,
+/// and the value of `fingerprint` must not change.
 #[track_caller]
 pub fn assert_refused_unchanged<'a, S, F, W, M, T, E, V, P>(
     state: &mut S,
@@ -56,8 +56,7 @@ pub fn assert_refused_unchanged<'a, S, F, W, M, T, E, V, P>(
     assert_none(&findings);
 }
 
-/// Asserts that a result is an error whose variant and fields, as `Debug` shows them, contain `kind`, and whose message
-/// contains each of `parts`.
+/// Asserts that a result is an error whose `Debug` output contains `kind`, and whose message contains each of `parts`.
 #[track_caller]
 pub fn assert_error<T, E: Debug + Display>(result: Result<T, E>, kind: &str, parts: &[&str]) {
     let Err(error) = result else { panic!("accepted, expected {kind} {parts:?}") };

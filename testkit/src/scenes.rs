@@ -1,11 +1,11 @@
-//! Scenes for tests, the same on every run.
+//! Scenes for tests, identical in every run.
 
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
 use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::{Hemisphere, Instance, Material, PoseF32, RenderScene, Texture};
 use std::sync::Arc;
 
-/// Random numbers (xorshift64*) that are the same in every run, from a seed that is not 0.
+/// Random numbers (xorshift64*) that are identical in every run, from a seed other than 0.
 #[derive(Clone, Debug)]
 pub struct Random(pub u64);
 
@@ -17,17 +17,17 @@ impl Random {
         self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
     }
 
-    /// Uniform in lo..hi.
+    /// Uniform number in lo..hi.
     pub fn within(&mut self, lo: f64, hi: f64) -> f64 {
         lo + (hi - lo) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Three numbers, uniform in lo..hi.
+    /// Three uniform numbers in lo..hi.
     pub fn vector(&mut self, lo: f64, hi: f64) -> [f64; 3] {
         [self.within(lo, hi), self.within(lo, hi), self.within(lo, hi)]
     }
 
-    /// A random rotation, at a place within `reach` of the origin along each axis \[m\].
+    /// Random pose: any rotation, and a position within `reach` of the origin along each axis \[m\].
     pub fn pose(&mut self, reach: f64) -> PoseF32 {
         let q = nalgebra::Quaternion::new(
             self.within(-1., 1.),
@@ -44,7 +44,7 @@ impl Random {
     }
 }
 
-/// Two of every shape, each somewhere within `reach` \[m\].
+/// A scene with two of every shape, each within `reach` of the origin \[m\], and a checkered plane.
 pub fn random(random: &mut Random, reach: f64) -> (RenderScene, Vec<PoseF32>) {
     let shapes = every_shape().into_iter().chain(every_shape());
     let mut color = || random.within(0.1, 1.0) as f32;
@@ -58,7 +58,7 @@ pub fn random(random: &mut Random, reach: f64) -> (RenderScene, Vec<PoseF32>) {
     (RenderScene::new(instances).unwrap(), poses)
 }
 
-/// An infinite ground with a checker texture, mask id 100.
+/// An infinite ground plane with a checker texture, mask id 100.
 pub fn checker_plane() -> Instance {
     let checker = Texture::checker(64, [110, 120, 130], [140, 150, 160]);
     let material = Material {
@@ -72,7 +72,7 @@ pub fn checker_plane() -> Instance {
     Instance::new(Plane::INFINITE, material, 100)
 }
 
-/// A bumpy ball of triangles.
+/// A triangle mesh of a bumpy sphere.
 pub fn bumpy(segments: usize) -> Arc<RenderMesh> {
     let mut mesh = Shape::from(Sphere { radius: 0.3 }).tessellate(segments);
     for p in &mut mesh.positions {
@@ -97,7 +97,7 @@ pub fn every_shape() -> Vec<Shape> {
     ]
 }
 
-/// About 25 primitives that stand like a person, on a checkered ground.
+/// A figure of about 25 primitives in human shape, on a checkered ground.
 pub fn figure() -> (RenderScene, Vec<PoseF32>) {
     let skin = Material { rgba: [0.8, 0.6, 0.4, 1.0], ..Material::default() };
     let mut instances = vec![checker_plane()];
@@ -151,12 +151,12 @@ pub fn figure() -> (RenderScene, Vec<PoseF32>) {
     (scene, poses)
 }
 
-/// A place without rotation \[m\].
+/// A pose without rotation \[m\].
 pub fn at(x: f32, y: f32, z: f32) -> PoseF32 {
     PoseF32::from_translation([x, y, z])
 }
 
-/// Things with mask ids from 1 on.
+/// A scene of instances with mask ids from 1 on, and their poses.
 pub fn things(all: impl IntoIterator<Item = (impl Into<Shape>, Material, PoseF32)>) -> (RenderScene, Vec<PoseF32>) {
     let thing =
         |((shape, material, pose), id): ((_, Material, PoseF32), i32)| (Instance::new(shape, material, id), pose);
@@ -164,7 +164,7 @@ pub fn things(all: impl IntoIterator<Item = (impl Into<Shape>, Material, PoseF32
     (RenderScene::new(instances).unwrap(), poses)
 }
 
-/// A scene without lights and ambient light; the sky stays.
+/// The scene without lights and ambient light. The sky is kept.
 pub fn unlit(mut scene: RenderScene) -> RenderScene {
     scene.lights.clear();
     scene.headlight.active = false;

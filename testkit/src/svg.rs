@@ -1,15 +1,15 @@
-//! Plots in SVG, read back with nothing but the labels of their axes.
+//! Reading of SVG plots, using only the labels of their axes.
 
-/// Value and pixel of two labels of an axis.
+/// Value and pixel position of two labels of an axis.
 pub type Ticks = [[f64; 2]; 2];
 
 fn attribute(line: &str, name: &str) -> Option<f64> {
     line.split_once(&format!(" {name}=\""))?.1.split('"').next()?.parse().ok()
 }
 
-/// The two labels of the horizontal and of the vertical axis that are farthest apart.
+/// First and last label of the horizontal axis and of the vertical axis.
 pub fn axes(svg: &str) -> [Ticks; 2] {
-    // Labels of the vertical axis stand 4 pixels below their lines.
+    // Labels of the vertical axis are 4 pixels below their lines.
     [("\"middle\"", "x", 0.0), ("\"end\"", "y", 4.0)].map(|(anchor, name, below)| {
         let labels = svg.lines().filter(|line| line.starts_with("<text") && line.contains(anchor));
         let value = |line: &str| line.split_once('>')?.1.trim_end_matches("</text>").parse::<f64>().ok();
@@ -18,7 +18,7 @@ pub fn axes(svg: &str) -> [Ticks; 2] {
     })
 }
 
-/// The points of all curves, in the units of the axes.
+/// Points of all curves, in the units of the axes.
 pub fn curves(svg: &str) -> Vec<Vec<[f64; 2]>> {
     let [across, up] = axes(svg);
     let back = |[[a, x], [b, y]]: Ticks, pixel: &str| a + (pixel.parse::<f64>().unwrap() - x) / (y - x) * (b - a);

@@ -1,8 +1,8 @@
-//! Comparison within a tolerance that carries its derivation, so that a failure says why the limit is what it is.
+//! Comparison within a tolerance that carries its derivation, so that a failure shows the reason for the limit.
 
 use std::borrow::Borrow;
 
-/// A limit on the error, and where the limit comes from.
+/// A limit on an error, with its derivation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     /// Largest absolute error, in the unit of the value.
@@ -24,12 +24,12 @@ impl Tolerance {
         Self { absolute: 0.0, relative: limit, derivation }
     }
 
-    /// A limit on the error relative to an expected value larger than one, and on the absolute error of a smaller one.
+    /// A limit on the relative error of expected values larger than one, and on the absolute error of smaller ones.
     pub const fn mixed(limit: f64, derivation: &'static str) -> Self {
         Self { absolute: limit, relative: limit, derivation }
     }
 
-    /// The rounding error of `operations` operations in double precision on numbers of the expected size, or of size one.
+    /// Rounding error of `operations` operations in double precision, for values of the expected size, or of size one.
     pub const fn rounding(operations: f64) -> Self {
         Self::mixed(operations * f64::EPSILON, "rounding in double precision")
     }
@@ -39,13 +39,14 @@ impl Tolerance {
         self.absolute.max(self.relative * expected.abs())
     }
 
-    /// True if `found` is within the limit of `expected`; equal values are, infinities included, and NaN is not.
+    /// True if `found` is within the limit of `expected`. This holds for equal values, infinities included, but not for
+    /// NaN.
     pub fn holds(&self, found: f64, expected: f64) -> bool {
         found == expected || (found - expected).abs() <= self.limit(expected)
     }
 }
 
-/// The limits times a factor, for example a weight: the derivation is that of one unit.
+/// Scales the limits by a factor, for example a weight. The derivation remains that of one unit.
 impl std::ops::Mul<f64> for Tolerance {
     type Output = Self;
 
@@ -75,7 +76,7 @@ pub fn assert_close(
     }
 }
 
-/// As [`assert_close`], with the limit of the largest expected element for every element.
+/// Asserts closeness as [`assert_close`] does, with the limit of the largest expected element for every element.
 #[track_caller]
 pub fn assert_vector(
     what: &str,

@@ -1,13 +1,14 @@
-//! URDF snippets. Lengths are in metres, masses in kilograms, moments in kg m².
+//! URDF snippets. Lengths are in meters, masses in kilograms, moments of inertia in kg m².
 
 use std::path::{Path, PathBuf};
 
-/// A robot of these elements; the first element is in line 2.
+/// A robot with these elements; the first element is in line 2.
 pub fn robot(name: &str, elements: &str) -> String {
     format!("<robot name=\"{name}\">\n{elements}\n</robot>")
 }
 
-/// A link with a mass at `com` and the same moment about all axes there; `more` is further content (visuals, collisions).
+/// A link with a mass at a point and equal moments of inertia about all axes there; `more` is further content (visuals,
+/// collisions).
 pub fn link(name: &str, mass: f64, moment: f64, [x, y, z]: [f64; 3], more: &str) -> String {
     format!(
         "<link name=\"{name}\"><inertial><origin xyz=\"{x} {y} {z}\"/><mass value=\"{mass}\"/><inertia ixx=\"{moment}\" \
@@ -15,7 +16,7 @@ pub fn link(name: &str, mass: f64, moment: f64, [x, y, z]: [f64; 3], more: &str)
     )
 }
 
-/// A joint at `at` in the frame of its parent; `more` is further content (limit, dynamics, mimic).
+/// A joint at a point in the frame of its parent; `more` is further content (limit, dynamics, mimic).
 pub fn joint(
     name: &str,
     kind: &str,
@@ -35,12 +36,12 @@ pub fn limit([lower, upper]: [f64; 2], effort: f64, velocity: f64) -> String {
     format!("<limit lower=\"{lower}\" upper=\"{upper}\" effort=\"{effort}\" velocity=\"{velocity}\"/>")
 }
 
-/// A collision element with this geometry, for example `<sphere radius="0.1"/>`, at `at`.
+/// A collision element with this geometry, for example `<sphere radius="0.1"/>`, at a point.
 pub fn collision(geometry: &str, [x, y, z]: [f64; 3]) -> String {
     format!("<collision><origin xyz=\"{x} {y} {z}\"/><geometry>{geometry}</geometry></collision>")
 }
 
-/// Scratch files that are removed with the value.
+/// Temporary files that are removed when the value is dropped.
 #[derive(Debug)]
 pub struct Files(tempfile::TempDir);
 
@@ -51,12 +52,12 @@ impl Default for Files {
 }
 
 impl Files {
-    /// The folder.
+    /// The temporary folder.
     pub fn folder(&self) -> &Path {
         self.0.path()
     }
 
-    /// Writes a file, with its folders, and returns its path.
+    /// Writes a file and its parent folders, and returns its path.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.path().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();

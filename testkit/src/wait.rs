@@ -1,11 +1,11 @@
-//! Waiting for what another thread or process does.
+//! Waiting for other threads or processes.
 
 use std::time::{Duration, Instant};
 
-/// The longest wait: an event that has not come by then does not come, on a busy machine either.
+/// Longest wait. An event that has not occurred by then does not occur, even on a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Waits for a value.
+/// Waits until `found` returns a value.
 #[track_caller]
 pub fn some<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
@@ -24,7 +24,7 @@ pub fn until(what: &str, mut holds: impl FnMut() -> bool) {
     some(what, || holds().then_some(()));
 }
 
-/// Number of threads of this process, and of files that it has open. For a process of its own ([`crate::process`]).
+/// Number of threads and of open files of this process. For tests in their own process ([`crate::process`]).
 pub fn threads_and_files() -> [usize; 2] {
     ["task", "fd"].map(|of| std::fs::read_dir(format!("/proc/self/{of}")).unwrap().count())
 }

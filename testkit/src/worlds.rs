@@ -1,4 +1,4 @@
-//! Simulations, robots, objects and cameras that many tests start from. Poses are in the environment frame \[m\].
+//! Simulations, robots, objects and cameras for tests. Poses are in the environment frame \[m\].
 
 use crate::urdf::Files;
 use kinetoscope::ndarray::Array2;
@@ -8,7 +8,7 @@ use kinetoscope::sensors::{Imu, JointState, JointStateCfg};
 use kinetoscope::sim::env::Env;
 use kinetoscope::sim::{DriveType, ObjectId};
 
-/// A configuration with this number of threads.
+/// A configuration with this number of environments and threads.
 pub fn cfg(num_envs: usize, threads: usize) -> SimulationManagerCfg {
     SimulationManagerCfg { num_envs, threads: Some(threads), ..Default::default() }
 }
@@ -18,7 +18,7 @@ pub fn empty_cfg(num_envs: usize) -> SimulationManagerCfg {
     SimulationManagerCfg { ground: None, lights: vec![], ..cfg(num_envs, 2) }
 }
 
-/// A configuration of [`empty_cfg`] without gravity.
+/// The configuration of [`empty_cfg`], without gravity.
 pub fn weightless_cfg(num_envs: usize) -> SimulationManagerCfg {
     SimulationManagerCfg { gravity: [0.0; 3].into(), ..empty_cfg(num_envs) }
 }
@@ -29,7 +29,7 @@ pub fn sim(cfg: SimulationManagerCfg) -> SimulationManager {
     SimulationManager::new(cfg).unwrap()
 }
 
-/// An object with its origin at `at`, of the default density.
+/// An object of the default density with its origin at a point.
 pub fn object(uid: &str, shape: ObjectShape, [x, y, z]: [f64; 3]) -> RigidObjectCfg {
     RigidObjectCfg { uid: uid.into(), shape, init_pose: Pose::translation(x, y, z), ..Default::default() }
 }
@@ -44,7 +44,7 @@ pub fn ball(uid: &str, radius: f64, mass: f64, at: [f64; 3]) -> RigidObjectCfg {
     RigidObjectCfg { mass: Some(mass), ..object(uid, ObjectShape::Sphere { radius }, at) }
 }
 
-/// The same object, fixed in the world.
+/// The object, fixed in the world.
 pub fn fixed(object: RigidObjectCfg) -> RigidObjectCfg {
     RigidObjectCfg { body_type: BodyType::Static, ..object }
 }
@@ -64,12 +64,12 @@ pub fn mjcf_robot(uid: &str, mjcf: &str) -> RobotCfg {
     RobotCfg { uid: uid.into(), mjcf: Some(MjcfFile::text(mjcf)), ..Default::default() }
 }
 
-/// The same robot without drives.
+/// The robot without drives.
 pub fn passive(robot: RobotCfg) -> RobotCfg {
     RobotCfg { drive: DriveCfg { drive_type: DriveType::None, ..Default::default() }, ..robot }
 }
 
-/// Gains for all joints.
+/// A drive configuration with these gains for all joints.
 pub fn gains(stiffness: f64, damping: f64) -> DriveCfg {
     DriveCfg { stiffness: stiffness.into(), damping: damping.into(), ..Default::default() }
 }
@@ -104,7 +104,7 @@ pub fn camera([width, height]: [usize; 2], eye: [f64; 3], target: [f64; 3], chan
     }
 }
 
-/// Bits of everything that decides the next step of an environment, of the efforts, and the number of contacts.
+/// Bits of the state that determines the next step of an environment, of the efforts, and the number of contacts.
 pub fn bits_of(env: &Env) -> Vec<u64> {
     let data = env.data();
     [&[data.time()], data.qpos(), data.qvel(), data.qacc_warmstart(), &env.drives.position, &env.drives.effort]
@@ -122,7 +122,7 @@ pub fn all_bits(sim: &SimulationManager) -> Vec<Vec<u64>> {
     bits
 }
 
-/// A simulation to record: an arm that moves, a cube, a camera, an IMU and a sensor of joints.
+/// A simulation to record: a moving arm, a cube, a camera, an IMU and a joint sensor.
 #[derive(Debug)]
 pub struct RecordedWorld {
     /// The simulation.
@@ -135,7 +135,7 @@ pub struct RecordedWorld {
     pub camera: SensorId<Camera>,
     /// An IMU on the cube.
     pub imu: SensorId<Imu>,
-    /// The joints of the arm, at every step.
+    /// A sensor of the joints, at every step.
     pub joints: SensorId<JointState>,
 }
 
@@ -145,7 +145,7 @@ impl RecordedWorld {
     /// Steps between two measurements of the IMU.
     pub const IMU_EVERY: u32 = 2;
 
-    /// Builds it.
+    /// Builds the simulation.
     pub fn new(num_envs: usize, threads: usize) -> Self {
         let cfg = cfg(num_envs, threads);
         let dt = cfg.physics_dt;
@@ -172,7 +172,7 @@ impl RecordedWorld {
         Self { sim, arm, cube, camera, imu, joints }
     }
 
-    /// Targets that change at every step, in each environment differently, and one step.
+    /// Sets targets that differ between steps and environments, and runs one step.
     pub fn step(&mut self, step: u32) {
         let (envs, dof) = (self.sim.num_envs(), self.sim.robot(self.arm).dof());
         let target = |(env, joint)| 0.3 * (0.1 * f64::from(step) + joint as f64 + env as f64).sin();
@@ -182,7 +182,7 @@ impl RecordedWorld {
     }
 }
 
-/// The pose in a row of a batch of poses.
+/// Pose in a row of a batch of poses.
 pub fn pose_in(poses: &Array2<f64>, row: usize) -> Pose {
     kinetoscope::scene::pose::from_row(&std::array::from_fn(|k| poses[(row, k)]))
 }
@@ -192,7 +192,7 @@ pub fn errors(a: &Pose, b: &Pose) -> (f64, f64) {
     ((a.translation.vector - b.translation.vector).norm(), a.rotation.angle_to(&b.rotation))
 }
 
-/// The number of diagnostics whose text contains all of these words.
+/// Number of diagnostics whose text contains all of these words.
 pub fn count_diagnostics(sim: &SimulationManager, words: &[&str]) -> usize {
     sim.diagnostics()
         .iter()
@@ -212,7 +212,7 @@ pub fn mask_id(sim: &SimulationManager, object: &str) -> i32 {
     sim.scene().mask_ids().iter().find(|id| id.object == object).expect("an object of this name").id
 }
 
-/// A configuration in which no joint has a drive.
+/// A drive configuration in which no joint has a drive.
 pub fn no_drive() -> DriveCfg {
     DriveCfg { drive_type: DriveType::None, ..Default::default() }
 }

@@ -6,12 +6,12 @@ use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{ClientMessageEvent, ConnectionExt as _, EventMask, ImageFormat};
 use x11rb::rust_connection::RustConnection;
 
-/// An X server without a screen; it ends with the value.
+/// An X server without a screen. Dropping it ends the server.
 #[derive(Debug)]
 pub struct Display {
-    /// The process.
+    /// Process of the server.
     pub server: Child,
-    /// The name that clients connect to, for example `:1`.
+    /// Name that clients connect to, for example `:1`.
     pub name: String,
 }
 
@@ -27,13 +27,13 @@ impl Display {
         Self { server, name: format!(":{}", number.trim()) }
     }
 
-    /// Sends the server a signal by its name.
+    /// Sends a signal to the server, by the name of the signal.
     pub fn signal(&self, name: &str) {
         let sent = Command::new("kill").args(["-s", name, &self.server.id().to_string()]).status().unwrap();
         assert!(sent.success(), "{name}");
     }
 
-    /// Connects as a client.
+    /// Connects a client.
     pub fn connect(&self) -> RustConnection {
         x11rb::connect(Some(&self.name)).unwrap().0
     }
@@ -46,16 +46,16 @@ impl Drop for Display {
     }
 }
 
-/// A part of the screen, row by row: red, green and blue.
+/// Pixels of a rectangle of the screen, row by row: red, green and blue.
 pub fn screenshot(connection: &RustConnection, corner: [usize; 2], size: [usize; 2]) -> Vec<[u8; 3]> {
     let root = connection.setup().roots[0].root;
     let ([x, y], [width, height]) = (corner.map(|n| n as i16), size.map(|n| n as u16));
     let image = connection.get_image(ImageFormat::Z_PIXMAP, root, x, y, width, height, !0).unwrap();
-    // Pixels of 24 bits: blue, green, red, nothing.
+    // Pixels of 24 bits in four bytes: blue, green, red, unused.
     image.reply().unwrap().data.chunks_exact(4).map(|p| [p[2], p[1], p[0]]).collect()
 }
 
-/// Closes a window as window managers do it.
+/// Closes a window as a window manager does.
 pub fn close(connection: &RustConnection, window: u32) {
     let atom = |name: &[u8]| connection.intern_atom(false, name).unwrap().reply().unwrap().atom;
     let data = [atom(b"WM_DELETE_WINDOW"), 0, 0, 0, 0];

@@ -2,7 +2,7 @@ use super::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Each item is done once, by no more threads than there are items; with and without worker threads.
+/// Each item is processed once, by at most as many threads as items, with and without worker threads.
 #[test]
 fn for_each() {
     for pool in [ThreadPool::new(), ThreadPool::serial()] {

@@ -7,10 +7,10 @@ fn me() -> ThreadId {
     std::thread::current().id()
 }
 
-/// The work that was done: number, slot, thread.
+/// Completed items: number, slot, thread.
 type Taken = Vec<(usize, usize, ThreadId)>;
 
-/// Takes numbers up to `count`, slowly; fails at `fail`.
+/// Runs a slow job that takes the numbers below `count`; it panics at the number `fail`.
 fn numbers(threads: &Workers, slots: usize, count: usize, fail: Option<usize>) -> Taken {
     let (next, taken) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     threads.run(slots, &|slot| {
@@ -43,7 +43,7 @@ fn reused_threads() {
     assert_eq!(threads.started(), 2);
 }
 
-/// Borrowed data are written by other threads, and belong to the caller again afterwards.
+/// Other threads write borrowed data, which belong to the caller again afterwards.
 #[test]
 fn borrowed_data() {
     let threads = Workers::default();
@@ -72,7 +72,7 @@ fn alone() {
     let threads = Workers::default();
     assert_eq!(numbers(&threads, 1, 5, None).len(), 5);
     assert_eq!(threads.started(), 0);
-    // A second caller while they are busy.
+    // A second caller while the workers are busy.
     let (there, over) = (AtomicBool::new(false), AtomicBool::new(false));
     std::thread::scope(|scope| {
         scope.spawn(|| {
@@ -103,7 +103,7 @@ fn end_of_threads() {
     assert_eq!(shared.strong_count(), 0);
 }
 
-/// A panic reaches the caller, whichever thread it was on, and the threads go on.
+/// A panic on any thread reaches the caller, and the threads keep working.
 #[test]
 fn panics() {
     let threads = Workers::default();
@@ -114,17 +114,17 @@ fn panics() {
     assert_eq!(numbers(&threads, 3, 10, None).len(), 10);
 }
 
-/// Root cause: a caller that waited for its helper had already withdrawn its work, so another caller could put
-/// up its own before the first one woke, and took the panic. The pool stays with one caller until all helpers are done.
+/// Regression test: a caller that waited for its helper had already withdrawn its work. Another caller could then post
+/// its own work and receive the panic. The pool now belongs to one caller until all helpers are done.
 #[test]
 fn panics_of_two_callers() {
     let threads = Workers::default();
     for round in 0..300 {
         let (there, now) = (AtomicBool::new(false), AtomicBool::new(false));
-        // Fails at any slot but the first, when told.
+        // Panics in every slot but the first, once `now` is set.
         let fails_late = |slot| {
             if slot == 0 {
-                // Until a helper came: late helpers are not waited for.
+                // Waits for a helper, because `run` does not wait for late helpers.
                 while !there.load(Ordering::Relaxed) {
                     std::thread::yield_now();
                 }
@@ -134,12 +134,12 @@ fn panics_of_two_callers() {
             while !now.load(Ordering::Relaxed) {
                 std::thread::yield_now();
             }
-            // Without the words that a panic hook prints 300 times.
+            // `resume_unwind` skips the panic hook, which would print 300 messages.
             resume_unwind(Box::new("fails on purpose"));
         };
         std::thread::scope(|scope| {
             let first = scope.spawn(|| catch_unwind(AssertUnwindSafe(|| threads.run(2, &fails_late))).is_err());
-            // The helper is at its slot, and its caller waits for it.
+            // The helper runs its slot, and its caller waits for it.
             while !there.load(Ordering::Relaxed) || lock(&threads.shared.job).work.is_some() {
                 std::thread::yield_now();
             }

@@ -1,4 +1,4 @@
-//! Transforms of points and normals, scale and shear included.
+//! Affine transforms of points and normals, including scale and shear.
 
 use super::builder::unit;
 
@@ -28,12 +28,12 @@ pub(super) fn rotation(axis: [f64; 3], angle: f64) -> Affine {
     ]
 }
 
-/// A transform ready for points and normals.
+/// A transform prepared for points and normals.
 pub(super) struct Placement {
     matrix: Affine,
-    /// The cofactors: the inverse transpose times the determinant, so that no division can fail.
+    /// Cofactors: the inverse transpose times the determinant, so that no division can fail.
     cofactors: [[f64; 3]; 3],
-    /// Left and right are exchanged: the winding has to be, too.
+    /// True if the transform mirrors, in which case the winding must be reversed.
     pub(super) mirrored: bool,
 }
 
@@ -53,11 +53,11 @@ impl Placement {
         self.matrix.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
     }
 
-    /// The unit normal; `None` for a zero one and where the transform flattens it away.
+    /// Transformed unit normal; `None` for a zero normal or one that the transform flattens.
     pub(super) fn normal(&self, n: [f64; 3]) -> Option<[f32; 3]> {
         let sign = if self.mirrored { -1.0 } else { 1.0 };
         let n = self.cofactors.map(|row| sign * (row[0] * n[0] + row[1] * n[1] + row[2] * n[2]));
-        // Scaled first: the cofactors of a millimetre file are of the order 1e-6.
+        // Scaled first: the cofactors of a file in millimeters are of the order 1e-6.
         let largest = n.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         if !(largest > 0.0 && largest.is_finite()) {
             return None;

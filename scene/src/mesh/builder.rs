@@ -1,4 +1,4 @@
-//! From the triangles of a file, corner by corner, to a welded [`TriMesh`].
+//! Conversion of the triangle corners of a file to a welded [`TriMesh`].
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -6,11 +6,11 @@ use std::hash::{BuildHasherDefault, Hasher};
 use super::error::Ctx;
 use super::{MeshError, MeshMaterial, MeshPart, TriMesh};
 
-/// The most triangles a file may unfold to. Far above any robot part; it keeps a few hostile lines of instances from
-/// filling the memory.
+/// Largest number of triangles that a file may expand to. It is far above any robot part, and keeps a few malicious
+/// lines of instances from filling the memory.
 pub(super) const MAX_TRIANGLES: usize = 1 << 24;
 
-/// One corner of one triangle, as the file gives it, after its transforms.
+/// One corner of a triangle of the file, with its transforms applied.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
     pub(super) position: [f32; 3],
@@ -33,7 +33,7 @@ impl Builder {
         self.materials.len() - 1
     }
 
-    /// Adds a triangle; `at` names its place in the file when it is bad.
+    /// Adds a triangle. `at` describes its position in the file, for errors.
     pub(super) fn triangle(
         &mut self,
         ctx: &Ctx<'_>,
@@ -58,10 +58,10 @@ impl Builder {
         Ok(())
     }
 
-    /// Groups triangles by material (in order of first use), drops degenerate ones, merges equal vertices.
+    /// Groups triangles by material (in order of first use), drops degenerate triangles, merges equal vertices.
     ///
-    /// Where only some corners have a normal, the others get the normal of their triangle; missing texture coordinates
-    /// become 0 when others have them. If every triangle is degenerate, all are kept.
+    /// If only some corners have a normal, the others get the normal of their triangle. Missing texture coordinates
+    /// become 0 if other corners have some. If every triangle is degenerate, all are kept.
     pub(super) fn finish(mut self, ctx: &Ctx<'_>) -> Result<TriMesh, MeshError> {
         if self.corners.is_empty() {
             return Err(MeshError::Empty { path: ctx.path.to_owned() });
@@ -111,7 +111,7 @@ impl Builder {
     }
 }
 
-/// Unit length, or `None` for zero and for what is not finite.
+/// Vector scaled to unit length; `None` for a zero or non-finite vector.
 pub(super) fn unit(v: [f32; 3]) -> Option<[f32; 3]> {
     let v = v.map(f64::from);
     let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
@@ -165,13 +165,13 @@ impl Welder {
             if self.any_uv {
                 self.uvs.push(uv);
             }
-            // At most 3 * MAX_TRIANGLES vertices, which fits.
+            // At most 3 * MAX_TRIANGLES vertices, which fit into a u32.
             (self.positions.len() - 1) as u32
         })
     }
 }
 
-/// A quick hash of a few machine words; the default one costs more than the rest of the weld.
+/// A fast hash of a few machine words. The default hash costs more than the rest of the welding.
 #[derive(Default)]
 struct BitsHasher(u64);
 

@@ -1,31 +1,32 @@
-//! The convex cells of space that planes cut a solid into.
+//! Convex cells, into which planes cut the space around a solid.
 //!
-//! What a solid and a cell have in common has corners of three kinds: those of the surface within the cell, those where the
-//! surface crosses faces and edges of the cell, and those of the cell that are in the solid. The first two are found by
-//! cutting the triangles of the surface; the third are found here, so that the hull of a piece keeps the inside of the solid.
+//! The intersection of a solid and a cell has three kinds of corners: surface vertices inside the cell, intersections
+//! of the surface with faces and edges of the cell, and cell corners inside the solid. Cutting the triangles of the
+//! surface gives the first two kinds. This module gives the third, so that the hull of a piece includes the inside of
+//! the solid.
 
 use super::builder::{cross, dot, sub};
 
 type V3 = [f64; 3];
 
-/// A convex cell: what is behind all its planes, each a unit normal and its distance from the origin.
+/// A convex cell: the space behind all its planes. A plane is a unit normal and its distance from the origin.
 #[derive(Clone, Debug)]
 pub(super) struct Cell {
     planes: Vec<(V3, f64)>,
     corners: Vec<Corner>,
-    /// What is nearer than this is the same place \[m\].
+    /// Points that are closer than this count as equal \[m\].
     near: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Corner {
     at: V3,
-    /// Whether it is in the solid.
+    /// True if the corner is in the solid.
     inside: bool,
 }
 
 impl Cell {
-    /// A box around a solid with some room: its corners are outside.
+    /// A box around a solid with a margin, so that its corners are outside.
     pub(super) fn around(lo: V3, hi: V3) -> Self {
         let size = (0..3).map(|k| hi[k] - lo[k]).fold(0.0, f64::max);
         let (lo, hi) = (lo.map(|x| x - 0.01 * size), hi.map(|x| x + 0.01 * size));
@@ -36,12 +37,12 @@ impl Cell {
         Self { planes, corners, near: 1e-9 * size }
     }
 
-    /// The corners that are in the solid.
+    /// Corners that are in the solid.
     pub(super) fn inside(&self) -> impl Iterator<Item = V3> + '_ {
         self.corners.iter().filter(|corner| corner.inside).map(|corner| corner.at)
     }
 
-    /// What is in front of a plane, and what is behind it. `solid` says whether a point is in the solid.
+    /// Splits the cell by a plane into the parts in front of it and behind it. `solid` is true for points in the solid.
     pub(super) fn halves(&self, normal: V3, distance: f64, solid: &impl Fn(V3) -> bool) -> [Self; 2] {
         let mut new: Vec<Corner> = Vec::new();
         for (k, &first) in self.planes.iter().enumerate() {
@@ -56,7 +57,7 @@ impl Cell {
         [-1.0, 1.0].map(|sign| {
             let behind = |corner: &&Corner| (dot(normal, corner.at) - distance) * sign < -self.near;
             let corners: Vec<Corner> = self.corners.iter().filter(behind).chain(&new).copied().collect();
-            // Planes that only touch the cell bound it nowhere.
+            // A plane that only touches the cell does not bound it.
             let bounds = |&&(n, d): &&(V3, f64)| {
                 corners.iter().filter(|corner| (dot(n, corner.at) - d).abs() <= 2.0 * self.near).count() >= 3
             };
@@ -67,15 +68,15 @@ impl Cell {
     }
 }
 
-/// Where three planes meet (Cramer's rule); `None` where two of them are parallel, or all along a line.
+/// Intersection of three planes (Cramer's rule); `None` if their normals are linearly dependent.
 fn meet([(a, d), (b, e), (c, f)]: [(V3, f64); 3]) -> Option<V3> {
     let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
     let volume = dot(a, bc);
     (volume.abs() > 1e-9).then(|| [0, 1, 2].map(|k| (d * bc[k] + e * ca[k] + f * ab[k]) / volume))
 }
 
-/// How often closed triangles wind around a point: 1 inside, 0 outside; the sum of the angles of space under which they are
-/// seen, over 4π. Source: van Oosterom and Strackee, "The solid angle of a plane triangle", IEEE Transactions on Biomedical
+/// Winding number of closed triangles around a point: 1 inside, 0 outside. It is the sum of their solid angles over 4π.
+/// Source: van Oosterom and Strackee, "The solid angle of a plane triangle", IEEE Transactions on Biomedical
 /// Engineering 30(2), 1983.
 pub(super) fn winding(triangles: &[[V3; 3]], p: V3) -> f64 {
     let half: f64 = triangles
@@ -93,14 +94,14 @@ pub(super) fn winding(triangles: &[[V3; 3]], p: V3) -> f64 {
 mod tests {
     use super::*;
 
-    /// Cells of any cuts share out the box: of random points each is in one, and a cell has the corners of its hull.
+    /// Cuts of a box give cells with the expected corners and planes.
     #[test]
     fn halves() {
         let all = |_| true;
         let cube = Cell::around([0.0; 3], [1.0; 3]);
         let s = 0.5f64.sqrt();
         let [front, back] = cube.halves([s, s, 0.0], s, &all);
-        // Through two opposite edges, of 1.02 m length: a prism on each side, whose four corners on the plane are inside.
+        // A cut through two opposite edges of 1.02 m: a prism on each side, whose four corners on the plane are inside.
         for half in [&front, &back] {
             assert_eq!((half.corners.len(), half.planes.len(), half.inside().count()), (6, 5, 4));
         }

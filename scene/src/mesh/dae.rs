@@ -1,7 +1,7 @@
-//! COLLADA: the part of it that robot meshes use.
+//! COLLADA reader for the subset that robot meshes use.
 //!
-//! Node transforms multiply in document order, parent before child. Polygons with holes, curves, skinning weights,
-//! `<lookat>` and `<skew>` are not read (the last two are errors).
+//! Node transforms multiply in document order, parent before child. Curves and skinning weights are ignored. Polygons
+//! with holes, `<lookat>` and `<skew>` are errors.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -31,7 +31,7 @@ pub(super) struct Dae<'a, 'i> {
     nodes_seen: usize,
 }
 
-/// Rows of numbers behind an `<accessor>`.
+/// Rows of numbers that an `<accessor>` describes.
 struct Source {
     data: Vec<f64>,
     offset: usize,
@@ -46,7 +46,7 @@ impl Source {
     }
 }
 
-/// Where the numbers of a corner come from: the column of `<p>` and the source.
+/// Origin of a corner's numbers: the column of `<p>` and the source.
 struct Input {
     column: usize,
     source: Rc<Source>,
@@ -59,7 +59,7 @@ struct Inputs {
     columns: usize,
 }
 
-/// COLLADA.
+/// The COLLADA format.
 pub(super) const FORMAT: Format = Format {
     code: 2,
     extensions: &["dae"],
@@ -106,7 +106,7 @@ fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
                 dae.visit(node, &world, 0)?;
             }
         }
-        // A file without a scene is a bag of geometries.
+        // A file without a scene is a collection of geometries.
         None => {
             for library in children(root, "library_geometries") {
                 for geometry in children(library, "geometry") {
@@ -167,7 +167,7 @@ impl<'a, 'i> Dae<'a, 'i> {
         Ok(turn.map(|row| row.map(|x| x * unit)))
     }
 
-    /// The element that a `#id` attribute of `node` refers to.
+    /// Element that a `#id` attribute of `node` refers to.
     pub(super) fn target(&self, node: Node<'a, 'i>, attribute: &str) -> Result<Node<'a, 'i>, MeshError> {
         let url = node
             .attribute(attribute)
@@ -207,7 +207,7 @@ impl<'a, 'i> Dae<'a, 'i> {
                     let geometry = self.target(part, "url")?;
                     self.geometry(geometry, &here, &Binding::of_instance(part))?;
                 }
-                // The mesh of a skin in its bind pose.
+                // The mesh of a skin, in its bind pose.
                 "instance_controller" => {
                     let controller = self.target(part, "url")?;
                     if let Some(skin) = child(controller, "skin") {
@@ -223,7 +223,7 @@ impl<'a, 'i> Dae<'a, 'i> {
         Ok(())
     }
 
-    /// The transform of one element of a node; `None` where it is none.
+    /// Transform of a child element of a node; `None` for an element that is not a transform.
     fn step(&self, node: Node<'a, 'i>) -> Result<Option<Affine>, MeshError> {
         Ok(Some(match node.tag_name().name() {
             "matrix" => self.matrix(node)?,
@@ -266,7 +266,7 @@ impl<'a, 'i> Dae<'a, 'i> {
     where
         T::Err: std::error::Error + Send + Sync + 'static,
     {
-        // A comment may stand between the numbers.
+        // Comments may separate the numbers.
         let texts = node.children().filter(Node::is_text).filter_map(|t| t.text());
         let mut out = Vec::with_capacity(node.range().len() / 8);
         for word in texts.flat_map(str::split_ascii_whitespace) {
@@ -311,7 +311,7 @@ impl<'a, 'i> Dae<'a, 'i> {
 
     fn inputs(&mut self, primitive: Node<'a, 'i>, uv_set: Option<u32>) -> Result<Inputs, MeshError> {
         let (mut position, mut normal) = (None, None);
-        // The texture coordinates that were asked for, else set 0, else the first.
+        // Texture coordinates in order of preference: the requested set, set 0, the first set.
         let mut uvs: Vec<(u32, Input)> = Vec::new();
         let mut columns = 0;
         for input in children(primitive, "input") {
@@ -422,7 +422,7 @@ impl<'a, 'i> Dae<'a, 'i> {
         Ok(())
     }
 
-    /// The corner of one row of `<p>`: where it is before rounding, and what the mesh gets.
+    /// Corner of one row of `<p>`: its position before rounding, and the corner for the mesh.
     fn corner(
         &self,
         primitive: Node<'a, 'i>,

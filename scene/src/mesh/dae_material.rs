@@ -1,4 +1,4 @@
-//! Materials of COLLADA: from the symbol on a primitive to a colour or an image.
+//! COLLADA materials: from the material symbol of a primitive to a color or an image.
 
 use std::collections::HashMap;
 
@@ -8,15 +8,15 @@ use super::dae::{Dae, child, children, line};
 use super::error::percent_decoded;
 use super::{MeshError, MeshMaterial, TextureSource};
 
-/// What `<instance_material>` binds a symbol to.
+/// Binding of a material symbol by `<instance_material>`.
 pub(super) struct Binding<'a, 'i> {
     element: Node<'a, 'i>,
-    /// Texture coordinate set by the name that `<texture texcoord>` uses.
+    /// Texture coordinate sets, by the name that `<texture texcoord>` uses.
     sets: HashMap<&'a str, u32>,
 }
 
 impl<'a, 'i> Binding<'a, 'i> {
-    /// The bindings of `<instance_geometry>` by symbol.
+    /// Bindings of `<instance_geometry>`, by symbol.
     pub(super) fn of_instance(instance: Node<'a, 'i>) -> HashMap<&'a str, Self> {
         let materials = children(instance, "bind_material")
             .flat_map(|b| children(b, "technique_common"))
@@ -34,7 +34,7 @@ impl<'a, 'i> Binding<'a, 'i> {
 }
 
 impl<'a, 'i> Dae<'a, 'i> {
-    /// The material of a primitive and the texture coordinate set that its diffuse texture uses, where it says so.
+    /// Material of a primitive, and the texture coordinate set of its diffuse texture, if the file names one.
     pub(super) fn look(
         &mut self,
         primitive: Node<'a, 'i>,
@@ -43,7 +43,7 @@ impl<'a, 'i> Dae<'a, 'i> {
         let Some(symbol) = primitive.attribute("material") else { return Ok((None, None)) };
         let (material, binding) = match bindings.get(symbol) {
             Some(binding) => (self.target(binding.element, "target")?, Some(binding)),
-            // Some exporters leave the binding out and use the id of the material as its symbol.
+            // Some exporters omit the binding and use the id of the material as its symbol.
             None => match self.by_id(symbol).filter(|n| n.tag_name().name() == "material") {
                 Some(material) => (material, None),
                 None => return Ok((None, None)),
@@ -82,7 +82,7 @@ impl<'a, 'i> Dae<'a, 'i> {
         Ok((handle, uv_set))
     }
 
-    /// `<color>`, or the `<float4>` that `<param ref>` names.
+    /// `<color>`, or the `<float4>` or `<float3>` that `<param ref>` names.
     fn colour(&self, effect: Node<'a, 'i>, diffuse: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
         child(diffuse, "color").or_else(|| {
             let name = child(diffuse, "param")?.attribute("ref")?;
@@ -91,7 +91,8 @@ impl<'a, 'i> Dae<'a, 'i> {
         })
     }
 
-    /// The image file of a texture: sampler, surface, image, each by name; or the image at once.
+    /// Image file of a texture. The texture names a sampler, which names a surface, which names an image; or the
+    /// texture names the image directly.
     fn image(&self, effect: Node<'a, 'i>, texture: Node<'a, 'i>) -> Option<std::path::PathBuf> {
         let name = texture.attribute("texture")?;
         let mut image = name;
@@ -116,7 +117,7 @@ fn parameter<'a, 'i>(effect: Node<'a, 'i>, sid: &str) -> Option<Node<'a, 'i>> {
     effect.descendants().find(|n| n.tag_name().name() == "newparam" && n.attribute("sid") == Some(sid))
 }
 
-/// The element with the base colour: `<diffuse>` of the shading model, or what a constant one has instead.
+/// Element with the base color: `<diffuse>` of the shading model, or `<emission>` of a constant one.
 fn diffuse<'a, 'i>(effect: Node<'a, 'i>) -> Option<Node<'a, 'i>> {
     let profile = child(effect, "profile_COMMON")?;
     let technique = child(profile, "technique")?;

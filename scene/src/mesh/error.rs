@@ -1,11 +1,11 @@
-//! What can go wrong with a mesh file.
+//! Errors of mesh files.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use super::{HullError, MeshOptions};
 
-/// A mesh file that cannot be used, and where it goes wrong.
+/// Error of a mesh file, with the position in the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
@@ -14,15 +14,15 @@ pub enum MeshError {
     Io {
         /// The file that was opened.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Neither the extension nor the first bytes tell the format.
+    /// Neither the extension nor the first bytes identify the format.
     #[error("{}: unknown mesh format; expected {expected}", path.display())]
     UnknownFormat {
         /// The mesh file.
         path: PathBuf,
-        /// The extensions of the known formats.
+        /// Extensions of the supported formats.
         expected: String,
     },
     /// The file ends before the data it announces.
@@ -30,26 +30,26 @@ pub enum MeshError {
     Truncated {
         /// The mesh file.
         path: PathBuf,
-        /// Which part of the file.
+        /// Part of the file.
         at: String,
-        /// Bytes that should be there.
+        /// Expected number of bytes.
         expected: u64,
-        /// Bytes that are there.
+        /// Number of bytes found.
         found: u64,
     },
-    /// A line or element does not say what the format asks for.
+    /// A line or element violates the format.
     #[error("{}: {at}: {what}", path.display())]
     Invalid {
         /// The file (a mesh, or the MTL of an OBJ).
         path: PathBuf,
         /// The line or element.
         at: String,
-        /// What is wrong and what would be right.
+        /// The problem, and the expected content.
         what: String,
         /// The parser's own error, if one was involved.
         source: Option<Box<dyn Error + Send + Sync>>,
     },
-    /// An index points past the end of what it refers to.
+    /// An index is out of range.
     #[error("{}: {at}: index {index} is out of range, there are {count}", path.display())]
     IndexOutOfRange {
         /// The mesh file.
@@ -58,7 +58,7 @@ pub enum MeshError {
         at: String,
         /// The index as written.
         index: i64,
-        /// How many there are to refer to.
+        /// Number of elements that the index may refer to.
         count: usize,
     },
     /// A position is infinite or not a number.
@@ -71,12 +71,12 @@ pub enum MeshError {
         /// The position after all transforms.
         value: [f32; 3],
     },
-    /// The file needs something these readers do not have.
+    /// The file needs a feature that the readers do not support.
     #[error("{}: {feature} is not supported", path.display())]
     Unsupported {
         /// The mesh file.
         path: PathBuf,
-        /// The extension, element or mode, by name.
+        /// Name of the extension, element or mode.
         feature: String,
     },
     /// The file is well formed but holds no triangle.
@@ -85,14 +85,14 @@ pub enum MeshError {
         /// The mesh file.
         path: PathBuf,
     },
-    /// The file unfolds to more triangles than a mesh may have.
+    /// The file expands to more triangles or nodes than allowed.
     #[error("{}: more than {limit} {what}", path.display())]
     TooLarge {
         /// The mesh file.
         path: PathBuf,
-        /// What there is too much of.
+        /// Kind of the elements: `triangles` or `nodes`.
         what: &'static str,
-        /// The most that is accepted.
+        /// Largest accepted number.
         limit: usize,
     },
     /// The mesh has no convex hull.
@@ -100,12 +100,12 @@ pub enum MeshError {
     Hull {
         /// The mesh file.
         path: PathBuf,
-        /// Why.
+        /// Reason.
         source: HullError,
     },
 }
 
-/// The file being read and how: what every reader needs to make an error.
+/// The file and the options of its reader, from which readers make errors.
 pub(super) struct Ctx<'a> {
     pub(super) path: &'a Path,
     pub(super) options: &'a MeshOptions,
@@ -142,20 +142,20 @@ impl Ctx<'_> {
         MeshError::TooLarge { path: self.path.to_owned(), what, limit }
     }
 
-    /// A path written in this file, relative to the folder of this file.
+    /// Resolves a path that is written in this file, relative to the folder of this file.
     pub(super) fn beside(&self, written: &str) -> PathBuf {
         beside(self.path, written)
     }
 }
 
-/// A path as mesh files write it (URI escapes, `file://`, backslashes), relative to the folder of `file`.
+/// Resolves a path as mesh files write it (`file://`, backslashes), relative to the folder of `file`.
 pub(super) fn beside(file: &Path, written: &str) -> PathBuf {
     let plain = written.trim();
     let plain = plain.strip_prefix("file://").unwrap_or(plain).replace('\\', "/");
     file.parent().unwrap_or(Path::new("")).join(plain)
 }
 
-/// Undoes `%20` and its like; what is not a valid escape stays as written.
+/// Decodes URI escapes such as `%20`. Invalid escapes stay as written.
 pub(super) fn percent_decoded(uri: &str) -> String {
     let bytes = uri.as_bytes();
     let mut out = Vec::with_capacity(bytes.len());

@@ -1,8 +1,8 @@
-//! glTF 2.0: the binary container and the plain JSON file.
+//! glTF 2.0: the binary container (GLB) and the plain JSON file.
 //!
-//! Coordinates stay as stored (glTF means y up, metres). Texture coordinates are turned upside down, because glTF counts
-//! from the top of the image. Colour factors are linear in the file and become display values (sRGB). Skins, morph
-//! targets, animations and vertex colours are not read.
+//! Coordinates stay as stored (by the standard y up, in meters). Texture coordinates are flipped vertically, because
+//! glTF counts from the top of the image. Color factors are linear in the file and are converted to display colors
+//! (sRGB). Skins, morph targets, animations and vertex colors are ignored.
 
 use serde_json::Value;
 
@@ -18,10 +18,10 @@ const BIN: u32 = u32::from_le_bytes(*b"BIN\0");
 const MAX_DEPTH: usize = 64;
 const MAX_NODES: usize = 100_000;
 
-/// Required extensions that change nothing this reader looks at, or that it implements (quantized accessors).
+/// Required extensions that do not affect this reader, or that it implements (quantized accessors).
 const HARMLESS: [&str; 3] = ["KHR_mesh_quantization", "KHR_lights_punctual", "KHR_xmp_json_ld"];
 
-/// Binary glTF.
+/// The binary glTF format.
 pub(super) const GLB: Format = Format {
     code: 3,
     extensions: &["glb"],
@@ -31,7 +31,7 @@ pub(super) const GLB: Format = Format {
     read: read_glb,
 };
 
-/// glTF.
+/// The plain glTF format.
 pub(super) const GLTF: Format = Format {
     code: 4,
     extensions: &["gltf"],
@@ -100,7 +100,7 @@ fn read_json(ctx: &Ctx<'_>, json: &[u8], bin: Option<&[u8]>) -> Result<TriMesh, 
     let roots: Vec<usize> = match (scene, item(&json, "scenes", 0)) {
         (Some(index), _) => reader.children(reader.gltf.referred("scenes", index, "glTF")?, "nodes", "scene")?,
         (None, Some(first)) => reader.children(first, "nodes", "scene")?,
-        // Without scenes, every node that is no child of another.
+        // Without scenes, every node that is not a child of another node.
         (None, None) => {
             let mut root = vec![true; nodes];
             for node in array(&json, "nodes") {
@@ -131,7 +131,7 @@ fn array<'j>(json: &'j Value, key: &str) -> &'j [Value] {
 struct Reader<'a> {
     gltf: Gltf<'a>,
     builder: Builder,
-    /// Handle and texture coordinate set of the materials read so far.
+    /// Handles and texture coordinate sets of the materials read so far.
     materials: Vec<Option<(usize, usize)>>,
     nodes_seen: usize,
 }
@@ -164,7 +164,7 @@ impl Reader<'_> {
             return Err(self.gltf.ctx.too_large("nodes", MAX_NODES));
         }
         let local = match self.numbers::<16>(node, "matrix", &at)? {
-            // Column by column in the file.
+            // The file stores columns.
             Some(m) => [0, 1, 2].map(|row| [m[row], m[4 + row], m[8 + row], m[12 + row]]),
             None => {
                 let t = self.numbers(node, "translation", &at)?.unwrap_or([0.0; 3]);
@@ -282,7 +282,7 @@ impl Reader<'_> {
             uv_set = self.gltf.optional(base, "texCoord", &at)?.unwrap_or(0);
             let number = self.gltf.number(base, "index", &at)?;
             let entry = self.gltf.referred("textures", number, &at)?;
-            // A texture whose image only an extension names has no source.
+            // A texture without a source has its image in an extension.
             if let Some(source) = self.gltf.optional(entry, "source", &format!("texture {number}"))? {
                 texture = self.image(source, &at)?;
             }
@@ -307,7 +307,7 @@ impl Reader<'_> {
     }
 }
 
-/// Translation, rotation (x, y, z, w), scale.
+/// Transform of a translation, a rotation (x, y, z, w) and a scale.
 fn trs(t: [f64; 3], [x, y, z, w]: [f64; 4], s: [f64; 3]) -> Affine {
     let length = (x * x + y * y + z * z + w * w).sqrt();
     let [x, y, z, w] = if length > 0.0 { [x, y, z, w].map(|c| c / length) } else { [0.0, 0.0, 0.0, 1.0] };
@@ -319,7 +319,7 @@ fn trs(t: [f64; 3], [x, y, z, w]: [f64; 4], s: [f64; 3]) -> Affine {
     [0, 1, 2].map(|i| [r[i][0] * s[0], r[i][1] * s[1], r[i][2] * s[2], t[i]])
 }
 
-/// Linear light to sRGB.
+/// Converts linear light to sRGB.
 fn to_display(x: f64) -> f64 {
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }

@@ -1,4 +1,4 @@
-//! The bytes of glTF: buffers, buffer views, accessors. Every offset is checked before it is used.
+//! Binary data of glTF: buffers, buffer views, accessors. Every offset is checked before its use.
 
 use std::borrow::Cow;
 
@@ -16,7 +16,7 @@ pub(super) struct Gltf<'a> {
     bin: Option<&'a [u8]>,
 }
 
-/// The bytes of an accessor and how to read them.
+/// Location and element type of an accessor's bytes.
 struct Layout {
     buffer: usize,
     start: usize,
@@ -26,7 +26,7 @@ struct Layout {
     normalized: bool,
 }
 
-/// An array element by name and index; `None` when either is missing.
+/// Array element by name and index; `None` if either is missing.
 pub(super) fn item<'j>(json: &'j Value, array: &str, index: usize) -> Option<&'j Value> {
     json.get(array)?.as_array()?.get(index)
 }
@@ -41,19 +41,19 @@ impl<'a> Gltf<'a> {
         Self { ctx, json, buffers, bin }
     }
 
-    /// A whole number that must be there.
+    /// A required whole number.
     pub(super) fn number(&self, value: &Value, key: &str, at: &str) -> Result<usize, MeshError> {
         self.optional(value, key, at)?.ok_or_else(|| self.ctx.invalid(at, format!("{key:?} is missing")))
     }
 
-    /// A whole number that may be missing, but must be one if it is there.
+    /// An optional whole number. Any other value is an error.
     pub(super) fn optional(&self, value: &Value, key: &str, at: &str) -> Result<Option<usize>, MeshError> {
         let Some(found) = value.get(key) else { return Ok(None) };
         let number = found.as_u64().and_then(|n| usize::try_from(n).ok());
         number.map(Some).ok_or_else(|| self.ctx.invalid(at, format!("{key:?} is not a whole number")))
     }
 
-    /// The element that an index refers to.
+    /// Element that an index refers to.
     pub(super) fn referred(&self, array: &str, index: usize, at: &str) -> Result<&'a Value, MeshError> {
         let found = item(self.json, array, index);
         found.ok_or_else(|| self.ctx.index(format!("{at}, index into {array}"), index as i64, len(self.json, array)))
@@ -78,7 +78,7 @@ impl<'a> Gltf<'a> {
         Ok(())
     }
 
-    /// What a URI holds: the bytes of a `data:` URI, or of a file beside this one.
+    /// Bytes of a `data:` URI, or of a file beside this one.
     fn uri_bytes(&self, uri: &str, at: &str) -> Result<Vec<u8>, MeshError> {
         if let Some(data) = uri.strip_prefix("data:") {
             let text = data.split_once(";base64,").map(|(_, text)| text);
@@ -89,13 +89,13 @@ impl<'a> Gltf<'a> {
         read(&self.ctx.beside(&percent_decoded(uri)))
     }
 
-    /// The bytes of a buffer view (an embedded image).
+    /// Bytes of a buffer view (an embedded image).
     pub(super) fn view(&mut self, index: usize, at: &str) -> Result<Vec<u8>, MeshError> {
         let (buffer, start, length, _) = self.view_range(index, at)?;
         Ok(self.bytes(buffer)[start..start + length].to_vec())
     }
 
-    /// The bytes of a data: URI.
+    /// Bytes of a `data:` URI; `None` for other URIs.
     pub(super) fn embedded(&self, uri: &str, at: &str) -> Result<Option<Vec<u8>>, MeshError> {
         if uri.starts_with("data:") { self.uri_bytes(uri, at).map(Some) } else { Ok(None) }
     }
@@ -104,7 +104,7 @@ impl<'a> Gltf<'a> {
         self.buffers.get(buffer).and_then(|b| b.as_deref()).unwrap_or_default()
     }
 
-    /// Buffer, start, length and stride of a view, inside its buffer.
+    /// Buffer, start, length and stride of a view, checked against its buffer.
     fn view_range(&mut self, index: usize, at: &str) -> Result<(usize, usize, usize, Option<usize>), MeshError> {
         let view = self.referred("bufferViews", index, at)?;
         let name = format!("bufferView {index}");
@@ -168,7 +168,7 @@ impl<'a> Gltf<'a> {
         }
     }
 
-    /// An accessor of vectors. Integers count as fractions of their largest value when they are marked normalized.
+    /// Reads an accessor of vectors. Integers that are marked normalized are fractions of their largest value.
     pub(super) fn vectors<const N: usize>(&mut self, index: usize, at: &str) -> Result<Vec<[f64; N]>, MeshError> {
         let layout = self.layout(index, if N == 3 { "VEC3" } else { "VEC2" }, at)?;
         let bytes = self.bytes(layout.buffer);
@@ -180,7 +180,7 @@ impl<'a> Gltf<'a> {
         Ok((0..layout.count).map(row).collect())
     }
 
-    /// An accessor of vertex indices.
+    /// Reads an accessor of vertex indices.
     pub(super) fn indices(&mut self, index: usize, at: &str) -> Result<Vec<u32>, MeshError> {
         let layout = self.layout(index, "SCALAR", at)?;
         if !matches!(layout.component, 5121 | 5123 | 5125) {

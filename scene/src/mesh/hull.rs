@@ -1,11 +1,11 @@
 //! Convex hulls with a bounded number of vertices.
 //!
-//! Quickhull that always adds the point that is farthest outside the hull so far. Stopped early, the hull is therefore a
-//! good coarse one; its vertices are input points, so that it never reaches beyond the true hull.
+//! The algorithm is Quickhull that always adds the point farthest outside the current hull. Stopped early, it therefore
+//! gives a good coarse hull. Its vertices are input points, so the hull never extends beyond the true hull.
 //!
-//! Which side of a plane a point is on is decided exactly: points are snapped to a grid of 2^38 steps across their extent
-//! (4e-12 of it, far below what `f32` coordinates resolve), where planes are integers. With rounding instead, faces of
-//! CAD parts with many points in one plane give slivers that point anywhere.
+//! The side of a plane on which a point lies is decided exactly: points are snapped to a grid of 2^38 steps across
+//! their extent (4e-12 of it, far below what `f32` coordinates resolve), where planes are integers. With rounding
+//! instead, faces of CAD parts with many points in one plane give slivers with arbitrary normals.
 
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, BinaryHeap, HashMap};
@@ -13,28 +13,30 @@ use std::collections::{BTreeSet, BinaryHeap, HashMap};
 use super::builder::{cross, dot, sub};
 use super::{HullError, TriMesh};
 
-/// Changes whenever the same input may give another hull; part of the key of [`super::HullCache`].
+/// Version of the algorithm. It changes whenever the same input may give another hull; part of the key of
+/// [`super::HullCache`].
 pub(super) const ALGORITHM: u32 = 1;
 
-/// The least tolerance, as a fraction of the diagonal: less than half a unit in the last place of `f32`.
+/// Smallest tolerance, as a fraction of the diagonal: less than half a unit in the last place of `f32`.
 const RESOLUTION: f64 = 1e-8;
 
-/// Steps of the grid across the largest extent, as a power of two. Planes then fit into 79 bits, and the products with
+/// Grid steps across the largest extent, as a power of two. Planes then fit into 79 bits, and their products with
 /// differences of points into 120.
 const GRID_BITS: i32 = 38;
 
-/// How a hull is simplified.
+/// Simplification of a convex hull.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HullCfg {
-    /// The most vertices of the hull, at least 4. Contact tests cost time per vertex.
+    /// Largest number of vertices, at least 4. Contact tests cost time per vertex.
     pub max_vertices: usize,
-    /// Points that stick out of the hull by less than this fraction of the diagonal of the bounding box are left out, at
-    /// least 0 (which acts as 1e-8, less than `f32` resolves). The default 1e-4 is 0.03 mm on a link of 0.3 m: below what a robot is built to, above the noise of a
-    /// tessellated cylinder.
+    /// Largest distance of an omitted point from the hull, as a fraction of the diagonal of the bounding box.
+    ///
+    /// At least 0, which acts as 1e-8 (less than `f32` resolves). The default 1e-4 is 0.03 mm on a link of 0.3 m: below
+    /// the tolerances of robot parts, above the noise of a tessellated cylinder.
     pub tolerance: f64,
-    /// The thickness \[m\] that a flat point set gets, half on each side of its plane. Flat means thinner than the
-    /// tolerance. `None` makes a flat point set an error.
+    /// Thickness of the hull of a flat point set \[m\], half on each side of its plane. Flat means thinner than the
+    /// tolerance. With `None`, a flat point set is an error.
     #[serde(with = "crate::file_format::or_false")]
     pub min_thickness: Option<f64>,
 }
@@ -45,9 +47,13 @@ impl Default for HullCfg {
     }
 }
 
-/// The convex hull of points: closed, convex, outside the front, the same for the same input.
+/// Computes the convex hull of points: closed, convex, with outward-facing triangles. Equal inputs give equal hulls.
 ///
-/// Unless `max_vertices` stops it, no point is farther outside than the tolerance.
+/// Unless `max_vertices` stops the algorithm, no point is farther outside than the tolerance.
+///
+/// # Errors
+/// The configuration is out of range, a coordinate is not finite, or the points are fewer than four, coincident,
+/// collinear, or coplanar without [`HullCfg::min_thickness`].
 pub fn convex_hull(points: &[[f32; 3]], cfg: &HullCfg) -> Result<TriMesh, HullError> {
     check(cfg)?;
     if let Some(index) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
@@ -110,7 +116,7 @@ fn norm(v: [f64; 3]) -> f64 {
     dot(v, v).sqrt()
 }
 
-/// Four extreme points and how far the third and fourth are off the line and the plane of those before.
+/// Four extreme points, the distance of the third from the line and of the fourth from the plane of the points before.
 struct Simplex {
     corners: [usize; 4],
     off_line: f64,
@@ -119,7 +125,7 @@ struct Simplex {
     origin: [f64; 3],
 }
 
-/// The index with the largest value; the first of equals.
+/// Index and value of the largest distance; the first of equal ones.
 fn farthest(points: &[[f64; 3]], distance: impl Fn([f64; 3]) -> f64) -> (usize, f64) {
     points.iter().enumerate().fold((0, f64::NEG_INFINITY), |best, (i, &p)| {
         let d = distance(p);
@@ -128,7 +134,7 @@ fn farthest(points: &[[f64; 3]], distance: impl Fn([f64; 3]) -> f64) -> (usize, 
 }
 
 fn simplex(points: &[[f64; 3]]) -> Simplex {
-    // The longest of the extents along the axes, then the point farthest from one end of it: nearly the diameter.
+    // The longest extent along the axes, then the point farthest from one of its ends: nearly the diameter.
     let extent = |axis: usize| {
         let (hi, above) = farthest(points, |p| p[axis]);
         let (_, below) = farthest(points, |p| -p[axis]);
@@ -144,7 +150,7 @@ fn simplex(points: &[[f64; 3]]) -> Simplex {
     Simplex { corners: [a, b, c, d], off_line, off_plane, normal, origin }
 }
 
-/// The points flattened into their plane, once on each side of it.
+/// Points projected into their plane, once on each side of it.
 fn thickened(points: &[[f64; 3]], flat: &Simplex, thickness: f64) -> Vec<[f64; 3]> {
     let heights = || points.iter().map(|&p| dot(flat.normal, sub(p, flat.origin)));
     let (lo, hi) = heights().fold((0.0f64, 0.0f64), |(lo, hi), h| (lo.min(h), hi.max(h)));
@@ -160,24 +166,25 @@ fn thickened(points: &[[f64; 3]], flat: &Simplex, thickness: f64) -> Vec<[f64; 3
 
 struct Face {
     corners: [usize; 3],
-    /// Neighbour across the edge from corner `i` to corner `i + 1`.
+    /// Neighbor across the edge from corner `i` to corner `i + 1`.
     neighbours: [usize; 3],
-    /// The normal, exactly, and with unit length.
+    /// Exact normal, not of unit length.
     exact: [i128; 3],
+    /// Unit normal.
     normal: [f64; 3],
     alive: bool,
-    /// Points in front of this face, each in the list of one face only.
+    /// Points in front of this face. Each point is in the list of one face only.
     outside: Vec<usize>,
 }
 
-/// An edge of the horizon, directed as in the face that goes, and the face that stays.
+/// An edge of the horizon, directed as in the removed face, with the remaining face beyond it.
 struct Edge {
     from: usize,
     to: usize,
     beyond: usize,
 }
 
-/// A candidate for the next point; the farthest first, then the smaller point.
+/// Candidate for the next point, ordered by distance, then by the smaller index.
 #[derive(PartialEq)]
 struct Candidate {
     distance: f64,
@@ -201,20 +208,20 @@ impl PartialOrd for Candidate {
 }
 
 struct Quickhull {
-    /// Points in steps of the grid, relative to the first.
+    /// Points in grid steps, relative to the first point.
     points: Vec<[f64; 3]>,
     faces: Vec<Face>,
     heap: BinaryHeap<Candidate>,
-    /// Faces at each vertex of the hull; 0 for all other points.
+    /// Number of faces at each vertex of the hull; 0 for all other points.
     degree: Vec<u32>,
     vertices: usize,
-    /// In steps of the grid.
+    /// Tolerance in grid steps.
     tolerance: f64,
 }
 
 impl Quickhull {
     fn run(points: &[[f64; 3]], start: [usize; 4], tolerance: f64, max_vertices: usize) -> TriMesh {
-        // At most twice the largest extent.
+        // The diagonal is at most twice the largest extent.
         let extent = diagonal(points);
         let steps = 2f64.powi(GRID_BITS - 1 - extent.log2().floor() as i32);
         let snapped = points.iter().map(|&p| sub(p, points[0]).map(|x| (x * steps).round())).collect();
@@ -232,15 +239,15 @@ impl Quickhull {
             sub(hull.points[d], hull.points[a]),
         );
         if height > 0.0 {
-            // Seen from d, the triangle a b c has to turn clockwise.
+            // Seen from d, the triangle a b c must turn clockwise.
             std::mem::swap(&mut b, &mut c);
         }
-        // Neighbours by hand: face 0 is the base, faces 1 to 3 stand on its edges.
+        // Initial neighbors: face 0 is the base, faces 1 to 3 are on its edges.
         hull.add([a, b, c], [1, 2, 3]);
         hull.add([b, a, d], [0, 3, 2]);
         hull.add([c, b, d], [0, 1, 3]);
         hull.add([a, c, d], [0, 2, 1]);
-        // Points that the tolerance dropped too early get another chance; a second round that finds nothing is the rule.
+        // Each round reconsiders points that the tolerance dropped too early. The second round usually finds no points.
         for _ in 0..8 {
             let everything = (0..points.len()).collect();
             let all: Vec<usize> = (0..hull.faces.len()).filter(|&f| hull.faces[f].alive).collect();
@@ -252,7 +259,7 @@ impl Quickhull {
         hull.into_mesh(points)
     }
 
-    /// Adds points until none is outside (true) or there are vertices enough (false).
+    /// Adds points until no point is outside (true) or the vertex limit is reached (false).
     fn grow(&mut self, max_vertices: usize) -> bool {
         while let Some(Candidate { point, face, .. }) = self.heap.pop() {
             if !self.faces[face].alive {
@@ -269,16 +276,16 @@ impl Quickhull {
         true
     }
 
-    /// How far a point is in front of a face, in steps.
+    /// Distance of a point in front of a face, in grid steps.
     fn distance(&self, face: usize, point: usize) -> f64 {
         let face = &self.faces[face];
         dot(face.normal, sub(self.points[point], self.points[face.corners[0]]))
     }
 
-    /// Whether a point is strictly in front of a face, exactly.
+    /// True if a point is strictly in front of a face, decided exactly.
     fn sees(&self, point: usize, face: usize) -> bool {
         let distance = self.distance(face, point);
-        // The rounding of `distance` is below 2^-12 steps.
+        // The rounding error of `distance` is below 2^-12 steps.
         if distance.abs() > 0.01 {
             return distance > 0.0;
         }
@@ -310,7 +317,7 @@ impl Quickhull {
         std::mem::take(&mut self.faces[face].outside)
     }
 
-    /// Gives each point to the face of `among` that it is farthest in front of, and drops those in front of none.
+    /// Assigns each point to the face of `among` that it is farthest in front of, and drops points behind all faces.
     fn hand_out(&mut self, points: Vec<usize>, among: &[usize]) {
         for point in points {
             if self.degree[point] > 0 {
@@ -332,7 +339,7 @@ impl Quickhull {
         }
     }
 
-    /// Puts the farthest point of a face up as a candidate.
+    /// Adds the farthest point of a face to the candidates.
     fn announce(&mut self, face: usize) {
         let points = self.faces[face].outside.iter();
         let candidates = points.map(|&point| Candidate { distance: self.distance(face, point), point, face });
@@ -341,13 +348,14 @@ impl Quickhull {
         }
     }
 
-    /// Replaces all faces that `apex` sees by a cone.
+    /// Replaces all faces that `apex` sees by a cone of new faces.
     fn insert(&mut self, apex: usize, from: usize) {
         let (seen, rim) = self.horizon(apex, from);
         let first = self.faces.len();
         let count = rim.len();
         for (i, &Edge { from: a, to: b, beyond }) in rim.iter().enumerate() {
-            // No sliver without area: the apex is strictly in front of a face with this edge, so not in line with it.
+            // No face is degenerate: the apex is strictly in front of a face with this edge, so not in line with the
+            // edge.
             self.add([a, b, apex], [beyond, first + (i + 1) % count, first + (i + count - 1) % count]);
             if let Some(edge) = (0..3).find(|&e| self.faces[beyond].corners[e] == b) {
                 self.faces[beyond].neighbours[edge] = first + i;
@@ -361,8 +369,8 @@ impl Quickhull {
         self.hand_out(points, &new);
     }
 
-    /// The faces that `apex` sees, starting with `from`, and the edges around them in order. Exact planes of a convex
-    /// body make that one simple loop.
+    /// Faces that `apex` sees, starting with `from`, and the edges around them in order. Exact planes of a convex body
+    /// make these edges one simple loop.
     fn horizon(&self, apex: usize, from: usize) -> (Vec<usize>, Vec<Edge>) {
         let mut seen = vec![from];
         let mut is_seen = BTreeSet::from([from]);

@@ -1,4 +1,4 @@
-//! Hulls of mesh files, kept on disk between runs.
+//! Disk cache of convex hulls of mesh files.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -10,21 +10,24 @@ use super::load::{format_of, read};
 use super::{DaeUpAxis, HullCfg, MeshError, MeshOptions, TriMesh, convex_hull, hull, load_bytes};
 use crate::atomic_file::AtomicFile;
 
-/// Changes whenever the readers give other vertices for the same file.
+/// Version of the readers. It changes whenever they give other vertices for the same file.
 const READERS: u32 = 1;
 const MAGIC: &[u8; 12] = b"kshull\r\n\x00\x01\x00\x00";
 pub(super) const KEY: usize = 32;
 const HEAD: usize = MAGIC.len() + KEY + 8;
 
-/// A folder of convex hulls. Whatever is wrong with the folder or a file in it costs time, never an error: the hull is
-/// computed again, and written again where that is possible.
+/// Disk cache of convex hulls, in one folder.
+///
+/// A problem with the folder or a file in it costs time but is never an error: the hull is computed again, and written
+/// again if possible.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct HullCache {
     dir: Option<PathBuf>,
 }
 
 impl HullCache {
-    /// `$KINETOSCOPE_CACHE`, else `$XDG_CACHE_HOME/kinetoscope`, else `$HOME/.cache/kinetoscope`, else no cache.
+    /// Cache in `$KINETOSCOPE_CACHE`, else `$XDG_CACHE_HOME/kinetoscope`, else `$HOME/.cache/kinetoscope`, else
+    /// disabled.
     pub fn default_location() -> Self {
         Self::located(|name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from))
     }
@@ -36,27 +39,33 @@ impl HullCache {
         Self { dir }
     }
 
-    /// A cache in a folder, which is made when the first hull is written.
+    /// Cache in a folder, which is created when the first hull is written.
     pub fn at(dir: impl Into<PathBuf>) -> Self {
         Self { dir: Some(dir.into()) }
     }
 
-    /// No cache: every hull is computed.
+    /// A disabled cache: every hull is computed.
     pub fn disabled() -> Self {
         Self { dir: None }
     }
 
-    /// The folder.
+    /// Folder of the cache; `None` if the cache is disabled.
     pub fn dir(&self) -> Option<&Path> {
         self.dir.as_deref()
     }
 
-    /// The convex hull of the vertices of a mesh file, scaled along its axes (the `scale` of URDF).
+    /// Returns the convex hull of the vertices of a mesh file, scaled along its axes (the `scale` of URDF).
+    ///
+    /// # Errors
+    /// A factor of the scale is 0 or not finite, the file cannot be read, or its vertices have no hull.
     pub fn hull_of_file(&self, path: &Path, scale: [f64; 3], cfg: &HullCfg) -> Result<TriMesh, MeshError> {
         self.hull_of_file_with(path, &MeshOptions::default(), scale, cfg)
     }
 
-    /// [`HullCache::hull_of_file`] with options for the reader.
+    /// Returns the hull as [`HullCache::hull_of_file`] does, with options of the mesh reader.
+    ///
+    /// # Errors
+    /// As [`HullCache::hull_of_file`].
     pub fn hull_of_file_with(
         &self,
         path: &Path,
@@ -91,7 +100,7 @@ impl HullCache {
         let hull =
             convex_hull(&mesh.positions, cfg).map_err(|source| MeshError::Hull { path: path.to_owned(), source })?;
         if let Some((file, key)) = entry {
-            // A cache that cannot be written is no cache.
+            // A failed write is ignored: the hull is valid without it.
             let _ = store(&file, &encoded(&hull, &key));
         }
         Ok(hull)
@@ -114,7 +123,7 @@ pub(super) fn key(bytes: &[u8], format: &Format, options: &MeshOptions, scale: [
     hasher.finalize().into()
 }
 
-/// Magic, key, counts, positions, triangles, and the SHA-256 of all that.
+/// Encodes a hull: magic, key, counts, positions, triangles, and the SHA-256 of all of these.
 pub(super) fn encoded(hull: &TriMesh, key: &[u8; KEY]) -> Vec<u8> {
     let mut out = MAGIC.to_vec();
     out.extend(key);
@@ -145,7 +154,7 @@ pub(super) fn decoded(bytes: &[u8], key: &[u8; KEY]) -> Option<TriMesh> {
     hull.validate().is_ok().then_some(hull)
 }
 
-/// Writes a file of the cache, and its folder where that is missing.
+/// Writes a file of the cache, and creates its folder if it is missing.
 pub(super) fn store(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     if let Some(dir) = file.parent() {
         std::fs::create_dir_all(dir)?;
@@ -189,7 +198,7 @@ mod tests {
         let file = only_file(cache.dir().unwrap());
         let good = fs::read(&file).unwrap();
         assert_eq!(cache.hull_of_file(&mesh, scale, &cfg).unwrap(), fresh);
-        // A hit does not look at the mesh again: a hull planted under the right key comes back.
+        // A hit does not compute the hull again: a hull planted under the right key is returned.
         let key: [u8; KEY] = good[MAGIC.len()..][..KEY].try_into().unwrap();
         let planted = fresh.scaled([2.0; 3]);
         fs::write(&file, encoded(&planted, &key)).unwrap();
@@ -205,7 +214,7 @@ mod tests {
         assert_eq!(fs::read(only_file(cache.dir().unwrap())).unwrap(), good);
     }
 
-    /// A tetrahedron along y in a file with y up: the hull stands where the option says, and each has a file of its own.
+    /// A tetrahedron along y in a file with y up: the hull is oriented by the option, and each option has its own file.
     #[test]
     fn reader_options() {
         let scratch = tempfile::tempdir().unwrap();
@@ -222,7 +231,7 @@ mod tests {
             [0, 1, 2].map(|k| hi[k] - lo[k])
         };
         for _ in 0..2 {
-            // As the file has it; with y up, y of the file is z, which is doubled.
+            // `Ignore` keeps the axes of the file. `Apply` makes its y axis the z axis, which is doubled.
             for (option, expected) in [(DaeUpAxis::Ignore, [1.0, 3.0, 4.0]), (DaeUpAxis::Apply, [1.0, 2.0, 6.0])] {
                 let found: [f32; 3] = size(option);
                 assert!((0..3).all(|k| (found[k] - expected[k]).abs() < 1e-5), "{option:?}: {found:?}");
@@ -268,7 +277,7 @@ mod tests {
 
     #[test]
     fn default_place() {
-        // The folder of this process is one of those that the variables name, whichever are set.
+        // The default folder follows from the first of the three variables that is set.
         let of = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
         let expected = match (of("KINETOSCOPE_CACHE"), of("XDG_CACHE_HOME"), of("HOME")) {
             (Some(dir), ..) => Some(dir),

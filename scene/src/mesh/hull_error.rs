@@ -2,16 +2,16 @@
 
 use super::MeshFault;
 
-/// Why points have no hull.
+/// Error of a convex hull or of convex pieces.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HullError {
     /// A field of the configuration is out of its range.
     #[error("HullCfg::{field} is {value}; expected {expected}")]
     InvalidCfg {
-        /// The field.
+        /// Name of the field.
         field: &'static str,
-        /// Its value.
+        /// Value of the field.
         value: f64,
         /// Accepted values.
         expected: &'static str,
@@ -19,9 +19,9 @@ pub enum HullError {
     /// A field of the configuration of convex pieces is out of its range.
     #[error("PiecesCfg::{field} is {value}; expected {expected}")]
     InvalidPieces {
-        /// The field.
+        /// Name of the field.
         field: &'static str,
-        /// Its value.
+        /// Value of the field.
         value: f64,
         /// Accepted values.
         expected: &'static str,
@@ -32,44 +32,44 @@ pub enum HullError {
         /// The thickness \[m\].
         value: f64,
     },
-    /// A mesh breaks a promise of its type.
+    /// A mesh violates an invariant of its type.
     #[error("{source}")]
     Mesh {
-        /// Which.
+        /// The violation.
         source: MeshFault,
     },
-    /// A mesh has more triangles than are cut into pieces.
+    /// A mesh has too many triangles to be cut into convex pieces.
     #[error("{found} triangles; at most {most} are cut into convex pieces: simplify the mesh, or let its hull collide")]
     TooManyTriangles {
-        /// How many there are.
+        /// Number of triangles.
         found: usize,
-        /// How many there may be.
+        /// Largest accepted number.
         most: usize,
     },
     /// No triangle of a mesh has an area.
     #[error("none of {triangles} triangles has an area")]
     NoArea {
-        /// How many there are.
+        /// Number of triangles.
         triangles: usize,
     },
     /// Fewer than four points.
     #[error("{found} points; a hull needs at least 4")]
     TooFewPoints {
-        /// How many there are.
+        /// Number of points.
         found: usize,
     },
     /// A coordinate is infinite or not a number.
     #[error("point {index} is {value:?}; expected finite coordinates")]
     NonFinite {
-        /// Which point.
+        /// Index of the point.
         index: usize,
-        /// Its coordinates.
+        /// Coordinates of the point \[m\].
         value: [f32; 3],
     },
     /// All points are the same.
     #[error("all {count} points coincide")]
     Coincident {
-        /// How many there are.
+        /// Number of points.
         count: usize,
     },
     /// All points are on a line, within the tolerance.

@@ -1,4 +1,4 @@
-//! The list of mesh formats, and which of them a file has.
+//! List of mesh formats, and detection of a file's format.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use super::{MeshError, MeshOptions, TriMesh, dae, glb, obj, stl};
 /// All formats.
 const FORMATS: [&Format; 5] = [&stl::FORMAT, &obj::FORMAT, &dae::FORMAT, &glb::GLB, &glb::GLTF];
 
-/// The format of a file: by what the first bytes prove, then by extension, then by what the first bytes suggest.
+/// Format of a file: by content that proves it, then by extension, then by content that suggests it.
 pub(super) fn format_of(path: &Path, bytes: &[u8]) -> Option<&'static Format> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let certain = FORMATS.into_iter().find(|format| (format.is_certain)(bytes));
@@ -21,7 +21,7 @@ pub(super) fn format_of(path: &Path, bytes: &[u8]) -> Option<&'static Format> {
     certain.or_else(named).or_else(|| likely().map(|(_, format)| format))
 }
 
-/// The extensions of all formats, for a message.
+/// Extensions of all formats, for an error message.
 fn extensions() -> String {
     let all = FORMATS.map(|format| format!(".{}", format.extensions[0]));
     let (last, others) = all.split_last().map_or(("", &all[..]), |(last, others)| (last, others));
@@ -30,21 +30,32 @@ fn extensions() -> String {
 
 /// Reads a mesh file: STL (binary or ASCII), OBJ with MTL, COLLADA, GLB or glTF.
 ///
-/// The format comes from the content where that is certain, else from the extension in any case. The result is welded
-/// (vertices equal in position, normal and texture coordinate are one), free of degenerate triangles unless there is
-/// nothing else, and its triangles are grouped by material; the order depends on the file alone. Positions are metres
-/// as stored, except that COLLADA's `<unit>` is applied. No axis is exchanged (see [`MeshOptions`] for COLLADA; glTF
-/// says y is up, URDF says nothing about it, and so the coordinates stay as stored).
+/// The content determines the format if it is unambiguous, else the extension, else the likely content. Vertices of
+/// equal position, normal and texture coordinates are merged. Degenerate triangles are removed, unless all are
+/// degenerate. Triangles are grouped by material, in an order that depends on the file alone.
+///
+/// Positions are in meters as stored, except that COLLADA's `<unit>` is applied. Axes are not exchanged: URDF defines
+/// no up axis for meshes, so the y-up coordinates of glTF stay as stored (see [`MeshOptions`] for COLLADA).
+///
+/// # Errors
+/// The file cannot be read, or its content is invalid, unsupported or without triangles.
 pub fn load(path: &Path) -> Result<TriMesh, MeshError> {
     load_with(path, &MeshOptions::default())
 }
 
-/// [`load`] with options.
+/// Reads a mesh file as [`load`] does, with options.
+///
+/// # Errors
+/// As [`load`].
 pub fn load_with(path: &Path, options: &MeshOptions) -> Result<TriMesh, MeshError> {
     load_bytes(path, &read(path)?, options)
 }
 
-/// Reads a mesh from the content of a file; `path` serves the extension, error messages and files beside it.
+/// Reads a mesh from the content of a file. `path` gives the extension, the name in errors and the folder of other
+/// files.
+///
+/// # Errors
+/// As [`load`].
 pub fn load_bytes(path: &Path, bytes: &[u8], options: &MeshOptions) -> Result<TriMesh, MeshError> {
     let ctx = Ctx { path, options };
     let format = format_of(path, bytes)

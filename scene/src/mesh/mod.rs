@@ -1,4 +1,6 @@
-//! Triangle meshes and their files: STL, OBJ + MTL, DAE, GLB in; convex hulls; STL and OBJ out.
+//! Triangle meshes and their files.
+//!
+//! Readers: STL, OBJ with MTL, COLLADA, GLB and glTF. Writers: STL and OBJ. Also convex hulls and convex pieces.
 
 mod affine;
 mod builder;
@@ -47,15 +49,15 @@ pub use write::{write_binary_stl, write_obj};
 /// Triangles with optional normals and texture coordinates, in one vertex array.
 ///
 /// Every index is smaller than `positions.len()`; every position is finite; `normals` and `uvs` are either absent or as
-/// long as `positions`. [`load`] guarantees it.
+/// long as `positions`. [`load`] guarantees these invariants.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
     /// Vertex positions \[m\].
     pub positions: Vec<[f32; 3]>,
     /// Unit vertex normals.
     pub normals: Option<Vec<[f32; 3]>>,
-    /// Texture coordinates, origin at the lower left of the image (OpenGL, OBJ, COLLADA). They may leave 0..=1: the
-    /// image repeats.
+    /// Texture coordinates, origin at the lower left of the image (OpenGL, OBJ, COLLADA). Coordinates outside of 0..=1
+    /// repeat the image.
     pub uvs: Option<Vec<[f32; 2]>>,
     /// Vertex indices of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
@@ -70,25 +72,25 @@ pub struct TriMesh {
 pub struct MeshPart {
     /// Range in [`TriMesh::triangles`].
     pub triangles: Range<usize>,
-    /// Index in [`TriMesh::materials`]; `None` where the file gives none.
+    /// Index in [`TriMesh::materials`]; `None` for triangles without a material in the file.
     pub material: Option<usize>,
 }
 
-/// The look of a part as the mesh file gives it.
+/// Material of a part, as given in the mesh file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshMaterial {
     /// Name in the file.
     pub name: String,
-    /// Base colour rgba in 0..=1 (multiplies the texture), meant for the screen as it is (sRGB, not linear).
+    /// Base color rgba in 0..=1, a display color (sRGB, not linear). It multiplies the texture.
     pub rgba: [f32; 4],
-    /// Base colour image.
+    /// Base color texture.
     pub texture: Option<TextureSource>,
 }
 
-/// Where the pixels of a texture are.
+/// Source of a texture's pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TextureSource {
-    /// An image file next to the mesh (it may not exist).
+    /// An image file. It may not exist.
     File(PathBuf),
     /// An image inside the mesh file (GLB): its bytes, PNG or JPEG.
     Embedded(Vec<u8>),

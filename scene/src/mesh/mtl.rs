@@ -5,7 +5,7 @@ use std::path::Path;
 use super::error::{Ctx, beside};
 use super::{MeshError, MeshMaterial, TextureSource};
 
-/// Options of `map_Kd` and how many words follow each at most; of several, only numbers count.
+/// Options of `map_Kd`, with the largest number of words after each. After the first word, only numbers count.
 const MAP_OPTIONS: [(&str, usize); 12] = [
     ("-s", 3),
     ("-o", 3),
@@ -23,8 +23,8 @@ const MAP_OPTIONS: [(&str, usize); 12] = [
 
 /// Reads an MTL file that lies next to an OBJ: `Kd`, `d`, `Tr` and `map_Kd`.
 ///
-/// `Kd` multiplies the texture, as the format says, unless it is exactly black, which exporters write when they mean
-/// "see the texture".
+/// `Kd` multiplies the texture, as the format specifies, unless `Kd` is exactly black. Exporters write black to refer
+/// to the texture.
 pub(super) fn read(path: &Path, ctx: &Ctx<'_>, bytes: &[u8]) -> Result<Vec<MeshMaterial>, MeshError> {
     let ctx = Ctx { path, options: ctx.options };
     let text = String::from_utf8_lossy(bytes);
@@ -40,7 +40,7 @@ pub(super) fn read(path: &Path, ctx: &Ctx<'_>, bytes: &[u8]) -> Result<Vec<MeshM
         }
         let Some(material) = materials.last_mut() else { continue };
         match word {
-            // Colours by spectrum or in CIE XYZ are not read; they do not occur.
+            // Spectral and CIE XYZ colors are ignored; they do not occur in practice.
             "Kd" if !rest.starts_with("spectral") && !rest.starts_with("xyz") => {
                 let values = numbers(&ctx, rest, &at)?;
                 match values[..] {
@@ -83,7 +83,7 @@ fn numbers(ctx: &Ctx<'_>, words: &str, at: &dyn Fn() -> String) -> Result<Vec<f3
     words.split_whitespace().take_while(|w| !w.starts_with('#')).map(number).collect()
 }
 
-/// The file name behind the options; names may hold spaces.
+/// File name after the options. Names may contain spaces.
 fn without_options(mut rest: &str) -> &str {
     let cut = |s: &str| s.find(char::is_whitespace).unwrap_or(s.len());
     while rest.starts_with('-') {

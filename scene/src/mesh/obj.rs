@@ -1,7 +1,7 @@
-//! Wavefront OBJ.
+//! Wavefront OBJ reader.
 //!
-//! The `tobj` crate serves as the reference of the tests only: version 4.0.5 panics on an MTL line `Kd 1`, loses track of
-//! which vertex has which texture coordinate where only some have one, and its errors do not tell the line.
+//! The `tobj` crate is a reference in the tests only: version 4.0.5 panics on an MTL line `Kd 1`, confuses the texture
+//! coordinates of vertices if only some have one, and its errors do not name the line.
 
 use std::collections::HashMap;
 
@@ -11,7 +11,7 @@ use super::format::{Format, begins_with_word};
 use super::polygon::triangulate;
 use super::{MeshError, TriMesh, mtl};
 
-/// Wavefront OBJ.
+/// The Wavefront OBJ format.
 pub(super) const FORMAT: Format = Format {
     code: 1,
     extensions: &["obj"],
@@ -27,7 +27,7 @@ struct Reader {
     vt: Vec<[f32; 2]>,
     vn: Vec<[f32; 3]>,
     builder: Builder,
-    /// Every material of every library read, by name.
+    /// Materials of all libraries read so far, by name.
     known: HashMap<String, usize>,
     material: Option<usize>,
 }
@@ -60,7 +60,7 @@ impl Reader {
         let line = line.trim();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         match word {
-            // A fourth number would be a weight or the first of a colour: neither moves the point.
+            // A fourth number is a weight or the first component of a color. Neither moves the point.
             "v" => self.v.push(floats(ctx, number, rest)?),
             "vn" => self.vn.push(floats(ctx, number, rest)?),
             // One number is a coordinate of a 1D texture.
@@ -90,7 +90,7 @@ impl Reader {
                 normal: vn.map(|i| look_up(ctx, number, i, &self.vn, "vn")).transpose()?,
             });
         }
-        // A line: it has no area, as a triangle whose corners are in a line has none, and is left out as that.
+        // A line element has no area and is dropped, like a degenerate triangle.
         if corners.len() == 2 {
             return Ok(());
         }
@@ -105,9 +105,9 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the libraries of one `mtllib` line; those that are not there are skipped.
+    /// Reads the libraries of one `mtllib` line. Missing files are skipped.
     fn library(&mut self, ctx: &Ctx<'_>, names: &str) -> Result<(), MeshError> {
-        // One name with spaces, or several names?
+        // `names` is either one name with spaces or several names.
         let whole = std::fs::read(beside(ctx.path, names)).ok().map(|bytes| vec![(names, bytes)]);
         let files = whole.unwrap_or_else(|| {
             let one = |name| std::fs::read(beside(ctx.path, name)).ok().map(|bytes| (name, bytes));
@@ -135,7 +135,7 @@ fn floats<const N: usize>(ctx: &Ctx<'_>, number: usize, rest: &str) -> Result<[f
     Ok(out)
 }
 
-/// An index as OBJ counts: from 1, or backwards from the newest with a minus.
+/// Element at an OBJ index: counted from 1, or backwards from the newest element if negative.
 fn look_up<T: Copy>(ctx: &Ctx<'_>, number: usize, word: &str, all: &[T], what: &str) -> Result<T, MeshError> {
     let at = || format!("line {number}, {what} index");
     let index: i64 = word.parse().map_err(|e| ctx.caused(at(), format!("{word:?} is not a whole number"), e))?;

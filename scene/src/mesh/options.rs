@@ -1,6 +1,6 @@
 //! Options of mesh readers.
 
-/// Options that a file does not settle.
+/// Options for conventions that a mesh file does not define.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeshOptions {
     /// Treatment of `<up_axis>` of COLLADA files.
@@ -10,9 +10,9 @@ pub struct MeshOptions {
 /// The two conventions for `<up_axis>` of COLLADA files in robot descriptions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DaeUpAxis {
-    /// Coordinates stay as written: RViz, hence every URDF that looks right there.
+    /// Coordinates stay as written, as in RViz: URDF files are made to look right there.
     #[default]
     Ignore,
-    /// The scene turns so that the axis named up becomes +z (a file that names none is y up, says the standard).
+    /// The scene is rotated so that the up axis becomes +z. By the standard, a file without `<up_axis>` is y up.
     Apply,
 }

@@ -1,64 +1,71 @@
-//! Convex pieces of a mesh that is not convex.
+//! Decomposition of a non-convex mesh into convex pieces.
 //!
-//! The mesh is cut by planes where the hull of a piece is farthest from its surface, until it nowhere is by more than a
-//! tolerance. Triangles are cut exactly; the hull of a piece is that of the triangles that are left and of the corners of its
-//! [cell](super::cell) that are in the solid: what the solid and the cell have in common is all in the hull, its inside too.
+//! Planes cut the mesh where the hull of a piece is farthest from its surface, until this distance is within a
+//! tolerance everywhere. Triangles are cut exactly. The hull of a piece is the hull of its remaining triangles and of
+//! the corners of its [cell](super::cell) that are in the solid. It therefore contains the whole intersection of the
+//! solid and the cell.
 
 use super::builder::{cross, dot, sub};
 use super::cell::{Cell, winding};
 use super::{HullCfg, HullError, TriMesh, convex_hull};
 use serde::{Deserialize, Serialize};
 
-/// Changes whenever the same input may give other pieces; part of the key of [`super::HullCache`].
+/// Version of the algorithm. It changes whenever the same input may give other pieces; part of the key of
+/// [`super::HullCache`].
 pub(super) const ALGORITHM: u32 = 2;
 
-/// The most triangles of a mesh that is cut: the time for a cut goes with their number.
+/// Largest number of triangles of a mesh: the time for a cut grows with it.
 const MAX_TRIANGLES: usize = 50_000;
 
-/// The most vertices of a hull of a piece.
+/// Largest number of vertices of the hull of a piece.
 const MAX_VERTICES: usize = 4096;
 
-/// How a mesh is cut into convex pieces.
+/// Configuration of the decomposition into convex pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PiecesCfg {
-    /// The most pieces, 1 to 1024.
+    /// Largest number of pieces, 1 to 1024.
     pub max_pieces: usize,
-    /// How far the hull of a piece may be above its surface \[m\], along the surface's normal, or below it, above 0.
+    /// Largest distance of the hull of a piece above its surface, along the surface's normal, or below it \[m\]; above
+    /// 0.
     pub tolerance: f64,
 }
 
 impl Default for PiecesCfg {
-    /// Up to 64 pieces, 1 mm.
+    /// 64 pieces, 1 mm.
     fn default() -> Self {
         Self { max_pieces: 64, tolerance: 1e-3 }
     }
 }
 
-/// A mesh cut into pieces.
+/// Result of a decomposition into convex pieces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pieces {
-    /// Convex, closed, outside the front; in the order in which they were cut.
+    /// Closed convex hulls with outward-facing triangles, in the order in which they were cut.
     pub hulls: Vec<TriMesh>,
-    /// How far the hull of a piece is above its surface at most \[m\], measured at the corners of its triangles, the middles of
-    /// their edges and their middles, or how far a corner is outside its hull, which has only so many vertices. More than the
-    /// tolerance where there were not pieces enough.
+    /// Largest distance between the hull of a piece and its surface \[m\].
+    ///
+    /// The distance of the hull above the surface is measured at the corners of triangles, the middles of their edges
+    /// and their centers. Corners outside of their hull, which has a limited number of vertices, count too. The depth
+    /// exceeds the tolerance if the number of pieces does not suffice.
     pub depth: f64,
 }
 
 type V3 = [f64; 3];
 pub(super) type Triangle = [V3; 3];
 
-/// A part of the surface and its hull.
+/// A part of the surface, its cell and its hull.
 struct Piece {
     surface: Vec<Triangle>,
     cell: Cell,
-    /// How many cuts in a row made nothing better.
+    /// Number of consecutive cuts without an improvement.
     idle: u32,
     hull: TriMesh,
-    /// How far the hull is from the surface at most, where, and the normal of the one or the other there.
+    /// Largest distance between the hull and the surface \[m\].
     depth: f64,
+    /// Position of the largest distance.
     at: V3,
+    /// Normal of the surface or of the hull at that position.
     normal: V3,
 }
 
@@ -75,19 +82,20 @@ impl PiecesCfg {
     }
 }
 
-/// Cuts a mesh into convex pieces. One that is convex within the tolerance is one piece: its hull.
+/// Decomposes a mesh into convex pieces. A mesh that is convex within the tolerance gives one piece: its hull.
 ///
-/// Together the pieces hold the whole solid, but for what hulls leave out: points that stick out by less than
-/// [`HullCfg::tolerance`], or by half of the tolerance of the pieces where that is less, and what
-/// [`HullCfg::max_vertices`] cuts off, which `depth` tells. A solid is what a [closed](TriMesh::is_closed) mesh encloses,
-/// whichever way its triangles turn. A hollow that is closed all around is a surface as others: it is cut out, too.
+/// Together, the pieces contain the whole solid except for what their hulls omit: points that stick out by less than
+/// [`HullCfg::tolerance`], or by half of the tolerance of the pieces if that is less, and what
+/// [`HullCfg::max_vertices`] cuts off, which [`Pieces::depth`] includes. The solid is the inside of a
+/// [closed](TriMesh::is_closed) mesh, in either orientation of its triangles. The surface of an enclosed cavity is
+/// treated like any other, so cavities stay empty.
 ///
-/// Of an open mesh the pieces hold the surface, and of what is behind it what their hulls span; outside is the side from
-/// which its triangles turn counter-clockwise. Pieces of it that are flat get [`HullCfg::min_thickness`], behind their front.
+/// The pieces of an open mesh contain its surface and the space that their hulls span behind it. Triangles are
+/// counter-clockwise seen from outside. Flat pieces get [`HullCfg::min_thickness`], behind their front.
 ///
 /// # Errors
-/// A configuration out of its range, a mesh that breaks a promise of [`TriMesh`], more than 50000 triangles or none that has
-/// an area; as [`convex_hull`] for the mesh as a whole.
+/// The configuration is out of range, the mesh violates an invariant of [`TriMesh`], it has more than 50000 triangles
+/// or no triangle with an area, or [`convex_hull`] fails for the mesh as a whole.
 pub fn convex_pieces(mesh: &TriMesh, hull: &HullCfg, cfg: &PiecesCfg) -> Result<Pieces, HullError> {
     cfg.check()?;
     if hull.max_vertices > MAX_VERTICES {
@@ -107,7 +115,7 @@ pub fn convex_pieces(mesh: &TriMesh, hull: &HullCfg, cfg: &PiecesCfg) -> Result<
     let tolerance = hull.tolerance.min(0.5 * cfg.tolerance / diagonal);
     let body = Body { all: mesh.is_closed().then(|| surface.clone()), hull: HullCfg { tolerance, ..*hull } };
     let mut pieces = vec![Piece::of(body.hull_of(surface, cell)?, 0)];
-    // Pieces that no plane makes better are left as they are.
+    // Pieces that no plane improves.
     let mut done: Vec<Piece> = Vec::new();
     while pieces.len() + done.len() < cfg.max_pieces {
         let deepest = (0..pieces.len()).filter(|&k| pieces[k].depth > cfg.tolerance);
@@ -125,7 +133,7 @@ pub fn convex_pieces(mesh: &TriMesh, hull: &HullCfg, cfg: &PiecesCfg) -> Result<
     Ok(Pieces { hulls: done.into_iter().map(|piece| piece.hull).collect(), depth })
 }
 
-/// The triangles of a mesh, counter-clockwise seen from outside where it is closed.
+/// Triangles of a mesh; for a closed mesh, counter-clockwise seen from outside.
 pub(super) fn triangles_of(mesh: &TriMesh) -> Result<Vec<Triangle>, HullError> {
     mesh.validate().map_err(|source| HullError::Mesh { source })?;
     let inside_out = mesh.signed_volume() < 0.0 && mesh.is_closed();
@@ -136,21 +144,22 @@ pub(super) fn triangles_of(mesh: &TriMesh) -> Result<Vec<Triangle>, HullError> {
     Ok(mesh.triangles.iter().map(corners).collect())
 }
 
-/// What is cut.
+/// The mesh to decompose.
 struct Body {
-    /// The whole surface, where it is closed.
+    /// Whole surface, if it is closed.
     all: Option<Vec<Triangle>>,
     hull: HullCfg,
 }
 
 impl Body {
-    /// Whether a point is in the solid.
+    /// True if a point is in the solid.
     fn holds(&self, p: V3) -> bool {
         self.all.as_ref().is_some_and(|all| winding(all, p) > 0.5)
     }
 
-    /// The hull of a surface and of the corners of its cell that are in the solid. A flat part of an open surface gets its
-    /// thickness behind its front; of a solid, a flat part is none.
+    /// Hull of a surface and of the corners of its cell that are in the solid.
+    ///
+    /// A flat part of an open surface gets its thickness behind its front. A flat part of a solid is an error.
     fn hull_of(&self, surface: Vec<Triangle>, cell: Cell) -> Result<Hulled, HullError> {
         let points = distinct(surface.iter().flatten().copied().chain(cell.inside()));
         let hull = match (convex_hull(&points, &HullCfg { min_thickness: None, ..self.hull }), self.hull.min_thickness)
@@ -170,7 +179,7 @@ impl Body {
     }
 }
 
-/// Points in single precision, each once.
+/// Distinct points in single precision.
 fn distinct(points: impl Iterator<Item = V3>) -> Vec<[f32; 3]> {
     let mut points: Vec<[f32; 3]> = points.map(|p| p.map(|x| x as f32 + 0.0)).collect();
     points.sort_by(|a, b| (0..3).fold(std::cmp::Ordering::Equal, |order, k| order.then(a[k].total_cmp(&b[k]))));
@@ -188,7 +197,7 @@ impl Piece {
                 unit_normal(&corners).map(|normal| (normal, dot(normal, corners[0])))
             })
             .collect();
-        // The way from a point to where the hull ends.
+        // Distance from a point to the end of the hull, along a normal.
         let above = |p: V3, normal: V3| {
             let faces = faces.iter().map(|&(n, d)| (dot(n, normal), d - dot(n, p)));
             faces.filter(|(slope, _)| *slope > 1e-6).map(|(slope, gap)| gap / slope).fold(f64::INFINITY, f64::min)
@@ -217,16 +226,18 @@ impl Piece {
         piece
     }
 
-    /// The two halves whose hulls are smallest together, of planes through where the hull is farthest from the surface and
-    /// through the middle of the piece; of those that are nearly the same, halves that are as large as each other: a bowl has
-    /// to be cut twice before its hulls become smaller. `None` where no plane makes two halves that are worth it, and after
-    /// some cuts in a row of which none made the hulls smaller or nearer to the surface.
+    /// Cuts the piece into the two halves with the smallest total hull volume.
+    ///
+    /// Candidate planes pass through the point where the hull is farthest from the surface, and through the middle of
+    /// the piece. Among nearly equal candidates, halves of similar size are preferred: a bowl has to be cut twice
+    /// before its hulls become smaller. Returns `None` if no plane gives two useful halves, or after several
+    /// consecutive cuts that made the hulls neither smaller nor closer to the surface.
     fn cut(&self, body: &Body) -> Option<[Self; 2]> {
-        /// What the larger half counts beside both.
+        /// Weight of the larger half in the cost, added to the sum of both halves.
         const LARGER: f64 = 0.05;
-        /// A half that is less than this of the whole is none.
+        /// Smallest useful half, as a fraction of the whole volume.
         const LEAST: f64 = 1e-4;
-        /// So many cuts in a row may be for nothing.
+        /// Largest number of consecutive cuts without an improvement.
         const IDLE: u32 = 4;
         if self.idle >= IDLE {
             return None;
@@ -269,7 +280,7 @@ struct Hulled {
     hull: TriMesh,
 }
 
-/// What is in front of a plane, and what is behind it. Corners nearer to it than `near` \[m\] are on it.
+/// Parts of a surface in front of a plane and behind it. Corners closer to the plane than `near` \[m\] are on it.
 fn halves(surface: &[Triangle], normal: V3, distance: f64, near: f64) -> [Vec<Triangle>; 2] {
     let mut halves = [Vec::new(), Vec::new()];
     for triangle in surface {
@@ -278,7 +289,7 @@ fn halves(surface: &[Triangle], normal: V3, distance: f64, near: f64) -> [Vec<Tr
             if height.abs() < near { 0.0 } else { height }
         });
         for (half, sign) in halves.iter_mut().zip([1.0, -1.0]) {
-            // One that lies in the plane belongs to what is behind its front.
+            // A triangle in the plane belongs to the half behind its front.
             let flat = heights.iter().all(|h| *h == 0.0);
             let faces = unit_normal(triangle).is_some_and(|n| dot(n, normal) * sign < 0.0);
             if flat && !faces {
@@ -294,7 +305,7 @@ fn halves(surface: &[Triangle], normal: V3, distance: f64, near: f64) -> [Vec<Tr
     halves
 }
 
-/// The part of a triangle where heights are not below 0.
+/// Part of a triangle where heights are at least 0.
 fn clipped(triangle: &Triangle, heights: [f64; 3]) -> Vec<V3> {
     let mut polygon = Vec::with_capacity(4);
     for k in 0..3 {
@@ -311,12 +322,12 @@ fn clipped(triangle: &Triangle, heights: [f64; 3]) -> Vec<V3> {
     polygon
 }
 
-/// The unit normal of a triangle; `None` where it is only an edge.
+/// Unit normal of a triangle; `None` for a degenerate triangle.
 pub(super) fn unit_normal(&[a, b, c]: &Triangle) -> Option<V3> {
     let (u, v) = (sub(b, a), sub(c, a));
     let normal = cross(u, v);
     let length = dot(normal, normal).sqrt();
-    // Twice the area against the longest sides: below this single precision knows no side.
+    // Twice the area against the longest sides: below this ratio, single precision does not resolve the normal.
     (length > 1e-10 * (dot(u, u) + dot(v, v))).then(|| normal.map(|x| x / length))
 }
 
@@ -358,7 +369,7 @@ mod tests {
         })
     }
 
-    /// An L is two boxes, whichever way it lies; the hull of it as a whole is a good deal more.
+    /// An L gives two boxes in any orientation; its hull as a whole is much larger.
     #[test]
     fn two_boxes() {
         let volume = 0.5 * (0.25 + 0.75 * 0.25);
@@ -383,10 +394,10 @@ mod tests {
         revolve(&[[0.8, 0.0], [1.0, 0.0], [1.0, 1.0], [0.8, 1.0], [0.8, 0.0]], 32)
     }
 
-    /// Every point of the surface is in a piece, and many pieces leave the hollow free.
+    /// Every point of the surface is in a piece, and many pieces leave the cavity free.
     #[test]
     fn surface_and_hollow() {
-        // So many vertices that no hull is simplified by them.
+        // With this limit of vertices, no hull is simplified.
         let (mesh, all) = (tube(), HullCfg { max_vertices: 1000, ..HullCfg::default() });
         assert!(mesh.is_closed() && mesh.signed_volume() > 0.0);
         let mut before = f64::INFINITY;
@@ -399,14 +410,14 @@ mod tests {
             for triangle in &mesh.triangles {
                 let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].map(f64::from));
                 let middle = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
-                // Hulls leave out what sticks out by less than 1e-4 of their size.
+                // Hulls omit points that stick out by less than 1e-4 of their size.
                 assert!(pieces.hulls.iter().any(|hull| within(hull, middle, 4e-4)), "{middle:?}");
             }
             if max_pieces < 64 {
                 continue;
             }
-            // On a ring in the hollow that is farther above the inner surface than that, nothing is. The depth is that of
-            // some points of each triangle; hulls bulge by a little more between them.
+            // A ring in the cavity that is farther above the inner surface than the depth is free. The depth is
+            // measured at some points of each triangle; hulls bulge by a little more between them.
             let free = 0.8 * (std::f64::consts::PI / 32.0).cos() - 1.5 * pieces.depth - 1e-3;
             for k in 0..200 {
                 let (sin, cos) = (0.1 + 0.0314 * f64::from(k)).sin_cos();
@@ -414,10 +425,10 @@ mod tests {
                 assert!(!pieces.hulls.iter().any(|hull| within(hull, p, 0.0)), "{max_pieces} pieces: {p:?}");
             }
         }
-        // The control: the hull fills the hollow.
+        // Control: the hull fills the cavity.
         let whole = convex_hull(&mesh.positions, &all).unwrap();
         assert!(within(&whole, [0.0, 0.0, 0.5], 0.0));
-        // What is convex stays whole.
+        // A convex mesh stays whole.
         let one = convex_pieces(&whole, &all, &PiecesCfg::default()).unwrap();
         assert_eq!((one.hulls.len(), one.depth < 1e-3), (1, true), "{}", one.depth);
     }
@@ -435,12 +446,12 @@ mod tests {
         mesh
     }
 
-    /// A solid stays one: of points all over its inside each is in a piece, however often it was cut.
+    /// A solid stays solid: points all over its inside are in a piece, however often it was cut.
     #[test]
     fn inside() {
         let mesh = carton();
         assert!(mesh.is_closed() && (mesh.signed_volume() - 0.2).abs() < 1e-3, "{}", mesh.signed_volume());
-        // Hulls leave out what sticks out by less than half the tolerance, 1e-4 of their size, or less.
+        // Hulls omit points that stick out by less than half the tolerance, or by 1e-4 of their size if that is less.
         let near = 2e-4;
         let covered = |hulls: &[TriMesh]| {
             let points = (0..19 * 19 * 11).map(|k| (k % 19, k / 19 % 19, k / 361));
@@ -457,18 +468,18 @@ mod tests {
                 assert!(pieces.hulls.len() >= 8, "{}", pieces.hulls.len());
                 let (inside, all) = covered(&pieces.hulls);
                 assert_eq!(inside, all, "{} pieces", pieces.hulls.len());
-                // Nor do they hold more than the solid and the tolerance on its top, or than that of its hull.
+                // The pieces exceed the volume of the solid by at most their depth or the tolerance on its top.
                 let volume: f64 = pieces.hulls.iter().map(TriMesh::signed_volume).sum();
                 assert!(volume < 0.2 + pieces.depth.max(1e-3), "{volume} {}", pieces.depth);
             }
         }
-        // The control: with one of its pieces left out there is a hole.
+        // Control: without one of the pieces there is a hole.
         let pieces = convex_pieces(&mesh, &HullCfg::default(), &PiecesCfg::default()).unwrap();
         let (inside, all) = covered(&pieces.hulls[1..]);
         assert!(inside < all);
     }
 
-    /// A cube is one piece whichever way its triangles turn, and prisms are within it.
+    /// A cube is one piece in either orientation of its triangles, and prisms are within it.
     #[test]
     fn inside_out_cube() {
         let corners: [[f32; 3]; 8] = std::array::from_fn(|k| [k & 1, k >> 1 & 1, k >> 2].map(|x| x as f32));
@@ -483,7 +494,7 @@ mod tests {
         }
     }
 
-    /// A flat sheet is one piece whose front is the sheet: it gets thicker behind.
+    /// A flat sheet is one piece whose front is the sheet; its thickness is added behind.
     #[test]
     fn sheet() {
         let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
@@ -497,7 +508,7 @@ mod tests {
         assert!(matches!(error, Err(HullError::Coplanar { .. })), "{error:?}");
     }
 
-    /// A ball whose hull may have few vertices only is farther out than its hull, and the depth says so.
+    /// With few vertices, points of a ball are outside of its hull, and the depth includes this distance.
     #[test]
     fn depth() {
         let points: Vec<[f32; 3]> = (0..600u16)
@@ -514,7 +525,7 @@ mod tests {
             convex_pieces(&ball, &hull, &PiecesCfg { max_pieces, tolerance: 1e-3 }).unwrap()
         };
         let (few, all) = (of(16, 1).depth, of(600, 1).depth);
-        // Sixteen points leave caps of 4π/16: 1 - cos θ = 1/8 each, if they were shared out evenly.
+        // Sixteen points leave caps of 4π/16, 1 - cos θ = 1/8 each, if they are distributed evenly.
         assert!(few > 0.1 && all < 1e-3, "{few} {all}");
         assert!(of(16, 8).depth < few);
     }
@@ -545,7 +556,7 @@ mod tests {
         for thickness in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(prisms(&ell(), thickness).unwrap_err().to_string().contains("thickness"));
         }
-        // 1 mm long and 2e-10 m high: 1e-15 m³, less than MuJoCo takes.
+        // 1 mm long and 2e-10 m high: 1e-15 m³, below MuJoCo's smallest volume.
         let sliver = vec![[0.0; 3], [1e-3, 0.0, 0.0], [5e-4, 2e-10, 0.0]];
         assert!(prisms(&TriMesh::from_triangles(sliver, vec![[0, 1, 2]]), 0.01).unwrap().is_empty());
     }
@@ -561,7 +572,7 @@ mod tests {
             let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].map(f64::from));
             let normal = cross(sub(b, a), sub(c, a));
             let volume = 0.01 * dot(normal, normal).sqrt() / 2.0;
-            // Outside the front: positive.
+            // Outward-facing triangles give a positive volume.
             assert!((prism.signed_volume() / volume - 1.0).abs() < 1e-4, "{} {volume}", prism.signed_volume());
         }
         let edge = TriMesh::from_triangles(vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], vec![[0, 1, 2]]);

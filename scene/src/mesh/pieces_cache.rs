@@ -1,4 +1,4 @@
-//! Convex pieces of mesh files, kept on disk between runs.
+//! Disk cache of convex pieces of mesh files.
 
 use super::hull_cache::{KEY, decoded, encoded, key, store};
 use super::load::{format_of, read};
@@ -8,11 +8,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 impl HullCache {
-    /// The [convex pieces](convex_pieces) of a mesh file, scaled along its axes, as
-    /// [`hull_of_file`](Self::hull_of_file) gives its hull.
+    /// Returns the [convex pieces](convex_pieces) of a mesh file, scaled along its axes.
+    ///
+    /// Pieces are cached like the hulls of [`hull_of_file`](Self::hull_of_file).
     ///
     /// # Errors
-    /// The file cannot be read, a scale is 0 or not finite, or the mesh has no hull.
+    /// The file cannot be read, a scale is 0 or not finite, a configuration is out of range, or the mesh has no hull.
     pub fn pieces_of_file(
         &self,
         path: &Path,
@@ -20,7 +21,7 @@ impl HullCache {
         hull: &HullCfg,
         cfg: &PiecesCfg,
     ) -> Result<Pieces, MeshError> {
-        // The scale is checked there.
+        // This call checks the scale.
         self.hull_of_file(path, scale, hull)?;
         let (bytes, options) = (read(path)?, MeshOptions::default());
         let format = format_of(path, &bytes).filter(|format| format.is_one_file);
@@ -40,7 +41,7 @@ impl HullCache {
         let pieces =
             convex_pieces(&mesh, hull, cfg).map_err(|source| MeshError::Hull { path: path.to_owned(), source })?;
         if let Some((file, key)) = entry {
-            // A cache that cannot be written is no cache.
+            // A failed write is ignored: the pieces are valid without it.
             let _ = store(&file, &bytes_of(&pieces, &key));
         }
         Ok(pieces)
@@ -58,7 +59,7 @@ fn pieces_key(hull: &[u8; KEY], cfg: &PiecesCfg) -> [u8; KEY] {
     hasher.finalize().into()
 }
 
-/// The depth, the number of hulls, then each hull as it stands in a file of its own, after its length; the SHA-256 of all that.
+/// Encodes pieces: the depth, the number of hulls, each encoded hull after its length, and the SHA-256 of all of these.
 fn bytes_of(pieces: &Pieces, key: &[u8; KEY]) -> Vec<u8> {
     let mut out = pieces.depth.to_le_bytes().to_vec();
     out.extend((pieces.hulls.len() as u64).to_le_bytes());
@@ -95,7 +96,7 @@ mod tests {
     use crate::mesh::{TriMesh, write_binary_stl};
     use std::fs;
 
-    /// Two tetrahedra that meet in a corner: two pieces.
+    /// Two tetrahedra that meet in a corner, which give two pieces.
     fn bow_tie() -> TriMesh {
         let corners = |s: f32| [[0.0, 0.0, 0.0], [s, 0.0, 0.0], [s, s, 0.0], [s, 0.0, s.abs()]];
         let faces = |o: u32| [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]].map(|face| face.map(|k: u32| o + k));
@@ -117,7 +118,7 @@ mod tests {
         let files = || fs::read_dir(cache.dir().unwrap()).unwrap().map(|entry| entry.unwrap().path());
         let file = files().find(|file| file.extension().is_some_and(|end| end == "pieces")).unwrap();
         let good = fs::read(&file).unwrap();
-        // A hit does not cut again: what is planted under the right key comes back.
+        // A hit does not decompose the mesh again: pieces planted under the right key are returned.
         let base =
             key(&read(&path).unwrap(), &crate::mesh::stl::FORMAT, &MeshOptions::default(), [1.0, 2.0, 1.0], &hull);
         let key = pieces_key(&base, &cfg);
@@ -133,7 +134,7 @@ mod tests {
         fs::write(&file, &good[..good.len() / 2]).unwrap();
         assert_eq!(of(&cache, &cfg), fresh);
         assert_eq!(fs::read(&file).unwrap(), good);
-        // Another configuration is another entry.
+        // Another configuration has its own entry.
         let one = of(&cache, &PiecesCfg { max_pieces: 1, ..cfg });
         assert_eq!(one.hulls.len(), 1);
         assert_eq!(files().filter(|file| file.extension().is_some_and(|end| end == "pieces")).count(), 2);

@@ -1,10 +1,12 @@
-//! Polygons of OBJ and COLLADA to triangles.
+//! Triangulation of the polygons of OBJ and COLLADA files.
 
-/// Above this a concave polygon is cut as a fan: ear clipping is quadratic, and such polygons are flat convex caps.
+/// A concave polygon with more corners is cut as a fan: ear clipping is quadratic, and such polygons are flat convex
+/// caps.
 const MAX_EARS: usize = 512;
 
-/// Cuts a polygon into triangles (indices into `points`) with the winding of the polygon: a fan from the first corner
-/// where it is convex, ear clipping where it is not.
+/// Cuts a polygon into triangles (indices into `points`) with the winding of the polygon.
+///
+/// A convex polygon becomes a fan from its first corner. A concave polygon is cut by ear clipping.
 pub(super) fn triangulate(points: &[[f64; 3]]) -> Vec<[usize; 3]> {
     let n = points.len();
     if n < 3 {
@@ -38,7 +40,7 @@ pub(super) fn triangulate(points: &[[f64; 3]]) -> Vec<[usize; 3]> {
                         || corner(c, a, q) < 0.0
                 })
         });
-        // A polygon that crosses itself may have no ear; cut anywhere rather than fail.
+        // A self-intersecting polygon may have no ear. It is cut anywhere rather than rejected.
         let i = ear.unwrap_or(0);
         out.push([ring[(i + k - 1) % k], ring[i], ring[(i + 1) % k]]);
         ring.remove(i);
@@ -47,7 +49,7 @@ pub(super) fn triangulate(points: &[[f64; 3]]) -> Vec<[usize; 3]> {
     out
 }
 
-/// The polygon seen along its normal (Newell's method), counter-clockwise.
+/// Projection of the polygon along the largest component of its normal (Newell's method), counter-clockwise.
 fn flattened(points: &[[f64; 3]]) -> Vec<[f64; 2]> {
     let mut normal = [0.0; 3];
     for (i, p) in points.iter().enumerate() {
@@ -83,7 +85,7 @@ mod tests {
 
     #[test]
     fn concave_polygons() {
-        // An L, an arrow whose fan from corner 0 would leave it, and the arrow wound the other way.
+        // An L and an arrow whose fan from corner 0 would leave it, both also with reversed winding.
         let l = [[0., 0., 0.], [2., 0., 0.], [2., 1., 0.], [1., 1., 0.], [1., 2., 0.], [0., 2., 0.]];
         let arrow = [[-1., -1., 0.], [0., -0.5, 0.], [1., -1., 0.], [0., 1., 0.]];
         for (points, expected) in [(&l[..], 3.0), (&arrow[..], 1.5)] {

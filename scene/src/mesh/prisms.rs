@@ -1,20 +1,21 @@
-//! Thin convex solids of the triangles of a mesh.
+//! Thin prisms from the triangles of a mesh.
 
 use super::pieces::{Triangle, triangles_of, unit_normal};
 use super::{HullError, TriMesh};
 
-/// A prism for each triangle that has an area: its front is the triangle, its back is `thickness` \[m\] behind it. Together they
-/// have the surface of the mesh, exactly, seen from outside; where the mesh is thinner than that, they reach out behind.
-/// Which side is outside a [closed](TriMesh::is_closed) mesh says itself, whichever way its triangles turn; of an open one it
-/// is the side from which they turn counter-clockwise.
+/// Builds a prism for each triangle with an area: its front is the triangle, its back is `thickness` \[m\] behind it.
 ///
-/// Triangles of less than 1e-14 m³ / `thickness`, or not higher than single precision tells their corners apart, are left
-/// out: MuJoCo takes no mesh of less than 1e-15 m³.
+/// Together, the prisms have exactly the surface of the mesh, seen from outside. Where the mesh is thinner than
+/// `thickness`, they stick out behind. For a [closed](TriMesh::is_closed) mesh, outside follows from the mesh, in
+/// either orientation of its triangles. The triangles of an open mesh are counter-clockwise seen from outside.
+///
+/// Triangles below an area of 1e-14 m³ / `thickness`, or with a height that single precision does not resolve, are left
+/// out. MuJoCo rejects meshes of less than 1e-15 m³.
 ///
 /// # Errors
-/// A thickness that is none; a mesh that breaks a promise of [`TriMesh`].
+/// The thickness is not positive and finite, or the mesh violates an invariant of [`TriMesh`].
 pub fn prisms(mesh: &TriMesh, thickness: f64) -> Result<Vec<TriMesh>, HullError> {
-    /// Ten times what MuJoCo takes \[m³\].
+    /// Ten times MuJoCo's smallest volume \[m³\].
     const LEAST: f64 = 1e-14;
     if !(thickness > 0.0 && thickness.is_finite()) {
         return Err(HullError::InvalidThickness { value: thickness });
@@ -26,7 +27,7 @@ pub fn prisms(mesh: &TriMesh, thickness: f64) -> Result<Vec<TriMesh>, HullError>
         let sides = [[0, 3, 4], [0, 4, 1], [1, 4, 5], [1, 5, 2], [2, 5, 3], [2, 3, 0]];
         let faces = [[0, 1, 2], [3, 5, 4]].into_iter().chain(sides).collect();
         let prism = TriMesh::from_triangles(positions, faces);
-        // As it is in single precision: the back of a sliver may be an edge, or turned over.
+        // The volume in single precision: the back of a sliver may be degenerate or flipped.
         let expected = super::pieces::area(&triangle) * thickness;
         let volume = prism.signed_volume();
         (volume >= LEAST && volume >= 0.5 * expected).then_some(prism)

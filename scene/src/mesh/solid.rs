@@ -1,30 +1,32 @@
-//! What a closed mesh encloses: volume, centre and second moments, exactly for its triangles.
+//! Volume, center and second moments of closed meshes, exact for their triangles.
 //!
-//! Every triangle and a point make a tetrahedron; signed, they add up to the solid. For a tetrahedron with corners 0, a, b, c
-//! and `d = a · (b × c)` the volume is `d/6`, the first moment `d/24 (a + b + c)`, and the second moment
-//! `d/120 (a aᵀ + b bᵀ + c cᵀ + s sᵀ)` with `s = a + b + c`. Source: Tonon, "Explicit exact formulas for the 3-D
-//! tetrahedron inertia tensor in terms of its vertex coordinates", Journal of Mathematics and Statistics 1(1), 2004.
+//! Every triangle forms a tetrahedron with a common point; the signed tetrahedra add up to the solid. For a tetrahedron
+//! with corners 0, a, b, c and `d = a · (b × c)` the volume is `d/6`, the first moment `d/24 (a + b + c)`, and the
+//! second moment `d/120 (a aᵀ + b bᵀ + c cᵀ + s sᵀ)` with `s = a + b + c`. Source: Tonon, "Explicit exact formulas for
+//! the 3-D tetrahedron inertia tensor in terms of its vertex coordinates", Journal of Mathematics and Statistics 1(1),
+//! 2004.
 
 use super::TriMesh;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 
-/// What a closed surface encloses, in the axes of the mesh.
+/// Volume, center and second moment of the inside of a closed surface, in the axes of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solid {
     /// Volume \[m³\], positive.
     pub volume: f64,
-    /// Centre of volume \[m\].
+    /// Center of volume \[m\].
     pub center: Vector3<f64>,
-    /// Integral of `r rᵀ` over the volume \[m⁵\], with `r` from the centre.
+    /// Integral of `r rᵀ` over the volume \[m⁵\], with `r` from the center.
     pub second_moment: Matrix3<f64>,
 }
 
 impl TriMesh {
-    /// Whether the surface has no rim: every edge is passed as often in the one direction as in the other. Vertices in the
-    /// same place are one; triangles that are only an edge do not count.
+    /// True if the surface has no boundary: every edge is traversed equally often in both directions.
+    ///
+    /// Vertices at the same position count as one, and degenerate triangles are ignored.
     pub fn is_closed(&self) -> bool {
-        // -0 and 0 are the same place.
+        // -0 and 0 are the same position.
         let place = |vertex: u32| self.positions[vertex as usize].map(|x| (x + 0.0).to_bits());
         let mut edges: HashMap<[[u32; 3]; 2], i64> = HashMap::new();
         for triangle in &self.triangles {
@@ -41,17 +43,19 @@ impl TriMesh {
         !edges.is_empty() && edges.values().all(|&count| count == 0)
     }
 
-    /// What the surface encloses; `None` where it is not [closed](Self::is_closed), encloses nothing, or where the numbers are
-    /// those of no body: a centre outside its bounds, more volume than these have, a second moment below 0. A surface that is
-    /// inside out encloses what it would with its front outside; where parts overlap, the volume counts twice.
+    /// Returns the volume that the surface encloses, with its center and second moment.
     ///
-    /// Parts count with their side: one that is inside out, within another, is a hollow. Beside the others it takes its volume
-    /// away from theirs, which is found where it is large or far away, and not where it is small.
+    /// Returns `None` if the surface is not [closed](Self::is_closed), encloses no volume, or gives values that no body
+    /// has: a center outside of the bounds, more volume than the bounds, or a negative second moment. A surface that is
+    /// inside out gives the same result as one with its front outside. Where parts overlap, the volume counts twice.
+    ///
+    /// The orientation of each part counts: a part that is inside out, within another part, is a cavity. Beside the
+    /// other parts, it subtracts its volume. This is detected if the part is large or far away, but not if it is small.
     pub fn solid(&self) -> Option<Solid> {
         if !self.is_closed() {
             return None;
         }
-        // About the middle, so that a small part far from the origin loses no digits.
+        // Relative to the middle of the bounds, so that a small part far from the origin loses no digits.
         let (low, high) = self.bounds()?;
         let middle = Vector3::from_fn(|i, _| (f64::from(low[i]) + f64::from(high[i])) / 2.0);
         let (mut volume, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
@@ -67,14 +71,14 @@ impl TriMesh {
         let side = volume.signum();
         let (volume, first, second) = (volume * side, first * side, second * side);
         let extent = (Vector3::from(high.map(f64::from)) - Vector3::from(low.map(f64::from))).norm();
-        // Less than rounding in single precision leaves of a body of this size.
+        // Smaller than the rounding error of a body of this size in single precision.
         if volume.is_nan() || volume <= 1e-9 * extent.powi(3) {
             return None;
         }
         let center = first / volume;
         let second_moment = second - center * center.transpose() * volume;
         let size = Vector3::from_fn(|i, _| f64::from(high[i]) - f64::from(low[i]));
-        // Rounding of sums over all triangles, and of a thin body's small moment.
+        // Tolerances for the rounding of sums over all triangles, and for the small moment of a thin body.
         let inside = (0..3).all(|i| center[i].abs() <= size[i] / 2.0 + 1e-6 * extent);
         let fits = volume <= size.product() * (1.0 + 1e-6);
         let possible = second_moment.symmetric_eigenvalues().min() >= -1e-9 * second_moment.norm();
@@ -92,7 +96,7 @@ mod tests {
         TriMesh::from_triangles(positions, vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     }
 
-    /// A brick as an STL file has it: no two triangles share a vertex.
+    /// A brick as in an STL file: no two triangles share a vertex.
     fn brick([x, y, z]: [f32; 3]) -> TriMesh {
         let corners: [[f32; 3]; 8] =
             std::array::from_fn(|k| [x * (k & 1) as f32, y * (k >> 1 & 1) as f32, z * (k >> 2) as f32]);
@@ -103,7 +107,7 @@ mod tests {
         TriMesh::from_triangles(positions, triangles)
     }
 
-    /// A tetrahedron with unit legs: ∫x² = 1/60, ∫xy = 1/120 about the corner, its centre at 1/4 (textbook integrals).
+    /// A tetrahedron with unit legs: ∫x² = 1/60, ∫xy = 1/120 about the corner, its center at 1/4 (textbook integrals).
     #[test]
     fn simplex() {
         let solid = corner().solid().unwrap();
@@ -112,11 +116,11 @@ mod tests {
         let (diagonal, mixed) = (1.0 / 60.0 - 1.0 / 96.0, 1.0 / 120.0 - 1.0 / 96.0);
         let expected = Matrix3::from_fn(|i, j| if i == j { diagonal } else { mixed });
         assert!((solid.second_moment - expected).norm() < 1e-15, "{}", solid.second_moment);
-        // Control: about the corner it is another one.
+        // Control: the second moment about the corner differs.
         assert!((solid.second_moment - expected.add_scalar(1.0 / 96.0)).norm() > 1e-3);
     }
 
-    /// A brick: V a²/12 along each axis, wherever it stands, however it is turned, whichever side is out.
+    /// The second moment of a brick is V a²/12 along each axis, in any pose and either orientation of its triangles.
     #[test]
     fn bricks() {
         let size = [0.25_f32, 0.5, 1.5];
@@ -151,7 +155,7 @@ mod tests {
         mesh
     }
 
-    /// Two closed shells of which one is inside out: no body has the difference of their volumes and moments.
+    /// Two closed shells, one of them inside out: no body has the difference of their volumes and moments.
     #[test]
     fn parts() {
         let at = |mesh: TriMesh, x| mesh.transformed(&from_xyz_rpy([x, 0.0, 0.0], [0.0; 3]));
@@ -162,10 +166,10 @@ mod tests {
             let bad = both(large.clone(), &turned_inside_out(part));
             assert!(bad.is_closed() && bad.solid().is_none());
         }
-        // Within the other it is a hollow.
+        // Within the other shell, it is a cavity.
         let hollow = both(large.clone(), &turned_inside_out(at(small, 0.25)));
         assert!((hollow.solid().unwrap().volume - 0.875).abs() < 1e-6);
-        // The same twice is more than there is room for.
+        // The same brick twice has more volume than its bounds.
         assert!(both(large.clone(), &large).solid().is_none());
     }
 
@@ -175,11 +179,11 @@ mod tests {
         assert!(open.is_closed());
         open.triangles.pop();
         assert!(!open.is_closed() && open.solid().is_none());
-        // One face turned over is not closed, either.
+        // A brick with one flipped triangle is not closed, either.
         let mut turned = brick([1.0, 1.0, 1.0]);
         turned.triangles[3].swap(0, 1);
         assert!(turned.solid().is_none());
-        // Both sides of a sheet: closed, and nothing inside.
+        // Both sides of a sheet are closed, but enclose nothing.
         let positions = vec![[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]];
         let sheet = TriMesh::from_triangles(positions, vec![[0, 1, 2], [0, 2, 1]]);
         assert!(sheet.is_closed() && sheet.solid().is_none());

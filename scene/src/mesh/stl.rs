@@ -1,14 +1,14 @@
-//! STL, binary and ASCII.
+//! STL reader, binary and ASCII.
 //!
-//! The normals of an STL are left out: they repeat the winding where they are right, and without them a vertex that
-//! several triangles share is one vertex.
+//! Normals in the file are ignored: correct normals repeat the winding, and without normals a vertex that several
+//! triangles share is one vertex.
 
 use super::builder::{Builder, Corner};
 use super::error::Ctx;
 use super::format::{Format, begins_with_word};
 use super::{MeshError, TriMesh};
 
-/// STL.
+/// The STL format.
 pub(super) const FORMAT: Format = Format {
     code: 0,
     extensions: &["stl", "stlb"],
@@ -25,7 +25,7 @@ pub(super) const FORMAT: Format = Format {
 const HEADER: u64 = 84;
 const RECORD: u64 = 50;
 
-/// The length of a binary STL with the triangle count that `bytes` announces; `None` without a whole header.
+/// Length of a binary STL file with the triangle count in `bytes`; `None` without a complete header.
 fn binary_length(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(80..84)?;
     let count = u32::from_le_bytes([count[0], count[1], count[2], count[3]]);
@@ -35,14 +35,14 @@ fn binary_length(bytes: &[u8]) -> Option<u64> {
 fn read(ctx: &Ctx<'_>, bytes: &[u8]) -> Result<TriMesh, MeshError> {
     let found = bytes.len() as u64;
     let announced = binary_length(bytes);
-    // Many exporters begin binary files with "solid", so that the length decides first and the words second.
+    // Many exporters begin binary files with "solid", so the length is checked before the words.
     if announced != Some(found) && is_text(bytes) {
         return ascii(ctx, bytes);
     }
     match announced {
         None => Err(ctx.truncated("binary STL header", HEADER, found)),
         Some(expected) if expected > found => Err(ctx.truncated("binary STL", expected, found)),
-        // Bytes after the last triangle are harmless.
+        // Bytes after the last triangle are ignored.
         Some(expected) => binary(ctx, &bytes[HEADER as usize..expected as usize]),
     }
 }
@@ -157,7 +157,7 @@ mod tests {
     fn binary() {
         let mut bytes = Vec::new();
         write_binary_stl(&load(TEXT.as_bytes()).unwrap(), &mut bytes).unwrap();
-        // A header that begins as text does.
+        // A header that begins like an ASCII file.
         bytes[..12].copy_from_slice(b"solid facet ");
         assert_eq!(load(&bytes).unwrap().triangles.len(), 2);
         bytes.extend(b"trailing");

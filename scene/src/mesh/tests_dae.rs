@@ -1,4 +1,4 @@
-//! COLLADA by small documents with known answers.
+//! COLLADA tests with small documents of known content.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ fn parse(text: &str, dae_up_axis: DaeUpAxis) -> Result<TriMesh, MeshError> {
     load_bytes(Path::new("meshes/part.dae"), text.as_bytes(), &MeshOptions { dae_up_axis })
 }
 
-/// One triangle with vertex 0 at the origin, 1 at +x, 2 at +y and the normal +z, between `asset` and `scene`.
+/// A document whose vertices are 0 at the origin, 1 at +x, 2 at +y and 3 at +x +y, with the normal +z.
 pub(crate) fn document(asset: &str, library: &str, primitive: &str, nodes: &str) -> String {
     format!(
         r##"<?xml version="1.0" encoding="utf-8"?>
@@ -53,7 +53,7 @@ fn near(found: &[[f32; 3]], expected: &[[f32; 3]]) {
 
 const UP: [[f32; 3]; 3] = [[0., 0., 1.]; 3];
 
-/// Parent times child, in the order of the document; mirrors swap corners so that the front stays outside.
+/// Transforms multiply parent by child, in document order. Mirrors swap corners so that the front stays outside.
 #[test]
 fn transforms() {
     let child = r##"<node><translate>1 0 0</translate><instance_geometry url="#g"/></node>"##;
@@ -72,10 +72,10 @@ fn transforms() {
         near(&mesh.positions, &expected);
         near(mesh.normals.as_ref().unwrap(), &UP);
     }
-    // x is sheared along z: the plane stays z = 0, so the normal stays +z, which the plain matrix would tilt.
+    // A shear of x along z keeps the plane z = 0, so the normal stays +z. The plain matrix would tilt the normal.
     let shear = "<matrix>.001 0 .001 0 0 .001 0 0 0 0 .001 0 0 0 0 1</matrix>";
     near(nodes(&format!("<node>{shear}{shape}</node>")).normals.as_ref().unwrap(), &UP);
-    // One geometry three times, once by a node of another node.
+    // One geometry three times, once through an instance of another node.
     let mesh = nodes(
         r##"<node id="a"><instance_geometry url="#g"/></node>
             <node><matrix>1 0 0 0  0 1 0 0  0 0 1 5  0 0 0 1</matrix><instance_geometry url="#g"/>
@@ -141,7 +141,7 @@ pub(crate) const BOUND: &str = r##"<node><instance_geometry url="#g"><bind_mater
     <instance_material symbol="b" target="#m2"/>
   </technique_common></bind_material></instance_geometry></node>"##;
 
-/// Two parts; the first has two sets of texture coordinates.
+/// Two parts with a material and one without. The first one has two sets of texture coordinates.
 pub(crate) const TWO_PARTS: &str = r##"
   <triangles material="a"><input semantic="VERTEX" source="#v" offset="0"/>
     <input semantic="TEXCOORD" source="#t" offset="0" set="0"/>
@@ -184,13 +184,13 @@ fn errors() {
         assert_ne!(changed, text);
         let error = match parse(&changed, DaeUpAxis::Ignore) {
             Err(error) => error.to_string(),
-            // The vertex that is not a number is not used.
+            // The vertex with NaN is not used.
             Ok(_) if expected == "no triangles" => continue,
             Ok(_) => panic!("{to} passed"),
         };
         assert!(error.starts_with(&format!("meshes/part.dae: {expected}")), "{error}");
     }
-    // Twice the nodes at each level: the count stops it, not the clock.
+    // The number of nodes doubles at each level: the limit of nodes ends the reading, not the time.
     let doubling: String = (0..40)
         .map(|i| format!(r##"<node id="d{i}"><instance_node url="#d{0}"/><instance_node url="#d{0}"/></node>"##, i + 1))
         .collect();

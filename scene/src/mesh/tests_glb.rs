@@ -1,4 +1,4 @@
-//! glTF by small files with known answers.
+//! glTF tests with small files of known content.
 
 use kinetoscope_testkit::urdf::Files;
 use std::path::Path;
@@ -21,8 +21,8 @@ pub(crate) fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A unit square in xy. Positions and normals interleaved (stride 24), uv as normalized u8 (stride 4), u16 indices of
-/// two triangles, u8 indices of a strip and of a fan, and an "image".
+/// A unit square in xy. Positions and normals are interleaved (stride 24), uv are normalized u8 (stride 4). Then u16
+/// indices of two triangles, u8 indices of a strip and of a fan, and an "image".
 pub(crate) fn buffer() -> Vec<u8> {
     let mut bin = Vec::new();
     for p in [[0.0f32, 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]] {
@@ -68,11 +68,11 @@ fn check(mesh: &TriMesh) {
     assert_eq!(mesh.triangles.len(), 6);
     let at = |t: usize| mesh.triangles[t].map(|i| mesh.positions[i as usize]);
     assert_eq!(at(0), [[2., 0., 0.], [4., 0., 0.], [4., 2., 0.]]);
-    // A quarter turn, 5 up, then twice the size; strip and fan keep the winding.
+    // A quarter turn, 5 up, then twice the size. Strip and fan keep the winding.
     assert_eq!(at(2), [[0., 0., 10.], [0., 2., 10.], [-2., 0., 10.]]);
     assert!((0..6).map(at).all(faces_up));
     assert_eq!(mesh.parts.iter().map(|p| p.material).collect::<Vec<_>>(), [Some(0), Some(1), None]);
-    // From the top in the file, from the bottom here.
+    // Texture coordinates count from the top in the file, and from the bottom in the mesh.
     assert_eq!(mesh.uvs.as_ref().unwrap()[..4], [[0., 0.], [1., 0.], [1., 1.], [0., 1.]]);
     let wood = &mesh.materials[0];
     assert_eq!((wood.name.as_str(), wood.rgba[0], wood.rgba[2], wood.rgba[3]), ("wood", 1.0, 0.0, 1.0));
@@ -85,11 +85,11 @@ fn square() {
     let mesh = parse(SQUARE).unwrap();
     check(&mesh);
     assert_eq!(mesh.materials[0].texture, Some(TextureSource::Embedded(b"PNG!".to_vec())));
-    // Mirrored nodes turn the triangles.
+    // Mirrored nodes reverse the winding of triangles.
     let mesh = parse(&SQUARE.replace("\"scale\": [2, 2, 2]", "\"scale\": [-2, 2, 2]")).unwrap();
     assert!(mesh.triangles.iter().all(|t| faces_up(t.map(|i| mesh.positions[i as usize]))));
     assert_eq!(mesh.normals.unwrap()[0], [0., 0., 1.]);
-    // In separate files.
+    // The same content in separate files.
     let files = Files::default();
     let data = files.write("my data.bin", buffer());
     let json = SQUARE

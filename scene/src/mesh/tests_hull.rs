@@ -1,4 +1,4 @@
-//! Hulls against closed forms and brute force.
+//! Tests of convex hulls against closed forms and brute force.
 
 use std::collections::HashSet;
 use std::f64::consts::PI;
@@ -7,8 +7,8 @@ use super::super::HullError;
 use super::*;
 use crate::mesh::tests_robots::{Random, files, load_of};
 
-/// Largest distance of any of `points` in front of any face. Blocks of points whose box lies behind the farthest point so far
-/// are left out; 1e-9 of its size is far more than rounding.
+/// Largest distance of any of `points` in front of any face. Blocks of points whose box is behind the farthest point so
+/// far are skipped; 1e-9 of the size of a box is far more than rounding.
 fn outside(hull: &TriMesh, points: &[[f32; 3]]) -> f64 {
     let blocks: Vec<_> = points
         .chunks(64)
@@ -36,7 +36,8 @@ fn outside(hull: &TriMesh, points: &[[f32; 3]]) -> f64 {
     worst
 }
 
-/// Closed, oriented, of one piece (Euler), convex, outward; all points inside unless the number of vertices was bounded.
+/// Asserts that a hull is closed, oriented, connected (Euler), convex and outward-facing, and that it contains all
+/// points unless its number of vertices was limited.
 fn verify(points: &[[f32; 3]], cfg: &HullCfg) -> TriMesh {
     let hull = convex_hull(points, cfg).unwrap();
     hull.validate().unwrap();
@@ -100,7 +101,7 @@ fn random_clouds() {
 
 #[test]
 fn grids_and_snapped_clouds() {
-    // Many points nearly, but not quite, in the planes and lines of the hull.
+    // Many points nearly, but not exactly, in the planes and lines of the hull.
     let mut random = Random(11);
     for _ in 0..40 {
         let pose = crate::pose::from_xyz_rpy([1.0, 2.0, 3.0], [random.unit() * 6.0, random.unit() * 6.0, 0.3]);
@@ -146,7 +147,7 @@ fn spheres_and_cylinders() {
         })
         .collect();
     let volume = verify(&cylinder, &unbounded(0.0)).signed_volume();
-    // 360 corners.
+    // A prism over a polygon of 360 corners.
     let exact = 0.3 * 0.01 * 180.0 * (PI / 180.0).sin();
     assert!((volume / exact - 1.0).abs() < 1e-5, "{volume} {exact}");
     let volume = verify(&cylinder, &HullCfg::default()).signed_volume();
@@ -170,11 +171,11 @@ fn thin_plates() {
     assert!((hull.signed_volume() / 0.5e-3 - 1.0).abs() < 0.1);
     verify(&plate(1e-5), &unbounded(0.0));
 
-    // Thinner than the tolerance: thickened to a millimetre, or refused.
+    // Thinner than the tolerance: thickened to a millimeter, or rejected.
     let flat = plate(0.0);
     let hull = convex_hull(&flat, &HullCfg::default()).unwrap();
     let convexity = outside(&hull, &hull.positions);
-    // Narrow faces magnify the steps of the grid.
+    // Narrow faces magnify grid steps.
     assert!(convexity < 1e-5, "{convexity:e}");
     assert!((hull.signed_volume() / 0.5e-3 - 1.0).abs() < 0.05, "{}", hull.signed_volume());
     assert!(hull.positions.len() <= 64);
@@ -209,14 +210,14 @@ fn refusals() {
     ] {
         assert!(matches!(convex_hull(&line, &cfg), Err(HullError::InvalidCfg { .. })));
     }
-    // The largest numbers that are finite do not overflow.
+    // The largest finite numbers do not overflow.
     let huge = [[f32::MAX, 0., 0.], [-f32::MAX, 0., 0.], [0., f32::MAX, 0.], [0., 0., f32::MAX]];
     assert_eq!(convex_hull(&huge, &cfg).unwrap().triangles.len(), 4);
     let tiny = huge.map(|p| p.map(|x| x / f32::MAX * 1e-30));
     assert_eq!(convex_hull(&tiny, &cfg).unwrap().triangles.len(), 4);
 }
 
-/// Volumes of the exact hulls by Qhull (SciPy), in the units of the files.
+/// Volumes of the exact hulls by Qhull (SciPy), in cubed units of the files.
 const QHULL: [(&str, f64); 11] = [
     ("xMateSR5_base.stl", 2084907.3686896092),
     ("xMateSR5_link1.stl", 3202154.612781883),

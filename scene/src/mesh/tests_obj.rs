@@ -1,4 +1,4 @@
-//! OBJ and MTL, and what is written by [`crate::mesh::write_obj`].
+//! Tests of OBJ and MTL files, and of files from [`crate::mesh::write_obj`].
 
 use kinetoscope_testkit::urdf::Files;
 use std::path::Path;
@@ -21,10 +21,10 @@ fn faces() {
     assert_eq!(mesh.positions.len(), 6);
     assert_eq!(mesh.normals.as_ref().unwrap()[3], [0.0, 0.0, 1.0]);
     assert_eq!(mesh.uvs.as_ref().unwrap()[..4], [[0., 0.], [1., 0.], [1., 1.], [0., 1.]]);
-    // No library: both materials are unknown, which makes one part without any.
+    // Without a library, both materials are unknown, which gives one part without a material.
     assert_eq!((mesh.parts.len(), mesh.materials.len()), (1, 0));
     mesh.validate().unwrap();
-    // A face of two corners is a line: pybullet's monastery has some, and was refused.
+    // A face with two corners is a line. Regression: pybullet's monastery has such faces and was rejected.
     assert_eq!(parse(&format!("{SQUARE}f 1 2\n")).unwrap(), mesh);
 }
 
@@ -64,7 +64,7 @@ fn errors() {
 
 #[test]
 fn tobj() {
-    // Every face corner of a random file in order, with the single index of both readers undone.
+    // All face corners of a random file in order. The comparison resolves the single indices of both readers.
     let mut random = crate::mesh::tests_robots::Random(9);
     let mut text = String::new();
     for _ in 0..60 {
@@ -89,7 +89,7 @@ fn tobj() {
         mesh.indices.iter().map(at).collect()
     };
     let theirs: Vec<_> = models.iter().flat_map(|model| corners(&model.mesh)).collect();
-    // Triangles with two corners at one position have no area and are gone here.
+    // This reader drops triangles with two corners at one position, because they have no area.
     let theirs: Vec<_> =
         theirs.chunks(3).filter(|t| t[0].0 != t[1].0 && t[1].0 != t[2].0 && t[2].0 != t[0].0).flatten().collect();
     let ours = parse(&text).unwrap();

@@ -1,4 +1,4 @@
-//! The vendors' meshes against numbers from an independent reader.
+//! Tests of the vendors' meshes against values of independent readers.
 #![allow(clippy::excessive_precision, reason = "numbers as the other reader printed them")]
 
 use kinetoscope_testkit::needs::{files_below, robots_dir};
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use super::builder::{cross, dot, sub};
 use super::{MeshMaterial, TextureSource, TriMesh, load};
 
-/// A small generator (xorshift64*) so that every run tests the same.
+/// A small random generator (xorshift64*), so that every run tests the same data.
 pub(super) struct Random(pub(super) u64);
 
 impl Random {
@@ -18,7 +18,7 @@ impl Random {
         self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
     }
 
-    /// Uniform in 0..1.
+    /// Uniform number in 0..1.
     pub(super) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -29,17 +29,17 @@ pub(super) fn faces_up([a, b, c]: [[f32; 3]; 3]) -> bool {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0
 }
 
-/// All files below the robots with an extension, sorted.
+/// All files of real robots with an extension, sorted.
 pub(super) fn files(extension: &str) -> Vec<PathBuf> {
     files_below(&robots_dir(), extension)
 }
 
-/// The first of `files` with this name.
+/// Loads the first of `files` with this name.
 pub(super) fn load_of(files: &[PathBuf], name: &str) -> TriMesh {
     load(files.iter().find(|path| path.ends_with(name)).unwrap()).unwrap()
 }
 
-/// ANYmal by pycollada: triangles with an area, smallest and largest coordinates \[m\].
+/// ANYmal meshes by pycollada: number of triangles with an area, smallest and largest coordinates \[m\].
 #[rustfmt::skip]
 const ANYMAL: [(&str, usize, [f32; 3], [f32; 3]); 19] = [
     ("base.dae", 4276, [-0.41459, -0.069633, -0.069794], [0.399738, 0.069633, 0.100456]),
@@ -63,10 +63,10 @@ const ANYMAL: [(&str, usize, [f32; 3], [f32; 3]); 19] = [
     ("wide_angle_camera.dae", 148, [-0.02441, -0.019879, -0.033957], [0.003711, 0.019879, 0.019117]),
 ];
 
-/// File, triangles, different positions.
+/// File, number of triangles, number of distinct positions.
 type Counts = (&'static str, usize, usize);
 
-/// SR5 and Inspire by trimesh: triangles, different positions, smallest and largest coordinates.
+/// SR5 and Inspire meshes by trimesh: counts, smallest and largest coordinates in units of the files.
 #[rustfmt::skip]
 const STL: [(Counts, [f32; 3], [f32; 3]); 9] = [
     (("L_hand_base_link.STL", 28960, 14410), [-0.0274, -0.14155, -0.042769], [0.0274, 0.0, 0.038735]),
@@ -98,12 +98,12 @@ fn anymal_by_pycollada() {
         assert_eq!(mesh.triangles.len(), triangles, "{name}");
         assert_bounds(name, &mesh, lo, hi);
         assert!(mesh.normals.is_some() && mesh.uvs.is_some());
-        // One textured part each, but for the base.
+        // One textured part each, except for the base.
         let Some(TextureSource::File(image)) = &mesh.materials[0].texture else { panic!("{name} has no texture") };
         assert!(image.is_file(), "{}", image.display());
         let parts = if name == "base.dae" { 6 } else { 1 };
         assert_eq!((mesh.materials.len(), mesh.parts.len()), (parts, parts));
-        // Normals agree with the winding, on the whole.
+        // Most normals agree with the winding.
         let normals = mesh.normals.as_ref().unwrap();
         let agree = mesh.triangles.iter().filter(|t| {
             let [a, b, c] = t.map(|i| mesh.positions[i as usize].map(f64::from));

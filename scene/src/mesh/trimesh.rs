@@ -1,22 +1,22 @@
-//! What every mesh can do.
+//! Operations on meshes.
 
 use super::affine::Placement;
 use super::builder::{cross, dot, unit};
 use super::{MeshPart, TriMesh};
 use crate::Pose;
 
-/// A broken promise of [`TriMesh`].
+/// A violated invariant of [`TriMesh`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshFault {
-    /// Normals or texture coordinates are not as many as positions.
+    /// The number of normals or texture coordinates differs from the number of positions.
     #[error("{count} {what} for {positions} positions; expected as many")]
     Length {
         /// "normals" or "texture coordinates".
         what: &'static str,
-        /// How many there are.
+        /// Number of normals or texture coordinates.
         count: usize,
-        /// How many positions there are.
+        /// Number of positions.
         positions: usize,
     },
     /// A position, normal or texture coordinate is not finite.
@@ -24,55 +24,55 @@ pub enum MeshFault {
     NonFinite {
         /// "position", "normal" or "texture coordinate".
         what: &'static str,
-        /// Which one.
+        /// Index of the element.
         index: usize,
     },
-    /// A triangle refers to a vertex that is not there.
+    /// A triangle refers to a missing vertex.
     #[error("triangle {triangle} refers to vertex {index}, but there are {positions}")]
     Index {
-        /// Which triangle.
+        /// Index of the triangle.
         triangle: usize,
-        /// The vertex it names.
+        /// Index of the vertex.
         index: u32,
-        /// How many positions there are.
+        /// Number of positions.
         positions: usize,
     },
-    /// The parts do not cover the triangles one after the other.
+    /// The parts do not cover the triangles consecutively.
     #[error(
         "part {part} covers triangles {found_start}..{found_end}; expected it to begin at {expected_start}, and the last to end at {triangles}"
     )]
     Parts {
-        /// Which part (one past the last if triangles are left over).
+        /// Index of the part (one past the last if triangles are left over).
         part: usize,
-        /// Where it begins.
+        /// First triangle of the part.
         found_start: usize,
-        /// Where it ends.
+        /// End of the part's triangles, exclusive.
         found_end: usize,
-        /// Where it has to begin.
+        /// Expected first triangle of the part.
         expected_start: usize,
-        /// How many triangles there are.
+        /// Number of triangles.
         triangles: usize,
     },
-    /// A part names a material that is not there.
+    /// A part refers to a missing material.
     #[error("part {part} names material {material}, but there are {materials}")]
     Material {
-        /// Which part.
+        /// Index of the part.
         part: usize,
-        /// The material it names.
+        /// Index of the material.
         material: usize,
-        /// How many materials there are.
+        /// Number of materials.
         materials: usize,
     },
 }
 
 impl TriMesh {
-    /// Triangles without normals, texture coordinates or material, as one part.
+    /// Creates a mesh of one part, without normals, texture coordinates and material.
     pub fn from_triangles(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
         let parts = vec![MeshPart { triangles: 0..triangles.len(), material: None }];
         Self { positions, triangles, parts, ..Self::default() }
     }
 
-    /// Smallest and largest coordinates \[m\]; `None` without vertices.
+    /// Bounding box: smallest and largest coordinates \[m\]; `None` without vertices.
     pub fn bounds(&self) -> Option<([f32; 3], [f32; 3])> {
         let first = *self.positions.first()?;
         Some(self.positions.iter().fold((first, first), |(lo, hi), p| {
@@ -81,9 +81,10 @@ impl TriMesh {
         }))
     }
 
-    /// Enclosed volume \[m³\]: positive for a closed surface with its front outside, meaningless for an open one.
+    /// Enclosed volume \[m³\]: positive for a closed surface with its front outside, negative for one that is inside
+    /// out, meaningless for an open one.
     pub fn signed_volume(&self) -> f64 {
-        // About the middle, so that a small part far from the origin loses no digits.
+        // Relative to the middle of the bounds, so that a small part far from the origin loses no digits.
         let Some((lo, hi)) = self.bounds() else { return 0.0 };
         let middle: [f64; 3] = std::array::from_fn(|i| (f64::from(lo[i]) + f64::from(hi[i])) / 2.0);
         let six: f64 = self
@@ -100,14 +101,16 @@ impl TriMesh {
         six / 6.0
     }
 
-    /// The mesh scaled along its axes, as `scale` of a URDF mesh does. A negative product mirrors the mesh: the winding
-    /// follows, so that the front stays outside.
+    /// Returns the mesh scaled along its axes, as by `scale` of a URDF mesh.
+    ///
+    /// A negative product of the factors mirrors the mesh. The winding is then reversed, so that the front stays
+    /// outside.
     pub fn scaled(&self, scale: [f64; 3]) -> Self {
         let [x, y, z] = scale;
         self.affine(&[[x, 0., 0., 0.], [0., y, 0., 0.], [0., 0., z, 0.]])
     }
 
-    /// The mesh moved by a pose: coordinates of the frame that `pose` maps into.
+    /// Returns the mesh transformed by a pose, in the frame that `pose` maps to.
     pub fn transformed(&self, pose: &Pose) -> Self {
         let m = pose.to_homogeneous();
         self.affine(&[0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)], m[(i, 3)]]))
@@ -120,7 +123,7 @@ impl TriMesh {
             *p = place.point(p.map(f64::from)).map(|x| x as f32);
         }
         for n in out.normals.iter_mut().flatten() {
-            // A scale of zero has no inverse; the old normal is as good as any.
+            // A scale of zero has no inverse, so the old normal is kept.
             *n = place.normal(n.map(f64::from)).or_else(|| unit(*n)).unwrap_or(*n);
         }
         if place.mirrored {
@@ -131,7 +134,10 @@ impl TriMesh {
         out
     }
 
-    /// Checks everything the type promises; meshes from [`super::load`] keep it.
+    /// Checks all invariants of the type. Meshes from [`super::load`] satisfy them.
+    ///
+    /// # Errors
+    /// The first violated invariant.
     pub fn validate(&self) -> Result<(), MeshFault> {
         let positions = self.positions.len();
         let lengths = [
@@ -204,7 +210,7 @@ mod tests {
         let mirrored = mesh.scaled([-2.0, 1.0, 3.0]);
         assert!((mirrored.signed_volume() - 1.0).abs() < 1e-9);
         assert_eq!(mirrored.bounds(), Some(([-2., 0., 0.], [0., 1., 3.])));
-        // The normal of the plane x/-2 + y + z/3 = 1 is (-1/2, 1, 1/3), normalised.
+        // The normal of the plane x/-2 + y + z/3 = 1 is (-1/2, 1, 1/3), normalized.
         let n = mirrored.normals.unwrap()[3];
         let length = (0.25f32 + 1.0 + 1.0 / 9.0).sqrt();
         for (found, expected) in n.iter().zip([-0.5 / length, 1.0 / length, 1.0 / 3.0 / length]) {

@@ -1,4 +1,4 @@
-//! Meshes to files.
+//! Writers of mesh files.
 
 use std::collections::HashMap;
 use std::io::{Error, ErrorKind, Result, Write};
@@ -7,12 +7,14 @@ use std::ops::Range;
 use super::TriMesh;
 use super::builder::{cross, sub};
 
-/// Writes all triangles as binary STL, with the normal of each triangle; normals, texture coordinates and materials are
-/// lost.
+/// Writes all triangles as binary STL with face normals. Vertex normals, texture coordinates and materials are lost.
+///
+/// # Errors
+/// `out` fails, or the mesh has more than 4294967295 triangles.
 pub fn write_binary_stl(mesh: &TriMesh, mut out: impl Write) -> Result<()> {
     let count = u32::try_from(mesh.triangles.len())
         .map_err(|_| Error::new(ErrorKind::InvalidInput, "STL holds at most 4294967295 triangles"))?;
-    // Not "solid", which would make some readers take it for ASCII.
+    // Not "solid", by which some readers detect ASCII.
     let mut buffer = b"binary STL".to_vec();
     buffer.resize(80, b' ');
     buffer.extend(count.to_le_bytes());
@@ -35,9 +37,13 @@ pub fn write_binary_stl(mesh: &TriMesh, mut out: impl Write) -> Result<()> {
     out.flush()
 }
 
-/// Writes a run of triangles (one [`super::MeshPart`], or `0..mesh.triangles.len()`) as OBJ with the normals and texture
-/// coordinates the mesh has, and only the vertices the run uses. Numbers are the shortest that read back as the same
-/// `f32`. No material is written.
+/// Writes a range of triangles (one [`super::MeshPart`], or `0..mesh.triangles.len()`) as OBJ.
+///
+/// The file has the normals and texture coordinates of the mesh, and only the vertices of the range. Numbers are the
+/// shortest that read back as the same `f32`. Materials are not written.
+///
+/// # Errors
+/// `out` fails, or the range exceeds the triangles of the mesh.
 pub fn write_obj(mesh: &TriMesh, triangles: Range<usize>, mut out: impl Write) -> Result<()> {
     let Some(run) = mesh.triangles.get(triangles.clone()) else {
         let what = format!("triangles {triangles:?} of a mesh with {}", mesh.triangles.len());

@@ -1,22 +1,22 @@
-//! A counter-based generator: a number is a function of its key and its place, and of nothing that was drawn before. So
-//! numbers may be drawn on any thread and in any order.
+//! A counter-based generator: a number depends on its key and its counter only. Numbers may therefore be computed on
+//! any thread and in any order.
 
 use super::Random;
 use std::f64::consts::TAU;
 
-/// Philox 4x32-10: a cipher-like function of a key and a counter of 128 bits. Source: Salmon, Moraes, Dror and Shaw 2011,
-/// "Parallel random numbers: as easy as 1, 2, 3".
+/// Philox 4x32-10: a cipher-like function of a key and a counter of 128 bits. Source: Salmon, Moraes, Dror and Shaw
+/// 2011, "Parallel random numbers: as easy as 1, 2, 3".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Philox([u32; 2]);
 
 impl Philox {
-    /// The numbers of the thing called `name` in the environment of global index `env`: keyed as [`Random::keyed`].
+    /// Creates the generator of the use `name` in the environment with global index `env`, keyed as [`Random::keyed`].
     pub fn keyed(seed: u64, env: u64, name: &str) -> Self {
         let mut random = Random::keyed(seed, env, name);
         Self([(); 2].map(|()| (random.uniform() * 2f64.powi(32)) as u32))
     }
 
-    /// 128 random bits at the place `at`.
+    /// 128 random bits at the counter `at`.
     #[inline]
     pub fn bits(self, at: [u32; 4]) -> [u32; 4] {
         let multiply = |a: u32, b: u32| {
@@ -33,14 +33,14 @@ impl Philox {
         c
     }
 
-    /// Four numbers of the uniform distribution on 0 to 1, both excluded.
+    /// Four uniform numbers in 0 to 1, both excluded.
     #[inline]
     pub fn uniforms(self, at: [u32; 4]) -> [f64; 4] {
         self.bits(at).map(|bits| (f64::from(bits) + 0.5) * 2f64.powi(-32))
     }
 
-    /// Four numbers of the normal distribution with mean 0 and standard deviation 1, by the transform of Box and Muller
-    /// (1958). With 32 bits each, none is beyond 6.8.
+    /// Four normal numbers with mean 0 and standard deviation 1, by the transform of Box and Muller (1958). With 32
+    /// bits each, their magnitudes are below 6.8.
     #[inline]
     pub fn normals(self, at: [u32; 4]) -> [f64; 4] {
         let [a, b, c, d] = self.uniforms(at);
@@ -57,7 +57,7 @@ impl Philox {
 mod tests {
     use super::*;
 
-    /// The known answers of the authors' own library, Random123.
+    /// Known answers of Random123, the library of the authors.
     #[test]
     fn known_answers() {
         let zero = Philox([0, 0]).bits([0; 4]);
@@ -68,9 +68,9 @@ mod tests {
         assert_eq!(pi, [0xd16c_fe09, 0x94fd_cceb, 0x5001_e420, 0x2412_6ea1]);
     }
 
-    /// Means of n independent numbers scatter by sigma / sqrt(n), variances of normal ones by sqrt(2 / n), of uniform ones by
-    /// sqrt(1 / 180 / n), fourth moments of normal ones by sqrt(96 / n), correlations by 1 / sqrt(n): six times that fails
-    /// once in 5e8 seeds, and the seeds here are fixed.
+    /// Means of n independent numbers scatter by sigma / sqrt(n), variances of normal ones by sqrt(2 / n), of uniform
+    /// ones by sqrt(1 / 180 / n), fourth moments of normal ones by sqrt(96 / n), correlations by 1 / sqrt(n). Limits of
+    /// six times that fail once in 5e8 seeds, and the seeds here are fixed.
     #[test]
     fn moments() {
         let dice = Philox::keyed(3, 1, "camera");
@@ -85,7 +85,7 @@ mod tests {
         assert!((moment(&uniforms, 1) - 0.5).abs() < 6.0 * (1.0 / 12.0_f64).sqrt() / root);
         let second: f64 = uniforms.iter().map(|x| (x - 0.5).powi(2)).sum::<f64>() / n;
         assert!((second - 1.0 / 12.0).abs() < 6.0 * (1.0 / 180.0_f64).sqrt() / root);
-        // Those next to each other, of the next place on every axis, and of another key.
+        // Correlations with adjacent numbers, the next counter on every axis, and other keys.
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / n;
         let near = product(&normals, &normals[1..]);
         assert!(near.abs() < 6.0 / root, "{near}");

@@ -1,4 +1,4 @@
-//! A cylinder with round ends.
+//! A capsule.
 
 use super::area_sampling::AreaSampling;
 use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
@@ -8,7 +8,7 @@ use crate::Ray;
 use crate::mesh::TriMesh;
 use crate::vector::{V3, along, unit};
 
-/// A cylinder along z with half a ball on each end.
+/// A capsule: a cylinder along z with a hemisphere at each end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
     /// Radius \[m\].
@@ -50,7 +50,7 @@ impl ClosedForm for Capsule {
         let (o, d) = (ray.origin, ray.direction);
         let (r, h) = (f64::from(self.radius), f64::from(self.half_length));
         let side = tube(o, d, r);
-        // The balls at the ends are inside of the tube.
+        // The spheres at the ends are inside of the infinite cylinder.
         if side.is_empty() {
             return None;
         }

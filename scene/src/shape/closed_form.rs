@@ -10,7 +10,7 @@ use crate::vector::V3;
 pub struct Intersection {
     /// Distance along the ray \[m\].
     pub t: f64,
-    /// Unit normal of the surface, of either sign.
+    /// Unit normal of the surface, in either direction.
     pub normal: V3,
 }
 
@@ -28,50 +28,53 @@ pub enum HullPart {
     },
 }
 
-/// The geometry of a shape with a closed form, in its own frame: a convex solid that contains the origin, or a plane.
+/// Geometry of a shape with a closed form, in its own frame: a convex solid that contains the origin, or a plane.
+///
 /// Shapes that are not convex are [made of triangles](super::Triangulated).
 pub trait ClosedForm {
     /// Sizes that must be positive and finite.
     fn sizes(&self) -> Vec<f32>;
 
-    /// Smallest and largest coordinates \[m\]; infinite for a shape without an end.
+    /// Smallest and largest coordinates \[m\]; infinite for an infinite shape.
     fn bounds(&self) -> [V3; 2];
 
     /// Triangles of the surface, counter-clockwise seen from outside, with about `segments` edges around a circle.
     fn tessellate(&self, segments: usize) -> TriMesh;
 
-    /// The largest coordinate along a direction, times the length of the direction \[m\].
+    /// Support function: the largest coordinate along a direction, times the length of the direction \[m\].
     fn support(&self, direction: V3) -> f64;
 
-    /// Calls `add` with the parts of which the shape is the convex hull.
+    /// Calls `add` for each part. The shape is the convex hull of its parts.
     fn hull(&self, add: &mut dyn FnMut(HullPart));
 
-    /// The nearest intersection at a distance from 0 to `limit`, both included. A ray that begins inside of a solid
-    /// intersects it where it leaves.
+    /// Returns the nearest intersection at a distance from 0 to `limit` \[m\], both included.
+    ///
+    /// A ray that begins inside of a solid intersects it at its exit.
     fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection>;
 
-    /// Number of the smooth part of the surface at an intersection, less than
+    /// Number of the smooth face at an intersection, less than
     /// [`IDS_OF_PRIMITIVE`](crate::RenderScene::IDS_OF_PRIMITIVE).
     fn face(&self, _intersection: &Intersection, _ray: &Ray) -> usize {
         0
     }
 
-    /// Sampling of points of the surface by area, for shapes that emit light; `None` if only paths that hit the shape by
-    /// chance find its light, which is right but noisy.
+    /// Area sampling of the surface, for shapes that emit light.
+    ///
+    /// With `None`, only paths that hit the shape by chance find its light, which is unbiased but noisy.
     fn area_sampling(&self) -> Option<&dyn AreaSampling>;
 
-    /// True if the surface is seen from +z only.
+    /// True if the surface is visible from +z only.
     fn is_one_sided(&self) -> bool {
         false
     }
 }
 
-/// Work on a shape with a closed form, compiled for each kind.
+/// An operation on a shape with a closed form, compiled for each kind of shape.
 pub trait ForClosedForm {
-    /// The result.
+    /// Result of the operation.
     type Output;
 
-    /// Does the work.
+    /// Runs the operation on a shape.
     fn run<T: ClosedForm>(self, shape: &T) -> Self::Output;
 }
 

@@ -1,4 +1,4 @@
-//! Normals per corner: smooth over flat angles, sharp over creases.
+//! Normals per corner: smooth across small angles, sharp across creases.
 
 use crate::mesh::TriMesh;
 use std::collections::HashMap;
@@ -20,14 +20,14 @@ pub(super) fn unit(a: [f32; 3]) -> Option<[f32; 3]> {
     (length > 0.0 && length.is_finite()).then(|| a.map(|x| x / length))
 }
 
-/// For every vertex the first vertex at the same place.
+/// For every vertex, the first vertex at the same position.
 pub(super) fn weld(positions: &[[f32; 3]]) -> Vec<u32> {
     let mut first = HashMap::with_capacity(positions.len());
     let key = |p: &[f32; 3]| p.map(|x| (x + 0.0).to_bits());
     positions.iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect()
 }
 
-/// Unit normals of the triangles; zero where a triangle has no area.
+/// Unit normals of the triangles; zero for a triangle without an area.
 pub(super) fn face_normals(mesh: &TriMesh) -> Vec<[f32; 3]> {
     let normal = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
@@ -36,17 +36,19 @@ pub(super) fn face_normals(mesh: &TriMesh) -> Vec<[f32; 3]> {
     mesh.triangles.iter().map(normal).collect()
 }
 
-/// The interior angle of a triangle at each corner \[rad\].
+/// Interior angles of a triangle at its corners \[rad\].
 pub(super) fn angles(mesh: &TriMesh, t: &[u32; 3]) -> [f32; 3] {
     let p = t.map(|i| mesh.positions[i as usize]);
     let edges = [0, 1, 2].map(|k| unit(sub(p[(k + 1) % 3], p[k])));
-    // The other edge of a corner comes towards it.
+    // The other edge of a corner points toward it.
     [0, 1, 2].map(|k| edges[k].zip(edges[(k + 2) % 3]).map_or(0.0, |(a, b)| (-dot(a, b)).clamp(-1.0, 1.0).acos()))
 }
 
-/// Normals of the three corners of every triangle: the mean, weighted by angle, over the triangles around the corner that
-/// are within `crease` \[rad\] of this one. `welded` has for each vertex the first one at the same place, `faces` the unit
-/// normal of each triangle ([`face_normals`]).
+/// Normals of the three corners of every triangle; those of the mesh, if it has any.
+///
+/// Otherwise, a corner normal is the mean, weighted by angle, of the triangles around the corner that are within
+/// `crease` \[rad\] of this triangle. `welded` has for each vertex the first vertex at the same position, `faces` the
+/// unit normal of each triangle ([`face_normals`]).
 pub(super) fn corner_normals(mesh: &TriMesh, welded: &[u32], faces: &[[f32; 3]], crease: f32) -> Vec<[[f32; 3]; 3]> {
     if let Some(normals) = &mesh.normals {
         let of = |(t, face): (&[u32; 3], &[f32; 3])| t.map(|i| unit(normals[i as usize]).unwrap_or(*face));
@@ -71,7 +73,7 @@ pub(super) fn corner_normals(mesh: &TriMesh, welded: &[u32], faces: &[[f32; 3]],
     let flat = normals.as_flattened_mut();
     for v in 1..start.len() {
         let around = &corners[start[v - 1] as usize..start[v] as usize];
-        // No crease: one sum, in the same order, is that of every corner here.
+        // Without a crease, one sum in the same order is valid for every corner here.
         let smooth = smooth(around, faces, limit).then(|| mean(around, None)).flatten();
         for &corner in around {
             let face = faces[corner as usize / 3];
@@ -82,7 +84,7 @@ pub(super) fn corner_normals(mesh: &TriMesh, welded: &[u32], faces: &[[f32; 3]],
     normals
 }
 
-/// True when each two of the triangles around a vertex are within the crease angle, whose cosine is `limit`.
+/// True if any two triangles around a vertex are within the crease angle, whose cosine is `limit`.
 fn smooth(around: &[u32], faces: &[[f32; 3]], limit: f32) -> bool {
     around.iter().enumerate().all(|(i, &corner)| {
         let face = faces[corner as usize / 3];
@@ -90,7 +92,8 @@ fn smooth(around: &[u32], faces: &[[f32; 3]], limit: f32) -> bool {
     })
 }
 
-/// Corners of triangles at each vertex `v`: `corners[start[v]..start[v + 1]]`. Corner c of triangle k has the number 3 k + c.
+/// Corners of triangles at each vertex `v`: `corners[start[v]..start[v + 1]]`. Corner c of triangle k has the number
+/// `3 * k + c`.
 struct Corners {
     start: Vec<u32>,
     corners: Vec<u32>,

@@ -15,7 +15,7 @@ use std::f64::consts::PI;
 pub struct Cylinder {
     /// Radius \[m\].
     pub radius: f32,
-    /// Half its length \[m\].
+    /// Half the length \[m\].
     pub half_length: f32,
 }
 
@@ -57,14 +57,14 @@ impl ClosedForm for Cylinder {
         let (o, d, [radius, half_length]) = (ray.origin, ray.direction, self.size());
         let (side, ends) = (tube(o, d, radius), slab(o[2], d[2], half_length));
         let t = side.and(ends).first(limit)?;
-        // The end that decided, if one did.
+        // True if the intersection is at an end.
         let flat = if t == ends.enter || t == ends.leave { t != side.enter && t != side.leave } else { false };
         let [x, y, _] = along(o, t, d);
         let normal = if flat { [0.0, 0.0, 1.0] } else { unit([x, y, 0.0])? };
         Some(Intersection { t, normal })
     }
 
-    /// The side, the lower end, the upper one.
+    /// Number of the face: the side, the lower end, the upper end.
     fn face(&self, intersection: &Intersection, ray: &Ray) -> usize {
         match intersection.normal {
             [0.0, 0.0, _] => 1 + usize::from(ray.at(intersection.t)[2] >= 0.0),

@@ -1,14 +1,14 @@
-//! Meshes whose vertices move: which vertex is where.
+//! Vertex maps of meshes with moving vertices.
 
 use super::RenderMesh;
 use super::crease::{cross, dot, sub};
 
-/// The places of a deformable mesh's vertices.
+/// Vertex maps of a deformable mesh.
 #[derive(Debug, Default)]
 pub(super) struct Deformation {
-    /// The vertex of the mesh that was prepared, for each vertex.
+    /// Vertex of the input mesh, for each vertex.
     pub(super) sources: Vec<u32>,
-    /// The vertex of each of [`RenderMesh::lanes`].
+    /// Vertex, for each of [`RenderMesh::lanes`].
     pub(super) vertex_of_lane: Vec<u32>,
 }
 
@@ -25,7 +25,7 @@ impl Deformation {
                     count = count.max(usize::from(corner) + 1);
                 }
             }
-            // The last vertex is repeated.
+            // The last vertex is repeated as padding.
             let last = count.checked_sub(1).map_or(0, |last| lanes[last]);
             lanes[count..].fill(last);
         }
@@ -33,12 +33,13 @@ impl Deformation {
     }
 }
 
-/// Fills `normals` with the unit normals of vertices: the means of the normals of the triangles around them, weighted by
-/// area; zero for a vertex without an area around it.
+/// Fills `normals` with the unit normals of vertices: the mean of the adjacent triangles' normals, weighted by area.
+///
+/// The normal of a vertex without an adjacent area is zero.
 ///
 /// # Panics
 ///
-/// There are more positions than normals, or a triangle has a vertex that does not exist.
+/// A triangle refers to a vertex beyond `positions` or `normals`.
 pub fn smooth_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]], normals: &mut [[f32; 3]]) {
     normals.fill([0.0; 3]);
     for triangle in triangles {

@@ -1,4 +1,4 @@
-//! A stretched ball.
+//! An ellipsoid.
 
 use super::area_sampling::AreaSampling;
 use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
@@ -8,7 +8,7 @@ use crate::Ray;
 use crate::mesh::TriMesh;
 use crate::vector::{V3, along, to_f64, unit};
 
-/// A ball stretched along its axes.
+/// An ellipsoid with its axes along x, y and z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ellipsoid {
     /// Half lengths along x, y and z \[m\].

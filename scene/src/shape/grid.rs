@@ -2,7 +2,7 @@
 
 use crate::mesh::TriMesh;
 
-/// Revolves a profile of (radius, z), from the bottom to the top, about z. A radius of zero is a pole.
+/// Revolves a profile of (radius, z), from the bottom to the top, about the z axis. A radius of zero is a pole.
 pub(crate) fn revolve(profile: &[[f64; 2]], segments: usize) -> TriMesh {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     let mut rings: Vec<Vec<u32>> = Vec::new();
@@ -31,7 +31,7 @@ pub(crate) fn revolve(profile: &[[f64; 2]], segments: usize) -> TriMesh {
     TriMesh::from_triangles(positions, triangles)
 }
 
-/// Half a circle (or a part of it) as a profile: angles from `from` to `to` \[rad\] about the middle at `z`.
+/// Profile of an arc: angles from `from` to `to` \[rad\] about the center at height `z`.
 pub(super) fn arc(radius: f64, z: f64, from: f64, to: f64, steps: usize) -> Vec<[f64; 2]> {
     (0..=steps)
         .map(|k| {

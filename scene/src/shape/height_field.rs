@@ -1,11 +1,11 @@
-//! Terrain.
+//! Height fields.
 
 use super::render_mesh::RenderMesh;
 use super::triangulated::{TriangleSampling, Triangulated};
 use crate::mesh::TriMesh;
 use std::sync::Arc;
 
-/// Terrain: heights over a regular grid, with walls and a floor below.
+/// A height field: heights over a regular grid, with walls and a floor below.
 #[derive(Clone, Debug)]
 pub struct HeightField {
     size: [f64; 4],
@@ -16,10 +16,13 @@ pub struct HeightField {
 }
 
 impl HeightField {
-    /// A height field as MuJoCo has it. `size` = half length along x, half length along y, height of elevation 1, depth of
-    /// the floor below zero \[m\]; `elevation` holds `rows` rows (along y) of `columns` numbers (along x) in 0..=1.
-    /// `None` where there are fewer than two rows or columns, not as many numbers as the grid has, or an elevation that is
-    /// negative or not finite.
+    /// Creates a height field with MuJoCo's parameters.
+    ///
+    /// `size` is the half length along x, half length along y, height of elevation 1, and depth of the floor below zero
+    /// \[m\]. `elevation` holds `rows` rows (along y) of `columns` numbers (along x) in 0..=1.
+    ///
+    /// Returns `None` for fewer than two rows or columns, another number of elevations than grid points, and an
+    /// elevation that is negative or not finite.
     pub fn new(size: [f64; 4], rows: usize, columns: usize, elevation: &[f32]) -> Option<Self> {
         let elevations = elevation.iter().all(|e| e.is_finite() && *e >= 0.0);
         if rows < 2 || columns < 2 || elevation.len() != rows.checked_mul(columns)? || !elevations {
@@ -59,7 +62,7 @@ impl HeightField {
             }
         }
         let mesh = TriMesh::from_triangles(positions, triangles);
-        // Its rim is below all heights where there is a floor: the surface is closed.
+        // With a floor, the rim is below all heights, so the surface is closed.
         let prepare = if bottom > 0.0 { RenderMesh::of_closed } else { RenderMesh::new };
         let mesh = Arc::new(prepare(&mesh, RenderMesh::CREASE));
         Some(Self { size, rows, columns, elevation: elevation.into(), mesh })
@@ -70,22 +73,22 @@ impl HeightField {
         self.size
     }
 
-    /// Rows of the grid, along y.
+    /// Number of rows of the grid, along y.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Columns of the grid, along x.
+    /// Number of columns of the grid, along x.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// Elevations, row after row.
+    /// Elevations, row by row.
     pub fn elevation(&self) -> &Arc<[f32]> {
         &self.elevation
     }
 
-    /// The triangles.
+    /// Triangles, prepared for rendering.
     pub fn mesh(&self) -> &Arc<RenderMesh> {
         &self.mesh
     }

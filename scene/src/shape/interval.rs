@@ -1,8 +1,8 @@
-//! The part of a ray that is inside a convex body.
+//! Intervals of a ray inside a convex body.
 
 use crate::vector::{V3, along, dot};
 
-/// Where a ray enters a convex body and where it leaves it; nothing where it leaves before it enters.
+/// Distances at which a ray enters and leaves a convex body. The interval is empty if `leave` is less than `enter`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Interval {
     pub(super) enter: f64,
@@ -18,30 +18,31 @@ impl Interval {
         self.enter > self.leave
     }
 
-    /// What is in both.
+    /// Intersection of both intervals.
     #[inline(always)]
     pub(super) fn and(self, other: Self) -> Self {
         Self { enter: self.enter.max(other.enter), leave: self.leave.min(other.leave) }
     }
 
-    /// What is in one of them or between them: for two parts of one convex body.
+    /// Smallest interval that contains both, for two parts of one convex body.
     #[inline(always)]
     pub(super) fn or(self, other: Self) -> Self {
         Self { enter: self.enter.min(other.enter), leave: self.leave.max(other.leave) }
     }
 
-    /// The first end at a distance from 0 to `limit`: where the ray enters, or where it leaves if it began inside.
+    /// First end at a distance from 0 to `limit`: the entry, or the exit of a ray that begins inside.
     #[inline(always)]
     pub(super) fn first(self, limit: f64) -> Option<f64> {
         let t = if self.enter >= 0.0 { self.enter } else { self.leave };
-        // Ends without a number belong to rays that run along the surface.
+        // Infinite and NaN ends belong to rays along the surface.
         (self.enter <= self.leave && t >= 0.0 && t <= limit && t < f64::INFINITY).then_some(t)
     }
 }
 
-/// A ball about the origin, for directions of any length. The distance of the ray from the middle is taken at its nearest
-/// point, not by the discriminant, which cancels for small balls far away. Source: Haines et al., Precision improvements
-/// for ray/sphere intersection, Ray Tracing Gems, 2019.
+/// Interval in a sphere about the origin, for directions of any length.
+///
+/// The distance from the center is computed at the nearest point, not by the discriminant, which cancels for small
+/// spheres far away. Source: Haines et al., Precision improvements for ray/sphere intersection, Ray Tracing Gems, 2019.
 #[inline(always)]
 pub(super) fn ball(o: V3, d: V3, radius: f64) -> Interval {
     let dd = dot(d, d);
@@ -50,7 +51,7 @@ pub(super) fn ball(o: V3, d: V3, radius: f64) -> Interval {
     around(middle, radius * radius - dot(p, p), dd)
 }
 
-/// An endless cylinder about z.
+/// Interval in an infinite cylinder about z.
 #[inline(always)]
 pub(super) fn tube(o: V3, d: V3, radius: f64) -> Interval {
     let dd = d[0] * d[0] + d[1] * d[1];
@@ -73,7 +74,7 @@ fn around(middle: f64, rest: f64, dd: f64) -> Interval {
     }
 }
 
-/// The space between -h and h along one axis.
+/// Interval between -h and h along one axis.
 #[inline(always)]
 pub(super) fn slab(o: f64, d: f64, h: f64) -> Interval {
     if d == 0.0 {

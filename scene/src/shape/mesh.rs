@@ -1,13 +1,13 @@
-//! Triangles as a shape.
+//! Triangle meshes as shapes.
 
 use super::render_mesh::RenderMesh;
 use super::triangulated::{TriangleSampling, Triangulated};
 use std::sync::Arc;
 
-/// Triangles, prepared for drawing once and shared.
+/// A triangle mesh, prepared for rendering once and shared.
 #[derive(Clone, Debug)]
 pub struct Mesh {
-    /// The prepared triangles.
+    /// Prepared triangles.
     pub mesh: Arc<RenderMesh>,
 }
 

@@ -1,6 +1,6 @@
-//! Shapes: one file for the geometry of each, all of them in one list.
+//! Shapes: the geometry of each kind in its own file, and all kinds in one enum.
 //!
-//! Sizes have MuJoCo's meaning: half lengths, the axis of round things along z, the centre at the origin. A shape has a
+//! Sizes have MuJoCo's meaning: half lengths, round shapes along z, the center at the origin. A shape has a
 //! [closed form](ClosedForm) or is [made of triangles](Triangulated).
 
 mod area_sampling;
@@ -25,7 +25,7 @@ pub use render_mesh::{Cluster, RenderMesh};
 use std::sync::Arc;
 pub use triangulated::{TriangleSampling, Triangulated};
 
-/// Declares the shapes: a module with a type of its own each.
+/// Declares the shapes: for each kind, a module with its type.
 macro_rules! shapes {
     (
         closed_forms { $($(#[$doc:meta])* $module:ident :: $Name:ident,)* }
@@ -34,7 +34,7 @@ macro_rules! shapes {
         $(mod $module; pub use $module::$Name;)*
         $(mod $triangles_module; pub use $triangles_module::$TrianglesName;)*
 
-        /// The surface of something, in its own frame.
+        /// A surface, in its own frame.
         #[derive(Clone, Debug)]
         pub enum Shape {
             $($(#[$doc])* $Name($Name),)*
@@ -42,10 +42,10 @@ macro_rules! shapes {
         }
 
         impl Shape {
-            /// The module of every kind of shape.
+            /// Module names of all kinds of shapes.
             pub const MODULES: &'static [&'static str] = &[$(stringify!($module),)* $(stringify!($triangles_module)),*];
 
-            /// The name of the kind.
+            /// Name of the kind.
             pub fn name(&self) -> &'static str {
                 match self {
                     $(Self::$Name(_) => stringify!($module).trim_end_matches('_'),)*
@@ -60,7 +60,7 @@ macro_rules! shapes {
                 }
             }
 
-            /// Does work on a shape with a closed form, compiled for each kind; `None` for triangles.
+            /// Runs an operation on a shape with a closed form, compiled for each kind; `None` for triangles.
             #[inline(always)]
             pub fn with_closed_form<W: ForClosedForm>(&self, work: W) -> Option<W::Output> {
                 match self {
@@ -85,13 +85,13 @@ macro_rules! shapes {
 
 shapes! {
     closed_forms {
-        /// A plane, seen from +z only.
+        /// A plane, visible from +z only.
         plane::Plane,
-        /// A ball.
+        /// A sphere.
         sphere::Sphere,
-        /// A cylinder with round ends.
+        /// A capsule.
         capsule::Capsule,
-        /// A ball stretched along its axes.
+        /// An ellipsoid.
         ellipsoid::Ellipsoid,
         /// A cylinder with flat ends.
         cylinder::Cylinder,
@@ -99,9 +99,9 @@ shapes! {
         box_::Box,
     }
     triangulated {
-        /// Triangles.
+        /// A triangle mesh.
         mesh::Mesh,
-        /// Terrain over a grid.
+        /// A height field.
         height_field::HeightField,
     }
 }
@@ -113,7 +113,8 @@ enum Geometry<'a> {
 }
 
 impl Shape {
-    /// Triangles of the surface, counter-clockwise seen from outside, with about `segments` edges around a circle.
+    /// Triangulates the surface, counter-clockwise seen from outside, with about `segments` edges around a circle.
+    ///
     /// Infinite planes become 200 m wide.
     pub fn tessellate(&self, segments: usize) -> TriMesh {
         match self.geometry() {
@@ -122,7 +123,7 @@ impl Shape {
         }
     }
 
-    /// The prepared triangles of a shape that is made of them.
+    /// Prepared triangles of a shape that is made of triangles; `None` for other shapes.
     pub fn mesh(&self) -> Option<&Arc<RenderMesh>> {
         match self.geometry() {
             Geometry::ClosedForm(_) => None,
@@ -130,16 +131,17 @@ impl Shape {
         }
     }
 
-    /// Smallest and largest coordinates \[m\]; infinite where the shape is.
+    /// Smallest and largest coordinates \[m\]; infinite for an infinite shape.
     pub fn aabb(&self) -> [[f32; 3]; 2] {
         match self.geometry() {
-            // A sum of two numbers of single precision has the same rounding in double precision and then in single.
+            // A sum of two single-precision numbers is the same, whether it is rounded once or through double
+            // precision.
             Geometry::ClosedForm(shape) => shape.bounds().map(|corner| corner.map(|x| x as f32)),
             Geometry::Triangulated(shape) => shape.mesh().bounds(),
         }
     }
 
-    /// Smallest and largest coordinates \[m\]; `None` for a shape without an end.
+    /// Smallest and largest coordinates \[m\]; `None` for an infinite shape.
     pub fn bounds(&self) -> Option<[V3; 2]> {
         let bounds = match self.geometry() {
             Geometry::ClosedForm(shape) => shape.bounds(),
@@ -148,7 +150,9 @@ impl Shape {
         bounds.as_flattened().iter().all(|x| x.is_finite()).then_some(bounds)
     }
 
-    /// The largest coordinate along a direction, times the length of the direction \[m\]; infinite where the shape is.
+    /// Support function: the largest coordinate along a direction, times the length of the direction \[m\].
+    ///
+    /// Infinite along an infinite axis of a plane.
     pub fn support(&self, direction: V3) -> f64 {
         match self.geometry() {
             Geometry::ClosedForm(shape) => shape.support(direction),
@@ -156,8 +160,8 @@ impl Shape {
         }
     }
 
-    /// The smallest and the largest coordinate along a direction, times the length of the direction \[m\]; infinite where the
-    /// shape is.
+    /// Smallest and largest coordinates along a direction, times the length of the direction \[m\]; infinite along an
+    /// infinite axis of a plane.
     pub fn extent(&self, direction: V3) -> [f64; 2] {
         match self.geometry() {
             Geometry::ClosedForm(shape) => [-shape.support(direction.map(|x| -x)), shape.support(direction)],
@@ -165,7 +169,7 @@ impl Shape {
         }
     }
 
-    /// Calls `add` with the parts of a shape whose convex hull is that of the shape.
+    /// Calls `add` for parts whose convex hull is that of the shape.
     pub fn hull(&self, add: &mut dyn FnMut(HullPart)) {
         match self.geometry() {
             Geometry::ClosedForm(shape) => shape.hull(add),
@@ -175,14 +179,14 @@ impl Shape {
         }
     }
 
-    /// The nearest intersection of a ray and a shape with a closed form at a distance from 0 to `limit`, both included;
-    /// `None` for triangles.
+    /// Returns the nearest intersection of a ray and a shape with a closed form, at a distance from 0 to `limit` \[m\],
+    /// both included; `None` for triangles.
     #[inline]
     pub fn intersect(&self, ray: &Ray, limit: f64) -> Option<Intersection> {
         self.with_closed_form(Intersect(ray, limit)).flatten()
     }
 
-    /// Number of the smooth part of the surface at an intersection of a shape with a closed form.
+    /// Number of the smooth face at an intersection with a shape with a closed form; 0 for triangles.
     pub fn face(&self, intersection: &Intersection, ray: &Ray) -> usize {
         match self.geometry() {
             Geometry::ClosedForm(shape) => shape.face(intersection, ray),
@@ -190,12 +194,12 @@ impl Shape {
         }
     }
 
-    /// True if the surface is seen from +z only.
+    /// True if the surface is visible from +z only.
     pub fn is_one_sided(&self) -> bool {
         matches!(self.geometry(), Geometry::ClosedForm(shape) if shape.is_one_sided())
     }
 
-    /// Sampling of points of the surface of a shape with a closed form; `None` if only chance finds its light.
+    /// Area sampling of a shape with a closed form; `None` if paths find its light by chance only, and for triangles.
     pub fn area_sampling(&self) -> Option<&dyn AreaSampling> {
         match self.geometry() {
             Geometry::ClosedForm(shape) => shape.area_sampling(),
@@ -203,7 +207,7 @@ impl Shape {
         }
     }
 
-    /// Sampling of points of the triangles of a shape that is made of them; `None` if only chance finds its light.
+    /// Area sampling of a shape that is made of triangles; `None` if paths find its light by chance only.
     pub fn triangle_sampling(&self) -> Option<TriangleSampling> {
         match self.geometry() {
             Geometry::ClosedForm(_) => None,
@@ -211,7 +215,7 @@ impl Shape {
         }
     }
 
-    /// The first size that is not a positive finite number.
+    /// First size that is not positive and finite, if any.
     pub fn bad_size(&self) -> Option<f32> {
         let sizes = match self.geometry() {
             Geometry::ClosedForm(shape) => shape.sizes(),
@@ -221,7 +225,7 @@ impl Shape {
     }
 }
 
-/// The nearest intersection of a ray up to a distance.
+/// Operation that returns the nearest intersection of a ray up to a distance.
 struct Intersect<'a>(&'a Ray, f64);
 
 impl ForClosedForm for Intersect<'_> {
@@ -233,7 +237,7 @@ impl ForClosedForm for Intersect<'_> {
     }
 }
 
-/// Smallest and largest coordinate of points along a direction, times its length; without points, +inf and -inf.
+/// Smallest and largest coordinates of points along a direction, times its length; without points, +inf and -inf.
 fn extent(points: &[[f32; 3]], [x, y, z]: V3) -> [f64; 2] {
     let along = points.iter().map(|p| x * f64::from(p[0]) + y * f64::from(p[1]) + z * f64::from(p[2]));
     along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])

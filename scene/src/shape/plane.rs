@@ -6,7 +6,7 @@ use crate::Ray;
 use crate::mesh::TriMesh;
 use crate::vector::V3;
 
-/// The plane z = 0, seen from +z only.
+/// The plane z = 0, visible from +z only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     /// Half lengths along x and y \[m\]; 0 means infinite.
@@ -14,10 +14,10 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// Infinite in both directions.
+    /// A plane that is infinite in both directions.
     pub const INFINITE: Self = Self { half: [0.0, 0.0] };
 
-    /// Half lengths along x and y \[m\]; +inf without an end.
+    /// Half lengths along x and y \[m\]; +inf along an infinite axis.
     #[inline(always)]
     fn extent(&self) -> [f64; 2] {
         self.half.map(|h| if h == 0.0 { f64::INFINITY } else { h.into() })

@@ -1,4 +1,4 @@
-//! Triangles prepared for drawing: normals, clusters, bounds.
+//! Triangles prepared for rendering: normals, clusters, bounds, levels of detail.
 
 use super::crease::{corner_normals, dot, face_normals, sub, unit, weld};
 use super::deformation::Deformation;
@@ -8,10 +8,10 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-/// A mesh prepared for drawing, once per asset and shared by all environments.
+/// A mesh prepared for rendering, once per asset and shared by all environments.
 ///
-/// Triangles are sorted along a space-filling curve and cut into [`Cluster`]s of at most [`RenderMesh::CLUSTER`], which
-/// are what the rasterizer culls and transforms.
+/// Triangles are sorted along a space-filling curve and split into [`Cluster`]s of at most [`RenderMesh::CLUSTER`]
+/// triangles, which the rasterizer culls and transforms.
 #[derive(Clone, Debug, Default)]
 pub struct RenderMesh {
     positions: Vec<[f32; 3]>,
@@ -23,61 +23,64 @@ pub struct RenderMesh {
     corners: Vec<[u8; 3]>,
     bounds: [[f32; 3]; 2],
     levels: OnceLock<Vec<Level>>,
-    /// Of a mesh whose vertices may be moved.
+    /// Vertex maps of a deformable mesh.
     deformation: Option<Arc<Deformation>>,
 }
 
-/// A handful of neighbouring triangles.
+/// A group of neighboring triangles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cluster {
-    /// The first triangle, in [`RenderMesh::triangles`].
+    /// Index of the first triangle in [`RenderMesh::triangles`].
     pub first: u32,
     /// Number of triangles.
     pub count: u32,
-    /// The first vertex, in [`RenderMesh::lanes`].
+    /// Index of the first vertex in [`RenderMesh::lanes`].
     pub first_lane: u32,
-    /// Number of vertices, rounded up to a multiple of 16 (the last is repeated).
+    /// Number of vertices, padded to a multiple of 16 by repeating the last one.
     pub lane_count: u32,
-    /// Middle of the bounding sphere \[m\].
+    /// Center of the bounding sphere \[m\].
     pub center: [f32; 3],
     /// Radius of the bounding sphere \[m\].
     pub radius: f32,
-    /// Whether every triangle belongs to a closed surface with its front outside: from outside, its back is never seen.
+    /// True if every triangle belongs to a closed surface with its front outside, so that no back face is visible from
+    /// outside.
     pub closed: bool,
-    /// Axis of the cone that holds all normals.
+    /// Axis of the cone that contains all normals.
     pub cone_axis: [f32; 3],
     /// Cosine of the half angle of that cone; -1 if there is no useful cone.
     pub cone_cos: f32,
 }
 
 impl RenderMesh {
-    /// The crease angle used for meshes without normals \[rad\]: 30°. Chamfers of CAD parts (45°) stay sharp, cylinders of
-    /// 16 sides (22.5°) look round.
+    /// Crease angle of meshes without normals \[rad\]: 30°. Chamfers of CAD parts (45°) stay sharp, cylinders of 16
+    /// sides (22.5°) look round.
     pub const CREASE: f32 = std::f32::consts::FRAC_PI_6;
-    /// Triangles per cluster, at most.
+    /// Largest number of triangles per cluster.
     pub const CLUSTER: usize = 64;
 
-    /// Prepares all triangles; where the mesh has no normals, they are smooth up to the `crease` angle \[rad\].
+    /// Prepares all triangles. If the mesh has no normals, they are smooth up to the `crease` angle \[rad\].
     ///
     /// # Panics
     ///
-    /// Where `mesh` breaks the promises of [`TriMesh`].
+    /// If `mesh` violates an invariant of [`TriMesh`].
     pub fn new(mesh: &TriMesh, crease: f32) -> Self {
         let welded = weld(&mesh.positions);
         let closed = closed_triangles(mesh, &welded);
         Self::prepare(mesh, crease, &welded, &closed)
     }
 
-    /// The same of a closed surface whose vertices are all at different places, such as that of a height field: it takes a
-    /// fraction of the time, since nothing is searched for.
+    /// Prepares a closed surface whose vertices are at different positions, such as a height field.
+    ///
+    /// This takes a fraction of the time of [`new`](Self::new), because it searches for neither edges nor positions.
     pub(super) fn of_closed(mesh: &TriMesh, crease: f32) -> Self {
         let welded: Vec<u32> = (0..mesh.positions.len() as u32).collect();
         Self::prepare(mesh, crease, &welded, &vec![true; mesh.triangles.len()])
     }
 
-    /// `welded` has for each vertex the first one at the same place, `closed` for each triangle whether its surface is closed.
+    /// `welded` has for each vertex the first vertex at the same position; `closed` is true for triangles of closed
+    /// surfaces.
     fn prepare(mesh: &TriMesh, crease: f32, welded: &[u32], closed: &[bool]) -> Self {
-        /// No vertex.
+        /// Marks a missing vertex.
         const NONE: u32 = u32::MAX;
         let faces = face_normals(mesh);
         let corner_normals = corner_normals(mesh, welded, &faces, crease);
@@ -91,8 +94,8 @@ impl RenderMesh {
         out.clusters.reserve(order.len().div_ceil(Self::CLUSTER));
         out.lanes.iter_mut().for_each(|lane| lane.reserve(order.len() * 3 / 4));
         out.bounds = mesh.bounds().map_or([[0.; 3]; 2], |(lo, hi)| [lo, hi]);
-        // The vertices that were made of each vertex of `mesh`, one for each normal, as lists: the last one, and for each the
-        // one before.
+        // Vertices that were made from each vertex of `mesh`, one for each normal, as linked lists: the last one, and
+        // the previous one of each.
         let (mut last, mut before) = (vec![NONE; vertices], Vec::with_capacity(vertices));
         let mut places = Vec::with_capacity(vertices);
         for &k in &order {
@@ -118,7 +121,7 @@ impl RenderMesh {
             });
             out.triangles.push(triangle);
         }
-        // For each place the last cluster that has it, and the number of its vertex there.
+        // For each position, the last cluster that contains it, and the number of its vertex there.
         let mut known = vec![(NONE, 0u8); mesh.positions.len()];
         for (cluster, first) in (0..).zip((0..order.len()).step_by(Self::CLUSTER)) {
             let end = (first + Self::CLUSTER).min(order.len());
@@ -136,23 +139,24 @@ impl RenderMesh {
         out
     }
 
-    /// Prepares a mesh whose vertices will be moved by [`deform`](Self::deform): every vertex has one normal, that of `mesh`
-    /// or, where it has none, the mean of its triangles' normals, weighted by area. Both sides of the triangles are seen.
-    /// It has no coarser [levels](Self::levels).
+    /// Prepares a mesh whose vertices [`deform`](Self::deform) will move.
+    ///
+    /// Every vertex has one normal: that of `mesh` or, if it has none, the mean of its triangles' normals, weighted by
+    /// area. Both sides of the triangles are visible. The mesh has no coarser [levels](Self::levels).
     ///
     /// # Panics
     ///
-    /// Where `mesh` breaks the promises of [`TriMesh`].
+    /// If `mesh` violates an invariant of [`TriMesh`].
     pub fn deformable(mesh: &TriMesh) -> Self {
         let normals = mesh.normals.clone().unwrap_or_else(|| {
             let mut normals = vec![[0.0; 3]; mesh.positions.len()];
             super::smooth_normals(&mesh.positions, &mesh.triangles, &mut normals);
             normals
         });
-        // A vertex has one normal, so it stays one vertex; a vertex of degenerate triangles alone has some.
+        // With one normal, a vertex stays one vertex. A vertex without an adjacent area gets an arbitrary normal.
         let some = |n: [f32; 3]| unit(n).unwrap_or([0.0, 0.0, 1.0]);
         let mesh = &TriMesh { normals: Some(normals.into_iter().map(some).collect()), ..mesh.clone() };
-        // Vertices at the same place may part.
+        // Vertices at the same position may separate.
         let welded: Vec<u32> = (0..mesh.positions.len() as u32).collect();
         let mut out = Self::prepare(mesh, Self::CREASE, &welded, &vec![false; mesh.triangles.len()]);
         let mut sources = vec![0; out.positions.len()];
@@ -164,13 +168,14 @@ impl RenderMesh {
         out
     }
 
-    /// True if [`deform`](Self::deform) can move its vertices.
+    /// True if [`deform`](Self::deform) can move the vertices.
     pub fn is_deformable(&self) -> bool {
         self.deformation.is_some()
     }
 
-    /// Moves the vertices: `positions` \[m\] and `normals`, of length 1 or 0, are in the order of the mesh that was prepared.
-    /// Allocates nothing.
+    /// Moves the vertices: `positions` \[m\] and `normals`, of length 1 or 0, are in the order of the input mesh.
+    ///
+    /// Does not allocate.
     ///
     /// # Panics
     ///
@@ -200,9 +205,9 @@ impl RenderMesh {
             let far = lanes
                 .map(|i| sub([0, 1, 2].map(|a| self.lanes[a][i]), cluster.center))
                 .fold(0.0f32, |m, d| m.max(dot(d, d).sqrt()));
-            // A little more than measured: rounding must never cull.
+            // Slightly enlarged, so that rounding never culls.
             cluster.radius = far * 1.0001;
-            // Both sides are seen.
+            // Both sides are visible.
             (cluster.cone_axis, cluster.cone_cos) = ([0.0, 0.0, 1.0], -1.0);
         }
         self.bounds = if self.clusters.is_empty() { [[0.0; 3]; 2] } else { all };
@@ -232,8 +237,10 @@ impl RenderMesh {
         Self::new(&out, crease)
     }
 
-    /// Adds a cluster of triangles with their unit normals, zero where a triangle has no area. `number` gives the number of a vertex in the cluster, which is the number given where it is
-    /// new, and whether it is.
+    /// Adds a cluster of triangles with their unit normals, which are zero for triangles without an area.
+    ///
+    /// `number(vertex, next)` returns the number of a vertex in the cluster and true if the vertex is new. The number
+    /// of a new vertex is `next`.
     fn push_cluster(
         &mut self,
         Range { start: first, end }: Range<usize>,
@@ -278,7 +285,7 @@ impl RenderMesh {
             first_lane: first_lane as u32,
             lane_count: lane_count as u32,
             center,
-            // A little more than measured: rounding must never cull.
+            // Slightly enlarged, so that rounding never culls.
             radius: far * 1.0001,
             closed,
             cone_axis,
@@ -306,7 +313,7 @@ impl RenderMesh {
         &self.triangles
     }
 
-    /// The clusters; they cover the triangles one after the other.
+    /// Clusters, which cover the triangles consecutively.
     pub fn clusters(&self) -> &[Cluster] {
         &self.clusters
     }
@@ -316,7 +323,7 @@ impl RenderMesh {
         &self.lanes
     }
 
-    /// Corners of each triangle as vertices of its cluster.
+    /// Corners of each triangle, as vertex numbers in its cluster.
     pub fn corners(&self) -> &[[u8; 3]] {
         &self.corners
     }
@@ -326,21 +333,23 @@ impl RenderMesh {
         self.bounds
     }
 
-    /// Coarser versions of the mesh, the finest first: each with a bound on how far it is from the mesh, 1 mm at most. They
-    /// are made when they are first asked for, which takes some time (about 2 µs for each triangle), and shared by everybody
-    /// who has the mesh. Meshes of fewer than 1000 triangles, with texture coordinates or with vertices that move have none.
+    /// Levels of detail, the finest first, each with a bound of at most 1 mm on its distance from the mesh.
+    ///
+    /// They are computed when they are first requested (about 2 µs for each triangle) and shared by all holders of the
+    /// mesh. Meshes with fewer than 1000 triangles, with texture coordinates or with moving vertices have no levels.
     pub fn levels(&self) -> &[Level] {
         self.levels.get_or_init(|| lod::chain(self))
     }
 
-    /// The number of the coarsest level whose [`Level::error`] is not larger than `error` \[m\]; 0 is the mesh itself. Makes
-    /// the levels only where one of them could be that.
+    /// Number of the coarsest level whose [`Level::error`] is at most `error` \[m\]; 0 is the mesh itself.
+    ///
+    /// Computes the levels only if one of them may qualify.
     pub fn level_within(&self, error: f32) -> usize {
         let may = error >= lod::FINEST && lod::may_have_levels(self);
         if may { self.levels().iter().take_while(|level| level.error <= error).count() } else { 0 }
     }
 
-    /// A level by its number, as [`RenderMesh::level_within`] says it; 0, and numbers that have no level, are the mesh
+    /// Returns the level with a number of [`RenderMesh::level_within`]. 0 and numbers without a level give the mesh
     /// itself.
     #[inline]
     pub fn level(&self, number: usize) -> &Self {
@@ -348,13 +357,13 @@ impl RenderMesh {
         number.checked_sub(1).and_then(level).map_or(self, |level| &level.mesh)
     }
 
-    /// The [`Level::error`] of a level by its number \[m\]; 0 for the mesh itself.
+    /// [`Level::error`] of the level with a number \[m\]; 0 for the mesh itself.
     pub fn level_error(&self, number: usize) -> f32 {
         let level = |index: usize| self.levels.get().and_then(|levels| levels.get(index));
         number.checked_sub(1).and_then(level).map_or(0.0, |level| level.error)
     }
 
-    /// The mesh as it is drawn.
+    /// Converts the mesh back to a [`TriMesh`], in drawing order.
     pub fn to_tri_mesh(&self) -> TriMesh {
         let mut mesh = TriMesh::from_triangles(self.positions.clone(), self.triangles.clone());
         mesh.normals = Some(self.normals.clone());
@@ -363,14 +372,14 @@ impl RenderMesh {
     }
 }
 
-/// The triangles in the order in which they are drawn.
+/// Indices of the triangles in drawing order.
 fn drawing_order(mesh: &TriMesh) -> Vec<u32> {
     let mut order: Vec<u64> = curve(mesh).into_iter().zip(0..).map(|(code, k)| u64::from(code) << 32 | k).collect();
     order.sort_unstable();
     order.into_iter().map(|place| place as u32).collect()
 }
 
-/// The position of each triangle on a space-filling curve (Morton code of its middle, 10 bits per axis).
+/// Position of each triangle on a space-filling curve (Morton code of its center, 10 bits per axis).
 fn curve(mesh: &TriMesh) -> Vec<u32> {
     let (lo, hi) = mesh.bounds().unwrap_or_default();
     let extent = (0..3).map(|a| hi[a] - lo[a]).fold(1e-30, f32::max);
@@ -383,7 +392,7 @@ fn curve(mesh: &TriMesh) -> Vec<u32> {
     mesh.triangles.iter().map(code).collect()
 }
 
-/// Moves the lowest 10 bits of a number apart: bit n becomes bit 3 n.
+/// Spreads the lowest 10 bits of a number: bit n becomes bit 3 n.
 pub(super) fn spread(mut v: u32) -> u32 {
     for (shift, kept) in [(16, 0x0300_00ff), (8, 0x0300_f00f), (4, 0x030c_30c3), (2, 0x0924_9249)] {
         v = (v | v << shift) & kept;
@@ -391,7 +400,7 @@ pub(super) fn spread(mut v: u32) -> u32 {
     v
 }
 
-/// Which triangles belong to a connected surface where every edge has exactly one neighbour with the opposite direction,
+/// True for triangles of a connected surface in which every edge has exactly one neighbor with the opposite direction,
 /// and that encloses a positive volume.
 fn closed_triangles(mesh: &TriMesh, welded: &[u32]) -> Vec<bool> {
     let mut edges: HashMap<(u32, u32), u32> = HashMap::with_capacity(mesh.triangles.len() * 3);
@@ -417,7 +426,7 @@ fn closed_triangles(mesh: &TriMesh, welded: &[u32]) -> Vec<bool> {
             parent[a.max(b) as usize] = a.min(b);
         }
     }
-    // Per component: whether it is closed so far, and six times its volume.
+    // Per component: true while it is closed, and six times its volume.
     let mut components: HashMap<u32, (bool, f64)> = HashMap::new();
     let middle = mesh.bounds().map_or([0.; 3], |(lo, hi)| [0, 1, 2].map(|a| f64::from(lo[a] + hi[a]) / 2.0));
     for t in &mesh.triangles {

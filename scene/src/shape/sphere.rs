@@ -1,4 +1,4 @@
-//! A ball.
+//! A sphere.
 
 use super::area_sampling::{AreaSampling, SurfacePoint};
 use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
@@ -11,7 +11,7 @@ use crate::sampling::turn;
 use crate::vector::{V3, along, dot, scale, unit};
 use std::f64::consts::PI;
 
-/// A ball.
+/// A sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     /// Radius \[m\].
@@ -54,14 +54,14 @@ impl ClosedForm for Sphere {
 }
 
 impl Sphere {
-    /// The radius, and the square of the distance of a point outside; `None` for a point inside.
+    /// Radius, and squared distance of a point outside from the center; `None` for a point inside.
     fn seen_from_outside(&self, from: V3) -> Option<(f64, f64)> {
         let (radius, square) = (f64::from(self.radius), dot(from, from));
         (square > radius * radius * (1.0 + 1e-9)).then_some((radius, square))
     }
 }
 
-/// From outside, directions in the cone around the ball are sampled. Source: Shirley, Wang and Zimmerman, Monte Carlo
+/// From outside, directions in the cone around the sphere are sampled. Source: Shirley, Wang and Zimmerman, Monte Carlo
 /// techniques for direct lighting calculations, 1996.
 impl AreaSampling for Sphere {
     fn area(&self) -> f64 {

@@ -1,4 +1,4 @@
-//! Properties of every shape.
+//! Tests of properties that all shapes share.
 use super::closed_form::norm;
 use super::*;
 use crate::vector::{along, cross, dot, sub};
@@ -38,9 +38,10 @@ fn tessellations() {
     }
 }
 
-/// A closed surface without vertices at equal places is prepared without a search for them, to the same bits.
+/// A closed surface without vertices at equal positions is prepared without a search for them, with the same bits.
 ///
-/// Cause: a height field of 1024 x 1024 took 14.7 s, most of it in tables of edges and places that its grid does not need.
+/// Regression test: a height field of 1024 x 1024 took 14.7 s, mostly in tables of edges and positions that its grid
+/// does not need.
 #[test]
 fn closed_surfaces() {
     let boxed = Box { half: [0.1, 0.2, 0.3] };
@@ -52,15 +53,16 @@ fn closed_surfaces() {
         let [all, closed] = [RenderMesh::new, RenderMesh::of_closed].map(|prepare| prepare(&mesh, RenderMesh::CREASE));
         assert_eq!(format!("{all:?}"), format!("{closed:?}"));
     }
-    // The control: an open surface is not closed.
+    // Control: an open surface is not closed.
     let plane = Plane { half: [1.0, 2.0] }.tessellate(1);
     assert!(
         !RenderMesh::new(&plane, 0.5).clusters()[0].closed && RenderMesh::of_closed(&plane, 0.5).clusters()[0].closed
     );
 }
 
-/// A deformed mesh has the triangles of the prepared one, each vertex where it was moved, in clusters whose spheres hold
-/// them. The judge: the same triangles moved by the same formula, whatever their order.
+/// A deformed mesh has the triangles of the prepared mesh with moved vertices, in clusters whose spheres contain them.
+///
+/// Reference: the same triangles moved by the same formula, in any order.
 #[test]
 fn deformable_meshes() {
     let bend = |[x, y, z]: [f32; 3]| [x + 0.3 * z * z, 2.0 * y - 0.1, z + 0.2 * x];
@@ -132,10 +134,10 @@ fn clusters() {
     assert!(RenderMesh::new(&TriMesh::default(), 0.5).clusters().is_empty());
 }
 
-/// Normals of corners have the bits of their definition: each corner sums the triangles around it, by itself.
+/// Corner normals have the bits of their definition: each corner sums the triangles around it on its own.
 ///
-/// Cause: a height field of 1024 x 1024 took 3 s before its first picture, most of it in three sums for every triangle where
-/// one for each vertex is enough.
+/// Regression test: a height field of 1024 x 1024 took 3 s before its first image, mostly in three sums for every
+/// triangle where one for each vertex is enough.
 #[test]
 fn corner_normals() {
     let height = |k: usize| (k.wrapping_mul(2_654_435_761) >> 7 & 1023) as f32 / 1023.0;
@@ -183,7 +185,7 @@ fn corner_normals() {
     assert!(creases.iter().all(|&count| count > 1000), "with and without creases: {creases:?}");
 }
 
-/// Codes of a space-filling curve take each bit to its place.
+/// Codes of the space-filling curve move each bit to its position.
 #[test]
 fn curve() {
     for v in 0..1024u32 {
@@ -199,7 +201,7 @@ fn sizes() {
     assert!(HeightField::new([1.; 4], 1, 3, &[0.; 3]).is_none());
 }
 
-/// The same triangles in any order, with their corners, winding and texture coordinates, and a normal for each vertex.
+/// Triangles are kept in any order, with their corners, winding and texture coordinates, and a normal for each vertex.
 #[test]
 fn mesh_of_a_render_mesh() {
     let mut mesh = Box { half: [0.1, 0.2, 0.3] }.tessellate(1);
@@ -214,7 +216,7 @@ fn mesh_of_a_render_mesh() {
         };
         let triangle = |triangle: &[u32; 3]| {
             let mut corners = triangle.each_ref().map(corner);
-            // The winding stays when the least corner comes first.
+            // Rotating the smallest corner to the front keeps the winding.
             let least = (0..3).min_by_key(|&k| corners[k]).unwrap();
             corners.rotate_left(least);
             corners
@@ -234,7 +236,7 @@ fn mesh_of_a_render_mesh() {
     }
 }
 
-/// Directions all around, by a spiral.
+/// Directions over the whole sphere, on a spiral.
 fn directions(count: u32) -> impl Iterator<Item = V3> {
     (0..count).map(move |k| {
         let z = 1.0 - 2.0 * (f64::from(k) + 0.5) / f64::from(count);
@@ -243,7 +245,8 @@ fn directions(count: u32) -> impl Iterator<Item = V3> {
     })
 }
 
-/// Support, extent and convex hull of a shape are those of its triangles, which are inside by 1 - cos(pi / 512) of a radius.
+/// Support, extent and convex hull of a shape agree with its triangles, which are inside by 1 - cos(pi / 512) of a
+/// radius.
 #[test]
 fn supports_and_hulls() {
     for shape in all() {
@@ -267,7 +270,7 @@ fn supports_and_hulls() {
     }
 }
 
-/// Sampled points are on the surface, where a ray against their normal meets it; the area is that of the triangles.
+/// Sampled points are on the surface, where a ray against their normal hits it; the area is that of the triangles.
 #[test]
 fn area_samplings() {
     let mut sampled = 0;

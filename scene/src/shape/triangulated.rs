@@ -7,27 +7,28 @@ use std::sync::Arc;
 
 /// A shape made of triangles.
 pub trait Triangulated {
-    /// The prepared triangles.
+    /// Prepared triangles.
     fn mesh(&self) -> &Arc<RenderMesh>;
 
     /// Sizes that must be positive and finite.
     fn sizes(&self) -> Vec<f32>;
 
-    /// Sampling of points of the surface by area, for shapes that emit light; `None` if only paths that hit the shape by
-    /// chance find its light, which is right but noisy.
+    /// Area sampling of the surface, for shapes that emit light.
+    ///
+    /// With `None`, only paths that hit the shape by chance find its light, which is unbiased but noisy.
     fn area_sampling(&self) -> Option<TriangleSampling>;
 }
 
-/// Sampling of points of triangles.
+/// Area sampling of triangles.
 #[derive(Clone, Debug)]
 pub struct TriangleSampling {
     mesh: Arc<RenderMesh>,
-    /// Sums of the areas of the triangles up to each \[m²\].
+    /// Cumulative areas of the triangles \[m²\].
     sums: Vec<f64>,
 }
 
 impl TriangleSampling {
-    /// Sums up the areas of a mesh.
+    /// Computes the cumulative areas of a mesh.
     pub fn new(mesh: &Arc<RenderMesh>) -> Self {
         let areas = (0..mesh.triangles().len()).scan(0.0, |sum, k| {
             let [a, b, c] = corners(mesh, k);

@@ -1,10 +1,10 @@
-//! Any of the generators, as configuration files name them.
+//! [`TerrainGenerator`]: any generator, as named in configuration files.
 
 use super::{PyramidStairs, RoughTerrain, Slope, TerrainError};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// One of the generators. In a file it is a table with its name: `rough = { seed = 7 }`, `slope = {}`,
+/// A terrain generator. In a file, it is a table with its name: `rough = { seed = 7 }`, `slope = {}`,
 /// `pyramid_stairs = { tread = 0.3 }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]

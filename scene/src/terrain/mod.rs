@@ -1,7 +1,7 @@
-//! Heights of ground that is not flat: generators of height fields, one per file.
+//! Terrain generators: height fields of uneven ground, one generator per file.
 //!
-//! Each gives an array of heights \[m\] over a regular grid: rows along y, columns along x, the first of both at the negative
-//! end. They hold nothing of MuJoCo; `kinetoscope_sim::TerrainCfg` takes what they give.
+//! Each generator returns an array of heights \[m\] over a regular grid: rows along y, columns along x, both starting
+//! at the negative end. Generators are independent of MuJoCo; `kinetoscope_sim::TerrainCfg` takes their result.
 
 mod generator;
 mod rough;
@@ -15,50 +15,50 @@ pub use stairs::PyramidStairs;
 
 use thiserror::Error;
 
-/// The most points that a height field may have. Drawing takes some 200 bytes for each.
+/// Largest number of points of a height field. Rendering takes about 200 bytes for each.
 pub const MAX_POINTS: usize = 1 << 22;
 
-/// What is wrong with a terrain.
+/// Error of a terrain generator.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TerrainError {
-    /// A number that cannot be used.
+    /// A number is out of range.
     #[error("{terrain}: {field} is {value:?}; {expected}")]
     Number {
-        /// The generator.
+        /// Name of the generator.
         terrain: &'static str,
-        /// The field.
+        /// Name of the field.
         field: &'static str,
-        /// The value given.
+        /// The given value.
         value: f64,
-        /// What would be right.
+        /// Accepted values.
         expected: &'static str,
     },
     /// A side is not a whole number of cells.
     #[error("{terrain}: a side of {side} m is no whole number of cells of {cell} m; {nearest} m would be")]
     Cells {
-        /// The generator.
+        /// Name of the generator.
         terrain: &'static str,
         /// The side \[m\].
         side: f64,
         /// The cell \[m\].
         cell: f64,
-        /// The nearest side that is one \[m\].
+        /// Nearest side that is a whole number of cells \[m\].
         nearest: f64,
     },
-    /// More points than can be drawn.
+    /// A height field has more points than can be drawn.
     #[error(
         "{terrain}: {columns} by {rows} points are too many; at most {MAX_POINTS} can be drawn: choose larger cells"
     )]
     TooMany {
-        /// The generator.
+        /// Name of the generator.
         terrain: &'static str,
-        /// Points along x.
+        /// Number of points along x.
         columns: f64,
-        /// Points along y.
+        /// Number of points along y.
         rows: f64,
     },
-    /// No height of the range is a multiple of the step.
+    /// The range contains no multiple of the step.
     #[error(
         "rough terrain: no multiple of the step {step} m lies between {low} m and {high} m; 0 m to {step} m has two"
     )]
@@ -72,7 +72,7 @@ pub enum TerrainError {
     },
 }
 
-/// Refuses a number that is not finite and positive.
+/// Returns an error for a number that is not positive and finite.
 fn positive(terrain: &'static str, field: &'static str, value: f64) -> Result<(), TerrainError> {
     let fine = value.is_finite() && value > 0.0;
     if fine {
@@ -82,13 +82,13 @@ fn positive(terrain: &'static str, field: &'static str, value: f64) -> Result<()
     }
 }
 
-/// Refuses a number that is not finite.
+/// Returns an error for a number that is not finite.
 fn finite(terrain: &'static str, field: &'static str, value: f64) -> Result<(), TerrainError> {
     let error = || TerrainError::Number { terrain, field, value, expected: "it must be finite" };
     value.is_finite().then_some(()).ok_or_else(error)
 }
 
-/// Points along x and y of a field of `size`.
+/// Number of points along x and y of a field of `size`.
 fn points(terrain: &'static str, size: [f64; 2], cell: f64) -> Result<[usize; 2], TerrainError> {
     positive(terrain, "cell", cell)?;
     for side in size {
@@ -100,7 +100,7 @@ fn points(terrain: &'static str, size: [f64; 2], cell: f64) -> Result<[usize; 2]
         return Err(TerrainError::TooMany { terrain, columns, rows });
     }
     for (side, n) in size.into_iter().zip(cells) {
-        // Sides and cells are decimal numbers: quotients are whole up to a few rounding errors.
+        // Sides and cells are decimal numbers, so quotients are whole up to a few rounding errors.
         if n < 1.0 || (side / cell - n).abs() > 1e-6 {
             return Err(TerrainError::Cells { terrain, side, cell, nearest: n.max(1.0) * cell });
         }

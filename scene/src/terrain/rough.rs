@@ -1,24 +1,25 @@
-//! Ground of random heights.
+//! Terrain with random heights.
 
 use super::{TerrainError, finite, points, positive};
 use crate::Random;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// Ground whose points stand at random heights, each independent of its neighbours: every multiple of `step` between the
-/// ends of the range is as likely. Isaac calls it random uniform terrain.
+/// Terrain with independent random heights at its points. Every multiple of `step` within the range is equally likely.
+///
+/// Isaac's name is random uniform terrain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RoughTerrain {
     /// Lengths along x and y \[m\].
     pub size: [f64; 2],
-    /// Distance of neighbouring points \[m\].
+    /// Distance of neighboring points \[m\].
     pub cell: f64,
     /// Lowest and highest height \[m\].
     pub range: [f64; 2],
-    /// Heights are multiples of it \[m\].
+    /// Step between heights, which are its multiples \[m\].
     pub step: f64,
-    /// Seed: the same one gives the same heights, bit for bit, on every machine.
+    /// Seed. Equal seeds give the same heights, bit for bit, on every machine.
     pub seed: u64,
 }
 
@@ -33,8 +34,8 @@ impl RoughTerrain {
     /// Heights \[m\], rows along y, columns along x.
     ///
     /// # Errors
-    /// A number that is not positive or finite, sides that are no whole number of cells, too many points, a range without a
-    /// multiple of the step.
+    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, or the
+    /// range contains no multiple of the step.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "rough terrain";
         let [columns, rows] = points(NAME, self.size, self.cell)?;
@@ -42,7 +43,7 @@ impl RoughTerrain {
         let [low, high] = self.range;
         finite(NAME, "range", low)?;
         finite(NAME, "range", high)?;
-        // Ends of the range are multiples of the step up to rounding.
+        // Ends of the range may be multiples of the step up to rounding.
         const ROUNDING: f64 = 1e-9;
         let first = (low / self.step - ROUNDING).ceil();
         let levels = (high / self.step + ROUNDING).floor() - first + 1.0;
@@ -50,7 +51,7 @@ impl RoughTerrain {
             return Err(TerrainError::NoLevel { low, high, step: self.step });
         }
         let mut random = Random::keyed(self.seed, 0, "rough terrain");
-        // Beyond that, neighbouring multiples are the same number.
+        // Beyond this limit, neighboring multiples are the same number.
         const MOST_LEVELS: f64 = 1e15;
         if levels > MOST_LEVELS {
             let expected = "it must not divide the range into more than 1e15 levels";

@@ -4,20 +4,20 @@ use super::{TerrainError, finite, points};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// An inclined plane: height 0 in the middle, rising along x and y.
+/// An inclined plane: height 0 at the center, rising along x and y.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Slope {
     /// Lengths along x and y \[m\].
     pub size: [f64; 2],
-    /// Distance of neighbouring points \[m\].
+    /// Distance of neighboring points \[m\].
     pub cell: f64,
-    /// Rise per metre along x and y: the tangent of the angle.
+    /// Rise per meter along x and y: the tangent of the angle.
     pub gradient: [f64; 2],
 }
 
 impl Default for Slope {
-    /// 8 m by 8 m, rising by a fifth along x.
+    /// 8 m by 8 m, rising by 0.2 m per meter along x.
     fn default() -> Self {
         Self { size: [8.0, 8.0], cell: 0.5, gradient: [0.2, 0.0] }
     }
@@ -27,7 +27,7 @@ impl Slope {
     /// Heights \[m\], rows along y, columns along x.
     ///
     /// # Errors
-    /// A number that is not positive or finite, sides that are no whole number of cells, too many points.
+    /// A number is not positive or not finite, a side is not a whole number of cells, or there are too many points.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "slope";
         let [columns, rows] = points(NAME, self.size, self.cell)?;

@@ -4,18 +4,19 @@ use super::{TerrainError, finite, points, positive};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// Stairs that lead from all four sides up (or down) to a square platform in the middle. A height field has no vertical
-/// walls: each riser leans over one cell.
+/// Stairs from all four sides up (or down) to a square platform at the center.
+///
+/// A height field has no vertical walls, so each riser is inclined over one cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PyramidStairs {
     /// Lengths along x and y \[m\].
     pub size: [f64; 2],
-    /// Distance of neighbouring points \[m\].
+    /// Distance of neighboring points \[m\].
     pub cell: f64,
-    /// Height of a step \[m\]; negative ones lead down.
+    /// Height of a step \[m\]; negative heights lead down.
     pub step_height: f64,
-    /// Depth of a tread, its riser included \[m\].
+    /// Depth of a tread, including its riser \[m\].
     pub tread: f64,
     /// Side of the platform \[m\].
     pub platform: f64,
@@ -32,8 +33,8 @@ impl PyramidStairs {
     /// Heights \[m\], 0 at the rim; rows along y, columns along x.
     ///
     /// # Errors
-    /// A number that is not positive or finite, sides that are no whole number of cells, too many points, treads less than
-    /// two cells deep, a platform larger than the field.
+    /// A number is not positive or not finite, a side is not a whole number of cells, there are too many points, treads
+    /// are less than two cells deep, or the platform is larger than the field.
     pub fn heights(&self) -> Result<Array2<f64>, TerrainError> {
         const NAME: &str = "stairs";
         let [columns, rows] = points(NAME, self.size, self.cell)?;

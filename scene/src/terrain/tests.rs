@@ -1,4 +1,4 @@
-//! Heights of the generators against what they say.
+//! Tests of the generators' heights.
 
 use super::*;
 
@@ -13,7 +13,7 @@ fn rough() {
         assert!((level - level.round()).abs() < 1e-9, "{height}");
         counts[(level.round() + 2.0) as usize] += 1;
     }
-    // n p each, which scatter by sqrt(n p (1 - p)): six times that.
+    // Each count is n p and scatters by sqrt(n p (1 - p)); the limit is six times that.
     let n = heights.len() as f64;
     let (mean, sigma) = (n / 6.0, (n * 5.0 / 36.0).sqrt());
     assert!(counts.iter().all(|&count| (f64::from(count) - mean).abs() < 6.0 * sigma), "{counts:?}, not {mean}");
@@ -27,7 +27,7 @@ fn seeds() {
     };
     assert_eq!(bits(1), bits(1));
     let (a, b) = (bits(1), bits(2));
-    // Of four levels a quarter agrees by chance.
+    // With four levels, a quarter of the heights agrees by chance.
     let differing = a.iter().zip(&b).filter(|(a, b)| a != b).count();
     assert!(differing > a.len() / 2, "{differing} of {}", a.len());
 }
@@ -46,7 +46,7 @@ fn slope() {
 fn stairs() {
     let stairs = PyramidStairs { size: [4.0, 4.0], cell: 0.1, step_height: 0.15, tread: 0.3, platform: 1.0 };
     let heights = stairs.heights().expect("heights");
-    // 1.5 m from the rim to the platform are five treads of 0.3 m; the third point of each is one step higher.
+    // 1.5 m from the rim to the platform are five treads of 0.3 m. Every third point is one step higher.
     let profile: Vec<f64> = heights.row(20).iter().take(21).map(|h| (h / 0.15).round()).collect();
     let expected: Vec<f64> = (0..21).map(|k| f64::from(k / 3).min(5.0)).collect();
     assert_eq!(profile, expected);

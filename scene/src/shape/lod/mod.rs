@@ -1,18 +1,20 @@
-//! Coarser versions of a mesh, with proven bounds on how far they are from it.
+//! Levels of detail: coarser versions of a mesh, with proven bounds on their distance from it.
 //!
-//! A coarser version is made by collapses: a vertex moves onto a neighbour, two triangles vanish. The triangles around the
-//! vertex, and those that replace them, fill the same polygon when they are looked at along the mean normal (that is
-//! checked), so every point has a partner straight above or below. The difference in height is linear over the pieces that
-//! the edges of both cut each other into; it is largest at a corner of a piece, and all corners are looked at. A triangle
-//! keeps the sum of these largest differences over the chain of collapses that led to it. So the mesh and its coarser
-//! version are joined by a continuous one-to-one map that moves no point by more than [`Level::error`]: every point of each
-//! surface has a point of the other within that distance, sheets stay sheets, and what was closed stays closed. Source of
-//! the idea: Cohen, Manocha and Olano, Simplifying polygonal models using successive mappings, Visualization 1997.
+//! Collapses make a coarser version: a vertex moves onto a neighbor, and two triangles vanish. Seen along the mean
+//! normal, the triangles around the vertex and those that replace them fill the same polygon. This is checked, so every
+//! point has a partner straight above or below. The difference in height is linear over the pieces into which the edges
+//! of both cut each other. It is largest at a corner of a piece, and all corners are evaluated. A triangle keeps the
+//! sum of these largest differences over the chain of collapses that led to it.
 //!
-//! Vertices are not moved: a coarser version has some of the mesh's own vertices, each with the normal that it had. No
-//! triangle is made whose own normal is farther than about 40° from the normal of one of its corners, so that creases stay
-//! where they are. Borders of open meshes and edges with more than two triangles stay as they are, which keeps parts of
-//! one mesh that are drawn with different materials together.
+//! The mesh and its coarser version are thus joined by a continuous one-to-one map that moves no point by more than
+//! [`Level::error`]. Every point of each surface has a point of the other within that distance, sheets stay sheets, and
+//! closed surfaces stay closed. Source of the idea: Cohen, Manocha and Olano, Simplifying polygonal models using
+//! successive mappings, Visualization 1997.
+//!
+//! Vertices do not move: a coarser version has some of the mesh's vertices, with their normals. A new triangle's own
+//! normal is within about 40° of the normals of its corners, so that creases stay in place. Borders of open meshes and
+//! edges with more than two triangles are kept. This keeps parts of one mesh that are drawn with different materials
+//! together.
 
 mod simplify;
 mod star;
@@ -23,35 +25,35 @@ use super::RenderMesh;
 use crate::mesh::TriMesh;
 use simplify::Surface;
 
-/// A coarser version of a mesh.
+/// A level of detail: a coarser version of a mesh.
 #[derive(Clone, Debug)]
 pub struct Level {
-    /// Every point of each of both surfaces has a point of the other that is not farther \[m\].
+    /// Bound on the distance between both surfaces \[m\]: every point of each has a point of the other within it.
     pub error: f32,
-    /// The coarser version. It has no levels of its own.
+    /// The coarser mesh, which has no levels itself.
     pub mesh: RenderMesh,
 }
 
-/// Meshes of fewer triangles have no coarser versions.
+/// Smallest number of triangles of a mesh with levels.
 const MIN_TRIANGLES: usize = 1000;
-/// The bound that is aimed at before the first level, so that the cheaper collapses come first \[m\].
+/// Bound of a simplification before the first level, so that the cheaper collapses come first \[m\].
 const BEFORE: f64 = 0.0625e-3;
-/// The bounds of the levels \[m\]: 1/8 mm is half a pixel at a distance of 15 cm, where the focal length is 600 pixels.
+/// Bounds of the levels \[m\]: 1/8 mm is half a pixel at a distance of 15 cm, for a focal length of 600 pixels.
 const BOUNDS: [f64; 4] = [0.125e-3, 0.25e-3, 0.5e-3, 1e-3];
-/// No level has a smaller bound \[m\].
+/// Smallest bound of a level \[m\].
 pub(super) const FINEST: f32 = 0.01e-3;
-/// A level has this share of the triangles of the one before, or less; others are not worth their memory.
+/// Largest ratio of a level's triangles to those of the previous level; other levels are not worth their memory.
 const WORTH: f64 = 0.8;
-/// Rounding of all collapses of a vertex together, as a share of the mesh's extent: computed with 53 bits, from positions
-/// that are taken over bit by bit.
+/// Rounding errors of all collapses of a vertex together, as a fraction of the mesh's extent. They are computed with 53
+/// bits, from unchanged positions.
 const ROUNDING: f64 = 1e-7;
 
-/// False for a mesh that has no coarser versions: it is small, collapses would pull textures along, or its vertices move.
+/// False for a mesh without levels: it is small, collapses would distort its texture, or its vertices move.
 pub(super) fn may_have_levels(mesh: &RenderMesh) -> bool {
     mesh.triangles().len() >= MIN_TRIANGLES && mesh.uvs().is_none() && !mesh.is_deformable()
 }
 
-/// The coarser versions of a mesh, the finest first.
+/// Levels of a mesh, the finest first.
 pub(super) fn chain(mesh: &RenderMesh) -> Vec<Level> {
     let mut levels = Vec::new();
     if !may_have_levels(mesh) {
@@ -63,7 +65,7 @@ pub(super) fn chain(mesh: &RenderMesh) -> Vec<Level> {
     let mut last = mesh.triangles().len();
     surface.simplify(BEFORE - rounding);
     for bound in BOUNDS {
-        // A part in a thousand for the rounding to 24 bits.
+        // A margin of 0.1 % for the rounding to 24 bits.
         surface.simplify(0.999 * bound - rounding);
         let count = surface.triangles().len();
         if count as f64 <= WORTH * last as f64 {
@@ -75,7 +77,7 @@ pub(super) fn chain(mesh: &RenderMesh) -> Vec<Level> {
     levels
 }
 
-/// Some triangles of a mesh's vertices, prepared for drawing.
+/// Prepares some triangles of a mesh for rendering.
 fn prepare(mesh: &RenderMesh, triangles: &[[u32; 3]]) -> RenderMesh {
     const UNUSED: u32 = u32::MAX;
     let mut place = vec![UNUSED; mesh.positions().len()];

@@ -1,27 +1,27 @@
-//! Many collapses, in an order that keeps the bounds small.
+//! Sequences of collapses, in an order that keeps the bounds small.
 
 use super::super::RenderMesh;
 use super::super::crease::weld;
 use super::star::{Best, Fan, Star};
 
-/// Rounds of collapses for one bound, at most.
+/// Largest number of rounds of collapses for one bound.
 const ROUNDS: usize = 40;
-/// A round that removes a smaller share of the vertices is the last.
+/// A round that removes a smaller fraction of the vertices is the last one.
 const WORTH: f64 = 0.02;
 
-/// The triangles of a mesh while they are made fewer.
+/// Triangles of a mesh during its simplification.
 #[derive(Clone, Debug)]
 pub(super) struct Surface<'a> {
     mesh: &'a RenderMesh,
-    /// For every corner of the mesh the first one at the same place: its vertex.
+    /// For every corner of the mesh, the first corner at the same position: its vertex.
     vertex: Vec<u32>,
     triangles: Vec<[u32; 3]>,
-    /// The bound of each triangle \[m\].
+    /// Bound of each triangle \[m\].
     error: Vec<f32>,
-    /// Triangles around each vertex, and which of their corners it is: `around[start[v]..start[v + 1]]`.
+    /// Triangles around each vertex, with the vertex's corner in each: `around[start[v]..start[v + 1]]`.
     start: Vec<u32>,
     around: Vec<(u32, u8)>,
-    /// The smallest bound of a triangle after a collapse of each vertex, as far as it is known \[m\].
+    /// Smallest known bound of a triangle after a collapse of each vertex \[m\].
     least: Vec<f32>,
 }
 
@@ -32,7 +32,7 @@ impl<'a> Surface<'a> {
             let [a, b, c] = t.map(|i| vertex[i as usize]);
             a == b || b == c || c == a
         };
-        // Those without an area are never drawn, and their other edges belong together.
+        // Triangles without an area are never drawn, and their two other edges coincide.
         let triangles: Vec<[u32; 3]> = mesh.triangles().iter().filter(|t| !flat(t)).copied().collect();
         let count = mesh.positions().len();
         let error = vec![0.0; triangles.len()];
@@ -44,7 +44,7 @@ impl<'a> Surface<'a> {
         &self.triangles
     }
 
-    /// The largest bound of all triangles \[m\].
+    /// Largest bound of all triangles \[m\].
     pub(super) fn error(&self) -> f32 {
         self.error.iter().copied().fold(0.0, f32::max)
     }
@@ -54,19 +54,19 @@ impl<'a> Surface<'a> {
         f64::from(self.error[triangle as usize])
     }
 
-    /// The triangles around a vertex, and which of their corners it is.
+    /// Triangles around a vertex, with the vertex's corner in each.
     #[inline]
     pub(super) fn around(&self, vertex: u32) -> &[(u32, u8)] {
         &self.around[self.start[vertex as usize] as usize..self.start[vertex as usize + 1] as usize]
     }
 
-    /// A corner of a triangle, counted on from 0, 1, 2.
+    /// Corner of a triangle. Corners 3 and 4 are the corners 0 and 1.
     #[inline]
     pub(super) fn corner(&self, triangle: u32, corner: u8) -> u32 {
         self.triangles[triangle as usize][usize::from(if corner < 3 { corner } else { corner - 3 })]
     }
 
-    /// The vertex at a corner of a triangle.
+    /// Vertex at a corner of a triangle.
     #[inline]
     pub(super) fn vertex_of(&self, triangle: u32, corner: u8) -> u32 {
         self.vertex[self.corner(triangle, corner) as usize]
@@ -82,7 +82,7 @@ impl<'a> Surface<'a> {
         self.mesh.normals()[corner as usize]
     }
 
-    /// Collapses what can be while no triangle's bound exceeds `bound` \[m\].
+    /// Collapses vertices while no triangle's bound exceeds `bound` \[m\].
     pub(super) fn simplify(&mut self, bound: f64) {
         for _ in 0..ROUNDS {
             let (vertices, removed) = self.round(bound);
@@ -92,8 +92,10 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// One round, in the order of the vertices: each is looked at once, and not at all where another collapse changed what is
-    /// around it. Returns how many vertices there were, and how many were removed.
+    /// Runs one round in the order of the vertices.
+    ///
+    /// Each vertex is tried once, unless another collapse changed its surroundings. Returns the number of vertices
+    /// before the round, and the number of removed ones.
     fn round(&mut self, bound: f64) -> (usize, usize) {
         self.connect();
         let (mut star, mut fan) = (Star::empty(), Fan::empty());
@@ -138,7 +140,7 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// Takes out triangles that have vanished.
+    /// Removes triangles that have vanished.
     fn sweep(&mut self) {
         let Self { triangles, error, .. } = self;
         let alive = |t: &[u32; 3]| t[0] != u32::MAX;
@@ -147,7 +149,7 @@ impl<'a> Surface<'a> {
         triangles.retain(alive);
     }
 
-    /// Finds the triangles around each vertex.
+    /// Collects the triangles around each vertex.
     fn connect(&mut self) {
         let Self { vertex, triangles, start, around, .. } = self;
         start.fill(0);

@@ -1,12 +1,12 @@
-//! One vertex, the triangles around it, and what a collapse onto a neighbour would change.
+//! The star of a vertex (the triangles around it), and the effect of a collapse onto a neighbor.
 
 use super::simplify::Surface;
 
-/// Vertices with more triangles around them stay.
+/// Largest number of triangles around a vertex that may collapse.
 pub(super) const MOST: usize = 32;
 /// Cosine of the largest angle between a new triangle's own normal and the normals of its corners: 40°.
 const FACING: f32 = 0.766;
-/// Sine of an angle below which lines count as parallel, and triangles as flat: 53 bits say nothing about them.
+/// Sine of the angle below which lines count as parallel and triangles as degenerate: 53 bits do not resolve them.
 const PARALLEL: f64 = 1e-8;
 
 type V = [f64; 3];
@@ -32,49 +32,50 @@ fn area(a: [f64; 2], b: [f64; 2]) -> f64 {
 #[derive(Clone, Debug)]
 pub(super) struct Star {
     pub(super) count: usize,
-    /// Triangle and which of its corners the vertex is.
+    /// Triangles, with the vertex's corner in each.
     pub(super) triangles: [(u32, u8); MOST],
     pub(super) ring: [u32; MOST],
-    /// From the vertex to the ring.
+    /// Vectors from the vertex to the ring.
     to: [V; MOST],
-    /// The same, looked at along the mean normal: right, up, and height towards the eye.
+    /// Projections of these vectors along the mean normal: right and up.
     flat: [[f64; 2]; MOST],
+    /// Heights of the ring along the mean normal.
     height: [f64; MOST],
     normal: V,
-    /// Sum over the triangles of area times n nᵀ: how far points are from their planes.
+    /// Sum over the triangles of area times n nᵀ, which gives the distances of points from their planes.
     quadric: [f64; 6],
 }
 
-/// What the best collapse of a vertex is.
+/// Best collapse of a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Best {
-    /// Onto that place of the ring, within the bound.
+    /// A collapse onto this place of the ring, within the bound.
     Enough(usize),
-    /// None is within the bound; the smallest that was found.
+    /// No collapse is within the bound; the smallest bound that was found.
     Least(f64),
-    /// None is possible.
+    /// No collapse is possible.
     None,
-    /// Neighbours have changed.
+    /// Unknown, because neighbors have changed.
     Unknown,
 }
 
-/// The triangles after a collapse onto `ring[onto]`: triangle `j`, of `1..count - 1` counted from there, is (that
-/// neighbour, `ring[onto + j]`, `ring[onto + j + 1]`).
+/// Triangles after a collapse onto `ring[onto]`. Triangle `j` in `1..count - 1` is (`ring[onto]`, `ring[onto + j]`,
+/// `ring[onto + j + 1]`), with indices modulo `count`.
 #[derive(Clone, Debug)]
 pub(super) struct Fan {
-    /// The bound of each.
+    /// Bound of each triangle.
     pub(super) error: [f64; MOST],
-    /// The neighbour as a corner of each: which of its normals.
+    /// Corner of the neighbor in each triangle, which selects one of its normals.
     pub(super) corner: [u32; MOST],
-    /// The ring counted from that neighbour: from the vertex, and looked at along the mean normal.
+    /// The ring, counted from that neighbor: vectors from the vertex, their projections along the mean normal, heights.
     to: [V; MOST],
     flat: [[f64; 2]; MOST],
     height: [f64; MOST],
     /// Normals of the new triangles, of any length.
     planes: [V; MOST],
-    /// The largest difference in height over each new triangle.
+    /// Largest difference in height over each new triangle.
     apart: [f64; MOST],
-    /// Which old triangles are above or below each new one.
+    /// Old triangles above or below each new triangle, as bits.
     over: [u32; MOST],
 }
 
@@ -92,13 +93,13 @@ impl Star {
         }
     }
 
-    /// Looks at a vertex; `false` where it must stay: on a border, where surfaces meet, or where the triangles around it
-    /// cover each other when they are looked at along their mean normal.
+    /// Loads a vertex. Returns `false` if the vertex must stay: on a border, where surfaces meet, or where the
+    /// triangles around it overlap when seen along their mean normal.
     pub(super) fn look(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
         self.order(surface, vertex) && self.flatten(surface, vertex)
     }
 
-    /// Brings the triangles in order.
+    /// Sorts the triangles around the vertex.
     fn order(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
         let around = surface.around(vertex);
         let count = around.len();
@@ -126,7 +127,7 @@ impl Star {
         ends[count - 1] == self.ring[0]
     }
 
-    /// Looks at the triangles along their mean normal.
+    /// Projects the triangles along their mean normal.
     fn flatten(&mut self, surface: &Surface<'_>, vertex: u32) -> bool {
         let count = self.count;
         let middle = surface.position(vertex);
@@ -165,13 +166,13 @@ impl Star {
             let products = [c[0] * c[0], c[1] * c[1], c[2] * c[2], c[0] * c[1], c[1] * c[2], c[2] * c[0]];
             self.quadric = std::array::from_fn(|q| self.quadric[q] + k * products[q]);
         }
-        // All turn the same way: they cover nothing twice if they go around once.
+        // All triangles have the same orientation, so they do not overlap if they go around once.
         let rises = (0..count).filter(|&i| self.flat[i][1] < 0.0 && self.flat[next(i)][1] >= 0.0).count();
         rises == 1
     }
 
-    /// How much the collapse onto `ring[k]` seems to cost: the mean squared distance from the planes, and a little for the
-    /// length of the way, so that triangles do not become needles where everything is flat.
+    /// Estimated cost of the collapse onto `ring[k]`: the mean squared distance from the planes, plus a small penalty
+    /// for the length of the edge, which prevents needles in flat regions.
     fn cost(&self, k: usize) -> f64 {
         let (d, q) = (self.to[k], self.quadric);
         let planes = q[0] * d[0] * d[0]
@@ -181,8 +182,8 @@ impl Star {
         planes / (q[0] + q[1] + q[2]) + 1e-8 * dot(d, d)
     }
 
-    /// Tries the few collapses that look best, onto neighbours that are not `changed`, until one keeps `bound`; that is in
-    /// `fan` then.
+    /// Tries the few most promising collapses onto neighbors that are not `changed`, until one keeps `bound`. Its
+    /// triangles are then in `fan`.
     pub(super) fn best(&self, surface: &Surface<'_>, fan: &mut Fan, changed: &[bool], bound: f64) -> Best {
         const TRIES: usize = 3;
         let mut costs = [(0.0, 0); MOST];
@@ -211,8 +212,10 @@ impl Star {
         }
     }
 
-    /// The triangles after the collapse onto `ring[onto]`, and the largest of their bounds. `None` where it would make
-    /// triangles that cover each other, that face elsewhere than their corners, or an edge with more than two triangles.
+    /// Computes the triangles after the collapse onto `ring[onto]`, and returns the largest of their bounds.
+    ///
+    /// Returns `None` if triangles would overlap, deviate from the normals of their corners, or share an edge with more
+    /// than one other triangle.
     pub(super) fn collapse(&self, surface: &Surface<'_>, onto: usize, fan: &mut Fan) -> Option<f64> {
         let m = self.count;
         for (j, i) in (onto..m).chain(0..onto).enumerate() {
@@ -250,8 +253,8 @@ impl Star {
         Some(largest)
     }
 
-    /// Where pieces of old and new triangles meet: the largest difference in height over each new triangle, and which old
-    /// ones are below or above it.
+    /// Overlays old and new triangles: the largest difference in height over each new triangle, and the old triangles
+    /// above or below it.
     fn overlay(&self, fan: &mut Fan) {
         let m = self.count;
         let Fan { to, flat, height, planes, apart, over, .. } = fan;
@@ -259,11 +262,11 @@ impl Star {
         apart[1..m - 1].fill(0.0);
         over[1..m - 1].fill(0);
         for i in 0..m {
-            // Old triangle `i` and a new one have an edge of the polygon in common.
+            // Old triangle `i` and a new one share an edge of the polygon.
             over[i.clamp(1, m - 2)] |= 1 << i;
         }
         for j in 1..m - 1 {
-            // The vertex itself, at the origin.
+            // The vertex itself is at the origin.
             let sides = [area(start, flat[j]), area(flat[j], flat[j + 1]), area(flat[j + 1], start)];
             if sides.iter().all(|&side| side >= 0.0) {
                 let gap = dot(planes[j], to[0]) / dot(planes[j], self.normal);
@@ -279,7 +282,7 @@ impl Star {
             for i in 1..m {
                 let spoke = flat[i];
                 let turn = area(spoke, edge);
-                // They cross at the shares s = before / turn of the spoke and t = after / turn of the edge.
+                // They cross at the fractions s = before / turn of the spoke and t = after / turn of the edge.
                 let after = area(start, spoke);
                 let most = (1.0 + PARALLEL) * turn.abs();
                 let (s, t) = if turn < 0.0 { (-before, -after) } else { (before, after) };
@@ -287,7 +290,7 @@ impl Star {
                 if s < -least || s > most || t < -least || t > most || i == j {
                     continue;
                 }
-                // Parallel ones that lie on each other part at ends that are looked at anyway.
+                // Parallel lines on top of each other separate at ends, which are evaluated anyway.
                 if turn * turn <= PARALLEL * PARALLEL * length * (spoke[0] * spoke[0] + spoke[1] * spoke[1]) {
                     continue;
                 }
@@ -301,8 +304,8 @@ impl Star {
         }
     }
 
-    /// Finds which normal of the neighbour each new triangle gets: of the two along the collapsed edge the one that is
-    /// nearer to what the corner had. `None` where a triangle would face elsewhere than its corners.
+    /// Selects a normal of the neighbor for each new triangle: of the two along the collapsed edge, the one nearer to
+    /// the corner's previous normal. Returns `None` if a triangle would deviate from the normals of its corners.
     fn corners(&self, surface: &Surface<'_>, onto: usize, fan: &mut Fan) -> Option<()> {
         let m = self.count;
         let corner = |(triangle, corner): (u32, u8), step: u8| surface.corner(triangle, corner + step);
@@ -326,12 +329,12 @@ impl Star {
         Some(())
     }
 
-    /// Whether the neighbour has an edge already to where the collapse would make one: three sheets would meet there, or
-    /// two cover each other.
+    /// True if the neighbor already has an edge to a vertex to which the collapse would make one: three sheets would
+    /// meet there, or two would overlap.
     fn pinches(&self, surface: &Surface<'_>, onto: usize) -> bool {
         let m = self.count;
         let next = |i: usize, step: usize| if i + step < m { i + step } else { i + step - m };
-        // Its neighbours along the ring, which it has edges to; nobody else of the ring may be one.
+        // Neighbors of the neighbor along the ring, to which it has edges. It must have no edge to other ring vertices.
         let (after, before) = (self.ring[next(onto, 1)], self.ring[next(onto, m - 1)]);
         let own = |triangle: u32| self.triangles[..m].iter().any(|&(t, _)| t == triangle);
         surface.around(self.ring[onto]).iter().any(|&(triangle, corner)| {

@@ -1,4 +1,4 @@
-//! The bounds against distances found by brute force, and what else levels promise.
+//! Tests of the bounds against distances found by brute force, and of the other guarantees of levels.
 use super::super::crease::weld;
 use super::super::{RenderMesh, Shape, Sphere};
 use super::{Level, MIN_TRIANGLES, chain};
@@ -23,7 +23,7 @@ fn cross(a: V, b: V) -> V {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Square of the distance of a point from a triangle: to its plane where the foot is inside of it, or to the nearest edge.
+/// Squared distance of a point from a triangle: from its plane if the foot is inside, else from the nearest edge.
 fn squared(p: V, t: &[V; 3]) -> f64 {
     let n = cross(sub(t[1], t[0]), sub(t[2], t[0]));
     let (mut nearest, mut inside) = (f64::MAX, dot(n, n) > 0.0);
@@ -41,7 +41,7 @@ fn corners(mesh: &RenderMesh) -> Vec<[V; 3]> {
     mesh.triangles().iter().map(|t| t.map(|i| mesh.positions()[i as usize].map(f64::from))).collect()
 }
 
-/// Triangles in blocks of neighbours, each with the corners of its box.
+/// Triangles in blocks of neighbors, each with its bounding box.
 struct Blocks<'a>(Vec<([V; 2], &'a [[V; 3]])>);
 
 impl<'a> Blocks<'a> {
@@ -52,7 +52,7 @@ impl<'a> Blocks<'a> {
         Self(triangles.chunks(32).map(|block| ([corner(block, f64::min), corner(block, f64::max)], block)).collect())
     }
 
-    /// Square of the distance of a point from the nearest triangle; boxes that are farther away are left out.
+    /// Squared distance of a point from the nearest triangle; boxes that are farther away are skipped.
     fn squared(&self, p: V) -> f64 {
         let mut nearest = f64::MAX;
         for ([low, high], block) in &self.0 {
@@ -65,7 +65,7 @@ impl<'a> Blocks<'a> {
     }
 }
 
-/// The largest distance of points of `from` to `to`: the corners, middles of edges and middles of some triangles.
+/// Largest distance from `from` to `to`, at the corners, edge midpoints and centers of some triangles.
 fn farthest(from: &[[V; 3]], to: &[[V; 3]], triangles: usize) -> f64 {
     let (step, to) = ((from.len() / triangles).max(1), Blocks::new(to));
     let points = from.iter().step_by(step).flat_map(|t| {
@@ -75,7 +75,7 @@ fn farthest(from: &[[V; 3]], to: &[[V; 3]], triangles: usize) -> f64 {
     points.map(|p| to.squared(p)).fold(0.0, f64::max).sqrt()
 }
 
-/// A plate of 40 x 30 x 2 cm with fillets of 4 mm all around, in 100 thousand triangles.
+/// A plate of 40 x 30 x 2 cm with fillets of 4 mm all around, in 139456 triangles.
 fn plate() -> TriMesh {
     const RADIUS: f64 = 0.004;
     let half = [0.2, 0.15, 0.01];
@@ -131,13 +131,13 @@ fn sphere(segments: usize) -> RenderMesh {
     render(&tessellated(segments))
 }
 
-/// A link of the vendor's SR5.
+/// A link of the vendor's SR5 robot.
 fn vendor(link: &str) -> RenderMesh {
     let file = format!("rokae_description/meshes/xMateSR5/visual/xMateSR5_{link}.stl");
     render(&load(&kinetoscope_testkit::needs::robot(&file)).unwrap().scaled([0.001; 3]))
 }
 
-/// How often each directed edge occurs.
+/// Number of occurrences of each directed edge.
 fn edges(mesh: &RenderMesh) -> BTreeMap<(u32, u32), u32> {
     let welded = weld(mesh.positions());
     let mut edges = BTreeMap::new();
@@ -149,7 +149,7 @@ fn edges(mesh: &RenderMesh) -> BTreeMap<(u32, u32), u32> {
     edges
 }
 
-/// Checks the bounds, borders and numbers of triangles of all levels.
+/// Checks the bounds, borders and triangle counts of all levels.
 fn check(name: &str, mesh: &RenderMesh, most: &[usize]) {
     let levels = mesh.levels();
     let fine = corners(mesh);
@@ -166,7 +166,7 @@ fn check(name: &str, mesh: &RenderMesh, most: &[usize]) {
         assert!(back <= error, "{name}: {back} from a level to the mesh, bound {error}");
         assert!(coarse.len() <= most, "{name}: {} triangles instead of {most}", coarse.len());
         assert_eq!(borders(&level.mesh), open, "{name}: edges without exactly one neighbour");
-        // The control: what is moved by twice the bound is found.
+        // Control: a level that is moved by twice the bound is detected.
         let moved: Vec<[V; 3]> = coarse.iter().map(|t| t.map(|p| along(p, [1.0, 0.9, 0.8], 2.0 * error))).collect();
         assert!(farthest(&fine, &moved, 600) > error, "{name}: a level that is elsewhere must be found");
         facing(name, &level.mesh);
@@ -180,7 +180,7 @@ fn check(name: &str, mesh: &RenderMesh, most: &[usize]) {
     }
 }
 
-/// Normals are kept from the mesh; new triangles face where their corners do.
+/// Checks that triangles agree with the normals of their corners, which come from the mesh.
 fn facing(name: &str, level: &RenderMesh) {
     let mut elsewhere = 0;
     for t in level.triangles() {
@@ -193,14 +193,14 @@ fn facing(name: &str, level: &RenderMesh) {
     assert!(elsewhere * 50 <= level.triangles().len(), "{name}: {elsewhere} of {}", level.triangles().len());
 }
 
-/// A ball of 99224 triangles; a regular triangle inside of it that is d below the surface has an area of 3 sqrt(3) r d / 2:
-/// no fewer than 1452 triangles stay within 1 mm.
+/// A sphere of 99224 triangles. A regular triangle inside of it, d below the surface, has an area of 3 sqrt(3) r d / 2,
+/// so at least 1452 triangles are needed within 1 mm.
 #[test]
 fn ball() {
     check("ball", &sphere(316), &[43_000, 26_000, 15_500, 8_500]);
 }
 
-/// Of 139456 triangles.
+/// A plate of 139456 triangles.
 #[test]
 fn plate_with_fillets() {
     check("plate", &render(&plate()), &[1_400, 640, 330, 180]);
@@ -241,7 +241,7 @@ fn repeatable() {
     assert_eq!(mesh.levels().len(), mesh.clone().levels().len());
 }
 
-/// Half a ball: the border is open. Every vertex of it must stay, so that a neighbour of another material fits.
+/// Half a sphere with an open border. Every border vertex must stay, so that an adjacent part of another material fits.
 #[test]
 fn borders() {
     let mut half = tessellated(160);
