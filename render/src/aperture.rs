@@ -4,7 +4,7 @@ use crate::visibility::RenderError;
 use serde::{Deserialize, Serialize};
 
 /// The opening of a thin lens: what is not at the distance that it is focused on is blurred. Needs
-/// [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced), whose paths begin all over the opening: colours are blurred, all other
+/// [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced), whose paths begin all over the opening: colors are blurred, all other
 /// channels are those of its middle.
 ///
 /// Fields of view stay those of [`Intrinsics`](crate::intrinsics::Intrinsics), whatever the lens is focused on.

@@ -1,4 +1,4 @@
-//! Pictures by path tracing: threads share the rows of one picture at a time.
+//! Images by path tracing: threads share the rows of one image at a time.
 
 use super::lens::LensRays;
 use super::rasterizer::Rasterizer;
@@ -120,7 +120,7 @@ fn draw_colors(
     Ok(())
 }
 
-/// Draws all channels but the colour: what the pixels' centres see.
+/// Draws all channels but the color: what the pixels' centers see.
 fn draw_others(
     pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],

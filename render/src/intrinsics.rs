@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// A pinhole lens without distortion, in the terms that users have. The centre of pixel (u, v) is (u + 0.5, v + 0.5).
+/// A pinhole lens without distortion, in the terms that users have. The center of pixel (u, v) is (u + 0.5, v + 0.5).
 ///
 /// For OpenCV and ROS it is (u, v): of what they calibrate, cx and cy are to be half a pixel more here. To read and write files of
 /// ROS there is `CameraInfo`, which minds that.
@@ -65,7 +65,7 @@ pub struct PixelIntrinsics {
 }
 
 impl Intrinsics {
-    /// EmbodiChain's default lens, f = 600 pixels in a picture 640 wide, which sees the same in pictures of other sizes: f is
+    /// EmbodiChain's default lens, f = 600 pixels in a image 640 wide, which sees the same in images of other sizes: f is
     /// 15/16 of the width, pixels are square.
     pub const EMBODICHAIN: Self = Self::Aperture {
         focal_length: 15.0,
@@ -103,7 +103,7 @@ impl Intrinsics {
         Ok(Self::Pixels { fx, fy, cx, cy })
     }
 
-    /// The same lens in pixels of a picture of `width` by `height`.
+    /// The same lens in pixels of a image of `width` by `height`.
     ///
     /// # Errors
     ///
@@ -148,7 +148,7 @@ impl Intrinsics {
         Ok(pixels)
     }
 
-    /// The 3x3 matrix of the lens in pixels of a picture of `width` by `height`.
+    /// The 3x3 matrix of the lens in pixels of a image of `width` by `height`.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! A renderer for CPUs: depth, masks, normals and colour of a [`RenderScene`](kinetoscope_scene::RenderScene), by a
+//! A renderer for CPUs: depth, masks, normals and color of a [`RenderScene`](kinetoscope_scene::RenderScene), by a
 //! rasterizer, a ray tracer or a path tracer; and exact distances along rays.
 //!
 //! ```text
@@ -10,7 +10,7 @@
 //! |---|---|
 //! | `rasterizer`, `parallel` | one frame, and many on several threads |
 //! | `request` | the scene, the view and the settings of a frame |
-//! | [`frame`] | channels (colour, depth, ...), one file each, and their images |
+//! | [`frame`] | channels (color, depth, ...), one file each, and their images |
 //! | `renderer`, `aperture`, `shutter`, `progress` | settings of a frame |
 //! | [`lens`], `intrinsics` | from pixels to rays |
 //! | `visibility` | views and the surface at each pixel; `raster` finds it by triangles, `trace` by rays |

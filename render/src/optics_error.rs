@@ -28,7 +28,7 @@ pub enum OpticsError {
         /// The angle with the optical axis where it folds back or is about to reach its pole, in the first direction in which it
         /// does \[rad\].
         angle: f64,
-        /// How far from the principal point that is, in the normalised picture (times fx: in pixels).
+        /// How far from the principal point that is, in the normalized image (times fx: in pixels).
         radius: f64,
         /// The part of the image that needs more.
         wanted: String,

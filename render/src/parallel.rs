@@ -20,14 +20,14 @@ const WORTH_A_THREAD: usize = 1_000_000;
 /// Parts that each thread gets, about: the last ones decide how long the others wait.
 const PARTS: usize = 8;
 
-/// A shot and where its pictures go.
+/// A shot and where its images go.
 pub type Job<'a> = (Shot<'a>, FrameMut<'a>);
 
 /// Draws batches of frames on several threads; keeps the scratch memory of each. The bits do not depend on the number of
 /// threads.
 ///
 /// Where there are many shots, each is drawn by one thread. The last ones, that would leave threads without work, are
-/// drawn together: first what is drawn where, then their shadow maps in parts, then bands of the pictures.
+/// drawn together: first what is drawn where, then their shadow maps in parts, then bands of the images.
 #[derive(Debug)]
 pub struct ParallelRasterizer {
     rasterizers: Vec<Rasterizer>,
@@ -115,7 +115,7 @@ impl ParallelRasterizer {
         }
     }
 
-    /// How far the paths of the pictures are that are drawn.
+    /// How far the paths of the images are that are drawn.
     pub fn progress(&self) -> &RenderProgress {
         &self.progress
     }
@@ -147,7 +147,7 @@ impl ParallelRasterizer {
         self.render_takes(jobs, &[])
     }
 
-    /// As [`render`](Self::render), of pictures by path tracing each with its noise and with things that moved while the
+    /// As [`render`](Self::render), of images by path tracing each with its noise and with things that moved while the
     /// shutter was open. Shots without a take are still, and have the same noise.
     ///
     /// # Errors

@@ -4,10 +4,10 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How far the path tracing of pictures is, and a way to break it off; clones are handles of the same, for other threads.
+/// How far the path tracing of images is, and a way to break it off; clones are handles of the same, for other threads.
 ///
-/// Counts are of the batch of pictures that is drawn or was drawn last, those of pictures that need no paths are 0. What is
-/// broken off leaves every pixel of the picture that it was at as it was before, and is an error:
+/// Counts are of the batch of images that is drawn or was drawn last, those of images that need no paths are 0. What is
+/// broken off leaves every pixel of the image that it was at as it was before, and is an error:
 /// [`RenderError::Cancelled`](crate::visibility::RenderError::Cancelled).
 ///
 /// ```
@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 ///
 /// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 1);
 /// let progress = rasterizer.progress().clone();
-/// // On another thread, while pictures are drawn:
+/// // On another thread, while images are drawn:
 /// println!("{} of {} paths, {:?} left", progress.samples(), progress.total(), progress.remaining());
 /// progress.cancel();
 /// assert!(progress.is_cancelled());
@@ -39,7 +39,7 @@ impl RenderProgress {
         self.0.samples.load(Ordering::Relaxed)
     }
 
-    /// Paths that there are to follow: pixels times samples, without those of pictures that turned out to be impossible.
+    /// Paths that there are to follow: pixels times samples, without those of images that turned out to be impossible.
     pub fn total(&self) -> u64 {
         self.0.total.load(Ordering::Relaxed)
     }
@@ -72,7 +72,7 @@ impl RenderProgress {
         self.0.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Pictures that are begun from now on are drawn again, those that were broken off too when somebody reads them.
+    /// Images that are begun from now on are drawn again, those that were broken off too when somebody reads them.
     pub fn resume(&self) {
         self.0.cancelled.store(false, Ordering::Relaxed);
     }
@@ -90,7 +90,7 @@ impl RenderProgress {
         self.0.total.store(total, Ordering::Relaxed);
     }
 
-    /// Some of it will never be done: a picture that cannot be drawn.
+    /// Some of it will never be done: a image that cannot be drawn.
     pub(crate) fn refuse(&self, samples: u64) {
         let less = |total: u64| Some(total.saturating_sub(samples));
         let _ = self.0.total.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);

@@ -22,7 +22,7 @@ use kinetoscope_scene::{PoseF32, RenderScene};
 ///
 /// The same shot gives the same bits on every thread and with every instruction set.
 ///
-/// Transparency: things with 0 < alpha < 1 are blended into the colour, back to front by the depth of their origins, each
+/// Transparency: things with 0 < alpha < 1 are blended into the color, back to front by the depth of their origins, each
 /// with its nearest surface only; they are not seen by things behind them twice. All other channels see the nearest
 /// surface whatever its alpha, unless that is 0, as in MuJoCo. Opacity of textures is not used.
 #[derive(Debug)]
@@ -36,16 +36,16 @@ pub struct Rasterizer {
     /// When light falls on which row.
     pub shutter: Shutter,
     /// Stops, -20 to 20: light is multiplied by 2 to this power before the tone curve, so that what is brighter than white in
-    /// one picture is told apart in a shorter one.
+    /// one image is told apart in a shorter one.
     pub stops: f64,
-    /// How far the paths of a picture are.
+    /// How far the paths of a image are.
     pub progress: RenderProgress,
     pub(super) assets: RayAssets,
     pub(super) plan: Plan,
     pub(super) brush: Brush,
-    /// Of pictures by path tracing.
+    /// Of images by path tracing.
     pub(super) film: Film,
-    /// Of pictures whose rows are of several instants.
+    /// Of images whose rows are of several instants.
     pub(super) roll: Roll,
 }
 
@@ -133,7 +133,7 @@ impl Rasterizer {
         self.render_take(shot, &Take::default(), frame)
     }
 
-    /// As [`render_shot`](Self::render_shot), of pictures by path tracing with noise of their own and with things that moved
+    /// As [`render_shot`](Self::render_shot), of images by path tracing with noise of their own and with things that moved
     /// while the shutter was open.
     ///
     /// # Errors
@@ -164,7 +164,7 @@ impl Rasterizer {
         Ok(())
     }
 
-    /// Draws a row of a picture, at its own instant, into a frame of that row.
+    /// Draws a row of a image, at its own instant, into a frame of that row.
     pub(super) fn draw_row(
         &mut self,
         shot: &Shot<'_>,

@@ -1,4 +1,4 @@
-//! Which renderer draws pictures.
+//! Which renderer draws images.
 
 use super::request::{RasterCfg, Shot};
 use crate::frame::FrameMut;
@@ -8,7 +8,7 @@ use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
 
-/// Which renderer draws pictures. All of them give the same depth, distance, mask, normals and positions off silhouettes,
+/// Which renderer draws images. All of them give the same depth, distance, mask, normals and positions off silhouettes,
 /// where the rasterizer draws meshes as they are: with [`RasterCfg::lod`](crate::request::RasterCfg::lod), which is on by default, its
 /// surfaces are moved as is said there, and no other renderer's are.
 ///
@@ -25,48 +25,48 @@ pub enum Renderer {
     /// and transparency are the rasterizer's. Meshes are never drawn coarser
     /// ([`RasterCfg::lod`](crate::request::RasterCfg::lod) is for shadow maps only).
     FastRayTraced,
-    /// The rasterizer, with shadows by rays: sharp at every distance, of all lamps that cast shadows, point lamps too; and
+    /// The rasterizer, with shadows by rays: sharp at every distance, of all lights that cast shadows, point lights too; and
     /// with ambient occlusion by rays, where [`RasterCfg::occlusion_rays`](crate::request::RasterCfg::occlusion_rays) asks for some.
     /// Meshes are never drawn coarser. Rays begin on the triangles: near the edge of its dark side, a coarse mesh with smooth normals
     /// goes dark triangle by triangle. Behind a lens that bends lines what is seen is found by rays too.
     Hybrid,
-    /// Colours by path tracing: light that went over several surfaces, soft shadows of lamps that have a size, mirrors that
+    /// Colors by path tracing: light that went over several surfaces, soft shadows of lights that have a size, mirrors that
     /// show the scene. All other channels as [`FastRayTraced`](Self::FastRayTraced) has them.
     ///
-    /// - **Lamps** are as bright as the rasterizer draws them: a white matt surface that faces a lamp of colour L has the
-    ///   radiance L. A lamp with a [`radius`](kinetoscope_scene::Light::radius) is a disc that faces what it lights: half of one on a
-    ///   ceiling would be behind the ceiling, so keep it the radius below. Ambient light of lamps and of the headlight reaches
-    ///   everything, as in the rasterizer. The headlight is shaded by nothing that is before the near plane. 16 lamps count,
+    /// - **Lights** are as bright as the rasterizer draws them: a white matt surface that faces a light of color L has the
+    ///   radiance L. A light with a [`radius`](kinetoscope_scene::Light::radius) is a disc that faces what it lights: half of one on a
+    ///   ceiling would be behind the ceiling, so keep it the radius below. Ambient light of lights and of the headlight reaches
+    ///   everything, as in the rasterizer. The headlight is shaded by nothing that is before the near plane. 16 lights count,
     ///   the first, and the headlight.
     /// - **The dome** is [`RenderScene::ambient`](kinetoscope_scene::RenderScene::ambient): its sky's radiance from above the horizon, its
     ///   ground's from below. Where nothing is in the way a matt surface (specular 0) gets what the rasterizer gives it; below a glossy
     ///   layer it gets what the layer leaves. Cameras and mirrors see
     ///   [`RenderScene::sky`](kinetoscope_scene::RenderScene::sky) there instead.
     /// - **Emission** of a material lights other things, with `max_bounces` 0 too. Points of what glows are looked for at every
-    ///   surface: of finite planes (area lamps), boxes, spheres, cylinders and meshes. Capsules, ellipsoids, height fields and
+    ///   surface: of finite planes (area lights), boxes, spheres, cylinders and meshes. Capsules, ellipsoids, height fields and
     ///   infinite planes light as much, with more noise: paths meet them by chance.
     /// - **Materials**: Lambert's law below a GGX layer that reflects F0 = 0.08 specular at normal incidence and
     ///   F90 = min(1, 50 F0) at grazing, of roughness alpha² = 2 / (e + 2) with MuJoCo's exponent e = 128 shininess (at least
-    ///   1), or its roughness to the fourth power. The layer mirrors a lamp's `specular` colour and everything else's only
-    ///   colour. Of a metal F0 is its colour, F90 is 1, and nothing is below. `reflectance` of the light is
+    ///   1), or its roughness to the fourth power. The layer mirrors a light's `specular` color and everything else's only
+    ///   color. Of a metal F0 is its color, F90 is 1, and nothing is below. `reflectance` of the light is
     ///   mirrored perfectly, of boxes by the +z face alone. Of what is left, `transmission` meets smooth glass: it is mirrored by Fresnel's equations or goes
-    ///   through by Snell's law, and takes the colour where it enters. Each surface of glass is a bounce; lamps cast its shadow,
+    ///   through by Snell's law, and takes the color where it enters. Each surface of glass is a bounce; lights cast its shadow,
     ///   and are not seen through it. `alpha` is the part of the light that the front of a surface takes; the rest goes on straight; their
     ///   backs are not seen. Paths end, black, after 64 such surfaces, and where a smooth normal mirrors them below the surface
     ///   itself.
     ///
     /// The [tone curve](crate::request::RasterCfg::tone) and sRGB are those of the rasterizer. Noise depends on the pixel and the seed only: the same bits for
-    /// any number of threads. Pictures of `Camera`s have noise of their own each, by the seed of the
-    /// simulation, the environment's global index, the name of the camera and which picture it is, besides this seed: the
+    /// any number of threads. Images of `Camera`s have noise of their own each, by the seed of the
+    /// simulation, the environment's global index, the name of the camera and which image it is, besides this seed: the
     /// same in any batch.
     RayTraced {
         /// Paths per pixel; 1 to 65536. A power of two spreads them best.
         samples: u32,
-        /// Surfaces that light goes over after the one that is seen, at most; 0 is light that comes from lamps, from the
+        /// Surfaces that light goes over after the one that is seen, at most; 0 is light that comes from lights, from the
         /// dome and from what glows at once. At most 64.
         max_bounces: u32,
         /// Whether noise is smoothed where normals and depth of the surface are alike and light differs no more than noise does.
-        /// The surface's own colours stay as they are.
+        /// The surface's own colors stay as they are.
         denoise: bool,
         /// Another seed has other noise.
         seed: u32,
@@ -74,7 +74,7 @@ pub enum Renderer {
 }
 
 impl Renderer {
-    /// A picture to look at: 64 paths of up to 4 bounces, smoothed.
+    /// A image to look at: 64 paths of up to 4 bounces, smoothed.
     pub const RAY_TRACED: Self = Self::RayTraced { samples: 64, max_bounces: 4, denoise: true, seed: 0 };
     /// The most paths per pixel.
     pub const MAX_SAMPLES: u32 = 1 << 16;
@@ -138,12 +138,12 @@ impl Renderer {
         }
     }
 
-    /// Whether colours come from paths.
+    /// Whether colors come from paths.
     pub fn follows_paths(self) -> bool {
         matches!(self, Self::RayTraced { .. })
     }
 
-    /// How many paths a picture takes.
+    /// How many paths a image takes.
     pub(crate) fn paths(self, shot: &Shot<'_>, frame: &FrameMut<'_>) -> u64 {
         match self {
             Self::RayTraced { samples, .. } if frame.color.is_some() => {

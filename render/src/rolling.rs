@@ -1,4 +1,4 @@
-//! Draws rows of pictures, each at an instant of its own: all channels but colours, which paths draw.
+//! Draws rows of images, each at an instant of its own: all channels but colors, which paths draw.
 
 use super::request::Shot;
 use super::shutter::ShutterInterval;
@@ -27,7 +27,7 @@ impl Roll {
         self.plan.bytes() + self.poses.capacity() * size_of::<PoseF32>() + width * BLOCK * channels.bytes_per_pixel()
     }
 
-    /// Draws row `y` of a picture, as it is in the middle of its exposure, into a frame of that row.
+    /// Draws row `y` of a image, as it is in the middle of its exposure, into a frame of that row.
     pub(super) fn draw(
         &mut self,
         brush: &mut Brush,

@@ -1,4 +1,4 @@
-//! When light falls on which row of a picture.
+//! When light falls on which row of a image.
 
 use super::request::Shot;
 use crate::visibility::RenderError;
@@ -6,14 +6,14 @@ use kinetoscope_scene::PoseF32;
 use serde::{Deserialize, Serialize};
 
 /// A shutter that takes time: each row of pixels is read `row_time` after the one above it, and each collects light for
-/// `exposure_time` before it is read. The last row is read at the instant of the picture's stamp, so the first light falls
-/// in [`span`](Self::span) before it. With both 0, as by default, a picture is of one instant.
+/// `exposure_time` before it is read. The last row is read at the instant of the image's stamp, so the first light falls
+/// in [`span`](Self::span) before it. With both 0, as by default, a image is of one instant.
 ///
 /// What moves meanwhile is sheared by the first (rolling shutter) and blurred by the second (motion blur). Cameras look at
 /// where things are at the physics step at which the shutter opens, or the one before, and at the stamp; between, things go
 /// straight and turn steadily. What somebody puts elsewhere meanwhile counts as having been there since the shutter opened: how
-/// it moves from then on is spread over the whole span. Lamps are where they are at the stamp. Needs
-/// [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced). Colours are of the whole exposure; all other channels of its middle,
+/// it moves from then on is spread over the whole span. Lights are where they are at the stamp. Needs
+/// [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced). Colors are of the whole exposure; all other channels of its middle,
 /// row by row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -24,10 +24,10 @@ pub struct Shutter {
     pub exposure_time: f64,
 }
 
-/// What tells a picture from others of the same things from the same place.
+/// What tells a image from others of the same things from the same place.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Take<'a> {
-    /// Paths with another number have other noise: of another picture, or of another environment.
+    /// Paths with another number have other noise: of another image, or of another environment.
     pub noise: u32,
     /// Where things were when the shutter opened; without it nothing moves.
     pub opened: Option<Opened<'a>>,
@@ -40,7 +40,7 @@ pub struct Opened<'a> {
     pub poses: &'a [PoseF32],
     /// Where the camera was.
     pub world_from_camera: PoseF32,
-    /// How long before the picture's stamp that was \[s\]: at least the shutter's [`span`](Shutter::span).
+    /// How long before the image's stamp that was \[s\]: at least the shutter's [`span`](Shutter::span).
     pub before: f64,
 }
 
@@ -68,12 +68,12 @@ impl Clock {
 }
 
 impl Shutter {
-    /// Whether the whole picture is of one instant.
+    /// Whether the whole image is of one instant.
     pub fn is_instant(&self) -> bool {
         self.row_time == 0.0 && self.exposure_time == 0.0
     }
 
-    /// From the first light to the last row's reading \[s\], of a picture of so many rows.
+    /// From the first light to the last row's reading \[s\], of a image of so many rows.
     pub fn span(&self, rows: usize) -> f64 {
         self.row_time * rows.saturating_sub(1) as f64 + self.exposure_time
     }

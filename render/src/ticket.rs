@@ -1,26 +1,26 @@
-//! Which picture it is: what its random numbers are looked up by.
+//! Which image it is: what its random numbers are looked up by.
 
 use kinetoscope_scene::Philox;
 
-/// Which picture it is, of all that a camera ever took in an environment. With the place in the picture, every random number
-/// of the picture is a function of this: neither threads nor laziness nor the order of readings change one.
+/// Which image it is, of all that a camera ever took in an environment. With the place in the image, every random number
+/// of the image is a function of this: neither threads nor laziness nor the order of readings change one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ticket {
     dice: Philox,
-    /// Pictures so far, those of resets and refreshes and those that got lost among them.
+    /// Images so far, those of resets and refreshes and those that got lost among them.
     number: u64,
     /// The number that the last reset had.
     epoch: u64,
-    /// Pictures that were due since then.
+    /// Images that were due since then.
     age: u32,
 }
 
-/// What random numbers are for: they are different for every use.
+/// What random numbers are for: they are different forevery use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stream(u8);
 
 impl Stream {
-    /// Whether a picture gets lost.
+    /// Whether a image gets lost.
     pub const DROPOUT: Self = Self(0);
     /// Shot noise.
     pub const SHOT: Self = Self(1);
@@ -33,7 +33,7 @@ impl Stream {
     /// The noise of paths.
     pub const PATHS: Self = Self(5);
 
-    /// What each picture adds to a channel; channels are counted from 0.
+    /// What each image adds to a channel; channels are counted from 0.
     pub const fn white(channel: u8) -> Self {
         Self(16 + channel)
     }
@@ -51,56 +51,56 @@ impl Stream {
 
 /// A place in Philox's space: four numbers each.
 fn place(stream: Stream, block: u32, number: u64, time: u32) -> [u32; 4] {
-    // A camera would have to take pictures for 2000 years at 1 MHz to need more than 56 bits.
+    // A camera would have to take images for 2000 years at 1 MHz to need more than 56 bits.
     [block, time, number as u32, (((number >> 32) as u32) << 8) | u32::from(stream.0)]
 }
 
 impl Ticket {
-    /// The ticket before the first picture of the sensor called `name`, in the environment of global index `env`.
+    /// The ticket before the first image of the sensor called `name`, in the environment of global index `env`.
     pub fn first(seed: u64, env: u64, name: &str) -> Self {
         Self { dice: Philox::keyed(seed, env, name), number: 0, epoch: 0, age: 0 }
     }
 
-    /// The next picture, which is due.
+    /// The next image, which is due.
     pub fn due(&mut self) {
         self.number += 1;
         self.age = self.age.saturating_add(1);
     }
 
-    /// The next picture, which nobody waited for: somebody wrote to the state.
+    /// The next image, which nobody waited for: somebody wrote to the state.
     pub fn refresh(&mut self) {
         self.number += 1;
     }
 
-    /// The next picture, with which everything begins again.
+    /// The next image, with which everything begins again.
     pub fn reset(&mut self) {
         self.number += 1;
         (self.epoch, self.age) = (self.number, 0);
     }
 
-    /// Four uniform numbers of this picture, in 0 to 1; those of one `block` belong together.
+    /// Four uniform numbers of this image, in 0 to 1; those of one `block` belong together.
     #[inline]
     pub fn uniforms(&self, stream: Stream, block: u32) -> [f64; 4] {
         self.dice.uniforms(place(stream, block, self.number, 0))
     }
 
-    /// 32 random bits of this picture.
+    /// 32 random bits of this image.
     pub fn bits(&self, stream: Stream) -> u32 {
         self.dice.bits(place(stream, 0, self.number, 0))[0]
     }
 
-    /// Four normal numbers of this picture.
+    /// Four normal numbers of this image.
     #[inline]
     pub fn normals(&self, stream: Stream, block: u32) -> [f64; 4] {
         self.dice.normals(place(stream, block, self.number, 0))
     }
 
-    /// Four normal numbers that are the same in all pictures until the next reset.
+    /// Four normal numbers that are the same in all images until the next reset.
     pub fn biases(&self, stream: Stream, block: u32) -> [f64; 4] {
         self.dice.normals(place(stream, block, self.epoch, 0))
     }
 
-    /// Where four random walks are, each of as many steps of variance 1 as pictures were due since the reset.
+    /// Where four random walks are, each of as many steps of variance 1 as images were due since the reset.
     ///
     /// Their place is looked up, without the steps before. Between two known times, the place in the middle is normal: its mean
     /// is theirs, its variance a quarter of the time between (Lévy's construction of Brownian motion); the known times are powers of two,

@@ -1,11 +1,11 @@
-//! Colour of the surface itself, as if light came from everywhere.
+//! Color of the surface itself, as if light came from everywhere.
 
 use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix4;
 
-/// Colour of the surface itself (sRGB, without a tone curve) and opacity: 255, and 0 where nothing was hit.
+/// Color of the surface itself (sRGB, without a tone curve) and opacity: 255, and 0 where nothing was hit.
 ///
-/// The material's colour times its texture, without light, shadow, highlight, mirror, emission or haze: a material of
+/// The material's color times its texture, without light, shadow, highlight, mirror, emission or haze: a material of
 /// `rgba` (0.5, 0.5, 0.5) is 128 everywhere. It is that of what the mask shows, transparent or not.
 #[derive(Clone, Copy, Debug)]
 pub struct Albedo;

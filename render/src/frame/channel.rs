@@ -10,7 +10,7 @@ const LANES: usize = 16;
 pub struct PixelGroup {
     /// Linear or final, as the stage says: final bytes.
     pub color: [[u8; 4]; LANES],
-    /// Colour of the surface itself, final bytes; 0 on a miss.
+    /// Color of the surface itself, final bytes; 0 on a miss.
     pub albedo: [[u8; 4]; LANES],
     /// Depth along the optical axis \[m\]; +inf on a miss.
     pub depth: [f32; LANES],
@@ -24,20 +24,20 @@ pub struct PixelGroup {
     pub shading_normal: [[f32; LANES]; 3],
     /// Position of the surface, frame of the environment \[m\]; 0 on a miss.
     pub position: [[f32; LANES]; 3],
-    /// How far it has moved since the picture before \[pixels\]; +inf on a miss.
+    /// How far it has moved since the image before \[pixels\]; +inf on a miss.
     pub flow: [[f32; LANES]; 2],
 }
 
 /// When a channel is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// As soon as it is known what each pixel centre sees.
+    /// As soon as it is known what each pixel center sees.
     Geometry,
     /// As [`Geometry`](Self::Geometry), and computed only for cameras that measure such a channel: few do.
     Detail,
-    /// As [`Detail`](Self::Detail), for the colour of surfaces: textures are read for it.
+    /// As [`Detail`](Self::Detail), for the color of surfaces: textures are read for it.
     Albedo,
-    /// As [`Detail`](Self::Detail), for what needs the picture before.
+    /// As [`Detail`](Self::Detail), for what needs the image before.
     Flow,
     /// After light, transparency and multisampling.
     Color,
@@ -47,7 +47,7 @@ pub enum Stage {
 pub trait Channel {
     /// The type of its numbers.
     type Number: Copy + Default + PartialEq + std::fmt::Debug + Send + Sync + 'static;
-    /// Axes of its pictures: views, rows, columns, and the numbers of a pixel where there are several.
+    /// Axes of its images: views, rows, columns, and the numbers of a pixel where there are several.
     type Layout: Layout;
     /// Its name.
     const NAME: &'static str;
@@ -74,9 +74,9 @@ pub trait Channel {
     fn replace_misses(_numbers: &mut [Self::Number], _value: f32) {}
 }
 
-/// The axes of a batch of pictures.
+/// The axes of a batch of images.
 pub trait Layout: Dimension {
-    /// The shape of `views` pictures with `height` rows of `width` pixels.
+    /// The shape of `views` images with `height` rows of `width` pixels.
     fn of(views: usize, height: usize, width: usize, components: usize) -> Self;
 }
 

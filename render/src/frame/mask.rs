@@ -6,7 +6,7 @@ use ndarray::Ix3;
 /// Which link or object is seen: its mask id, whichever of the channel's names it was asked by.
 ///
 /// Isaac's names `semantic_segmentation` and `instance_segmentation` turn this channel on, they do not choose what its numbers
-/// mean: they are ids of links. Pictures of instances or semantic classes are made of them by a
+/// mean: they are ids of links. Images of instances or semantic classes are made of them by a
 /// `Segmentation`, which `SceneView::segmentation` knows.
 #[derive(Clone, Copy, Debug)]
 pub struct Mask;

@@ -15,11 +15,11 @@ pub trait Listed: Channel {
     /// Whether it is wanted.
     fn is_in(channels: Channels) -> bool;
 
-    /// Its pictures, if it is there.
+    /// Its images, if it is there.
     fn of(pictures: &Pictures) -> Option<PictureView<'_, Self>>;
 }
 
-/// Pictures of one channel, shape (views, height, width) or (views, height, width, components).
+/// Images of one channel, shape (views, height, width) or (views, height, width, components).
 pub type PictureView<'a, C> = ArrayView<'a, <C as Channel>::Number, <C as Channel>::Layout>;
 
 /// Calls a macro with the list of channels: the documentation, the module and the type of each.
@@ -27,7 +27,7 @@ pub type PictureView<'a, C> = ArrayView<'a, <C as Channel>::Number, <C as Channe
 macro_rules! with_channels {
     ($then:ident) => {
         $then! {
-            /// Colour (sRGB) and opacity (always 255), u8, 4 per pixel.
+            /// Color (sRGB) and opacity (always 255), u8, 4 per pixel.
             color::Color,
             /// Depth along the optical axis \[m\], f32; +inf where nothing was hit.
             depth::Depth,
@@ -41,7 +41,7 @@ macro_rules! with_channels {
             shading_normal::ShadingNormal,
             /// Position of the surface, frame of the environment \[m\], f32, 3 per pixel; 0 where nothing was hit.
             position::Position,
-            /// Colour of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
+            /// Color of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
             albedo::Albedo,
             /// How far what is seen has moved since the image before (right, down) \[pixels\], f32, 2 per pixel; +inf where nothing
             /// was hit and in the first image.
@@ -102,14 +102,14 @@ macro_rules! channels {
             }
         }
 
-        /// Pictures of many views, one array per channel; the first axis is the view.
+        /// Images of many views, one array per channel; the first axis is the view.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Pictures {
             $($field: Option<Array<<$Name as Channel>::Number, <$Name as Channel>::Layout>>,)*
         }
 
         impl Pictures {
-            /// Pictures of `views` views of `width` by `height` pixels, empty.
+            /// Images of `views` views of `width` by `height` pixels, empty.
             ///
             /// # Panics
             ///
@@ -129,12 +129,12 @@ macro_rules! channels {
                 Channels { $($field: self.$field.is_some(),)* }
             }
 
-            /// The pictures of one channel, if it is there.
+            /// The images of one channel, if it is there.
             pub fn get<C: Listed>(&self) -> Option<PictureView<'_, C>> {
                 C::of(self)
             }
 
-            /// Moves the pictures of `views`, of `all` there are, up by as many places as `by` says; the last ones fall out.
+            /// Moves the images of `views`, of `all` there are, up by as many places as `by` says; the last ones fall out.
             pub fn move_up(&mut self, all: usize, views: Range<usize>, by: usize) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
@@ -143,7 +143,7 @@ macro_rules! channels {
                 })*
             }
 
-            /// Makes zeros of the pictures of `views`, of `all` there are.
+            /// Makes zeros of the images of `views`, of `all` there are.
             pub fn forget(&mut self, all: usize, views: Range<usize>) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
@@ -183,20 +183,20 @@ macro_rules! channels {
             }
         })*
 
-        /// Pictures of one view, row by row from the top left.
+        /// Images of one view, row by row from the top left.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Frame {
             $($(#[$doc])* pub $field: Option<Vec<<$Name as Channel>::Number>>,)*
         }
 
-        /// Where the pictures of one view go; missing channels are not computed.
+        /// Where the images of one view go; missing channels are not computed.
         #[derive(Debug, Default)]
         pub struct FrameMut<'a> {
             $($(#[$doc])* pub $field: Option<&'a mut [<$Name as Channel>::Number]>,)*
         }
 
         impl Frame {
-            /// Pictures of `width` by `height` pixels, empty.
+            /// Images of `width` by `height` pixels, empty.
             pub fn new(width: usize, height: usize, channels: Channels) -> Self {
                 let pixels = width * height;
                 Self { $($field: channels.$field.then(|| vec![Default::default(); pixels * $Name::COMPONENTS]),)* }
@@ -257,7 +257,7 @@ macro_rules! channels {
                 false $(|| (self.$field.is_some() && $Name::STAGE == stage))*
             }
 
-            /// Writes the pixels of a group, whose first is at (x, y), that are inside of the picture.
+            /// Writes the pixels of a group, whose first is at (x, y), that are inside of the image.
             #[inline(always)]
             pub(crate) fn write(&mut self, stage: Stage, group: &PixelGroup, at: [usize; 2], size: [usize; 2]) {
                 $(if $Name::STAGE == stage && let Some(buffer) = &mut self.$field {

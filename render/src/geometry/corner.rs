@@ -16,7 +16,7 @@ pub(crate) struct Corner {
 }
 
 /// The smooth normal at a point of a triangle that is seen from a side (1 from outside), its texture coordinates and how many
-/// of them a metre has.
+/// of them a meter has.
 pub(crate) fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64) -> Corner {
     let corners = mesh.triangles()[triangle].map(|i| i as usize);
     let ends @ [a, b, c] = corners.map(|i| to_f64(mesh.positions()[i]));
@@ -37,7 +37,7 @@ pub(crate) fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64)
         let t = corners.map(|i| uvs[i].map(f64::from));
         let uv = [0, 1].map(|k| (0..3).map(|n| share[n] * t[n][k]).sum());
         let [p, q] = [1, 2].map(|n| [t[n][0] - t[0][0], t[n][1] - t[0][1]]);
-        // Square root of the ratio of areas, in the picture and on the surface.
+        // Square root of the ratio of areas, in the image and on the surface.
         (uv, ((p[0] * q[1] - q[0] * p[1]).abs() / area.sqrt()).sqrt())
     });
     Corner { normal, lift, uv }

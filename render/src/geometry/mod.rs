@@ -1,6 +1,6 @@
 //! Exact distances along rays to what is in a scene, for ray casters, ray tracing and cameras made of rays.
 //!
-//! Geometry is in double precision: a distance of 20 m is right to far less than a micrometre, up to the single precision
+//! Geometry is in double precision: a distance of 20 m is right to far less than a micrometer, up to the single precision
 //! sizes of shapes. [`world::RayTargets`] is what can be hit, prepared once; [`world::RayWorld`] is where it is in one environment.
 //!
 //! Rays are cast in packets of eight, a lane for each. A shape says what one ray touches; a shape that can do better for rays

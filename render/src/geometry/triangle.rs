@@ -1,4 +1,4 @@
-//! A ray against a triangle, without gaps between neighbours.
+//! A ray against a triangle, without gaps between neighbors.
 
 use super::packet::{ALL, Packet, WIDTH};
 use crate::simd::{D, D3, N, Simd, axes, dot_3};
@@ -15,7 +15,7 @@ pub(crate) type Triangle = [[f32; 3]; 3];
 /// What is on which side of an edge is the sign of a difference of two products. Rounding keeps order, so that sign is never
 /// the wrong one; but it may be none, and of a triangle that is seen edge on a ray in its plane would be inside however far
 /// it passes beside it. So with an edge that has no sign, a ray is inside only if it is between the corners along both axes.
-/// That is so for every ray that is inside or on an edge, which leaves no gap either.
+/// That is so forevery ray that is inside or on an edge, which leaves no gap either.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shear {
     origin: V3,
@@ -49,7 +49,7 @@ impl Shear {
         let w = b[0] * a[1] - b[1] * a[0];
         let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
         let whole = u + v + w;
-        // Zero where the ray runs in the plane of the triangle: its neighbours are hit.
+        // Zero where the ray runs in the plane of the triangle: its neighbors are hit.
         if outside || whole == 0.0 {
             return None;
         }
@@ -108,13 +108,13 @@ impl<S: Simd> ShearPacket<S> {
         self.origin
     }
 
-    /// How far rays get along the first and the second axis, for each metre along the third.
+    /// How far rays get along the first and the second axis, for each meter along the third.
     #[inline(always)]
     pub(crate) fn slopes(&self) -> [D<S>; 2] {
         [self.by[0], self.by[1]]
     }
 
-    /// How far rays get along the first and the second axis for each metre along the third, and how far along themselves.
+    /// How far rays get along the first and the second axis for each meter along the third, and how far along themselves.
     #[inline(always)]
     pub(crate) fn by(&self) -> D3<S> {
         self.by

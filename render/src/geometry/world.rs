@@ -243,7 +243,7 @@ impl RayWorld {
         &self.targets
     }
 
-    /// Puts everything where it is: `poses` are world from instance, one for every instance of the scene. What does not
+    /// Puts everything where it is: `poses` are world from instance, one forevery instance of the scene. What does not
     /// move is prepared anew only where it is elsewhere than before. A target whose pose is not finite is not hit.
     ///
     /// # Panics

@@ -10,18 +10,18 @@ use std::f64::consts::PI;
 const ISAAC_SLOPE: f64 = 0.00245;
 
 /// NVIDIA's f-theta lens: theta = a + b r + c r² + d r³ + e r⁴ + f r⁵ \[rad\], where r is the distance from the principal point
-/// in pixels of the picture that the lens was calibrated with. There, fx and fy are [`focal_length`](Self::focal_length); in
-/// another picture of the same lens they are as many times larger as that has more pixels.
+/// in pixels of the image that the lens was calibrated with. There, fx and fy are [`focal_length`](Self::focal_length); in
+/// another image of the same lens they are as many times larger as that has more pixels.
 ///
 /// The default is Isaac Lab's `FisheyeCameraCfg`: b = 0.00245 rad per pixel and nothing else, a field of view of 200 degrees.
 /// Source of these numbers: `isaaclab/sim/spawners/sensors/sensors_cfg.py`, fields `fisheye_polynomial_a` to `_f` and
-/// `fisheye_max_fov`. Its nominal picture is 1936 x 1216 pixels: see [`ISAAC`](Self::ISAAC).
+/// `fisheye_max_fov`. Its nominal image is 1936 x 1216 pixels: see [`ISAAC`](Self::ISAAC).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FTheta {
     /// Coefficients a to f; a is 0, for the optical axis is at r = 0.
     pub polynomial: [f64; 6],
-    /// The focal length of the picture whose pixels the polynomial counts \[pixels\]; 1 / b makes it the slope in the middle.
+    /// The focal length of the image whose pixels the polynomial counts \[pixels\]; 1 / b makes it the slope in the middle.
     pub focal_length: f64,
     /// Nothing is seen farther from the optical axis than this angle \[rad\]: half of Isaac's `fisheye_max_fov`.
     pub max_angle: f64,
@@ -38,7 +38,7 @@ impl Default for FTheta {
 }
 
 impl FTheta {
-    /// Focal length and principal point of Isaac's default lens, in a picture of 1936 x 1216 pixels. Source: as the lens,
+    /// Focal length and principal point of Isaac's default lens, in a image of 1936 x 1216 pixels. Source: as the lens,
     /// `fisheye_optical_centre_x` and `_y`.
     pub const ISAAC: Intrinsics =
         Intrinsics::Pixels { fx: 1.0 / ISAAC_SLOPE, fy: 1.0 / ISAAC_SLOPE, cx: 970.94244, cy: 600.37482 };

@@ -1,6 +1,6 @@
-//! Lenses: which way the ray of a point of the picture goes. One model per file, all of them in one list.
+//! Lenses: which way the ray of a point of the image goes. One model per file, all of them in one list.
 //!
-//! A model maps directions in the camera's optical frame (x right, y down, z forward) to points of the *normalised picture*
+//! A model maps directions in the camera's optical frame (x right, y down, z forward) to points of the *normalized image*
 //! and back: a point (x, y) of it is the pixel (u, v) = (cx + fx x, cy + fy y), so [`Intrinsics`](crate::intrinsics::Intrinsics) and
 //! lens are independent of each other. All of it is double precision.
 
@@ -29,7 +29,7 @@ macro_rules! lenses {
     ($($(#[$doc:meta])* $file:ident :: $Name:ident,)*) => {
         $(mod $file; pub use $file::$Name;)*
 
-        /// A lens, in front of a picture whose focal lengths and principal point are [`Intrinsics`](crate::intrinsics::Intrinsics).
+        /// A lens, in front of a image whose focal lengths and principal point are [`Intrinsics`](crate::intrinsics::Intrinsics).
         ///
         /// In files: the name alone (`lens = "equidistant"`) for the default numbers, or a table with the name
         /// (`lens.opencv = { k1 = -0.28, k2 = 0.07 }`).
@@ -82,7 +82,7 @@ macro_rules! lenses {
                 match self { $(Self::$Name(_) => $Name::HAS_AXIS,)* }
             }
 
-            /// Whether it bends nothing: pictures are those without a lens, bit for bit, with every renderer.
+            /// Whether it bends nothing: images are those without a lens, bit for bit, with every renderer.
             pub fn is_pinhole(&self) -> bool {
                 match self { $(Self::$Name(lens) => lens.is_pinhole(),)* }
             }

@@ -8,7 +8,7 @@ use crate::optics_error::OpticsError;
 pub struct Domain {
     /// The largest angle between a ray and the optical axis \[rad\].
     pub angle: f64,
-    /// How far from the principal point such a ray is, in the normalised picture (times fx: in pixels).
+    /// How far from the principal point such a ray is, in the normalized image (times fx: in pixels).
     pub radius: f64,
     /// True if rays end there because the mapping folds back or has a pole, not at an angle that was asked for.
     pub folds: bool,
@@ -53,10 +53,10 @@ pub trait LensModel: Copy + Default {
     /// How far it sees; the numbers are good.
     fn domain(&self) -> Domain;
 
-    /// The point of the normalised picture where a direction is seen; `None` outside of the domain.
+    /// The point of the normalized image where a direction is seen; `None` outside of the domain.
     fn project(&self, domain: &Domain, direction: [f64; 3]) -> Option<[f64; 2]>;
 
-    /// The direction that is seen at a point of the normalised picture: with z = 1 if all rays go
+    /// The direction that is seen at a point of the normalized image: with z = 1 if all rays go
     /// [forward](Self::FORWARD), else of length 1. `None` outside of the domain.
     fn unproject(&self, domain: &Domain, point: [f64; 2]) -> Option<[f64; 3]>;
 }

@@ -14,7 +14,7 @@ const DIRECTIONS: usize = 64;
 /// Parts of the way to a point, where Newton's method does not find it at once.
 const PARTS: usize = 32;
 
-/// A pinhole with OpenCV's distortion: with (x, y) = (X / Z, Y / Z) and r² = x² + y² the normalised picture has
+/// A pinhole with OpenCV's distortion: with (x, y) = (X / Z, Y / Z) and r² = x² + y² the normalized image has
 ///
 /// - x' = x g + 2 p1 x y + p2 (r² + 2 x²) + s1 r² + s2 r⁴,
 /// - y' = y g + p1 (r² + 2 y²) + 2 p2 x y + s3 r² + s4 r⁴,
@@ -28,11 +28,11 @@ const PARTS: usize = 32;
 /// has for a pixel it is the one within that, which `cv::undistortPoints` need not find.
 ///
 /// **Poles.** Where the fraction g has a pole that a zero beside it nearly cancels, as calibrations with k4 to k6 often have one in
-/// the picture, OpenCV's formula runs to infinity and back within a ring of directions, in which pixels have two of them or none.
-/// There, within 2 degrees of the pole and mostly much less, the radius of the picture is a straight line from one end of the ring
+/// the image, OpenCV's formula runs to infinity and back within a ring of directions, in which pixels have two of them or none.
+/// There, within 2 degrees of the pole and mostly much less, the radius of the image is a straight line from one end of the ring
 /// to the other, for lack of anything that would be right: each pixel has a direction, each direction a pixel, and everywhere else
 /// it is OpenCV's formula to the last digit. Another pole ends the lens: where it would be without pole and zero, if there are
-/// directions behind it, for they would be seen in the same pixels; else the picture has no end before it.
+/// directions behind it, for they would be seen in the same pixels; else the image has no end before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OpenCv {
@@ -60,7 +60,7 @@ pub struct OpenCv {
     pub s3: f64,
     /// Thin prism, along y: of r⁴.
     pub s4: f64,
-    /// Nothing is seen farther from the optical axis than this angle \[rad\]; at most 1.569 (89.9 degrees). `None`: a picture
+    /// Nothing is seen farther from the optical axis than this angle \[rad\]; at most 1.569 (89.9 degrees). `None`: a image
     /// that reaches beyond where the distortion folds back is an error.
     pub max_angle: Option<f64>,
 }

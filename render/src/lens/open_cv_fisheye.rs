@@ -19,7 +19,7 @@ pub struct OpenCvFisheye {
     pub k3: f64,
     /// Coefficient of theta⁹.
     pub k4: f64,
-    /// Nothing is seen farther from the optical axis than this angle \[rad\]; at most pi. `None`: a picture that reaches
+    /// Nothing is seen farther from the optical axis than this angle \[rad\]; at most pi. `None`: a image that reaches
     /// beyond where the polynomial folds back is an error.
     pub max_angle: Option<f64>,
 }

@@ -58,7 +58,7 @@ impl Optics {
     }
 
     /// The pixel (u, v) where a direction of the optical frame (x right, y down, z forward), of any length, is seen; `None`
-    /// where the lens does not see it. The centre of the pixel in column k is at k + 0.5.
+    /// where the lens does not see it. The center of the pixel in column k is at k + 0.5.
     pub fn project(&self, direction: [f64; 3]) -> Option<[f64; 2]> {
         let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
         let [x, y] = self.lens.project(&self.domain, direction)?;
@@ -92,7 +92,7 @@ impl Optics {
         }
     }
 
-    /// The solid angle \[sr\] that a unit of area of the normalised picture sees at a point: by differences of rays that are
+    /// The solid angle \[sr\] that a unit of area of the normalized image sees at a point: by differences of rays that are
     /// 1e-7 rad apart near the axis. Where they spread without end, at a right angle of the orthographic fisheye and where a
     /// distortion is about to fold back, that is not little.
     fn solid_angle(&self, point: [f64; 2]) -> Option<f64> {
@@ -125,7 +125,7 @@ impl Optics {
         Some(slope(0)?.cross(&slope(1)?).norm())
     }
 
-    /// The direction of length 1 that is seen at a point of the normalised picture.
+    /// The direction of length 1 that is seen at a point of the normalized image.
     fn unit(&self, point: [f64; 2]) -> Option<Vector3<f64>> {
         Some(Vector3::from(self.lens.unproject(&self.domain, point)?).normalize())
     }

@@ -7,13 +7,13 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// The equirectangular panorama: x is the longitude from the optical axis to the right, atan2(X, Z), and y the latitude
 /// downward, atan2(Y, hypot(X, Z)) \[rad\]. So fx and fy are pixels per radian; [`intrinsics`](Self::intrinsics) gives those
-/// of a picture that shows everything.
+/// of a image that shows everything.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Panorama {}
 
 impl Panorama {
-    /// The intrinsics with which a picture shows everything: 2 pi along a row, pi along a column, straight ahead in the
+    /// The intrinsics with which a image shows everything: 2 pi along a row, pi along a column, straight ahead in the
     /// middle.
     pub fn intrinsics(width: usize, height: usize) -> Intrinsics {
         let (w, h) = (width as f64, height as f64);

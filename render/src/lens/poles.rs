@@ -2,13 +2,13 @@
 //! one ends the lens.
 //!
 //! A calibration that fits k4 to k6 has more numbers than the lens needs. The surplus makes pairs of a pole and a zero beside
-//! it, also where the picture is: the factory's calibrations of OAK-D cameras have such pairs, and 18 of 57 fits of
+//! it, also where the image is: the factory's calibrations of OAK-D cameras have such pairs, and 18 of 57 fits of
 //! `cv2.calibrateCamera` to simulated points with a quarter pixel of noise had. (OpenCV, issue 15577, "Ill-defined distortion model
 //! found by calibrateCamera".)
 //!
-//! Beside a pole at the tangent p, the picture's radius R of a ray at the tangent r is about c + m (r - p) - e / (r - p): with
+//! Beside a pole at the tangent p, the image's radius R of a ray at the tangent r is about c + m (r - p) - e / (r - p): with
 //! the pole before the zero (e > 0) both sides reach every radius, so that a pixel has two directions; behind it (e < 0) there
-//! is a ring of the picture that no direction reaches. Either is so within sqrt(|e| / m) of the pole. A little beyond, where the
+//! is a ring of the image that no direction reaches. Either is so within sqrt(|e| / m) of the pole. A little beyond, where the
 //! radius grows again as the lens has it, a bridge begins: there R is a straight line from one end to the other. All else is
 //! OpenCV's formula to the last digit.
 
@@ -45,7 +45,7 @@ impl Fraction {
         (g, ((k1 + s * (2.0 * k2 + s * 3.0 * k3)) - g * (k4 + s * (2.0 * k5 + s * 3.0 * k6))) / below)
     }
 
-    /// The picture's radius at a tangent r, and its slope by r.
+    /// The image's radius at a tangent r, and its slope by r.
     fn radius(&self, r: f64) -> (f64, f64) {
         let (g, slope) = self.at(r * r);
         (r * g, g + 2.0 * r * r * slope)
@@ -82,7 +82,7 @@ impl Fraction {
     }
 }
 
-/// Where the picture's radius is a straight line.
+/// Where the image's radius is a straight line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bridge {
     /// The tangents of its ends.
@@ -111,7 +111,7 @@ impl Bridge {
 pub(super) struct End {
     /// The last angle with the optical axis \[rad\].
     pub(super) angle: f64,
-    /// Whether the picture has no end there.
+    /// Whether the image has no end there.
     pub(super) endless: bool,
 }
 
@@ -141,7 +141,7 @@ impl Poles {
         poles
     }
 
-    /// The end that a pole at s is. Where no zero follows it, the picture grows to it without end. With a zero up to `far`
+    /// The end that a pole at s is. Where no zero follows it, the image grows to it without end. With a zero up to `far`
     /// there are directions on the other side, too, for each pixel; the pixels from the axis on are those that would be before
     /// the pole if neither were there.
     fn end_before(&self, fraction: &Fraction, pole: f64, far: f64) -> End {

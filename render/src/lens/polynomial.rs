@@ -1,6 +1,6 @@
 //! Polynomials of one number, lowest coefficient first.
 
-/// Halvings of an interval: after so many the ends are neighbouring numbers.
+/// Halvings of an interval: after so many the ends are neighboring numbers.
 const HALVINGS: usize = 200;
 
 /// The value at x.
@@ -13,7 +13,7 @@ pub(super) fn derivative(coefficients: &[f64]) -> Vec<f64> {
     coefficients.iter().enumerate().skip(1).map(|(k, c)| k as f64 * c).collect()
 }
 
-/// Where the sign changes between `from` and `to`, in order. Between two neighbouring ones, or the ends, there is at most one,
+/// Where the sign changes between `from` and `to`, in order. Between two neighboring ones, or the ends, there is at most one,
 /// for the derivative's are known. A root where the sign stays is none.
 pub(super) fn sign_changes(coefficients: &[f64], from: f64, to: f64) -> Vec<f64> {
     let used = coefficients.iter().rposition(|&c| c != 0.0).map_or(0, |last| last + 1);

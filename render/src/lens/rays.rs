@@ -1,4 +1,4 @@
-//! The rays of all samples of a picture behind a lens: computed once, for all pictures of the same lens.
+//! The rays of all samples of a image behind a lens: computed once, for all images of the same lens.
 
 use super::Optics;
 use crate::optics_error::OpticsError;
@@ -12,21 +12,21 @@ const GROUP: usize = 3 * LANES;
 /// Cones are wider by this \[rad\]: more than what is lost by single precision.
 const WIDER: f64 = 1e-5;
 
-/// The rays of a picture behind a lens, single precision; see [`Shot::lens`](crate::request::Shot::lens).
+/// The rays of a image behind a lens, single precision; see [`Shot::lens`](crate::request::Shot::lens).
 ///
-/// It takes 12 bytes for each pixel, 60 where colours have four samples besides, 4 more where there is vignetting, and is
+/// It takes 12 bytes for each pixel, 60 where colors have four samples besides, 4 more where there is vignetting, and is
 /// computed once: cameras keep one for each kind of lens and intrinsics among their environments.
 #[derive(Clone)]
 pub struct LensRays {
     optics: Optics,
     size: [usize; 2],
-    /// Samples of a pixel: its centre, or all of [`SAMPLES`].
+    /// Samples of a pixel: its center, or all of [`SAMPLES`].
     planes: usize,
     /// Plane after plane, pairs of rows from the top, groups from the left; 0 where there is no ray. Length 1, or z = 1.
     directions: Vec<f32>,
     /// What each block of 8 x 8 pixels sees, row by row.
     cones: Vec<Cone>,
-    /// Distance of the rays of neighbouring pixels, where they are as long as they are kept: a mean.
+    /// Distance of the rays of neighboring pixels, where they are as long as they are kept: a mean.
     pixel: f64,
     /// Of each pixel, row by row, once somebody asks for one; see [`Optics::falloff`].
     falloff: OnceLock<Vec<f32>>,
@@ -70,8 +70,8 @@ impl Sight {
 }
 
 impl LensRays {
-    /// The rays of a picture of `width` by `height` pixels: one through the middle of each, and with `samples` 4 those of
-    /// its other four colour samples.
+    /// The rays of a image of `width` by `height` pixels: one through the middle of each, and with `samples` 4 those of
+    /// its other four color samples.
     ///
     /// # Errors
     ///
@@ -121,7 +121,7 @@ impl LensRays {
         self.size
     }
 
-    /// Samples of a pixel: 1, or 4 if colours have four besides the centre.
+    /// Samples of a pixel: 1, or 4 if colors have four besides the center.
     pub fn samples(&self) -> u8 {
         if self.planes > 1 { 4 } else { 1 }
     }
@@ -132,7 +132,7 @@ impl LensRays {
         size_of::<f32>() * numbers + size_of::<Cone>() * self.cones.capacity()
     }
 
-    /// The memory of rays for a picture \[bytes\], before it is taken.
+    /// The memory of rays for a image \[bytes\], before it is taken.
     pub(crate) fn bytes_of([width, height]: [usize; 2], samples: u8) -> usize {
         let blocks = width.div_ceil(BLOCK).saturating_mul(height.div_ceil(BLOCK));
         let planes = if samples == 4 { SAMPLES.len() } else { 1 };
@@ -145,7 +145,7 @@ impl LensRays {
         self.optics.lens().is_forward()
     }
 
-    /// About how far the rays of neighbouring pixels are apart, where they are as long as they are kept.
+    /// About how far the rays of neighboring pixels are apart, where they are as long as they are kept.
     pub(crate) fn pixel(&self) -> f64 {
         self.pixel
     }
@@ -172,7 +172,7 @@ impl LensRays {
         [0, 1, 2].map(|axis| self.directions[group + axis * LANES + lane])
     }
 
-    /// How much of the light of the optical axis falls on a pixel: `Optics::falloff` of its centre.
+    /// How much of the light of the optical axis falls on a pixel: `Optics::falloff` of its center.
     pub fn falloff(&self, [x, y]: [usize; 2]) -> f64 {
         let all = self.falloff.get_or_init(|| {
             let [width, height] = self.size;
@@ -183,7 +183,7 @@ impl LensRays {
         f64::from(all[y * self.size[0] + x])
     }
 
-    /// The rays of the centres of 8 x 2 pixels, of which this is the first.
+    /// The rays of the centers of 8 x 2 pixels, of which this is the first.
     #[inline(always)]
     pub(crate) fn of_pixels<S: Simd>(&self, s: S, at: [usize; 2]) -> V3<S> {
         let group = &self.directions[self.place(0, at).0..];
@@ -240,7 +240,7 @@ impl LensRays {
         Cone { axis, cosine: angle.cos(), sine: angle.sin().max(0.0) }
     }
 
-    /// The mean distance of the rays of neighbouring pixels, in a row or in a column, whichever is larger; `None` where there
+    /// The mean distance of the rays of neighboring pixels, in a row or in a column, whichever is larger; `None` where there
     /// is no ray.
     fn spacing(&self) -> Option<f64> {
         let [width, height] = self.size;

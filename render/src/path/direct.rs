@@ -1,4 +1,4 @@
-//! Light that comes to a point straight from lamps and from what glows.
+//! Light that comes to a point straight from lights and from what glows.
 
 use super::point::Point;
 use super::{Path, Paths, SCATTERED, above, times};
@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 const GLOWING: u32 = 1 << 29;
 
 impl Paths<'_> {
-    /// What a point sends to `o` of the lamps' light.
+    /// What a point sends to `o` of the lights' light.
     #[inline(always)]
     pub(super) fn lit<S: Simd>(&self, s: S, point: &Point, o: V3, path: &mut Path<'_>, dims: u32) -> V3 {
         let basis = Basis::of(point.normal);

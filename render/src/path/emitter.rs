@@ -153,7 +153,7 @@ impl Emitters {
     }
 }
 
-/// How much it glows, for its colour.
+/// How much it glows, for its color.
 fn strength(instance: &Instance) -> f64 {
     let material = &instance.material;
     let part = |x: f32| f64::from(x.clamp(0.0, 1.0));

@@ -37,7 +37,7 @@ pub(super) struct First {
     pub(super) travelled: f64,
     /// How far it goes \[m\].
     pub(super) limit: f64,
-    /// How wide a pixel is where it begins, and how much wider it gets by the metre.
+    /// How wide a pixel is where it begins, and how much wider it gets by the meter.
     pub(super) width: f64,
     pub(super) spread: f64,
 }
@@ -51,7 +51,7 @@ impl Pupil {
 }
 
 impl Eye<'_> {
-    /// The ray through a point of the picture and the point of the opening that two numbers in 0..1 choose, of a camera at
+    /// The ray through a point of the image and the point of the opening that two numbers in 0..1 choose, of a camera at
     /// `pose`; `None` outside of the image circle.
     pub(super) fn look(&self, [u, v]: [f64; 2], pose: &PoseF64, choice: impl Fn() -> [f64; 2]) -> Option<First> {
         let (view, wide) = (self.projection, f64::from);

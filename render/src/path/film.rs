@@ -1,4 +1,4 @@
-//! The colours of a picture while its paths are followed: one row of memory per row of pixels, so that threads share it.
+//! The colors of a image while its paths are followed: one row of memory per row of pixels, so that threads share it.
 
 use super::smooth::Guide;
 use super::{Found, Lamps, Paths};
@@ -10,7 +10,7 @@ use crate::simd::{LANES, Level, Simd, at_level, load};
 /// Light that is brighter is not told apart from this: sums of some dozen of its squares are numbers of single precision.
 const BRIGHTEST: f32 = 1e18;
 
-/// A picture in linear light; keeps its memory.
+/// A image in linear light; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub struct Film {
     pub(crate) width: usize,
@@ -41,7 +41,7 @@ pub(crate) struct Rows<'a> {
 }
 
 impl Film {
-    /// Memory for a pixel of a picture, with or without smoothing.
+    /// Memory for a pixel of a image, with or without smoothing.
     pub const fn bytes_per_pixel(smooth: bool) -> usize {
         if smooth { 2 * size_of::<Pixel>() + size_of::<Guide>() } else { size_of::<Pixel>() }
     }
@@ -52,7 +52,7 @@ impl Film {
             + self.lamps.bytes()
     }
 
-    /// Memory for a picture.
+    /// Memory for a image.
     pub(crate) fn resize(&mut self, [width, height]: [usize; 2], smooth: bool) {
         self.width = width;
         let count = width * height;
@@ -61,7 +61,7 @@ impl Film {
         self.next.resize(if smooth { count } else { 0 }, Pixel::default());
     }
 
-    /// The film in parts of some rows, and its lamps.
+    /// The film in parts of some rows, and its lights.
     pub(crate) fn rows(&mut self, rows: usize) -> (&Lamps, impl Iterator<Item = Rows<'_>>) {
         let size = (self.width * rows).max(1);
         let (parts, mut guides) = (self.pixels.chunks_mut(size).enumerate(), self.guides.chunks_mut(size));
@@ -71,7 +71,7 @@ impl Film {
 }
 
 impl Rows<'_> {
-    /// Follows the paths of all pixels, until it is broken off; whether it was not. With `smooth` the colour of surfaces is
+    /// Follows the paths of all pixels, until it is broken off; whether it was not. With `smooth` the color of surfaces is
     /// divided out.
     pub(crate) fn expose(
         &mut self,
@@ -119,7 +119,7 @@ impl Rows<'_> {
     }
 }
 
-/// Colours for the screen, of as many pixels as there are; where there are guides the colour of surfaces is multiplied again.
+/// Colors for the screen, of as many pixels as there are; where there are guides the color of surfaces is multiplied again.
 /// Light is multiplied by `exposure` before the tone curve.
 pub(crate) fn develop(
     level: Level,

@@ -1,4 +1,4 @@
-//! Lamps, as paths see them.
+//! Lights, as paths see them.
 
 use kinetoscope_scene::basis::Basis;
 
@@ -8,7 +8,7 @@ use kinetoscope_scene::sampling::on_disc;
 use kinetoscope_scene::vector::{V3, along, dot, scale, sub, to_f64, unit};
 use kinetoscope_scene::{Light, LightKind};
 
-/// A lamp of a frame.
+/// A light of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lamp {
     kind: LightKind,
@@ -23,12 +23,12 @@ pub(super) struct Lamp {
     pub(super) diffuse: V3,
     pub(super) specular: V3,
     pub(super) cast_shadow: bool,
-    /// Of a lamp at a camera: where the camera looks, and the depth that it sees from \[m\]. Without a direction that is a
+    /// Of a light at a camera: where the camera looks, and the depth that it sees from \[m\]. Without a direction that is a
     /// distance.
     sight: Option<(Option<V3>, f64)>,
 }
 
-/// Light from a lamp at a point.
+/// Light from a light at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Incoming {
     /// Unit vector to where it comes from.
@@ -40,7 +40,7 @@ pub(super) struct Incoming {
 }
 
 impl Incoming {
-    /// Light that was asked for at one point, asked for at another beside it: the same point of the lamp, where it is from there
+    /// Light that was asked for at one point, asked for at another beside it: the same point of the light, where it is from there
     /// and how far.
     pub(super) fn seen_from(&self, asked: V3, origin: V3) -> (V3, f64) {
         if !(self.distance.is_finite() && self.distance > 0.0) {
@@ -75,7 +75,7 @@ impl Lamp {
         }
     }
 
-    /// A lamp at a camera.
+    /// A light at a camera.
     pub(super) fn of_camera(headlight: &kinetoscope_scene::Headlight, view: &Projection, along_axis: bool) -> Self {
         let light = Light {
             kind: LightKind::Point,
@@ -89,7 +89,7 @@ impl Lamp {
         Self { position: to_f64(position), sight, ..Self::new(&light) }
     }
 
-    /// Light at `point` from the point of the lamp's disc that two numbers in 0..1 choose; `None` where none arrives.
+    /// Light at `point` from the point of the light's disc that two numbers in 0..1 choose; `None` where none arrives.
     pub(super) fn at(&self, point: V3, choice: [f64; 2]) -> Option<Incoming> {
         if self.kind == LightKind::Directional {
             let toward = scale(self.along, -1.0);

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 /// How a point scatters.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lobe {
-    /// The colour of the surface.
+    /// The color of the surface.
     pub(super) albedo: V3,
     /// What is scattered below the layer: nothing of a metal.
     pub(super) body: V3,
@@ -172,7 +172,7 @@ impl Lobe {
         let lobe = lobe - self.mirror;
         if lobe < self.glass {
             let (mirrored, through) = self.bent(o);
-            // What goes in takes the colour.
+            // What goes in takes the color.
             let tint = if self.front { self.albedo } else { [1.0; 3] };
             let (direction, weight) = match through {
                 Some(through) if lobe >= mirrored * self.glass => (through, tint),
@@ -295,7 +295,7 @@ mod tests {
         }
     }
 
-    /// Of light along the normal a smooth metal mirrors its colour, and nothing else; half a metal as the mean of both says.
+    /// Of light along the normal a smooth metal mirrors its color, and nothing else; half a metal as the mean of both says.
     #[test]
     fn metals() {
         let gold = [1.0, 0.77, 0.34];
@@ -310,7 +310,7 @@ mod tests {
             // below alpha²/2. The net is good to a thousandth.
             assert!((metal[c] - gold[c]).abs() < 2e-3, "{metal:?}");
         }
-        // The control: without metal, the layer reflects 0.04 of all colours, and of what is below 0.96 times what it lets out.
+        // The control: without metal, the layer reflects 0.04 of all colors, and of what is below 0.96 times what it lets out.
         let plain = returned(0.0);
         assert!((plain[2] - metal[2]).abs() < 0.1 && (plain[0] - metal[0]).abs() > 0.02, "{plain:?}");
     }
@@ -350,7 +350,7 @@ mod tests {
         let air = Lobe::new(&Material { refractive_index: 1.0, ..glass.clone() }, 0.0, [1.0; 3], true);
         let straight = air.choose([0.6, 0.0, 0.8], 1e-9, [0.5; 2]).unwrap().direction;
         assert!((straight[0] + 0.6).abs() < 1e-15 && (straight[2] + 0.8).abs() < 1e-15, "{straight:?}");
-        // But for its colour.
+        // But for its color.
         let coloured = Lobe::new(&Material { refractive_index: 1.0, ..glass }, 0.0, [0.3; 3], true);
         assert_eq!(coloured.choose([0.6, 0.0, 0.8], 0.5, [0.5; 2]).unwrap().weight, [0.3; 3]);
     }

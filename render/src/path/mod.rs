@@ -1,7 +1,7 @@
-//! Colours by path tracing: light is followed backward from the camera.
+//! Colors by path tracing: light is followed backward from the camera.
 //!
-//! At every surface all lamps are asked for their light (one shadow ray each), and one direction is chosen by the surface's
-//! own law; what is met there sends its emission, what is not met the dome's light. So lamps are met by shadow rays only, the
+//! At every surface all lights are asked for their light (one shadow ray each), and one direction is chosen by the surface's
+//! own law; what is met there sends its emission, what is not met the dome's light. So lights are met by shadow rays only, the
 //! dome by paths only: nothing counts twice. Surfaces that glow are met in both ways, each of which has its share of the light
 //! (`emitter`). Later bounces end by Russian roulette. Source: Kajiya, The rendering equation, 1986; the conventions of
 //! light are those of [`Renderer`](crate::renderer::Renderer).
@@ -38,7 +38,7 @@ use point::Point;
 use sobol::{Sample, Sequence};
 use std::sync::Arc;
 
-/// Lamps that are asked, at most; the camera's comes besides.
+/// Lights that are asked, at most; the camera's comes besides.
 const MAX_LAMPS: usize = crate::shade::light::MAX_LIGHTS;
 /// Paths begin this part of their coordinates above a surface.
 const ABOVE: f64 = 1e-7;
@@ -46,20 +46,20 @@ const ABOVE: f64 = 1e-7;
 const SURE: u32 = 2;
 /// Surfaces that are not opaque that a path goes through, at most.
 const MAX_PASSES: u32 = 64;
-/// How much wider by the metre what is seen together gets where light is scattered, at least.
+/// How much wider by the meter what is seen together gets where light is scattered, at least.
 const SCATTERED: f64 = 0.1;
 /// Pairs of numbers: in the pixel, and at each surface where to go on, which lobe and whether at all, whether through.
 const IN_PIXEL: u32 = 0;
 const ONWARD: u32 = 1;
 const CHANCE: u32 = 2;
 const THROUGH: u32 = 3;
-/// Pairs of each surface: those, and one for each lamp.
+/// Pairs of each surface: those, and one for each light.
 const PAIRS: u32 = 4 + MAX_LAMPS as u32;
 /// Far beyond those: the point of the lens's opening, and the instant.
 const ON_LENS: u32 = 1 << 30;
 const INSTANT: u32 = (1 << 30) + 1;
 
-/// What the paths of a picture have in common.
+/// What the paths of a image have in common.
 #[derive(Clone, Debug)]
 pub(crate) struct Paths<'a> {
     pub(crate) scene: &'a RenderScene,
@@ -131,7 +131,7 @@ pub(crate) struct Lamps {
 }
 
 impl Lamps {
-    /// Prepares the light. `shadows` is whether lamps cast any, `view` where the camera is, `forward` whether it counts near
+    /// Prepares the light. `shadows` is whether lights cast any, `view` where the camera is, `forward` whether it counts near
     /// along its axis.
     pub(crate) fn prepare(
         &mut self,
@@ -194,8 +194,8 @@ pub(crate) struct Found {
     /// Variance of the mean of the brightness, from its samples as if they did not depend on each other: more than it is.
     /// 0 of one sample.
     pub(crate) variance: f64,
-    /// Means over what is seen: colour of the surface (1 for mirrors and sky), the part of its light that is mirrored rather than
-    /// coloured, normal, distance (0 for the sky).
+    /// Means over what is seen: color of the surface (1 for mirrors and sky), the part of its light that is mirrored rather than
+    /// colored, normal, distance (0 for the sky).
     pub(crate) albedo: V3,
     pub(crate) gloss: f64,
     pub(crate) normal: V3,
@@ -237,7 +237,7 @@ impl Paths<'_> {
             let mut path = Path { sample, time, rays: 0, stack: &mut *stack };
             let (color, first) = self.radiance(s, &mut path, [at[0] as f64 + dx, at[1] as f64 + dy]);
             out.rays += path.rays;
-            // Lamps and skies may be anything; what is no number would spread over its neighbours.
+            // Lights and skies may be anything; what is no number would spread over its neighbors.
             let color = if color.iter().all(|x| x.is_finite()) { color } else { [0.0; 3] };
             let bright = brightness(color);
             squares += bright * bright / n;
@@ -260,7 +260,7 @@ impl Paths<'_> {
         }
     }
 
-    /// The light that comes to a point of the picture, and what is seen there.
+    /// The light that comes to a point of the image, and what is seen there.
     #[inline(always)]
     fn radiance<S: Simd>(&self, s: S, path: &mut Path<'_>, at: [f64; 2]) -> (V3, First) {
         let (sample, time) = (path.sample, path.time);
@@ -368,7 +368,7 @@ fn add(a: V3, b: V3) -> V3 {
     [0, 1, 2].map(|k| a[k] + b[k])
 }
 
-/// How bright a colour is. Source: ITU-R BT.709.
+/// How bright a color is. Source: ITU-R BT.709.
 fn brightness([r, g, b]: V3) -> f64 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }

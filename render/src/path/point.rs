@@ -68,7 +68,7 @@ fn mirrors(instance: &Instance, hit: &Hit) -> bool {
     !matches!(instance.shape, Shape::Box(_)) || dot(hit.normal, up) > 0.5
 }
 
-/// Linear colour of an instance's texture.
+/// Linear color of an instance's texture.
 fn texture(
     scene: &RenderScene,
     index: usize,

@@ -1,5 +1,5 @@
 //! Smooths noise: a few passes of a small filter with holes, each twice as wide as the one before, that does not blend across
-//! edges of normals, of depth or of light brighter than its own noise. Colours of surfaces were divided out before, so that they stay
+//! edges of normals, of depth or of light brighter than its own noise. Colors of surfaces were divided out before, so that they stay
 //! as they are; where some of the light is mirrored, which does not have them, their edges are edges too.
 //!
 //! Sources: Dammertz et al., Edge-avoiding à-trous wavelet transform for fast global illumination filtering, HPG 2010; the
@@ -120,7 +120,7 @@ fn light(pixel: &Pixel) -> f32 {
     brightness(pixel.color.map(f64::from)) as f32
 }
 
-/// The mean variance of a pixel and its neighbours: that of one is itself noise.
+/// The mean variance of a pixel and its neighbors: that of one is itself noise.
 fn around(from: &[Pixel], [width, height]: [usize; 2], [x, y]: [isize; 2]) -> f32 {
     let (mut sum, mut count) = (0.0, 0.0);
     for j in -1..=1 {

@@ -53,7 +53,7 @@ fn second(mut first: u32) -> u32 {
 }
 
 impl Sequence {
-    /// Of a pixel, in pictures of a seed.
+    /// Of a pixel, in images of a seed.
     pub(crate) fn new([x, y]: [usize; 2], seed: u32) -> Self {
         Self { seed: combine(combine(mix(seed), x as u32), y as u32) }
     }

@@ -118,7 +118,7 @@ fn glass_of(alpha: f32) -> Material {
 
 const ONE: [PoseF32; 1] = [PoseF32::IDENTITY];
 
-/// White furnace: a convex object of albedo a reflects a times the light that is everywhere. To the last digits, for every
+/// White furnace: a convex object of albedo a reflects a times the light that is everywhere. To the last digits, forevery
 /// path does.
 #[test]
 fn matt_in_furnace() {

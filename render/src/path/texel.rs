@@ -1,10 +1,10 @@
-//! Colours of textures at one point: bilinear within the level that is as fine as asked.
+//! Colors of textures at one point: bilinear within the level that is as fine as asked.
 
 use kinetoscope_scene::Level;
 use kinetoscope_scene::Texture;
 use kinetoscope_scene::vector::V3;
 
-/// Linear colour at (u, v), v upward, where `footprint` texture coordinates are seen together.
+/// Linear color at (u, v), v upward, where `footprint` texture coordinates are seen together.
 pub(super) fn at(texture: &Texture, [u, v]: [f64; 2], footprint: f64) -> V3 {
     let first = &texture.levels()[0];
     let level = level(texture, footprint * f64::from(first.width().max(first.height())));
@@ -14,7 +14,7 @@ pub(super) fn at(texture: &Texture, [u, v]: [f64; 2], footprint: f64) -> V3 {
     bilinear(level, wrap(part(u) * w - 0.5, w), wrap((1.0 - part(v)) * h - 0.5, h))
 }
 
-/// Linear colour in a direction of a cube texture, where `footprint` is seen together on a cube of half length 1.
+/// Linear color in a direction of a cube texture, where `footprint` is seen together on a cube of half length 1.
 pub(super) fn at_cube(texture: &Texture, d: V3, footprint: f64) -> V3 {
     let level = level(texture, footprint * 0.5 * f64::from(texture.levels()[0].width()));
     let [ax, ay, az] = d.map(f64::abs);

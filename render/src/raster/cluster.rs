@@ -71,7 +71,7 @@ pub(crate) fn draw<S: Simd>(
         let double = |a: [i32; 2], b: [i32; 2]| i64::from(a[0]) * i64::from(b[1]) - i64::from(a[1]) * i64::from(b[0]);
         let edge = |k: usize| [p[k][0] - p[0][0], p[k][1] - p[0][1]];
         let area = double(edge(1), edge(2));
-        // The picture's y points down, so fronts turn clockwise in its numbers: negative.
+        // The image's y points down, so fronts turn clockwise in its numbers: negative.
         if area == 0 || (area > 0 && pass.cull) {
             continue;
         }
@@ -133,7 +133,7 @@ fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 }
 
 /// The plane of a triangle, from its unsnapped corners. A ray (x, y, 1) meets the plane n·p = d at the nearness
-/// 1/z = n·(x, y, 1) / d, which is linear in the pixels. `at` is where the first corner is in the picture, `polygon` the
+/// 1/z = n·(x, y, 1) / d, which is linear in the pixels. `at` is where the first corner is in the image, `polygon` the
 /// nearness of the corners that are drawn, that one first.
 #[inline(always)]
 fn gradient(projection: &Projection, p: [[f32; 3]; 3], at: [f32; 2], polygon: &[f32]) -> Gradient {
@@ -155,7 +155,7 @@ fn gradient(projection: &Projection, p: [[f32; 3]; 3], at: [f32; 2], polygon: &[
 }
 
 /// A triangle that leaves the guard band or comes too near: clipped to a polygon of at most eight corners, drawn as a fan.
-/// Corners are cut from the inside to the outside, so both neighbours of an edge get the same point.
+/// Corners are cut from the inside to the outside, so both neighbors of an edge get the same point.
 #[inline(never)]
 fn clipped<S: Simd>(s: S, tile: &mut Tile, v: &Vertices, corners: [usize; 3], pass: &Pass<'_>, id: u32) {
     let projection = pass.projection;

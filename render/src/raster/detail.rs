@@ -10,7 +10,7 @@ const DISTANCE: f32 = 1e-3;
 const PIXELS: f32 = 0.5;
 
 /// The number of the coarsest level of an instance's mesh that may be drawn instead of it: its surface is nowhere farther
-/// from the mesh than [`DISTANCE`], and than [`PIXELS`] anywhere in the picture. 0 is the mesh itself. Depends on the
+/// from the mesh than [`DISTANCE`], and than [`PIXELS`] anywhere in the image. 0 is the mesh itself. Depends on the
 /// instance, its pose and the projection only.
 ///
 /// Terrain is drawn as it is: cameras stand on it.
@@ -70,7 +70,7 @@ mod tests {
             let z = f64::from(distance) - 0.3;
             let f = [250.0, 310.0];
             let at = |p: [f64; 3]| [f[0] * p[0] / p[2] + 120.0, f[1] * p[1] / p[2] + 90.0];
-            // The nearest point that is seen in the farthest corner of the picture, moved in every direction.
+            // The nearest point that is seen in the farthest corner of the image, moved in every direction.
             let p = [200.0 / f[0] * z, 110.0 / f[1] * z, z];
             let steps = 64;
             for i in 0..steps * steps {

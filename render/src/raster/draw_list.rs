@@ -1,4 +1,4 @@
-//! What is drawn in a frame, in which order, and where in the picture.
+//! What is drawn in a frame, in which order, and where in the image.
 
 use super::detail;
 use super::tile::BLOCK;
@@ -52,7 +52,7 @@ pub enum Layer {
     Hidden,
     /// Seen by all channels.
     Opaque,
-    /// Blended into the colour, and seen by the other channels.
+    /// Blended into the color, and seen by the other channels.
     Veil,
 }
 
@@ -108,7 +108,7 @@ impl DrawList {
             + self.blended.capacity() * size_of::<(Layer, Item)>()
     }
 
-    /// Empties the list, with room for everything that is kept: what is seen changes from frame to frame, and memory must not
+    /// Empties the list, with room foreverything that is kept: what is seen changes from frame to frame, and memory must not
     /// grow with it.
     pub(crate) fn reserve(&mut self, scene: &RenderScene, parts: Parts, keep: impl Fn(&Instance) -> Layer) {
         self.placed.clear();
@@ -129,7 +129,7 @@ impl DrawList {
         self.blended.reserve_exact(blended);
     }
 
-    /// Finds what may be seen. `keep` tells instances apart. Behind a lens anything may be anywhere in the picture.
+    /// Finds what may be seen. `keep` tells instances apart. Behind a lens anything may be anywhere in the image.
     pub(crate) fn build(
         &mut self,
         projection: &Projection,
@@ -304,7 +304,7 @@ fn everywhere(projection: &Projection) -> [u16; 4] {
     [0, 0, ((projection.width - 1) / BLOCK) as u16, ((projection.height - 1) / BLOCK) as u16]
 }
 
-/// The blocks of a rectangle \[pixels\], one pixel wider on each side; `None` outside of the picture.
+/// The blocks of a rectangle \[pixels\], one pixel wider on each side; `None` outside of the image.
 fn blocks(projection: &Projection, lo: [f32; 2], hi: [f32; 2]) -> Option<[u16; 4]> {
     let size = [projection.width as f32, projection.height as f32];
     if (0..2).any(|k| hi[k] + 1.0 < 0.0 || lo[k] - 1.0 > size[k]) {

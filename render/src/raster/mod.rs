@@ -1,7 +1,7 @@
 //! The tile rasterizer: fills a visibility buffer with the nearest surface at every sample.
 //!
 //! Meshes are drawn triangle by triangle, shapes with a closed form by casting the rays of the pixels they may cover, endless
-//! planes by their nearness, which is linear in the picture. The picture is drawn in bands that stay in the cache; things are
+//! planes by their nearness, which is linear in the image. The image is drawn in bands that stay in the cache; things are
 //! drawn front to back, and blocks that are full of nearer things are skipped.
 
 mod cluster;
@@ -88,8 +88,8 @@ fn is_floor(shape: &Shape, projection: &Projection) -> bool {
     matches!(shape, Shape::Plane(plane) if plane.half == [0.0; 2]) && !projection.parallel
 }
 
-/// An endless plane, whose nearness is linear in the picture: 1/z = -d.z / o.z, where a ray d from the camera o goes down
-/// in the plane's frame. Most pictures are full of one.
+/// An endless plane, whose nearness is linear in the image: 1/z = -d.z / o.z, where a ray d from the camera o goes down
+/// in the plane's frame. Most images are full of one.
 #[inline(always)]
 fn draw_floor<S: Simd>(
     s: S,

@@ -1,4 +1,4 @@
-//! The visibility buffer: nearness and id of the nearest surface, for a part of the picture.
+//! The visibility buffer: nearness and id of the nearest surface, for a part of the image.
 
 /// Pixels along the side of a block.
 pub(crate) const BLOCK: usize = 8;
@@ -7,13 +7,13 @@ pub(crate) const AREA: usize = BLOCK * BLOCK;
 /// The id where nothing is.
 pub(crate) const NOTHING: u32 = u32::MAX;
 
-/// Where the samples of a pixel are, from its centre, in 1/256 pixel. The first is the centre, which all channels but the
-/// colour see; the other four are the rotated grid that graphics cards use.
+/// Where the samples of a pixel are, from its center, in 1/256 pixel. The first is the center, which all channels but the
+/// color see; the other four are the rotated grid that graphics cards use.
 pub(crate) const SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, -96], [96, -32], [-96, 32], [32, 96]];
 /// The largest offset of a sample.
 pub(crate) const REACH: i32 = 96;
 
-/// A rectangle of 8x8 blocks of the picture. Within a block, samples of one kind are together: `[block][plane][64]`.
+/// A rectangle of 8x8 blocks of the image. Within a block, samples of one kind are together: `[block][plane][64]`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tile {
     /// The first pixel; a multiple of [`BLOCK`].
@@ -120,7 +120,7 @@ impl Tile {
             + self.fresh.capacity()
     }
 
-    /// The block with the pixel (8 bx, 8 by) of the picture.
+    /// The block with the pixel (8 bx, 8 by) of the image.
     #[inline(always)]
     pub(crate) fn block(&self, bx: usize, by: usize) -> usize {
         (by - self.y0 / BLOCK) * self.blocks_x + bx - self.x0 / BLOCK

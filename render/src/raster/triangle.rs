@@ -17,10 +17,10 @@ pub(crate) const GUARD: f32 = 16000.0;
 /// Sub-pixel positions per pixel.
 pub(crate) const SUB: f32 = 256.0;
 
-/// How the nearness of a plane changes over the picture, and between which values it stays on the triangle.
+/// How the nearness of a plane changes over the image, and between which values it stays on the triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gradient {
-    /// A point of the picture \[pixels\] and the nearness there.
+    /// A point of the image \[pixels\] and the nearness there.
     pub(crate) at: [f32; 3],
     /// Change per pixel.
     pub(crate) step: [f32; 2],

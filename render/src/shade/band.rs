@@ -1,4 +1,4 @@
-//! A band of a picture: from what is drawn where to the pixels of all channels.
+//! A band of a image: from what is drawn where to the pixels of all channels.
 
 use super::group::{At, Colors, resolve};
 use super::multisample::{Edges, blend};
@@ -25,7 +25,7 @@ pub(crate) struct Brush {
     layer: Tile,
     veiled: Tile,
     painter: Painter,
-    /// Of rays that are cast for a picture, and of those that are cast while it is shaded.
+    /// Of rays that are cast for a image, and of those that are cast while it is shaded.
     stack: Stack,
     shade_stack: Stack,
     colors: Vec<Colors>,
@@ -90,7 +90,7 @@ impl Brush {
         }
     }
 
-    /// Draws a band of the picture, where the tile is.
+    /// Draws a band of the image, where the tile is.
     #[inline(always)]
     fn band<S: Simd>(
         &mut self,
@@ -209,8 +209,8 @@ impl Brush {
     }
 }
 
-/// Groups of 8 x 2 pixels of a tile that are inside of the picture: block, pair of rows, first pixel. Along the rows, not
-/// block after block: then pictures are written in few places at a time, which the machine's prefetching keeps up with.
+/// Groups of 8 x 2 pixels of a tile that are inside of the image: block, pair of rows, first pixel. Along the rows, not
+/// block after block: then images are written in few places at a time, which the machine's prefetching keeps up with.
 #[inline(always)]
 fn groups(tile: &Tile, [width, height]: [usize; 2]) -> impl Iterator<Item = (usize, usize, [usize; 2])> + use<> {
     let (wide, high) = (tile.blocks_x, tile.blocks_y);
@@ -223,7 +223,7 @@ fn groups(tile: &Tile, [width, height]: [usize; 2]) -> impl Iterator<Item = (usi
     })
 }
 
-/// Writes a group into a frame whose first row is `top` of the picture.
+/// Writes a group into a frame whose first row is `top` of the image.
 #[inline(always)]
 fn write(
     frame: &mut FrameMut<'_>,

@@ -59,10 +59,10 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Linear colours of sixteen samples.
+/// Linear colors of sixteen samples.
 pub(crate) type Colors = [[f32; LANES]; 3];
 
-/// Where sixteen samples are in the picture.
+/// Where sixteen samples are in the image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum At<'a> {
     /// In the middle of 8 x 2 pixels, of which this is the first.
@@ -82,7 +82,7 @@ impl At<'_> {
     }
 }
 
-/// Resolves sixteen samples: geometry into `pixels`, colour into `colors`, each only if wanted.
+/// Resolves sixteen samples: geometry into `pixels`, color into `colors`, each only if wanted.
 ///
 /// One copy per instruction set, so its arguments are in memory.
 #[inline(never)]
@@ -217,7 +217,7 @@ fn resolve_lanes<S: Simd>(
     }
 }
 
-/// Some linear colours as bytes, opaque.
+/// Some linear colors as bytes, opaque.
 #[inline(always)]
 fn store_bytes<S: Simd>(s: S, color: V3<S>, lanes: M<S>, to: &mut [[u8; 4]; LANES]) {
     let (zero, one) = (splat(s, 0.0), splat(s, 1.0));

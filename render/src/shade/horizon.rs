@@ -1,7 +1,7 @@
 //! Haze at the end of an endless ground, as MuJoCo's renderer draws it: two cones around the camera that meet in the circle
-//! where the ground ends. Colours are mixed as numbers of the screen.
+//! where the ground ends. Colors are mixed as numbers of the screen.
 //!
-//! The formula was fitted to pictures of MuJoCo 4 on OSMesa. In a frame where the ground ends at the distance 1 and the camera
+//! The formula was fitted to images of MuJoCo 4 on OSMesa. In a frame where the ground ends at the distance 1 and the camera
 //! has the height 1, the lower cone goes from opaque at (1, 0) to clear at (1 - w², -w) for a width w, and the upper one to
 //! clear at (1 + w, 1).
 
@@ -18,7 +18,7 @@ pub(crate) struct Horizon {
     up: [f32; 3],
     /// Distance where the ground ends, in heights of the camera above it.
     radius: f32,
-    /// Colour, 0..=255.
+    /// Color, 0..=255.
     color: [f32; 3],
     width: f32,
 }

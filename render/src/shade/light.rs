@@ -1,4 +1,4 @@
-//! How much light of which colour a surface sends to the camera.
+//! How much light of which color a surface sends to the camera.
 
 use super::horizon::Horizon;
 use super::shadow::ShadowMap;
@@ -9,7 +9,7 @@ use crate::simd::{F, M, Simd, V3, abs, max, min, root, select, splat};
 use kinetoscope_scene::{Light, LightKind, LightSum, Material, RenderScene, Texture};
 use std::sync::Arc;
 
-/// The largest number of lamps that are drawn.
+/// The largest number of lights that are drawn.
 pub(crate) const MAX_LIGHTS: usize = 16;
 
 /// A light prepared for a frame.
@@ -23,7 +23,7 @@ struct Lamp {
     shadow: Option<usize>,
 }
 
-/// What colours need besides the surface, prepared once per frame.
+/// What colors need besides the surface, prepared once per frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lighting {
     lamps: Vec<Lamp>,
@@ -34,7 +34,7 @@ pub(crate) struct Lighting {
     haze: Option<[f32; 3]>,
     /// Haze at the end of the ground, where there is some.
     pub(crate) ground_haze: Option<Horizon>,
-    /// True if the headlight is one of the lamps: of MuJoCo's light it is directional.
+    /// True if the headlight is one of the lights: of MuJoCo's light it is directional.
     headlight_is_lamp: bool,
 }
 
@@ -76,7 +76,7 @@ pub(crate) fn cos_deg(deg: f32) -> f32 {
 }
 
 impl Lamp {
-    /// The direction to the lamp (unit) and how much of its light reaches points, without shadows; `None` where it lights
+    /// The direction to the light (unit) and how much of its light reaches points, without shadows; `None` where it lights
     /// none of them.
     #[inline(always)]
     fn reaches<S: Simd>(&self, s: S, position: V3<S>, lanes: M<S>) -> Option<(V3<S>, F<S>)> {
@@ -200,14 +200,14 @@ struct Gloss {
 }
 
 impl Gloss {
-    /// A metal mirrors lamps as it does everything, whatever `specular` says of what is not metal.
+    /// A metal mirrors lights as it does everything, whatever `specular` says of what is not metal.
     fn of(material: &Material, display: bool) -> Self {
         let exponent = (material.exponent() + 0.5) as u32;
         let strength = if material.metallic > 0.0 && !display { 1.0 } else { material.specular };
         Self { strength, exponent, faint: FAINT_ROOT[exponent as usize] }
     }
 
-    /// Whether it shines in a light of this colour.
+    /// Whether it shines in a light of this color.
     fn shows(&self, specular: [f32; 3]) -> bool {
         self.strength != 0.0 && specular.iter().any(|&x| x != 0.0)
     }
@@ -259,7 +259,7 @@ fn skybox<S: Simd>(s: S, image: &Texture, direction: V3<S>, pixel: f32) -> V3<S>
     )
 }
 
-/// The colour of a surface, linear. `tint` multiplies the colour of the surface, but not its highlights.
+/// The color of a surface, linear. `tint` multiplies the color of the surface, but not its highlights.
 #[inline(always)]
 pub(crate) fn shade<S: Simd>(
     s: S,
@@ -362,7 +362,7 @@ pub(crate) fn shade<S: Simd>(
         let sum = plain(gloss);
         V3 { x: display_light(s, sum.x), y: display_light(s, sum.y), z: display_light(s, sum.z) }
     } else if material.metallic > 0.0 {
-        // What it mirrors, in its colour, and its own light; of a scene without a mirror, the sky.
+        // What it mirrors, in its color, and its own light; of a scene without a mirror, the sky.
         let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)), pixel);
         let metal = V3 {
             x: base.x * (mirrored.x + gloss[0] + material.emission),
@@ -393,7 +393,7 @@ fn display_light<S: Simd>(s: S, x: F<S>) -> F<S> {
     tone::decode_bytes(min(max(x, splat(s, 0.0)), splat(s, 1.0)) * 255.0)
 }
 
-/// The colour of the surface itself, linear.
+/// The color of the surface itself, linear.
 #[inline(always)]
 pub(crate) fn albedo<S: Simd>(
     s: S,
@@ -413,7 +413,7 @@ pub(crate) fn albedo<S: Simd>(
     }
 }
 
-/// The colour of the surface itself, as numbers of the screen (sRGB, 0..=1).
+/// The color of the surface itself, as numbers of the screen (sRGB, 0..=1).
 #[inline(always)]
 fn display_albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixel: f32, lanes: M<S>) -> V3<S> {
     let [r, g, b, _] = source.instance.material.rgba;

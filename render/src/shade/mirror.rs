@@ -1,5 +1,5 @@
-//! Planar mirrors of pictures that are shaded without paths: one ray from each sample that shows a mirror, and the shading of
-//! the rasterizer where it ends. Mirrors in mirrors show their own colour.
+//! Planar mirrors of images that are shaded without paths: one ray from each sample that shows a mirror, and the shading of
+//! the rasterizer where it ends. Mirrors in mirrors show their own color.
 
 use super::group::{Colors, Context};
 use super::light::{ViewRays, shade, sky};
@@ -88,7 +88,7 @@ pub(crate) struct MirrorSamples<S: Simd> {
     pub(crate) view: V3<S>,
     /// Metres along the ray for each unit of the point's depth.
     pub(crate) length: F<S>,
-    /// The mirror's own colour.
+    /// The mirror's own color.
     pub(crate) color: V3<S>,
 }
 
@@ -174,10 +174,10 @@ impl Mirrors<'_> {
         index == self.first || index > self.first && !self.only_first && reflectance(instance) > 0.0
     }
 
-    /// The colour of a mirror with what it reflects.
+    /// The color of a mirror with what it reflects.
     ///
     /// Of linear light, `(1 - r) color + r mirrored`; the sky is mirrored, too. Of MuJoCo's, `color + mirrored` in numbers of the
-    /// screen, where the colours of surfaces, but not their highlights, are multiplied by r before they are lit; the sky is not
+    /// screen, where the colors of surfaces, but not their highlights, are multiplied by r before they are lit; the sky is not
     /// mirrored.
     #[inline(never)]
     pub(crate) fn reflect<S: Simd>(

@@ -1,4 +1,4 @@
-//! Where things were when the picture before was taken.
+//! Where things were when the image before was taken.
 
 use crate::intrinsics::PixelIntrinsics;
 use crate::lens::optics::Optics;
@@ -12,7 +12,7 @@ use kinetoscope_scene::PoseF32;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Moves {
     list: Vec<Move>,
-    /// Where the picture before saw what; `None` where there is none.
+    /// Where the image before saw what; `None` where there is none.
     eye: Option<Eye>,
 }
 
@@ -30,7 +30,7 @@ enum Eye {
 struct Move {
     /// Neither it nor the camera moved, and the lens is the same.
     still: bool,
-    /// The camera of the picture before, from the instance.
+    /// The camera of the image before, from the instance.
     camera_from_instance: PoseF32,
 }
 
@@ -43,7 +43,7 @@ impl Moves {
     ///
     /// # Errors
     ///
-    /// A picture before of another scene, or with a view or a pose that is no good.
+    /// A image before of another scene, or with a view or a pose that is no good.
     pub(crate) fn prepare(&mut self, shot: &Shot<'_>) -> Result<(), RenderError> {
         self.list.clear();
         self.eye = None;

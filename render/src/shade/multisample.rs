@@ -1,4 +1,4 @@
-//! Colours of pixels whose four samples do not see the same: the mean of the samples.
+//! Colors of pixels whose four samples do not see the same: the mean of the samples.
 
 use super::group::{At, Colors, Context, resolve};
 use crate::raster::tile::{BLOCK, NOTHING, SAMPLES, Tile};
@@ -7,7 +7,7 @@ use crate::simd::{LANES, Simd, load, load_u, splat_u, store};
 /// Requests that are resolved together, at most.
 const CAPACITY: usize = 1024;
 
-/// A colour to compute: for which pixel of which group, how many of its samples it stands for, where and of which id.
+/// A color to compute: for which pixel of which group, how many of its samples it stands for, where and of which id.
 #[derive(Clone, Copy, Debug)]
 struct Request {
     group: u32,
@@ -18,14 +18,14 @@ struct Request {
     v: f32,
 }
 
-/// Colours that pixels on edges still need. They are collected over many groups: there are few in each, and sixteen are
+/// Colors that pixels on edges still need. They are collected over many groups: there are few in each, and sixteen are
 /// computed at a time.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Edges {
     requests: Vec<Request>,
 }
 
-/// Whether two ids of one pixel look different enough to need a colour each.
+/// Whether two ids of one pixel look different enough to need a color each.
 #[inline(always)]
 fn differ(context: &Context<'_>, a: u32, b: u32, qa: f32, qb: f32, last: &mut usize) -> bool {
     if a == b {
@@ -40,7 +40,7 @@ fn differ(context: &Context<'_>, a: u32, b: u32, qa: f32, qb: f32, last: &mut us
         return true;
     }
     let Some(mesh) = context.placed[*last].mesh(&context.shade.scene.instances()[*last]) else { return true };
-    // Neighbouring triangles of a smooth surface look the same: same normal, same distance.
+    // Neighboring triangles of a smooth surface look the same: same normal, same distance.
     let corner = |id: u32| mesh.normals()[mesh.triangles()[(id - first[*last]) as usize][0] as usize];
     let (na, nb) = (corner(a), corner(b));
     let cosine = na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2];
@@ -52,13 +52,13 @@ impl Edges {
         self.requests.capacity() * size_of::<Request>()
     }
 
-    /// Takes the memory it will ever need: later pictures have more edges.
+    /// Takes the memory it will ever need: later images have more edges.
     pub(crate) fn reserve(&mut self) {
         self.requests.reserve_exact(CAPACITY - self.requests.len());
     }
 
-    /// Finds the pixels of a group (two rows of a block, `row` counts pairs) that lie on an edge. What their centre sees
-    /// keeps its share of the colour; the rest is added by [`resolve`](Self::resolve).
+    /// Finds the pixels of a group (two rows of a block, `row` counts pairs) that lie on an edge. What their center sees
+    /// keeps its share of the color; the rest is added by [`resolve`](Self::resolve).
     #[inline(always)]
     pub(crate) fn collect<S: Simd>(
         &mut self,

@@ -1,4 +1,4 @@
-//! What the parts of a picture have in common: what is drawn where, the lamps and their shadows.
+//! What the parts of a image have in common: what is drawn where, the lights and their shadows.
 
 use super::BAND;
 use super::group::Context;
@@ -26,7 +26,7 @@ use crate::visibility::{Projection, RenderError, View};
 use kinetoscope_scene::{Instance, LightSum, PoseF32};
 use std::cell::RefCell;
 
-/// Lamps with a shadow, at most.
+/// Lights with a shadow, at most.
 const MAX_SHADOWS: usize = 4;
 
 /// A shot that is ready to be drawn, band by band; keeps its memory.
@@ -40,7 +40,7 @@ pub(crate) struct Plan {
     maps: usize,
     /// Kinds of samples: 1, or 5 with multisampling.
     pub(crate) planes: usize,
-    /// The picture, while there is one.
+    /// The image, while there is one.
     pub(crate) projection: Option<Projection>,
     /// What rays meet, where some are cast.
     pub(crate) tracer: Tracer,
@@ -51,7 +51,7 @@ pub(crate) struct Plan {
     shadow_rays: bool,
     /// Rays for ambient occlusion.
     occlusion_rays: u16,
-    /// The first instance that mirrors, of pictures with colours that are shaded without paths.
+    /// The first instance that mirrors, of images with colors that are shaded without paths.
     first_mirror: Option<usize>,
     pub(crate) tone: ToneCurve,
     /// What light is multiplied by before the tone curve.
@@ -72,7 +72,7 @@ pub(crate) struct Style<'a> {
     pub(crate) assets: &'a RayAssets,
 }
 
-/// The most stops by which pictures are lighter or darker.
+/// The most stops by which images are lighter or darker.
 const STOPS: f64 = 20.0;
 
 impl Plan {
@@ -97,7 +97,7 @@ impl Plan {
         self.prepare_part(style, shot, frame)
     }
 
-    /// As [`prepare`](Self::prepare), for one row of the picture; the frame is that of the row of blocks that it is in.
+    /// As [`prepare`](Self::prepare), for one row of the image; the frame is that of the row of blocks that it is in.
     pub(crate) fn prepare_row(
         &mut self,
         style: Style<'_>,
@@ -176,7 +176,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Prepares lamps and their shadows.
+    /// Prepares lights and their shadows.
     fn light(&mut self, cfg: RasterCfg, shot: &Shot<'_>) {
         let Shot { scene, poses, view, lights, lens, .. } = *shot;
         let lights = lights.unwrap_or(&scene.lights);
@@ -222,12 +222,12 @@ impl Plan {
         self.maps > 0
     }
 
-    /// The parts of the shadow maps; all must be drawn before the picture.
+    /// The parts of the shadow maps; all must be drawn before the image.
     pub(crate) fn shadow_bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
         self.shadows.iter_mut().take(self.maps).flat_map(ShadowMap::bands)
     }
 
-    /// Samples of a tile that can hold any band of the shadow maps, of lamps too that cast no shadow now.
+    /// Samples of a tile that can hold any band of the shadow maps, of lights too that cast no shadow now.
     pub(crate) fn most_of_shadow_bands(&self) -> usize {
         self.shadows.iter().map(ShadowMap::most_of_bands).max().unwrap_or(0)
     }
@@ -236,7 +236,7 @@ impl Plan {
     pub(crate) fn rows(&self) -> usize {
         let Some(projection) = &self.projection else { return 1 };
         let blocks = [projection.width.div_ceil(BLOCK), projection.height.div_ceil(BLOCK)];
-        // Small pictures with many samples in halves, so that the scratch memory is not much larger than the picture.
+        // Small images with many samples in halves, so that the scratch memory is not much larger than the image.
         let most = if self.planes > 1 { blocks[1].div_ceil(2) } else { blocks[1] };
         (BAND / (self.planes * blocks[0] * BLOCK * BLOCK)).clamp(1, most)
     }
@@ -299,7 +299,7 @@ pub fn check_light(renderer: Renderer, aperture: Option<&Aperture>, shutter: Shu
     Err(RenderError::NeedsPaths { what, renderer: renderer.name() })
 }
 
-/// Whether the rays of a lens are those of the picture, and can be followed.
+/// Whether the rays of a lens are those of the image, and can be followed.
 fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> Result<(), RenderError> {
     if !renderer.sees_by_rays(true) {
         let (lens, renderer) = (lens.optics().lens().name(), renderer.name());
@@ -312,7 +312,7 @@ fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> 
     Ok(())
 }
 
-/// Texels along the side of a shadow map: about three for two pixels of a square picture of the same area.
+/// Texels along the side of a shadow map: about three for two pixels of a square image of the same area.
 fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
     match cfg.shadow_size {
         0 => (view.width.saturating_mul(view.height).isqrt().min(1024) * 3 / 2).next_power_of_two().clamp(128, 1024),

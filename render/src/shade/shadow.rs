@@ -1,4 +1,4 @@
-//! Shadow maps: what a lamp sees.
+//! Shadow maps: what a light sees.
 
 use super::BAND;
 use super::shadow_fit::{Extent, LampView};
@@ -11,19 +11,19 @@ use crate::visibility::Projection;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{Instance, PoseF32, RenderScene};
 
-/// Depths from a lamp.
+/// Depths from a light.
 #[derive(Clone, Debug)]
 pub(crate) struct ShadowMap {
     projection: Projection,
-    /// What the lamp sees.
+    /// What the light sees.
     list: DrawList,
     /// Texels along a side before it was cut.
     side: usize,
-    /// Rotation from the world's axes to the lamp's.
+    /// Rotation from the world's axes to the light's.
     lamp_from_world: [[f32; 3]; 3],
     /// A texel's width on a surface: at any depth, or at depth 1 for a spot.
     texel: f32,
-    /// Nearness of what the lamp sees at each texel, row by row: the taps of a point are together in four rows.
+    /// Nearness of what the light sees at each texel, row by row: the taps of a point are together in four rows.
     nearness: Vec<f32>,
     /// The smallest and the largest nearness in each block of texels: most points are lit, or not, by all of their texels.
     range: Vec<[f32; 2]>,
@@ -83,7 +83,7 @@ impl ShadowMap {
         self.list.bytes() + size_of::<f32>() * (self.nearness.capacity() + 2 * self.range.capacity())
     }
 
-    /// Finds the casters that a lamp sees before `receivers`, on a map of up to `side` by `side` texels, without drawing them.
+    /// Finds the casters that a light sees before `receivers`, on a map of up to `side` by `side` texels, without drawing them.
     /// `false` where none of them is shaded.
     pub(super) fn prepare(
         &mut self,
@@ -176,7 +176,7 @@ impl ShadowMap {
         })
     }
 
-    /// How much of the lamp's light reaches points, 0..=1: the mean over 3x3 texels, blended between them. The points are
+    /// How much of the light's light reaches points, 0..=1: the mean over 3x3 texels, blended between them. The points are
     /// moved off the surface first, by more than a texel, so that a surface does not shadow itself: and farther where it is
     /// drawn coarser by up to `error` \[m\], or what casts the shadow is.
     #[inline(always)]

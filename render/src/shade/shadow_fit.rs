@@ -347,7 +347,7 @@ pub(super) fn seen<const N: usize>(
     out
 }
 
-/// The extents of everything there is, for pictures through a lens.
+/// The extents of everything there is, for images through a lens.
 pub(super) fn everything<const N: usize>() -> [Extent; N] {
     [Extent::ALL; N]
 }

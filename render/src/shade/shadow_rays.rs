@@ -1,4 +1,4 @@
-//! Shadows and ambient occlusion by rays, for pictures that are shaded without paths.
+//! Shadows and ambient occlusion by rays, for images that are shaded without paths.
 
 use super::surface::SurfacePoint;
 use crate::geometry::bvh::Stack;
@@ -13,7 +13,7 @@ use kinetoscope_scene::vector::{along, dot, scale, sub, to_f64};
 use kinetoscope_scene::{Light, LightKind};
 use std::cell::RefCell;
 
-/// Light is asked for up to this part of its way: a lamp on a ceiling is not behind it.
+/// Light is asked for up to this part of its way: a light on a ceiling is not behind it.
 pub(crate) const REACH: f64 = 1.0 - 1e-6;
 
 /// Rays begin this part of the numbers that their origins are made of above the surface: positions are single precision.
@@ -24,7 +24,7 @@ const ABOVE: f32 = 1e-5;
 pub(crate) struct ShadowRays<'a> {
     pub(crate) tracer: &'a Tracer,
     pub(crate) stack: &'a RefCell<&'a mut Stack>,
-    /// Whether lamps cast shadows.
+    /// Whether lights cast shadows.
     pub(crate) shadows: bool,
     /// Rays for ambient occlusion; 0 is none.
     pub(crate) occlusion_rays: u16,
@@ -71,7 +71,7 @@ pub(super) fn lanes_of(mut bits: u64) -> impl Iterator<Item = usize> {
 }
 
 impl ShadowRays<'_> {
-    /// The part of a lamp's light that reaches each point; 1 where it is not asked for. `toward` is the lamp's direction if
+    /// The part of a light's light that reaches each point; 1 where it is not asked for. `toward` is the light's direction if
     /// it is parallel.
     #[inline(never)]
     pub(crate) fn light<S: Simd>(

@@ -19,7 +19,7 @@ pub(crate) struct Surface<S: Simd> {
     pub(crate) position: V3<S>,
     /// Frame of the instance \[m\].
     pub(crate) local: V3<S>,
-    /// Texture coordinates and how many of them a metre of surface has.
+    /// Texture coordinates and how many of them a meter of surface has.
     pub(crate) uv: [F<S>; 2],
     pub(crate) uv_density: F<S>,
 }
@@ -49,9 +49,9 @@ pub(crate) struct Source<'a> {
     pub(crate) world_from_instance: &'a PoseF32,
     pub(crate) placed: &'a Placed,
     pub(crate) first_id: u32,
-    /// Linear colour of the material.
+    /// Linear color of the material.
     pub(crate) color: [f32; 3],
-    /// Texture coordinates per metre, see [`kinetoscope_scene::RenderScene::texture_scales`].
+    /// Texture coordinates per meter, see [`kinetoscope_scene::RenderScene::texture_scales`].
     pub(crate) texture_scale: [f32; 3],
     /// Texture coordinates at the origin, see [`kinetoscope_scene::RenderScene::texture_offsets`].
     pub(crate) texture_offset: [f32; 2],
@@ -69,7 +69,7 @@ pub(crate) struct Ray<S: Simd> {
 /// Sixteen rays from the camera.
 #[derive(Clone, Copy)]
 pub(crate) struct CameraRays<S: Simd> {
-    /// Points (u, v) of the picture.
+    /// Points (u, v) of the image.
     pub(crate) uv: [F<S>; 2],
     /// The rays behind a lens; `None` for a pinhole.
     pub(crate) bent: Option<Ray<S>>,
@@ -208,7 +208,7 @@ fn triangles<S: Simd>(
         let (u1, v1) = (at(1, 0) - at(0, 0), at(1, 1) - at(0, 1));
         let (u2, v2) = (at(2, 0) - at(0, 0), at(2, 1) - at(0, 1));
         let square = u1 * v2 - u2 * v1;
-        // Square root of the ratio of areas, in the picture and on the surface.
+        // Square root of the ratio of areas, in the image and on the surface.
         uv_density = (max(square, -square) * area.sqrt() * inverse).sqrt();
     }
     TriangleHit { t: depth, normal: normal.unit(s), shading, uv, uv_density }

@@ -1,4 +1,4 @@
-//! Colours of textures: bilinear within a level, and between two levels.
+//! Colors of textures: bilinear within a level, and between two levels.
 //!
 //! Texels are blended as they are (sRGB bytes), which is four times as fast as in linear light; the levels themselves were
 //! averaged in linear light.
@@ -17,7 +17,7 @@ fn floor_lanes<S: Simd>(s: S, x: F<S>) -> F<S> {
     r - select(r.simd_gt(x), splat(s, 1.0), splat(s, 0.0))
 }
 
-/// Colours (bytes, 0..=255) at (u, v), v upward, of surfaces where one pixel is `footprint` wide in texture coordinates.
+/// Colors (bytes, 0..=255) at (u, v), v upward, of surfaces where one pixel is `footprint` wide in texture coordinates.
 #[inline(always)]
 pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footprint: F<S>, lanes: M<S>) -> [F<S>; 3] {
     let first = &texture.levels()[0];
@@ -41,7 +41,7 @@ pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footpri
     )
 }
 
-/// Colours (bytes, 0..=255) in directions of a cube texture, where one pixel is `footprint` wide on a cube of half length 1.
+/// Colors (bytes, 0..=255) in directions of a cube texture, where one pixel is `footprint` wide on a cube of half length 1.
 #[inline(always)]
 pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint: F<S>, lanes: M<S>) -> [F<S>; 3] {
     let zero = splat(s, 0.0);
@@ -84,9 +84,9 @@ pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint:
     )
 }
 
-/// The colours that `at` finds in the levels that pixels `texels` wide need.
+/// The colors that `at` finds in the levels that pixels `texels` wide need.
 ///
-/// Neighbouring pixels use the same two or three levels, so the loop is over levels, whose sizes all lanes share.
+/// Neighboring pixels use the same two or three levels, so the loop is over levels, whose sizes all lanes share.
 #[inline(always)]
 fn between_levels<S: Simd>(
     s: S,
@@ -137,7 +137,7 @@ fn pair(bytes: &[u8], from: usize) -> u64 {
     }
 }
 
-/// The colours between four texels each: column and row of the upper left one, and how far from it to the next.
+/// The colors between four texels each: column and row of the upper left one, and how far from it to the next.
 #[inline(always)]
 fn bilinear<S: Simd>(s: S, level: &Level, [x, y]: [F<S>; 2], [fx, fy]: [F<S>; 2], lanes: M<S>) -> [F<S>; 3] {
     let stride = level.width() as i32 + 1;

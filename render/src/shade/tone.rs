@@ -88,7 +88,7 @@ pub(crate) fn to_bytes<S: Simd>(s: S, x: F<S>) -> F<S> {
     to_srgb(s, min(max(x, splat(s, 0.0)), splat(s, 1.0))) - 0.5
 }
 
-/// A screen colour as linear light.
+/// A screen color as linear light.
 pub(crate) fn decode(c: [f32; 3]) -> [f32; 3] {
     c.map(kinetoscope_scene::decode_srgb)
 }

@@ -97,7 +97,7 @@ fn odd_scenes() {
     }
 }
 
-/// A pane in front of a wall: more and more of its colour, and the other channels see it whatever its alpha, unless that is 0.
+/// A pane in front of a wall: more and more of its color, and the other channels see it whatever its alpha, unless that is 0.
 #[test]
 fn transparency() {
     let view = View { cx: 16.5, cy: 12.5, ..view() };

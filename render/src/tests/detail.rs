@@ -64,18 +64,18 @@ fn scene_of(meshes: &[Mesh; 3]) -> (RenderScene, Vec<PoseF32>) {
     (scene, poses)
 }
 
-/// The image of the meshes themselves, and all within half a pixel of each pixel's centre.
+/// The image of the meshes themselves, and all within half a pixel of each pixel's center.
 struct Truth<'a> {
     view: &'a View,
     plain: Image,
     fine: Image,
-    /// Fine pixels near the centre of a pixel, counted from the one above and left of the pixel.
+    /// Fine pixels near the center of a pixel, counted from the one above and left of the pixel.
     near: Vec<usize>,
 }
 
 impl<'a> Truth<'a> {
     fn new(still: &'a Still) -> Self {
-        // An odd number of fine pixels would have one at the centre; all of them are within reach here.
+        // An odd number of fine pixels would have one at the center; all of them are within reach here.
         let (k, View { width, height, fx, fy, cx, cy, .. }) = (TIMES as f32, still.view);
         let (width, height) = (width * TIMES, height * TIMES);
         let view = View { width, height, fx: fx * k, fy: fy * k, cx: cx * k, cy: cy * k, ..still.view };
@@ -91,7 +91,7 @@ impl<'a> Truth<'a> {
         Self { view: &still.view, plain: still.draw(), fine, near }
     }
 
-    /// Masks and depths that the mesh has near the centre of an inner pixel.
+    /// Masks and depths that the mesh has near the center of an inner pixel.
     fn near(&self, x: usize, y: usize) -> impl Iterator<Item = (i32, f32)> {
         let first = (y * TIMES - 1) * self.fine.width + x * TIMES - 1;
         self.near.iter().map(move |k| (self.fine.mask()[first + k], self.fine.depth()[first + k]))
@@ -105,7 +105,7 @@ struct Found {
     masks: usize,
     /// Pixels of meshes away from silhouettes.
     compared: usize,
-    /// Those of them whose depth is not between those near, and a millimetre more.
+    /// Those of them whose depth is not between those near, and a millimeter more.
     depths: usize,
     /// Where the mesh is not seen at a slant: largest difference of their depth \[m\].
     facing: f32,
@@ -130,7 +130,7 @@ impl Truth<'_> {
                 found.masks += 1;
                 continue;
             }
-            // Silhouettes, against other things or the same: steeper than 4 over the pixel and its half neighbours. There
+            // Silhouettes, against other things or the same: steeper than 4 over the pixel and its half neighbors. There
             // depth falls like a root of the distance from the edge, and edges are between fine pixels. The ground has
             // no levels.
             let width = 2.0 * PIXELS as f32 * low / view.fx;

@@ -18,7 +18,7 @@ use kinetoscope_testkit::scenes::{Random, figure, random};
 const RENDERERS: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS];
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };
 
-/// Everything that colours are made of: veils, mirrors, all kinds of lights, haze.
+/// Everything that colors are made of: veils, mirrors, all kinds of lights, haze.
 fn rich(seed: u64, [width, height]: [usize; 2], zoom: f32) -> Still {
     let (scene, poses) = random(&mut Random(seed), 1.0);
     let mut instances = scene.instances().to_vec();
@@ -128,7 +128,7 @@ fn channels() {
     }
 }
 
-/// Path tracing and the hybrid change no channel but the colour.
+/// Path tracing and the hybrid change no channel but the color.
 #[test]
 fn only_color_differs() {
     let view = look([97, 83], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8]);

@@ -14,8 +14,8 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 const WANTED: Channels = Channels { flow: true, mask: true, position: true, depth: true, ..Channels::NONE };
 
-/// Pixels by which single precision may be off: coordinates of some metres have 5e-7 m, which are 1e-5 pixels for each pixel
-/// of focal length and metre of distance; those of 100 pixels at 0.5 m 1e-4, some of them added.
+/// Pixels by which single precision may be off: coordinates of some meters have 5e-7 m, which are 1e-5 pixels for each pixel
+/// of focal length and meter of distance; those of 100 pixels at 0.5 m 1e-4, some of them added.
 const ROUNDING: f64 = 1e-3;
 
 /// A random scene in which everything, the camera too, moved by up to 0.1 m and 0.2 rad since the frame before.

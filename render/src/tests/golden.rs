@@ -129,7 +129,7 @@ fn room_of_cornell() {
     let off = rms(&few, &expected);
     // Tone curves bend: noise makes means darker by a little; and the golden is rounded to whole bytes.
     assert!(off < 1.5 * noise + 0.3 && noise < 1.0, "off by {off}, noise is {noise}");
-    // Controls: light that went over one surface less is missed, and so is the colour of the walls.
+    // Controls: light that went over one surface less is missed, and so is the color of the walls.
     let less = rms(&means(&draw(64, 2, 2)), &expected);
     assert!(less > 3.0 * (1.5 * noise + 0.3), "{less}");
     let (left, right) = (golden.get_pixel(14, 44).0, golden.get_pixel(50, 36).0);

@@ -224,7 +224,7 @@ impl Image {
         ImageCheck { name, size: [self.width, self.color().len() / self.width], tolerance, outliers: 0.0 }
     }
 
-    /// Asserts that all colours of a pixel are the byte of a formula, where it has one.
+    /// Asserts that all colors of a pixel are the byte of a formula, where it has one.
     #[track_caller]
     pub(super) fn assert_gray(&self, name: &str, tolerance: f64, expected: impl Fn(usize) -> Option<f64>) {
         let check = self.check(name, tolerance);
@@ -257,24 +257,24 @@ impl Image {
         out
     }
 
-    /// [`Self::bits`] without the colour.
+    /// [`Self::bits`] without the color.
     pub(super) fn bits_but_color(&self) -> Vec<u32> {
         Self { frame: Frame { color: None, ..self.frame.clone() }, width: self.width }.bits()
     }
 
-    /// Pixels that have eight neighbours.
+    /// Pixels that have eight neighbors.
     pub(super) fn inner(&self) -> impl Iterator<Item = usize> + use<> {
         let (width, height) = (self.width, self.mask().len() / self.width);
         (1..height - 1).flat_map(move |y| (1..width - 1).map(move |x| y * width + x))
     }
 
-    /// An inner pixel and its eight neighbours.
+    /// An inner pixel and its eight neighbors.
     pub(super) fn around(&self, k: usize) -> impl Iterator<Item = usize> + Clone + use<> {
         let width = self.width;
         (0..9).map(move |n| k + (n / 3) * width + n % 3 - width - 1)
     }
 
-    /// True if an inner pixel and its neighbours show the same thing.
+    /// True if an inner pixel and its neighbors show the same thing.
     pub(super) fn alone(&self, k: usize) -> bool {
         self.around(k).all(|n| self.mask()[n] == self.mask()[k])
     }
@@ -287,7 +287,7 @@ impl Image {
     }
 }
 
-/// How many pixels differ by more than some bytes in any colour.
+/// How many pixels differ by more than some bytes in any color.
 pub(super) fn far_apart(a: &Image, b: &Image, bytes: u8) -> usize {
     let differ = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|c| a[c].abs_diff(b[c]) > bytes);
     a.color().iter().zip(b.color()).filter(differ).count()

@@ -85,7 +85,7 @@ fn lens_without_distortion() {
     assert!(compared > 2 * 6 * 101 * 75 / 2 && different * 1000 <= compared, "{different} of {compared}");
 }
 
-/// Samples of colours go through the lens, each where it is in the pixel.
+/// Samples of colors go through the lens, each where it is in the pixel.
 #[test]
 fn sample_rays() {
     let pixels = PixelIntrinsics { fx: 20.0, fy: 22.0, cx: 30.25, cy: 25.5 };
@@ -123,7 +123,7 @@ fn sample_rays() {
     }
 }
 
-/// Paths change no channel but the colour, and leave black what is outside of the image circle; the sky is as bright as
+/// Paths change no channel but the color, and leave black what is outside of the image circle; the sky is as bright as
 /// without a lens.
 #[test]
 fn paths() {

@@ -5,7 +5,7 @@ use crate::lens::{Lens, LensRays, OpenCv, Optics};
 use crate::optics_error::OpticsError;
 use kinetoscope_testkit::opencv::opencv;
 
-/// A factory's calibration of an OAK-D's colour camera on a TurtleBot 4, 250 x 250 pixels, rounded to five digits. Its radial
+/// A factory's calibration of an OAK-D's color camera on a TurtleBot 4, 250 x 250 pixels, rounded to five digits. Its radial
 /// factor has a pole at 33.965 degrees and a zero at 33.970.
 const OAK_D: [f64; 8] = [-4.8608, 17.282, 0.000204, 0.001025, -25.172, -4.9436, 17.514, -25.291];
 const OAK_D_PIXELS: PixelIntrinsics = PixelIntrinsics { fx: 196.5, fy: 196.5, cx: 127.4, cy: 126.3 };

@@ -51,7 +51,7 @@ pub(super) fn all() -> Vec<(Lens, PixelIntrinsics)> {
     ]
 }
 
-/// Rays of a lens, with those of the samples of colours.
+/// Rays of a lens, with those of the samples of colors.
 pub(super) fn rays_of(lens: Lens, pixels: PixelIntrinsics, size: [usize; 2]) -> LensRays {
     LensRays::new(&Optics::new(lens, pixels).unwrap(), size, 4).unwrap()
 }
@@ -75,7 +75,7 @@ fn round_trip() {
         let optics = Optics::new(lens, pixels).unwrap();
         let (mut seen, mut blind) = (0, 0);
         for k in 0..4 * 64 * 48 {
-            // Four in each pixel, not its centre.
+            // Four in each pixel, not its center.
             let at = [(k % 128) as f64 / 2.0 + 0.13, (k / 128) as f64 / 2.0 + 0.29];
             let radius = ((at[0] - pixels.cx) / pixels.fx).hypot((at[1] - pixels.cy) / pixels.fy);
             let Some(ray) = optics.unproject(at) else {

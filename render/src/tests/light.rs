@@ -86,7 +86,7 @@ fn ceiling_light() {
     };
     let [off, all] = wrong(2.0);
     assert!(off == 0 && all > 2000, "{off} of {all}");
-    // The control: a millimetre inside of it the light reaches nothing.
+    // The control: a millimeter inside of it the light reaches nothing.
     assert_eq!(wrong(2.001), [all; 2]);
 }
 
@@ -121,7 +121,7 @@ fn ambient_occlusion() {
     still.scene.ambient.ground = [0.2; 3];
     let of = |occlusion_rays| still.with(|still| still.cfg.occlusion_rays = occlusion_rays).draw();
     let (with, without) = (of(1024), of(0));
-    // Colours of pixels at edges are means.
+    // Colors of pixels at edges are means.
     let x = |k: usize| Some(with.position()[k][0]).filter(|x| with.mask()[k] == 1 && *x < -0.02);
     let shade = |x: f32| byte(0.6 * (1.0 - 0.5 * (1.0 - -x / (x * x + 1.0).sqrt())));
     // The net finds the share to 1/256 or so, and byte(x) rises by 250 at most here.
@@ -227,7 +227,7 @@ fn shadows_on_wide_ground() {
         let [image, other] = [wide.draw(), small.draw()];
         let rays = wide.by(Renderer::Hybrid);
         let bright = wide.with(|still| still.cfg.shadows = false).draw();
-        // Pixels of the ground whose neighbours are of the ground: elsewhere it is the coverage that differs.
+        // Pixels of the ground whose neighbors are of the ground: elsewhere it is the coverage that differs.
         let ground: Vec<usize> = image.inner().filter(|k| image.mask()[*k] == 1 && image.alone(*k)).collect();
         let dark = |image: &Image, k: usize| i32::from(image.color()[k][0]) + 20 < i32::from(bright.color()[k][0]);
         let count = |f: &dyn Fn(usize) -> bool| ground.iter().filter(|k| f(**k)).count();
@@ -276,7 +276,7 @@ const PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denois
 
 const DARK: Headlight = Headlight { ambient: [0.0; 3], diffuse: [0.0; 3], specular: [0.0; 3], active: false };
 
-/// The colour in the middle of an image of a plane, from straight above.
+/// The color in the middle of an image of a plane, from straight above.
 fn middle(material: Material, headlight: Headlight, sky: [f32; 3], tone: ToneCurve, by: (Renderer, f64)) -> [u8; 4] {
     let (scene, poses) = things([(Plane::INFINITE, material, PoseF32::IDENTITY)]);
     let mut scene = unlit(scene);
@@ -296,7 +296,7 @@ fn close(seen: [u8; 4], light: [f64; 3]) -> bool {
     (0..3).all(|k| (f64::from(seen[k]) - srgb(light[k].min(1.0))).abs() <= 1.5)
 }
 
-/// Seen along its normal a surface mirrors the sky behind the camera, and the headlight in full: a metal in its own colour, and
+/// Seen along its normal a surface mirrors the sky behind the camera, and the headlight in full: a metal in its own color, and
 /// with its own light, whatever `specular` says. Root cause once: highlights of metals were those of other materials, none
 /// where `specular` was 0, and their own light was lost.
 #[test]
@@ -319,7 +319,7 @@ fn metals() {
     }
 }
 
-/// A plane that glows in the dark: its light is its colour times its emission, by the rasterizer and by paths, through every curve.
+/// A plane that glows in the dark: its light is its color times its emission, by the rasterizer and by paths, through every curve.
 #[test]
 fn tone_curves() {
     for (renderer, emission) in
@@ -364,9 +364,9 @@ fn stops() {
     }
 }
 
-/// Light that is added up as MuJoCo's renderer does: the byte of a matt plane is 255 times its sRGB colour times the sum of
-/// the lights, each times its cosine; the sum ends at white. Root cause once: lamps were added in linear light, and four of
-/// them were darker than in MuJoCo; then the soft tone curve made white of MuJoCo's a grey of 237.
+/// Light that is added up as MuJoCo's renderer does: the byte of a matt plane is 255 times its sRGB color times the sum of
+/// the lights, each times its cosine; the sum ends at white. Root cause once: lights were added in linear light, and four of
+/// them were darker than in MuJoCo; then the soft tone curve made white of MuJoCo's a gray of 237.
 #[test]
 fn display_sum() {
     let directions = [[0.0, 0.0, -1.0], [0.6, 0.0, -0.8], [0.0, -0.6, -0.8], [-0.8, 0.0, -0.6]];

@@ -20,7 +20,7 @@ const BALL: f32 = 0.6;
 const SKY: f32 = 0.5;
 const REFLECTANCE: f32 = 0.4;
 const RADIUS: f32 = 0.4;
-/// Centre of the ball in the frame of the mirror.
+/// Center of the ball in the frame of the mirror.
 const CENTER: [f32; 3] = [0.2, -0.1, 0.7];
 
 /// The turned and shifted frame of a mirror.
@@ -29,7 +29,7 @@ fn tilted() -> PoseF32 {
     PoseF32 { rotation: [[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]], translation: [0.1, -0.2, 0.3] }
 }
 
-/// A surface that shows its own colour in the dark.
+/// A surface that shows its own color in the dark.
 fn glowing(color: f32) -> Material {
     Material { emission: 1.0, ..matt([color; 3]) }
 }
@@ -47,7 +47,7 @@ fn over(shape: impl Into<Shape>, mirror: PoseF32, reflectance: f32, sum: LightSu
 }
 
 /// The byte of a pixel of the mirror, and true if it shows the ball; `None` at the edge of the ball's image. `z` is the height of
-/// the mirror in its frame, `sign` is -1 for the reflected centre.
+/// the mirror in its frame, `sign` is -1 for the reflected center.
 fn expected(still: &Still, image: &Image, k: usize, [z, sign]: [f32; 2]) -> Option<(f64, bool)> {
     let material = &still.scene.instances()[0].material;
     let eye = still.poses[0].inverse_times(&still.view.world_from_camera).translation;
@@ -77,7 +77,7 @@ fn expected(still: &Still, image: &Image, k: usize, [z, sign]: [f32; 2]) -> Opti
     Some((byte, hit))
 }
 
-/// A ball over a plane and over a box: its image is where the reflected centre is, and adds to the colour as MuJoCo's renderer
+/// A ball over a plane and over a box: its image is where the reflected center is, and adds to the color as MuJoCo's renderer
 /// adds it (`own + reflectance * mirrored`, of things, not of the sky), or as light is mirrored
 /// (`(1 - reflectance) * own + reflectance * mirrored`, of the sky too).
 ///

@@ -1,4 +1,4 @@
-//! Long renderings report their progress and can be cancelled.
+//! Long renderings report their progress and can be canceled.
 
 use crate::frame::{Channels, Frame};
 use crate::parallel::ParallelRasterizer;
@@ -97,7 +97,7 @@ fn cancel() {
     assert!(samples > 0 && samples < total / 20, "{samples} of {total}");
     assert!(left.is_some_and(|left| left > Duration::ZERO), "{left:?}");
     assert_eq!(frame, before);
-    // It stays cancelled until it is resumed.
+    // It stays canceled until it is resumed.
     rasterizer.set_renderer(paths(1));
     let (_, error) = rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap_err();
     assert_eq!(error, RenderError::Cancelled { samples: 0, total: 64 * 64 });
@@ -105,7 +105,7 @@ fn cancel() {
     progress.resume();
     rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap();
     assert!(frame != before && progress.fraction() == Some(1.0));
-    // A clone of a renderer has its own progress and is not cancelled with the other one.
+    // A clone of a renderer has its own progress and is not canceled with the other one.
     let mut clone = rasterizer.clone();
     progress.cancel();
     clone.set_renderer(paths(2));

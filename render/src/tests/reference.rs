@@ -203,7 +203,7 @@ impl Block {
     }
 }
 
-/// Compares an image with the caster at all pixels that are on no silhouette: where some neighbour sees another thing or is
+/// Compares an image with the caster at all pixels that are on no silhouette: where some neighbor sees another thing or is
 /// more than a tenth nearer or farther. Returns how many were compared.
 fn compare(scene: (RenderScene, Vec<PoseF32>), view: View, name: &str) -> usize {
     let still = Still { channels: Channels { color: false, ..Channels::ALL }, ..Still::new(scene, view) };
@@ -232,7 +232,7 @@ fn compare(scene: (RenderScene, Vec<PoseF32>), view: View, name: &str) -> usize 
             let parallel = normal.dot(&hit.normal) >= 0.5f64.to_radians().cos();
             mask == still.scene.instances()[hit.instance].mask_id && close && parallel
         };
-        // A pixel centre within a hundredth of a pixel of an edge may belong to either side of it.
+        // A pixel center within a hundredth of a pixel of an edge may belong to either side of it.
         let mut beside = (0..48).map(|n| {
             let (sin, cos) = (n as f64 * FRAC_PI_8).sin_cos();
             [cos, sin].map(|x| [0.001, 0.003, 0.01][n / 16] * x)

@@ -40,7 +40,7 @@ pub(super) fn bar() -> (RenderScene, View) {
     (scene, View { fx: F, fy: F, ..view })
 }
 
-/// The bar, its front at the depth, `right` metres to the right.
+/// The bar, its front at the depth, `right` meters to the right.
 pub(super) fn bar_at(right: f64) -> Vec<PoseF32> {
     vec![PoseF32::from_translation([DEPTH + THIN, -right as f32, 0.0])]
 }
@@ -48,7 +48,7 @@ pub(super) fn bar_at(right: f64) -> Vec<PoseF32> {
 /// The bar goes right \[m/s\].
 const SPEED: f64 = 3.0;
 
-/// The bar `right` metres to the right, by paths of one sample at the pixel's centre for all other channels; the shutter opened
+/// The bar `right` meters to the right, by paths of one sample at the pixel's center for all other channels; the shutter opened
 /// `before` seconds ago.
 fn tracer(samples: u32, shutter: Shutter, right: f64, before: f64) -> Still {
     let (scene, view) = bar();
@@ -93,7 +93,7 @@ fn shear() {
             // its side's; bytes are steps of 1/255 of the whole, of pixels that are partly lit.
             assert!((mean - middle).abs() < 0.05, "row {r}: {mean}, not {middle}");
             assert!((var - side * side / 12.0 - 1.0 / 12.0).abs() < 0.2, "row {r}: {var}");
-            // The pixels' centres, at the same instant.
+            // The pixels' centers, at the same instant.
             for x in 0..WIDTH {
                 let off = (x as f64 + 0.5 - middle).abs() - 0.5 * side;
                 let (mask, depth) = (image.mask()[r * WIDTH + x], image.depth()[r * WIDTH + x]);
@@ -161,7 +161,7 @@ fn blur() {
     let expected = way * way / 12.0 + side * side / 12.0 + 1.0 / 12.0;
     assert!((var - expected).abs() < 0.02 * expected, "{var}, not {expected}");
     assert!(way * way / 12.0 > 0.5 * expected, "the control: most of it is blur");
-    // The centres see the middle of the exposure.
+    // The centers see the middle of the exposure.
     let hits = image.mask()[..WIDTH].iter().zip(0..).filter(|(mask, _)| **mask == 1);
     let places: Vec<f64> = hits.map(|(_, x)| f64::from(x) + 0.5).collect();
     assert!((places.iter().sum::<f64>() / places.len() as f64 - middle).abs() < 0.5);

@@ -23,7 +23,7 @@ fn faces() -> Arc<Texture> {
 /// A camera that looks along an axis with a field of view of a right angle sees one face of a skybox: which, and how it is
 /// turned, as MuJoCo's renderer showed it on OSMesa (forward, up, face, columns from the right, rows from below).
 ///
-/// Root cause once: images of skyboxes were gradients of three colours.
+/// Root cause once: images of skyboxes were gradients of three colors.
 #[test]
 fn skybox_faces() {
     let z = [0.0f32, 0.0, 1.0];

@@ -19,7 +19,7 @@ fn albedo((scene, poses): (RenderScene, Vec<PoseF32>), view: View) -> Still {
     Still { channels: ALBEDO, cfg, ..Still::new((scene, poses), view) }
 }
 
-/// Without a texture it is the material's colour in sRGB, as it was given: bytes of k / 255 are k, which the polynomial of
+/// Without a texture it is the material's color in sRGB, as it was given: bytes of k / 255 are k, which the polynomial of
 /// the transfer function keeps to one (see `tone`), in any light, and 0 where nothing is.
 #[test]
 fn material_albedo() {
@@ -63,8 +63,8 @@ fn material_albedo() {
     }
 }
 
-/// A square metre with a checkered texture of 2 by 2 fields, seen from so near that a texel is many pixels: each field has its
-/// bytes, to 1, off the seams, where texels are blended; the material's colour is multiplied in linear light.
+/// A square meter with a checkered texture of 2 by 2 fields, seen from so near that a texel is many pixels: each field has its
+/// bytes, to 1, off the seams, where texels are blended; the material's color is multiplied in linear light.
 #[test]
 fn texture_albedo() {
     let (dark, light) = ([40, 90, 150], [220, 180, 60]);
@@ -93,7 +93,7 @@ fn texture_albedo() {
 
 /// Paths find of a texture what the rasterizer draws of it: on a plane, by texture coordinates of a mesh that are turned,
 /// squeezed and end nowhere, and of the six images of a cube. In even light matt and convex things are as bright as their albedo
-/// times that light, so that the colour of paths tells the albedo.
+/// times that light, so that the color of paths tells the albedo.
 #[test]
 fn textures_of_paths() {
     const LIGHT: f32 = 0.5;
@@ -122,7 +122,7 @@ fn textures_of_paths() {
         scene.ambient = Hemisphere { sky: [LIGHT; 3], ground: [LIGHT; 3] };
         (scene, poses)
     };
-    // Pixels whose neighbours are alike, that is off edges and seams, and those of them that differ.
+    // Pixels whose neighbors are alike, that is off edges and seams, and those of them that differ.
     let compare = |drawn, traced, eye: [f32; 3]| {
         let of = |what, renderer| {
             let mut still = albedo(scene_of(what), look([96, 96], 0.7, eye, [0.0; 3]));
@@ -157,7 +157,7 @@ fn textures_of_paths() {
     }
 }
 
-/// A cube texture of six colours, seen along its axes: MuJoCo's order of the faces is +x, -x, +y, -y, +z, -z.
+/// A cube texture of six colors, seen along its axes: MuJoCo's order of the faces is +x, -x, +y, -y, +z, -z.
 #[test]
 fn cube_faces() {
     let colors: [[u8; 3]; 6] = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0], [0, 255, 255], [255, 0, 255]];
@@ -220,7 +220,7 @@ fn coincident_surfaces() {
 }
 
 /// Renderers that follow no paths draw surfaces with `reflectance` that are no planar mirrors as if they had none. Root cause
-/// once: they mixed in the sky, and an object that reflects all light had no colour of its own.
+/// once: they mixed in the sky, and an object that reflects all light had no color of its own.
 #[test]
 fn curved_mirrors_are_for_paths() {
     let still = |reflectance| {

@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 pub(super) struct Comparison {
     /// Pixels.
     pub(super) compared: usize,
-    /// Those that differ in any channel but colour and albedo.
+    /// Those that differ in any channel but color and albedo.
     pub(super) different: usize,
     /// Those that differ in another channel than the normals.
     pub(super) elsewhere: usize,
@@ -26,10 +26,10 @@ pub(super) struct Comparison {
     pub(super) albedo: usize,
 }
 
-/// Compares all channels but the colour where no silhouette is in either image.
+/// Compares all channels but the color where no silhouette is in either image.
 ///
 /// Depth and distance may differ by 1e-4 of themselves: of surfaces seen at a slant of up to 1 : 100, rounding of rays in
-/// single precision makes 1e-5. Normals may differ by 0.5 degrees: a pixel's centre on an edge between two triangles may
+/// single precision makes 1e-5. Normals may differ by 0.5 degrees: a pixel's center on an edge between two triangles may
 /// belong to either, which is what the few pixels that differ are.
 pub(super) fn compare(a: &Image, b: &Image) -> Comparison {
     let mut all = Comparison::default();
@@ -69,15 +69,15 @@ fn raster() {
         sum.different += found.different;
         sum.elsewhere += found.elsewhere;
         sum.albedo += found.albedo;
-        // Colours come from the same shading: they differ where samples on edges do.
+        // Colors come from the same shading: they differ where samples on edges do.
         let differ = far_apart(&raster, &traced, 3);
         assert!(differ * 50 < 101 * 75, "scene {seed}: {differ} pixels look different");
     }
     assert!(sum.compared > 40 * 101 * 75 / 2, "{sum:?}");
     assert_eq!(sum.elsewhere, 0, "{sum:?}");
-    // Normals at centres on edges of triangles: of the order of 1/256 pixel wide, a pixel or two apart.
+    // Normals at centers on edges of triangles: of the order of 1/256 pixel wide, a pixel or two apart.
     assert!(sum.different * 1000 <= sum.compared && sum.albedo * 1000 < sum.compared, "{sum:?}");
-    // The control: an image from a millimetre beside is not the same.
+    // The control: an image from a millimeter beside is not the same.
     let still =
         Still { cfg: EXACT, ..Still::new(random(&mut Random(5), 1.2), look([101, 75], 1.0, [2.0, 0.5, 1.0], [0.; 3])) };
     let mut beside = Still { renderer: Renderer::FastRayTraced, ..still.clone() };
@@ -86,15 +86,15 @@ fn raster() {
     assert!(beside.elsewhere * 2 > beside.compared, "{beside:?}");
 }
 
-/// Things that glow, each in a colour of its own, without any other light: paths meet first what the mask shows. Paths go
-/// through all of a pixel, so that where it and its neighbours show one thing they must meet it.
+/// Things that glow, each in a color of its own, without any other light: paths meet first what the mask shows. Paths go
+/// through all of a pixel, so that where it and its neighbors show one thing they must meet it.
 ///
 /// Root cause once: where a mat lies on endless ground both are as near, to the bit, and paths met what came first in the scene.
 #[test]
 fn mask_of_paths() {
     // Steps of 51 of 255, which the test tells apart.
     let color_of = |k: usize| [k % 6, k / 6 % 6, k / 36 % 6].map(|x| 51 * x as u8);
-    // Of what glows a hundred times as bright as its colour, only a hundredth more is the others' light.
+    // Of what glows a hundred times as bright as its color, only a hundredth more is the others' light.
     let glowing = |k: usize| {
         let light = |x: u8| 0.01 * f64::from(kinetoscope_scene::decode_srgb(f32::from(x) / 255.0));
         Material { emission: 100.0, ..matt(color_of(k).map(|x| (srgb(light(x)) / 255.0) as f32)) }
@@ -128,7 +128,7 @@ fn mask_of_paths() {
 
 /// Edges between the faces of a box, and of a cylinder, are as smooth by rays as by the rasterizer: each sample has its face.
 ///
-/// Root cause once: rays gave every face of a closed form the number of the first, so that colours had one sample there.
+/// Root cause once: rays gave every face of a closed form the number of the first, so that colors had one sample there.
 #[test]
 fn smooth_edges() {
     let plain = Material::from_rgba([0.7, 0.7, 0.7, 1.0]);
@@ -185,7 +185,7 @@ fn smoothed_noise() {
     };
     let (rough, smooth, more) = (error(4, false), error(4, true), error(16, false));
     assert!(smooth < 0.6 * rough, "{smooth} of {rough}");
-    // One path does not know its own noise: it is that of its neighbours.
+    // One path does not know its own noise: it is that of its neighbors.
     let (one, smoothed) = (error(1, false), error(1, true));
     assert!(smoothed < 0.6 * one, "{smoothed} of {one}");
     // A control of the measure: noise falls as paths are added.
@@ -209,7 +209,7 @@ fn tiles(emission: f32, dim: f32) -> Still {
 
 /// Black tiles mirror their surroundings, and white ones beside them are as bright: neither is blended into the other.
 ///
-/// Root cause once: light was divided by the colour of the surface, though mirrored light does not have it.
+/// Root cause once: light was divided by the color of the surface, though mirrored light does not have it.
 #[test]
 fn smoothed_tiles() {
     let still = tiles(3.0, 1.0);
@@ -226,7 +226,7 @@ fn smoothed_tiles() {
         rms(black.iter().map(|&k| many.color()[k][0].abs_diff(few.color()[k][0])))
     };
     let (rough, smooth) = (error(false), error(true));
-    // A third. With the tiles' colours out of sight it was half.
+    // A third. With the tiles' colors out of sight it was half.
     assert!(black.len() > 300 && smooth < 0.4 * rough, "{smooth} of {rough}, {} pixels", black.len());
 }
 
@@ -243,7 +243,7 @@ fn smoothed_exposure() {
         still.by(paths(16, 1, true, 3))
     };
     let (plain, dim) = (of(3.0, 1.0, 0.0), of(3.0, 1.0 / 1024.0, 10.0));
-    // Powers of two change no digit; the tiles' colours are the same.
+    // Powers of two change no digit; the tiles' colors are the same.
     assert_eq!(far_apart(&plain, &dim, 1), 0);
     let blinding = of(1e30, 1.0, 0.0);
     // Pixels of the light and of its mirror image are white; the dome leaves no pixel black.

@@ -1,11 +1,11 @@
 //! Visibility by rays: what a ray from anywhere meets, and a visibility buffer filled by the rays of its samples.
 //!
 //! Two levels. Below, one tree for each mesh, in the mesh's own frame: built once, shared by all environments, the one that
-//! ray casters use. Above, a tree over the boxes of what there is in a frame, built for every frame (`tree`). Shapes with
+//! ray casters use. Above, a tree over the boxes of what there is in a frame, built forevery frame (`tree`). Shapes with
 //! a closed form are met exactly; height fields as the triangles that the rasterizer draws. Everything is in double
 //! precision.
 //!
-//! The rays of a picture need no upper tree: an instance is met only within the rectangle of the picture that it covers,
+//! The rays of a image need no upper tree: an instance is met only within the rectangle of the image that it covers,
 //! where its rays are cast in packets of eight, the nearest instances first. What is written is the rasterizer's own
 //! visibility buffer, so every channel comes from the same code.
 
@@ -40,7 +40,7 @@ const PAST: f64 = 1e-9;
 type Side = [[usize; 2]; WIDTH];
 /// As near to each other as can be: fewer triangles are between them than between those of a row.
 const TOGETHER: Side = [[0, 0], [1, 0], [2, 0], [3, 0], [0, 1], [1, 1], [2, 1], [3, 1]];
-/// Of pictures whose rows have an instant each.
+/// Of images whose rows have an instant each.
 const IN_A_ROW: Side = [[0, 0], [1, 0], [2, 0], [3, 0], [4, 0], [5, 0], [6, 0], [7, 0]];
 
 /// What rays meet of an instance, in its own frame.
@@ -441,7 +441,7 @@ impl Lens {
         first_id: u32,
     ) -> bool {
         let TileSamples { nearness, ids, at } = samples;
-        // Distances along a ray for a metre of depth.
+        // Distances along a ray for a meter of depth.
         let mut length = [1.0; WIDTH];
         let mut rays = [Ray { origin: self.origin, direction: [0.0, 0.0, 1.0] }; WIDTH];
         let mut none = [false; WIDTH];

@@ -7,11 +7,11 @@ pub(crate) mod view;
 pub(crate) use projection::Projection;
 pub use view::View;
 
-/// Why a picture cannot be drawn.
+/// Why a image cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// The picture has no pixels or too many.
+    /// The image has no pixels or too many.
     #[error("a picture of {width} x {height} pixels cannot be drawn; both sides are 1 to {limit}")]
     Size {
         /// Pixels per row.
@@ -71,7 +71,7 @@ pub enum RenderError {
     BufferSize {
         /// The channel.
         channel: &'static str,
-        /// How many numbers the picture has.
+        /// How many numbers the image has.
         expected: usize,
         /// How many the buffer has.
         found: usize,
@@ -151,7 +151,7 @@ pub enum RenderError {
         /// How long the shutter takes \[s\].
         span: f64,
     },
-    /// Somebody broke the picture off ([`RenderProgress::cancel`](crate::progress::RenderProgress::cancel)).
+    /// Somebody broke the image off ([`RenderProgress::cancel`](crate::progress::RenderProgress::cancel)).
     #[error("the picture was broken off after {samples} of {total} paths")]
     Cancelled {
         /// Paths that were followed.
@@ -159,15 +159,15 @@ pub enum RenderError {
         /// Paths that there were to follow.
         total: u64,
     },
-    /// Rays of a lens that are not those of the picture.
+    /// Rays of a lens that are not those of the image.
     #[error(
         "rays of a lens for {found:?} pixels with {found_samples} samples, but the picture has {expected:?} pixels and needs \
          {samples}"
     )]
     LensRays {
-        /// Pixels per row and rows of the picture.
+        /// Pixels per row and rows of the image.
         expected: [usize; 2],
-        /// Samples per pixel that its colours need.
+        /// Samples per pixel that its colors need.
         samples: u8,
         /// Pixels per row and rows that the rays are for.
         found: [usize; 2],

@@ -95,7 +95,7 @@ fn sign<S: Simd>(s: S, x: F<S>) -> F<S> {
     select(x.simd_lt(splat(s, 0.0)), splat(s, -1.0), splat(s, 1.0))
 }
 
-/// Nearness 1/z of a plane, where rays that go `down` by so much for each metre of depth (negative) begin at a height above
+/// Nearness 1/z of a plane, where rays that go `down` by so much for each meter of depth (negative) begin at a height above
 /// it \[m\].
 #[inline(always)]
 pub(crate) fn plane_nearness<S: Simd>(down: F<S>, height: f32) -> F<S> {
@@ -204,7 +204,7 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
     }
 }
 
-/// [`intersect`] for every shape with a closed form, by [`Shape::intersect`].
+/// [`intersect`] forevery shape with a closed form, by [`Shape::intersect`].
 #[cold]
 #[inline(never)]
 fn ray_by_ray<S: Simd>(s: S, shape: &Shape, o: &V3<S>, d: &V3<S>, near: f32) -> PrimitiveHit<S> {

@@ -1,4 +1,4 @@
-//! From pixels to rays and back, for cameras (pinhole) and lamps (pinhole or parallel).
+//! From pixels to rays and back, for cameras (pinhole) and lights (pinhole or parallel).
 
 use super::View;
 use crate::simd::{F, Simd, V3, splat};
@@ -7,7 +7,7 @@ use kinetoscope_scene::PoseF32;
 /// A view with pinhole or parallel rays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Projection {
-    /// Whether rays are parallel; `fx` and `fy` are pixels per metre then.
+    /// Whether rays are parallel; `fx` and `fy` are pixels per meter then.
     pub(crate) parallel: bool,
     pub(crate) width: usize,
     pub(crate) height: usize,
@@ -51,7 +51,7 @@ impl Projection {
         self.nearness(self.near)
     }
 
-    /// Rays through the points (u, v) of the picture, in the frame of an instance: origin and direction, such that the
+    /// Rays through the points (u, v) of the image, in the frame of an instance: origin and direction, such that the
     /// parameter is the depth.
     #[inline(always)]
     pub(crate) fn rays<S: Simd>(&self, s: S, camera: &LocalCamera, u: F<S>, v: F<S>) -> (V3<S>, V3<S>) {

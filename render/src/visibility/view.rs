@@ -5,7 +5,7 @@ use kinetoscope_scene::PoseF32;
 
 /// A pinhole camera at a place, without distortion.
 ///
-/// The axes are ROS's optical ones: x to the right of the picture, y down, z forward. The ray of pixel (u, v) goes through
+/// The axes are ROS's optical ones: x to the right of the image, y down, z forward. The ray of pixel (u, v) goes through
 /// (u + 0.5, v + 0.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
@@ -30,11 +30,11 @@ pub struct View {
 }
 
 impl View {
-    /// The largest side of a picture: edge functions stay exact up to here (see `raster::triangle`).
+    /// The largest side of a image: edge functions stay exact up to here (see `raster::triangle`).
     pub const MAX_SIDE: usize = 8192;
 
     /// A camera at `eye` that looks at `target`, with the vertical field of view `fovy` \[rad\], square pixels and the
-    /// principal point in the middle; it sees depths from 1 cm to 100 m. The picture's upward direction is as near to `up`
+    /// principal point in the middle; it sees depths from 1 cm to 100 m. The image's upward direction is as near to `up`
     /// as possible; looking along `up`, it is +y of the world (or +x, where `up` is y).
     ///
     /// # Errors

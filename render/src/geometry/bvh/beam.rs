@@ -173,7 +173,7 @@ impl Bvh {
                     insert(stack, bottom, Entry { near: near[k], child, count });
                     continue;
                 }
-                // Things at once: their order among neighbours is worth less than keeping it.
+                // Things at once: their order among neighbors is worth less than keeping it.
                 let (first, count) = (child as usize, count as usize);
                 if count > budget {
                     return Walked::Part;

@@ -408,7 +408,7 @@ mod tests {
             let grown = (1.0 + 2.0 * f64::from(far + 1.0) * PAD * (1.0 + 1.0 / 16.0) / 0.01).powi(2);
             assert!(outlying < 1.5 * plain * grown, "{far}: {outlying}, not {plain} times {grown}");
         }
-        // All at one place: every thing is tested, and nothing recurs for ever.
+        // All at one place: every thing is tested, and nothing recurs forever.
         assert_eq!(tested(&vec![[[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]; 1000]), 1000.0);
     }
 }

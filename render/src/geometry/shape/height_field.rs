@@ -38,7 +38,7 @@ pub(crate) struct Field {
     cells: [usize; 2],
     /// Half lengths along x and y \[m\].
     half: [f64; 2],
-    /// Cells per metre.
+    /// Cells per meter.
     per_metre: [f64; 2],
     /// Heights of all points, row after row \[m\].
     heights: Vec<f64>,

@@ -197,7 +197,7 @@ impl MeshTree {
         best
     }
 
-    /// [`nearest`](Self::nearest) for every ray of a packet, up to its limit, to the bit; `shear` is that of the rays, if they
+    /// [`nearest`](Self::nearest) forevery ray of a packet, up to its limit, to the bit; `shear` is that of the rays, if they
     /// have one. One walk for all of them where they run side by side. Only lanes with a ray are written.
     #[inline(always)]
     pub(crate) fn nearest_of_packet<S: Simd>(

@@ -14,7 +14,7 @@ pub(crate) trait RayShape {
     /// The nearest surface at a distance from 0 to `limit`, both included.
     fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Intersection>;
 
-    /// The same for every ray of a packet, up to its limit, to the bit. Of what `touches` were before only those of lanes
+    /// The same forevery ray of a packet, up to its limit, to the bit. Of what `touches` were before only those of lanes
     /// without a ray may stay.
     #[inline(always)]
     fn touch_packet<S: Simd>(&self, _s: S, packet: &Packet, stack: &mut Stack, touches: &mut Touches)

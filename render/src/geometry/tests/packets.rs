@@ -170,7 +170,7 @@ fn height_fields() {
     assert!(hits > 5000, "{hits}");
 }
 
-/// The control of the tests above: neighbours of a height scanner walk through the tree together.
+/// The control of the tests above: neighbors of a height scanner walk through the tree together.
 #[test]
 fn beams() {
     let mut dice = Dice(34);

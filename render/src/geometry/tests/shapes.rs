@@ -81,7 +81,7 @@ fn surfaces() {
     }
 }
 
-/// Within a few micrometres of where faces meet.
+/// Within a few micrometers of where faces meet.
 fn edge(shape: &Shape, [x, y, z]: [f64; 3]) -> bool {
     let near = |p: f64, h: f32| (p.abs() - f64::from(h)).abs() < 1e-5;
     match shape {

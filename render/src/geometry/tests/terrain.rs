@@ -12,7 +12,7 @@ use kinetoscope_scene::shape::HeightField;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::unit;
 
-/// The field's triangles. Points are a quarter of a metre apart; where single precision has missed that, it is put right.
+/// The field's triangles. Points are a quarter of a meter apart; where single precision has missed that, it is put right.
 fn triangles(field: &HeightField) -> Vec<Triangle> {
     let mesh = field.mesh();
     let half = field.size();
@@ -134,7 +134,7 @@ fn level() {
     assert_eq!(hit([0.5, 0.0, 0.25], [0.0, -1.0, 0.0]).unwrap().0, 1.0, "from inside, a wall");
 }
 
-/// Long flat rays over large terrain, whose peak is at (-212, 188), 2 m high, its foot a metre around.
+/// Long flat rays over large terrain, whose peak is at (-212, 188), 2 m high, its foot a meter around.
 #[test]
 fn long_rays() {
     let n = 1025;
@@ -143,7 +143,7 @@ fn long_rays() {
     let field = HeightField::new([512.0, 512.0, 2.0, 1.0], n, n, &elevation).unwrap();
     let walk = solid(&field);
     let hit = |origin: [f64; 3], direction: [f64; 3]| distance(&walk, &Ray { origin, direction }).map(|(t, _)| t);
-    // Half way up the slope of one cell of a metre.
+    // Half way up the slope of one cell of a meter.
     for (x, expected) in [(-900.0, 900.0 - 212.0 - 0.5), (900.0, 900.0 + 212.0 - 0.5)] {
         let t = hit([x, 188.0, 1.0], [-f64::signum(x), 0.0, 0.0]).unwrap();
         assert!((t - expected).abs() < 1e-9, "{t} {expected}");

@@ -74,7 +74,7 @@ fn watertight_and_textbook() {
             }
         }
     }
-    // Slivers squeezed to a thousandth, of a millimetre's size, seen from 20 m lose some digits in the textbook formula.
+    // Slivers squeezed to a thousandth, of a millimeter's size, seen from 20 m lose some digits in the textbook formula.
     assert!(hits > 500 && worst < 1e-7, "{hits} hits, {worst:e}");
 }
 

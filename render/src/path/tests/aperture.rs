@@ -61,7 +61,7 @@ fn circle_of_confusion() {
         let (sum, mean, var) = moments(&blurred);
         let side = 2.0 * f64::from(half) * f64::from(F) / f64::from(depth);
         let light = 2.0 * albedo(0.5);
-        // So many paths meet the lamp; of a disc's points, x² has a standard deviation as large as its mean.
+        // So many paths meet the light; of a disc's points, x² has a standard deviation as large as its mean.
         let paths = 2048.0 * side * side;
         let off = 5.0 / f64::sqrt(paths);
         assert!((sum - light * side * side).abs() < off * sum, "{sum}, not {}", light * side * side);

@@ -39,7 +39,7 @@ fn same((a, da): (f64, f64), (b, db): (f64, f64)) -> bool {
     (a - b).abs() < 5.0 * da.hypot(db) + 1e-6
 }
 
-/// The same mean by each way alone and by both, for every shape whose points are sampled, on matt and on shiny floors.
+/// The same mean by each way alone and by both, forevery shape whose points are sampled, on matt and on shiny floors.
 #[test]
 fn both_ways() {
     let upright = PoseF32::from_translation([0.2, 0.1, 0.9]);
@@ -87,7 +87,7 @@ fn multiple_importance_sampling() {
         }
     }
     let [both, looking, meeting] = variances;
-    // Of 400 pictures a variance is known to 7 %.
+    // Of 400 images a variance is known to 7 %.
     assert!(both < 0.5 * looking && both < 0.5 * meeting, "{both} {looking} {meeting}");
 }
 

@@ -37,7 +37,7 @@ fn plate() {
     let across = ((angle - inside).sin() / (angle + inside).sin()).powi(2);
     let along = ((angle - inside).tan() / (angle + inside).tan()).powi(2);
     let expected = (1.0 - 0.5 * (across + along)).powi(2);
-    // From where the ray meets the plate, at x = 0, to the height of the lamp, 0.9 below the plate.
+    // From where the ray meets the plate, at x = 0, to the height of the light, 0.9 below the plate.
     let x = t * inside.tan() + 0.9 * angle.tan();
     let lamp = Material { emission: 1.0, ..matt(1.0) };
     let shapes = vec![

@@ -25,7 +25,7 @@ fn at(light: Light, x: f32) -> (f64, f64) {
 fn near_lights() {
     let spot = LightKind::Spot { cutoff_deg: 40.0, exponent: 4.0 };
     for (kind, exponent) in [(LightKind::Point, 0), (spot, 4)] {
-        // The lamp is 2 m up.
+        // The light is 2 m up.
         let light = |radius: f64| Light {
             attenuation: [1., 0., 0.],
             radius: radius as f32,
@@ -60,7 +60,7 @@ fn near_lights() {
     }
 }
 
-/// Of a directional lamp directions are spread over a disc of its radius at a distance of 1 m: the light at x is the mean cosine
+/// Of a directional light directions are spread over a disc of its radius at a distance of 1 m: the light at x is the mean cosine
 /// of those that pass the edge of the box, an integral over the disc whose inner part is closed.
 #[test]
 fn directional_lights() {
@@ -115,7 +115,7 @@ fn emissive_rectangle() {
 }
 
 /// Surfaces below a point light exactly on a ceiling, which takes nothing of its light: a floor in closed form, and a smooth
-/// ball of triangles to the bit. The control: a millimetre inside the ceiling the light is gone.
+/// ball of triangles to the bit. The control: a millimeter inside the ceiling the light is gone.
 ///
 /// Root cause: shadow rays began above the triangles, at the smooth surface, and went as far as from the triangles: beyond
 /// the light, into the ceiling.

@@ -4,7 +4,7 @@ use super::{Bounds, Cells, Item, NOTHING, quad};
 
 /// Bins along a side.
 const BINS: usize = 16;
-/// No more groups than these are cut between neighbours on the curve: clearing and summing up bins would take longer than
+/// No more groups than these are cut between neighbors on the curve: clearing and summing up bins would take longer than
 /// filling them.
 const FEW: usize = 16;
 

@@ -32,7 +32,7 @@ const NARROW: f64 = 0.7;
 const MOST: f64 = 2.0;
 /// In how many columns triangles are on average, at most; meshes of triangles of very different sizes have none.
 const SPREAD: usize = 12;
-/// How far a steep ray gets along x or y for each metre along z, at most.
+/// How far a steep ray gets along x or y for each meter along z, at most.
 const STEEP: f64 = 0.125;
 /// Columns that a ray may pass along x, and along y.
 const PASSED: usize = 4;
