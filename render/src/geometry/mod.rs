@@ -1,8 +1,8 @@
 //! Exact ray casting against the shapes of a scene, for ray casters, ray tracing and cameras made of rays.
 //!
 //! Geometry is in double precision: a distance of 20 m is right to far less than a micrometer, up to the single
-//! precision sizes of shapes. [`world::RayTargets`] holds the targets, prepared once; [`world::RayWorld`] holds their
-//! poses in one environment.
+//! precision sizes of shapes. [`RayTargets`] holds the targets, prepared once; [`RayWorld`] holds their poses in one
+//! environment.
 //!
 //! Rays are cast in packets of eight, one per lane. A shape intersects one ray at a time. A shape that can do better
 //! for nearly parallel rays uses the same operations in the same order. So a hit never depends on the other rays of the

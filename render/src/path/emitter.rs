@@ -1,8 +1,8 @@
 //! Emissive instances as area lights: at every surface, a point on an emitter is sampled besides the direction that the
 //! BSDF samples. Multiple importance sampling combines both by their pdfs.
 //!
-//! Source: Veach and Guibas, Optimally combining sampling techniques for Monte Carlo rendering, SIGGRAPH 1995 (the power
-//! heuristic).
+//! Source: Veach and Guibas, Optimally combining sampling techniques for Monte Carlo rendering, SIGGRAPH 1995 (the
+//! power heuristic).
 
 use super::brightness;
 use crate::trace::Tracer;

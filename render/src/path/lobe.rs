@@ -1,8 +1,8 @@
 //! BSDF of a surface: Lambertian reflection below a glossy GGX layer, with perfect mirrors and smooth glass.
 //!
-//! Sources: Walter et al., Microfacet models for refraction through rough surfaces, 2007 (GGX); Heitz, Understanding the
-//! masking-shadowing function, JCGT 3(2), 2014; Dupuy and Benyoub, Sampling visible GGX normals with spherical caps, 2023;
-//! Schlick, 1994; Lagarde and de Rousiers, Moving Frostbite to physically based rendering, 2014 (F90).
+//! Sources: Walter et al., Microfacet models for refraction through rough surfaces, 2007 (GGX); Heitz, Understanding
+//! the masking-shadowing function, JCGT 3(2), 2014; Dupuy and Benyoub, Sampling visible GGX normals with spherical
+//! caps, 2023; Schlick, 1994; Lagarde and de Rousiers, Moving Frostbite to physically based rendering, 2014 (F90).
 
 use super::brightness;
 use kinetoscope_scene::Material;

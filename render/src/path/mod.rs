@@ -154,7 +154,7 @@ impl Lamps {
         *haze = scene.haze.map(|h| (h.color.map(linear), f64::from(h.start), f64::from(h.end)));
         lamps.clear();
         lamps.extend(lights.iter().filter(|l| l.active).take(MAX_LAMPS).map(Lamp::new));
-        // After the other lights, whose limit it does not count towards: it is a point, and needs no random numbers.
+        // After the other lights, and not counted in their limit: it is a point, and needs no random numbers.
         if scene.headlight.active {
             let axis = forward.then(|| view.world_from_camera.rotation.map(|row| row[2]));
             lamps.push(match scene.headlight.along(scene.light_sum, axis) {

@@ -3,9 +3,9 @@
 //! its noise. Albedo is divided out before, so that textures stay sharp. Where some of the light is mirrored, which
 //! albedo does not tint, edges of albedo are edges too.
 //!
-//! Sources: Dammertz et al., Edge-avoiding à-trous wavelet transform for fast global illumination filtering, HPG 2010; the
-//! weights by the variance of light after Schied et al., Spatiotemporal variance-guided filtering, HPG 2017, with polynomials
-//! in place of exponentials, which differ from machine to machine.
+//! Sources: Dammertz et al., Edge-avoiding à-trous wavelet transform for fast global illumination filtering, HPG 2010;
+//! the weights by the variance of light after Schied et al., Spatiotemporal variance-guided filtering, HPG 2017, with
+//! polynomials in place of exponentials, which differ from machine to machine.
 
 use super::film::Pixel;
 use super::{Found, brightness};

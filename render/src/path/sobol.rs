@@ -1,8 +1,8 @@
 //! Low-discrepancy random numbers: Sobol's first two dimensions with Owen scrambling, independent for each pixel and
 //! each pair of dimensions.
 //!
-//! Sources: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified sampling for stochastic
-//! transparency, 2011, section 4.1; Burley, Practical hash-based Owen scrambling, JCGT 9(4), 2020.
+//! Sources: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified sampling for
+//! stochastic transparency, 2011, section 4.1; Burley, Practical hash-based Owen scrambling, JCGT 9(4), 2020.
 
 /// The random sequence of a pixel.
 #[derive(Clone, Copy, Debug)]

@@ -3,8 +3,9 @@
 //! heuristic (SAH). Above groups, the heuristic selects planes between bins along the longest side, two children at a
 //! time; eight such children are a node.
 //!
-//! Sources: Wald, On fast construction of SAH-based bounding volume hierarchies, 2007; Lauterbach et al., Fast BVH construction
-//! on GPUs, 2009; Ganestam et al., Bonsai: rapid bounding volume hierarchy generation using mini trees, JCGT 4(3), 2015.
+//! Sources: Wald, On fast construction of SAH-based bounding volume hierarchies, 2007; Lauterbach et al., Fast BVH
+//! construction on GPUs, 2009; Ganestam et al., Bonsai: rapid bounding volume hierarchy generation using mini trees,
+//! JCGT 4(3), 2015.
 
 use super::{Aabb, Bvh, Node, PAD, WIDE};
 use crate::simd::{F4, Level, Simd, at_level};

@@ -171,7 +171,7 @@ fn sums() {
     assert!((together.0 - (sum - alone[0].0)).abs() > off);
 }
 
-/// A panel as a mesh, two half sides wide, offset by `aside` from its frame, facing down (or up).
+/// A square panel of half side `half` as a mesh, offset by `aside` from its frame, facing down (or up).
 fn panel(half: f32, aside: f32, up: bool) -> Shape {
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let positions = corners.map(|[x, y]| [aside + half * x, half * y, 0.0f32]).to_vec();

@@ -11,7 +11,8 @@ const DIGITS: usize = 1 << BITS;
 const FEW: usize = 512;
 /// Adjacent cells with at most this many boxes together become one group: one node less, and not more to test.
 const JOINED: usize = 12;
-/// More boxes than a group holds may not share all but these last bits of their cell.
+/// Lowest bits of the Morton code of a cell. If more boxes than a group holds differ in these bits only, they are
+/// sorted along a finer curve.
 const CROWDED: u32 = 3;
 
 /// Bits of a coordinate spread out with two empty bits between them. A table takes a third of the time of shifting.
