@@ -13,11 +13,11 @@ use serde::{Deserialize, Serialize};
 /// ```
 /// use kinetoscope_render::Aperture;
 ///
-/// A 50 mm lens at f/2, focused at 2 m, in a camera with a focal length of 1000 pixels.
+/// // A 50 mm lens at f/2, focused at 2 m, in a camera with a focal length of 1000 pixels.
 /// let aperture = Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 };
 /// assert_eq!(aperture.diameter(), 0.025);
 /// assert_eq!(aperture.circle_of_confusion(2.0, 1000.0), 0.0);
-/// c = A |S2 - S1| / S2 f / (S1 - f) on the sensor, where 1000 pixels are f S1 / (S1 - f).
+/// // c = A |S2 - S1| / S2 f / (S1 - f) on the sensor, where 1000 pixels are f S1 / (S1 - f).
 /// assert!((aperture.circle_of_confusion(4.0, 1000.0) - 1000.0 * 0.025 * (0.5 - 0.25)).abs() < 1e-12);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,7 +49,8 @@ impl Aperture {
     ///
     /// # Errors
     ///
-    /// [`RenderError::Aperture`] with the name, the value and the allowed range of the first number that is not.
+    /// [`RenderError::Aperture`] with the name, the value and the allowed range of the first number out of
+    /// range.
     pub fn check(&self) -> Result<(), RenderError> {
         let Self { focal_length, f_number, focus_distance } = *self;
         let wrong = |what, value, allowed| Err(RenderError::Aperture { what, value, allowed });

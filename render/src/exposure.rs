@@ -89,7 +89,7 @@ fn draw_colors(
     let seed = seed ^ noise;
     let (scene, moving) = (shot.scene, moving.as_ref());
     let paths = Paths { scene, tracer, eye, moving, samples, max_bounces, seed, lamps, ways: Ways::Both };
-    // The progress object is not asked afterwards: another thread may have resumed it meanwhile, with rows missing.
+    // Not read from the progress object afterwards: another thread may have resumed it meanwhile, with rows missing.
     let broken_off = AtomicBool::new(false);
     pool.for_each(rasterizers, rows, |rasterizer, mut rows| {
         let level = rasterizer.brush.level;

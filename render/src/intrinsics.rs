@@ -90,7 +90,7 @@ impl Intrinsics {
     ///
     /// # Errors
     ///
-    /// [`OpticsError::IntrinsicMatrix`] for another form (skew, scale), [`OpticsError::Lens`] for a bad number.
+    /// [`OpticsError::IntrinsicMatrix`] for another form (skew, scale), [`OpticsError::Lens`] for an invalid number.
     pub fn from_matrix(matrix: &Matrix3<f64>) -> Result<Self, OpticsError> {
         let fixed = [((0, 1), 0.0), ((1, 0), 0.0), ((2, 0), 0.0), ((2, 1), 0.0), ((2, 2), 1.0)];
         for ((row, column), wanted) in fixed {

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 ///
 /// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 1);
 /// let progress = rasterizer.progress().clone();
-/// On another thread, during rendering:
+/// // On another thread, during rendering:
 /// println!("{} of {} paths, {:?} left", progress.samples(), progress.total(), progress.remaining());
 /// progress.cancel();
 /// assert!(progress.is_cancelled());

@@ -35,7 +35,7 @@ pub struct RayHit {
 }
 
 impl RayHit {
-    /// The instance of a miss.
+    /// Value of `instance` for a miss.
     pub const NOTHING: u32 = u32::MAX;
     /// A miss.
     pub const MISS: Self = Self { distance: f64::INFINITY, normal: [0.0; 3], instance: Self::NOTHING, mask_id: 0 };
@@ -238,7 +238,7 @@ impl RayWorld {
         }
     }
 
-    /// The targets.
+    /// Targets that rays are cast against.
     pub fn targets(&self) -> &Arc<RayTargets> {
         &self.targets
     }

@@ -13,7 +13,7 @@ const ISAAC_SLOPE: f64 = 0.00245;
 /// principal point in pixels of the calibration image.
 ///
 /// For the calibration image, fx and fy equal [`focal_length`](Self::focal_length). For another image size, scale fx
-/// and fy in proportion to its number of pixels.
+/// in proportion to its width and fy in proportion to its height.
 ///
 /// The default is Isaac Lab's `FisheyeCameraCfg`: b = 0.00245 rad per pixel, all other coefficients 0, a field of view
 /// of 200 degrees. Source of these numbers: `isaaclab/sim/spawners/sensors/sensors_cfg.py`, fields
@@ -24,7 +24,8 @@ const ISAAC_SLOPE: f64 = 0.00245;
 pub struct FTheta {
     /// Coefficients a to f; a is 0, because the optical axis is at r = 0.
     pub polynomial: [f64; 6],
-    /// Focal length of the calibration image \[pixels\]; the slope at the center is 1 for 1 / b.
+    /// Focal length of the calibration image \[pixels\]. With 1 / b it is the scale at the center, in pixels per
+    /// radian.
     pub focal_length: f64,
     /// Largest visible angle from the optical axis \[rad\]: half of Isaac's `fisheye_max_fov`.
     pub max_angle: f64,

@@ -292,7 +292,7 @@ pub(crate) fn shade<S: Simd>(
     let mut diffuse = [ambient(0), ambient(1), ambient(2)];
     if let Some(rays) = shadow_rays.filter(|rays| rays.occlusion_rays > 0) {
         let [above, below] = rays.blocked(s, at.point(), n, lanes);
-        // Ray counts may exceed the ambient light itself: no light is subtracted twice.
+        // The occluded fractions are estimates: they are limited to the light that is there.
         let (above, below) = (min(above, up), min(below, splat(s, 1.0) - up));
         for (k, diffuse) in diffuse.iter_mut().enumerate() {
             *diffuse = *diffuse - above * sky_light[k] - below * ground[k];

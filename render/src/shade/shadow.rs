@@ -239,8 +239,8 @@ impl ShadowMap {
         load(s, &lit)
     }
 
-    /// Filters sixteen texels around a point. Exactly 1 if no texel is nearer, as if none had been read (and if the
-    /// nearer ones weigh less than a ninety-thousandth).
+    /// Filters sixteen texels around a point. The result is exactly 1 if no texel is nearer to the light, or if the
+    /// nearer ones weigh less than a ninety-thousandth: the same as without reading texels.
     #[inline(always)]
     fn taps(&self, [column, row]: [usize; 2], fx: f32, fy: f32, q: f32) -> f32 {
         let width = self.projection.width;

@@ -116,7 +116,7 @@ impl LampView {
                 out.add([x + margin, y + margin, z]);
                 continue;
             }
-            // A point beside the light may be anywhere in its view.
+            // A point at the height of the light or behind it has no bounds in its view.
             let depth = z.max(SPOT_NEAR);
             let reach = if z < SPOT_NEAR { f32::INFINITY } else { margin / depth };
             out.add([x / depth - reach, y / depth - reach, z]);

@@ -190,8 +190,8 @@ fn shadow_maps() {
     }
 }
 
-/// A cube of 5 cm and an arm of boxes on a plane of half size `ground`, with the light of a simulation, from a camera
-/// above.
+/// A cube of 5 cm and an arm of boxes on a plane of half size `ground`, with the default light of a simulation, from a
+/// camera above.
 fn tabletop(ground: f32, view: crate::visibility::View) -> Still {
     let gray = || matt([GRAY; 3]);
     let cuboid = |half: [f32; 3], pose| (Shape::from(Box { half }), gray(), pose);

@@ -40,7 +40,7 @@ pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut 
     recent[0] = F8::load(s, &least[LEAF - 1]);
     // Least cost of all primitives as k + 1 leaves.
     let mut best = none;
-    // The boxes around the last thing, the last two, and so on.
+    // The boxes around the last primitive, the last two, and so on.
     let mut lo = [F4::splat(s, f32::INFINITY); 3];
     let mut hi = [F4::splat(s, f32::NEG_INFINITY); 3];
     let (longest, tests) = (F4::splat(s, f32::MAX), F4::load(s, &TESTS));
