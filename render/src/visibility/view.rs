@@ -70,7 +70,8 @@ impl View {
         view.validate().map(|()| view)
     }
 
-    /// Checks every number.
+    /// Checks every number: sides of 1 to [`MAX_SIDE`](Self::MAX_SIDE) pixels, focal lengths of at least 0.001 pixels,
+    /// focal lengths and principal point below 1e7 pixels in magnitude, 1e-6 m <= near < far, and a rigid pose.
     ///
     /// # Errors
     ///
