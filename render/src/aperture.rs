@@ -1,49 +1,56 @@
-//! Depth of field: a lens that has a size.
+//! Depth of field of a thin lens.
 
 use crate::visibility::RenderError;
 use serde::{Deserialize, Serialize};
 
-/// The opening of a thin lens: what is not at the distance that it is focused on is blurred. Needs
-/// [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced), whose paths begin all over the opening: colours are blurred, all other
-/// channels are those of its middle.
+/// Aperture of a thin lens: surfaces away from the focus distance are blurred.
 ///
-/// Fields of view stay those of [`Intrinsics`](crate::intrinsics::Intrinsics), whatever the lens is focused on.
+/// Depth of field needs [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced), whose camera rays start all over
+/// the aperture. It blurs the color channel only. All other channels are those of the aperture's center.
+///
+/// The field of view stays that of [`Intrinsics`](crate::intrinsics::Intrinsics) for every focus distance.
 ///
 /// ```
 /// use kinetoscope_render::Aperture;
 ///
-/// // A lens of 50 mm at f/2, focused on what is 2 m away, in a camera whose focal length is 1000 pixels.
+/// // A 50 mm lens at f/2, focused at 2 m, in a camera with a focal length of 1000 pixels.
 /// let aperture = Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 };
 /// assert_eq!(aperture.diameter(), 0.025);
 /// assert_eq!(aperture.circle_of_confusion(2.0, 1000.0), 0.0);
-/// // c = A |S2 - S1| / S2 f / (S1 - f) on the sensor, and f S1 / (S1 - f) of it are 1000 pixels.
+/// // c = A |S2 - S1| / S2 f / (S1 - f) on the sensor, where 1000 pixels are f S1 / (S1 - f).
 /// assert!((aperture.circle_of_confusion(4.0, 1000.0) - 1000.0 * 0.025 * (0.5 - 0.25)).abs() < 1e-12);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Aperture {
-    /// Focal length of the lens \[m\]: with the f-number it gives the opening, and nothing else.
+    /// Focal length of the lens \[m\]. It determines the aperture diameter, together with the f-number, and nothing
+    /// else.
     pub focal_length: f64,
-    /// The focal length over the diameter of the opening; infinite is an opening without a size.
+    /// Focal length divided by the aperture diameter. An infinite f-number is a pinhole.
     pub f_number: f64,
-    /// The depth along the optical axis that is sharp \[m\] (through lenses whose rays go aside, the distance), farther than the
-    /// focal length; may be infinite.
+    /// Depth of the plane in focus along the optical axis \[m\], farther than the focal length; may be infinite.
+    /// Through lenses whose rays do not all go forward, it is the distance from the camera.
     pub focus_distance: f64,
 }
 
 impl Aperture {
-    /// The diameter of the opening \[m\].
+    /// Diameter of the aperture \[m\].
     pub fn diameter(&self) -> f64 {
         self.focal_length / self.f_number
     }
 
-    /// The diameter of the disc that a point at a depth \[m\] becomes \[pixels\], where a camera's focal length is `f` \[pixels\].
-    /// Source: similar triangles, see any text on optics, such as Hecht, Optics, section 5.2.
+    /// Diameter of the disc to which a point at `depth` \[m\] is blurred \[pixels\], for a camera of focal length `f`
+    /// \[pixels\]. Source: similar triangles, see any text on optics, such as Hecht, Optics, section 5.2.
     pub fn circle_of_confusion(&self, depth: f64, f: f64) -> f64 {
         f * self.diameter() * (1.0 / self.focus_distance - 1.0 / depth).abs()
     }
 
-    /// Checks the numbers.
+    /// Checks that the numbers are in their ranges.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Aperture`] with the name, the value and the allowed range of the first number out of
+    /// range.
     pub fn check(&self) -> Result<(), RenderError> {
         let Self { focal_length, f_number, focus_distance } = *self;
         let wrong = |what, value, allowed| Err(RenderError::Aperture { what, value, allowed });
@@ -56,7 +63,7 @@ impl Aperture {
         if focus_distance.is_nan() || focus_distance <= focal_length {
             return wrong("focus_distance", focus_distance, "larger than the focal length; infinite is possible");
         }
-        // Far wider than any lens; squares of it are finite in single precision.
+        // Far wider than any lens; its square is finite in single precision.
         if self.diameter() > 1e6 {
             return wrong(
                 "f_number",

@@ -1,4 +1,4 @@
-//! Pictures by path tracing: threads share the rows of one picture at a time.
+//! Path tracing of one frame after the other; threads share the rows of a frame.
 
 use super::lens::LensRays;
 use super::rasterizer::Rasterizer;
@@ -18,20 +18,20 @@ use kinetoscope_exec::ThreadPool;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Rows of pixels that a thread takes at once: a row of blocks.
+/// Rows of pixels per job of a thread: one row of blocks.
 const ROWS: usize = BLOCK;
 
-/// A frame whose shot is prepared.
+/// A frame whose request is prepared.
 struct Exposure<'a> {
     shot: &'a Shot<'a>,
     plan: &'a Plan,
-    /// `None` if the frame is of one instant.
+    /// `None` if the frame shows one instant.
     interval: Option<ShutterInterval<'a>>,
     /// [`Take::noise`].
     noise: u32,
 }
 
-/// Draws a shot with the threads of some rasterizers. The bits do not depend on their number.
+/// Renders a frame with the threads of several rasterizers. The bits do not depend on the number of threads.
 pub(super) fn expose(
     pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
@@ -58,7 +58,7 @@ pub(super) fn expose(
     result
 }
 
-/// Follows the paths of a prepared shot; writes nothing into the frame.
+/// Traces the paths of a prepared frame; writes nothing into the frame.
 fn draw_colors(
     pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
@@ -85,11 +85,11 @@ fn draw_colors(
     });
     let eye = Eye { projection, lens, pupil: first.aperture.as_ref().and_then(Pupil::of) };
     let (lamps, rows) = film.rows(ROWS);
-    // Takes of number 0 are as they were without.
+    // A noise number of 0 leaves the seed as it is.
     let seed = seed ^ noise;
     let (scene, moving) = (shot.scene, moving.as_ref());
     let paths = Paths { scene, tracer, eye, moving, samples, max_bounces, seed, lamps, ways: Ways::Both };
-    // Not what the progress says afterwards: it may have been resumed meanwhile, and rows be missing.
+    // Not read from the progress object afterwards: another thread may have resumed it meanwhile, with rows missing.
     let broken_off = AtomicBool::new(false);
     pool.for_each(rasterizers, rows, |rasterizer, mut rows| {
         let level = rasterizer.brush.level;
@@ -120,7 +120,7 @@ fn draw_colors(
     Ok(())
 }
 
-/// Draws all channels but the colour: what the pixels' centres see.
+/// Renders all channels but color, at the pixel centers.
 fn draw_others(
     pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
@@ -156,7 +156,7 @@ fn draw_others(
     failure
 }
 
-/// Makes bytes of what the paths found.
+/// Converts the traced light to sRGB bytes.
 fn show(pool: &ThreadPool, rasterizers: &mut [Rasterizer], plan: &Plan, film: &Film, frame: &mut FrameMut<'_>) {
     let Renderer::RayTraced { denoise, .. } = plan.renderer else { return };
     let Some(color) = frame.color.as_deref_mut() else { return };

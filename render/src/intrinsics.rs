@@ -1,14 +1,15 @@
-//! The lens: from focal lengths, apertures or angles to pixels.
+//! Camera intrinsics: conversion of focal lengths, sensor sizes or angles to pixels.
 
 use super::optics_error::OpticsError;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// A pinhole lens without distortion, in the terms that users have. The centre of pixel (u, v) is (u + 0.5, v + 0.5).
+/// Pinhole intrinsics without distortion, in several user-facing forms. The center of pixel (u, v) is (u + 0.5, v +
+/// 0.5).
 ///
-/// For OpenCV and ROS it is (u, v): of what they calibrate, cx and cy are to be half a pixel more here. To read and write files of
-/// ROS there is `CameraInfo`, which minds that.
+/// OpenCV and ROS put the center of that pixel at (u, v): add half a pixel to their calibrated cx and cy. `CameraInfo`
+/// does so when it reads and writes files of ROS.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -24,34 +25,35 @@ pub enum Intrinsics {
         /// Principal point, from the upper edge.
         cy: f64,
     },
-    /// A film of a size, as Isaac's `PinholeCameraCfg` has it. All numbers are in one unit of length, of any kind.
+    /// An image sensor (film) of a given size, as in Isaac's `PinholeCameraCfg`. All numbers share one unit of length,
+    /// of any kind.
     ///
-    /// fx = W f / horizontal_aperture, and fy = H f / vertical_aperture, or fx where that is `None` (square pixels). The
-    /// principal point lies `horizontal_offset` to the right and `vertical_offset` below the middle of the film:
-    /// cx = W / 2 + fx horizontal_offset / f, cy = H / 2 + fy vertical_offset / f. (Isaac leaves the division by f out,
-    /// which is the same only for f = 1.)
+    /// fx = W f / horizontal_aperture, and fy = H f / vertical_aperture, or fx if `vertical_aperture` is `None` (square
+    /// pixels). The principal point lies `horizontal_offset` to the right and `vertical_offset` below the center of the
+    /// sensor: cx = W / 2 + fx horizontal_offset / f, cy = H / 2 + fy vertical_offset / f. (Isaac leaves out the
+    /// division by f, which is the same only for f = 1.)
     Aperture {
         /// Focal length f.
         focal_length: f64,
-        /// Width of the film.
+        /// Width of the sensor.
         horizontal_aperture: f64,
-        /// Height of the film; `None` makes pixels square.
+        /// Height of the sensor; `None` makes pixels square.
         vertical_aperture: Option<f64>,
-        /// The principal point, right of the middle.
+        /// Offset of the principal point to the right of the center.
         #[serde(default)]
         horizontal_offset: f64,
-        /// The principal point, below the middle.
+        /// Offset of the principal point below the center.
         #[serde(default)]
         vertical_offset: f64,
     },
-    /// Square pixels, the principal point in the middle, and this angle between the lower and the upper edge.
+    /// Vertical field of view, with square pixels and the principal point at the center.
     Fovy {
-        /// The angle \[rad\], between 0 and pi.
+        /// Angle between the lower and the upper edge \[rad\], between 0 and pi.
         radians: f64,
     },
 }
 
-/// A pinhole lens \[pixels\].
+/// Pinhole intrinsics \[pixels\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelIntrinsics {
     /// Focal length along x.
@@ -65,8 +67,8 @@ pub struct PixelIntrinsics {
 }
 
 impl Intrinsics {
-    /// EmbodiChain's default lens, f = 600 pixels in a picture 640 wide, which sees the same in pictures of other sizes: f is
-    /// 15/16 of the width, pixels are square.
+    /// EmbodiChain's default intrinsics: f = 600 pixels in an image 640 wide. f is 15/16 of the width in images of any
+    /// size, and pixels are square.
     pub const EMBODICHAIN: Self = Self::Aperture {
         focal_length: 15.0,
         horizontal_aperture: 16.0,
@@ -75,7 +77,7 @@ impl Intrinsics {
         vertical_offset: 0.0,
     };
 
-    /// Isaac's default lens: 24 behind a film 20.955 wide, square pixels.
+    /// Isaac's default intrinsics: a focal length of 24 with a sensor 20.955 wide, square pixels.
     pub const ISAAC: Self = Self::Aperture {
         focal_length: 24.0,
         horizontal_aperture: 20.955,
@@ -84,11 +86,11 @@ impl Intrinsics {
         vertical_offset: 0.0,
     };
 
-    /// The lens of the matrix `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\].
+    /// Intrinsics from the matrix `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` \[pixels\].
     ///
     /// # Errors
     ///
-    /// [`OpticsError::IntrinsicMatrix`] for another form (skew, scale), [`OpticsError::Lens`] for a bad number.
+    /// [`OpticsError::IntrinsicMatrix`] for another form (skew, scale), [`OpticsError::Lens`] for an invalid number.
     pub fn from_matrix(matrix: &Matrix3<f64>) -> Result<Self, OpticsError> {
         let fixed = [((0, 1), 0.0), ((1, 0), 0.0), ((2, 0), 0.0), ((2, 1), 0.0), ((2, 2), 1.0)];
         for ((row, column), wanted) in fixed {
@@ -103,11 +105,11 @@ impl Intrinsics {
         Ok(Self::Pixels { fx, fy, cx, cy })
     }
 
-    /// The same lens in pixels of a picture of `width` by `height`.
+    /// The same intrinsics in pixels of an image of `width` by `height`.
     ///
     /// # Errors
     ///
-    /// [`OpticsError::Lens`]: a number is not finite, a length is not positive, an angle is not between 0 and pi.
+    /// [`OpticsError::Lens`] if a number is not finite, a length is not positive, or an angle is not between 0 and pi.
     pub fn to_pixels(&self, width: usize, height: usize) -> Result<PixelIntrinsics, OpticsError> {
         let (w, h) = (width as f64, height as f64);
         let pixels = match *self {
@@ -148,7 +150,7 @@ impl Intrinsics {
         Ok(pixels)
     }
 
-    /// The 3x3 matrix of the lens in pixels of a picture of `width` by `height`.
+    /// The 3x3 intrinsic matrix in pixels of an image of `width` by `height`.
     ///
     /// # Errors
     ///
@@ -166,7 +168,7 @@ impl From<PixelIntrinsics> for Intrinsics {
 }
 
 impl PixelIntrinsics {
-    /// `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]`.
+    /// The matrix `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]`.
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::new(self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
     }
@@ -203,12 +205,12 @@ mod tests {
             horizontal_offset: -1.0,
             vertical_offset,
         };
-        // Square pixels: 32 per unit of film on both axes.
+        // Square pixels: 32 per unit of sensor length on both axes.
         let square = film(None, 2.0).to_pixels(640, 480).unwrap();
         assert_eq!(square, PixelIntrinsics { fx: 768.0, fy: 768.0, cx: 288.0, cy: 304.0 });
-        // The same film, its height given: 20 * 480 / 640.
+        // The same sensor with its height given: 20 * 480 / 640.
         assert_eq!(film(Some(15.0), 2.0).to_pixels(640, 480).unwrap(), square);
-        // Half as high: 64 pixels per unit of film along y.
+        // Half as high: 64 pixels per unit of sensor length along y.
         let tall = film(Some(7.5), 0.5).to_pixels(640, 480).unwrap();
         assert_eq!(tall, PixelIntrinsics { fx: 768.0, fy: 1536.0, cx: 288.0, cy: 272.0 });
 

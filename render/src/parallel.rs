@@ -1,4 +1,4 @@
-//! Draws many frames on several threads.
+//! Renders many frames on several threads.
 
 use super::aperture::Aperture;
 use super::exposure::expose;
@@ -15,30 +15,31 @@ use crate::visibility::RenderError;
 use kinetoscope_exec::ThreadPool;
 use std::sync::{Mutex, PoisonError};
 
-/// Less work than this is drawn on the calling thread: waking or starting another takes up to 0.05 ms \[ns\].
+/// Less work than this is done on the calling thread: waking or starting another takes up to 0.05 ms \[ns\].
 const WORTH_A_THREAD: usize = 1_000_000;
-/// Parts that each thread gets, about: the last ones decide how long the others wait.
+/// Bands per thread, approximately: the last bands decide how long other threads wait.
 const PARTS: usize = 8;
 
-/// A shot and where its pictures go.
+/// A render request and the buffers of its images.
 pub type Job<'a> = (Shot<'a>, FrameMut<'a>);
 
-/// Draws batches of frames on several threads; keeps the scratch memory of each. The bits do not depend on the number of
-/// threads.
+/// Renders batches of frames on several threads; keeps the scratch memory of each thread. The bits do not depend on the
+/// number of threads.
 ///
-/// Where there are many shots, each is drawn by one thread. The last ones, that would leave threads without work, are
-/// drawn together: first what is drawn where, then their shadow maps in parts, then bands of the pictures.
+/// With many frames, each frame is rendered by one thread. The last frames, which would leave threads without work, are
+/// rendered by all threads together: first their visibility is prepared, then their shadow maps in parts, then bands of
+/// the images.
 #[derive(Debug)]
 pub struct ParallelRasterizer {
     rasterizers: Vec<Rasterizer>,
-    /// How many of them work.
+    /// Number of rasterizers in use.
     working: usize,
     plans: Vec<Plan>,
     pool: ThreadPool,
     progress: RenderProgress,
 }
 
-/// Draws as the other does, and counts its own progress.
+/// Clones the settings. The clone has its own progress counter.
 impl Clone for ParallelRasterizer {
     fn clone(&self) -> Self {
         let mut clone = Self {
@@ -54,8 +55,8 @@ impl Clone for ParallelRasterizer {
 }
 
 impl ParallelRasterizer {
-    /// A rasterizer for each of `threads` threads, the calling one included; 0 counts as 1. The others start with each
-    /// batch and end with it: see [`with_pool`](Self::with_pool).
+    /// Creates a rasterizer for each of `threads` threads, the calling one included; 0 counts as 1. The other threads
+    /// start and end with each batch, unless [`with_pool`](Self::with_pool) sets a thread pool.
     pub fn new(cfg: RasterCfg, threads: usize) -> Self {
         let (working, rasterizers) = (threads.max(1), vec![Rasterizer::new(cfg); threads.max(1)]);
         let (pool, progress) = (ThreadPool::new(), RenderProgress::default());
@@ -64,14 +65,14 @@ impl ParallelRasterizer {
         all
     }
 
-    /// All threads count together.
+    /// Lets all threads count their progress together.
     fn share_progress(&mut self) {
         for rasterizer in &mut self.rasterizers {
             rasterizer.progress = self.progress.clone();
         }
     }
 
-    /// Draws on the threads of `pool`. With those of a simulation nothing is allocated after the first batches.
+    /// Renders on the threads of `pool`. With the pool of a simulation, no memory is allocated after the first batches.
     pub fn with_pool(mut self, pool: ThreadPool) -> Self {
         self.pool = pool;
         self
@@ -82,50 +83,50 @@ impl ParallelRasterizer {
         self.rasterizers.len()
     }
 
-    /// Draws with no more than so many of its threads from now on, and at least with one; all keep their memory.
+    /// Limits the number of threads from now on, to at least one; all keep their memory.
     pub fn use_threads(&mut self, most: usize) {
         self.working = most.clamp(1, self.rasterizers.len());
     }
 
-    /// How frames are drawn.
+    /// Sets the options of the rasterizer.
     pub fn set_cfg(&mut self, cfg: RasterCfg) {
         for rasterizer in &mut self.rasterizers {
             rasterizer.cfg = cfg;
         }
     }
 
-    /// Which renderer draws frames.
+    /// Sets the renderer.
     pub fn set_renderer(&mut self, renderer: Renderer) {
         for rasterizer in &mut self.rasterizers {
             rasterizer.renderer = renderer;
         }
     }
 
-    /// What the lens and the shutter do to light: `None` and [`Shutter::default`] are a point and an instant.
+    /// Sets depth of field and exposure time: `None` and [`Shutter::default`] are a pinhole and an instant.
     pub fn set_light(&mut self, aperture: Option<Aperture>, shutter: Shutter) {
         for rasterizer in &mut self.rasterizers {
             (rasterizer.aperture, rasterizer.shutter) = (aperture, shutter);
         }
     }
 
-    /// How much light there is: stops, -20 to 20, see [`Rasterizer::stops`].
+    /// Sets the exposure compensation in stops, -20 to 20, see [`Rasterizer::stops`].
     pub fn set_stops(&mut self, stops: f64) {
         for rasterizer in &mut self.rasterizers {
             rasterizer.stops = stops;
         }
     }
 
-    /// How far the paths of the pictures are that are drawn.
+    /// Progress of the path tracing of the current images.
     pub fn progress(&self) -> &RenderProgress {
         &self.progress
     }
 
-    /// The geom groups that are drawn: bit k is group k.
+    /// Geom groups that are rendered: bit k is group k.
     pub fn groups(&self) -> u32 {
         self.rasterizers.first().map_or(0, |rasterizer| rasterizer.cfg.groups)
     }
 
-    /// Takes trees over meshes from there, and keeps new ones there.
+    /// Shares the cache of BVHs over meshes.
     pub fn share_assets(&mut self, assets: &RayAssets) {
         for rasterizer in &mut self.rasterizers {
             rasterizer.assets = assets.clone();
@@ -138,17 +139,18 @@ impl ParallelRasterizer {
         own + self.plans.iter().map(Plan::bytes).sum::<usize>()
     }
 
-    /// Draws every shot into its frame.
+    /// Renders every request into its frame.
     ///
     /// # Errors
     ///
-    /// Of the first shot that cannot be drawn, with its index; the others are drawn nevertheless.
+    /// The error of the first frame that cannot be rendered, with its index; the other frames are rendered
+    /// nevertheless.
     pub fn render(&mut self, jobs: &mut [Job<'_>]) -> Result<(), (usize, RenderError)> {
         self.render_takes(jobs, &[])
     }
 
-    /// As [`render`](Self::render), of pictures by path tracing each with its noise and with things that moved while the
-    /// shutter was open. Shots without a take are still, and have the same noise.
+    /// As [`render`](Self::render), with noise and motion per frame for path tracing: `takes` holds the noise number of
+    /// each frame and the poses at shutter opening. Frames without an entry show one instant, with the same noise.
     ///
     /// # Errors
     ///
@@ -176,7 +178,7 @@ impl ParallelRasterizer {
         let together = match threads {
             1 => 0,
             _ if count < 2 * threads => count,
-            // As many as one thread would draw while the others wait.
+            // As many as one thread would render while the others wait.
             _ if count < 8 * threads => count % threads,
             _ => 0,
         };
@@ -195,13 +197,13 @@ impl ParallelRasterizer {
     }
 }
 
-/// How many threads some shots are worth; at least 1.
+/// Number of threads that pay off for these frames; at least 1.
 fn worth(cfg: RasterCfg, renderer: Renderer, jobs: &[Job<'_>]) -> usize {
     let cost = jobs.iter().fold(0usize, |sum, (shot, frame)| sum.saturating_add(estimate(cfg, shot, frame)));
     (cost.saturating_mul(renderer.slowness(cfg)) / (WORTH_A_THREAD / 2)).max(1)
 }
 
-/// The first shot that could not be drawn.
+/// Error of the first frame that could not be rendered.
 #[derive(Debug, Default)]
 struct Failure(Mutex<Option<(usize, RenderError)>>);
 
@@ -220,7 +222,7 @@ impl Failure {
     }
 }
 
-/// Draws a few shots, each by all threads.
+/// Renders a few frames, each by all threads.
 fn draw_together(
     pool: &ThreadPool,
     rasterizers: &mut [Rasterizer],
@@ -253,8 +255,8 @@ fn draw_together(
     });
 }
 
-/// Bands of a frame, about `parts` of them: the first row of blocks, their number, and that part of the frame. None where
-/// the shot cannot be drawn.
+/// Splits a frame into about `parts` bands: first row of blocks, number of rows of blocks, and the buffers of the band.
+/// Empty if the frame cannot be rendered.
 fn bands<'a>(
     plan: &Plan,
     shot: &Shot<'_>,
@@ -280,7 +282,7 @@ mod tests {
     use kinetoscope_scene::shape::Sphere;
     use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene};
 
-    /// A small image of many paths takes seconds, one of few is drawn before a thread has woken.
+    /// A small image with many paths takes seconds; with few paths, it is done before a thread has woken.
     #[test]
     fn worth_of_paths() {
         let scene = &RenderScene::new(vec![Instance::new(Sphere { radius: 0.3 }, Material::default(), 1)]).unwrap();
@@ -288,7 +290,7 @@ mod tests {
         let mut frame = Frame::new(32, 32, Channels::ALL);
         let shot = Shot { scene, poses: &[PoseF32::IDENTITY], view, lights: None, lens: None, before: None };
         let jobs = [(shot, frame.as_mut())];
-        // Without shadow maps, whose cost is that of many more pixels.
+        // Without shadow maps, which cost as much as many more pixels.
         let cfg = RasterCfg { shadows: false, ..RasterCfg::default() };
         let paths = |samples, max_bounces| Renderer::RayTraced { samples, max_bounces, denoise: false, seed: 0 };
         assert_eq!(worth(cfg, Renderer::Raster, &jobs), 1);

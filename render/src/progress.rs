@@ -1,13 +1,13 @@
-//! How far a long rendering is, for whoever waits for it.
+//! Progress of long renderings, and their cancellation.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How far the path tracing of pictures is, and a way to break it off; clones are handles of the same, for other threads.
+/// Progress of path tracing, and a way to cancel it; clones are handles of the same progress, for other threads.
 ///
-/// Counts are of the batch of pictures that is drawn or was drawn last, those of pictures that need no paths are 0. What is
-/// broken off leaves every pixel of the picture that it was at as it was before, and is an error:
+/// Counts belong to the current batch of images, or to the last one. They are 0 for images without paths. Cancellation
+/// leaves all pixels of the current image unchanged, and is an error:
 /// [`RenderError::Cancelled`](crate::visibility::RenderError::Cancelled).
 ///
 /// ```
@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 ///
 /// let rasterizer = ParallelRasterizer::new(RasterCfg::default(), 1);
 /// let progress = rasterizer.progress().clone();
-/// // On another thread, while pictures are drawn:
+/// // On another thread, during rendering:
 /// println!("{} of {} paths, {:?} left", progress.samples(), progress.total(), progress.remaining());
 /// progress.cancel();
 /// assert!(progress.is_cancelled());
@@ -34,55 +34,55 @@ struct Counters {
 }
 
 impl RenderProgress {
-    /// Paths that were followed.
+    /// Number of traced paths.
     pub fn samples(&self) -> u64 {
         self.0.samples.load(Ordering::Relaxed)
     }
 
-    /// Paths that there are to follow: pixels times samples, without those of pictures that turned out to be impossible.
+    /// Number of paths of the batch: pixels times samples, without those of images that could not be rendered.
     pub fn total(&self) -> u64 {
         self.0.total.load(Ordering::Relaxed)
     }
 
-    /// Rays that were cast for them: of the paths themselves and for shadows.
+    /// Number of rays, for the paths themselves and for shadows.
     pub fn rays(&self) -> u64 {
         self.0.rays.load(Ordering::Relaxed)
     }
 
-    /// The part that is done, 0 to 1; `None` where there is nothing to do.
+    /// Finished fraction, 0 to 1; `None` without any paths.
     pub fn fraction(&self) -> Option<f64> {
         let total = self.total();
         (total > 0).then(|| self.samples() as f64 / total as f64)
     }
 
-    /// Since the batch was begun; `None` before the first.
+    /// Time since the start of the batch; `None` before the first batch.
     pub fn elapsed(&self) -> Option<Duration> {
         self.0.started.lock().unwrap_or_else(PoisonError::into_inner).map(|start| start.elapsed())
     }
 
-    /// About how long it takes yet, if it goes on as it went so far; `None` before anything is known.
+    /// Estimated time left, at the mean speed so far; `None` before the first path.
     pub fn remaining(&self) -> Option<Duration> {
         let (elapsed, done) = (self.elapsed()?, self.fraction().filter(|done| *done > 0.0)?);
         Duration::try_from_secs_f64(elapsed.as_secs_f64() * (1.0 - done) / done).ok()
     }
 
-    /// Breaks off the paths that are followed now, and whatever is begun later until [`resume`](Self::resume). What comes after
-    /// the paths, other channels and smoothing, is done to its end.
+    /// Cancels the current path tracing, and any that starts before [`resume`](Self::resume). The steps after the
+    /// paths, other channels and denoising, are completed.
     pub fn cancel(&self) {
         self.0.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Pictures that are begun from now on are drawn again, those that were broken off too when somebody reads them.
+    /// Allows rendering again. Canceled images are rendered when they are read again.
     pub fn resume(&self) {
         self.0.cancelled.store(false, Ordering::Relaxed);
     }
 
-    /// Whether it was broken off.
+    /// True after [`cancel`](Self::cancel), until [`resume`](Self::resume).
     pub fn is_cancelled(&self) -> bool {
         self.0.cancelled.load(Ordering::Relaxed)
     }
 
-    /// A batch begins.
+    /// Starts a batch.
     pub(crate) fn begin(&self, total: u64) {
         *self.0.started.lock().unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
         self.0.samples.store(0, Ordering::Relaxed);
@@ -90,13 +90,13 @@ impl RenderProgress {
         self.0.total.store(total, Ordering::Relaxed);
     }
 
-    /// Some of it will never be done: a picture that cannot be drawn.
+    /// Subtracts the paths of an image that cannot be rendered.
     pub(crate) fn refuse(&self, samples: u64) {
         let less = |total: u64| Some(total.saturating_sub(samples));
         let _ = self.0.total.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
     }
 
-    /// Some of it is done.
+    /// Adds finished paths, and their rays.
     pub(crate) fn add(&self, samples: u64, rays: u64) {
         self.0.samples.fetch_add(samples, Ordering::Relaxed);
         self.0.rays.fetch_add(rays, Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! Draws frames.
+//! Renders single frames.
 
 use super::aperture::Aperture;
 use super::exposure::expose;
@@ -18,38 +18,38 @@ use crate::visibility::{RenderError, View};
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_scene::{PoseF32, RenderScene};
 
-/// Draws frames, one at a time; keeps its scratch memory. Use one per thread.
+/// Renders frames, one at a time; keeps its scratch memory. Use one per thread.
 ///
-/// The same shot gives the same bits on every thread and with every instruction set.
+/// The same request gives the same bits on every thread and with every instruction set.
 ///
-/// Transparency: things with 0 < alpha < 1 are blended into the colour, back to front by the depth of their origins, each
-/// with its nearest surface only; they are not seen by things behind them twice. All other channels see the nearest
-/// surface whatever its alpha, unless that is 0, as in MuJoCo. Opacity of textures is not used.
+/// Transparency: instances with 0 < alpha < 1 are blended into the color, back to front by the depth of their origins.
+/// Only the nearest surface of each is blended. All other channels contain the nearest surface whatever its alpha,
+/// unless that is 0, as in MuJoCo. The opacity of textures is ignored.
 #[derive(Debug)]
 pub struct Rasterizer {
-    /// How frames are drawn.
+    /// Options of the rasterizer.
     pub cfg: RasterCfg,
-    /// Which renderer draws them.
+    /// The renderer that is used.
     pub renderer: Renderer,
-    /// The size of the lens; `None` is a point.
+    /// Aperture of the lens, for depth of field; `None` is a pinhole.
     pub aperture: Option<Aperture>,
-    /// When light falls on which row.
+    /// Exposure time and readout of the rows.
     pub shutter: Shutter,
-    /// Stops, -20 to 20: light is multiplied by 2 to this power before the tone curve, so that what is brighter than white in
-    /// one picture is told apart in a shorter one.
+    /// Exposure compensation in stops, -20 to 20: light is multiplied by 2 to this power before the tone curve. Bright
+    /// areas that saturate in one image keep their detail in an image with fewer stops.
     pub stops: f64,
-    /// How far the paths of a picture are.
+    /// Progress of path tracing.
     pub progress: RenderProgress,
     pub(super) assets: RayAssets,
     pub(super) plan: Plan,
     pub(super) brush: Brush,
-    /// Of pictures by path tracing.
+    /// Accumulator of path-traced images.
     pub(super) film: Film,
-    /// Of pictures whose rows are of several instants.
+    /// Scratch memory of images whose rows show different instants.
     pub(super) roll: Roll,
 }
 
-/// Draws as the other does, and counts its own progress.
+/// Clones the settings. The clone has its own progress counter.
 impl Clone for Rasterizer {
     fn clone(&self) -> Self {
         let Self { cfg, renderer, aperture, shutter, stops, progress: _, assets, plan, brush, film, roll } = self;
@@ -76,12 +76,12 @@ impl Default for Rasterizer {
 }
 
 impl Rasterizer {
-    /// A rasterizer for this machine.
+    /// Creates a rasterizer with the best SIMD level of this machine.
     pub fn new(cfg: RasterCfg) -> Self {
         Self::with_level(cfg, Level::best())
     }
 
-    /// A rasterizer that uses a SIMD level of its own.
+    /// Creates a rasterizer with a given SIMD level.
     pub(crate) fn with_level(cfg: RasterCfg, level: Level) -> Self {
         Self {
             cfg,
@@ -98,7 +98,7 @@ impl Rasterizer {
         }
     }
 
-    /// How shots are drawn.
+    /// Current settings of all frames.
     pub(super) fn style(&self) -> Style<'_> {
         let Self { cfg, renderer, aperture, shutter, stops, assets, .. } = self;
         Style { cfg: *cfg, renderer: *renderer, aperture: aperture.as_ref(), shutter: *shutter, stops: *stops, assets }
@@ -109,11 +109,11 @@ impl Rasterizer {
         self.plan.bytes() + self.brush.bytes() + self.film.bytes() + self.roll.bytes()
     }
 
-    /// Draws the channels that `frame` has.
+    /// Renders the channels of `frame`.
     ///
     /// # Errors
     ///
-    /// A view, a pose or a buffer that is no good; nothing is drawn then.
+    /// For an invalid view, pose or buffer; the frame is unchanged then.
     pub fn render(
         &mut self,
         scene: &RenderScene,
@@ -124,21 +124,21 @@ impl Rasterizer {
         self.render_shot(&Shot { scene, poses, view, lights: None, lens: None, before: None }, &mut frame.as_mut())
     }
 
-    /// Draws the channels that `frame` has, into borrowed memory.
+    /// Renders the channels of `frame` into borrowed buffers.
     ///
     /// # Errors
     ///
-    /// A view, a pose or a buffer that is no good; nothing is drawn then.
+    /// For an invalid view, pose or buffer; the frame is unchanged then.
     pub fn render_shot(&mut self, shot: &Shot<'_>, frame: &mut FrameMut<'_>) -> Result<(), RenderError> {
         self.render_take(shot, &Take::default(), frame)
     }
 
-    /// As [`render_shot`](Self::render_shot), of pictures by path tracing with noise of their own and with things that moved
-    /// while the shutter was open.
+    /// As [`render_shot`](Self::render_shot), with noise and motion for path tracing: `take` holds the noise number and
+    /// the poses at shutter opening.
     ///
     /// # Errors
     ///
-    /// As [`render_shot`](Self::render_shot), and where things were that is no good or not long enough ago.
+    /// As [`render_shot`](Self::render_shot), and for invalid or too recent poses at shutter opening.
     pub fn render_take(
         &mut self,
         shot: &Shot<'_>,
@@ -164,7 +164,7 @@ impl Rasterizer {
         Ok(())
     }
 
-    /// Draws a row of a picture, at its own instant, into a frame of that row.
+    /// Renders one row of an image, at its own instant, into a frame of that row.
     pub(super) fn draw_row(
         &mut self,
         shot: &Shot<'_>,

@@ -1,4 +1,4 @@
-//! Which renderer draws pictures.
+//! Selection of the renderer.
 
 use super::request::{RasterCfg, Shot};
 use crate::frame::FrameMut;
@@ -8,12 +8,13 @@ use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
 
-/// Which renderer draws pictures. All of them give the same depth, distance, mask, normals and positions off silhouettes,
-/// where the rasterizer draws meshes as they are: with [`RasterCfg::lod`](crate::request::RasterCfg::lod), which is on by default, its
-/// surfaces are moved as is said there, and no other renderer's are.
+/// Renderer of images. All renderers agree on depth, distance, mask, normals and positions, except at silhouettes, and
+/// where the rasterizer uses a mesh's level of detail ([`RasterCfg::lod`](crate::request::RasterCfg::lod), on by
+/// default).
 ///
-/// In files it is a name, `"hybrid"`, or a table of paths with what is not as in [`Renderer::RAY_TRACED`]:
-/// `{ ray_traced = { samples = 256 } }`. EmbodiChain's names `auto`, `fast-rt` and `rt` are known there.
+/// In files it is a name, `"hybrid"`, or a table with the parameters of path tracing that differ from
+/// [`Renderer::RAY_TRACED`]: `{ ray_traced = { samples = 256 } }`. EmbodiChain's names `auto`, `fast-rt` and `rt` are
+/// accepted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -21,71 +22,74 @@ pub enum Renderer {
     /// The rasterizer.
     #[default]
     Raster,
-    /// What is seen is found by rays: one through each sample, against every triangle and the exact shapes. Light, shadows
-    /// and transparency are the rasterizer's. Meshes are never drawn coarser
-    /// ([`RasterCfg::lod`](crate::request::RasterCfg::lod) is for shadow maps only).
+    /// Ray-traced visibility: one ray through each sample, against every triangle and the exact shapes. Light, shadows
+    /// and transparency are the rasterizer's. Meshes are always at full detail
+    /// ([`RasterCfg::lod`](crate::request::RasterCfg::lod) applies to shadow maps only).
     FastRayTraced,
-    /// The rasterizer, with shadows by rays: sharp at every distance, of all lamps that cast shadows, point lamps too; and
-    /// with ambient occlusion by rays, where [`RasterCfg::occlusion_rays`](crate::request::RasterCfg::occlusion_rays) asks for some.
-    /// Meshes are never drawn coarser. Rays begin on the triangles: near the edge of its dark side, a coarse mesh with smooth normals
-    /// goes dark triangle by triangle. Behind a lens that bends lines what is seen is found by rays too.
+    /// The rasterizer with ray-traced shadows: sharp at every distance, for all lights that cast shadows, point lights
+    /// too. [`RasterCfg::occlusion_rays`](crate::request::RasterCfg::occlusion_rays) adds ray-traced ambient occlusion.
+    /// Meshes are always at full detail.
+    ///
+    /// Shadow rays start on the triangles. So a coarse mesh with smooth normals gets dark triangle by triangle near the
+    /// edge of its dark side. With a lens that bends lines, visibility is ray traced too.
     Hybrid,
-    /// Colours by path tracing: light that went over several surfaces, soft shadows of lamps that have a size, mirrors that
-    /// show the scene. All other channels as [`FastRayTraced`](Self::FastRayTraced) has them.
+    /// Path-traced color: indirect light, soft shadows of lights with a size, and mirrors that show the scene. All
+    /// other channels are those of [`FastRayTraced`](Self::FastRayTraced).
     ///
-    /// - **Lamps** are as bright as the rasterizer draws them: a white matt surface that faces a lamp of colour L has the
-    ///   radiance L. A lamp with a [`radius`](kinetoscope_scene::Light::radius) is a disc that faces what it lights: half of one on a
-    ///   ceiling would be behind the ceiling, so keep it the radius below. Ambient light of lamps and of the headlight reaches
-    ///   everything, as in the rasterizer. The headlight is shaded by nothing that is before the near plane. 16 lamps count,
-    ///   the first, and the headlight.
-    /// - **The dome** is [`RenderScene::ambient`](kinetoscope_scene::RenderScene::ambient): its sky's radiance from above the horizon, its
-    ///   ground's from below. Where nothing is in the way a matt surface (specular 0) gets what the rasterizer gives it; below a glossy
-    ///   layer it gets what the layer leaves. Cameras and mirrors see
-    ///   [`RenderScene::sky`](kinetoscope_scene::RenderScene::sky) there instead.
-    /// - **Emission** of a material lights other things, with `max_bounces` 0 too. Points of what glows are looked for at every
-    ///   surface: of finite planes (area lamps), boxes, spheres, cylinders and meshes. Capsules, ellipsoids, height fields and
-    ///   infinite planes light as much, with more noise: paths meet them by chance.
-    /// - **Materials**: Lambert's law below a GGX layer that reflects F0 = 0.08 specular at normal incidence and
-    ///   F90 = min(1, 50 F0) at grazing, of roughness alpha² = 2 / (e + 2) with MuJoCo's exponent e = 128 shininess (at least
-    ///   1), or its roughness to the fourth power. The layer mirrors a lamp's `specular` colour and everything else's only
-    ///   colour. Of a metal F0 is its colour, F90 is 1, and nothing is below. `reflectance` of the light is
-    ///   mirrored perfectly, of boxes by the +z face alone. Of what is left, `transmission` meets smooth glass: it is mirrored by Fresnel's equations or goes
-    ///   through by Snell's law, and takes the colour where it enters. Each surface of glass is a bounce; lamps cast its shadow,
-    ///   and are not seen through it. `alpha` is the part of the light that the front of a surface takes; the rest goes on straight; their
-    ///   backs are not seen. Paths end, black, after 64 such surfaces, and where a smooth normal mirrors them below the surface
-    ///   itself.
+    /// - **Lights** are as bright as in the rasterizer: a white matt surface that faces a light of color L has the
+    ///   radiance L. A light with a [`radius`](kinetoscope_scene::Light::radius) is a disc that faces the lit point:
+    ///   keep it at least the radius below a ceiling, or half of it is behind the ceiling. Ambient light of lights and
+    ///   of the headlight reaches every surface, as in the rasterizer. Objects in front of the near plane cast no
+    ///   shadow in the headlight. The first 16 lights count, and the headlight.
+    /// - **Environment light** is [`RenderScene::ambient`](kinetoscope_scene::RenderScene::ambient): its sky's radiance
+    ///   from above the horizon, its ground's from below. An unoccluded matt surface (specular 0) receives the same
+    ///   light as in the rasterizer; below a glossy layer it receives the rest. Cameras and mirrors see
+    ///   [`RenderScene::sky`](kinetoscope_scene::RenderScene::sky) instead.
+    /// - **Emission** of a material lights other objects, with `max_bounces` 0 too. Emissive finite planes (area
+    ///   lights), boxes, spheres, cylinders and meshes are sampled at every surface. Capsules, ellipsoids, height
+    ///   fields and infinite planes light as much, with more noise: only paths that hit them find them.
+    /// - **Materials**: Lambertian reflection below a GGX layer with F0 = 0.08 specular at normal incidence and F90 =
+    ///   min(1, 50 F0) at grazing. Its roughness is alpha² = 2 / (e + 2) with MuJoCo's exponent e = 128 shininess (at
+    ///   least 1), or the material's roughness to the fourth power. The layer mirrors a light's `specular` color, and
+    ///   the plain color of all other light. For a metal, F0 is its color, F90 is 1, and the layer below is black. The
+    ///   fraction `reflectance` of the light is mirrored perfectly, for boxes by the +z face alone. Of the rest, the
+    ///   fraction `transmission` meets smooth glass: it is mirrored by Fresnel's equations or transmitted by Snell's
+    ///   law, and takes the color where it enters. Each surface of glass is a bounce; glass casts shadows, and lights
+    ///   are invisible through it. `alpha` is the fraction of light that the front of a surface absorbs or scatters;
+    ///   the rest passes straight. Backs of transparent surfaces are invisible. Paths end, black, after 64 such
+    ///   surfaces, and where a smooth normal mirrors them below the flat surface.
     ///
-    /// The [tone curve](crate::request::RasterCfg::tone) and sRGB are those of the rasterizer. Noise depends on the pixel and the seed only: the same bits for
-    /// any number of threads. Pictures of `Camera`s have noise of their own each, by the seed of the
-    /// simulation, the environment's global index, the name of the camera and which picture it is, besides this seed: the
-    /// same in any batch.
+    /// The [tone curve](crate::request::RasterCfg::tone) and sRGB are those of the rasterizer. Noise depends on the
+    /// pixel and the seed only: the same bits for any number of threads. Each image of a `Camera` has its own noise. It
+    /// is keyed by the seed of the simulation, the environment's global index, the name of the camera and the index of
+    /// the image, besides this seed: the same in any batch.
     RayTraced {
-        /// Paths per pixel; 1 to 65536. A power of two spreads them best.
+        /// Paths per pixel; 1 to 65536. A power of two distributes them best.
         samples: u32,
-        /// Surfaces that light goes over after the one that is seen, at most; 0 is light that comes from lamps, from the
-        /// dome and from what glows at once. At most 64.
+        /// Largest number of bounces after the visible surface, at most 64. 0 is direct light only: from lights, the
+        /// environment and emissive surfaces.
         max_bounces: u32,
-        /// Whether noise is smoothed where normals and depth of the surface are alike and light differs no more than noise does.
-        /// The surface's own colours stay as they are.
+        /// True to denoise: light is smoothed where normals and depth are similar, and light differs by no more than
+        /// its noise. Surface colors stay sharp.
         denoise: bool,
-        /// Another seed has other noise.
+        /// Seed of the noise.
         seed: u32,
     },
 }
 
 impl Renderer {
-    /// A picture to look at: 64 paths of up to 4 bounces, smoothed.
+    /// Parameters for viewing: 64 paths of up to 4 bounces, denoised.
     pub const RAY_TRACED: Self = Self::RayTraced { samples: 64, max_bounces: 4, denoise: true, seed: 0 };
-    /// The most paths per pixel.
+    /// Largest number of paths per pixel.
     pub const MAX_SAMPLES: u32 = 1 << 16;
-    /// The most bounces.
+    /// Largest number of bounces.
     pub const MAX_BOUNCES: u32 = 64;
 
-    /// Checks the numbers.
+    /// Checks the parameters of path tracing.
     ///
     /// # Errors
     ///
-    /// [`RenderError::Paths`], [`RenderError::Bounces`].
+    /// [`RenderError::Paths`] or [`RenderError::Bounces`] for a number out of range.
     pub fn validate(self) -> Result<(), RenderError> {
         let Self::RayTraced { samples, max_bounces, .. } = self else { return Ok(()) };
         if !(1..=Self::MAX_SAMPLES).contains(&samples) {
@@ -97,7 +101,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// The renderer of a name in files, EmbodiChain's too; paths are those of [`RAY_TRACED`](Self::RAY_TRACED).
+    /// The renderer of a name or alias, EmbodiChain's too; path tracing gets the parameters of
+    /// [`RAY_TRACED`](Self::RAY_TRACED).
     fn from_name(name: &str) -> Result<Self, UnknownName> {
         const ALL: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, Renderer::RAY_TRACED];
         ALL.into_iter().find(|renderer| renderer.name() == name || renderer.aliases().contains(&name)).ok_or_else(
@@ -109,7 +114,7 @@ impl Renderer {
         )
     }
 
-    /// Its name in files.
+    /// Name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Raster => "raster",
@@ -119,7 +124,7 @@ impl Renderer {
         }
     }
 
-    /// What EmbodiChain, and so the flags of examples, call it.
+    /// EmbodiChain's names, also used by the flags of examples.
     fn aliases(self) -> &'static [&'static str] {
         match self {
             Self::Raster => &["auto"],
@@ -129,7 +134,7 @@ impl Renderer {
         }
     }
 
-    /// Whether what is seen at a pixel is found by rays; `bent` says whether there is a lens that bends lines.
+    /// True if visibility is ray traced; `bent` is true for a lens that bends lines.
     pub fn sees_by_rays(self, bent: bool) -> bool {
         match self {
             Self::Raster => false,
@@ -138,12 +143,12 @@ impl Renderer {
         }
     }
 
-    /// Whether colours come from paths.
+    /// True if color is path traced.
     pub fn follows_paths(self) -> bool {
         matches!(self, Self::RayTraced { .. })
     }
 
-    /// How many paths a picture takes.
+    /// Number of paths of an image.
     pub(crate) fn paths(self, shot: &Shot<'_>, frame: &FrameMut<'_>) -> u64 {
         match self {
             Self::RayTraced { samples, .. } if frame.color.is_some() => {
@@ -153,7 +158,7 @@ impl Renderer {
         }
     }
 
-    /// How much longer a pixel takes than the rasterizer's, about.
+    /// Approximate time per pixel, relative to the rasterizer.
     pub(crate) fn slowness(self, cfg: RasterCfg) -> usize {
         match self {
             Self::Raster => 1,
@@ -166,7 +171,7 @@ impl Renderer {
     }
 }
 
-/// What a file says of the paths of [`Renderer::RayTraced`].
+/// Parameters of [`Renderer::RayTraced`] in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Paths {
@@ -176,7 +181,7 @@ struct Paths {
     seed: Option<u32>,
 }
 
-/// Reads a renderer.
+/// Deserializes a renderer from a name or a table.
 struct InFile;
 
 impl<'de> Visitor<'de> for InFile {
@@ -230,7 +235,7 @@ mod tests {
         renderer: Renderer,
     }
 
-    /// As in scene files: a name, or a table with numbers; and back.
+    /// As in scene files: a name, or a table with parameters; and back.
     #[test]
     fn serde() {
         let read = |text: &str| toml::from_str::<Cfg>(text).map(|cfg| cfg.renderer);

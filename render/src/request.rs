@@ -1,4 +1,4 @@
-//! The request of a frame: scene, poses, view, and the settings of drawing.
+//! Render request of a frame: scene, poses, view, and options.
 
 use crate::lens::LensRays;
 use crate::shade::tone::ToneCurve;
@@ -6,46 +6,47 @@ use crate::visibility::View;
 use kinetoscope_scene::{Light, PoseF32, RenderScene};
 use serde::{Deserialize, Serialize};
 
-/// How frames are drawn.
+/// Options of the rasterizer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RasterCfg {
-    /// Samples per pixel for the colour: 1 or 4. All other channels see the pixel's centre.
+    /// Samples per pixel for color: 1 or 4. All other channels sample the pixel's center.
     pub samples: u8,
-    /// True if lamps cast shadows (directional lamps and spots, the first four of them).
+    /// True if lights cast shadows (the first four directional lights and spots).
     pub shadows: bool,
-    /// True if planar mirrors (material `reflectance` of planes and of the +z face of boxes) show what is before them: one ray
-    /// from each sample that shows a mirror, and the light where it ends. Path tracing mirrors always.
+    /// True if planar mirrors (material `reflectance` of planes and of the +z face of boxes) reflect the scene: one ray
+    /// from each sample on a mirror, shaded at its hit. Path tracing always reflects.
     pub reflections: bool,
-    /// Texels along the side of a shadow map; 0 chooses by the picture's size.
+    /// Texels along the side of a shadow map; 0 selects the size by the image size.
     pub shadow_size: usize,
-    /// Rays from each sample of a colour for ambient occlusion, of [`Renderer::Hybrid`](crate::renderer::Renderer::Hybrid) only; 0 switches it off. Ambient light is then
-    /// what arrives of [`RenderScene::ambient`] past what is in the way, as [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced) has it without bounces:
-    /// exact where nothing is in the way of flat surfaces (of a mesh with smooth normals, what lies below a facet is in the way),
-    /// with the noise of so many rays elsewhere, which depends on the point and nothing else.
+    /// Rays per color sample for ambient occlusion, in [`Renderer::Hybrid`](crate::renderer::Renderer::Hybrid) only; 0
+    /// disables it. Ambient light is then the part of [`RenderScene::ambient`] that is not occluded, as in
+    /// [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced) without bounces. It is exact where flat surfaces
+    /// are unoccluded (with smooth normals, parts of the mesh below a facet occlude it). Elsewhere it has the noise of
+    /// so many rays, which depends on the point only.
     pub occlusion_rays: u16,
-    /// How light becomes the bytes of the colour.
+    /// Tone curve from light to color bytes.
     pub tone: ToneCurve,
-    /// Geom groups that are drawn: bit k is group k.
+    /// Geom groups that are rendered: bit k is group k.
     pub groups: u32,
-    /// Draw dense meshes coarser where that is hardly seen (level of detail).
+    /// True to render dense meshes at a lower level of detail where that is hardly visible.
     ///
-    /// The surface that is drawn instead of a mesh is joined to it by a continuous map that moves no point by more than
-    /// 1 mm, nor by more than half a pixel anywhere in the picture (both are proven, see [`kinetoscope_scene::shape::RenderMesh::levels`];
+    /// A continuous map joins the simplified surface to the mesh. It moves no point by more than 1 mm, nor by more than
+    /// half a pixel anywhere in the image (both are proven, see [`kinetoscope_scene::shape::RenderMesh::levels`];
     /// vertices are snapped to 1/256 pixel besides, with or without levels). So:
-    /// - what is seen at a pixel is seen within half a pixel of it without levels; of things that are less than 2 mm
-    ///   behind each other, either may be seen;
-    /// - depth, distance and position are those of a point not farther than 1 mm from a point of the mesh that is seen
-    ///   within half a pixel; where a surface is seen at a slant, or near a silhouette, depth changes by more than that
-    ///   within half a pixel, and may differ by as much;
+    /// - the surface visible at a pixel is visible within half a pixel of it at full detail; of surfaces less than 2 mm
+    ///   behind each other, either may be visible;
+    /// - depth, distance and position are those of a point not farther than 1 mm from a point of the mesh that is
+    ///   visible within half a pixel. On slanted surfaces and near silhouettes, depth changes by more than that within
+    ///   half a pixel, and may differ by as much;
     /// - flat normals are those of the larger triangles: on smooth surfaces within some degrees of the mesh's, and
-    ///   arbitrary on features that are smaller than half a pixel or 1 mm. Shading normals are blended from normals of the
+    ///   arbitrary on features smaller than half a pixel or 1 mm. Shading normals are interpolated from normals of the
     ///   mesh's own vertices, and no new triangle faces more than 40° away from them;
     /// - shadow maps follow the same rule in texels.
     ///
-    /// The level depends on the mesh, its pose and the view, on nothing else in the picture. Meshes of fewer than 1000
-    /// triangles, with texture coordinates, that reach behind the near plane, and terrain are drawn as they are. The
-    /// levels of a mesh are made when a picture first needs one, and shared by all environments.
+    /// The level depends only on the mesh, its pose and the view. Terrain is rendered at full detail. So are meshes
+    /// with fewer than 1000 triangles, with texture coordinates, or that reach behind the near plane. The levels of a
+    /// mesh are built on first use, and shared by all environments.
     pub lod: bool,
 }
 
@@ -65,29 +66,29 @@ impl Default for RasterCfg {
     }
 }
 
-/// The request of one frame.
+/// Render request of one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Shot<'a> {
-    /// What can be seen.
+    /// The scene.
     pub scene: &'a RenderScene,
     /// Pose of each instance: world from instance.
     pub poses: &'a [PoseF32],
     /// The camera.
     pub view: &'a View,
-    /// Lamps instead of the scene's, for those that move.
+    /// Lights that replace the scene's, for lights that move.
     pub lights: Option<&'a [Light]>,
-    /// The rays of a lens, instead of the view's focal lengths and principal point; `None` is a pinhole.
+    /// Rays of a lens, used instead of the view's focal lengths and principal point; `None` is a pinhole.
     pub lens: Option<&'a LensRays>,
-    /// The previous frame, for [`Flow`](crate::frame::Flow) only.
+    /// The previous frame, used by [`Flow`](crate::frame::Flow) only.
     pub before: Option<Before<'a>>,
 }
 
-/// The previous frame.
+/// Poses and camera of the previous frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Before<'a> {
-    /// Pose of each instance then: world from instance.
+    /// Pose of each instance in the previous frame: world from instance.
     pub poses: &'a [PoseF32],
-    /// The camera. Behind a lens, its focal lengths and principal point tell the intrinsics from those of
-    /// [`Shot::view`]: where both are the same, the lens had the same ones.
+    /// Camera of the previous frame. With a lens, its focal lengths and principal point only show if the intrinsics
+    /// differ from those of [`Shot::view`]; if both are equal, the lens is the same.
     pub view: &'a View,
 }

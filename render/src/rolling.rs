@@ -1,4 +1,4 @@
-//! Draws rows of pictures, each at an instant of its own: all channels but colours, which paths draw.
+//! Rolling shutter: renders each row at its own instant, in all channels but path-traced color.
 
 use super::request::Shot;
 use super::shutter::ShutterInterval;
@@ -10,14 +10,14 @@ use crate::trace::motion::Motion;
 use crate::visibility::{RenderError, View};
 use kinetoscope_scene::PoseF32;
 
-/// What is needed for it; keeps its memory.
+/// Scratch memory for one row.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Roll {
     plan: Plan,
     poses: Vec<PoseF32>,
-    /// A row of blocks.
+    /// Buffers of a row of blocks.
     frame: Frame,
-    /// What the frame is for.
+    /// Width and channels of the buffers.
     size: (usize, Channels),
 }
 
@@ -27,7 +27,7 @@ impl Roll {
         self.plan.bytes() + self.poses.capacity() * size_of::<PoseF32>() + width * BLOCK * channels.bytes_per_pixel()
     }
 
-    /// Draws row `y` of a picture, as it is in the middle of its exposure, into a frame of that row.
+    /// Renders row `y` of an image, at the middle of its exposure, into a frame of that row.
     pub(super) fn draw(
         &mut self,
         brush: &mut Brush,

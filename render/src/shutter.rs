@@ -1,57 +1,59 @@
-//! When light falls on which row of a picture.
+//! Exposure time and rolling shutter.
 
 use super::request::Shot;
 use crate::visibility::RenderError;
 use kinetoscope_scene::PoseF32;
 use serde::{Deserialize, Serialize};
 
-/// A shutter that takes time: each row of pixels is read `row_time` after the one above it, and each collects light for
-/// `exposure_time` before it is read. The last row is read at the instant of the picture's stamp, so the first light falls
-/// in [`span`](Self::span) before it. With both 0, as by default, a picture is of one instant.
+/// Rolling shutter with an exposure time: each row of pixels is read `row_time` after the row above it, and each
+/// collects light for `exposure_time` before it is read. The last row is read at the time stamp of the image, so
+/// exposure starts [`span`](Self::span) before the stamp. With both times 0, the default, an image shows one instant.
 ///
-/// What moves meanwhile is sheared by the first (rolling shutter) and blurred by the second (motion blur). Cameras look at
-/// where things are at the physics step at which the shutter opens, or the one before, and at the stamp; between, things go
-/// straight and turn steadily. What somebody puts elsewhere meanwhile counts as having been there since the shutter opened: how
-/// it moves from then on is spread over the whole span. Lamps are where they are at the stamp. Needs
-/// [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced). Colours are of the whole exposure; all other channels of its middle,
-/// row by row.
+/// Moving objects are sheared by the first (rolling shutter) and blurred by the second (motion blur). Cameras use two
+/// poses of each object: at the physics step at or just before shutter opening, and at the time stamp. Between them,
+/// objects move straight and rotate steadily. An object that is set to another pose in between counts as having been
+/// there since the shutter opened; its motion after that is spread over the whole span. Lights have their poses at the
+/// stamp.
+///
+/// A shutter needs [`Renderer::RayTraced`](crate::renderer::Renderer::RayTraced). Color integrates the whole exposure;
+/// all other channels show its middle, row by row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Shutter {
-    /// From the reading of a row to that of the next \[s\].
+    /// Time from the reading of a row to that of the next \[s\].
     pub row_time: f64,
-    /// How long each row collects light \[s\].
+    /// Exposure time of each row \[s\].
     pub exposure_time: f64,
 }
 
-/// What tells a picture from others of the same things from the same place.
+/// Noise and motion of one frame, for path tracing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Take<'a> {
-    /// Paths with another number have other noise: of another picture, or of another environment.
+    /// Number that varies the noise: for another frame, or another environment.
     pub noise: u32,
-    /// Where things were when the shutter opened; without it nothing moves.
+    /// Poses at shutter opening; `None` for a static scene.
     pub opened: Option<Opened<'a>>,
 }
 
-/// Where things were when the shutter opened.
+/// Poses at shutter opening.
 #[derive(Clone, Copy, Debug)]
 pub struct Opened<'a> {
-    /// Pose of each instance then: world from instance.
+    /// Pose of each instance at shutter opening: world from instance.
     pub poses: &'a [PoseF32],
-    /// Where the camera was.
+    /// Pose of the camera at shutter opening.
     pub world_from_camera: PoseF32,
-    /// How long before the picture's stamp that was \[s\]: at least the shutter's [`span`](Shutter::span).
+    /// Time from shutter opening to the time stamp of the image \[s\]: at least the shutter's [`span`](Shutter::span).
     pub before: f64,
 }
 
-/// The time in which the shutter of a frame is open: the poses at its beginning, and the instants of rows.
+/// Exposure interval of a frame: the poses at its beginning, and the instants of its rows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShutterInterval<'a> {
     pub(crate) opened: Opened<'a>,
     pub(crate) clock: Clock,
 }
 
-/// When rows see what they see, in parts of the time from where things were (0) to where they are (1).
+/// Instants of rows, as a fraction of the interval from the first poses (0) to the last poses (1).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Clock {
     last_row: usize,
@@ -60,7 +62,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// The time of a part of a row's exposure: 0 is its end, 1 its beginning.
+    /// Instant at a fraction of a row's exposure: 0 is its end, 1 its beginning.
     pub(crate) fn at(&self, row: usize, part: f64) -> f64 {
         let before = self.last_row.saturating_sub(row) as f64 * self.row + part * self.exposure;
         (1.0 - before).max(0.0)
@@ -68,17 +70,21 @@ impl Clock {
 }
 
 impl Shutter {
-    /// Whether the whole picture is of one instant.
+    /// True if the whole image shows one instant.
     pub fn is_instant(&self) -> bool {
         self.row_time == 0.0 && self.exposure_time == 0.0
     }
 
-    /// From the first light to the last row's reading \[s\], of a picture of so many rows.
+    /// Time from the first light to the reading of the last row \[s\], for an image with `rows` rows.
     pub fn span(&self, rows: usize) -> f64 {
         self.row_time * rows.saturating_sub(1) as f64 + self.exposure_time
     }
 
-    /// Checks the numbers.
+    /// Checks that both times are valid.
+    ///
+    /// # Errors
+    ///
+    /// [`RenderError::Shutter`] for a time that is negative or not finite.
     pub fn check(&self) -> Result<(), RenderError> {
         for (what, value) in [("row_time", self.row_time), ("exposure_time", self.exposure_time)] {
             if !(value >= 0.0 && value.is_finite()) {
@@ -88,11 +94,11 @@ impl Shutter {
         Ok(())
     }
 
-    /// The time in which the shutter of a frame is open; `None` where that is one instant.
+    /// Exposure interval of a frame; `None` if it is one instant.
     ///
     /// # Errors
     ///
-    /// Poses from when the shutter opened that are no good, or not old enough.
+    /// For poses at shutter opening that are invalid, or not old enough.
     pub(crate) fn interval<'a>(
         &self,
         shot: &Shot<'_>,
@@ -111,7 +117,7 @@ impl Shutter {
             return Err(RenderError::CameraPose { pose: world_from_camera });
         }
         let span = self.span(shot.view.height);
-        // Half a nanosecond: times are sums.
+        // Tolerance of half a nanosecond: times are sums.
         if !(before + 5e-10 >= span && before > 0.0 && before.is_finite()) {
             return Err(RenderError::Opened { before, span });
         }

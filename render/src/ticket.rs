@@ -1,115 +1,116 @@
-//! Which picture it is: what its random numbers are looked up by.
+//! Counter-based random numbers of camera images.
 
 use kinetoscope_scene::Philox;
 
-/// Which picture it is, of all that a camera ever took in an environment. With the place in the picture, every random number
-/// of the picture is a function of this: neither threads nor laziness nor the order of readings change one.
+/// Key of the random numbers of one image, among all images of a camera in an environment. Every random number of the
+/// image is a function of this key and the position in the image. So threads, lazy rendering and the order of reads
+/// change no number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ticket {
     dice: Philox,
-    /// Pictures so far, those of resets and refreshes and those that got lost among them.
+    /// Number of images so far, including those of resets and refreshes and dropped ones.
     number: u64,
-    /// The number that the last reset had.
+    /// Image number of the last reset.
     epoch: u64,
-    /// Pictures that were due since then.
+    /// Number of images due since the last reset.
     age: u32,
 }
 
-/// What random numbers are for: they are different for every use.
+/// Purpose of random numbers: the numbers differ for every purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stream(u8);
 
 impl Stream {
-    /// Whether a picture gets lost.
+    /// Dropout of an image.
     pub const DROPOUT: Self = Self(0);
     /// Shot noise.
     pub const SHOT: Self = Self(1);
-    /// Where the count of a pixel with few electrons stands in its distribution.
+    /// Position of a pixel with few electrons in the distribution of its count.
     pub const SHOT_IN_THE_DARK: Self = Self(4);
     /// Read noise.
     pub const READ: Self = Self(2);
     /// Depth noise.
     pub const DEPTH: Self = Self(3);
-    /// The noise of paths.
+    /// Noise of path tracing.
     pub const PATHS: Self = Self(5);
 
-    /// What each picture adds to a channel; channels are counted from 0.
+    /// White noise of a channel, new for each image; channels are counted from 0.
     pub const fn white(channel: u8) -> Self {
         Self(16 + channel)
     }
 
-    /// The biases of a channel at a reset.
+    /// Biases of a channel, drawn at a reset.
     pub const fn bias(channel: u8) -> Self {
         Self(32 + channel)
     }
 
-    /// The steps that biases of a channel take.
+    /// Random-walk steps of the biases of a channel.
     pub const fn walk(channel: u8) -> Self {
         Self(48 + channel)
     }
 }
 
-/// A place in Philox's space: four numbers each.
+/// Philox counter, which yields four numbers.
 fn place(stream: Stream, block: u32, number: u64, time: u32) -> [u32; 4] {
-    // A camera would have to take pictures for 2000 years at 1 MHz to need more than 56 bits.
+    // A camera would have to take images for 2000 years at 1 MHz to need more than 56 bits.
     [block, time, number as u32, (((number >> 32) as u32) << 8) | u32::from(stream.0)]
 }
 
 impl Ticket {
-    /// The ticket before the first picture of the sensor called `name`, in the environment of global index `env`.
+    /// The key before the first image of the sensor called `name`, in the environment of global index `env`.
     pub fn first(seed: u64, env: u64, name: &str) -> Self {
         Self { dice: Philox::keyed(seed, env, name), number: 0, epoch: 0, age: 0 }
     }
 
-    /// The next picture, which is due.
+    /// Advances to the next scheduled image.
     pub fn due(&mut self) {
         self.number += 1;
         self.age = self.age.saturating_add(1);
     }
 
-    /// The next picture, which nobody waited for: somebody wrote to the state.
+    /// Advances to an unscheduled image, after a write to the state.
     pub fn refresh(&mut self) {
         self.number += 1;
     }
 
-    /// The next picture, with which everything begins again.
+    /// Advances to the first image after a reset.
     pub fn reset(&mut self) {
         self.number += 1;
         (self.epoch, self.age) = (self.number, 0);
     }
 
-    /// Four uniform numbers of this picture, in 0 to 1; those of one `block` belong together.
+    /// Four uniform random numbers of this image, in 0 to 1; `block` selects the group of four.
     #[inline]
     pub fn uniforms(&self, stream: Stream, block: u32) -> [f64; 4] {
         self.dice.uniforms(place(stream, block, self.number, 0))
     }
 
-    /// 32 random bits of this picture.
+    /// 32 random bits of this image.
     pub fn bits(&self, stream: Stream) -> u32 {
         self.dice.bits(place(stream, 0, self.number, 0))[0]
     }
 
-    /// Four normal numbers of this picture.
+    /// Four normally distributed random numbers of this image, with mean 0 and variance 1.
     #[inline]
     pub fn normals(&self, stream: Stream, block: u32) -> [f64; 4] {
         self.dice.normals(place(stream, block, self.number, 0))
     }
 
-    /// Four normal numbers that are the same in all pictures until the next reset.
+    /// Four normally distributed random numbers that stay the same in all images until the next reset.
     pub fn biases(&self, stream: Stream, block: u32) -> [f64; 4] {
         self.dice.normals(place(stream, block, self.epoch, 0))
     }
 
-    /// Where four random walks are, each of as many steps of variance 1 as pictures were due since the reset.
+    /// Positions of four random walks, with one step of variance 1 for each image that was due since the reset.
     ///
-    /// Their place is looked up, without the steps before. Between two known times, the place in the middle is normal: its mean
-    /// is theirs, its variance a quarter of the time between (Lévy's construction of Brownian motion); the known times are powers of two,
-    /// each as far from the one before as that is from 0. So twice the number of binary digits of the time are the normal
-    /// numbers that a place takes.
+    /// The positions are computed without the steps before. Between two known times, the position at the middle time is
+    /// normal: its mean is the mean of both, its variance a quarter of the time between them (Lévy's construction of
+    /// Brownian motion). The known times are powers of two, each as far from the one before as that is from 0. So a
+    /// position takes twice as many normal numbers as the time has binary digits.
     pub fn walks(&self, stream: Stream, block: u32) -> [f64; 4] {
         let Some(digits) = self.age.checked_ilog2() else { return [0.0; 4] };
         let now = u64::from(self.age);
-        // Every time is made once, so that it may number its own random numbers.
+        // Every time is reached once, so it can key its own random numbers.
         let normals = |time: u64| self.dice.normals(place(stream, block, self.epoch, time as u32));
         let step = |from: [f64; 4], variance: f64, time: u64| {
             let (normals, sigma) = (normals(time), variance.sqrt());
@@ -142,8 +143,8 @@ impl Ticket {
 mod tests {
     use super::*;
 
-    /// The law of a random walk: places at times s and t have the covariance min(s, t). The mean of the product of two normal
-    /// numbers scatters by sqrt((s t + min²) / n): six times that.
+    /// Covariance of random walks: positions at times s and t have the covariance min(s, t). The mean of the product of
+    /// two normal numbers has the standard deviation sqrt((s t + min²) / n); the bound is six times that.
     #[test]
     fn covariance() {
         let times = [1, 2, 3, 5, 8, 100, 777];
@@ -166,7 +167,7 @@ mod tests {
         assert!(last.iter().all(|x| x.abs() < 7.0 * 65536.0 && *x != 0.0), "{last:?}");
     }
 
-    /// A value is the one before plus a step of variance 1.
+    /// A value is the previous one plus a step of variance 1.
     #[test]
     fn independent_steps() {
         let n = 40_000.0;

@@ -1,12 +1,12 @@
-//! Colour of the surface itself, as if light came from everywhere.
+//! Albedo: base color of the surface without lighting.
 
 use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix4;
 
-/// Colour of the surface itself (sRGB, without a tone curve) and opacity: 255, and 0 where nothing was hit.
+/// Base color of the surface (sRGB, without a tone curve) and opacity: 255, or 0 where no surface was hit.
 ///
-/// The material's colour times its texture, without light, shadow, highlight, mirror, emission or haze: a material of
-/// `rgba` (0.5, 0.5, 0.5) is 128 everywhere. It is that of what the mask shows, transparent or not.
+/// The material's color times its texture, without light, shadow, highlight, mirror, emission or haze: a material of
+/// `rgba` (0.5, 0.5, 0.5) is 128 everywhere. The surface is the one of the mask channel, transparent or not.
 #[derive(Clone, Copy, Debug)]
 pub struct Albedo;
 

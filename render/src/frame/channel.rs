@@ -1,16 +1,16 @@
-//! The trait of channels, and what is known of a group of pixels.
+//! The trait of image channels, and the group of pixels that channels are written from.
 
 use ndarray::{Dimension, Ix3, Ix4};
 
 /// Lanes of a [`PixelGroup`].
 const LANES: usize = 16;
 
-/// Everything that is known of 8 x 2 pixels; what channels are made of.
+/// Computed values of 8 x 2 pixels, from which channels are written.
 #[derive(Clone, Debug, Default)]
 pub struct PixelGroup {
-    /// Linear or final, as the stage says: final bytes.
+    /// Color and opacity after the tone curve (sRGB).
     pub color: [[u8; 4]; LANES],
-    /// Colour of the surface itself, final bytes; 0 on a miss.
+    /// Base color (sRGB) and opacity; 0 on a miss.
     pub albedo: [[u8; 4]; LANES],
     /// Depth along the optical axis \[m\]; +inf on a miss.
     pub depth: [f32; LANES],
@@ -18,50 +18,51 @@ pub struct PixelGroup {
     pub distance: [f32; LANES],
     /// Mask id; 0 on a miss.
     pub mask: [i32; LANES],
-    /// Normal of the surface itself, turned to the camera, world frame; 0 on a miss.
+    /// Geometric normal, facing the camera, world frame; 0 on a miss.
     pub normal: [[f32; LANES]; 3],
-    /// Smooth normal, world frame; 0 on a miss.
+    /// Interpolated normal, world frame; 0 on a miss.
     pub shading_normal: [[f32; LANES]; 3],
     /// Position of the surface, frame of the environment \[m\]; 0 on a miss.
     pub position: [[f32; LANES]; 3],
-    /// How far it has moved since the picture before \[pixels\]; +inf on a miss.
+    /// Motion since the previous frame \[pixels\]; +inf on a miss.
     pub flow: [[f32; LANES]; 2],
 }
 
-/// When a channel is known.
+/// Stage of rendering at which a channel can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// As soon as it is known what each pixel centre sees.
+    /// After visibility: the surface at each pixel center is found.
     Geometry,
-    /// As [`Geometry`](Self::Geometry), and computed only for cameras that measure such a channel: few do.
+    /// As [`Geometry`](Self::Geometry), but computed only for cameras with such a channel: few have one.
     Detail,
-    /// As [`Detail`](Self::Detail), for the colour of surfaces: textures are read for it.
+    /// As [`Detail`](Self::Detail), for the base color of surfaces, which reads textures.
     Albedo,
-    /// As [`Detail`](Self::Detail), for what needs the picture before.
+    /// As [`Detail`](Self::Detail), for channels that need the previous frame.
     Flow,
     /// After light, transparency and multisampling.
     Color,
 }
 
-/// One thing a camera measures at every pixel.
+/// A quantity that a camera measures at every pixel.
 pub trait Channel {
-    /// The type of its numbers.
+    /// Scalar type of the channel.
     type Number: Copy + Default + PartialEq + std::fmt::Debug + Send + Sync + 'static;
-    /// Axes of its pictures: views, rows, columns, and the numbers of a pixel where there are several.
+    /// Axes of a batch of images: view, row, column, and component if a pixel has several.
     type Layout: Layout;
-    /// Its name.
+    /// Canonical name.
     const NAME: &'static str;
     /// Accepted aliases.
     const ALIASES: &'static [&'static str];
-    /// Numbers per pixel.
+    /// Components per pixel.
     const COMPONENTS: usize;
-    /// When it is known.
+    /// Stage at which the channel can be written.
     const STAGE: Stage;
 
-    /// The numbers of one pixel.
+    /// Writes the components of one pixel of a group.
     fn write(group: &PixelGroup, lane: usize, out: &mut [Self::Number]);
 
-    /// The numbers of pixels beside each other, at most 8 of them. Channels that have them in this order already copy them.
+    /// Writes up to 8 horizontally adjacent pixels of a group. Channels whose memory already has this order override it
+    /// with a copy.
     #[inline(always)]
     fn write_row(group: &PixelGroup, first: usize, out: &mut [Self::Number]) {
         for (column, out) in out.chunks_exact_mut(Self::COMPONENTS).enumerate() {
@@ -69,32 +70,32 @@ pub trait Channel {
         }
     }
 
-    /// Puts `value` where nothing was hit: see `DepthMiss` of cameras. Only for channels that measure how far
-    /// something is; the others have a value of their own for a miss.
+    /// Replaces the value of pixels that hit no surface by `value`; see `DepthMiss` of cameras. Only channels that
+    /// measure depth or distance do so; other channels have their own value for a miss.
     fn replace_misses(_numbers: &mut [Self::Number], _value: f32) {}
 }
 
-/// The axes of a batch of pictures.
+/// Axes of a batch of images.
 pub trait Layout: Dimension {
-    /// The shape of `views` pictures with `height` rows of `width` pixels.
+    /// Shape of `views` images with `height` rows of `width` pixels.
     fn of(views: usize, height: usize, width: usize, components: usize) -> Self;
 }
 
-/// One number per pixel: (views, height, width).
+/// One component per pixel: (views, height, width).
 impl Layout for Ix3 {
     fn of(views: usize, height: usize, width: usize, _components: usize) -> Self {
         Ix3(views, height, width)
     }
 }
 
-/// Several numbers per pixel: (views, height, width, components).
+/// Several components per pixel: (views, height, width, components).
 impl Layout for Ix4 {
     fn of(views: usize, height: usize, width: usize, components: usize) -> Self {
         Ix4(views, height, width, components)
     }
 }
 
-/// Copies the numbers of a row of pixels, of which there are N in a whole one: that many are copied without a call.
+/// Copies a row of pixels. A whole row has N components, a constant length that compiles to no call.
 #[inline(always)]
 pub(super) fn copy_row<const N: usize, T: Copy>(from: &[T], out: &mut [T]) {
     match (<&mut [T; N]>::try_from(&mut *out), from.first_chunk()) {

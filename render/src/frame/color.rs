@@ -1,9 +1,9 @@
-//! Colour (sRGB, see the tone curve) and opacity (always 255).
+//! Color after the tone curve (sRGB) and opacity (always 255).
 
 use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix4;
 
-/// Colour (sRGB, see the tone curve) and opacity (always 255).
+/// Color after the tone curve (sRGB) and opacity (always 255).
 #[derive(Clone, Copy, Debug)]
 pub struct Color;
 

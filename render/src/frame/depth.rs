@@ -3,7 +3,7 @@
 use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix3;
 
-/// Depth along the optical axis \[m\].
+/// Depth along the optical axis \[m\]; +inf where no surface was hit.
 #[derive(Clone, Copy, Debug)]
 pub struct Depth;
 

@@ -3,7 +3,7 @@
 use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix3;
 
-/// Distance from the camera \[m\].
+/// Distance from the camera \[m\]; +inf where no surface was hit.
 #[derive(Clone, Copy, Debug)]
 pub struct Distance;
 

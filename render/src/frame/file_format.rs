@@ -1,16 +1,16 @@
-//! How types of this crate stand in configuration files where a derive would not read well.
+//! Serialization of channels in configuration files.
 
 use super::Channels;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A list of names: `["depth", "mask"]`.
+/// Serializes as a list of names: `["depth", "mask"]`.
 impl Serialize for Channels {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         self.names().serialize(serializer)
     }
 }
 
-/// A list of names, which may be those of others: `["rgb", "distance_to_image_plane"]`.
+/// Deserializes from a list of names or aliases: `["rgb", "distance_to_image_plane"]`.
 impl<'de> Deserialize<'de> for Channels {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let names = Vec::<String>::deserialize(deserializer)?;

@@ -1,16 +1,19 @@
-//! How far what is seen has moved in the picture.
+//! Optical flow: motion of the visible surface in the image.
 
 use super::{Channel, PixelGroup, Stage};
 use ndarray::Ix4;
 
-/// Optical flow \[pixels\]: how far the point of the surface that this pixel sees has moved in the picture since the picture
-/// before, u to the right and v down. It was at (u + 0.5 - flow u, v + 0.5 - flow v) then, in the picture or beside it.
+/// Optical flow \[pixels\]: motion of the visible surface point since the previous frame, u to the right and v down.
+/// The point was at (u + 0.5 - flow u, v + 0.5 - flow v) in the previous frame, inside or outside of the image.
 ///
-/// It is exact, from the poses of the thing and of the camera at both instants, and the lenses of both; whether something hid
-/// the point before it does not say. Exactly 0 where neither moved. +inf where nothing was hit, where the point was not in
-/// front of the camera before (behind a lens: where the lens did not see it, [`Optics::domain`](crate::lens::optics::Optics::domain)), and in the
-/// first picture, which has none before it. Of what crosses the seam of a panorama it is a whole turn, 2 pi fx, less or more.
-/// Isaac's `motion_vectors` are minus this: they count to the left and up.
+/// The flow is exact: it comes from the poses of the instance and of the camera at both instants, and from both lenses.
+/// It does not tell if the point was occluded in the previous frame. It is exactly 0 where neither instance nor camera
+/// moved.
+///
+/// It is +inf where no surface was hit, where the point was not in front of the camera in the previous frame (for
+/// lenses: outside of [`Optics::domain`](crate::lens::optics::Optics::domain)), and in the first frame. Across the seam
+/// of a panorama it is a whole turn, 2 pi fx, less or more. Isaac's `motion_vectors` have the opposite sign: left and
+/// up.
 #[derive(Clone, Copy, Debug)]
 pub struct Flow;
 

@@ -1,13 +1,13 @@
-//! Which instance is seen.
+//! Segmentation mask: id of the visible instance.
 
 use super::{Channel, PixelGroup, Stage, copy_row};
 use ndarray::Ix3;
 
-/// Which link or object is seen: its mask id, whichever of the channel's names it was asked by.
+/// Mask id of the visible link or object, by whichever alias the channel was selected.
 ///
-/// Isaac's names `semantic_segmentation` and `instance_segmentation` turn this channel on, they do not choose what its numbers
-/// mean: they are ids of links. Pictures of instances or semantic classes are made of them by a
-/// `Segmentation`, which `SceneView::segmentation` knows.
+/// Isaac's names `semantic_segmentation` and `instance_segmentation` select this channel; its numbers are ids of links
+/// in either case. `SceneView::segmentation` returns a `Segmentation`, which turns them into images of instances or
+/// semantic classes.
 #[derive(Clone, Copy, Debug)]
 pub struct Mask;
 

@@ -1,4 +1,4 @@
-//! What a camera measures: one channel per file, all of them in one list.
+//! Image channels of a camera: one file per channel, and one list of all of them.
 
 mod channel;
 mod file_format;
@@ -10,71 +10,71 @@ use kinetoscope_scene::pattern::{UnknownName, closest};
 use ndarray::{Array, ArrayView};
 use std::ops::Range;
 
-/// A channel of the list: [`Pictures`] have a place for it.
+/// A channel of the list, with an array in [`Pictures`].
 pub trait Listed: Channel {
-    /// Whether it is wanted.
+    /// True if the channel is selected.
     fn is_in(channels: Channels) -> bool;
 
-    /// Its pictures, if it is there.
+    /// Images of the channel; `None` if it was not rendered.
     fn of(pictures: &Pictures) -> Option<PictureView<'_, Self>>;
 }
 
-/// Pictures of one channel, shape (views, height, width) or (views, height, width, components).
+/// View of the images of one channel, shape (views, height, width) or (views, height, width, components).
 pub type PictureView<'a, C> = ArrayView<'a, <C as Channel>::Number, <C as Channel>::Layout>;
 
-/// Calls a macro with the list of channels: the documentation, the module and the type of each.
+/// Calls a macro with the list of channels: documentation, module and type of each.
 #[macro_export]
 macro_rules! with_channels {
     ($then:ident) => {
         $then! {
-            /// Colour (sRGB) and opacity (always 255), u8, 4 per pixel.
+            /// Color (sRGB) and opacity (always 255), u8, 4 per pixel.
             color::Color,
-            /// Depth along the optical axis \[m\], f32; +inf where nothing was hit.
+            /// Depth along the optical axis \[m\], f32; +inf where no surface was hit.
             depth::Depth,
-            /// Distance from the camera \[m\], f32; +inf where nothing was hit.
+            /// Distance from the camera \[m\], f32; +inf where no surface was hit.
             distance::Distance,
-            /// Mask id, i32; 0 where nothing was hit.
+            /// Mask id, i32; 0 where no surface was hit.
             mask::Mask,
-            /// Normal of the surface itself, turned to the camera, unit, world frame, f32, 3 per pixel; 0 where nothing was hit.
+            /// Geometric normal, facing the camera, unit, world frame, f32, 3 per pixel; 0 where no surface was hit.
             normal::Normal,
-            /// Normal that light sees (smooth), unit, world frame, f32, 3 per pixel; 0 where nothing was hit.
+            /// Interpolated normal used for shading, unit, world frame, f32, 3 per pixel; 0 where no surface was hit.
             shading_normal::ShadingNormal,
-            /// Position of the surface, frame of the environment \[m\], f32, 3 per pixel; 0 where nothing was hit.
+            /// Position of the surface, frame of the environment \[m\], f32, 3 per pixel; 0 where no surface was hit.
             position::Position,
-            /// Colour of the surface itself, without light (sRGB), and opacity, u8, 4 per pixel; 0 where nothing was hit.
+            /// Base color without lighting (sRGB), and opacity, u8, 4 per pixel; 0 where no surface was hit.
             albedo::Albedo,
-            /// How far what is seen has moved since the image before (right, down) \[pixels\], f32, 2 per pixel; +inf where nothing
-            /// was hit and in the first image.
+            /// Motion of the visible surface since the previous image (right, down) \[pixels\], f32, 2 per pixel; +inf
+            /// where no surface was hit and in the first image.
             flow::Flow,
         }
     };
 }
 
-/// Declares the channels: a module with a type of its own each.
+/// Declares the channels: a module and a type for each.
 macro_rules! channels {
     ($($(#[$doc:meta])* $field:ident :: $Name:ident,)*) => {
         $(mod $field; pub use $field::$Name;)*
 
-        /// Which channels are wanted.
+        /// Set of selected channels.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
         pub struct Channels {
             $($(#[$doc])* pub $field: bool,)*
         }
 
         impl Channels {
-            /// All of them.
+            /// All channels.
             pub const ALL: Self = Self { $($field: true,)* };
-            /// None of them.
+            /// No channels.
             pub const NONE: Self = Self { $($field: false,)* };
-            /// Their names.
+            /// Names of all channels.
             pub const NAMES: &'static [&'static str] = &[$($Name::NAME),*];
 
-            /// The channels of these names, which may be aliases (`rgb`, `distance_to_image_plane`, `normals`...).
-            /// All of Isaac's names of segmentations are the mask, ids of links; see [`Mask`] for instances and classes.
+            /// Channels of these names or aliases (`rgb`, `distance_to_image_plane`, `normals`...). All of Isaac's
+            /// segmentation names select the mask, ids of links; see [`Mask`] for instances and classes.
             ///
             /// # Errors
             ///
-            /// [`UnknownName`] with the names most like one that is not known.
+            /// [`UnknownName`] with the most similar names, for the first unknown name.
             pub fn from_names<S: AsRef<str>>(names: &[S]) -> Result<Self, UnknownName> {
                 let mut channels = Self::default();
                 for name in names.iter().map(AsRef::as_ref) {
@@ -86,34 +86,34 @@ macro_rules! channels {
                 Ok(channels)
             }
 
-            /// Whether a channel is wanted.
+            /// True if a channel is selected.
             pub fn has<C: Listed>(self) -> bool {
                 C::is_in(self)
             }
 
-            /// The names of those that are wanted.
+            /// Names of the selected channels.
             pub fn names(self) -> Vec<&'static str> {
                 [$((self.$field, $Name::NAME)),*].into_iter().filter(|(on, _)| *on).map(|(_, name)| name).collect()
             }
 
-            /// Memory of a pixel \[bytes\].
+            /// Memory per pixel of the selected channels \[bytes\].
             pub fn bytes_per_pixel(self) -> usize {
                 0 $(+ usize::from(self.$field) * size_of::<<$Name as Channel>::Number>() * $Name::COMPONENTS)*
             }
         }
 
-        /// Pictures of many views, one array per channel; the first axis is the view.
+        /// Images of several views, one array per channel; the first axis is the view.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Pictures {
             $($field: Option<Array<<$Name as Channel>::Number, <$Name as Channel>::Layout>>,)*
         }
 
         impl Pictures {
-            /// Pictures of `views` views of `width` by `height` pixels, empty.
+            /// Images of `views` views of `width` by `height` pixels, filled with zeros.
             ///
             /// # Panics
             ///
-            /// If they do not fit into the address space.
+            /// If the images do not fit into the address space.
             #[track_caller]
             pub fn new(channels: Channels, views: usize, width: usize, height: usize) -> Self {
                 Self {
@@ -124,17 +124,18 @@ macro_rules! channels {
                 }
             }
 
-            /// Which channels there are.
+            /// Set of the stored channels.
             pub fn channels(&self) -> Channels {
                 Channels { $($field: self.$field.is_some(),)* }
             }
 
-            /// The pictures of one channel, if it is there.
+            /// Images of one channel; `None` if the channel is not stored.
             pub fn get<C: Listed>(&self) -> Option<PictureView<'_, C>> {
                 C::of(self)
             }
 
-            /// Moves the pictures of `views`, of `all` there are, up by as many places as `by` says; the last ones fall out.
+            /// Moves the images of `views`, a range of `all` views, up by `by` places; the last images of the range are
+            /// dropped.
             pub fn move_up(&mut self, all: usize, views: Range<usize>, by: usize) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
@@ -143,7 +144,7 @@ macro_rules! channels {
                 })*
             }
 
-            /// Makes zeros of the pictures of `views`, of `all` there are.
+            /// Fills the images of `views`, a range of `all` views, with zeros.
             pub fn forget(&mut self, all: usize, views: Range<usize>) {
                 $(if let Some(numbers) = self.$field.as_mut().and_then(|array| array.as_slice_mut()) {
                     let each = numbers.len() / all.max(1);
@@ -151,8 +152,8 @@ macro_rules! channels {
                 })*
             }
 
-            /// Copies view `from` of `other_count` views of others, which have the same channels and size, to view `to` of
-            /// `count`.
+            /// Copies view `from` of `others`, which holds `other_count` views, to view `to` of the `count` views here.
+            /// Channels and size are the same.
             pub fn copy_view(&mut self, count: usize, to: usize, others: &Self, other_count: usize, from: usize) {
                 $(if let (Some(numbers), Some(others)) = (
                     self.$field.as_mut().and_then(|array| array.as_slice_mut()),
@@ -163,7 +164,7 @@ macro_rules! channels {
                 })*
             }
 
-            /// Every view borrowed for drawing, in order.
+            /// Mutable frames of all views, in order.
             pub fn frames_mut(&mut self, views: usize) -> impl Iterator<Item = FrameMut<'_>> {
                 $(let mut $field = self.$field.as_mut().and_then(|array| array.as_slice_mut()).map(|numbers| {
                     let each = (numbers.len() / views.max(1)).max(1);
@@ -183,57 +184,57 @@ macro_rules! channels {
             }
         })*
 
-        /// Pictures of one view, row by row from the top left.
+        /// Image of one view per channel, row by row from the top left.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Frame {
             $($(#[$doc])* pub $field: Option<Vec<<$Name as Channel>::Number>>,)*
         }
 
-        /// Where the pictures of one view go; missing channels are not computed.
+        /// Mutable buffers of one view; channels without a buffer are not computed.
         #[derive(Debug, Default)]
         pub struct FrameMut<'a> {
             $($(#[$doc])* pub $field: Option<&'a mut [<$Name as Channel>::Number]>,)*
         }
 
         impl Frame {
-            /// Pictures of `width` by `height` pixels, empty.
+            /// Images of `width` by `height` pixels, filled with zeros.
             pub fn new(width: usize, height: usize, channels: Channels) -> Self {
                 let pixels = width * height;
                 Self { $($field: channels.$field.then(|| vec![Default::default(); pixels * $Name::COMPONENTS]),)* }
             }
 
-            /// Borrowed for drawing.
+            /// Mutable buffers of the frame.
             pub fn as_mut(&mut self) -> FrameMut<'_> {
                 FrameMut { $($field: self.$field.as_deref_mut(),)* }
             }
         }
 
         impl<'a> FrameMut<'a> {
-            /// The same frame for a shorter time.
+            /// Reborrows the buffers for a shorter time.
             pub fn reborrow(&mut self) -> FrameMut<'_> {
                 FrameMut { $($field: self.$field.as_deref_mut(),)* }
             }
 
-            /// Takes the first pixels of all channels, or as many as there are.
+            /// Splits off the first `pixels` pixels of all channels, or as many as there are.
             pub(crate) fn split_off_first(&mut self, pixels: usize) -> FrameMut<'a> {
                 FrameMut { $($field: split_off::<$Name>(&mut self.$field, pixels),)* }
             }
         }
 
         impl FrameMut<'_> {
-            /// Puts `value` where nothing was hit, in the channels that measure how far something is.
+            /// Replaces the value of pixels that hit no surface by `value`, in channels of depth or distance.
             pub fn replace_misses(&mut self, value: f32) {
                 $(if let Some(numbers) = self.$field.as_deref_mut() {
                     $Name::replace_misses(numbers, value);
                 })*
             }
 
-            /// Which channels there are.
+            /// Set of the channels with a buffer.
             pub fn channels(&self) -> Channels {
                 Channels { $($field: self.$field.is_some(),)* }
             }
 
-            /// Takes over a row of a frame with the same channels and `width`, as the first row.
+            /// Copies a row of a frame with the same channels and `width` to the first row here.
             pub(crate) fn take_row(&mut self, from: &Frame, row: usize, width: usize) {
                 $(if let (Some(to), Some(from)) = (self.$field.as_deref_mut(), from.$field.as_deref()) {
                     let each = width * $Name::COMPONENTS;
@@ -241,7 +242,7 @@ macro_rules! channels {
                 })*
             }
 
-            /// Checks the lengths against a number of pixels.
+            /// Checks the lengths of the buffers against a number of pixels.
             pub(crate) fn validate(&self, pixels: usize) -> Result<(), RenderError> {
                 $(if let Some(buffer) = &self.$field {
                     let (found, expected) = (buffer.len(), pixels * $Name::COMPONENTS);
@@ -252,12 +253,12 @@ macro_rules! channels {
                 Ok(())
             }
 
-            /// Whether a channel of this stage is wanted.
+            /// True if a channel of this stage has a buffer.
             pub(crate) fn wants(&self, stage: Stage) -> bool {
                 false $(|| (self.$field.is_some() && $Name::STAGE == stage))*
             }
 
-            /// Writes the pixels of a group, whose first is at (x, y), that are inside of the picture.
+            /// Writes those pixels of a group that are inside the image; its first pixel is at (x, y).
             #[inline(always)]
             pub(crate) fn write(&mut self, stage: Stage, group: &PixelGroup, at: [usize; 2], size: [usize; 2]) {
                 $(if $Name::STAGE == stage && let Some(buffer) = &mut self.$field {
@@ -268,14 +269,14 @@ macro_rules! channels {
     };
 }
 
-/// The error for a name that is no channel, with the names and aliases most like it.
+/// The error for an unknown channel name, with the most similar names and aliases.
 fn unknown(name: &str, known: &[(&'static str, &[&'static str])]) -> UnknownName {
     let all = known.iter().flat_map(|(own, aliases)| aliases.iter().chain([own]));
     let candidates = closest(name, all.copied()).into_iter().map(String::from).collect();
     UnknownName { what: "channel", name: name.into(), candidates }
 }
 
-/// The first pixels of one channel.
+/// Splits off the first pixels of one channel.
 fn split_off<'a, C: Channel>(buffer: &mut Option<&'a mut [C::Number]>, pixels: usize) -> Option<&'a mut [C::Number]> {
     let all = buffer.take()?;
     let (first, rest) = all.split_at_mut(pixels.saturating_mul(C::COMPONENTS).min(all.len()));

@@ -1,9 +1,9 @@
-//! Normal of the surface itself, turned to the camera.
+//! Geometric normal of the surface, facing the camera.
 
 use super::{Channel, PixelGroup, Stage};
 use ndarray::Ix4;
 
-/// Normal of the surface itself, turned to the camera.
+/// Geometric normal of the surface, facing the camera, unit, world frame; 0 where no surface was hit.
 #[derive(Clone, Copy, Debug)]
 pub struct Normal;
 

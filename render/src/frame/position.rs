@@ -1,9 +1,9 @@
-//! Where the surface is \[m\].
+//! Position of the surface \[m\].
 
 use super::{Channel, PixelGroup, Stage};
 use ndarray::Ix4;
 
-/// Where the surface is \[m\].
+/// Position of the surface in the frame of the environment \[m\]; 0 where no surface was hit.
 #[derive(Clone, Copy, Debug)]
 pub struct Position;
 

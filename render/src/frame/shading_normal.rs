@@ -1,9 +1,10 @@
-//! Normal that light sees: smooth where the surface is meant to be.
+//! Shading normal: interpolated between vertices where the surface is smooth.
 
 use super::{Channel, PixelGroup, Stage};
 use ndarray::Ix4;
 
-/// Normal that light sees: smooth where the surface is meant to be.
+/// Interpolated normal used for shading, smooth where the surface is smooth, unit, world frame; 0 where no surface was
+/// hit.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadingNormal;
 

@@ -1,4 +1,4 @@
-//! What is built once for an asset: trees over meshes, pyramids over height fields.
+//! Acceleration structures shared between ray casters: BVHs over meshes, height pyramids over height fields.
 
 use super::shape::height_field::Field;
 use super::shape::mesh::{MeshBuilder, MeshTree};
@@ -6,13 +6,13 @@ use kinetoscope_scene::shape::HeightField;
 use kinetoscope_scene::shape::RenderMesh;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-/// What ray casters have built, shared by all of a simulation: a second one over the same terrain builds nothing. What
-/// nobody uses any more is given back.
+/// Cache of acceleration structures, shared by the ray casters of a simulation. A second ray caster over the same
+/// terrain builds nothing. Entries without users are dropped.
 #[derive(Clone, Debug, Default)]
 pub struct RayAssets(Arc<Mutex<Assets>>);
 
 impl RayAssets {
-    /// Does something with the assets; one after the other.
+    /// Calls `f` with the cache, under its lock.
     pub(crate) fn with<R>(&self, f: impl FnOnce(&mut Assets) -> R) -> R {
         let mut assets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let result = f(&mut assets);
@@ -21,15 +21,15 @@ impl RayAssets {
     }
 }
 
-/// Something built, and the mesh that it was built from.
+/// The mesh that a structure was built from, and the structure.
 type Entry<T> = (Weak<RenderMesh>, Weak<T>);
 
-/// What was built, found by the identity of the mesh.
+/// Acceleration structures, found by the identity of their mesh.
 #[derive(Debug, Default)]
 pub struct Assets {
     meshes: Vec<Entry<MeshTree>>,
     fields: Vec<Entry<Field>>,
-    /// For the meshes of one call.
+    /// Scratch memory for the meshes of one call.
     builder: MeshBuilder,
 }
 
@@ -43,9 +43,9 @@ impl Assets {
     }
 }
 
-/// What was built from a mesh; built now where nobody has it.
+/// Returns the structure built from a mesh, and builds it if it is missing.
 fn find<T>(entries: &mut Vec<Entry<T>>, mesh: &Arc<RenderMesh>, build: impl FnOnce() -> T) -> Arc<T> {
-    // While an entry is there, no other mesh can be where its own was.
+    // While an entry exists, no other mesh can be at the address of its mesh.
     entries.retain(|(_, built)| built.strong_count() > 0);
     let known =
         entries.iter().find(|(from, _)| from.as_ptr() == Arc::as_ptr(mesh)).and_then(|(_, built)| built.upgrade());

@@ -1,22 +1,22 @@
-//! The smooth normal and the texture coordinates at a point of a triangle.
+//! Interpolation of normals and texture coordinates in a triangle.
 
 use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::vector::{V3, cross, dot, scale, sub, to_f64};
 
-/// Points are lifted by this part of the size of their triangle, at most: those of a ball of eight sides are.
+/// Largest lift of a point, as a fraction of the size of its triangle: that of a ball with eight sides.
 const LIFT: f64 = 0.15;
 
-/// A point in a triangle.
+/// Interpolated attributes at a point of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Corner {
     pub(crate) normal: V3,
-    /// From the triangle to the surface that is meant.
+    /// Offset from the flat triangle to the smooth surface that it approximates.
     pub(crate) lift: V3,
     pub(crate) uv: Option<([f64; 2], f64)>,
 }
 
-/// The smooth normal at a point of a triangle that is seen from a side (1 from outside), its texture coordinates and how many
-/// of them a metre has.
+/// The interpolated normal at a point of a triangle seen from a side (1 from outside), its texture coordinates and
+/// their number per meter.
 pub(crate) fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64) -> Corner {
     let corners = mesh.triangles()[triangle].map(|i| i as usize);
     let ends @ [a, b, c] = corners.map(|i| to_f64(mesh.positions()[i]));
@@ -28,7 +28,7 @@ pub(crate) fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64)
     let share = [1.0 - kb - kc, kb, kc];
     let normals = corners.map(|i| to_f64(mesh.normals()[i]));
     let normal = [0, 1, 2].map(|k| (0..3).map(|n| share[n] * normals[n][k]).sum());
-    // How far the point is below the plane of each corner.
+    // Depth of the point below the tangent plane of each corner.
     let below = [0, 1, 2].map(|n| (side * dot(sub(at, ends[n]), normals[n])).min(0.0));
     let lift: V3 = [0, 1, 2].map(|k| (0..3).map(|n| -side * share[n] * below[n] * normals[n][k]).sum());
     let (far, most) = (dot(lift, lift).sqrt(), LIFT * area.sqrt().sqrt());
@@ -37,7 +37,7 @@ pub(crate) fn in_triangle(mesh: &RenderMesh, triangle: usize, at: V3, side: f64)
         let t = corners.map(|i| uvs[i].map(f64::from));
         let uv = [0, 1].map(|k| (0..3).map(|n| share[n] * t[n][k]).sum());
         let [p, q] = [1, 2].map(|n| [t[n][0] - t[0][0], t[n][1] - t[0][1]]);
-        // Square root of the ratio of areas, in the picture and on the surface.
+        // Square root of the ratio of areas, in the texture and on the surface.
         (uv, ((p[0] * q[1] - q[0] * p[1]).abs() / area.sqrt()).sqrt())
     });
     Corner { normal, lift, uv }

@@ -1,13 +1,16 @@
-//! Exact distances along rays to what is in a scene, for ray casters, ray tracing and cameras made of rays.
+//! Exact ray casting against the shapes of a scene, for ray casters, ray tracing and cameras made of rays.
 //!
-//! Geometry is in double precision: a distance of 20 m is right to far less than a micrometre, up to the single precision
-//! sizes of shapes. [`world::RayTargets`] is what can be hit, prepared once; [`world::RayWorld`] is where it is in one environment.
+//! Geometry is in double precision: a distance of 20 m is right to far less than a micrometer, up to the single
+//! precision sizes of shapes. [`RayTargets`] holds the targets, prepared once; [`RayWorld`] holds their poses in one
+//! environment.
 //!
-//! Rays are cast in packets of eight, a lane for each. A shape says what one ray touches; a shape that can do better for rays
-//! that run side by side does so by the same operations in the same order, so that a hit never depends on which other rays
-//! are cast with it, on the order of the rays or on the instruction set. Meshes have lists of what steep rays may meet
-//! (`shape/mesh/columns`); for others they walk their tree once for a packet (`bvh/beam`) and test triangles in all lanes;
-//! height fields look at the first cells in all lanes. Rays that run apart are cast one by one.
+//! Rays are cast in packets of eight, one per lane. A shape intersects one ray at a time. A shape that can do better
+//! for nearly parallel rays uses the same operations in the same order. So a hit never depends on the other rays of the
+//! packet, on the order of the rays or on the instruction set.
+//!
+//! Meshes have lists of the triangles that steep rays may meet (`shape/mesh/columns`). For other rays they traverse
+//! their BVH once per packet (`bvh/beam`) and test triangles in all lanes. Height fields test their first cells in all
+//! lanes. Diverging rays are cast one by one.
 
 pub(crate) mod assets;
 pub(crate) mod bvh;

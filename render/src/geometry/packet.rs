@@ -1,4 +1,4 @@
-//! Rays that are cast together, one in each lane.
+//! Packets of rays that are cast together, one ray per lane.
 
 use crate::simd::{D, D3, DOUBLES, Simd, axes, dot_3, load_3};
 use kinetoscope_scene::PoseF64;
@@ -10,18 +10,18 @@ pub const WIDTH: usize = DOUBLES;
 /// All lanes, a bit for each.
 pub(crate) const ALL: u64 = (1 << WIDTH) - 1;
 
-/// Some rays: lanes of the same number in all arrays. Every number of origins and directions is finite.
+/// Several rays: one lane is one ray in all arrays. All origins and directions are finite.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Packet {
     origin: [[f64; WIDTH]; 3],
     direction: [[f64; WIDTH]; 3],
-    /// Nothing farther away counts \[m\]; negative for a lane without a ray.
+    /// Largest distance \[m\]; negative for a lane without a ray.
     limit: [f64; WIDTH],
 }
 
 impl Packet {
-    /// The first rays of a list that hit things up to `max_distance`. A ray with a number that is not finite is none; its lane
-    /// and those at the end look like one of the others.
+    /// Packs the first rays of a list, with hits up to `max_distance`. A ray with a non-finite number is left out. Its
+    /// lane and the lanes beyond the list copy another ray.
     #[inline(always)]
     pub(crate) fn of(rays: &[Ray], max_distance: f64) -> Self {
         let like = rays.iter().find(|ray| ray.is_finite()).copied();
@@ -49,7 +49,7 @@ impl Packet {
         }
     }
 
-    /// One ray alone, in its lane.
+    /// One ray alone, copied to all lanes.
     #[inline(always)]
     pub(super) fn only(&self, k: usize) -> Self {
         let mut limit = [-1.0; WIDTH];
@@ -62,13 +62,13 @@ impl Packet {
         self.limit[k]
     }
 
-    /// Nothing farther away than this counts in a lane any more.
+    /// Lowers the largest distance of a lane.
     #[inline(always)]
     pub(crate) fn shorten(&mut self, k: usize, limit: f64) {
         self.limit[k] = self.limit[k].min(limit);
     }
 
-    /// Whether a lane has a ray.
+    /// True if a lane has a ray.
     #[inline(always)]
     pub(crate) fn has(&self, k: usize) -> bool {
         self.limit[k] >= 0.0
@@ -89,8 +89,8 @@ impl Packet {
         D::load(s, &self.limit)
     }
 
-    /// The rays that may meet a sphere before their limits, in the frame that `pose` maps from; `None` where no ray does. A
-    /// radius of +inf is met by all. To the bit what one ray alone is in that frame.
+    /// The rays that may meet a sphere before their limits, in the frame that `pose` maps from; `None` if no ray does.
+    /// All rays meet a sphere of radius +inf. Each lane equals, to the bit, the transform of its ray alone.
     #[inline(always)]
     pub(super) fn seen_from<S: Simd>(&self, s: S, pose: &PoseF64, middle: V3, radius: f64) -> Option<Self> {
         let (origin, direction, limit) = (self.origins(s), self.directions(s), self.limits(s));
@@ -102,7 +102,7 @@ impl Packet {
                 |k| D::splat(s, middle[k]) - origin[k],
             );
             let t = dot_3(to_middle, direction);
-            // Where the ray is nearest to the middle; not by the difference of squares, which cancels.
+            // Offset from the center at the closest approach; a difference of squares would cancel.
             let beside = axes(
                 #[inline(always)]
                 |k| to_middle[k] + (-t) * direction[k],
@@ -125,7 +125,7 @@ impl Packet {
     }
 }
 
-/// As [`PoseF64::rotate_inverse`], to the bit.
+/// The rotation of [`PoseF64::rotate_inverse`], to the bit.
 #[inline(always)]
 fn turned_back<S: Simd>(pose: &PoseF64, v: D3<S>) -> [[f64; WIDTH]; 3] {
     let r = &pose.rotation;

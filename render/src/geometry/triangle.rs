@@ -1,4 +1,4 @@
-//! A ray against a triangle, without gaps between neighbours.
+//! Watertight ray-triangle intersection.
 
 use super::packet::{ALL, Packet, WIDTH};
 use crate::simd::{D, D3, N, Simd, axes, dot_3};
@@ -8,18 +8,18 @@ use kinetoscope_scene::vector::{V3, cross, dot, sub, to_f64, unit};
 /// Corners of a triangle \[m\].
 pub(crate) type Triangle = [[f32; 3]; 3];
 
-/// A ray, sheared so that it runs along one axis. Source: Woop, Benthin, Wald: Watertight ray/triangle intersection,
-/// JCGT 2(1), 2013; in double precision. An edge has the same magnitude, to the bit, in both triangles that share it, so
-/// that no ray passes between them.
+/// A ray, sheared so that it runs along one axis. An edge has the same magnitude, to the bit, in both triangles that
+/// share it, so that no ray passes between them. Source: Woop, Benthin, Wald: Watertight ray/triangle intersection,
+/// JCGT 2(1), 2013; in double precision.
 ///
-/// What is on which side of an edge is the sign of a difference of two products. Rounding keeps order, so that sign is never
-/// the wrong one; but it may be none, and of a triangle that is seen edge on a ray in its plane would be inside however far
-/// it passes beside it. So with an edge that has no sign, a ray is inside only if it is between the corners along both axes.
-/// That is so for every ray that is inside or on an edge, which leaves no gap either.
+/// The side of an edge is the sign of a difference of two products. Rounding keeps order, so that sign is never wrong;
+/// but it may be 0. Seen edge-on, a ray in the plane of a triangle would count as inside however far away it passes. So
+/// if an edge has a sign of 0, a ray is inside only if it is between the corners along both axes. That holds for every
+/// ray inside or on an edge, so it leaves no gap either.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shear {
     origin: V3,
-    /// The axis along which the ray is longest comes last.
+    /// Permutation of the axes; the dominant axis of the ray comes last.
     axes: [usize; 3],
     by: V3,
 }
@@ -35,7 +35,7 @@ impl Shear {
         Self { origin: ray.origin, axes, by: [d[axes[0]] * inverse, d[axes[1]] * inverse, inverse] }
     }
 
-    /// Distance of the plane of a triangle, where the ray is inside of the triangle; from either side. Of any sign.
+    /// Distance of the triangle's plane, of any sign, if the ray is inside of the triangle; from either side.
     #[inline(always)]
     pub(crate) fn distance(&self, triangle: &Triangle) -> Option<f64> {
         let [i, j, k] = self.axes;
@@ -49,7 +49,7 @@ impl Shear {
         let w = b[0] * a[1] - b[1] * a[0];
         let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
         let whole = u + v + w;
-        // Zero where the ray runs in the plane of the triangle: its neighbours are hit.
+        // Zero if the ray runs in the plane of the triangle: its neighbors are hit.
         if outside || whole == 0.0 {
             return None;
         }
@@ -64,8 +64,8 @@ impl Shear {
     }
 }
 
-/// The same for all rays of a packet, of which every one runs along the same axis: the same operations in the same order, so
-/// the same bits.
+/// Packet version of [`Shear`] for rays with the same dominant axis: the same operations in the same order, so the same
+/// bits.
 #[derive(Clone, Copy)]
 pub(crate) struct ShearPacket<S: Simd> {
     s: S,
@@ -76,7 +76,7 @@ pub(crate) struct ShearPacket<S: Simd> {
 }
 
 impl<S: Simd> ShearPacket<S> {
-    /// `None` where some rays run along one axis and some along another.
+    /// Shears a packet; `None` if the dominant axes of its rays differ.
     #[inline(always)]
     pub(crate) fn new(s: S, packet: &Packet) -> Option<Self> {
         let d = packet.directions(s);
@@ -96,31 +96,32 @@ impl<S: Simd> ShearPacket<S> {
         Some(Self { s, origin: [origin[i], origin[j], origin[last]], axes: [i, j, last], by })
     }
 
-    /// The axis along which rays are longest comes last.
+    /// Permutation of the axes; the dominant axis of the rays comes last.
     #[inline(always)]
     pub(crate) fn axes(&self) -> [usize; 3] {
         self.axes
     }
 
-    /// Where rays begin, in the order of the axes.
+    /// Ray origins, in the order of the axes.
     #[inline(always)]
     pub(crate) fn origin(&self) -> D3<S> {
         self.origin
     }
 
-    /// How far rays get along the first and the second axis, for each metre along the third.
+    /// Slopes of the rays along the first and the second axis, per meter along the third.
     #[inline(always)]
     pub(crate) fn slopes(&self) -> [D<S>; 2] {
         [self.by[0], self.by[1]]
     }
 
-    /// How far rays get along the first and the second axis for each metre along the third, and how far along themselves.
+    /// Slopes of the rays along the first and the second axis per meter along the third, and distance along the ray per
+    /// meter along the third.
     #[inline(always)]
     pub(crate) fn by(&self) -> D3<S> {
         self.by
     }
 
-    /// Distances of the plane of a triangle, and which rays are inside of the triangle; `None` where none is.
+    /// Distances of the triangle's plane, and the rays that are inside of the triangle; `None` if no ray is.
     #[inline(always)]
     pub(crate) fn distances(&self, triangle: &Triangle) -> Option<(D<S>, N<S>)> {
         let s = self.s;
@@ -134,8 +135,9 @@ impl<S: Simd> ShearPacket<S> {
     }
 }
 
-/// Distances of the planes of triangles along rays, a pair of them in each lane, and which rays are inside; `None` where none
-/// is. Coordinates are in the order of a [`Shear`]'s axes: those of rays, how they are sheared, and those of a corner.
+/// Distances of the planes of triangles along rays, a pair of them in each lane, and the lanes that are inside; `None`
+/// if no lane is. All coordinates are in the order of a [`Shear`]'s axes: ray origins, shears, and corners (corner,
+/// axis).
 #[inline(always)]
 pub(crate) fn distances<S: Simd>(
     s: S,
@@ -154,7 +156,7 @@ pub(crate) fn distances<S: Simd>(
     let v = a[0] * c[1] - a[1] * c[0];
     let w = b[0] * a[1] - b[1] * a[0];
     let zero = D::splat(s, 0.0);
-    // Where one of them is no number, neither is the distance, and it does not matter which side that is.
+    // If an edge value is NaN, so is the distance, and the side does not matter.
     let (least, most) = (u.min(v).min(w), u.max(v).max(w));
     let whole = u + v + w;
     let mut inside = !((least.lt(zero) & zero.lt(most)) | whole.eq(zero));
@@ -173,7 +175,7 @@ pub(crate) fn distances<S: Simd>(
     Some(((u * a[2] + v * b[2] + w * c[2]) * by[2] / whole, inside))
 }
 
-/// As [`normal`], to the bit, of a triangle in each lane, and which ones have an area.
+/// Packet version of [`normal`]: the same bits for a triangle in each lane, and the lanes whose triangles have an area.
 #[inline(always)]
 pub(crate) fn normals<S: Simd>(s: S, corner: impl Fn(usize, usize) -> D<S>) -> ([[f64; WIDTH]; 3], N<S>) {
     let p = axes(
@@ -192,16 +194,16 @@ pub(crate) fn normals<S: Simd>(s: S, corner: impl Fn(usize, usize) -> D<S>) -> (
     ([(across[0] * by).array(), (across[1] * by).array(), (across[2] * by).array()], known)
 }
 
-/// Unit normal, counter-clockwise corners seen from its tip; `None` for a triangle without an area.
+/// Unit normal; the corners are counter-clockwise seen from its tip. `None` for a triangle without an area.
 pub(crate) fn normal(triangle: &Triangle) -> Option<V3> {
     unit(across(triangle))
 }
 
-/// Whether a triangle has corners of finite numbers and an area, and so a [`normal`].
+/// True if a triangle has finite corners and an area, and so a [`normal`].
 #[inline(always)]
 pub(crate) fn has_area(triangle: &Triangle) -> bool {
-    // Squares of products of two single precision numbers, 1e-180 to 1e157, are in the range; what is not finite makes
-    // something that is not.
+    // Squares of products of two single precision numbers, 1e-180 to 1e157, are in the range of doubles; non-finite
+    // corners give a non-finite square.
     let across = across(triangle);
     let square = dot(across, across);
     square > 0.0 && square < f64::INFINITY

@@ -1,4 +1,4 @@
-//! What rays hit in one environment.
+//! Ray casting against the targets of one environment.
 
 use super::bvh::{Beam, Bvh, Stack, Walked};
 use super::packet::{Packet, WIDTH};
@@ -13,20 +13,20 @@ use kinetoscope_scene::{PoseF64, RenderScene};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// More instances that do not move than this are put into a tree.
+/// Up to this many fixed targets are tested one by one; more are put into a BVH.
 const FEW: usize = 4;
-/// How much larger bounding spheres are: more than the rounding of the test, for things down to a billionth of their
+/// Enlargement of bounding spheres: more than the rounding of the test, for targets down to a billionth of their
 /// distance.
 const LARGER: f64 = 1.0 + 1e-6;
-/// Targets of a tree that a packet meets together; where there are more in its way, rays go on one by one.
+/// Targets of the BVH that a packet tests together; beyond that, rays go on one by one.
 const BUDGET: usize = 48;
 
-/// What a ray hit.
+/// The nearest hit of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
-    /// How far away \[m\]; +inf for a miss.
+    /// Distance \[m\]; +inf for a miss.
     pub distance: f64,
-    /// Unit normal of the surface, turned to where the ray comes from, in the environment; 0 for a miss.
+    /// Unit normal of the surface, facing the ray's origin, in the frame of the environment; 0 for a miss.
     pub normal: [f64; 3],
     /// Index of the instance in the scene; [`RayHit::NOTHING`] for a miss.
     pub instance: u32,
@@ -35,25 +35,25 @@ pub struct RayHit {
 }
 
 impl RayHit {
-    /// The instance of a miss.
+    /// Value of `instance` for a miss.
     pub const NOTHING: u32 = u32::MAX;
-    /// No hit.
+    /// A miss.
     pub const MISS: Self = Self { distance: f64::INFINITY, normal: [0.0; 3], instance: Self::NOTHING, mask_id: 0 };
 
-    /// Whether something was hit.
+    /// True if the ray hit a target.
     pub fn is_hit(&self) -> bool {
         self.instance != Self::NOTHING
     }
 }
 
-/// Instances of a scene that rays hit: immutable, shared by all environments and threads.
+/// Targets: the instances of a scene that rays hit. Immutable, shared by all environments and threads.
 #[derive(Clone, Debug)]
 pub struct RayTargets {
     targets: Vec<Target>,
-    /// Those of `targets` that do not move, and those that may.
+    /// Indices of the fixed targets; `moving` holds the others.
     fixed: Vec<u32>,
     moving: Vec<u32>,
-    /// Instances of the scene.
+    /// Number of instances in the scene.
     instances: usize,
 }
 
@@ -61,33 +61,33 @@ pub struct RayTargets {
 struct Target {
     instance: u32,
     mask_id: i32,
-    /// Whether it can be hit: what cannot be seen keeps its place, since it may be seen in another environment.
+    /// True if rays can hit the target. Invisible targets keep their place: they may be visible in another environment.
     visible: bool,
     solid: Solid,
-    /// Middle and radius of a sphere around it; `None` for a shape without an end.
+    /// Center and radius of the bounding sphere \[m\]; `None` for an unbounded shape.
     sphere: Option<(V3, f64)>,
 }
 
-/// A target in an environment.
+/// A target at its pose in an environment.
 #[derive(Clone, Copy, Debug)]
 struct Placed {
     target: u32,
     world_from_target: PoseF64,
-    /// Of the sphere around it; a radius of +inf where there is none.
+    /// Bounding sphere in the environment; radius +inf for an unbounded shape.
     middle: V3,
     radius: f64,
 }
 
-/// Targets that do not move, where they are: shared by all environments where they are at the same places.
+/// Fixed targets at their poses: shared by all environments with the same fixed poses.
 #[derive(Clone, Debug, Default)]
 pub struct FixedWorld {
     placed: Vec<Placed>,
-    /// Over some of `placed`, given by the list; the others are tested one by one.
+    /// BVH over some of `placed`, and the indices of those; the others are tested one by one.
     tree: Option<(Bvh, Vec<u32>)>,
     one_by_one: Vec<u32>,
 }
 
-/// What rays hit, at the places of one environment. Keeps its scratch memory; use one per thread.
+/// Ray caster for one environment: targets at their poses. Keeps its scratch memory; use one per thread.
 #[derive(Clone, Debug)]
 pub struct RayWorld {
     targets: Arc<RayTargets>,
@@ -100,8 +100,8 @@ pub struct RayWorld {
 }
 
 impl RayTargets {
-    /// The instances of `scene` that `wanted` names, by their indices; repetitions count once, others are left out.
-    /// Those that are not visible are never hit. Trees over meshes are taken from `assets`, or built.
+    /// Prepares the instances of `scene` with the `wanted` indices; repeated indices count once. Invisible instances
+    /// are never hit. BVHs over meshes are taken from `assets`, or built.
     pub fn new(scene: &RenderScene, wanted: impl IntoIterator<Item = usize>, assets: &RayAssets) -> Self {
         let mut is_wanted = vec![false; scene.instances().len()];
         for index in wanted {
@@ -131,32 +131,32 @@ impl RayTargets {
         out
     }
 
-    /// Indices of the instances that can be hit.
+    /// Indices of the target instances in the scene.
     pub fn instances(&self) -> impl Iterator<Item = usize> {
         self.targets.iter().map(|t| t.instance as usize)
     }
 
-    /// How many instances can be hit.
+    /// Number of targets.
     pub fn len(&self) -> usize {
         self.targets.len()
     }
 
-    /// Whether nothing can be hit.
+    /// True if there are no targets.
     pub fn is_empty(&self) -> bool {
         self.targets.is_empty()
     }
 
-    /// How many of them never move.
+    /// Number of fixed targets.
     pub fn fixed_count(&self) -> usize {
         self.fixed.len()
     }
 
-    /// How many of them may move.
+    /// Number of targets that may move.
     pub fn moving_count(&self) -> usize {
         self.moving.len()
     }
 
-    /// The poses of those that may move, from those of all instances.
+    /// Poses of the targets that may move, selected from the poses of all instances.
     pub fn moving_poses(&self, poses: &[PoseF64]) -> impl Iterator<Item = PoseF64> {
         self.moving.iter().map(|&index| self.pose_of(index, poses))
     }
@@ -165,7 +165,7 @@ impl RayTargets {
         poses[self.targets[index as usize].instance as usize]
     }
 
-    /// A target at a pose; `None` where that is no pose, or the target cannot be seen: it cannot be hit there.
+    /// A target at a pose; `None` if the pose is not finite or the target is invisible.
     fn place(&self, index: u32, pose: PoseF64) -> Option<Placed> {
         let target = &self.targets[index as usize];
         if !pose.is_finite() || !target.visible {
@@ -177,7 +177,7 @@ impl RayTargets {
 }
 
 impl FixedWorld {
-    /// The fixed ones of `targets` at their poses (world from target).
+    /// Places the fixed targets at their poses (world from target), one pose per instance of the scene.
     pub fn new(targets: &RayTargets, poses: &[PoseF64]) -> Self {
         let placed: Vec<Placed> =
             targets.fixed.iter().filter_map(|&t| targets.place(t, targets.pose_of(t, poses))).collect();
@@ -192,7 +192,7 @@ impl FixedWorld {
         Self { placed, tree: Some((bvh, order)), one_by_one }
     }
 
-    /// Whether targets that do not move are where they were when this was built.
+    /// True if the fixed targets are still at the poses that this was built for.
     pub fn is_at(&self, targets: &RayTargets, poses: &[PoseF64]) -> bool {
         let mut placed = self.placed.iter();
         let same = targets.fixed.iter().all(|&t| match targets.place(t, targets.pose_of(t, poses)) {
@@ -206,7 +206,7 @@ impl FixedWorld {
 }
 
 impl RayTargets {
-    /// The box around a target in the world, rounded outward.
+    /// Bounding box of a target in the world, rounded outward.
     fn world_box(&self, placed: &Placed) -> [[f32; 3]; 2] {
         let [lo, hi] = self.targets[placed.target as usize].solid.bounds().unwrap_or([[0.0; 3]; 2]);
         let (middle, half) = ([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k])), [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k])));
@@ -221,7 +221,7 @@ impl RayTargets {
 }
 
 impl RayWorld {
-    /// Nothing is placed yet.
+    /// Creates a ray caster without placed targets.
     pub fn new(targets: &Arc<RayTargets>) -> Self {
         Self::with_level(targets, Level::best())
     }
@@ -238,17 +238,17 @@ impl RayWorld {
         }
     }
 
-    /// What can be hit.
+    /// Targets that rays are cast against.
     pub fn targets(&self) -> &Arc<RayTargets> {
         &self.targets
     }
 
-    /// Puts everything where it is: `poses` are world from instance, one for every instance of the scene. What does not
-    /// move is prepared anew only where it is elsewhere than before. A target whose pose is not finite is not hit.
+    /// Places all targets: `poses` are world from instance, one for every instance of the scene. Fixed targets are
+    /// prepared again only if a fixed pose changed. A target with a non-finite pose is never hit.
     ///
     /// # Panics
     ///
-    /// There are fewer poses than instances in the scene.
+    /// If there are fewer poses than instances in the scene.
     #[track_caller]
     pub fn place(&mut self, poses: &[PoseF64]) {
         assert!(poses.len() >= self.targets.instances, "poses of another scene");
@@ -259,7 +259,7 @@ impl RayWorld {
         self.place_moving(targets.moving_poses(poses));
     }
 
-    /// The same, of other targets, with what does not move already prepared, and the poses of what may move:
+    /// Places other targets, with the fixed ones already prepared and the poses of the moving ones as in
     /// [`RayTargets::moving_poses`].
     pub fn place_with(&mut self, targets: &Arc<RayTargets>, fixed: &Arc<FixedWorld>, moving: &[PoseF64]) {
         if !Arc::ptr_eq(&self.targets, targets) {
@@ -277,12 +277,12 @@ impl RayWorld {
         self.moving.extend(targets.moving.iter().zip(poses).filter_map(|(&t, pose)| targets.place(t, pose)));
     }
 
-    /// The nearest hit of every ray, at a distance from 0 to `max_distance` \[m\]. Of two that are as near, the instance
-    /// that comes first in the scene counts. A ray with a number that is not finite hits nothing.
+    /// Finds the nearest hit of every ray, at a distance from 0 to `max_distance` \[m\]. Of equally near instances, the
+    /// first of the scene counts. A ray with a non-finite number hits nothing.
     ///
     /// # Panics
     ///
-    /// `hits` has another length than `rays`.
+    /// If `hits` and `rays` differ in length.
     #[track_caller]
     pub fn cast(&mut self, rays: &[Ray], max_distance: f64, hits: &mut [RayHit]) {
         assert_eq!(rays.len(), hits.len(), "as many hits as rays");
@@ -312,7 +312,7 @@ impl RayWorld {
 }
 
 impl FixedWorld {
-    /// The rays of a packet against what is in the tree; keeps what is nearer than the hits.
+    /// Casts the rays of a packet against the BVH; keeps hits that are nearer than those in `hits`.
     fn meet_tree<S: Simd>(
         &self,
         s: S,
@@ -361,8 +361,8 @@ impl FixedWorld {
     }
 }
 
-/// Every ray of some packets against one target: keeps what is nearer than the hits, in `hits`, of the same rays. Compiled once
-/// for each instruction set.
+/// Casts all packets against one target; keeps hits that are nearer than those in `hits`. Compiled once for each
+/// instruction set.
 #[inline(never)]
 fn meet<S: Simd>(
     s: S,
@@ -379,7 +379,7 @@ fn meet<S: Simd>(
     );
 }
 
-/// The box around some rays.
+/// Bounding box of several rays.
 struct Bundle {
     lo: V3,
     hi: V3,
@@ -388,7 +388,7 @@ struct Bundle {
 impl Bundle {
     #[inline(always)]
     fn around<S: Simd>(s: S, packets: &[Packet], max_distance: f64) -> Self {
-        // An infinity times a zero would be no number.
+        // Infinity times zero would be NaN.
         let far = max_distance.min(1e30);
         let (mut lo, mut hi) = ([D::splat(s, f64::INFINITY); 3], [D::splat(s, f64::NEG_INFINITY); 3]);
         for packet in packets {
@@ -402,14 +402,14 @@ impl Bundle {
         Self { lo: [x.least(), y.least(), z.least()], hi: [a.most(), b.most(), c.most()] }
     }
 
-    /// Whether it meets the sphere around a target.
+    /// True if the box may meet the bounding sphere of a target.
     #[inline(always)]
     fn may_meet(&self, placed: &Placed) -> bool {
         (0..3).all(|k| placed.middle[k] + placed.radius >= self.lo[k] && placed.middle[k] - placed.radius <= self.hi[k])
     }
 }
 
-/// Every ray against one target.
+/// Work of casting every ray against one target.
 struct Sweep<'a, S> {
     s: S,
     target: &'a Target,
@@ -438,7 +438,7 @@ impl<S: Simd> ForShape for Sweep<'_, S> {
     }
 }
 
-/// Keeps a touch that is nearer than the hit, or as near and of an instance that comes before.
+/// Keeps a hit that is nearer, or as near and of an earlier instance.
 #[inline(always)]
 fn keep(hit: &mut RayHit, direction: V3, target: &Target, placed: &Placed, touch: Intersection) {
     if touch.t < hit.distance || touch.t == hit.distance && target.instance < hit.instance {

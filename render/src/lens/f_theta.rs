@@ -6,24 +6,28 @@ use crate::intrinsics::Intrinsics;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// The slope of Isaac's default lens \[rad per pixel\].
+/// Slope of Isaac's default lens \[rad per pixel\].
 const ISAAC_SLOPE: f64 = 0.00245;
 
-/// NVIDIA's f-theta lens: theta = a + b r + c r² + d r³ + e r⁴ + f r⁵ \[rad\], where r is the distance from the principal point
-/// in pixels of the picture that the lens was calibrated with. There, fx and fy are [`focal_length`](Self::focal_length); in
-/// another picture of the same lens they are as many times larger as that has more pixels.
+/// NVIDIA's f-theta lens: theta = a + b r + c r² + d r³ + e r⁴ + f r⁵ \[rad\], where r is the distance from the
+/// principal point in pixels of the calibration image.
 ///
-/// The default is Isaac Lab's `FisheyeCameraCfg`: b = 0.00245 rad per pixel and nothing else, a field of view of 200 degrees.
-/// Source of these numbers: `isaaclab/sim/spawners/sensors/sensors_cfg.py`, fields `fisheye_polynomial_a` to `_f` and
-/// `fisheye_max_fov`. Its nominal picture is 1936 x 1216 pixels: see [`ISAAC`](Self::ISAAC).
+/// For the calibration image, fx and fy equal [`focal_length`](Self::focal_length). For another image size, scale fx
+/// in proportion to its width and fy in proportion to its height.
+///
+/// The default is Isaac Lab's `FisheyeCameraCfg`: b = 0.00245 rad per pixel, all other coefficients 0, a field of view
+/// of 200 degrees. Source of these numbers: `isaaclab/sim/spawners/sensors/sensors_cfg.py`, fields
+/// `fisheye_polynomial_a` to `_f` and `fisheye_max_fov`. Its nominal image has 1936 x 1216 pixels: see
+/// [`ISAAC`](Self::ISAAC).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FTheta {
-    /// Coefficients a to f; a is 0, for the optical axis is at r = 0.
+    /// Coefficients a to f; a is 0, because the optical axis is at r = 0.
     pub polynomial: [f64; 6],
-    /// The focal length of the picture whose pixels the polynomial counts \[pixels\]; 1 / b makes it the slope in the middle.
+    /// Focal length of the calibration image \[pixels\]. With 1 / b it is the scale at the center, in pixels per
+    /// radian.
     pub focal_length: f64,
-    /// Nothing is seen farther from the optical axis than this angle \[rad\]: half of Isaac's `fisheye_max_fov`.
+    /// Largest visible angle from the optical axis \[rad\]: half of Isaac's `fisheye_max_fov`.
     pub max_angle: f64,
 }
 
@@ -38,12 +42,12 @@ impl Default for FTheta {
 }
 
 impl FTheta {
-    /// Focal length and principal point of Isaac's default lens, in a picture of 1936 x 1216 pixels. Source: as the lens,
-    /// `fisheye_optical_centre_x` and `_y`.
+    /// Focal length and principal point of Isaac's default lens, in an image of 1936 x 1216 pixels. Source: the file
+    /// above, `fisheye_optical_centre_x` and `_y`.
     pub const ISAAC: Intrinsics =
         Intrinsics::Pixels { fx: 1.0 / ISAAC_SLOPE, fy: 1.0 / ISAAC_SLOPE, cx: 970.94244, cy: 600.37482 };
 
-    /// The angle at a radius \[pixels\], and its slope.
+    /// Angle \[rad\] at a radius \[pixels\], and its slope.
     fn angle(&self, radius: f64) -> (f64, f64) {
         let [_, b, c, d, e, f] = self.polynomial;
         (value(&self.polynomial, radius), value(&[b, 2.0 * c, 3.0 * d, 4.0 * e, 5.0 * f], radius))
@@ -77,7 +81,7 @@ impl LensModel for FTheta {
 
     fn domain(&self) -> Domain {
         let slope = derivative(&self.polynomial);
-        // Farther out the angle is reached, or the polynomial falls: its last coefficient decides.
+        // Doubles the radius until the angle is reached or the polynomial falls: its last coefficient decides.
         let mut far = self.max_angle / self.polynomial[1];
         let reached = |radius: f64| self.angle(radius).0 >= self.max_angle;
         while far < 1e12 && !reached(far) && first_sign_change(&slope, far).is_none() {

@@ -1,8 +1,9 @@
-//! Lenses: which way the ray of a point of the picture goes. One model per file, all of them in one list.
+//! Lens models: projection of directions to image points and back. One model per file, and one list of all of them.
 //!
-//! A model maps directions in the camera's optical frame (x right, y down, z forward) to points of the *normalised picture*
-//! and back: a point (x, y) of it is the pixel (u, v) = (cx + fx x, cy + fy y), so [`Intrinsics`](crate::intrinsics::Intrinsics) and
-//! lens are independent of each other. All of it is double precision.
+//! A model maps directions in the camera's optical frame (x right, y down, z forward) to points of the *normalized
+//! image* and back. A point (x, y) of the normalized image is the pixel (u, v) = (cx + fx x, cy + fy y), so
+//! [`Intrinsics`](crate::intrinsics::Intrinsics) and lens are independent of each other. All computations are in double
+//! precision.
 
 mod model;
 pub mod optics;
@@ -24,17 +25,18 @@ use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
-/// Declares the lenses: a module with a type of its own each.
+/// Declares the lenses: a module and a type for each.
 macro_rules! lenses {
     ($($(#[$doc:meta])* $file:ident :: $Name:ident,)*) => {
         $(mod $file; pub use $file::$Name;)*
 
-        /// A lens, in front of a picture whose focal lengths and principal point are [`Intrinsics`](crate::intrinsics::Intrinsics).
+        /// A lens model, used with an image whose focal lengths and principal point are
+        /// [`Intrinsics`](crate::intrinsics::Intrinsics).
         ///
         /// In files: the name alone (`lens = "equidistant"`) for the default numbers, or a table with the name
         /// (`lens.opencv = { k1 = -0.28, k2 = 0.07 }`).
         ///
-        /// Lenses other than a pinhole bend straight lines, which only rays follow: they need another renderer than
+        /// Lenses other than a pinhole bend straight lines, which needs ray casting: they require a renderer other than
         /// [`Renderer::Raster`](crate::renderer::Renderer::Raster).
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[non_exhaustive]
@@ -49,14 +51,14 @@ macro_rules! lenses {
         })*
 
         impl Lens {
-            /// The names of all lenses.
+            /// Names of all lenses.
             pub const NAMES: &'static [&'static str] = &[$($Name::NAME),*];
 
-            /// The lens of a name, which may be an alias, with its default numbers.
+            /// Creates the lens of a name or alias, with its default numbers.
             ///
             /// # Errors
             ///
-            /// [`UnknownName`] with the names most like it.
+            /// [`UnknownName`] with the most similar names.
             pub fn from_name(name: &str) -> Result<Self, UnknownName> {
                 $(if name == $Name::NAME || $Name::ALIASES.contains(&name) {
                     return Ok(Self::$Name($Name::default()));
@@ -66,33 +68,33 @@ macro_rules! lenses {
                 Err(UnknownName { what: "lens", name: name.into(), candidates })
             }
 
-            /// Its name.
+            /// Canonical name of the lens.
             pub fn name(&self) -> &'static str {
                 match self { $(Self::$Name(_) => $Name::NAME,)* }
             }
 
-            /// Whether every ray goes forward: near, far and depth are those of a pinhole. Of other lenses, near and far are
-            /// distances along the ray.
+            /// True if every ray goes forward: near, far and depth are those of a pinhole. For other lenses, near and
+            /// far are distances along the ray.
             pub fn is_forward(&self) -> bool {
                 match self { $(Self::$Name(_) => $Name::FORWARD,)* }
             }
 
-            /// Whether it is one lens with an optical axis, off which there is less light.
+            /// True for a single lens with an optical axis, off which the illumination falls off.
             pub fn has_axis(&self) -> bool {
                 match self { $(Self::$Name(_) => $Name::HAS_AXIS,)* }
             }
 
-            /// Whether it bends nothing: pictures are those without a lens, bit for bit, with every renderer.
+            /// True if the lens has no distortion: images equal those without a lens, bit for bit, with every renderer.
             pub fn is_pinhole(&self) -> bool {
                 match self { $(Self::$Name(lens) => lens.is_pinhole(),)* }
             }
 
-            /// Checks every number.
+            /// Validates every number and computes the domain of the lens.
             ///
             /// # Errors
             ///
-            /// [`OpticsError::Lens`]; [`OpticsError::LensFolds`] where the mapping folds back before the angle that the lens
-            /// is to see.
+            /// [`OpticsError::Lens`] for an invalid number; [`OpticsError::LensFolds`] if the mapping folds back before
+            /// the requested `max_angle`.
             pub fn domain(&self) -> Result<Domain, OpticsError> {
                 let (domain, max_angle) = match self { $(Self::$Name(lens) => {
                     lens.validate()?;
@@ -154,27 +156,27 @@ macro_rules! lenses {
 }
 
 lenses! {
-    /// No lens: straight lines stay straight.
+    /// A pinhole without distortion: straight lines stay straight.
     pinhole::Pinhole,
     /// A pinhole with OpenCV's distortion, 12 coefficients.
     open_cv::OpenCv,
     /// OpenCV's fisheye, 4 coefficients.
     open_cv_fisheye::OpenCvFisheye,
-    /// A fisheye: r = f theta.
+    /// The equidistant fisheye: r = f theta.
     equidistant::Equidistant,
-    /// A fisheye that keeps areas: r = 2 f sin(theta / 2).
+    /// The equal-area fisheye: r = 2 f sin(theta / 2).
     equisolid::Equisolid,
-    /// A fisheye: r = f sin(theta).
+    /// The orthographic fisheye: r = f sin(theta).
     orthographic::Orthographic,
-    /// A fisheye that keeps angles: r = 2 f tan(theta / 2).
+    /// The stereographic (conformal) fisheye: r = 2 f tan(theta / 2).
     stereographic::Stereographic,
     /// NVIDIA's f-theta: the angle is a polynomial of the radius.
     f_theta::FTheta,
-    /// All around: longitudes along rows, latitudes along columns.
+    /// The equirectangular panorama: longitudes along rows, latitudes along columns.
     panorama::Panorama,
 }
 
-/// Reads a lens.
+/// Deserializes a lens from a name or a table.
 struct InFile;
 
 impl<'de> Deserialize<'de> for Lens {

@@ -1,38 +1,38 @@
-//! The trait of lenses, and how far a lens sees.
+//! The trait of lens models, and the domain of a lens.
 
 use super::poles::Poles;
 use crate::optics_error::OpticsError;
 
-/// How far a lens sees.
+/// Domain of a lens: the range of visible directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Domain {
-    /// The largest angle between a ray and the optical axis \[rad\].
+    /// Largest angle between a ray and the optical axis \[rad\].
     pub angle: f64,
-    /// How far from the principal point such a ray is, in the normalised picture (times fx: in pixels).
+    /// Distance of such a ray from the principal point in the normalized image (times fx: in pixels).
     pub radius: f64,
-    /// True if rays end there because the mapping folds back or has a pole, not at an angle that was asked for.
+    /// True if rays end there because the mapping folds back or has a pole, not at a requested angle.
     pub folds: bool,
-    /// Of [`OpenCv`] alone.
+    /// Poles of the radial factor of [`OpenCv`]; empty for other lenses.
     pub(super) poles: Poles,
 }
 
 impl Domain {
-    /// How far a lens sees that needs no more to be known of it.
+    /// Domain of a lens without poles.
     pub const fn new(angle: f64, radius: f64, folds: bool) -> Self {
         Self { angle, radius, folds, poles: Poles::NONE }
     }
 }
 
-/// One kind of lens: its file, and a line in the list below.
+/// A kind of lens: one file, and one line in the list of lenses.
 pub trait LensModel: Copy + Default {
-    /// Its name.
+    /// Canonical name.
     const NAME: &'static str;
     /// Accepted aliases.
     const ALIASES: &'static [&'static str];
-    /// True if every ray goes forward, so that near, far and depth are measured along the optical axis, as without a lens.
-    /// Of others, near and far are distances along the ray.
+    /// True if every ray goes forward, so that near, far and depth are measured along the optical axis, as for a
+    /// pinhole. For other lenses, near and far are distances along the ray.
     const FORWARD: bool = false;
-    /// True if there is an aperture with an optical axis; a panorama is put together of many images.
+    /// True if there is an aperture with an optical axis; a panorama is composed of many images.
     const HAS_AXIS: bool = true;
 
     /// True if these numbers make a pinhole.
@@ -40,23 +40,23 @@ pub trait LensModel: Copy + Default {
         false
     }
 
-    /// The angle that was given as the end of what it sees \[rad\], where one was.
+    /// Requested largest angle from the optical axis \[rad\]; `None` if not set.
     fn max_angle(&self) -> Option<f64>;
 
-    /// Checks every number.
+    /// Checks that every number is valid.
     ///
     /// # Errors
     ///
-    /// [`OpticsError::Lens`].
+    /// [`OpticsError::Lens`] for the first invalid number.
     fn validate(&self) -> Result<(), OpticsError>;
 
-    /// How far it sees; the numbers are good.
+    /// Computes the domain; the numbers are valid.
     fn domain(&self) -> Domain;
 
-    /// The point of the normalised picture where a direction is seen; `None` outside of the domain.
+    /// Projects a direction of any length to a point of the normalized image; `None` outside of the domain.
     fn project(&self, domain: &Domain, direction: [f64; 3]) -> Option<[f64; 2]>;
 
-    /// The direction that is seen at a point of the normalised picture: with z = 1 if all rays go
+    /// Direction of the ray through a point of the normalized image: with z = 1 if all rays go
     /// [forward](Self::FORWARD), else of length 1. `None` outside of the domain.
     fn unproject(&self, domain: &Domain, point: [f64; 2]) -> Option<[f64; 3]>;
 }
@@ -69,7 +69,7 @@ pub(super) fn finite(numbers: &[(&'static str, f64)]) -> Result<(), OpticsError>
     }
 }
 
-/// Checks the angle at which a lens ends.
+/// Checks the largest angle of a lens.
 pub(super) fn angle_up_to(max_angle: f64, most: f64, allowed: &'static str) -> Result<(), OpticsError> {
     if max_angle > 0.0 && max_angle <= most {
         return Ok(());

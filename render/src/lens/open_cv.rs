@@ -6,83 +6,86 @@ use super::{OpticsError, Domain, LensModel, angle_up_to, finite};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Nothing is seen farther from the optical axis than this \[rad\] (89.9 degrees), where no smaller angle is given.
+/// Largest visible angle from the optical axis \[rad\] (89.9 degrees) if no smaller angle is set.
 pub(super) const MOST: f64 = 1.569_051;
-/// Angles and directions at which it is looked whether the distortion folds back.
+/// Number of angles and directions at which the distortion is checked for folding back.
 const ANGLES: usize = 1024;
 const DIRECTIONS: usize = 64;
-/// Parts of the way to a point, where Newton's method does not find it at once.
+/// Continuation steps from the optical axis to a point, used if Newton's method fails at once.
 const PARTS: usize = 32;
 
-/// A pinhole with OpenCV's distortion: with (x, y) = (X / Z, Y / Z) and r² = x² + y² the normalised picture has
+/// A pinhole with OpenCV's distortion: with (x, y) = (X / Z, Y / Z) and r² = x² + y² the normalized image has
 ///
 /// - x' = x g + 2 p1 x y + p2 (r² + 2 x²) + s1 r² + s2 r⁴,
 /// - y' = y g + p1 (r² + 2 y²) + 2 p2 x y + s3 r² + s4 r⁴,
 /// - g = (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶).
 ///
-/// Source: OpenCV, module calib3d, "Camera Calibration and 3D Reconstruction". ROS's `plumb_bob` has k1, k2, p1, p2, k3 of it,
-/// its `rational_polynomial` k4 to k6 too. OpenCV's tilted sensor (tau) is not offered.
+/// Source: OpenCV, module calib3d, "Camera Calibration and 3D Reconstruction". ROS's `plumb_bob` uses k1, k2, p1, p2,
+/// k3; its `rational_polynomial` adds k4 to k6. OpenCV's tilted sensor (tau) is not supported.
 ///
-/// The mapping is inverted by Newton's method, where it can be: from the optical axis to where it folds back in the direction
-/// in question. Whether it does is looked at in steps of less than a tenth of a degree. Of the directions that OpenCV's formula
-/// has for a pixel it is the one within that, which `cv::undistortPoints` need not find.
+/// Newton's method inverts the mapping, in each direction from the optical axis to the angle where the mapping folds
+/// back. Folding is checked in steps of less than a tenth of a degree. If OpenCV's formula has several directions for a
+/// pixel, the one within that range is used; `cv::undistortPoints` may find another.
 ///
-/// **Poles.** Where the fraction g has a pole that a zero beside it nearly cancels, as calibrations with k4 to k6 often have one in
-/// the picture, OpenCV's formula runs to infinity and back within a ring of directions, in which pixels have two of them or none.
-/// There, within 2 degrees of the pole and mostly much less, the radius of the picture is a straight line from one end of the ring
-/// to the other, for lack of anything that would be right: each pixel has a direction, each direction a pixel, and everywhere else
-/// it is OpenCV's formula to the last digit. Another pole ends the lens: where it would be without pole and zero, if there are
-/// directions behind it, for they would be seen in the same pixels; else the picture has no end before it.
+/// **Poles.** The fraction g may have a pole that a nearby zero nearly cancels. Calibrations with k4 to k6 often have
+/// such a pole in the image. Within a ring of directions around it, OpenCV's formula runs to infinity and back, and
+/// pixels have two directions or none. The ring is within 2 degrees of the pole, mostly much narrower. There the image
+/// radius is replaced by a straight line from one end of the ring to the other, for lack of anything more accurate. So
+/// each pixel has one direction, and each direction one pixel; everywhere else OpenCV's formula is used to the last
+/// digit.
+///
+/// Any other pole ends the lens. If directions behind the pole would be seen in the same pixels, the lens ends at the
+/// radius that the formula without pole and zero has at the pole. Otherwise the image is unbounded before the pole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OpenCv {
-    /// Radial, above: of r².
+    /// Radial, numerator: coefficient of r².
     pub k1: f64,
-    /// Radial, above: of r⁴.
+    /// Radial, numerator: coefficient of r⁴.
     pub k2: f64,
-    /// Tangential.
+    /// Tangential: coefficient of 2 x y along x, of r² + 2 y² along y.
     pub p1: f64,
-    /// Tangential.
+    /// Tangential: coefficient of r² + 2 x² along x, of 2 x y along y.
     pub p2: f64,
-    /// Radial, above: of r⁶.
+    /// Radial, numerator: coefficient of r⁶.
     pub k3: f64,
-    /// Radial, below: of r².
+    /// Radial, denominator: coefficient of r².
     pub k4: f64,
-    /// Radial, below: of r⁴.
+    /// Radial, denominator: coefficient of r⁴.
     pub k5: f64,
-    /// Radial, below: of r⁶.
+    /// Radial, denominator: coefficient of r⁶.
     pub k6: f64,
-    /// Thin prism, along x: of r².
+    /// Thin prism, along x: coefficient of r².
     pub s1: f64,
-    /// Thin prism, along x: of r⁴.
+    /// Thin prism, along x: coefficient of r⁴.
     pub s2: f64,
-    /// Thin prism, along y: of r².
+    /// Thin prism, along y: coefficient of r².
     pub s3: f64,
-    /// Thin prism, along y: of r⁴.
+    /// Thin prism, along y: coefficient of r⁴.
     pub s4: f64,
-    /// Nothing is seen farther from the optical axis than this angle \[rad\]; at most 1.569 (89.9 degrees). `None`: a picture
-    /// that reaches beyond where the distortion folds back is an error.
+    /// Largest visible angle from the optical axis \[rad\]; at most 1.569 (89.9 degrees). `None`: an image that reaches
+    /// beyond the angle where the distortion folds back is an error.
     pub max_angle: Option<f64>,
 }
 
-/// A point after the distortion.
+/// A distorted point and its derivatives.
 #[derive(Clone, Copy, Debug)]
 struct Distorted {
     point: [f64; 2],
-    /// Derivatives: of x' by x and y, of y' by x and y.
+    /// Jacobian: derivatives of x' by x and y, and of y' by x and y.
     slope: [[f64; 2]; 2],
-    /// Whether orientation and sign are kept there.
+    /// True if the mapping keeps orientation and sign at this point.
     regular: bool,
 }
 
 impl OpenCv {
-    /// The coefficients in OpenCV's order: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4.
+    /// Coefficients in OpenCV's order: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4.
     pub fn coefficients(&self) -> [f64; 12] {
         let Self { k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, .. } = *self;
         [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4]
     }
 
-    /// The lens of coefficients in OpenCV's order; missing ones are 0, and those after the twelfth do not count.
+    /// Creates a lens from coefficients in OpenCV's order; missing ones are 0, and those after the twelfth are ignored.
     pub fn from_coefficients(coefficients: &[f64]) -> Self {
         let mut all = [0.0; 12];
         all.iter_mut().zip(coefficients).for_each(|(to, from)| *to = *from);
@@ -90,13 +93,13 @@ impl OpenCv {
         Self { k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, max_angle: None }
     }
 
-    /// Whether it is the same in all directions.
+    /// True if the distortion is rotationally symmetric.
     fn is_radial(&self) -> bool {
         let Self { p1, p2, s1, s2, s3, s4, .. } = *self;
         [p1, p2, s1, s2, s3, s4] == [0.0; 6]
     }
 
-    /// The factor of the radial distortion.
+    /// Factor g of the radial distortion.
     fn fraction(&self) -> Fraction {
         Fraction { above: [1.0, self.k1, self.k2, self.k3], below: [1.0, self.k4, self.k5, self.k6] }
     }
@@ -104,7 +107,7 @@ impl OpenCv {
     fn distort(&self, poles: &Poles, [x, y]: [f64; 2]) -> Distorted {
         let Self { p1, p2, s1, s2, s3, s4, .. } = *self;
         let r = x * x + y * y;
-        // The slope is by r².
+        // The slope is the derivative by r².
         let (g, slope) = poles.factor(&self.fraction(), r);
         let point = [
             x * g + 2.0 * p1 * x * y + p2 * (r + 2.0 * x * x) + r * (s1 + r * s2),
@@ -126,11 +129,11 @@ impl OpenCv {
         Distorted { point, slope, regular: g > 0.0 && area > 0.0 && area.is_finite() }
     }
 
-    /// The angle up to which all is regular in a direction, if that is less than `most` \[rad\].
+    /// Angle \[rad\] up to which the mapping is regular in a direction; `None` if that is at least `most`.
     fn fold(&self, poles: &Poles, [c, s]: [f64; 2], most: f64) -> Option<f64> {
         let end = poles.end.map(|end| end.angle).filter(|end| *end < most);
         let last = end.unwrap_or(most);
-        // What ends at a pole is good up to there.
+        // An angle that ends at a pole is regular up to there.
         let regular = |angle: f64| {
             let r = angle.tan();
             Some(angle) == end || self.distort(poles, [c * r, s * r]).regular
@@ -142,21 +145,21 @@ impl OpenCv {
         }
     }
 
-    /// Whether a point before the distortion belongs to the lens: in its domain, or in a direction that folds back later.
+    /// True if an undistorted point belongs to the lens: in its domain, or in a direction that folds back later.
     fn sees(&self, domain: &Domain, [x, y]: [f64; 2]) -> bool {
         let r = x.hypot(y);
         if r <= domain.angle.tan() {
             return true;
         }
         let angle = r.atan();
-        // What is the same in all directions folds back at the same angle in all of them.
+        // A rotationally symmetric distortion folds back at the same angle in all directions.
         domain.folds
             && !self.is_radial()
             && angle <= self.max_angle.unwrap_or(MOST)
             && self.fold(&domain.poles, [x / r, y / r], angle).is_none()
     }
 
-    /// The point that is distorted to `target`, from one that is near it.
+    /// Finds the point that is distorted to `target` by Newton's method from a nearby start.
     fn undistort_from(&self, poles: &Poles, target: [f64; 2], start: [f64; 2]) -> Option<[f64; 2]> {
         let mut p = start;
         let mut now = self.distort(poles, p);
@@ -183,7 +186,7 @@ impl OpenCv {
                     (p, now) = (next, then);
                     break;
                 }
-                // As near as rounding lets it come.
+                // Rounding allows no closer approach.
                 if size <= 1e-13 * scale {
                     return Some(p);
                 }
@@ -196,8 +199,9 @@ impl OpenCv {
         None
     }
 
-    /// The point that belongs to the lens and is distorted to `target`: Newton's method finds it from there, or what is beyond a
-    /// fold, which is another direction for the same pixel; then it is gone after from the optical axis.
+    /// Finds the point within the lens that is distorted to `target`. Newton's method starts at the target. If it
+    /// fails, or finds a point beyond a fold (another direction for the same pixel), continuation from the optical axis
+    /// is used.
     fn undistort(&self, domain: &Domain, target: [f64; 2]) -> Option<[f64; 2]> {
         let from = |target: [f64; 2], start: [f64; 2]| {
             self.undistort_from(&domain.poles, target, start).filter(|point| self.sees(domain, *point))

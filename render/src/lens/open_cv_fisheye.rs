@@ -1,13 +1,15 @@
-//! OpenCV's fisheye.
+//! OpenCV's fisheye lens.
 
 use super::polynomial::{first_sign_change, solve, value};
 use super::{OpticsError, Domain, LensModel, angle_up_to, finite, radial};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// OpenCV's fisheye: r = theta (1 + k1 theta² + k2 theta⁴ + k3 theta⁶ + k4 theta⁸). ROS calls it `equidistant`. Source: OpenCV,
-/// module calib3d, `cv::fisheye`; Kannala and Brandt, A generic camera model and calibration method for conventional,
-/// wide-angle, and fish-eye lenses, PAMI 2006. Skew is not offered.
+/// OpenCV's fisheye: r = theta (1 + k1 theta² + k2 theta⁴ + k3 theta⁶ + k4 theta⁸). ROS calls it `equidistant`. Skew is
+/// not supported.
+///
+/// Source: OpenCV, module calib3d, `cv::fisheye`; Kannala and Brandt, A generic camera model and calibration method for
+/// conventional, wide-angle, and fish-eye lenses, PAMI 2006.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OpenCvFisheye {
@@ -19,8 +21,8 @@ pub struct OpenCvFisheye {
     pub k3: f64,
     /// Coefficient of theta⁹.
     pub k4: f64,
-    /// Nothing is seen farther from the optical axis than this angle \[rad\]; at most pi. `None`: a picture that reaches
-    /// beyond where the polynomial folds back is an error.
+    /// Largest visible angle from the optical axis \[rad\]; at most pi. `None`: an image that reaches beyond the angle
+    /// where the polynomial folds back is an error.
     pub max_angle: Option<f64>,
 }
 
@@ -31,7 +33,7 @@ impl OpenCvFisheye {
         (angle * value(&[1.0, self.k1, self.k2, self.k3, self.k4], s), value(&self.slope(), s))
     }
 
-    /// The slope's coefficients, in the square of the angle.
+    /// Coefficients of the slope, as a polynomial of the squared angle.
     fn slope(&self) -> [f64; 5] {
         [1.0, 3.0 * self.k1, 5.0 * self.k2, 7.0 * self.k3, 9.0 * self.k4]
     }

@@ -1,11 +1,11 @@
-//! A lens in front of pixels.
+//! A lens with pixel intrinsics.
 
 use super::{Domain, Lens};
 use crate::intrinsics::{Intrinsics, PixelIntrinsics};
 use crate::optics_error::OpticsError;
 use nalgebra::Vector3;
 
-/// A lens in front of pixels, checked: from directions to pixels and back.
+/// A validated lens with pixel intrinsics: maps directions to pixels and back.
 ///
 /// ```
 /// use kinetoscope_render::Intrinsics;
@@ -26,60 +26,61 @@ pub struct Optics {
 }
 
 impl Optics {
-    /// The lens in front of pixels.
+    /// Combines a lens and intrinsics.
     ///
     /// # Errors
     ///
-    /// [`OpticsError::Lens`] for a bad number, [`OpticsError::LensFolds`] where the mapping folds back before
-    /// the angle that the lens is to see.
+    /// [`OpticsError::Lens`] for an invalid number, [`OpticsError::LensFolds`] if the mapping folds back before the
+    /// lens's `max_angle`.
     pub fn new(lens: Lens, pixels: PixelIntrinsics) -> Result<Self, OpticsError> {
         let pixels = Intrinsics::from(pixels).to_pixels(1, 1)?;
         Ok(Self { lens, pixels, domain: lens.domain()? })
     }
 
-    /// The same lens in front of other pixels, which are good.
+    /// The same lens with other intrinsics, which are valid.
     pub(crate) fn with_pixels(&self, pixels: PixelIntrinsics) -> Self {
         Self { pixels, ..*self }
     }
 
-    /// The lens.
+    /// The lens model.
     pub fn lens(&self) -> Lens {
         self.lens
     }
 
-    /// The pixels.
+    /// The pixel intrinsics.
     pub fn pixels(&self) -> PixelIntrinsics {
         self.pixels
     }
 
-    /// How far the lens sees.
+    /// Range of visible directions.
     pub fn domain(&self) -> Domain {
         self.domain
     }
 
-    /// The pixel (u, v) where a direction of the optical frame (x right, y down, z forward), of any length, is seen; `None`
-    /// where the lens does not see it. The centre of the pixel in column k is at k + 0.5.
+    /// Projects a direction of the optical frame (x right, y down, z forward), of any length, to the pixel (u, v).
+    /// `None` outside of the lens's domain. The center of the pixel in column k is at k + 0.5.
     pub fn project(&self, direction: [f64; 3]) -> Option<[f64; 2]> {
         let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
         let [x, y] = self.lens.project(&self.domain, direction)?;
         Some([cx + fx * x, cy + fy * y])
     }
 
-    /// The direction of length 1 in the optical frame that is seen at the pixel (u, v); `None` outside of what the lens sees.
+    /// Unit direction in the optical frame of the ray through the pixel (u, v); `None` outside of the lens's domain.
     pub fn unproject(&self, pixel: [f64; 2]) -> Option<[f64; 3]> {
         let [x, y, z] = self.ray(pixel)?;
         let by = 1.0 / (x * x + y * y + z * z).sqrt();
         Some([x * by, y * by, z * by])
     }
 
-    /// As [`unproject`](Self::unproject), with z = 1 where all rays go forward: near and far count lengths of it.
+    /// As [`unproject`](Self::unproject), but scaled to z = 1 if all rays go forward: near and far are multiples of
+    /// this vector.
     pub fn ray(&self, [u, v]: [f64; 2]) -> Option<[f64; 3]> {
         let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
         self.lens.unproject(&self.domain, [(u - cx) / fx, (v - cy) / fy])
     }
 
-    /// How much light falls on pixels, where 1 falls on the principal point: the solid angle that one sees, and the cosine by
-    /// which the aperture is turned aside. 0 where nothing is seen, and from a right angle on.
+    /// Illumination of a pixel relative to the principal point: its solid angle times the cosine of the ray with the
+    /// optical axis, by which the aperture is foreshortened. 0 outside of the domain, and from a right angle on.
     pub(crate) fn falloff(&self) -> impl Fn([f64; 2]) -> f64 {
         let PixelIntrinsics { fx, fy, cx, cy } = self.pixels;
         let most = self.solid_angle([0.0; 2]);
@@ -92,14 +93,14 @@ impl Optics {
         }
     }
 
-    /// The solid angle \[sr\] that a unit of area of the normalised picture sees at a point: by differences of rays that are
-    /// 1e-7 rad apart near the axis. Where they spread without end, at a right angle of the orthographic fisheye and where a
-    /// distortion is about to fold back, that is not little.
+    /// Solid angle \[sr\] per unit of area of the normalized image at a point, by differences of rays that are 1e-7 rad
+    /// apart near the axis. The step is coarse where rays spread without bound: at a right angle of the orthographic
+    /// fisheye, and where a distortion is about to fold back.
     fn solid_angle(&self, point: [f64; 2]) -> Option<f64> {
         const NEAR_THE_AXIS: f64 = 1e-4;
         let [x, y] = self.lens.project(&self.domain, [NEAR_THE_AXIS, 0.0, 1.0])?;
         let apart = 1e-7 * x.hypot(y) / NEAR_THE_AXIS;
-        // On the edge of what the lens sees there may be nothing on either side of a point, but there is of one farther in.
+        // At the edge of the domain both neighbors of a point may be outside; a point slightly farther in is used.
         self.solid_angle_by(point, apart).or_else(|| {
             let inwards = 1.0 - apart / point[0].hypot(point[1]);
             self.solid_angle_by(point.map(|x| inwards * x), apart)
@@ -114,7 +115,7 @@ impl Optics {
                 there[axis] += by;
                 self.unit(there)
             };
-            // One side may be outside of what the lens sees.
+            // One neighbor may be outside of the domain.
             match (beside(-apart), beside(apart)) {
                 (Some(before), Some(after)) => Some((after - before) / (2.0 * apart)),
                 (Some(before), None) => Some((here - before) / apart),
@@ -125,7 +126,7 @@ impl Optics {
         Some(slope(0)?.cross(&slope(1)?).norm())
     }
 
-    /// The direction of length 1 that is seen at a point of the normalised picture.
+    /// Unit direction of the ray through a point of the normalized image.
     fn unit(&self, point: [f64; 2]) -> Option<Vector3<f64>> {
         Some(Vector3::from(self.lens.unproject(&self.domain, point)?).normalize())
     }

@@ -1,4 +1,4 @@
-//! The panorama: all around.
+//! The equirectangular panorama.
 
 use super::{OpticsError, Domain, LensModel};
 use crate::intrinsics::Intrinsics;
@@ -6,15 +6,14 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// The equirectangular panorama: x is the longitude from the optical axis to the right, atan2(X, Z), and y the latitude
-/// downward, atan2(Y, hypot(X, Z)) \[rad\]. So fx and fy are pixels per radian; [`intrinsics`](Self::intrinsics) gives those
-/// of a picture that shows everything.
+/// downward, atan2(Y, hypot(X, Z)) \[rad\]. So fx and fy are pixels per radian; [`intrinsics`](Self::intrinsics)
+/// returns those of a full panorama.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Panorama {}
 
 impl Panorama {
-    /// The intrinsics with which a picture shows everything: 2 pi along a row, pi along a column, straight ahead in the
-    /// middle.
+    /// Intrinsics of an image of all directions: 2 pi along a row, pi along a column, straight ahead at the center.
     pub fn intrinsics(width: usize, height: usize) -> Intrinsics {
         let (w, h) = (width as f64, height as f64);
         Intrinsics::Pixels { fx: w / TAU, fy: h / PI, cx: 0.5 * w, cy: 0.5 * h }
@@ -34,7 +33,7 @@ impl LensModel for Panorama {
         Ok(())
     }
 
-    /// Everything.
+    /// The domain of all directions.
     fn domain(&self) -> Domain {
         Domain::new(PI, PI, false)
     }

@@ -1,10 +1,10 @@
-//! No lens: straight lines stay straight.
+//! The pinhole: straight lines stay straight.
 
 use super::{OpticsError, Domain, LensModel};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
-/// No lens: (x, y) = (X / Z, Y / Z).
+/// The pinhole, without distortion: (x, y) = (X / Z, Y / Z).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pinhole {}

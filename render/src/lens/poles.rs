@@ -1,30 +1,30 @@
-//! Poles of OpenCV's radial factor, a fraction of two polynomials of r²: those that a zero nearly cancels are bridged, another
-//! one ends the lens.
+//! Poles of OpenCV's radial factor, a fraction of two polynomials of r². Poles that a zero nearly cancels are bridged;
+//! any other pole ends the lens.
 //!
-//! A calibration that fits k4 to k6 has more numbers than the lens needs. The surplus makes pairs of a pole and a zero beside
-//! it, also where the picture is: the factory's calibrations of OAK-D cameras have such pairs, and 18 of 57 fits of
-//! `cv2.calibrateCamera` to simulated points with a quarter pixel of noise had. (OpenCV, issue 15577, "Ill-defined distortion model
-//! found by calibrateCamera".)
+//! A calibration that fits k4 to k6 has more parameters than the lens needs. The surplus makes pairs of a pole and a
+//! nearby zero, also within the image. The factory calibrations of OAK-D cameras have such pairs, and so had 18 of 57
+//! fits of `cv2.calibrateCamera` to simulated points with a quarter pixel of noise. (OpenCV, issue 15577, "Ill-defined
+//! distortion model found by calibrateCamera".)
 //!
-//! Beside a pole at the tangent p, the picture's radius R of a ray at the tangent r is about c + m (r - p) - e / (r - p): with
-//! the pole before the zero (e > 0) both sides reach every radius, so that a pixel has two directions; behind it (e < 0) there
-//! is a ring of the picture that no direction reaches. Either is so within sqrt(|e| / m) of the pole. A little beyond, where the
-//! radius grows again as the lens has it, a bridge begins: there R is a straight line from one end to the other. All else is
-//! OpenCV's formula to the last digit.
+//! Near a pole at the tangent p, a ray at the tangent r has the image radius R = c + m (r - p) - e / (r - p),
+//! approximately. With the pole before the zero (e > 0) both sides reach every radius, so a pixel has two directions.
+//! With the pole behind the zero (e < 0) no direction reaches a ring of the image. Both happen within sqrt(|e| / m) of
+//! the pole. Slightly beyond, where the radius grows again as the lens does, a bridge begins: there R is a straight
+//! line from one end to the other. Everywhere else OpenCV's formula is used to the last digit.
 
 use super::open_cv::MOST;
 use super::polynomial::{bisect, derivative, sign_changes, value};
 
-/// A bridge may reach as far as this to either side of its pole \[rad\] (2 degrees). Where a wider one is needed, the formula is
-/// off by so much that no calibration with points there would give it: what it says there is not of the lens. The widest of
-/// the calibrations that were looked at, of an OAK-D Lite, needs 1.6 degrees.
+/// Largest reach of a bridge to either side of its pole \[rad\] (2 degrees). If a pole needs a wider bridge, the
+/// formula is off by so much that no calibration with points there would give it: the formula does not describe the
+/// lens there. The widest bridge of all examined calibrations, of an OAK-D Lite, is 1.6 degrees.
 const WIDEST: f64 = 0.035;
-/// How far to either side a bridge reaches, where what is about the pole reaches 1: the first that will do. At 1.1, R grows by a
-/// sixth of m beside the bridge (e < 0) or on it (e > 0), which Newton's method is content with.
+/// Reach of a bridge to either side, in units of sqrt(|e| / m): the first sufficient one is used. At 1.1, R grows by a
+/// sixth of m beside the bridge (e < 0) or on it (e > 0), which is enough for Newton's method.
 const REACHES: [f64; 5] = [1.1, 1.2, 1.4, 1.7, 2.0];
-/// The least of m by which R has to grow on a bridge, and beside it.
+/// Least growth of R on a bridge and beside it, as a fraction of m.
 const LEAST_SLOPE: f64 = 0.05;
-/// The shortest bridge, where its pole is 1 from the axis: so close to a pole the fraction still has ten digits.
+/// Shortest reach of a bridge, for a pole at the tangent 1: so close to a pole the fraction still has ten digits.
 const SHORTEST: f64 = 1e-6;
 
 /// A fraction of two polynomials of s = r², the square of the tangent; lowest coefficient first.
@@ -35,7 +35,7 @@ pub(super) struct Fraction {
 }
 
 impl Fraction {
-    /// Value, and slope by s.
+    /// Value, and derivative by s.
     fn at(&self, s: f64) -> (f64, f64) {
         let [_, k1, k2, k3] = self.above;
         let [_, k4, k5, k6] = self.below;
@@ -45,13 +45,13 @@ impl Fraction {
         (g, ((k1 + s * (2.0 * k2 + s * 3.0 * k3)) - g * (k4 + s * (2.0 * k5 + s * 3.0 * k6))) / below)
     }
 
-    /// The picture's radius at a tangent r, and its slope by r.
+    /// Image radius at a tangent r, and its derivative by r.
     fn radius(&self, r: f64) -> (f64, f64) {
         let (g, slope) = self.at(r * r);
         (r * g, g + 2.0 * r * r * slope)
     }
 
-    /// e and m beside a pole at s. With g = c0 / u + c1 + c2 u + .. of u = s - p², e is -c0 / 2 and m is c1 + 2 p² c2.
+    /// e and m at a pole at s. With g = c0 / u + c1 + c2 u + .. of u = s - p², e is -c0 / 2 and m is c1 + 2 p² c2.
     fn beside(&self, pole: f64) -> (f64, f64) {
         let taylor = |of: &[f64]| {
             let (first, third) = (derivative(of), of[3]);
@@ -64,7 +64,7 @@ impl Fraction {
         (-0.5 * c0, c1 + 2.0 * pole * c2)
     }
 
-    /// A bridge over a pole at s, not before a tangent; `None` where none will do.
+    /// A bridge over a pole at s that starts after the tangent `before`; `None` if no reach is sufficient.
     fn bridge(&self, pole: f64, before: f64) -> Option<Bridge> {
         let (e, m) = self.beside(pole);
         let at = pole.sqrt();
@@ -82,20 +82,20 @@ impl Fraction {
     }
 }
 
-/// Where the picture's radius is a straight line.
+/// A range in which the image radius is a straight line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bridge {
-    /// The tangents of its ends.
+    /// Tangents of the start and the end.
     from: f64,
     to: f64,
-    /// The radius where it begins.
+    /// Image radius at the start.
     start: f64,
-    /// By the tangent.
+    /// Derivative of the image radius by the tangent.
     slope: f64,
 }
 
 impl Bridge {
-    /// The factor and its slope by s, if that is on the bridge.
+    /// The factor and its derivative by s; `None` if s is not on the bridge.
     fn at(&self, s: f64) -> Option<(f64, f64)> {
         let r = s.sqrt();
         if r < self.from || r > self.to {
@@ -106,16 +106,16 @@ impl Bridge {
     }
 }
 
-/// Where a pole ends a lens.
+/// End of a lens at a pole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct End {
-    /// The last angle with the optical axis \[rad\].
+    /// The last angle from the optical axis \[rad\].
     pub(super) angle: f64,
-    /// Whether the picture has no end there.
+    /// True if the image radius grows without bound there.
     pub(super) endless: bool,
 }
 
-/// What is known of the poles of a fraction.
+/// Poles of a fraction: the bridged ones, and the one that ends the lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Poles {
     bridges: [Option<Bridge>; 3],
@@ -125,7 +125,7 @@ pub(super) struct Poles {
 impl Poles {
     pub(super) const NONE: Self = Self { bridges: [None; 3], end: None };
 
-    /// Looks for them, up to an angle for what ends the lens \[rad\].
+    /// Finds the poles; `most` is the largest angle \[rad\] at which a pole can end the lens.
     pub(super) fn of(fraction: &Fraction, most: f64) -> Self {
         let far = MOST.tan().powi(2);
         let mut poles = Self::NONE;
@@ -141,16 +141,16 @@ impl Poles {
         poles
     }
 
-    /// The end that a pole at s is. Where no zero follows it, the picture grows to it without end. With a zero up to `far`
-    /// there are directions on the other side, too, for each pixel; the pixels from the axis on are those that would be before
-    /// the pole if neither were there.
+    /// The end of the lens at a pole at s. If no zero follows the pole, the image radius grows to it without bound.
+    /// With a zero up to `far`, directions behind the pole map to the same pixels. Then the pixels from the axis on are
+    /// those that the formula without pole and zero has before the pole.
     fn end_before(&self, fraction: &Fraction, pole: f64, far: f64) -> End {
         let (e, _) = fraction.beside(pole);
         let (at, angle) = (pole.sqrt(), pole.sqrt().atan());
         let zero = sign_changes(&fraction.above, pole, far).first().copied();
         match zero {
             Some(zero) if e > 0.0 => {
-                // The factor without both, times the tangent.
+                // The factor without pole and zero, times the tangent.
                 let radius = 2.0 * e / at * zero / (zero - pole);
                 let before = |angle: f64| {
                     let r = angle.tan();
@@ -162,7 +162,7 @@ impl Poles {
         }
     }
 
-    /// The factor and its slope by s.
+    /// The factor and its derivative by s.
     pub(super) fn factor(&self, fraction: &Fraction, s: f64) -> (f64, f64) {
         self.bridges.iter().flatten().find_map(|bridge| bridge.at(s)).unwrap_or_else(|| fraction.at(s))
     }

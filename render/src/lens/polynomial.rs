@@ -1,20 +1,20 @@
-//! Polynomials of one number, lowest coefficient first.
+//! Polynomials of one variable, lowest coefficient first.
 
-/// Halvings of an interval: after so many the ends are neighbouring numbers.
+/// Bisection steps: enough to reach adjacent numbers.
 const HALVINGS: usize = 200;
 
-/// The value at x.
+/// Value at x.
 pub(super) fn value(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
-/// The derivative's coefficients.
+/// Coefficients of the derivative.
 pub(super) fn derivative(coefficients: &[f64]) -> Vec<f64> {
     coefficients.iter().enumerate().skip(1).map(|(k, c)| k as f64 * c).collect()
 }
 
-/// Where the sign changes between `from` and `to`, in order. Between two neighbouring ones, or the ends, there is at most one,
-/// for the derivative's are known. A root where the sign stays is none.
+/// Sign changes between `from` and `to`, in order. Roots without a change of sign are left out. Between two neighboring
+/// sign changes of the derivative, or the ends, there is at most one.
 pub(super) fn sign_changes(coefficients: &[f64], from: f64, to: f64) -> Vec<f64> {
     let used = coefficients.iter().rposition(|&c| c != 0.0).map_or(0, |last| last + 1);
     let coefficients = &coefficients[..used];
@@ -32,12 +32,12 @@ pub(super) fn sign_changes(coefficients: &[f64], from: f64, to: f64) -> Vec<f64>
     ends.windows(2).filter_map(change).collect()
 }
 
-/// The first place from 0 to `limit` where a polynomial that is positive at 0 changes its sign.
+/// The first sign change from 0 to `limit` of a polynomial that is positive at 0.
 pub(super) fn first_sign_change(coefficients: &[f64], limit: f64) -> Option<f64> {
     sign_changes(coefficients, 0.0, limit).first().copied()
 }
 
-/// Where `holds`, which it does at `from` and not at `to`, ends: the last number where it was seen to.
+/// Bisects a predicate that holds at `from` and not at `to`; returns the last number found where it holds.
 pub(super) fn bisect(from: f64, to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let (mut yes, mut no) = (from, to);
     for _ in 0..HALVINGS {
@@ -50,8 +50,8 @@ pub(super) fn bisect(from: f64, to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     yes
 }
 
-/// Where a function that grows from `from` to `to` has a value that lies between: Newton's steps, and halves where they leave
-/// the interval. `at` gives value and slope.
+/// Solves for a value of a function that increases from `from` to `to`, by Newton's method with bisection if a step
+/// leaves the interval. `at` returns value and slope.
 pub(super) fn solve(target: f64, from: f64, to: f64, start: f64, at: impl Fn(f64) -> (f64, f64)) -> f64 {
     let (mut low, mut high) = (from, to);
     let mut x = start.clamp(low, high);
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn roots() {
-        // (x - 1)(x - 2)(x - 3), times (x - 5)^2, whose sign stays.
+        // (x - 1)(x - 2)(x - 3), and (x - 5)^2, whose sign does not change.
         let cubic = [-6.0, 11.0, -6.0, 1.0];
         let found = sign_changes(&cubic, 0.0, 10.0);
         assert!(found.len() == 3 && found.iter().zip([1.0, 2.0, 3.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");

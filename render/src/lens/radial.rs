@@ -1,6 +1,6 @@
-//! Lenses that are the same all around the optical axis: they turn angles into radii.
+//! Rotationally symmetric lenses, which map angles to radii.
 
-/// Where a direction is seen, if `radius` is that of an angle \[rad\] up to `most`.
+/// Projects a direction, where `radius` maps an angle \[rad\] up to `most` to the image radius.
 pub(super) fn project([x, y, z]: [f64; 3], most: f64, radius: impl Fn(f64) -> f64) -> Option<[f64; 2]> {
     let across = x.hypot(y);
     let angle = across.atan2(z);
@@ -8,14 +8,15 @@ pub(super) fn project([x, y, z]: [f64; 3], most: f64, radius: impl Fn(f64) -> f6
         return None;
     }
     if across == 0.0 {
-        // Straight back is a whole circle.
+        // The direction straight back would be a whole circle.
         return (z > 0.0).then_some([0.0; 2]);
     }
     let by = radius(angle) / across;
     Some([x * by, y * by])
 }
 
-/// The unit direction that is seen at a point, if `angle` is that of a radius \[rad\]; up to `most` of them.
+/// Unit direction through a point, where `angle` maps an image radius to the angle \[rad\]; angles up to `most` are
+/// valid.
 pub(super) fn unproject([x, y]: [f64; 2], most: f64, angle: impl Fn(f64) -> Option<f64>) -> Option<[f64; 3]> {
     let radius = x.hypot(y);
     if radius == 0.0 {
@@ -27,7 +28,7 @@ pub(super) fn unproject([x, y]: [f64; 2], most: f64, angle: impl Fn(f64) -> Opti
     Some([x * by, y * by, cosine])
 }
 
-/// A fisheye of one law, the same all around: a type whose only number is the angle at which it ends.
+/// Declares a rotationally symmetric fisheye without coefficients: a type whose only number is its largest angle.
 macro_rules! fisheye {
     (
         $(#[$doc:meta])*
@@ -45,7 +46,7 @@ macro_rules! fisheye {
         }
 
         impl Default for $Name {
-            /// As far as it goes.
+            /// The largest angle of the mapping.
             fn default() -> Self {
                 Self { max_angle: $most }
             }

@@ -1,4 +1,4 @@
-//! The rays of all samples of a picture behind a lens: computed once, for all pictures of the same lens.
+//! Rays of all samples of an image through a lens: computed once, for all images of the same lens.
 
 use super::Optics;
 use crate::optics_error::OpticsError;
@@ -9,56 +9,57 @@ use std::sync::OnceLock;
 
 /// Numbers of a group: x, y, z of two rows of eight pixels.
 const GROUP: usize = 3 * LANES;
-/// Cones are wider by this \[rad\]: more than what is lost by single precision.
+/// Widening of cones \[rad\]: more than the error of single precision.
 const WIDER: f64 = 1e-5;
 
-/// The rays of a picture behind a lens, single precision; see [`Shot::lens`](crate::request::Shot::lens).
+/// Precomputed rays of an image through a lens, single precision; see [`Shot::lens`](crate::request::Shot::lens).
 ///
-/// It takes 12 bytes for each pixel, 60 where colours have four samples besides, 4 more where there is vignetting, and is
-/// computed once: cameras keep one for each kind of lens and intrinsics among their environments.
+/// The table takes 12 bytes per pixel, 60 with four color samples, and 4 more with vignetting. It is computed once:
+/// cameras keep one for each combination of lens and intrinsics among their environments.
 #[derive(Clone)]
 pub struct LensRays {
     optics: Optics,
     size: [usize; 2],
-    /// Samples of a pixel: its centre, or all of [`SAMPLES`].
+    /// Sample planes: the pixel center alone, or all of [`SAMPLES`].
     planes: usize,
-    /// Plane after plane, pairs of rows from the top, groups from the left; 0 where there is no ray. Length 1, or z = 1.
+    /// Ray directions by plane, then pairs of rows from the top, then groups from the left; 0 for samples without a
+    /// ray. Scaled to length 1, or to z = 1.
     directions: Vec<f32>,
-    /// What each block of 8 x 8 pixels sees, row by row.
+    /// Bounding cone of the rays of each block of 8 x 8 pixels, row by row.
     cones: Vec<Cone>,
-    /// Distance of the rays of neighbouring pixels, where they are as long as they are kept: a mean.
+    /// Mean distance between the stored directions of neighboring pixels.
     pixel: f64,
-    /// Of each pixel, row by row, once somebody asks for one; see [`Optics::falloff`].
+    /// Relative illumination of each pixel, row by row, computed on first use; see [`Optics::falloff`].
     falloff: OnceLock<Vec<f32>>,
 }
 
-/// Directions around one.
+/// A cone of directions around an axis.
 #[derive(Clone, Copy, Debug)]
 struct Cone {
     axis: [f64; 3],
-    /// Of half the angle; no ray at all has a cosine of 2.
+    /// Cosine of half the angle; 2 for a block without rays.
     cosine: f64,
     sine: f64,
 }
 
-/// A ball as the eye sees it.
+/// Cone of directions in which the camera sees a ball.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Sight {
-    /// In all directions.
+    /// All directions: the camera is inside the ball.
     Everywhere,
-    /// In those around one.
+    /// Directions around an axis.
     Around {
-        /// Where its middle is, length 1.
+        /// Unit direction of the ball's center.
         axis: [f64; 3],
-        /// Of half the angle.
+        /// Cosine of half the angle.
         cosine: f64,
-        /// Of half the angle.
+        /// Sine of half the angle.
         sine: f64,
     },
 }
 
 impl Sight {
-    /// A ball around a point of the optical frame \[m\].
+    /// The cone of a ball around a point of the optical frame \[m\].
     pub(crate) fn of_ball(middle: [f64; 3], radius: f64) -> Self {
         let far = dot(middle, middle).sqrt();
         let sine = radius / far + WIDER;
@@ -70,13 +71,13 @@ impl Sight {
 }
 
 impl LensRays {
-    /// The rays of a picture of `width` by `height` pixels: one through the middle of each, and with `samples` 4 those of
-    /// its other four colour samples.
+    /// Computes the rays of an image of `width` by `height` pixels: one through the center of each pixel, and with
+    /// `samples` 4 those of its four color samples too.
     ///
     /// # Errors
     ///
-    /// [`OpticsError::LensFolds`] if pixels are where the mapping of the lens cannot be inverted, and
-    /// [`OpticsError::LensBlind`] if no pixel sees anything.
+    /// [`OpticsError::LensFolds`] if pixels lie where the mapping of the lens cannot be inverted, and
+    /// [`OpticsError::LensBlind`] if no pixel lies in the lens's domain.
     pub fn new(optics: &Optics, [width, height]: [usize; 2], samples: u8) -> Result<Self, OpticsError> {
         let planes = if samples == 4 { SAMPLES.len() } else { 1 };
         let blocks = [width.div_ceil(BLOCK), height.div_ceil(BLOCK)];
@@ -111,17 +112,17 @@ impl LensRays {
         Ok(rays)
     }
 
-    /// The lens and the pixels.
+    /// The lens with its pixel intrinsics.
     pub fn optics(&self) -> &Optics {
         &self.optics
     }
 
-    /// Pixels per row, rows.
+    /// Image size: pixels per row, and rows.
     pub fn size(&self) -> [usize; 2] {
         self.size
     }
 
-    /// Samples of a pixel: 1, or 4 if colours have four besides the centre.
+    /// Samples per pixel: 1, or 4 with color samples besides the center.
     pub fn samples(&self) -> u8 {
         if self.planes > 1 { 4 } else { 1 }
     }
@@ -132,7 +133,7 @@ impl LensRays {
         size_of::<f32>() * numbers + size_of::<Cone>() * self.cones.capacity()
     }
 
-    /// The memory of rays for a picture \[bytes\], before it is taken.
+    /// Memory of the rays of an image \[bytes\], before allocation.
     pub(crate) fn bytes_of([width, height]: [usize; 2], samples: u8) -> usize {
         let blocks = width.div_ceil(BLOCK).saturating_mul(height.div_ceil(BLOCK));
         let planes = if samples == 4 { SAMPLES.len() } else { 1 };
@@ -140,17 +141,17 @@ impl LensRays {
         blocks.saturating_mul(size_of::<Cone>() + of_block * size_of::<f32>())
     }
 
-    /// Whether all rays have z = 1, not length 1.
+    /// True if all rays have z = 1 instead of length 1.
     pub fn is_forward(&self) -> bool {
         self.optics.lens().is_forward()
     }
 
-    /// About how far the rays of neighbouring pixels are apart, where they are as long as they are kept.
+    /// Mean distance between the stored directions of neighboring pixels.
     pub(crate) fn pixel(&self) -> f64 {
         self.pixel
     }
 
-    /// Where the group of a pixel begins, and which lane is its.
+    /// Start of the group of a pixel, and the pixel's lane.
     #[inline(always)]
     fn place(&self, plane: usize, [x, y]: [usize; 2]) -> (usize, usize) {
         let wide = self.size[0].div_ceil(BLOCK);
@@ -165,14 +166,14 @@ impl LensRays {
         }
     }
 
-    /// The ray of a sample in the optical frame; 0 where there is none.
+    /// Ray of a sample in the optical frame; 0 if the sample has no ray.
     #[inline(always)]
     pub fn direction(&self, plane: usize, at: [usize; 2]) -> [f32; 3] {
         let (group, lane) = self.place(plane, at);
         [0, 1, 2].map(|axis| self.directions[group + axis * LANES + lane])
     }
 
-    /// How much of the light of the optical axis falls on a pixel: `Optics::falloff` of its centre.
+    /// Illumination of a pixel relative to the optical axis: `Optics::falloff` of its center.
     pub fn falloff(&self, [x, y]: [usize; 2]) -> f64 {
         let all = self.falloff.get_or_init(|| {
             let [width, height] = self.size;
@@ -183,21 +184,21 @@ impl LensRays {
         f64::from(all[y * self.size[0] + x])
     }
 
-    /// The rays of the centres of 8 x 2 pixels, of which this is the first.
+    /// Rays through the centers of 8 x 2 pixels, the first of which is given.
     #[inline(always)]
     pub(crate) fn of_pixels<S: Simd>(&self, s: S, at: [usize; 2]) -> V3<S> {
         let group = &self.directions[self.place(0, at).0..];
         V3 { x: load(s, group), y: load(s, &group[LANES..]), z: load(s, &group[2 * LANES..]) }
     }
 
-    /// The rays of sixteen points, each of which is a sample of a pixel.
+    /// Rays of sixteen points, each of which is a sample of a pixel.
     #[inline(always)]
     pub(crate) fn of_points<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> V3<S> {
         let (u, v): ([f32; LANES], [f32; LANES]) = (u.array(), v.array());
         let mut out = [[0.0f32; LANES]; 3];
         for lane in 0..LANES {
             let [x, y] = [u[lane].floor(), v[lane].floor()];
-            // Multiples of 1/256 that single precision holds exactly.
+            // Multiples of 1/256, which single precision holds exactly.
             let offset = [u[lane] - x - 0.5, v[lane] - y - 0.5].map(|d| (d * 256.0) as i32);
             let plane = SAMPLES.iter().take(self.planes).position(|sample| *sample == offset).unwrap_or(0);
             let inside = [(x as usize).min(self.size[0] - 1), (y as usize).min(self.size[1] - 1)];
@@ -209,7 +210,7 @@ impl LensRays {
         V3 { x: load(s, &out[0]), y: load(s, &out[1]), z: load(s, &out[2]) }
     }
 
-    /// Whether a block of 8 x 8 pixels, which this counts, may see something.
+    /// True if a block of 8 x 8 pixels, given in blocks, may see a ball.
     #[inline(always)]
     pub(crate) fn may_see(&self, [bx, by]: [usize; 2], sight: &Sight) -> bool {
         let cone = &self.cones[by * self.size[0].div_ceil(BLOCK) + bx];
@@ -217,12 +218,12 @@ impl LensRays {
             return false;
         }
         let Sight::Around { axis, cosine, sine } = sight else { return true };
-        // The angle between the axes against the sum of both, which may be more than half a turn.
+        // Compares the angle between the axes with the sum of both angles, which may exceed half a turn.
         let (sum_cosine, sum_sine) = (cone.cosine * cosine - cone.sine * sine, cone.sine * cosine + cone.cosine * sine);
         sum_sine <= 0.0 || dot(cone.axis, *axis) >= sum_cosine
     }
 
-    /// What a block sees, whose first pixel is given.
+    /// Bounding cone of the rays of a block, given by its first pixel.
     fn cone(&self, [x0, y0]: [usize; 2]) -> Cone {
         let rays = (0..self.planes).flat_map(|plane| {
             let pixels = (0..BLOCK * BLOCK).map(move |k| [x0 + k % BLOCK, y0 + k / BLOCK]);
@@ -231,7 +232,7 @@ impl LensRays {
         let sum = rays.clone().fold([0.0; 3], |sum, ray| [0, 1, 2].map(|k| sum[k] + ray[k]));
         let Some(first) = rays.clone().next() else { return Cone { axis: [0.0; 3], cosine: 2.0, sine: 0.0 } };
         let axis = unit(sum).unwrap_or(first);
-        // By the chord, which small angles keep their digits in.
+        // By the chord, which keeps the digits of small angles.
         let apart = |ray: [f64; 3]| {
             let chord = [0, 1, 2].map(|k| ray[k] - axis[k]);
             2.0 * (0.5 * dot(chord, chord).sqrt()).min(1.0).asin()
@@ -240,8 +241,8 @@ impl LensRays {
         Cone { axis, cosine: angle.cos(), sine: angle.sin().max(0.0) }
     }
 
-    /// The mean distance of the rays of neighbouring pixels, in a row or in a column, whichever is larger; `None` where there
-    /// is no ray.
+    /// Mean distance between the rays of neighboring pixels in a row or in a column, whichever is larger; `None`
+    /// without rays.
     fn spacing(&self) -> Option<f64> {
         let [width, height] = self.size;
         let (mut sum, mut count, mut any) = ([0.0; 2], [0.0f64; 2], false);
@@ -272,7 +273,7 @@ impl LensRays {
     }
 }
 
-/// Says where the mapping folds back, if that is why there is no ray.
+/// Returns an error if the pixel has no ray because the mapping folds back.
 fn not_folded(optics: &Optics, [u, v]: [f64; 2]) -> Result<(), OpticsError> {
     let (domain, f) = (optics.domain(), optics.pixels());
     if !domain.folds {
@@ -283,7 +284,7 @@ fn not_folded(optics: &Optics, [u, v]: [f64; 2]) -> Result<(), OpticsError> {
     Err(OpticsError::LensFolds { lens: optics.lens().name(), angle: domain.angle, radius: domain.radius, wanted })
 }
 
-/// All else follows from these.
+/// All other fields follow from these.
 impl PartialEq for LensRays {
     fn eq(&self, other: &Self) -> bool {
         let Self { optics, size, planes, directions, cones: _, pixel: _, falloff: _ } = self;
@@ -315,7 +316,7 @@ mod tests {
     use crate::raster::tile::SAMPLES;
     use crate::simd::{at_level, levels, load};
 
-    /// Rays in lanes are those of the optics, to the bit, at every SIMD level.
+    /// Rays in lanes equal those of the optics, to the bit, at every SIMD level.
     #[test]
     fn points_in_lanes() {
         let pixels = PixelIntrinsics { fx: 20.0, fy: 22.0, cx: 30.25, cy: 25.5 };

@@ -1,26 +1,26 @@
-//! The rays of all rows of a camera: rows of the same intrinsics share them.
+//! Rays of all views of a camera: views with the same intrinsics share them.
 
 use super::{Lens, LensRays, Optics};
 use crate::intrinsics::PixelIntrinsics;
 use crate::optics_error::OpticsError;
 use std::sync::Arc;
 
-/// The most memory that the rays of a camera may take \[bytes\].
+/// Largest memory of the rays of a camera \[bytes\].
 const MAX_BYTES: usize = 16 << 30;
 
-/// The lens of a camera and its rays; none for a pinhole.
+/// Lens and rays of all views (rows) of a camera. A pinhole has no rays.
 #[derive(Clone, Debug)]
 pub struct RaysOfRows {
     lens: Lens,
     size: [usize; 2],
     samples: u8,
-    /// Those that are configured, and those that were set.
+    /// Rays of the configured intrinsics, and of those that were set later.
     known: Vec<Arc<LensRays>>,
     rows: Vec<Option<Arc<LensRays>>>,
 }
 
 impl RaysOfRows {
-    /// The rays of a lens with the same pixels in every row.
+    /// Computes the rays of a lens with the same intrinsics in every row.
     pub fn new(
         lens: Lens,
         pixels: &PixelIntrinsics,
@@ -35,27 +35,28 @@ impl RaysOfRows {
         Ok(all)
     }
 
-    /// The lens of all rows.
+    /// Lens of all rows.
     pub fn lens(&self) -> Lens {
         self.lens
     }
 
-    /// The rays of a row; `None` for a pinhole.
+    /// Rays of a row; `None` for a pinhole.
     ///
     /// # Panics
-    /// If there is no such row.
+    ///
+    /// If `row` is out of range.
     #[track_caller]
     pub fn row(&self, row: usize) -> Option<&LensRays> {
         self.rows[row].as_deref()
     }
 
-    /// The rays of a row, to keep.
+    /// Shared rays of a row; `None` for a pinhole.
     #[track_caller]
     pub fn shared(&self, row: usize) -> Option<&Arc<LensRays>> {
         self.rows[row].as_ref()
     }
 
-    /// The rays of some pixels, those of the same ones once; none for a pinhole.
+    /// Computes the rays of several intrinsics, once for equal ones; empty for a pinhole.
     pub fn make(&self, pixels: &[PixelIntrinsics]) -> Result<Vec<Arc<LensRays>>, OpticsError> {
         if self.lens.is_pinhole() {
             self.lens.domain()?;
@@ -81,7 +82,7 @@ impl RaysOfRows {
         Ok(made)
     }
 
-    /// Gives rows the rays of their pixels, which were made or are known.
+    /// Assigns rays to rows by their intrinsics; `made` holds the rays that were computed for them.
     pub fn set(&mut self, made: Vec<Arc<LensRays>>, rows: &[usize], pixels: impl Fn(usize) -> PixelIntrinsics) {
         if self.lens.is_pinhole() {
             return;
@@ -99,9 +100,9 @@ impl RaysOfRows {
         self.forget();
     }
 
-    /// Frees the rays that no row has, and nobody else.
+    /// Drops the rays without users, except for those of the configured intrinsics.
     pub fn forget(&mut self) {
-        // Nobody else has them: only these lists, twice where they are in use. The first are the configured ones.
+        // Rays in use are referenced by a row or elsewhere too. The first ones are the configured ones.
         let mut number = 0;
         self.known.retain(|rays| {
             number += 1;

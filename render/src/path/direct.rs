@@ -1,4 +1,4 @@
-//! Light that comes to a point straight from lamps and from what glows.
+//! Direct light: light that reaches a point straight from lights and emissive surfaces.
 
 use super::point::Point;
 use super::{Path, Paths, SCATTERED, above, times};
@@ -10,11 +10,11 @@ use kinetoscope_scene::basis::Basis;
 use kinetoscope_scene::vector::{V3, along, dot, sub, unit};
 use std::f64::consts::PI;
 
-/// Pairs of numbers of what glows, two at each surface: far beyond those of paths.
+/// First dimension for emitter sampling, two pairs of numbers per surface: far beyond those of paths.
 const GLOWING: u32 = 1 << 29;
 
 impl Paths<'_> {
-    /// What a point sends to `o` of the lamps' light.
+    /// Direct light of all lights, scattered by a point towards `o`.
     #[inline(always)]
     pub(super) fn lit<S: Simd>(&self, s: S, point: &Point, o: V3, path: &mut Path<'_>, dims: u32) -> V3 {
         let basis = Basis::of(point.normal);
@@ -45,8 +45,8 @@ impl Paths<'_> {
         out
     }
 
-    /// What a point sends to `o` of the light of one thing that glows, which is looked for: on average its share of the
-    /// light of all of them. `width` is that of a pixel at the point.
+    /// Direct light of one sampled emissive instance, scattered by a point towards `o`. Multiple importance sampling
+    /// weights it against paths that hit the emitter. `width` is the width of a pixel at the point \[m\].
     #[inline(always)]
     pub(super) fn glow<S: Simd>(&self, s: S, point: &Point, o: V3, path: &mut Path<'_>, bounce: u32, width: f64) -> V3 {
         let none = [0.0; 3];
@@ -54,7 +54,7 @@ impl Paths<'_> {
             return none;
         }
         let pair = |k: u32| path.sample.pair(GLOWING + 2 * bounce + k);
-        // Without any, no numbers are needed.
+        // Without emitters, no random numbers are drawn.
         let Some(emitter) = self.lamps.emitters.choose(0.0).and_then(|_| self.lamps.emitters.choose(pair(0)[0])) else {
             return none;
         };
@@ -65,7 +65,7 @@ impl Paths<'_> {
         let (distance, Some(direction)) = (dot(to, to).sqrt(), unit(to)) else { return none };
         let basis = Basis::of(point.normal);
         let (local, i) = (basis.to_local(o), basis.to_local(direction));
-        // Where paths do not go, no light is looked for.
+        // Directions that paths do not take contribute no direct light.
         if dot(direction, point.flat) <= 0.0 || i[2] <= 0.0 || local[2] <= 0.0 {
             return none;
         }
@@ -79,7 +79,7 @@ impl Paths<'_> {
         let normal = pose.rotate(chosen.normal);
         let hit = Hit { distance, instance, triangle, normal, world_from_instance: pose };
         let Some(there) = Point::new(self.scene, &ray, &hit, width + SCATTERED * distance) else { return none };
-        // Backs of what is not opaque are not seen.
+        // Backs of transparent surfaces are invisible.
         if there.alpha < 1.0 && !there.front {
             return none;
         }
@@ -90,8 +90,8 @@ impl Paths<'_> {
         [0, 1, 2].map(|c| by * there.emission[c] * (scatter.below[c] + scatter.layer[c]))
     }
 
-    /// The share of the light of what a path met that is not found by looking for it. The path's direction was chosen at
-    /// `from`, with a density.
+    /// MIS weight of emission that a path hit. The direction of the path was sampled at `from` with the pdf `likely`
+    /// \[1/sr\].
     pub(super) fn met(&self, from: V3, likely: f64, hit: &Hit, at: V3) -> f64 {
         let Some(emitter) = self.lamps.emitters.of(hit.instance) else { return 1.0 };
         let pose = &hit.world_from_instance;
@@ -100,7 +100,8 @@ impl Paths<'_> {
         self.ways.meeting(likely, density * emitter.share())
     }
 
-    /// Where shadow rays of a point begin: where its smooth normals mean it to be, unless something is between.
+    /// Origin of a point's shadow rays: on the smooth surface that the normals describe, unless another surface is
+    /// between.
     #[inline(always)]
     fn lifted<S: Simd>(&self, s: S, point: &Point, path: &mut Path<'_>) -> V3 {
         let (here, lifted) = (above(point, 1.0), above(&Point { position: point.lifted, ..*point }, 1.0));

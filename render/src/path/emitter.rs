@@ -1,8 +1,8 @@
-//! Things that glow, as lights to look for: a point of them is chosen at every surface, besides the direction that the surface
-//! chooses itself. Light that both ways may find is shared between them by their densities.
+//! Emissive instances as area lights: at every surface, a point on an emitter is sampled besides the direction that the
+//! BSDF samples. Multiple importance sampling combines both by their pdfs.
 //!
-//! Source: Veach and Guibas, Optimally combining sampling techniques for Monte Carlo rendering, SIGGRAPH 1995 (the power
-//! heuristic).
+//! Source: Veach and Guibas, Optimally combining sampling techniques for Monte Carlo rendering, SIGGRAPH 1995 (the
+//! power heuristic).
 
 use super::brightness;
 use crate::trace::Tracer;
@@ -13,28 +13,28 @@ use kinetoscope_scene::vector::{V3, dot, sub, to_f64};
 use kinetoscope_scene::{Instance, RenderScene};
 use std::sync::Arc;
 
-/// The things that glow in a frame; keeps its memory.
+/// The emissive instances of a frame; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Emitters {
     list: Vec<Emitter>,
-    /// Sum of the powers of all.
+    /// Sum of the powers of all emitters, in any unit.
     power: f64,
 }
 
-/// A thing that glows.
+/// An emissive instance.
 #[derive(Clone, Debug)]
 pub(super) struct Emitter {
     pub(super) instance: u32,
     surface: Surface,
-    /// \[m²\].
+    /// Surface area \[m²\].
     area: f64,
-    /// Power of this and all before, in any unit.
+    /// Cumulative power of all emitters up to this one, in any unit.
     until: f64,
-    /// The part of all choices that are this.
+    /// Probability of this emitter.
     share: f64,
 }
 
-/// A surface of which points are sampled. Those of some shapes are not: paths meet them.
+/// A surface whose points can be sampled. Shapes without sampling are only hit by paths.
 #[derive(Clone, Debug)]
 enum Surface {
     Closed(Shape),
@@ -47,9 +47,9 @@ impl Surface {
         triangles.or_else(|| shape.area_sampling().map(|_| Self::Closed(shape.clone())))
     }
 
-    /// True if it is what `shape` has: meshes are compared by their address.
+    /// True if the surface is that of `shape`: meshes are compared by address.
     fn is_of(&self, shape: &Shape) -> bool {
-        // Of others there is nothing that is worth keeping.
+        // Other surfaces hold no data worth keeping.
         matches!((self, shape.mesh()), (Self::Triangles(sampling), Some(mesh)) if Arc::ptr_eq(sampling.mesh(), mesh))
     }
 
@@ -66,15 +66,15 @@ impl Surface {
 }
 
 impl Emitter {
-    /// A point that may be seen from `from`, both in its own frame, sampled by three numbers in 0..1, and the density of its
-    /// direction \[1/sr\], of this emitter.
+    /// Samples a point that is visible from `from`, both in the emitter's frame, by three random numbers in 0..1.
+    /// Returns the point and the pdf of its direction \[1/sr\], given this emitter.
     pub(super) fn choose(&self, from: V3, side: f64, at: [f64; 2]) -> Option<(SurfacePoint, f64)> {
         let (point, density) = self.surface.sampling()?.sample_from(from, side, at)?;
         let density = density.or_else(|| self.density_by_area(from, point.position, point.normal))?;
         Some((point, density))
     }
 
-    /// How likely the direction from `from` to a point of its surface is \[1/sr\]; `None` where it is never chosen.
+    /// Pdf of the direction from `from` to a point of the surface \[1/sr\]; `None` if the point is never sampled.
     pub(super) fn density(&self, from: V3, at: V3, normal: V3) -> Option<f64> {
         self.surface.sampling()?.density_from(from).or_else(|| self.density_by_area(from, at, normal))
     }
@@ -82,7 +82,7 @@ impl Emitter {
     fn density_by_area(&self, from: V3, at: V3, normal: V3) -> Option<f64> {
         let to = sub(at, from);
         let (square, slant) = (dot(to, to), dot(to, normal));
-        // From behind, the surface is not there.
+        // A one-sided surface is invisible from behind.
         if self.surface.is_one_sided() && slant >= 0.0 {
             return None;
         }
@@ -90,7 +90,7 @@ impl Emitter {
         (density > 0.0 && density.is_finite()).then_some(density)
     }
 
-    /// The part of all choices that are this emitter.
+    /// Probability of this emitter.
     pub(super) fn share(&self) -> f64 {
         self.share
     }
@@ -105,7 +105,7 @@ impl Emitters {
         self.list.capacity() * size_of::<Emitter>() + sums.sum::<usize>()
     }
 
-    /// Finds what glows of what rays meet.
+    /// Finds the emissive instances among those that rays hit.
     pub(super) fn prepare(&mut self, scene: &RenderScene, tracer: &Tracer) {
         let Self { list, power } = self;
         let (mut count, mut sum) = (0, 0.0);
@@ -114,7 +114,7 @@ impl Emitters {
             if !(bright > 0.0 && bright.is_finite()) || tracer.pose_of(k as u32, NOW).is_none() {
                 continue;
             }
-            // Sums over a mesh are kept from frame to frame.
+            // The cumulative areas of a mesh are kept from frame to frame.
             let known = list.get(count).is_some_and(|e| e.instance == k as u32 && e.surface.is_of(&instance.shape));
             if !known {
                 let Some(surface) = Surface::of(&instance.shape) else { continue };
@@ -139,21 +139,21 @@ impl Emitters {
         *power = sum;
     }
 
-    /// One of them, as often as it is bright, by a number in 0..1; `None` where nothing glows.
+    /// Samples an emitter in proportion to its power, by a number in 0..1; `None` without emitters.
     pub(super) fn choose(&self, number: f64) -> Option<&Emitter> {
         let place = number * self.power;
         let k = self.list.partition_point(|emitter| emitter.until <= place);
         self.list.get(k.min(self.list.len().checked_sub(1)?))
     }
 
-    /// The emitter that an instance is.
+    /// The emitter of an instance.
     pub(super) fn of(&self, instance: u32) -> Option<&Emitter> {
         let k = self.list.binary_search_by_key(&instance, |emitter| emitter.instance).ok()?;
         self.list.get(k)
     }
 }
 
-/// How much it glows, for its colour.
+/// Strength of the emission, relative to the color of the instance.
 fn strength(instance: &Instance) -> f64 {
     let material = &instance.material;
     let part = |x: f32| f64::from(x.clamp(0.0, 1.0));
@@ -162,9 +162,9 @@ fn strength(instance: &Instance) -> f64 {
     f64::from(material.emission.max(0.0)) * (1.0 - mirrored) * part(material.rgba[3])
 }
 
-/// The share of light that was found in a way of density `own`, where another way finds it with density `other`.
+/// Weight of a sample with pdf `own` that another strategy finds with pdf `other`.
 pub(super) fn power_heuristic(own: f64, other: f64) -> f64 {
-    // Squares of large densities may leave the range: their ratio does not.
+    // Squares of large pdfs may leave the range: their ratio does not.
     let ratio = other / own;
     1.0 / (1.0 + ratio * ratio)
 }

@@ -1,4 +1,4 @@
-//! Where a camera's paths begin, and which way they go.
+//! Camera rays of path tracing: origins and directions.
 
 use kinetoscope_scene::basis::Basis;
 
@@ -10,40 +10,40 @@ use kinetoscope_scene::Ray;
 use kinetoscope_scene::sampling::on_disc;
 use kinetoscope_scene::vector::{along, dot, scale, sub};
 
-/// A camera, as paths see it.
+/// Generator of camera rays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Eye<'a> {
     pub(crate) projection: &'a Projection,
-    /// Instead of the projection's rays.
+    /// Rays of the lens, used instead of the projection's.
     pub(crate) lens: Option<&'a LensRays>,
     pub(crate) pupil: Option<Pupil>,
 }
 
-/// The opening of a lens.
+/// Aperture of a thin lens.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pupil {
-    /// \[m\].
+    /// Radius of the aperture \[m\].
     radius: f64,
-    /// What is this far away is sharp \[m\].
+    /// Focus distance \[m\].
     focus: f64,
 }
 
-/// The first ray of a path.
+/// A camera ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct First {
-    /// From the near plane on.
+    /// Starts at the near plane.
     pub(super) ray: Ray,
-    /// How far it was already \[m\].
+    /// Distance from the camera to the start of the ray \[m\].
     pub(super) travelled: f64,
-    /// How far it goes \[m\].
+    /// Length of the ray, up to the far plane \[m\].
     pub(super) limit: f64,
-    /// How wide a pixel is where it begins, and how much wider it gets by the metre.
+    /// Width of a pixel at the start of the ray \[m\], and its growth per meter.
     pub(super) width: f64,
     pub(super) spread: f64,
 }
 
 impl Pupil {
-    /// `None` for an opening without a size.
+    /// `None` for a pinhole.
     pub(crate) fn of(aperture: &Aperture) -> Option<Self> {
         let radius = 0.5 * aperture.diameter();
         (radius > 0.0).then_some(Self { radius, focus: aperture.focus_distance })
@@ -51,8 +51,8 @@ impl Pupil {
 }
 
 impl Eye<'_> {
-    /// The ray through a point of the picture and the point of the opening that two numbers in 0..1 choose, of a camera at
-    /// `pose`; `None` outside of the image circle.
+    /// The camera ray through a point of the image and a sampled point of the aperture, for a camera at `pose`.
+    /// `choice` gives two random numbers in 0..1. `None` outside of the image circle.
     pub(super) fn look(&self, [u, v]: [f64; 2], pose: &PoseF64, choice: impl Fn() -> [f64; 2]) -> Option<First> {
         let (view, wide) = (self.projection, f64::from);
         let (c, f) = match self.lens {
@@ -66,7 +66,7 @@ impl Eye<'_> {
             None => (c, pose.translation),
             Some(Pupil { radius, focus }) => {
                 let [x, y] = on_disc(choice()).map(|x| radius * x);
-                // The opening faces forward, or each ray of those that go aside.
+                // The aperture faces forward; for lenses whose rays do not all go forward, it faces each ray.
                 let forward = self.lens.is_none_or(LensRays::is_forward);
                 let off = if forward { [x, y, 0.0] } else { Basis::of(c).to_world([x, y, 0.0]) };
                 (sub(c, scale(off, 1.0 / focus)), pose.apply(off))

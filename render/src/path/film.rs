@@ -1,4 +1,4 @@
-//! The colours of a picture while its paths are followed: one row of memory per row of pixels, so that threads share it.
+//! Accumulator of path-traced images: one row of memory per row of pixels, so that threads share it.
 
 use super::smooth::Guide;
 use super::{Found, Lamps, Paths};
@@ -7,31 +7,31 @@ use crate::progress::RenderProgress;
 use crate::shade::tone::{ToneCurve, encode};
 use crate::simd::{LANES, Level, Simd, at_level, load};
 
-/// Light that is brighter is not told apart from this: sums of some dozen of its squares are numbers of single precision.
+/// Limit of radiance: sums of several dozen of its squares are finite in single precision.
 const BRIGHTEST: f32 = 1e18;
 
-/// A picture in linear light; keeps its memory.
+/// Accumulator of an image in linear light; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub struct Film {
     pub(crate) width: usize,
     pub(crate) lamps: Lamps,
-    /// Radiance; with smoothing that of a white surface, until it is encoded.
+    /// Radiance; with denoising, radiance divided by albedo until it is encoded.
     pub(crate) pixels: Vec<Pixel>,
-    /// The pixels of the next pass of smoothing.
+    /// Pixels of the next denoising pass.
     pub(crate) next: Vec<Pixel>,
-    /// None without smoothing.
+    /// Denoising guides; empty without denoising.
     pub(crate) guides: Vec<Guide>,
 }
 
-/// A pixel of a film.
+/// A pixel of the accumulator.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Pixel {
     pub(crate) color: [f32; 3],
-    /// Variance of its brightness.
+    /// Variance of the brightness.
     pub(crate) variance: f32,
 }
 
-/// Rows of a film, in the hands of a thread.
+/// Rows of an image that one thread works on.
 #[derive(Debug)]
 pub(crate) struct Rows<'a> {
     /// The first row.
@@ -41,7 +41,7 @@ pub(crate) struct Rows<'a> {
 }
 
 impl Film {
-    /// Memory for a pixel of a picture, with or without smoothing.
+    /// Memory per pixel of an image \[bytes\], with or without denoising.
     pub const fn bytes_per_pixel(smooth: bool) -> usize {
         if smooth { 2 * size_of::<Pixel>() + size_of::<Guide>() } else { size_of::<Pixel>() }
     }
@@ -52,7 +52,7 @@ impl Film {
             + self.lamps.bytes()
     }
 
-    /// Memory for a picture.
+    /// Allocates the memory of an image.
     pub(crate) fn resize(&mut self, [width, height]: [usize; 2], smooth: bool) {
         self.width = width;
         let count = width * height;
@@ -61,7 +61,7 @@ impl Film {
         self.next.resize(if smooth { count } else { 0 }, Pixel::default());
     }
 
-    /// The film in parts of some rows, and its lamps.
+    /// The image in bands of `rows` rows, and its lights.
     pub(crate) fn rows(&mut self, rows: usize) -> (&Lamps, impl Iterator<Item = Rows<'_>>) {
         let size = (self.width * rows).max(1);
         let (parts, mut guides) = (self.pixels.chunks_mut(size).enumerate(), self.guides.chunks_mut(size));
@@ -71,8 +71,8 @@ impl Film {
 }
 
 impl Rows<'_> {
-    /// Follows the paths of all pixels, until it is broken off; whether it was not. With `smooth` the colour of surfaces is
-    /// divided out.
+    /// Traces the paths of all pixels; returns false if rendering was canceled. With `smooth`, radiance is divided by
+    /// albedo.
     pub(crate) fn expose(
         &mut self,
         level: Level,
@@ -119,8 +119,7 @@ impl Rows<'_> {
     }
 }
 
-/// Colours for the screen, of as many pixels as there are; where there are guides the colour of surfaces is multiplied again.
-/// Light is multiplied by `exposure` before the tone curve.
+/// Converts radiance to sRGB bytes: multiplies it by `exposure` before the tone curve, and with guides by the albedo.
 pub(crate) fn develop(
     level: Level,
     exposure: f32,
@@ -140,7 +139,8 @@ fn develop_lanes<S: Simd>(s: S, exposure: f32, curve: ToneCurve, pixels: &[Pixel
                 *to = pixel.color[c] * guides.get(k).map_or(1.0, |guide| guide.albedo[c]);
             }
             let mut bytes = [0i32; LANES];
-            // Outside of this, the wide registers of some instruction sets are put on a stack that is not aligned for them.
+            // Loads stay inside of this closure: outside, wide registers of some instruction sets are spilled to a
+            // stack that is not aligned for them.
             s.vectorize(
                 #[inline(always)]
                 || bytes = encode(s, curve, load(s, &linear) * exposure).to_int().array(),

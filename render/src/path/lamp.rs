@@ -1,4 +1,4 @@
-//! Lamps, as paths see them.
+//! Lights, as path tracing samples them.
 
 use kinetoscope_scene::basis::Basis;
 
@@ -8,12 +8,12 @@ use kinetoscope_scene::sampling::on_disc;
 use kinetoscope_scene::vector::{V3, along, dot, scale, sub, to_f64, unit};
 use kinetoscope_scene::{Light, LightKind};
 
-/// A lamp of a frame.
+/// A light of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lamp {
     kind: LightKind,
     position: V3,
-    /// Unit vector along which it shines.
+    /// Unit vector along which the light shines.
     along: V3,
     cutoff_cos: f64,
     exponent: u32,
@@ -23,31 +23,31 @@ pub(super) struct Lamp {
     pub(super) diffuse: V3,
     pub(super) specular: V3,
     pub(super) cast_shadow: bool,
-    /// Of a lamp at a camera: where the camera looks, and the depth that it sees from \[m\]. Without a direction that is a
-    /// distance.
+    /// For a light at a camera: the camera's viewing direction, and its near depth \[m\]. Without a direction, near is
+    /// a distance.
     sight: Option<(Option<V3>, f64)>,
 }
 
-/// Light from a lamp at a point.
+/// Light that arrives at a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Incoming {
-    /// Unit vector to where it comes from.
+    /// Unit vector towards the light.
     pub(super) direction: V3,
-    /// How far it may be cut off \[m\].
+    /// Distance within which the light may be occluded \[m\].
     pub(super) distance: f64,
-    /// How much of it arrives.
+    /// Factor of the light's color that arrives.
     pub(super) strength: f64,
 }
 
 impl Incoming {
-    /// Light that was asked for at one point, asked for at another beside it: the same point of the lamp, where it is from there
-    /// and how far.
+    /// Direction and distance of the same point of the light from another origin. This light was computed for the point
+    /// `asked`.
     pub(super) fn seen_from(&self, asked: V3, origin: V3) -> (V3, f64) {
         if !(self.distance.is_finite() && self.distance > 0.0) {
             return (self.direction, self.distance);
         }
         let to = sub(along(asked, self.distance, self.direction), origin);
-        // Where both are one point nothing is between them.
+        // If both points coincide, the distance is 0.
         unit(to).map_or((self.direction, 0.0), |direction| (direction, dot(to, to).sqrt()))
     }
 }
@@ -75,7 +75,7 @@ impl Lamp {
         }
     }
 
-    /// A lamp at a camera.
+    /// A headlight: a light at the camera.
     pub(super) fn of_camera(headlight: &kinetoscope_scene::Headlight, view: &Projection, along_axis: bool) -> Self {
         let light = Light {
             kind: LightKind::Point,
@@ -89,7 +89,8 @@ impl Lamp {
         Self { position: to_f64(position), sight, ..Self::new(&light) }
     }
 
-    /// Light at `point` from the point of the lamp's disc that two numbers in 0..1 choose; `None` where none arrives.
+    /// Light at `point` from a sampled point of the light's disc, by two random numbers in 0..1; `None` if no light
+    /// arrives.
     pub(super) fn at(&self, point: V3, choice: [f64; 2]) -> Option<Incoming> {
         if self.kind == LightKind::Directional {
             let toward = scale(self.along, -1.0);
@@ -112,14 +113,14 @@ impl Lamp {
         let direction = unit(to)?;
         let mut distance = dot(to, to).sqrt();
         if let Some((forward, near)) = self.sight {
-            // What is nearer than the camera sees, its housing, does not shade it.
+            // Objects nearer than the near plane, such as the camera's housing, cast no shadow.
             let cos = forward.map_or(1.0, |forward| -dot(direction, forward));
             distance -= if cos > 1e-3 { near / cos } else { 0.0 };
         }
         Some(Incoming { direction, distance, strength })
     }
 
-    /// From the middle of the disc to a point of it.
+    /// From the center of the disc to a point of it.
     fn spread(&self, to: V3, normal: V3, choice: [f64; 2]) -> Option<V3> {
         if self.radius == 0.0 {
             return Some(to);

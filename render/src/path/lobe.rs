@@ -1,8 +1,8 @@
-//! How a surface scatters light: Lambert's law below a glossy layer.
+//! BSDF of a surface: Lambertian reflection below a glossy GGX layer, with perfect mirrors and smooth glass.
 //!
-//! Sources: Walter et al., Microfacet models for refraction through rough surfaces, 2007 (GGX); Heitz, Understanding the
-//! masking-shadowing function, JCGT 3(2), 2014; Dupuy and Benyoub, Sampling visible GGX normals with spherical caps, 2023;
-//! Schlick, 1994; Lagarde and de Rousiers, Moving Frostbite to physically based rendering, 2014 (F90).
+//! Sources: Walter et al., Microfacet models for refraction through rough surfaces, 2007 (GGX); Heitz, Understanding
+//! the masking-shadowing function, JCGT 3(2), 2014; Dupuy and Benyoub, Sampling visible GGX normals with spherical
+//! caps, 2023; Schlick, 1994; Lagarde and de Rousiers, Moving Frostbite to physically based rendering, 2014 (F90).
 
 use super::brightness;
 use kinetoscope_scene::Material;
@@ -10,43 +10,43 @@ use kinetoscope_scene::sampling::{cosine, turn};
 use kinetoscope_scene::vector::{V3, dot, scale};
 use std::f64::consts::PI;
 
-/// How a point scatters.
+/// BSDF of a surface point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lobe {
-    /// The colour of the surface.
+    /// Base color of the surface.
     pub(super) albedo: V3,
-    /// What is scattered below the layer: nothing of a metal.
+    /// Diffuse albedo below the layer: 0 for a metal.
     pub(super) body: V3,
-    /// What the layer reflects along the normal, and at grazing.
+    /// Reflectance of the layer along the normal (F0), and at grazing angles (`f90`).
     f0: V3,
     f90: f64,
-    /// Roughness alpha of the layer, squared.
+    /// Squared roughness alpha of the layer.
     alpha2: f64,
-    /// What is mirrored perfectly.
+    /// Fraction of light that is mirrored perfectly.
     pub(super) mirror: f64,
-    /// What meets a smooth surface of glass.
+    /// Fraction of light that meets a smooth surface of glass.
     glass: f64,
-    /// Refractive index of the side that light comes from, over that of the other side.
+    /// Refractive index of the side that light comes from, divided by that of the other side.
     ratio: f64,
-    /// Whether light comes from outside of the body.
+    /// True if light comes from outside of the body.
     front: bool,
 }
 
-/// The least alpha², of a roughness of 0: highlights of a twentieth of a degree.
+/// Least alpha², for a roughness of 0: highlights of a twentieth of a degree.
 const SMOOTHEST: f64 = 1e-6;
 
-/// Where light is followed to.
+/// A sampled direction of the BSDF.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scattered {
     pub(super) direction: V3,
-    /// What of the light from there goes on.
+    /// Factor of the light from there: BSDF times cosine, divided by the pdf.
     pub(super) weight: V3,
     pub(super) mirrored: bool,
-    /// How likely the direction was \[1/sr\]; 0 of mirrors, which have one only.
+    /// Pdf of the direction \[1/sr\]; 0 for mirrors, which have a single direction.
     pub(super) likely: f64,
 }
 
-/// What of the light from a direction is scattered into another, times the cosine of the first: below the layer, and by it.
+/// BSDF times the cosine of the incoming direction: of the diffuse part below the layer, and of the layer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scatter {
     pub(super) below: V3,
@@ -54,7 +54,8 @@ pub(super) struct Scatter {
 }
 
 impl Lobe {
-    /// `reflectance` is that of the material where it mirrors, `front` is true if light comes from outside of the body.
+    /// Creates the BSDF. `reflectance` is that of the material if the point mirrors; `front` is true if light comes
+    /// from outside of the body.
     pub(super) fn new(material: &Material, reflectance: f32, albedo: V3, front: bool) -> Self {
         let part = |x: f32| f64::from(x.clamp(0.0, 1.0));
         let (layer, metal) = (0.08 * part(material.specular), part(material.metallic));
@@ -71,22 +72,22 @@ impl Lobe {
         Self { albedo, body: scale(albedo, 1.0 - metal), f0, f90, alpha2, mirror, glass, ratio, front }
     }
 
-    /// The part of the light that is scattered: neither mirrored nor let through.
+    /// Fraction of light that is scattered: neither mirrored nor transmitted.
     pub(super) fn rest(&self) -> f64 {
         1.0 - self.mirror - self.glass
     }
 
-    /// Whether light goes through, and is bent.
+    /// True if light is refracted through the surface.
     pub(super) fn is_glass(&self) -> bool {
         self.glass > 0.0
     }
 
-    /// Whether there is no layer.
+    /// True if the layer reflects no light.
     fn is_matt(&self) -> bool {
         self.f0 == [0.0; 3]
     }
 
-    /// What the layer reflects at an angle of this cosine. Source: Schlick, 1994.
+    /// Fresnel reflectance of the layer at an angle of this cosine. Source: Schlick, 1994.
     fn fresnel(&self, cos: f64) -> V3 {
         let k = (1.0 - cos).clamp(0.0, 1.0);
         let square = k * k;
@@ -94,9 +95,9 @@ impl Lobe {
         self.f0.map(|f0| f0 + (self.f90 - f0) * grazing)
     }
 
-    /// Where light goes that is bent into what `o` (from outside, z up) looks at, and how much is mirrored instead: Snell's law
-    /// and Fresnel's equations of light without polarisation; `None` where all is mirrored. Source: Born and Wolf, Principles
-    /// of Optics, section 1.5.
+    /// Refraction at a smooth surface: the reflected fraction, and the direction that light refracted from `o` (from
+    /// outside, z up) takes. Snell's law and Fresnel's equations of unpolarized light; `None` at total internal
+    /// reflection. Source: Born and Wolf, Principles of Optics, section 1.5.
     fn bent(&self, o: V3) -> (f64, Option<V3>) {
         let square = 1.0 - self.ratio * self.ratio * (1.0 - o[2] * o[2]);
         if square <= 0.0 {
@@ -109,8 +110,8 @@ impl Lobe {
         (mirrored, Some([-self.ratio * o[0], -self.ratio * o[1], -there]))
     }
 
-    /// Of light that comes from everywhere and goes to `o`, about the part that is mirrored rather than scattered below the layer.
-    /// Of Schlick's term 1/21 is left in the mean over all directions.
+    /// Approximate fraction of the light towards `o` that is mirrored rather than scattered below the layer, with light
+    /// from everywhere. The mean of Schlick's term over all directions is 1/21.
     pub(super) fn gloss(&self, o: V3) -> f64 {
         let (rest, layer) = (self.rest(), self.fresnel(o[2]));
         let out = self.f0.map(|f0| 1.0 - f0 - (self.f90 - f0) / 21.0);
@@ -119,18 +120,18 @@ impl Lobe {
         mirrored / (mirrored + below).max(1e-12)
     }
 
-    /// Density of microfacets, by the cosine of their tilt.
+    /// GGX density of microfacets (D), by the cosine of their tilt.
     fn density(&self, cos: f64) -> f64 {
         let k = cos * cos * (self.alpha2 - 1.0) + 1.0;
         self.alpha2 / (PI * k * k)
     }
 
-    /// What of the microfacets is seen at an angle of this cosine.
+    /// Smith's masking term (G1) at an angle of this cosine.
     fn seen(&self, cos: f64) -> f64 {
         2.0 * cos / (cos + (self.alpha2 + (1.0 - self.alpha2) * cos * cos).sqrt())
     }
 
-    /// Light from `i` to `o`, both unit and in the frame of the point.
+    /// Evaluates the BSDF for light from `i` to `o`, both unit and in the local frame of the point.
     pub(super) fn scatter(&self, o: V3, i: V3) -> Scatter {
         if o[2] <= 0.0 || i[2] <= 0.0 {
             return Scatter { below: [0.0; 3], layer: [0.0; 3] };
@@ -149,7 +150,7 @@ impl Lobe {
         Scatter { below, layer: scale(self.fresnel(angle), rest * self.density(tilt) * seen_twice * i[2]) }
     }
 
-    /// The part of directions that are chosen by the layer.
+    /// Probability of sampling the layer.
     fn share(&self, o: V3) -> f64 {
         if self.is_matt() {
             return 0.0;
@@ -160,8 +161,9 @@ impl Lobe {
         (layer / (layer + below).max(1e-12)).clamp(0.1, 1.0)
     }
 
-    /// Chooses where light comes from that goes to `o` (unit, in the frame of the point), by three numbers in 0..1. The mean
-    /// of the weight times the light from there is the light that goes to `o`; `None` is none, along the surface too.
+    /// Samples the direction of light that is scattered to `o` (unit, in the local frame of the point), by three random
+    /// numbers in 0..1. The mean of the weight times the light from there is the light towards `o`. `None` stands for
+    /// no light, also for directions along the surface.
     pub(super) fn choose(&self, o: V3, lobe: f64, at: [f64; 2]) -> Option<Scattered> {
         if o[2] <= 0.0 {
             return None;
@@ -172,7 +174,7 @@ impl Lobe {
         let lobe = lobe - self.mirror;
         if lobe < self.glass {
             let (mirrored, through) = self.bent(o);
-            // What goes in takes the colour.
+            // Light that enters takes the color.
             let tint = if self.front { self.albedo } else { [1.0; 3] };
             let (direction, weight) = match through {
                 Some(through) if lobe >= mirrored * self.glass => (through, tint),
@@ -196,10 +198,10 @@ impl Lobe {
         Some(Scattered { direction, weight, mirrored: false, likely })
     }
 
-    /// How likely [`choose`](Self::choose) chooses a direction above the surface for light that goes to `o` \[1/sr\].
+    /// Pdf of a direction above the surface in [`choose`](Self::choose), for light that is scattered to `o` \[1/sr\].
     pub(super) fn likely(&self, o: V3, i: V3) -> f64 {
         let share = self.share(o);
-        // As likely as one of the two ways makes it.
+        // The sum of both strategies' pdfs.
         let mut likely = (1.0 - share) * i[2] / PI;
         if share > 0.0 {
             let half = [0, 1, 2].map(|k| o[k] + i[k]);
@@ -209,7 +211,7 @@ impl Lobe {
         likely * self.rest()
     }
 
-    /// Mirrored by a microfacet that is seen from `o`.
+    /// Samples a visible microfacet and mirrors `o` by it.
     fn mirrored_by_facet(&self, o: V3, [a, b]: [f64; 2]) -> Option<V3> {
         let alpha = self.alpha2.sqrt();
         let unit = |v: V3| scale(v, 1.0 / dot(v, v).sqrt());
@@ -233,7 +235,7 @@ mod tests {
         Lobe::new(&Material { specular, shininess, ..Material::default() }, 0.0, [albedo; 3], true)
     }
 
-    /// The mean of a function over 2^`log` chosen directions.
+    /// Mean of a function over 2^`log` sampled directions.
     fn mean(lobe: &Lobe, o: V3, (pixel, seed): ([usize; 2], u32), log: u32, f: impl Fn(&Scattered) -> f64) -> f64 {
         let one = |k| {
             let sample = Sequence::new(pixel, seed).sample(k);
@@ -256,9 +258,9 @@ mod tests {
         }
     }
 
-    /// Light from everywhere: the sum over a grid of directions and the mean of chosen ones are the same, and not more than
-    /// comes in. The grid's error is that of the midpoint rule, which is largest for sharp highlights: at 1000 x 1000 cells
-    /// an order below what is asked. Chosen ones: 2^14 points of a net.
+    /// With light from everywhere, the sum over a grid of directions equals the mean of sampled ones, and does not
+    /// exceed the incoming light. The grid's error is that of the midpoint rule, which is largest for sharp highlights:
+    /// at 1000 x 1000 cells an order of magnitude below the tolerance. Samples: 2^14 points of a net.
     #[test]
     fn energy() {
         let n = 1000;
@@ -285,7 +287,7 @@ mod tests {
                 if specular == 0.0 {
                     assert!((all - albedo).abs() < 1e-5, "{what}: {all}");
                 }
-                // A control: without the layer taking from what is below, more would go out than comes in.
+                // A control: if the layer did not take light from below it, more light would leave than arrives.
                 if albedo == 1.0 && specular == 1.0 {
                     let layer = Lobe { body: [0.0; 3], ..lobe };
                     let above = mean(&layer, o, ([1, 2], 3), 14, |next| next.weight[0]);
@@ -295,7 +297,8 @@ mod tests {
         }
     }
 
-    /// Of light along the normal a smooth metal mirrors its colour, and nothing else; half a metal as the mean of both says.
+    /// For light along the normal, a smooth metal mirrors its color, and nothing else; half a metal is the mean of
+    /// both.
     #[test]
     fn metals() {
         let gold = [1.0, 0.77, 0.34];
@@ -306,18 +309,19 @@ mod tests {
         };
         let metal = returned(1.0);
         for c in 0..3 {
-            // Facets of alpha 0.04 are tilted by some degrees: Schlick's term is below 1e-5 there, what they hide of each other
-            // below alpha²/2. The net is good to a thousandth.
+            // Facets of alpha 0.04 are tilted by a few degrees. Schlick's term is below 1e-5 there, and their masking
+            // below alpha²/2. The net is accurate to a thousandth.
             assert!((metal[c] - gold[c]).abs() < 2e-3, "{metal:?}");
         }
-        // The control: without metal, the layer reflects 0.04 of all colours, and of what is below 0.96 times what it lets out.
+        // The control: without metal, the layer reflects 0.04 of all colors, and 0.96 times the light from below it
+        // passes.
         let plain = returned(0.0);
         assert!((plain[2] - metal[2]).abs() < 0.1 && (plain[0] - metal[0]).abs() > 0.02, "{plain:?}");
     }
 
-    /// Along the normal ((n - 1)/(n + 1))² is mirrored; at Brewster's angle, tan = n, half of what the electric field across the
-    /// plane gives, ((n² - 1)/(n² + 1))²; and from inside beyond the critical angle, sin = 1/n, everything. What goes through
-    /// obeys Snell's law.
+    /// Along the normal ((n - 1)/(n + 1))² is mirrored. At Brewster's angle, tan = n, it is half of the reflectance of
+    /// the electric field across the plane, ((n² - 1)/(n² + 1))². From inside beyond the critical angle, sin = 1/n, it
+    /// is everything. Transmitted light obeys Snell's law.
     #[test]
     fn glass() {
         let n = 1.5f64;
@@ -338,7 +342,7 @@ mod tests {
             let up = chosen.iter().filter(|next| next.direction[2] > 0.0).count() as f64 / f64::from(count);
             assert!((up - expected).abs() < 2e-4, "{o:?}: {up}, not {expected}");
             for next in chosen.iter().filter(|next| next.direction[2] < 0.0) {
-                // sin of the two angles are as the indices.
+                // The sines of the two angles have the ratio of the indices.
                 let ratio = (next.direction[0] + lobe.ratio * o[0]).abs();
                 let length = dot(next.direction, next.direction);
                 assert!(ratio < 1e-15 && (length - 1.0).abs() < 1e-14, "{next:?}");
@@ -346,11 +350,11 @@ mod tests {
                 assert!(next.mirrored && next.weight == [tint; 3]);
             }
         }
-        // The control: an index of 1 is nothing at all.
+        // The control: an index of 1 is invisible.
         let air = Lobe::new(&Material { refractive_index: 1.0, ..glass.clone() }, 0.0, [1.0; 3], true);
         let straight = air.choose([0.6, 0.0, 0.8], 1e-9, [0.5; 2]).unwrap().direction;
         assert!((straight[0] + 0.6).abs() < 1e-15 && (straight[2] + 0.8).abs() < 1e-15, "{straight:?}");
-        // But for its colour.
+        // Except for its color.
         let coloured = Lobe::new(&Material { refractive_index: 1.0, ..glass }, 0.0, [0.3; 3], true);
         assert_eq!(coloured.choose([0.6, 0.0, 0.8], 0.5, [0.5; 2]).unwrap().weight, [0.3; 3]);
     }
@@ -373,15 +377,15 @@ mod tests {
             let lobe = Lobe::new(&Material { specular, ..Material::default() }, reflectance, [0.5; 3], true);
             for chance in [0.0, 0.3, 0.6, 0.99] {
                 assert!(lobe.choose([1.0, 0.0, 0.0], chance, [0.3, 0.7]).is_none());
-                // A control: a little above, something is, and it is a number.
+                // A control: slightly above, a direction is sampled, and its weight is finite.
                 let next = lobe.choose(toward(0.5), chance, [0.3, 0.7]);
                 assert!(next.is_none_or(|next| next.weight.iter().all(|x| x.is_finite())));
             }
         }
     }
 
-    /// Against chosen directions, with the layer alone and with all: to some percent, as it leaves out what facets hide of each
-    /// other.
+    /// Compares with sampled directions, with the layer alone and with both parts: to a few percent, because masking is
+    /// left out.
     #[test]
     fn gloss() {
         for (specular, shininess, albedo) in [(0.0, 0.5, 0.7), (0.5, 0.5, 0.5), (1.0, 0.2, 0.0), (1.0, 0.2, 1.0)] {
@@ -402,7 +406,7 @@ mod tests {
         let o = toward(0.6);
         assert!(lobe.choose(o, 0.39, [0.5; 2]).unwrap().mirrored && !lobe.choose(o, 0.41, [0.5; 2]).unwrap().mirrored);
         assert_eq!(lobe.choose(o, 0.0, [0.5; 2]).unwrap().direction, [-o[0], 0.0, 0.6]);
-        // What is not mirrored is Lambert's: 0.6 of 0.5, of which 0.6 are chosen.
+        // The rest is Lambertian: 0.6 of 0.5, and 0.6 of the samples.
         assert!((lobe.choose(o, 0.8, [0.3, 0.2]).unwrap().weight[0] - 0.5).abs() < 1e-6);
         let all = lobe.scatter(o, [0.0, 0.0, 1.0]).below[0] * PI;
         assert!((all - 0.6 * 0.5).abs() < 1e-6);

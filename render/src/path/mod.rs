@@ -1,10 +1,12 @@
-//! Colours by path tracing: light is followed backward from the camera.
+//! Path tracing: light is traced backward from the camera.
 //!
-//! At every surface all lamps are asked for their light (one shadow ray each), and one direction is chosen by the surface's
-//! own law; what is met there sends its emission, what is not met the dome's light. So lamps are met by shadow rays only, the
-//! dome by paths only: nothing counts twice. Surfaces that glow are met in both ways, each of which has its share of the light
-//! (`emitter`). Later bounces end by Russian roulette. Source: Kajiya, The rendering equation, 1986; the conventions of
-//! light are those of [`Renderer`](crate::renderer::Renderer).
+//! At every surface, all lights are sampled (one shadow ray each), and one direction is sampled from the BSDF. A path
+//! that hits a surface adds its emission; a path that hits no surface adds the environment light. So lights are found
+//! by shadow rays only, the environment by paths only: no light counts twice. Emissive surfaces are found by both
+//! strategies, with weights of multiple importance sampling (`emitter`). Later bounces end by Russian roulette.
+//!
+//! Source: Kajiya, The rendering equation, 1986. The units of light are those of
+//! [`Renderer`](crate::renderer::Renderer).
 
 mod direct;
 mod emitter;
@@ -38,28 +40,29 @@ use point::Point;
 use sobol::{Sample, Sequence};
 use std::sync::Arc;
 
-/// Lamps that are asked, at most; the camera's comes besides.
+/// Largest number of sampled lights; the headlight is counted separately.
 const MAX_LAMPS: usize = crate::shade::light::MAX_LIGHTS;
-/// Paths begin this part of their coordinates above a surface.
+/// Offset of ray origins above a surface, as a fraction of the largest coordinate.
 const ABOVE: f64 = 1e-7;
-/// Bounces after which paths may end by chance.
+/// Bounces after which Russian roulette starts.
 const SURE: u32 = 2;
-/// Surfaces that are not opaque that a path goes through, at most.
+/// Largest number of transparent surfaces that a path passes.
 const MAX_PASSES: u32 = 64;
-/// How much wider by the metre what is seen together gets where light is scattered, at least.
+/// Least growth of the pixel footprint after diffuse scattering, per meter.
 const SCATTERED: f64 = 0.1;
-/// Pairs of numbers: in the pixel, and at each surface where to go on, which lobe and whether at all, whether through.
+/// Dimensions (pairs of random numbers): position in the pixel, and per surface the direction, the lobe with Russian
+/// roulette, and transparency.
 const IN_PIXEL: u32 = 0;
 const ONWARD: u32 = 1;
 const CHANCE: u32 = 2;
 const THROUGH: u32 = 3;
-/// Pairs of each surface: those, and one for each lamp.
+/// Dimensions per surface: the ones above, and one for each light.
 const PAIRS: u32 = 4 + MAX_LAMPS as u32;
-/// Far beyond those: the point of the lens's opening, and the instant.
+/// Far beyond those: the point of the aperture, and the instant.
 const ON_LENS: u32 = 1 << 30;
 const INSTANT: u32 = (1 << 30) + 1;
 
-/// What the paths of a picture have in common.
+/// State that all paths of an image share.
 #[derive(Clone, Debug)]
 pub(crate) struct Paths<'a> {
     pub(crate) scene: &'a RenderScene,
@@ -73,27 +76,27 @@ pub(crate) struct Paths<'a> {
     pub(crate) ways: Ways,
 }
 
-/// A shutter that takes time, and a camera that may move meanwhile.
+/// Exposure time of the shutter, and motion of the camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moving {
     pub(crate) clock: Clock,
     pub(crate) camera: Option<Motion>,
 }
 
-/// In which ways light of what glows is found.
+/// Strategies of multiple importance sampling for emissive surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ways {
     Both,
-    /// Only by looking for it.
+    /// Direct light only: emitters are sampled.
     #[cfg(test)]
     Looking,
-    /// Only by paths that meet it.
+    /// BSDF sampling only: paths hit emitters.
     #[cfg(test)]
     Meeting,
 }
 
 impl Ways {
-    /// The share of light that is found by looking for it with a density, which paths meet with another.
+    /// Weight of an emitter sample with pdf `own`, where BSDF sampling has the pdf `other`.
     fn looking(self, own: f64, other: f64) -> f64 {
         match self {
             Self::Both => power_heuristic(own, other),
@@ -104,7 +107,7 @@ impl Ways {
         }
     }
 
-    /// The share of light that paths meet with a density, where it is looked for with another.
+    /// Weight of a BSDF sample with pdf `own` that hits an emitter, where emitter sampling has the pdf `other`.
     fn meeting(self, own: f64, other: f64) -> f64 {
         match self {
             Self::Both => power_heuristic(own, other),
@@ -116,23 +119,23 @@ impl Ways {
     }
 }
 
-/// The light of a frame; keeps its memory.
+/// All light of a frame; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lamps {
     lamps: Vec<Lamp>,
     emitters: Emitters,
-    /// Radiance of the dome from above and below the horizon.
+    /// Radiance of the environment from above and below the horizon.
     dome: [V3; 2],
-    /// What cameras and mirrors see there: straight up, at the horizon, straight down.
+    /// Sky colors for cameras and mirrors: straight up, at the horizon, straight down.
     sky: [V3; 3],
-    /// An image instead.
+    /// Image that replaces these sky colors.
     skybox: Option<Arc<Texture>>,
     haze: Option<(Option<V3>, f64, f64)>,
 }
 
 impl Lamps {
-    /// Prepares the light. `shadows` is whether lamps cast any, `view` where the camera is, `forward` whether it counts near
-    /// along its axis.
+    /// Prepares the light of a frame. `shadows` enables shadows, `view` is the camera. `forward` is true if its near
+    /// plane is measured along the axis.
     pub(crate) fn prepare(
         &mut self,
         scene: &RenderScene,
@@ -151,7 +154,7 @@ impl Lamps {
         *haze = scene.haze.map(|h| (h.color.map(linear), f64::from(h.start), f64::from(h.end)));
         lamps.clear();
         lamps.extend(lights.iter().filter(|l| l.active).take(MAX_LAMPS).map(Lamp::new));
-        // After the others, of which it takes no place: it is a point, and needs no numbers of its own.
+        // After the other lights, and not counted in their limit: it is a point, and needs no random numbers.
         if scene.headlight.active {
             let axis = forward.then(|| view.world_from_camera.rotation.map(|row| row[2]));
             lamps.push(match scene.headlight.along(scene.light_sum, axis) {
@@ -173,7 +176,7 @@ impl Lamps {
         self.lamps.capacity() * size_of::<Lamp>() + self.emitters.bytes()
     }
 
-    /// The sky as cameras see it.
+    /// Sky color in a direction, for cameras and mirrors.
     fn sky(&self, direction: V3) -> V3 {
         if let Some(image) = &self.skybox {
             let [x, y, z] = direction;
@@ -186,25 +189,24 @@ impl Lamps {
     }
 }
 
-/// What a pixel's paths found.
+/// Result of the paths of a pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Found {
     /// Mean radiance, linear.
     pub(crate) color: V3,
-    /// Variance of the mean of the brightness, from its samples as if they did not depend on each other: more than it is.
-    /// 0 of one sample.
+    /// Variance of the mean brightness, estimated as if samples were independent: an upper bound. 0 for one sample.
     pub(crate) variance: f64,
-    /// Means over what is seen: colour of the surface (1 for mirrors and sky), the part of its light that is mirrored rather than
-    /// coloured, normal, distance (0 for the sky).
+    /// Means over the first hits: albedo (1 for mirrors and sky), fraction of mirrored light, normal, distance \[m\] (0
+    /// for the sky).
     pub(crate) albedo: V3,
     pub(crate) gloss: f64,
     pub(crate) normal: V3,
     pub(crate) distance: f64,
-    /// How many rays were cast.
+    /// Number of rays.
     pub(crate) rays: u64,
 }
 
-/// What a camera ray met first.
+/// The first hit of a camera ray.
 #[derive(Clone, Copy, Debug)]
 struct First {
     albedo: V3,
@@ -213,7 +215,7 @@ struct First {
     distance: f64,
 }
 
-/// One path: its numbers, its instant, and how many rays were cast for it.
+/// One path: its random numbers, its instant, and its number of rays.
 #[derive(Debug)]
 struct Path<'a> {
     sample: Sample,
@@ -223,7 +225,7 @@ struct Path<'a> {
 }
 
 impl Paths<'_> {
-    /// Follows the paths of a pixel.
+    /// Traces the paths of a pixel.
     #[inline(always)]
     pub(crate) fn pixel<S: Simd>(&self, s: S, at: [usize; 2], stack: &mut Stack) -> Found {
         let sequence = Sequence::new(at, self.seed);
@@ -237,7 +239,7 @@ impl Paths<'_> {
             let mut path = Path { sample, time, rays: 0, stack: &mut *stack };
             let (color, first) = self.radiance(s, &mut path, [at[0] as f64 + dx, at[1] as f64 + dy]);
             out.rays += path.rays;
-            // Lamps and skies may be anything; what is no number would spread over its neighbours.
+            // Colors of lights and skies are not checked; a NaN would spread to the neighbors.
             let color = if color.iter().all(|x| x.is_finite()) { color } else { [0.0; 3] };
             let bright = brightness(color);
             squares += bright * bright / n;
@@ -252,7 +254,7 @@ impl Paths<'_> {
         out
     }
 
-    /// Where the camera is at a time.
+    /// Pose of the camera at a time.
     fn camera(&self, time: f64) -> PoseF64 {
         match self.moving.and_then(|moving| moving.camera.as_ref()) {
             Some(motion) => motion.at(time),
@@ -260,7 +262,7 @@ impl Paths<'_> {
         }
     }
 
-    /// The light that comes to a point of the picture, and what is seen there.
+    /// Radiance at a point of the image, and the first hit.
     #[inline(always)]
     fn radiance<S: Simd>(&self, s: S, path: &mut Path<'_>, at: [f64; 2]) -> (V3, First) {
         let (sample, time) = (path.sample, path.time);
@@ -268,14 +270,14 @@ impl Paths<'_> {
         let Some(eye::First { mut ray, travelled: near, mut limit, mut width, mut spread }) =
             self.eye.look(at, &self.camera(time), || sample.pair(ON_LENS))
         else {
-            // Outside of the image circle no light falls.
+            // No light falls outside of the image circle.
             return ([0.0; 3], first);
         };
         let (mut light, mut kept) = ([0.0; 3], [1.0; 3]);
         let (mut bounce, mut passes, mut travelled) = (0, 0, near);
-        // Whether it goes on as the camera's ray went.
+        // True as long as only mirrors and glass were hit.
         let mut clear = true;
-        // Where the direction was chosen, and how likely it was, if it was not the only one.
+        // Origin and pdf of a sampled direction; `None` for the camera ray, mirrors and glass.
         let mut chosen: Option<(V3, f64)> = None;
         loop {
             path.rays += 1;
@@ -329,7 +331,8 @@ impl Paths<'_> {
             let [lobe, chance] = sample.pair(dims + CHANCE);
             let Some(next) = point.lobe.choose(basis.to_local(o), lobe, sample.pair(dims + ONWARD)) else { break };
             let onward = basis.to_world(next.direction);
-            // Below the surface itself, though not below its smooth normal; or above, though it goes through.
+            // A direction below the flat surface though above its smooth normal ends the path, and so does a refracted
+            // one above the flat surface.
             let through = next.direction[2] < 0.0;
             if (dot(onward, point.flat) <= 0.0) != through {
                 break;
@@ -354,7 +357,7 @@ impl Paths<'_> {
     }
 }
 
-/// Just above a surface, or below it.
+/// A point slightly above a surface, or below it.
 fn above(point: &Point, side: f64) -> V3 {
     let far = point.position.iter().fold(1.0f64, |m, x| m.max(x.abs()));
     along(point.position, side * ABOVE * far, point.flat)
@@ -368,7 +371,7 @@ fn add(a: V3, b: V3) -> V3 {
     [0, 1, 2].map(|k| a[k] + b[k])
 }
 
-/// How bright a colour is. Source: ITU-R BT.709.
+/// Brightness (luminance) of a color. Source: ITU-R BT.709.
 fn brightness([r, g, b]: V3) -> f64 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }

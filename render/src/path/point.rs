@@ -1,4 +1,4 @@
-//! What a path finds where it meets a surface.
+//! Surface interaction of a path: the point that a ray hit.
 
 use super::lobe::Lobe;
 use super::texel;
@@ -9,19 +9,19 @@ use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::{V3, along, dot, scale, sub, unit};
 use kinetoscope_scene::{Instance, RenderScene, TextureKind};
 
-/// A point of a surface.
+/// A point of a surface, with its material.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     pub(super) position: V3,
-    /// The point on the surface that the smooth normals mean: of a round thing made of triangles, outside of them, so that
-    /// light at the edge of its dark side is not cut off triangle by triangle. Source: Hanika, Hacking the shadow terminator,
-    /// Ray Tracing Gems II, 2021.
+    /// The point on the smooth surface that the normals describe: for a round object made of triangles, outside of
+    /// them. Shadow rays start there, so that the edge of its dark side is not cut triangle by triangle. Source:
+    /// Hanika, Hacking the shadow terminator, Ray Tracing Gems II, 2021.
     pub(super) lifted: V3,
-    /// Unit normal of the surface itself, to where the ray came from.
+    /// Geometric unit normal, facing the ray's origin.
     pub(super) flat: V3,
-    /// Unit normal that light sees, on the same side.
+    /// Shading unit normal, on the same side.
     pub(super) normal: V3,
-    /// Whether the ray came from outside.
+    /// True if the ray came from outside.
     pub(super) front: bool,
     pub(super) lobe: Lobe,
     pub(super) emission: V3,
@@ -29,7 +29,7 @@ pub(super) struct Point {
 }
 
 impl Point {
-    /// The point of a hit. `footprint` is how much of the surface is seen together, if it is seen straight on \[m\].
+    /// The point of a hit. `footprint` is the width of the pixel at the surface, if seen straight on \[m\].
     pub(super) fn new(scene: &RenderScene, ray: &Ray, hit: &Hit, footprint: f64) -> Option<Self> {
         let index = hit.instance as usize;
         let (instance, pose) = (scene.instances().get(index)?, &hit.world_from_instance);
@@ -43,7 +43,7 @@ impl Point {
         let corner = instance.mesh().map(|mesh| in_triangle(mesh, hit.triangle as usize, local, side));
         let normal = corner.and_then(|c| {
             let turned = rotation.map(|row| side * dot(row, c.normal));
-            // A smooth normal may look away from where the surface itself is seen.
+            // A smooth normal may face away although the flat surface is visible.
             unit(turned).filter(|n| dot(*n, ray.direction) < -1e-3 && dot(*n, flat) > 0.0)
         });
         let slant = (-dot(flat, ray.direction)).max(0.02).sqrt();
@@ -62,13 +62,13 @@ impl Point {
     }
 }
 
-/// True if the reflectance of a material acts where a ray meets an instance: of boxes, the +z face has it.
+/// True if the reflectance of a material applies at a hit: of boxes, only the +z face mirrors.
 fn mirrors(instance: &Instance, hit: &Hit) -> bool {
     let up = hit.world_from_instance.rotation.map(|row| row[2]);
     !matches!(instance.shape, Shape::Box(_)) || dot(hit.normal, up) > 0.5
 }
 
-/// Linear colour of an instance's texture.
+/// Linear color of an instance's texture.
 fn texture(
     scene: &RenderScene,
     index: usize,

@@ -1,36 +1,37 @@
-//! Smooths noise: a few passes of a small filter with holes, each twice as wide as the one before, that does not blend across
-//! edges of normals, of depth or of light brighter than its own noise. Colours of surfaces were divided out before, so that they stay
-//! as they are; where some of the light is mirrored, which does not have them, their edges are edges too.
+//! Denoising by an edge-avoiding à-trous wavelet filter: several passes of a small filter with holes, each twice as
+//! wide as the one before. It does not blend across edges of normals, of depth, or of light that differs by more than
+//! its noise. Albedo is divided out before, so that textures stay sharp. Where some of the light is mirrored, which
+//! albedo does not tint, edges of albedo are edges too.
 //!
-//! Sources: Dammertz et al., Edge-avoiding à-trous wavelet transform for fast global illumination filtering, HPG 2010; the
-//! weights by the variance of light after Schied et al., Spatiotemporal variance-guided filtering, HPG 2017, with polynomials
-//! in place of exponentials, which differ from machine to machine.
+//! Sources: Dammertz et al., Edge-avoiding à-trous wavelet transform for fast global illumination filtering, HPG 2010;
+//! the weights by the variance of light after Schied et al., Spatiotemporal variance-guided filtering, HPG 2017, with
+//! polynomials in place of exponentials, which differ from machine to machine.
 
 use super::film::Pixel;
 use super::{Found, brightness};
 
-/// Passes: the last one reaches 2 * 2^4 pixels.
+/// Number of passes: the last one reaches 2 * 2^4 pixels.
 pub(crate) const PASSES: u32 = 5;
-/// Weights of a pixel and of those one and two steps away: a cubic B-spline's.
+/// Weights of a pixel and of those one and two steps away: a cubic B-spline.
 const SPLINE: [f32; 3] = [0.375, 0.25, 0.0625];
-/// Distances of a surface may differ by this part of themselves, per pixel.
+/// Relative difference of distance per pixel within one surface.
 const BEND: f32 = 0.016;
-/// Light may differ by so many standard deviations of its noise.
+/// Tolerated difference of light, in standard deviations of its noise.
 const NOISE: f32 = 4.0;
-/// And by this, as exposed: far below what is seen.
+/// Additional tolerated difference, after exposure: far below visibility.
 const UNSEEN: f32 = 1e-4;
-/// What mirrors in part may reflect this part more or less.
+/// Relative difference of albedo at which glossy surfaces count as different.
 const TINT: f32 = 0.2;
 
-/// What a pixel shows, apart from light.
+/// Features of a pixel that guide the filter.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Guide {
-    /// Never 0.
+    /// Albedo, never 0.
     pub(crate) albedo: [f32; 3],
-    /// The mirrored part of what it reflects.
+    /// Mirrored fraction of the reflected light.
     pub(crate) gloss: f32,
     pub(crate) normal: [f32; 3],
-    /// 0 for the sky.
+    /// Distance \[m\]; 0 for the sky.
     pub(crate) distance: f32,
 }
 
@@ -45,8 +46,8 @@ impl Guide {
     }
 }
 
-/// The pixels of some rows, of which the first is `first`, with a variance from what is around each, where nothing else says
-/// how much noise there is: of one path. Source: Schied et al. 2017, section 4.2.
+/// Estimates the variance of pixels from their neighborhood, for images of one path per pixel, which have no other
+/// estimate. Writes some rows, beginning at `first`. Source: Schied et al. 2017, section 4.2.
 pub(crate) fn guess([width, first]: [usize; 2], from: &[Pixel], guides: &[Guide], to: &mut [Pixel]) {
     let height = from.len() / width.max(1);
     for (k, to) in to.iter_mut().enumerate() {
@@ -69,7 +70,7 @@ pub(crate) fn guess([width, first]: [usize; 2], from: &[Pixel], guides: &[Guide]
     }
 }
 
-/// One pass over some rows, of which the first is `first`; `pass` counts from 0, light will be multiplied by `exposure`.
+/// One filter pass over some rows, beginning at `first`; `pass` counts from 0. Light will be multiplied by `exposure`.
 pub(crate) fn pass(
     [width, first]: [usize; 2],
     pass: u32,
@@ -98,7 +99,7 @@ pub(crate) fn pass(
                 let (pixel, beside) = (from[other], guides[other]);
                 let reach = step as f32 * (i.unsigned_abs().max(j.unsigned_abs()) as f32);
                 let apart = (light(&pixel) - bright) / noise;
-                // It is itself, even where its mean normal is almost none.
+                // The pixel itself always counts, even if its mean normal is almost 0.
                 let surface = if i == 0 && j == 0 { 1.0 } else { alike(&guide, &beside, reach) };
                 let weight = SPLINE[i.unsigned_abs()]
                     * SPLINE[j.unsigned_abs()]
@@ -111,7 +112,7 @@ pub(crate) fn pass(
                 sum.variance += weight * weight * pixel.variance;
             }
         }
-        // Its own weight is not 0.
+        // The pixel's own weight is positive, so `whole` is.
         *to = Pixel { color: sum.color.map(|x| x / whole), variance: sum.variance / (whole * whole) };
     }
 }
@@ -120,7 +121,7 @@ fn light(pixel: &Pixel) -> f32 {
     brightness(pixel.color.map(f64::from)) as f32
 }
 
-/// The mean variance of a pixel and its neighbours: that of one is itself noise.
+/// Mean variance of a pixel and its neighbors: the variance of one pixel is itself noisy.
 fn around(from: &[Pixel], [width, height]: [usize; 2], [x, y]: [isize; 2]) -> f32 {
     let (mut sum, mut count) = (0.0, 0.0);
     for j in -1..=1 {
@@ -135,7 +136,7 @@ fn around(from: &[Pixel], [width, height]: [usize; 2], [x, y]: [isize; 2]) -> f3
     sum / count
 }
 
-/// How much two pixels show the same surface, 0..=1, if they are `reach` pixels apart.
+/// Similarity of two pixels' surfaces, 0..=1, at a distance of `reach` pixels.
 fn alike(a: &Guide, b: &Guide, reach: f32) -> f32 {
     if (a.distance == 0.0) != (b.distance == 0.0) {
         return 0.0;

@@ -1,23 +1,23 @@
-//! Numbers that fill a square evenly: Sobol's first two dimensions with Owen's scrambling, another one for each pixel and
+//! Low-discrepancy random numbers: Sobol's first two dimensions with Owen scrambling, independent for each pixel and
 //! each pair of dimensions.
 //!
-//! Sources: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified sampling for stochastic
-//! transparency, 2011, section 4.1; Burley, Practical hash-based Owen scrambling, JCGT 9(4), 2020.
+//! Sources: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified sampling for
+//! stochastic transparency, 2011, section 4.1; Burley, Practical hash-based Owen scrambling, JCGT 9(4), 2020.
 
-/// The sequence of a pixel.
+/// The random sequence of a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sequence {
     seed: u32,
 }
 
-/// One sample of it.
+/// One sample of a sequence.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sample {
     seed: u32,
     index: u32,
 }
 
-/// Mixes bits so that all depend on all. Source: Wellons, hash-prospector, "lowbias32".
+/// Mixes bits so that all output bits depend on all input bits. Source: Wellons, hash-prospector, "lowbias32".
 fn mix(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x21f0_aaad);
@@ -30,7 +30,7 @@ fn combine(seed: u32, x: u32) -> u32 {
     mix(seed ^ mix(x.wrapping_add(0x9e37_79b9)))
 }
 
-/// Each bit is flipped or not by what is above it.
+/// Owen scrambling: flips each bit depending on the bits above it.
 fn scramble(x: u32, seed: u32) -> u32 {
     let mut x = x.reverse_bits();
     x = x.wrapping_add(seed);
@@ -41,9 +41,9 @@ fn scramble(x: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// The second dimension of the point whose first one has these bits: the product with Pascal's triangle modulo 2, whose
-/// halves are triangles again. Source: Ahmed, An implementation algorithm of 2D Sobol sequence fast, elegant, and compact, EGSR
-/// 2024.
+/// The second dimension of the point whose first dimension has these bits: the product with Pascal's triangle modulo 2,
+/// whose halves are triangles again. Source: Ahmed, An implementation algorithm of 2D Sobol sequence fast, elegant, and
+/// compact, EGSR 2024.
 fn second(mut first: u32) -> u32 {
     first ^= first << 16;
     first ^= (first & 0x00ff_00ff) << 8;
@@ -53,7 +53,7 @@ fn second(mut first: u32) -> u32 {
 }
 
 impl Sequence {
-    /// Of a pixel, in pictures of a seed.
+    /// The sequence of a pixel, in images of a seed.
     pub(crate) fn new([x, y]: [usize; 2], seed: u32) -> Self {
         Self { seed: combine(combine(mix(seed), x as u32), y as u32) }
     }
@@ -64,8 +64,8 @@ impl Sequence {
 }
 
 impl Sample {
-    /// Two numbers in 0..1. The first 2^k samples have one in each of 2^k boxes of the square, of any proportions; pairs do
-    /// not depend on each other.
+    /// Two random numbers in 0..1. Of the first 2^k samples, each of 2^k equal boxes of the square, of any proportions,
+    /// has one. Pairs of different dimensions are independent.
     pub(crate) fn pair(self, dimension: u32) -> [f64; 2] {
         let seed = combine(self.seed, dimension);
         let first = scramble(self.index, seed).reverse_bits();
@@ -78,7 +78,8 @@ impl Sample {
 mod tests {
     use super::*;
 
-    /// The textbook's sum: every bit of the index adds a direction number, of which each is the one before times 1 + x.
+    /// Compares with the textbook's sum: every bit of the index adds a direction number, each the one before times 1 +
+    /// x.
     #[test]
     fn second_dimension() {
         for k in 0..100_000u32 {
@@ -92,7 +93,7 @@ mod tests {
         }
     }
 
-    /// A net: one sample in every box of the same area, however it is cut in halves.
+    /// The net property: one sample in every box of equal area, however the square is halved.
     #[test]
     fn net() {
         for (pixel, dimension) in [([0, 0], 0), ([3, 7], 1), ([639, 479], 12)] {
@@ -110,7 +111,7 @@ mod tests {
                 }
             }
         }
-        // A control: numbers of a generator do not.
+        // A control: numbers of a plain generator do not have it.
         let mut state = 1u32;
         let mut seen = [0; 256];
         for _ in 0..256 {
@@ -120,7 +121,8 @@ mod tests {
         assert!(seen.iter().any(|&n| n != 1));
     }
 
-    /// Means over pixels are those of even numbers: sums of n numbers in 0..1 have a standard deviation of sqrt(n / 12).
+    /// Means over pixels are those of uniform numbers: sums of n numbers in 0..1 have a standard deviation of sqrt(n /
+    /// 12).
     #[test]
     fn independence() {
         let n = 4096usize;
@@ -128,14 +130,14 @@ mod tests {
         let pick = |k: usize, dimension, seed| Sequence::new([k % 64, k / 64], seed).sample(0).pair(dimension);
         let mean = |f: &dyn Fn(usize) -> f64| (0..n).map(f).sum::<f64>() / n as f64;
         assert!((0..2).all(|axis| (mean(&|k| pick(k, 3, 0)[axis]) - 0.5).abs() < five));
-        // Products of two that do not depend on each other: mean 1/4, variance 7/144.
+        // Products of two independent numbers: mean 1/4, variance 7/144.
         let five = 5.0 * (7.0 / 144.0 / n as f64).sqrt();
         for (a, b) in [((3, 0), (4, 0)), ((3, 0), (3, 1))] {
             let product = mean(&|k| pick(k, a.0, a.1)[0] * pick(k, b.0, b.1)[0]);
             assert!((product - 0.25).abs() < five, "{product}");
         }
         assert!((mean(&|k| pick(k, 3, 0)[0] * pick(k + 1, 3, 0)[0]) - 0.25).abs() < five);
-        // A control: one that depends on itself has a third.
+        // A control: the square of a number has the mean 1/3.
         assert!((mean(&|k| pick(k, 3, 0)[0].powi(2)) - 0.25).abs() > five);
     }
 }

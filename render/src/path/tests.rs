@@ -1,4 +1,4 @@
-//! Light against closed forms.
+//! Path tracing compared with closed forms.
 
 mod aperture;
 mod emitters;
@@ -17,7 +17,7 @@ use kinetoscope_scene::{Headlight, Hemisphere, Instance, LightKind, Material, Po
 use kinetoscope_testkit::tolerance::{Tolerance, assert_number};
 use std::f64::consts::PI;
 
-/// A scene without any light of its own.
+/// A scene without any light.
 fn dark(instances: Vec<Instance>) -> RenderScene {
     let mut scene = RenderScene::new(instances).unwrap();
     scene.lights.clear();
@@ -33,17 +33,17 @@ fn matt(linear: f32) -> Material {
     Material { specular: 0.0, ..Material::from_rgba([srgb, srgb, srgb, 1.0]) }
 }
 
-/// The albedo of [`matt`]: sRGB and back rounds.
+/// The albedo of [`matt`]: conversion to sRGB and back rounds.
 fn albedo(linear: f32) -> f64 {
     f64::from(kinetoscope_scene::decode_srgb(matt(linear).rgba[0]))
 }
 
-/// A pixel of a millionth of a radian: the light of one ray.
+/// A view of one pixel of a millionth of a radian: the light of one ray.
 fn looking(eye: [f32; 3], target: [f32; 3]) -> View {
     View { fx: 1e6, fy: 1e6, cx: 0.5, cy: 0.5, ..View::look_at([1, 1], 0.5, eye, target, [0., 0., 1.]).unwrap() }
 }
 
-/// Objects that rays meet, and the lights.
+/// A scene prepared for rays, with its lights.
 struct Studio<'a> {
     scene: &'a RenderScene,
     tracer: Tracer,
@@ -67,7 +67,7 @@ impl<'a> Studio<'a> {
         Paths { scene, tracer, eye, moving: None, samples, max_bounces, seed, lamps, ways: Ways::Both }
     }
 
-    /// The light of a pixel in several images of different seeds: the mean and its standard deviation.
+    /// The light of a pixel in several images with different seeds: the mean and its standard deviation.
     fn seen(&self, paths: &Paths<'_>, count: u32) -> (f64, f64) {
         let mut stack = Stack::default();
         let all: Vec<f64> =
@@ -85,12 +85,12 @@ fn seen(scene: &RenderScene, poses: &[PoseF32], view: &View, samples: u32, max_b
     studio.seen(&studio.paths(samples, max_bounces, 0), 16)
 }
 
-/// Five standard deviations, and rounding: colors and lights are single precision.
+/// True within five standard deviations, and rounding: colors and lights are single precision.
 fn agrees((mean, deviation): (f64, f64), expected: f64) -> bool {
     (mean - expected).abs() <= 5.0 * deviation + 1e-6 * expected.abs().max(1e-3)
 }
 
-/// Of light of brightness 1.
+/// Tolerances for light of brightness 1.
 const SINGLE: Tolerance = Tolerance::absolute(1e-5, "colors, lights and the camera are single precision");
 const TIGHT: Tolerance = Tolerance::absolute(1e-6, "colors are single precision; every path sees the same light");
 
@@ -99,7 +99,7 @@ fn on_floor(floor: Material, others: impl IntoIterator<Item = Instance>) -> Rend
     dark(std::iter::once(Instance::new(Plane::INFINITE, floor, 1)).chain(others).collect())
 }
 
-/// One shape in light that is the same everywhere.
+/// One shape in uniform light.
 fn furnace(shape: impl Into<Shape>, material: Material, light: f32) -> RenderScene {
     let mut scene = dark(vec![Instance::new(shape, material, 1)]);
     scene.ambient = Hemisphere { sky: [light; 3], ground: [light; 3] };
@@ -118,8 +118,8 @@ fn glass_of(alpha: f32) -> Material {
 
 const ONE: [PoseF32; 1] = [PoseF32::IDENTITY];
 
-/// White furnace: a convex object of albedo a reflects a times the light that is everywhere. To the last digits, for every
-/// path does.
+/// White furnace: a convex object of albedo a reflects a times the uniform light. Exact to the last digits, because
+/// every path does so.
 #[test]
 fn matt_in_furnace() {
     let shapes: [Shape; 5] = [
@@ -137,16 +137,17 @@ fn matt_in_furnace() {
             assert!(deviation < 1e-12);
         }
     }
-    // A control: a camera inside, where no light is.
+    // A control: a camera inside, where there is no light.
     let scene = furnace(Sphere { radius: 0.3 }, matt(1.0), 0.8);
     assert_eq!(seen(&scene, &ONE, &looking([0.0; 3], [1.0, 0.2, 0.1]), 4, 3).0, 0.0);
 }
 
-/// A shiny object in a furnace takes a part of the light, and adds none.
+/// A shiny object in a furnace reflects a part of the light, and adds no light.
 ///
-/// A metal that mirrors everything, of roughness 1: facets of all tilts are equally dense, D = 1/pi, and hide each other by
-/// G = 2 o i / (o + i) of the cosines o and i, so the reflected light is the integral of D G / (4 o i) i over the hemisphere,
-/// `1 - o ln(1 + 1/o)`: 0.31 straight on. Light between facets is lost, as GGX has it. A metal of roughness 0 loses nothing.
+/// A perfectly reflecting metal of roughness 1: facets of all tilts are equally dense, D = 1/pi, and mask each other by
+/// G = 2 o i / (o + i) of the cosines o and i. So the reflected light is the integral of D G / (4 o i) i over the
+/// hemisphere, `1 - o ln(1 + 1/o)`: 0.31 straight on. GGX loses the light between facets. A metal of roughness 0 loses
+/// no light.
 #[test]
 fn gloss_in_furnace() {
     let ball = |material| furnace(Sphere { radius: 1.0 }, material, 1.0);
@@ -163,7 +164,7 @@ fn gloss_in_furnace() {
         let expected = 1.0 - cos * (1.0 / cos).ln_1p();
         let light = seen(&rough, &ONE, &view, 256, 3);
         assert!(agrees(light, expected), "{beside}: {light:?}, not {expected}");
-        // The control: a fiftieth more or less is found out.
+        // The control: a deviation of a fiftieth is detected.
         assert!(!agrees(light, 1.02 * expected) && !agrees(light, 0.98 * expected), "{beside}: {light:?}");
         let limit = Tolerance::absolute(1e-4, "facets of alpha² 1e-6 hide less than that, over the cosine");
         assert_number(&format!("{beside} aside"), seen(&smooth, &ONE, &view, 256, 3).0, 1.0, limit);
@@ -183,7 +184,7 @@ fn bounces() {
             let light = light(bounces);
             assert!(agrees(light, sum(bounces)), "{bounces} bounces: {light:?}, not {}", sum(bounces));
         }
-        // Controls: another number of bounces would be found out. All of them: e / (1 - a).
+        // Controls: another number of bounces is detected. The limit of all bounces: e / (1 - a).
         assert!(!agrees(light(2), sum(1)) && !agrees(light(2), sum(3)));
         assert!(agrees(light(64), 0.25 * a / (1.0 - a)), "{:?}", light(64));
     }
@@ -213,7 +214,7 @@ fn lights() {
         (lamp(LightKind::Directional, place, down), -axis[2]),
         (lamp(LightKind::Point, place, down), to[2] / square.powf(1.5)),
         (lamp(spot, place, down), to[2] / square.powf(1.5) * inside.powi(3)),
-        // Looks the other way.
+        // Faces away.
         (lamp(spot, place, [0.7, 0.5, -1.5]), 0.0),
     ] {
         scene.lights = vec![light];
@@ -239,15 +240,15 @@ fn lights() {
     }
 }
 
-/// A rectangle above the middle of which a point lies, `a` by `b` half sides in units of the height: its form factor.
-/// Source: Howell, A catalog of radiation heat transfer configuration factors, B-3.
+/// Form factor of a rectangle with a point below its center, `a` by `b` half sides in units of the height. Source:
+/// Howell, A catalog of radiation heat transfer configuration factors, B-3.
 fn form_factor(a: f64, b: f64) -> f64 {
     let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
     4.0 / (2.0 * PI) * (a / p * (b / p).atan() + b / q * (a / q).atan())
 }
 
-/// An object of alpha 0.3 between the floor and a light lets 0.7 of the light past, once for each of its fronts; seen from
-/// above it takes 0.3 of the image.
+/// An object of alpha 0.3 between the floor and a light transmits 0.7 of the light, once for each of its fronts; seen
+/// from above it contributes 0.3 of the image.
 #[test]
 fn alpha() {
     let (lit, part) = (albedo(0.6) * f64::from(0.9f32), 1.0 - f64::from(0.3f32));
@@ -260,7 +261,7 @@ fn alpha() {
         if let Shape::Sphere(_) = shape {
             let (mean, _) = seen(&scene, &lifted(1.0), &looking([1.0, 0.0, 0.5], [0.0; 3]), 4, 0);
             assert_number("below the middle", mean, part * lit, SINGLE);
-            // Through the ball at a point that is lit past it.
+            // Through the ball at a point that is lit directly.
             let light = seen(&scene, &lifted(1.0), &looking([-0.5, 0.0, 1.5], [0.5, 0.0, 0.5]), 1024, 0);
             assert!(agrees(light, part * lit), "{light:?}");
             assert!(!agrees(light, lit) && !agrees(light, part * part * lit));
@@ -283,8 +284,8 @@ fn mirrors() {
     assert_number("the sky", mean, linear(0.9) + 0.5f64.sqrt().sqrt() * (linear(0.2) - linear(0.9)), SINGLE);
 }
 
-/// The headlight and ambient light are as bright as the rasterizer draws them. The headlight counts beside sixteen lights,
-/// and shines out of a housing of the camera that is nearer than its near plane.
+/// The headlight and ambient light are as bright as in the rasterizer. The headlight is added to sixteen other lights,
+/// and is not blocked by a housing of the camera nearer than its near plane.
 #[test]
 fn headlight() {
     let only = |ambient, active| Headlight { ambient: [ambient; 3], diffuse: [0.4; 3], specular: [0.0; 3], active };
@@ -300,20 +301,21 @@ fn headlight() {
     scene.headlight = only(0.0, true);
     scene.lights = vec![Light { diffuse: [0.03; 3], ..sun() }; 16];
     let expected = albedo(0.6) * (16.0 * f64::from(0.03f32) + front);
-    // A sixteenth of the lights would be 0.018.
+    // A missing light of the sixteen would be 0.018.
     assert_number("sixteen lights", seen(&scene, &ONE, &view, 4, 0).0, expected, SINGLE);
 
     let mut scene = on_floor(matt(0.6), [Instance::new(Box { half: [0.05; 3] }, matt(0.6), 2)]);
     scene.headlight = only(0.0, true);
     let (view, poses) = (View { near: 0.1, ..view }, [PoseF32::IDENTITY, PoseF32::from_translation(eye)]);
     assert_number("housing", seen(&scene, &poses, &view, 4, 0).0, albedo(0.6) * front, SINGLE);
-    // A control: a light at the same place is shaded by it.
+    // A control: a light at the same place is shaded by the housing.
     scene.headlight = only(0.0, false);
     scene.lights = vec![Light { attenuation: [1., 0., 0.], ..lamp(LightKind::Point, eye, [0., 0., -1.]) }];
     assert_eq!(seen(&scene, &poses, &view, 4, 0).0, 0.0);
 }
 
-/// A light in a black glossy floor, seen in the direction of the mirror and beside: Walter et al. 2007, Schlick 1994.
+/// A light reflected by a black glossy floor, seen in the mirror direction and beside it: Walter et al. 2007, Schlick
+/// 1994.
 #[test]
 fn ggx_highlights() {
     for (specular, shininess) in [(1.0f32, 1.0f32), (0.5, 0.25), (0.1, 0.05)] {
@@ -321,7 +323,7 @@ fn ggx_highlights() {
         let toward_light = [0.8f64, 0.0, 0.6];
         let light = Light { diffuse: [0.0; 3], specular: [0.5; 3], ..Light::default() };
         scene.lights = vec![Light { direction: toward_light.map(|x| -x as f32), ..light }];
-        // The first is the direction of the mirror.
+        // The first is the mirror direction.
         let all = [[-1.6f32, 0.0, 1.2], [-1.5, 0.3, 1.2], [-1.0, 0.5, 2.0], [0.0, 0.0, 2.0]].map(|eye| {
             let (mean, _) = seen(&scene, &ONE, &looking(eye, [0.0; 3]), 1, 0);
             let o = kinetoscope_scene::vector::unit(eye.map(f64::from)).unwrap();
@@ -338,12 +340,12 @@ fn ggx_highlights() {
             assert_number(&format!("{specular} {shininess} {eye:?}"), mean, expected, sharp);
             mean
         });
-        // Controls: there is a highlight, in the direction of the mirror.
+        // Controls: a highlight exists, in the mirror direction.
         assert!(all[0] > 0.0 && all[0] > all[2] && all[2] > all[3], "{all:?}");
     }
 }
 
-/// One mesh of bricks, one inside the other, whose corners share their normals.
+/// One mesh of nested bricks, whose corners share their normals.
 fn bricks(halves: &[f32]) -> Shape {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     for half in halves {

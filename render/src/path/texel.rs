@@ -1,10 +1,10 @@
-//! Colours of textures at one point: bilinear within the level that is as fine as asked.
+//! Texture lookup at one point: bilinear within the mip level of the footprint.
 
 use kinetoscope_scene::Level;
 use kinetoscope_scene::Texture;
 use kinetoscope_scene::vector::V3;
 
-/// Linear colour at (u, v), v upward, where `footprint` texture coordinates are seen together.
+/// Linear color at (u, v), v upward, for a footprint in texture coordinates.
 pub(super) fn at(texture: &Texture, [u, v]: [f64; 2], footprint: f64) -> V3 {
     let first = &texture.levels()[0];
     let level = level(texture, footprint * f64::from(first.width().max(first.height())));
@@ -14,7 +14,7 @@ pub(super) fn at(texture: &Texture, [u, v]: [f64; 2], footprint: f64) -> V3 {
     bilinear(level, wrap(part(u) * w - 0.5, w), wrap((1.0 - part(v)) * h - 0.5, h))
 }
 
-/// Linear colour in a direction of a cube texture, where `footprint` is seen together on a cube of half length 1.
+/// Linear color in a direction of a cube texture, for a footprint on a cube of half length 1.
 pub(super) fn at_cube(texture: &Texture, d: V3, footprint: f64) -> V3 {
     let level = level(texture, footprint * 0.5 * f64::from(texture.levels()[0].width()));
     let [ax, ay, az] = d.map(f64::abs);
@@ -36,12 +36,12 @@ pub(super) fn at_cube(texture: &Texture, d: V3, footprint: f64) -> V3 {
     let face = 2 * axis + usize::from(!front);
     let k = if major > 0.0 { 0.5 / major } else { 0.0 };
     let side = f64::from(level.width());
-    // Nothing is blended across the edge of a face.
+    // Clamped: texels are not blended across the edge of a face.
     let inside = |x: f64| ((x * k + 0.5) * side - 0.5).clamp(0.0, side - 1.0);
     bilinear(level, inside(u), inside(v) + face as f64 * side)
 }
 
-/// The level whose texels are as wide as what is seen together, or the next finer one.
+/// The mip level whose texels are as wide as the footprint, or the next finer one.
 fn level(texture: &Texture, texels: f64) -> &Level {
     let levels = texture.levels();
     let mut k = 0;
@@ -52,7 +52,7 @@ fn level(texture: &Texture, texels: f64) -> &Level {
     &levels[k]
 }
 
-/// Between four texels, which are blended as they are, as the rasterizer does.
+/// Blends four texels in sRGB, as the rasterizer does.
 fn bilinear(level: &Level, x: f64, y: f64) -> V3 {
     let (ix, iy) = (x as usize, y as usize);
     let (fx, fy) = (x - ix as f64, y - iy as f64);
@@ -67,7 +67,7 @@ fn bilinear(level: &Level, x: f64, y: f64) -> V3 {
 }
 
 /// Linear light of an sRGB value in 0..=1: the polynomial of the rasterizer's textures
-/// ([`decode_bytes`](crate::shade::tone::decode_bytes)), for powers differ from machine to machine.
+/// ([`decode_bytes`](crate::shade::tone::decode_bytes)), because `powf` differs from machine to machine.
 fn linear(x: f64) -> f64 {
     (((x * -0.156_114_5 + 0.615_823_9) * x + 0.494_052_83) * x + 0.045_749_872) * x
 }

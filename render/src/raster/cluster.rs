@@ -1,4 +1,4 @@
-//! A cluster of triangles into the visibility buffer: transform, clip, set up.
+//! Rasterization of a cluster of triangles: transform, clip, triangle setup.
 
 use super::tile::Tile;
 use super::triangle::{self, GUARD, Gradient, SUB};
@@ -9,17 +9,17 @@ use kinetoscope_scene::shape::Cluster;
 use kinetoscope_scene::shape::RenderMesh;
 
 const MAX_VERTICES: usize = 3 * RenderMesh::CLUSTER;
-/// Adding and subtracting this rounds to an integer (of less than 2^22). `round()` would be a library call.
+/// Adding and subtracting this rounds to an integer (below 2^22). `round()` would be a library call.
 const ROUND: f32 = 12_582_912.0;
 
-/// The vertices of a cluster as the camera sees them.
+/// Transformed vertices of a cluster.
 #[derive(Clone, Debug)]
 pub(crate) struct Vertices {
     camera: [[f32; MAX_VERTICES]; 3],
     screen: [[f32; MAX_VERTICES]; 2],
     snapped: [[i32; MAX_VERTICES]; 2],
     nearness: [f32; MAX_VERTICES],
-    /// 1 where the vertex must be clipped.
+    /// 1 if the vertex must be clipped, else 0.
     clip: [f32; MAX_VERTICES],
 }
 
@@ -35,17 +35,17 @@ impl Default for Vertices {
     }
 }
 
-/// What the triangles of an instance have in common.
+/// State that all triangles of an instance share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pass<'a> {
     pub(crate) projection: &'a Projection,
     pub(crate) camera_from_instance: &'a PoseF32,
-    /// Whether backs cannot be seen.
+    /// True if back faces are culled.
     pub(crate) cull: bool,
     pub(crate) first_id: u32,
 }
 
-/// Draws the triangles of a cluster.
+/// Rasterizes the triangles of a cluster.
 #[inline(always)]
 pub(crate) fn draw<S: Simd>(
     s: S,
@@ -71,7 +71,7 @@ pub(crate) fn draw<S: Simd>(
         let double = |a: [i32; 2], b: [i32; 2]| i64::from(a[0]) * i64::from(b[1]) - i64::from(a[1]) * i64::from(b[0]);
         let edge = |k: usize| [p[k][0] - p[0][0], p[k][1] - p[0][1]];
         let area = double(edge(1), edge(2));
-        // The picture's y points down, so fronts turn clockwise in its numbers: negative.
+        // The image's y axis points down, so front faces are clockwise: negative area.
         if area == 0 || (area > 0 && pass.cull) {
             continue;
         }
@@ -88,7 +88,7 @@ pub(crate) fn draw<S: Simd>(
     }
 }
 
-/// Whether no vertex must be clipped.
+/// Transforms the vertices of a cluster; true if no vertex must be clipped.
 #[inline(always)]
 fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Cluster, pass: &Pass<'_>) -> bool {
     let (projection, pose) = (pass.projection, pass.camera_from_instance);
@@ -132,9 +132,9 @@ fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// The plane of a triangle, from its unsnapped corners. A ray (x, y, 1) meets the plane n·p = d at the nearness
-/// 1/z = n·(x, y, 1) / d, which is linear in the pixels. `at` is where the first corner is in the picture, `polygon` the
-/// nearness of the corners that are drawn, that one first.
+/// Nearness gradient of a triangle's plane, from its unsnapped corners. A ray (x, y, 1) meets the plane n·p = d at the
+/// nearness 1/z = n·(x, y, 1) / d, which is linear in the pixels. `at` is the first corner in the image, `polygon`
+/// holds the nearness of the rasterized corners, the first corner first.
 #[inline(always)]
 fn gradient(projection: &Projection, p: [[f32; 3]; 3], at: [f32; 2], polygon: &[f32]) -> Gradient {
     let (u, v) = (sub(p[1], p[0]), sub(p[2], p[0]));
@@ -154,8 +154,8 @@ fn gradient(projection: &Projection, p: [[f32; 3]; 3], at: [f32; 2], polygon: &[
     Gradient { at: [at[0], at[1], polygon[0]], step, low, high }
 }
 
-/// A triangle that leaves the guard band or comes too near: clipped to a polygon of at most eight corners, drawn as a fan.
-/// Corners are cut from the inside to the outside, so both neighbours of an edge get the same point.
+/// Rasterizes a triangle that leaves the guard band or comes too near: clipped to a polygon of at most eight corners,
+/// drawn as a fan. Edges are cut from the inside to the outside, so both neighbors of an edge get the same point.
 #[inline(never)]
 fn clipped<S: Simd>(s: S, tile: &mut Tile, v: &Vertices, corners: [usize; 3], pass: &Pass<'_>, id: u32) {
     let projection = pass.projection;
@@ -190,7 +190,7 @@ fn clipped<S: Simd>(s: S, tile: &mut Tile, v: &Vertices, corners: [usize; 3], pa
     }
 }
 
-/// A second copy of [`triangle::draw`] is not worth its place.
+/// Not inlined: a second copy of [`triangle::draw`] does not pay off.
 #[inline(never)]
 fn rarely<S: Simd>(s: S, tile: &mut Tile, p: [[i32; 2]; 3], g: &Gradient, nearest: f32, id: u32) {
     s.vectorize(
@@ -199,10 +199,10 @@ fn rarely<S: Simd>(s: S, tile: &mut Tile, p: [[i32; 2]; 3], g: &Gradient, neares
     );
 }
 
-/// The part of a triangle in front of the camera and inside the guard band.
+/// Clips a triangle to the region in front of the camera and inside the guard band.
 fn clip(projection: &Projection, triangle: [[f32; 3]; 3]) -> Option<([[f32; 3]; 9], usize)> {
     let p = projection;
-    // Signed distances: positive inside. The screen coordinate is fx x / z + cx, of parallel rays fx x + cx.
+    // Signed distances: positive inside. The screen coordinate is fx x / z + cx, for parallel rays fx x + cx.
     let side = |fx: f32, fy: f32, guard: f32| {
         let [by_depth, alone] = if p.parallel { [0.0, guard] } else { [guard, 0.0] };
         [fx, fy, by_depth, alone]

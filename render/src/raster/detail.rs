@@ -1,26 +1,26 @@
-//! How coarse a mesh may be drawn.
+//! Level of detail: selection of the mesh level.
 
 use crate::visibility::Projection;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{Instance, PoseF32};
 
-/// A surface may be elsewhere by this much at most \[m\].
+/// Largest displacement of a surface \[m\].
 const DISTANCE: f32 = 1e-3;
-/// And by this many pixels (or texels of a shadow map).
+/// Largest displacement in the image \[pixels\] (or texels of a shadow map).
 const PIXELS: f32 = 0.5;
 
-/// The number of the coarsest level of an instance's mesh that may be drawn instead of it: its surface is nowhere farther
-/// from the mesh than [`DISTANCE`], and than [`PIXELS`] anywhere in the picture. 0 is the mesh itself. Depends on the
-/// instance, its pose and the projection only.
+/// Selects the coarsest level of an instance's mesh whose surface is nowhere farther from the mesh than [`DISTANCE`],
+/// and than [`PIXELS`] anywhere in the image. 0 is the mesh itself. The level depends on the instance, its pose and the
+/// projection only.
 ///
-/// Terrain is drawn as it is: cameras stand on it.
+/// Terrain has no levels: cameras stand on it.
 pub(crate) fn level(projection: &Projection, instance: &Instance, camera_from_instance: &PoseF32) -> u8 {
     let Shape::Mesh(shape) = &instance.shape else { return 0 };
     let [lo, hi] = shape.mesh.bounds();
     shape.mesh.level_within(tolerance(projection, camera_from_instance, [lo, hi])) as u8
 }
 
-/// How far a surface within bounds may be from where it is \[m\]; 0 where the bounds reach behind the near plane.
+/// Largest allowed displacement of a surface within bounds \[m\]; 0 if the bounds reach behind the near plane.
 fn tolerance(projection: &Projection, camera_from_instance: &PoseF32, [lo, hi]: [[f32; 3]; 2]) -> f32 {
     let f = projection.fx.max(projection.fy);
     if projection.parallel {
@@ -29,13 +29,13 @@ fn tolerance(projection: &Projection, camera_from_instance: &PoseF32, [lo, hi]: 
     let middle = camera_from_instance.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k])));
     let forward = camera_from_instance.rotation[2];
     let reach: f32 = (0..3).map(|k| forward[k].abs() * 0.5 * (hi[k] - lo[k])).sum();
-    // Both surfaces are within this.
+    // Both surfaces are beyond this depth.
     let near = 0.999 * (middle[2] - reach) - DISTANCE;
     if near.is_nan() || near < projection.near {
         return 0.0;
     }
-    // At depth z, where rays have the slopes p, a displacement d moves a point by f / z (d_xy - p d_z) pixels, which is
-    // at most f / z |d| sqrt(1 + p²).
+    // At depth z, for a ray with slopes p, a displacement d moves a point by f / z (d_xy - p d_z) pixels, which is at
+    // most f / z |d| sqrt(1 + p²).
     let slope = |size: usize, c: f32, f: f32| c.abs().max((size as f32 - c).abs()) / f;
     let (x, y) =
         (slope(projection.width, projection.cx, projection.fx), slope(projection.height, projection.cy, projection.fy));
@@ -70,7 +70,7 @@ mod tests {
             let z = f64::from(distance) - 0.3;
             let f = [250.0, 310.0];
             let at = |p: [f64; 3]| [f[0] * p[0] / p[2] + 120.0, f[1] * p[1] / p[2] + 90.0];
-            // The nearest point that is seen in the farthest corner of the picture, moved in every direction.
+            // The nearest point visible at the farthest corner of the image, moved in every direction.
             let p = [200.0 / f[0] * z, 110.0 / f[1] * z, z];
             let steps = 64;
             for i in 0..steps * steps {
@@ -83,7 +83,7 @@ mod tests {
                 closest = closest.max(moved);
             }
         }
-        // Not so careful that it allows nothing: fx is not fy here.
+        // The tolerance is not too strict; it is not reached, because fx differs from fy here.
         assert!(closest > 0.35, "{closest}");
     }
 

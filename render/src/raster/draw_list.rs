@@ -1,4 +1,4 @@
-//! What is drawn in a frame, in which order, and where in the picture.
+//! Draw list of a frame: visible items, their order, and their bounds in the image.
 
 use super::detail;
 use super::tile::BLOCK;
@@ -9,35 +9,35 @@ use kinetoscope_scene::shape::Cluster;
 use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 
-/// A primitive or a cluster that may be seen.
+/// A primitive or a cluster that may be visible.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Item {
     pub(crate) instance: u32,
     /// `None` for shapes with a closed form.
     pub(crate) cluster: Option<u32>,
-    /// Blocks that it may touch: x0, y0, x1, y1, the last included.
+    /// Blocks that the item may touch: x0, y0, x1, y1, the last included.
     pub(crate) rect: [u16; 4],
-    /// It is nowhere nearer than this.
+    /// Upper bound of the item's nearness.
     pub(crate) nearness: f32,
-    /// Nearer things are drawn first: the nearness, but endless planes are drawn last.
+    /// Sort key, largest first: the nearness, but infinite planes come last.
     order: f32,
 }
 
-/// An instance as the camera sees it.
+/// An instance in the camera's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placed {
     pub(crate) camera_from_instance: PoseF32,
     pub(crate) local: LocalCamera,
-    /// Whether the camera is outside of the instance's bounds, far enough that nothing is cut off in front.
+    /// True if the camera is outside of the instance's bounds, by enough that the near plane cuts nothing off.
     pub(crate) outside: bool,
-    /// The level of its mesh that is drawn: ids count that level's triangles.
+    /// Level of the mesh that is rendered: ids count that level's triangles.
     pub(crate) level: u8,
-    /// How far that may be from the mesh \[m\].
+    /// Largest distance of that level from the mesh \[m\].
     pub(crate) error: f32,
 }
 
 impl Placed {
-    /// The triangles that are drawn of the instance that is placed.
+    /// The triangles of the instance at the selected level.
     #[inline(always)]
     pub(crate) fn mesh<'a>(&self, instance: &'a Instance) -> Option<&'a RenderMesh> {
         let mesh = instance.mesh()?;
@@ -45,19 +45,19 @@ impl Placed {
     }
 }
 
-/// Which instances are drawn where.
+/// Visibility class of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
-    /// Not drawn.
+    /// Not rendered.
     Hidden,
-    /// Seen by all channels.
+    /// Visible in all channels.
     Opaque,
-    /// Blended into the colour, and seen by the other channels.
+    /// Blended into the color, and opaque in the other channels.
     Veil,
 }
 
 impl Layer {
-    /// The layer of an instance, where the geom groups of `groups` are drawn (bit k is group k).
+    /// Layer of an instance, when the geom groups of `groups` are rendered (bit k is group k).
     pub fn of(instance: &Instance, groups: u32) -> Self {
         let alpha = instance.material.rgba[3];
         if !instance.visible || alpha <= 0.0 || groups >> instance.group.min(31) & 1 == 0 {
@@ -69,8 +69,8 @@ impl Layer {
         }
     }
 
-    /// True if an instance casts shadows into shadow maps: it is drawn, its alpha is at least 0.5, and it is no marker, which
-    /// shows a measurement and is no thing of the scene.
+    /// True if an instance casts shadows into shadow maps: it is rendered, its alpha is at least 0.5, and it is not a
+    /// marker. Markers show measurements and are not part of the scene.
     pub(crate) fn casts_shadows(instance: &Instance, groups: u32) -> bool {
         Self::of(instance, groups) != Self::Hidden
             && instance.material.rgba[3] >= 0.5
@@ -78,24 +78,24 @@ impl Layer {
     }
 }
 
-/// In which parts instances are drawn.
+/// Granularity of a draw list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Parts {
-    /// Meshes by cluster, each as coarse as it may be.
+    /// Meshes by cluster, at their level of detail.
     Levels,
-    /// Meshes by cluster, as they are.
+    /// Meshes by cluster, at full detail.
     Clusters,
-    /// Each in one piece.
+    /// Each instance as one item.
     Whole,
 }
 
-/// Everything that may be seen in a frame.
+/// The visible items of a frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DrawList {
     pub(crate) placed: Vec<Placed>,
-    /// Opaque things, the nearest first.
+    /// Opaque items, the nearest first.
     pub(crate) opaque: Vec<Item>,
-    /// Things that are not quite opaque, the farthest instance first.
+    /// Transparent items, the farthest instance first.
     pub(crate) blended: Vec<(Layer, Item)>,
     /// The largest [`Placed::error`].
     pub(crate) error: f32,
@@ -108,8 +108,8 @@ impl DrawList {
             + self.blended.capacity() * size_of::<(Layer, Item)>()
     }
 
-    /// Empties the list, with room for everything that is kept: what is seen changes from frame to frame, and memory must not
-    /// grow with it.
+    /// Empties the list and reserves memory for all instances that may be kept: visibility changes from frame to frame,
+    /// and memory must not grow with it.
     pub(crate) fn reserve(&mut self, scene: &RenderScene, parts: Parts, keep: impl Fn(&Instance) -> Layer) {
         self.placed.clear();
         self.opaque.clear();
@@ -129,7 +129,8 @@ impl DrawList {
         self.blended.reserve_exact(blended);
     }
 
-    /// Finds what may be seen. `keep` tells instances apart. Behind a lens anything may be anywhere in the picture.
+    /// Finds the items that may be visible. `keep` classifies instances. With a lens, items may be anywhere in the
+    /// image.
     pub(crate) fn build(
         &mut self,
         projection: &Projection,
@@ -189,7 +190,7 @@ impl DrawList {
                 }
             }
         }
-        // By nearness, then by order in the scene: the same order on every run.
+        // By nearness, then by order in the scene: the same order in every run.
         self.opaque.sort_unstable_by(|a, b| {
             b.order.total_cmp(&a.order).then((a.instance, a.cluster).cmp(&(b.instance, b.cluster)))
         });
@@ -204,7 +205,7 @@ impl DrawList {
     }
 }
 
-/// Whether all triangles of a closed cluster show their back.
+/// True if all triangles of a closed cluster are back-facing.
 fn faces_away(projection: &Projection, placed: &Placed, cluster: &Cluster) -> bool {
     if !cluster.closed || cluster.cone_cos <= 0.0 {
         return false;
@@ -220,7 +221,7 @@ fn faces_away(projection: &Projection, placed: &Placed, cluster: &Cluster) -> bo
     dot(to, cluster.cone_axis) > sine * dot(to, to).sqrt() + 1.01 * cluster.radius
 }
 
-/// Where a box may be seen, and how near.
+/// Bounds of a box in the image, and its largest nearness; `None` if it is not visible.
 fn bounds(
     projection: &Projection,
     camera_from_instance: &PoseF32,
@@ -238,7 +239,7 @@ fn bounds(
     if projection.parallel {
         return box_bounds(projection, c, reach);
     }
-    // Corner by corner where all are in front, which is tighter than the box around the box.
+    // Corner by corner if all are in front, which is tighter than the box around the box.
     let (near, far) = (c[2] - reach[2], c[2] + reach[2]);
     if far < projection.near || near > projection.far {
         return None;
@@ -258,8 +259,8 @@ fn bounds(
     Some((blocks(projection, lo, hi)?, projection.nearness(near * 0.9999)))
 }
 
-/// Where a box around a point of the optical frame may be seen through a lens, and how near: somewhere, if the range allows
-/// it. Its blocks look for themselves.
+/// Bounds of a box around a point of the optical frame, through a lens, and its largest nearness: the whole image if
+/// the depth range allows it. Blocks are tested later.
 fn lens_bounds(projection: &Projection, lens: &LensRays, middle: [f32; 3], half: [f32; 3]) -> Option<([u16; 4], f32)> {
     let everywhere = everywhere(projection);
     let length = |v: [f32; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
@@ -275,7 +276,7 @@ fn lens_bounds(projection: &Projection, lens: &LensRays, middle: [f32; 3], half:
     Some((everywhere, if near < projection.near { f32::MAX } else { projection.nearness(near) }))
 }
 
-/// Where a ball may be seen, and how near.
+/// Bounds of a ball in the image, and its largest nearness; `None` if it is not visible.
 fn ball_bounds(projection: &Projection, c: [f32; 3], radius: f32) -> Option<([u16; 4], f32)> {
     box_bounds(projection, c, [radius; 3])
 }
@@ -304,7 +305,7 @@ fn everywhere(projection: &Projection) -> [u16; 4] {
     [0, 0, ((projection.width - 1) / BLOCK) as u16, ((projection.height - 1) / BLOCK) as u16]
 }
 
-/// The blocks of a rectangle \[pixels\], one pixel wider on each side; `None` outside of the picture.
+/// Blocks of a rectangle \[pixels\], enlarged by one pixel on each side; `None` outside of the image.
 fn blocks(projection: &Projection, lo: [f32; 2], hi: [f32; 2]) -> Option<[u16; 4]> {
     let size = [projection.width as f32, projection.height as f32];
     if (0..2).any(|k| hi[k] + 1.0 < 0.0 || lo[k] - 1.0 > size[k]) {

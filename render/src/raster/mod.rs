@@ -1,8 +1,8 @@
 //! The tile rasterizer: fills a visibility buffer with the nearest surface at every sample.
 //!
-//! Meshes are drawn triangle by triangle, shapes with a closed form by casting the rays of the pixels they may cover, endless
-//! planes by their nearness, which is linear in the picture. The picture is drawn in bands that stay in the cache; things are
-//! drawn front to back, and blocks that are full of nearer things are skipped.
+//! Meshes are rasterized triangle by triangle. Shapes with a closed form are rendered by casting the rays of the pixels
+//! they may cover, infinite planes by their nearness, which is linear in the image. The image is processed in bands
+//! that stay in the cache. Items are drawn front to back, and blocks that are full of nearer surfaces are skipped.
 
 mod cluster;
 mod detail;
@@ -21,14 +21,15 @@ use kinetoscope_scene::RenderScene;
 use kinetoscope_scene::shape::Shape;
 use tile::{BLOCK, NOTHING, SAMPLES, Tile};
 
-/// Draws things into a visibility buffer.
+/// Rasterizes items into a visibility buffer.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Painter {
     vertices: Vertices,
 }
 
 impl Painter {
-    /// Draws one thing of a draw list. One copy per instruction set: inlined into every caller, it took minutes to compile.
+    /// Draws one item of a draw list. One copy per instruction set: inlined into every caller, it took minutes to
+    /// compile.
     #[inline(never)]
     pub(crate) fn draw<S: Simd>(
         &mut self,
@@ -82,14 +83,14 @@ impl Painter {
     }
 }
 
-/// Whether something is an endless plane seen through a pinhole.
+/// True for an infinite plane seen by a perspective camera.
 #[inline(always)]
 fn is_floor(shape: &Shape, projection: &Projection) -> bool {
     matches!(shape, Shape::Plane(plane) if plane.half == [0.0; 2]) && !projection.parallel
 }
 
-/// An endless plane, whose nearness is linear in the picture: 1/z = -d.z / o.z, where a ray d from the camera o goes down
-/// in the plane's frame. Most pictures are full of one.
+/// Draws an infinite plane, whose nearness is linear in the image: 1/z = -d.z / o.z, where the ray d from the camera o
+/// points down in the plane's frame. Most images are full of one.
 #[inline(always)]
 fn draw_floor<S: Simd>(
     s: S,
@@ -102,7 +103,7 @@ fn draw_floor<S: Simd>(
     let camera = &placed.local;
     let ([right, down, forward], height) =
         (camera.instance_from_camera.rotation[2], camera.instance_from_camera.translation[2]);
-    // Seen from above only.
+    // Visible from above only.
     if height <= 0.0 {
         return;
     }
@@ -111,7 +112,7 @@ fn draw_floor<S: Simd>(
     for by in area[1]..=area[3] {
         for bx in area[0]..=area[2] {
             let block = tile.block(bx, by);
-            // Most of a floor is drawn where nothing else is: then there is nothing to compare.
+            // Most of a floor is the first item in its blocks, which then need no comparison.
             let empty = tile.take_fresh(block);
             let mut drawn = false;
             for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
@@ -121,7 +122,7 @@ fn draw_floor<S: Simd>(
                 let samples = tile.samples(block, plane);
                 for row in 0..BLOCK / 2 {
                     let v = load(s, &ROW) + ((by * BLOCK + 2 * row) as f32 + 0.5 + offset[1]);
-                    // Rounded as [`Projection::rays`] does: what is resolved is what was seen.
+                    // Rounded as in [`Projection::rays`]: shading must see the surface that visibility found.
                     let down = across + (v - projection.cy) * camera.inverse_f[1] * down + forward;
                     let q = primitive::plane_nearness(down, height);
                     let hit = down.simd_lt(zero) & q.simd_le(nearest);
@@ -144,7 +145,8 @@ fn draw_floor<S: Simd>(
     }
 }
 
-/// Keeps the samples that are hit nearer than what is there, or as near by a later instance. True if there are any.
+/// Keeps the samples that are nearer than the stored ones, or as near and of a later instance. Returns true if any is
+/// kept.
 #[inline(always)]
 fn keep<S: Simd>(s: S, tile: &mut Tile, at: usize, hit: M<S>, nearness: F<S>, id: U<S>) -> bool {
     let old = load(s, &tile.nearness[at..]);
@@ -192,7 +194,7 @@ fn draw_primitive<S: Simd>(
                         continue;
                     }
                     let q = match shape {
-                        // As an endless one at the same height, so that the later one does not shine through.
+                        // Same as an infinite plane at the same height, so that the later plane does not shine through.
                         Shape::Plane(_) if !projection.parallel => {
                             primitive::plane_nearness(d.z, placed.local.instance_from_camera.translation[2])
                         }

@@ -1,19 +1,19 @@
-//! The visibility buffer: nearness and id of the nearest surface, for a part of the picture.
+//! The visibility buffer: nearness and id of the nearest surface, for a part of the image.
 
 /// Pixels along the side of a block.
 pub(crate) const BLOCK: usize = 8;
 /// Pixels in a block.
 pub(crate) const AREA: usize = BLOCK * BLOCK;
-/// The id where nothing is.
+/// Id of an empty sample.
 pub(crate) const NOTHING: u32 = u32::MAX;
 
-/// Where the samples of a pixel are, from its centre, in 1/256 pixel. The first is the centre, which all channels but the
-/// colour see; the other four are the rotated grid that graphics cards use.
+/// Sample positions in a pixel, from its center, in 1/256 pixel. The first is the center, used by all channels but
+/// color; the other four are the rotated grid of GPUs.
 pub(crate) const SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, -96], [96, -32], [-96, 32], [32, 96]];
 /// The largest offset of a sample.
 pub(crate) const REACH: i32 = 96;
 
-/// A rectangle of 8x8 blocks of the picture. Within a block, samples of one kind are together: `[block][plane][64]`.
+/// A rectangle of 8x8 blocks of the image. Within a block, samples of one kind are contiguous: `[block][plane][64]`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tile {
     /// The first pixel; a multiple of [`BLOCK`].
@@ -25,21 +25,21 @@ pub(crate) struct Tile {
     pub(crate) planes: usize,
     pub(crate) nearness: Vec<f32>,
     pub(crate) id: Vec<u32>,
-    /// The smallest nearness in each block, or less.
+    /// Lower bound of the nearness in each block.
     farthest: Vec<f32>,
-    /// Whether the block was drawn into since `farthest` was taken.
+    /// True if the block changed since `farthest` was computed.
     stale: Vec<bool>,
-    /// Whether the block is empty whatever its memory holds: it is cleared when something is drawn into it, while it is on
-    /// its way through the cache anyway.
+    /// True if the block is empty, whatever its memory holds. It is cleared when it is first drawn into, while it
+    /// passes through the cache anyway.
     fresh: Vec<bool>,
-    /// The nearness where nothing is.
+    /// Nearness of an empty sample.
     empty: f32,
-    /// The only row of each block that rays are cast for, if not all.
+    /// The only row of each block that rays are cast for; `None` for all rows.
     pub(crate) only: Option<usize>,
 }
 
 impl Tile {
-    /// Takes memory for tiles of up to so many samples.
+    /// Reserves memory for tiles of up to `samples` samples.
     pub(crate) fn reserve(&mut self, samples: usize) {
         let blocks = samples.div_ceil(AREA);
         self.nearness.reserve_exact(samples.saturating_sub(self.nearness.len()));
@@ -49,7 +49,7 @@ impl Tile {
         self.fresh.reserve_exact(blocks.saturating_sub(self.fresh.len()));
     }
 
-    /// Moves the tile and empties it. What is left of it must be [settled](Self::settle) before it is read.
+    /// Moves the tile and empties it. It must be [settled](Self::settle) before it is read.
     pub(crate) fn clear(&mut self, origin: [usize; 2], blocks: [usize; 2], planes: usize, farthest: f32) {
         [self.x0, self.y0] = origin;
         [self.blocks_x, self.blocks_y] = blocks;
@@ -66,7 +66,7 @@ impl Tile {
         self.farthest.resize(count, farthest);
     }
 
-    /// Readies a block to be drawn into.
+    /// Prepares a block for drawing.
     #[inline(always)]
     pub(crate) fn open(&mut self, block: usize) {
         if self.fresh[block] {
@@ -82,26 +82,27 @@ impl Tile {
         self.fresh[block] = false;
     }
 
-    /// Readies a block of which every sample is about to be written, and says what they all hold, if nothing was drawn yet.
+    /// Prepares a block of which every sample will be written; returns the value of all samples if the block is still
+    /// empty.
     #[inline(always)]
     pub(crate) fn take_fresh(&mut self, block: usize) -> Option<f32> {
         std::mem::take(&mut self.fresh[block]).then_some(self.empty)
     }
 
-    /// Readies the tile to be read, when all is drawn.
+    /// Clears untouched blocks, so that the tile can be read.
     pub(crate) fn settle(&mut self) {
         for block in 0..self.fresh.len() {
             self.open(block);
         }
     }
 
-    /// Takes over the depths of another tile, with nothing in it.
+    /// Copies the depths of another tile, with no ids.
     pub(crate) fn behind(&mut self, other: &Self) {
         self.copy(other);
         self.id.fill(NOTHING);
     }
 
-    /// Takes over another tile.
+    /// Copies another tile.
     pub(crate) fn copy(&mut self, other: &Self) {
         let Self { x0, y0, blocks_x, blocks_y, planes, .. } = *other;
         (self.x0, self.y0, self.blocks_x, self.blocks_y, self.planes) = (x0, y0, blocks_x, blocks_y, planes);
@@ -113,26 +114,26 @@ impl Tile {
         (self.empty, self.only) = (other.empty, other.only);
     }
 
-    /// Bytes held.
+    /// Memory held \[bytes\].
     pub(crate) fn bytes(&self) -> usize {
         4 * (self.nearness.capacity() + self.id.capacity() + self.farthest.capacity())
             + self.stale.capacity()
             + self.fresh.capacity()
     }
 
-    /// The block with the pixel (8 bx, 8 by) of the picture.
+    /// Index of the block with the pixel (8 bx, 8 by) of the image.
     #[inline(always)]
     pub(crate) fn block(&self, bx: usize, by: usize) -> usize {
         (by - self.y0 / BLOCK) * self.blocks_x + bx - self.x0 / BLOCK
     }
 
-    /// Where the samples of a block and plane begin.
+    /// Index of the first sample of a block and plane.
     #[inline(always)]
     pub(crate) fn samples(&self, block: usize, plane: usize) -> usize {
         (block * self.planes + plane) * AREA
     }
 
-    /// The blocks of a rectangle that are in this tile: x0, y0, x1, y1, the last included.
+    /// The part of a rectangle of blocks that is in this tile: x0, y0, x1, y1, the last included.
     #[inline(always)]
     pub(crate) fn overlap(&self, rect: [u16; 4]) -> Option<[usize; 4]> {
         let [x, y] = [self.x0 / BLOCK, self.y0 / BLOCK];
@@ -146,7 +147,7 @@ impl Tile {
         self.stale[block] = true;
     }
 
-    /// Whether nothing of this nearness can be seen in a block any more.
+    /// True if a surface of this nearness is hidden in the whole block.
     #[inline(always)]
     pub(crate) fn hidden(&mut self, block: usize, nearness: f32) -> bool {
         if nearness <= self.farthest[block] {

@@ -1,12 +1,12 @@
-//! One triangle into the visibility buffer.
+//! Rasterization of one triangle into the visibility buffer.
 //!
-//! Coverage: vertices are snapped to 1/256 pixel, edge functions are exact integers, the top-left rule decides on edges:
-//! two triangles that share an edge never both draw a sample and never both leave it out.
+//! Coverage: vertices are snapped to 1/256 pixel, edge functions are exact integers, and the top-left rule decides on
+//! edges. Two triangles that share an edge never both draw a sample and never both leave it out.
 //!
 //! Overflow: snapped coordinates are below 2^22 ([`GUARD`] pixels of 2^8), so differences are below 2^23 and edge
-//! functions below 2^47: set up in `i64`. Samples are a whole pixel apart, so the value shifted down by 8 has the same sign
-//! and steps by the edge's differences: within a block it changes by less than 14 * 2^23 < 2^27. The value at a block's
-//! corner is cut to ±2^30, which keeps every sign in the block, and the rest is done in `i32`.
+//! functions below 2^47: set up in `i64`. Samples are a whole pixel apart, so the value shifted down by 8 has the same
+//! sign and steps by the edge's differences: within a block it changes by less than 14 * 2^23 < 2^27. The value at a
+//! block's corner is clamped to ±2^30, which keeps every sign in the block, and the rest is done in `i32`.
 
 use super::tile::{BLOCK, REACH, SAMPLES, Tile};
 use crate::simd::{COLUMN, F, I, ROW, Simd, load, load_i, load_u, max, min, select, select_i, select_u};
@@ -17,10 +17,10 @@ pub(crate) const GUARD: f32 = 16000.0;
 /// Sub-pixel positions per pixel.
 pub(crate) const SUB: f32 = 256.0;
 
-/// How the nearness of a plane changes over the picture, and between which values it stays on the triangle.
+/// Nearness of a plane over the image, and its range on the triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gradient {
-    /// A point of the picture \[pixels\] and the nearness there.
+    /// A point of the image \[pixels\] and its nearness.
     pub(crate) at: [f32; 3],
     /// Change per pixel.
     pub(crate) step: [f32; 2],
@@ -28,8 +28,8 @@ pub(crate) struct Gradient {
     pub(crate) high: f32,
 }
 
-/// Draws a triangle given by its snapped corners. The gradient costs several divisions: most triangles of dense meshes lie
-/// between the samples, and end before it is asked for.
+/// Rasterizes a triangle given by its snapped corners. The gradient costs several divisions: most triangles of dense
+/// meshes lie between the samples, and return before it is computed.
 #[inline(always)]
 pub(crate) fn draw<S: Simd>(
     s: S,
@@ -112,7 +112,7 @@ pub(crate) fn draw<S: Simd>(
                     let old = load(s, &tile.nearness[here..]);
                     let m = inside & q.simd_ge(old) & q.simd_le(nearest);
                     if m.any_true() {
-                        // Of surfaces at the same depth the last one counts. Nothing has the largest id.
+                        // Of surfaces at the same depth the last one counts. An empty sample has the largest id.
                         let old_ids = load_u(s, &tile.id[here..]);
                         let m = m & (q.simd_gt(old) | old_ids.simd_lt(ids));
                         store(select(m, q, old), &mut tile.nearness[here..]);
@@ -128,7 +128,7 @@ pub(crate) fn draw<S: Simd>(
     }
 }
 
-/// At most four pixels, one after the other; the same numbers as [`draw`].
+/// At most four pixels, one after the other; the same values as in [`draw`].
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
 fn few_pixels(
@@ -152,7 +152,7 @@ fn few_pixels(
                 if (at(0) | at(1) | at(2)) < 0 {
                     continue;
                 }
-                // In the order of additions of the wide path: corner of the block, sample, row pair, lane.
+                // The additions have the order of the wide path: corner of the block, sample, row pair, lane.
                 let (bx, by) = (x & !7, y & !7);
                 let corner =
                     g.at[2] + g.step[0] * (bx as f32 + 0.5 - g.at[0]) + g.step[1] * (by as f32 + 0.5 - g.at[1]);

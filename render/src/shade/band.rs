@@ -1,4 +1,4 @@
-//! A band of a picture: from what is drawn where to the pixels of all channels.
+//! A band of an image: from the draw list to the pixels of all channels.
 
 use super::group::{At, Colors, resolve};
 use super::multisample::{Edges, blend};
@@ -17,7 +17,7 @@ use kinetoscope_scene::RenderScene;
 use std::cell::RefCell;
 use std::ops::Range;
 
-/// What a thread needs to draw; keeps its memory.
+/// Scratch memory of a thread for rendering.
 #[derive(Clone, Debug)]
 pub(crate) struct Brush {
     pub(crate) level: Level,
@@ -25,7 +25,7 @@ pub(crate) struct Brush {
     layer: Tile,
     veiled: Tile,
     painter: Painter,
-    /// Of rays that are cast for a picture, and of those that are cast while it is shaded.
+    /// Stack for visibility rays; `shade_stack` is for rays cast during shading.
     stack: Stack,
     shade_stack: Stack,
     colors: Vec<Colors>,
@@ -58,22 +58,22 @@ impl Brush {
             + self.shade_stack.bytes()
     }
 
-    /// Scratch memory of rays.
+    /// BVH stack, as scratch memory.
     pub(crate) fn stack(&mut self) -> &mut Stack {
         &mut self.stack
     }
 
-    /// Draws a part of a shadow map.
+    /// Renders a band of a shadow map.
     pub(crate) fn shadow(&mut self, scene: &RenderScene, band: ShadowBand<'_>) {
         band.draw(self.level, scene, &mut self.tile, &mut self.painter);
     }
 
-    /// Draws rows of blocks of a prepared shot, a band at a time. `frame` begins with the first of them.
+    /// Renders rows of blocks of a prepared frame, a band at a time. `frame` begins with the first of these rows.
     pub(crate) fn paint(&mut self, plan: &Plan, shot: &Shot<'_>, frame: &mut FrameMut<'_>, rows: Range<usize>) {
         let Some(projection) = &plan.projection else { return };
         let wide = projection.width.div_ceil(BLOCK);
         let (level, step, top) = (self.level, plan.rows(), rows.start * BLOCK);
-        // Shadows may come later: memory is taken once.
+        // Shadow maps may be rendered later: memory is reserved once.
         self.tile.reserve(plan.most_of_shadow_bands());
         self.tile.only = plan.only;
         for first in rows.clone().step_by(step) {
@@ -90,7 +90,7 @@ impl Brush {
         }
     }
 
-    /// Draws a band of the picture, where the tile is.
+    /// Renders the band of the image that the tile covers.
     #[inline(always)]
     fn band<S: Simd>(
         &mut self,
@@ -117,7 +117,7 @@ impl Brush {
         tile.settle();
         let wanted = [Stage::Detail, Stage::Albedo, Stage::Flow].map(|stage| frame.wants(stage));
         let [wants_detail, wants_albedo, wants_flow] = wanted;
-        // A pixel's rays need it where only shared things are at hand.
+        // Shading has shared references only, so its stack is in a cell.
         let shade_stack = RefCell::new(shade_stack);
         let context = plan.context(shot, projection, &shade_stack, wanted);
         let veils = !list.blended.is_empty();
@@ -141,7 +141,7 @@ impl Brush {
             } else {
                 resolve(s, &context, ids, points, wants_geometry.then_some(&mut pixels), color);
             }
-            // Without the instruction set: with it, normals become scattered writes, which are slower.
+            // Outside of `vectorize`: with the instruction set, normals become scattered writes, which are slower.
             write(frame, Stage::Geometry, &pixels, [x, y], size, top);
             if wants_detail {
                 write(frame, Stage::Detail, &pixels, [x, y], size, top);
@@ -159,7 +159,7 @@ impl Brush {
         if tile.planes > 1 {
             let mut line = 0;
             for (block, row, [x, y]) in groups(tile, size) {
-                // A row of blocks at a time: what is computed together does not depend on the bands.
+                // One row of blocks at a time: the samples that are shaded together do not depend on the bands.
                 if block / tile.blocks_x != line {
                     line = block / tile.blocks_x;
                     edges.resolve(s, &context, colors);
@@ -193,7 +193,7 @@ impl Brush {
                 #[inline(always)]
                 || {
                     let [r, g, b] = &colors[block * 4 + row];
-                    // Spelled out: a closure that is called thrice is compiled without the instruction set.
+                    // Written out: a closure that is called three times is compiled without the instruction set.
                     let r = encode(s, curve, load(s, r) * exposure).to_int();
                     let g = encode(s, curve, load(s, g) * exposure).to_int() * (1 << 8);
                     let b = encode(s, curve, load(s, b) * exposure).to_int() * (1 << 16);
@@ -209,8 +209,8 @@ impl Brush {
     }
 }
 
-/// Groups of 8 x 2 pixels of a tile that are inside of the picture: block, pair of rows, first pixel. Along the rows, not
-/// block after block: then pictures are written in few places at a time, which the machine's prefetching keeps up with.
+/// Groups of 8 x 2 pixels of a tile that are inside the image: block, pair of rows, first pixel. In the order of rows,
+/// not of blocks: then images are written in few places at a time, which the hardware prefetcher can follow.
 #[inline(always)]
 fn groups(tile: &Tile, [width, height]: [usize; 2]) -> impl Iterator<Item = (usize, usize, [usize; 2])> + use<> {
     let (wide, high) = (tile.blocks_x, tile.blocks_y);
@@ -223,7 +223,7 @@ fn groups(tile: &Tile, [width, height]: [usize; 2]) -> impl Iterator<Item = (usi
     })
 }
 
-/// Writes a group into a frame whose first row is `top` of the picture.
+/// Writes a group into a frame whose first row is row `top` of the image.
 #[inline(always)]
 fn write(
     frame: &mut FrameMut<'_>,

@@ -1,4 +1,4 @@
-//! Sixteen samples: which instances they see, and what each channel makes of it.
+//! Shading of sixteen samples: finds their instances, and computes each channel.
 
 use super::light::{ShadeContext, ViewRays, albedo, shade, sky};
 use super::mirror::{MirrorSamples, Mirrors};
@@ -15,27 +15,27 @@ use crate::simd::{
 use crate::visibility::Projection;
 use kinetoscope_scene::PoseF32;
 
-/// What the pixels of a frame have in common.
+/// State that all pixels of a frame share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Context<'a> {
     pub(crate) projection: &'a Projection,
-    /// The rays, where a lens bends them.
+    /// Rays of a lens that bends them.
     pub(crate) lens: Option<&'a LensRays>,
     pub(crate) poses: &'a [PoseF32],
     pub(crate) placed: &'a [Placed],
     pub(crate) shade: ShadeContext<'a>,
-    /// Surfaces that mirror, where there are some.
+    /// Mirroring surfaces, if the scene has any.
     pub(crate) mirrors: Option<Mirrors<'a>>,
-    /// Whether channels of [`Stage::Detail`](crate::frame::Stage::Detail) are wanted.
+    /// True if channels of [`Stage::Detail`](crate::frame::Stage::Detail) are rendered.
     pub(crate) detail: bool,
-    /// Whether channels of [`Stage::Albedo`](crate::frame::Stage::Albedo) are wanted.
+    /// True if channels of [`Stage::Albedo`](crate::frame::Stage::Albedo) are rendered.
     pub(crate) albedo: bool,
-    /// Where channels of [`Stage::Flow`](crate::frame::Stage::Flow) are wanted.
+    /// Motion vectors, if channels of [`Stage::Flow`](crate::frame::Stage::Flow) are rendered.
     pub(crate) moves: Option<&'a Moves>,
 }
 
 impl<'a> Context<'a> {
-    /// The instance that an id belongs to.
+    /// Index of the instance that an id belongs to; `last` is tried first.
     #[inline(always)]
     pub(crate) fn instance(&self, id: u32, last: usize) -> usize {
         let first = self.shade.scene.first_ids();
@@ -59,15 +59,15 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Linear colours of sixteen samples.
+/// Linear colors of sixteen samples.
 pub(crate) type Colors = [[f32; LANES]; 3];
 
-/// Where sixteen samples are in the picture.
+/// Positions of sixteen samples in the image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum At<'a> {
-    /// In the middle of 8 x 2 pixels, of which this is the first.
+    /// Centers of 8 x 2 pixels, the first of which is given.
     Pixels([usize; 2]),
-    /// At these u and v.
+    /// Points given by u and v \[pixels\].
     Points([&'a [f32; LANES]; 2]),
 }
 
@@ -75,14 +75,14 @@ impl At<'_> {
     #[inline(always)]
     fn uv<S: Simd>(self, s: S) -> [F<S>; 2] {
         match self {
-            // Not from memory: numbers that were just written one by one are waited for.
+            // Computed instead of loaded: a load would wait for numbers that were just written one by one.
             Self::Pixels([x, y]) => [load(s, &COLUMN) + (x as f32 + 0.5), load(s, &ROW) + (y as f32 + 0.5)],
             Self::Points([u, v]) => [load(s, u), load(s, v)],
         }
     }
 }
 
-/// Resolves sixteen samples: geometry into `pixels`, colour into `colors`, each only if wanted.
+/// Shades sixteen samples: geometry into `pixels`, color into `colors`, each only if given.
 ///
 /// One copy per instruction set, so its arguments are in memory.
 #[inline(never)]
@@ -125,10 +125,10 @@ fn resolve_lanes<S: Simd>(
     };
     let mut length = direction.dot(direction).sqrt();
     if bent.is_some() {
-        // There are pixels without a ray.
+        // Some pixels have no ray.
         length = select(length.simd_gt(zero), length, one);
     }
-    // What a number along a ray means for depths.
+    // Conversion from distances along a ray to depths.
     let forward = context.lens.is_none_or(LensRays::is_forward);
     let ray = bent.map(|ray| Ray { direction: ray, forward });
     let rays = CameraRays { uv, bent: ray, direction };
@@ -146,7 +146,7 @@ fn resolve_lanes<S: Simd>(
             color = horizon.over_sky(s, view, color);
         }
     }
-    // Kept in memory, where they are wanted: registers are for what everybody wants.
+    // Optional channels are kept in memory; registers are for the common channels.
     if let Some(pixels) = pixels.as_mut().filter(|_| context.albedo) {
         pixels.albedo = [[0; 4]; LANES];
     }
@@ -210,18 +210,18 @@ fn resolve_lanes<S: Simd>(
     }
     if let Some(colors) = &mut colors {
         if let Some(ray) = bent {
-            // Outside of the image circle no light falls.
+            // No light falls outside of the image circle.
             color = V3::select(ray.dot(ray).simd_gt(zero), color, none);
         }
         store_v3(color, colors);
     }
 }
 
-/// Some linear colours as bytes, opaque.
+/// Stores linear colors of some lanes as sRGB bytes, opaque.
 #[inline(always)]
 fn store_bytes<S: Simd>(s: S, color: V3<S>, lanes: M<S>, to: &mut [[u8; 4]; LANES]) {
     let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
-    // Spelled out: a closure that is called thrice is compiled without the instruction set.
+    // Written out: a closure that is called three times is compiled without the instruction set.
     let r = to_srgb(s, min(max(color.x, zero), one)).to_int();
     let g = to_srgb(s, min(max(color.y, zero), one)).to_int() * (1 << 8);
     let b = to_srgb(s, min(max(color.z, zero), one)).to_int() * (1 << 16);

@@ -1,9 +1,9 @@
-//! Haze at the end of an endless ground, as MuJoCo's renderer draws it: two cones around the camera that meet in the circle
-//! where the ground ends. Colours are mixed as numbers of the screen.
+//! Haze at the end of an infinite ground, as in MuJoCo's renderer: two cones around the camera that meet in the circle
+//! where the ground ends. Colors are mixed in sRGB.
 //!
-//! The formula was fitted to pictures of MuJoCo 4 on OSMesa. In a frame where the ground ends at the distance 1 and the camera
-//! has the height 1, the lower cone goes from opaque at (1, 0) to clear at (1 - w², -w) for a width w, and the upper one to
-//! clear at (1 + w, 1).
+//! The formula was fitted to images of MuJoCo 4 on OSMesa. In a frame where the ground ends at the distance 1 and the
+//! camera has the height 1, the lower cone goes from opaque at (1, 0) to clear at (1 - w², -w) for a width w, and the
+//! upper one to clear at (1 + w, 1).
 
 use super::tone::{decode_bytes, to_bytes};
 use crate::simd::{F, M, Simd, V3, max, root, select, splat};
@@ -13,18 +13,19 @@ use kinetoscope_scene::{Instance, PoseF32, RenderScene};
 /// The haze of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Horizon {
-    /// The instance that is the ground.
+    /// Index of the ground's instance.
     pub(crate) ground: usize,
     up: [f32; 3],
     /// Distance where the ground ends, in heights of the camera above it.
     radius: f32,
-    /// Colour, 0..=255.
+    /// Color, 0..=255.
     color: [f32; 3],
     width: f32,
 }
 
 impl Horizon {
-    /// The haze seen from a point; `None` where the scene has none, no endless plane, or the point is below it.
+    /// The haze seen from a point; `None` if the scene has no haze or no infinite plane, or if the point is below the
+    /// plane.
     pub(crate) fn of(
         scene: &RenderScene,
         poses: &[PoseF32],
@@ -49,7 +50,7 @@ impl Horizon {
     fn opacity<S: Simd>(&self, s: S, view: V3<S>) -> (F<S>, M<S>) {
         let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
         let down = -view.dot(V3::splat(s, self.up));
-        // Below the horizon by p / q times the slope to the end of the ground.
+        // Below the horizon, by p / q times the slope to the end of the ground.
         let (p, q) = (max(down, zero) * self.radius, root(s, one - down * down));
         let both = max(q + p * self.width, splat(s, 1e-30));
         let near = max(one - (p - q) / (both * self.width.max(1e-6)), zero);
@@ -72,7 +73,7 @@ impl Horizon {
         V3::select(opacity.simd_gt(splat(s, 0.0)), hazy, color)
     }
 
-    /// The haze before the sky in a direction (unit).
+    /// Blends the haze over the sky in a direction (unit).
     #[inline(never)]
     pub(crate) fn over_sky<S: Simd>(&self, s: S, view: V3<S>, sky: V3<S>) -> V3<S> {
         s.vectorize(
@@ -84,7 +85,7 @@ impl Horizon {
         )
     }
 
-    /// The haze before the ground in a direction (unit). Beyond its end the sky is seen.
+    /// Blends the haze over the ground in a direction (unit). Beyond its end the sky is visible.
     #[inline(always)]
     pub(crate) fn over_ground<S: Simd>(&self, s: S, view: V3<S>, ground: V3<S>, sky: impl Fn() -> V3<S>) -> V3<S> {
         let (opacity, beyond) = self.opacity(s, view);

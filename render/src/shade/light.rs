@@ -1,4 +1,4 @@
-//! How much light of which colour a surface sends to the camera.
+//! Shading of the rasterizer: light that a surface reflects towards the camera.
 
 use super::horizon::Horizon;
 use super::shadow::ShadowMap;
@@ -9,21 +9,21 @@ use crate::simd::{F, M, Simd, V3, abs, max, min, root, select, splat};
 use kinetoscope_scene::{Light, LightKind, LightSum, Material, RenderScene, Texture};
 use std::sync::Arc;
 
-/// The largest number of lamps that are drawn.
+/// Largest number of lights.
 pub(crate) const MAX_LIGHTS: usize = 16;
 
 /// A light prepared for a frame.
 #[derive(Clone, Copy, Debug)]
 struct Lamp {
     light: Light,
-    /// Unit vector along which it shines.
+    /// Unit vector along which the light shines.
     along: [f32; 3],
     cutoff_cos: f32,
     exponent: u32,
     shadow: Option<usize>,
 }
 
-/// What colours need besides the surface, prepared once per frame.
+/// Inputs of shading besides the surface, prepared once per frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lighting {
     lamps: Vec<Lamp>,
@@ -32,25 +32,25 @@ pub(crate) struct Lighting {
     nadir: [f32; 3],
     skybox: Option<Arc<Texture>>,
     haze: Option<[f32; 3]>,
-    /// Haze at the end of the ground, where there is some.
+    /// Haze at the end of the ground, if the scene has any.
     pub(crate) ground_haze: Option<Horizon>,
-    /// True if the headlight is one of the lamps: of MuJoCo's light it is directional.
+    /// True if the headlight is one of the lights: in MuJoCo's light model it is directional.
     headlight_is_lamp: bool,
 }
 
-/// Lighting and settings from which surfaces are shaded.
+/// Lighting and settings for shading surfaces.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadeContext<'a> {
     pub(crate) scene: &'a RenderScene,
     pub(crate) lighting: &'a Lighting,
     pub(crate) shadows: &'a [ShadowMap],
-    /// Instead of maps.
+    /// Shadow rays, used instead of shadow maps.
     pub(crate) shadow_rays: Option<ShadowRays<'a>>,
-    /// Width of a pixel at depth 1 (behind lenses whose rays go aside, at distance 1).
+    /// Width of a pixel at depth 1 (for lenses whose rays do not all go forward, at distance 1).
     pub(crate) pixel: f32,
 }
 
-/// Rays on which surfaces are seen.
+/// Viewing rays of the shaded surfaces.
 #[derive(Clone, Copy)]
 pub(crate) struct ViewRays<S: Simd> {
     /// Unit vector away from the camera, world frame.
@@ -64,7 +64,7 @@ pub(crate) fn unit(v: [f32; 3]) -> [f32; 3] {
     if length > 0.0 && length.is_finite() { v.map(|x| x / length) } else { [0., 0., -1.] }
 }
 
-/// The cosine of an angle in degrees, by its series: `cos()` is not the same on every machine.
+/// Cosine of an angle in degrees, by its series: `cos()` differs from machine to machine.
 pub(crate) fn cos_deg(deg: f32) -> f32 {
     let x = f64::from(deg.clamp(0.0, 180.0)) * (std::f64::consts::PI / 180.0);
     let (mut sum, mut term) = (1.0f64, 1.0f64);
@@ -76,8 +76,8 @@ pub(crate) fn cos_deg(deg: f32) -> f32 {
 }
 
 impl Lamp {
-    /// The direction to the lamp (unit) and how much of its light reaches points, without shadows; `None` where it lights
-    /// none of them.
+    /// Direction to the light (unit) and the fraction of its light that reaches points, without shadows; `None` if no
+    /// point is lit.
     #[inline(always)]
     fn reaches<S: Simd>(&self, s: S, position: V3<S>, lanes: M<S>) -> Option<(V3<S>, F<S>)> {
         let (light, zero, one) = (&self.light, splat(s, 0.0), splat(s, 1.0));
@@ -89,8 +89,8 @@ impl Lamp {
         let square = to.dot(to);
         let axis = -to.dot(V3::splat(s, self.along));
         let is_spot = matches!(light.kind, LightKind::Spot { .. });
-        // Most of a floor is outside of a cone, and needs no root to know it. A little more than the cone, so that what a
-        // point gets does not depend on the points beside it.
+        // Most of a floor is outside of a spot's cone; this test needs no square root. It is slightly wider than the
+        // cone, so that the light of a point does not depend on its neighbors.
         if is_spot && self.cutoff_cos > 0.0 {
             let least = square * (self.cutoff_cos * self.cutoff_cos * 0.9999);
             if !(lanes & axis.simd_gt(zero) & (axis * axis).simd_ge(least)).any_true() {
@@ -115,7 +115,7 @@ impl Lamp {
 }
 
 impl Lighting {
-    /// `forward` is the camera's viewing direction, of a camera that has one.
+    /// Prepares the lighting of a frame. `forward` is the camera's viewing direction, for cameras that have one.
     pub(crate) fn prepare(
         &mut self,
         scene: &RenderScene,
@@ -154,7 +154,7 @@ impl Lighting {
     }
 }
 
-/// The exponent of a spot as it is drawn: the nearest whole number, up to OpenGL's largest.
+/// The exponent of a spot, rounded to an integer, up to OpenGL's largest.
 pub(crate) fn whole_exponent(exponent: f32) -> u32 {
     (exponent.clamp(0.0, 128.0) + 0.5) as u32
 }
@@ -162,12 +162,12 @@ pub(crate) fn whole_exponent(exponent: f32) -> u32 {
 /// Highlights weaker than this are black: a third of the weakest light that is not black on a screen.
 const FAINT: f32 = 1e-4;
 
-/// The numbers whose power is [`FAINT`], by exponent: below them there is no highlight to compute.
+/// Numbers whose power is [`FAINT`], by exponent: below them, no highlight is computed.
 const FAINT_ROOT: [f32; 129] = {
     let mut roots = [0.0f32; 129];
     let mut exponent = 1;
     while exponent < roots.len() {
-        // Halving the interval: a constant is computed the same on every machine.
+        // By bisection: a constant is computed the same on every machine.
         let (mut low, mut high) = (0.0f32, 1.0f32);
         let mut halvings = 0;
         while halvings < 24 {
@@ -190,7 +190,7 @@ const FAINT_ROOT: [f32; 129] = {
     roots
 };
 
-/// How a surface shines.
+/// Specular highlight of a surface.
 #[derive(Clone, Copy)]
 struct Gloss {
     strength: f32,
@@ -200,14 +200,14 @@ struct Gloss {
 }
 
 impl Gloss {
-    /// A metal mirrors lamps as it does everything, whatever `specular` says of what is not metal.
+    /// A metal mirrors lights as it mirrors everything, whatever the `specular` of its nonmetallic part.
     fn of(material: &Material, display: bool) -> Self {
         let exponent = (material.exponent() + 0.5) as u32;
         let strength = if material.metallic > 0.0 && !display { 1.0 } else { material.specular };
         Self { strength, exponent, faint: FAINT_ROOT[exponent as usize] }
     }
 
-    /// Whether it shines in a light of this colour.
+    /// True if the highlight is visible in a light of this specular color.
     fn shows(&self, specular: [f32; 3]) -> bool {
         self.strength != 0.0 && specular.iter().any(|&x| x != 0.0)
     }
@@ -227,7 +227,7 @@ fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
     result
 }
 
-/// The sky in a direction (unit). `pixel` is the width of a pixel at depth 1.
+/// Sky color in a direction (unit). `pixel` is the width of a pixel at depth 1.
 #[inline(always)]
 pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>, pixel: f32) -> V3<S> {
     if let Some(image) = &lighting.skybox {
@@ -245,7 +245,7 @@ pub(crate) fn sky<S: Simd>(s: S, lighting: &Lighting, direction: V3<S>, pixel: f
     V3 { x: mix(0), y: mix(1), z: mix(2) }
 }
 
-/// The image around everything in a direction: a cube map whose y is up.
+/// Skybox color in a direction: a cube map whose y is up.
 #[inline(never)]
 fn skybox<S: Simd>(s: S, image: &Texture, direction: V3<S>, pixel: f32) -> V3<S> {
     s.vectorize(
@@ -259,7 +259,7 @@ fn skybox<S: Simd>(s: S, image: &Texture, direction: V3<S>, pixel: f32) -> V3<S>
     )
 }
 
-/// The colour of a surface, linear. `tint` multiplies the colour of the surface, but not its highlights.
+/// Linear color of a surface. `tint` multiplies the color of the surface, but not its highlights.
 #[inline(always)]
 pub(crate) fn shade<S: Simd>(
     s: S,
@@ -282,7 +282,7 @@ pub(crate) fn shade<S: Simd>(
     let base = if tint == 1.0 { base } else { base.scale(splat(s, tint)) };
     let zero = splat(s, 0.0);
     let n = at.shading;
-    // Ambient: between ground and sky by the normal's height.
+    // Ambient light: interpolated between ground and sky by the normal's height.
     let up = n.z * 0.5 + 0.5;
     let (sky_light, ground) = (scene.ambient.sky, scene.ambient.ground);
     let ambient = {
@@ -292,7 +292,7 @@ pub(crate) fn shade<S: Simd>(
     let mut diffuse = [ambient(0), ambient(1), ambient(2)];
     if let Some(rays) = shadow_rays.filter(|rays| rays.occlusion_rays > 0) {
         let [above, below] = rays.blocked(s, at.point(), n, lanes);
-        // What is counted with rays may be more than there is: light is never taken twice.
+        // The occluded fractions are estimates: they are limited to the light that is there.
         let (above, below) = (min(above, up), min(below, splat(s, 1.0) - up));
         for (k, diffuse) in diffuse.iter_mut().enumerate() {
             *diffuse = *diffuse - above * sky_light[k] - below * ground[k];
@@ -358,11 +358,11 @@ pub(crate) fn shade<S: Simd>(
         }
     };
     let mut color = if display {
-        // OpenGL's sum ends at 1.
+        // OpenGL clamps the sum at 1.
         let sum = plain(gloss);
         V3 { x: display_light(s, sum.x), y: display_light(s, sum.y), z: display_light(s, sum.z) }
     } else if material.metallic > 0.0 {
-        // What it mirrors, in its colour, and its own light; of a scene without a mirror, the sky.
+        // Mirrored light, tinted by the metal's color, and emission; without a traced mirror, the sky is mirrored.
         let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)), pixel);
         let metal = V3 {
             x: base.x * (mirrored.x + gloss[0] + material.emission),
@@ -387,13 +387,13 @@ pub(crate) fn shade<S: Simd>(
     color
 }
 
-/// Linear light of an sRGB number, cut to 0..=1.
+/// Linear light of an sRGB value, clamped to 0..=1.
 #[inline(always)]
 fn display_light<S: Simd>(s: S, x: F<S>) -> F<S> {
     tone::decode_bytes(min(max(x, splat(s, 0.0)), splat(s, 1.0)) * 255.0)
 }
 
-/// The colour of the surface itself, linear.
+/// Linear base color of a surface.
 #[inline(always)]
 pub(crate) fn albedo<S: Simd>(
     s: S,
@@ -405,7 +405,7 @@ pub(crate) fn albedo<S: Simd>(
 ) -> V3<S> {
     let flat = source.color;
     let Some(bytes) = texels(s, source, at, view, pixel, lanes) else { return V3::splat(s, flat) };
-    // Spelled out: a closure is compiled without the instruction set where the compiler does not inline it.
+    // Written out: a closure that is not inlined is compiled without the instruction set.
     V3 {
         x: tone::decode_bytes(bytes[0]) * flat[0],
         y: tone::decode_bytes(bytes[1]) * flat[1],
@@ -413,7 +413,7 @@ pub(crate) fn albedo<S: Simd>(
     }
 }
 
-/// The colour of the surface itself, as numbers of the screen (sRGB, 0..=1).
+/// Base color of a surface in sRGB, 0..=1.
 #[inline(always)]
 fn display_albedo<S: Simd>(s: S, source: &Source<'_>, at: &Surface<S>, view: V3<S>, pixel: f32, lanes: M<S>) -> V3<S> {
     let [r, g, b, _] = source.instance.material.rgba;
@@ -433,7 +433,7 @@ fn texels<S: Simd>(
 ) -> Option<[F<S>; 3]> {
     let instance = source.instance;
     let image = instance.material.texture.as_deref()?;
-    // The width of a pixel on the surface: between its narrow and its wide side where it is seen at a slant.
+    // Width of a pixel on the surface: between its narrow and its wide side for slanted surfaces.
     let slant = max(-at.normal.dot(view), splat(s, 0.02));
     let width = at.along * pixel / root(s, slant);
     let scale = source.texture_scale;

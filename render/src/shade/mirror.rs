@@ -1,5 +1,5 @@
-//! Planar mirrors of pictures that are shaded without paths: one ray from each sample that shows a mirror, and the shading of
-//! the rasterizer where it ends. Mirrors in mirrors show their own colour.
+//! Planar mirrors of rasterized images: one ray from each sample on a mirror, shaded by the rasterizer at its hit. A
+//! mirror seen in a mirror shows its own color.
 
 use super::group::{Colors, Context};
 use super::light::{ViewRays, shade, sky};
@@ -17,33 +17,33 @@ use kinetoscope_scene::vector::{along, dot, scale, sub, to_f64};
 use kinetoscope_scene::{Instance, LightSum, RenderScene};
 use std::cell::RefCell;
 
-/// Surfaces that are not opaque that a mirrored ray goes through, at most.
+/// Largest number of transparent surfaces that a mirrored ray passes.
 const MAX_PASSES: usize = 16;
-/// Rays go on this part of their coordinates past a surface.
+/// Offset of rays past a surface, as a fraction of the largest coordinate.
 const PAST: f64 = 1e-7;
-/// Light that is weaker than this part is not followed.
+/// A ray ends if less than this fraction of the light is left.
 const FAINT: f32 = 1e-3;
 
-/// Surfaces that mirror, and a thread's scratch memory.
+/// Mirroring surfaces of the scene, and a thread's scratch memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mirrors<'a> {
     pub(crate) tracer: &'a Tracer,
     pub(crate) stack: &'a RefCell<&'a mut Stack>,
-    /// The first instance that mirrors.
+    /// Index of the first instance that mirrors.
     pub(crate) first: usize,
     /// True if no other instance mirrors, as in MuJoCo's renderer.
     pub(crate) only_first: bool,
-    /// A box around everything that mirrored rays may meet; `None` if they may meet something without an end.
+    /// Bounding box of the objects that mirrored rays may hit; `None` if one of them is unbounded.
     pub(crate) reach: Option<Reach>,
 }
 
-/// A box around what mirrored rays may meet, larger by what single precision may miss: the rays of most of a floor miss it, and
-/// are not followed.
+/// Bounding box of the objects that mirrored rays may hit, enlarged by the error of single precision. Rays that miss
+/// the box, as from most of a floor, are not traced.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reach([[f32; 3]; 2]);
 
 impl Reach {
-    /// Part of the size and of the coordinates by which the box is larger.
+    /// Enlargement of the box, as a fraction of its size and coordinates.
     const MARGIN: f64 = 1e-3;
 
     pub(crate) fn new([lo, hi]: [[f64; 3]; 2]) -> Self {
@@ -51,7 +51,7 @@ impl Reach {
         Self([lo.map(|x| (x - pad) as f32), hi.map(|x| (x + pad) as f32)])
     }
 
-    /// Lanes whose rays, from `origin` in a direction of any length, may meet what is in the box.
+    /// Lanes whose rays, from `origin` in a direction of any length, may hit the box.
     #[inline(always)]
     fn may_meet<S: Simd>(&self, s: S, origin: V3<S>, direction: V3<S>) -> M<S> {
         let [lo, hi] = &self.0;
@@ -71,7 +71,7 @@ impl Reach {
     }
 }
 
-/// Share that an instance mirrors where it is a planar mirror, 0..=1; 0 of other shapes and of what is not opaque.
+/// Reflectance of an instance that is a planar mirror, 0..=1; 0 for other shapes and transparent instances.
 pub(crate) fn reflectance(instance: &Instance) -> f32 {
     let material = &instance.material;
     match instance.shape {
@@ -80,28 +80,28 @@ pub(crate) fn reflectance(instance: &Instance) -> f32 {
     }
 }
 
-/// Samples that show a mirror.
+/// Samples on a mirror.
 #[derive(Clone, Copy)]
 pub(crate) struct MirrorSamples<S: Simd> {
     pub(crate) point: SurfacePoint<S>,
     /// Unit vector of the ray from the camera, world frame.
     pub(crate) view: V3<S>,
-    /// Metres along the ray for each unit of the point's depth.
+    /// Meters along the ray per unit of the point's depth.
     pub(crate) length: F<S>,
-    /// The mirror's own colour.
+    /// Color of the mirror without reflections.
     pub(crate) color: V3<S>,
 }
 
-/// A mirrored ray, and how far it was followed \[m\].
+/// A mirrored ray, and the distance \[m\] traced so far.
 #[derive(Clone, Copy, Debug)]
 struct Reflected {
     ray: Ray,
     travelled: f64,
-    /// The part of the light that nothing took yet.
+    /// Fraction of the light that is left.
     left: f32,
 }
 
-/// Surfaces at some lanes, one by one.
+/// Surfaces in lanes that are set one by one.
 #[derive(Clone, Debug)]
 struct Lanes {
     positions: [[f32; LANES]; 3],
@@ -124,7 +124,7 @@ impl Lanes {
         distances: [1.0; LANES],
     };
 
-    /// Sets a lane to what a ray met.
+    /// Sets a lane to the hit of a ray.
     fn set(&mut self, k: usize, scene: &RenderScene, reflected: &Reflected, hit: &Hit) {
         let (ray, pose) = (&reflected.ray, &hit.world_from_instance);
         let position = ray.at(hit.distance);
@@ -174,11 +174,11 @@ impl Mirrors<'_> {
         index == self.first || index > self.first && !self.only_first && reflectance(instance) > 0.0
     }
 
-    /// The colour of a mirror with what it reflects.
+    /// Color of a mirror with its reflection.
     ///
-    /// Of linear light, `(1 - r) color + r mirrored`; the sky is mirrored, too. Of MuJoCo's, `color + mirrored` in numbers of the
-    /// screen, where the colours of surfaces, but not their highlights, are multiplied by r before they are lit; the sky is not
-    /// mirrored.
+    /// In linear light, `(1 - r) color + r mirrored`; the sky is mirrored too. In MuJoCo's light model, `color +
+    /// mirrored` in sRGB, where the surface colors, but not their highlights, are multiplied by r before shading; the
+    /// sky is not mirrored.
     #[inline(never)]
     pub(crate) fn reflect<S: Simd>(
         &self,
@@ -230,7 +230,7 @@ impl Mirrors<'_> {
                         return color;
                     }
                     let hit = lanes & mask(s, met);
-                    // Spelled out: a closure that is called thrice is compiled without the instruction set.
+                    // Written out: a closure that is called three times is compiled without the instruction set.
                     let lit = V3 { x: add(s, color.x, sum.x), y: add(s, color.y, sum.y), z: add(s, color.z, sum.z) };
                     return V3::select(hit, lit, color);
                 }
@@ -241,7 +241,7 @@ impl Mirrors<'_> {
         )
     }
 
-    /// Adds up what mirrored rays meet, as linear light or as bytes of a display; returns the lanes that meet something.
+    /// Adds up the colors that mirrored rays hit, as linear light or as sRGB bytes; returns the lanes with a hit.
     /// `tint` is that of [`shade`].
     #[inline(always)]
     fn follow<S: Simd>(
@@ -313,7 +313,7 @@ impl Mirrors<'_> {
         met
     }
 
-    /// The next surface along a mirrored ray: not the back of something that is not opaque.
+    /// The next surface along a mirrored ray, without backs of transparent surfaces.
     #[inline(always)]
     fn next<S: Simd>(&self, s: S, scene: &RenderScene, reflected: &mut Reflected, stack: &mut Stack) -> Option<Hit> {
         for _ in 0..MAX_PASSES {
@@ -329,7 +329,7 @@ impl Mirrors<'_> {
 }
 
 impl Reflected {
-    /// Goes on past a surface.
+    /// Moves the ray past a surface.
     fn pass(&mut self, distance: f64) {
         let far = self.ray.origin.iter().fold(distance.max(1.0), |m, x| m.max(x.abs()));
         let onward = distance + PAST * far;
@@ -338,7 +338,7 @@ impl Reflected {
     }
 }
 
-/// The lanes of some bits.
+/// Mask of the lanes in `bits`.
 #[inline(always)]
 fn mask<S: Simd>(s: S, bits: u64) -> M<S> {
     let mut set = [0.0f32; LANES];
@@ -348,7 +348,7 @@ fn mask<S: Simd>(s: S, bits: u64) -> M<S> {
     load(s, &set).simd_gt(splat(s, 0.5))
 }
 
-/// Linear light of the sum of linear light and of bytes of a display, which ends at white.
+/// Linear light of a sum of linear light and of sRGB bytes, clamped at white.
 #[inline(always)]
 fn add<S: Simd>(s: S, light: F<S>, byte: F<S>) -> F<S> {
     decode_bytes(min(max(to_bytes(s, light) + byte, splat(s, 0.0)), splat(s, 255.0)))

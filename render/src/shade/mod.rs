@@ -1,6 +1,6 @@
-//! From the visibility buffer to channels: every channel is computed from the same hit.
+//! Shading: from the visibility buffer to channels. All channels are computed from the same hit.
 //!
-//! Colour is computed in linear light; `tone` says how it reaches the screen.
+//! Color is computed in linear light; `tone` converts it for the screen.
 
 pub(crate) mod band;
 pub(crate) mod group;
@@ -17,5 +17,5 @@ pub(crate) mod surface;
 pub(crate) mod texture;
 pub(crate) mod tone;
 
-/// Samples in a band of the picture, at most about: it stays in a core's own cache (8 bytes each).
+/// Approximate largest number of samples in a band of the image: it stays in a core's own cache (8 bytes each).
 pub(crate) const BAND: usize = 128 * 1024;

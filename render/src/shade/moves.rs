@@ -1,4 +1,4 @@
-//! Where things were when the picture before was taken.
+//! Motion vectors: poses in the previous frame, and optical flow.
 
 use crate::intrinsics::PixelIntrinsics;
 use crate::lens::optics::Optics;
@@ -8,15 +8,15 @@ use crate::simd::{F, LANES, M, Simd, V3, load, select, splat};
 use crate::visibility::{RenderError, View};
 use kinetoscope_scene::PoseF32;
 
-/// How instances moved against the camera; keeps its memory.
+/// Motion of instances relative to the camera since the previous frame; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Moves {
     list: Vec<Move>,
-    /// Where the picture before saw what; `None` where there is none.
+    /// Projection of the previous frame; `None` without one.
     eye: Option<Eye>,
 }
 
-/// Where a camera sees a point of its optical frame.
+/// Projection from a camera's optical frame to pixels.
 #[expect(clippy::large_enum_variant, reason = "there is one for a picture; a box would be an allocation for each")]
 #[derive(Clone, Copy, Debug)]
 enum Eye {
@@ -25,12 +25,12 @@ enum Eye {
     Lens(Optics),
 }
 
-/// How one instance moved.
+/// Motion of one instance.
 #[derive(Clone, Copy, Debug)]
 struct Move {
-    /// Neither it nor the camera moved, and the lens is the same.
+    /// True if neither the instance nor the camera moved, and the lens is the same.
     still: bool,
-    /// The camera of the picture before, from the instance.
+    /// Camera of the previous frame, from the instance.
     camera_from_instance: PoseF32,
 }
 
@@ -39,11 +39,11 @@ impl Moves {
         self.list.capacity() * size_of::<Move>()
     }
 
-    /// Takes up where the instances of a shot were.
+    /// Stores the poses of the previous frame.
     ///
     /// # Errors
     ///
-    /// A picture before of another scene, or with a view or a pose that is no good.
+    /// For a previous frame of another scene, or with an invalid view or pose.
     pub(crate) fn prepare(&mut self, shot: &Shot<'_>) -> Result<(), RenderError> {
         self.list.clear();
         self.eye = None;
@@ -64,7 +64,7 @@ impl Moves {
             camera_from_instance: view.world_from_camera.inverse_times(before),
         }));
         let behind = |rays: &LensRays| {
-            // The rays' own numbers have more digits.
+            // The intrinsics of the rays have more digits.
             let [fx, fy, cx, cy] = then.map(f64::from);
             if then == now { *rays.optics() } else { rays.optics().with_pixels(PixelIntrinsics { fx, fy, cx, cy }) }
         };
@@ -72,8 +72,8 @@ impl Moves {
         Ok(())
     }
 
-    /// How far points of an instance, seen at (u, v), have moved; `local` is where they are in its frame. Of lanes that are
-    /// not `here` it says nothing of use.
+    /// Motion of points of an instance, seen at (u, v) \[pixels\]; `local` are their positions in its frame. Lanes
+    /// outside of `here` are undefined.
     #[inline(always)]
     pub(crate) fn of<S: Simd>(&self, s: S, instance: usize, local: V3<S>, [u, v]: [F<S>; 2], here: M<S>) -> [F<S>; 2] {
         let unknown = splat(s, f32::INFINITY);
@@ -96,7 +96,7 @@ impl Moves {
                 let [x, y, z]: [[f32; LANES]; 3] = [there.x, there.y, there.z].map(|axis| axis.array());
                 let [u, v]: [[f32; LANES]; 2] = [u, v].map(|axis| axis.array());
                 let mut flow = [[f32::INFINITY; LANES]; 2];
-                // One after the other, and some lenses take long: only what is wanted.
+                // Lane by lane, and only where needed: some lenses are slow.
                 let here = here.to_bitmask();
                 for lane in (0..LANES).filter(|lane| here >> lane & 1 == 1) {
                     let direction = [x[lane], y[lane], z[lane]].map(f64::from);

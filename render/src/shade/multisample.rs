@@ -1,13 +1,13 @@
-//! Colours of pixels whose four samples do not see the same: the mean of the samples.
+//! Multisampling: color of pixels whose four samples hit different surfaces, the mean of the samples.
 
 use super::group::{At, Colors, Context, resolve};
 use crate::raster::tile::{BLOCK, NOTHING, SAMPLES, Tile};
 use crate::simd::{LANES, Simd, load, load_u, splat_u, store};
 
-/// Requests that are resolved together, at most.
+/// Largest number of samples that are shaded together.
 const CAPACITY: usize = 1024;
 
-/// A colour to compute: for which pixel of which group, how many of its samples it stands for, where and of which id.
+/// A sample to be shaded: pixel (group and lane), number of samples it stands for (`weight`), id and position.
 #[derive(Clone, Copy, Debug)]
 struct Request {
     group: u32,
@@ -18,14 +18,14 @@ struct Request {
     v: f32,
 }
 
-/// Colours that pixels on edges still need. They are collected over many groups: there are few in each, and sixteen are
-/// computed at a time.
+/// Samples that pixels on edges still need. They are collected over many groups: each has few, and sixteen are shaded
+/// at a time.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Edges {
     requests: Vec<Request>,
 }
 
-/// Whether two ids of one pixel look different enough to need a colour each.
+/// True if two ids of one pixel look different enough to be shaded separately.
 #[inline(always)]
 fn differ(context: &Context<'_>, a: u32, b: u32, qa: f32, qb: f32, last: &mut usize) -> bool {
     if a == b {
@@ -40,7 +40,7 @@ fn differ(context: &Context<'_>, a: u32, b: u32, qa: f32, qb: f32, last: &mut us
         return true;
     }
     let Some(mesh) = context.placed[*last].mesh(&context.shade.scene.instances()[*last]) else { return true };
-    // Neighbouring triangles of a smooth surface look the same: same normal, same distance.
+    // Neighboring triangles of a smooth surface look the same: same normal, same distance.
     let corner = |id: u32| mesh.normals()[mesh.triangles()[(id - first[*last]) as usize][0] as usize];
     let (na, nb) = (corner(a), corner(b));
     let cosine = na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2];
@@ -52,13 +52,13 @@ impl Edges {
         self.requests.capacity() * size_of::<Request>()
     }
 
-    /// Takes the memory it will ever need: later pictures have more edges.
+    /// Reserves memory for the largest number of samples: later images have more edges.
     pub(crate) fn reserve(&mut self) {
         self.requests.reserve_exact(CAPACITY - self.requests.len());
     }
 
-    /// Finds the pixels of a group (two rows of a block, `row` counts pairs) that lie on an edge. What their centre sees
-    /// keeps its share of the colour; the rest is added by [`resolve`](Self::resolve).
+    /// Finds the pixels of a group (two rows of a block, `row` counts pairs) that lie on an edge. The center's surface
+    /// keeps its share of the color; [`resolve`](Self::resolve) adds the rest.
     #[inline(always)]
     pub(crate) fn collect<S: Simd>(
         &mut self,
@@ -122,10 +122,10 @@ impl Edges {
         }
     }
 
-    /// Computes what was collected, and adds it to the pixels.
+    /// Shades the collected samples, and adds them to the pixels.
     #[inline(always)]
     pub(crate) fn resolve<S: Simd>(&mut self, s: S, context: &Context<'_>, colors: &mut [Colors]) {
-        // By id: the same surfaces together. The rest makes the order one of a kind.
+        // Sorted by id, so that samples of a surface are together. The other keys make the order unique.
         self.requests.sort_unstable_by_key(|r| (r.id, r.group, r.lane));
         for batch in self.requests.chunks(LANES) {
             let (mut u, mut v, mut id) = ([batch[0].u; LANES], [batch[0].v; LANES], [NOTHING; LANES]);
@@ -145,7 +145,7 @@ impl Edges {
     }
 }
 
-/// Blends a layer over a group: `alpha` times the share of the samples that the layer covers.
+/// Blends a layer over a group: `alpha` times the fraction of samples that the layer covers.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
 pub(crate) fn blend<S: Simd>(

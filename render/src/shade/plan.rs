@@ -1,4 +1,4 @@
-//! What the parts of a picture have in common: what is drawn where, the lamps and their shadows.
+//! State that all bands of a frame share: draw list, lights and shadows.
 
 use super::BAND;
 use super::group::Context;
@@ -26,41 +26,41 @@ use crate::visibility::{Projection, RenderError, View};
 use kinetoscope_scene::{Instance, LightSum, PoseF32};
 use std::cell::RefCell;
 
-/// Lamps with a shadow, at most.
+/// Largest number of lights with a shadow map.
 const MAX_SHADOWS: usize = 4;
 
-/// A shot that is ready to be drawn, band by band; keeps its memory.
+/// A frame that is prepared for rendering, band by band; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Plan {
     pub(crate) list: DrawList,
     lighting: Lighting,
     moves: Moves,
     shadows: Vec<ShadowMap>,
-    /// How many of the maps are in use.
+    /// Number of maps in use.
     maps: usize,
-    /// Kinds of samples: 1, or 5 with multisampling.
+    /// Sample planes: 1, or 5 with multisampling.
     pub(crate) planes: usize,
-    /// The picture, while there is one.
+    /// Projection of the image; `None` if preparation failed.
     pub(crate) projection: Option<Projection>,
-    /// What rays meet, where some are cast.
+    /// Ray tracer, used if any rays are cast.
     pub(crate) tracer: Tracer,
     pub(crate) renderer: Renderer,
-    /// Whether what is seen is found by rays.
+    /// True if visibility is ray traced.
     pub(crate) sees_by_rays: bool,
-    /// Whether shadows are cast by rays.
+    /// True if shadows are ray traced.
     shadow_rays: bool,
-    /// Rays for ambient occlusion.
+    /// Rays per sample for ambient occlusion.
     occlusion_rays: u16,
-    /// The first instance that mirrors, of pictures with colours that are shaded without paths.
+    /// The first instance that mirrors, for rasterized color.
     first_mirror: Option<usize>,
     pub(crate) tone: ToneCurve,
-    /// What light is multiplied by before the tone curve.
+    /// Factor of light before the tone curve.
     pub(crate) exposure: f32,
-    /// The only row of each block that is wanted, if not all.
+    /// The only row of each block that is rendered; `None` for all rows.
     pub(crate) only: Option<usize>,
 }
 
-/// How shots are drawn.
+/// Settings of a renderer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Style<'a> {
     pub(crate) cfg: RasterCfg,
@@ -68,11 +68,11 @@ pub(crate) struct Style<'a> {
     pub(crate) aperture: Option<&'a Aperture>,
     pub(crate) shutter: Shutter,
     pub(crate) stops: f64,
-    /// Where trees over meshes are kept.
+    /// Cache of BVHs over meshes.
     pub(crate) assets: &'a RayAssets,
 }
 
-/// The most stops by which pictures are lighter or darker.
+/// Largest exposure compensation, in stops.
 const STOPS: f64 = 20.0;
 
 impl Plan {
@@ -83,7 +83,7 @@ impl Plan {
             + self.shadows.iter().map(ShadowMap::bytes).sum::<usize>()
     }
 
-    /// Checks a shot and finds what is drawn where. Shadows are not drawn yet, see [`Plan::shadow_bands`].
+    /// Validates a request and builds its draw list. Shadow maps are rendered later, see [`Plan::shadow_bands`].
     pub(crate) fn prepare(
         &mut self,
         style: Style<'_>,
@@ -97,7 +97,7 @@ impl Plan {
         self.prepare_part(style, shot, frame)
     }
 
-    /// As [`prepare`](Self::prepare), for one row of the picture; the frame is that of the row of blocks that it is in.
+    /// As [`prepare`](Self::prepare), for one row of the image; the frame covers the row of blocks that contains it.
     pub(crate) fn prepare_row(
         &mut self,
         style: Style<'_>,
@@ -176,7 +176,7 @@ impl Plan {
         Ok(())
     }
 
-    /// Prepares lamps and their shadows.
+    /// Prepares lights and their shadow maps.
     fn light(&mut self, cfg: RasterCfg, shot: &Shot<'_>) {
         let Shot { scene, poses, view, lights, lens, .. } = *shot;
         let lights = lights.unwrap_or(&scene.lights);
@@ -217,31 +217,32 @@ impl Plan {
         self.lighting.ground_haze = Horizon::of(scene, poses, view.world_from_camera.translation, shown);
     }
 
-    /// Whether there are shadow maps to draw.
+    /// True if there are shadow maps to render.
     pub(crate) fn has_shadows(&self) -> bool {
         self.maps > 0
     }
 
-    /// The parts of the shadow maps; all must be drawn before the picture.
+    /// Bands of the shadow maps; all must be rendered before the image.
     pub(crate) fn shadow_bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
         self.shadows.iter_mut().take(self.maps).flat_map(ShadowMap::bands)
     }
 
-    /// Samples of a tile that can hold any band of the shadow maps, of lamps too that cast no shadow now.
+    /// Samples of a tile that can hold any band of the shadow maps, including maps that are not in use now.
     pub(crate) fn most_of_shadow_bands(&self) -> usize {
         self.shadows.iter().map(ShadowMap::most_of_bands).max().unwrap_or(0)
     }
 
-    /// Rows of blocks that are drawn together.
+    /// Rows of blocks that are rendered together.
     pub(crate) fn rows(&self) -> usize {
         let Some(projection) = &self.projection else { return 1 };
         let blocks = [projection.width.div_ceil(BLOCK), projection.height.div_ceil(BLOCK)];
-        // Small pictures with many samples in halves, so that the scratch memory is not much larger than the picture.
+        // Small images with many samples are split in two, so that the scratch memory is not much larger than the
+        // image.
         let most = if self.planes > 1 { blocks[1].div_ceil(2) } else { blocks[1] };
         (BAND / (self.planes * blocks[0] * BLOCK * BLOCK)).clamp(1, most)
     }
 
-    /// What all pixels need; `detail`, `albedo` and `flow` say whether channels of these stages are wanted.
+    /// Context for shading pixels; the flags select the stages `detail`, `albedo` and `flow`.
     pub(crate) fn context<'a>(
         &'a self,
         shot: &Shot<'a>,
@@ -278,7 +279,11 @@ impl Plan {
     }
 }
 
-/// Whether a renderer casts rays for ambient occlusion, if it is to.
+/// Checks that a renderer supports the configured ambient occlusion.
+///
+/// # Errors
+///
+/// [`RenderError::Occlusion`] for occlusion rays of a renderer that casts none.
 pub fn check_occlusion(cfg: RasterCfg, renderer: Renderer) -> Result<(), RenderError> {
     match renderer {
         Renderer::Raster | Renderer::FastRayTraced if cfg.occlusion_rays > 0 => {
@@ -288,7 +293,11 @@ pub fn check_occlusion(cfg: RasterCfg, renderer: Renderer) -> Result<(), RenderE
     }
 }
 
-/// Whether a renderer can draw what a lens and a shutter do to light.
+/// Checks that a renderer supports the configured depth of field and exposure time.
+///
+/// # Errors
+///
+/// [`RenderError::NeedsPaths`] for a renderer without path tracing.
 pub fn check_light(renderer: Renderer, aperture: Option<&Aperture>, shutter: Shutter) -> Result<(), RenderError> {
     let what = match (aperture, shutter.is_instant()) {
         _ if renderer.follows_paths() => return Ok(()),
@@ -299,7 +308,7 @@ pub fn check_light(renderer: Renderer, aperture: Option<&Aperture>, shutter: Shu
     Err(RenderError::NeedsPaths { what, renderer: renderer.name() })
 }
 
-/// Whether the rays of a lens are those of the picture, and can be followed.
+/// Checks that a renderer supports lenses, and that the rays match the image.
 fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> Result<(), RenderError> {
     if !renderer.sees_by_rays(true) {
         let (lens, renderer) = (lens.optics().lens().name(), renderer.name());
@@ -312,7 +321,7 @@ fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> 
     Ok(())
 }
 
-/// Texels along the side of a shadow map: about three for two pixels of a square picture of the same area.
+/// Texels along the side of a shadow map: about three texels for two pixels of a square image of the same area.
 fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
     match cfg.shadow_size {
         0 => (view.width.saturating_mul(view.height).isqrt().min(1024) * 3 / 2).next_power_of_two().clamp(128, 1024),
@@ -320,7 +329,7 @@ fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
     }
 }
 
-/// Triangles of all meshes, each as coarse as it is drawn.
+/// Number of triangles of all meshes, at their level of detail.
 fn triangle_count(cfg: RasterCfg, shot: &Shot<'_>) -> usize {
     let Shot { scene, poses, view, .. } = *shot;
     if !cfg.lod {
@@ -335,7 +344,7 @@ fn triangle_count(cfg: RasterCfg, shot: &Shot<'_>) -> usize {
     scene.instances().iter().zip(poses).filter_map(count).sum()
 }
 
-/// How long a shot takes, about \[ns\]: to tell whether another thread is worth its start.
+/// Approximate time of a frame \[ns\]: decides if another thread pays off.
 pub(crate) fn estimate(cfg: RasterCfg, shot: &Shot<'_>, frame: &FrameMut<'_>) -> usize {
     let Shot { scene, view, .. } = *shot;
     let wants_color = frame.wants(Stage::Color);

@@ -1,4 +1,4 @@
-//! Shadow maps: what a lamp sees.
+//! Shadow maps: depth images from a light.
 
 use super::BAND;
 use super::shadow_fit::{Extent, LampView};
@@ -11,44 +11,44 @@ use crate::visibility::Projection;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{Instance, PoseF32, RenderScene};
 
-/// Depths from a lamp.
+/// Depths from a light.
 #[derive(Clone, Debug)]
 pub(crate) struct ShadowMap {
     projection: Projection,
-    /// What the lamp sees.
+    /// Casters in the light's view.
     list: DrawList,
-    /// Texels along a side before it was cut.
+    /// Texels along a side before cropping.
     side: usize,
-    /// Rotation from the world's axes to the lamp's.
+    /// Rotation from the world's axes to the light's.
     lamp_from_world: [[f32; 3]; 3],
-    /// A texel's width on a surface: at any depth, or at depth 1 for a spot.
+    /// Width of a texel on a surface \[m\]: at any depth, or at depth 1 for a spot.
     texel: f32,
-    /// Nearness of what the lamp sees at each texel, row by row: the taps of a point are together in four rows.
+    /// Nearness at each texel, row by row: the taps of a point are contiguous in four rows.
     nearness: Vec<f32>,
-    /// The smallest and the largest nearness in each block of texels: most points are lit, or not, by all of their texels.
+    /// Smallest and largest nearness in each block of texels: for most points, all texels are lit, or none.
     range: Vec<[f32; 2]>,
 }
 
-/// Rows of a map that are drawn together, and what is needed for that.
+/// Rows of a map that are rendered together, with their inputs.
 #[derive(Debug)]
 pub(crate) struct ShadowBand<'a> {
     projection: &'a Projection,
     list: &'a DrawList,
-    /// Which row of blocks is the first.
+    /// Index of the first row of blocks.
     first: usize,
-    /// Texels of a band, at most, however the map is cut.
+    /// Largest number of texels of a band, for any crop of the map.
     most: usize,
     nearness: &'a mut [f32],
     range: &'a mut [[f32; 2]],
 }
 
-/// Rows of blocks of a map that are drawn together. Of small maps a quarter, so that the scratch memory is smaller than the
-/// map.
+/// Rows of blocks of a map that are rendered together; a quarter of small maps, so that the scratch memory is smaller
+/// than the map.
 fn rows_of_bands([width, height]: [usize; 2]) -> usize {
     (BAND / (width * BLOCK)).min(height / BLOCK / 4).max(1)
 }
 
-/// Texels of a band, at most, however a map of `side` by `side` texels is cut.
+/// Largest number of texels of a band, for any crop of a map of `side` by `side` texels.
 fn most_of_bands(side: usize) -> usize {
     if side == 0 { 0 } else { rows_of_bands([side, side]) * BLOCK * side }
 }
@@ -83,8 +83,8 @@ impl ShadowMap {
         self.list.bytes() + size_of::<f32>() * (self.nearness.capacity() + 2 * self.range.capacity())
     }
 
-    /// Finds the casters that a lamp sees before `receivers`, on a map of up to `side` by `side` texels, without drawing them.
-    /// `false` where none of them is shaded.
+    /// Finds the casters between the light and the `receivers`, on a map of up to `side` by `side` texels, without
+    /// rendering them. Returns false if no caster shades a receiver.
     pub(super) fn prepare(
         &mut self,
         lamp: &LampView,
@@ -97,7 +97,7 @@ impl ShadowMap {
         let solid = |instance: &Instance| {
             Layer::casts_shadows(instance, cfg.groups) && instance.shape.aabb()[1].iter().all(|x| x.is_finite())
         };
-        // Room for the whole map and all casters from the beginning: what casts shadows moves, and memory must not grow with it.
+        // Reserves the whole map and all casters at once: casters move, and memory must not grow with it.
         let parts = if cfg.lod { Parts::Levels } else { Parts::Clusters };
         self.list.reserve(scene, parts, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
         self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
@@ -121,19 +121,19 @@ impl ShadowMap {
             return false;
         }
         let Projection { width, height, .. } = self.projection;
-        // All of it is written when it is drawn.
+        // Rendering overwrites all of it.
         self.nearness.resize(width * height, 0.0);
         self.range.resize((width / BLOCK) * (height / BLOCK), [0.0; 2]);
         true
     }
 
-    /// Samples of a tile that can hold any band of the map, even if there is no map now.
+    /// Samples of a tile that can hold any band of the map, even if the map is not in use now.
     pub(crate) fn most_of_bands(&self) -> usize {
         most_of_bands(self.side)
     }
 
-    /// Cuts the map to what is seen, and a block more on each side for the texels around a point: everything else is lit.
-    /// `false` where nothing is seen.
+    /// Crops the map to the visible casters, and one block more on each side for the texels around a point: everything
+    /// else is lit. Returns false if no caster is visible.
     fn crop(&mut self) -> bool {
         let Self { projection, list, .. } = self;
         let (mut lo, mut hi) = ([u16::MAX; 2], [0u16; 2]);
@@ -152,13 +152,13 @@ impl ShadowMap {
             item.rect = [x0 - lo[0], y0 - lo[1], x1 - lo[0], y1 - lo[1]];
         }
         [projection.width, projection.height] = [0, 1].map(|k| usize::from(hi[k] - lo[k] + 1) * BLOCK);
-        // Whole texels: the cut moves no texel over the surfaces.
+        // Whole texels: the crop moves no texel over the surfaces.
         projection.cx -= (usize::from(lo[0]) * BLOCK) as f32;
         projection.cy -= (usize::from(lo[1]) * BLOCK) as f32;
         true
     }
 
-    /// The map in parts that can be drawn one by one.
+    /// Bands of the map, which can be rendered independently.
     pub(crate) fn bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
         let Self { projection, list, nearness, range, side, .. } = self;
         let (projection, list) = (&*projection, &*list);
@@ -176,9 +176,9 @@ impl ShadowMap {
         })
     }
 
-    /// How much of the lamp's light reaches points, 0..=1: the mean over 3x3 texels, blended between them. The points are
-    /// moved off the surface first, by more than a texel, so that a surface does not shadow itself: and farther where it is
-    /// drawn coarser by up to `error` \[m\], or what casts the shadow is.
+    /// Fraction of the light that reaches points, 0..=1: the mean over 3x3 texels, interpolated between them. The
+    /// points are first moved off the surface by more than a texel, so that a surface does not shadow itself. They are
+    /// moved farther if the surface has a level of detail with an error up to `error` \[m\], or the caster has one.
     #[inline(always)]
     pub(crate) fn light<S: Simd>(&self, s: S, position: V3<S>, normal: V3<S>, error: f32, lanes: M<S>) -> F<S> {
         let p = &self.projection;
@@ -202,7 +202,7 @@ impl ShadowMap {
         if bits == 0 {
             return splat(s, 1.0);
         }
-        // Lanes that are not wanted look where one that is does.
+        // Lanes that are not wanted use the texels of a wanted lane.
         let some = bits.trailing_zeros() as usize % LANES;
         let x = select(wanted, x, splat(s, x.array()[some]));
         let y = select(wanted, y, splat(s, y.array()[some]));
@@ -213,7 +213,7 @@ impl ShadowMap {
         }
         let [x0, y0] = [(lo[0] as usize - 1) / BLOCK, (lo[1] as usize - 1) / BLOCK];
         let [x1, y1] = [(hi[0] as usize + 2) / BLOCK, (hi[1] as usize + 2) / BLOCK];
-        // Pixels far apart on the map would look at too many blocks.
+        // Pixels far apart on the map would read too many blocks.
         if (x1 + 1 - x0) * (y1 + 1 - y0) <= 12 {
             let (mut low, mut high) = (f32::MAX, f32::MIN);
             for row in y0..=y1 {
@@ -239,8 +239,8 @@ impl ShadowMap {
         load(s, &lit)
     }
 
-    /// Sixteen texels around a point. Exactly 1 where none of them is nearer, as if they had not been looked at (and where
-    /// those that are weigh less than a ninety-thousandth).
+    /// Filters sixteen texels around a point. The result is exactly 1 if no texel is nearer to the light, or if the
+    /// nearer ones weigh less than a ninety-thousandth: the same as without reading texels.
     #[inline(always)]
     fn taps(&self, [column, row]: [usize; 2], fx: f32, fy: f32, q: f32) -> f32 {
         let width = self.projection.width;
@@ -258,7 +258,7 @@ impl ShadowMap {
 }
 
 impl ShadowBand<'_> {
-    /// Draws the band, by way of a tile that stays in the cache.
+    /// Renders the band, by way of a tile that stays in the cache.
     pub(crate) fn draw(self, level: Level, scene: &RenderScene, tile: &mut Tile, painter: &mut Painter) {
         let Self { projection, list, first, most, nearness, range } = self;
         let wide = projection.width / BLOCK;
@@ -278,7 +278,7 @@ impl ShadowBand<'_> {
     }
 }
 
-/// Blocks into rows.
+/// Copies blocks into rows.
 #[inline(always)]
 fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2]]) {
     let side = tile.blocks_x * BLOCK;
@@ -294,7 +294,7 @@ fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2
             for (&l, &h) in lows.iter().zip(&highs) {
                 *range = [if l < range[0] { l } else { range[0] }, if h > range[1] { h } else { range[1] }];
             }
-            // Arrays: slices of a length that is not known are copied by a call.
+            // Arrays, because slices of unknown length are copied by a call.
             for (row, from) in block.as_chunks::<BLOCK>().0.iter().enumerate() {
                 if let Some(to) = lines[row * side + bx * BLOCK..].first_chunk_mut() {
                     *to = *from;

@@ -5,17 +5,18 @@ use crate::visibility::Projection;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{Instance, Light, LightKind, PoseF32, RenderScene};
 
-/// Texels around the covered part: for the taps around a point and for its offset along the normal.
+/// Margin around the covered part, in texels: for the taps around a point and for its offset along the normal.
 const ROOM: f32 = 6.0;
-/// Meshes are drawn coarser by up to this \[m\] (see [`RasterCfg::lod`](crate::request::RasterCfg::lod)), receivers and casters.
+/// Largest displacement of receivers and casters by their level of detail \[m\] (see
+/// [`RasterCfg::lod`](crate::request::RasterCfg::lod)).
 const DETAIL: f32 = 2e-3;
 /// Nearest depth of a spot's map \[m\].
 const SPOT_NEAR: f32 = 0.02;
 /// Largest half angle of a spot's map \[deg\].
 const SPOT_CUTOFF: f32 = 75.0;
 
-/// A range of coordinates on a light's image plane and along its axis. Of a directional light x and y are lengths \[m\], of a
-/// spot they are divided by the depth.
+/// A range of coordinates on a light's image plane and along its axis. For a directional light, x and y are lengths
+/// \[m\]; for a spot, they are divided by the depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Extent {
     lo: [f32; 3],
@@ -49,20 +50,20 @@ impl Extent {
     /// The part of this caster's extent whose shadow may fall into `other`.
     fn shading(&self, other: &Self) -> Self {
         let mut out = self.meet(other);
-        // The caster may begin and end anywhere before the receiver.
+        // The caster may have any depth in front of the receiver.
         (out.lo[2], out.hi[2]) = (self.lo[2], self.hi[2]);
         if self.lo[2] > other.hi[2] { Self::EMPTY } else { out }
     }
 }
 
-/// A light that casts shadows, as its map sees the world.
+/// View of a light that casts shadows, for its map.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LampView {
     parallel: bool,
     position: [f32; 3],
     /// World from light; the columns are the light's axes, the last one along its direction.
     pub(super) rotation: [[f32; 3]; 3],
-    /// The part that the light can reach.
+    /// Range that the light can reach.
     cone: Extent,
 }
 
@@ -77,12 +78,12 @@ fn frame_along(z: [f32; 3]) -> [[f32; 3]; 3] {
     let b = z[0] * z[1] * a;
     let x = [1.0 + sign * z[0] * z[0] * a, sign * b, -sign * z[0]];
     let y = [b, sign + z[1] * z[1] * a, -z[1]];
-    // Columns are the axes.
+    // The columns are the axes.
     [0, 1, 2].map(|k| [x[k], y[k], z[k]])
 }
 
 impl LampView {
-    /// The view of a light; `None` for lights whose shadows are not drawn into maps.
+    /// The view of a light; `None` for lights without shadow maps.
     pub(super) fn of(light: &Light) -> Option<Self> {
         let rotation = frame_along(unit(light.direction));
         match light.kind {
@@ -104,7 +105,7 @@ impl LampView {
         [self.rotation[0][k], self.rotation[1][k], self.rotation[2][k]]
     }
 
-    /// The extent of the convex hull of points of the world, `margin` \[m\] wider on each side.
+    /// Extent of the convex hull of world points, `margin` \[m\] wider on each side.
     fn hull(&self, points: &[[f32; 3]], margin: f32) -> Extent {
         let mut out = Extent::EMPTY;
         for point in points {
@@ -115,7 +116,7 @@ impl LampView {
                 out.add([x + margin, y + margin, z]);
                 continue;
             }
-            // Something beside the light may be anywhere in its view.
+            // A point at the height of the light or behind it has no bounds in its view.
             let depth = z.max(SPOT_NEAR);
             let reach = if z < SPOT_NEAR { f32::INFINITY } else { margin / depth };
             out.add([x / depth - reach, y / depth - reach, z]);
@@ -132,7 +133,7 @@ impl LampView {
         self.hull(&corners(lo, hi).map(|p| pose.apply(p)), margin)
     }
 
-    /// The map's projection over the casters that can shade the receivers, and whether planes are among these casters.
+    /// Projection of the map over the casters that can shade the receivers, and true if planes are among these casters.
     pub(super) fn fit(
         &self,
         scene: &RenderScene,
@@ -151,7 +152,7 @@ impl LampView {
             }
         }
         let extent = |all: &Extent| (all.hi[0] - all.lo[0]).max(all.hi[1] - all.lo[1]).max(1e-3);
-        // A plane shades only things that reach below it: by more than the map resolves.
+        // A plane shades only objects that reach below it, by more than the map's resolution.
         let texel = if all.is_empty() { 0.0 } else { extent(&all) / side as f32 };
         let mut planes = false;
         for (k, (plane, plane_pose)) in things().enumerate() {
@@ -208,7 +209,7 @@ impl LampView {
                 cx: middle,
                 cy: middle,
                 near: 0.0,
-                // Receivers behind everything that casts are still compared.
+                // Receivers behind all casters are still compared.
                 far: 1.1 * depth + 2e-3,
                 world_from_camera: PoseF32 { rotation: self.rotation, translation },
                 ..square
@@ -222,7 +223,7 @@ impl LampView {
 fn depth_below(plane: &PoseF32, normal: [f32; 3], instance: &Instance, pose: &PoseF32) -> f32 {
     let [lo, hi] = instance.shape.aabb();
     let local = pose.rotate_inverse(normal);
-    // 0 times infinity: an endless plane does not reach below one that is parallel to it.
+    // 0 times infinity: an infinite plane does not reach below a parallel one.
     let reach = |k: usize| {
         let (tilt, half) = (local[k].abs(), 0.5 * (hi[k] - lo[k]));
         if half.is_finite() || tilt > 1e-6 { tilt * half } else { 0.0 }
@@ -237,9 +238,9 @@ fn corners(lo: [f32; 3], hi: [f32; 3]) -> [[f32; 3]; 8] {
     std::array::from_fn(|c| [0, 1, 2].map(|k| if c >> k & 1 == 1 { hi[k] } else { lo[k] }))
 }
 
-/// The corners of each face of a box, as [`corners`] numbers them.
+/// The corners of each face of a box, in the order of [`corners`].
 const FACES: [[usize; 4]; 6] = [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]];
-/// Corners of a convex polygon of four corners that is cut by six planes.
+/// Largest number of corners of a quadrilateral clipped by six planes.
 const MOST: usize = 10;
 
 /// Adds the corners of a polygon's part on the positive side of all planes.
@@ -276,7 +277,7 @@ fn clip(polygon: [[f32; 3]; 4], planes: &[[f32; 4]; 6], points: &mut [[f32; 3]],
     }
 }
 
-/// The extents, for each light, of all surfaces in the view of a pinhole camera.
+/// Extents, for each light, of all surfaces in the view of a pinhole camera.
 pub(super) fn seen<const N: usize>(
     projection: &Projection,
     scene: &RenderScene,
@@ -305,7 +306,7 @@ pub(super) fn seen<const N: usize>(
     for (instance, pose) in scene.instances().iter().zip(poses).filter(|(instance, _)| shown(instance)) {
         let [mut lo, mut hi] = instance.shape.aabb();
         let camera = projection.world_from_camera.inverse_times(pose);
-        // Of an endless plane, all that the camera can reach.
+        // Clips an infinite plane to the camera's reach.
         let eye = pose.inverse_times(&projection.world_from_camera).translation;
         for k in 0..3 {
             lo[k] = lo[k].max(eye[k] - reach - 1.0).min(hi[k]);
@@ -323,7 +324,7 @@ pub(super) fn seen<const N: usize>(
                 let (k, sign) = (face / 2, if face % 2 == 0 { 1.0 } else { -1.0 });
                 let normal = [0, 1, 2].map(|i| sign * camera.rotation[i][k]);
                 let bound = if face % 2 == 0 { -lo[k] } else { hi[k] };
-                // A little outward: what lies on a face is inside.
+                // Slightly outward, so that points on a face are inside.
                 let slack = 1e-5 * (1.0 + bound.abs());
                 [normal[0], normal[1], normal[2], bound + slack - dot(normal, camera.translation)]
             });
@@ -347,7 +348,7 @@ pub(super) fn seen<const N: usize>(
     out
 }
 
-/// The extents of everything there is, for pictures through a lens.
+/// Unbounded extents, for images through a lens.
 pub(super) fn everything<const N: usize>() -> [Extent; N] {
     [Extent::ALL; N]
 }

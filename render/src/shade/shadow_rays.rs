@@ -1,4 +1,4 @@
-//! Shadows and ambient occlusion by rays, for pictures that are shaded without paths.
+//! Ray-traced shadows and ambient occlusion for rasterized images.
 
 use super::surface::SurfacePoint;
 use crate::geometry::bvh::Stack;
@@ -13,24 +13,25 @@ use kinetoscope_scene::vector::{along, dot, scale, sub, to_f64};
 use kinetoscope_scene::{Light, LightKind};
 use std::cell::RefCell;
 
-/// Light is asked for up to this part of its way: a lamp on a ceiling is not behind it.
+/// Fraction of the way to a light that shadow rays cover: a light on a ceiling is not occluded by it.
 pub(crate) const REACH: f64 = 1.0 - 1e-6;
 
-/// Rays begin this part of the numbers that their origins are made of above the surface: positions are single precision.
+/// Offset of ray origins above the surface, as a fraction of their coordinates and depth: positions are single
+/// precision.
 const ABOVE: f32 = 1e-5;
 
-/// What is in the way of light, and a thread's scratch memory.
+/// Ray tracer for shadows, and a thread's scratch memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadowRays<'a> {
     pub(crate) tracer: &'a Tracer,
     pub(crate) stack: &'a RefCell<&'a mut Stack>,
-    /// Whether lamps cast shadows.
+    /// True if lights cast shadows.
     pub(crate) shadows: bool,
-    /// Rays for ambient occlusion; 0 is none.
+    /// Rays per sample for ambient occlusion; 0 disables it.
     pub(crate) occlusion_rays: u16,
 }
 
-/// Some points, one by one.
+/// Points in lanes that are read one by one.
 pub(super) struct Points {
     positions: [[f32; LANES]; 3],
     normals: [[f32; LANES]; 3],
@@ -48,7 +49,7 @@ impl Points {
         self.normals.map(|axis| f64::from(axis[k]))
     }
 
-    /// Just above a point.
+    /// A point slightly above the surface.
     pub(super) fn above(&self, k: usize) -> [f64; 3] {
         let at = self.positions.map(|axis| axis[k]);
         let far = ABOVE * (self.depths[k] + at.iter().map(|x| x.abs()).sum::<f32>());
@@ -71,8 +72,8 @@ pub(super) fn lanes_of(mut bits: u64) -> impl Iterator<Item = usize> {
 }
 
 impl ShadowRays<'_> {
-    /// The part of a lamp's light that reaches each point; 1 where it is not asked for. `toward` is the lamp's direction if
-    /// it is parallel.
+    /// Fraction of a light that reaches each point; 1 in lanes that are not selected. `toward` is the direction to a
+    /// directional light.
     #[inline(never)]
     pub(crate) fn light<S: Simd>(
         &self,
@@ -102,8 +103,8 @@ impl ShadowRays<'_> {
         if out == [1.0; LANES] { splat(s, 1.0) } else { load(s, &out) }
     }
 
-    /// The parts of the light from above and from below the horizon that do not reach each point of a matt surface, of what
-    /// would come from everywhere; 0 where it is not asked for. `smooth` is the normal that light sees.
+    /// Occluded fractions of the ambient light from above and from below the horizon, for a matt surface; 0 in lanes
+    /// that are not selected. `smooth` is the shading normal.
     #[inline(never)]
     pub(crate) fn blocked<S: Simd>(&self, s: S, point: SurfacePoint<S>, smooth: V3<S>, lanes: M<S>) -> [F<S>; 2] {
         let (points, smooth) = (Points::new(point), arrays(smooth));
@@ -118,8 +119,8 @@ impl ShadowRays<'_> {
             for index in 0..u32::from(self.occlusion_rays) {
                 let direction = basis.to_world(cosine(sequence.sample(index).pair(0)));
                 let direction = scale(direction, 1.0 / dot(direction, direction).sqrt());
-                // What the smooth normal means lies beyond the surface itself: below that, rays are asked where it mirrors
-                // them. So what is round and made of triangles does not shade itself, and what is enclosed is dark.
+                // Directions of the smooth normal's hemisphere may point below the flat surface; those rays are
+                // mirrored by it. So a round mesh does not shade itself, and enclosed points are dark.
                 let over = dot(direction, flat);
                 let asked = along(direction, if over < 0.0 { -2.0 * over } else { 0.0 }, flat);
                 let passes = self.tracer.passes(s, &Ray { origin, direction: asked }, f64::INFINITY, NOW, &mut stack);
@@ -145,7 +146,7 @@ mod tests {
 
     const UP: [f32; 3] = [0.0, 0.0, 1.0];
 
-    /// The blocked parts from above and below at a point above a floor, with its geometric and its smooth normal.
+    /// The occluded fractions from above and below at a point above a floor, with its geometric and its smooth normal.
     fn blocked(objects: Vec<(Shape, PoseF32)>, at: [f32; 3], normals: [[f32; 3]; 2]) -> [f64; 2] {
         let floor = (Plane::INFINITE.into(), PoseF32::IDENTITY);
         let (shapes, poses): (Vec<Shape>, Vec<PoseF32>) = std::iter::once(floor).chain(objects).unzip();
@@ -166,12 +167,12 @@ mod tests {
         })
     }
 
-    /// Of a net of 4096 points, those in the cells that an edge goes through are uncertain: about twice 64 of them, half of
-    /// which are on the right side: sqrt(128) / 2 / 4096 is a standard deviation of at most 0.0014.
+    /// Of a net of 4096 points, only those in the cells that an edge crosses are uncertain: about twice 64, half of
+    /// which are on the right side. So sqrt(128) / 2 / 4096 is a standard deviation of at most 0.0014.
     const NOISE: f64 = 5.0 * 0.0014;
 
-    /// Beside a wall of height h that goes on and on, at the distance d: (1 - d / sqrt(d² + h²)) / 2, which is a half in its
-    /// corner. Source: Howell, A catalog of radiation heat transfer configuration factors, B-1 (infinitely long).
+    /// Beside an infinitely long wall of height h, at the distance d: (1 - d / sqrt(d² + h²)) / 2, which is a half in
+    /// its corner. Source: Howell, A catalog of radiation heat transfer configuration factors, B-1 (infinitely long).
     #[test]
     fn wall() {
         let wall = |height: f32| {
@@ -186,11 +187,11 @@ mod tests {
         }
         let [corner, _] = blocked(vec![wall(3000.0)], [0.001, 0.0, 0.0], [UP; 2]);
         assert!((corner - 0.5).abs() < NOISE);
-        // Nothing in the way: nothing is blocked, exactly. A control: the wall takes something everywhere above.
+        // Without occluders, the fraction is exactly 0. The control: the wall occludes a part in all cases above.
         assert_eq!(blocked(vec![], [0.3, 0.2, 0.0], [UP; 2]), [0.0; 2]);
     }
 
-    /// Below a ball: (r / d)²; on a wall half of the light is from below, and the floor takes it.
+    /// Below a ball: (r / d)²; on a wall half of the light is from below, and the floor occludes it.
     #[test]
     fn ball_and_floor() {
         let ball = (Sphere { radius: 0.5 }.into(), PoseF32::from_translation([0.0, 0.0, 1.25]));
@@ -200,8 +201,8 @@ mod tests {
         assert!((below - 0.5).abs() < NOISE && above == 0.0, "{below}");
     }
 
-    /// A facet of something round, whose smooth normal leans over by half a right angle: alone it is not shaded at all, by
-    /// itself neither. In a closed box nothing passes, whatever the normals.
+    /// A facet of a round object, whose smooth normal leans over by half a right angle: without occluders it is not
+    /// shaded at all, also not by itself. In a closed ball no light passes, whatever the normals.
     #[test]
     fn facets() {
         let normals = [UP, [0.5f32.sqrt(), 0.0, 0.5f32.sqrt()]];
@@ -209,7 +210,7 @@ mod tests {
         let room = vec![(Sphere { radius: 2.0 }.into(), PoseF32::IDENTITY)];
         let [above, below] = blocked(room, [0.3, 0.2, 0.0], normals);
         assert!((above + below - 1.0).abs() < 1e-6, "{above} {below}");
-        // Light from below the horizon is that part of it that a plane of this tilt sees: (1 - cos) / 2.
+        // Light from below the horizon is the fraction that a plane of this tilt sees: (1 - cos) / 2.
         assert!((below - 0.5 * (1.0 - 0.5f64.sqrt())).abs() < NOISE, "{below}");
     }
 }

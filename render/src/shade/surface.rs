@@ -1,4 +1,5 @@
-//! The surface at sixteen samples of one instance: exact, from the ray and the shape, not from the visibility buffer.
+//! Surface reconstruction at sixteen samples of one instance: exact, from the ray and the shape, not from the
+//! visibility buffer.
 
 use crate::raster::Placed;
 use crate::simd::{F, LANES, M, Simd, U, V3, load, max, min, select, splat};
@@ -6,32 +7,32 @@ use crate::visibility::{Projection, primitive};
 use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::{Instance, PoseF32};
 
-/// The surface at sixteen samples.
+/// Surfaces at sixteen samples.
 #[derive(Clone, Copy)]
 pub(crate) struct Surface<S: Simd> {
-    /// How many times the ray's direction it is away: depth along the optical axis, or distance, \[m\].
+    /// Distance in units of the ray's direction: depth along the optical axis, or distance, \[m\].
     pub(crate) along: F<S>,
-    /// Normal of the surface itself, towards the camera, world frame.
+    /// Geometric normal, facing the camera, world frame.
     pub(crate) normal: V3<S>,
-    /// Smooth normal, world frame.
+    /// Interpolated normal, world frame.
     pub(crate) shading: V3<S>,
-    /// World frame \[m\].
+    /// Position in the world frame \[m\].
     pub(crate) position: V3<S>,
-    /// Frame of the instance \[m\].
+    /// Position in the frame of the instance \[m\].
     pub(crate) local: V3<S>,
-    /// Texture coordinates and how many of them a metre of surface has.
+    /// Texture coordinates, and their number per meter of surface.
     pub(crate) uv: [F<S>; 2],
     pub(crate) uv_density: F<S>,
 }
 
-/// Points of surfaces, as far as rays that begin there need them.
+/// Points on surfaces, as origins of rays.
 #[derive(Clone, Copy)]
 pub(crate) struct SurfacePoint<S: Simd> {
-    /// World frame \[m\].
+    /// Position in the world frame \[m\].
     pub(crate) position: V3<S>,
-    /// Normal of the surface itself, towards the camera, world frame.
+    /// Geometric normal, facing the camera, world frame.
     pub(crate) normal: V3<S>,
-    /// Distance from the camera, as [`Surface::along`].
+    /// Depth, as in [`Surface::along`].
     pub(crate) depth: F<S>,
 }
 
@@ -42,42 +43,43 @@ impl<S: Simd> Surface<S> {
     }
 }
 
-/// What all samples of an instance have in common.
+/// State that all samples of an instance share.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'a> {
     pub(crate) instance: &'a Instance,
     pub(crate) world_from_instance: &'a PoseF32,
     pub(crate) placed: &'a Placed,
     pub(crate) first_id: u32,
-    /// Linear colour of the material.
+    /// Linear color of the material.
     pub(crate) color: [f32; 3],
-    /// Texture coordinates per metre, see [`kinetoscope_scene::RenderScene::texture_scales`].
+    /// Texture coordinates per meter, see [`kinetoscope_scene::RenderScene::texture_scales`].
     pub(crate) texture_scale: [f32; 3],
     /// Texture coordinates at the origin, see [`kinetoscope_scene::RenderScene::texture_offsets`].
     pub(crate) texture_offset: [f32; 2],
 }
 
-/// Sixteen rays that a lens has bent.
+/// Sixteen rays through a lens that bends them.
 #[derive(Clone, Copy)]
 pub(crate) struct Ray<S: Simd> {
-    /// In the optical frame.
+    /// Directions in the optical frame.
     pub(crate) direction: V3<S>,
-    /// Whether they have z = 1; else length 1.
+    /// True if they have z = 1, else length 1.
     pub(crate) forward: bool,
 }
 
 /// Sixteen rays from the camera.
 #[derive(Clone, Copy)]
 pub(crate) struct CameraRays<S: Simd> {
-    /// Points (u, v) of the picture.
+    /// Points (u, v) of the image \[pixels\].
     pub(crate) uv: [F<S>; 2],
-    /// The rays behind a lens; `None` for a pinhole.
+    /// Rays through a lens; `None` for a pinhole.
     pub(crate) bent: Option<Ray<S>>,
-    /// World frame.
+    /// Directions in the world frame.
     pub(crate) direction: V3<S>,
 }
 
-/// The surface at some rays where `lanes` says that this instance is seen, with the ids that the visibility buffer has.
+/// Surfaces at the rays of the selected lanes, given by their ids in the visibility buffer; all belong to this
+/// instance.
 #[inline(always)]
 pub(crate) fn surface<S: Simd>(
     s: S,
@@ -106,7 +108,7 @@ pub(crate) fn surface<S: Simd>(
     } else {
         let hit = primitive::intersect(s, &source.instance.shape, o, d, projection.near);
         along = hit.t;
-        // The others have a unit normal already.
+        // Other shapes have a unit normal already.
         normal = match source.instance.shape {
             Shape::Plane(_) | Shape::Box(_) => hit.normal,
             _ => hit.normal.unit(s),
@@ -119,7 +121,7 @@ pub(crate) fn surface<S: Simd>(
     let flip = select(back, splat(s, -1.0), splat(s, 1.0));
     let world = source.world_from_instance;
     let local = o.add(d.scale(along));
-    // From the camera outward, as the depth says: agrees with the depth to the last digits.
+    // From the camera outward, as for the depth: both agree to the last digits.
     let position = direction.scale(along).add(V3::splat(s, projection.world_from_camera.translation));
     Surface {
         along,
@@ -161,7 +163,7 @@ fn triangles<S: Simd>(
     let (positions, normals) = (mesh.positions(), mesh.normals());
     let fill = bits.trailing_zeros() as usize % LANES;
     for lane in 0..LANES {
-        // Lanes of other instances get the first triangle's numbers, so that nothing is infinite.
+        // Lanes of other instances copy a triangle of this one, so that all numbers stay finite.
         let from = if bits >> lane & 1 == 1 { lane } else { fill };
         let triangle = mesh.triangles()[(ids[from] - first_id) as usize];
         for corner in 0..3 {
@@ -186,7 +188,7 @@ fn triangles<S: Simd>(
     let zero = splat(s, 0.0);
     let facing = select(facing.simd_eq(zero), splat(s, 1e-30), facing);
     let depth = -(normal.dot(ao) / facing);
-    // Snapping may cover a sample just outside of a triangle seen edge-on, whose plane is anywhere there.
+    // Snapping may cover a sample just outside of a triangle seen edge-on, where its plane may be at any depth.
     let z = [a.sub(o).dot(axis), b.sub(o).dot(axis), c.sub(o).dot(axis)];
     let low = min(min(z[0], z[1]), z[2]);
     let high = max(max(z[0], z[1]), z[2]);
@@ -208,7 +210,7 @@ fn triangles<S: Simd>(
         let (u1, v1) = (at(1, 0) - at(0, 0), at(1, 1) - at(0, 1));
         let (u2, v2) = (at(2, 0) - at(0, 0), at(2, 1) - at(0, 1));
         let square = u1 * v2 - u2 * v1;
-        // Square root of the ratio of areas, in the picture and on the surface.
+        // Square root of the ratio of areas, in the texture and on the surface.
         uv_density = (max(square, -square) * area.sqrt() * inverse).sqrt();
     }
     TriangleHit { t: depth, normal: normal.unit(s), shading, uv, uv_density }

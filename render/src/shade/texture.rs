@@ -1,23 +1,23 @@
-//! Colours of textures: bilinear within a level, and between two levels.
+//! Texture sampling: bilinear within a mip level, and interpolated between two levels.
 //!
-//! Texels are blended as they are (sRGB bytes), which is four times as fast as in linear light; the levels themselves were
+//! Texels are blended as sRGB bytes, which is four times as fast as in linear light; the levels themselves were
 //! averaged in linear light.
 
 use crate::simd::{F, LANES, M, Simd, V3, abs, halves, max, min, select, select_i, splat, splat_i};
 use kinetoscope_scene::Level;
 use kinetoscope_scene::{Texture, TextureKind};
 
-/// Adding and subtracting this rounds to an integer (of less than 2^22).
+/// Adding and subtracting this rounds to an integer (below 2^22).
 const ROUND: f32 = 12_582_912.0;
 
-/// The largest integer that is not larger.
+/// Rounds down to an integer.
 #[inline(always)]
 fn floor_lanes<S: Simd>(s: S, x: F<S>) -> F<S> {
     let r = (x + ROUND) - ROUND;
     r - select(r.simd_gt(x), splat(s, 1.0), splat(s, 0.0))
 }
 
-/// Colours (bytes, 0..=255) at (u, v), v upward, of surfaces where one pixel is `footprint` wide in texture coordinates.
+/// Colors (bytes, 0..=255) at (u, v), v upward, where one pixel is `footprint` wide in texture coordinates.
 #[inline(always)]
 pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footprint: F<S>, lanes: M<S>) -> [F<S>; 3] {
     let first = &texture.levels()[0];
@@ -41,7 +41,8 @@ pub(crate) fn sample<S: Simd>(s: S, texture: &Texture, u: F<S>, v: F<S>, footpri
     )
 }
 
-/// Colours (bytes, 0..=255) in directions of a cube texture, where one pixel is `footprint` wide on a cube of half length 1.
+/// Colors (bytes, 0..=255) in directions of a cube texture, where one pixel is `footprint` wide on a cube of half
+/// length 1.
 #[inline(always)]
 pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint: F<S>, lanes: M<S>) -> [F<S>; 3] {
     let zero = splat(s, 0.0);
@@ -72,7 +73,7 @@ pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint:
         #[inline(always)]
         |level, wanted| {
             let side = level.width() as f32;
-            // Nothing is blended across the edge of a face.
+            // Clamped: texels are not blended across the edge of a face.
             let inside = {
                 #[inline(always)]
                 |x: F<S>| min(max(x * side - 0.5, zero), splat(s, side - 1.0))
@@ -84,9 +85,9 @@ pub(crate) fn sample_cube<S: Simd>(s: S, texture: &Texture, d: V3<S>, footprint:
     )
 }
 
-/// The colours that `at` finds in the levels that pixels `texels` wide need.
+/// Interpolates the colors of `at` between the mip levels for pixels `texels` wide.
 ///
-/// Neighbouring pixels use the same two or three levels, so the loop is over levels, whose sizes all lanes share.
+/// Neighboring pixels use the same two or three levels, so the loop is over levels, whose sizes all lanes share.
 #[inline(always)]
 fn between_levels<S: Simd>(
     s: S,
@@ -98,8 +99,8 @@ fn between_levels<S: Simd>(
     let levels = texture.levels();
     let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
     let mut out = [zero, zero, zero];
-    // Level k is for pixels 2^k to 2^(k+1) texels wide. Up to 1.75 times 2^k it is enough alone: the four texels of a point
-    // nearly cover that; beyond it is blended with the next, which costs a second look.
+    // Level k is for pixels 2^k to 2^(k+1) texels wide. Up to 1.75 times 2^k it is used alone: the four texels of a
+    // point nearly cover that. Beyond, it is blended with the next level, which costs a second lookup.
     let (mut from_last, mut left, mut width) = (zero, lanes, 1.0f32);
     let mut carried = false;
     for (k, level) in levels.iter().enumerate() {
@@ -128,7 +129,7 @@ fn between_levels<S: Simd>(
     out
 }
 
-/// Two texels beside each other.
+/// Two horizontally adjacent texels.
 #[inline(always)]
 fn pair(bytes: &[u8], from: usize) -> u64 {
     match bytes.get(from..from + 8) {
@@ -137,14 +138,14 @@ fn pair(bytes: &[u8], from: usize) -> u64 {
     }
 }
 
-/// The colours between four texels each: column and row of the upper left one, and how far from it to the next.
+/// Bilinear interpolation: column and row of the upper left texel, and the fractions to the next ones.
 #[inline(always)]
 fn bilinear<S: Simd>(s: S, level: &Level, [x, y]: [F<S>; 2], [fx, fy]: [F<S>; 2], lanes: M<S>) -> [F<S>; 3] {
     let stride = level.width() as i32 + 1;
     let at = select_i(lanes, y.to_int() * stride + x.to_int(), splat_i(s, 0));
     let at: [i32; LANES] = at.array();
     let (bytes, next_row) = (level.bytes(), 4 * stride as usize);
-    // Spelled out: `from_fn` stays a call, and a loop goes through memory.
+    // Written out: `from_fn` stays a call, and a loop goes through memory.
     macro_rules! pairs {
         ($row:expr, $($lane:literal)*) => { [$(pair(bytes, 4 * at[$lane] as usize + $row)),*] };
     }
@@ -160,7 +161,7 @@ fn bilinear<S: Simd>(s: S, level: &Level, [x, y]: [F<S>; 2], [fx, fy]: [F<S>; 2]
     out
 }
 
-/// Into 0..n, from -1..=n.
+/// Wraps -1..=n to 0..n.
 #[inline(always)]
 fn wrap<S: Simd>(s: S, i: F<S>, n: f32) -> F<S> {
     let i = select(i.simd_lt(splat(s, 0.0)), i + n, i);
@@ -168,7 +169,7 @@ fn wrap<S: Simd>(s: S, i: F<S>, n: f32) -> F<S> {
     min(max(i, splat(s, 0.0)), splat(s, n - 1.0))
 }
 
-/// The kind of a texture decides how it lies.
+/// True for a cube texture.
 pub(crate) fn is_cube(texture: &Texture) -> bool {
     texture.kind() == TextureKind::Cube
 }

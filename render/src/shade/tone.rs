@@ -1,33 +1,34 @@
-//! From linear light to the screen: a tone curve, then the sRGB transfer function, as a polynomial of √x that is within 0.2
-//! of 255 of the standard (square roots and products round the same on every machine; powers do not).
+//! Conversion of linear light for the screen: a tone curve, then the sRGB transfer function. The transfer function is a
+//! polynomial of √x, within 0.2 of 255 of the standard (square roots and products round the same on every machine;
+//! powers do not).
 
 use crate::simd::{F, Scalar, Simd, max, min, select, splat};
 use serde::{Deserialize, Serialize};
 
-/// How light becomes what a screen shows, which ends at 1, before the sRGB transfer function. x is linear light, 1 that of a
-/// white surface in full light.
+/// Tone curve: maps linear light to the range of a screen, up to 1, before the sRGB transfer function. x is linear
+/// light; 1 is a white surface in full light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ToneCurve {
-    /// x up to 0.7; above it bends smoothly towards 1, so that highlights on white things do not clip:
-    /// 0.7 + 0.3 k / (k + 0.3) with k = x - 0.7. Of [`LightSum::Display`](kinetoscope_scene::LightSum::Display), whose sums end at 1, it is
-    /// [`Clip`](Self::Clip), but for path-traced frames.
+    /// x up to 0.7; above, it bends smoothly towards 1, so that highlights on white surfaces do not clip: 0.7 + 0.3 k /
+    /// (k + 0.3) with k = x - 0.7. With [`LightSum::Display`](kinetoscope_scene::LightSum::Display), whose sums end at
+    /// 1, it is [`Clip`](Self::Clip), except for path-traced frames.
     #[default]
     Soft,
-    /// x up to 1, and 1 above: the measure of light where nothing is too bright.
+    /// x up to 1, and 1 above: proportional to light where it does not saturate.
     Clip,
-    /// As film, with a foot and a shoulder: x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14), 1 at most. Source: Narkowicz, ACES
-    /// filmic tone mapping curve, 2015.
+    /// Like film, with a toe and a shoulder: x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14), at most 1. Source:
+    /// Narkowicz, ACES filmic tone mapping curve, 2015.
     Filmic,
 }
 
-/// Where the soft curve begins to bend.
+/// Start of the bend of the soft curve.
 const KNEE: f32 = 0.7;
-/// Brighter than this is as bright: what comes after stays a number.
+/// Limit of light, so that the results stay finite.
 const BRIGHTEST: f32 = 1e6;
 
 impl ToneCurve {
-    /// All of them.
+    /// All curves.
     pub const ALL: [Self; 3] = [Self::Soft, Self::Clip, Self::Filmic];
 
     #[inline(always)]
@@ -53,24 +54,24 @@ impl ToneCurve {
 }
 
 impl ToneCurve {
-    /// The sRGB value of a linear intensity, 0..=255, before it is rounded.
+    /// The sRGB value of linear light, 0..=255, not rounded.
     pub fn encode(self, intensity: f32) -> f32 {
         encode(Scalar, self, splat(Scalar, intensity)).array()[0]
     }
 }
 
-/// The byte for a linear intensity, as a number in 0..=255.
+/// The sRGB byte of linear light, as a number in 0..=255.
 #[inline(always)]
 pub(crate) fn encode<S: Simd>(s: S, curve: ToneCurve, x: F<S>) -> F<S> {
     to_srgb(s, curve.apply(s, max(x, splat(s, 0.0))))
 }
 
-/// The sRGB byte for a linear intensity in 0..=1, without the tone curve, as a number in 0..=255.
+/// The sRGB byte of linear light in 0..=1, without the tone curve, as a number in 0..=255.
 #[inline(always)]
 pub(crate) fn to_srgb<S: Simd>(s: S, x: F<S>) -> F<S> {
     let r = x.sqrt();
     let y = (((r * -0.309_826 + 0.843_371_8) * r - 0.945_305_94) * r + 1.448_028_3) * r - 0.037_015_604;
-    // Near black the standard is a straight line.
+    // The standard is a straight line near black.
     let y = select(x.simd_lt(splat(s, 0.003_130_8)), x * 12.92, y);
     min(max(y * 255.0 + 0.5, splat(s, 0.0)), splat(s, 255.0))
 }
@@ -82,13 +83,13 @@ pub(crate) fn decode_bytes<S: Simd>(x: F<S>) -> F<S> {
     (((x * -0.156_114_5 + 0.615_823_9) * x + 0.494_052_83) * x + 0.045_749_872) * x
 }
 
-/// Linear light as numbers of the screen, 0..=255, not rounded: the inverse of [`decode_bytes`].
+/// Linear light as sRGB, 0..=255, not rounded: the inverse of [`decode_bytes`].
 #[inline(always)]
 pub(crate) fn to_bytes<S: Simd>(s: S, x: F<S>) -> F<S> {
     to_srgb(s, min(max(x, splat(s, 0.0)), splat(s, 1.0))) - 0.5
 }
 
-/// A screen colour as linear light.
+/// Converts an sRGB color to linear light.
 pub(crate) fn decode(c: [f32; 3]) -> [f32; 3] {
     c.map(kinetoscope_scene::decode_srgb)
 }
@@ -98,7 +99,7 @@ mod tests {
     use super::*;
     use crate::simd::levels;
 
-    /// Against the curves as their documentation has them and the standard's transfer function, in double precision.
+    /// Compares with the documented curves and the standard's transfer function, in double precision.
     #[test]
     fn encoding() {
         let shown = |curve, x: f64| match curve {
@@ -122,7 +123,7 @@ mod tests {
             }
             assert_eq!([1e9, f32::MAX, f32::INFINITY].map(|x| encoded(x) as u8), [255; 3], "{curve:?}");
         }
-        // The control: they are not all the same.
+        // The control: the curves differ.
         let middle =
             ToneCurve::ALL.map(|curve| encode(crate::simd::Scalar, curve, splat(crate::simd::Scalar, 0.9)).array()[0]);
         assert!((0..3).all(|k| (middle[k] - middle[(k + 1) % 3]).abs() > 1.0), "{middle:?}");

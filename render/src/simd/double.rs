@@ -1,4 +1,4 @@
-//! Eight numbers of double precision: operators, and three coordinates of eight points.
+//! Eight lanes of double precision: operators, and vectors of three coordinates.
 
 use super::{D, DOUBLES, N, Simd};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
@@ -61,29 +61,29 @@ impl<S: Simd> D<S> {
     pub(crate) fn eq(self, o: Self) -> N<S> {
         N::new(self.s, S::eq_d(self.v, o.v))
     }
-    /// The smaller one; the second if they do not compare.
+    /// The smaller number; the second one if either is NaN.
     #[inline(always)]
     pub(crate) fn min(self, o: Self) -> Self {
         self.lt(o).select(self, o)
     }
-    /// The larger one; the second if they do not compare.
+    /// The larger number; the second one if either is NaN.
     #[inline(always)]
     pub(crate) fn max(self, o: Self) -> Self {
         o.lt(self).select(self, o)
     }
-    /// The magnitude.
+    /// Absolute value.
     #[inline(always)]
     pub(crate) fn abs(self) -> Self {
         self.max(-self)
     }
-    /// The smallest of the eight, none of which is NaN.
+    /// The smallest lane; no lane may be NaN.
     #[inline(always)]
     pub(crate) fn least(self) -> f64 {
         let [a, b, c, d, e, f, g, h] = self.array();
         let min = |a: f64, b: f64| if a < b { a } else { b };
         min(min(min(a, b), min(c, d)), min(min(e, f), min(g, h)))
     }
-    /// The largest of the eight, none of which is NaN.
+    /// The largest lane; no lane may be NaN.
     #[inline(always)]
     pub(crate) fn most(self) -> f64 {
         let [a, b, c, d, e, f, g, h] = self.array();
@@ -93,12 +93,12 @@ impl<S: Simd> D<S> {
 }
 
 impl<S: Simd> N<S> {
-    /// A bit for each lane, the first one lowest.
+    /// A bit for each lane, the first lane in the lowest bit.
     #[inline(always)]
     pub(crate) fn to_bitmask(self) -> u64 {
         S::bits_n(self.v)
     }
-    /// `a` where the condition holds, else `b`.
+    /// `a` where the mask is set, else `b`.
     #[inline(always)]
     pub(crate) fn select(self, a: D<S>, b: D<S>) -> D<S> {
         D::new(a.s, S::select_d(self.v, a.v, b.v))
@@ -132,20 +132,20 @@ impl<S: Simd> Not for N<S> {
 /// Three coordinates of eight points.
 pub(crate) type D3<S> = [D<S>; 3];
 
-/// One for each axis. Not by [`array::map`](std::array), which is not always inlined, and then compiled for no instruction set;
-/// for the same reason the closures of vectors are to be `#[inline(always)]`.
+/// Evaluates `of` for each axis. [`array::map`](std::array) is not always inlined, and then compiled without the
+/// instruction set. For the same reason, closures over vectors are `#[inline(always)]`.
 #[inline(always)]
 pub(crate) fn axes<T>(of: impl Fn(usize) -> T) -> [T; 3] {
     [of(0), of(1), of(2)]
 }
 
-/// Three coordinates of eight points, as numbers.
+/// Loads three coordinates of eight points.
 #[inline(always)]
 pub(crate) fn load_3<S: Simd>(s: S, x: &[[f64; DOUBLES]; 3]) -> D3<S> {
     [D::load(s, &x[0]), D::load(s, &x[1]), D::load(s, &x[2])]
 }
 
-/// As [`dot`](kinetoscope_scene::vector::dot), to the bit.
+/// SIMD version of [`dot`](kinetoscope_scene::vector::dot), to the bit.
 #[inline(always)]
 pub(crate) fn dot_3<S: Simd>(a: D3<S>, b: D3<S>) -> D<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -1,8 +1,10 @@
-//! Sixteen numbers at once, or eight of double precision, or fewer: the only place that knows the SIMD library.
+//! SIMD abstraction: sixteen lanes of single precision, eight of double precision, and narrower ones. The only module
+//! that depends on the SIMD library.
 //!
-//! Only operations that IEEE 754 defines to the bit are used (add, subtract, multiply, divide, square root, compare), and
-//! never fused: so every instruction set gives the same image. [`Scalar`] is the reference: plain loops, always compiled.
-//! (The library has a scalar level of its own, but inlining sixteen-wide loops everywhere took over ten minutes to compile.)
+//! Only operations that IEEE 754 defines to the bit are used (add, subtract, multiply, divide, square root, compare),
+//! and never fused: so every instruction set gives the same image. [`Scalar`] is the reference: plain loops, always
+//! compiled. (The library has a scalar level of its own, but inlining sixteen-wide loops everywhere took over ten
+//! minutes to compile.)
 
 mod double;
 mod narrow;
@@ -14,24 +16,24 @@ pub(crate) use fearless_simd::Level as SimdLevel;
 pub(crate) use scalar::Scalar;
 pub(crate) use vector::{D, F, F4, F8, I, M, N, Simd, U};
 
-/// An instruction set that this machine has.
+/// An instruction set of this machine.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Level {
     /// Plain loops.
     Scalar,
-    /// What the SIMD library found.
+    /// A level of the SIMD library.
     Simd(SimdLevel),
 }
 
 impl Level {
-    /// The best one.
+    /// The best level of this machine.
     pub(crate) fn best() -> Self {
         let level = SimdLevel::new();
         if level.is_fallback() { Self::Scalar } else { Self::Simd(level) }
     }
 }
 
-/// Runs generic code with the instruction set of a level: AVX-512, AVX2, what the machine has at least, or none.
+/// Runs generic code with the instruction set of a level: AVX-512, AVX2, the machine's baseline, or plain loops.
 ///
 /// One level fewer than the library's own `dispatch!` (SSE4.2 gains nothing here), because every level is compiled.
 macro_rules! at_level {
@@ -80,12 +82,12 @@ macro_rules! at_simd_level {
 }
 pub(crate) use {at_level, at_simd_level};
 
-/// Lanes are 2 rows of 8 pixels.
+/// Lanes of single precision: 2 rows of 8 pixels.
 pub(crate) const LANES: usize = 16;
 /// Lanes of double precision.
 pub(crate) const DOUBLES: usize = 8;
 
-/// The first sixteen of a slice.
+/// The first sixteen elements of a slice.
 #[inline(always)]
 pub(crate) fn first<T>(x: &[T]) -> &[T; LANES] {
     match x.first_chunk() {
@@ -94,7 +96,7 @@ pub(crate) fn first<T>(x: &[T]) -> &[T; LANES] {
     }
 }
 
-/// The first sixteen of a slice.
+/// The first sixteen elements of a slice.
 #[inline(always)]
 fn first_mut<T>(x: &mut [T]) -> &mut [T; LANES] {
     match x.first_chunk_mut() {
@@ -121,19 +123,19 @@ pub(crate) fn splat_u<S: Simd>(s: S, x: u32) -> U<S> {
     U::new(s, s.splat_u(x))
 }
 
-/// Sixteen numbers of a slice.
+/// Loads sixteen numbers.
 #[inline(always)]
 pub(crate) fn load<S: Simd>(s: S, x: &[f32]) -> F<S> {
     F::new(s, s.load(first(x)))
 }
 
-/// Sixteen integers of a slice.
+/// Loads sixteen integers.
 #[inline(always)]
 pub(crate) fn load_i<S: Simd>(s: S, x: &[i32]) -> I<S> {
     I::new(s, s.load_i(first(x)))
 }
 
-/// Sixteen ids of a slice.
+/// Loads sixteen ids.
 #[inline(always)]
 pub(crate) fn load_u<S: Simd>(s: S, x: &[u32]) -> U<S> {
     U::new(s, s.load_u(first(x)))
@@ -146,61 +148,61 @@ pub(crate) fn halves<S: Simd>(s: S, pairs: &[u64; LANES]) -> [I<S>; 2] {
     [I::new(s, lower), I::new(s, upper)]
 }
 
-/// Writes sixteen numbers.
+/// Stores sixteen numbers.
 #[inline(always)]
 pub(crate) fn store<S: Simd>(x: F<S>, to: &mut [f32]) {
     *first_mut(to) = x.array();
 }
 
-/// Writes sixteen ids.
+/// Stores sixteen ids.
 #[inline(always)]
 pub(crate) fn store_u<S: Simd>(x: U<S>, to: &mut [u32]) {
     *first_mut(to) = x.array();
 }
 
-/// Writes sixteen integers.
+/// Stores sixteen integers.
 #[inline(always)]
 pub(crate) fn store_i<S: Simd>(x: I<S>, to: &mut [i32]) {
     *first_mut(to) = x.array();
 }
 
-/// `a` where the condition holds, else `b`.
+/// `a` where the mask is set, else `b`.
 #[inline(always)]
 pub(crate) fn select<S: Simd>(m: M<S>, a: F<S>, b: F<S>) -> F<S> {
     F::new(a.s, S::select(m.v, a.v, b.v))
 }
 
-/// `a` where the condition holds, else `b`.
+/// `a` where the mask is set, else `b`.
 #[inline(always)]
 pub(crate) fn select_i<S: Simd>(m: M<S>, a: I<S>, b: I<S>) -> I<S> {
     I::new(a.s, S::select_i(m.v, a.v, b.v))
 }
 
-/// `a` where the condition holds, else `b`.
+/// `a` where the mask is set, else `b`.
 #[inline(always)]
 pub(crate) fn select_u<S: Simd>(m: M<S>, a: U<S>, b: U<S>) -> U<S> {
     U::new(a.s, S::select_u(m.v, a.v, b.v))
 }
 
-/// The smaller one; the second if they do not compare.
+/// The smaller number; the second one if either is NaN.
 #[inline(always)]
 pub(crate) fn min<S: Simd>(a: F<S>, b: F<S>) -> F<S> {
     select(a.simd_lt(b), a, b)
 }
 
-/// The larger one; the second if they do not compare.
+/// The larger number; the second one if either is NaN.
 #[inline(always)]
 pub(crate) fn max<S: Simd>(a: F<S>, b: F<S>) -> F<S> {
     select(a.simd_gt(b), a, b)
 }
 
-/// The magnitude.
+/// Absolute value.
 #[inline(always)]
 pub(crate) fn abs<S: Simd>(a: F<S>) -> F<S> {
     max(a, -a)
 }
 
-/// The square root; 0 of negative numbers.
+/// Square root; 0 for negative numbers.
 #[inline(always)]
 pub(crate) fn root<S: Simd>(s: S, a: F<S>) -> F<S> {
     max(a, splat(s, 0.0)).sqrt()
@@ -211,7 +213,7 @@ pub(crate) const COLUMN: [f32; LANES] = [0., 1., 2., 3., 4., 5., 6., 7., 0., 1.,
 /// Row 0..2 of each lane.
 pub(crate) const ROW: [f32; LANES] = [0., 0., 0., 0., 0., 0., 0., 0., 1., 1., 1., 1., 1., 1., 1., 1.];
 
-/// Three coordinates of sixteen points.
+/// Vectors of sixteen points.
 #[derive(Clone, Copy)]
 pub(crate) struct V3<S: Simd> {
     pub(crate) x: F<S>,
@@ -265,7 +267,7 @@ impl<S: Simd> V3<S> {
         Self { x: row(&r[0]), y: row(&r[1]), z: row(&r[2]) }
     }
 
-    /// Length 1; stays zero where it is zero.
+    /// Normalizes to length 1; zero vectors stay zero.
     #[inline(always)]
     pub(crate) fn unit(self, s: S) -> Self {
         let length = self.dot(self).sqrt();
@@ -274,7 +276,7 @@ impl<S: Simd> V3<S> {
     }
 }
 
-/// Every level that this machine has, the scalar one first: for tests that all of them give the same bits.
+/// All levels of this machine, the scalar one first: for tests that all levels give the same bits.
 #[cfg(test)]
 pub(crate) fn levels() -> Vec<Level> {
     let mut levels = vec![Level::Scalar];

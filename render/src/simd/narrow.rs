@@ -1,5 +1,4 @@
-//! Four numbers, or eight: for what has no sixteen. The smaller and the larger one are those of numbers that compare; of two
-//! zeros it is either.
+//! Four or eight lanes. `min` and `max` are defined for numbers other than NaN; of two zeros either may be returned.
 
 use super::{F4, F8, Simd};
 use std::ops::{Add, Mul, Sub};
@@ -20,7 +19,7 @@ macro_rules! narrow {
             pub(crate) fn array(self) -> [f32; $count] {
                 S::$array(self.v)
             }
-            /// A number first, then all but the last.
+            /// A number followed by all lanes but the last.
             #[inline(always)]
             pub(crate) fn shift_in(self, x: f32) -> Self {
                 Self::new(self.s, S::$slide(self.s.$splat(x), self.v))

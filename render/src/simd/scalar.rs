@@ -1,12 +1,12 @@
-//! The reference: plain loops over arrays.
+//! The reference implementation: plain loops over arrays.
 
 use super::{DOUBLES, LANES, Simd};
 
-/// No instruction set but what every machine has.
+/// The level without SIMD instructions, available on every machine.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scalar;
 
-// One copy of each loop: inlined into the kernels they would make functions of a hundred thousand instructions.
+// Not inlined: in the kernels, the loops would make functions of a hundred thousand instructions.
 #[inline(never)]
 fn pairs<A: Copy, B: Copy, R, const N: usize>(a: &[A; N], b: &[B; N], f: impl Fn(A, B) -> R) -> [R; N] {
     std::array::from_fn(|k| f(a[k], b[k]))

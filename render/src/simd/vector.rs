@@ -1,10 +1,10 @@
-//! The operations of an instruction set, and numbers that have operators.
+//! Operations of an instruction set, and lane types with operators.
 
 use super::{DOUBLES, LANES};
 use fearless_simd::{Bytes, SimdBase, SimdFloat, SimdInt, SimdMask};
 use std::ops::{Add, AddAssign, BitAnd, BitAndAssign, BitOr, BitOrAssign, Div, Mul, Neg, Not, Sub};
 
-/// Operations on the numbers of an instruction set, by pairs of operands or of an operand and nothing.
+/// Declares the operations of an instruction set, and implements them by the SIMD library.
 macro_rules! operations {
     ($($name:ident($($arg:ident: $A:ident),*) -> $R:ident = $body:expr;)*) => {
         /// An instruction set.
@@ -15,18 +15,18 @@ macro_rules! operations {
             type I: Copy;
             /// Sixteen ids.
             type U: Copy;
-            /// Sixteen conditions.
+            /// Sixteen booleans.
             type M: Copy;
             /// Eight numbers of double precision.
             type D: Copy;
-            /// Eight conditions.
+            /// Eight booleans.
             type N: Copy;
             /// Four numbers.
             type F4: Copy;
             /// Eight numbers.
             type F8: Copy;
 
-            /// Compiles what is inlined into `f` for this instruction set.
+            /// Calls `f`; code inlined into `f` is compiled for this instruction set.
             fn vectorize<R>(self, f: impl FnOnce() -> R) -> R;
             fn splat(self, x: f32) -> Self::F;
             fn splat_i(self, x: i32) -> Self::I;
@@ -170,7 +170,7 @@ operations! {
     div(a: F, b: F) -> F = a / b;
     neg(a: F) -> F = -a;
     sqrt(a: F) -> F = SimdFloat::sqrt(a);
-    // Only for numbers that an i32 can hold.
+    // Only for numbers in the range of i32.
     to_int(a: F) -> I = SimdFloat::to_int(a);
     lt(a: F, b: F) -> M = SimdBase::simd_lt(a, b);
     le(a: F, b: F) -> M = SimdBase::simd_le(a, b);
@@ -208,17 +208,17 @@ operations! {
     add_4(a: F4, b: F4) -> F4 = a + b;
     sub_4(a: F4, b: F4) -> F4 = a - b;
     mul_4(a: F4, b: F4) -> F4 = a * b;
-    // Only of numbers that compare.
+    // Only for numbers other than NaN.
     min_4(a: F4, b: F4) -> F4 = SimdBase::min(a, b);
     max_4(a: F4, b: F4) -> F4 = SimdBase::max(a, b);
-    // The last of one, and before the last of the other.
+    // The last lane of `a`, then all lanes of `b` but the last.
     slide_4(a: F4, b: F4) -> F4 = SimdBase::slide::<3>(a, b);
     add_8(a: F8, b: F8) -> F8 = a + b;
     min_8(a: F8, b: F8) -> F8 = SimdBase::min(a, b);
     slide_8(a: F8, b: F8) -> F8 = SimdBase::slide::<7>(a, b);
 }
 
-/// Sixteen values with operators.
+/// Declares a lane type with operators.
 macro_rules! lanes {
     ($(#[$doc:meta])* $Name:ident) => {
         $(#[$doc])*
@@ -250,7 +250,7 @@ lanes! {
     U
 }
 lanes! {
-    /// Sixteen conditions.
+    /// Sixteen booleans.
     M
 }
 lanes! {
@@ -258,7 +258,7 @@ lanes! {
     D
 }
 lanes! {
-    /// Eight conditions.
+    /// Eight booleans.
     N
 }
 lanes! {
@@ -314,7 +314,7 @@ impl<S: Simd> F<S> {
     pub(crate) fn sqrt(self) -> Self {
         Self::new(self.s, S::sqrt(self.v))
     }
-    /// Towards zero; only for numbers that an `i32` can hold.
+    /// Rounds towards zero; only for numbers in the range of `i32`.
     #[inline(always)]
     pub(crate) fn to_int(self) -> I<S> {
         I::new(self.s, S::to_int(self.v))

@@ -1,4 +1,4 @@
-//! Bad input and odd scenes.
+//! Invalid input and degenerate scenes.
 
 use super::harness::{Still, look};
 use crate::frame::FrameMut;
@@ -89,7 +89,7 @@ fn odd_scenes() {
     for mesh in [TriMesh::default(), flat] {
         of(Mesh { mesh: Arc::new(RenderMesh::new(&mesh, RenderMesh::CREASE)) }).draw();
     }
-    // Straight up and down: a plane is seen from above only.
+    // Straight up and down: a plane is visible from above only.
     for z in [2.0, -2.0] {
         let view = look([16, 16], 1.0, [0., 0., z], [0.; 3]);
         assert!(of(Plane::INFINITE).from(view).mask().iter().all(|&m| m == i32::from(z > 0.0)), "{z}");
@@ -97,7 +97,8 @@ fn odd_scenes() {
     }
 }
 
-/// A pane in front of a wall: more and more of its colour, and the other channels see it whatever its alpha, unless that is 0.
+/// A pane in front of a wall: the color changes with alpha. The other channels contain the pane whatever its alpha,
+/// unless that is 0.
 #[test]
 fn transparency() {
     let view = View { cx: 16.5, cy: 12.5, ..view() };

@@ -1,4 +1,4 @@
-//! Images with level of detail against images of the meshes themselves, in eight times as many rows and columns.
+//! Images at a level of detail, compared with images at full detail in eight times as many rows and columns.
 
 use super::harness::{EXACT, Image, Still, look};
 use super::robots::{sr5, sr5_view};
@@ -13,11 +13,11 @@ use kinetoscope_testkit::scenes::checker_plane;
 use nalgebra::Vector3;
 use std::sync::{Arc, LazyLock};
 
-/// Rows and columns of fine pixels in a pixel.
+/// Rows and columns of fine pixels per pixel.
 const TIMES: usize = 8;
-/// The farthest that levels may move a point: half a pixel, and the steps to which vertices are snapped, twice.
+/// Largest displacement by levels \[pixels\]: half a pixel, and twice the steps to which vertices are snapped.
 const PIXELS: f64 = 0.5 + 2.0 / 256.0;
-/// \[m\]; a little more for rounding.
+/// Largest displacement by levels \[m\], with a margin for rounding.
 const METRES: f32 = 1e-3 + 1e-6;
 
 const OFF: RasterCfg = EXACT;
@@ -39,13 +39,13 @@ static PREPARED: LazyLock<[RenderMesh; 3]> = LazyLock::new(|| {
     [ball, cylinder, bumpy].map(|mesh| RenderMesh::new(&mesh, RenderMesh::CREASE))
 });
 
-/// Those meshes, apart from each other, before a ground. All tests share them and their levels.
+/// These meshes, apart from each other, in front of a ground. All tests share the meshes and their levels.
 fn dense() -> (RenderScene, Vec<PoseF32>) {
     static MESHES: LazyLock<[Mesh; 3]> = LazyLock::new(new_meshes);
     scene_of(&MESHES)
 }
 
-/// Copies of the meshes whose levels have yet to be made.
+/// Copies of the meshes, whose levels are not built yet.
 fn new_meshes() -> [Mesh; 3] {
     PREPARED.clone().map(|mesh| Mesh { mesh: Arc::new(mesh) })
 }
@@ -64,25 +64,26 @@ fn scene_of(meshes: &[Mesh; 3]) -> (RenderScene, Vec<PoseF32>) {
     (scene, poses)
 }
 
-/// The image of the meshes themselves, and all within half a pixel of each pixel's centre.
+/// The image at full detail, and all fine pixels within half a pixel of each pixel's center.
 struct Truth<'a> {
     view: &'a View,
     plain: Image,
     fine: Image,
-    /// Fine pixels near the centre of a pixel, counted from the one above and left of the pixel.
+    /// Fine pixels near the center of a pixel, counted from the one above and left of the pixel.
     near: Vec<usize>,
 }
 
 impl<'a> Truth<'a> {
     fn new(still: &'a Still) -> Self {
-        // An odd number of fine pixels would have one at the centre; all of them are within reach here.
+        // An odd number of fine pixels would have one at the center; all of them are within reach here.
         let (k, View { width, height, fx, fy, cx, cy, .. }) = (TIMES as f32, still.view);
         let (width, height) = (width * TIMES, height * TIMES);
         let view = View { width, height, fx: fx * k, fy: fy * k, cx: cx * k, cy: cy * k, ..still.view };
         let cfg = RasterCfg { shadows: false, samples: 1, ..OFF };
         let channels = Channels { mask: true, depth: true, ..Channels::NONE };
         let fine = Still { cfg, view, channels, ..still.clone() }.draw();
-        // As far as levels reach, and half the diagonal of a fine pixel farther, so that nothing between fine pixels is missed.
+        // The displacement by levels plus half the diagonal of a fine pixel, so that features between fine pixels
+        // count.
         let reach = PIXELS * TIMES as f64 + std::f64::consts::FRAC_1_SQRT_2;
         let middle = (TIMES + 1) as f64 / 2.0;
         assert!(reach < middle + 1.0, "one fine pixel beside the pixel is enough");
@@ -91,30 +92,30 @@ impl<'a> Truth<'a> {
         Self { view: &still.view, plain: still.draw(), fine, near }
     }
 
-    /// Masks and depths that the mesh has near the centre of an inner pixel.
+    /// Masks and depths at full detail near the center of an inner pixel.
     fn near(&self, x: usize, y: usize) -> impl Iterator<Item = (i32, f32)> {
         let first = (y * TIMES - 1) * self.fine.width + x * TIMES - 1;
         self.near.iter().map(move |k| (self.fine.mask()[first + k], self.fine.depth()[first + k]))
     }
 }
 
-/// Differences of an image from the mesh's own nearby.
+/// Differences between an image and full detail nearby.
 #[derive(Clone, Copy, Debug, Default)]
 struct Found {
-    /// Pixels whose mask is nowhere near.
+    /// Pixels whose mask does not occur nearby.
     masks: usize,
     /// Pixels of meshes away from silhouettes.
     compared: usize,
-    /// Those of them whose depth is not between those near, and a millimetre more.
+    /// Compared pixels whose depth is outside of the depths nearby, with a margin of a millimeter.
     depths: usize,
-    /// Where the mesh is not seen at a slant: largest difference of their depth \[m\].
+    /// Largest difference of depth where the mesh faces the camera \[m\].
     facing: f32,
-    /// Pixels that are not the same as without levels.
+    /// Pixels that differ from full detail.
     changed: usize,
 }
 
 impl Truth<'_> {
-    /// Compares an image with the meshes themselves.
+    /// Compares an image with full detail.
     fn compare(&self, coarse: &Image) -> Found {
         let Self { view, plain, .. } = self;
         let mut found = Found::default();
@@ -130,9 +131,9 @@ impl Truth<'_> {
                 found.masks += 1;
                 continue;
             }
-            // Silhouettes, against other things or the same: steeper than 4 over the pixel and its half neighbours. There
-            // depth falls like a root of the distance from the edge, and edges are between fine pixels. The ground has
-            // no levels.
+            // Silhouettes, against another surface or the same: steeper than 4 over the pixel and half of its
+            // neighbors. There depth falls like a root of the distance from the edge, and edges are between fine
+            // pixels. The ground has no levels.
             let width = 2.0 * PIXELS as f32 * low / view.fx;
             if !alone || mask == 0 || mask == 100 || high - low > 4.0 * width {
                 continue;
@@ -149,14 +150,14 @@ impl Truth<'_> {
     }
 }
 
-/// The image with levels, and images that are wrong: with the camera a pixel to the side, and 3 mm back.
+/// Checks the image with levels, and images that are wrong: with the camera a pixel to the side, and 3 mm back.
 fn check(name: &str, scene: (RenderScene, Vec<PoseF32>), view: View) {
     let still = Still { cfg: OFF, ..Still::new(scene, view) };
     let truth = Truth::new(&still);
     let found = truth.compare(&still.with(|still| still.cfg = ON).draw());
     assert!(found.changed * 4 > found.compared, "{name}: levels are in use: {found:?}");
     assert_eq!((found.masks, found.depths), (0, 0), "{name}: {found:?}");
-    // 1 mm off, seen at an angle of up to acos 0.9.
+    // 1 mm off, at an angle of up to acos 0.9.
     assert!(found.compared > 100 && found.facing <= 1.2e-3, "{name}: {found:?}");
     let wrong = truth.compare(&still.from(View { cx: view.cx + 1.0, ..view }));
     assert!(wrong.masks > 0, "{name}: a mask that is a pixel off must be found: {wrong:?}");
@@ -185,12 +186,12 @@ fn vendor_sr5_meshes() {
     }
 }
 
-/// Dense meshes, a veil and a glass among them.
+/// Dense meshes, two of them transparent.
 pub(super) fn veiled() -> Still {
     veiled_scene(dense())
 }
 
-/// [`veiled`], whose levels have yet to be made.
+/// [`veiled`], whose levels are not built yet.
 pub(super) fn new_veiled() -> Still {
     veiled_scene(scene_of(&new_meshes()))
 }
@@ -203,7 +204,7 @@ fn veiled_scene((scene, poses): (RenderScene, Vec<PoseF32>)) -> Still {
     Still { cfg: OFF, ..Still::new((veiled, poses), look([203, 150], 0.8, [1.2, 0.4, 0.5], [0.; 3])) }
 }
 
-/// Other things change no level.
+/// The level of an instance does not depend on other instances.
 #[test]
 fn independent_levels() {
     let (scene, poses) = dense();

@@ -18,7 +18,7 @@ use kinetoscope_testkit::scenes::{Random, figure, random};
 const RENDERERS: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS];
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denoise: true, seed: 3 };
 
-/// Everything that colours are made of: veils, mirrors, all kinds of lights, haze.
+/// A scene with all inputs of color: transparency, mirrors, all kinds of lights, haze.
 fn rich(seed: u64, [width, height]: [usize; 2], zoom: f32) -> Still {
     let (scene, poses) = random(&mut Random(seed), 1.0);
     let mut instances = scene.instances().to_vec();
@@ -35,7 +35,7 @@ fn rich(seed: u64, [width, height]: [usize; 2], zoom: f32) -> Still {
     Still::new((scene, poses), View { fx: zoom * view.fx, fy: zoom * view.fy, ..view })
 }
 
-/// Sizes on both sides of what is worth a thread.
+/// Sizes above and below the limit for another thread.
 #[test]
 fn raster() {
     assert!(levels().len() >= 2, "{:?}", levels());
@@ -67,7 +67,7 @@ fn rays() {
 #[test]
 fn lens_images() {
     let view = look([64, 48], 0.9, [1.6, -0.9, 1.0], [0.1, 0., 0.7]);
-    // Farther to the side, and of other intrinsics.
+    // Farther to the side, and with other intrinsics.
     let old = look([64, 48], 0.8, [1.5, -1.0, 1.1], [0.1, 0., 0.7]);
     for (lens, rays) in lenses::bent() {
         for renderer in &RENDERERS[1..] {
@@ -100,7 +100,7 @@ fn detail_levels() {
     assert!(images[0].bits() != detail::veiled().draw().bits(), "levels are in use");
 }
 
-/// Bands, samples and channels that are not asked for change no bit of the other channels.
+/// Bands, samples and unselected channels change no bit of the other channels.
 #[test]
 fn channels() {
     // Tall enough for several bands with four samples.
@@ -128,7 +128,7 @@ fn channels() {
     }
 }
 
-/// Path tracing and the hybrid change no channel but the colour.
+/// Path tracing and the hybrid change no channel but color.
 #[test]
 fn only_color_differs() {
     let view = look([97, 83], 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8]);

@@ -1,4 +1,4 @@
-//! Optical flow, against projections at both instants.
+//! Optical flow compared with projections at both instants.
 
 use super::harness::{Image, Still, look, wide};
 use crate::frame::Channels;
@@ -14,11 +14,11 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 const WANTED: Channels = Channels { flow: true, mask: true, position: true, depth: true, ..Channels::NONE };
 
-/// Pixels by which single precision may be off: coordinates of some metres have 5e-7 m, which are 1e-5 pixels for each pixel
-/// of focal length and metre of distance; those of 100 pixels at 0.5 m 1e-4, some of them added.
+/// Error of single precision \[pixels\]: coordinates of several meters have 5e-7 m, which are 1e-5 pixels per pixel of
+/// focal length and meter of distance; those of 100 pixels at 0.5 m 1e-4, some of them added.
 const ROUNDING: f64 = 1e-3;
 
-/// A random scene in which everything, the camera too, moved by up to 0.1 m and 0.2 rad since the frame before.
+/// A random scene in which all instances and the camera moved by up to 0.1 m and 0.2 rad since the previous frame.
 fn moving(r: &mut Random, reach: f64, view: impl Fn(View) -> View, size: [usize; 2]) -> Still {
     let (scene, poses) = random(r, 1.2);
     let (eye, target) = (r.pose(reach), r.vector(-0.5, 0.5).map(|x| x as f32));
@@ -31,15 +31,17 @@ fn moving(r: &mut Random, reach: f64, view: impl Fn(View) -> View, size: [usize;
     Still { channels: WANTED, cfg, before: Some((before, old)), ..Still::new((scene, poses), view) }
 }
 
-/// Visibility of a point in the frame before: unknown, not seen, or a pixel and factors of [`ROUNDING`] for both axes.
+/// Visibility of a point in the previous frame: unknown, not visible, or a pixel and factors of [`ROUNDING`] for both
+/// axes.
 enum Then {
     Either,
     Unseen,
     At([f64; 2], [f64; 2]),
 }
 
-/// Every pixel of an image against its point, moved back with its thing into the frame of the old camera; `seen` says where the
-/// point was, given the distance of its point from the origin too. Returns how many were judged, and how many were not seen before.
+/// Compares every pixel of an image with its point, moved back with its instance into the frame of the previous camera.
+/// `seen` gives the previous visibility of a point, from its position there, the pixel, and the distance of the point
+/// from the origin. Returns the number of compared pixels, and of pixels that were not visible before.
 fn check(what: &str, still: &Still, image: &Image, seen: impl Fn(Point3<f64>, [f64; 2], f64) -> Then) -> [usize; 2] {
     let (before, old) = still.before.as_ref().unwrap();
     let mut counts = [0, 0];
@@ -77,7 +79,7 @@ fn random_scenes() {
     let mut judged = 0;
     for seed in 0..16 {
         let mut still = moving(&mut numbers, 3.0, |view| view, [96, 72]);
-        // The lens changes, too.
+        // The intrinsics change, too.
         let (view, old) = (still.view, &mut still.before.as_mut().unwrap().1);
         (old.fx, old.cx) = (view.fx * 1.1, view.cx + 3.0);
         let old = *old;
@@ -91,7 +93,7 @@ fn random_scenes() {
                 }
                 let [fx, fy, cx, cy] = [old.fx, old.fy, old.cx, old.cy].map(f64::from);
                 let there = [fx * p.x / p.z + cx, fy * p.y / p.z + cy];
-                // Far beside the frame before, digits are lost with the slant; far away, with the distance.
+                // Far outside of the previous image, digits are lost with the slant; far away, with the distance.
                 let slant = |axis: usize| 1.0 + (here[axis] - there[axis]).abs() / 100.0;
                 Then::At(there, [0, 1].map(|axis| slant(axis) * (1.0 + distance / p.z / 4.0)))
             });
@@ -101,8 +103,8 @@ fn random_scenes() {
     assert!(judged > 100_000, "{judged}");
 }
 
-/// Behind every lens, things and the camera move and the pixels change: each point is where the lens saw it before, or it was
-/// not seen. The lens itself is judged elsewhere.
+/// Through every lens, with moving instances, a moving camera and changing intrinsics: each point is where the lens
+/// projected it in the previous frame, or was not visible. Other tests check the lenses.
 #[test]
 fn lenses() {
     let (mut numbers, mut unseen) = (Random(8), 0);
@@ -124,11 +126,11 @@ fn lenses() {
                 let then = Optics::new(lens, numbers).unwrap();
                 let [found, missed] = check(lens.name(), &still, &still.draw(), |p, _, _| {
                     let aside = p.x.hypot(p.y).atan2(p.z);
-                    // Within 1e-4 rad of the end of the lens a point may be seen or not.
+                    // Within 1e-4 rad of the end of the lens, the point may be visible or not.
                     if p.coords.norm() < 0.2 || (aside - then.domain().angle).abs() < 1e-4 {
                         return Then::Either;
                     }
-                    // Far beside the image a pixel is a small angle.
+                    // Far outside of the image a pixel is a small angle.
                     let slope = 1.0 / aside.cos().abs().max(0.02);
                     then.project(p.coords.into()).map_or(Then::Unseen, |there| Then::At(there, [slope; 2]))
                 });
@@ -140,8 +142,8 @@ fn lenses() {
     assert!(unseen > 100, "the control: {unseen}");
 }
 
-/// A camera that turns about itself: flow is that of the homography K R K^-1, whatever the distance; where neither things nor
-/// the camera move, it is exactly zero.
+/// A camera that rotates about its center: flow is that of the homography K R K^-1, at any distance. Without any
+/// motion, it is exactly zero.
 #[test]
 fn homography() {
     let view = look([90, 70], 1.0, [2.5, 0.3, 0.8], [0.0; 3]);
@@ -188,6 +190,6 @@ fn refused_frames_before() {
     assert!(matches!(pose, Some(RenderError::InstancePose { instance: 2, .. })), "{pose:?}");
     let flat = error(WANTED, |_, view| view.fx = 0.0);
     assert!(matches!(flat, Some(RenderError::Intrinsics { .. })), "{flat:?}");
-    // Other channels do not need it.
+    // Other channels do not use the previous frame.
     assert_eq!(error(Channels { depth: true, ..Channels::NONE }, few), None);
 }

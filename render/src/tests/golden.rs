@@ -1,4 +1,4 @@
-//! Small images that were inspected once. `KINETOSCOPE_BLESS=1` writes them anew.
+//! Small images that were inspected once. `KINETOSCOPE_BLESS=1` rewrites them.
 
 use super::harness::{Image, Still, look};
 use crate::frame::Channels;
@@ -19,7 +19,8 @@ fn color(image: &Image) -> RgbaImage {
     RgbaImage::from_raw(width, color.len() as u32 / 4 / width, color).unwrap()
 }
 
-/// Compares with a tolerance of two steps of 255 per number. A failure writes expected, actual and their difference.
+/// Compares with a tolerance of two steps of 255 per number. A failure writes expected image, actual image and their
+/// difference.
 fn compare(name: &str, still: &Still) {
     let (golden, actual) = (file(name), &color(&still.draw()));
     if std::env::var_os("KINETOSCOPE_BLESS").is_some() {
@@ -32,7 +33,7 @@ fn compare(name: &str, still: &Still) {
     let far = |(a, b): (&u8, &u8)| a.abs_diff(*b);
     let worst = expected.iter().zip(actual.iter()).map(far).max().unwrap_or(0);
     if worst > 2 {
-        // Beside the test program, in the build folder.
+        // In the build folder, beside the test program.
         let folder = std::env::current_exe().unwrap().parent().unwrap().join("golden");
         std::fs::create_dir_all(&folder).unwrap();
         let mut difference = expected.clone();
@@ -69,13 +70,13 @@ fn shapes() {
     compare("every_shape", &Still::new(scene, look([128, 72], 0.6, [3.5, 0.5, 3.0], [0.1, 0.05, 0.])));
 }
 
-/// A box after Cornell's: white, a red and a green wall, two blocks, and a light in the ceiling that is all the light there is.
+/// A Cornell box: white, a red and a green wall, two blocks, and a light in the ceiling as the only light.
 fn cornell_box() -> Still {
     let (white, red, green) = (matt([0.87, 0.87, 0.85]), matt([0.8, 0.2, 0.15]), matt([0.3, 0.7, 0.25]));
     let light = Material { emission: 12.0, ..matt([1.0, 0.93, 0.8]) };
     let wall = |half: f32| Shape::from(Plane { half: [half; 2] });
     let block = |height| Shape::from(Box { half: [0.3, 0.3, height] });
-    // Columns are the axes of a plane: its normal looks inward.
+    // The columns are the axes of a plane: its normal faces inward.
     let facing = |rotation, translation| PoseF32 { rotation, translation };
     let (up, down) = ([[1., 0., 0.], [0., 1., 0.], [0., 0., 1.]], [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]]);
     let turned = |angle: f32, at| {
@@ -98,7 +99,7 @@ fn cornell_box() -> Still {
     Still { channels, ..Still::new((scene, poses), look([64; 2], 0.6, [0., -4.2, 1.], [0., 0., 1.])) }
 }
 
-/// A converged image is the golden; an image of few paths, whose noise two seeds tell, is that one on average.
+/// The golden image is converged. The mean of an image with few paths equals it, within a noise that two seeds show.
 #[test]
 fn room_of_cornell() {
     /// Pixels along a block, whose means are compared, and blocks along a side.
@@ -124,12 +125,12 @@ fn room_of_cornell() {
     let rms =
         |a: &[f64], b: &[f64]| (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt();
     let (expected, few, other) = (means(&golden), means(&draw(64, 12, 2)), means(&draw(64, 12, 3)));
-    // Of one image, not of two.
+    // The noise of one image, not of two.
     let noise = rms(&few, &other) / f64::sqrt(2.0);
     let off = rms(&few, &expected);
-    // Tone curves bend: noise makes means darker by a little; and the golden is rounded to whole bytes.
+    // The tone curve is concave, so noise makes means slightly darker; and the golden image is rounded to whole bytes.
     assert!(off < 1.5 * noise + 0.3 && noise < 1.0, "off by {off}, noise is {noise}");
-    // Controls: light that went over one surface less is missed, and so is the colour of the walls.
+    // Controls: a missing bounce is detected, and so are the colors of the walls.
     let less = rms(&means(&draw(64, 2, 2)), &expected);
     assert!(less > 3.0 * (1.5 * noise + 0.3), "{less}");
     let (left, right) = (golden.get_pixel(14, 44).0, golden.get_pixel(50, 36).0);

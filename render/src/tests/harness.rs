@@ -1,4 +1,4 @@
-//! A scene, drawn by a renderer, and its image pixel by pixel, to compare with an analytic answer or another renderer.
+//! A test scene rendered to an image, to be compared with an analytic answer or another renderer.
 
 use crate::aperture::Aperture;
 use crate::frame::{Channels, Frame};
@@ -15,7 +15,7 @@ use kinetoscope_scene::{Pose, PoseF32, RenderScene};
 use kinetoscope_testkit::image_check::ImageCheck;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// Every geom group, and meshes as they are: what all renderers draw alike.
+/// Every geom group, and meshes at full detail: all renderers agree on these settings.
 pub(super) const EXACT: RasterCfg = RasterCfg {
     samples: 4,
     reflections: true,
@@ -27,7 +27,7 @@ pub(super) const EXACT: RasterCfg = RasterCfg {
     lod: false,
 };
 
-/// Everything that an image depends on.
+/// All inputs of an image.
 #[derive(Clone, Debug)]
 pub(super) struct Still {
     pub(super) scene: RenderScene,
@@ -38,11 +38,11 @@ pub(super) struct Still {
     pub(super) renderer: Renderer,
     pub(super) stops: f64,
     pub(super) lens: Option<LensRays>,
-    /// Poses and view of the frame before, for flow.
+    /// Poses and view of the previous frame, for flow.
     pub(super) before: Option<(Vec<PoseF32>, View)>,
     pub(super) aperture: Option<Aperture>,
     pub(super) shutter: Shutter,
-    /// Poses of things and camera when the shutter opened, and how long before \[s\].
+    /// Poses of instances and camera at shutter opening, and the time since then \[s\].
     pub(super) opened: Option<(Vec<PoseF32>, PoseF32, f64)>,
 }
 
@@ -82,7 +82,7 @@ impl Still {
         Frame::new(self.view.width, self.view.height, self.channels)
     }
 
-    /// The image with an instruction set.
+    /// The image rendered with an instruction set.
     pub(super) fn draw_on(&self, level: Level) -> Result<Image, RenderError> {
         self.draw_by(&mut self.rasterizer(level))
     }
@@ -95,7 +95,7 @@ impl Still {
         rasterizer
     }
 
-    /// The image by a rasterizer, with its settings; it keeps what it builds of meshes.
+    /// The image rendered by a rasterizer with these settings, which keeps the BVHs of meshes.
     pub(super) fn draw_by(&self, rasterizer: &mut Rasterizer) -> Result<Image, RenderError> {
         let mut frame = self.frame();
         rasterizer.render_take(&self.shot(), &self.take(), &mut frame.as_mut())?;
@@ -130,16 +130,16 @@ impl Still {
     }
 }
 
-/// Asserts that stills have the same bits with every instruction set, and in batches of these sizes for these numbers of
-/// threads. A batch begins anew with the first of the `kinds` of stills where it has more. Scenes are made anew for each batch, so
-/// that threads meet while assets of meshes are built. Returns an image of each kind.
+/// Asserts that stills have the same bits with every instruction set, and in batches of these sizes with these numbers
+/// of threads. Larger batches repeat the `kinds` of stills. Scenes are created for each batch, so that threads build
+/// assets of meshes concurrently. Returns an image of each kind.
 pub(super) fn assert_same_bits(
     what: &str,
     (kinds, make): (usize, &dyn Fn(usize) -> Still),
     threads: &[usize],
     batches: &[usize],
 ) -> Vec<Image> {
-    // The best one is that of the images.
+    // The best level is that of the images.
     let best = format!("{:?}", Level::best());
     let others: Vec<Level> = levels().into_iter().filter(|level| format!("{level:?}") != best).collect();
     let image = |k| {
@@ -224,14 +224,14 @@ impl Image {
         ImageCheck { name, size: [self.width, self.color().len() / self.width], tolerance, outliers: 0.0 }
     }
 
-    /// Asserts that all colours of a pixel are the byte of a formula, where it has one.
+    /// Asserts that all colors of a pixel are the byte of a formula, where it has a value.
     #[track_caller]
     pub(super) fn assert_gray(&self, name: &str, tolerance: f64, expected: impl Fn(usize) -> Option<f64>) {
         let check = self.check(name, tolerance);
         (0..3).for_each(|c| check.assert_matches(&self.channel(c), |x, y| expected(y * self.width + x)));
     }
 
-    /// How many pixels are not the byte of a formula, and for how many it has one.
+    /// Number of pixels that differ from the byte of a formula, and number of pixels with a value.
     pub(super) fn count_gray(&self, tolerance: f64, expected: impl Fn(usize) -> Option<f64>) -> [usize; 2] {
         self.check("", tolerance).count(&self.channel(0), |x, y| expected(y * self.width + x))
     }
@@ -241,7 +241,7 @@ impl Image {
         self.bits() == other.bits()
     }
 
-    /// All channels as bits: NaN would equal itself.
+    /// All channels as bits, so that NaN equals itself.
     pub(super) fn bits(&self) -> Vec<u32> {
         let Frame { color, albedo, mask, depth, distance, normal, shading_normal, position, flow, .. } = &self.frame;
         let mut out = Vec::new();
@@ -257,29 +257,29 @@ impl Image {
         out
     }
 
-    /// [`Self::bits`] without the colour.
+    /// [`Self::bits`] without the color.
     pub(super) fn bits_but_color(&self) -> Vec<u32> {
         Self { frame: Frame { color: None, ..self.frame.clone() }, width: self.width }.bits()
     }
 
-    /// Pixels that have eight neighbours.
+    /// Pixels that have eight neighbors.
     pub(super) fn inner(&self) -> impl Iterator<Item = usize> + use<> {
         let (width, height) = (self.width, self.mask().len() / self.width);
         (1..height - 1).flat_map(move |y| (1..width - 1).map(move |x| y * width + x))
     }
 
-    /// An inner pixel and its eight neighbours.
+    /// An inner pixel and its eight neighbors.
     pub(super) fn around(&self, k: usize) -> impl Iterator<Item = usize> + Clone + use<> {
         let width = self.width;
         (0..9).map(move |n| k + (n / 3) * width + n % 3 - width - 1)
     }
 
-    /// True if an inner pixel and its neighbours show the same thing.
+    /// True if an inner pixel and its neighbors show the same instance.
     pub(super) fn alone(&self, k: usize) -> bool {
         self.around(k).all(|n| self.mask()[n] == self.mask()[k])
     }
 
-    /// True if an inner pixel is off silhouettes: all around is the same thing, to a tenth as deep.
+    /// True if an inner pixel is off silhouettes: all neighbors show the same instance, at a depth within a tenth.
     pub(super) fn whole(&self, k: usize) -> bool {
         let depth = self.depth();
         let near = |n: usize| depth[n] == depth[k] || (depth[n] - depth[k]).abs() <= 0.1 * depth[k].abs();
@@ -287,7 +287,7 @@ impl Image {
     }
 }
 
-/// How many pixels differ by more than some bytes in any colour.
+/// Number of pixels that differ by more than `bytes` in any color.
 pub(super) fn far_apart(a: &Image, b: &Image, bytes: u8) -> usize {
     let differ = |(a, b): &(&[u8; 4], &[u8; 4])| (0..4).any(|c| a[c].abs_diff(b[c]) > bytes);
     a.color().iter().zip(b.color()).filter(differ).count()

@@ -1,4 +1,4 @@
-//! Images through lenses: against closed forms, and against images without a lens of the same rays.
+//! Images through lenses, compared with closed forms, and with pinhole images of the same rays.
 
 use super::harness::{Still, far_apart, look};
 use super::lenses::{FISHEYE, WARPED, all, bent, rays_of};
@@ -25,7 +25,7 @@ fn figure_through(rays: &LensRays) -> Still {
     Still { lens: Some(rays.clone()), ..Still::new(figure(), view) }
 }
 
-/// A pixel shows what an image of one pixel of a pinhole shows that looks the same way: of meshes, boxes and all else.
+/// A pixel equals an image of one pixel of a pinhole camera along its ray: for meshes, boxes and all other shapes.
 #[test]
 fn single_pixels() {
     let (mut compared, mut different, mut seen) = (0, 0, 0);
@@ -52,20 +52,20 @@ fn single_pixels() {
             let alone = Still { view: one, ..still.clone() }.draw_by(&mut rasterizer).unwrap();
             let (a, b) = (image.distance()[at], alone.depth()[0]);
             let cosine = Vector3::from(image.normal()[at]).dot(&Vector3::from(alone.normal()[0]));
-            // Forward lenses have near and far along their axis: nothing here is near either.
+            // Forward lenses measure near and far along their axis: no surface here is near either.
             let near = a == b || (a - b).abs() <= 1e-4 * b && cosine > 0.9999;
             compared += 1;
             seen += usize::from(alone.mask()[0] != 0);
             different += usize::from(image.mask()[at] != alone.mask()[0] || !near);
         }
     }
-    // Rays that are 1e-7 apart see different triangles within that of an edge: one pixel in thousands.
+    // Rays that are 1e-7 apart hit different triangles within that of an edge: one pixel in thousands.
     assert!(compared > 1500 && seen > compared / 4 && different * 500 <= compared, "{different} of {compared}");
 }
 
 #[test]
 fn lens_without_distortion() {
-    // Its rays from a table show the same as those of a pinhole, where no silhouette is.
+    // Rays from a table give the same image as a pinhole, away from silhouettes.
     let (mut compared, mut different) = (0, 0);
     for seed in 0..6 {
         let view = View { cx: 44.25, fy: 80.5, ..look([101, 75], 1.0, [2.0, 0.5, 1.0], [0.; 3]) };
@@ -73,7 +73,7 @@ fn lens_without_distortion() {
         let rays = rays_of(OpenCv::default().into(), PixelIntrinsics { fx, fy, cx, cy }, [101, 75]);
         let still = Still::new(random(&mut Random(seed), 1.2), view);
         for renderer in [Renderer::FastRayTraced, Renderer::Hybrid] {
-            // Shadow maps cover what a pinhole sees, and everything behind a lens: their edges are not the same.
+            // Shadow maps cover the view of a pinhole, and the whole scene with a lens: the edges of shadows differ.
             let still = still.with(|still| still.cfg.shadows = renderer == Renderer::Hybrid);
             let (a, b) = (still.by(renderer), Still { lens: Some(rays.clone()), ..still.clone() }.by(renderer));
             let Comparison { compared: all, different: other, .. } = compare(&a, &b);
@@ -85,7 +85,7 @@ fn lens_without_distortion() {
     assert!(compared > 2 * 6 * 101 * 75 / 2 && different * 1000 <= compared, "{different} of {compared}");
 }
 
-/// Samples of colours go through the lens, each where it is in the pixel.
+/// Color samples have their own rays through the lens, each at its position in the pixel.
 #[test]
 fn sample_rays() {
     let pixels = PixelIntrinsics { fx: 20.0, fy: 22.0, cx: 30.25, cy: 25.5 };
@@ -95,7 +95,7 @@ fn sample_rays() {
         let expected = rays.optics().ray(at.map(f64::from)).unwrap().map(|x| x as f32);
         assert_eq!(rays.direction(k, [31, 17]), expected);
     }
-    // A white ball before a black sky: a bright pixel, a dark one, or as many quarters as samples see the ball.
+    // A white ball in front of a black sky: the brightness of a pixel is the number of samples that hit the ball.
     let white = Material { emission: 1.0, ..matt([1.0; 3]) };
     let (scene, poses) = things([(Sphere { radius: 0.4 }, white, PoseF32::IDENTITY)]);
     let mut scene = unlit(scene);
@@ -123,8 +123,8 @@ fn sample_rays() {
     }
 }
 
-/// Paths change no channel but the colour, and leave black what is outside of the image circle; the sky is as bright as
-/// without a lens.
+/// Path tracing changes no channel but color, and leaves pixels outside of the image circle black; the sky is as bright
+/// as without a lens.
 #[test]
 fn paths() {
     let pixels = PixelIntrinsics { fx: 16.0, fy: 16.0, cx: 32.0, cy: 24.0 };
@@ -140,7 +140,7 @@ fn paths() {
         for (k, color) in empty.by(renderer).color().iter().enumerate() {
             let at = [(k % SIZE[0]) as f64 + 0.5 - 32.0, (k / SIZE[0]) as f64 + 0.5 - 24.0];
             let radius = at[0].hypot(at[1]) / 16.0;
-            // A pixel's corners are 0.71 pixels from its middle.
+            // A pixel's corners are 0.71 pixels from its center.
             if (radius - 1.2).abs() > 0.75 / 16.0 {
                 assert_eq!(*color, if radius < 1.2 { plain } else { [0, 0, 0, 255] }, "{renderer:?} {k}");
             }
@@ -148,8 +148,8 @@ fn paths() {
     }
 }
 
-/// Behind lenses, the hybrid's rays see what all rays see. Its shadows are sharp: the light of pixels with no shadow's edge and
-/// no silhouette beside them is that of shadow maps too.
+/// With lenses, the hybrid has ray-traced visibility. Its shadows are sharp: pixels without a shadow edge or a
+/// silhouette nearby have the same light as with shadow maps.
 #[test]
 fn hybrid() {
     const BESIDE: usize = 2;
@@ -176,14 +176,15 @@ fn hybrid() {
                 shadowed += usize::from(shadow(k));
             }
         }
-        // Edges of shadows are others: the control.
+        // The control: the edges of shadows differ.
         assert!(judged > 500 && other > 0, "{}: {judged} {other}", lens.name());
         all_shadowed += shadowed;
     }
     assert!(all_shadowed > 0);
 }
 
-/// The rasterizer draws straight lines; other renderers refuse rays of another image, or of too few samples.
+/// The rasterizer draws straight lines only; other renderers reject rays of another image size, or with too few
+/// samples.
 #[test]
 fn refused_rays() {
     let pixels = PixelIntrinsics { fx: 50.0, fy: 50.0, cx: 32.0, cy: 24.0 };

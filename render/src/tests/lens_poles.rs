@@ -5,11 +5,11 @@ use crate::lens::{Lens, LensRays, OpenCv, Optics};
 use crate::optics_error::OpticsError;
 use kinetoscope_testkit::opencv::opencv;
 
-/// A factory's calibration of an OAK-D's colour camera on a TurtleBot 4, 250 x 250 pixels, rounded to five digits. Its radial
-/// factor has a pole at 33.965 degrees and a zero at 33.970.
+/// Factory calibration of an OAK-D's color camera on a TurtleBot 4, 250 x 250 pixels, rounded to five digits. Its
+/// radial factor has a pole at 33.965 degrees and a zero at 33.970.
 const OAK_D: [f64; 8] = [-4.8608, 17.282, 0.000204, 0.001025, -25.172, -4.9436, 17.514, -25.291];
 const OAK_D_PIXELS: PixelIntrinsics = PixelIntrinsics { fx: 196.5, fy: 196.5, cx: 127.4, cy: 126.3 };
-/// That of an OAK-D Lite: 37.00 and 37.07 degrees. Its bridge is the longest.
+/// Factory calibration of an OAK-D Lite, with pole and zero at 37.00 and 37.07 degrees. Its bridge is the longest.
 const OAK_D_LITE: [f64; 8] = [
     -4.0933966636657715,
     9.190781593322754,
@@ -20,8 +20,8 @@ const OAK_D_LITE: [f64; 8] = [
     9.556831359863281,
     -9.303533554077148,
 ];
-/// The example of a calibration in the documentation of Basalt's converter for DepthAI: the zero is before the pole, at 44.853
-/// degrees and 44.937.
+/// The calibration example in the documentation of Basalt's converter for DepthAI. The zero is before the pole, at
+/// 44.853 degrees and 44.937.
 const ZERO_FIRST: [f64; 8] = [-7.64, 19.10, 0.00068, 0.00112, -12.51, -7.64, 19.06, -12.45];
 const UNIT: PixelIntrinsics = PixelIntrinsics { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0 };
 
@@ -29,7 +29,7 @@ fn optics(coefficients: &[f64], pixels: PixelIntrinsics) -> Optics {
     Optics::new(OpenCv::from_coefficients(coefficients).into(), pixels).unwrap()
 }
 
-/// OpenCV's formula, with nothing around it.
+/// OpenCV's formula without bridges.
 fn formula(d: &[f64; 8], [x, y]: [f64; 2]) -> [f64; 2] {
     let [k1, k2, p1, p2, k3, k4, k5, k6] = *d;
     let r = x * x + y * y;
@@ -37,14 +37,14 @@ fn formula(d: &[f64; 8], [x, y]: [f64; 2]) -> [f64; 2] {
     [x * g + 2.0 * p1 * x * y + p2 * (r + 2.0 * x * x), y * g + p1 * (r + 2.0 * y * y) + 2.0 * p2 * x * y]
 }
 
-/// Root cause: "regular" meant a positive denominator, so that everything behind the first pole of the fraction counted as folded
-/// back. Newton's method failed there, and going on from the axis climbed the spike before the pole: 33.92 degrees where OpenCV
-/// has 36.60, without an error.
+/// Root cause: "regular" meant a positive denominator, so directions behind the first pole of the fraction counted as
+/// folded back. Newton's method failed there, and continuation from the axis climbed the spike before the pole: 33.92
+/// degrees instead of OpenCV's 36.60, without an error.
 #[test]
 fn cancelled_poles() {
     for (d, name) in [(OAK_D, "oak_d pole"), (ZERO_FIRST, "zero_first pole")] {
         let optics = optics(&d, UNIT);
-        // As far as a lens without a pole: up to where p1 and p2 fold it back, which are a thousandth.
+        // As far as a lens without a pole: up to the fold by p1 and p2, which are a thousandth.
         let domain = optics.domain();
         assert!(domain.angle > 1.56 && domain.radius < 1000.0, "{domain:?}");
         let all: Vec<[f64; 4]> = opencv(name).collect();
@@ -58,12 +58,12 @@ fn cancelled_poles() {
             assert!((u - point[0]).abs() < 1e-14 && (v - point[1]).abs() < 1e-14, "{point:?}: {u} {v}");
         }
     }
-    // A control: the other direction of the fourth point, on the spike, is a good solution of OpenCV's formula.
+    // A control: the other direction of the fourth point, on the spike, is a valid solution of OpenCV's formula.
     let of = |degrees: f64| formula(&OAK_D, [degrees.to_radians().tan(), 0.0])[0];
     assert!(of(33.90) < 0.75 && of(33.92) > 0.75, "{} {}", of(33.90), of(33.92));
 }
 
-/// All around the pole the image grows with the angle, each direction has a pixel and each pixel a direction.
+/// Around the pole the image radius grows with the angle, each direction has a pixel and each pixel a direction.
 #[test]
 fn bridges() {
     for (d, pole) in [(OAK_D, 33.965), (OAK_D_LITE, 37.0), (ZERO_FIRST, 44.937)] {
@@ -88,26 +88,26 @@ fn bridges() {
                 assert!((x / z - c * r).hypot(y / z - s * r) < 1e-11, "{angle}: {x} {y} {z}");
             }
         }
-        // Elsewhere it is the formula: off it only near the pole, by 2 degrees at most.
+        // Away from the pole, by 2 degrees at most, OpenCV's formula holds.
         let [from, to] = off_formula;
         assert!(from > pole - 2.0 && from < pole && to > pole && to < pole + 2.0, "{off_formula:?}");
-        // And pixels in steps of a thousandth of the focal length, as images of 2000 pixels have them.
+        // Pixels in steps of a thousandth of the focal length, as in images of 2000 pixels.
         for k in 0..1000 {
             let at = [0.001 * f64::from(k), -0.0004 * f64::from(k)];
             let [x, y, z] = optics.unproject(at).unwrap();
             let back = optics.project([x, y, z]).unwrap();
             assert!((back[0] - at[0]).hypot(back[1] - at[1]) < 1e-12, "{at:?}: {back:?}");
-            // The lens itself bends little: nowhere is the ray farther aside than the bridge is long.
+            // The lens itself bends little: no ray is farther off than the bridge is long.
             assert!((x / z - at[0]).hypot(y / z - at[1]) < 0.06, "{at:?}: {x} {y} {z}");
         }
     }
-    // A control: the formula alone runs away before the pole, and comes from the other side.
+    // A control: the formula alone diverges before the pole, and returns from the other side.
     let of = |degrees: f64| formula(&OAK_D, [degrees.to_radians().tan(), 0.0])[0];
     assert!(of(33.9648) > 3.0 && of(33.9649) < -3.0, "{} {}", of(33.9648), of(33.9649));
 }
 
-/// The whole image of that camera: each pixel that is not on the bridge is where OpenCV's formula brings its ray to, and no ray
-/// is on the spike, which is up to 46 pixels aside.
+/// The whole image of that camera: OpenCV's formula maps the ray of each pixel outside of the bridge to that pixel, and
+/// no ray is on the spike, which is up to 46 pixels off.
 #[test]
 fn oak_d() {
     let optics = optics(&OAK_D, OAK_D_PIXELS);
@@ -132,12 +132,12 @@ fn oak_d() {
         assert!(aside < 4.0, "{at:?} looks {aside} pixels aside");
         assert_ne!(rays.direction(0, [column, row]), [0.0; 3]);
     }
-    // A ring of 0.87 degrees that is squeezed to 0.74 pixels, and meets the corners alone.
+    // A ring of 0.87 degrees that is compressed to 0.74 pixels, and reaches the corners only.
     assert!((50..500).contains(&bridged), "{bridged}");
 }
 
-/// Poles that are no surplus of a fit end the lens: the image where it would be without pole and zero, if there are directions
-/// behind it.
+/// Poles that are not surplus of a fit end the lens: at the radius without pole and zero, if there are directions
+/// behind the pole.
 #[test]
 fn wide_poles() {
     // g = (1 - s / 1.5) / (1 - s): without both it is 1, so the pole is at radius 1. There r - r³ / 1.5 = 1 - r².
@@ -153,12 +153,13 @@ fn wide_poles() {
         matches!(error, OpticsError::LensFolds { angle, radius, .. } if (angle, radius) == (domain.angle, domain.radius))
     );
     assert!(error.to_string().contains("it folds back, or nears a pole, 36.03 degrees"), "{error}");
-    // An image that ends before is good, and so is all of it for a lens that is said to end before the pole.
+    // An image that ends before the pole is valid, and so is a whole image if `max_angle` ends the lens before the
+    // pole.
     let middle = PixelIntrinsics { cx: 70.0, cy: 70.0, ..pixels };
     assert!(LensRays::new(&Optics::new(wide.into(), middle).unwrap(), [140, 140], 1).is_ok());
     let short = Optics::new(OpenCv { max_angle: Some(0.78), ..wide }.into(), UNIT).unwrap();
     assert!(!short.domain().folds && short.unproject([3.0, 0.0]).is_some());
-    // No zero at all: r / (1 - r²) is a lens that has a direction for each pixel, r = (sqrt(1 + 4 R²) - 1) / (2 R).
+    // Without a zero: the lens r / (1 - r²) has a direction for each pixel, r = (sqrt(1 + 4 R²) - 1) / (2 R).
     let endless = Optics::new(OpenCv { k4: -1.0, ..OpenCv::default() }.into(), UNIT).unwrap();
     let domain = endless.domain();
     assert!(domain.folds && domain.radius == f64::INFINITY && (domain.angle - 1f64.atan()).abs() < 1e-12, "{domain:?}");
@@ -168,7 +169,7 @@ fn wide_poles() {
         assert!((x / z - expected).abs() < 1e-12, "{radius}: {x} {z}");
     }
     assert_eq!(endless.project([1.01, 0.0, 1.0]), None);
-    // Above and below the same: nothing at all, whatever the roots are.
+    // Equal numerator and denominator: no distortion, whatever the roots are.
     let same = OpenCv { k1: -2.0, k2: 0.7, k3: 0.1, k4: -2.0, k5: 0.7, k6: 0.1, ..OpenCv::default() };
     let same = Optics::new(same.into(), UNIT).unwrap();
     assert!(!same.domain().folds);
@@ -179,7 +180,7 @@ fn wide_poles() {
     }
 }
 
-/// Fits of cameras leave pairs of either order, up to three of them: whatever they are, a pixel with a ray leads back to itself.
+/// Camera fits leave pairs of either order, up to three of them: in all cases, a pixel with a ray maps back to itself.
 #[test]
 fn random_pairs() {
     let mut bridged = 0;
@@ -190,7 +191,7 @@ fn random_pairs() {
             [pole * (1.0 + 0.02 * (part(n + 1) - 0.5).powi(3)), pole]
         };
         let pairs = [pair(1), pair(3)];
-        // (1 - s / z1) (1 - s / z2) (1 + 0.1 s), and the same of the poles.
+        // (1 - s / z1) (1 - s / z2) (1 + 0.1 s), and the same for the poles.
         let of = |which: usize| {
             let [a, b, c] = [-1.0 / pairs[0][which], -1.0 / pairs[1][which], 0.1 * (which == 0) as u8 as f64];
             [a + b + c, a * b + a * c + b * c, a * b * c]
@@ -220,11 +221,12 @@ fn random_pairs() {
     assert!(bridged > 250, "{bridged}");
 }
 
-/// Two directions of a lens that dips between 28.05 and 33 degrees: those before the dip, through
+/// Two directions per pixel of a lens that dips between 28.05 and 33 degrees: the ones before the dip, from
 /// `cv2.projectPoints(p, zeros(3), zeros(3), eye(3), d)`.
 ///
-/// Root cause: Newton's method from the point itself found the direction behind the dip, which the lens does not see; what went
-/// on from the axis was asked only where it found nothing. So whole cameras were refused, or had dark pixels within `max_angle`.
+/// Root cause: Newton's method from the point itself found the direction behind the dip, which is outside of the lens's
+/// domain. Continuation from the axis was used only if Newton's method failed. So whole cameras were rejected, or had
+/// dark pixels within `max_angle`.
 #[test]
 fn rays_before_folds() {
     let d = [4.16224, -63.47165, -0.0002, -0.0007, 168.96335, 3.79104, -65.55826, 164.80506];
@@ -244,7 +246,7 @@ fn rays_before_folds() {
     // A control: the other direction of the first pixel, which OpenCV itself finds: 35.74 degrees.
     let [u, v] = formula(&d, [0.7196107881897857, 4.643358733776809e-5]);
     assert!((u - pixels[0][2]).hypot(v - pixels[0][3]) < 1e-14);
-    // An image up to the fold is good, and one with max_angle is dark nowhere within.
+    // An image up to the fold is valid, and an image with `max_angle` has no dark pixel within it.
     let fx = 100.0;
     let inside = Intrinsics::Pixels { fx, fy: fx, cx: 62.0, cy: 62.0 }.to_pixels(124, 124).unwrap();
     let rays = LensRays::new(&Optics::new(lens.into(), inside).unwrap(), [124, 124], 4);

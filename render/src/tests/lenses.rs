@@ -1,4 +1,4 @@
-//! Lenses against closed forms, OpenCV's numbers, and themselves backward.
+//! Lens models compared with closed forms, OpenCV's numbers, and their own inverses.
 
 use crate::intrinsics::{Intrinsics, PixelIntrinsics};
 use crate::lens::{
@@ -12,7 +12,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 const PIXELS: PixelIntrinsics = PixelIntrinsics { fx: 610.0, fy: 605.0, cx: 322.0, cy: 243.0 };
 
-/// All twelve of a cheap camera.
+/// All twelve coefficients, of a cheap camera.
 pub(super) const WARPED: OpenCv = OpenCv {
     k1: -0.28,
     k2: 0.09,
@@ -32,7 +32,7 @@ pub(super) const WARPED: OpenCv = OpenCv {
 pub(super) const FISHEYE: OpenCvFisheye =
     OpenCvFisheye { k1: 0.03, k2: -0.012, k3: 0.004, k4: -0.0011, max_angle: Some(1.6) };
 
-/// One of each kind, and the pixels of an image of 64 x 48 that it fills, or more than fills.
+/// One lens of each kind, and intrinsics for which it fills an image of 64 x 48, or more than fills it.
 pub(super) fn all() -> Vec<(Lens, PixelIntrinsics)> {
     let f = |f: f64| PixelIntrinsics { fx: f, fy: 1.1 * f, cx: 30.25, cy: 25.5 };
     let panorama = Panorama::intrinsics(64, 48).to_pixels(64, 48).unwrap();
@@ -51,12 +51,12 @@ pub(super) fn all() -> Vec<(Lens, PixelIntrinsics)> {
     ]
 }
 
-/// Rays of a lens, with those of the samples of colours.
+/// Rays of a lens, including the color samples.
 pub(super) fn rays_of(lens: Lens, pixels: PixelIntrinsics, size: [usize; 2]) -> LensRays {
     LensRays::new(&Optics::new(lens, pixels).unwrap(), size, 4).unwrap()
 }
 
-/// Those of [`all`] that are no pinhole.
+/// Lenses of [`all`] other than the pinhole.
 pub(super) fn bent() -> impl Iterator<Item = (Lens, LensRays)> {
     all()
         .into_iter()
@@ -68,14 +68,15 @@ fn angle_with([x, y, z]: [f64; 3]) -> f64 {
     x.hypot(y).atan2(z)
 }
 
-/// Every pixel that has a ray is where its ray is seen, to 1e-10 pixel; every other one is outside of the image circle.
+/// Every pixel with a ray is the projection of that ray, to 1e-10 pixels; all other pixels are outside of the image
+/// circle.
 #[test]
 fn round_trip() {
     for (lens, pixels) in all() {
         let optics = Optics::new(lens, pixels).unwrap();
         let (mut seen, mut blind) = (0, 0);
         for k in 0..4 * 64 * 48 {
-            // Four in each pixel, not its centre.
+            // Four points in each pixel, none at its center.
             let at = [(k % 128) as f64 / 2.0 + 0.13, (k / 128) as f64 / 2.0 + 0.29];
             let radius = ((at[0] - pixels.cx) / pixels.fx).hypot((at[1] - pixels.cy) / pixels.fy);
             let Some(ray) = optics.unproject(at) else {
@@ -85,7 +86,7 @@ fn round_trip() {
             };
             assert!((ray.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() < 1e-14);
             assert!(angle_with(ray) <= optics.domain().angle + 1e-9 || optics.domain().folds, "{}", lens.name());
-            // Of any length.
+            // Directions of any length.
             let back = optics.project(ray.map(|x| 7.0 * x)).unwrap();
             let off = (back[0] - at[0]).hypot(back[1] - at[1]);
             assert!(off < 1e-10, "{}: {at:?} comes back {off:e} pixels off", lens.name());
@@ -105,7 +106,7 @@ fn fisheye_radii() {
         (Equisolid::default().into(), |t| 2.0 * (t / 2.0).sin(), PI),
         (Orthographic::default().into(), f64::sin, FRAC_PI_2),
         (Stereographic::default().into(), |t| 2.0 * (t / 2.0).tan(), 3.1),
-        // Isaac's: 0.00245 rad for each pixel at f = 1 / 0.00245, so r = f theta, up to 100 degrees.
+        // Isaac's default: 0.00245 rad per pixel at f = 1 / 0.00245, so r = f theta, up to 100 degrees.
         (FTheta::default().into(), |t| t, 100f64.to_radians()),
     ];
     for (lens, law, end) in laws {
@@ -117,8 +118,8 @@ fn fisheye_radii() {
             let direction = [angle.sin() * c, angle.sin() * s, angle.cos()];
             let [u, v] = optics.project(direction).unwrap();
             let expected = [PIXELS.cx + PIXELS.fx * law(angle) * c, PIXELS.cy + PIXELS.fy * law(angle) * s];
-            // The largest radius is 40 000 pixels, the last digit of the angle 1e-16 of pi, and the stereographic slope there
-            // 1000.
+            // The largest radius is 40 000 pixels, the last digit of the angle 1e-16 of pi, and the stereographic slope
+            // there 1000.
             let off = (u - expected[0]).abs().max((v - expected[1]).abs());
             assert!(off < 1e-9 * law(angle).max(1.0), "{} at {angle}: {off:e}", lens.name());
         }
@@ -127,7 +128,7 @@ fn fisheye_radii() {
             assert_eq!(optics.project([past.sin(), 0.0, past.cos()]), None, "{}", lens.name());
         }
     }
-    // A control: one law is not another.
+    // A control: the laws differ.
     assert!((FRAC_PI_2 - 2.0 * (FRAC_PI_2 / 2.0).sin()).abs() > 0.1);
     // Isaac's image of 200 degrees has a circle of 712.4 pixels: 100 degrees / 0.00245.
     let isaac = Optics::new(FTheta::default().into(), FTheta::ISAAC.to_pixels(1936, 1216).unwrap()).unwrap();
@@ -184,14 +185,14 @@ fn folds() {
         let domain = optics.domain();
         assert!(domain.folds && (domain.angle - angle).abs() < 1e-8, "{}: {domain:?}", lens.name());
         assert!((domain.radius - tangent * 2.0 / 3.0).abs() < 1e-12, "{}: {domain:?}", lens.name());
-        // An image that ends before is good; one that does not is refused, by the radius.
+        // An image that ends before the fold is valid; a larger one is rejected, by the radius.
         let middle = Optics::new(lens, PixelIntrinsics { cx: 50.0, cy: 50.0, ..pixels }).unwrap();
         assert!(LensRays::new(&middle, [100, 100], 1).is_ok());
         let error = LensRays::new(&optics, [200, 200], 1).unwrap_err();
         assert!(matches!(error, OpticsError::LensFolds { radius, .. } if (radius - domain.radius).abs() < 1e-12));
         assert!(error.to_string().contains("at radius 0.8607 of the normalised picture"), "{error}");
     }
-    // To see farther than that is refused at once; if it ends before, the rest is dark.
+    // A larger `max_angle` is rejected at once; a smaller one leaves the rest dark.
     let short = |max_angle| Lens::from(OpenCv { k1: -0.2, max_angle: Some(max_angle), ..OpenCv::default() });
     assert!(matches!(short(1.2).domain(), Err(OpticsError::LensFolds { .. })));
     let rays = LensRays::new(&Optics::new(short(0.5), pixels).unwrap(), [200, 200], 1).unwrap();
@@ -201,7 +202,7 @@ fn folds() {
     let r = (0.00245f64 / 9e-9).sqrt();
     let Err(OpticsError::LensFolds { angle, radius, .. }) = Lens::from(theta).domain() else { panic!("it folds") };
     assert!((radius * theta.focal_length - r).abs() < 1e-6 && (angle - 0.00245 * r * 2.0 / 3.0).abs() < 1e-12);
-    // Distortions that are not the same all around are looked at all around: here only along +x.
+    // Distortions without rotational symmetry are checked in all directions: this one folds along +x only.
     let prism = OpenCv { s1: -0.4, ..OpenCv::default() };
     let domain = Lens::from(prism).domain().unwrap();
     // x - 0.4 r² falls with x from x = 1 / 0.8 on.
@@ -240,7 +241,7 @@ fn refusals() {
         assert_eq!(Lens::from_name(name).unwrap().name(), *name);
     }
     assert_eq!(Lens::from_name("plumb_bob").unwrap(), Lens::from(OpenCv::default()));
-    // Nothing but dark: the circle is far beside the image.
+    // The whole image is dark: the circle is far outside of it.
     let beside = Intrinsics::Pixels { fx: 1.0, fy: 1.0, cx: -50.0, cy: 0.0 }.to_pixels(8, 8).unwrap();
     let optics = Optics::new(Orthographic::default().into(), beside).unwrap();
     assert_eq!(LensRays::new(&optics, [8, 8], 1), Err(OpticsError::LensBlind { lens: "orthographic" }));

@@ -1,4 +1,4 @@
-//! Shadows, ambient occlusion, metals, own light and tone curves, against closed forms.
+//! Shadows, ambient occlusion, metals, emission and tone curves, compared with closed forms.
 
 use super::harness::{EXACT, Image, Still, look};
 use crate::renderer::Renderer;
@@ -11,7 +11,7 @@ use kinetoscope_testkit::scenes::{at, matt, things, unlit};
 use kinetoscope_testkit::srgb::{linear, srgb};
 use nalgebra::Vector3;
 
-/// sRGB number of the gray that floors have here.
+/// sRGB value of the gray floors.
 const GRAY: f32 = 0.7;
 
 /// A gray floor, and a gray box of these half sizes, by the hybrid.
@@ -24,7 +24,7 @@ fn floor_and_box(half: [f32; 3], place: PoseF32, ambient: f32, view: crate::visi
     Still { cfg: EXACT, renderer: Renderer::Hybrid, ..Still::new((scene, poses), view) }
 }
 
-/// The byte of a gray floor in this light; below where the tone curve bends.
+/// The byte of a gray floor in this light, below the bend of the tone curve.
 fn byte(light: f32) -> f64 {
     srgb(linear(GRAY) * f64::from(light))
 }
@@ -32,7 +32,7 @@ fn byte(light: f32) -> f64 {
 /// A quarter for the polynomial, a half for rounding.
 const ROUNDING: f64 = 0.8;
 
-/// A box over a floor, its shadow by rays: where its edge is, and how bright the floor is on both sides.
+/// The ray-traced shadow of a box over a floor: position of its edge, and brightness of the floor on both sides.
 #[test]
 fn hybrid_shadows() {
     // From -2 to 0 along x, 0.9 to 1.1 high.
@@ -60,15 +60,15 @@ fn hybrid_shadows() {
         let sides: [&dyn Fn(f32) -> bool; 2] = [&|x| x <= edge, &|x| x > edge];
         let sizes = sides.map(|side| image.count_gray(ROUNDING, |k| of(&image, k, side))[1]);
         assert!(sizes.iter().all(|&n| n > 2000), "{sizes:?}");
-        // The control: without shadows all that is dark is wrong, and nothing else.
+        // The control: without shadows exactly the dark pixels are wrong.
         let bright = still.with(|still| still.cfg.shadows = false).draw();
         assert_eq!(bright.count_gray(ROUNDING, |k| of(&bright, k, &|_| true))[0], sizes[0]);
     }
 }
 
-/// A point light exactly on a ceiling, which is not between it and the floor: the floor below is lit everywhere, by the cosine.
+/// A point light exactly on a ceiling does not get occluded by it: the floor below is lit everywhere, by the cosine.
 ///
-/// Root cause once: rays went as far as the light, so that the last bit decided whether the ceiling was before it.
+/// Root cause: rays went as far as the light, so the last bit decided whether the ceiling occluded it.
 #[test]
 fn ceiling_light() {
     let view = look([80, 60], 0.6, [1.5, 0.3, 0.6], [0.0; 3]);
@@ -86,11 +86,11 @@ fn ceiling_light() {
     };
     let [off, all] = wrong(2.0);
     assert!(off == 0 && all > 2000, "{off} of {all}");
-    // The control: a millimetre inside of it the light reaches nothing.
+    // The control: a millimeter inside of the ceiling, the light reaches no surface.
     assert_eq!(wrong(2.001), [all; 2]);
 }
 
-/// The light of a point at the distance d is 1 / (c + l d + q d²) of itself.
+/// A point light at the distance d is attenuated by 1 / (c + l d + q d²).
 #[test]
 fn attenuation() {
     let view = look([80, 60], 0.6, [1.5, 0.3, 0.6], [0.0; 3]);
@@ -110,8 +110,8 @@ fn attenuation() {
     }
 }
 
-/// Ambient occlusion at the foot of a long wall of height h: of the light that is everywhere, the wall takes
-/// `(1 - d / sqrt(d² + h²)) / 2` at the distance d. Source: Howell, A catalog of radiation heat transfer configuration factors, B-71.
+/// Ambient occlusion at the foot of a long wall of height h: at the distance d, the wall occludes `(1 - d / sqrt(d² +
+/// h²)) / 2` of uniform light. Source: Howell, A catalog of radiation heat transfer configuration factors, B-71.
 #[test]
 fn ambient_occlusion() {
     // From x = 0 on, 1 m high.
@@ -121,10 +121,10 @@ fn ambient_occlusion() {
     still.scene.ambient.ground = [0.2; 3];
     let of = |occlusion_rays| still.with(|still| still.cfg.occlusion_rays = occlusion_rays).draw();
     let (with, without) = (of(1024), of(0));
-    // Colours of pixels at edges are means.
+    // Colors of pixels at edges are means.
     let x = |k: usize| Some(with.position()[k][0]).filter(|x| with.mask()[k] == 1 && *x < -0.02);
     let shade = |x: f32| byte(0.6 * (1.0 - 0.5 * (1.0 - -x / (x * x + 1.0).sqrt())));
-    // The net finds the share to 1/256 or so, and byte(x) rises by 250 at most here.
+    // The net finds the fraction to about 1/256, and byte(x) rises by at most 250 here.
     with.assert_gray("ambient occlusion", 1.5, |k| x(k).map(shade));
     let all: Vec<(usize, f32)> = (0..48 * 16).filter_map(|k| Some((k, x(k)?))).collect();
     assert!(all.len() > 300 && all.iter().any(|(_, x)| *x > -0.1), "{} pixels", all.len());
@@ -135,14 +135,14 @@ fn ambient_occlusion() {
     }
 }
 
-/// Distance of a point from the way of the light to another.
+/// Distance of a point from the segment between the light and another point.
 fn beside(point: [f32; 3], from: [f32; 3], to: [f32; 3]) -> f32 {
     let (way, at) = (Vector3::from(to) - Vector3::from(from), Vector3::from(point) - Vector3::from(from));
     (at - way * (at.dot(&way) / way.norm_squared()).clamp(0.0, 1.0)).norm()
 }
 
-/// Shadow maps are cut to things that cast shadows. A point of the ground is dark where the way to the light goes through a
-/// ball, and lit elsewhere: balls in the middle of the cone, half outside of it, close to the light, far apart.
+/// Shadow maps are cropped to the casters. A point of the ground is dark if its segment to the light crosses a ball,
+/// and lit elsewhere: balls at the center of the cone, half outside of it, close to the light, far apart.
 #[test]
 fn shadow_maps() {
     const RADIUS: f32 = 0.3;
@@ -153,7 +153,7 @@ fn shadow_maps() {
         &[[-0.9, -1.6, 0.6]],
         &[[0.1, 0.0, 2.5]],
         &[[-1.5, 1.0, 0.35], [1.4, -1.1, 0.5], [0.0, 0.3, 1.4]],
-        // None at all in the cone.
+        // No ball is in the cone.
         &[[6.0, 0.0, 0.5]],
     ];
     for (case, kind) in (0..cases.len()).flat_map(|case| [(case, spot), (case, LightKind::Directional)]) {
@@ -169,15 +169,15 @@ fn shadow_maps() {
         let (image, bright) = (still.draw(), still.with(|still| still.cfg.shadows = false).draw());
         let (mut dark, mut lit) = (0, 0);
         for (k, &p) in image.position().iter().enumerate().filter(|(k, _)| image.mask()[*k] == 1) {
-            // Inside of the cone and of the map, whose light the balls could take.
+            // Inside of the cone and of the map, where the balls can occlude the light.
             if p[0].hypot(p[1]) > 3.0 * 38f32.to_radians().tan() {
                 continue;
             }
             let from = if kind == spot { position } else { [0, 1, 2].map(|k| p[k] - 8.0 * direction[k]) };
             let near = cases[case].iter().map(|ball| beside(*ball, from, p)).fold(f32::INFINITY, f32::min);
             let [with, without] = [&image, &bright].map(|image| i32::from(image.color()[k][0]));
-            // The edge of a shadow is two texels of 1 to 2 cm wide on each side, and points are moved off the ground by
-            // two more; close to the light a ball is larger on the map than on the ground.
+            // The edge of a shadow is two texels of 1 to 2 cm wide on each side, and points are offset from the ground
+            // by two more; close to the light a ball is larger on the map than on the ground.
             if near < RADIUS - 0.08 {
                 assert!(with + 20 < without, "case {case}, {kind:?}: {with} of {without} at {p:?}");
                 dark += 1;
@@ -190,11 +190,12 @@ fn shadow_maps() {
     }
 }
 
-/// A cube of 5 cm and an arm of boxes on a plane of half size `ground`, in the light of a simulation, from a camera above.
+/// A cube of 5 cm and an arm of boxes on a plane of half size `ground`, with the default light of a simulation, from a
+/// camera above.
 fn tabletop(ground: f32, view: crate::visibility::View) -> Still {
     let gray = || matt([GRAY; 3]);
     let cuboid = |half: [f32; 3], pose| (Shape::from(Box { half }), gray(), pose);
-    // The cube sinks in by what a contact does.
+    // The cube sinks in by the depth of a contact.
     let (mut scene, poses) = things([
         (Plane { half: [ground; 2] }.into(), gray(), PoseF32::IDENTITY),
         cuboid([0.025; 3], at(1.0, -0.2, 0.0249)),
@@ -205,10 +206,10 @@ fn tabletop(ground: f32, view: crate::visibility::View) -> Still {
     Still::new((scene, poses), view)
 }
 
-/// Shadow maps against rays, on a ground of 100 m as on one of 6 m, near and far, and below a light with a cone.
+/// Shadow maps compared with shadow rays, on a ground of 100 m as on one of 6 m, near and far, and below a spot.
 ///
-/// Root cause once: the map was stretched over all casters, and the ground, which shades nothing above it, was one. A texel
-/// of the default ground was 10 cm wide, and a cube of 5 cm had no shadow.
+/// Root cause: the map covered all casters, and the ground, which shades no surface above it, was one. A texel of the
+/// default ground was 10 cm wide, and a cube of 5 cm had no shadow.
 #[test]
 fn shadows_on_wide_ground() {
     let views = [
@@ -227,28 +228,28 @@ fn shadows_on_wide_ground() {
         let [image, other] = [wide.draw(), small.draw()];
         let rays = wide.by(Renderer::Hybrid);
         let bright = wide.with(|still| still.cfg.shadows = false).draw();
-        // Pixels of the ground whose neighbours are of the ground: elsewhere it is the coverage that differs.
+        // Ground pixels whose neighbors are ground pixels too: elsewhere the coverage differs.
         let ground: Vec<usize> = image.inner().filter(|k| image.mask()[*k] == 1 && image.alone(*k)).collect();
         let dark = |image: &Image, k: usize| i32::from(image.color()[k][0]) + 20 < i32::from(bright.color()[k][0]);
         let count = |f: &dyn Fn(usize) -> bool| ground.iter().filter(|k| f(**k)).count();
         let [shaded, both] = [count(&|k| dark(&rays, k)), count(&|k| dark(&rays, k) && dark(&image, k))];
         let wrong = count(&|k| dark(&rays, k) != dark(&image, k));
-        // A shadow's edge is a texel or two wide: of the pixels in shadow, one of eight is beside an edge at most.
+        // A shadow's edge is a texel or two wide: at most one in eight of the pixels in shadow is beside an edge.
         assert!(shaded > 200, "{name}, {kind:?}: {shaded} pixels in shadow");
         assert!(wrong * 8 <= shaded, "{name}, {kind:?}: {wrong} wrong, {both} of {shaded} in shadow");
-        // The size of the ground changes nothing where there is ground.
+        // The size of the ground changes no ground pixel.
         let [mut differ, mut same] = [0, 0];
         for &k in ground.iter().filter(|k| other.mask()[**k] == 1 && other.alone(**k)) {
             let far = (0..3).any(|c| image.color()[k][c].abs_diff(other.color()[k][c]) > 2);
             (differ, same) = (differ + usize::from(far), same + usize::from(!far));
         }
         assert!(differ * 1000 <= same, "{name}, {kind:?}: {differ} of {same} depend on the size of the ground");
-        // The control: without shadows everything in shadow is wrong.
+        // The control: without shadows all pixels in shadow are wrong.
         assert_eq!(count(&|k| dark(&rays, k) != dark(&bright, k)), shaded);
     }
 }
 
-/// A plane shades what is below it, in its own light alone.
+/// A plane shades the objects below it, for lights above it only.
 #[test]
 fn plane_above() {
     let view = look([160, 120], 0.8, [3.0, 0.0, 1.5], [0.0, 0.0, 0.2]);
@@ -276,7 +277,7 @@ const PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 2, denois
 
 const DARK: Headlight = Headlight { ambient: [0.0; 3], diffuse: [0.0; 3], specular: [0.0; 3], active: false };
 
-/// The colour in the middle of an image of a plane, from straight above.
+/// The color at the center of an image of a plane, from straight above.
 fn middle(material: Material, headlight: Headlight, sky: [f32; 3], tone: ToneCurve, by: (Renderer, f64)) -> [u8; 4] {
     let (scene, poses) = things([(Plane::INFINITE, material, PoseF32::IDENTITY)]);
     let mut scene = unlit(scene);
@@ -296,9 +297,9 @@ fn close(seen: [u8; 4], light: [f64; 3]) -> bool {
     (0..3).all(|k| (f64::from(seen[k]) - srgb(light[k].min(1.0))).abs() <= 1.5)
 }
 
-/// Seen along its normal a surface mirrors the sky behind the camera, and the headlight in full: a metal in its own colour, and
-/// with its own light, whatever `specular` says. Root cause once: highlights of metals were those of other materials, none
-/// where `specular` was 0, and their own light was lost.
+/// Seen along its normal, a metal mirrors the sky behind the camera and the full headlight, in its own color, and adds
+/// its emission, whatever its `specular`. Root cause: highlights of metals were those of other materials, 0 for a
+/// `specular` of 0, and their emission was lost.
 #[test]
 fn metals() {
     let (base, above) = ([0.7, 0.5, 0.3], [0.4, 0.5, 0.6]);
@@ -319,7 +320,8 @@ fn metals() {
     }
 }
 
-/// A plane that glows in the dark: its light is its colour times its emission, by the rasterizer and by paths, through every curve.
+/// A plane that glows in the dark: its light is its color times its emission, by the rasterizer and by path tracing,
+/// with every tone curve.
 #[test]
 fn tone_curves() {
     for (renderer, emission) in
@@ -337,13 +339,13 @@ fn tone_curves() {
             assert!(close(seen, [curve; 3]), "{renderer:?}, {tone:?} of {x}: {seen:?}, not {curve}");
             seen[0]
         });
-        // The control: above the knee no two curves are alike.
+        // The control: above the knee all curves differ.
         assert!(emission != 0.9 || (0..3).all(|k| shown[k].abs_diff(shown[(k + 1) % 3]) > 3), "{shown:?}");
     }
 }
 
-/// A stop is twice the light before the curve, in both renderers: also of light that is far brighter than white, where finished
-/// bytes are all the same.
+/// A stop doubles the light before the curve, in both renderers: also for light far brighter than white, which the
+/// finished bytes do not distinguish.
 #[test]
 fn stops() {
     for renderer in [Renderer::Raster, PATHS] {
@@ -364,9 +366,9 @@ fn stops() {
     }
 }
 
-/// Light that is added up as MuJoCo's renderer does: the byte of a matt plane is 255 times its sRGB colour times the sum of
-/// the lights, each times its cosine; the sum ends at white. Root cause once: lamps were added in linear light, and four of
-/// them were darker than in MuJoCo; then the soft tone curve made white of MuJoCo's a grey of 237.
+/// Light summed as in MuJoCo's renderer: the byte of a matt plane is 255 times its sRGB color times the sum of the
+/// lights, each times its cosine; the sum is clamped at white. Root causes: lights were added in linear light, and four
+/// of them were darker than in MuJoCo; then the soft tone curve turned MuJoCo's white into a gray of 237.
 #[test]
 fn display_sum() {
     let directions = [[0.0, 0.0, -1.0], [0.6, 0.0, -0.8], [0.0, -0.6, -0.8], [-0.8, 0.0, -0.6]];
@@ -380,7 +382,7 @@ fn display_sum() {
         let view = crate::visibility::View::look_at([33, 33], 0.5, [0.0, 0.0, 2.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
         let still = Still::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip);
         let renderers = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced];
-        // The sum has its end already: the soft curve bends nothing.
+        // The sum is clamped already: the soft curve changes no value.
         let tones = [ToneCurve::Clip, ToneCurve::Soft];
         for (renderer, tone) in renderers.into_iter().flat_map(|renderer| tones.map(|tone| (renderer, tone))) {
             let found = still.with(|still| still.cfg.tone = tone).by(renderer).color()[16 * 33 + 16];
@@ -390,7 +392,7 @@ fn display_sum() {
                 assert!(off <= 1.5, "{renderer:?}, {base} {light}: {found:?}, {expected} in channel {c}");
             }
         }
-        // The control: a linear sum is another one.
+        // The control: a linear sum differs.
         let linear = still.with(|still| still.scene.light_sum = LightSum::Linear).draw().color()[16 * 33 + 16];
         assert!((f32::from(linear[1]) - 255.0 * 0.5 * base * light * cosines).abs() > 5.0, "{linear:?}");
     }
@@ -398,7 +400,7 @@ fn display_sum() {
 
 /// MuJoCo's headlight is directional: a plane that faces the camera is equally bright from corner to corner.
 ///
-/// Root cause once: it shone from the camera's position, and the ground of a model file grew darker with the distance.
+/// Root cause: it shone from the camera's position, and the ground of a model file grew darker with the distance.
 #[test]
 fn display_headlight() {
     let (scene, poses) = things([(Plane::INFINITE, matt([0.8; 3]), PoseF32::IDENTITY)]);

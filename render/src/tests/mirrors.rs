@@ -1,4 +1,4 @@
-//! Planar mirrors, against closed forms: a mirror shows the scene that is reflected at its plane.
+//! Planar mirrors compared with closed forms: a mirror shows the scene reflected at its plane.
 
 use super::harness::{EXACT, Image, Still, look};
 use crate::renderer::Renderer;
@@ -12,7 +12,7 @@ use kinetoscope_testkit::scenes::{Random, matt, random, things, unlit};
 use kinetoscope_testkit::srgb::{linear, srgb};
 
 const RENDERERS: [Renderer; 3] = [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced];
-/// Mirrored paths that scatter nothing: there is no other light than emission.
+/// Path tracing without scattering: emission is the only light.
 const PATHS: Renderer = Renderer::RayTraced { samples: 64, max_bounces: 1, denoise: false, seed: 5 };
 
 const FLOOR: f32 = 0.2;
@@ -20,21 +20,21 @@ const BALL: f32 = 0.6;
 const SKY: f32 = 0.5;
 const REFLECTANCE: f32 = 0.4;
 const RADIUS: f32 = 0.4;
-/// Centre of the ball in the frame of the mirror.
+/// Center of the ball in the frame of the mirror.
 const CENTER: [f32; 3] = [0.2, -0.1, 0.7];
 
-/// The turned and shifted frame of a mirror.
+/// The rotated and shifted frame of a mirror.
 fn tilted() -> PoseF32 {
     let (sin, cos) = (0.28f32, 0.96f32);
     PoseF32 { rotation: [[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]], translation: [0.1, -0.2, 0.3] }
 }
 
-/// A surface that shows its own colour in the dark.
+/// A surface that shows its own color in the dark.
 fn glowing(color: f32) -> Material {
     Material { emission: 1.0, ..matt([color; 3]) }
 }
 
-/// A ball over a mirror, which the scene contains at `mirror`, in no light but their own; `sum` is how light is added.
+/// A ball over a mirror at the pose `mirror`, with emission as the only light; `sum` is the light model.
 fn over(shape: impl Into<Shape>, mirror: PoseF32, reflectance: f32, sum: LightSum) -> Still {
     let floor = Material { reflectance, ..glowing(FLOOR) };
     let above = PoseF32 { translation: mirror.apply(CENTER), ..PoseF32::IDENTITY };
@@ -46,8 +46,8 @@ fn over(shape: impl Into<Shape>, mirror: PoseF32, reflectance: f32, sum: LightSu
     Still { cfg, ..Still::new((scene, poses), look([160, 120], 0.9, [2.4, -1.2, 1.9], [0.1, 0.0, 0.3])) }
 }
 
-/// The byte of a pixel of the mirror, and true if it shows the ball; `None` at the edge of the ball's image. `z` is the height of
-/// the mirror in its frame, `sign` is -1 for the reflected centre.
+/// The byte of a pixel of the mirror, and true if it shows the ball; `None` at the edge of the ball's reflection. `z`
+/// is the height of the mirror in its frame, `sign` is -1 for the reflected center.
 fn expected(still: &Still, image: &Image, k: usize, [z, sign]: [f32; 2]) -> Option<(f64, bool)> {
     let material = &still.scene.instances()[0].material;
     let eye = still.poses[0].inverse_times(&still.view.world_from_camera).translation;
@@ -58,7 +58,7 @@ fn expected(still: &Still, image: &Image, k: usize, [z, sign]: [f32; 2]) -> Opti
     let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
     let along = dot(from, to) / dot(to, to).sqrt();
     let off = (dot(from, from) - along * along).max(0.0).sqrt() - f64::from(RADIUS);
-    // Two pixels are 0.05 m wide at most here.
+    // Two pixels are at most 0.05 m wide here.
     if off.abs() < 0.05 {
         return None;
     }
@@ -77,11 +77,11 @@ fn expected(still: &Still, image: &Image, k: usize, [z, sign]: [f32; 2]) -> Opti
     Some((byte, hit))
 }
 
-/// A ball over a plane and over a box: its image is where the reflected centre is, and adds to the colour as MuJoCo's renderer
-/// adds it (`own + reflectance * mirrored`, of things, not of the sky), or as light is mirrored
-/// (`(1 - reflectance) * own + reflectance * mirrored`, of the sky too).
+/// A ball over a plane and over a box: its reflection is at the reflected center. It is added to the color as in
+/// MuJoCo's renderer (`own + reflectance * mirrored`, for objects, not for the sky), or mixed as light is mirrored (`(1
+/// - reflectance) * own + reflectance * mirrored`, for the sky too).
 ///
-/// Root cause once: reflectance had no effect but on paths.
+/// Root cause: only path tracing used the reflectance.
 #[test]
 fn mirrored_ball() {
     let shapes: [(Shape, f32); 3] = [
@@ -105,7 +105,7 @@ fn mirrored_ball() {
                     let found = f64::from(image.color()[k][1]);
                     assert!((found - seen).abs() <= 1.5, "{renderer:?} {sum:?} {}: {found}, {seen}", shape.name());
                     (hits, misses) = (hits + usize::from(hit), misses + usize::from(!hit));
-                    // The control: the image of a ball at another height.
+                    // The control: the reflection of a ball at another height.
                     wrong += usize::from(of(k, -1.6).is_some_and(|(seen, _)| (found - seen).abs() > 1.5));
                 }
                 assert!(hits > 300 && misses > 1000 && wrong > 50, "{hits} {misses} {wrong}");
@@ -114,14 +114,14 @@ fn mirrored_ball() {
     }
 }
 
-/// The sides of a box do not mirror, nor do spheres of the rasterizer, nor what is not opaque: without paths and, of boxes,
-/// with paths.
+/// Sides of boxes, spheres and transparent instances do not mirror in the rasterizer; sides of boxes do not mirror in
+/// path tracing either.
 ///
-/// Root cause once: paths were mirrored on all faces of a box.
+/// Root cause: path tracing mirrored on all faces of a box.
 #[test]
 fn only_upper_faces() {
     let size = Box { half: [0.5, 0.5, 1.5] };
-    // From below its upper face: only sides are seen.
+    // From below its upper face: only sides are visible.
     let sides = |reflectance| {
         let still = over(size, PoseF32::IDENTITY, reflectance, LightSum::Linear);
         still.with(|still| still.view = look([64, 48], 0.9, [4.0, -2.0, 0.4], [0.0; 3]))
@@ -149,7 +149,8 @@ fn only_upper_faces() {
     assert!(ball(0.8).same_bits(&ball(0.0)));
 }
 
-/// Of MuJoCo's light only the first surface with reflectance mirrors, as in MuJoCo's renderer; of linear light all do.
+/// In MuJoCo's light model only the first surface with reflectance mirrors, as in MuJoCo's renderer; in linear light
+/// all do.
 #[test]
 fn first_mirror() {
     let draw_with = |sum, reflectances: [f32; 2], reflections| {
@@ -182,8 +183,8 @@ fn first_mirror() {
     assert!(left > 50 && right > 50, "{left} {right}");
 }
 
-/// Mirrored rays that miss the box around everything are not followed. A plane far below, which no mirrored ray meets, has no
-/// end: all rays are followed, and the mirror looks the same.
+/// Mirrored rays that miss the bounding box of all objects are not traced. A plane far below, which no mirrored ray
+/// hits, is part of the box: all rays are traced then, and the mirror looks the same.
 #[test]
 fn rays_that_miss() {
     for sum in [LightSum::Display, LightSum::Linear] {
@@ -214,8 +215,8 @@ fn rays_that_miss() {
     }
 }
 
-/// A perfect mirror shows what a camera at the reflected eye sees without the mirror: shapes of every kind, smooth meshes,
-/// textures, several lights, and things that are not opaque, which are seen one behind the other.
+/// A perfect mirror shows the view of a camera at the reflected eye without the mirror: shapes of every kind, smooth
+/// meshes, textures, several lights, and transparent objects behind each other.
 #[test]
 fn reflected_eye() {
     let (scene, mut poses) = random(&mut Random(11), 0.9);
@@ -225,7 +226,7 @@ fn reflected_eye() {
         if k % 4 == 1 {
             instance.material = Material { rgba: [1.0, 0.8, 0.6, 1.0], ..checker.clone() };
         }
-        // What lies below the mirror is seen from neither side.
+        // Objects below the mirror are invisible from both eyes.
         poses[k].translation[2] = poses[k].translation[2].abs() + 0.6;
     }
     instances[9].material.rgba[3] = 0.5;
@@ -237,7 +238,7 @@ fn reflected_eye() {
     let scene = |instances: Vec<Instance>| {
         let mut scene = RenderScene::new(instances).unwrap();
         scene.lights.clone_from(&lamps);
-        // It would shine from another place.
+        // The headlight would shine from another place.
         scene.headlight.active = false;
         scene
     };
@@ -251,7 +252,7 @@ fn reflected_eye() {
     for k in seen.inner().filter(|&k| seen.alone(k) && seen.mask()[k] == 99).step_by(3) {
         let (below, at) = ([eye[0], eye[1], -eye[2]], seen.position()[k]);
         let to = [0, 1, 2].map(|i| at[i] - below[i]);
-        // The camera stands in the mirror; one pixel of it is as wide as the mirror's pixel.
+        // The camera is in the mirror's plane; one pixel of its image is as wide as the mirror's pixel.
         let view = View { near: 1e-4, ..look([1, 1], 0.01, at, [0, 1, 2].map(|i| at[i] + to[i])) };
         let there = Still { cfg, ..Still::new((without.clone(), poses.clone()), view) }.draw();
         let far = (0..3).any(|c| there.color()[0][c].abs_diff(seen.color()[k][c]) > 3);
@@ -259,6 +260,6 @@ fn reflected_eye() {
         things += usize::from(there.mask()[0] != 0);
     }
     assert!(compared > 500 && things > 150, "{compared} {things}");
-    // Rays within 1e-5 m of an edge may be on either side; textures are as fine as the pixel is wide.
+    // Rays within 1e-5 m of an edge may hit either side; textures are as fine as the pixel is wide.
     assert!(wrong * 50 <= compared, "{wrong} of {compared}");
 }

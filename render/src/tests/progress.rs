@@ -1,4 +1,4 @@
-//! Long renderings report their progress and can be cancelled.
+//! Long renderings report their progress and can be canceled.
 
 use crate::frame::{Channels, Frame};
 use crate::parallel::ParallelRasterizer;
@@ -25,7 +25,7 @@ fn view(size: [usize; 2]) -> View {
     View::look_at(size, 0.9, [2.6, -1.6, 1.6], [0.2, 0., 0.8], [0., 0., 1.]).unwrap()
 }
 
-/// Samples, their total, share and remaining time.
+/// Samples, their total, finished fraction and remaining time.
 type Numbers = (u64, u64, Option<f64>, Option<Duration>);
 
 fn numbers(progress: &RenderProgress) -> Numbers {
@@ -48,7 +48,8 @@ fn totals() {
         let mut jobs: Vec<_> = frames.iter_mut().map(|frame| (shot(&poses), frame.as_mut())).collect();
         rasterizer.render(&mut jobs).unwrap();
         assert_eq!(numbers(&progress), done(2 * 33 * 21 * 8));
-        // Each path is a ray at least; of two bounces it has three, and one for each of the lights at each, at most.
+        // Each path has at least one ray; with two bounces at most three, and one shadow ray for each light at each
+        // surface.
         let most = (3 + 3 * 2 * (scene.lights.len() as u64 + 2)) * progress.samples();
         assert!((progress.samples() + 1..=most).contains(&progress.rays()), "{}", progress.rays());
         // Images without paths have no samples.
@@ -56,7 +57,7 @@ fn totals() {
         rasterizer.render(&mut jobs).unwrap();
         assert_eq!((progress.samples(), progress.total()), (0, 0));
     }
-    // Of two images one has an invalid pose: only the other one counts.
+    // One of two images has an invalid pose: only the other image counts.
     let mut broken: Vec<PoseF32> = poses.clone();
     broken[0].rotation = [[0.0; 3]; 3];
     let mut rasterizer = rasterizer(8, 2);
@@ -66,7 +67,7 @@ fn totals() {
     assert_eq!(numbers(rasterizer.progress()), done(33 * 21 * 8));
 }
 
-/// Rendering would take minutes. Cancelled, it ends early and leaves every channel of the frame as it was.
+/// Rendering would take minutes. After cancellation, it ends early and leaves every channel of the frame unchanged.
 #[test]
 fn cancel() {
     let ((scene, poses), view) = (figure(), view([64, 64]));
@@ -97,7 +98,7 @@ fn cancel() {
     assert!(samples > 0 && samples < total / 20, "{samples} of {total}");
     assert!(left.is_some_and(|left| left > Duration::ZERO), "{left:?}");
     assert_eq!(frame, before);
-    // It stays cancelled until it is resumed.
+    // It stays canceled until it is resumed.
     rasterizer.set_renderer(paths(1));
     let (_, error) = rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap_err();
     assert_eq!(error, RenderError::Cancelled { samples: 0, total: 64 * 64 });
@@ -105,7 +106,7 @@ fn cancel() {
     progress.resume();
     rasterizer.render(&mut [(shot, frame.as_mut())]).unwrap();
     assert!(frame != before && progress.fraction() == Some(1.0));
-    // A clone of a renderer has its own progress and is not cancelled with the other one.
+    // A clone of a renderer has its own progress and is not canceled with the original.
     let mut clone = rasterizer.clone();
     progress.cancel();
     clone.set_renderer(paths(2));

@@ -1,5 +1,5 @@
-//! The rasterizer, every pixel against rays in double precision: textbook formulas for shapes, Möller-Trumbore for triangles;
-//! and triangles that share an edge.
+//! The rasterizer compared at every pixel with rays in double precision: textbook formulas for shapes, Möller-Trumbore
+//! for triangles; and watertight edges.
 
 use super::harness::{Still, look};
 use crate::frame::Channels;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 type V = Vector3<f64>;
 
-/// A hit: depth, normal turned to the camera (world), instance.
+/// A hit: depth, normal facing the camera (world), instance.
 #[derive(Clone, Copy, Debug)]
 struct Hit {
     t: f64,
@@ -152,21 +152,21 @@ fn side(o: V, d: V, r: f64, h: f64, offer: &mut dyn FnMut(f64, V)) {
     }
 }
 
-/// Some triangles of a mesh: a corner and the edges from it, and a box around all of them.
+/// Several triangles of a mesh: a corner and the edges from it, and their bounding box.
 struct Block {
     low: V,
     high: V,
     triangles: Vec<[V; 3]>,
 }
 
-/// The triangles of a mesh, in their order.
+/// The triangles of a mesh, in order.
 fn blocks(mesh: &TriMesh) -> Vec<Block> {
     let block = |triangles: &[[u32; 3]]| {
         let corner = |i: u32| V::from(mesh.positions[i as usize].map(f64::from));
         let corners = triangles.as_flattened().iter().map(|&i| corner(i));
         let (low, high) =
             (corners.clone().reduce(|a, b| a.inf(&b)).unwrap(), corners.reduce(|a, b| a.sup(&b)).unwrap());
-        // Wider by more than what rounding moves a hit, 1e-16 of the coordinates.
+        // Enlarged by more than the rounding of a hit, 1e-16 of the coordinates.
         let wider = V::repeat(1e-9 * (low.amax() + high.amax()));
         let edges = |t: &[u32; 3]| {
             let [a, b, c] = t.map(corner);
@@ -188,7 +188,7 @@ impl Block {
         if from <= to { from } else { f64::INFINITY }
     }
 
-    /// Source: Möller and Trumbore, Fast, minimum storage ray/triangle intersection, 1997.
+    /// Intersects all triangles. Source: Möller and Trumbore, Fast, minimum storage ray/triangle intersection, 1997.
     fn triangles(&self, o: V, d: V, offer: &mut dyn FnMut(f64, V)) {
         for [a, ab, ac] in &self.triangles {
             let p = d.cross(ac);
@@ -203,8 +203,8 @@ impl Block {
     }
 }
 
-/// Compares an image with the caster at all pixels that are on no silhouette: where some neighbour sees another thing or is
-/// more than a tenth nearer or farther. Returns how many were compared.
+/// Compares an image with the caster at all pixels off silhouettes; at a silhouette, a neighbor shows another instance
+/// or is more than a tenth nearer or farther. Returns the number of compared pixels.
 fn compare(scene: (RenderScene, Vec<PoseF32>), view: View, name: &str) -> usize {
     let still = Still { channels: Channels { color: false, ..Channels::ALL }, ..Still::new(scene, view) };
     let (image, caster, w) = (still.draw(), Caster::new(&still), view.width);
@@ -232,7 +232,7 @@ fn compare(scene: (RenderScene, Vec<PoseF32>), view: View, name: &str) -> usize 
             let parallel = normal.dot(&hit.normal) >= 0.5f64.to_radians().cos();
             mask == still.scene.instances()[hit.instance].mask_id && close && parallel
         };
-        // A pixel centre within a hundredth of a pixel of an edge may belong to either side of it.
+        // A pixel center within a hundredth of a pixel of an edge may belong to either side of it.
         let mut beside = (0..48).map(|n| {
             let (sin, cos) = (n as f64 * FRAC_PI_8).sin_cos();
             [cos, sin].map(|x| [0.001, 0.003, 0.01][n / 16] * x)
@@ -294,7 +294,7 @@ fn grid(cells: usize, half: f32, random: &mut Random) -> TriMesh {
     TriMesh::from_triangles(positions, (0..cells * cells).flat_map(cell).collect())
 }
 
-/// Every pixel of a crumpled grid is drawn by exactly one triangle.
+/// Every pixel of a crumpled grid is covered by exactly one triangle.
 #[test]
 fn watertight_edges() {
     let mut random = Random(3);
@@ -320,7 +320,7 @@ fn watertight_edges() {
         assert_eq!(count, whole, "camera {k}");
         assert!(whole.iter().sum::<i32>() > 2000, "camera {k} sees the grid");
         if k == 1 {
-            // The border of the grid is straight, so inside of it nothing may be missing.
+            // The border of the grid is straight, so no pixel inside of it may be missing.
             let ends =
                 |line: &[i32]| line.iter().position(|&m| m == 1).zip(line.iter().rposition(|&m| m == 1)).unwrap();
             let (first, last) = ends(&whole);

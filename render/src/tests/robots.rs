@@ -1,4 +1,4 @@
-//! Robots of vendors, drawn from their own meshes.
+//! Vendor robots, rendered from their own meshes.
 
 use super::harness::{Still, look};
 use crate::visibility::View;
@@ -9,7 +9,8 @@ use kinetoscope_scene::{Instance, Material, Pose, PoseF32, RenderScene, Texture,
 use kinetoscope_testkit::scenes::checker_plane;
 use std::sync::{Arc, LazyLock};
 
-/// The joint frames of the vendor's SR5 at rest, bent a little: (mesh, translation and rotation about an axis from the link before).
+/// Joint frames of the vendor's SR5 at rest, slightly bent: (mesh, translation and rotation about an axis from the
+/// previous link).
 const SR5: [(&str, [f64; 3], [f64; 3]); 7] = [
     ("base", [0.; 3], [0.; 3]),
     ("link1", [0., 0., 0.328], [0., 0., 0.4]),
@@ -20,7 +21,7 @@ const SR5: [(&str, [f64; 3], [f64; 3]); 7] = [
     ("link6", [0., 0., 0.1035], [0., 0., 0.]),
 ];
 
-/// The meshes of its links, which all tests share.
+/// Meshes of the SR5's links, which all tests share.
 static SR5_MESHES: LazyLock<[Mesh; 7]> = LazyLock::new(|| {
     let folder = kinetoscope_testkit::needs::robot("rokae_description/urdf/SR5.urdf")
         .with_file_name("../meshes/xMateSR5/visual");
@@ -30,7 +31,7 @@ static SR5_MESHES: LazyLock<[Mesh; 7]> = LazyLock::new(|| {
     })
 });
 
-/// Copies of the robot, one beside the other, on a checkered ground; mask ids count links.
+/// Copies of the robot, side by side, on a checkered ground; mask ids count links.
 pub(super) fn sr5(copies: usize) -> (RenderScene, Vec<PoseF32>) {
     let white = Material { rgba: [0.92, 0.92, 0.93, 1.0], specular: 0.4, shininess: 0.4, ..Material::default() };
     let mut instances = vec![checker_plane()];

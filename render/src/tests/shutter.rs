@@ -1,4 +1,4 @@
-//! Rolling shutters and motion blur, against closed forms.
+//! Rolling shutter and motion blur compared with closed forms.
 
 use super::harness::{Image, Still};
 use super::lenses::rays_of;
@@ -19,16 +19,16 @@ const HEIGHT: usize = 40;
 
 const WIDTH: usize = 64;
 
-/// \[pixels\].
+/// Focal length \[pixels\].
 const F: f32 = 80.0;
 
 /// Depth of the bar's front \[m\].
 const DEPTH: f32 = 2.0;
 
-/// Half its width \[m\].
+/// Half of the bar's width \[m\].
 const HALF: f32 = 0.1;
 
-/// Half its thickness \[m\]: its sides are less than a hundredth of a pixel.
+/// Half of the bar's thickness \[m\]: its sides are less than a hundredth of a pixel.
 const THIN: f32 = 0.0005;
 
 /// A glowing bar across all rows, in the dark; a camera at the origin looks along x, so that the image's right is -y.
@@ -40,15 +40,15 @@ pub(super) fn bar() -> (RenderScene, View) {
     (scene, View { fx: F, fy: F, ..view })
 }
 
-/// The bar, its front at the depth, `right` metres to the right.
+/// Pose of the bar, with its front at the depth, `right` meters to the right.
 pub(super) fn bar_at(right: f64) -> Vec<PoseF32> {
     vec![PoseF32::from_translation([DEPTH + THIN, -right as f32, 0.0])]
 }
 
-/// The bar goes right \[m/s\].
+/// Speed of the bar to the right \[m/s\].
 const SPEED: f64 = 3.0;
 
-/// The bar `right` metres to the right, by paths of one sample at the pixel's centre for all other channels; the shutter opened
+/// The bar `right` meters to the right, path traced with one center sample for all other channels; the shutter opened
 /// `before` seconds ago.
 fn tracer(samples: u32, shutter: Shutter, right: f64, before: f64) -> Still {
     let (scene, view) = bar();
@@ -62,7 +62,7 @@ fn tracer(samples: u32, shutter: Shutter, right: f64, before: f64) -> Still {
     }
 }
 
-/// Of each row: the middle of the light, and its variance \[pixels\].
+/// Mean position of the light in each row, and its variance \[pixels\].
 fn rows(image: &Image) -> Vec<(f64, f64)> {
     let row = |row: &[[u8; 4]]| {
         let light: Vec<f64> = row.iter().map(|p| linear(f32::from(p[1]) / 255.0)).collect();
@@ -74,12 +74,13 @@ fn rows(image: &Image) -> Vec<(f64, f64)> {
     image.color().chunks(WIDTH).map(row).collect()
 }
 
-/// The bar goes right at v; row r is read (H - 1 - r) t before the last: there it is v (H - 1 - r) t f / z pixels farther left.
+/// The bar moves right at v; row r is read (H - 1 - r) t before the last one: there the bar is v (H - 1 - r) t f / z
+/// pixels farther left.
 #[test]
 fn shear() {
     let (row_time, before) = (0.004, 0.2);
     let moving = tracer(64, Shutter { row_time, exposure_time: 0.0 }, 0.3, before);
-    // As if the bar stood, and the camera went left.
+    // As if the bar stood still, and the camera moved left.
     let mut camera_moves = moving.clone();
     let left = [0.0, -(SPEED * before) as f32, 0.0];
     camera_moves.opened = Some((bar_at(0.3), PoseF32 { translation: left, ..moving.view.world_from_camera }, before));
@@ -89,11 +90,11 @@ fn shear() {
         for (r, (mean, var)) in all.iter().enumerate() {
             let late = (HEIGHT - 1 - r) as f64 * row_time;
             let middle = 0.5 * WIDTH as f64 + (0.3 - SPEED * late) * pixels;
-            // 64 samples in each pixel, which are as even as a net: at each edge less than an eighth of a pixel times one of
-            // its side's; bytes are steps of 1/255 of the whole, of pixels that are partly lit.
+            // The 64 samples in each pixel are as even as a net: at each edge, the error is below an eighth of a pixel
+            // times one sample of its side. Bytes are steps of 1/255 of the whole, in partly lit pixels.
             assert!((mean - middle).abs() < 0.05, "row {r}: {mean}, not {middle}");
             assert!((var - side * side / 12.0 - 1.0 / 12.0).abs() < 0.2, "row {r}: {var}");
-            // The pixels' centres, at the same instant.
+            // The pixel centers, at the same instant.
             for x in 0..WIDTH {
                 let off = (x as f64 + 0.5 - middle).abs() - 0.5 * side;
                 let (mask, depth) = (image.mask()[r * WIDTH + x], image.depth()[r * WIDTH + x]);
@@ -106,8 +107,8 @@ fn shear() {
     }
 }
 
-/// Behind a lens too each row sees the bar where it is at that row's instant: the ray of the pixel (u, v) of an equidistant lens
-/// is r / f from the axis, r from the principal point, and meets the plane of the bar at z tan(r / f).
+/// With a lens too, each row shows the bar at that row's instant. The ray of the pixel (u, v) of an equidistant lens is
+/// r / f from the axis, r from the principal point, and meets the plane of the bar at z tan(r / f).
 #[test]
 fn lens_rows() {
     let (row_time, f) = (0.004, 30.0);
@@ -117,12 +118,12 @@ fn lens_rows() {
     still.lens = Some(rays_of(Equidistant::default().into(), pixels, [WIDTH, HEIGHT]));
     (still.view.fx, still.view.fy) = (f as f32, f as f32);
     let image = still.draw();
-    // True inside of the bar at an instant, and the distance from its edge \[pixels\], about.
+    // True inside of the bar at an instant, and the approximate distance from its edge \[pixels\].
     let at = |u: f64, v: f64, late: f64| {
         let r = (u - cx).hypot(v - cy);
         let right = f64::from(DEPTH) * (r / f).tan() * (u - cx) / r;
         let off = (right - (0.3 - SPEED * late)).abs() - f64::from(HALF);
-        // A pixel beside it is this much of the plane or more.
+        // A pixel at the edge covers at least this much of the plane.
         (off < 0.0, off.abs() * f / f64::from(DEPTH))
     };
     let (mut seen, mut of_the_stamp) = (0, 0);
@@ -135,9 +136,9 @@ fn lens_rows() {
         assert_eq!(image.mask()[k], i32::from(inside), "({x}, {y}): {edge}");
         assert!(!inside || (image.depth()[k] - DEPTH).abs() < 1e-4, "({x}, {y}): {}", image.depth()[k]);
         seen += usize::from(inside);
-        // The control: with the bar where it is at the stamp most rows would be wrong.
+        // The control: with the bar at its pose at the stamp most rows would be wrong.
         of_the_stamp += usize::from(inside != at(u, v, 0.0).0);
-        // Paths of a pixel go through its square, half of a pixel to each side of its middle.
+        // Paths of a pixel cover its square, half a pixel to each side of its center.
         if edge > 1.0 {
             assert_eq!(image.color()[k][0] > 0, inside, "({x}, {y}): {:?}", image.color()[k]);
         }
@@ -145,7 +146,8 @@ fn lens_rows() {
     assert!(seen > 80 && of_the_stamp > 80, "{seen} {of_the_stamp}");
 }
 
-/// With the exposure e the bar is blurred: its variance is (v e f / z)² / 12 more, and its middle half of that behind.
+/// With the exposure e the bar is blurred: its variance is (v e f / z)² / 12 more, and its center is half of that way
+/// behind.
 #[test]
 fn blur() {
     let exposure_time = 0.1;
@@ -155,17 +157,18 @@ fn blur() {
     let (side, way) = (2.0 * f64::from(HALF) * pixels, SPEED * exposure_time * pixels);
     let (mean, var) = rows(&image).iter().fold((0.0, 0.0), |sum, row| (sum.0 + row.0, sum.1 + row.1));
     let [mean, var] = [mean, var].map(|sum| sum / HEIGHT as f64);
-    // 256 samples a pixel and 40 rows of about 16 pixels: 1.6e5 places, of which x² scatters as much as it is large.
+    // 256 samples per pixel and 40 rows of about 16 pixels: 1.6e5 points, whose x² has a standard deviation as large as
+    // its mean.
     let middle = 0.5 * WIDTH as f64 + 0.2 * pixels - 0.5 * way;
     assert!((mean - middle).abs() < 0.05, "{mean}, not {middle}");
     let expected = way * way / 12.0 + side * side / 12.0 + 1.0 / 12.0;
     assert!((var - expected).abs() < 0.02 * expected, "{var}, not {expected}");
     assert!(way * way / 12.0 > 0.5 * expected, "the control: most of it is blur");
-    // The centres see the middle of the exposure.
+    // The centers show the middle of the exposure.
     let hits = image.mask()[..WIDTH].iter().zip(0..).filter(|(mask, _)| **mask == 1);
     let places: Vec<f64> = hits.map(|(_, x)| f64::from(x) + 0.5).collect();
     assert!((places.iter().sum::<f64>() / places.len() as f64 - middle).abs() < 0.5);
-    // Things that stand still are as with an instant, to the bit, and so is everything with an instant.
+    // Static objects look as with an instant, to the bit, and so do all objects with an instant.
     let now = Some((still.poses.clone(), still.view.world_from_camera, 0.1));
     let of = |shutter, opened: &Option<_>| Still { shutter, opened: opened.clone(), ..still.clone() }.draw().bits();
     let instant = of(Shutter::default(), &None);
@@ -175,7 +178,7 @@ fn blur() {
 
 #[test]
 fn refusals() {
-    // Renderers without paths say which one to use.
+    // Renderers without path tracing name the renderer to use.
     let good = Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 };
     let slow = Shutter { row_time: 1e-4, exposure_time: 0.0 };
     for (aperture, shutter, expected) in
@@ -188,7 +191,7 @@ fn refusals() {
             assert!(error.to_string().contains("use renderer: RayTraced"), "{error}");
         }
     }
-    // Poses must be known from long enough ago.
+    // Poses must be old enough.
     let shutter = Shutter { row_time: 0.01, exposure_time: 0.0 };
     let with = |before, poses| {
         let mut still = tracer(1, shutter, 0.0, before);

@@ -1,4 +1,4 @@
-//! Images around everything, and haze at the end of the ground.
+//! Skyboxes, and haze at the end of the ground.
 
 use super::harness::{EXACT, Still, look};
 use crate::renderer::Renderer;
@@ -13,17 +13,17 @@ use std::sync::Arc;
 const CLIP: RasterCfg = RasterCfg { samples: 1, tone: ToneCurve::Clip, ..EXACT };
 const SIDE: u32 = 32;
 
-/// Six faces whose red is the column, whose green is the row, and whose blue is the face.
+/// Six faces: red is the column, green the row, and blue the face.
 fn faces() -> Arc<Texture> {
     let pixels = (0..6 * SIDE).flat_map(|row| (0..SIDE).map(move |column| [column, row % SIDE, row / SIDE]));
     let bytes: Vec<u8> = pixels.flat_map(|[x, y, face]| [8 * x, 8 * y, 40 * face + 20].map(|x| x as u8)).collect();
     Arc::new(Texture::new(TextureKind::Cube, SIDE, 6 * SIDE, 3, &bytes).unwrap())
 }
 
-/// A camera that looks along an axis with a field of view of a right angle sees one face of a skybox: which, and how it is
-/// turned, as MuJoCo's renderer showed it on OSMesa (forward, up, face, columns from the right, rows from below).
+/// A camera along an axis with a field of view of a right angle sees one face of a skybox. The table lists the face and
+/// its orientation, as in MuJoCo's renderer on OSMesa (forward, up, face, columns from the right, rows from below).
 ///
-/// Root cause once: images of skyboxes were gradients of three colours.
+/// Root cause: images of skyboxes were gradients of three colors.
 #[test]
 fn skybox_faces() {
     let z = [0.0f32, 0.0, 1.0];
@@ -54,16 +54,17 @@ fn skybox_faces() {
                 mirrored += usize::from((f32::from(found[0]) - (8 * turned(column, !from_right)) as f32).abs() > 8.0);
             }
             assert!(worst <= tolerance, "{renderer:?} towards {forward:?}: {worst}");
-            // The control: the other way round most columns are wrong.
+            // The control: mirrored, most columns are wrong.
             assert!(mirrored > 700, "{mirrored}");
         }
     }
 }
 
-/// Haze over a green ground before a blue sky, as numbers of MuJoCo's renderer on OSMesa: the slope of a ray, and red, green
-/// and blue, for a camera 20 m above the ground, `zfar` 50 and an extent of 1 m, 360 slices, and a red haze of widths 0.1 to 1.
+/// Haze over a green ground in front of a blue sky, as values of MuJoCo's renderer on OSMesa: the slope of a ray, and
+/// red, green and blue. The camera is 20 m above the ground, with `zfar` 50, an extent of 1 m, 360 slices, and a red
+/// haze of widths 0.1 to 1.
 ///
-/// Root cause once: nothing was hazy, and endless ground went on beyond where MuJoCo's ends.
+/// Root cause: no haze was rendered, and an infinite ground went on beyond the end of MuJoCo's.
 #[test]
 fn horizon_haze() {
     const SEEN: &[(f32, f32, [u8; 3])] = &[
@@ -127,7 +128,7 @@ fn horizon_haze() {
             let found = shown(width, slope, radius);
             [0, 1, 2].map(|k| found[k].abs_diff(expected[k])).into_iter().max().unwrap()
         };
-        // One of rounding; where the ground begins to fade, the slope of the middle of a pixel is known to 2e-5.
+        // A byte of rounding; where the ground begins to fade, the slope at the center of a pixel is known to 2e-5.
         let tolerance = 2;
         assert!(
             off(radius) <= tolerance,
@@ -136,9 +137,9 @@ fn horizon_haze() {
         );
         wrong += usize::from(off(0.9 * radius) > tolerance);
     }
-    // The control: ground that ends 10 % nearer.
+    // The control: a ground that ends 10 % nearer.
     assert!(wrong >= 25, "{wrong}");
-    // Without an endless plane, or from below, there is no haze.
+    // Without an infinite plane, or from below, no haze is rendered.
     let mut below = Still::new((scene.clone(), poses.clone()), look([8, 8], 0.1, [0.0, 0.0, -1.0], [1.0, 0.0, -1.0]));
     let clear = below.draw();
     below.scene.horizon = Some(HorizonHaze { color: [1.0, 0.0, 0.0], radius, width: 0.3 });

@@ -1,4 +1,4 @@
-//! Albedo, textures and planes, against materials, texels and closed forms.
+//! Albedo, textures and planes compared with materials, texels and closed forms.
 
 use super::harness::{Still, look};
 use crate::frame::Channels;
@@ -19,8 +19,8 @@ fn albedo((scene, poses): (RenderScene, Vec<PoseF32>), view: View) -> Still {
     Still { channels: ALBEDO, cfg, ..Still::new((scene, poses), view) }
 }
 
-/// Without a texture it is the material's colour in sRGB, as it was given: bytes of k / 255 are k, which the polynomial of
-/// the transfer function keeps to one (see `tone`), in any light, and 0 where nothing is.
+/// Without a texture, albedo is the material's sRGB color as given: bytes of k / 255 are k, to one byte by the
+/// polynomial of the transfer function (see `tone`), in any light, and 0 on a miss.
 #[test]
 fn material_albedo() {
     let colors =
@@ -36,7 +36,8 @@ fn material_albedo() {
             ball(1, 0.5, 0.4),
             ball(2, -0.5, -0.4),
             ball(3, 0.5, -0.4),
-            // The nearest surface counts, whatever its alpha, unless that is 0. Root cause once: alpha below 0.5 was left out.
+            // The nearest surface counts, whatever its alpha, unless that is 0. Root cause: alpha below 0.5 was left
+            // out.
             (Box { half: [0.05, 0.1, 0.1] }.into(), material(4, 0.7), at(1.0, 0.0, 0.0)),
             (Box { half: [0.05, 0.1, 0.1] }.into(), material(5, 0.3), at(1.0, 0.3, 0.0)),
             (Box { half: [0.05, 0.1, 0.1] }.into(), material(5, 0.0), at(1.0, -0.3, 0.0)),
@@ -63,8 +64,9 @@ fn material_albedo() {
     }
 }
 
-/// A square metre with a checkered texture of 2 by 2 fields, seen from so near that a texel is many pixels: each field has its
-/// bytes, to 1, off the seams, where texels are blended; the material's colour is multiplied in linear light.
+/// A square meter with a checkered texture of 2 by 2 fields, seen from so near that a texel covers many pixels. Each
+/// field has its bytes, to 1, away from the seams, where texels are blended; the material's color is multiplied in
+/// linear light.
 #[test]
 fn texture_albedo() {
     let (dark, light) = ([40, 90, 150], [220, 180, 60]);
@@ -91,9 +93,9 @@ fn texture_albedo() {
     }
 }
 
-/// Paths find of a texture what the rasterizer draws of it: on a plane, by texture coordinates of a mesh that are turned,
-/// squeezed and end nowhere, and of the six images of a cube. In even light matt and convex things are as bright as their albedo
-/// times that light, so that the colour of paths tells the albedo.
+/// Path tracing reads the same textures as the rasterizer: on a plane, by rotated, scaled and unbounded texture
+/// coordinates of a mesh, and by the six images of a cube. In uniform light, matt and convex objects are as bright as
+/// their albedo times that light, so path-traced color shows the albedo.
 #[test]
 fn textures_of_paths() {
     const LIGHT: f32 = 0.5;
@@ -122,7 +124,7 @@ fn textures_of_paths() {
         scene.ambient = Hemisphere { sky: [LIGHT; 3], ground: [LIGHT; 3] };
         (scene, poses)
     };
-    // Pixels whose neighbours are alike, that is off edges and seams, and those of them that differ.
+    // Number of pixels with similar neighbors, off edges and seams, and number of those that differ.
     let compare = |drawn, traced, eye: [f32; 3]| {
         let of = |what, renderer| {
             let mut still = albedo(scene_of(what), look([96, 96], 0.7, eye, [0.0; 3]));
@@ -135,8 +137,8 @@ fn textures_of_paths() {
         let alike =
             |k: usize, n: usize| albedo[n][3] == 255 && (0..3).all(|c| albedo[k][c].abs_diff(albedo[n][c]) <= 16);
         let compared: Vec<usize> = raster.inner().filter(|&k| raster.around(k).all(|n| alike(k, n))).collect();
-        // Of the part of a pixel that a path falls on, the mean in linear light is off by less than a byte of 16; the
-        // polynomials and two roundings are another one each.
+        // The mean in linear light over the part of a pixel that a path covers is off by less than a byte of 16; the
+        // polynomials and two roundings add another byte each.
         let light = |byte: u8| f64::from(LIGHT) * linear(f32::from(byte) / 255.0);
         let off = |k: usize, c: usize| (f64::from(color[k][c]) - srgb(light(albedo[k][c]))).abs();
         (compared.len(), compared.iter().filter(|&&k| (0..3).any(|c| off(k, c) > 3.0)).count())
@@ -150,14 +152,14 @@ fn textures_of_paths() {
             assert!(enough, "{} from {eye:?}: {different} of {compared}", what.0.name());
         }
     }
-    // Controls: texture coordinates that are turned by half, and an image that is not a cube's.
+    // Controls: texture coordinates rotated by half a turn, and an image that is not a cube map.
     for (drawn, traced) in [((&mesh, &square), (&other, &square)), ((&brick, &cube), (&brick, &square))] {
         let (compared, different) = compare(drawn, traced, eyes[0]);
         assert!(different * 2 > compared, "{different} of {compared}");
     }
 }
 
-/// A cube texture of six colours, seen along its axes: MuJoCo's order of the faces is +x, -x, +y, -y, +z, -z.
+/// A cube texture of six colors, seen along its axes: MuJoCo's order of the faces is +x, -x, +y, -y, +z, -z.
 #[test]
 fn cube_faces() {
     let colors: [[u8; 3]; 6] = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0], [0, 255, 255], [255, 0, 255]];
@@ -178,7 +180,7 @@ fn cube_faces() {
         for (seen, p) in image.color().iter().zip(image.position()) {
             let along: f32 = (0..3).map(|k| p[k] * axis[k]).sum();
             let across = (0..3).map(|k| (p[k] * (1.0 - axis[k].abs())).abs()).fold(0.0, f32::max);
-            // Inside of the face: nothing is blended across its edge.
+            // Inside of the face: texels are not blended across its edge.
             if along <= 0.0 || across > 0.999 * along {
                 continue;
             }
@@ -190,8 +192,8 @@ fn cube_faces() {
     }
 }
 
-/// Of coincident surfaces the last one of the scene is seen by all renderers, as in MuJoCo: two boxes of the same size, an
-/// endless ground and a mat on it. Root cause once: the first one that was drawn stayed.
+/// Of coincident surfaces all renderers show the last one of the scene, as in MuJoCo: two boxes of the same size, an
+/// infinite ground and a mat on it. Root cause: the first one that was drawn stayed.
 #[test]
 fn coincident_surfaces() {
     let of = |color: [f32; 3]| (Shape::from(Box { half: [0.4, 0.3, 0.2] }), matt(color), at(0.1, 0.2, 0.3));
@@ -205,7 +207,7 @@ fn coincident_surfaces() {
     let view = look([120, 90], 0.6, [2.0, 1.2, 1.4], [0.1, 0.2, 0.2]);
     for pair in [[of(red), of(blue)], [mesh(red), mesh(blue)], [mat(red), ground(blue)], [ground(red), mat(blue)]] {
         let still = albedo(things(pair.clone()), view);
-        // The pixels of the second thing alone.
+        // The pixels of the second instance alone.
         let alone = albedo(things(pair[1..].to_vec()), view).draw();
         for renderer in [Renderer::Raster, Renderer::FastRayTraced] {
             let image = still.by(renderer);
@@ -219,8 +221,8 @@ fn coincident_surfaces() {
     }
 }
 
-/// Renderers that follow no paths draw surfaces with `reflectance` that are no planar mirrors as if they had none. Root cause
-/// once: they mixed in the sky, and an object that reflects all light had no colour of its own.
+/// Renderers without path tracing ignore `reflectance` of surfaces other than planar mirrors. Root cause: they mixed in
+/// the sky, and an object that reflects all light lost its own color.
 #[test]
 fn curved_mirrors_are_for_paths() {
     let still = |reflectance| {
@@ -237,13 +239,13 @@ fn curved_mirrors_are_for_paths() {
     for renderer in [Renderer::Raster, Renderer::Hybrid, Renderer::FastRayTraced] {
         assert!(still(1.0).by(renderer).same_bits(&still(0.0).by(renderer)), "{renderer:?}");
     }
-    // The control: paths are mirrored.
+    // The control: path tracing mirrors them.
     let paths = Renderer::RayTraced { samples: 1, max_bounces: 1, denoise: false, seed: 0 };
     assert!(!still(1.0).by(paths).same_bits(&still(0.0).by(paths)));
 }
 
-/// A mat and an endless ground at the same height: the ground, which is as near, must not shine
-/// through. Root cause once: the two were rounded in different ways.
+/// A mat and an infinite ground at the same height: the equally near ground must not shine through. Root cause: both
+/// were rounded in different ways.
 #[test]
 fn mat_on_ground() {
     let ground = (Plane::INFINITE, Material::default(), PoseF32::IDENTITY);
@@ -255,7 +257,7 @@ fn mat_on_ground() {
             let mut counts = [0, 0];
             for (id, p) in image.mask().iter().zip(image.position()).filter(|(id, _)| **id != 0) {
                 let edge = p[0].abs().max(p[1].abs());
-                // The position is rounded to 1e-6 of 4 m at most.
+                // The position is rounded to 1e-6 of at most 4 m.
                 if (edge - 1.0).abs() > 1e-4 {
                     assert_eq!(*id, if edge < 1.0 { 2 } else { 1 }, "height {height}, at {p:?}");
                     counts[usize::from(edge < 1.0)] += 1;

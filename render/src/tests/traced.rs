@@ -1,4 +1,4 @@
-//! Images by rays against the rasterizer's, and smoothing of paths against many paths.
+//! Ray-traced images compared with the rasterizer's, and denoised path tracing compared with many paths.
 
 use super::harness::{EXACT, Image, Still, far_apart, look};
 use crate::frame::Channels;
@@ -16,21 +16,21 @@ use nalgebra::Vector3;
 /// Differences of two images off silhouettes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Comparison {
-    /// Pixels.
+    /// Number of compared pixels.
     pub(super) compared: usize,
-    /// Those that differ in any channel but colour and albedo.
+    /// Pixels that differ in any channel but color and albedo.
     pub(super) different: usize,
-    /// Those that differ in another channel than the normals.
+    /// Pixels that differ in a channel other than the normals.
     pub(super) elsewhere: usize,
-    /// Those whose albedo differs by more than one byte: at edges of a texture or another triangle.
+    /// Pixels whose albedo differs by more than one byte: at edges of a texture or another triangle.
     pub(super) albedo: usize,
 }
 
-/// Compares all channels but the colour where no silhouette is in either image.
+/// Compares all channels but color, off silhouettes of both images.
 ///
-/// Depth and distance may differ by 1e-4 of themselves: of surfaces seen at a slant of up to 1 : 100, rounding of rays in
-/// single precision makes 1e-5. Normals may differ by 0.5 degrees: a pixel's centre on an edge between two triangles may
-/// belong to either, which is what the few pixels that differ are.
+/// Depth and distance may differ by 1e-4 of themselves: on surfaces with a slant of up to 1 : 100, rounding of rays in
+/// single precision makes 1e-5. Normals may differ by 0.5 degrees: a pixel's center on an edge between two triangles
+/// may belong to either, which explains the few pixels that differ.
 pub(super) fn compare(a: &Image, b: &Image) -> Comparison {
     let mut all = Comparison::default();
     let near = |a: f32, b: f32| a == b || (a - b).abs() <= 1e-4 * a.abs();
@@ -69,15 +69,15 @@ fn raster() {
         sum.different += found.different;
         sum.elsewhere += found.elsewhere;
         sum.albedo += found.albedo;
-        // Colours come from the same shading: they differ where samples on edges do.
+        // Colors come from the same shading: they differ only where samples on edges do.
         let differ = far_apart(&raster, &traced, 3);
         assert!(differ * 50 < 101 * 75, "scene {seed}: {differ} pixels look different");
     }
     assert!(sum.compared > 40 * 101 * 75 / 2, "{sum:?}");
     assert_eq!(sum.elsewhere, 0, "{sum:?}");
-    // Normals at centres on edges of triangles: of the order of 1/256 pixel wide, a pixel or two apart.
+    // Normals at centers on edges of triangles: of the order of 1/256 pixel wide, a pixel or two apart.
     assert!(sum.different * 1000 <= sum.compared && sum.albedo * 1000 < sum.compared, "{sum:?}");
-    // The control: an image from a millimetre beside is not the same.
+    // The control: an image from a viewpoint a millimeter aside differs.
     let still =
         Still { cfg: EXACT, ..Still::new(random(&mut Random(5), 1.2), look([101, 75], 1.0, [2.0, 0.5, 1.0], [0.; 3])) };
     let mut beside = Still { renderer: Renderer::FastRayTraced, ..still.clone() };
@@ -86,15 +86,16 @@ fn raster() {
     assert!(beside.elsewhere * 2 > beside.compared, "{beside:?}");
 }
 
-/// Things that glow, each in a colour of its own, without any other light: paths meet first what the mask shows. Paths go
-/// through all of a pixel, so that where it and its neighbours show one thing they must meet it.
+/// Emissive objects, each in a color of its own, without any other light: paths hit the instance that the mask shows.
+/// Paths cover the whole pixel, so this holds where the pixel and its neighbors show one instance.
 ///
-/// Root cause once: where a mat lies on endless ground both are as near, to the bit, and paths met what came first in the scene.
+/// Root cause: a mat on an infinite ground is as near as the ground, to the bit, and paths hit the first one of the
+/// scene.
 #[test]
 fn mask_of_paths() {
-    // Steps of 51 of 255, which the test tells apart.
+    // Steps of 51 of 255, which the test distinguishes.
     let color_of = |k: usize| [k % 6, k / 6 % 6, k / 36 % 6].map(|x| 51 * x as u8);
-    // Of what glows a hundred times as bright as its colour, only a hundredth more is the others' light.
+    // Emission is a hundred times the color, so the light of other objects adds only a hundredth.
     let glowing = |k: usize| {
         let light = |x: u8| 0.01 * f64::from(kinetoscope_scene::decode_srgb(f32::from(x) / 255.0));
         Material { emission: 100.0, ..matt(color_of(k).map(|x| (srgb(light(x)) / 255.0) as f32)) }
@@ -126,9 +127,10 @@ fn mask_of_paths() {
     assert!(compared > 12 * 99 * 73 / 3 && on_mats > 500, "{compared}, {on_mats} on mats");
 }
 
-/// Edges between the faces of a box, and of a cylinder, are as smooth by rays as by the rasterizer: each sample has its face.
+/// Edges between the faces of a box, and of a cylinder, are as smooth in ray tracing as in the rasterizer: each sample
+/// has its face.
 ///
-/// Root cause once: rays gave every face of a closed form the number of the first, so that colours had one sample there.
+/// Root cause: rays gave every face of a closed form the number of the first face, so that colors had one sample there.
 #[test]
 fn smooth_edges() {
     let plain = Material::from_rgba([0.7, 0.7, 0.7, 1.0]);
@@ -143,11 +145,11 @@ fn smooth_edges() {
     let normal = |k: usize| Vector3::from(raster.normal()[k]);
     let edge = |k: &usize| raster.around(*k).any(|n| normal(n).dot(&normal(*k)) <= 0.5);
     let edges: Vec<usize> = raster.inner().filter(|&k| raster.mask()[k] != 0 && raster.alone(k)).filter(edge).collect();
-    // A sample at the very edge may belong to either face: a quarter of what is between them.
+    // A sample at the very edge may belong to either face: a quarter of the difference between them.
     let [found, expected] = [&traced, &raster].map(Image::color);
     let differ = edges.iter().filter(|&&k| (0..3).any(|c| found[k][c].abs_diff(expected[k][c]) > 3)).count();
     assert!(edges.len() > 200 && differ * 50 <= edges.len(), "{differ} of {}", edges.len());
-    // The control: one sample looks otherwise at most of them.
+    // The control: one sample looks different at most of them.
     let rough = still.with(|still| still.cfg.samples = 1).by(Renderer::FastRayTraced);
     let apart = raster.channel(0).iter().zip(rough.channel(0)).filter(|(a, b)| (**a - b).abs() > 3.0).count();
     assert!(apart * 4 > edges.len(), "{apart} of {}", edges.len());
@@ -163,8 +165,8 @@ fn rms(differences: impl Iterator<Item = u8>) -> f64 {
     (sum / n).sqrt()
 }
 
-/// Smoothing makes few paths look more like many, where light is hard to find: below a glowing ellipsoid, which is no light
-/// that paths sample, so that they meet it by chance.
+/// Denoising brings few paths closer to many, where light is hard to find: below a glowing ellipsoid, which is not
+/// sampled as a light, so that paths hit it by chance.
 #[test]
 fn smoothed_noise() {
     let red = |red| matt([red, 0.7, 0.7]);
@@ -185,14 +187,14 @@ fn smoothed_noise() {
     };
     let (rough, smooth, more) = (error(4, false), error(4, true), error(16, false));
     assert!(smooth < 0.6 * rough, "{smooth} of {rough}");
-    // One path does not know its own noise: it is that of its neighbours.
+    // A single path has no estimate of its noise; the neighbors give one.
     let (one, smoothed) = (error(1, false), error(1, true));
     assert!(smoothed < 0.6 * one, "{smoothed} of {one}");
     // A control of the measure: noise falls as paths are added.
     assert!(more < 0.75 * rough, "{more} of {rough}");
 }
 
-/// A floor of black and white tiles below a glossy layer, lit from everywhere by a little light, and the edge of a shadow on it.
+/// A floor of black and white tiles below a glossy layer, in weak uniform light, with the edge of a shadow on it.
 fn tiles(emission: f32, dim: f32) -> Still {
     let tile = |k: i32| {
         let rgba = if (k / 6 + k % 6) % 2 == 0 { [1.0; 4] } else { [0.0, 0.0, 0.0, 1.0] };
@@ -207,9 +209,10 @@ fn tiles(emission: f32, dim: f32) -> Still {
     Still { cfg: EXACT, ..Still::new((scene, poses), look([96, 72], 0.6, [-1.2, -0.8, 0.9], [0.; 3])) }
 }
 
-/// Black tiles mirror their surroundings, and white ones beside them are as bright: neither is blended into the other.
+/// Black tiles mirror their surroundings, and adjacent white tiles are as bright: denoising blends neither into the
+/// other.
 ///
-/// Root cause once: light was divided by the colour of the surface, though mirrored light does not have it.
+/// Root cause: light was divided by the color of the surface, though mirrored light is not tinted by it.
 #[test]
 fn smoothed_tiles() {
     let still = tiles(3.0, 1.0);
@@ -226,14 +229,14 @@ fn smoothed_tiles() {
         rms(black.iter().map(|&k| many.color()[k][0].abs_diff(few.color()[k][0])))
     };
     let (rough, smooth) = (error(false), error(true));
-    // A third. With the tiles' colours out of sight it was half.
+    // A third of the error. Without tile colors in the guides it was half.
     assert!(black.len() > 300 && smooth < 0.4 * rough, "{smooth} of {rough}, {} pixels", black.len());
 }
 
-/// A thousandth of the light, exposed a thousand times as long, is smoothed as the whole of it is. And light that is far too
-/// bright for single precision stays a number.
+/// A thousandth of the light, with a thousand times the exposure, is denoised like the whole light. Light that is too
+/// bright for single precision stays finite.
 ///
-/// Root cause once: light that differed by less than a fixed amount was blended, and an infinity times a weight of 0 spread.
+/// Root cause: light that differed by less than a fixed amount was blended, and infinity times a weight of 0 spread.
 #[test]
 fn smoothed_exposure() {
     let of = |emission: f32, dim: f32, stops: f64| {
@@ -243,10 +246,10 @@ fn smoothed_exposure() {
         still.by(paths(16, 1, true, 3))
     };
     let (plain, dim) = (of(3.0, 1.0, 0.0), of(3.0, 1.0 / 1024.0, 10.0));
-    // Powers of two change no digit; the tiles' colours are the same.
+    // Powers of two change no digit; the tiles' colors are the same.
     assert_eq!(far_apart(&plain, &dim, 1), 0);
     let blinding = of(1e30, 1.0, 0.0);
-    // Pixels of the light and of its mirror image are white; the dome leaves no pixel black.
+    // Pixels of the light and of its mirror image are white; ambient light leaves no pixel black.
     let dark = |image: &Image| image.color().iter().filter(|color| color[..3] == [0; 3]).count();
     assert!(dark(&blinding) <= dark(&plain), "{} pixels, not {}", dark(&blinding), dark(&plain));
 }

@@ -1,12 +1,12 @@
-//! Visibility by rays: what a ray from anywhere meets, and a visibility buffer filled by the rays of its samples.
+//! Ray-traced visibility: hits of arbitrary rays, and a visibility buffer filled by the rays of its samples.
 //!
-//! Two levels. Below, one tree for each mesh, in the mesh's own frame: built once, shared by all environments, the one that
-//! ray casters use. Above, a tree over the boxes of what there is in a frame, built for every frame (`tree`). Shapes with
-//! a closed form are met exactly; height fields as the triangles that the rasterizer draws. Everything is in double
-//! precision.
+//! Two levels of BVHs. The lower level has one BVH per mesh, in the mesh's own frame: built once, shared by all
+//! environments, and the same that ray casters use. The upper level is a BVH over the boxes of a frame's instances,
+//! built for every frame (`tree`). Shapes with a closed form are intersected exactly; height fields as the triangles
+//! that the rasterizer draws. Everything is in double precision.
 //!
-//! The rays of a picture need no upper tree: an instance is met only within the rectangle of the picture that it covers,
-//! where its rays are cast in packets of eight, the nearest instances first. What is written is the rasterizer's own
+//! The rays of an image need no upper BVH: an instance is tested only within the rectangle of the image that it covers.
+//! There its rays are cast in packets of eight, the nearest instances first. The rays fill the rasterizer's own
 //! visibility buffer, so every channel comes from the same code.
 
 pub(crate) mod motion;
@@ -31,72 +31,72 @@ use motion::{Motion, rigid, wide};
 use std::sync::Arc;
 use tree::Tree;
 
-/// Surfaces of one thing that is not opaque that a shadow ray goes through, at most.
+/// Largest number of surfaces of a transparent instance that a shadow ray passes.
 const MAX_FRONTS: usize = 64;
-/// Rays go on this part of their coordinates past a surface.
+/// Offset of rays past a surface, as a fraction of the largest coordinate.
 const PAST: f64 = 1e-9;
 
-/// Where the samples of a packet are beside the first, in pixels.
+/// Offsets of the samples of a packet from the first one \[pixels\].
 type Side = [[usize; 2]; WIDTH];
-/// As near to each other as can be: fewer triangles are between them than between those of a row.
+/// A compact block: fewer triangles are between its rays than between those of a row.
 const TOGETHER: Side = [[0, 0], [1, 0], [2, 0], [3, 0], [0, 1], [1, 1], [2, 1], [3, 1]];
-/// Of pictures whose rows have an instant each.
+/// A row, for images whose rows show different instants.
 const IN_A_ROW: Side = [[0, 0], [1, 0], [2, 0], [3, 0], [4, 0], [5, 0], [6, 0], [7, 0]];
 
-/// What rays meet of an instance, in its own frame.
+/// Geometry of an instance that rays hit, in its own frame.
 #[derive(Clone, Debug)]
 enum Body {
-    /// Triangles, and the mesh that they are of.
+    /// Triangles: the mesh, and its BVH.
     Mesh(Arc<RenderMesh>, Arc<MeshTree>),
-    /// A closed form.
+    /// A shape with a closed form.
     Closed(Shape),
 }
 
-/// A body in the world.
+/// An instance placed in the world.
 #[derive(Clone, Copy, Debug)]
 struct Thing {
     instance: u32,
     world_from_instance: PoseF64,
-    /// Of what moves while the shutter is open.
+    /// Motion during the exposure; `None` for a static instance.
     motion: Option<Motion>,
     /// Opacity.
     alpha: f64,
-    /// False for markers, which show measurements and are no things of the scene.
+    /// False for markers: they show measurements and are not part of the scene.
     casts_shadow: bool,
 }
 
-/// Where a ray meets a surface.
+/// Hit of a ray with a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hit {
-    /// How far away \[m\].
+    /// Distance \[m\].
     pub(crate) distance: f64,
     pub(crate) instance: u32,
-    /// The triangle of the instance's mesh; 0 for a closed form.
+    /// Index of the triangle in the instance's mesh; 0 for a closed form.
     pub(crate) triangle: u32,
-    /// Unit normal out of the body, world frame.
+    /// Outward unit normal, world frame.
     pub(crate) normal: V3,
-    /// Where the instance is.
+    /// Pose of the instance.
     pub(crate) world_from_instance: PoseF64,
 }
 
-/// A camera whose rays are cast, and the instances before it.
+/// A camera whose rays are cast, and the placed instances.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CameraView<'a> {
     pub(crate) projection: &'a Projection,
-    /// The rays, where a lens bends them.
+    /// Rays of a lens that bends them.
     pub(crate) lens: Option<&'a LensRays>,
     pub(crate) placed: &'a [Placed],
-    /// Of each instance, the first id in the visibility buffer.
+    /// First id of each instance in the visibility buffer.
     pub(crate) first_ids: &'a [u32],
 }
 
-/// What rays meet in a frame; keeps its memory.
+/// Ray tracer of a frame; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tracer {
-    /// One for each instance; `None` where it is not seen.
+    /// Geometry of each instance; `None` for hidden instances.
     bodies: Vec<Option<Body>>,
     things: Vec<Thing>,
-    /// Things without an end.
+    /// Unbounded instances, which are outside of the BVH.
     endless: Vec<u32>,
     tree: Tree,
 }
@@ -110,7 +110,7 @@ impl Body {
         }
     }
 
-    /// Smallest and largest coordinates; `None` for a shape without an end.
+    /// Bounding box: smallest and largest coordinates; `None` for an unbounded shape.
     fn bounds(&self) -> Option<[V3; 2]> {
         match self {
             Self::Mesh(_, tree) => Some(tree.bounds()),
@@ -120,7 +120,7 @@ impl Body {
 }
 
 impl Thing {
-    /// Where it is at a time.
+    /// Pose at a time.
     #[inline(always)]
     fn at(&self, time: f64) -> PoseF64 {
         self.motion.as_ref().map_or(self.world_from_instance, |motion| motion.at(time))
@@ -135,11 +135,11 @@ impl Tracer {
             + self.tree.bytes()
     }
 
-    /// Finds the trees of everything that `keep` does not hide; those that nobody has yet are built.
+    /// Finds the BVHs of all instances that `keep` does not hide, and builds the missing ones.
     pub(crate) fn find_bodies(&mut self, scene: &RenderScene, assets: &RayAssets, keep: impl Fn(&Instance) -> Layer) {
         let instances = scene.instances();
         self.bodies.resize_with(instances.len(), || None);
-        // All at once: what building takes of memory is kept from one mesh to the next.
+        // All under one lock: scratch memory is kept from one mesh to the next.
         assets.with(|assets| {
             for (body, instance) in self.bodies.iter_mut().zip(instances) {
                 *body = match keep(instance) {
@@ -150,8 +150,8 @@ impl Tracer {
         });
     }
 
-    /// Puts everything where it is, for rays that go anywhere at any time; `before` is where it was at time 0, if it was not
-    /// where it is all the time. Its bodies were found before.
+    /// Places all instances, for rays in any direction at any time. `before` holds the poses at time 0; without it, all
+    /// instances are static. [`find_bodies`](Self::find_bodies) must be called before.
     pub(crate) fn place(&mut self, scene: &RenderScene, poses: &[PoseF32], before: Option<&[PoseF32]>) {
         let Self { bodies, things, endless, tree } = self;
         things.clear();
@@ -174,19 +174,19 @@ impl Tracer {
         tree.build();
     }
 
-    /// A box around everything that a ray may meet beside `instance`; `None` if that has no end.
+    /// Bounding box of all instances but the unbounded `instance`; `None` if another instance is unbounded.
     pub(crate) fn bounds_beside(&self, instance: u32) -> Option<[V3; 2]> {
         let alone = self.endless.iter().all(|&thing| self.things[thing as usize].instance == instance);
         alone.then(|| self.tree.bounds().unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]))
     }
 
-    /// Where an instance that is seen is at a time.
+    /// Pose of a visible instance at a time.
     pub(crate) fn pose_of(&self, instance: u32, time: f64) -> Option<PoseF64> {
         let thing = self.things.binary_search_by_key(&instance, |thing| thing.instance).ok()?;
         Some(self.things[thing].at(time))
     }
 
-    /// The nearest surface at a distance from 0 to `limit` \[m\], at a time. One copy per instruction set.
+    /// Finds the nearest surface at a distance from 0 to `limit` \[m\], at a time. One copy per instruction set.
     #[inline(never)]
     pub(crate) fn nearest<S: Simd>(&self, s: S, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Hit> {
         s.vectorize(
@@ -214,8 +214,8 @@ impl Tracer {
         )
     }
 
-    /// The part of the light that gets along a ray from distance 0 to `limit` \[m\], at a time: nothing past something opaque,
-    /// and past the front of other things what they let through. One copy per instruction set.
+    /// Fraction of light that passes along a ray from distance 0 to `limit` \[m\], at a time: 0 past an opaque surface,
+    /// and `1 - alpha` past each front of a transparent one. One copy per instruction set.
     #[inline(never)]
     pub(crate) fn passes<S: Simd>(&self, s: S, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> f64 {
         s.vectorize(
@@ -243,7 +243,7 @@ impl Tracer {
                             return limit;
                         }
                         left = 0.0;
-                        // Nothing is nearer than this: the visit ends.
+                        // A negative limit ends the traversal.
                         -1.0
                     }
                 };
@@ -257,10 +257,10 @@ impl Tracer {
         )
     }
 
-    /// How many fronts of a thing a ray goes through, at most [`MAX_FRONTS`].
+    /// Number of front surfaces of an instance that a ray passes, at most [`MAX_FRONTS`].
     #[inline(never)]
     fn fronts(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> i32 {
-        // Closed forms are convex: after the first surface there is only a back.
+        // Closed forms are convex: all surfaces after the first are backs.
         let body = &self.bodies[self.things[thing as usize].instance as usize];
         let most = if matches!(body, Some(Body::Closed(_))) { 1 } else { MAX_FRONTS };
         let (mut from, mut left, mut count) = (*ray, limit, 0);
@@ -275,7 +275,7 @@ impl Tracer {
         count
     }
 
-    /// Where a ray meets a thing.
+    /// Intersects a ray with one instance.
     #[inline(always)]
     fn meet(&self, thing: u32, ray: &Ray, limit: f64, time: f64, stack: &mut Stack) -> Option<Found> {
         let placed @ Thing { instance, .. } = &self.things[thing as usize];
@@ -287,8 +287,8 @@ impl Tracer {
             }
             Body::Closed(shape) => {
                 let at = shape.intersect(&local, limit)?;
-                // These bodies are convex, about their origin: outward is where the surface is. A plane's points are level
-                // with it.
+                // These shapes are convex around their origin: the position of a surface point is its outward
+                // direction. Points of a plane have no height, so planes are excluded.
                 let inward = dot(at.normal, local.at(at.t)) < 0.0 && !shape.is_one_sided();
                 let normal = scale(at.normal, if inward { -1.0 } else { 1.0 });
                 Some(Found { thing, distance: at.t, index: 0, normal })
@@ -307,7 +307,8 @@ impl Tracer {
         Some(Hit { distance: found.distance, instance: *instance, triangle, normal, world_from_instance })
     }
 
-    /// Casts the rays of all samples where an instance may be seen, into a visibility buffer. One copy per instruction set.
+    /// Casts the rays of all samples where an instance may be visible, into a visibility buffer. One copy per
+    /// instruction set.
     #[inline(never)]
     pub(crate) fn draw<S: Simd>(&self, s: S, stack: &mut Stack, tile: &mut Tile, view: &CameraView<'_>, item: &Item) {
         let Some(area) = tile.overlap(item.rect) else { return };
@@ -358,22 +359,22 @@ impl Tracer {
     }
 }
 
-/// Where a ray meets a thing, as far as it must be known to compare.
+/// The nearest hit so far, as far as needed for comparisons.
 #[derive(Clone, Copy, Debug)]
 struct Found {
     thing: u32,
     distance: f64,
-    /// Place of a triangle in its tree.
+    /// Position of the triangle in its BVH.
     index: usize,
-    /// Of a closed form, out of it, in its own frame.
+    /// Outward normal of a closed form, in its own frame.
     normal: V3,
 }
 
-/// Where a thing with bounds in its own frame may be seen.
+/// Bounding cone of an instance, from bounds in its own frame.
 fn sight(placed: &Placed, [lo, hi]: [V3; 2]) -> Sight {
     let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
     let pose = wide(&placed.camera_from_instance);
-    // Poses are single precision.
+    // A margin, because poses are single precision.
     let size = lo.iter().chain(&hi).chain(&pose.translation).fold(0.0f64, |m, x| m.max(x.abs()));
     Sight::of_ball(pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k]))), dot(half, half).sqrt() + 1e-6 * size)
 }
@@ -384,11 +385,11 @@ struct TileSamples<'a> {
     nearness: &'a mut [f32],
     /// Ids of all samples of the tile.
     ids: &'a mut [u32],
-    /// Indices of the eight.
+    /// Indices of the eight samples.
     at: [usize; WIDTH],
 }
 
-/// A camera's rays in the frame of an instance.
+/// Camera rays in the frame of an instance.
 struct Lens {
     rotation: [V3; 3],
     origin: V3,
@@ -409,7 +410,7 @@ impl Lens {
         }
     }
 
-    /// The rays of eight samples through a pinhole, in the optical frame, the first of them at (u, v).
+    /// Rays of eight samples of a pinhole camera, in the optical frame; the first one is at (u, v).
     #[inline(always)]
     fn pinhole(&self, [u, v]: [f64; 2], side: &Side) -> [V3; WIDTH] {
         let mut rays = [[0.0, 0.0, 1.0]; WIDTH];
@@ -419,7 +420,7 @@ impl Lens {
         rays
     }
 
-    /// The rays of a kind of samples of eight pixels behind a lens; 0 where there is none.
+    /// Rays of one sample plane of eight pixels through a lens; 0 for samples without a ray.
     #[inline(always)]
     fn bent(&self, rays: &LensRays, plane: usize, [x, y]: [usize; 2], side: &Side) -> [V3; WIDTH] {
         let mut out = [[0.0; 3]; WIDTH];
@@ -429,7 +430,8 @@ impl Lens {
         out
     }
 
-    /// Casts the rays of eight samples, and keeps what is nearer than what the samples hold. Returns true if there is any.
+    /// Casts the rays of eight samples, and keeps hits that are nearer than the stored ones. Returns true if any is
+    /// kept.
     #[inline(always)]
     fn cast<S: Simd>(
         &self,
@@ -441,7 +443,7 @@ impl Lens {
         first_id: u32,
     ) -> bool {
         let TileSamples { nearness, ids, at } = samples;
-        // Distances along a ray for a metre of depth.
+        // Distance along a ray per meter of depth.
         let mut length = [1.0; WIDTH];
         let mut rays = [Ray { origin: self.origin, direction: [0.0, 0.0, 1.0] }; WIDTH];
         let mut none = [false; WIDTH];
@@ -450,12 +452,12 @@ impl Lens {
             let c = if *none { [0.0, 0.0, 1.0] } else { *c };
             let d = self.rotation.map(|r| r[0] * c[0] + r[1] * c[1] + r[2] * c[2]);
             *length = dot(d, d).sqrt();
-            // Nothing before the near plane counts: rays begin there.
+            // Rays start at the near plane.
             *ray = Ray { origin: along(self.origin, self.near, d), direction: scale(d, 1.0 / *length) };
         }
         let mut packet = Packet::of(&rays, f64::INFINITY);
         for k in 0..WIDTH {
-            // What is there is known to single precision.
+            // Stored nearness is single precision.
             let limit = (1.000_001 / f64::from(nearness[at[k]]) - self.near) * length[k];
             packet.shorten(k, if none[k] { -1.0 } else { limit });
         }

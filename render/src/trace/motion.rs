@@ -1,33 +1,34 @@
-//! Where something is at times between two poses.
+//! Interpolation between two poses.
 
 use kinetoscope_scene::vector::{V3, along, sub};
 use kinetoscope_scene::{PoseF32, PoseF64};
 
-/// The time of the second pose; that of the first is 0.
+/// The time of the second pose; the first pose has the time 0.
 pub(crate) const NOW: f64 = 1.0;
 
-/// A way from one pose to another: its origin goes straight, at the same speed all the time; its axes turn the shorter way
-/// around, as a blend of unit quaternions that is made unit again. Between poses 0.5 rad apart that is never off a steady turn by
-/// more than 1 mrad; a cosine, which differs from machine to machine, is not needed.
+/// Motion between two poses. The origin moves straight at constant speed. The axes rotate the shorter way, by a
+/// normalized blend of unit quaternions (nlerp). Between poses 0.5 rad apart, that differs from a steady rotation by at
+/// most 1 mrad; it needs no cosine, which differs from machine to machine.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motion {
     to: PoseF64,
     origins: [V3; 2],
-    /// Quaternions w, x, y, z; `None` where nothing turns.
+    /// Quaternions w, x, y, z; `None` without rotation.
     turn: Option<[[f64; 4]; 2]>,
 }
 
-/// The pose in double precision.
+/// Converts a pose to double precision.
 pub(crate) fn wide(pose: &PoseF32) -> PoseF64 {
     PoseF64 { rotation: pose.rotation.map(|r| r.map(f64::from)), translation: pose.translation.map(f64::from) }
 }
 
-/// The pose in double precision, its rotation made one to the last digits: as it is in single precision, the way there and
-/// back moves a point by 1e-7 of its coordinates, so that a surface would not lie where its own points do.
+/// Converts a pose to double precision and orthonormalizes its rotation to the last digits. With a rotation in single
+/// precision, a transform and its inverse move a point by 1e-7 of its coordinates, so a surface would not contain its
+/// own points.
 pub(crate) fn rigid(pose: &PoseF32) -> PoseF64 {
     let PoseF64 { mut rotation, translation } = wide(pose);
-    // The nearest rotation, by Newton's iteration R (3 - R'R) / 2: an error of e becomes one of e². Source: Higham, Computing
-    // the polar decomposition, 1986. Axes of the world stay what they are, to the bit.
+    // The nearest rotation, by Newton's iteration R (3 - R'R) / 2: an error of e becomes one of e². Axis-aligned
+    // rotations keep their bits. Source: Higham, Computing the polar decomposition, 1986.
     for _ in 0..3 {
         let r = rotation;
         let product = |i: usize, j: usize| (0..3).map(|k| r[k][i] * r[k][j]).sum::<f64>();
@@ -38,7 +39,7 @@ pub(crate) fn rigid(pose: &PoseF32) -> PoseF64 {
 }
 
 impl Motion {
-    /// The way between two poses; `None` between equal ones.
+    /// The motion between two poses; `None` between equal ones.
     pub(crate) fn between(from: &PoseF32, to: &PoseF32) -> Option<Self> {
         if from == to {
             return None;
@@ -46,14 +47,14 @@ impl Motion {
         let (a, b) = (rigid(from), rigid(to));
         let turn = (from.rotation != to.rotation).then(|| {
             let (p, q) = (quaternion(&a.rotation), quaternion(&b.rotation));
-            // Of the two quaternions of a rotation the nearer one.
+            // The nearer one of the two quaternions of a rotation.
             let sign = if p.iter().zip(q).map(|(x, y)| x * y).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
             [p, q.map(|x| sign * x)]
         });
         Some(Self { to: b, origins: [a.translation, b.translation], turn })
     }
 
-    /// Where it is at a time from 0 to [`NOW`].
+    /// Pose at a time from 0 to [`NOW`].
     pub(crate) fn at(&self, time: f64) -> PoseF64 {
         let [from, to] = self.origins;
         let translation = along(from, time, sub(to, from));
@@ -64,7 +65,7 @@ impl Motion {
         PoseF64 { rotation, translation }
     }
 
-    /// A box that holds at every time what is in a box of its own frame.
+    /// A box that contains, at every time, a box given in the moving frame.
     pub(super) fn bounds(&self, [lo, hi]: [V3; 2], larger: f64) -> [V3; 2] {
         let [a, b] = self.origins;
         let reach = match self.turn {
@@ -74,7 +75,7 @@ impl Motion {
                 [middle - larger * half, middle + larger * half]
             }),
             Some(_) => {
-                // Wherever it turns, its farthest corner is no farther from its origin.
+                // In any orientation, the farthest corner has the same distance from the origin.
                 let corner = [0, 1, 2].map(|k| lo[k].abs().max(hi[k].abs()));
                 let far = larger * corner.iter().map(|x| x * x).sum::<f64>().sqrt();
                 [[-far, far]; 3]
@@ -129,7 +130,7 @@ mod tests {
         Pose::from_parts(at.into(), UnitQuaternion::from_scaled_axis(Vector3::from(axis)))
     }
 
-    /// nalgebra's own spherical interpolation, of poses whose matrices are of every kind of Shepperd's four.
+    /// Compares with nalgebra's spherical interpolation, for poses with each of Shepperd's four kinds of matrices.
     #[test]
     fn interpolation() {
         let far = 3.1;

@@ -1,5 +1,5 @@
-//! The tree over the things of a frame: parts that rays meet least often, by the surface area heuristic; of many things, and
-//! far down, halves of equal number along the longest side.
+//! BVH over the instances of a frame: split by the surface area heuristic; large or deep nodes are split into halves of
+//! equal number along the longest side.
 //!
 //! Source: Goldsmith and Salmon, Automatic creation of object hierarchies for ray tracing, 1987.
 
@@ -8,28 +8,28 @@ use kinetoscope_scene::PoseF64;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::vector::{V3, scale};
 
-/// How much larger boxes are: more than the rounding of the test.
+/// Enlargement of boxes: more than the rounding of the test.
 const LARGER: f64 = 1.0 + 1e-6;
-/// Levels of parts that may be of any size.
+/// Depth of splits by the heuristic.
 const UNEVEN: usize = 8;
-/// Deeper than any tree: below those, halves of equal number of less than 2^32 things.
+/// More than the depth of any BVH: below, nodes of fewer than 2^32 instances are split in half.
 const DEPTH: usize = UNEVEN + 32;
-/// Of more things all places to cut are not looked at: that takes as long as some thousand rays.
+/// Larger nodes are not split by the heuristic: that takes as long as several thousand rays.
 const FEW: usize = 64;
 
-/// A box with two boxes in it, or with a thing.
+/// A box that contains two boxes, or an instance.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     bounds: [V3; 2],
-    /// The second node in it; the first one follows this node. 0 for a thing.
+    /// Index of the second child; the first child follows this node. 0 for a leaf.
     second: u32,
     thing: u32,
 }
 
-/// A box, its middle (doubled), and the thing in it.
+/// A box, its center (doubled), and its instance.
 type Boxed = ([V3; 2], V3, u32);
 
-/// A tree over boxes; keeps its memory.
+/// A BVH over boxes; keeps its memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
     boxes: Vec<Boxed>,
@@ -46,7 +46,7 @@ impl Tree {
         self.nodes.clear();
     }
 
-    /// Adds a thing by the box around it in its own frame.
+    /// Adds an instance by its bounding box in its own frame.
     pub(super) fn add(&mut self, thing: u32, pose: &PoseF64, [lo, hi]: [V3; 2]) {
         let at = pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k])));
         let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
@@ -56,18 +56,18 @@ impl Tree {
         self.boxes.push((bounds, scale(at, 2.0), thing));
     }
 
-    /// Adds a thing that moves.
+    /// Adds a moving instance.
     pub(super) fn add_moving(&mut self, thing: u32, motion: &Motion, bounds: [V3; 2]) {
         let [lo, hi] = motion.bounds(bounds, LARGER);
         self.boxes.push(([lo, hi], [0, 1, 2].map(|k| lo[k] + hi[k]), thing));
     }
 
-    /// A box around everything, after building; `None` for nothing.
+    /// Bounding box of all instances, after building; `None` without instances.
     pub(super) fn bounds(&self) -> Option<[V3; 2]> {
         self.nodes.first().map(|node| node.bounds)
     }
 
-    /// Builds the tree over what was added.
+    /// Builds the BVH over the added boxes.
     pub(super) fn build(&mut self) {
         let Self { boxes, nodes } = self;
         if !boxes.is_empty() {
@@ -76,13 +76,13 @@ impl Tree {
         }
     }
 
-    /// Visits the things whose boxes a ray meets at distances from 0 to `limit`, the near boxes first. `act` is given a thing
-    /// and the limit, and returns a new limit.
+    /// Visits the instances whose boxes a ray meets at distances from 0 to `limit`, near boxes first. `act` receives an
+    /// instance and the limit, and returns a new limit.
     #[inline(always)]
     pub(super) fn visit(&self, ray: &Ray, mut limit: f64, mut act: impl FnMut(u32, f64) -> f64) {
-        // A direction that is almost none would make an infinity, and no number of it and a zero.
+        // A component close to 0 would have an infinite inverse, and infinity times zero is NaN.
         let inverse = ray.direction.map(|d| 1.0 / if d.abs() < 1e-200 { 1e-200f64.copysign(d) } else { d });
-        // Plain comparisons: those of the library look for what is no number.
+        // Plain comparisons, because those of the library check for NaN.
         let smaller = |a: f64, b: f64| if a < b { a } else { b };
         let larger = |a: f64, b: f64| if a > b { a } else { b };
         let enter = {
@@ -102,7 +102,7 @@ impl Tree {
         let mut next = if self.nodes.is_empty() { None } else { enter(0, limit).map(|_| 0) };
         loop {
             let Some(node) = next else {
-                // What waits may be too far by now.
+                // A waiting node may be beyond the limit by now.
                 let Some(last) = count.checked_sub(1) else { return };
                 count = last;
                 let (near, node) = waiting[count];
@@ -137,12 +137,12 @@ fn union(all: [V3; 2], b: &[V3; 2]) -> [V3; 2] {
     [[0, 1, 2].map(|k| all[0][k].min(b[0][k])), [0, 1, 2].map(|k| all[1][k].max(b[1][k]))]
 }
 
-/// Sorts by the middles along an axis; of those that are at one place the first thing comes first.
+/// Order by the centers along an axis; of equal centers the first instance comes first.
 fn order(axis: usize, a: &Boxed, b: &Boxed) -> std::cmp::Ordering {
     a.1[axis].total_cmp(&b.1[axis]).then(a.2.cmp(&b.2))
 }
 
-/// Sorts a few boxes so that the best place to cut them is where it says.
+/// Sorts a few boxes for the best split; returns its position.
 fn best_cut(boxes: &mut [Boxed]) -> usize {
     let area = |b: [V3; 2]| {
         let [x, y, z] = [0, 1, 2].map(|k| b[1][k] - b[0][k]);
@@ -172,7 +172,7 @@ fn best_cut(boxes: &mut [Boxed]) -> usize {
     best.2
 }
 
-/// Adds the node of some boxes, and all below.
+/// Adds the node of some boxes, and all nodes below.
 fn split(boxes: &mut [Boxed], nodes: &mut Vec<Node>, depth: usize) {
     let around = boxes.iter().fold(NOTHING, |all, (b, ..)| union(all, b));
     let index = nodes.len();
@@ -187,7 +187,7 @@ fn split(boxes: &mut [Boxed], nodes: &mut Vec<Node>, depth: usize) {
     split(high, nodes, depth + 1);
 }
 
-/// Cuts boxes in halves of equal number, along the longest side.
+/// Splits boxes into halves of equal number, along the longest side.
 fn halve(boxes: &mut [Boxed]) -> usize {
     let spread = |axis: usize| {
         let ends = boxes
@@ -230,7 +230,7 @@ mod tests {
                 let length = d.iter().map(|x| x * x).sum::<f64>().sqrt();
                 let ray = Ray { origin: [0, 1, 2].map(|_| 6.0 * number() - 3.0), direction: d.map(|x| x / length) };
                 let limit = 3.0 * number();
-                // The textbook's slabs, with the boxes as they are.
+                // The textbook's slab test, with the original boxes.
                 let meets = |[lo, hi]: &[V3; 2]| {
                     let (mut near, mut far) = (0.0f64, limit);
                     for (k, (o, d)) in ray.origin.iter().zip(ray.direction).enumerate() {
@@ -246,7 +246,7 @@ mod tests {
                 });
                 for (visited, b) in visited.iter().zip(&boxes) {
                     assert!(*visited || !meets(b), "{count} boxes");
-                    // Boxes are a millionth larger: few are visited for nothing.
+                    // Boxes are enlarged by a millionth: few are visited needlessly.
                     met_at_all += usize::from(*visited != meets(b));
                 }
             }

@@ -1,4 +1,4 @@
-//! What a camera sees: which surface at which pixel.
+//! Visibility: views, and the surface at each pixel.
 
 pub(crate) mod primitive;
 pub(crate) mod projection;
@@ -7,11 +7,11 @@ pub(crate) mod view;
 pub(crate) use projection::Projection;
 pub use view::View;
 
-/// Why a picture cannot be drawn.
+/// An error of rendering an image.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
-    /// The picture has no pixels or too many.
+    /// The image is empty or too large.
     #[error("a picture of {width} x {height} pixels cannot be drawn; both sides are 1 to {limit}")]
     Size {
         /// Pixels per row.
@@ -21,7 +21,7 @@ pub enum RenderError {
         /// The largest side.
         limit: usize,
     },
-    /// Focal lengths or the principal point are no good.
+    /// Focal lengths or the principal point are invalid.
     #[error("intrinsics fx {fx}, fy {fy}, cx {cx}, cy {cy}: all must be finite, fx and fy positive")]
     Intrinsics {
         /// Focal length along x \[pixels\].
@@ -33,10 +33,10 @@ pub enum RenderError {
         /// Principal point, y \[pixels\].
         cy: f32,
     },
-    /// The scene with what sensors show in it.
+    /// Markers of sensors cannot be added to the scene.
     #[error("what sensors show cannot be drawn into the picture: {0}")]
     Markers(String),
-    /// The range of depths is empty.
+    /// The range of depths is empty or invalid.
     #[error("near {near} m and far {far} m: both must be finite, with 0 < near < far")]
     Range {
         /// Smallest depth \[m\].
@@ -44,146 +44,146 @@ pub enum RenderError {
         /// Largest depth \[m\].
         far: f32,
     },
-    /// The camera's pose is not finite, or no rotation.
+    /// The camera's pose is not finite, or its matrix is not a rotation.
     #[error("the camera's pose is not a rigid transform: {pose:?}")]
     CameraPose {
         /// The pose.
         pose: kinetoscope_scene::PoseF32,
     },
-    /// An instance's pose is not finite, or no rotation.
+    /// An instance's pose is not finite, or its matrix is not a rotation.
     #[error("the pose of instance {instance} is not a rigid transform: {pose:?}")]
     InstancePose {
-        /// Which instance.
+        /// Index of the instance.
         instance: usize,
         /// The pose.
         pose: kinetoscope_scene::PoseF32,
     },
-    /// There are not as many poses as instances.
+    /// The numbers of poses and instances differ.
     #[error("{found} poses for {expected} instances")]
     PoseCount {
-        /// Instances of the scene.
+        /// Number of instances in the scene.
         expected: usize,
-        /// Poses given.
+        /// Number of given poses.
         found: usize,
     },
     /// A buffer has the wrong length.
     #[error("the {channel} buffer has {found} numbers; the picture needs {expected}")]
     BufferSize {
-        /// The channel.
+        /// Name of the channel.
         channel: &'static str,
-        /// How many numbers the picture has.
+        /// Length that the image needs.
         expected: usize,
-        /// How many the buffer has.
+        /// Length of the buffer.
         found: usize,
     },
-    /// The eye is where the target is.
+    /// Eye and target of a view coincide, or are not finite.
     #[error("the eye and the target of a view are the same point, or not finite")]
     LookAt,
-    /// Paths per pixel that a ray tracer cannot have.
+    /// The number of paths per pixel is out of range.
     #[error("{samples} paths per pixel; 1 to {limit} are possible")]
     Paths {
-        /// The number.
+        /// Paths per pixel.
         samples: u32,
-        /// The most that is possible.
+        /// Largest number of paths per pixel.
         limit: u32,
     },
-    /// Bounces that a ray tracer cannot have.
+    /// The number of bounces is out of range.
     #[error("{max_bounces} bounces; 0 to {limit} are possible")]
     Bounces {
-        /// The number.
+        /// Number of bounces.
         max_bounces: u32,
-        /// The most that is possible.
+        /// Largest number of bounces.
         limit: u32,
     },
-    /// A renderer that draws straight lines, and a lens that bends them.
+    /// The renderer draws straight lines only, but the lens bends them.
     #[error(
         "the {lens} lens bends straight lines, which {renderer} does not; use renderer: FastRayTraced, Hybrid or RayTraced"
     )]
     LensRenderer {
-        /// The lens.
+        /// Name of the lens.
         lens: &'static str,
-        /// The renderer.
+        /// Name of the renderer.
         renderer: &'static str,
     },
-    /// What only paths can show, and a renderer that follows none.
+    /// A feature needs path tracing, but the renderer has none.
     #[error(
         "{what}: colours come from paths all over the lens and the exposure, and {renderer} follows none; use renderer: RayTraced"
     )]
     NeedsPaths {
-        /// What is to be shown.
+        /// Name of the feature.
         what: &'static str,
-        /// The renderer.
+        /// Name of the renderer.
         renderer: &'static str,
     },
-    /// Ambient occlusion of a renderer that has none.
+    /// Ambient occlusion is enabled for a renderer that does not support it.
     #[error("{rays} rays for ambient occlusion: {renderer} casts none; use renderer: Hybrid (RayTraced needs none)")]
     Occlusion {
-        /// How many rays.
+        /// Rays per sample.
         rays: u16,
-        /// The renderer.
+        /// Name of the renderer.
         renderer: &'static str,
     },
-    /// A lens that no camera has.
+    /// A number of the aperture is out of range.
     #[error("{what} of the aperture is {value}; it must be {allowed}")]
     Aperture {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
-        /// The number.
+        /// Its value.
         value: f64,
         /// Accepted values.
         allowed: &'static str,
     },
-    /// A shutter that no camera has.
+    /// A time of the shutter is out of range.
     #[error("{what} of the shutter is {value} s; it must be 0 or positive, and finite")]
     Shutter {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
-        /// The number \[s\].
+        /// Its value \[s\].
         value: f64,
     },
-    /// The shutter was open before anybody knows where things were.
+    /// The poses at shutter opening are more recent than the opening.
     #[error(
         "the shutter opens {span} s before the picture's instant, but where things were is known from {before} s before"
     )]
     Opened {
-        /// From when poses are \[s\].
+        /// Age of the poses at the time stamp of the image \[s\].
         before: f64,
-        /// How long the shutter takes \[s\].
+        /// Time from shutter opening to the time stamp \[s\].
         span: f64,
     },
-    /// Somebody broke the picture off ([`RenderProgress::cancel`](crate::progress::RenderProgress::cancel)).
+    /// Rendering was canceled by [`RenderProgress::cancel`](crate::progress::RenderProgress::cancel).
     #[error("the picture was broken off after {samples} of {total} paths")]
     Cancelled {
-        /// Paths that were followed.
+        /// Number of traced paths.
         samples: u64,
-        /// Paths that there were to follow.
+        /// Number of paths of the batch.
         total: u64,
     },
-    /// Rays of a lens that are not those of the picture.
+    /// The rays of a lens do not match the image.
     #[error(
         "rays of a lens for {found:?} pixels with {found_samples} samples, but the picture has {expected:?} pixels and needs \
          {samples}"
     )]
     LensRays {
-        /// Pixels per row and rows of the picture.
+        /// Pixels per row and rows of the image.
         expected: [usize; 2],
-        /// Samples per pixel that its colours need.
+        /// Samples per pixel that the colors need.
         samples: u8,
-        /// Pixels per row and rows that the rays are for.
+        /// Pixels per row and rows of the rays.
         found: [usize; 2],
-        /// Samples per pixel that they are for.
+        /// Samples per pixel of the rays.
         found_samples: u8,
     },
-    /// An exposure that is none.
+    /// The exposure compensation is out of range.
     #[error("an exposure of {stops} stops; it must be -20 to 20")]
     Stops {
-        /// The number.
+        /// Exposure compensation in stops.
         stops: f32,
     },
-    /// A number of samples that is not offered.
+    /// The number of samples is not supported.
     #[error("{samples} samples per pixel; 1 and 4 are possible")]
     Samples {
-        /// The number.
+        /// Samples per pixel.
         samples: u8,
     },
 }

@@ -1,9 +1,9 @@
-//! Rays against the shapes that have a closed form, sixteen at a time.
+//! Intersection of rays with closed-form shapes, sixteen at a time.
 //!
-//! All solids are convex: a ray is inside one over an interval. The nearest surface in front of `near` is where the
-//! interval begins, or where it ends if the camera is inside.
+//! All solids are convex: a ray is inside of a solid over an interval. The nearest surface in front of `near` is the
+//! start of the interval, or its end if the camera is inside.
 //!
-//! The shapes of the list below have arithmetic for sixteen rays in single precision. Other shapes are intersected ray by
+//! The shapes listed below have SIMD code for sixteen rays in single precision. Other shapes are intersected ray by
 //! ray, in double precision.
 
 use crate::simd::{F, LANES, M, Simd, U, V3, abs, load, load_u, max, min, select, select_u, splat, splat_u};
@@ -11,7 +11,7 @@ use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::{along, dot, scale};
 
-/// Where sixteen rays hit a shape.
+/// Hits of sixteen rays with a shape.
 #[derive(Clone, Copy)]
 pub(crate) struct PrimitiveHit<S: Simd> {
     pub(crate) hit: M<S>,
@@ -19,28 +19,28 @@ pub(crate) struct PrimitiveHit<S: Simd> {
     pub(crate) t: F<S>,
     /// Outward normal, of any length.
     pub(crate) normal: V3<S>,
-    /// Which smooth part of the surface, smaller than [`kinetoscope_scene::RenderScene::IDS_OF_PRIMITIVE`].
+    /// Index of the smooth part of the surface, smaller than [`kinetoscope_scene::RenderScene::IDS_OF_PRIMITIVE`].
     pub(crate) face: U<S>,
 }
 
-/// Over which part of the rays a convex body is, where it begins and ends.
+/// Intervals of the rays inside of a convex body.
 #[derive(Clone, Copy)]
 struct Interval<S: Simd> {
     enter: F<S>,
     leave: F<S>,
 }
 
-/// The first surface at or behind `near`, of an interval that is empty where it leaves before it enters.
+/// The first surface at or behind `near`. An interval that leaves before it enters is empty.
 #[inline(always)]
 fn first<S: Simd>(s: S, i: Interval<S>, near: f32) -> (M<S>, F<S>, M<S>) {
     let near = splat(s, near);
     let outside = i.enter.simd_ge(near);
     let t = select(outside, i.enter, i.leave);
-    // Infinite ends belong to rays that run along the surface.
+    // Infinite ends belong to rays along the surface.
     (i.enter.simd_le(i.leave) & t.simd_ge(near) & t.simd_lt(splat(s, f32::MAX)), t, outside)
 }
 
-/// Never zero, so that a division by it is finite or a clean infinity.
+/// Replaces zero, so that a division is finite or a clean infinity.
 #[inline(always)]
 fn nonzero<S: Simd>(s: S, d: F<S>) -> F<S> {
     select(abs(d).simd_lt(splat(s, 1e-18)), splat(s, 1e-18), d)
@@ -48,8 +48,8 @@ fn nonzero<S: Simd>(s: S, d: F<S>) -> F<S> {
 
 const EMPTY: f32 = f32::INFINITY;
 
-/// A ball about the origin, in coordinates where it is round. The distance of the ray from the middle is taken at its
-/// nearest point, not by the discriminant, which cancels for small balls far away. Source: Haines et al., Precision
+/// A ball about the origin, in coordinates where it is round. The distance of the ray from the center is computed at
+/// the ray's closest point; the discriminant would cancel for small balls far away. Source: Haines et al., Precision
 /// improvements for ray/sphere intersection, Ray Tracing Gems, 2019.
 #[inline(always)]
 fn ball<S: Simd>(s: S, o: V3<S>, d: V3<S>, radius: f32) -> Interval<S> {
@@ -65,7 +65,7 @@ fn ball<S: Simd>(s: S, o: V3<S>, d: V3<S>, radius: f32) -> Interval<S> {
     Interval { enter: select(hit, middle - half, splat(s, EMPTY)), leave: select(hit, middle + half, splat(s, -EMPTY)) }
 }
 
-/// An endless cylinder about z.
+/// An infinite cylinder about z.
 #[inline(always)]
 fn tube<S: Simd>(s: S, o: V3<S>, d: V3<S>, radius: f32) -> Interval<S> {
     let dd = d.x * d.x + d.y * d.y;
@@ -95,14 +95,14 @@ fn sign<S: Simd>(s: S, x: F<S>) -> F<S> {
     select(x.simd_lt(splat(s, 0.0)), splat(s, -1.0), splat(s, 1.0))
 }
 
-/// Nearness 1/z of a plane, where rays that go `down` by so much for each metre of depth (negative) begin at a height above
-/// it \[m\].
+/// Nearness 1/z of a plane. `down` is the slope of the rays, meters along the normal per meter of depth (negative);
+/// `height` is that of their origin above the plane \[m\].
 #[inline(always)]
 pub(crate) fn plane_nearness<S: Simd>(down: F<S>, height: f32) -> F<S> {
     down * (-1.0 / height)
 }
 
-/// Where rays hit a shape with a closed form, in its own frame. Shapes made of triangles are never hit.
+/// Intersects rays with a shape that has a closed form, in its own frame. Shapes made of triangles are never hit.
 #[inline(always)]
 pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: f32) -> PrimitiveHit<S> {
     let zero = splat(s, 0.0);
@@ -204,7 +204,7 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
     }
 }
 
-/// [`intersect`] for every shape with a closed form, by [`Shape::intersect`].
+/// Version of [`intersect`] for every shape with a closed form, by [`Shape::intersect`].
 #[cold]
 #[inline(never)]
 fn ray_by_ray<S: Simd>(s: S, shape: &Shape, o: &V3<S>, d: &V3<S>, near: f32) -> PrimitiveHit<S> {
@@ -216,7 +216,7 @@ fn ray_by_ray<S: Simd>(s: S, shape: &Shape, o: &V3<S>, d: &V3<S>, near: f32) -> 
             for k in 0..LANES {
                 let [o, d] = [&origins, &directions].map(|v| [0, 1, 2].map(|axis| f64::from(v[axis][k])));
                 let length = dot(d, d).sqrt();
-                // Nothing before the near plane counts: rays begin there.
+                // Rays start at the near plane.
                 let ray = Ray { origin: along(o, near.into(), d), direction: scale(d, 1.0 / length) };
                 let found = if ray.is_finite() { shape.intersect(&ray, f64::INFINITY) } else { None };
                 let Some(found) = found else { continue };
@@ -240,7 +240,7 @@ mod tests {
     use crate::simd::{at_level, levels};
     use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
 
-    /// Shapes without arithmetic for sixteen rays look as those that have it.
+    /// The ray-by-ray version agrees with the SIMD code.
     #[test]
     fn rays_one_by_one() {
         let shapes: [Shape; 7] = [
@@ -276,10 +276,10 @@ mod tests {
                         for k in (0..LANES).filter(|k| both >> k & 1 == 1) {
                             hits += 1;
                             let facing: f32 = (0..3).map(|axis| n[axis][k] * n2[axis][k]).sum();
-                            // At an edge two faces are as near as each other.
+                            // At an edge two faces are equally near.
                             let off = (t[k] - t2[k]).abs();
                             let same = facing > 0.999 && f[k] == f2[k] && off < 1e-4;
-                            // Rays that graze lose half of the digits.
+                            // Grazing rays lose half of the digits.
                             assert!(off < 5e-3, "{}: {} and {}", shape.name(), t[k], t2[k]);
                             differ += u32::from(!same);
                         }
@@ -290,7 +290,7 @@ mod tests {
         }
     }
 
-    /// Triangles are found elsewhere.
+    /// Triangles are intersected elsewhere.
     #[test]
     fn triangles() {
         let ball = kinetoscope_scene::shape::RenderMesh::new(&Shape::from(Sphere { radius: 0.5 }).tessellate(8), 0.5);

@@ -1,4 +1,4 @@
-//! From pixels to rays and back, for cameras (pinhole) and lamps (pinhole or parallel).
+//! Projection between pixels and rays, for cameras (pinhole) and lights (pinhole or parallel).
 
 use super::View;
 use crate::simd::{F, Simd, V3, splat};
@@ -7,7 +7,7 @@ use kinetoscope_scene::PoseF32;
 /// A view with pinhole or parallel rays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Projection {
-    /// Whether rays are parallel; `fx` and `fy` are pixels per metre then.
+    /// True if rays are parallel; `fx` and `fy` are pixels per meter then.
     pub(crate) parallel: bool,
     pub(crate) width: usize,
     pub(crate) height: usize,
@@ -28,7 +28,7 @@ impl From<&View> for Projection {
 }
 
 impl Projection {
-    /// Nearness of a depth: larger is nearer. 1/z for a pinhole, so that it is linear on the screen.
+    /// Nearness of a depth: larger is nearer. 1/z for a pinhole, which is linear in the image.
     #[inline(always)]
     pub(crate) fn nearness(&self, z: f32) -> f32 {
         if self.parallel { 1.0 - z / self.far } else { 1.0 / z }
@@ -40,19 +40,19 @@ impl Projection {
         if self.parallel { 1.0 - z / self.far } else { 1.0 / z }
     }
 
-    /// The nearness beyond which nothing is seen.
+    /// Surfaces with a nearness up to this are beyond the far plane.
     pub(crate) fn farthest(&self) -> f32 {
-        // The largest number that is smaller, so that the far plane itself is seen.
+        // The next smaller number, so that the far plane itself is visible.
         if self.parallel { f32::MIN } else { (1.0 / self.far).next_down() }
     }
 
-    /// The nearness above which nothing is seen.
+    /// Largest visible nearness, at the near plane.
     pub(crate) fn nearest(&self) -> f32 {
         self.nearness(self.near)
     }
 
-    /// Rays through the points (u, v) of the picture, in the frame of an instance: origin and direction, such that the
-    /// parameter is the depth.
+    /// Rays through the points (u, v) of the image, in the frame of an instance: origin and direction, scaled such that
+    /// the parameter is the depth.
     #[inline(always)]
     pub(crate) fn rays<S: Simd>(&self, s: S, camera: &LocalCamera, u: F<S>, v: F<S>) -> (V3<S>, V3<S>) {
         let x = (u - self.cx) * camera.inverse_f[0];
@@ -66,7 +66,7 @@ impl Projection {
         if self.parallel { (origin.add(across), forward) } else { (origin, across.add(forward)) }
     }
 
-    /// The camera as an instance sees it.
+    /// The camera in the frame of an instance.
     pub(crate) fn local(&self, world_from_instance: &PoseF32) -> LocalCamera {
         LocalCamera {
             instance_from_camera: world_from_instance.inverse_times(&self.world_from_camera),
@@ -74,7 +74,7 @@ impl Projection {
         }
     }
 
-    /// Directions of the rays in the world frame, such that the parameter is the depth. Not for parallel rays.
+    /// Directions of the rays in the world frame, scaled such that the parameter is the depth. Not for parallel rays.
     #[inline(always)]
     pub(crate) fn world_directions<S: Simd>(&self, s: S, u: F<S>, v: F<S>) -> V3<S> {
         let c = V3 { x: (u - self.cx) * (1.0 / self.fx), y: (v - self.cy) * (1.0 / self.fy), z: splat(s, 1.0) };

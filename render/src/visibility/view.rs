@@ -1,12 +1,12 @@
-//! A pinhole camera at a place.
+//! A pinhole camera with its pose.
 
 use super::RenderError;
 use kinetoscope_scene::PoseF32;
 
-/// A pinhole camera at a place, without distortion.
+/// A pinhole camera without distortion, with its pose.
 ///
-/// The axes are ROS's optical ones: x to the right of the picture, y down, z forward. The ray of pixel (u, v) goes through
-/// (u + 0.5, v + 0.5).
+/// The axes are ROS's optical ones: x to the right of the image, y down, z forward. The ray of pixel (u, v) goes
+/// through (u + 0.5, v + 0.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Pixels per row.
@@ -21,25 +21,25 @@ pub struct View {
     pub cx: f32,
     /// Principal point, y \[pixels\].
     pub cy: f32,
-    /// Nothing nearer is seen: smallest depth along the optical axis \[m\].
+    /// Smallest visible depth along the optical axis \[m\].
     pub near: f32,
-    /// Nothing farther is seen: largest depth along the optical axis \[m\].
+    /// Largest visible depth along the optical axis \[m\].
     pub far: f32,
-    /// Where the camera is.
+    /// Pose of the camera.
     pub world_from_camera: PoseF32,
 }
 
 impl View {
-    /// The largest side of a picture: edge functions stay exact up to here (see `raster::triangle`).
+    /// Largest side of an image \[pixels\]: edge functions stay exact up to here (see `raster::triangle`).
     pub const MAX_SIDE: usize = 8192;
 
-    /// A camera at `eye` that looks at `target`, with the vertical field of view `fovy` \[rad\], square pixels and the
-    /// principal point in the middle; it sees depths from 1 cm to 100 m. The picture's upward direction is as near to `up`
-    /// as possible; looking along `up`, it is +y of the world (or +x, where `up` is y).
+    /// A camera at `eye` that looks at `target` \[m\], with the vertical field of view `fovy` \[rad\], square pixels
+    /// and the principal point at the center; it sees depths from 1 cm to 100 m. The image's upward direction is as
+    /// near to `up` as possible; for a view along `up`, it is +y of the world (or +x, if `up` is y).
     ///
     /// # Errors
     ///
-    /// [`RenderError::LookAt`] where eye and target coincide, and what [`View::validate`] finds.
+    /// [`RenderError::LookAt`] if eye and target coincide, and the errors of [`View::validate`].
     pub fn look_at(
         size: [usize; 2],
         fovy: f32,
@@ -70,11 +70,12 @@ impl View {
         view.validate().map(|()| view)
     }
 
-    /// Checks every number.
+    /// Checks every number: sides of 1 to [`MAX_SIDE`](Self::MAX_SIDE) pixels, focal lengths of at least 0.001 pixels,
+    /// focal lengths and principal point below 1e7 pixels in magnitude, 1e-6 m <= near < far, and a rigid pose.
     ///
     /// # Errors
     ///
-    /// The first that is no good.
+    /// The error of the first invalid number.
     pub fn validate(&self) -> Result<(), RenderError> {
         let Self { width, height, fx, fy, cx, cy, near, far, world_from_camera } = *self;
         if width == 0 || height == 0 || width.max(height) > Self::MAX_SIDE {

@@ -1,13 +1,15 @@
-//! Rays that run side by side, and the part of a tree that they may meet: one walk for all of them.
+//! Beams of nearly parallel rays: one BVH traversal for the part of the tree that any of them may meet.
 //!
-//! Depth is the coordinate along the axis that all rays run along most. Across it, the rays are between two straight lines
-//! along either other axis: where a ray is, is linear in the depth, so the smallest of some rays is nowhere below the chord
-//! between two depths, and the largest nowhere above. A box is met where it reaches between the lines over its own depths.
+//! Depth is the coordinate along the dominant axis of all rays. Across it, along either other axis, the rays lie
+//! between two straight lines. A ray's position is linear in the depth. So the smallest of several rays is nowhere
+//! below the chord between two depths, and the largest nowhere above. A box is met if it reaches between the lines over
+//! its own depths.
 //!
-//! In units of u R (u = 2^-24, R the largest coordinate of the tree) a line's single precision height is off by at most 4 for
-//! its rounded height at depth 0, 1 for its slope (which is at most 1), 1 for a rounded end of the depths, and 1 and 5 for
-//! the product and the sum: less than what boxes are larger than what they hold, [`PAD`](super::PAD). That is with heights
-//! at depth 0 up to 4 R: lines that begin farther out stay outside of the tree, by more than their error.
+//! Errors are in units of u R (u = 2^-24, R the largest coordinate of the tree). The single precision height of a line
+//! is off by at most 4 for its rounded height at depth 0, 1 for its slope (which is at most 1), 1 for a rounded end of
+//! the depths, and 1 and 5 for the product and the sum. That is less than the padding of the boxes,
+//! [`PAD`](super::PAD). It holds for heights at depth 0 up to 4 R: lines that begin farther out stay outside of the
+//! tree, by more than their error.
 
 use super::{Bvh, Entry, Node, Stack, WIDE, insert};
 use crate::geometry::packet::Packet;
@@ -15,42 +17,42 @@ use crate::geometry::triangle::ShearPacket;
 use crate::simd::{D, Simd};
 use std::ops::Range;
 
-/// Rays from farther away than this many times the largest coordinate are cast one by one: their positions at the tree are
-/// not known well enough in double precision for the lines to be right to single precision.
+/// Rays from farther away than this multiple of the largest coordinate are cast one by one. Their positions at the tree
+/// are not accurate enough in double precision for lines that are right to single precision.
 pub(crate) const FAR: f64 = (1u32 << 20) as f64;
-/// A part of the largest coordinate: chords between depths closer than this are not sloped.
+/// Fraction of the largest coordinate: chords between depths closer than this have no slope.
 const THIN: f64 = 1e-4;
 
-/// Rays side by side.
+/// A bundle of nearly parallel rays.
 #[derive(Clone, Copy)]
 pub(crate) struct Beam<S: Simd> {
-    /// The axis of depth comes last.
+    /// Permutation of the axes; the axis of depth comes last.
     axes: [usize; 3],
-    /// Depth by the coordinate: 1 or -1.
+    /// Factor from the coordinate to depth: 1 or -1.
     sign: f32,
     start: f32,
     end: f32,
-    /// The lower and the upper line along the first axis, then along the second: height at depth 0, and the slope, once where
-    /// it is positive and once where it is negative.
+    /// Lower and upper line along the first axis, then along the second: height at depth 0, and the slope's positive
+    /// and negative part.
     lines: [[f32; 3]; 4],
-    /// Where rays begin, and how fast they get deeper.
+    /// Depth of the ray origins, and depth per unit of distance.
     depth: D<S>,
     speed: D<S>,
-    /// Part of the tree's cross-section that lies between the lines, about.
+    /// Approximate fraction of the tree's cross-section between the lines.
     share: f64,
 }
 
-/// How a walk ended.
+/// Result of a traversal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Walked {
-    /// All that may be met was visited.
+    /// All leaves that the rays may meet were visited.
     All,
-    /// More was to be visited than the budget allows.
+    /// Stopped because the budget was exceeded.
     Part,
 }
 
 impl<S: Simd> Beam<S> {
-    /// Around all lanes of a packet, where it may meet a tree; `None` where it cannot be told in single precision.
+    /// The beam around all lanes of a packet, within a tree; `None` if single precision cannot bound it.
     #[inline(always)]
     pub(crate) fn around(s: S, packet: &Packet, shear: &ShearPacket<S>, tree: &Bvh) -> Option<Self> {
         let axes @ [i, j, k] = shear.axes();
@@ -93,19 +95,19 @@ impl<S: Simd> Beam<S> {
         finite.then_some(beam)
     }
 
-    /// About which part of a tree's things lies in it.
+    /// Approximate fraction of the tree's primitives that lie in the beam.
     #[inline(always)]
     pub(crate) fn share(&self) -> f64 {
         self.share
     }
 
-    /// The largest depth that counts, rounded up.
+    /// The largest depth within the limits, rounded up.
     #[inline(always)]
     fn deepest(&self, limits: D<S>) -> f32 {
         ((self.depth + limits * self.speed).most() as f32).next_up()
     }
 
-    /// From which depth on each of the boxes begins, and a bit for each box that is met before the depth `deepest`.
+    /// Depths at which the boxes begin, and a bit for each box that is met before the depth `deepest`.
     #[inline(always)]
     fn meets(&self, node: &Node, deepest: f32) -> ([f32; WIDE], u32) {
         let [i, j, k] = self.axes;
@@ -118,13 +120,13 @@ impl<S: Simd> Beam<S> {
             let z = if z > start { z } else { start };
             if z < end { z } else { end }
         };
-        // One plain loop: compilers make vectors of it.
+        // One plain loop, which compilers vectorize.
         let (mut from, mut met) = ([0.0f32; WIDE], [0u32; WIDE]);
         for c in 0..WIDE {
             let (z0, z1) = (near[c] * sign, far[c] * sign);
             from[c] = z0;
             let (a, b) = (within(z0), within(z1));
-            // A line that rises is lowest at the near side.
+            // A rising line is lowest at the near side.
             let deep = (z0 <= deepest) & (z1 >= start);
             let u = (al + pl * a + nl * b <= u1[c]) & (ah + ph * b + nh * a >= u0[c]);
             let v = (bl + ql * a + ml * b <= v1[c]) & (bh + qh * b + mh * a >= v0[c]);
@@ -134,7 +136,8 @@ impl<S: Simd> Beam<S> {
     }
 }
 
-/// Height at depth 0 and slope of the line through two heights, which `outer` chooses from where they are too close together.
+/// Height at depth 0 and slope of the line through two heights. If the depths are too close together, `outer` chooses
+/// one of the heights.
 #[inline(always)]
 fn line([start, end]: [f64; 2], [a, b]: [f64; 2], reach: f64, outer: fn(f64, f64) -> f64) -> [f32; 3] {
     let long = end - start;
@@ -144,8 +147,9 @@ fn line([start, end]: [f64; 2], [a, b]: [f64; 2], reach: f64, outer: fn(f64, f64
 }
 
 impl Bvh {
-    /// Visits the leaves that the rays of a beam may meet up to its limits, those of near nodes first, until more than `budget`
-    /// things were visited. `leaf` is given the things of a leaf; it returns new limits, where there are.
+    /// Visits the leaves that the rays of a beam may meet within its limits, those of near nodes first, until more than
+    /// `budget` primitives were visited. `leaf` receives the primitives of a leaf and returns new limits if they
+    /// changed.
     #[inline(always)]
     pub(crate) fn walk_beam<S: Simd>(
         &self,
@@ -173,7 +177,7 @@ impl Bvh {
                     insert(stack, bottom, Entry { near: near[k], child, count });
                     continue;
                 }
-                // Things at once: their order among neighbours is worth less than keeping it.
+                // Leaves are visited at once: their order among neighbors is worth less than keeping it.
                 let (first, count) = (child as usize, count as usize);
                 if count > budget {
                     return Walked::Part;

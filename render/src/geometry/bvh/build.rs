@@ -1,10 +1,11 @@
-//! Builds the tree. Boxes are sorted along a Morton curve; those that lie together on it become groups. A group is one node:
-//! of all ways to cut it along the curve into eight leaves at most, the one that the surface area heuristic finds cheapest.
-//! Above groups the heuristic chooses from planes between bins along the longest side, two children at a time; eight such
-//! children are a node.
+//! Builds a BVH. Boxes are sorted along a Morton curve; boxes that are close together on it become groups. A group is
+//! one node: among all ways to split it along the curve into at most eight leaves, the cheapest by the surface area
+//! heuristic (SAH). Above groups, the heuristic selects planes between bins along the longest side, two children at a
+//! time; eight such children are a node.
 //!
-//! Sources: Wald, On fast construction of SAH-based bounding volume hierarchies, 2007; Lauterbach et al., Fast BVH construction
-//! on GPUs, 2009; Ganestam et al., Bonsai: rapid bounding volume hierarchy generation using mini trees, JCGT 4(3), 2015.
+//! Sources: Wald, On fast construction of SAH-based bounding volume hierarchies, 2007; Lauterbach et al., Fast BVH
+//! construction on GPUs, 2009; Ganestam et al., Bonsai: rapid bounding volume hierarchy generation using mini trees,
+//! JCGT 4(3), 2015.
 
 use super::{Aabb, Bvh, Node, PAD, WIDE};
 use crate::simd::{F4, Level, Simd, at_level};
@@ -16,26 +17,27 @@ mod curve;
 mod cut;
 mod leaves;
 
-/// Things of a group, at most.
+/// Largest number of primitives in a group.
 const GROUP: usize = 24;
-/// Groups of no more than these are leaves of the node above.
+/// Groups up to this size are leaves of the node above.
 const SINGLE_LEAF: usize = 3;
-/// Deeper than this, halves of equal number: things that are spread over many orders of magnitude.
+/// Below this depth ranges are split in half by count: primitives spread over many orders of magnitude.
 const MAX_DEPTH: u32 = 48;
-/// What is added to a coordinate, between 0 and 2^22, has its whole number in the last bits: no instruction is needed to round.
+/// Added to a coordinate between 0 and 2^22, it puts the integer part into the last bits; rounding needs no
+/// instruction.
 const TO_BITS: f32 = 12_582_912.0;
 
-/// Three numbers in a register of four.
+/// Three numbers in a register of four lanes.
 type Quad = [f32; 4];
 
-/// A box.
+/// An axis-aligned box.
 #[derive(Clone, Copy, Debug)]
 struct Bounds {
     lo: Quad,
     hi: Quad,
 }
 
-/// The box of a thing, or of a group: the last places hold which it is (as bits), and how many things it is.
+/// Box of a primitive or of a group. The fourth components hold its index (as bits) and its number of primitives.
 type Item = Bounds;
 
 const NOTHING: Bounds = Bounds { lo: [f32::INFINITY; 4], hi: [f32::NEG_INFINITY; 4] };
@@ -54,7 +56,7 @@ impl Bounds {
         self.lo[3].to_bits()
     }
 
-    /// The box around both. Plain comparisons: those of the library look for what is no number.
+    /// The box around both. Plain comparisons, because those of the library check for NaN.
     #[inline(always)]
     fn with(&self, other: &Self) -> Self {
         Self {
@@ -72,7 +74,7 @@ impl Bounds {
         quad(|k| 0.5 * self.lo[k] + 0.5 * self.hi[k])
     }
 
-    /// Half the surface.
+    /// Half the surface area.
     #[inline(always)]
     fn area(&self) -> f32 {
         let [x, y, z, _] = quad(|k| self.hi[k] - self.lo[k]);
@@ -80,7 +82,7 @@ impl Bounds {
     }
 }
 
-/// The box around all items.
+/// Bounding box of all items.
 #[inline(always)]
 fn bounds_of<S: Simd>(s: S, all: &[Item]) -> Bounds {
     let mut lo = F4::load(s, &NOTHING.lo);
@@ -92,17 +94,17 @@ fn bounds_of<S: Simd>(s: S, all: &[Item]) -> Bounds {
     Bounds { lo: lo.array(), hi: hi.array() }
 }
 
-/// What tells in which of `count` cells along each axis of a box a point is.
+/// Maps a point to one of N cells along each axis of a box.
 #[derive(Clone, Copy, Debug)]
 struct Cells<const N: usize> {
     base: Quad,
-    /// 0 where the box has no length that counts.
+    /// Cells per unit length; 0 along axes without a usable length.
     scale: Quad,
 }
 
 impl<const N: usize> Cells<N> {
     fn of(within: &Bounds) -> Self {
-        // The last point of the box is in the last cell.
+        // The factor below 1 keeps the last point of the box in the last cell.
         let scale = quad(|k| (N as f32 * (1.0 - 1e-6)) / (within.hi[k] - within.lo[k]));
         Self { base: within.lo, scale: scale.map(|x| if x.is_finite() { x } else { 0.0 }) }
     }
@@ -113,7 +115,7 @@ impl<const N: usize> Cells<N> {
     }
 }
 
-/// Groups that belong together: a range of those.
+/// A range of groups.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     bounds: Bounds,
@@ -127,13 +129,13 @@ impl Part {
         (self.end - self.start) as usize
     }
 
-    /// What opening it is worth: less than any area where there is nothing to open.
+    /// Priority of splitting the range; below any area if it cannot be split.
     #[inline(always)]
     fn worth(&self) -> f32 {
         if self.len() > 1 { self.bounds.area() } else { -1.0 }
     }
 
-    /// Its first `count` and the rest.
+    /// The first `count` groups and the rest.
     #[inline(always)]
     fn cut(&self, count: usize, [near, far]: [Bounds; 2]) -> [Self; 2] {
         let (at, depth) = (self.start + count as u32, self.depth + 1);
@@ -141,27 +143,27 @@ impl Part {
     }
 }
 
-/// A child of a node: a node, or the things of a leaf.
+/// A child of a node: a node, or the primitives of a leaf.
 #[derive(Clone, Copy, Debug)]
 struct Child {
-    /// The node, or the first thing.
+    /// Index of the node, or of the first primitive.
     index: u32,
-    /// How many things; 0 if it is a node.
+    /// Number of primitives; 0 for a node.
     count: u32,
 }
 
-/// Builds trees, one after the other: what building takes of memory is kept from one to the next.
+/// Builds BVHs one after the other and keeps its memory between builds.
 #[derive(Debug)]
 pub(crate) struct Builder {
     level: Level,
     unsorted: Vec<Item>,
     curve: Curve,
-    /// Where each group begins on the curve, and where the last one ends.
+    /// Start of each group on the curve, and the end of the last one.
     starts: Vec<u32>,
     groups: Vec<Item>,
-    /// Each group as a child of a node above it.
+    /// Each group as a child of the node above it.
     children: Vec<Child>,
-    /// What a cut moves.
+    /// Scratch memory for splits.
     aside: Vec<Item>,
     nodes: Vec<Node>,
     costs: Costs,
@@ -185,14 +187,15 @@ impl Node {
 }
 
 impl Bvh {
-    /// A tree over boxes of finite numbers, and the order of the boxes in its leaves. The same boxes give the same tree.
+    /// Builds a BVH over boxes of finite numbers; returns it and the order of the boxes in its leaves. The same boxes
+    /// give the same BVH.
     pub(crate) fn build(boxes: impl IntoIterator<Item = Aabb>) -> (Self, Vec<u32>) {
         Builder::new(Level::best()).build(boxes)
     }
 }
 
 impl Builder {
-    /// The trees are the same with every instruction set.
+    /// Creates a builder for a SIMD level. The BVHs are the same at every level.
     pub(crate) fn new(level: Level) -> Self {
         Self {
             level,
@@ -208,7 +211,8 @@ impl Builder {
         }
     }
 
-    /// A tree over boxes of finite numbers, and the order of the boxes in its leaves. The same boxes give the same tree.
+    /// Builds a BVH over boxes of finite numbers; returns it and the order of the boxes in its leaves. The same boxes
+    /// give the same BVH.
     pub(crate) fn build(&mut self, boxes: impl IntoIterator<Item = Aabb>) -> (Bvh, Vec<u32>) {
         self.unsorted.clear();
         self.unsorted.extend((0..).zip(boxes).map(|(k, [lo, hi])| Item::item(lo, hi, k, 1)));
@@ -247,7 +251,7 @@ impl Builder {
         (Bvh { nodes: std::mem::take(&mut self.nodes), root, around, bounds }, order)
     }
 
-    /// Adds all groups of things, which are in this order.
+    /// Adds all groups of primitives, which are in this order.
     #[inline(always)]
     fn add_groups<S: Simd>(&mut self, s: S, order: &[u32]) {
         let mut things = [NOTHING; GROUP];
@@ -264,7 +268,7 @@ impl Builder {
 }
 
 impl Builder {
-    /// Adds a group of things, of which the first is at `start`, and its node if it needs one.
+    /// Adds a group whose first primitive is at `start`, and its node if it needs one.
     #[inline(always)]
     fn add_group<S: Simd>(&mut self, s: S, things: &[Item], start: u32, alone: bool) {
         let count = things.len() as u32;
@@ -272,7 +276,7 @@ impl Builder {
             (bounds_of(s, things), Child { index: start, count })
         } else {
             let (ends, leaves) = leaves::ends(s, things, &mut self.costs);
-            // Filled where it stays.
+            // Filled in place.
             let index = self.push(Node::EMPTY);
             let node = &mut self.nodes[index as usize];
             let (mut around, mut first) = (NOTHING, 0);
@@ -295,7 +299,8 @@ impl Builder {
         self.nodes.len() as u32 - 1
     }
 
-    /// Adds the wide node of the first `count` of two parts, and all above groups that is below; returns its index.
+    /// Adds the wide node of the first `count` of two ranges, and all nodes below it that are above groups; returns its
+    /// index.
     fn add(&mut self, seed: [Part; 2], mut count: usize) -> u32 {
         let mut parts = [seed[0]; WIDE];
         parts[1] = seed[1];
@@ -303,7 +308,7 @@ impl Builder {
         for (worth, part) in worth.iter_mut().zip(&parts).take(count) {
             *worth = part.worth();
         }
-        // Opens the largest until there are eight.
+        // Splits the largest range until there are eight.
         while count < WIDE {
             let (mut largest, mut most) = (0, worth[0]);
             for (k, &other) in worth.iter().enumerate().skip(1) {
@@ -332,7 +337,8 @@ impl Builder {
         self.push(node)
     }
 
-    /// Adds the node of a part of no more groups than a node has children: however they are cut, all are its children.
+    /// Adds the node of a range of at most eight groups: however the range is split, all groups are children of this
+    /// node.
     fn add_few(&mut self, part: &Part) -> u32 {
         let mut node = Node::EMPTY;
         for (k, group) in self.groups[part.start as usize..part.end as usize].iter().enumerate().take(WIDE) {
@@ -341,13 +347,13 @@ impl Builder {
         self.push(node)
     }
 
-    /// The halves of a part of several groups.
+    /// Splits a range of several groups.
     #[inline(always)]
     fn open(&mut self, part: &Part) -> [Part; 2] {
         let groups = &mut self.groups[part.start as usize..part.end as usize];
         let best = if part.depth < MAX_DEPTH { cut::best(&part.bounds, groups, &mut self.aside) } else { None };
         let (at, sides) = best.unwrap_or_else(|| {
-            // Too close together, or too deep.
+            // No plane separates the groups, or the range is too deep.
             let at = groups.len() / 2;
             (at, [Bounds::around(&groups[..at]), Bounds::around(&groups[at..])])
         });
@@ -380,8 +386,8 @@ mod tests {
         count as f64 / RAYS as f64
     }
 
-    /// A floor of 10 000 tiles without gaps, in an order that has nothing to do with their places, `thick` thick at random: a ray
-    /// meets one tile, or two.
+    /// A floor of 10 000 tiles without gaps, in an order unrelated to their positions, with a random thickness up to
+    /// `thick`: a ray meets one tile, or two.
     fn floor(thick: f32) -> Vec<Aabb> {
         let tile = |k: u32| {
             let k = k * 7919 % 10_000;
@@ -392,8 +398,8 @@ mod tests {
         (0..10_000).map(tile).collect()
     }
 
-    /// Root cause: a grid over everything put all boxes into one cell if one was far away, where the order of the file decided;
-    /// and noise across a flat object was cut as if it were as long as its sides.
+    /// Root causes: a grid over everything put all boxes into one cell if one box was far away, so the order of the
+    /// file decided. Noise across a flat object was split as if it were as long as the other sides.
     #[test]
     fn outliers_and_noise() {
         let plain = tested(&floor(0.0));
@@ -404,11 +410,12 @@ mod tests {
             let mut boxes = floor(0.0);
             boxes.push([[far, far, 0.0], [far + 1.0, far + 1.0, 0.0]]);
             let outlying = tested(&boxes);
-            // Boxes are padded for the largest coordinate there is: tiles of 1 cm overlap, by 3 mm on each side at 3 km.
+            // Boxes are padded for the largest coordinate of the scene: tiles of 1 cm overlap, by 3 mm on each side at
+            // 3 km.
             let grown = (1.0 + 2.0 * f64::from(far + 1.0) * PAD * (1.0 + 1.0 / 16.0) / 0.01).powi(2);
             assert!(outlying < 1.5 * plain * grown, "{far}: {outlying}, not {plain} times {grown}");
         }
-        // All at one place: every thing is tested, and nothing recurs for ever.
+        // All boxes at one place: each box is tested, and the recursion ends.
         assert_eq!(tested(&vec![[[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]; 1000]), 1000.0);
     }
 }

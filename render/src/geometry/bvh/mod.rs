@@ -1,7 +1,7 @@
-//! A tree of boxes with eight children per node: which boxes a ray may meet, the near ones first.
+//! Bounding volume hierarchy (BVH) with eight children per node: finds the boxes that a ray may meet, near ones first.
 //!
-//! Boxes are single precision, rounded outward by more than the error of a single precision test, so that nothing is
-//! missed; what is in them is tested in double precision by who asks. So the result does not depend on the tree.
+//! Boxes are single precision, rounded outward by more than the error of a single precision test, so that no primitive
+//! is missed. The caller tests the primitives of a box in double precision, so the result does not depend on the BVH.
 
 mod beam;
 mod build;
@@ -15,21 +15,21 @@ use std::ops::Range;
 
 /// Children of a node.
 const WIDE: usize = 8;
-/// How much larger boxes are than what they hold, as a part of the largest coordinate R in the tree. With u = 2^-24, the
-/// plane of a side is off by at most u R for the rounded origin, and by 4 u of its distance from there, which is 2 R at most,
-/// for the difference, the inverse of the rounded direction and the product: 9 u R, and terms of u².
+/// Padding of boxes, as a fraction of the largest coordinate R in the BVH. With u = 2^-24, the plane of a side is off
+/// by at most u R for the rounded origin, and by 4 u of its distance from there, which is 2 R at most, for the
+/// difference, the inverse of the rounded direction and the product: 9 u R, and terms of u².
 const PAD: f64 = 16.0 / (1u32 << 24) as f64;
 
 /// Smallest and largest coordinates.
 pub(crate) type Aabb = [[f32; 3]; 2];
 
-/// A tree of boxes.
+/// A bounding volume hierarchy.
 #[derive(Clone, Debug)]
 pub(crate) struct Bvh {
     nodes: Vec<Node>,
-    /// Which node is above all others.
+    /// Index of the root node.
     root: u32,
-    /// The box around everything, and the same padded.
+    /// The box around all primitives, and the same box padded.
     around: Aabb,
     bounds: [V3; 2],
 }
@@ -38,15 +38,15 @@ pub(crate) struct Bvh {
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 struct Node {
-    /// Smallest x, y, z, then largest x, y, z. Nothing where there is no child: larger than every number, and smaller.
+    /// Smallest x, y, z, then largest x, y, z. A missing child has an empty box, from +inf to -inf.
     sides: [[f32; WIDE]; 6],
-    /// A node, or the first thing of a leaf.
+    /// Index of a node, or of the first primitive of a leaf.
     child: [u32; WIDE],
-    /// Things of a leaf; 0 for a node.
+    /// Primitives of a leaf; 0 for a node.
     count: [u32; WIDE],
 }
 
-/// What is still to be visited: scratch memory, to be kept.
+/// Stack of nodes to visit: scratch memory that is kept between traversals.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Stack(Vec<Entry>);
 
@@ -58,32 +58,32 @@ impl Stack {
 
 #[derive(Clone, Copy, Debug)]
 struct Entry {
-    /// The ray is not in it before.
+    /// Distance at which the ray enters the box.
     near: f32,
     child: u32,
     count: u32,
 }
 
-/// A ray from where it enters the tree, in single precision.
+/// A ray that starts where it enters the BVH, in single precision.
 #[derive(Clone, Copy, Debug)]
 struct ShortRay {
-    /// How far the double precision ray runs before.
+    /// Distance that the double precision ray runs before.
     shift: f64,
     origin: [f32; 3],
     inverse: [f32; 3],
-    /// Along which axes the larger sides come first.
+    /// Axes along which the larger sides come first.
     backward: [bool; 3],
 }
 
 impl Bvh {
-    /// The box around everything; a point where there is nothing.
+    /// The box around all primitives; a point if there are no primitives.
     #[inline(always)]
     pub(crate) fn around(&self) -> &Aabb {
         &self.around
     }
 
-    /// Visits the leaves that `ray` may meet at distances from 0 to `limit`, the near ones first. `leaf` is given the
-    /// things of a leaf, as positions in the order of the build, and the limit; it returns a new limit.
+    /// Visits the leaves that `ray` may meet at distances from 0 to `limit`, near ones first. `leaf` receives the
+    /// primitives of a leaf, as positions in the order of the build, and the limit; it returns a new limit.
     #[inline(always)]
     pub(crate) fn walk(
         &self,
@@ -129,7 +129,7 @@ impl Bvh {
         }
     }
 
-    /// The ray from where it enters the box around everything; `None` if it does not before `limit`.
+    /// The ray from where it enters the box around all primitives; `None` if it does not enter before `limit`.
     #[inline(always)]
     fn enter(&self, ray: &Ray, limit: f64) -> Option<ShortRay> {
         if self.nodes.is_empty() {
@@ -153,7 +153,7 @@ impl Bvh {
             return None;
         }
         let origin = along(ray.origin, shift, ray.direction).map(|x| x as f32);
-        // A direction that is almost none would make an infinity; its sign is that of the ray.
+        // A component close to 0 would have an infinite inverse; it keeps the sign of the ray.
         let inverse = ray.direction.map(|d| {
             let d = d as f32;
             1.0 / if d.abs() < 1e-18 { 1e-18f32.copysign(d) } else { d }
@@ -163,7 +163,8 @@ impl Bvh {
     }
 }
 
-/// Puts an entry where it belongs above `bottom`: the nearest one on top, the first of those that are as near.
+/// Inserts an entry into the sorted part of the stack above `bottom`: the nearest on top, of equally near entries the
+/// first.
 #[inline(always)]
 fn insert(stack: &mut Vec<Entry>, bottom: usize, entry: Entry) {
     let mut at = stack.len();
@@ -175,13 +176,13 @@ fn insert(stack: &mut Vec<Entry>, bottom: usize, entry: Entry) {
 }
 
 impl ShortRay {
-    /// A limit, rounded up.
+    /// A limit relative to the entry point, rounded up.
     #[inline(always)]
     fn limit(&self, limit: f64) -> f32 {
         ((limit - self.shift) as f32).next_up()
     }
 
-    /// From where on the ray is in each of the boxes, and a bit for each box that it meets before `limit`.
+    /// Distances at which the ray enters each box, and a bit for each box that it meets before `limit`.
     #[inline(always)]
     fn meets(&self, node: &Node, limit: f32) -> ([f32; WIDE], u32) {
         let [x0, y0, z0, x1, y1, z1] = &node.sides;
@@ -190,7 +191,7 @@ impl ShortRay {
         let ([ox, oy, oz], [ix, iy, iz]) = (self.origin, self.inverse);
         let larger = |a: f32, b: f32| if a > b { a } else { b };
         let smaller = |a: f32, b: f32| if a < b { a } else { b };
-        // One plain loop: compilers make vectors of it.
+        // One plain loop, which compilers vectorize.
         let mut near = [0.0f32; WIDE];
         let mut met = [0u32; WIDE];
         for k in 0..WIDE {

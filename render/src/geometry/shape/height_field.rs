@@ -1,10 +1,12 @@
-//! Terrain: a walk over the cells that a ray crosses.
+//! Height fields: a walk over the cells that a ray crosses.
 //!
-//! The solid is what lies between the floor and the surface, a graph over the grid, so a ray meets it where it changes from
-//! above the surface to below or the other way. The walk keeps on which side the ray is: between two cells it cannot slip
-//! through. It goes over blocks of cells that the ray stays above (or below) at once, by a pyramid of the lowest and the
-//! highest heights. Source: Tevs, Ihrke, Seidel: Maximum mipmaps for fast, accurate, and scalable dynamic height field
-//! rendering, I3D 2008.
+//! The solid lies between the floor and the surface, a graph over the grid. So a ray hits it where it changes from
+//! above the surface to below or the other way. The walk tracks the side of the ray, so a ray cannot slip through
+//! between two cells. Blocks of cells that the ray stays above (or below) are skipped, by a pyramid of the lowest and
+//! the highest heights.
+//!
+//! Source: Tevs, Ihrke, Seidel: Maximum mipmaps for fast, accurate, and scalable dynamic height field rendering, I3D
+//! 2008.
 
 mod packet;
 
@@ -18,13 +20,13 @@ use kinetoscope_scene::shape::Intersection;
 use kinetoscope_scene::vector::{V3, along, unit};
 use std::sync::Arc;
 
-/// Cells that a walk looks at one by one before it looks at blocks: rays from above mostly hit in the first or the second.
+/// Cells that a walk visits one by one before it tries blocks: rays from above mostly hit in the first or the second.
 const FIRST_CELLS: usize = 4;
 
-/// Rounding may put a height that is met at most this part of the heights beyond the ends of a piece of the ray.
+/// Rounding may move a hit beyond the ends of a ray segment by this fraction of the heights.
 const SLACK: f64 = 1e-12;
 
-/// Terrain, one for each asset.
+/// A height field, shared by all instances of the asset.
 #[derive(Clone, Debug)]
 pub(crate) struct HeightField {
     field: Arc<Field>,
@@ -38,18 +40,18 @@ pub(crate) struct Field {
     cells: [usize; 2],
     /// Half lengths along x and y \[m\].
     half: [f64; 2],
-    /// Cells per metre.
+    /// Cells per meter.
     per_metre: [f64; 2],
-    /// Heights of all points, row after row \[m\].
+    /// Heights of all points, row by row \[m\].
     heights: Vec<f64>,
-    /// The floor, and the highest point \[m\].
+    /// Heights of the floor and of the highest point \[m\].
     floor: f64,
     top: f64,
     /// Level k has blocks of 2^(k+1) by 2^(k+1) cells.
     pyramid: Vec<Level>,
 }
 
-/// The lowest and the highest height over blocks of cells.
+/// Lowest and highest height over blocks of cells.
 #[derive(Clone, Debug)]
 struct Level {
     wide: usize,
@@ -102,13 +104,13 @@ impl Field {
         field
     }
 
-    /// Levels of the pyramid above the cells.
+    /// Number of pyramid levels above the cells.
     #[cfg(test)]
     pub(crate) fn levels(&self) -> usize {
         self.pyramid.len()
     }
 
-    /// The lowest and the highest height over a block of a level; level 0 are the cells.
+    /// Lowest and highest height over a block of a level; level 0 is the cells.
     #[inline(always)]
     fn range(&self, level: usize, [i, j]: [usize; 2]) -> [f64; 2] {
         if level == 0 {
@@ -127,21 +129,21 @@ impl Field {
         [low[0], low[1], high[0], high[1]]
     }
 
-    /// Height and slopes (per cell) of the surface in a cell: of the triangle on the right of its diagonal, or on the left.
-    /// The triangles are those of [`kinetoscope_scene::shape::HeightField`].
+    /// Height and slopes (per cell) of one triangle of a cell, right or left of its diagonal. The triangles are those
+    /// of [`kinetoscope_scene::shape::HeightField`].
     #[inline(always)]
     fn plane(corners: [f64; 4], right: bool) -> [f64; 3] {
         let [a, b, d, e] = corners;
         if right { [a, b - a, e - b] } else { [a, e - d, d - a] }
     }
 
-    /// The surface met in a cell between distances `from` and `to`.
+    /// The hit with the surface in a cell between distances `from` and `to`.
     #[inline(always)]
     fn cross(&self, walk: &Walk, cell: [usize; 2], from: f64, to: f64) -> Option<Intersection> {
         let corners = self.corners(cell);
         let [x, y] = [0, 1].map(|k| walk.origin[k] - cell[k] as f64);
         let [dx, dy] = walk.direction;
-        // Right of the diagonal where positive.
+        // Positive right of the diagonal.
         let (w, dw) = (x - y, dx - dy);
         let diagonal = if dw == 0.0 { to } else { -w / dw };
         let pieces =
@@ -173,7 +175,7 @@ impl Field {
         loop {
             steps += 1;
             let block = cell.map(|c| c >> level);
-            // Where the ray leaves the block, and across which side.
+            // Distance at which the ray leaves the block, and the axis across which it does.
             let mut leave = to;
             let mut axis = None;
             for (k, &block) in block.iter().enumerate() {
@@ -199,7 +201,7 @@ impl Field {
                 return Some(touch);
             }
             let k = axis?;
-            // The next block along the axis; along the other one wherever the ray is by now.
+            // The next block along the axis; along the other axis, the one where the ray is by now.
             let next = if walk.direction[k] > 0.0 { (block[k] + 1) << level } else { block[k] << level };
             if walk.direction[k] > 0.0 && next >= self.cells[k] || walk.direction[k] < 0.0 && next == 0 {
                 return None;
@@ -212,7 +214,7 @@ impl Field {
                 cell[other] = clamped(position(leave, other), first, last);
             }
             from = leave;
-            // Over the border of a larger block: try that one next.
+            // At the border of a larger block, that block is tried next.
             let aligned = if walk.direction[k] > 0.0 { next } else { cell[k] + 1 };
             if clear && steps >= FIRST_CELLS && level < self.pyramid.len() && aligned.trailing_zeros() as usize > level
             {
@@ -221,8 +223,8 @@ impl Field {
         }
     }
 
-    /// A ray straight down from above the surface, as height scanners cast them: it crosses one cell, and nothing else must
-    /// be known of it. `None` for other rays, for those that begin below the surface, and where it misses the footprint.
+    /// Hit of a ray straight down from above the surface, as height scanners cast them: it crosses one cell, so no walk
+    /// is needed. `None` for other rays, for rays that begin below the surface, and outside of the footprint.
     #[inline(always)]
     fn plumb(&self, ray: &Ray) -> Option<Intersection> {
         let (o, d) = (ray.origin, ray.direction);
@@ -242,7 +244,7 @@ impl Field {
         }
         let (o, d) = (ray.origin, ray.direction);
         let [lo, hi] = [[-self.half[0], -self.half[1], self.floor], [self.half[0], self.half[1], self.top]];
-        // Through which side of the box around everything the ray comes and goes.
+        // Sides through which the ray enters and leaves the bounding box.
         let (mut enter, mut leave) = ((0.0f64, None), (f64::INFINITY, 2));
         for k in 0..3 {
             if d[k] == 0.0 {
@@ -273,9 +275,9 @@ impl Field {
         let inverse = direction.map(|d| 1.0 / d);
         let mut walk = Walk { origin, direction, inverse, z: o[2], dz: d[2], side: 1.0 };
         match enter.1 {
-            // From below, through the floor.
+            // Upward through the floor.
             Some(2) if d[2] > 0.0 => return wall(from, 2),
-            // From above.
+            // Downward through the top.
             Some(2) => {}
             came => {
                 let [x, y, z] = along(o, from, d);
@@ -291,11 +293,11 @@ impl Field {
         if let Some(touch) = self.walk(&walk, from, to.min(limit)) {
             return (touch.t <= limit).then_some(touch);
         }
-        // From inside through a wall or the floor, or from above through a floor without a thickness.
+        // From inside through a wall or the floor, or from above through a floor without thickness.
         (walk.side < 0.0 || leave.1 == 2 && d[2] < 0.0).then(|| wall(to, leave.1)).flatten()
     }
 
-    /// The cell of a point of the footprint, in units of cells.
+    /// The cell of a point of the footprint, given in units of cells.
     #[inline(always)]
     fn cell_at(&self, at: [f64; 2]) -> [usize; 2] {
         [0, 1].map(|k| (at[k].max(0.0) as usize).min(self.cells[k] - 1))
@@ -317,7 +319,7 @@ impl HeightField {
         Self { field: assets.height_field(shape) }
     }
 
-    /// Smallest and largest coordinates.
+    /// Bounding box: smallest and largest coordinates.
     pub(super) fn bounds(&self) -> [V3; 2] {
         let Field { half, floor, top, .. } = &*self.field;
         [[-half[0], -half[1], *floor], [half[0], half[1], *top]]

@@ -1,4 +1,4 @@
-//! Triangles.
+//! Triangle meshes.
 
 pub(crate) mod columns;
 
@@ -15,29 +15,29 @@ use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::vector::{V3, to_f64};
 use std::sync::{Arc, OnceLock};
 
-/// Triangles that a packet tests against all of its rays; where there are more in its way, rays go on one by one. That costs
-/// about as much as these.
+/// Triangles that a packet tests against all of its rays; beyond that, rays go on one by one. That costs about as much
+/// as these tests.
 const BUDGET: usize = 320;
 
-/// Triangles in a tree, one for each asset.
+/// A mesh with its BVH, shared by all instances of the asset.
 #[derive(Clone, Debug)]
 pub(crate) struct Mesh {
     tree: Arc<MeshTree>,
 }
 
-/// The triangles of an asset, in the order of the leaves.
+/// The triangles of an asset, in the order of the BVH's leaves.
 #[derive(Clone, Debug)]
 pub(crate) struct MeshTree {
     bvh: Bvh,
     triangles: Vec<Triangle>,
-    /// Which triangle of the mesh each of them is.
+    /// Index of each triangle in the mesh.
     numbers: Vec<u32>,
-    /// Along each axis, made when the first steep rays come; none for some meshes.
+    /// Columns along each axis, built when the first steep rays come; `None` for unsuitable meshes.
     columns: [OnceLock<Option<Columns>>; 3],
 }
 
-/// Builds trees over meshes, one after the other: what building takes of memory is kept from one to the next. New memory would
-/// take a fifth of the time.
+/// Builds BVHs over meshes one after the other and keeps its memory between builds. New memory would take a fifth of
+/// the time.
 #[derive(Debug)]
 pub(crate) struct MeshBuilder {
     builder: Builder,
@@ -51,7 +51,7 @@ impl Default for MeshBuilder {
 }
 
 impl MeshBuilder {
-    /// Over the triangles that have an area.
+    /// Builds a BVH over the triangles that have an area.
     pub(crate) fn build(&mut self, mesh: &RenderMesh) -> MeshTree {
         let (indices, positions) = (mesh.triangles(), mesh.positions());
         let corners = |indices: &[u32; 3]| indices.map(|i| positions[i as usize]);
@@ -64,7 +64,7 @@ impl MeshBuilder {
             }
         }
         let mut tree = self.tree();
-        // Mostly there are no others.
+        // Most meshes have no triangles without area.
         if tree.triangles.len() < indices.len() {
             let with_area: Vec<u32> =
                 (0..).zip(indices).filter(|(_, indices)| has_area(&corners(indices))).map(|(k, _)| k).collect();
@@ -73,9 +73,9 @@ impl MeshBuilder {
         tree
     }
 
-    /// Over its own triangles, of which each has an area.
+    /// Builds a BVH over the builder's triangles, all of which have an area.
     fn tree(&mut self) -> MeshTree {
-        // Plain comparisons: those of the library look for what is no number.
+        // Plain comparisons, because those of the library check for NaN.
         let smaller = |a: f32, b: f32| if a < b { a } else { b };
         let larger = |a: f32, b: f32| if a > b { a } else { b };
         let around = |[a, b, c]: &Triangle| {
@@ -92,7 +92,7 @@ impl Mesh {
         Self { tree: assets.mesh(mesh) }
     }
 
-    /// Smallest and largest coordinates.
+    /// Bounding box: smallest and largest coordinates.
     pub(crate) fn bounds(&self) -> [V3; 2] {
         self.tree.bounds()
     }
@@ -124,24 +124,24 @@ impl MeshTree {
         self.columns[axes[2]].get_or_init(|| Columns::new(&self.triangles, &self.bounds(), axes)).as_ref()
     }
 
-    /// The number that a triangle, given by its place in the tree, has in the mesh.
+    /// Index in the mesh of a triangle given by its position in the BVH.
     #[inline(always)]
     pub(crate) fn number(&self, index: usize) -> u32 {
         self.numbers[index]
     }
 
-    /// Unit normal of a triangle, given by its place in the tree: counter-clockwise corners seen from its tip.
+    /// Unit normal of a triangle given by its position in the BVH; its corners are counter-clockwise seen from the tip.
     #[inline(always)]
     pub(crate) fn normal(&self, index: usize) -> Option<V3> {
         normal(&self.triangles[index])
     }
 
-    /// Smallest and largest coordinates.
+    /// Bounding box: smallest and largest coordinates.
     pub(crate) fn bounds(&self) -> [V3; 2] {
         self.bvh.around().map(to_f64)
     }
 
-    /// Whether some triangle is met at a distance from 0 to `limit`.
+    /// True if the ray meets any triangle at a distance from 0 to `limit`.
     #[inline(always)]
     pub(crate) fn blocks(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> bool {
         let shear = Shear::new(ray);
@@ -158,14 +158,14 @@ impl MeshTree {
                         break;
                     }
                 }
-                // Nothing is nearer than this: the walk ends.
+                // A negative limit ends the traversal.
                 if blocked { -1.0 } else { limit }
             },
         );
         blocked
     }
 
-    /// The nearest triangle up to `limit`, or one that was found before: how far away, and its place in the tree.
+    /// The nearest triangle up to `limit`, or the one `found` before: distance, and position in the BVH.
     #[inline(always)]
     pub(crate) fn nearest(
         &self,
@@ -185,7 +185,7 @@ impl MeshTree {
                 let first = leaf.start;
                 for (k, triangle) in self.triangles[leaf].iter().enumerate() {
                     let Some(t) = shear.distance(triangle).filter(|&t| t >= 0.0 && t <= limit) else { continue };
-                    // On an edge the first triangle counts, in whatever order they are met.
+                    // On an edge the first triangle counts, in any order of visits.
                     if best.is_none_or(|(s, index)| t < s || first + k < index) {
                         best = Some((t, first + k));
                         limit = t;
@@ -197,8 +197,9 @@ impl MeshTree {
         best
     }
 
-    /// [`nearest`](Self::nearest) for every ray of a packet, up to its limit, to the bit; `shear` is that of the rays, if they
-    /// have one. One walk for all of them where they run side by side. Only lanes with a ray are written.
+    /// Packet version of [`nearest`](Self::nearest): the same bits for every ray, up to its limit. `shear` is that of
+    /// the rays, if they share one. Nearly parallel rays take one traversal together. Only lanes with a ray are
+    /// written.
     #[inline(always)]
     pub(crate) fn nearest_of_packet<S: Simd>(
         &self,
@@ -220,7 +221,7 @@ impl MeshTree {
             return;
         };
         let (zero, mut limit) = (D::splat(s, 0.0), packet.limits(s));
-        // Of the best triangle, as a number that has all of them; +inf where there is none.
+        // Position of the best triangle, as a float that holds all positions exactly; +inf without a hit.
         let mut best = D::splat(s, f64::INFINITY);
         let walked = self.bvh.walk_beam(
             &beam,
@@ -261,9 +262,9 @@ impl RayShape for Mesh {
         self.tree.touch(self.tree.nearest(ray, limit, None, stack)?)
     }
 
-    /// Steep rays look into columns; others take one walk for all where they run side by side. Every triangle that a ray may
-    /// hit is tested by the arithmetic of the single ray, and the nearest one counts, the first one of those that are as
-    /// near: the same bits.
+    /// Steep rays use columns; other nearly parallel rays take one traversal together. Every triangle that a ray may
+    /// hit is tested by the arithmetic of the single ray. The nearest one counts, the first of equally near ones: the
+    /// same bits.
     #[inline(always)]
     fn touch_packet<S: Simd>(&self, s: S, packet: &Packet, stack: &mut Stack, touches: &mut Touches) {
         let tree = &*self.tree;

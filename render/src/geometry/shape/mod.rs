@@ -1,8 +1,8 @@
-//! The geometry that rays hit, in the frame of each shape.
+//! Shapes that rays hit, each in its own frame.
 //!
-//! Shapes with a closed form come with their intersections ([`ClosedForm`]); triangles get a tree, height fields a pyramid.
-//! Planes are seen from the front, solids from both sides: a ray that begins inside hits the way out. The rasterizer and
-//! MuJoCo's `mj_ray` see the same.
+//! Shapes with a closed form come with their intersections ([`ClosedForm`]); triangles get a BVH, height fields a
+//! pyramid. Planes are hit from the front, solids from both sides: a ray that begins inside hits the exit. The
+//! rasterizer and MuJoCo's `mj_ray` agree with that.
 
 pub(crate) mod height_field;
 pub(crate) mod mesh;
@@ -21,7 +21,7 @@ use mesh::Mesh;
 use ray_shape::touch_each;
 pub(crate) use ray_shape::{ForShape, RayShape, Touches};
 
-/// A shape, ready for rays.
+/// A shape prepared for rays.
 #[derive(Clone, Debug)]
 pub(crate) enum Solid {
     ClosedForm(Shape),
@@ -30,7 +30,7 @@ pub(crate) enum Solid {
 }
 
 impl Solid {
-    /// The shape of a scene; trees and pyramids are shared through `assets`.
+    /// Prepares a shape of a scene; BVHs and pyramids are shared through `assets`.
     pub(crate) fn of(shape: &Shape, assets: &mut Assets) -> Self {
         match (shape, shape.mesh()) {
             (Shape::HeightField(field), _) => Self::HeightField(HeightField::of(field, assets)),
@@ -39,7 +39,7 @@ impl Solid {
         }
     }
 
-    /// Smallest and largest coordinates; `None` for a shape without an end.
+    /// Bounding box: smallest and largest coordinates; `None` for an unbounded shape.
     pub(crate) fn bounds(&self) -> Option<[V3; 2]> {
         match self {
             Self::ClosedForm(shape) => shape.bounds(),
@@ -48,7 +48,7 @@ impl Solid {
         }
     }
 
-    /// The nearest surface at a distance from 0 to `limit`, both included, by a ray alone.
+    /// The nearest surface at a distance from 0 to `limit`, both included, for a single ray.
     #[cfg(test)]
     pub(crate) fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Intersection> {
         match self {
@@ -58,7 +58,7 @@ impl Solid {
         }
     }
 
-    /// Does the work with the shape itself.
+    /// Runs `work` on the concrete shape.
     #[inline(always)]
     pub(crate) fn with<W: ForShape>(&self, work: W) {
         match self {
@@ -71,7 +71,7 @@ impl Solid {
     }
 }
 
-/// Work on a shape that has a closed form.
+/// Adapter for work on a shape that has a closed form.
 struct OfClosedForm<W>(W);
 
 impl<W: ForShape> ForClosedForm for OfClosedForm<W> {

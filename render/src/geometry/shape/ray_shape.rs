@@ -6,16 +6,16 @@ use crate::simd::Simd;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::{ClosedForm, Intersection};
 
-/// Intersections of the rays of a packet, lane by lane.
+/// Intersections of the rays of a packet, one per lane.
 pub(crate) type Touches = [Option<Intersection>; WIDTH];
 
-/// The operations of a shape.
+/// Ray intersection of a shape.
 pub(crate) trait RayShape {
     /// The nearest surface at a distance from 0 to `limit`, both included.
     fn touch(&self, ray: &Ray, limit: f64, stack: &mut Stack) -> Option<Intersection>;
 
-    /// The same for every ray of a packet, up to its limit, to the bit. Of what `touches` were before only those of lanes
-    /// without a ray may stay.
+    /// Packet version of `touch`: the same bits for every ray, up to its limit. Overwrites `touches` in all lanes with
+    /// a ray.
     #[inline(always)]
     fn touch_packet<S: Simd>(&self, _s: S, packet: &Packet, stack: &mut Stack, touches: &mut Touches)
     where
@@ -32,7 +32,7 @@ impl<T: ClosedForm> RayShape for T {
     }
 }
 
-/// One ray after the other.
+/// Intersects one ray after the other.
 #[inline(always)]
 pub(super) fn touch_each(shape: &impl RayShape, packet: &Packet, stack: &mut Stack, touches: &mut Touches) {
     for (k, touch) in touches.iter_mut().enumerate().filter(|(k, _)| packet.has(*k)) {
@@ -40,7 +40,7 @@ pub(super) fn touch_each(shape: &impl RayShape, packet: &Packet, stack: &mut Sta
     }
 }
 
-/// Work that does not depend on the kind of shape, compiled for each.
+/// Work compiled separately for each kind of shape.
 pub(crate) trait ForShape {
     fn run<T: RayShape>(self, shape: &T);
 }

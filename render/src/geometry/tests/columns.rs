@@ -1,4 +1,4 @@
-//! Steep rays in packets, which look into columns, find what single rays find in the tree, to the bit.
+//! Columns: packets of steep rays find the same hits as single rays through the BVH, to the bit.
 
 use super::packets::{Compare, targets};
 use super::trees::soup;
@@ -18,7 +18,7 @@ use kinetoscope_scene::vector::{along, cross, dot, scale, sub, to_f64, unit};
 use kinetoscope_scene::{PoseF64, pose};
 use std::sync::Arc;
 
-/// The axes of columns along z.
+/// Axes of columns along z.
 const ABOVE: [usize; 3] = [0, 1, 2];
 
 /// Numbers of compared rays and packets.
@@ -26,13 +26,13 @@ const ABOVE: [usize; 3] = [0, 1, 2];
 struct Count {
     hits: usize,
     packets: usize,
-    /// Packets that looked into columns.
+    /// Packets that used the columns.
     columns: usize,
-    /// Rays that are not what they are alone.
+    /// Rays whose hit differs from that of the ray alone.
     wrong: usize,
 }
 
-/// Casts packets as they are and by some columns, at every level, and each ray alone.
+/// Casts packets through the mesh and through given columns, at every SIMD level, and each ray alone.
 fn compare(tree: &Arc<MeshTree>, columns: Option<&Columns>, rays: &[Ray], max_distance: f64) -> Count {
     let mesh = Mesh::of_tree(Arc::clone(tree));
     let mut count = Count { packets: rays.len().div_ceil(WIDTH), ..Count::default() };
@@ -59,8 +59,9 @@ fn compare(tree: &Arc<MeshTree>, columns: Option<&Columns>, rays: &[Ray], max_di
     count
 }
 
-/// Packets of steep rays towards about `at`, from above and from below: along z, on a grid of eighths, where edges and corners
-/// are hit exactly; along z anywhere; parallel ones; fans to points of the grid; from within; and some that are not steep.
+/// Packets of steep rays towards about `at`, from above and from below: along z on a grid of eighths, with exact hits
+/// of edges and corners; along z anywhere; parallel ones; fans to points of the grid; from within; and some that are
+/// not steep.
 fn steep(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
     let mut rays = Vec::new();
     for kind in 0..240 {
@@ -94,7 +95,7 @@ fn steep(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
     rays
 }
 
-/// Cells of eighths about the middle, two triangles each, at heights of sixty-fourths.
+/// A height field of triangles: cells of an eighth around the origin, two triangles each, heights in sixty-fourths.
 fn sheet(dice: &mut Dice, side: usize, height: f64) -> Vec<Triangle> {
     let heights: Vec<f32> =
         (0..side * side).map(|_| (height + f64::from(dice.number(0.0, 16.0) as u8) / 64.0) as f32).collect();
@@ -108,7 +109,7 @@ fn sheet(dice: &mut Dice, side: usize, height: f64) -> Vec<Triangle> {
     cells.flat_map(|(i, j)| cell(i, j)).collect()
 }
 
-/// With the coordinates x, y, z along some axes.
+/// Permutes the coordinates x, y, z to the given axes.
 fn turned<T: Copy>(p: [T; 3], axes: [usize; 3]) -> [T; 3] {
     let mut to = p;
     axes.into_iter().zip(p).for_each(|(axis, x)| to[axis] = x);
@@ -123,7 +124,7 @@ fn moved(triangles: &[Triangle], by: f32) -> Vec<Triangle> {
 fn steep_rays() {
     let mut dice = Dice(51);
     let ground = sheet(&mut dice, 25, 0.0);
-    // Twice the same triangles: of all ties the first one counts.
+    // All triangles twice: of equally near ones the first counts.
     let twice: Vec<Triangle> = ground.iter().chain(&ground).copied().collect();
     let layers: Vec<Triangle> = (0..4).flat_map(|k| sheet(&mut dice, 25, 0.3 * f64::from(k) - 0.9)).collect();
     let rotated = ground.iter().map(|t| t.map(|p| [0.8 * p[0] - 0.6 * p[1], 0.6 * p[0] + 0.8 * p[1], p[2]]));
@@ -140,7 +141,7 @@ fn steep_rays() {
     ] {
         let mut all = Count::default();
         for (last, max_distance) in [(2, f64::INFINITY), (2, 3.0), (2, 0.5), (0, f64::INFINITY), (1, 3.0)] {
-            // The same with other axes above.
+            // The same mesh with other axes as the vertical one.
             let axes = [(last + 1) % 3, (last + 2) % 3, last];
             let tree: Vec<_> = triangles.iter().map(|t| t.map(|p| turned(p, axes))).collect();
             let tree = Arc::new(MeshTree::of_triangles(&tree));
@@ -153,15 +154,15 @@ fn steep_rays() {
             (all.hits, all.packets, all.columns) =
                 (all.hits + count.hits, all.packets + count.packets, all.columns + count.columns);
         }
-        // In a soup, much is above each other; its packets go on in the tree.
+        // In a soup, many triangles are above each other; its packets fall back to the BVH.
         let least = if what.starts_with("soup") { 0 } else { all.packets / 3 };
         assert!(all.hits > 1000 && all.columns >= least, "{what}: {all:?}");
     }
 }
 
-/// Rays to corners of a nearly flat sheet (its normals tell which triangle was hit), where columns meet, from a bit less than
-/// -8192 m along x: there the difference to a corner is rounded and that to the sheet is not. The slack of rays is needed.
-/// The control: without it, some are lost.
+/// The slack of rays is needed. Rays go to corners of a nearly flat sheet (its normals show which triangle was hit),
+/// where columns meet. They come from slightly less than -8192 m along x: there the difference to a corner is rounded
+/// and that to the sheet is not. The control: without slack, some hits are lost.
 #[test]
 fn slack() {
     let mut dice = Dice(52);
@@ -187,8 +188,8 @@ fn slack() {
     assert!(without.wrong > 10, "{without:?}");
 }
 
-/// From very far away, the place of a ray at the mesh is rounding, and columns would hit triangles that the boxes of the tree
-/// hide: these rays are left to the tree. The control: from closer, columns are used.
+/// Very far rays are left to the BVH: their position at the mesh is rounding noise, and columns would hit triangles
+/// that the BVH's boxes hide. The control: from closer, columns are used.
 #[test]
 fn far_rays() {
     let mut dice = Dice(57);
@@ -211,7 +212,7 @@ fn far_rays() {
     assert!(near.wrong == 0 && near.columns == near.packets && near.hits > 8000, "{near:?}");
 }
 
-/// Columns are for meshes that are spread out, of triangles of about the same size.
+/// Columns exist only for meshes that are spread out, with triangles of similar size.
 #[test]
 fn meshes_without_columns() {
     let mut dice = Dice(53);
@@ -231,7 +232,7 @@ fn meshes_without_columns() {
     }
 }
 
-/// A packet whose columns hold too many triangles takes the tree.
+/// A packet whose columns hold too many triangles uses the BVH.
 #[test]
 fn crowded_columns() {
     let mut dice = Dice(54);
@@ -248,8 +249,8 @@ fn crowded_columns() {
     assert_eq!(count, Count { hits: WIDTH, packets: 1, columns: 1, wrong: 0 }, "the control: beside it");
 }
 
-/// Rays in the planes of triangles pass them at a distance of at least their length: none is inside, however edges are
-/// rounded. The control: by the signs of edges alone, as the source of the test has it, some are.
+/// Rays in the planes of triangles pass them at a distance of at least their length: no ray is inside, however edges
+/// are rounded. The control: by the signs of edges alone, as in the paper, some are.
 #[test]
 fn edge_on() {
     let mut dice = Dice(55);
@@ -290,7 +291,7 @@ fn inside_by_signs(ray: &Ray, triangle: &Triangle) -> bool {
     !mixed && edges.iter().sum::<f64>() != 0.0
 }
 
-/// Height scanners over and beside fixed and moving meshes: scans of the whole world, and every ray alone.
+/// Height scanners over and beside fixed and moving meshes: whole scans give the same hits as every ray alone.
 #[test]
 fn scans() {
     let mut dice = Dice(56);

@@ -1,4 +1,4 @@
-//! Rays held against closed forms and against brute force.
+//! Rays compared with closed forms and with brute force.
 
 mod columns;
 mod packets;
@@ -14,11 +14,11 @@ fn bits(touch: &Option<Intersection>) -> Option<(u64, [u64; 3])> {
     touch.as_ref().map(|touch| (touch.t.to_bits(), touch.normal.map(f64::to_bits)))
 }
 
-/// Numbers that are the same in every run (PCG's generator of 32 bits, the upper ones).
+/// Random numbers that are the same in every run (PCG's 32-bit generator, the upper bits).
 pub(crate) struct Dice(pub(crate) u64);
 
 impl Dice {
-    /// Between `low` and `high`.
+    /// A random number between `low` and `high`.
     pub(crate) fn number(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         low + (high - low) * (self.0 >> 33) as f64 / f64::from(1u32 << 31)
@@ -39,7 +39,7 @@ impl Dice {
         }
     }
 
-    /// A ray from somewhere within `far` of the origin to somewhere within `near` of it.
+    /// A random ray from within `far` of the origin to within `near` of it.
     pub(super) fn ray(&mut self, far: f64, near: f64) -> Ray {
         let (origin, target) = (self.point(far), self.point(near));
         let direction = unit(kinetoscope_scene::vector::sub(target, origin)).unwrap();

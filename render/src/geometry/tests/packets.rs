@@ -1,4 +1,4 @@
-//! Packets find what single rays find, to the bit, on every instruction set.
+//! Packets find the same hits as single rays, to the bit, on every instruction set.
 
 use super::trees::soup;
 use super::{Dice, bits};
@@ -48,13 +48,13 @@ impl ForShape for Compare<'_> {
     }
 }
 
-/// Packets of every kind: side by side, from one point, across each other, and in all directions.
+/// Packets of every kind: parallel, from one point, crossing, and in all directions.
 fn packets(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
     let mut rays = Vec::new();
     for kind in 0..160 {
         let spread = 10f64.powf(dice.number(-3.0, 0.0));
         let first = match kind % 5 {
-            // Along an axis, on a grid of eighths: edges and corners are hit exactly.
+            // Along an axis, on a grid of eighths: exact hits of edges and corners.
             0 | 1 => {
                 let axis = kind / 5 % 3;
                 let sign = if kind % 2 == 0 { 1.0 } else { -1.0 };
@@ -80,7 +80,7 @@ fn packets(dice: &mut Dice, at: [f64; 3]) -> Vec<Ray> {
             ray.origin = [0, 1, 2].map(|a| ray.origin[a] + at[a]);
             rays.push(ray);
         }
-        // The next kind begins a packet of its own; rays that are none fill this one.
+        // The next kind begins a packet of its own; invalid rays fill this one.
         let none = Ray { origin: [f64::INFINITY; 3], direction: [0.0, 0.0, 1.0] };
         rays.extend((count..WIDTH).map(|_| none));
     }
@@ -93,7 +93,7 @@ fn terrain(side: usize, dice: &mut Dice) -> HeightField {
     HeightField::new([half, half, 0.5, 0.25], side, side, &elevation).unwrap()
 }
 
-/// Triangles over a grid of eighths, so that rays of the grid meet corners and edges.
+/// Triangles over a grid of eighths, so that rays of the grid hit corners and edges.
 fn sheet(field: &HeightField) -> Vec<Triangle> {
     let mesh = field.mesh();
     mesh.triangles().iter().map(|t| t.map(|i| mesh.positions()[i as usize])).collect()
@@ -103,7 +103,7 @@ fn sheet(field: &HeightField) -> Vec<Triangle> {
 fn triangles() {
     let mut dice = Dice(31);
     let sheet = sheet(&terrain(33, &mut dice));
-    // Twice the same triangles: of all ties the first one counts.
+    // All triangles twice: of equally near ones the first counts.
     let twice: Vec<Triangle> = sheet.iter().chain(&sheet).copied().collect();
     let mut hits = 0;
     for (what, triangles, at) in [
@@ -124,7 +124,7 @@ fn triangles() {
     assert!(hits > 3000, "{hits}");
 }
 
-/// A limit that is a distance to the bit counts, the one before it does not, in packets as alone.
+/// A limit equal to the distance includes the hit, the next smaller number does not, in packets and alone.
 #[test]
 fn limits() {
     let mut dice = Dice(32);
@@ -170,7 +170,7 @@ fn height_fields() {
     assert!(hits > 5000, "{hits}");
 }
 
-/// The control of the tests above: neighbours of a height scanner walk through the tree together.
+/// The control of the tests above: neighbors of a height scanner traverse the BVH together.
 #[test]
 fn beams() {
     let mut dice = Dice(34);
@@ -190,7 +190,7 @@ fn beams() {
                     None
                 })
             };
-            // Five by three cells are below them, with thirty of 8192 triangles, but not in leaves of their own.
+            // Five by three cells are below the rays, with thirty of 8192 triangles, but not in leaves of their own.
             assert_eq!(walk(128), Walked::All);
             assert_eq!(walk(8), Walked::Part, "the control");
             assert!(met >= 30, "{met}");
@@ -229,7 +229,8 @@ fn cast(world: &mut RayWorld, poses: &[PoseF64], rays: &[Ray]) -> Vec<RayHit> {
     hits
 }
 
-/// The whole world against each shape and each ray alone: the nearest, and of two as near the first instance.
+/// Compares the whole world with each shape and each ray alone: the nearest hit, of equally near ones the first
+/// instance.
 #[test]
 fn world() {
     let mut dice = Dice(35);
@@ -287,7 +288,7 @@ fn world() {
     }
 }
 
-/// Fixed instances are placed again where they moved; poses and rays that are not finite hit nothing.
+/// Fixed instances are placed again when they move; non-finite poses and rays hit nothing.
 #[test]
 fn placing() {
     let mut dice = Dice(23);

@@ -1,4 +1,4 @@
-//! Shapes against closed forms: points on the surface are where rays say they are.
+//! Shapes compared with closed forms: hit points lie on the surface.
 
 use super::Dice;
 use kinetoscope_scene::Ray;
@@ -11,7 +11,7 @@ fn touch(shape: impl Into<Shape>, origin: [f64; 3], direction: [f64; 3]) -> Opti
     shape.into().intersect(&Ray { origin, direction }, f64::INFINITY).map(|t| (t.t, t.normal))
 }
 
-/// How far outside of the shape a point is: 0 on the surface, negative inside, near the surface a distance \[m\].
+/// Signed distance from the shape: 0 on the surface, negative inside, near the surface in meters.
 fn outside(shape: &Shape, [x, y, z]: [f64; 3]) -> f64 {
     let beyond = |p: f64, h: f32| p.abs() - f64::from(h);
     match shape {
@@ -42,8 +42,8 @@ fn solids() -> Vec<Shape> {
     ]
 }
 
-/// From 20 m away and from inside: the touched point is on the surface, nothing before it is on the other side, and the
-/// normal is the gradient of the distance.
+/// From 20 m away and from inside: the hit is on the surface, no point before it is on the other side, and the normal
+/// is the gradient of the distance.
 #[test]
 fn surfaces() {
     let mut dice = Dice(1);
@@ -54,7 +54,7 @@ fn surfaces() {
             let ray = dice.ray(far, near);
             let off = |t: f64| outside(&shape, ray.at(t));
             let inside = outside(&shape, ray.origin) < 0.0;
-            // Every tenth: this is the slow part.
+            // Only every tenth ray: this is the slow part.
             let steps = |to: f64| (0..if k % 10 > 1 { 0 } else { 400 }).map(move |s| to * (f64::from(s) + 0.5) / 400.0);
             let Some((t, normal)) = touch(shape.clone(), ray.origin, ray.direction) else {
                 assert!(!inside, "{name}: a way out is missed");
@@ -69,7 +69,7 @@ fn surfaces() {
                 let by = [0, 1, 2].map(|k| if k == axis { h } else { 0.0 });
                 (outside(&shape, along(ray.at(t), 1.0, by)) - outside(&shape, along(ray.at(t), -1.0, by))) / (2.0 * h)
             });
-            // At an edge the slope is that of one face or the other.
+            // At an edge the slope is that of either face.
             let facing = dot(normal, slope).abs() / dot(slope, slope).sqrt();
             assert!((dot(normal, normal) - 1.0).abs() < 1e-12);
             if dot(slope, slope).sqrt() > 0.5 && !edge(&shape, ray.at(t)) {
@@ -81,7 +81,7 @@ fn surfaces() {
     }
 }
 
-/// Within a few micrometres of where faces meet.
+/// True within a few micrometers of an edge.
 fn edge(shape: &Shape, [x, y, z]: [f64; 3]) -> bool {
     let near = |p: f64, h: f32| (p.abs() - f64::from(h)).abs() < 1e-5;
     match shape {
@@ -95,7 +95,7 @@ fn edge(shape: &Shape, [x, y, z]: [f64; 3]) -> bool {
 
 #[test]
 fn closed_forms() {
-    // A ball of 0.5 m at the offset 0.3 is met 0.4 m before its middle.
+    // A ball of 0.5 m at the offset 0.3 is hit 0.4 m before its center.
     let (t, n) = touch(Sphere { radius: 0.5 }, [0.3, 0.0, 20.0], [0.0, 0.0, -1.0]).unwrap();
     assert!((t - 19.6).abs() < 1e-13 && (n[0] - 0.6).abs() < 1e-14 && (n[2] - 0.8).abs() < 1e-13);
     let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];

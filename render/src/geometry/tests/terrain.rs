@@ -1,4 +1,4 @@
-//! Walking over a grid finds what brute force over the triangles of the same field finds.
+//! The walk over a grid finds the same hits as brute force over the triangles of the same field.
 
 use super::Dice;
 use super::trees::nearest;
@@ -12,7 +12,7 @@ use kinetoscope_scene::shape::HeightField;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::unit;
 
-/// The field's triangles. Points are a quarter of a metre apart; where single precision has missed that, it is put right.
+/// The field's triangles. Grid points are a quarter of a meter apart; rounding to single precision is undone.
 fn triangles(field: &HeightField) -> Vec<Triangle> {
     let mesh = field.mesh();
     let half = field.size();
@@ -31,7 +31,7 @@ fn distance(solid: &Solid, ray: &Ray) -> Option<(f64, [f64; 3])> {
     solid.touch(ray, f64::INFINITY, &mut Stack::default()).map(|t| (t.t, t.normal))
 }
 
-/// Rough terrain whose points are at numbers that single precision has exactly, so that triangles are where the grid is.
+/// Rough terrain with coordinates that single precision represents exactly, so that triangles match the grid.
 fn rough(dice: &mut Dice, rows: usize, columns: usize) -> HeightField {
     let elevation: Vec<f32> = (0..rows * columns).map(|_| (dice.number(0.0, 256.0) as u32) as f32 / 256.0).collect();
     let half = |n: usize| (n - 1) as f64 / 8.0;
@@ -65,7 +65,7 @@ fn brute_force() {
                 ray.direction = if k % 2 == 0 { [1.0, 0.0, 0.0] } else { [0.0, -1.0, 0.0] };
             }
             let ours = distance(&walk, &ray).map(|(t, _)| t);
-            // Rounding may decide for the one or the other at an edge of a wall, nowhere else.
+            // Rounding may decide either way at an edge of a wall, nowhere else.
             let (tight, wide) = (nearest(&ray, &triangles, -1e-9), nearest(&ray, &triangles, 1e-9));
             if tight.zip(wide).is_none_or(|(a, b)| (a - b).abs() > 1e-9) && (tight.is_some() || wide.is_some()) {
                 let fits = |t: Option<f64>| t.zip(ours).map_or(t == ours, |(a, b)| (a - b).abs() < 1e-9);
@@ -99,7 +99,8 @@ fn other_terrain() {
     assert!(differing > 300, "{differing}");
 }
 
-/// Straight down on points, edges, diagonals and the rim of the grid: hits at the height given by the four corners.
+/// Straight down on points, edges, diagonals and the rim of the grid: hits at the height interpolated from the four
+/// corners.
 #[test]
 fn scans_from_above() {
     let field = rough(&mut Dice(5), 17, 17);
@@ -134,7 +135,7 @@ fn level() {
     assert_eq!(hit([0.5, 0.0, 0.25], [0.0, -1.0, 0.0]).unwrap().0, 1.0, "from inside, a wall");
 }
 
-/// Long flat rays over large terrain, whose peak is at (-212, 188), 2 m high, its foot a metre around.
+/// Long flat rays over large terrain with a peak at (-212, 188), 2 m high, whose foot is one meter around.
 #[test]
 fn long_rays() {
     let n = 1025;
@@ -143,7 +144,7 @@ fn long_rays() {
     let field = HeightField::new([512.0, 512.0, 2.0, 1.0], n, n, &elevation).unwrap();
     let walk = solid(&field);
     let hit = |origin: [f64; 3], direction: [f64; 3]| distance(&walk, &Ray { origin, direction }).map(|(t, _)| t);
-    // Half way up the slope of one cell of a metre.
+    // Half way up the slope of one cell of a meter.
     for (x, expected) in [(-900.0, 900.0 - 212.0 - 0.5), (900.0, 900.0 + 212.0 - 0.5)] {
         let t = hit([x, 188.0, 1.0], [-f64::signum(x), 0.0, 0.0]).unwrap();
         assert!((t - expected).abs() < 1e-9, "{t} {expected}");

@@ -1,4 +1,5 @@
-//! Triangles and their trees against brute force, by the textbook formula in double precision and by the watertight test.
+//! Triangles and their BVHs compared with brute force, by the textbook formula in double precision and by the
+//! watertight test.
 
 use super::Dice;
 use crate::geometry::bvh::{Builder, Bvh, Stack};
@@ -12,8 +13,8 @@ use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::vector::{V3, cross, dot, sub, to_f64, unit};
 use std::sync::Arc;
 
-/// Distance of a triangle along a ray, from either side. Source: Möller, Trumbore: Fast, minimum storage ray/triangle
-/// intersection, 1997. `slack` widens the triangle.
+/// Distance of a triangle along a ray, from either side. `slack` widens the triangle. Source: Möller, Trumbore: Fast,
+/// minimum storage ray/triangle intersection, 1997.
 fn moeller_trumbore(ray: &Ray, triangle: &Triangle, slack: f64) -> Option<f64> {
     let [a, b, c] = triangle.map(to_f64);
     let (ab, ac) = (sub(b, a), sub(c, a));
@@ -30,12 +31,12 @@ fn moeller_trumbore(ray: &Ray, triangle: &Triangle, slack: f64) -> Option<f64> {
     (u >= -slack && v >= -slack && u + v <= 1.0 + slack && t >= 0.0).then_some(t)
 }
 
-/// The nearest triangle.
+/// Distance of the nearest triangle by the textbook formula.
 pub(super) fn nearest(ray: &Ray, triangles: &[Triangle], slack: f64) -> Option<f64> {
     triangles.iter().filter_map(|t| moeller_trumbore(ray, t, slack)).min_by(f64::total_cmp)
 }
 
-/// The same with the watertight test.
+/// Distance of the nearest triangle by the watertight test.
 fn nearest_watertight(ray: &Ray, triangles: &[Triangle]) -> Option<f64> {
     let shear = Shear::new(ray);
     triangles.iter().filter_map(|t| shear.distance(t)).filter(|t| *t >= 0.0).min_by(f64::total_cmp)
@@ -55,7 +56,7 @@ pub(super) fn soup(dice: &mut Dice, count: usize, at: V3) -> Vec<Triangle> {
     (0..count).map(|_| triangle()).collect()
 }
 
-/// A triangle is hit by the textbook formula where the watertight test hits it, at the same distance.
+/// The textbook formula and the watertight test agree on hits and distances.
 #[test]
 fn watertight_and_textbook() {
     let mut dice = Dice(3);
@@ -74,7 +75,8 @@ fn watertight_and_textbook() {
             }
         }
     }
-    // Slivers squeezed to a thousandth, of a millimetre's size, seen from 20 m lose some digits in the textbook formula.
+    // Slivers squeezed to a thousandth, of a millimeter's size, seen from 20 m lose some digits in the textbook
+    // formula.
     assert!(hits > 500 && worst < 1e-7, "{hits} hits, {worst:e}");
 }
 
@@ -91,7 +93,7 @@ fn edges() {
         let (i, j) = (dice.number(0.0, 4.0) as usize, dice.number(0.0, 4.0) as usize);
         let part = dice.number(0.0, 1.0);
         let on_edge = [0, 1, 2].map(|k| f64::from(corner[i][k]) * part + f64::from(corner[j][k]) * (1.0 - part));
-        // From the middle of the solid outwards: every ray must hit.
+        // From the center of the solid outwards: every ray must hit.
         let origin = [0.185, 0.03, -0.025];
         let ray = Ray { origin, direction: unit(sub(on_edge, origin)).unwrap() };
         assert!(nearest_watertight(&ray, &triangles).is_some(), "{ray:?} got out");
@@ -108,7 +110,7 @@ fn distance(mesh: &Mesh, ray: &Ray, limit: f64) -> Option<f64> {
     mesh.touch(ray, limit, &mut Stack::default()).map(|t| t.t)
 }
 
-/// Equals brute force on every ray, to the bit.
+/// The BVH equals brute force on every ray, to the bit.
 #[test]
 fn brute_force() {
     for (seed, count, at) in [(1, 1, 0.0), (2, 7, 0.0), (3, 300, 0.0), (4, 2000, 0.0), (5, 500, 1000.0), (6, 500, -3e4)]
@@ -137,7 +139,7 @@ fn brute_force() {
     }
 }
 
-/// The control: a tree without one of its triangles is found out.
+/// The control: a BVH without one of its triangles gives a different result.
 #[test]
 fn lost_triangle() {
     let mut dice = Dice(7);
@@ -173,11 +175,11 @@ fn degenerate() {
     let mesh = TriMesh::from_triangles(vec![[-1., -1., 0.], [1., -1., 0.], [0., 2., 0.]], flat.to_vec());
     let built = Mesh::of_tree(Arc::new(MeshBuilder::default().build(&RenderMesh::new(&mesh, 0.5))));
     assert_eq!(distance(&built, &ray, 10.0), Some(1.0));
-    // All at one place: no plane can cut them.
+    // All at one place: no plane separates them.
     let same = vec![[[0.0f32, 0., 0.], [1., 0., 0.], [0., 1., 0.]]; 1000];
     let ray = Ray { origin: [0.2, 0.2, 1.0], direction: [0.0, 0.0, -1.0] };
     assert_eq!(distance(&tree(&same), &ray, 10.0), Some(1.0));
-    // Sizes over forty orders of magnitude: the tree gets deep, not endless.
+    // Sizes over forty orders of magnitude: the BVH gets deep, not endless.
     let nested: Vec<Triangle> = (0..2000)
         .map(|k| 10f32.powf(k as f32 / 50.0 - 20.0))
         .map(|s| [[s, 0.0, s], [2.0 * s, 0.0, s], [s, s, s]])
@@ -186,7 +188,8 @@ fn degenerate() {
     assert_eq!(distance(&tree(&nested), &ray, 100.0), nearest_watertight(&ray, &nested));
 }
 
-/// The same boxes give the same tree, after other builds and with every instruction set; also where sizes leave the range.
+/// The same boxes give the same BVH, after other builds and with every instruction set; also for sizes beyond the
+/// range.
 #[test]
 fn same_tree() {
     let boxes = |count, scale: f32| -> Vec<_> {
@@ -213,7 +216,7 @@ fn same_tree() {
     }
 }
 
-/// A mesh of a shape is hit where the shape is, up to the flatness of its triangles.
+/// A tessellated shape is hit at the shape's surface, up to the flatness of its triangles.
 #[test]
 fn tessellated_ball() {
     let ball = Shape::from(kinetoscope_scene::shape::Sphere { radius: 0.5 }).tessellate(256);

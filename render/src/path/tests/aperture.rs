@@ -1,4 +1,4 @@
-//! Depth of field against the thin lens.
+//! Depth of field compared with the thin lens equation.
 
 use super::super::eye::Pupil;
 use super::*;
@@ -9,20 +9,20 @@ use crate::lens::optics::Optics;
 use crate::lens::rays::LensRays;
 
 const SIZE: usize = 28;
-/// \[pixels\].
+/// Focal length \[pixels\].
 const F: f32 = 400.0;
 
-/// Looks along x from the origin.
+/// A view along x from the origin.
 fn ahead() -> View {
     let view = View::look_at([SIZE; 2], 0.5, [0.; 3], [1., 0., 0.], [0., 0., 1.]).unwrap();
     View { fx: F, fy: F, ..view }
 }
 
-/// A glowing square of half side `half` at a depth, that faces the camera.
+/// A glowing square of half side `half` at a depth, facing the camera.
 fn lamp_at(depth: f32, half: f32) -> (RenderScene, [PoseF32; 1]) {
     let glow = Material { emission: 2.0, ..matt(0.5) };
     let scene = dark(vec![Instance::new(Plane { half: [half; 2] }, glow, 1)]);
-    // Columns are its axes: its normal is -x.
+    // The columns are its axes: its normal is -x.
     let rotation = [[0., 0., -1.], [1., 0., 0.], [0., -1., 0.]];
     (scene, [PoseF32 { rotation, translation: [depth, 0., 0.] }])
 }
@@ -45,8 +45,8 @@ fn moments(image: &[f64]) -> (f64, [f64; 2], [f64; 2]) {
     (sum, mean, [0, 1].map(|a| square(a) / sum))
 }
 
-/// Out of focus, a point becomes a disc of diameter c = f A |1 / S1 - 1 / S2|, and a square the sum of such discs: its variance
-/// along an axis is c² / 16 more than its own, side² / 12, and that of a pixel, 1 / 12.
+/// Out of focus, a point becomes a disc of diameter c = f A |1 / S1 - 1 / S2|, and a square the sum of such discs. Its
+/// variance along an axis is c² / 16 more than its own, side² / 12, and that of a pixel, 1 / 12.
 #[test]
 fn circle_of_confusion() {
     let half = 0.01f32;
@@ -61,7 +61,7 @@ fn circle_of_confusion() {
         let (sum, mean, var) = moments(&blurred);
         let side = 2.0 * f64::from(half) * f64::from(F) / f64::from(depth);
         let light = 2.0 * albedo(0.5);
-        // So many paths meet the lamp; of a disc's points, x² has a standard deviation as large as its mean.
+        // Number of paths that hit the square; of a disc's points, x² has a standard deviation as large as its mean.
         let paths = 2048.0 * side * side;
         let off = 5.0 / f64::sqrt(paths);
         assert!((sum - light * side * side).abs() < off * sum, "{sum}, not {}", light * side * side);
@@ -69,10 +69,10 @@ fn circle_of_confusion() {
             assert!((mean[axis] - 0.5 * SIZE as f64).abs() < 0.5 * c * off, "{mean:?}");
             let expected = c * c / 16.0 + side * side / 12.0 + 1.0 / 12.0;
             assert!((var[axis] - expected).abs() < off * expected, "{var:?}, not {expected}");
-            // A control: a tenth more aperture would be found out.
+            // A control: a tenth more aperture is detected.
             assert!((var[axis] - expected - 0.21 * c * c / 16.0).abs() > off * expected);
         }
-        // Nothing falls beyond the disc, and something does just inside of it.
+        // No light falls beyond the disc, and some just inside of it.
         let far = |k: usize| {
             let [x, y] = [k % SIZE, k / SIZE].map(|p| ((p as f64 + 0.5 - 0.5 * SIZE as f64).abs() - 0.5).max(0.0));
             x.hypot(y)
@@ -89,18 +89,18 @@ fn in_focus() {
     let sharp = image(&scene, &poses, None, 64);
     let aperture = |f_number| Aperture { focal_length: 0.05, f_number, focus_distance: 2.0 };
     let wide = image(&scene, &poses, Some(&aperture(0.25)), 64);
-    // The same samples meet it, but for rounding at its edges.
+    // The same samples hit the square, except for rounding at its edges.
     let different = sharp.iter().zip(&wide).filter(|(a, b)| (*a - *b).abs() > 1e-9).count();
     assert!(different <= 2, "{different} pixels");
     assert!(sharp.iter().sum::<f64>() > 10.0);
-    // An opening without a size is none, to the bit.
+    // An aperture without a size equals a pinhole, to the bit.
     assert_eq!(image(&scene, &poses, Some(&aperture(f64::INFINITY)), 64), sharp);
-    // A control: elsewhere it is blurred.
+    // A control: at another distance it is blurred.
     let (scene, poses) = lamp_at(1.8, 0.03);
     assert_ne!(image(&scene, &poses, Some(&aperture(0.25)), 64), image(&scene, &poses, None, 64));
 }
 
-/// The aperture of a fisheye faces each ray: a ball is in focus, in the middle and far aside.
+/// The aperture of a fisheye faces each ray: a ball is in focus, at the center and far off the axis.
 #[test]
 fn fisheye() {
     let pixels = Intrinsics::Pixels { fx: 10.0, fy: 10.0, cx: 14.0, cy: 14.0 }.to_pixels(SIZE, SIZE).unwrap();
@@ -118,7 +118,7 @@ fn fisheye() {
             let along_ray = dot(sub(to, ray.origin), ray.direction);
             let off = sub(ray.at(along_ray), to);
             assert!(dot(off, off).sqrt() < 1e-9, "{at:?} {choice:?}");
-            // From the opening, which the ray through its middle is perpendicular to.
+            // From the aperture, which is perpendicular to the ray through its center.
             let start = along(ray.origin, -eye.look(at, &pose, || choice).unwrap().travelled, ray.direction);
             assert!((dot(start, start).sqrt() - 0.05 * choice[0].sqrt()).abs() < 1e-9);
             assert!(dot(start, to).abs() < 1e-9);

@@ -1,4 +1,4 @@
-//! Light of emissive objects, sampled at the object and met by paths.
+//! Emissive objects: sampled as lights and hit by paths.
 
 use super::*;
 
@@ -11,7 +11,7 @@ fn lit_by(shape: Shape, at: PoseF32, floor: Material) -> (RenderScene, [PoseF32;
     (on_floor(floor, [Instance::new(shape, glow(2.0), 2)]), [PoseF32::IDENTITY, at])
 }
 
-/// Face down.
+/// A pose facing down.
 fn down(translation: [f32; 3]) -> PoseF32 {
     PoseF32 { rotation: [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]], translation }
 }
@@ -27,19 +27,20 @@ fn brick(half: [f32; 3]) -> Shape {
         .into()
 }
 
-/// The light found by both ways together and by each alone: mean and standard deviation.
+/// The light found by both strategies together and by each alone: mean and standard deviation.
 fn by_ways(scene: &RenderScene, poses: &[PoseF32], view: &View, bounces: u32, count: u32) -> [(f64, f64); 3] {
     let studio = Studio::new(scene, poses, view);
     [Ways::Both, Ways::Looking, Ways::Meeting]
         .map(|ways| studio.seen(&Paths { ways, ..studio.paths(16, bounces, 0) }, count))
 }
 
-/// The means differ by less than five standard deviations of the difference, and single precision.
+/// True if the means differ by less than five standard deviations of the difference, and single precision.
 fn same((a, da): (f64, f64), (b, db): (f64, f64)) -> bool {
     (a - b).abs() < 5.0 * da.hypot(db) + 1e-6
 }
 
-/// The same mean by each way alone and by both, for every shape whose points are sampled, on matt and on shiny floors.
+/// Each strategy alone and both together give the same mean, for every shape with sampling, on matt and on shiny
+/// floors.
 #[test]
 fn both_ways() {
     let upright = PoseF32::from_translation([0.2, 0.1, 0.9]);
@@ -58,17 +59,18 @@ fn both_ways() {
         let [both, looking, meeting] = by_ways(&scene, &poses, &looking([1.2, 0.5, 0.9], [0.0; 3]), 0, images);
         let what = format!("{} over {}: {both:?} {looking:?} {meeting:?}", shape.name(), floor.specular);
         assert!(same(both, looking) && same(both, meeting), "{what}");
-        // A path brings at most the light of the emitter, so the variance of one is at most that times the mean. Of 400
-        // images a deviation is known to 3.5 %: five of these more.
+        // A path contributes at most the light of the emitter, so the variance of one path is at most that times the
+        // mean. A deviation from 400 images is known to 3.5 %: the bound is five of these higher.
         let bound = (sent * both.0 / f64::from(16 * images)).sqrt();
         assert!(meeting.1 < 1.18 * bound, "{what}");
-        // Controls: that tells half of the light from none, and a tenth less light would be found out.
+        // Controls: the tolerance separates half of the light from no light, and a tenth less light is detected.
         assert!(5.0 * bound < 0.5 * both.0 && 0.1 * both.0 > 5.0 * both.1, "{what}");
     }
 }
 
-/// A large emitter over a sharp highlight is met by paths and hard to sample; a small one over a matt floor is sampled and
-/// hard to meet. Both ways together have less variance than either over both, as in Veach and Guibas 1995, figure 8.
+/// A large emitter over a sharp highlight is easy to hit and hard to sample; a small one over a matt floor is easy to
+/// sample and hard to hit. Both strategies together have less variance than either over both scenes, as in Veach and
+/// Guibas 1995, figure 8.
 #[test]
 fn multiple_importance_sampling() {
     let sharp = Material { specular: 1.0, shininess: 1.0, ..matt(0.05) };
@@ -81,17 +83,17 @@ fn multiple_importance_sampling() {
     for ((scene, poses), eye) in &scenes {
         let light = by_ways(scene, poses, &looking(*eye, [0.0; 3]), 0, 400);
         for (variance, (mean, deviation)) in variances.iter_mut().zip(light) {
-            // Relative: the scenes are not as bright as each other.
+            // Relative: the scenes differ in brightness.
             *variance += (deviation / mean).powi(2);
             assert!(same((mean, deviation), light[0]), "{light:?}");
         }
     }
     let [both, looking, meeting] = variances;
-    // Of 400 pictures a variance is known to 7 %.
+    // A variance from 400 images is known to 7 %.
     assert!(both < 0.5 * looking && both < 0.5 * meeting, "{both} {looking} {meeting}");
 }
 
-/// The form factors of rectangles (Howell, B-3) and of balls of radius r at the distance d, (r / d)² (Howell, B-43).
+/// Form factors of rectangles (Howell, B-3) and of balls of radius r at the distance d, (r / d)² (Howell, B-43).
 #[test]
 fn form_factors() {
     let expected = |factor: f64| albedo(0.7) * 2.0 * albedo(0.5) * factor;
@@ -107,14 +109,14 @@ fn form_factors() {
             light.1 < known * expected && !agrees(light, (1.0 + 10.0 * known) * expected),
             "the control: {light:?}"
         );
-        // From behind, the rectangle is not there.
+        // The rectangle is invisible from behind.
         assert_eq!(seen(&scene, &lifted(height), &looking(eye, [0.0; 3]), 64, 0).0, 0.0);
     }
     for (radius, distance) in [(0.3f32, 1.0f32), (0.05, 2.0), (0.9, 1.0)] {
         let (scene, poses) = lit_by(Sphere { radius }.into(), lifted(distance)[1], matt(0.7));
         let expected = expected(f64::from(radius / distance).powi(2));
-        // Few paths in many images: of 256 paths in 16 images as many fell into the ball's cone every time up to one, and
-        // images that are all off by the same part of one path do not show how far they are off.
+        // Few paths in many images. With 256 paths in 16 images, equally many paths fell into the ball's cone in each
+        // image, up to one; images that are all off by the same fraction of a path do not show the error.
         let studio = Studio::new(&scene, &poses, &looking([0.4, 0.02, 0.05], [0.0; 3]));
         let light = studio.seen(&studio.paths(16, 0, 0), 1024);
         assert!(agrees(light, expected), "{radius} {distance}: {light:?}, not {expected}");
@@ -122,7 +124,7 @@ fn form_factors() {
     }
 }
 
-/// An emitter of alpha 0.5 sends half as much, and an object between takes its alpha once, by each way alone.
+/// An emitter of alpha 0.5 sends half as much, and an object between takes its alpha once, in each strategy alone.
 #[test]
 fn alpha() {
     let view = looking([1.2, 0.5, 0.4], [0.0; 3]);
@@ -135,7 +137,7 @@ fn alpha() {
     instances[1].material.rgba[3] = 1.0;
     instances.push(Instance::new(Plane { half: [2.0; 2] }, glass_of(0.3), 3));
     let scene = dark(instances);
-    // Its back is not seen, and rays of paths and shadow rays come from below.
+    // Its back is invisible, and paths and shadow rays come from below.
     let veiled = seen(&scene, &[poses[0], poses[1], PoseF32::from_translation([0., 0., 0.5])], &view, 256, 0);
     assert!((veiled.0 - whole.0).abs() < 5.0 * veiled.1.hypot(whole.1), "{veiled:?}, {whole:?}");
     // Turned over, it takes its alpha once.
@@ -143,12 +145,12 @@ fn alpha() {
     for light in by_ways(&scene, &[poses[0], poses[1], down([0., 0., 0.5])], &view, 0, 400) {
         let off = 5.0 * light.1.hypot(part * whole.1);
         assert!((light.0 - part * whole.0).abs() < off, "{light:?}, {part} of {whole:?}");
-        // Controls: light that is not taken, and light that is taken twice, would be found out.
+        // Controls: light that is not absorbed, and light that is absorbed twice, are detected.
         assert!(off < 0.15 * whole.0 && part - part * part > 0.2, "{light:?}, {whole:?}");
     }
 }
 
-/// Of several emitters each is chosen as often as it is bright: the sum is that of each alone.
+/// Each of several emitters is sampled in proportion to its power: the sum is that of all emitters alone.
 #[test]
 fn sums() {
     let lamp = |x: f32, emission: f32, half: f32| {
@@ -169,7 +171,7 @@ fn sums() {
     assert!((together.0 - (sum - alone[0].0)).abs() > off);
 }
 
-/// A panel of a mesh, 2 half sides wide, `aside` from where its instance is, that looks down (or up).
+/// A square panel of half side `half` as a mesh, offset by `aside` from its frame, facing down (or up).
 fn panel(half: f32, aside: f32, up: bool) -> Shape {
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let positions = corners.map(|[x, y]| [aside + half * x, half * y, 0.0f32]).to_vec();
@@ -177,9 +179,10 @@ fn panel(half: f32, aside: f32, up: bool) -> Shape {
     mesh(positions, triangles, 0.1)
 }
 
-/// An emitter close above a floor, both rotated and 40 m away from the frames of their meshes. A rotation in single precision
-/// is inexact: there and back is 1e-7 of 40 m aside, forty times the gap that rays leave at an emitter 0.1 m away, so
-/// emitters would shade themselves, and floors too. The form factor does not rotate.
+/// An emitter close above a floor, both rotated and 40 m away from the frames of their meshes. A rotation in single
+/// precision is inexact: forward and back is an offset of 1e-7 of 40 m, forty times the offset of ray origins at an
+/// emitter 0.1 m away. So emitters would shade themselves, and floors too. The form factor does not depend on the
+/// rotation.
 #[test]
 fn far_from_own_frame() {
     let (aside, height) = (40.0f32, 0.1f32);
@@ -204,7 +207,7 @@ fn far_from_own_frame() {
             assert_number(&format!("{angles:?} {ways:?}"), light.0, expected, far);
             assert!(light.1 < 0.01 * expected, "it can tell a twentieth: {light:?}");
         }
-        // A light without a size lights the floor wherever the floor's frame is; the panel is not between.
+        // A light without a size lights the floor, whatever the floor's frame; the panel is not between.
         let normal = there([0.0, 0.0, 1.0]);
         let shine = scale(to_f64(there([0.8, 0.0, 0.6])), -1.0);
         scene.lights = vec![lamp(LightKind::Directional, [0.; 3], shine.map(|x| x as f32))];
@@ -227,11 +230,11 @@ fn far_from_own_frame() {
     }
 }
 
-/// An emitter that faces away from the visible floor, so that its light comes by a wall only, at later bounces. Judged by
-/// paths that only meet it, over walls of every kind.
+/// An emitter that faces away from the visible floor: its light arrives via a wall only, at later bounces. Compared
+/// with BSDF sampling alone, over walls of every kind.
 #[test]
 fn both_ways_after_bounces() {
-    // Columns are the axes of a plane: the wall's normal is +x, the emitter's -x.
+    // The columns are the axes of a plane: the wall's normal is +x, the emitter's -x.
     let wall = PoseF32 { rotation: [[0., 0., 1.], [1., 0., 0.], [0., 1., 0.]], translation: [-0.5, 0.0, 0.0] };
     let lamp = PoseF32 { rotation: [[0., 0., -1.], [1., 0., 0.], [0., -1., 0.]], translation: [0.1, 0.0, 0.7] };
     let (poses, view) = ([PoseF32::IDENTITY, wall, lamp], looking([1.5, 0.4, 0.9], [0.6, 0.0, 0.0]));
@@ -250,7 +253,7 @@ fn both_ways_after_bounces() {
             for one in [both, looking] {
                 let off = 5.0 * meeting.1.hypot(one.1);
                 assert!((meeting.0 - one.0).abs() < off, "{what}");
-                // Controls: a light counted twice, or its share forgotten, would be found out.
+                // Controls: a light counted twice, or a missing MIS weight, is detected.
                 assert!(off < 0.3 * meeting.0, "{what}");
             }
             assert!(both.0 > last, "{what}");

@@ -1,4 +1,4 @@
-//! Glass against Snell's law and Fresnel's equations.
+//! Glass compared with Snell's law and Fresnel's equations.
 
 use super::*;
 
@@ -6,8 +6,8 @@ fn glass(refractive_index: f32) -> Material {
     Material { transmission: 1.0, refractive_index, specular: 0.0, ..Material::from_rgba([1.0; 4]) }
 }
 
-/// All light that meets clear glass leaves it again, so that it cannot be seen where light is the same everywhere. (An ellipsoid
-/// keeps light for more bounces than there may be.)
+/// All light that enters clear glass leaves it again, so glass is invisible in uniform light. (An ellipsoid keeps light
+/// for more bounces than the limit.)
 #[test]
 fn clear_in_furnace() {
     let shapes: [Shape; 3] = [
@@ -23,13 +23,13 @@ fn clear_in_furnace() {
         };
         let limit = Tolerance::absolute(1e-12, "rounding of 64 bounces in double precision");
         assert_number(shape.name(), light(glass(1.5)), 1.0, limit);
-        // The control: gray glass takes a part of the light.
+        // The control: gray glass absorbs a part of the light.
         assert!(light(Material { rgba: [0.5, 0.5, 0.5, 1.0], ..glass(1.5) }) < 0.5, "{shape:?}");
     }
 }
 
-/// A plate of thickness t, seen at an angle θ, shows what is behind it moved by t (tan θ - tan θ'), sin θ' = sin θ/n, and lets
-/// (1 - F)² of its light through at first; what is mirrored inside comes out 2 t tan θ' beside, where nothing is.
+/// A plate of thickness t, seen at an angle θ, shifts the image behind it by t (tan θ - tan θ'), sin θ' = sin θ/n, and
+/// first transmits (1 - F)² of its light. Light mirrored inside leaves 2 t tan θ' beside, where the scene is empty.
 #[test]
 fn plate() {
     let (angle, n, t) = (0.25 * PI, 1.5f64, 0.2f64);
@@ -37,7 +37,7 @@ fn plate() {
     let across = ((angle - inside).sin() / (angle + inside).sin()).powi(2);
     let along = ((angle - inside).tan() / (angle + inside).tan()).powi(2);
     let expected = (1.0 - 0.5 * (across + along)).powi(2);
-    // From where the ray meets the plate, at x = 0, to the height of the lamp, 0.9 below the plate.
+    // From the ray's hit with the plate, at x = 0, to the height of the emitter, 0.9 below the plate.
     let x = t * inside.tan() + 0.9 * angle.tan();
     let lamp = Material { emission: 1.0, ..matt(1.0) };
     let shapes = vec![
@@ -50,7 +50,7 @@ fn plate() {
     let scene = dark(shapes);
     let through = seen(&scene, &poses, &view, 1024, 4);
     assert!(agrees(through, expected), "{through:?}, not {expected}");
-    // Controls: as bright as without losses it is not, and with air instead of glass the ray goes past.
+    // Controls: it is darker than without losses, and with air instead of glass the ray misses.
     assert!(!agrees(through, 1.0), "{through:?}");
     let mut air = scene.instances().to_vec();
     air[0].material = glass(1.0);

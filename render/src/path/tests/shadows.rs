@@ -1,4 +1,4 @@
-//! Soft shadows of lights with a size, against closed forms, and surfaces close to a light or to each other.
+//! Soft shadows of lights with a size, compared with closed forms, and surfaces close to a light or to each other.
 
 use super::*;
 
@@ -25,7 +25,7 @@ fn at(light: Light, x: f32) -> (f64, f64) {
 fn near_lights() {
     let spot = LightKind::Spot { cutoff_deg: 40.0, exponent: 4.0 };
     for (kind, exponent) in [(LightKind::Point, 0), (spot, 4)] {
-        // The lamp is 2 m up.
+        // The light is 2 m up.
         let light = |radius: f64| Light {
             attenuation: [1., 0., 0.],
             radius: radius as f32,
@@ -33,9 +33,9 @@ fn near_lights() {
         };
         let cosine = |x: f64| 2.0 / (4.0 + x * x).sqrt();
         let open = |x: f64| albedo(0.6) * f64::from(0.9f32) * cosine(x).powi(1 + exponent);
-        // Below the edge of the box's lower side (0, 0.9) a ray to the height 2 goes through x' with (x' - x) 0.9 / 2 = -x,
-        // and below that of its upper side (0, 1.1) with 1.1. The disc is nearly level: its tilt is x / 2, seen from x; what
-        // is lit is what lies beyond the larger of both.
+        // Below the edge of the box's lower side (0, 0.9), a ray to the height 2 goes through x' with (x' - x) 0.9 / 2
+        // = -x; below that of its upper side (0, 1.1), with 1.1. The disc is nearly level: its tilt is x / 2, seen from
+        // x. The lit part lies beyond the larger of both.
         let cut = |x: f64| SIDES.map(|height| x - x * 2.0 / height).into_iter().fold(f64::MIN, f64::max);
         let part = |c: f64| {
             let c = (c / RADIUS).clamp(-1.0, 1.0);
@@ -47,10 +47,10 @@ fn near_lights() {
             let expected = open(x.into()) * part(cut(x.into()));
             // The tilt of the disc moves its points by up to r (1 - cos) sideways and r sin in height: both below 1 %.
             assert!((mean - expected).abs() < 5.0 * deviation + 0.015 * open(x.into()), "{x}: {mean}, not {expected}");
-            // Off the edge a spot is darker again.
+            // Farther from the edge, a spot gets darker again.
             assert!(mean > last - 1e-3 || x == 0.5, "{x}");
             last = mean;
-            // A control: points cast sharp shadows.
+            // A control: point lights cast sharp shadows.
             let (sharp, _) = at(light(0.0), x);
             let lit = if x < 0.0 { 0.0 } else { open(x.into()) };
             assert!(x == 0.0 || (sharp - lit).abs() < 1e-5, "{x}: {sharp}, not {lit}");
@@ -60,12 +60,13 @@ fn near_lights() {
     }
 }
 
-/// Of a directional lamp directions are spread over a disc of its radius at a distance of 1 m: the light at x is the mean cosine
-/// of those that pass the edge of the box, an integral over the disc whose inner part is closed.
+/// A directional light's directions are spread over a disc of its radius at a distance of 1 m. The light at x is the
+/// mean cosine of the directions that pass the edge of the box: an integral over the disc whose inner part has a closed
+/// form.
 #[test]
 fn directional_lights() {
     let light = Light { radius: RADIUS as f32, ..lamp(LightKind::Directional, [0.; 3], [0., 0., -1.]) };
-    // Of the directions (u, v, 1) with a given u, whose cosine is 1 / sqrt(1 + u² + v²).
+    // Integral over the directions (u, v, 1) with a given u, whose cosine is 1 / sqrt(1 + u² + v²).
     let column = |u: f64| 2.0 * ((RADIUS * RADIUS - u * u).max(0.0) / (1.0 + u * u)).sqrt().asinh();
     let expected = |x: f64| {
         let cut = SIDES.map(|height| -x / height).into_iter().fold(-RADIUS, f64::max).min(RADIUS);
@@ -74,7 +75,7 @@ fn directional_lights() {
         let sum: f64 = (0..STEPS).map(|k| column(cut + (k as f64 + 0.5) * step)).sum();
         albedo(0.6) * f64::from(0.9f32) * sum * step / (PI * RADIUS * RADIUS)
     };
-    // The control of the integral: all of the disc.
+    // The control of the integral: the whole disc.
     let whole = 2.0 * ((1.0 + RADIUS * RADIUS).sqrt() - 1.0) / (RADIUS * RADIUS);
     assert!((expected(0.5) - albedo(0.6) * f64::from(0.9f32) * whole).abs() < 1e-6);
     let mut between = 0;
@@ -87,8 +88,8 @@ fn directional_lights() {
     assert!(between >= 4, "the control: {between} places tell a fiftieth");
 }
 
-/// A glowing rectangle behind the edge of a board: the form factor of the part that is seen. Source: Howell, B-3, of which parts
-/// on either side of the middle are halves.
+/// A glowing rectangle behind the edge of a board: the form factor of its visible part. Source: Howell, B-3; parts on
+/// either side of the center are halves.
 #[test]
 fn emissive_rectangle() {
     const BOARD: f64 = 0.4;
@@ -97,7 +98,7 @@ fn emissive_rectangle() {
     let half = [0.6f32, 0.4];
     let board = Instance::new(Box { half: [1.0, 1.0, THIN as f32] }, matt(0.0), 3);
     let scene = on_floor(matt(0.7), [Instance::new(Plane { half }, emitter, 2), board]);
-    // Face down, 0.8 m up.
+    // Facing down, 0.8 m up.
     let rotation = [[1., 0., 0.], [0., -1., 0.], [0., 0., -1.]];
     let view = looking([2.0, 0.5, 0.4], [0.0; 3]);
     let whole = |side: f64| form_factor(side / 0.8, f64::from(half[1]) / 0.8);
@@ -114,11 +115,11 @@ fn emissive_rectangle() {
     }
 }
 
-/// Surfaces below a point light exactly on a ceiling, which takes nothing of its light: a floor in closed form, and a smooth
-/// ball of triangles to the bit. The control: a millimetre inside the ceiling the light is gone.
+/// Surfaces below a point light exactly on a ceiling, which does not occlude it: a floor in closed form, and a smooth
+/// ball of triangles to the bit. The control: a millimeter inside the ceiling the light is gone.
 ///
-/// Root cause: shadow rays began above the triangles, at the smooth surface, and went as far as from the triangles: beyond
-/// the light, into the ceiling.
+/// Root cause: shadow rays started above the triangles, at the smooth surface, with the length from the triangles:
+/// beyond the light, into the ceiling.
 #[test]
 fn light_on_a_ceiling() {
     let ceiling = || Instance::new(Box { half: [3.0, 3.0, 0.5] }, matt(0.0), 2);
@@ -154,7 +155,8 @@ fn light_on_a_ceiling() {
     assert!(lit > 30, "{lit}");
 }
 
-/// The smooth normals of a brick of 1 m mean a point 0.33 m above the middle of its top; a lid 0.05 m above it shades it.
+/// The smooth normals of a brick of 1 m describe a point 0.33 m above the center of its top; a lid 0.05 m above it
+/// shades it.
 #[test]
 fn close_above_a_smooth_surface() {
     let lid = Instance::new(Box { half: [0.3, 0.3, 0.001] }, matt(0.6), 2);

@@ -1,20 +1,21 @@
-//! Boxes along a Morton curve, and the groups of those that lie together on it.
+//! Sorting of boxes along a Morton curve, and grouping of adjacent boxes.
 
 use super::{Bounds, Cells, GROUP, Item, NOTHING, TO_BITS};
 use crate::simd::{F4, Simd};
 
-/// Bits of a coordinate on the curve.
+/// Bits per coordinate on the curve.
 const BITS: u32 = 10;
-/// Keys are sorted by as many digits as there are axes.
+/// Size of a radix sort digit: one digit per axis.
 const DIGITS: usize = 1 << BITS;
-/// Fewer keys than these are compared: clearing and summing up places takes longer.
+/// Fewer keys than this are sorted by comparison: clearing and summing the counters of a radix sort takes longer.
 const FEW: usize = 512;
-/// Cells that follow each other are one group where that is no more than these: a node less, and no more to test.
+/// Adjacent cells with at most this many boxes together become one group: one node less, and not more to test.
 const JOINED: usize = 12;
-/// Bits of a place within a cell that more than a group may not share.
+/// Lowest bits of the Morton code of a cell. If more boxes than a group holds differ in these bits only, they are
+/// sorted along a finer curve.
 const CROWDED: u32 = 3;
 
-/// The bits of each coordinate, with room for those of two others behind each: a table takes a third of what moving them takes.
+/// Bits of a coordinate spread out with two empty bits between them. A table takes a third of the time of shifting.
 static SPREAD: [u32; 1 << BITS] = {
     let mut table = [0; 1 << BITS];
     let mut x = 0;
@@ -29,18 +30,19 @@ static SPREAD: [u32; 1 << BITS] = {
     table
 };
 
-/// Items in the order of the curve: places on it in the upper half of each number, indices of items in the lower.
+/// Items in the order of the curve: the Morton code in the upper half of each number, the index of the item in the
+/// lower.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Curve {
     keys: Vec<u64>,
-    /// Memory to sort in.
+    /// Scratch memory for sorting.
     sorted: Vec<u64>,
 }
 
 impl Curve {
-    /// Sorts items by their middles' places on the curve through a box around them, and says where groups begin, and where the
-    /// last one ends: the largest cells of the curve, halves of halves of the box, that hold no more than a group may, or a few
-    /// small ones.
+    /// Sorts items by the Morton codes of their centers within a box around them, and writes the starts of the groups
+    /// and the end of the last group. A group is the largest cell of the curve (halves of halves of the box) that holds
+    /// no more items than a group may, or a few adjacent small cells.
     #[inline(always)]
     pub(super) fn sort<S: Simd>(&mut self, s: S, items: &[Item], bounds: &Bounds, starts: &mut Vec<u32>) -> &[u64] {
         self.through(s, items, 0..items.len() as u32, bounds);
@@ -50,11 +52,12 @@ impl Curve {
         &self.keys
     }
 
-    /// Keys of some of the items, sorted.
+    /// Computes sorted keys of some items.
     #[inline(always)]
     fn through<S: Simd>(&mut self, s: S, items: &[Item], numbers: impl ExactSizeIterator<Item = u32>, bounds: &Bounds) {
         let mut cells = Cells::<{ 1 << BITS }>::of(bounds);
-        // Cells are cubes: what a flat thing has of thickness, rounding perhaps, is not cut as if it were as long as the rest.
+        // Cells are cubes: the small thickness of a flat object, perhaps rounding noise, is not split as if it were as
+        // long as the other sides.
         let least =
             cells.scale.iter().take(3).filter(|&&scale| scale > 0.0).fold(f32::INFINITY, |least, &x| least.min(x));
         cells.scale = [if least.is_finite() { least } else { 0.0 }; 4];
@@ -62,7 +65,7 @@ impl Curve {
         let (base, scale) = (F4::load(s, &cells.base), F4::load(s, &cells.scale));
         self.keys.clear();
         self.keys.reserve(numbers.len());
-        // No closures of the library's: what those hold is not compiled for the instruction set.
+        // No closures of the standard library: their bodies are not compiled for the instruction set.
         for number in numbers {
             let Bounds { lo: [a, b, c, _], hi: [d, e, f, _] } = items[number as usize];
             let middle = half * F4::load(s, &[a, b, c, 0.0]) + half * F4::load(s, &[d, e, f, 0.0]);
@@ -74,7 +77,7 @@ impl Curve {
             self.keys.sort_unstable();
             return;
         }
-        // Digit by digit: a part of what comparing them takes.
+        // Radix sort: a fraction of the time of comparison sort.
         let digit = |key: u64, pass: u32| (key >> (32 + BITS * pass)) as usize % DIGITS;
         let mut places = [[0u32; DIGITS]; 3];
         for &key in &self.keys {
@@ -98,15 +101,15 @@ impl Curve {
     }
 }
 
-/// Where the groups of sorted keys begin.
+/// Finds the starts of the groups of sorted keys.
 fn group<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
     let place = |key: u64| (key >> 32) as u32;
-    // None that the first one could join.
+    // The first cell cannot join a group before it.
     let (mut at, mut last) = (0, GROUP);
     while at < keys.len() {
         let here = place(keys[at]);
         let differs = |key: Option<&u64>| key.map_or(u32::MAX, |&key| place(key) ^ here);
-        // Neither what comes before nor what is one too many may be in the cell.
+        // The cell must not contain the item before the group or the first one after a full group.
         let (before, after) = (differs(keys[..at].last()), differs(keys.get(at + GROUP)));
         if after >> CROWDED == 0 {
             let count = keys[at..].partition_point(|&key| place(key) >> CROWDED == here >> CROWDED);
@@ -115,7 +118,7 @@ fn group<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &m
             continue;
         }
         let bits = before.checked_ilog2().unwrap_or(0).min(after.ilog2());
-        // Of those that may be in the cell, all are looked at: where it ends cannot be foreseen.
+        // All candidates are counted: the end of the cell is unpredictable for a branch.
         let few = &keys[at..keys.len().min(at + GROUP)];
         let count = few.iter().filter(|&&key| place(key) >> bits == here >> bits).count();
         if last + count <= JOINED {
@@ -128,8 +131,8 @@ fn group<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &m
     }
 }
 
-/// The same of more keys than the bits that are left can tell apart: they are sorted along a curve of their own. Details that
-/// lie close together, and something else far away.
+/// Groups keys that the remaining bits cannot distinguish: they are sorted along a curve of their own. Happens for
+/// dense details with an outlier far away.
 #[cold]
 fn crowd<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &mut Vec<u32>) {
     let numbers = || keys.iter().map(|&key| key as u32);
@@ -147,7 +150,7 @@ fn crowd<S: Simd>(s: S, items: &[Item], keys: &mut [u64], first: u32, starts: &m
         keys.copy_from_slice(&finer);
         group(s, items, keys, first, starts);
     } else {
-        // At one place.
+        // All centers coincide.
         starts.extend((0..keys.len() as u32).step_by(GROUP).map(|k| first + k));
     }
 }

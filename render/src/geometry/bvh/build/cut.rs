@@ -1,22 +1,24 @@
-//! Where to cut a part of the tree in two: the surface area heuristic of planes between bins, or of places on the curve.
+//! Binary splits of a range of groups by the surface area heuristic: by planes between bins, or by position on the
+//! curve.
 
 use super::{Bounds, Cells, Item, NOTHING, quad};
 
-/// Bins along a side.
+/// Bins along the longest side.
 const BINS: usize = 16;
-/// No more groups than these are cut between neighbours on the curve: clearing and summing up bins would take longer than
+/// Up to this many groups are split between neighbors on the curve: clearing and summing bins would take longer than
 /// filling them.
 const FEW: usize = 16;
 
-/// How many of at least two groups within a box come before the best cut, once they are sorted by it, and the boxes of both
-/// sides; `None` where no plane cuts them.
+/// The best split of at least two groups within a box: the number of groups before it, once they are sorted by it, and
+/// the boxes of both sides; `None` if no plane separates the groups.
 #[inline(always)]
 pub(super) fn best(within: &Bounds, groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
-    // Cuts have kept the order along the curve.
+    // Splits keep the order along the curve.
     if groups.len() <= FEW { Some(between(groups)) } else { halve(within, groups, aside) }
 }
 
-/// The best place to cut up to [`FEW`] groups along the curve: how many come before, and the boxes of both sides.
+/// The best position to split up to [`FEW`] groups along the curve: the number of groups before it, and the boxes of
+/// both sides.
 fn between(groups: &[Item]) -> (usize, [Bounds; 2]) {
     let n = groups.len().min(FEW);
     let mut rest = [NOTHING; FEW];
@@ -42,14 +44,14 @@ fn between(groups: &[Item]) -> (usize, [Bounds; 2]) {
     (at, [near, rest[at % FEW]])
 }
 
-/// Sorts groups by the best plane between bins along the longest side of the box around them: how many come before, and the
-/// boxes of both sides; `None` where the middles of all are in one bin.
+/// Partitions groups by the best plane between bins along the longest side of their box. Returns the number of groups
+/// before the plane and the boxes of both sides; `None` if all centers are in one bin.
 fn halve(within: &Bounds, groups: &mut [Item], aside: &mut [Item]) -> Option<(usize, [Bounds; 2])> {
     let cells = Cells::<BINS>::of(within);
     let [x, y, z, _] = quad(|k| within.hi[k] - within.lo[k]);
     let axis = if x >= y && x >= z { 0 } else { 1 + usize::from(z > y) };
     let cell = |group: &Item| cells.along(axis, 0.5 * group.lo[axis] + 0.5 * group.hi[axis]) as usize % BINS;
-    // The last place holds how many things there are.
+    // The fourth component holds the number of primitives.
     let mut bins = [Bounds { hi: [f32::NEG_INFINITY, f32::NEG_INFINITY, f32::NEG_INFINITY, 0.0], ..NOTHING }; BINS];
     for group in &*groups {
         let bin = &mut bins[cell(group)];
@@ -75,7 +77,7 @@ fn halve(within: &Bounds, groups: &mut [Item], aside: &mut [Item]) -> Option<(us
             continue;
         }
         let cost = before * sum.area() + costs[k + 1] * rest[k + 1].area();
-        // A cost that is no number comes from sizes beyond the range: any plane will do.
+        // A NaN cost comes from sizes beyond the range: any plane is accepted.
         if best.is_none_or(|(least, ..)| cost < least) {
             best = Some((cost, k, sum));
         }
@@ -86,7 +88,7 @@ fn halve(within: &Bounds, groups: &mut [Item], aside: &mut [Item]) -> Option<(us
     for k in 0..groups.len() {
         let group = groups[k];
         let first = cell(&group) <= last;
-        // To both places, without a branch: one of them is written over.
+        // Written to both places without a branch; one of the two is overwritten.
         (groups[near], aside[far]) = (group, group);
         near += usize::from(first);
         far += usize::from(!first);

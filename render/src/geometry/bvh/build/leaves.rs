@@ -1,24 +1,24 @@
-//! The leaves of a group: which way to cut it costs least. By dynamic programming over the cuts: the cheapest leaves of the first
-//! j things are the cheapest leaves of fewer, and one leaf more.
+//! Splits a group into leaves at the least cost, by dynamic programming: the cheapest leaves of the first j primitives
+//! are the cheapest leaves of fewer primitives, plus one leaf.
 
 use super::{GROUP, Item, WIDE};
 use crate::simd::{F4, F8, Simd};
 
-/// Things of a leaf, at most.
+/// Largest number of primitives in a leaf.
 const LEAF: usize = 4;
-/// What a leaf that is met costs, in tests of one thing.
+/// Cost of visiting a leaf, in tests of one primitive.
 const LEAF_COST: f32 = 1.0;
-/// What leaves of one thing, two, and so on cost that are met.
+/// Cost of a visited leaf with one primitive, two, and so on.
 const TESTS: [f32; LEAF] = [1.0 + LEAF_COST, 2.0 + LEAF_COST, 3.0 + LEAF_COST, 4.0 + LEAF_COST];
 const _: () = assert!(GROUP <= LEAF * WIDE, "every group can be cut into leaves");
 
-/// What leaves of a group cost: memory to be kept, so that only what is looked at is written. Rows of more things than the group
-/// has are an earlier group's.
+/// Costs of the leaves of a group. The memory is kept between groups, so that only rows in use are written. Rows beyond
+/// the primitives of the group are those of an earlier group.
 #[derive(Clone, Debug)]
 pub(super) struct Costs {
-    /// Of leaves that end with each of the things, one thing long, two, and so on.
+    /// Cost of a leaf that ends with each primitive, one primitive long, two, and so on.
     costs: [[f32; LEAF]; GROUP],
-    /// Least cost of the first j things as k leaves; and before those, of fewer things than none.
+    /// Least cost of the first j primitives as k leaves, in row j + LEAF - 1. The rows in front stand for negative j.
     least: [[f32; WIDE]; LEAF + GROUP],
 }
 
@@ -30,17 +30,17 @@ impl Default for Costs {
     }
 }
 
-/// Where the leaves of things that lie together on the curve end, and how many leaves there are.
+/// Splits consecutive primitives into leaves: the end of each leaf, and the number of leaves.
 #[inline(always)]
 pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut Costs) -> ([u8; WIDE], usize) {
     let things = &things[..things.len().min(GROUP)];
-    // The last rows, the newest first: not read from memory that has just been written.
+    // The last rows, the newest first: avoids reading memory that has just been written.
     let none = F8::splat(s, f32::INFINITY);
     let mut recent = [none; LEAF];
     recent[0] = F8::load(s, &least[LEAF - 1]);
-    // And of all of them, as k + 1.
+    // Least cost of all primitives as k + 1 leaves.
     let mut best = none;
-    // The boxes around the last thing, the last two, and so on.
+    // The boxes around the last primitive, the last two, and so on.
     let mut lo = [F4::splat(s, f32::INFINITY); 3];
     let mut hi = [F4::splat(s, f32::NEG_INFINITY); 3];
     let (longest, tests) = (F4::splat(s, f32::MAX), F4::load(s, &TESTS));
@@ -49,13 +49,13 @@ pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut 
             lo[axis] = lo[axis].shift_in(f32::INFINITY).min(F4::splat(s, thing.lo[axis]));
             hi[axis] = hi[axis].shift_in(f32::NEG_INFINITY).max(F4::splat(s, thing.hi[axis]));
         }
-        // Numbers all of them: no side is infinite, so that none times infinity is none.
+        // No NaN: no side is infinite, so 0 times infinity does not occur.
         let [x, y, z] = [0, 1, 2].map(
             #[inline(always)]
             |axis| (hi[axis] - lo[axis]).min(longest),
         );
         costs[j] = ((x * y + y * z + z * x) * tests).array();
-        // The newest row last: it is what all else waits for.
+        // The newest row comes last: the next row depends on it.
         best = none;
         for (row, &cost) in recent.iter().zip(&costs[j]).rev() {
             best = best.min(*row + F8::splat(s, cost));
@@ -67,7 +67,7 @@ pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut 
     for (k, other) in best.array().into_iter().enumerate() {
         (leaves, cost) = if other < cost { (k, other) } else { (leaves, cost) };
     }
-    // Sizes beyond the range cost too much to compare: any leaves will do, but not too long ones.
+    // Sizes beyond the range have an infinite cost: full leaves are used.
     if cost == f32::INFINITY {
         let ends = std::array::from_fn(|k| (LEAF * (k + 1)).min(things.len()) as u8);
         return (ends, things.len().div_ceil(LEAF));
@@ -76,7 +76,7 @@ pub(super) fn ends<S: Simd>(s: S, things: &[Item], Costs { costs, least }: &mut 
     let mut j = things.len();
     for k in (0..=leaves).rev() {
         ends[k] = j as u8;
-        // Those that gave the least. All are looked at: where the first one is cannot be foreseen.
+        // Leaf lengths that gave the least cost. All are tested: the first one is unpredictable for a branch.
         let gave = (0..LEAF).fold(1 << LEAF, |bits: u32, before| {
             bits | u32::from(least[LEAF + j - 2 - before][k] + costs[j - 1][before] == cost) << before
         });
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use crate::simd::{Scalar, at_level, levels};
 
-    /// Cost of leaves: the tests of those that are met.
+    /// Cost of leaves, by their areas.
     fn cost(things: &[Item], ends: impl IntoIterator<Item = usize>) -> f32 {
         let mut first = 0;
         let mut sum = 0.0;
@@ -105,7 +105,7 @@ mod tests {
         sum
     }
 
-    /// Every way to cut is looked at.
+    /// Compares with every possible split.
     #[test]
     fn least_cost() {
         let mut state = 1u32;
@@ -135,7 +135,7 @@ mod tests {
                     least = least.min(cost(&things, all));
                 }
             }
-            // Both are sums of up to eight numbers: they may be rounded otherwise.
+            // Both are sums of up to eight numbers, which may be rounded differently.
             let ours = cost(&things, chosen);
             assert!(ours <= least * (1.0 + 16.0 * f32::EPSILON), "{ours}, not {least}, of {count}");
         }

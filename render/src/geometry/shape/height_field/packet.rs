@@ -1,4 +1,4 @@
-//! Packets of rays from above: the first steps of the walk, for all lanes at once, by the operations of the single ray.
+//! Packets of rays from above: the first steps of the walk in all lanes at once, by the operations of the single ray.
 
 use super::{FIRST_CELLS, Field, SLACK};
 use crate::geometry::packet::{Packet, WIDTH};
@@ -6,7 +6,7 @@ use crate::geometry::shape::Touches;
 use crate::simd::{D, D3, N, Simd, axes, dot_3};
 use kinetoscope_scene::shape::Intersection;
 
-/// Heights of the corners of a cell in each lane, and where the cell is.
+/// Corner heights of a cell in each lane, and the index of the cell.
 #[derive(Clone, Copy)]
 struct Cells<S: Simd> {
     /// At (0, 0), (1, 0), (0, 1), (1, 1).
@@ -15,7 +15,7 @@ struct Cells<S: Simd> {
 }
 
 impl<S: Simd> Cells<S> {
-    /// As [`Field::plane`]: height and slopes of the surface on the right of the diagonal, or on the left.
+    /// Packet version of [`Field::plane`]: height and slopes of the surface right or left of the diagonal.
     #[inline(always)]
     fn plane(&self, right: N<S>) -> D3<S> {
         let [a, b, d, e] = self.corners;
@@ -24,7 +24,7 @@ impl<S: Simd> Cells<S> {
 }
 
 impl Field {
-    /// The cells of the footprint under points in units of cells; those of points that are beside it are on its rim.
+    /// The cells under points in units of cells; points outside of the footprint get a cell of the rim.
     #[inline(always)]
     fn cells_at<S: Simd>(&self, s: S, at: [D<S>; 2]) -> Cells<S> {
         let (x, y) = (at[0].array(), at[1].array());
@@ -39,7 +39,8 @@ impl Field {
         Cells { corners, at: [D::load(s, &cells[0]), D::load(s, &cells[1])] }
     }
 
-    /// As [`unit`](kinetoscope_scene::vector::unit) of the surface's normal; false in lanes without a surface.
+    /// Packet version of [`unit`](kinetoscope_scene::vector::unit) for the surface's normal; false in lanes without a
+    /// surface.
     #[inline(always)]
     fn normals<S: Simd>(&self, s: S, hx: D<S>, hy: D<S>) -> ([[f64; WIDTH]; 3], N<S>) {
         let one = D::splat(s, 1.0);
@@ -54,7 +55,7 @@ impl Field {
         (normal, largest.lt(D::splat(s, f64::INFINITY)))
     }
 
-    /// [`plumb`](Self::plumb) for all rays of a packet, and a bit for each lane that it is for.
+    /// Packet version of [`plumb`](Self::plumb); returns a bit for each lane it applies to.
     #[inline(always)]
     pub(super) fn plumb_packet<S: Simd>(&self, s: S, packet: &Packet, touches: &mut Touches) -> u64 {
         let (o, d) = (packet.origins(s), packet.directions(s));
@@ -76,8 +77,8 @@ impl Field {
         done.to_bitmask()
     }
 
-    /// The first steps of [`touch`](Self::touch) for those rays of a packet that are `wanted` and come through the top of the
-    /// box around everything, and a bit for each lane that hits the surface there.
+    /// The first steps of [`touch`](Self::touch) for the `wanted` rays of a packet that enter through the top of the
+    /// bounding box. Returns a bit for each lane that hits the surface there.
     #[inline(always)]
     pub(super) fn steep_packet<S: Simd>(&self, s: S, packet: &Packet, wanted: u64, touches: &mut Touches) -> u64 {
         let (o, d, limit) = (packet.origins(s), packet.directions(s), packet.limits(s));
@@ -92,7 +93,7 @@ impl Field {
                 (forward.select(a, b), forward.select(b, a))
             },
         );
-        // Through the top comes who does so last.
+        // A ray enters through the top if that entry distance is the largest.
         let mut from = ends[2].0 + zero;
         let leave = ends[0].1.min(ends[1].1).min(ends[2].1);
         let enters = zero.max(ends[0].0).max(ends[1].0).le(from) & from.le(leave) & from.le(limit) & !none;
@@ -113,7 +114,7 @@ impl Field {
         let mut done = 0;
         for _ in 0..FIRST_CELLS {
             let cells = self.cells_at(s, at);
-            // Where the ray leaves the cell.
+            // Distance at which the ray leaves the cell.
             let (mut next, mut leave) = (cells.at, to);
             let mut inside = zero.lt(zero);
             for k in 0..2 {
@@ -121,7 +122,7 @@ impl Field {
                 let t = (line - origin[k]) * inverse[k];
                 let sooner = t.lt(leave);
                 leave = sooner.select(t, leave);
-                // The cell beyond, and whether there is one.
+                // The next cell, and its existence.
                 let beyond = right_hand[k].select(line, line - one);
                 let there = zero.le(beyond) & beyond.lt(D::splat(s, self.cells[k] as f64));
                 next[0] = sooner.select(if k == 0 { beyond } else { cells.at[0] }, next[0]);
@@ -152,7 +153,7 @@ impl Field {
     }
 }
 
-/// As [`Field::cross`] for rays that are above the surface: where, the slopes there, and in which lanes.
+/// Packet version of [`Field::cross`] for rays above the surface: distance, slopes at the hit, and the lanes that hit.
 #[inline(always)]
 fn cross<S: Simd>(
     s: S,
@@ -168,7 +169,7 @@ fn cross<S: Simd>(
     let (w, dw) = (x - y, dx - dy);
     let diagonal = dw.eq(zero).select(to, -w / dw);
     let split = from.lt(diagonal) & diagonal.lt(to);
-    // The part before the diagonal, then, in lanes that met nothing there, the one behind.
+    // The segment before the diagonal, then, in lanes without a hit, the segment behind it.
     let (mut from, mut end, mut open) = (from, split.select(diagonal, to), zero.le(zero));
     let (mut t, mut slopes, mut met) = (from, [zero; 2], zero.lt(zero));
     for _ in 0..2 {
@@ -189,7 +190,7 @@ fn cross<S: Simd>(
     (t, slopes[0], slopes[1], met)
 }
 
-/// Writes what some lanes touch.
+/// Writes the hits of some lanes.
 #[inline(always)]
 fn write<S: Simd>(touches: &mut Touches, t: D<S>, normal: &[[f64; WIDTH]; 3], lanes: u64) {
     let t = t.array();

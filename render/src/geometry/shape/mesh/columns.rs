@@ -1,18 +1,21 @@
-//! Triangles by where they are seen from above: a list for each of many columns.
+//! Triangles binned into columns, a uniform grid seen from above: one list of triangles per column.
 //!
-//! What height scanners look at is terrain, from above. There a steep ray has few triangles near it, and which ones is known
-//! without a walk: those of the columns that it passes between the lowest and the highest corner. It is tested against each of
-//! them, eight pairs of a ray and a triangle at a time, by the arithmetic of a single ray: the same bits.
+//! Height scanners look at terrain from above. A steep ray has few triangles near it, and no BVH traversal is needed to
+//! find them. They are those of the columns that the ray passes between the lowest and the highest corner of the mesh.
+//! The ray is tested against each of them, eight pairs of a ray and a triangle at a time, by the arithmetic of a single
+//! ray: the same bits.
 //!
-//! Above is along any axis of the mesh's own frame (MuJoCo turns meshes to their principal axes); below, that is called z.
+//! Above is along any axis of the mesh's own frame (MuJoCo turns meshes to their principal axes). That axis is called z
+//! below.
 //!
-//! No triangle is missed that [`Shear`](crate::geometry::triangle::Shear) finds a ray inside of. Of that triangle, a point at a
-//! height z between those of its corners is, along x, where the ray is at that height, up to rounding: its corners as seen from
-//! the ray are on both sides of it. With coordinates up to M, slopes b up to 1 and e = 2^-53, a corner is off by at most e M
-//! times 2 (the difference to the ray's origin along x), 2 (along z), 2 (their product with b) and 4 (the difference of both).
-//! Where the ray is at the lowest and the highest corner is off by 2 (the difference along z), 2 (the product) and 3 (the sum).
-//! So the interval between these two, wider by 15 e M, meets the triangle's own; along y likewise. Rounding keeps order when
-//! coordinates become columns, so intervals that meet have columns in common, and both have all columns of a rectangle.
+//! No triangle is missed that [`Shear`](crate::geometry::triangle::Shear) finds a ray inside of. Some point of that
+//! triangle, at a height z between those of its corners, is along x where the ray is at that height, up to rounding:
+//! the corners as seen from the ray are on both sides of it. With coordinates up to M, slopes b up to 1 and e = 2^-53,
+//! a corner is off by at most e M times 2 (the difference to the ray's origin along x), 2 (along z), 2 (their product
+//! with b) and 4 (the difference of both). The ray's position at the lowest and the highest corner is off by 2 (the
+//! difference along z), 2 (the product) and 3 (the sum). So the interval between these two positions, wider by 15 e M,
+//! meets the triangle's own interval; along y likewise. Rounding keeps order when coordinates become columns. So
+//! intervals that meet have columns in common, and both have all columns of a rectangle.
 
 use super::MeshTree;
 use crate::geometry::bvh::FAR;
@@ -23,48 +26,49 @@ use crate::simd::{D, D3, Simd};
 use kinetoscope_scene::shape::Intersection;
 use kinetoscope_scene::vector::V3;
 
-/// Meshes of fewer triangles have no columns: their trees are small.
+/// Meshes with fewer triangles have no columns: their BVHs are small.
 const FEWEST: usize = 256;
-/// How wide columns are, by the mean extent of triangles: of narrow ones there are many to look at, in wide ones there is much
-/// to test.
+/// Width of columns, relative to the mean extent of the triangles. A ray passes many narrow columns, and wide columns
+/// hold many triangles to test.
 const NARROW: f64 = 0.7;
-/// Columns by triangles, at most.
+/// Largest ratio of columns to triangles.
 const MOST: f64 = 2.0;
-/// In how many columns triangles are on average, at most; meshes of triangles of very different sizes have none.
+/// Largest mean number of columns per triangle; meshes of triangles of very different sizes have no columns.
 const SPREAD: usize = 12;
-/// How far a steep ray gets along x or y for each metre along z, at most.
+/// Largest slope of a steep ray: meters along x or y per meter along z.
 const STEEP: f64 = 0.125;
 /// Columns that a ray may pass along x, and along y.
 const PASSED: usize = 4;
-/// Triangles in columns that the rays of a packet pass, at most. A walk through the tree costs about as much as these.
+/// Largest number of triangles in the columns that the rays of a packet pass. A BVH traversal costs about as much as
+/// these tests.
 const CROWD: usize = 320;
-/// No triangle.
+/// Marks the absence of a triangle.
 const NONE: u32 = u32::MAX;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Columns {
-    /// The axis of the columns comes last; all other numbers are in this order.
+    /// Permutation of the axes, the axis of the columns last; all other fields are in this order.
     axes: [usize; 3],
-    /// Smallest coordinates of all triangles.
+    /// Smallest coordinates of all triangles \[m\].
     low: [f64; 2],
     per_metre: [f64; 2],
     /// Columns along x and y.
     size: [usize; 2],
-    /// Where the list of each column begins, row by row along x, and after the last one where it ends.
+    /// Start of each column's list, row by row along x, and the end of the last list.
     starts: Vec<u32>,
     lists: Vec<u32>,
-    /// Smallest and largest coordinates of each triangle across the columns.
+    /// Smallest and largest coordinates of each triangle across the columns \[m\].
     sides: Vec<[[f32; 2]; 2]>,
-    /// Lowest and highest corner.
+    /// Heights of the lowest and highest corner \[m\].
     heights: [f64; 2],
-    /// The largest coordinate.
+    /// Largest absolute coordinate \[m\].
     reach: f64,
-    /// By how much rays are wider, as a part of the largest coordinate.
+    /// Widening of rays, as a fraction of the largest coordinate.
     slack: f64,
 }
 
 impl Columns {
-    /// Columns a bit narrower than the mean triangle; `None` where triangles are in too many.
+    /// Builds columns slightly narrower than the mean triangle; `None` if triangles are in too many columns.
     pub(crate) fn new(triangles: &[Triangle], bounds: &[V3; 2], axes: [usize; 3]) -> Option<Self> {
         if triangles.len() < FEWEST {
             return None;
@@ -75,7 +79,7 @@ impl Columns {
                 triangles.iter().map(|t| extent(t, axes[axis])).map(|[low, high]| high - low).sum::<f64>() / count;
             (bounds[1][axes[axis]] - bounds[0][axes[axis]]) / (NARROW * mean)
         });
-        // No more than are worth the memory.
+        // The number of columns is limited by their memory.
         let fewer = (MOST * count / (size[0] * size[1])).sqrt().min(1.0);
         let size = size.map(|n| (n * fewer).ceil());
         let known = size.iter().all(|n| (1.0..=MOST * count).contains(n));
@@ -111,8 +115,8 @@ impl Columns {
         }
         let side = |t: &Triangle, axis: usize| extent(t, axes[axis]).map(|x| x as f32);
         columns.sides = triangles.iter().map(|t| [side(t, 0), side(t, 1)]).collect();
-        // Counted two columns ahead, a running sum says one ahead where each list begins; when a list is written, that is where
-        // the next one begins.
+        // Counts are stored two columns ahead, so the running sum is stored one ahead of each list's start. Writing a
+        // list advances that number to the start of the next list.
         for t in triangles {
             columns.each_row(t, |row, starts, _| row.for_each(|column| starts[column + 2] += 1));
         }
@@ -139,7 +143,7 @@ impl Columns {
         self.axes
     }
 
-    /// The same, with rays as wide as they are.
+    /// The same columns without slack for rays.
     #[cfg(test)]
     pub(crate) fn without_slack(&self) -> Self {
         Self { slack: 0.0, ..self.clone() }
@@ -152,13 +156,13 @@ impl Columns {
         [[left, bottom], [right, top]]
     }
 
-    /// Which column a coordinate is in; the first or the last one of those outside.
+    /// Column of a coordinate; the first or the last one for coordinates outside.
     fn column(&self, axis: usize, x: f64) -> usize {
         let at = (x - self.low[axis]) * self.per_metre[axis];
         at.max(0.0).min((self.size[axis] - 1) as f64) as usize
     }
 
-    /// Shows the columns of a triangle, row by row.
+    /// Passes the columns of a triangle to `show`, row by row.
     fn each_row(&mut self, triangle: &Triangle, show: impl Fn(std::ops::Range<usize>, &mut [u32], &mut [u32])) {
         let [[left, bottom], [right, top]] = self.rectangle(triangle);
         for row in bottom..=top {
@@ -174,29 +178,29 @@ fn extent(triangle: &Triangle, axis: usize) -> [f64; 2] {
     [a.min(b).min(c), a.max(b).max(c)]
 }
 
-/// Whether the rays of a packet are steep enough.
+/// True if all rays of a packet are steep enough.
 #[inline(always)]
 pub(crate) fn are_steep<S: Simd>(s: S, shear: &ShearPacket<S>) -> bool {
     let [x, y] = shear.slopes();
     x.abs().max(y.abs()).le(D::splat(s, STEEP)).to_bitmask() == crate::geometry::packet::ALL
 }
 
-/// For both ends, along both axes, what is so of each ray.
+/// A value per ray, for both ends, along both axes.
 type Ends<T> = [[[T; WIDTH]; 2]; 2];
 
-/// Whether two intervals have something in common.
+/// True if two intervals overlap.
 #[inline(always)]
 fn meet([a, b]: &[f32; 2], [c, d]: [f64; 2]) -> bool {
     (f64::from(*a) <= d) & (c <= f64::from(*b))
 }
 
-/// The nearest triangle of each ray that was found.
+/// The nearest triangle of each ray so far.
 struct Nearest {
     limit: [f64; WIDTH],
     best: [u32; WIDTH],
 }
 
-/// Triangles and rays to be tested.
+/// Pairs of a triangle and a ray to be tested.
 #[derive(Default)]
 struct Pairs {
     count: usize,
@@ -205,8 +209,8 @@ struct Pairs {
 }
 
 impl Columns {
-    /// What the rays of a packet touch, all of which are steep; false where too much is in their columns, or where they begin
-    /// so far away that rounding could put them into triangles whose boxes they miss in the tree.
+    /// Intersects a packet of steep rays. Returns false if their columns hold too many triangles, or if the rays begin
+    /// so far away that rounding could put them into triangles whose BVH boxes they miss.
     #[inline(always)]
     pub(crate) fn touch_packet<S: Simd>(
         &self,
@@ -248,7 +252,8 @@ impl Columns {
                 for &triangle in self.list(row, left[k], right[k]) {
                     let at = pairs.count % WIDTH;
                     (pairs.triangles[at], pairs.rays[at]) = (triangle, k);
-                    // No jump that could not be foretold: about half of them are near the ray.
+                    // Written without a branch, which would be unpredictable: about half of the triangles are near the
+                    // ray.
                     let sides = &self.sides[triangle as usize];
                     pairs.count += usize::from(meet(&sides[0], x) & meet(&sides[1], y));
                     if pairs.count == WIDTH {
@@ -259,14 +264,14 @@ impl Columns {
             }
         }
         if pairs.count > 0 {
-            // The others are of before, or none at first: they change nothing.
+            // The remaining lanes hold earlier pairs or default ones: they change nothing.
             pairs.test(s, &tree.triangles, self.axes, &rays, &mut nearest);
         }
         tree.show(s, &nearest.limit, &nearest.best, touches);
         true
     }
 
-    /// Between which coordinates rays are, along both axes, and the first and the last columns there.
+    /// Intervals of the rays' coordinates along both axes, and the first and the last columns there.
     #[inline(always)]
     fn passed<S: Simd>(&self, s: S, origin: &D3<S>, by: &D3<S>) -> (Ends<f64>, Ends<usize>) {
         let reach = origin[0].abs().max(origin[1].abs()).max(origin[2].abs()).max(D::splat(s, self.reach));
@@ -289,7 +294,7 @@ impl Columns {
         (ends, columns)
     }
 
-    /// What is in some columns of a row.
+    /// Triangles in a run of columns of a row.
     #[inline(always)]
     fn list(&self, row: usize, left: usize, right: usize) -> &[u32] {
         let row = row * self.size[0];
@@ -347,7 +352,7 @@ impl Pairs {
 }
 
 impl MeshTree {
-    /// What the rays touch that found something, lane by lane.
+    /// Writes the hits of a packet, lane by lane.
     #[inline(always)]
     fn show<S: Simd>(&self, s: S, limit: &[f64; WIDTH], best: &[u32; WIDTH], touches: &mut Touches) {
         let mut corners = [[[0.0; WIDTH]; 3]; 3];
