@@ -82,7 +82,7 @@ pub enum CameraError {
         /// Measured channels.
         enabled: Vec<&'static str>,
     },
-    /// Disparity needs parallel cameras side by side with equal lenses.
+    /// Disparity needs parallel cameras side by side with equal fx, fy and cy.
     #[error("disparity is defined for a rectified pair of eyes: {what} is {value}, it must be {expected}")]
     NotRectified {
         /// Name of the number.
