@@ -118,7 +118,7 @@ impl Viewpoints {
         Ok(())
     }
 
-    /// Sets intrinsics: one for each of `rows`, or one for all. `check` refuses those that the sensor cannot use.
+    /// Sets intrinsics: one for each of `rows`, or one for all. `check` rejects intrinsics that the sensor cannot use.
     pub(crate) fn set_intrinsics(
         &mut self,
         rows: &[usize],
@@ -137,14 +137,14 @@ impl Viewpoints {
         Ok(())
     }
 
-    /// Sets the configured poses and intrinsics.
+    /// Restores the configured poses and intrinsics.
     pub(crate) fn restore(&mut self, rows: &[usize]) {
         rows.iter().for_each(|&row| self.rows[row] = self.configured);
         self.rays.set(Vec::new(), rows, |row| self.rows[row].pixels);
     }
 }
 
-/// Values for `count` environments: one each, or one for all.
+/// Returns values for `count` environments: one each, or one for all.
 pub(crate) fn one_each<'a, T>(
     what: &'static str,
     values: &'a [T],
