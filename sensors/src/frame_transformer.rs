@@ -97,8 +97,8 @@ impl SensorCfg for FrameTransformerCfg {
 
     /// # Errors
     ///
-    /// An unknown source body, no targets, a pattern that matches nothing, an offset that is not a pose, two target
-    /// frames with the same name, or an invalid sampling configuration.
+    /// An unknown source body, no targets, a pattern that matches nothing, two target frames with the same name, an
+    /// offset that is not a pose, or an invalid sampling configuration.
     fn build(&self, context: &SensorContext) -> Result<FrameTransformer, SensorError> {
         let source = context.body(&self.source)?;
         at_least_one(

@@ -152,7 +152,8 @@ impl JointState {
         self.sampler.history("positions")
     }
 
-    /// Past velocities \[rad/s or m/s\], newest first, shape \[num_envs, history_length, joints\]; 0 where not filled yet.
+    /// Past velocities \[rad/s or m/s\], newest first, shape \[num_envs, history_length, joints\]; 0 where not filled
+    /// yet.
     pub fn velocity_history(&self) -> ArrayView3<'_, f64> {
         self.sampler.history("velocities")
     }

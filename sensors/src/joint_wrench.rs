@@ -36,9 +36,9 @@ pub struct JointWrenchCfg {
 /// Shapes: N environments, B links.
 ///
 /// Both are in the axes of the link and about its origin: the joint frame on the child side, as URDF defines it. For
-/// [`JointWrenchCfg::frames`], the wrench is moved to the origin of the frame and rotated into its axes. With the force
-/// `F`, the torque `T` about the origin of the link, and the frame at `p` with the rotation `R` in the link, the force
-/// is `Rᵀ F` and the torque `Rᵀ (T - p x F)`. The whole joint is measured, wherever the frame is.
+/// [`JointWrenchCfg::frames`], the wrench is moved to the origin of the frame and rotated into its axes. `F` is the
+/// force and `T` the torque about the origin of the link; the frame is at `p` with the rotation `R` in the link. The
+/// force is then `Rᵀ F` and the torque `Rᵀ (T - p x F)`. The whole joint is measured, wherever the frame is.
 ///
 /// The sign is that of the wrench **on the link**: a load that hangs from its joint reads an upward force of its
 /// weight. Gravity and contacts of the link are not part of the wrench, but the reaction to them is. The effort of the

@@ -193,7 +193,7 @@ impl MujocoSensor {
     ///
     /// # Errors
     ///
-    /// As [`columns`](Self::columns).
+    /// Same as [`columns`](Self::columns).
     pub fn value(&self, name: &str) -> Result<ArrayView2<'_, f64>, SensorError> {
         let columns = self.columns(name)?;
         let mut values = self.values();

@@ -27,8 +27,8 @@ pub struct SamplingCfg {
     /// Rounds a period that is not a whole number of physics steps to the nearest one, instead of returning an error.
     pub round_period: bool,
     /// Measures when the sensor is read, not when it is due: [`SensorCfg::lazy`](crate::SensorCfg::lazy). The values
-    /// are the same, bit for bit. A sensor with a history, a latency, dropout or noise ignores this and measures when
-    /// it is due, because its values depend on all measurements before.
+    /// are the same, bit for bit. A sensor with a history, a latency, dropout or noise always measures when it is due,
+    /// because its values depend on all measurements before.
     pub lazy: bool,
     /// Number of measurements in the history, the newest included.
     pub history_length: usize,
@@ -233,7 +233,7 @@ impl Sampler {
     ///
     /// # Errors
     ///
-    /// Those of [`check`](Self::check). Nothing is measured then.
+    /// Same as [`check`](Self::check). Nothing is measured then.
     pub fn update(&mut self, state: &SceneState, mut read: impl FnMut(usize, &mut [f64])) -> Result<(), SensorError> {
         self.check(state)?;
         for env in 0..self.expected.num_envs() {
@@ -275,7 +275,7 @@ impl Sampler {
     ///
     /// # Errors
     ///
-    /// Those of [`check`](Self::check), and [`SensorError::IndexOutOfRange`]. Nothing is reset then.
+    /// Same as [`check`](Self::check), and [`SensorError::IndexOutOfRange`]. Nothing is reset then.
     pub fn reset(
         &mut self,
         env_ids: &[usize],
@@ -309,7 +309,7 @@ impl Sampler {
     ///
     /// # Errors
     ///
-    /// Those of [`reset`](Self::reset). Nothing is refreshed then.
+    /// Same as [`reset`](Self::reset). Nothing is refreshed then.
     pub fn refresh(
         &mut self,
         env_ids: &[usize],

@@ -99,7 +99,7 @@ impl Phases {
     ///
     /// # Panics
     ///
-    /// As [`is_due`](Self::is_due).
+    /// Same as [`is_due`](Self::is_due).
     #[track_caller]
     pub fn fallen_due(&mut self, env: usize, step: u64) -> u64 {
         let fallen_due = self.fallen_due_by(env, step);

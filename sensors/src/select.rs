@@ -38,7 +38,7 @@ pub(crate) fn select<P: AsRef<str>>(
 ///
 /// # Errors
 ///
-/// As [`select`].
+/// Same as [`select`].
 pub(crate) fn select_or_all(
     patterns: Option<&[String]>,
     names: &[String],
@@ -82,7 +82,7 @@ pub(crate) fn at_least_one(count: usize, choice: Choice, names: &[String]) -> Re
 ///
 /// # Errors
 ///
-/// As [`select`].
+/// Same as [`select`].
 pub(crate) fn matching(pattern: &str, names: &[String], what: &'static str) -> Result<Vec<usize>, SensorError> {
     let pattern = in_every_env(pattern);
     let compiled = Pattern::new(pattern).map_err(|error| SensorError::Pattern(error.to_string()))?;

@@ -74,7 +74,7 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     ///
     /// # Errors
     ///
-    /// Those of [`update`](Self::update), and [`SensorError::IndexOutOfRange`]. Nothing is reset then.
+    /// Same as [`update`](Self::update), and [`SensorError::IndexOutOfRange`]. Nothing is reset then.
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
     /// Refreshes the current value of the environments `env_ids` after a write to their state, so outdated values are
@@ -82,7 +82,7 @@ pub trait Sensor: Any + fmt::Debug + Send + Sync {
     ///
     /// # Errors
     ///
-    /// Those of [`reset`](Self::reset). Nothing is refreshed then.
+    /// Same as [`reset`](Self::reset). Nothing is refreshed then.
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
     /// Markers that visualize the last measurement in environment `env`: rendered in viewers, never measured. They are
@@ -131,8 +131,8 @@ pub struct SensorContext {
     pub carriers: Arc<[usize]>,
     /// Names of the joints in the order of the joint axis of [`SceneState`]: `uid/joint`.
     pub joints: Arc<[String]>,
-    /// Names of the actuators in the order of the actuator axis of [`SceneState`]: `uid/joint` for the drive of a robot's
-    /// joint, `uid/actuator` for those of an MJCF file.
+    /// Names of the actuators in the order of the actuator axis of [`SceneState`]: `uid/joint` for the drive of a robot
+    /// joint, `uid/actuator` for an actuator of an MJCF file.
     pub actuators: Arc<[String]>,
     /// The physics engine's own sensors, in the order of their values in [`SceneState::sensordata`].
     pub engine_sensors: Arc<[EngineSensor]>,
@@ -151,7 +151,7 @@ pub struct SensorContext {
 }
 
 impl SensorContext {
-    /// Returns the index of a body on the body axis, by its full name (`uid/link`), or by the part after the first
+    /// Returns the index of a body on the body axis. `name` is the full name (`uid/link`), or the part after the first
     /// slash if only one body has it. The prefixes `{ENV}/` and `{ENV_REGEX_NS}/` are ignored.
     ///
     /// # Errors

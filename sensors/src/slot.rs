@@ -170,7 +170,7 @@ impl SensorSlot {
     ///
     /// # Errors
     ///
-    /// Those of [`sensor`](Self::sensor).
+    /// Same as [`sensor`](Self::sensor).
     pub fn sensor_mut(&mut self) -> Result<&mut dyn Sensor, &SensorError> {
         match self.now() {
             Some(Holder { fault: None, sensor }) => Ok(sensor.as_mut()),

@@ -14,7 +14,7 @@ macro_rules! accessors {
             ///
             /// # Errors
             ///
-            /// As [`channel`](Self::channel).
+            /// Same as [`channel`](Self::channel).
             pub fn $name(&self) -> Result<PictureView<'_, frame::$Channel>, SensorError> {
                 self.channel::<frame::$Channel>()
             })*

@@ -92,7 +92,7 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// As [`channel`](Self::channel).
+    /// Same as [`channel`](Self::channel).
     pub fn arrived<C: Listed>(&self) -> Result<PictureView<'_, C>, SensorError> {
         let rows = self.env_ids().len();
         if (0..rows).all(|row| self.frames.unseen(row).is_none()) {

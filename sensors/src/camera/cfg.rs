@@ -102,10 +102,10 @@ pub struct CameraCfg {
     /// `near` to `far`, distance stays at least `near`, and misses stay misses. Noise of `color` is in steps of its 8
     /// bits, independent for red, green and blue; results are rounded to bytes.
     ///
-    /// The random numbers depend only on the seed of the simulation, the environment, the name of the camera, the index
-    /// of the image and the pixel. They are computed from these keys, so laziness, the time of reading and the number
-    /// of threads do not change them. An image that is rendered again after a setter has the same noise again. The cost
-    /// of `bias_walk` grows with the image count n since the reset: it needs as many random numbers as twice the binary
+    /// The random numbers depend only on the seed of the simulation, the environment, the camera name, the image index
+    /// and the pixel. They are computed from these keys, so laziness, the time of reading and the number of threads do
+    /// not change them. An image that is rendered again after a setter has the same noise again. The cost of
+    /// `bias_walk` grows with the image count n since the reset: it needs as many random numbers as twice the binary
     /// digits of n.
     pub noise: BTreeMap<String, NoiseCfg>,
     /// Imperfections of the camera itself; applied before [`noise`](Self::noise).

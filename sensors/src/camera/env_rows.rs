@@ -73,7 +73,7 @@ impl EnvRows {
     ///
     /// # Errors
     ///
-    /// As [`row`](Self::row), and [`CameraError::DuplicateEnvironment`].
+    /// Same as [`row`](Self::row), and [`CameraError::DuplicateEnvironment`].
     pub(crate) fn chosen(&self, env_ids: Option<&[usize]>) -> Result<Vec<usize>, SensorError> {
         let Some(env_ids) = env_ids else { return Ok((0..self.len()).collect()) };
         let mut taken = vec![false; self.len()];

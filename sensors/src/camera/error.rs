@@ -36,7 +36,7 @@ pub enum CameraError {
         /// Numbers per row.
         columns: usize,
     },
-    /// The eye coincides with the target, or a number is not finite.
+    /// The position of the camera and its target coincide, or a number is not finite.
     #[error("a camera at {eye:?} cannot look at {target:?}: both must be finite and apart")]
     LookAt {
         /// Position of the camera \[m\].

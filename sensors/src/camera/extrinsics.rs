@@ -140,8 +140,8 @@ pub trait Poses {
     ///
     /// # Errors
     ///
-    /// [`CameraError::Pose`] with the first pose that has a number that is not finite or a quaternion of norm 0 (other
-    /// quaternions are normalized), [`CameraError::PoseColumns`] for rows that do not have seven numbers.
+    /// [`CameraError::Pose`] with the first pose that has a number that is not finite or a quaternion of norm 0; other
+    /// quaternions are normalized. [`CameraError::PoseColumns`] for rows that do not have seven numbers.
     fn to_poses(&self) -> Result<Vec<Pose>, CameraError>;
 }
 

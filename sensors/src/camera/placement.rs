@@ -78,7 +78,7 @@ pub trait CameraPlacement: PlaceRows {
     ///
     /// # Errors
     ///
-    /// Those of [`set_local_pose`](Self::set_local_pose), and
+    /// Same as [`set_local_pose`](Self::set_local_pose), and
     /// [`CameraError::NothingCaptured`](super::CameraError::NothingCaptured) for an attached camera whose parent was
     /// not captured yet.
     fn set_world_poses(
@@ -98,7 +98,8 @@ pub trait CameraPlacement: PlaceRows {
     /// point an attached camera at a point of the environment, pass [`look_at_pose`](super::look_at_pose) to
     /// [`set_world_poses`](Self::set_world_poses).
     ///
-    /// One `eye`, `target` and `up` for each of `env_ids` (`None` is all environments of the camera), or one for all \[m\].
+    /// One `eye`, `target` and `up` for each of `env_ids` (`None` is all environments of the camera), or one for all
+    /// \[m\].
     ///
     /// # Errors
     ///

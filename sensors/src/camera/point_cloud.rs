@@ -24,7 +24,7 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// Those of [`channel`](Self::channel) for [`Depth`], or for [`Distance`] if distances are needed, and an
+    /// Same as [`channel`](Self::channel) for [`Depth`], or for [`Distance`] if distances are needed, and an
     /// environment that the camera does not see.
     pub fn point_map(&self, env: usize, frame: PointFrame) -> Result<Array3<f32>, SensorError> {
         let (row, (height, width)) = (self.row(env)?, self.image_shape());
@@ -53,7 +53,7 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// As [`point_map`](Self::point_map).
+    /// Same as [`point_map`](Self::point_map).
     pub fn point_cloud(&self, env: usize, frame: PointFrame) -> Result<Array2<f32>, SensorError> {
         let map = self.point_map(env, frame)?;
         Ok(seen(map.view()))

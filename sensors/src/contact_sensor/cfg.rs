@@ -38,9 +38,9 @@ pub struct ContactSensorCfg {
     /// `total_forces_w`, `force_matrix_w`, and, where they are tracked, `friction_matrix_w`, `contact_points_w`,
     /// `contact_point_matrix_w` and `pos_w`.
     pub sampling: SamplingCfg,
-    /// Shows a red ball at every body in contact, a green ball at every other body, and an arrow of the net normal
-    /// force, 1 m for 500 N ([`Sensor::markers`](crate::Sensor::markers)). The forces are those of the last
-    /// measurement, at the current positions of the bodies.
+    /// Shows a red ball at every body in contact and a green ball at every other body
+    /// ([`Sensor::markers`](crate::Sensor::markers)). An arrow shows the net normal force, 1 m for 500 N. The forces
+    /// are those of the last measurement, at the current positions of the bodies.
     pub debug_vis: bool,
 }
 
@@ -85,9 +85,10 @@ impl SensorCfg for ContactSensorCfg {
 
     /// # Errors
     ///
-    /// An empty selection of bodies, a pattern that matches nothing or a body that another pattern matches, a filter
-    /// that matches only the watched body itself, friction by filter without filters, a negative threshold, or an
-    /// invalid sampling configuration.
+    /// - An empty selection of bodies.
+    /// - A pattern that matches nothing, or a body that another pattern matches.
+    /// - A filter that matches only the watched body itself, or friction by filter without filters.
+    /// - A negative threshold, or an invalid sampling configuration.
     fn build(&self, context: &SensorContext) -> Result<ContactSensor, SensorError> {
         let bodies = select(&self.bodies, &context.bodies, "body")?;
         if bodies.is_empty() {

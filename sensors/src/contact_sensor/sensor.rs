@@ -13,8 +13,8 @@ use std::fmt;
 
 /// Contact forces on bodies in all environments, world axes; [`Sampled`] gives their stamps and counts.
 ///
-/// Forces act **on** the body: a foot that stands on the ground reads +z. Shapes: N environments, B bodies, M filters, T
-/// measurements of history, newest first.
+/// Forces act **on** the body: a foot that stands on the ground reads +z. Shapes: N environments, B bodies, M filters,
+/// T measurements of history, newest first.
 #[derive(Clone, Debug)]
 pub struct ContactSensor {
     pub(super) names: Vec<String>,

@@ -163,7 +163,8 @@ impl Cutter {
     }
 
     /// Adds the part of a convex polygon inside the frustum. At each plane, the polygon keeps its corners inside and
-    /// gains the points where its edges cross the plane (Sutherland and Hodgman, "Reentrant polygon clipping", 1974).
+    /// gains the points where its edges cross the plane. Source: Sutherland and Hodgman, "Reentrant polygon clipping",
+    /// 1974.
     fn polygon(&mut self, corners: &[[f64; 3]]) {
         self.polygon.clear();
         self.polygon.extend_from_slice(corners);
@@ -230,8 +231,8 @@ mod tests {
         PoseF32::from(&kinetoscope_scene::pose::from_xyz_rpy(at, rpy))
     }
 
-    /// The rays to a ball fill a cone around the direction of its center with the half-angle asin(r / d), also in the
-    /// plane y = 0. So u is cx + fx tan(atan2(x, z) ± asin(r / hypot(x, z))).
+    /// The rays to a ball fill a cone around the direction of its center with the half-angle asin(r / d). The same
+    /// holds in the plane y = 0. So u is cx + fx tan(atan2(x, z) ± asin(r / hypot(x, z))).
     #[test]
     fn balls() {
         for (at, radius) in [([0.3, -0.2, 2.0], 0.25), ([-3.0, 1.0, 1.5], 0.4), ([0.0, 0.0, 0.6], 0.45)] {

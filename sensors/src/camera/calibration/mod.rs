@@ -160,7 +160,7 @@ impl CameraInfo {
     ///
     /// # Errors
     ///
-    /// As [`read`](Self::read).
+    /// Same as [`read`](Self::read).
     pub fn parse(text: &str, file: &str) -> Result<Self, CalibrationError> {
         let root = yaml::parse(text, file)?;
         let reader = Reader { file };

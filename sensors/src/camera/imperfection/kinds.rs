@@ -53,7 +53,7 @@ impl Picture<'_> {
         [(u - f64::from(cx)) / f64::from(fx), (v - f64::from(cy)) / f64::from(fy), 1.0]
     }
 
-    /// Returns true if rays do not all go forward, so that reach is distance, not depth.
+    /// Returns true if rays do not all go forward: the reach is then the distance, not the depth.
     pub(super) fn reaches_aside(&self) -> bool {
         self.rays.is_some_and(|rays| !rays.is_forward())
     }

@@ -36,8 +36,8 @@ macro_rules! imperfections {
 
         /// Imperfections of a camera; `None`, the default, for those that are absent.
         ///
-        /// The random numbers depend only on the seed of the simulation, the environment, the name of the camera, the
-        /// index of the image and the pixel.
+        /// The random numbers depend only on the seed of the simulation, the environment, the camera name, the image
+        /// index and the pixel.
         #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
         #[serde(default, deny_unknown_fields)]
         pub struct Imperfections {

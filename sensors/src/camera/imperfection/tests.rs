@@ -402,8 +402,7 @@ fn left(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
 
 /// Vignetting of fisheyes follows their formulas, and of lenses without distortion that of a pinhole. All lenses follow
 /// their mapping from directions to points, which the falloff does not use. A patch of the sky of solid angle d omega
-/// at the angle theta illuminates an area of the image, and contributes cos theta d omega.
-/// the image, and gets there cos theta d omega of the light.
+/// at the angle theta illuminates an area of the image. This area receives cos theta d omega of the light.
 #[test]
 fn lens_vignetting() {
     let size = [64, 48];
@@ -494,8 +493,8 @@ fn focal_length_unit() {
     }
 }
 
-/// Under a uniformly bright sky, a lens with the field-of-view angle theta (up to a right angle) collects the
-/// irradiance pi sin² theta, whatever its mapping: the sum over all pixels times the area of a pixel.
+/// Under a uniformly bright sky, a lens with the half field of view theta collects the irradiance pi sin² theta. This
+/// holds for any mapping, up to a right angle. The irradiance is the sum over all pixels times the area of a pixel.
 #[test]
 fn light_of_sky() {
     use kinetoscope_render::lens::{Equisolid, Orthographic, Stereographic};
@@ -514,8 +513,8 @@ fn light_of_sky() {
         let rays = LensRays::new(&Optics::new(lens, pixels).unwrap(), size, 1).unwrap();
         let found = left(&rays, size).iter().sum::<f64>() / (f * f);
         let expected = PI * most.sin().powi(2);
-        // At a sharp edge at radius r, only the 2 pi r edge pixels can be counted wrong, by half a pixel each at most
-        // and randomly: the bound is six times the square root.
+        // At a sharp edge at radius r, only the 2 pi r edge pixels can be counted wrong, randomly and by half a pixel
+        // each. The bound is six times the square root.
         let edge = (2.0 * PI * rays.optics().domain().radius * f).sqrt() * 0.5 * 6.0 / (f * f);
         assert!((found - expected).abs() < edge.min(0.01 * expected), "{}: {found} is not {expected}", lens.name());
     }

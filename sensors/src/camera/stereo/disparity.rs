@@ -22,10 +22,10 @@ impl StereoCamera {
     /// Disparities of the left image \[pixels\], f32, shape (N, H, W): how much farther left the right camera sees the
     /// same point.
     ///
-    /// d = fx b / z, with the focal length fx, the baseline b = `left_to_right_pos.x` and the depth z of the left
-    /// camera (so z = fx b / d). The point is at (u - d, v) in the right image, or at (u - d + cx_right - cx_left, v)
-    /// if principal points differ. Misses have the disparity 0 of infinitely far points, whatever the value of
-    /// [`depth_miss`](crate::camera::CameraCfg::depth_miss).
+    /// The disparity is d = fx b / z, so z = fx b / d. Here fx is the focal length, b = `left_to_right_pos.x` the
+    /// baseline, and z the depth of the left camera. The point is at (u - d, v) in the right image; if principal points
+    /// differ, it is at (u - d + cx_right - cx_left, v). Misses have the disparity 0 of infinitely far points, for
+    /// every [`depth_miss`](crate::camera::CameraCfg::depth_miss).
     ///
     /// Disparities are computed from the measured depth of the left camera, with its noise, holes and imperfections. A
     /// depth error e gives a disparity error of about d e / z. There is no stereo matching: points that are occluded in
@@ -53,7 +53,7 @@ impl StereoCamera {
     ///
     /// # Errors
     ///
-    /// As [`disparity`](Self::disparity).
+    /// Same as [`disparity`](Self::disparity).
     pub fn arrived_disparity(&self) -> Result<Array3<f32>, SensorError> {
         let baseline = self.baseline()?;
         let matrices = self.left().arrived_intrinsic_matrices();

@@ -20,10 +20,11 @@ impl StereoCameraCfg {
     /// publish them.
     ///
     /// Sizes, intrinsics and lenses are those of K and D, as in [`CameraInfo::apply_to`]. The pose of the right camera
-    /// follows from the rectification. With R of each camera and the baseline b = -P\[0\]\[3\] / P\[0\]\[0\] of the
-    /// right one, a point X of the right optical frame is at R_leftᵀ (R_right X + (b, 0, 0)) in the left one. The
-    /// extrinsics place the left camera ([`StereoOrigin::Left`]). The renderer is [`Renderer::FastRayTraced`] if a
-    /// camera has a lens other than a pinhole, else the default one; all other fields have their defaults.
+    /// follows from the rectification. The baseline is b = -P\[0\]\[3\] / P\[0\]\[0\] of the right camera. With R of
+    /// each camera, a point X of the right optical frame is at `R_leftᵀ (R_right X + (b, 0, 0))` in the left one.
+    ///
+    /// The extrinsics place the left camera ([`StereoOrigin::Left`]). The renderer is [`Renderer::FastRayTraced`] if a
+    /// camera has a lens other than a pinhole, else the default one. All other fields have their defaults.
     ///
     /// Source: ROS, message `sensor_msgs/CameraInfo`.
     ///
@@ -52,9 +53,13 @@ impl StereoCameraCfg {
     ///
     /// # Errors
     ///
-    /// [`CameraError::NotAPair`] for sizes that differ, R that is not a rotation, P of the right camera whose fourth
-    /// column does not place it to the right of the left camera, P of the left camera whose fourth column is not 0
-    /// (maybe the files are swapped), and focal lengths or vertical principal points of both P that differ.
+    /// [`CameraError::NotAPair`] for
+    ///
+    /// - sizes that differ,
+    /// - R that is not a rotation,
+    /// - P of the right camera whose fourth column does not place it to the right of the left camera,
+    /// - P of the left camera whose fourth column is not 0 (maybe the files are swapped),
+    /// - focal lengths or vertical principal points of both P that differ.
     pub fn of_infos(left: &CameraInfo, right: &CameraInfo) -> Result<Self, CameraError> {
         if (left.width, left.height) != (right.width, right.height) {
             let size = |info: &CameraInfo| format!("{} x {}", info.width, info.height);
@@ -140,8 +145,8 @@ fn rotation(what: &'static str, matrix: &Matrix3<f64>) -> Result<UnitQuaternion<
 impl StereoCamera {
     /// Returns the calibrations of both cameras in environment `env`, named `name` with `/left` or `/right` added: K
     /// and D of raw images, and R and P of the [rectification](Rectification). ROS nodes read them as a calibrated
-    /// stereo pair. [`StereoCameraCfg::of_infos`] is the inverse. If the cameras are parallel and side by side, with
-    /// the same fx, fy and cy, rectified images have the principal points and focal lengths of raw images.
+    /// stereo pair. [`StereoCameraCfg::of_infos`] is the inverse. Rectified images keep the principal points and focal
+    /// lengths of raw images if the cameras are parallel and side by side, with the same fx, fy and cy.
     ///
     /// P projects points of the rectified *left* frame to rectified images. For the right camera it is
     /// `[fx, 0, cx, -fx b; 0, fy, cy, 0; 0, 0, 1, 0]` with the baseline b \[m\]. Source: ROS, message
@@ -149,7 +154,7 @@ impl StereoCamera {
     ///
     /// # Errors
     ///
-    /// Those of [`Camera::camera_info`](crate::camera::Camera::camera_info), and [`CameraError::NotRectifiable`].
+    /// Same as [`Camera::camera_info`](crate::camera::Camera::camera_info), and [`CameraError::NotRectifiable`].
     pub fn camera_info(&self, name: &str, env: usize) -> Result<[CameraInfo; 2], SensorError> {
         let left = self.left().camera_info(&format!("{name}/left"), env)?;
         let right = self.right().camera_info(&format!("{name}/right"), env)?;

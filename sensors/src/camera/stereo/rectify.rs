@@ -29,7 +29,7 @@ const MOST: f64 = 80.0 * std::f64::consts::PI / 180.0;
 ///   place, on the mean of both cameras.
 ///
 /// Lenses have no influence: R applies after a raw image is undistorted. Cameras that are parallel and side by side
-/// with the same fx, fy and cy are rectified without a rotation, and each keeps its fx, fy, cx and cy.
+/// with the same fx, fy and cy need no rotation. Each of them keeps its fx, fy, cx and cy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rectification {
     /// R of the left and the right camera: from its optical frame to its rectified frame.

@@ -207,8 +207,8 @@ fn assert_box(found: PixelBox, expected: [f64; 4], tolerance: f64) {
     assert!(edges.iter().zip(expected).all(|(a, b)| (a - b).abs() < tolerance), "{found:?}, {expected:?}");
 }
 
-/// A ball on the axis of a lens, 2 m away, and a ball 20 degrees to the left, each with a screen in front of its right
-/// half. The lens shows a ball of radius r at distance d as wide as the cone around it, 2 f asin(r / d).
+/// A ball on the axis of a lens, 2 m away, and a ball 20 degrees to the left. A screen is in front of the right half of
+/// each ball. The lens shows a ball of radius r at distance d as wide as the cone around it, 2 f asin(r / d).
 #[test]
 fn lens_cones() {
     // y points left. One screen reaches from the axis to the right; the other is rotated with the second ball.
@@ -341,7 +341,7 @@ fn solid_boxes() {
     }
 }
 
-/// For every shape, a fine tessellation touches all six sides of its box from inside, up to the gap of its polygons,
+/// A fine tessellation of every shape touches all six sides of its box from inside. The gap of its polygons is
 /// `R (1 - cos(pi / 256))` < 4e-5 m.
 #[test]
 fn tight_solids() {

@@ -50,7 +50,7 @@ fn twin(info: &CameraInfo, renderer: Renderer) -> CameraCfg {
 }
 
 /// OpenCV and ROS count pixels from the center of the first pixel. The camera sees in pixel (i, j) the point that
-/// OpenCV's documented model projects to (i, j) with the numbers of the file, without an offset of half a pixel.
+/// OpenCV's documented model projects to (i, j) with the numbers of the file. There is no offset of half a pixel.
 #[test]
 fn real_file() {
     let info = CameraInfo::parse(FILE, "left.yaml").unwrap();

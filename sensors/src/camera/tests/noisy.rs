@@ -1,7 +1,7 @@
 //! Noise of cameras, against its distribution.
 //!
-//! The standard deviation of the mean of n numbers is sigma / sqrt(n), of the variance sqrt(2 / n) of the variance, of
-//! correlations 1 / sqrt(n). Bounds are six times that, which fails for one of 5e8 seeds; the seeds here are fixed.
+//! Standard deviations for n numbers: sigma / sqrt(n) of the mean, sqrt(2 / n) of the variance as a fraction, 1 /
+//! sqrt(n) of a correlation. Bounds are six times that, which fails for one of 5e8 seeds; the seeds here are fixed.
 
 use super::super::imperfection::{DepthNoise, Exposure, ReadNoise, ShotNoise};
 use super::super::{Camera, CameraCfg, DepthMiss, Extrinsics, Imperfections, Placement, PointFrame};

@@ -98,8 +98,9 @@ fn single_cameras() {
     }
 }
 
-/// Returns the number of compared pixels of the left image, and the number of those that the right camera does not see
-/// at the expected position. Disparities are multiplied by `scale`: 1, or another value as a control.
+/// Returns the number of compared pixels of the left image, and the number of errors among them: pixels that the right
+/// camera does not see at the expected position. Disparities are multiplied by `scale`: 1, or another value as a
+/// control.
 ///
 /// A point P seen by the left camera is projected to the right camera. Rows of a rectified stereo pair correspond, so P
 /// falls between two pixels of its row, which see Q and R. Both surfaces are convex (a plane, a ball). So the right

@@ -44,7 +44,7 @@ impl RayCasterCamera {
     ///
     /// # Errors
     ///
-    /// As [`point_map`](Self::point_map).
+    /// Same as [`point_map`](Self::point_map).
     pub fn point_cloud(&self, env: usize, frame: PointFrame) -> Result<Array2<f32>, SensorError> {
         Ok(seen(self.point_map(env, frame)?.view()))
     }

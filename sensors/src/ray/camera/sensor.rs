@@ -168,8 +168,8 @@ impl RayCasterCamera {
         self.images.pictures.distance.view()
     }
 
-    /// Past distances along the rays, newest first, shape (N, history_length, H * W) \[m\]: +inf for a miss, 0 where not
-    /// filled yet.
+    /// Past distances along the rays, newest first, shape (N, history_length, H * W) \[m\]: +inf for a miss, 0 where
+    /// not filled yet.
     pub fn distance_history(&self) -> ArrayView3<'_, f64> {
         self.sampler().history("distances")
     }

@@ -62,7 +62,7 @@ fn built(cfg: &RayCasterCameraCfg, n: usize) -> RayCasterCamera {
     camera
 }
 
-/// The point of every pixel, from its depth and in the point map, lies on the surface of its mask id, and the normal is
+/// The point of every pixel, from its depth and in the point map, lies on the surface of its mask id. The normal is
 /// that of the surface. Depths have single precision: 5 m times 6e-8, and as much again along the ray.
 #[test]
 fn pixels() {
