@@ -2,7 +2,7 @@
 
 use crate::schedule::Phases;
 
-/// Values that arrive a fixed number of steps after their capture, in one queue per environment. All memory is
+/// Values that are delivered a fixed number of steps after their capture, in one queue per environment. All memory is
 /// allocated at construction.
 #[derive(Clone, Debug)]
 pub(crate) struct DelayLine<T> {
@@ -30,7 +30,7 @@ pub(crate) fn capacity(steps: u64, period: u64) -> usize {
 }
 
 impl<T: Clone> DelayLine<T> {
-    /// Creates queues of values that are captured at most every `period` steps and arrive `steps` later; slots start
+    /// Creates queues of values that are captured at most every `period` steps and delivered `steps` later; slots start
     /// with `value`.
     pub(crate) fn new(num_envs: usize, steps: u64, period: u64, value: T) -> Self {
         let capacity = capacity(steps, period);
@@ -52,8 +52,8 @@ impl<T: Clone> DelayLine<T> {
         value
     }
 
-    /// Takes the oldest value of environment `env` that has arrived by `step`, with true if it was captured after the
-    /// last [`refresh`](Self::refresh).
+    /// Takes the oldest value of environment `env` that is due for delivery by `step`, with true if it was captured
+    /// after the last [`refresh`](Self::refresh).
     pub(crate) fn take(&mut self, env: usize, step: u64) -> Option<(&T, bool)> {
         self.arrival(env).filter(|&arrival| arrival <= step)?;
         let queue = &mut self.queues[env];
@@ -63,13 +63,13 @@ impl<T: Clone> DelayLine<T> {
         Some((value, *captured > self.refreshed[env]))
     }
 
-    /// Returns the step at which the next value of environment `env` arrives.
+    /// Returns the step at which the next value of environment `env` is delivered.
     fn arrival(&self, env: usize) -> Option<u64> {
         let queue = self.queues[env];
         (queue.len > 0).then(|| self.slots[env * self.capacity + queue.first].0 + self.steps)
     }
 
-    /// Returns the steps until the next arrival in any environment, at least 1, with the environments at `steps`;
+    /// Returns the steps until the next delivery in any environment, at least 1, with the environments at `steps`;
     /// `None` if no value is in flight.
     pub(crate) fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> Option<u64> {
         let running = steps.into_iter().enumerate().filter(|(_, now)| *now != Phases::STANDS);
@@ -77,7 +77,7 @@ impl<T: Clone> DelayLine<T> {
     }
 
     /// Records that the current value of environment `env` was refreshed at `step`. Values that were captured before do
-    /// not replace it when they arrive.
+    /// not replace it when they are delivered.
     pub(crate) fn refresh(&mut self, env: usize, step: u64) {
         self.refreshed[env] = step;
     }

@@ -127,8 +127,8 @@ impl Noise {
         }
     }
 
-    /// Applies noise to the true values of environment `env`; returns true if the measurement arrives. The number of
-    /// random numbers used does not depend on the values.
+    /// Applies noise to the true values of environment `env`; returns true if the measurement is delivered. The number
+    /// of random numbers used does not depend on the values.
     pub(crate) fn measure(&mut self, env: usize, row: &mut [f64]) -> bool {
         let mut biases = self.biases.index_axis_mut(Axis(0), env);
         for Noisy { columns, noise, .. } in self.channels.iter().filter(|c| c.noise.bias_walk > 0.0) {

@@ -129,7 +129,7 @@ pub struct Sampler {
     force_stamps: Array1<f64>,
     /// Both stamps of past measurements.
     stamp_history: History<f64>,
-    /// Both stamps of the latest arrived measurement; empty without a latency.
+    /// Both stamps of the latest delivered measurement; empty without a latency.
     arrived: History<f64>,
     counts: Array1<u64>,
     noise: Option<Noise>,
@@ -144,7 +144,7 @@ struct Quantity {
     channel: Channel,
     now: Array2<f64>,
     history: History<f64>,
-    /// The latest arrived measurement, with a latency; without a latency this is `now`.
+    /// The latest delivered measurement, with a latency; without a latency this is `now`.
     arrived: History<f64>,
 }
 
@@ -228,8 +228,8 @@ impl Sampler {
     }
 
     /// Measures in the environments that are due. `read(env, row)` writes the true values of all channels of one
-    /// environment, one after the other, to `row`, which is zero before. Measurements in flight that have arrived
-    /// become readable.
+    /// environment, one after the other, to `row`, which is zero before. Measurements in flight whose latency has
+    /// passed become readable.
     ///
     /// # Errors
     ///
@@ -304,8 +304,8 @@ impl Sampler {
     }
 
     /// Refreshes the current values of the environments `env_ids` from `state`, with noise: see
-    /// [`Sensor::refresh`](crate::Sensor::refresh). Measurements in flight still arrive in the history and are counted,
-    /// but do not replace the refreshed values.
+    /// [`Sensor::refresh`](crate::Sensor::refresh). Measurements in flight still enter the history and are counted, but
+    /// do not replace the refreshed values.
     ///
     /// # Errors
     ///
@@ -327,7 +327,7 @@ impl Sampler {
                 noise.disturb(env, &mut self.row[STAMPS..]);
             }
             self.show(env);
-            // Before the first measurement arrives, the values of the reset count as the latest.
+            // Before the first measurement is delivered, the values of the reset count as the latest.
             if self.arrived.filled(env) == 0 {
                 self.arrive(env);
             }
@@ -356,7 +356,7 @@ impl Sampler {
         self.arrive(env);
     }
 
-    /// Makes `row` the latest arrived measurement.
+    /// Makes `row` the latest delivered measurement.
     fn arrive(&mut self, env: usize) {
         let (stamps, mut values) = self.row.split_at(STAMPS);
         self.arrived.push(env, stamps);
@@ -381,7 +381,7 @@ impl Sampler {
         }
     }
 
-    /// Physics steps until the next measurement of any environment is captured or arrives, at least 1: see
+    /// Physics steps until the next measurement of any environment is captured or delivered, at least 1: see
     /// [`Sensor::due_in`](crate::Sensor::due_in).
     pub fn due_in(&self, step: &[u64]) -> u64 {
         let due = self.phases.due_in(step.iter().copied());
@@ -435,9 +435,9 @@ impl Sampler {
         self.quantity(channel).now.view()
     }
 
-    /// Values of a channel in the latest arrived measurement, shape \[num_envs, width\]; those of the reset before the
-    /// first one arrives. They equal the current [`values`](Self::values), except with a latency after a write to the
-    /// state: measurements in flight then arrive, but do not replace the current values.
+    /// Values of a channel in the latest delivered measurement, shape \[num_envs, width\]; those of the reset before
+    /// the first one is delivered. They equal the current [`values`](Self::values), except with a latency after a write
+    /// to the state: measurements in flight are then delivered, but do not replace the current values.
     ///
     /// # Panics
     ///
@@ -452,7 +452,7 @@ impl Sampler {
         }
     }
 
-    /// Number of measurements that arrived since the last reset, per environment.
+    /// Number of measurements delivered since the last reset, per environment.
     pub(crate) fn counts(&self) -> ArrayView1<'_, u64> {
         self.counts.view()
     }
@@ -573,8 +573,8 @@ pub trait Sampled {
         self.sampler().stamp_history.view().index_axis_move(Axis(2), 1)
     }
 
-    /// Number of measurements that arrived since the last reset, shape \[num_envs\]. Unread measurements of a lazy
-    /// sensor count; the refresh of a reset does not.
+    /// Number of measurements delivered since the last reset, shape \[num_envs\]. Unread measurements of a lazy sensor
+    /// count; the refresh of a reset does not.
     fn sample_counts(&self) -> ArrayView1<'_, u64> {
         self.sampler().counts()
     }

@@ -1,7 +1,7 @@
-//! Arrived frames of a camera: the latest one, shown or not, and the frame history.
+//! Delivered frames of a camera: the latest one, shown or not, and the frame history.
 //!
-//! After a write to the state, a camera shows the state as written. Frames in flight at that time still arrive later.
-//! They are counted but not shown, because they are older. A reader of every frame, such as a recorder, uses
+//! After a write to the state, a camera shows the state as written. Frames in flight at that time are still delivered
+//! later. They are counted but not shown, because they are older. A reader of every frame, such as a recorder, uses
 //! [`Camera::arrived`].
 
 use super::cfg::CameraCfg;
@@ -26,7 +26,7 @@ pub type HistoryView<'a, C> = ArrayView<'a, <C as Channel>::Number, <<C as Chann
 pub(super) struct PastImages {
     images: DrawnImages,
     length: usize,
-    /// Number of frames of each row that arrived since the images were rendered.
+    /// Number of frames of each row delivered since the images were rendered.
     new: Vec<usize>,
 }
 
@@ -43,7 +43,7 @@ impl PastImages {
         row * self.length..(row + 1) * self.length
     }
 
-    /// Shifts the images of each row to make room for the frames that arrived since.
+    /// Shifts the images of each row to make room for the frames delivered since.
     fn move_up(&mut self) {
         for row in 0..self.new.len() {
             let by = std::mem::take(&mut self.new[row]);
@@ -53,8 +53,8 @@ impl PastImages {
 }
 
 impl Camera {
-    /// Capture times of the latest arrived frames \[s\], shape (N). Equal to [`stamps`](Self::stamps), except with a
-    /// latency after a write to the state or a move of the camera. Before the first frame arrives, the time of the
+    /// Capture times of the latest delivered frames \[s\], shape (N). Equal to [`stamps`](Self::stamps), except with a
+    /// latency after a write to the state or a move of the camera. Before the first frame is delivered, the time of the
     /// reset.
     pub fn arrived_stamps(&self) -> Array1<f64> {
         let shown = self.stamps();
@@ -64,7 +64,7 @@ impl Camera {
         })
     }
 
-    /// Camera poses at the capture of the latest arrived frames, in the layout of [`pose_w`](Self::pose_w).
+    /// Camera poses at the capture of the latest delivered frames, in the layout of [`pose_w`](Self::pose_w).
     pub fn arrived_pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         let mut poses = self.pose_w(convention);
         for (row, mut pose) in poses.rows_mut().into_iter().enumerate() {
@@ -77,7 +77,7 @@ impl Camera {
         poses
     }
 
-    /// Intrinsic matrices of the latest arrived frames, in the layout of
+    /// Intrinsic matrices of the latest delivered frames, in the layout of
     /// [`intrinsic_matrices`](Self::intrinsic_matrices).
     pub fn arrived_intrinsic_matrices(&self) -> Array3<f64> {
         let shown = self.intrinsic_matrices();
@@ -87,8 +87,8 @@ impl Camera {
         })
     }
 
-    /// Latest arrived images of one channel, in the shape of [`channel`](Self::channel). Images that are not shown are
-    /// rendered on read, with the same noise as if they had been shown.
+    /// Latest delivered images of one channel, in the shape of [`channel`](Self::channel). Images that are not shown
+    /// are rendered on read, with the same noise as if they had been shown.
     ///
     /// # Errors
     ///
@@ -162,7 +162,7 @@ impl Camera {
         }
     }
 
-    /// Returns the history images, updated with all arrived frames.
+    /// Returns the history images, updated with all delivered frames.
     fn past_images(&self) -> Result<&PastImages, CameraError> {
         let (rows, length) = (self.env_ids().len(), self.history_length());
         let filled = |row: usize| self.frames.stamp_history().filled(row);
@@ -186,7 +186,7 @@ impl Camera {
         )
     }
 
-    /// Records that `count` frames of a row have arrived.
+    /// Records that `count` frames of a row were delivered.
     pub(super) fn note_arrivals(&mut self, row: usize, count: u64) {
         if count == 0 {
             return;

@@ -121,7 +121,7 @@ impl<'a> FrameSource<'a> {
     }
 }
 
-/// A frame that has arrived, with its viewpoint and lens at that time. Later setters do not change it.
+/// A delivered frame, with its viewpoint and lens at that time. Later setters do not change it.
 #[derive(Clone, Debug)]
 struct ArrivedFrame {
     frame: CapturedFrame,
@@ -152,15 +152,15 @@ pub(super) struct FrameBuffer {
     /// Probability that a frame is lost on its way.
     dropout: f64,
     arrived: Arrived,
-    /// True if the latest arrived frame is shown, from the viewpoint that it arrived with.
+    /// True if the latest delivered frame is shown, from the viewpoint of its delivery.
     shows_latest: Vec<bool>,
 }
 
-/// Frames that have arrived.
+/// Delivered frames.
 #[derive(Debug)]
 struct Arrived {
     counts: Array1<u64>,
-    /// The latest arrived frame, with a latency; without a latency this is the shown frame.
+    /// The latest delivered frame, with a latency; without a latency this is the shown frame.
     latest: History<ArrivedFrame>,
     history: History<ArrivedFrame>,
     stamps: History<f64>,
@@ -236,7 +236,7 @@ impl FrameBuffer {
         true
     }
 
-    /// Takes the frames of a row that have arrived by `step`; returns true if another frame is shown.
+    /// Takes the frames of a row that are due for delivery by `step`; returns true if another frame is shown.
     pub(super) fn receive(&mut self, row: usize, step: u64, viewpoints: &Viewpoints) -> bool {
         let mut shows = false;
         while let Some((frame, is_newest)) = self.delay.as_mut().and_then(|delay| delay.take(row, step)) {
@@ -271,8 +271,8 @@ impl FrameBuffer {
         }
     }
 
-    /// Returns the steps until the next frame arrives, at least 1, with the rows at `steps`; `None` if no frame is in
-    /// flight.
+    /// Returns the steps until the next frame is delivered, at least 1, with the rows at `steps`; `None` if no frame is
+    /// in flight.
     pub(super) fn arrives_in(&self, steps: impl Iterator<Item = u64>) -> Option<u64> {
         self.delay.as_ref()?.due_in(steps)
     }
@@ -282,7 +282,7 @@ impl FrameBuffer {
         &self.shown[row]
     }
 
-    /// Returns true if the latest arrived frame is shown, from the viewpoint that it arrived with.
+    /// Returns true if the latest delivered frame is shown, from the viewpoint of its delivery.
     pub(super) fn shows_latest(&self, row: usize) -> bool {
         self.shows_latest[row]
     }
@@ -291,7 +291,7 @@ impl FrameBuffer {
         self.shows_latest[row] = shows_latest;
     }
 
-    /// Returns the latest arrived frame of a row if it is not the shown one.
+    /// Returns the latest delivered frame of a row if it is not the shown one.
     pub(super) fn unseen(&self, row: usize) -> Option<FrameSource<'_>> {
         let [latest] = self.arrived.latest.slice(row, 0).filter(|_| !self.shows_latest[row])? else { return None };
         Some(latest.source(row))
@@ -308,7 +308,7 @@ impl FrameBuffer {
         self.stamps.view()
     }
 
-    /// Frames that arrived since the last reset, shape (rows).
+    /// Frames delivered since the last reset, shape (rows).
     pub(super) fn counts(&self) -> ArrayView1<'_, u64> {
         self.arrived.counts.view()
     }

@@ -42,7 +42,7 @@ use std::sync::{Arc, Mutex};
 ///
 /// A camera is perfect by default. Optionally it has a [`history`](Self::history), latency, dropout, noise, and
 /// imperfections of real cameras ([`CameraCfg::imperfections`]). It stays lazy and gives the same bits: each capture is
-/// kept until it arrives or is read. Setters affect the shown frame and frames in flight; the history stays as it was
+/// kept until it is delivered or read. Setters affect the shown frame and frames in flight; the history stays as it was
 /// captured.
 ///
 /// Returned views borrow the camera, so images are not overwritten while they are read. The first axis of all arrays is
@@ -63,7 +63,7 @@ pub struct Camera {
     pub(super) tickets: Vec<Ticket>,
     pub(super) frames: FrameBuffer,
     pub(super) motion: Motion,
-    /// Images of the shown frames, of the latest arrived frames where others are shown, and of the history.
+    /// Images of the shown frames, of the latest delivered frames where others are shown, and of the history.
     pub(super) images: Cached<DrawnImages>,
     pub(super) latest_images: Cached<DrawnImages>,
     pub(super) past_images: Cached<PastImages>,
@@ -244,8 +244,7 @@ impl Camera {
         self.frames.stamps()
     }
 
-    /// Number of frames that arrived since the last reset, read or not, shape (N). The refresh of a reset does not
-    /// count.
+    /// Number of frames delivered since the last reset, read or not, shape (N). The refresh of a reset does not count.
     pub fn frame_counts(&self) -> ArrayView1<'_, u64> {
         self.frames.counts()
     }

@@ -69,8 +69,8 @@ fn latency() {
     }
 }
 
-/// Measurements in flight at a write arrive one after the other, in the history and in `arrived`. Those from before the
-/// write do not replace the written value.
+/// Measurements in flight at a write are delivered one after the other, in the history and in `arrived`. Those from
+/// before the write do not replace the written value.
 #[test]
 fn refresh() {
     let read = |s: &Sampler| (s.arrived("b")[(0, 1)], s.arrived_stamps()[0], s.values("b")[(0, 1)], s.stamps()[0]);
@@ -125,7 +125,7 @@ fn due() {
         assert_eq!(lazy.values("b"), eager.values("b"), "step {now}");
         assert_eq!(lazy.sample_counts(), eager.sample_counts());
     }
-    // Captures at 4, 8, .., 100 and arrivals at 9, 13, .., 97.
+    // Captures at 4, 8, .., 100 and deliveries at 9, 13, .., 97.
     assert_eq!(updates, 25 + 23);
 }
 
@@ -145,8 +145,8 @@ fn resets() {
     assert_eq!((sampler.values("a"), sampler.sample_counts()), (array![[10.0], [2.0]].view(), array![5, 1].view()));
 }
 
-/// A lost measurement never arrives. The standard deviation of the lost fraction of n is sqrt(p (1 - p) / n); the bound
-/// is six times that.
+/// A lost measurement is never delivered. The standard deviation of the lost fraction of n is sqrt(p (1 - p) / n); the
+/// bound is six times that.
 #[test]
 fn dropout() {
     let mut sampler = sampler(1, &SamplingCfg { dropout: 0.3, history_length: 2, ..SamplingCfg::default() });

@@ -48,7 +48,7 @@ impl StereoCamera {
         Ok(self.disparities.get_or_update(|| Ok(DisparityMap::default()), update)?.pixels.view())
     }
 
-    /// [`disparity`](Self::disparity) of the latest arrived images, from the depth of
+    /// [`disparity`](Self::disparity) of the latest delivered images, from the depth of
     /// [`Camera::arrived`](crate::camera::Camera::arrived); computed at every call.
     ///
     /// # Errors

@@ -152,12 +152,12 @@ fn due() {
         assert!(bits(&rare, 0..2) == bits(&often, 0..2), "step {now}");
         assert_eq!((rare.frame_counts(), rare.stamps()), (often.frame_counts(), often.stamps()));
     }
-    // Captures at 4, 8, .., 40 and arrivals at 9, 13, .., 37.
+    // Captures at 4, 8, .., 40 and deliveries at 9, 13, .., 37.
     assert_eq!(updates, 10 + 8);
 }
 
-/// A lost image keeps the previous one. Of 300 images lost with probability 0.4, 180 arrive, with a standard deviation
-/// of sqrt(300 0.4 0.6) = 8.5; the bound is six times that.
+/// A lost image keeps the previous one. Of 300 images lost with probability 0.4, 180 are delivered, with a standard
+/// deviation of sqrt(300 0.4 0.6) = 8.5; the bound is six times that.
 #[test]
 fn dropout() {
     let context = context(2);

@@ -43,7 +43,7 @@ fn late_and_past() {
     let run = |cancelled: bool| {
         let mut camera = built(&cfg, &context(1));
         (1..=3).for_each(|step| camera.update(&state(&[step])).unwrap());
-        // After a write, the shown image is not the latest arrived one.
+        // After a write, the shown image is not the latest delivered one.
         camera.refresh(&[0], &state(&[3])).unwrap();
         assert!(camera.color().is_ok() && camera.arrived_stamps() != camera.stamps());
         if cancelled {

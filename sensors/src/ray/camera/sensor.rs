@@ -128,8 +128,8 @@ impl RayCasterCamera {
         Self { path, rays, images: Images { viewpoints, world_from_parent: vec![None; n], miss, pictures } }
     }
 
-    /// Images of the latest arrived measurement, in all environments. They equal the shown images, except with a
-    /// latency after a write to the state: images in flight then arrive but are not shown. With a latency, they are
+    /// Images of the latest delivered measurement, in all environments. They equal the shown images, except with a
+    /// latency after a write to the state: images in flight are then delivered but not shown. With a latency, they are
     /// computed at every call.
     pub fn arrived(&self) -> Cow<'_, RayPictures> {
         if !self.sampler().is_late() {
@@ -184,7 +184,7 @@ impl RayCasterCamera {
         self.images.pictures.mask.view()
     }
 
-    /// Number of images that arrived since the last reset, shape (N); the refresh of a reset does not count.
+    /// Number of images delivered since the last reset, shape (N); the refresh of a reset does not count.
     pub fn frame_counts(&self) -> ArrayView1<'_, u64> {
         self.sample_counts()
     }

@@ -171,8 +171,8 @@ impl RayCaster {
         self.hits.points.view()
     }
 
-    /// [`hits`](Self::hits) of the latest arrived measurement, from the distances of [`Sampler::arrived`]; computed at
-    /// every call.
+    /// [`hits`](Self::hits) of the latest delivered measurement, from the distances of [`Sampler::arrived`]; computed
+    /// at every call.
     pub fn arrived_hits(&self) -> Array3<f64> {
         let [distances, ids, pos, quat] =
             ["distances", "ids", "pos_w", "quat_w"].map(|channel| self.sampler().arrived(channel));
