@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 /// `x / electrons`. Red, green and blue are independent. Source: EMVA standard 1288, release 3.1, section 2.2; plotting
 /// variance against signal (a photon transfer curve, Janesick 2007) gives the slope `1 / electrons`.
 ///
-/// Below 50 electrons the distribution is Poisson's, above a normal distribution with the same mean and variance.
+/// Up to a mean of 50 electrons the distribution is Poisson's, above it a normal distribution with the same mean and
+/// variance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ShotNoise {
