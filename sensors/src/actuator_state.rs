@@ -1,4 +1,4 @@
-//! What moves things: controls, forces and activations of actuators.
+//! Actuator state sensor: controls, forces and activations.
 
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
@@ -16,15 +16,15 @@ use std::fmt;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ActuatorStateCfg {
-    /// The actuators to measure, by patterns of their names, in the order they are reported; `None` is all of them. The
-    /// drive of a robot's joint is called `uid/joint`, an actuator of an MJCF file `uid/actuator`; the part behind the slash
-    /// does alone.
+    /// Name patterns of the actuators to measure, in the order they are reported; `None` measures all. The drive of a
+    /// robot joint is named `uid/joint`, an actuator of an MJCF file `uid/actuator`. The part after the slash is
+    /// enough.
     pub actuators: Option<Vec<String>>,
     /// Rate, history, latency and noise; the channels are `controls`, `forces` and `activations`.
     pub sampling: SamplingCfg,
 }
 
-/// Controls, forces and activations of actuators in all environments; [`Sampled`] has their stamps and counts.
+/// Controls, forces and activations of actuators in all environments. [`Sampled`] gives their stamps and counts.
 #[derive(Clone, Debug)]
 pub struct ActuatorState {
     actuators: Vec<usize>,
@@ -45,12 +45,13 @@ impl SensorCfg for ActuatorStateCfg {
 
     /// # Errors
     ///
-    /// A pattern that matches nothing or an actuator that two match, no actuator at all, and what is wrong with the sampling.
+    /// A pattern that matches nothing, an actuator that two patterns match, an empty selection, or an invalid sampling
+    /// configuration.
     fn build(&self, context: &SensorContext) -> Result<ActuatorState, SensorError> {
         let all = &context.actuators;
         let actuators = select_or_all(self.actuators.as_deref(), all, "actuator")?;
         at_least_one(actuators.len(), Choice { sensor: "actuator state", field: "actuators", what: "actuator" }, all)?;
-        // MJCF files give their actuators units of their own.
+        // No unit: each actuator of an MJCF file has its own.
         let channel = |name| Channel::new(name, actuators.len());
         let channels = [channel("controls"), channel("forces").at(Stamp::Force), channel("activations")];
         Ok(ActuatorState {
@@ -61,7 +62,7 @@ impl SensorCfg for ActuatorStateCfg {
     }
 }
 
-/// Writes what the sensor measures in environment `env` to `row`.
+/// Writes the measurement of environment `env` to `row`.
 fn read(actuators: &[usize], state: &SceneState, env: usize, row: &mut [f64]) {
     let fields = [&state.actuator_controls, &state.actuator_forces, &state.actuator_activations];
     read_columns(fields, actuators, env, row);
@@ -89,7 +90,7 @@ impl Sensor for ActuatorState {
     }
 }
 
-/// A summary of several lines.
+/// Writes a summary of several lines.
 impl fmt::Display for ActuatorState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         summary::write_sampled(f, "Actuator state", &self.sampler, &[("actuators", &summary::list(&self.names))])
@@ -112,18 +113,18 @@ impl ActuatorState {
         &self.names
     }
 
-    /// What the actuators are told, shape \[num_envs, actuators\]: see [`SceneState::actuator_controls`].
+    /// Controls (inputs) of the actuators, shape \[num_envs, actuators\]; see [`SceneState::actuator_controls`].
     pub fn controls(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("controls")
     }
 
-    /// What the actuators exert, shape \[num_envs, actuators\]: see [`SceneState::actuator_forces`]. Captured at
+    /// Forces of the actuators, shape \[num_envs, actuators\]; see [`SceneState::actuator_forces`]. Captured at
     /// [`Sampled::force_stamps`].
     pub fn forces(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("forces")
     }
 
-    /// Activations, shape \[num_envs, actuators\]; 0 for actuators that have none.
+    /// Activations, shape \[num_envs, actuators\]; 0 for actuators without activation.
     pub fn activations(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("activations")
     }

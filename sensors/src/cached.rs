@@ -1,42 +1,43 @@
-//! Values that are computed when they are first read.
+//! Values computed on first read.
 
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// A value that the first reader after a change brings up to date, while others wait. Its memory is reused.
+/// A lazily updated value. The first reader after a change updates the value while other readers wait. Its memory is
+/// reused.
 #[derive(Debug)]
 pub(crate) struct Cached<T> {
     current: OnceLock<T>,
-    /// The value while it is outdated, locked while a reader updates it. Empty while a current value exists, before the first
+    /// The outdated value; locked while a reader updates it. `None` while a current value exists, before the first
     /// value was made, and after an update that panicked.
     outdated: Mutex<Option<T>>,
 }
 
 impl<T> Cached<T> {
-    /// No value yet: the first reader makes it.
+    /// Creates an empty cell; the first reader makes the value.
     pub(crate) fn empty() -> Self {
         Self { current: OnceLock::new(), outdated: Mutex::new(None) }
     }
 
-    /// A value that is up to date.
+    /// Creates a cell with an up-to-date value.
     pub(crate) fn current(value: T) -> Self {
         Self { current: OnceLock::from(value), outdated: Mutex::new(None) }
     }
 
-    /// A value that the first reader brings up to date.
+    /// Creates a cell with an outdated value; the first reader updates it.
     pub(crate) fn outdated(value: T) -> Self {
         Self { current: OnceLock::new(), outdated: Mutex::new(Some(value)) }
     }
 
-    /// The value, if it is up to date.
+    /// Returns the value if it is up to date.
     pub(crate) fn get(&self) -> Option<&T> {
         self.current.get()
     }
 
-    /// The value, brought up to date by `update` if it is outdated, after `make` has made it if there was no value.
+    /// Returns the value. A missing value is created by `make`; a new or outdated value is then updated by `update`.
     ///
     /// # Errors
     ///
-    /// Those of `make` and `update`: the value stays outdated, and the next reader tries again.
+    /// Errors of `make` and `update`. The value stays outdated, and the next reader tries again.
     pub(crate) fn get_or_update<E>(
         &self,
         make: impl FnOnce() -> Result<T, E>,
@@ -46,7 +47,7 @@ impl<T> Cached<T> {
             return Ok(value);
         }
         let mut outdated = self.lock();
-        // Another reader may have updated it meanwhile.
+        // Another reader may have updated the value in the meantime.
         if let Some(value) = self.current.get() {
             return Ok(value);
         }
@@ -63,14 +64,14 @@ impl<T> Cached<T> {
         }
     }
 
-    /// Makes the value outdated.
+    /// Marks the value as outdated.
     pub(crate) fn invalidate(&mut self) {
         if let Some(value) = self.current.take() {
             *self.outdated.get_mut().unwrap_or_else(PoisonError::into_inner) = Some(value);
         }
     }
 
-    /// The value, up to date or not; `None` before the first.
+    /// Returns the value, current or outdated; `None` if there is no value.
     pub(crate) fn value_mut(&mut self) -> Option<&mut T> {
         match self.current.get_mut() {
             Some(value) => Some(value),
@@ -78,12 +79,12 @@ impl<T> Cached<T> {
         }
     }
 
-    /// True where there is no value, and none is being made.
+    /// Returns true if there is no value and no reader is making one.
     pub(crate) fn is_empty(&self) -> bool {
         let outdated = match self.outdated.try_lock() {
             Ok(outdated) => outdated,
             Err(std::sync::TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            // A reader updates it.
+            // A reader is updating the value.
             Err(std::sync::TryLockError::WouldBlock) => return false,
         };
         outdated.is_none() && self.current.get().is_none()
@@ -100,7 +101,7 @@ mod tests {
     use std::panic::{AssertUnwindSafe, catch_unwind};
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    /// One reader updates, others get the same; errors are not kept, and memory stays where it is.
+    /// One reader runs the update and the others get its result. Errors are not stored, and the value keeps its memory.
     #[test]
     fn updates() {
         let updates = AtomicUsize::new(0);

@@ -1,47 +1,48 @@
-//! Values on their way: captured, and not to be read yet.
+//! Delay line: captured values that become readable after a latency.
 
 use crate::schedule::Phases;
 
-/// Values that arrive a fixed number of steps after their capture, in a queue per environment. All memory is taken at
-/// construction.
+/// Values that are delivered a fixed number of steps after their capture, in one queue per environment. All memory is
+/// allocated at construction.
 #[derive(Clone, Debug)]
 pub(crate) struct DelayLine<T> {
     steps: u64,
     /// Slots per environment.
     capacity: usize,
     queues: Vec<Queue>,
-    /// Values and the steps of their capture: the slots of one environment after those of the other.
+    /// Values with the steps of their capture, environment by environment.
     slots: Vec<(u64, T)>,
-    /// Steps at which environments were last refreshed.
+    /// Step of the last refresh of each environment.
     refreshed: Vec<u64>,
 }
 
-/// A ring in the slots of one environment.
+/// A ring buffer in the slots of one environment.
 #[derive(Clone, Copy, Debug, Default)]
 struct Queue {
     first: usize,
     len: usize,
 }
 
-/// How many values an environment has on their way at most: with one captured every `period` steps, those of the last `steps`
-/// and the newest.
+/// Returns the maximum number of values of an environment that are in flight. If a value is captured every `period`
+/// steps, these are the values of the last `steps` steps and the newest one.
 pub(crate) fn capacity(steps: u64, period: u64) -> usize {
     usize::try_from(steps.div_ceil(period)).map_or(usize::MAX, |n| n.saturating_add(1))
 }
 
 impl<T: Clone> DelayLine<T> {
-    /// Queues of values that are captured every `period` steps at most and arrive `steps` later; slots hold `value` first.
+    /// Creates queues of values that are captured at most every `period` steps and delivered `steps` later; slots start
+    /// with `value`.
     pub(crate) fn new(num_envs: usize, steps: u64, period: u64, value: T) -> Self {
         let capacity = capacity(steps, period);
         let slots = vec![(0, value); num_envs * capacity];
         Self { steps, capacity, queues: vec![Queue::default(); num_envs], slots, refreshed: vec![0; num_envs] }
     }
 
-    /// Sends a value of environment `env` on its way at `step`: it is to be written over what this slot held before.
+    /// Puts a value of environment `env` in flight at `step`. The returned slot holds an old value, to be overwritten.
     pub(crate) fn push(&mut self, env: usize, step: u64) -> &mut T {
         let queue = &mut self.queues[env];
         if queue.len == self.capacity {
-            // Nothing was taken for a long time: the oldest value would have been overtaken anyway.
+            // No value was taken for a long time: the oldest value would have been overtaken anyway.
             *queue = Queue { first: (queue.first + 1) % self.capacity, len: queue.len - 1 };
         }
         let slot = env * self.capacity + (queue.first + queue.len) % self.capacity;
@@ -51,8 +52,8 @@ impl<T: Clone> DelayLine<T> {
         value
     }
 
-    /// Takes the oldest value of environment `env` that has arrived by `step`, and true where it was captured after the last
-    /// [`refresh`](Self::refresh).
+    /// Takes the oldest value of environment `env` that is due for delivery by `step`, with true if it was captured
+    /// after the last [`refresh`](Self::refresh).
     pub(crate) fn take(&mut self, env: usize, step: u64) -> Option<(&T, bool)> {
         self.arrival(env).filter(|&arrival| arrival <= step)?;
         let queue = &mut self.queues[env];
@@ -62,26 +63,26 @@ impl<T: Clone> DelayLine<T> {
         Some((value, *captured > self.refreshed[env]))
     }
 
-    /// The step at which the next value of environment `env` arrives.
+    /// Returns the step at which the next value of environment `env` is delivered.
     fn arrival(&self, env: usize) -> Option<u64> {
         let queue = self.queues[env];
         (queue.len > 0).then(|| self.slots[env * self.capacity + queue.first].0 + self.steps)
     }
 
-    /// Steps until the next arrival in any environment, at least 1, when they are at `steps`; `None` where nothing is on its
-    /// way.
+    /// Returns the steps until the next delivery in any environment, at least 1, with the environments at `steps`;
+    /// `None` if no value is in flight.
     pub(crate) fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> Option<u64> {
         let running = steps.into_iter().enumerate().filter(|(_, now)| *now != Phases::STANDS);
         running.filter_map(|(env, now)| Some(self.arrival(env)?.saturating_sub(now).max(1))).min()
     }
 
-    /// Notes that the current value of environment `env` was read anew at `step`: values that were captured before are not to
-    /// replace it when they arrive.
+    /// Records that the current value of environment `env` was refreshed at `step`. Values that were captured before do
+    /// not replace it when they are delivered.
     pub(crate) fn refresh(&mut self, env: usize, step: u64) {
         self.refreshed[env] = step;
     }
 
-    /// Forgets what is on its way in environment `env`.
+    /// Drops the values of environment `env` that are in flight.
     pub(crate) fn clear(&mut self, env: usize) {
         self.queues[env] = Queue::default();
     }

@@ -1,10 +1,10 @@
-//! What can be wrong with a sensor.
+//! Sensor errors.
 
 use crate::camera::{CalibrationError, CameraError};
 use crate::ray::RayError;
 use kinetoscope_scene::Requires;
 
-/// Why a sensor cannot be built or updated.
+/// Errors of building or updating a sensor.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SensorError {
@@ -14,7 +14,7 @@ pub enum SensorError {
         /// The physics step \[s\].
         dt: f64,
     },
-    /// The sensor panicked while it measured.
+    /// The sensor panicked during a measurement.
     #[error("a panic broke its measurement off")]
     BrokenOff,
     /// The update period is negative, infinite or not a number.
@@ -35,123 +35,123 @@ pub enum SensorError {
         dt: f64,
         /// The period in steps.
         steps: f64,
-        /// The nearest period that would do \[s\].
+        /// Nearest valid period \[s\].
         nearest: f64,
     },
-    /// An index names something that does not exist.
+    /// An index is out of range.
     #[error("there is no {what} {index}: there are {count}, counted from 0")]
     IndexOutOfRange {
-        /// What is counted.
+        /// Kind of item.
         what: &'static str,
-        /// The index given.
+        /// The given index.
         index: usize,
-        /// How many there are.
+        /// Number of items.
         count: usize,
     },
-    /// The state lacks what the sensor requires.
+    /// The state lacks fields that the sensor requires.
     #[error("the {sensor} sensor was given a state without {missing}")]
     MissingFields {
-        /// The kind of sensor.
+        /// Kind of sensor.
         sensor: &'static str,
-        /// What is not there.
+        /// Missing fields.
         missing: Requires,
     },
-    /// The state is not of the scene that the sensor was built for.
+    /// The state does not belong to the scene that the sensor was built for.
     #[error("the state has {found} {what}, the sensor was built for {expected}")]
     WrongShape {
-        /// What is counted.
+        /// Kind of item.
         what: &'static str,
-        /// What the sensor was built for.
+        /// Number of items at construction.
         expected: usize,
-        /// What the state has.
+        /// Number of items in the state.
         found: usize,
     },
-    /// Nothing is called so.
+    /// A name is unknown.
     #[error("there is no {what} {name:?}; {}", known(.candidates))]
     UnknownName {
-        /// What kind of thing was looked for.
+        /// Kind of item.
         what: &'static str,
-        /// The name given.
+        /// The given name.
         name: String,
-        /// Names that exist, nearest first.
+        /// Known names, nearest first.
         candidates: Vec<String>,
     },
-    /// Several things are called so.
+    /// A name without its prefix matches several items.
     #[error("{what} {name:?} may be any of {}; give the full name", quoted(.candidates))]
     AmbiguousName {
-        /// What kind of thing was looked for.
+        /// Kind of item.
         what: &'static str,
-        /// The name given.
+        /// The given name.
         name: String,
-        /// What it may mean.
+        /// Full names of the matching items.
         candidates: Vec<String>,
     },
-    /// A name pattern is no regular expression, or two match the same name.
+    /// A name pattern is not a regular expression, or two patterns match the same name.
     #[error("{0}")]
     Pattern(String),
     /// A number of the configuration is out of range.
     #[error("{field} is {value}; {expected}")]
     OutOfRange {
-        /// Which number.
+        /// Name of the number.
         field: String,
-        /// The value given.
+        /// The given value.
         value: f64,
-        /// What would be right.
+        /// Accepted values.
         expected: &'static str,
     },
-    /// A contact sensor without bodies.
+    /// A contact sensor has no bodies.
     #[error("there are no bodies to watch; give patterns of their names{}", if .candidates.is_empty() { String::new() } else { format!(", such as {}", quoted(.candidates)) })]
     NoBodies {
-        /// Bodies that exist.
+        /// Names of existing bodies.
         candidates: Vec<String>,
     },
-    /// A sensor that is told to measure nothing at all.
+    /// The configuration selects nothing to measure.
     #[error("the {sensor} sensor would measure nothing: {field}: there is no {what}; {}", known(.candidates))]
     NothingChosen {
-        /// The kind of sensor.
+        /// Kind of sensor.
         sensor: &'static str,
-        /// Which field of its configuration.
+        /// Name of the configuration field.
         field: &'static str,
-        /// What it names.
+        /// Kind of item that the field selects.
         what: &'static str,
-        /// Names that exist, the first of them.
+        /// First existing names.
         candidates: Vec<String>,
     },
-    /// A contact sensor of one body that looks for contacts of that body with itself.
+    /// The filter of a contact sensor matches only its single watched body.
     #[error("the filter {filter:?} means only {body:?}, the one body that is watched: it does not touch itself")]
     OwnFilter {
-        /// The body.
+        /// Name of the body.
         body: String,
-        /// The filter.
+        /// Pattern of the filter.
         filter: String,
     },
-    /// A contact sensor that is to tell counterparts apart, without any.
+    /// A contact sensor reports forces by filter, but has no filters.
     #[error(
         "{field} tells forces apart by filter, and there are no filters; name counterparts in `filters` (the sum over all of them is {always}, which is always there)"
     )]
     NoFilters {
-        /// What was asked for.
+        /// Name of the configuration field.
         field: &'static str,
-        /// What says the same of all counterparts together.
+        /// Name of the channel with the sum over all counterparts.
         always: &'static str,
     },
-    /// A link that fixed joints fuse to another one: no joint holds it alone.
+    /// A link is fused to another link by fixed joints, so it has no joint of its own.
     #[error("the link {link:?} is fused to {carrier:?} by fixed joints; measure the joint of {carrier:?} instead")]
     FusedLink {
-        /// The link.
+        /// Name of the link.
         link: String,
-        /// The link that moves it.
+        /// Name of the link that moves it.
         carrier: String,
     },
-    /// Two things of a sensor are called alike.
+    /// Two items of a sensor have the same name.
     #[error("there are two {what}s called {name:?}; give each a name of its own")]
     NameTaken {
-        /// What they are.
+        /// Kind of item.
         what: &'static str,
         /// The name.
         name: String,
     },
-    /// History and latency need more memory than can be given.
+    /// History and latency do not fit into memory.
     #[error(
         "{rows} measurements of {width} numbers in {num_envs} environments do not fit into memory; make history_length \
          or latency_steps smaller"
@@ -164,27 +164,27 @@ pub enum SensorError {
         /// Number of environments.
         num_envs: usize,
     },
-    /// Something is wrong with a camera.
+    /// A camera error.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// Something is wrong with one eye of a pair.
+    /// An error of one camera of a stereo camera.
     #[error("the {eye} eye: {error}")]
     Eye {
         /// `left` or `right`.
         eye: &'static str,
-        /// What is wrong with it.
+        /// The error.
         error: Box<SensorError>,
     },
-    /// Something is wrong with a calibration.
+    /// A calibration error.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// Something is wrong with a ray caster.
+    /// A ray caster error.
     #[error(transparent)]
     Ray(#[from] RayError),
 }
 
 impl SensorError {
-    /// What is wrong with an eye of a pair.
+    /// Wraps an error of one camera of a stereo camera.
     pub(crate) fn of_eye(eye: &'static str) -> impl FnOnce(Self) -> Self {
         move |error| Self::Eye { eye, error: Box::new(error) }
     }

@@ -1,11 +1,11 @@
-//! What a sensor expects of a state: that it has what the sensor needs, of the scene that it was built for.
+//! Requirements of a sensor on a state: required fields, and the shapes of the scene that the sensor was built for.
 
 use crate::error::SensorError;
 use crate::sensor::SensorContext;
 use kinetoscope_scene::Requires;
 use kinetoscope_scene::{Lengths, SceneState};
 
-/// What a sensor was built for.
+/// Requirements of a sensor on a state.
 #[derive(Clone, Debug)]
 pub struct Expected {
     sensor: &'static str,
@@ -14,7 +14,7 @@ pub struct Expected {
 }
 
 impl Expected {
-    /// States of the scene of `context` that have what the kind of sensor called `sensor` requires.
+    /// Creates the requirements of the kind of sensor named `sensor`, for states of the scene of `context`.
     pub fn new(sensor: &'static str, requires: Requires, context: &SensorContext) -> Self {
         let lengths = Lengths {
             num_envs: context.num_envs,

@@ -1,4 +1,4 @@
-//! Where frames are, in the world and seen from another frame.
+//! Frame transformer: poses of frames in the world and relative to a source frame.
 
 use crate::error::SensorError;
 use crate::frames::{check_offset, pose, put};
@@ -18,9 +18,9 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameTransformerCfg {
-    /// The body of the source frame: `uid/link`, a link's name alone where only one body is called so, or an object's uid.
+    /// Body of the source frame: `uid/link`, the link alone if only one body has this name, or the uid of an object.
     pub source: String,
-    /// The source frame in that of its body.
+    /// Pose of the source frame in the frame of its body.
     #[serde(default, with = "kinetoscope_scene::file_format::pose")]
     pub source_offset: Pose,
     /// The target frames, in the order they are reported.
@@ -29,33 +29,33 @@ pub struct FrameTransformerCfg {
     /// `target_pos_source`.
     #[serde(default)]
     pub sampling: SamplingCfg,
-    /// Show the axes of source and targets ([`Sensor::markers`]).
+    /// Shows the axes of source and targets ([`Sensor::markers`]).
     #[serde(default)]
     pub debug_vis: bool,
 }
 
-/// One target frame, or one on each of several bodies.
+/// A target frame, or a target frame on each of several bodies.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TargetFrameCfg {
-    /// Pattern of the names of the bodies, full or bare; the body of the source is no exception.
+    /// Name pattern of the bodies, for full names or link names; the source body may be a target too.
     pub bodies: String,
-    /// What the frame is called; the full name of its body where `None`. With several bodies, `name/body`.
+    /// Name of the frame; `None` is the full name of its body. With several bodies, frames are named `name/body`.
     pub name: Option<String>,
-    /// The frame in that of its body.
+    /// Pose of the frame in the frame of its body.
     #[serde(default, with = "kinetoscope_scene::file_format::pose")]
     pub offset: Pose,
 }
 
 impl TargetFrameCfg {
-    /// The frames of the bodies that a pattern matches.
+    /// Creates target frames at the origins of the bodies that a pattern matches.
     pub fn of(bodies: impl Into<String>) -> Self {
         Self { bodies: bodies.into(), name: None, offset: Pose::identity() }
     }
 }
 
 impl FrameTransformerCfg {
-    /// Targets seen from a body.
+    /// Creates a configuration with targets relative to a source body.
     pub fn from(source: impl Into<String>, targets: Vec<TargetFrameCfg>) -> Self {
         let sampling = SamplingCfg::default();
         Self { source: source.into(), source_offset: Pose::identity(), targets, sampling, debug_vis: false }
@@ -70,7 +70,7 @@ struct BodyFrame {
     body_from_frame: Pose,
 }
 
-/// Poses of target frames in the world and in the source frame, in all environments. N environments, M targets.
+/// Poses of target frames in the world and in the source frame, in all environments. Shapes: N environments, M targets.
 #[derive(Clone, Debug)]
 pub struct FrameTransformer {
     source_name: String,
@@ -97,8 +97,8 @@ impl SensorCfg for FrameTransformerCfg {
 
     /// # Errors
     ///
-    /// There is no such body, no target at all, a pattern that matches nothing, an offset that is no pose, two frames of one
-    /// name, and what is wrong with the sampling.
+    /// An unknown source body, no targets, a pattern that matches nothing, two target frames with the same name, an
+    /// offset that is not a pose, or an invalid sampling configuration.
     fn build(&self, context: &SensorContext) -> Result<FrameTransformer, SensorError> {
         let source = context.body(&self.source)?;
         at_least_one(
@@ -145,7 +145,7 @@ impl SensorCfg for FrameTransformerCfg {
     }
 }
 
-/// Writes what the sensor measures in environment `env` to `row`.
+/// Writes the measurement of environment `env` to `row`.
 fn read(source: &BodyFrame, targets: &[BodyFrame], state: &SceneState, env: usize, row: &mut [f64]) {
     let Some(poses) = &state.body_poses else { return };
     let world_from = |frame: &BodyFrame| pose(poses, env, frame.body) * frame.body_from_frame;
@@ -199,7 +199,7 @@ impl Sensor for FrameTransformer {
     }
 }
 
-/// A summary of several lines.
+/// Writes a summary of several lines.
 impl fmt::Display for FrameTransformer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         summary::write_sampled(
@@ -226,8 +226,8 @@ impl Sampled for FrameTransformer {
 }
 
 impl FrameTransformer {
-    /// Names of the target frames, in the order of the axis M: that of the configuration, and within a pattern that of the
-    /// bodies.
+    /// Names of the target frames, in the order of the axis M: the order of the configuration, and within a pattern the
+    /// order of the bodies.
     pub fn target_frame_names(&self) -> &[String] {
         &self.names
     }

@@ -1,12 +1,12 @@
-//! The last measurements of each environment, newest first.
+//! Histories of measurements per environment, newest first.
 
 use ndarray::{Array3, ArrayView1, ArrayView2, ArrayView3, Axis};
 
 /// Rows of values, newest first, per environment.
 ///
-/// All memory is taken at construction. Environments measure at their own times, so each has its own fill; rows of numbers
-/// that are not filled yet are `T::default()`. Older rows are moved up by one at each measurement, so that the whole history
-/// is one plain array view; a ring of indices would save the move (a few hundred bytes) and cost the view.
+/// All memory is allocated at construction. Environments measure at their own times, so each has its own fill level;
+/// rows that are not filled yet are `T::default()`. Each measurement moves older rows by one, so the whole history is
+/// one plain array view. A ring buffer would save the move (a few hundred bytes) but could not be viewed as an array.
 #[derive(Clone, Debug)]
 pub struct History<T> {
     rows: Array3<T>,
@@ -14,16 +14,16 @@ pub struct History<T> {
 }
 
 impl<T: Copy + Default> History<T> {
-    /// Room for `length` rows of `width` numbers in each of `num_envs` environments. A length of 0 remembers nothing.
+    /// Allocates `length` rows of `width` numbers in each of `num_envs` environments. A length of 0 stores nothing.
     pub fn new(num_envs: usize, length: usize, width: usize) -> Self {
         Self::of(num_envs, length, width, T::default())
     }
 
-    /// Adds the newest row of environment `env`; the oldest one falls out where the history is full.
+    /// Adds the newest row of environment `env`; a full history drops its oldest row.
     ///
     /// # Panics
     ///
-    /// If there is no such environment or `row` has not the width of the history.
+    /// If the environment does not exist, or if the length of `row` is not the width of the history.
     #[track_caller]
     pub fn push(&mut self, env: usize, row: &[T]) {
         let (_, length, width) = self.rows.dim();
@@ -37,11 +37,11 @@ impl<T: Copy + Default> History<T> {
         self.filled[env] = length.min(self.filled[env] + 1);
     }
 
-    /// Forgets the rows of environment `env`.
+    /// Clears the rows of environment `env`.
     ///
     /// # Panics
     ///
-    /// If there is no such environment.
+    /// If the environment does not exist.
     #[track_caller]
     pub fn reset(&mut self, env: usize) {
         self.rows.index_axis_mut(Axis(0), env).fill(T::default());
@@ -50,13 +50,13 @@ impl<T: Copy + Default> History<T> {
 }
 
 impl<T: Clone> History<T> {
-    /// Rows as in [`new`](Self::new), filled with `value`.
+    /// Allocates rows as [`new`](Self::new), filled with `value`.
     pub(crate) fn of(num_envs: usize, length: usize, width: usize, value: T) -> Self {
         Self { rows: Array3::from_elem((num_envs, length, width), value), filled: vec![0; num_envs] }
     }
 
-    /// The newest row of environment `env`, to be written: it holds what the row that fell out held. `None` where the history
-    /// has no length.
+    /// Returns the newest row of environment `env` for writing. The row holds the values of the dropped row. `None` for
+    /// a history of length 0.
     #[track_caller]
     pub(crate) fn push_reused(&mut self, env: usize) -> Option<&mut [T]> {
         let (_, length, width) = self.rows.dim();
@@ -66,7 +66,8 @@ impl<T: Clone> History<T> {
         Some(&mut flat[..width])
     }
 
-    /// The row of environment `env` that is `age` measurements old, as a slice; `None` if the history is shorter.
+    /// Returns the row of environment `env` that is `age` measurements old, as a slice; `None` if the history is
+    /// shorter.
     #[track_caller]
     pub(crate) fn slice(&self, env: usize, age: usize) -> Option<&[T]> {
         let (_, length, width) = self.rows.dim();
@@ -74,7 +75,7 @@ impl<T: Clone> History<T> {
         self.rows.as_slice()?.get(first..first + width).filter(|_| age < self.filled[env])
     }
 
-    /// Forgets the rows of environment `env`; their memory is reused by [`push_reused`](Self::push_reused).
+    /// Clears the rows of environment `env`; their memory is reused by [`push_reused`](Self::push_reused).
     #[track_caller]
     pub(crate) fn forget(&mut self, env: usize) {
         self.filled[env] = 0;
@@ -89,33 +90,33 @@ impl<T: Clone> History<T> {
     ///
     /// # Panics
     ///
-    /// If there is no such environment.
+    /// If the environment does not exist.
     #[track_caller]
     pub fn env(&self, env: usize) -> ArrayView2<'_, T> {
         self.rows.index_axis(Axis(0), env).split_at(Axis(0), self.filled[env]).0
     }
 
-    /// The row of environment `env` that is `age` measurements old (0 is the newest); `None` where there is none.
+    /// The row of environment `env` that is `age` measurements old (0 is the newest); `None` if the row is not filled.
     ///
     /// # Panics
     ///
-    /// If there is no such environment.
+    /// If the environment does not exist.
     #[track_caller]
     pub fn row(&self, env: usize, age: usize) -> Option<ArrayView1<'_, T>> {
         (age < self.filled[env]).then(|| self.rows.index_axis(Axis(0), env).index_axis_move(Axis(0), age))
     }
 
-    /// How many rows of environment `env` are filled.
+    /// Number of filled rows of environment `env`.
     ///
     /// # Panics
     ///
-    /// If there is no such environment.
+    /// If the environment does not exist.
     #[track_caller]
     pub fn filled(&self, env: usize) -> usize {
         self.filled[env]
     }
 
-    /// How many rows are kept.
+    /// Number of rows per environment.
     pub fn length(&self) -> usize {
         self.rows.dim().1
     }
@@ -126,7 +127,8 @@ mod tests {
     use super::*;
     use ndarray::array;
 
-    /// Newest first, the oldest falls out; a reset clears one environment; memory stays where it is.
+    /// The newest row comes first and the oldest is dropped. A reset clears one environment. The memory address stays
+    /// the same.
     #[test]
     fn rows() {
         let mut h = History::new(2, 3, 2);

@@ -1,4 +1,4 @@
-//! Inertial measurement units.
+//! Inertial measurement units (IMU).
 
 use crate::error::SensorError;
 use crate::frames::{check_offset, pose, put, vector};
@@ -18,30 +18,32 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImuCfg {
-    /// The body that it is fixed to: `uid/link`, a link's name alone where only one body is called so, or an object's uid.
+    /// Body that the IMU is fixed to: `uid/link`, the link alone if only one body has this name, or the uid of an
+    /// object.
     pub body: String,
-    /// Its frame in that of the body.
+    /// Pose of the IMU in the frame of the body.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub offset: Pose,
-    /// What it reads at rest beside its own acceleration \[m/s²\], in world axes; `None` for minus gravity, as a real one.
+    /// Bias added to the measured acceleration \[m/s²\], in world axes; `None` is minus gravity, as a real IMU measures
+    /// at rest.
     #[serde(with = "kinetoscope_scene::file_format::optional_vector")]
     pub gravity_bias: Option<Vector3<f64>>,
     /// Rate, history, latency and noise; channels that can have noise: `pos_w`, `lin_vel_b`, `ang_vel_b`, `lin_acc_b`,
     /// `ang_acc_b`.
     pub sampling: SamplingCfg,
-    /// Show its frame, and an arrow of what it reads as acceleration, 1 m for 20 m/s² ([`Sensor::markers`]).
+    /// Shows the IMU frame, and an arrow of the measured acceleration, 1 m for 20 m/s² ([`Sensor::markers`]).
     pub debug_vis: bool,
 }
 
 impl ImuCfg {
-    /// At the origin of a body.
+    /// Creates an IMU at the origin of a body.
     pub fn on(body: impl Into<String>) -> Self {
         Self { body: body.into(), ..Self::default() }
     }
 }
 
 impl Default for ImuCfg {
-    /// At the origin of no body yet.
+    /// No offset; the body is still to be set.
     fn default() -> Self {
         let sampling = SamplingCfg::default();
         Self { body: String::new(), offset: Pose::identity(), gravity_bias: None, sampling, debug_vis: false }
@@ -50,9 +52,9 @@ impl Default for ImuCfg {
 
 /// Pose, velocities and accelerations of a frame that is fixed to a body, in all environments.
 ///
-/// All of them are of one instant, [`Sampled::force_stamps`]: the physics engine knows the acceleration of the state before
-/// a step when the step is done. It is the engine's own acceleration, not a difference of velocities, so that neither the
-/// period nor a reset shows in it.
+/// All values refer to one instant, [`Sampled::force_stamps`]: the physics engine solves the acceleration of the state
+/// before a step during that step. The acceleration is the engine's own, not a difference of velocities, so neither the
+/// period nor a reset affects it.
 #[derive(Clone, Debug)]
 pub struct Imu {
     /// Name of the body.
@@ -85,7 +87,7 @@ impl SensorCfg for ImuCfg {
 
     /// # Errors
     ///
-    /// There is no such body, an offset that is no pose, a bias that is not finite, and what is wrong with the sampling.
+    /// An unknown body, an offset that is not a pose, a bias that is not finite, or an invalid sampling configuration.
     fn build(&self, context: &SensorContext) -> Result<Imu, SensorError> {
         let body = context.body(&self.body)?;
         let gravity_bias = self.gravity_bias.unwrap_or(-context.gravity);
@@ -112,7 +114,7 @@ impl SensorCfg for ImuCfg {
 }
 
 impl Mount {
-    /// Writes what the sensor measures in environment `env` to `row`.
+    /// Writes the measurement of environment `env` to `row`.
     fn read(&self, state: &SceneState, env: usize, row: &mut [f64]) {
         let (Some(poses), Some(velocities), Some(accelerations)) =
             (&state.force_poses, &state.force_velocities, &state.body_accelerations)
@@ -124,7 +126,7 @@ impl Mount {
         let arm = world_from_body.rotation * self.body_from_imu.translation.vector;
         let spin = vector(velocities, env, self.body, 3);
         let spin_up = vector(accelerations, env, self.body, 3);
-        // The velocity and the acceleration of another point of the same rigid body.
+        // Velocity and acceleration of another point of the same rigid body.
         let velocity = vector(velocities, env, self.body, 0) + spin.cross(&arm);
         let acceleration =
             vector(accelerations, env, self.body, 0) + spin_up.cross(&arm) + spin.cross(&spin.cross(&arm));
@@ -157,7 +159,7 @@ impl Sensor for Imu {
         Some(self)
     }
 
-    /// Its frame, and an arrow of the acceleration that it reads, 1 m for 20 m/s²: at rest upwards.
+    /// The IMU frame, and an arrow of the measured acceleration, 1 m for 20 m/s²; the arrow points upward at rest.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let (p, q, a) = (self.pos_w(), self.quat_w(), self.lin_acc_b());
         let place = from_row(&std::array::from_fn(|k| if k < 3 { p[(env, k)] } else { q[(env, k - 3)] }));
@@ -167,7 +169,7 @@ impl Sensor for Imu {
     }
 }
 
-/// A summary of several lines.
+/// Writes a summary of several lines.
 impl fmt::Display for Imu {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         summary::write_sampled(f, "Imu", &self.sampler, &[("body", &self.body)])
@@ -181,33 +183,33 @@ impl Sampled for Imu {
 }
 
 impl Imu {
-    /// Position \[m\], shape \[num_envs, 3\].
+    /// Position in the environment \[m\], shape \[num_envs, 3\].
     pub fn pos_w(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("pos_w")
     }
 
-    /// Orientation, w x y z, shape \[num_envs, 4\].
+    /// Orientation in the environment, w x y z, shape \[num_envs, 4\].
     pub fn quat_w(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("quat_w")
     }
 
-    /// Velocity \[m/s\] in the sensor's own axes, shape \[num_envs, 3\].
+    /// Velocity \[m/s\] in the axes of the IMU, shape \[num_envs, 3\].
     pub fn lin_vel_b(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("lin_vel_b")
     }
 
-    /// Angular velocity \[rad/s\] in the sensor's own axes, shape \[num_envs, 3\].
+    /// Angular velocity \[rad/s\] in the axes of the IMU, shape \[num_envs, 3\].
     pub fn ang_vel_b(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("ang_vel_b")
     }
 
-    /// Acceleration with the gravity bias \[m/s²\] in the sensor's own axes, shape \[num_envs, 3\]: 0 in free fall, 9.81
-    /// upwards at rest.
+    /// Acceleration including the gravity bias \[m/s²\] in the axes of the IMU, shape \[num_envs, 3\]. With the default
+    /// bias it is 0 in free fall and 9.81 upward at rest.
     pub fn lin_acc_b(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("lin_acc_b")
     }
 
-    /// Angular acceleration \[rad/s²\] in the sensor's own axes, shape \[num_envs, 3\].
+    /// Angular acceleration \[rad/s²\] in the axes of the IMU, shape \[num_envs, 3\].
     pub fn ang_acc_b(&self) -> ArrayView2<'_, f64> {
         self.sampler.values("ang_acc_b")
     }

@@ -1,7 +1,7 @@
-//! Joint encoders: positions, velocities and efforts of joints.
+//! Joint state sensor: positions, velocities and efforts of joints.
 //!
-//! The model of a sensor in one file: what it is configured by, which channels it has, how it reads one environment, and
-//! names for what can be read of it.
+//! This file is the template of a sensor with a sampler: configuration, channels, reading of one environment, and
+//! accessors.
 
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
@@ -19,15 +19,14 @@ use std::fmt;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct JointStateCfg {
-    /// The joints to measure, by patterns of their names (`uid/joint`, or `joint` alone), in the order they are reported;
-    /// `None` is all of them. They are the movable joints of robots, and of MJCF files those that turn about one axis or
-    /// slide along one.
+    /// Name patterns of the joints to measure (`uid/joint`, or `joint` alone), in the order they are reported; `None`
+    /// measures all. These are the movable joints of robots, and the hinge and slide joints of MJCF files.
     pub joints: Option<Vec<String>>,
     /// Rate, history, latency and noise; the channels are `positions`, `velocities` and `efforts`.
     pub sampling: SamplingCfg,
 }
 
-/// Positions, velocities and efforts of joints in all environments; [`Sampled`] has their stamps and counts.
+/// Positions, velocities and efforts of joints in all environments; [`Sampled`] gives their stamps and counts.
 #[derive(Clone, Debug)]
 pub struct JointState {
     joints: Vec<usize>,
@@ -48,8 +47,8 @@ impl SensorCfg for JointStateCfg {
 
     /// # Errors
     ///
-    /// A pattern that matches nothing or a joint that two match, an empty list of them, and what is wrong with the sampling.
-    /// All joints of a scene without any are none.
+    /// A pattern that matches nothing, a joint that two patterns match, an empty list of patterns, or an invalid
+    /// sampling configuration. `None` in a scene without joints is valid: the sensor then has no columns.
     fn build(&self, context: &SensorContext) -> Result<JointState, SensorError> {
         let joints = select_or_all(self.joints.as_deref(), &context.joints, "joint")?;
         if self.joints.is_some() {
@@ -72,7 +71,7 @@ impl SensorCfg for JointStateCfg {
     }
 }
 
-/// Writes what the sensor measures in environment `env` to `row`.
+/// Writes the measurement of environment `env` to `row`.
 fn read(joints: &[usize], state: &SceneState, env: usize, row: &mut [f64]) {
     let fields = [&state.joint_positions, &state.joint_velocities, &state.joint_efforts];
     read_columns(fields, joints, env, row);
@@ -100,7 +99,7 @@ impl Sensor for JointState {
     }
 }
 
-/// A summary of several lines.
+/// Writes a summary of several lines.
 impl fmt::Display for JointState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         summary::write_sampled(f, "Joint state", &self.sampler, &[("joints", &summary::list(&self.names))])
@@ -118,7 +117,7 @@ impl Sampled for JointState {
 }
 
 impl JointState {
-    /// Columns of the scene's joints, in the order of the sensor's own.
+    /// Indices of the measured joints on the joint axis of [`SceneState`], in the order of the sensor's columns.
     pub fn joints(&self) -> &[usize] {
         &self.joints
     }
@@ -143,7 +142,7 @@ impl JointState {
         self.sampler.values("efforts")
     }
 
-    /// Time at which efforts were captured \[s\], shape \[num_envs\]: see [`SceneState::force_time`].
+    /// Capture times of the efforts \[s\], shape \[num_envs\]: see [`SceneState::force_time`].
     pub fn effort_stamps(&self) -> ArrayView1<'_, f64> {
         self.force_stamps()
     }
@@ -153,7 +152,8 @@ impl JointState {
         self.sampler.history("positions")
     }
 
-    /// Past velocities \[rad/s or m/s\], newest first, shape \[num_envs, history_length, joints\]; 0 where not filled yet.
+    /// Past velocities \[rad/s or m/s\], newest first, shape \[num_envs, history_length, joints\]; 0 where not filled
+    /// yet.
     pub fn velocity_history(&self) -> ArrayView3<'_, f64> {
         self.sampler.history("velocities")
     }

@@ -1,4 +1,4 @@
-//! Six-axis force and torque in joints.
+//! Joint wrench sensor: six-axis force and torque in joints.
 
 use crate::error::SensorError;
 use crate::frames::{pose, put, vector};
@@ -18,32 +18,32 @@ use std::fmt;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct JointWrenchCfg {
-    /// The links whose joints are measured, by patterns of their names (`uid/link`, or `link` alone), in the order they are
-    /// reported. Links that fixed joints fuse to others have no joint that could be measured.
+    /// Name patterns of the links whose joints are measured (`uid/link`, or `link` alone), in the order they are
+    /// reported. Links that fixed joints fuse to others have no joint to measure.
     pub links: Vec<String>,
-    /// Frames to measure in, by patterns of the names of links, reported after `links`: the wrench of the joint that moves
-    /// the named link (where it is fused to another one, that of the other one), about the origin and in the axes of the
-    /// named link. The mount of a real force and torque sensor is such a link.
+    /// Name patterns of links in whose frames to measure, reported after `links`. Each gives the wrench of the joint
+    /// that moves the named link, about the origin and in the axes of the named link. If the link is fused to another
+    /// link, this is the joint of the other link. The mount of a real force-torque sensor is such a link.
     pub frames: Vec<String>,
     /// Rate, history, latency and noise; the channels are `forces` and `torques`.
     pub sampling: SamplingCfg,
-    /// Show arrows of every force, 1 m for 500 N, and of every torque, 1 m for 50 N m, where they are measured
+    /// Shows arrows of every force, 1 m for 500 N, and of every torque, 1 m for 50 N m, at their frames
     /// ([`Sensor::markers`]).
     pub debug_vis: bool,
 }
 
-/// What the joint of each link exerts on it, in all environments: the force and the torque with which its parent holds,
-/// carries and drives it. N environments, B links.
+/// Wrench of the joint of each link, in all environments: the force and the torque that the joint exerts on the link.
+/// Shapes: N environments, B links.
 ///
-/// Both are in the axes of the link, and about its origin: the frame of the joint on the side of the child, as URDF defines
-/// it. For [`JointWrenchCfg::frames`] the same wrench is moved to the origin of the frame and turned into its axes: with the
-/// force `F` and the torque `T` about the origin of the link, and the frame at `p` with the rotation `R` in the link, the
-/// force is `Rᵀ F` and the torque `Rᵀ (T - p x F)`. The whole joint is measured, whatever is on which side of the frame.
+/// Both are in the axes of the link and about its origin: the joint frame on the child side, as URDF defines it. For
+/// [`JointWrenchCfg::frames`], the wrench is moved to the origin of the frame and rotated into its axes. `F` is the
+/// force and `T` the torque about the origin of the link; the frame is at `p` with the rotation `R` in the link. The
+/// force is then `Rᵀ F` and the torque `Rᵀ (T - p x F)`. The whole joint is measured, wherever the frame is.
 ///
-/// The sign is that of what acts **on the link**: a load that hangs from its joint reads a force of its weight, upwards.
-/// Gravity and contacts of the link are not part of it, what they need to be held is; the drive's effort is part of it,
-/// along the axis of the joint. For the root of a fixed robot it is what the world holds the robot with; it is 0 for what
-/// floats freely.
+/// The sign is that of the wrench **on the link**: a load that hangs from its joint reads an upward force of its
+/// weight. Gravity and contacts of the link are not part of the wrench, but the reaction to them is. The effort of the
+/// drive along the joint axis is part of the wrench. For the root of a fixed robot, the wrench is that of the world on
+/// the robot; for a floating base it is 0.
 #[derive(Clone, Debug)]
 pub struct JointWrench {
     measured: Vec<Measured>,
@@ -51,12 +51,12 @@ pub struct JointWrench {
     sampler: Sampler,
 }
 
-/// One wrench.
+/// A measured wrench.
 #[derive(Clone, Copy, Debug)]
 struct Measured {
-    /// The link whose joint is measured.
+    /// Link whose joint is measured.
     link: usize,
-    /// The link whose frame it is measured in, where that is another one.
+    /// Link in whose frame the wrench is expressed, if that is another link.
     frame: Option<usize>,
 }
 
@@ -77,8 +77,8 @@ impl SensorCfg for JointWrenchCfg {
 
     /// # Errors
     ///
-    /// A pattern that matches nothing, neither `links` nor `frames`, a link that is fused to another one (the error names it), and what is wrong with the
-    /// sampling.
+    /// A pattern that matches nothing, an empty selection of `links` and `frames`, a link that is fused to another one
+    /// (the error names it), or an invalid sampling configuration.
     fn build(&self, context: &SensorContext) -> Result<JointWrench, SensorError> {
         let links = select(&self.links, &context.bodies, "link")?;
         for &link in &links {
@@ -110,14 +110,14 @@ impl SensorCfg for JointWrenchCfg {
     }
 }
 
-/// Writes what the sensor measures in environment `env` to `row`.
+/// Writes the measurement of environment `env` to `row`.
 fn read(measured: &[Measured], state: &SceneState, env: usize, row: &mut [f64]) {
     let Some(wrenches) = &state.joint_wrenches else { return };
     let (mut forces, mut torques) = row.split_at_mut(3 * measured.len());
     for Measured { link, frame } in measured {
         let (mut force, mut torque) = (vector(wrenches, env, *link, 0), vector(wrenches, env, *link, 3));
         if let (Some(frame), Some(poses)) = (frame, &state.body_poses) {
-            // Both are on one body: where they are to each other never changes.
+            // Both frames are on one rigid body: their relative pose is constant.
             (force, torque) = moved(&(pose(poses, env, *link).inverse() * pose(poses, env, *frame)), force, torque);
         }
         forces = put(forces, force.as_slice());
@@ -125,7 +125,7 @@ fn read(measured: &[Measured], state: &SceneState, env: usize, row: &mut [f64]) 
     }
 }
 
-/// A force, and a torque about the origin of a link, in a frame of the link.
+/// Expresses a force, and a torque about the origin of a link, in a frame of the link.
 fn moved(link_from_frame: &Pose, force: Vector3<f64>, torque: Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let Pose { translation, rotation } = link_from_frame;
     let torque = torque - translation.vector.cross(&force);
@@ -153,7 +153,7 @@ impl Sensor for JointWrench {
         Some(self)
     }
 
-    /// Arrows of forces (orange, 1 m for 500 N) and torques (violet, 1 m for 50 N m) where they are measured.
+    /// Arrows of forces (orange, 1 m for 500 N) and torques (violet, 1 m for 50 N m) at their frames.
     fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let (forces, torques) = (self.forces(), self.torques());
         let arrows = |(k, measured): (usize, &Measured)| {
@@ -169,7 +169,7 @@ impl Sensor for JointWrench {
     }
 }
 
-/// A summary of several lines.
+/// Writes a summary of several lines.
 impl fmt::Display for JointWrench {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         summary::write_sampled(f, "Joint wrench", &self.sampler, &[("links", &summary::list(&self.names))])
@@ -187,7 +187,7 @@ impl Sampled for JointWrench {
 }
 
 impl JointWrench {
-    /// Names of the links, then of those that are frames, in the order of the axis B.
+    /// Names of the measured links, then of the frame links, in the order of the axis B.
     pub fn link_names(&self) -> &[String] {
         &self.names
     }

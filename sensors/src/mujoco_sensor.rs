@@ -1,4 +1,4 @@
-//! The physics engine's own sensors, as its models declare them: MuJoCo's `<sensor>` elements.
+//! Sensors of the physics engine, declared in its models: MuJoCo's `<sensor>` elements.
 
 use crate::error::SensorError;
 use crate::sampling::{Channel, Sampled, Sampler, SamplingCfg, Stamp};
@@ -18,19 +18,19 @@ use std::ops::Range;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MujocoSensorCfg {
-    /// The sensors to read, by patterns of their names (`uid/sensor`, or `sensor` alone), in the order they are reported;
-    /// `None` is all of them.
+    /// Name patterns of the sensors to read (`uid/sensor`, or `sensor` alone), in the order they are reported; `None`
+    /// reads all.
     pub sensors: Option<Vec<String>>,
-    /// Rate, history, latency and noise; the channel is `values`, which takes noise where no sensor is a quaternion.
+    /// Rate, history, latency and noise of the channel `values`; noise is rejected if a sensor is a quaternion.
     pub sampling: SamplingCfg,
 }
 
-/// Values of MuJoCo's own sensors in all environments: N environments, D values, sensor after sensor.
+/// Values of MuJoCo sensors in all environments. Shapes: N environments, D values, sensor by sensor.
 ///
-/// They are MuJoCo's numbers, bit for bit. Two instants meet in them, as in every state here: sensors of positions and
-/// velocities are of [`Sampled::stamps`], sensors of accelerations and forces ([`EngineSensor::solved`]) of
-/// [`Sampled::force_stamps`], one step earlier. After a reset, and after somebody wrote to the state, both are of the state as
-/// it is.
+/// The values are MuJoCo's numbers, bit for bit. They refer to two instants, as all states do. Sensors of positions and
+/// velocities are captured at [`Sampled::stamps`]. Sensors of accelerations and forces ([`EngineSensor::solved`]) are
+/// captured at [`Sampled::force_stamps`], one step earlier. After a reset or a write to the state, both refer to the
+/// current state.
 #[derive(Clone, Debug)]
 pub struct MujocoSensor {
     sensors: Vec<EngineSensor>,
@@ -52,8 +52,8 @@ impl SensorCfg for MujocoSensorCfg {
 
     /// # Errors
     ///
-    /// A pattern that matches nothing or a sensor that two match, no sensor at all (nor one that there is), and what is wrong with the sampling: noise of quaternions
-    /// too.
+    /// A pattern that matches nothing, a sensor that two patterns match, an empty selection, a scene without MuJoCo
+    /// sensors, or an invalid sampling configuration, such as noise on quaternions.
     fn build(&self, context: &SensorContext) -> Result<MujocoSensor, SensorError> {
         let known: Vec<String> = context.engine_sensors.iter().map(|s| s.name.clone()).collect();
         let chosen = match &self.sensors {
@@ -69,7 +69,7 @@ impl SensorCfg for MujocoSensorCfg {
             width += sensor.width;
         }
         let noisy = !sensors.iter().any(|s| s.quaternion);
-        // All values are one channel: where it has both kinds, it is stamped as the positions.
+        // All values are one channel: a mix of both kinds is stamped as positions.
         let stamp = if sensors.iter().all(|s| s.solved) { Stamp::Force } else { Stamp::State };
         let channels = [Channel { noisy, ..Channel::new("values", width).in_unit(unit(&sensors)).at(stamp) }];
         Ok(MujocoSensor {
@@ -81,7 +81,7 @@ impl SensorCfg for MujocoSensorCfg {
     }
 }
 
-/// The unit that all sensors have, or else the units of all of them, separated by commas; empty for one that is not known.
+/// Returns the common unit of all sensors, or else all units, separated by commas; an unknown unit is empty.
 fn unit(sensors: &[EngineSensor]) -> String {
     let units: Vec<&str> = sensors.iter().map(|s| s.unit.as_deref().unwrap_or_default()).collect();
     match units.as_slice() {
@@ -90,7 +90,7 @@ fn unit(sensors: &[EngineSensor]) -> String {
     }
 }
 
-/// Writes what the sensors measure in environment `env` to `row`.
+/// Writes the measurement of environment `env` to `row`.
 fn read(sensors: &[EngineSensor], state: &SceneState, env: usize, row: &mut [f64]) {
     let Some(values) = &state.sensordata else { return };
     let values = sensors.iter().flat_map(|s| (s.first..s.first + s.width).map(|k| values[(env, k)]));
@@ -119,7 +119,7 @@ impl Sensor for MujocoSensor {
     }
 }
 
-/// A summary of several lines.
+/// Writes a summary of several lines.
 impl fmt::Display for MujocoSensor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         summary::write_sampled(f, "MuJoCo's own sensors", &self.sampler, &[("sensors", &summary::list(&self.names))])
@@ -137,31 +137,31 @@ impl Sampled for MujocoSensor {
 }
 
 impl MujocoSensor {
-    /// The sensors in the order of their columns: name, type, unit, instant.
+    /// The sensors in the order of their columns, with name, type, unit and instant.
     pub fn sensors(&self) -> &[EngineSensor] {
         &self.sensors
     }
 
-    /// Their names, `uid/sensor`.
+    /// Names of the sensors, `uid/sensor`.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// Number of values of each.
+    /// Number of values of each sensor.
     pub fn dims(&self) -> Vec<usize> {
         self.columns.iter().map(ExactSizeIterator::len).collect()
     }
 
-    /// Unit of each; `None` where it depends on what the sensor observes and nobody knows.
+    /// Unit of each sensor; `None` if the unit depends on the observed quantity and is unknown.
     pub fn units(&self) -> Vec<Option<&str>> {
         self.sensors.iter().map(|s| s.unit.as_deref()).collect()
     }
 
-    /// Columns of the sensor called `name`: the full name, or the part behind the first slash.
+    /// Columns of the sensor `name`: the full name, or the part after the first slash.
     ///
     /// # Errors
     ///
-    /// There is no such sensor among those that are read, or there are several; the error lists them.
+    /// A name that matches none or several of the sensors; the error lists candidates.
     pub fn columns(&self, name: &str) -> Result<Range<usize>, SensorError> {
         let bare = |full: &str| full.split_once('/').is_some_and(|(_, rest)| rest == name);
         let exact = self.names.iter().position(|full| full == name);
@@ -189,11 +189,11 @@ impl MujocoSensor {
         self.sampler.values("values")
     }
 
-    /// Values of the sensor called `name`, shape (N, its number of values).
+    /// Values of the sensor `name`, shape (N, number of its values).
     ///
     /// # Errors
     ///
-    /// As [`columns`](Self::columns).
+    /// Same as [`columns`](Self::columns).
     pub fn value(&self, name: &str) -> Result<ArrayView2<'_, f64>, SensorError> {
         let columns = self.columns(name)?;
         let mut values = self.values();
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn mistakes() {
         let wrong = |cfg: MujocoSensorCfg| cfg.build(&context()).unwrap_err().to_string();
-        // Root cause: an empty list was accepted, which gave a sensor of no numbers.
+        // Root cause: an empty list was accepted, which created a sensor without values.
         let nothing =
             "the MuJoCo sensor would measure nothing: sensors: there is no MuJoCo sensor; known are \"a/pos\",";
         assert!(wrong(cfg(&[])).starts_with(nothing), "{}", wrong(cfg(&[])));

@@ -1,4 +1,4 @@
-//! What a real sensor does to a number: noise, a bias that wanders, steps of its converter, and samples that get lost.
+//! Noise model of numeric sensors: white noise, bias with random walk, quantization and dropout.
 
 use crate::error::SensorError;
 use crate::sampling::{Channel, SamplingCfg};
@@ -9,41 +9,42 @@ use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Largest number of a [`NoiseCfg`]: what is made of them stays finite, however long biases wander.
+/// Upper limit of the numbers of a [`NoiseCfg`]: results stay finite, however long biases walk.
 const MAX_NOISE: f64 = 1e100;
 
-/// Errors of the numbers of one channel, each number for itself: `round(value + bias + std * n)`, n normal, from 0 to 1e100
-/// each. A channel of what has bounds, such as distances, saturates there. What is infinite (nothing was hit) stays so.
+/// Noise of the numbers of one channel, independent for each number: `round(value + bias + std * n)`, with n standard
+/// normal. All parameters are 0 to 1e100. A channel with bounds, such as distances, saturates at them. Infinite values
+/// (nothing was hit) stay infinite.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoiseCfg {
-    /// Standard deviation of what each measurement adds, in the unit of the channel.
+    /// Standard deviation of the white noise of each measurement, in the unit of the channel.
     pub std: f64,
-    /// Standard deviation of the bias that is drawn at every reset, in the unit of the channel.
+    /// Standard deviation of the bias, which is sampled at every reset, in the unit of the channel.
     pub bias_std: f64,
-    /// How far the bias wanders: its standard deviation after one second, growing with the square root of time, in the unit
-    /// of the channel per sqrt(s).
+    /// Random walk of the bias: its standard deviation after one second, in the unit of the channel per sqrt(s). It
+    /// grows with the square root of time.
     pub bias_walk: f64,
-    /// Values are rounded to whole multiples of this, in the unit of the channel; 0 for no rounding.
+    /// Quantization step: values are rounded to multiples of this, in the unit of the channel; 0 for no rounding.
     pub resolution: f64,
 }
 
 impl NoiseCfg {
-    /// White noise and nothing else.
+    /// Creates white noise only.
     pub fn white(std: f64) -> Self {
         Self { std, ..Self::default() }
     }
 
-    /// Rounds a value that has its errors already, and holds it between the least and the most that can be measured.
+    /// Rounds a noisy value and clamps it to the measurable range.
     pub(crate) fn settle(&self, value: f64, [least, most]: [f64; 2]) -> f64 {
         let steps = value / self.resolution;
-        // Steps that are finer than the value's own digits round nothing.
+        // A step finer than the precision of the value has no effect.
         let rounded = if self.resolution > 0.0 && steps.is_finite() { steps.round() * self.resolution } else { value };
         rounded.max(least).min(most)
     }
 }
 
-/// Which channels have noise, and whether `dropout` and all their numbers are good.
+/// Checks `dropout` and all noise parameters; returns the channels with noise.
 pub(crate) fn check<'a>(
     dropout: f64,
     noise: impl IntoIterator<Item = (&'a str, &'a NoiseCfg)>,
@@ -72,7 +73,7 @@ pub(crate) fn check<'a>(
     Ok(wanted)
 }
 
-/// The noise of a channel.
+/// Noise of a channel.
 #[derive(Clone, Debug)]
 pub(crate) struct Noisy {
     columns: Range<usize>,
@@ -81,20 +82,20 @@ pub(crate) struct Noisy {
     noise: NoiseCfg,
 }
 
-/// The noise of a sensor in all environments.
+/// Noise of a sensor in all environments.
 #[derive(Clone, Debug)]
 pub(crate) struct Noise {
     channels: Vec<Noisy>,
     dropout: f64,
-    /// Square root of the time between measurements.
+    /// Square root of the time between measurements \[√s\].
     sqrt_period: f64,
-    /// Shape \[num_envs, row\].
+    /// Biases, shape \[num_envs, row\].
     biases: Array2<f64>,
     randoms: Vec<Random>,
 }
 
 impl Noise {
-    /// The noise that `cfg` asks for; `None` where it asks for none.
+    /// Creates the noise that `cfg` describes; `None` without noise and dropout.
     pub(crate) fn new(
         context: &SensorContext,
         cfg: &SamplingCfg,
@@ -116,7 +117,7 @@ impl Noise {
         }))
     }
 
-    /// Draws the biases of environment `env` anew.
+    /// Samples new biases of environment `env`.
     pub(crate) fn reset(&mut self, env: usize) {
         let mut biases = self.biases.index_axis_mut(Axis(0), env);
         for Noisy { columns, noise, .. } in &self.channels {
@@ -126,8 +127,8 @@ impl Noise {
         }
     }
 
-    /// Makes a measurement of the true values of environment `env`; gives whether it arrives. How many numbers are drawn
-    /// does not depend on what they are.
+    /// Applies noise to the true values of environment `env`; returns true if the measurement is delivered. The number
+    /// of random numbers used does not depend on the values.
     pub(crate) fn measure(&mut self, env: usize, row: &mut [f64]) -> bool {
         let mut biases = self.biases.index_axis_mut(Axis(0), env);
         for Noisy { columns, noise, .. } in self.channels.iter().filter(|c| c.noise.bias_walk > 0.0) {
@@ -139,14 +140,14 @@ impl Noise {
         self.dropout == 0.0 || self.randoms[env].uniform() >= self.dropout
     }
 
-    /// Adds the noise of environment `env` to true values; biases stay where they are.
+    /// Adds noise to the true values of environment `env`; biases do not change.
     pub(crate) fn disturb(&mut self, env: usize, row: &mut [f64]) {
         let biases = self.biases.index_axis(Axis(0), env);
         for Noisy { columns, range, noise } in &self.channels {
             for column in columns.clone() {
                 let normal = if noise.std > 0.0 { self.randoms[env].normal() } else { 0.0 };
                 let value = &mut row[column];
-                // Nothing was hit: noise does not make a hit of it, nor a NaN.
+                // Misses have no noise: they must not become hits or NaN.
                 if !value.is_finite() {
                     continue;
                 }
@@ -156,7 +157,7 @@ impl Noise {
     }
 }
 
-/// Columns of the channel called `name`, and its smallest and largest value.
+/// Returns the columns of the channel `name`, and its smallest and largest value.
 fn columns(name: &str, channels: &[Channel]) -> Result<(Range<usize>, [f64; 2]), SensorError> {
     let mut first = 0;
     for channel in channels {

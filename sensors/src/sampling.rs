@@ -1,7 +1,7 @@
-//! What all sensors of numbers have in common: rate, history, latency, lost samples and noise.
+//! Sampling of numeric sensors: rate, history, latency, dropout and noise.
 //!
-//! A sensor says which [`Channel`]s it has and how to read the true values of one environment; the [`Sampler`] does the
-//! rest. [`crate::joint_state`] is the model to follow.
+//! A sensor declares its [`Channel`]s and reads the true values of one environment; the [`Sampler`] does the rest.
+//! [`crate::joint_state`] is the template.
 
 use crate::delay::{self, DelayLine};
 use crate::error::SensorError;
@@ -18,43 +18,43 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// When a sensor measures, what it remembers, and what goes wrong on the way. `Default` is a perfect sensor: every step,
-/// nothing late, lost or noisy.
+/// Rate, history, latency, dropout and noise of a sensor. `Default` is a perfect sensor that measures every step.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SamplingCfg {
     /// Time between measurements \[s\]; 0 is every physics step.
     pub update_period: f64,
-    /// Take the nearest whole number of physics steps where the period is none, instead of an error.
+    /// Rounds a period that is not a whole number of physics steps to the nearest one, instead of returning an error.
     pub round_period: bool,
-    /// Measure when somebody reads, not when it is due: [`SensorCfg::lazy`](crate::SensorCfg::lazy). What is read is the same,
-    /// bit for bit. A sensor with a history, a latency, dropout or noise measures when it is due nevertheless: there, what
-    /// is read follows from all measurements before.
+    /// Measures when the sensor is read, not when it is due: [`SensorCfg::lazy`](crate::SensorCfg::lazy). The values
+    /// are the same, bit for bit. A sensor with a history, a latency, dropout or noise always measures when it is due,
+    /// because its values depend on all measurements before.
     pub lazy: bool,
-    /// Measurements to remember, the newest included.
+    /// Number of measurements in the history, the newest included.
     pub history_length: usize,
-    /// Physics steps from the capture of a measurement until it can be read. It keeps the stamp of its capture. What somebody
-    /// writes to the state of an environment is seen at once there, by every sensor: nothing stale is ever read.
+    /// Latency in physics steps, from the capture of a measurement until it can be read. The measurement keeps the
+    /// stamp of its capture. All sensors see a write to the state of an environment at once: outdated values are never
+    /// read.
     pub latency_steps: u32,
-    /// Probability that a measurement is lost on the way, 0 to 1: the one before stays.
+    /// Probability that a measurement is lost on its way, 0 to 1; the previous measurement stays.
     pub dropout: f64,
-    /// Noise by the name of the channel. The numbers depend on the seed of the simulation, the environment and the name of
-    /// the sensor, and on nothing else.
+    /// Noise by channel name. The random numbers depend only on the seed of the simulation, the environment and the
+    /// name of the sensor.
     pub noise: BTreeMap<String, NoiseCfg>,
 }
 
 impl SamplingCfg {
-    /// A perfect sensor that measures every `period` \[s\].
+    /// Creates the sampling of a perfect sensor that measures every `period` \[s\].
     pub fn every(period: f64) -> Self {
         Self { update_period: period, ..Self::default() }
     }
 
-    /// By which schedule a sensor with this sampling is lazy, with physics steps of `dt` \[s\]: for
-    /// [`SensorCfg::lazy`](crate::SensorCfg::lazy). `None` where it is eager: it is not told to be [`lazy`](Self::lazy), or
-    /// what it measures is not of one instant alone.
+    /// Returns the schedule of a lazy sensor with this sampling, with physics steps of `dt` \[s\]: for
+    /// [`SensorCfg::lazy`](crate::SensorCfg::lazy). `None` for an eager sensor: [`lazy`](Self::lazy) is off, or its
+    /// values depend on more than one instant.
     pub fn lazy_schedule(&self, dt: f64) -> Option<Schedule> {
         let alone = self.history_length == 0 && self.latency_steps == 0 && self.dropout == 0.0 && self.noise.is_empty();
-        // A period that is no good is an error of building the sensor.
+        // An invalid period is reported when the sensor is built.
         (self.lazy && alone).then(|| Schedule::new(self.update_period, dt, self.round_period).ok()).flatten()
     }
 }
@@ -69,37 +69,37 @@ pub enum Stamp {
     Force,
 }
 
-/// Numbers of one kind in a measurement. Recorders take name, unit and instant from here.
+/// One kind of numbers in a measurement. Recorders take name, unit and instant from here.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// What they are called, in [`SamplingCfg::noise`] too.
+    /// Name of the channel, also in [`SamplingCfg::noise`].
     pub name: &'static str,
-    /// How many there are in one environment.
+    /// Count of numbers per environment.
     pub width: usize,
-    /// Unit, such as `m/s` or `rad or m`; empty where the numbers have no unit or the unit is not known. Where the
-    /// [columns](Sampled::columns) differ in their units, the units of all columns, separated by commas.
+    /// Unit, such as `m/s` or `rad or m`; empty if the numbers have no unit or the unit is unknown. If the units of the
+    /// [columns](Sampled::columns) differ, the units of all columns, separated by commas.
     pub unit: Cow<'static, str>,
     /// Instant of capture.
     pub stamp: Stamp,
-    /// Whether noise may be added: not to counts, nor to quaternions, which would no longer have length 1.
+    /// True if noise can be added: false for counts, and for quaternions, whose length must stay 1.
     pub noisy: bool,
-    /// Smallest and largest value that can be measured: with noise, values beyond become these. Infinite for no bound.
+    /// Smallest and largest value that can be measured; noisy values are clamped to them. Infinite for no bound.
     pub range: [f64; 2],
 }
 
 impl Channel {
-    /// `width` numbers without a unit that may have noise, captured with positions and velocities.
+    /// Creates a channel of `width` numbers without a unit that can have noise, captured with positions and velocities.
     pub const fn new(name: &'static str, width: usize) -> Self {
         let range = [f64::NEG_INFINITY, f64::INFINITY];
         Self { name, width, unit: Cow::Borrowed(""), stamp: Stamp::State, noisy: true, range }
     }
 
-    /// `width` numbers that may have noise, and are from `range[0]` to `range[1]` with it too.
+    /// Creates a channel of `width` numbers that can have noise and are clamped to `range`.
     pub fn within(name: &'static str, width: usize, range: [f64; 2]) -> Self {
         Self { range, ..Self::new(name, width) }
     }
 
-    /// `width` numbers without noise.
+    /// Creates a channel of `width` numbers without noise.
     pub fn exact(name: &'static str, width: usize) -> Self {
         Self { noisy: false, ..Self::new(name, width) }
     }
@@ -117,7 +117,7 @@ impl Channel {
     }
 }
 
-/// The measurements of a sensor in all environments: current ones, past ones, and those on their way.
+/// The measurements of a sensor in all environments: current, past and in flight.
 #[derive(Clone, Debug)]
 pub struct Sampler {
     name: Arc<str>,
@@ -129,12 +129,12 @@ pub struct Sampler {
     force_stamps: Array1<f64>,
     /// Both stamps of past measurements.
     stamp_history: History<f64>,
-    /// Both stamps of the measurement that arrived last, with a latency.
+    /// Both stamps of the latest delivered measurement; empty without a latency.
     arrived: History<f64>,
     counts: Array1<u64>,
     noise: Option<Noise>,
     delay: Option<DelayLine<Vec<f64>>>,
-    /// One measurement: two stamps, then the channels.
+    /// Buffer for one measurement: two stamps, then the channels.
     row: Vec<f64>,
 }
 
@@ -144,23 +144,23 @@ struct Quantity {
     channel: Channel,
     now: Array2<f64>,
     history: History<f64>,
-    /// The measurement that arrived last, with a latency; without one, that is what is shown.
+    /// The latest delivered measurement, with a latency; without a latency this is `now`.
     arrived: History<f64>,
 }
 
-/// Stamps stand before the channels of a row.
+/// Number of stamps at the beginning of a row.
 const STAMPS: usize = 2;
 
-/// Most numbers that one sensor may hold: 4 GiB. What is asked for by mistake is far above.
+/// Maximum count of numbers per sensor: 4 GiB. Configurations made by mistake exceed it by far.
 const MAX_NUMBERS: usize = 1 << 29;
 
 impl Sampler {
-    /// A sampler for the kind of sensor called `sensor`, which requires `requires` and measures `channels`.
+    /// Creates a sampler for the kind of sensor named `sensor`, which requires `requires` and measures `channels`.
     ///
     /// # Errors
     ///
-    /// A period that is no whole number of steps; noise of a channel that is not there, or that is negative or not finite; a
-    /// dropout that is no probability; a history or a latency that does not fit into memory.
+    /// A period that is not a whole number of steps; noise of an unknown channel, or noise parameters that are negative
+    /// or not finite; a dropout that is not a probability; a history or a latency that does not fit into memory.
     pub fn new(
         sensor: &'static str,
         requires: Requires,
@@ -209,7 +209,7 @@ impl Sampler {
         &self.name
     }
 
-    /// Checks that a state has what the sensor requires, of the scene that it was built for.
+    /// Checks that a state has the fields that the sensor requires, with the shapes of its scene.
     ///
     /// # Errors
     ///
@@ -227,12 +227,13 @@ impl Sampler {
         self.expected.check_envs(env_ids)
     }
 
-    /// Measures in the environments that are due: `read(env, row)` writes the true values of all channels of one environment,
-    /// one after the other, to `row`, which is zero before. What is on its way and arrives now can be read afterwards.
+    /// Measures in the environments that are due. `read(env, row)` writes the true values of all channels of one
+    /// environment, one after the other, to `row`, which is zero before. Measurements in flight whose latency has
+    /// passed become readable.
     ///
     /// # Errors
     ///
-    /// As [`check`](Self::check); nothing is measured then.
+    /// Same as [`check`](Self::check). Nothing is measured then.
     pub fn update(&mut self, state: &SceneState, mut read: impl FnMut(usize, &mut [f64])) -> Result<(), SensorError> {
         self.check(state)?;
         for env in 0..self.expected.num_envs() {
@@ -246,7 +247,7 @@ impl Sampler {
                     Some(delay) => delay.push(env, step).copy_from_slice(&self.row),
                     None => {
                         self.remember(env);
-                        // Those before that nobody read, where the sensor is lazy.
+                        // A lazy sensor also counts the measurements that were not read.
                         self.counts[env] += fallen_due - 1;
                         self.show(env);
                     }
@@ -263,18 +264,18 @@ impl Sampler {
         Ok(())
     }
 
-    /// True where the next [`update`](Self::update) measures in environment `env`, which is at physics step `step`.
+    /// Returns true if the next [`update`](Self::update) measures in environment `env`, which is at physics step
+    /// `step`.
     #[track_caller]
     pub(crate) fn is_due(&self, env: usize, step: u64) -> bool {
         self.phases.fallen_due_by(env, step) > 0
     }
 
-    /// Starts the environments `env_ids` anew from `state`: see [`Sensor::reset`](crate::Sensor::reset). Biases are drawn
-    /// again.
+    /// Resets the environments `env_ids` to `state`: see [`Sensor::reset`](crate::Sensor::reset). Samples new biases.
     ///
     /// # Errors
     ///
-    /// As [`check`](Self::check), and [`SensorError::IndexOutOfRange`]; nothing is reset then.
+    /// Same as [`check`](Self::check), and [`SensorError::IndexOutOfRange`]. Nothing is reset then.
     pub fn reset(
         &mut self,
         env_ids: &[usize],
@@ -303,12 +304,12 @@ impl Sampler {
     }
 
     /// Refreshes the current values of the environments `env_ids` from `state`, with noise: see
-    /// [`Sensor::refresh`](crate::Sensor::refresh). What is on its way arrives later in history and count, and does not
-    /// replace the fresh values.
+    /// [`Sensor::refresh`](crate::Sensor::refresh). Measurements in flight still enter the history and are counted, but
+    /// do not replace the refreshed values.
     ///
     /// # Errors
     ///
-    /// As [`reset`](Self::reset); nothing is refreshed then.
+    /// Same as [`reset`](Self::reset). Nothing is refreshed then.
     pub fn refresh(
         &mut self,
         env_ids: &[usize],
@@ -326,7 +327,7 @@ impl Sampler {
                 noise.disturb(env, &mut self.row[STAMPS..]);
             }
             self.show(env);
-            // Before the first one arrives, it is what a reset shows.
+            // Before the first measurement is delivered, the values of the reset count as the latest.
             if self.arrived.filled(env) == 0 {
                 self.arrive(env);
             }
@@ -334,7 +335,7 @@ impl Sampler {
         Ok(())
     }
 
-    /// Puts stamps and true values of an environment into the row.
+    /// Writes the stamps and true values of an environment to `row`.
     fn read(&mut self, env: usize, state: &SceneState, read: &mut impl FnMut(usize, &mut [f64])) {
         let (stamps, values) = self.row.split_at_mut(STAMPS);
         stamps.copy_from_slice(&[state.time[env], state.force_time[env]]);
@@ -342,7 +343,7 @@ impl Sampler {
         read(env, values);
     }
 
-    /// Puts the row into the history.
+    /// Adds `row` to the history.
     fn remember(&mut self, env: usize) {
         let (stamps, mut values) = self.row.split_at(STAMPS);
         self.stamp_history.push(env, stamps);
@@ -355,7 +356,7 @@ impl Sampler {
         self.arrive(env);
     }
 
-    /// Makes the row the measurement that arrived last.
+    /// Makes `row` the latest delivered measurement.
     fn arrive(&mut self, env: usize) {
         let (stamps, mut values) = self.row.split_at(STAMPS);
         self.arrived.push(env, stamps);
@@ -366,7 +367,7 @@ impl Sampler {
         }
     }
 
-    /// Makes the row the current values.
+    /// Makes `row` the current values.
     fn show(&mut self, env: usize) {
         (self.stamps[env], self.force_stamps[env]) = (self.row[0], self.row[1]);
         let mut values = &self.row[STAMPS..];
@@ -380,7 +381,7 @@ impl Sampler {
         }
     }
 
-    /// Physics steps until the next measurement of any environment is captured or arrives, at least 1: see
+    /// Physics steps until the next measurement of any environment is captured or delivered, at least 1: see
     /// [`Sensor::due_in`](crate::Sensor::due_in).
     pub fn due_in(&self, step: &[u64]) -> u64 {
         let due = self.phases.due_in(step.iter().copied());
@@ -388,7 +389,7 @@ impl Sampler {
         arrival.map_or(due, |arrival| arrival.min(due))
     }
 
-    /// When it measures.
+    /// Schedule of the measurements.
     pub fn schedule(&self) -> Schedule {
         self.phases.schedule()
     }
@@ -403,17 +404,17 @@ impl Sampler {
         self.expected.num_envs()
     }
 
-    /// Measurements that are remembered at most.
+    /// Maximum number of measurements in the history.
     pub fn history_length(&self) -> usize {
         self.stamp_history.length()
     }
 
-    /// Whether the sampler was built with a channel.
+    /// True if the sampler has a channel of this name.
     pub fn has(&self, channel: &str) -> bool {
         self.channels().any(|known| known.name == channel)
     }
 
-    /// Its channels, in the order of the numbers in a measurement.
+    /// Channels, in the order of the numbers in a measurement.
     pub fn channels(&self) -> impl Iterator<Item = &Channel> {
         self.quantities.iter().map(|quantity| &quantity.channel)
     }
@@ -434,9 +435,9 @@ impl Sampler {
         self.quantity(channel).now.view()
     }
 
-    /// Values of the measurement of a channel that arrived last, shape \[num_envs, width\]; before the first one, those of the
-    /// reset. They are the current [`values`](Self::values), except with a latency after somebody wrote to the state: what
-    /// was on its way then arrives, and does not replace them.
+    /// Values of a channel in the latest delivered measurement, shape \[num_envs, width\]; those of the reset before
+    /// the first one is delivered. They equal the current [`values`](Self::values), except with a latency after a write
+    /// to the state: measurements in flight are then delivered, but do not replace the current values.
     ///
     /// # Panics
     ///
@@ -451,12 +452,12 @@ impl Sampler {
         }
     }
 
-    /// Measurements that arrived since the last reset, environment by environment.
+    /// Number of measurements delivered since the last reset, per environment.
     pub(crate) fn counts(&self) -> ArrayView1<'_, u64> {
         self.counts.view()
     }
 
-    /// Whether measurements arrive later than they are captured.
+    /// Returns true if the sensor has a latency.
     pub(crate) fn is_late(&self) -> bool {
         self.arrived.length() > 0
     }
@@ -516,49 +517,48 @@ fn shaped<D: Dimension>(values: Option<&[f64]>, shape: D) -> ArrayView<'_, f64, 
     }
 }
 
-/// Measurements of a sensor with a [`Sampler`]: their times and counts, and the meaning of their numbers.
+/// Interface of sensors with a [`Sampler`]: times and counts of measurements, and the meaning of their numbers.
 ///
-/// [`Sampler::channels`] has the name, unit and instant of every channel. Recorders and plots need no more than this trait, so
-/// that they treat a sensor of another crate like a built-in one.
+/// [`Sampler::channels`] has the name, unit and instant of every channel. Recorders and plots use only this trait, so
+/// they treat sensors of other crates as built-in ones.
 pub trait Sampled {
     /// The sensor's sampler.
     fn sampler(&self) -> &Sampler;
 
-    /// Names of the bodies, joints or other things that the numbers of each channel belong to, in order. A channel has one or
-    /// more numbers for each of them, one after the other. Empty where they have no names.
+    /// Names of the bodies, joints or other items that the numbers of each channel belong to, in order. A channel has
+    /// one or more numbers for each item, consecutively. Empty if the items have no names.
     fn columns(&self) -> &[String] {
         &[]
     }
 
-    /// Names along the second axis of channels that are matrices: the counterparts of each [column](Self::columns). Empty for
+    /// Names along the second axis of matrix channels: the counterparts of each [column](Self::columns). Empty for
     /// sensors without such channels.
     fn filters(&self) -> &[String] {
         &[]
     }
 
-    /// When it measures.
+    /// Schedule of the measurements.
     fn schedule(&self) -> Schedule {
         self.sampler().schedule()
     }
 
-    /// Time at which the current positions and velocities were captured \[s\], shape \[num_envs\]: see
-    /// [`SceneState::time`].
+    /// Capture times of the current positions and velocities \[s\], shape \[num_envs\]: see [`SceneState::time`].
     fn stamps(&self) -> ArrayView1<'_, f64> {
         self.sampler().stamps.view()
     }
 
-    /// Time at which the current forces, efforts and accelerations were captured \[s\], shape \[num_envs\]: see
+    /// Capture times of the current forces, efforts and accelerations \[s\], shape \[num_envs\]: see
     /// [`SceneState::force_time`].
     fn force_stamps(&self) -> ArrayView1<'_, f64> {
         self.sampler().force_stamps.view()
     }
 
-    /// [`stamps`](Self::stamps) of what [`Sampler::arrived`] gives.
+    /// [`stamps`](Self::stamps) of the measurements of [`Sampler::arrived`].
     fn arrived_stamps(&self) -> ArrayView1<'_, f64> {
         self.sampler().stamps_arrived(0)
     }
 
-    /// [`force_stamps`](Self::force_stamps) of what [`Sampler::arrived`] gives.
+    /// [`force_stamps`](Self::force_stamps) of the measurements of [`Sampler::arrived`].
     fn arrived_force_stamps(&self) -> ArrayView1<'_, f64> {
         self.sampler().stamps_arrived(1)
     }
@@ -573,17 +573,17 @@ pub trait Sampled {
         self.sampler().stamp_history.view().index_axis_move(Axis(2), 1)
     }
 
-    /// Measurements that arrived since the last reset, shape \[num_envs\], those of a lazy sensor that nobody read among
-    /// them; the refresh of a reset is none.
+    /// Number of measurements delivered since the last reset, shape \[num_envs\]. Unread measurements of a lazy sensor
+    /// count; the refresh of a reset does not.
     fn sample_counts(&self) -> ArrayView1<'_, u64> {
         self.sampler().counts()
     }
 
-    /// How many rows of the histories of environment `env` are filled.
+    /// Number of filled rows in the histories of environment `env`.
     ///
     /// # Panics
     ///
-    /// If there is no such environment.
+    /// If the environment does not exist.
     #[track_caller]
     fn history_filled(&self, env: usize) -> usize {
         self.sampler().stamp_history.filled(env)

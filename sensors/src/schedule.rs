@@ -1,11 +1,11 @@
-//! When a sensor measures: a whole number of physics steps, counted in integers.
+//! Schedules of sensors: periods of a whole number of physics steps, counted in integers.
 
 use crate::error::SensorError;
 
-/// How far `update_period / dt` may be from a whole number, relative: decimal seconds are not exact in binary, and
-/// 1/30 s written with ten digits still counts.
+/// Relative tolerance of `update_period / dt` from a whole number. Decimal seconds are not exact in binary, and 1/30 s
+/// written with ten digits is still accepted.
 const TOLERANCE: f64 = 1e-8;
-/// The same, in steps: over 1e5 steps the relative tolerance would let fractions pass.
+/// Absolute tolerance in steps: over 1e5 steps, the relative tolerance would accept fractions.
 const TOLERANCE_STEPS: f64 = 1e-3;
 /// Whole numbers above this are not exact in f64.
 const MAX_STEPS: f64 = 9_007_199_254_740_992.0;
@@ -17,14 +17,15 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// A measurement every `update_period` \[s\], at physics steps of `dt` \[s\]. Period 0 is every step.
+    /// Creates a schedule with a measurement every `update_period` \[s\], at physics steps of `dt` \[s\]. Period 0 is
+    /// every step.
     ///
     /// With `round_period`, a period that is not a whole number of steps becomes the nearest one (at least 1).
     ///
     /// # Errors
     ///
-    /// A step that is not positive; a period that is negative or not finite, or that is not a whole number of steps
-    /// (unless `round_period`).
+    /// A step that is not positive; a period that is negative or not finite; without `round_period`, a period that is
+    /// not a whole number of steps.
     pub fn new(update_period: f64, dt: f64, round_period: bool) -> Result<Self, SensorError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(SensorError::InvalidTimeStep { dt });
@@ -48,13 +49,13 @@ impl Schedule {
         self.period_steps
     }
 
-    /// Counters for `num_envs` environments, all at step 0.
+    /// Creates counters for `num_envs` environments, all at step 0.
     pub fn phases(self, num_envs: usize) -> Phases {
         Phases { schedule: self, envs: vec![Phase { start: 0, seen: 0 }; num_envs] }
     }
 }
 
-/// A [`Schedule`] at work: each environment counts from its own last reset.
+/// Step counters of a [`Schedule`]: each environment counts from its own last reset.
 #[derive(Clone, Debug)]
 pub struct Phases {
     schedule: Schedule,
@@ -65,13 +66,12 @@ pub struct Phases {
 struct Phase {
     /// Step of the environment at which the sensor was reset.
     start: u64,
-    /// Step of the environment at which it was last asked.
+    /// Step of the environment at the last query.
     seen: u64,
 }
 
 impl Phases {
-    /// The step, for [`due_in`](Self::due_in), of an environment that stands still (it was put aside): nothing is due
-    /// there.
+    /// Step that marks a quarantined environment for [`due_in`](Self::due_in): no measurement is due there.
     pub const STANDS: u64 = u64::MAX;
 
     /// The schedule.
@@ -79,26 +79,27 @@ impl Phases {
         self.schedule
     }
 
-    /// Whether environment `env`, which is at physics step `step`, measures now: at whole periods after its reset, not
-    /// at the reset itself, and once per step however often it is asked.
+    /// Returns true if environment `env`, which is at physics step `step`, measures now. Measurements are due at whole
+    /// periods after the reset, not at the reset itself. Repeated calls at the same step return true only once.
     ///
-    /// `step` is [`kinetoscope_scene::SceneState::step`]. An environment that stands still (it was quarantined) measures nothing.
+    /// `step` is [`kinetoscope_scene::SceneState::step`]. A quarantined environment, whose step does not change,
+    /// measures nothing.
     ///
     /// # Panics
     ///
-    /// If there is no such environment, or if steps went backwards without [`reset`](Self::reset).
+    /// If the environment does not exist, or if steps went backwards without [`reset`](Self::reset).
     #[track_caller]
     pub fn is_due(&mut self, env: usize, step: u64) -> bool {
         self.fallen_due(env, step) > 0
     }
 
-    /// How many measurements environment `env`, which is at physics step `step`, has come to since it was last asked: 0
-    /// where [`is_due`](Self::is_due) says no, else 1, or more where it was not asked when the ones before were due (a lazy
-    /// sensor that nobody read).
+    /// Returns the number of measurements of environment `env`, which is at physics step `step`, since the last query.
+    /// The number is 0 if [`is_due`](Self::is_due) would return false, else at least 1. It exceeds 1 if due steps were
+    /// not queried, as for a lazy sensor that was not read.
     ///
     /// # Panics
     ///
-    /// As [`is_due`](Self::is_due).
+    /// Same as [`is_due`](Self::is_due).
     #[track_caller]
     pub fn fallen_due(&mut self, env: usize, step: u64) -> u64 {
         let fallen_due = self.fallen_due_by(env, step);
@@ -106,7 +107,7 @@ impl Phases {
         fallen_due
     }
 
-    /// The number that [`fallen_due`](Self::fallen_due) would return; it counts as not asked.
+    /// Returns the result of [`fallen_due`](Self::fallen_due) without recording a query.
     #[track_caller]
     pub(crate) fn fallen_due_by(&self, env: usize, step: u64) -> u64 {
         let (phase, period) = (&self.envs[env], self.schedule.period_steps);
@@ -116,29 +117,29 @@ impl Phases {
         if run.is_multiple_of(period) { run / period - before } else { 0 }
     }
 
-    /// Steps until the next environment is due, at least 1, when they are at `steps`.
+    /// Returns the steps until the next environment is due, at least 1, with the environments at `steps`.
     pub fn due_in(&self, steps: impl IntoIterator<Item = u64>) -> u64 {
         self.first_of(steps, |wait| wait)
     }
 
-    /// The least of what `of` makes of the steps until each environment is due.
+    /// Returns the minimum over all environments of `of` applied to the steps until the environment is due.
     pub(crate) fn first_of(&self, steps: impl IntoIterator<Item = u64>, of: impl Fn(u64) -> u64) -> u64 {
         let running = steps.into_iter().take(self.envs.len()).enumerate().filter(|(_, step)| *step != Self::STANDS);
         running.map(|(env, step)| of(self.wait(env, step))).min().unwrap_or(self.schedule.period_steps)
     }
 
-    /// Steps until environment `env`, which is at physics step `step`, is due: 1 to a period.
+    /// Returns the steps until environment `env`, which is at physics step `step`, is due: 1 to a period.
     #[track_caller]
     pub(crate) fn wait(&self, env: usize, step: u64) -> u64 {
         let period = self.schedule.period_steps;
         period - step.saturating_sub(self.envs[env].start) % period
     }
 
-    /// Starts environment `env` anew: the next measurement falls one period after `step`.
+    /// Resets environment `env`: the next measurement falls one period after `step`.
     ///
     /// # Panics
     ///
-    /// If there is no such environment.
+    /// If the environment does not exist.
     #[track_caller]
     pub fn reset(&mut self, env: usize, step: u64) {
         self.envs[env] = Phase { start: step, seen: step };
@@ -186,7 +187,7 @@ mod tests {
         }
     }
 
-    /// Counting seconds in f32, as others do, turns intervals of 20 steps into 21 after 3200 steps.
+    /// Counting seconds in f32 turns intervals of 20 steps into 21 after 3200 steps.
     #[test]
     fn million_steps() {
         let mut phases = schedule(0.1, 0.005).phases(1);
@@ -194,7 +195,7 @@ mod tests {
         assert!(due.eq((1..=50_000).map(|k| 20 * k)));
     }
 
-    /// Measurements that were not read are counted, and steps that cannot be due may be left out.
+    /// Measurements that were not read are counted, and steps without a due measurement may be skipped.
     #[test]
     fn skipped_steps() {
         let mut phases = schedule(0.02, 0.005).phases(1);
@@ -205,11 +206,11 @@ mod tests {
         let (mut step, mut due) = (0, [Vec::new(), Vec::new()]);
         while step < 20 {
             step += phases.due_in([step, step.max(3)]);
-            // Environment 1 came late: it is asked from its own step 3 on.
+            // Environment 1 starts late: it is queried from its own step 3 on.
             [0, 1].into_iter().filter(|&env| phases.is_due(env, step)).for_each(|env| due[env].push(step));
         }
         assert_eq!(due, [vec![4, 8, 12, 16, 20], vec![7, 11, 15, 19]]);
-        // An environment that stands still a step before its turn would otherwise make every block one step long.
+        // A quarantined environment one step before its due step would otherwise make every block one step long.
         let phases = schedule(0.1, 0.005).phases(2);
         assert_eq!(phases.due_in([19, 5]), 1, "running, it is due in a step");
         assert_eq!(phases.due_in([Phases::STANDS, 5]), 15);
@@ -234,7 +235,7 @@ mod tests {
             }
         }
         assert_eq!(due, [vec![4, 8, 12], vec![4, 10]]);
-        // A sensor that is reset alone keeps the steps of its environment.
+        // A reset of the sensor alone keeps the steps of the environment.
         phases.reset(0, 13);
         assert!((14..17).all(|step| !phases.is_due(0, step)) && phases.is_due(0, 17));
     }

@@ -1,17 +1,19 @@
-//! Bodies and joints by name patterns.
+//! Selection of bodies, joints and other items by name patterns.
 
 use crate::error::SensorError;
 use kinetoscope_scene::pattern::{MAX_CANDIDATES, Pattern, PatternError, closest, in_every_env};
 use ndarray::Array2;
 
-/// Indices of the names that the patterns match, names in their order within a pattern, patterns one after the other.
+/// Returns the indices of the names that the patterns match, pattern by pattern, in the order of the names within a
+/// pattern.
 ///
-/// A pattern is a regular expression that must match the whole name (see [`kinetoscope_scene::pattern`]): the full one (`uid/link`), or
-/// the part behind the first slash. `{ENV}/` and `{ENV_REGEX_NS}/` before it change nothing. `what` says what the names are, such as `body`.
+/// A pattern is a regular expression (see [`kinetoscope_scene::pattern`]). It must match the whole full name
+/// (`uid/link`), or the whole part after the first slash. The prefixes `{ENV}/` and `{ENV_REGEX_NS}/` are ignored.
+/// `what` is the kind of item for errors, such as `body`.
 ///
 /// # Errors
 ///
-/// A pattern that is no regular expression or matches nothing, and a name that two patterns match.
+/// A pattern that is not a regular expression or matches nothing, and a name that two patterns match.
 pub(crate) fn select<P: AsRef<str>>(
     patterns: &[P],
     names: &[String],
@@ -32,11 +34,11 @@ pub(crate) fn select<P: AsRef<str>>(
     Ok(selected)
 }
 
-/// As [`select`]; all of the names where there are no patterns.
+/// Selects as [`select`]; `None` selects all names.
 ///
 /// # Errors
 ///
-/// As [`select`].
+/// Same as [`select`].
 pub(crate) fn select_or_all(
     patterns: Option<&[String]>,
     names: &[String],
@@ -45,24 +47,24 @@ pub(crate) fn select_or_all(
     patterns.map_or_else(|| Ok((0..names.len()).collect()), |patterns| select(patterns, names, what))
 }
 
-/// Writes what `fields` have of environment `env` in these columns to `row`, one field after the other.
+/// Writes the numbers of `fields` in environment `env` and these columns to `row`, one field after the other.
 pub(crate) fn read_columns(fields: [&Option<Array2<f64>>; 3], columns: &[usize], env: usize, row: &mut [f64]) {
     let numbers =
         fields.into_iter().flatten().flat_map(|field| columns.iter().map(move |&column| field[(env, column)]));
     row.iter_mut().zip(numbers).for_each(|(to, from)| *to = from);
 }
 
-/// A field of a configuration that chooses by names.
+/// A configuration field that selects items by name, for errors.
 #[derive(Clone, Copy)]
 pub(crate) struct Choice {
     /// Kind of sensor.
     pub(crate) sensor: &'static str,
     pub(crate) field: &'static str,
-    /// Kind of thing that the names are of.
+    /// Kind of item.
     pub(crate) what: &'static str,
 }
 
-/// Refuses a choice of nothing, where `count` of `names` were chosen.
+/// Rejects an empty selection; `count` is the number of selected `names`.
 ///
 /// # Errors
 ///
@@ -76,11 +78,11 @@ pub(crate) fn at_least_one(count: usize, choice: Choice, names: &[String]) -> Re
     Err(SensorError::NothingChosen { sensor, field, what, candidates })
 }
 
-/// Indices of the names that one pattern matches, at least one.
+/// Returns the indices of the names that one pattern matches, at least one.
 ///
 /// # Errors
 ///
-/// As [`select`].
+/// Same as [`select`].
 pub(crate) fn matching(pattern: &str, names: &[String], what: &'static str) -> Result<Vec<usize>, SensorError> {
     let pattern = in_every_env(pattern);
     let compiled = Pattern::new(pattern).map_err(|error| SensorError::Pattern(error.to_string()))?;
@@ -98,7 +100,7 @@ pub(crate) fn matching(pattern: &str, names: &[String], what: &'static str) -> R
     Ok(found)
 }
 
-/// The part of a name behind the first slash, where there is one.
+/// Returns the part of a name after the first slash, or the whole name.
 fn bare(name: &str) -> &str {
     name.split_once('/').map_or(name, |(_, rest)| rest)
 }

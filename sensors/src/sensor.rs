@@ -1,4 +1,4 @@
-//! The contract of every sensor.
+//! Traits of sensors and their configurations, and the scene description that sensors are built from.
 
 use crate::error::SensorError;
 use crate::sampling::Sampled;
@@ -13,94 +13,95 @@ use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
 
-/// What a sensor is, before it exists: plain data with public fields and a `Default`.
+/// Configuration of a sensor: plain data with public fields and a `Default`.
 pub trait SensorCfg {
-    /// The sensor that is built from it.
+    /// The sensor built from this configuration.
     type Sensor: Sensor;
 
-    /// What the sensor needs to see. The simulation gathers the union over all sensors, and nothing else.
+    /// Fields of the state that the sensor needs. The simulation gathers the union over all sensors, and nothing else.
     fn requires(&self) -> Requires;
 
-    /// Whether the simulation shows the sensor's [`markers`](Sensor::markers) among its own, until somebody switches that.
-    /// Built-in sensors have a field `debug_vis` for it, off by default as in Isaac Lab; a sensor that has no such field shows
-    /// what it has.
+    /// True if the sensor's [`markers`](Sensor::markers) are shown initially. Built-in sensors have a field `debug_vis`
+    /// for it, off by default as in Isaac Lab. A sensor without such a field shows its markers.
     fn debug_vis(&self) -> bool {
         true
     }
 
-    /// When a lazy sensor is due, with physics steps of `dt` \[s\]; `None` for an eager one, as by default.
+    /// Schedule of a lazy sensor, with physics steps of `dt` \[s\]; `None`, the default, for an eager sensor.
     ///
-    /// An eager sensor measures when it is due. Of a lazy one, the owner keeps what the sensor [requires](Self::requires) of
-    /// the state then (the last time it was due, for each environment), and the sensor measures that when somebody first reads
-    /// it: what is read is the same, and what nobody reads costs no more than the copy. Isaac Lab's lazy sensors measure the
-    /// instant at which they are read; here that changes nothing either. Resets, and writes to the state, are seen at once.
+    /// An eager sensor measures when it is due. For a lazy sensor, the owner stores the fields that the sensor
+    /// [requires](Self::requires) when it is due, keeping the last such state of each environment. The sensor measures
+    /// this stored state at the first read. The values are the same, and unread measurements cost no more than the
+    /// copy. In contrast, lazy sensors of Isaac Lab measure the instant of the read. Resets and writes to the state
+    /// take effect at once.
     ///
-    /// Give a schedule only where a measurement depends on the state at its instant and on nothing before, and where
-    /// [`Sensor::update`] counts right with [`Phases::fallen_due`](crate::Phases::fallen_due), as a
-    /// [`Sampler`](crate::Sampler) does: [`SamplingCfg::lazy_schedule`](crate::SamplingCfg::lazy_schedule) decides that for
-    /// sensors with one. The [`Camera`](crate::camera::Camera) keeps and draws by itself.
+    /// Return a schedule only if a measurement depends on the state at its instant alone. [`Sensor::update`] must also
+    /// count correctly with [`Phases::fallen_due`](crate::Phases::fallen_due), as a [`Sampler`](crate::Sampler) does.
+    /// For sensors with a sampler, [`SamplingCfg::lazy_schedule`](crate::SamplingCfg::lazy_schedule) decides. The
+    /// [`Camera`](crate::camera::Camera) stores and renders its frames itself.
     fn lazy(&self, dt: f64) -> Option<Schedule> {
         let _ = dt;
         None
     }
 
-    /// The sensor, with all its buffers allocated.
+    /// Builds the sensor, with all its buffers allocated.
     ///
     /// # Errors
     ///
-    /// What the user got wrong: a period, an index, a size.
+    /// Invalid configurations: a period, an index, a size.
     fn build(&self, context: &SensorContext) -> Result<Self::Sensor, SensorError>;
 }
 
 /// A sensor of all environments.
 ///
-/// The owner calls [`update`](Self::update) after a physics step at the latest when [`due_in`](Self::due_in) says so (later
-/// for a [lazy](SensorCfg::lazy) sensor); the sensor knows which environments are due. Measurements are read through views borrowed from the sensor, so they cannot
-/// change while somebody reads. The trait is object safe, and `&dyn Sensor` converts to `&dyn Any`, from which the owner
-/// finds the type back.
+/// The owner calls [`update`](Self::update) after a physics step, at the latest when [`due_in`](Self::due_in) has
+/// elapsed (later for a [lazy](SensorCfg::lazy) sensor). The sensor determines which environments are due. Measurements
+/// are read through views that borrow the sensor, so they cannot change while they are read. The trait is object safe,
+/// and `&dyn Sensor` converts to `&dyn Any`, from which the owner recovers the concrete type.
 pub trait Sensor: Any + fmt::Debug + Send + Sync {
-    /// Measures in the environments that are due at `state`, which holds at least what the configuration requires. Each
-    /// environment is at an instant of its own ([`SceneState::step`]).
+    /// Measures in the environments that are due at `state`, which holds at least the required fields. Each environment
+    /// is at its own instant ([`SceneState::step`]).
     ///
     /// # Errors
     ///
-    /// [`SensorError::MissingFields`] or [`SensorError::WrongShape`] where the state does not fit; nothing is measured.
+    /// [`SensorError::MissingFields`] or [`SensorError::WrongShape`] if the state does not fit. Nothing is measured
+    /// then.
     fn update(&mut self, state: &SceneState) -> Result<(), SensorError>;
 
-    /// Starts the environments `env_ids` anew. The current value is refreshed from `state`, taken after the reset, so
-    /// that nothing stale is ever read; this is not a measurement: the history is empty, the first measurement falls one
-    /// period later.
+    /// Resets the environments `env_ids`. The current value is refreshed from `state`, taken after the reset, so
+    /// outdated values are never read. This is not a measurement: the history is empty, and the first measurement falls
+    /// one period later.
     ///
     /// # Errors
     ///
-    /// As [`update`](Self::update), and [`SensorError::IndexOutOfRange`]; nothing is reset then.
+    /// Same as [`update`](Self::update), and [`SensorError::IndexOutOfRange`]. Nothing is reset then.
     fn reset(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
-    /// Refreshes the current value of the environments `env_ids` after somebody wrote to their state, so that nothing
-    /// stale is ever read. This is not a measurement: history and schedule go on as if nothing had happened.
+    /// Refreshes the current value of the environments `env_ids` after a write to their state, so outdated values are
+    /// never read. This is not a measurement: history and schedule continue unchanged.
     ///
     /// # Errors
     ///
-    /// As [`reset`](Self::reset); nothing is refreshed then.
+    /// Same as [`reset`](Self::reset). Nothing is refreshed then.
     fn refresh(&mut self, env_ids: &[usize], state: &SceneState) -> Result<(), SensorError>;
 
-    /// What it shows people of its last measurement in environment `env`: drawn in overviews, never measured. Whether they
-    /// are drawn is [`SensorCfg::debug_vis`]. `pose` tells where a body of the body axis is now, which is where an overview
-    /// draws it.
+    /// Markers that visualize the last measurement in environment `env`: rendered in viewers, never measured. They are
+    /// shown if [`SensorCfg::debug_vis`] says so. `pose` returns the current pose of a body of the body axis, where a
+    /// viewer draws it.
     fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let _ = (env, pose);
         Vec::new()
     }
 
-    /// Physics steps until the next measurement of any environment, at least 1, when the environments are at `step`: the
-    /// owner may leave out updates before. The step of one that stands still (it was put aside) is
+    /// Physics steps until the next measurement of any environment, at least 1, with the environments at `step`. The
+    /// owner may skip updates before. The step of a quarantined environment is
     /// [`Phases::STANDS`](crate::Phases::STANDS).
     fn due_in(&self, step: &[u64]) -> u64 {
         let _ = step;
         1
     }
 
-    /// Its numbers with their channels, for who knows nothing of its type, such as a recorder; `None` for a sensor without a
+    /// Numbers and channels of the sensor for generic users such as recorders; `None` for a sensor without a
     /// [`Sampler`](crate::Sampler).
     fn sampled(&self) -> Option<&dyn Sampled> {
         None
@@ -116,47 +117,46 @@ pub struct SensorContext {
     pub dt: f64,
     /// Gravity \[m/s²\], in world axes.
     pub gravity: Vector3<f64>,
-    /// Name of the sensor: part of the key of its random numbers.
+    /// Name of the sensor, part of the key of its random numbers.
     pub name: Arc<str>,
-    /// Seed of random numbers.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// Index of environment 0 among the environments of all processes: part of the key of random numbers.
+    /// Index of environment 0 among the environments of all processes, part of the key of random numbers.
     pub first_env: usize,
-    /// Names of the bodies in the order of the body axis of [`SceneState`]: `uid/link`, the uid of an object, `uid/body` or
-    /// `uid/site` of an MJCF file.
+    /// Names of the bodies in the order of the body axis of [`SceneState`]: `uid/link`, the uid of an object,
+    /// `uid/body` or `uid/site` of an MJCF file.
     pub bodies: Arc<[String]>,
-    /// For every body, the body that moves it: itself where it moves by a joint of its own or not at all, else the one that
-    /// fixed joints fuse it to. As long as `bodies`, or empty where nobody knows.
+    /// For every body, the index of the body that moves it. This is the body itself if it has its own joint or cannot
+    /// move, else the body that fixed joints fuse it to. As long as `bodies`, or empty if unknown.
     pub carriers: Arc<[usize]>,
     /// Names of the joints in the order of the joint axis of [`SceneState`]: `uid/joint`.
     pub joints: Arc<[String]>,
-    /// Names of the actuators in the order of the actuator axis of [`SceneState`]: `uid/joint` for the drive of a robot's
-    /// joint, `uid/actuator` for those of an MJCF file.
+    /// Names of the actuators in the order of the actuator axis of [`SceneState`]: `uid/joint` for the drive of a robot
+    /// joint, `uid/actuator` for an actuator of an MJCF file.
     pub actuators: Arc<[String]>,
     /// The physics engine's own sensors, in the order of their values in [`SceneState::sensordata`].
     pub engine_sensors: Arc<[EngineSensor]>,
-    /// What can be seen; there for sensors that require [`Requires::VISIBLE`] or [`Requires::INSTANCES`].
+    /// Scene of the visual geometry; present for sensors that require [`Requires::VISIBLE`] or [`Requires::INSTANCES`].
     pub scene: Option<Arc<RenderScene>>,
-    /// What environments see whose looks are their own, where there are any; there for the same sensors.
+    /// Scenes of environments that differ from `scene`; present for the same sensors.
     pub own_scenes: Vec<OwnScene>,
-    /// Whether the sensor was there before and is built again for a scene that has changed: what it could only be refused for
-    /// when it was added is no error then.
+    /// True if an existing sensor is rebuilt after a scene change; checks made only at creation are skipped.
     pub rebuilt: bool,
-    /// What ray casters have built for the assets of the scene, shared by all of them.
+    /// BVHs and other ray-casting data of the assets of the scene, shared by all ray casters.
     pub ray_assets: RayAssets,
-    /// How many threads a sensor may use; 0 counts as 1.
+    /// Number of threads that a sensor may use; 0 counts as 1.
     pub threads: usize,
-    /// The threads that sensors share.
+    /// Thread pool shared by all sensors.
     pub pool: ThreadPool,
 }
 
 impl SensorContext {
-    /// Index of a body on the body axis, by its full name (`uid/link`), or by the part behind the first slash where only
-    /// one body is called so. `{ENV}/` and `{ENV_REGEX_NS}/` before it change nothing.
+    /// Returns the index of a body on the body axis. `name` is the full name (`uid/link`), or the part after the first
+    /// slash if only one body has it. The prefixes `{ENV}/` and `{ENV_REGEX_NS}/` are ignored.
     ///
     /// # Errors
     ///
-    /// [`SensorError::UnknownName`] with the nearest names, [`SensorError::AmbiguousName`] with those that it may mean.
+    /// [`SensorError::UnknownName`] with the nearest names, [`SensorError::AmbiguousName`] with all matching names.
     pub fn body(&self, name: &str) -> Result<usize, SensorError> {
         let name = in_every_env(name);
         if let Some(index) = self.bodies.iter().position(|b| b == name) {
@@ -180,7 +180,7 @@ impl SensorContext {
     }
 }
 
-/// The bodies whose bare or full name is most like `name`, the nearest first.
+/// Returns the bodies whose full or short name is most similar to `name`, nearest first.
 fn nearest_bodies(name: &str, bodies: &[String]) -> Vec<String> {
     let bare: Vec<&str> = bodies.iter().map(|b| b.split_once('/').map_or(b.as_str(), |(_, link)| link)).collect();
     let wanted = if name.contains('/') { bodies.iter().map(String::as_str).collect() } else { bare.clone() };
@@ -195,20 +195,20 @@ fn nearest_bodies(name: &str, bodies: &[String]) -> Vec<String> {
 /// A sensor that the physics engine evaluates itself.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EngineSensor {
-    /// `uid/sensor`.
+    /// Full name, `uid/sensor`.
     pub name: String,
-    /// The engine's word for its type.
+    /// Type name of the engine.
     pub kind: Arc<str>,
-    /// Unit of its values; `None` where nobody knows.
+    /// Unit of the values; `None` if unknown.
     pub unit: Option<Arc<str>>,
-    /// Its first value in [`SceneState::sensordata`].
+    /// Index of the first value in [`SceneState::sensordata`].
     pub first: usize,
-    /// Number of its values.
+    /// Number of values.
     pub width: usize,
-    /// Whether it measures what the engine solves for (accelerations, forces), at [`SceneState::force_time`]; else it measures
-    /// positions and velocities, at [`SceneState::time`].
+    /// True for quantities that the engine solves for (accelerations, forces), captured at [`SceneState::force_time`].
+    /// False for positions and velocities, captured at [`SceneState::time`].
     pub solved: bool,
-    /// Whether its values are a quaternion, w x y z.
+    /// True if the values are a quaternion, w x y z.
     pub quaternion: bool,
 }
 

@@ -1,4 +1,4 @@
-//! The place of a sensor with its owner: measures when it is due, or when it is read.
+//! Owner of a sensor: measures when the sensor is due, or when it is read.
 
 use crate::cached::Cached;
 use crate::error::SensorError;
@@ -7,24 +7,24 @@ use crate::sensor::Sensor;
 use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
 
-/// A sensor, eager or [lazy](crate::SensorCfg::lazy), as an owner keeps it: everything that happens is told to the slot, and
-/// the sensor is read through it.
+/// An eager or [lazy](crate::SensorCfg::lazy) sensor in its owner. The owner forwards all updates, resets and refreshes
+/// to the slot, and reads the sensor through it.
 ///
-/// A sensor that fails is not asked any more; reading says why.
+/// After an error, the sensor is not called any more; reading returns the error.
 #[derive(Debug)]
 pub struct SensorSlot {
     requires: Requires,
-    /// When it is due, where it is lazy.
+    /// Step counters of a lazy sensor.
     phases: Option<Phases>,
-    /// What there is to measure for a lazy sensor, when each environment was last due, reset or written to.
+    /// Stored state of a lazy sensor: each environment as of its last due step, reset or write.
     kept: Option<SceneState>,
-    /// Environments that are due, between updates without meaning: its memory is kept.
+    /// Environments that are due. Only used within an update, kept for its memory.
     due: Vec<bool>,
-    /// The sensor, outdated while it has something to measure: `kept`. Empty where measuring panicked.
+    /// The sensor, outdated while the stored state is not measured yet. Empty after a panic during a measurement.
     sensor: Cached<Holder>,
 }
 
-/// A sensor, and why it is not asked any more.
+/// A sensor, and the error after which it is not called any more.
 #[derive(Debug)]
 struct Holder {
     sensor: Box<dyn Sensor>,
@@ -32,7 +32,7 @@ struct Holder {
 }
 
 impl Holder {
-    /// Asks the sensor for something, unless it failed before.
+    /// Calls the sensor, unless it failed before.
     fn ask(&mut self, act: impl FnOnce(&mut dyn Sensor) -> Result<(), SensorError>) {
         if self.fault.is_none() {
             self.fault = act(self.sensor.as_mut()).err();
@@ -41,8 +41,8 @@ impl Holder {
 }
 
 impl SensorSlot {
-    /// A place for a sensor of `num_envs` environments that was built from a configuration which requires `requires`, and is
-    /// lazy by `lazy`. It is to be reset before anything else.
+    /// Creates a slot for a sensor of `num_envs` environments. `requires` are the requirements of its configuration,
+    /// and `lazy` its schedule if it is lazy. The slot must be reset before any other call.
     pub fn new(sensor: Box<dyn Sensor>, requires: Requires, lazy: Option<Schedule>, num_envs: usize) -> Self {
         let holder = Holder { sensor, fault: None };
         Self {
@@ -54,12 +54,12 @@ impl SensorSlot {
         }
     }
 
-    /// Whether it measures when it is read.
+    /// True if the sensor measures when it is read.
     pub fn is_lazy(&self) -> bool {
         self.phases.is_some()
     }
 
-    /// As [`Sensor::update`]: measures, or keeps what there is to measure.
+    /// Forwards [`Sensor::update`]: measures, or stores the state to measure.
     pub fn update(&mut self, state: &SceneState) {
         if self.keep(state) {
             return self.wait();
@@ -69,10 +69,10 @@ impl SensorSlot {
         }
     }
 
-    /// Keeps the environments that are due, where the sensor is lazy; `false` where it is to measure at once.
+    /// Stores the environments that are due if the sensor is lazy; returns false if it must measure at once.
     fn keep(&mut self, state: &SceneState) -> bool {
         let (Some(phases), Some(kept)) = (&mut self.phases, &mut self.kept) else { return false };
-        // A state of another scene: the sensor will say so.
+        // The sensor reports a state of another scene as an error.
         if state.num_envs() != self.due.len() {
             return false;
         }
@@ -82,14 +82,14 @@ impl SensorSlot {
         kept.take_over(state, &self.due)
     }
 
-    /// From now on the sensor has something to measure, unless it failed.
+    /// Marks the sensor as outdated if an environment is due, unless the sensor failed.
     fn wait(&mut self) {
         if self.due.contains(&true) && !self.has_failed() {
             self.sensor.invalidate();
         }
     }
 
-    /// As [`Sensor::reset`], at once. What the environments had to measure is gone.
+    /// Forwards [`Sensor::reset`] at once. Stored states of these environments are dropped.
     pub fn reset(&mut self, env_ids: &[usize], state: &SceneState) {
         if let Some(holder) = self.sensor.value_mut() {
             holder.ask(|sensor| sensor.reset(env_ids, state));
@@ -104,7 +104,7 @@ impl SensorSlot {
         self.keep_written(env_ids, state);
     }
 
-    /// As [`Sensor::refresh`], at once, after what there was to measure was measured.
+    /// Forwards [`Sensor::refresh`] at once, after measuring the stored state.
     pub fn refresh(&mut self, env_ids: &[usize], state: &SceneState) {
         if let Some(holder) = self.now() {
             holder.ask(|sensor| sensor.refresh(env_ids, state));
@@ -112,7 +112,7 @@ impl SensorSlot {
         self.keep_written(env_ids, state);
     }
 
-    /// Keeps environments that were reset or written to: what was before is never measured again.
+    /// Stores environments that were reset or written to; their earlier states are never measured.
     fn keep_written(&mut self, env_ids: &[usize], state: &SceneState) {
         if self.phases.is_none() {
             return;
@@ -129,7 +129,7 @@ impl SensorSlot {
         }
     }
 
-    /// As [`Sensor::due_in`].
+    /// Forwards [`Sensor::due_in`].
     pub fn due_in(&self, step: &[u64]) -> u64 {
         match &self.phases {
             Some(phases) => phases.due_in(step.iter().copied()),
@@ -137,7 +137,7 @@ impl SensorSlot {
         }
     }
 
-    /// Whether it failed, as far as that is known: one that has something to measure may yet fail.
+    /// True if the sensor is known to have failed; a stored state that is not measured yet may still fail.
     pub fn has_failed(&self) -> bool {
         match self.sensor.get() {
             Some(holder) => holder.fault.is_some(),
@@ -145,13 +145,14 @@ impl SensorSlot {
         }
     }
 
-    /// The sensor, to read: measures what there is to measure.
+    /// The sensor, for reading; measures the stored state first.
     ///
     /// # Errors
     ///
-    /// Why it failed. A panic of the sensor goes on to who reads first; after that it has failed.
+    /// The error of the sensor. A panic of the sensor reaches the first reader; after that, the sensor counts as
+    /// failed.
     pub fn sensor(&self) -> Result<&dyn Sensor, &SensorError> {
-        // One that panics is lost: its state is not known any more.
+        // A sensor that panicked is lost: its state is unknown.
         let lost = || Err(&SensorError::BrokenOff);
         let holder = self.sensor.get_or_update(lost, |holder| {
             if let Some(kept) = &self.kept {
@@ -165,11 +166,11 @@ impl SensorSlot {
         }
     }
 
-    /// The sensor, to change: measures first what there is to measure.
+    /// The sensor, for changes; measures the stored state first.
     ///
     /// # Errors
     ///
-    /// As [`sensor`](Self::sensor).
+    /// Same as [`sensor`](Self::sensor).
     pub fn sensor_mut(&mut self) -> Result<&mut dyn Sensor, &SensorError> {
         match self.now() {
             Some(Holder { fault: None, sensor }) => Ok(sensor.as_mut()),
@@ -178,9 +179,9 @@ impl SensorSlot {
         }
     }
 
-    /// The sensor with nothing to measure.
+    /// Returns the sensor after measuring the stored state.
     fn now(&mut self) -> Option<&mut Holder> {
-        // Its fault is returned by the next read.
+        // An error is returned by the next read.
         let _ = self.sensor();
         self.sensor.value_mut()
     }

@@ -4,7 +4,7 @@ use crate::sampling::Sampler;
 use crate::sensor::SensorContext;
 use std::fmt;
 
-/// Properties of a sensor: labels and values.
+/// Labels and values of the properties of a sensor.
 type Lines<'a> = [(&'a str, &'a dyn fmt::Display)];
 
 /// Writes `title @ "path":` and the properties.
@@ -13,7 +13,7 @@ pub(crate) fn write(f: &mut fmt::Formatter<'_>, title: &str, path: &str, lines: 
     lines.iter().try_for_each(|(label, value)| write!(f, "\n\t{label:<21}: {value}"))
 }
 
-/// Writes the summary of a sensor that has a sampler; its path is its name.
+/// Writes the summary of a sensor with a sampler; its path is its name.
 pub(crate) fn write_sampled(
     f: &mut fmt::Formatter<'_>,
     title: &str,
@@ -29,7 +29,7 @@ pub(crate) fn write_sampled(
     write(f, title, sampler.name(), &lines)
 }
 
-/// Path of a sensor: `uid/link/name` on a body, its name without one.
+/// Returns the path of a sensor: `uid/link/name` on a body, else its name.
 pub(crate) fn path(context: &SensorContext, parent: Option<usize>) -> String {
     match parent.and_then(|body| context.bodies.get(body)) {
         Some(body) => format!("{body}/{}", context.name),
@@ -37,7 +37,7 @@ pub(crate) fn path(context: &SensorContext, parent: Option<usize>) -> String {
     }
 }
 
-/// Names, separated by commas; `none` for an empty list.
+/// Joins names with commas; `none` for an empty list.
 pub(crate) fn list(names: &[String]) -> String {
     if names.is_empty() { "none".into() } else { names.join(", ") }
 }

@@ -1,20 +1,20 @@
-//! One method for each channel of a camera: `camera.depth()` is `camera.channel::<Depth>()`.
+//! Accessor methods of the camera channels: `camera.depth()` is `camera.channel::<Depth>()`.
 
 use super::sensor::Camera;
 use crate::error::SensorError;
 use kinetoscope_render::frame::{self, PictureView};
 
-/// Declares the methods.
+/// Declares one accessor method per channel.
 macro_rules! accessors {
     ($($(#[$doc:meta])* $name:ident :: $Channel:ident,)*) => {
         impl Camera {
             $($(#[$doc])*
             ///
-            /// The first axis is the camera's environments. Draws what was captured since the last reading.
+            /// The first axis is the environments of the camera. Renders the frames captured since the last read.
             ///
             /// # Errors
             ///
-            /// As [`channel`](Self::channel).
+            /// Same as [`channel`](Self::channel).
             pub fn $name(&self) -> Result<PictureView<'_, frame::$Channel>, SensorError> {
                 self.channel::<frame::$Channel>()
             })*

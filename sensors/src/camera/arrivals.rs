@@ -1,7 +1,8 @@
-//! Frames of a camera as they arrive: the latest, shown or not, and the history.
+//! Delivered frames of a camera: the latest one, shown or not, and the frame history.
 //!
-//! After a write to the state, a camera shows what there is then. Frames that were on their way arrive later, are counted, and
-//! are not shown: they are older. A reader of every frame, such as a recorder, gets them by [`Camera::arrived`].
+//! After a write to the state, a camera shows the state as written. Frames in flight at that time are still delivered
+//! later. They are counted but not shown, because they are older. A reader of every frame, such as a recorder, uses
+//! [`Camera::arrived`].
 
 use super::cfg::CameraCfg;
 use super::error::CameraError;
@@ -17,20 +18,20 @@ use kinetoscope_scene::pose::to_row;
 use ndarray::{Array1, Array2, Array3, ArrayView, ArrayView2, Axis, Dimension};
 use std::ops::Range;
 
-/// Past pictures of one channel, shape (views, history, height, width) or (views, history, height, width, components).
+/// Past images of one channel, shape (views, history, height, width) or (views, history, height, width, components).
 pub type HistoryView<'a, C> = ArrayView<'a, <C as Channel>::Number, <<C as Channel>::Layout as Dimension>::Larger>;
 
-/// Images of the history: those of each row one after the other, newest first.
+/// Images of the frame history, row by row, newest first within a row.
 #[derive(Debug)]
 pub(super) struct PastImages {
     images: DrawnImages,
     length: usize,
-    /// Frames of each row that arrived since the images were drawn.
+    /// Number of frames of each row delivered since the images were rendered.
     new: Vec<usize>,
 }
 
 impl PastImages {
-    /// Images of histories in which `filled` frames of each row are filled, none of them drawn.
+    /// Creates the history images. The first `filled(row)` images of each row are outdated, the others are zero.
     pub(super) fn new(cfg: &CameraCfg, rows: usize, filled: impl Fn(usize) -> usize) -> Self {
         let length = cfg.history_length;
         let mut images = DrawnImages::new(cfg, rows * length);
@@ -42,7 +43,7 @@ impl PastImages {
         row * self.length..(row + 1) * self.length
     }
 
-    /// Moves images up that are older than those that arrived since.
+    /// Shifts the images of each row to make room for the frames delivered since.
     fn move_up(&mut self) {
         for row in 0..self.new.len() {
             let by = std::mem::take(&mut self.new[row]);
@@ -52,8 +53,9 @@ impl PastImages {
 }
 
 impl Camera {
-    /// Time of the instant that the pictures show which arrived last \[s\], shape (N): as [`stamps`](Self::stamps), except with a
-    /// latency after a write to the state or a move of the camera. Before the first one arrives, that of the reset.
+    /// Capture times of the latest delivered frames \[s\], shape (N). Equal to [`stamps`](Self::stamps), except with a
+    /// latency after a write to the state or a move of the camera. Before the first frame is delivered, the time of the
+    /// reset.
     pub fn arrived_stamps(&self) -> Array1<f64> {
         let shown = self.stamps();
         Array1::from_shape_fn(shown.len(), |row| match self.frames.unseen(row) {
@@ -62,7 +64,7 @@ impl Camera {
         })
     }
 
-    /// Poses at that instant, as [`pose_w`](Self::pose_w).
+    /// Camera poses at the capture of the latest delivered frames, in the layout of [`pose_w`](Self::pose_w).
     pub fn arrived_pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         let mut poses = self.pose_w(convention);
         for (row, mut pose) in poses.rows_mut().into_iter().enumerate() {
@@ -75,7 +77,8 @@ impl Camera {
         poses
     }
 
-    /// Intrinsic matrices of these pictures, as [`intrinsic_matrices`](Self::intrinsic_matrices).
+    /// Intrinsic matrices of the latest delivered frames, in the layout of
+    /// [`intrinsic_matrices`](Self::intrinsic_matrices).
     pub fn arrived_intrinsic_matrices(&self) -> Array3<f64> {
         let shown = self.intrinsic_matrices();
         Array3::from_shape_fn(shown.raw_dim(), |(row, i, j)| match self.frames.unseen(row) {
@@ -84,19 +87,19 @@ impl Camera {
         })
     }
 
-    /// The pictures of one channel that arrived last, in the shape of [`channel`](Self::channel). Those that are not shown are drawn
-    /// when they are read, with the noise that they would have been shown with.
+    /// Latest delivered images of one channel, in the shape of [`channel`](Self::channel). Images that are not shown
+    /// are rendered on read, with the same noise as if they had been shown.
     ///
     /// # Errors
     ///
-    /// As [`channel`](Self::channel).
+    /// Same as [`channel`](Self::channel).
     pub fn arrived<C: Listed>(&self) -> Result<PictureView<'_, C>, SensorError> {
         let rows = self.env_ids().len();
         if (0..rows).all(|row| self.frames.unseen(row).is_none()) {
             return self.channel::<C>();
         }
         self.must_have::<C>()?;
-        // Of what is shown only some rows may be wanted, and drawing it is what the reader would have done anyway.
+        // All shown rows are rendered, although some may not be needed: the caller usually reads them anyway.
         let shown = self.pictures()?;
         let make = || {
             let mut images = DrawnImages::new(&self.cfg, rows);
@@ -109,12 +112,12 @@ impl Camera {
         images.pictures()?.get::<C>().ok_or_else(|| self.channel_off::<C>().into())
     }
 
-    /// Pictures that are remembered at most: [`CameraCfg::history_length`](super::CameraCfg::history_length).
+    /// Maximum number of frames in the history: [`CameraCfg::history_length`](super::CameraCfg::history_length).
     pub fn history_length(&self) -> usize {
         self.cfg.history_length
     }
 
-    /// How many pictures of the history of environment `env` are there.
+    /// Number of frames in the history of environment `env`.
     ///
     /// # Errors
     ///
@@ -123,20 +126,20 @@ impl Camera {
         Ok(self.frames.stamp_history().filled(self.row(env)?))
     }
 
-    /// Times of past pictures \[s\], newest first, shape (N, history_length); 0 before the first ones.
+    /// Capture times of past frames \[s\], newest first, shape (N, history_length); 0 for entries not filled yet.
     pub fn stamp_history(&self) -> ArrayView2<'_, f64> {
         self.frames.stamp_history().view().index_axis_move(Axis(2), 0)
     }
 
-    /// The last pictures that arrived, of one channel, newest first: `camera.history::<Depth>()?`, shape
-    /// (N, history_length, H, W) or (N, history_length, H, W, components); zeros before the first ones. Draws those that
-    /// were not read before.
+    /// Past images of one channel, newest first: `camera.history::<Depth>()?`. The shape is (N, history_length, H, W)
+    /// or (N, history_length, H, W, components); entries not filled yet are zero. Renders the images that were not read
+    /// before.
     ///
-    /// The newest is what [`channel`](Self::channel) shows, until the state is written to or the camera moves.
+    /// The newest image equals that of [`channel`](Self::channel) until the state is written to or the camera moves.
     ///
     /// # Errors
     ///
-    /// [`CameraError::ChannelOff`], and [`CameraError::Draw`] as long as a picture that cannot be drawn is in the history.
+    /// [`CameraError::ChannelOff`], and [`CameraError::Draw`] while the history holds a frame that cannot be rendered.
     pub fn history<C: Listed>(&self) -> Result<HistoryView<'_, C>, SensorError> {
         self.must_have::<C>()?;
         let (rows, length, (height, width)) = (self.env_ids().len(), self.history_length(), self.image_shape());
@@ -151,7 +154,7 @@ impl Camera {
         ArrayView::from_shape(shape, pictures.to_slice().unwrap_or_default()).map_err(|_| off().into())
     }
 
-    /// Draws the history, if there is one.
+    /// Renders the history if the camera has one.
     pub(super) fn draw_history(&self) {
         if self.history_length() > 0 {
             // Errors are returned by the next read.
@@ -159,7 +162,7 @@ impl Camera {
         }
     }
 
-    /// The images of the history, with all that has arrived.
+    /// Returns the history images, updated with all delivered frames.
     fn past_images(&self) -> Result<&PastImages, CameraError> {
         let (rows, length) = (self.env_ids().len(), self.history_length());
         let filled = |row: usize| self.frames.stamp_history().filled(row);
@@ -167,7 +170,7 @@ impl Camera {
             || Ok(PastImages::new(&self.cfg, rows, filled)),
             |past| {
                 past.move_up();
-                // A shown image is drawn once.
+                // Images that are also shown are copied instead of rendered again.
                 let is_shown = |row: &usize| self.frames.shows_latest(*row);
                 let wants_shown = length > 0 && (0..rows).any(|row| is_shown(&row));
                 let shown = if wants_shown { self.pictures().ok() } else { None };
@@ -183,7 +186,7 @@ impl Camera {
         )
     }
 
-    /// Notes that frames of a row have arrived.
+    /// Records that `count` frames of a row were delivered.
     pub(super) fn note_arrivals(&mut self, row: usize, count: u64) {
         if count == 0 {
             return;
@@ -195,7 +198,7 @@ impl Camera {
         }
     }
 
-    /// Makes zeros of the images of the history of a row.
+    /// Clears the history images of a row to zero.
     pub(super) fn forget_past_images(&mut self, row: usize) {
         self.past_images.invalidate();
         if let Some(past) = self.past_images.value_mut() {

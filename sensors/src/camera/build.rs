@@ -1,4 +1,4 @@
-//! Makes cameras of their configurations, and refuses those that cannot be.
+//! Construction of cameras from their configurations, with validation.
 
 use super::arrivals::PastImages;
 use super::cfg::CameraCfg;
@@ -32,15 +32,16 @@ use kinetoscope_scene::{Light, Marker, PoseF32};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 
-/// The most memory that the pictures of a camera may take \[bytes\].
+/// Limit of the memory of the images of a camera \[bytes\].
 const MAX_BYTES: u64 = 64 << 30;
-/// What a capture takes besides poses and lamps, at most \[bytes\]: its place, its lens, its stamp, its ticket.
+/// Upper bound of the memory of a captured frame besides poses and lights \[bytes\]: viewpoint, lens, stamp and random
+/// key.
 const CAPTURE: usize = 512;
 
 impl SensorCfg for CameraCfg {
     type Sensor = Camera;
 
-    /// What can be seen; the poses of bodies only where it hangs on one.
+    /// Visual state; body poses only if the camera is attached to a body; markers only if the camera renders them.
     fn requires(&self) -> Requires {
         Camera::requires(self.extrinsics.parent.is_some(), self.draw_markers)
     }
@@ -51,10 +52,10 @@ impl SensorCfg for CameraCfg {
 
     /// # Errors
     ///
-    /// Sizes, lens, depth range or placement that are no good, an unknown parent, environments that do not exist or are
-    /// named twice, a period that is no whole number of steps, a dropout that is no probability, noise of a channel that is not
-    /// there or has none, numbers of noise or of imperfections that are no good, pictures, history or latency that do not fit into
-    /// memory.
+    /// An invalid size, lens, depth range or pose; an unknown parent; environments that do not exist or are named
+    /// twice; a period that is not a whole number of steps; a dropout that is not a probability; noise of a channel
+    /// that is off or cannot have noise; invalid numbers of noise or imperfections; images, history or latency that do
+    /// not fit into memory.
     fn build(&self, context: &SensorContext) -> Result<Camera, SensorError> {
         let schedule = Schedule::new(self.update_period, context.dt, self.round_period)?;
         let scene = context.scene.clone().ok_or(CameraError::NoScene)?;
@@ -110,7 +111,7 @@ impl SensorCfg for CameraCfg {
 }
 
 impl CameraCfg {
-    /// The rasterizer of all rows.
+    /// Creates the rasterizer of all rows.
     fn rasterizer(&self, context: &SensorContext) -> ParallelRasterizer {
         let marked = u32::from(self.draw_markers) << Marker::GROUP;
         let raster = RasterCfg { groups: self.raster.groups | marked, ..self.raster };
@@ -122,7 +123,7 @@ impl CameraCfg {
         rasterizer
     }
 
-    /// Flow is of two pictures that follow each other.
+    /// Rejects flow without two consecutive frames of one instant each.
     fn check_flow(&self) -> Result<(), CameraError> {
         let past = self.latency_steps > 0 || self.dropout > 0.0 || self.history_length > 0;
         match self.channels.flow {
@@ -132,7 +133,7 @@ impl CameraCfg {
         }
     }
 
-    /// Refuses imperfections that the lens cannot have.
+    /// Rejects imperfections that the lens does not support.
     fn check_lens(&self) -> Result<(), CameraError> {
         let (lens, Imperfections { vignetting, holes, .. }) = (self.lens.name(), &self.imperfections);
         if vignetting.is_some() && !self.lens.has_axis() {
@@ -147,18 +148,18 @@ impl CameraCfg {
         Ok(())
     }
 
-    /// The rays of the lens in every row.
+    /// Creates the lens rays of all rows.
     fn lens_rays(&self, pixels: &PixelIntrinsics, rows: usize) -> Result<RaysOfRows, CameraError> {
         if !self.lens.is_pinhole() && !self.renderer.sees_by_rays(true) {
             let (lens, renderer) = (self.lens.name(), self.renderer.name());
             return Err(CameraError::View(RenderError::LensRenderer { lens, renderer }));
         }
-        // Paths have rays of their own; only colours without them have more samples than a pixel's centre.
+        // Path tracing generates its own rays. Without it, only color takes more samples than the pixel center.
         let samples = if self.channels.color && !self.renderer.follows_paths() { self.raster.samples } else { 1 };
         Ok(RaysOfRows::new(self.lens, pixels, [self.width, self.height], samples, rows)?)
     }
 
-    /// Refuses what would end the process: an allocation that fails.
+    /// Rejects sizes whose allocation would fail and abort the process.
     fn check_memory(
         &self,
         views: usize,
@@ -167,10 +168,10 @@ impl CameraCfg {
         schedule: Schedule,
     ) -> Result<(), CameraError> {
         let bytes_per_pixel = self.channels.bytes_per_pixel();
-        // A shutter that takes time is twice a moment.
+        // A shutter of nonzero span keeps two sets of poses.
         let moments = if self.shutter.is_instant() { 1 } else { 2 };
         let capture = moments * instances * size_of::<PoseF32>() + lamps * size_of::<Light>();
-        // What paths find is kept for one picture at a time.
+        // The path tracer accumulates one image at a time.
         let film = match self.renderer {
             Renderer::RayTraced { denoise, .. } if self.channels.color => {
                 self.width.saturating_mul(self.height).saturating_mul(Film::bytes_per_pixel(denoise))
@@ -185,7 +186,8 @@ impl CameraCfg {
                 .zip(captures)
                 .and_then(|(pictures, captures)| pictures.checked_add(captures)?.checked_mul(views)?.checked_add(film))
                 .filter(|&bytes| bytes as u64 <= MAX_BYTES);
-            // Asks for the memory, and gives it back untouched: that may fail, an array's own request must not.
+            // Reserves the memory and returns it untouched. A failed reservation is an error; a failed array allocation
+            // would abort.
             bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
         };
         if !fits(1, 1) {

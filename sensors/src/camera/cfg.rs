@@ -1,4 +1,4 @@
-//! What a camera is, before it exists.
+//! Camera configuration.
 
 use super::extrinsics::Extrinsics;
 use super::imperfection::Imperfections;
@@ -13,16 +13,16 @@ use kinetoscope_render::lens;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What depth and distance say where nothing is hit between the near and the far plane.
+/// Value of depth and distance where nothing is hit between the near and the far plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum DepthMiss {
     /// +inf.
     #[default]
     Inf,
-    /// The depth of the far plane; the same number in the distance channel. What was hit is nearer, with noise too: by the last
-    /// digit of single precision, at least (depth is, and distance behind lenses whose rays do not all go
-    /// [forward](lens::Lens::is_forward)).
+    /// Depth of the far plane; the same number in the distance channel. Hits are always nearer, also with noise, by at
+    /// least one step of single precision. This holds for depth, and for distance if rays of the lens do not all go
+    /// [forward](lens::Lens::is_forward).
     Far,
     /// 0.
     Zero,
@@ -52,78 +52,80 @@ pub enum DepthMiss {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraCfg {
-    /// Pixels per row.
+    /// Image width \[pixels\].
     pub width: usize,
-    /// Rows.
+    /// Image height \[pixels\].
     pub height: usize,
     /// Focal lengths and principal point.
     pub intrinsics: Intrinsics,
-    /// The lens: which way the rays of pixels go. Lenses other than a pinhole need a renderer that follows rays.
+    /// Lens: directions of the rays of pixels. Lenses other than a pinhole need a renderer that traces rays.
     pub lens: lens::Lens,
-    /// The size of the lens, for depth of field; `None` is a point. Needs [`Renderer::RayTraced`].
+    /// Aperture of the lens, for depth of field; `None` is a point. Needs [`Renderer::RayTraced`].
     pub aperture: Option<Aperture>,
-    /// When light falls on which row, for rolling shutters and motion blur; by default a picture is of one instant. Needs
-    /// [`Renderer::RayTraced`]. The first picture after a reset or after somebody wrote to the state is of one instant.
+    /// Exposure and readout times, for motion blur and rolling shutters; by default an image shows one instant. Needs
+    /// [`Renderer::RayTraced`]. The first image after a reset or a write to the state shows one instant.
     pub shutter: Shutter,
-    /// Nothing nearer is seen: smallest depth along the optical axis \[m\], or along the ray where rays of the lens do not all
-    /// go forward ([`Lens::is_forward`](lens::Lens::is_forward)).
+    /// Near limit: smallest depth along the optical axis \[m\]. If rays of the lens do not all go forward
+    /// ([`Lens::is_forward`](lens::Lens::is_forward)), smallest distance along the ray.
     pub near: f64,
-    /// Nothing farther is seen: largest depth along the optical axis \[m\], or along the ray, as [`near`](Self::near).
+    /// Far limit: largest depth along the optical axis \[m\], or largest distance along the ray, as
+    /// [`near`](Self::near).
     pub far: f64,
-    /// Where it is.
+    /// Pose of the camera, and the body that it is attached to.
     pub extrinsics: Extrinsics,
-    /// Time between pictures \[s\]; 0 is every physics step.
+    /// Time between images \[s\]; 0 is every physics step.
     pub update_period: f64,
-    /// Take the nearest whole number of physics steps where the period is none, instead of an error.
+    /// Rounds a period that is not a whole number of physics steps to the nearest one, instead of returning an error.
     pub round_period: bool,
-    /// What it measures.
+    /// Measured channels.
     pub channels: Channels,
-    /// What depth and distance say where nothing is hit.
+    /// Value of depth and distance where nothing is hit.
     pub depth_miss: DepthMiss,
-    /// Which renderer draws pictures.
+    /// Renderer of the images.
     pub renderer: Renderer,
-    /// How pictures are drawn.
+    /// Render settings.
     pub raster: RasterCfg,
-    /// The environments that it looks into, in this order; `None` is all of them.
+    /// Environments of the camera, in this order; `None` is all environments.
     pub env_ids: Option<Vec<usize>>,
-    /// Draw when somebody reads (and only then), not when the picture is due. The pictures are the same: what there is
-    /// to see is kept when it is due.
+    /// Renders images when they are read (and only then), not when they are due. The images are the same, because the
+    /// state is captured when they are due.
     pub lazy: bool,
-    /// Pictures to remember, the newest included: see [`Camera::history`](super::Camera::history). Those of a lazy camera are drawn when the
-    /// history is read.
+    /// Number of images in the history, the newest included: see [`Camera::history`](super::Camera::history). A lazy
+    /// camera renders them when the history is read.
     pub history_length: usize,
-    /// Physics steps from the capture of a picture until it can be read. It keeps the stamp of its capture. What somebody
-    /// writes to the state of an environment is seen at once there, by every sensor: nothing stale is ever read.
+    /// Latency in physics steps, from the capture of an image until it can be read. The image keeps the stamp of its
+    /// capture. All sensors see a write to the state of an environment at once: outdated values are never read.
     pub latency_steps: u32,
-    /// Probability that a picture is lost on the way, 0 to 1: the one before stays.
+    /// Probability that an image is lost on its way, 0 to 1; the previous image stays.
     pub dropout: f64,
-    /// Noise of numbers by the name of the channel, at every pixel by itself: of `depth` and `distance` \[m\], which is from
-    /// `near` to `far` with it too (distance from `near` on) and leaves misses what they are, and of `color` in steps of its
-    /// 8 bits, red, green and blue each by itself; results are rounded to bytes.
+    /// Noise by channel name, independent at every pixel. Noise of `depth` and `distance` is in \[m\]: depth stays from
+    /// `near` to `far`, distance stays at least `near`, and misses stay misses. Noise of `color` is in steps of its 8
+    /// bits, independent for red, green and blue; results are rounded to bytes.
     ///
-    /// The numbers depend on the seed of the simulation, the environment, the name of the camera, which picture it is and which
-    /// pixel, and on nothing else. They are looked up: whether a camera is lazy, when somebody reads, and how many threads
-    /// there are change nothing. A picture that is drawn again after a setter has the same noise again. Looking up where
-    /// `bias_walk` has come to takes longer, the longer it walks: as many numbers as twice the binary digits of
-    /// the count of pictures since the reset.
+    /// The random numbers depend only on the seed of the simulation, the environment, the camera name, the image index
+    /// and the pixel. They are computed from these keys, so laziness, the time of reading and the number of threads do
+    /// not change them. An image that is rendered again after a setter has the same noise again. The cost of
+    /// `bias_walk` grows with the image count n since the reset: it needs as many random numbers as twice the binary
+    /// digits of n.
     pub noise: BTreeMap<String, NoiseCfg>,
-    /// What is not perfect about the camera itself; it comes before [`noise`](Self::noise).
+    /// Imperfections of the camera itself; applied before [`noise`](Self::noise).
     pub imperfections: Imperfections,
-    /// Show where it is and what it sees: its frame, and an arrow along each edge of the picture's pyramid
+    /// Shows the camera's frame and an arrow along each edge of its view frustum
     /// ([`Sensor::markers`](crate::Sensor::markers)).
     pub debug_vis: bool,
-    /// Draw what the other sensors show people into the channel `color`, which is otherwise as without: ray hits, forces of
-    /// contacts, frames, what cameras see ([`SensorCfg::debug_vis`](crate::SensorCfg::debug_vis) says for each whether it shows
-    /// anything). All other channels stay what they are. Markers are what each sensor had measured last at
-    /// the instant of the picture (of cameras that draw markers and were added later, at the instant before), things are in front of them and behind them, and they cast
-    /// shadows; every renderer draws them.
+    /// Renders the markers of other sensors into the channel `color`: ray hits, contact forces, frames, view frustums.
+    /// Each sensor shows its markers if [`SensorCfg::debug_vis`](crate::SensorCfg::debug_vis) says so. All other
+    /// channels stay the same.
+    ///
+    /// Markers show the last measurement of each sensor at the instant of the image. Markers of cameras that render
+    /// markers themselves and were added later show the instant before. Objects and markers occlude each other, and
+    /// markers cast shadows; every renderer supports them.
     pub draw_markers: bool,
 }
 
 impl Default for CameraCfg {
-    /// EmbodiChain's camera: 640 x 480 pixels, f = 600 pixels ([`Intrinsics::EMBODICHAIN`]: what other sizes see is the
-    /// same), from 5 mm to 100 m, colour only. Geom groups 0, 1 and 2 are
-    /// drawn, as in MuJoCo's own viewers.
+    /// EmbodiChain's camera: 640 x 480 pixels, from 5 mm to 100 m, color only. f = 600 pixels; other sizes see the same
+    /// ([`Intrinsics::EMBODICHAIN`]). Geom groups 0, 1 and 2 are rendered, as in MuJoCo's viewers.
     fn default() -> Self {
         Self {
             width: 640,

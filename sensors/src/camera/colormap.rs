@@ -1,7 +1,7 @@
-//! Numbers of channels as colours that a person can read.
+//! Color maps of camera channels.
 
-/// The colour of a depth \[m\] between `near` (dark, then blue) and `far` (dark red): Google's Turbo. Nearer and farther ones get
-/// the colours of the ends, `inf` (nothing was hit) black.
+/// Returns the color of a depth \[m\] between `near` (dark, then blue) and `far` (dark red): Google's Turbo color map.
+/// Depths outside get the colors of the ends; `inf` (nothing was hit) is black.
 ///
 /// Source: Mikhailov's polynomial approximation of Turbo (2019).
 pub fn depth_color(depth: f32, [near, far]: [f32; 2]) -> [u8; 3] {
@@ -21,12 +21,12 @@ pub fn depth_color(depth: f32, [near, far]: [f32; 2]) -> [u8; 3] {
     })
 }
 
-/// The colour of a mask id: always the same for the same id, far from those of its neighbours; black for 0.
+/// Returns the color of a mask id: constant for an id, far from the colors of neighboring ids, black for 0.
 pub fn mask_color(id: i32) -> [u8; 3] {
     if id == 0 {
         return [0, 0, 0];
     }
-    // Hues one golden section apart never come close to a recent one; brightness alternates on top.
+    // Hues one golden section apart never come close to a recent hue; brightness alternates in addition.
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let hue = (f64::from(id) * GOLDEN).rem_euclid(1.0) * 6.0;
     let value = [1.0, 0.75, 0.88][id.rem_euclid(3) as usize];
@@ -39,7 +39,8 @@ pub fn mask_color(id: i32) -> [u8; 3] {
     [channel(5.0), channel(3.0), channel(1.0)]
 }
 
-/// The colour of a unit normal, (n + 1) / 2 for each axis: what looks along +z is light blue. Black for 0 (nothing was hit).
+/// Returns the color of a unit normal, (n + 1) / 2 for each axis: a surface facing +z is light blue. Black for 0
+/// (nothing was hit).
 pub fn normal_color(normal: [f32; 3]) -> [u8; 3] {
     if normal == [0.0; 3] {
         return [0, 0, 0];

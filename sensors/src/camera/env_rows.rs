@@ -1,9 +1,9 @@
-//! Rows of the environments that a camera sees.
+//! Rows of the environments of a camera.
 
 use super::error::CameraError;
 use crate::error::SensorError;
 
-/// Environments that a camera sees: one row of its arrays for each.
+/// Environments of a camera: one row of its arrays for each.
 #[derive(Clone, Debug)]
 pub struct EnvRows {
     env_ids: Vec<usize>,
@@ -12,7 +12,7 @@ pub struct EnvRows {
 }
 
 impl EnvRows {
-    /// Rows of the environments `env_ids`, out of `num_envs`; `None` is all of them.
+    /// Creates the rows of the environments `env_ids`, out of `num_envs`; `None` is all environments.
     ///
     /// # Errors
     ///
@@ -34,7 +34,7 @@ impl EnvRows {
         Ok(Self { env_ids, row_of_env })
     }
 
-    /// A row for every environment.
+    /// Creates a row for every environment.
     pub(crate) fn all(num_envs: usize) -> Self {
         Self { env_ids: (0..num_envs).collect(), row_of_env: (0..num_envs).map(Some).collect() }
     }
@@ -54,7 +54,7 @@ impl EnvRows {
         &self.env_ids
     }
 
-    /// Row of an environment; `None` where the camera does not see it.
+    /// Row of an environment; `None` if the camera does not see the environment.
     pub(crate) fn of(&self, env: usize) -> Option<usize> {
         self.row_of_env.get(env).copied().flatten()
     }
@@ -69,11 +69,11 @@ impl EnvRows {
         Ok(self.of(env).ok_or_else(|| CameraError::NotSeen { env, seen: self.env_ids.clone() })?)
     }
 
-    /// Rows of the environments that a caller chose, each once; `None` is all rows.
+    /// Rows of the given environments, each at most once; `None` is all rows.
     ///
     /// # Errors
     ///
-    /// As [`row`](Self::row), and [`CameraError::DuplicateEnvironment`].
+    /// Same as [`row`](Self::row), and [`CameraError::DuplicateEnvironment`].
     pub(crate) fn chosen(&self, env_ids: Option<&[usize]>) -> Result<Vec<usize>, SensorError> {
         let Some(env_ids) = env_ids else { return Ok((0..self.len()).collect()) };
         let mut taken = vec![false; self.len()];
@@ -88,7 +88,7 @@ impl EnvRows {
         Ok(rows)
     }
 
-    /// Rows of those of some environments of the simulation that the camera sees.
+    /// Rows of the given environments, without those that the camera does not see.
     ///
     /// # Errors
     ///

@@ -1,60 +1,60 @@
-//! What can be wrong with a camera.
+//! Camera errors.
 
 use kinetoscope_render::OpticsError;
 use kinetoscope_render::RenderError;
 
-/// Why a camera cannot be built, placed or read.
+/// Errors of building, placing or reading a camera.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CameraError {
-    /// Size, intrinsics, depth range or number of samples are no good.
+    /// Size, intrinsics, depth range or number of samples are invalid.
     #[error("the camera cannot see: {0}")]
     View(RenderError),
-    /// An environment could not be drawn; it is tried again when it was captured anew, and at the next reading where somebody
-    /// broke it off.
+    /// The image of an environment cannot be rendered. It is rendered again after the next capture, or at the next read
+    /// if rendering was cancelled.
     #[error("environment {env} cannot be drawn: {error}")]
     Draw {
         /// The environment.
         env: usize,
-        /// Why.
+        /// Reason.
         error: RenderError,
     },
-    /// A lens or intrinsics that cannot be used.
+    /// A lens or its intrinsics are invalid.
     #[error(transparent)]
     Optics(#[from] OpticsError),
-    /// A pose with a number that is not finite (or too large for the renderer), or without a rotation.
+    /// A pose has a number that is not finite (or too large for the renderer), or a quaternion of norm 0.
     #[error("pose {row} is not a rigid transform [x, y, z, qw, qx, qy, qz]: {pose:?}")]
     Pose {
-        /// Which of those given.
+        /// Index of the pose among the given ones.
         row: usize,
-        /// The pose, as a row.
+        /// The pose \[x, y, z, qw, qx, qy, qz\].
         pose: [f64; 7],
     },
-    /// Rows of poses that have not seven numbers.
+    /// Rows of poses do not have seven numbers.
     #[error("a pose is a row of 7 numbers [x, y, z, qw, qx, qy, qz], not {columns}")]
     PoseColumns {
-        /// Numbers in a row.
+        /// Numbers per row.
         columns: usize,
     },
-    /// The eye is where the target is, or a number is not finite.
+    /// The position of the camera and its target coincide, or a number is not finite.
     #[error("a camera at {eye:?} cannot look at {target:?}: both must be finite and apart")]
     LookAt {
-        /// Where the camera is \[m\].
+        /// Position of the camera \[m\].
         eye: [f64; 3],
-        /// What it looks at \[m\].
+        /// Position of the target \[m\].
         target: [f64; 3],
     },
-    /// Too few or too many values for the environments.
+    /// The number of values does not match the number of environments.
     #[error("{found} {what} for {expected} environments; give one for each, or one for all")]
     Count {
-        /// What is counted.
+        /// Name of the values.
         what: &'static str,
-        /// How many environments are meant.
+        /// Number of environments.
         expected: usize,
-        /// How many values were given.
+        /// Number of given values.
         found: usize,
     },
-    /// The camera would see no environment.
+    /// The camera has no environment.
     #[error("a camera needs at least one environment")]
     NoEnvironments,
     /// An environment is named twice.
@@ -63,99 +63,99 @@ pub enum CameraError {
         /// The environment.
         env: usize,
     },
-    /// The camera does not look into this environment.
+    /// The camera does not see this environment.
     #[error("the camera does not see environment {env}; it sees {}", some(.seen))]
     NotSeen {
         /// The environment.
         env: usize,
-        /// The environments of the camera.
+        /// Environments of the camera.
         seen: Vec<usize>,
     },
-    /// The camera would measure nothing.
+    /// The camera has no channels.
     #[error("the camera has no channels; name at least one")]
     NoChannels,
-    /// A channel that the camera was not asked to measure.
+    /// The camera does not measure this channel.
     #[error("the camera does not measure {channel}; it measures {}", .enabled.join(", "))]
     ChannelOff {
-        /// The channel.
+        /// Name of the channel.
         channel: &'static str,
-        /// Those it measures.
+        /// Measured channels.
         enabled: Vec<&'static str>,
     },
-    /// A disparity was asked of eyes that are not parallel, not side by side, or have different lenses.
+    /// Disparity needs parallel cameras side by side with equal fx, fy and cy.
     #[error("disparity is defined for a rectified pair of eyes: {what} is {value}, it must be {expected}")]
     NotRectified {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
-        /// The number.
+        /// Its value.
         value: f64,
-        /// What it would be in a rectified pair.
+        /// Value in a rectified stereo pair.
         expected: String,
     },
-    /// Eyes whose pictures cannot be turned so that both show a point in the same row.
+    /// The images of the stereo pair cannot be rectified.
     #[error("the pictures of these eyes cannot be rectified: {what} is {value}, it must be {expected}")]
     NotRectifiable {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
-        /// The number.
+        /// Its value.
         value: f64,
         /// Accepted values.
         expected: &'static str,
     },
-    /// Two calibrations that are not those of a left and a right eye.
+    /// Two calibrations do not belong to a left and a right camera.
     #[error("these are no calibrations of a left and a right eye: {what} is {value}; it must be {expected}")]
     NotAPair {
-        /// Which number of them.
+        /// Name of the number.
         what: &'static str,
-        /// What it is.
+        /// Its value.
         value: String,
-        /// What it would be of a pair.
+        /// Value in a stereo pair.
         expected: String,
     },
-    /// Something that is only known of pictures without a lens.
+    /// A feature is only defined for pinhole cameras.
     #[error("{what}: only of a pinhole camera, and this one has the lens {lens}; leave it out, or the lens")]
     PinholeOnly {
-        /// What was asked for.
+        /// Name of the feature.
         what: &'static str,
-        /// The lens.
+        /// Name of the lens.
         lens: &'static str,
     },
-    /// Something that needs an optical axis, of a lens that has none.
+    /// A feature needs an optical axis, which the lens does not have.
     #[error("{what}: the lens {lens} has no optical axis; take it away, or choose another lens")]
     NoAxis {
-        /// What was asked for.
+        /// Name of the feature.
         what: &'static str,
-        /// The lens.
+        /// Name of the lens.
         lens: &'static str,
     },
-    /// Flow of a camera whose pictures come late, get lost, or are kept.
+    /// Flow is combined with latency, dropout or a history.
     #[error(
         "flow is from the picture before to the one now: a camera with flow has no latency_steps, dropout or history_length"
     )]
     FlowOfThePast,
-    /// A shutter that is open longer than there is time between pictures.
+    /// The shutter is open for longer than the time between images.
     #[error(
         "the shutter takes {span} s, from the first light to the last row, and there is a picture every {period} s; make \
          row_time, exposure_time or the picture's height smaller, or update_period larger"
     )]
     ShutterTooSlow {
-        /// How long the shutter takes \[s\].
+        /// Span of the shutter, from the first light to the last row \[s\].
         span: f64,
-        /// Time between pictures \[s\].
+        /// Time between images \[s\].
         period: f64,
     },
-    /// Flow of a picture whose rows are of several instants.
+    /// Flow is combined with a shutter of nonzero span.
     #[error("flow is from one instant to another: a camera with flow has a shutter of one instant")]
     FlowOfRows,
-    /// A mask id that no thing can have.
+    /// A mask id is invalid.
     #[error("mask id {id} {problem}")]
     MaskId {
-        /// The id.
+        /// The mask id.
         id: i32,
-        /// What is wrong with it.
+        /// The problem.
         problem: &'static str,
     },
-    /// A thing that is nowhere has no box.
+    /// The pose of an instance is not finite, so it has no box.
     #[error("the pose of the thing with mask id {id} in environment {env} is not finite: it has no box")]
     ThingPose {
         /// The environment.
@@ -163,42 +163,42 @@ pub enum CameraError {
         /// The mask id.
         id: i32,
     },
-    /// The pictures of all environments do not fit into memory.
+    /// The images of all environments do not fit into memory.
     #[error(
         "pictures of {views} environments with {width} x {height} pixels of {bytes_per_pixel} bytes{} do not fit into memory \
          (at most {limit} bytes)",
         if *.paths > 0 { format!(", with {} bytes for paths,", .paths) } else { String::new() }
     )]
     Memory {
-        /// How many environments.
+        /// Number of environments.
         views: usize,
-        /// Pixels per row.
+        /// Image width \[pixels\].
         width: usize,
-        /// Rows.
+        /// Image height \[pixels\].
         height: usize,
-        /// Memory of a pixel \[bytes\].
+        /// Memory per pixel \[bytes\].
         bytes_per_pixel: usize,
-        /// What path tracing needs besides, for one picture at a time \[bytes\].
+        /// Memory of path tracing, needed once for all images \[bytes\].
         paths: usize,
-        /// The most that is allowed.
+        /// Memory limit \[bytes\].
         limit: u64,
     },
-    /// History and latency need more memory than can be given.
+    /// History and frames in flight do not fit into memory.
     #[error(
         "{pictures} past pictures and {captures} captures on their way, in each of {views} environments, do not fit into \
          memory (at most {limit} bytes); make history_length or latency_steps smaller"
     )]
     Past {
-        /// Pictures of the history.
+        /// Images in the history.
         pictures: usize,
-        /// Captures on their way.
+        /// Frames in flight.
         captures: usize,
-        /// How many environments.
+        /// Number of environments.
         views: usize,
-        /// The most that is allowed.
+        /// Memory limit \[bytes\].
         limit: u64,
     },
-    /// There is no scene to look at.
+    /// The camera was built without a scene.
     #[error("the camera was built without a scene to look at")]
     NoScene,
     /// Nothing was captured yet.
@@ -209,7 +209,7 @@ pub enum CameraError {
     },
 }
 
-/// The first few of a list.
+/// Lists the first eight ids, and counts the others.
 fn some(ids: &[usize]) -> String {
     let first: Vec<String> = ids.iter().take(8).map(usize::to_string).collect();
     let more = if ids.len() > 8 { format!(" and {} more", ids.len() - 8) } else { String::new() };
@@ -217,7 +217,7 @@ fn some(ids: &[usize]) -> String {
 }
 
 impl CameraError {
-    /// Whether somebody broke the drawing off: what is drawn again is another drawing.
+    /// Returns true if rendering was cancelled; the next read renders again.
     pub(super) fn is_cancelled(&self) -> bool {
         matches!(self, Self::Draw { error: RenderError::Cancelled { .. }, .. })
     }

@@ -1,4 +1,4 @@
-//! Where a camera is, and what its axes mean.
+//! Camera extrinsics: pose, parent body and axis convention.
 
 use super::error::CameraError;
 use kinetoscope_scene::pose::to_row;
@@ -7,22 +7,22 @@ use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
-/// Which way the axes of a camera point.
+/// Axis convention of a camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum CameraConvention {
-    /// ROS's optical frame, also OpenCV's: x right, y down, z forward.
+    /// ROS optical frame, also OpenCV's: x right, y down, z forward.
     #[default]
     Ros,
-    /// OpenGL's and USD's, also MuJoCo's: x right, y up, z backward.
+    /// OpenGL and USD, also MuJoCo: x right, y up, z backward.
     #[serde(alias = "opengl")]
     OpenGl,
-    /// ROS's body frame: x forward, y left, z up.
+    /// ROS body frame: x forward, y left, z up.
     World,
 }
 
 impl CameraConvention {
-    /// The axes of [`Ros`](Self::Ros) in this convention's own: a vector of the optical frame, turned into this one.
+    /// Returns the rotation that maps vectors of the optical frame ([`Ros`](Self::Ros)) to this convention.
     pub fn from_ros(self) -> UnitQuaternion<f64> {
         let q = match self {
             Self::Ros => return UnitQuaternion::identity(),
@@ -34,56 +34,56 @@ impl CameraConvention {
         UnitQuaternion::new_unchecked(q)
     }
 
-    /// The pose of the optical frame ([`Ros`](Self::Ros)) of a camera whose axes, in this convention, have the pose `pose`.
+    /// Converts the pose of a camera in this convention to the pose of its optical frame ([`Ros`](Self::Ros)).
     pub fn to_optical(self, pose: &Pose) -> Pose {
         pose * self.from_ros()
     }
 
-    /// The pose, in this convention, of a camera whose optical frame has the pose `optical`.
+    /// Converts the pose of an optical frame to the pose of the camera in this convention.
     pub fn of_optical(self, optical: &Pose) -> Pose {
         optical * self.from_ros().inverse()
     }
 }
 
-/// Where a camera is, relative to what.
+/// Pose of a camera relative to a body or to the environment.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Extrinsics {
-    /// The body that it moves with: `uid/link`, or the link alone where only one is called so; links that were fused
-    /// into another count too. `None` is the environment's frame.
+    /// Body that the camera is attached to: `uid/link`, or the link alone if only one body has this name. Links that
+    /// were fused into another link count too. `None` is the frame of the environment.
     pub parent: Option<String>,
-    /// Where it is in the frame of its parent, or of the environment.
+    /// Pose in the frame of the parent, or of the environment.
     pub placement: Placement,
-    /// What the axes of [`Placement::Pose`] mean; the same for free and attached cameras.
+    /// Axis convention of [`Placement::Pose`]; the same for free and attached cameras.
     pub convention: CameraConvention,
 }
 
-/// Where a camera is.
+/// Pose of a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Placement {
-    /// By a pose; the axes are those of [`Extrinsics::convention`].
+    /// An explicit pose; the axes are those of [`Extrinsics::convention`].
     Pose {
         /// Position in the frame of the parent, or of the environment for free cameras \[m\].
         #[serde(default)]
         pos: [f64; 3],
-        /// How the camera's axes are turned in that frame.
+        /// Rotation of the camera's axes in that frame.
         #[serde(default, with = "kinetoscope_scene::file_format::rotation")]
         rotation: UnitQuaternion<f64>,
     },
-    /// By what it looks at: see [`look_at_pose`].
+    /// A position and a target: see [`look_at_pose`].
     LookAt {
-        /// Where the camera is \[m\].
+        /// Position of the camera \[m\].
         eye: [f64; 3],
-        /// What is in the middle of the picture (if the principal point is) \[m\].
+        /// Point in the middle of the image, if the principal point is \[m\].
         target: [f64; 3],
-        /// What is up in the picture.
+        /// Upward direction of the image.
         #[serde(default = "z_axis")]
         up: [f64; 3],
     },
 }
 
-/// Up, where nobody says what it is.
+/// Default upward direction.
 fn z_axis() -> [f64; 3] {
     [0.0, 0.0, 1.0]
 }
@@ -95,11 +95,11 @@ impl Default for Placement {
 }
 
 impl Extrinsics {
-    /// The pose of the optical frame ([`CameraConvention::Ros`]) in the frame of the parent.
+    /// Returns the pose of the optical frame ([`CameraConvention::Ros`]) in the frame of the parent.
     ///
     /// # Errors
     ///
-    /// [`CameraError::Pose`] or [`CameraError::LookAt`] for numbers that are no good.
+    /// [`CameraError::Pose`] or [`CameraError::LookAt`] for an invalid pose.
     pub fn parent_from_camera(&self) -> Result<Pose, CameraError> {
         match self.placement {
             Placement::Pose { pos, rotation } => {
@@ -111,14 +111,14 @@ impl Extrinsics {
     }
 }
 
-/// The pose of the optical frame ([`CameraConvention::Ros`]) of a camera at `eye` that looks at `target`.
+/// Returns the pose of the optical frame ([`CameraConvention::Ros`]) of a camera at `eye` that looks at `target`.
 ///
-/// The picture's upward direction is as near to `up` as possible. Looking along `up` (straight up or down, for the usual
-/// z), the upward direction is +y, or +x where `up` itself is y. An `up` of zero is z.
+/// The upward direction of the image is as near to `up` as possible. If the camera looks along `up` (straight up or
+/// down, for the usual z), the upward direction is +y, or +x if `up` is y. An `up` of zero is replaced by z.
 ///
 /// # Errors
 ///
-/// [`CameraError::LookAt`] where eye and target coincide or a number is not finite.
+/// [`CameraError::LookAt`] if eye and target coincide or a number is not finite.
 pub fn look_at_pose(eye: [f64; 3], target: [f64; 3], up: [f64; 3]) -> Result<Pose, CameraError> {
     let error = CameraError::LookAt { eye, target };
     if eye.iter().chain(&target).chain(&up).any(|x| !x.is_finite()) {
@@ -134,14 +134,14 @@ pub fn look_at_pose(eye: [f64; 3], target: [f64; 3], up: [f64; 3]) -> Result<Pos
     rigid(0, &pose).map_err(|_| error)
 }
 
-/// Poses of several cameras, as whoever calls has them: typed, or rows `[x, y, z, qw, qx, qy, qz]`.
+/// Poses of several cameras, typed or as rows `[x, y, z, qw, qx, qy, qz]` with positions in \[m\].
 pub trait Poses {
-    /// The poses, every one a rigid transform.
+    /// Converts to poses, each a rigid transform.
     ///
     /// # Errors
     ///
-    /// [`CameraError::Pose`] with the first that has a number that is not finite or a quaternion of norm 0 (others are
-    /// normalised), [`CameraError::PoseColumns`] for rows that have not seven numbers.
+    /// [`CameraError::Pose`] with the first pose that has a number that is not finite or a quaternion of norm 0; other
+    /// quaternions are normalized. [`CameraError::PoseColumns`] for rows that do not have seven numbers.
     fn to_poses(&self) -> Result<Vec<Pose>, CameraError>;
 }
 
@@ -185,7 +185,7 @@ impl Poses for Array2<f64> {
     }
 }
 
-/// The pose, checked and with a quaternion of norm 1.
+/// Checks a pose and normalizes its quaternion.
 fn rigid(row: usize, pose: &Pose) -> Result<Pose, CameraError> {
     rigid_row(row, to_row(pose))
 }
@@ -193,7 +193,7 @@ fn rigid(row: usize, pose: &Pose) -> Result<Pose, CameraError> {
 fn rigid_row(row: usize, numbers: [f64; 7]) -> Result<Pose, CameraError> {
     let [x, y, z, qw, qx, qy, qz] = numbers;
     let q = Quaternion::new(qw, qx, qy, qz);
-    // A rotation that is one already, up to the rounding of a few products, keeps its bits.
+    // A unit quaternion, up to the rounding of a few products, keeps its bits.
     let unit = (q.norm_squared() - 1.0).abs() < 1e-13;
     let rotation = if unit { Some(UnitQuaternion::new_unchecked(q)) } else { UnitQuaternion::try_new(q, 1e-12) };
     rotation
@@ -212,7 +212,7 @@ mod tests {
         a.angle_to(b) < 1e-6
     }
 
-    /// The camera of Isaac Lab's own tests: at (2.5, 2.5, 2.5), it looks at the origin.
+    /// The camera of Isaac Lab's own tests: at (2.5, 2.5, 2.5), looking at the origin.
     #[test]
     fn conventions() {
         let ros = from_wxyz([-0.17591989, 0.33985114, 0.82047325, -0.42470819]);

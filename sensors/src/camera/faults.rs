@@ -1,4 +1,4 @@
-//! What happens to pictures after they were drawn: imperfections of the camera, then noise of the numbers that it sends.
+//! Post-processing of rendered images: imperfections of the camera, then noise of the numbers that it sends.
 
 use super::cfg::CameraCfg;
 use super::imperfection::{Imperfections, Picture};
@@ -10,19 +10,19 @@ use kinetoscope_render::Job;
 use kinetoscope_render::Ticket;
 use kinetoscope_render::ToneCurve;
 
-/// What happens to pictures after they were drawn. There is none of it for a perfect camera.
+/// Imperfections and noise of a camera, applied to its rendered images.
 #[derive(Clone, Debug)]
 pub(super) struct Faults {
     imperfections: Imperfections,
     tone: ToneCurve,
     noise: Option<PictureNoise>,
-    /// As many as threads.
+    /// One per thread.
     workers: Vec<()>,
     pool: ThreadPool,
 }
 
 impl Faults {
-    /// What `cfg` asks for, where pictures are `period` \[s\] apart.
+    /// Creates the model that `cfg` describes, with `period` \[s\] between images; `None` for a perfect camera.
     pub(super) fn new(cfg: &CameraCfg, context: &SensorContext, period: f64) -> Result<Option<Self>, SensorError> {
         let noise = PictureNoise::new(cfg, period)?;
         cfg.imperfections.check(cfg.channels)?;
@@ -36,7 +36,7 @@ impl Faults {
         }))
     }
 
-    /// Spoils pictures in which misses are infinite; each is spoilt by one thread.
+    /// Applies imperfections and noise to images in which misses are infinite; each image is processed by one thread.
     pub(super) fn spoil(&mut self, jobs: &mut [Job<'_>], tickets: &[Ticket]) {
         let Self { imperfections, tone, noise, workers, pool } = self;
         let noise = noise.as_ref();

@@ -1,4 +1,4 @@
-//! Frames of a camera: captured, on their way, shown, and past.
+//! Frames of a camera: captured, in flight, shown and past.
 
 use super::cfg::CameraCfg;
 use super::motion::OpeningPoses;
@@ -18,12 +18,12 @@ use std::sync::Arc;
 pub(super) struct Observation<'a> {
     pub(super) state: &'a SceneState,
     pub(super) env: usize,
-    /// Index of the body that the camera is attached to.
+    /// Index of the body that the camera is attached to; `None` for a free camera.
     pub(super) parent: Option<usize>,
 }
 
 impl Observation<'_> {
-    /// Pose of the body that the camera is attached to; the identity for a free camera.
+    /// Returns the pose of the body that the camera is attached to; the identity for a free camera.
     pub(super) fn parent_pose(&self) -> Pose {
         let parent = self.parent.zip(self.state.body_poses.as_ref());
         let pose = parent.map(|(body, poses)| from_row(&std::array::from_fn(|k| poses[(self.env, body, k)])));
@@ -31,13 +31,13 @@ impl Observation<'_> {
     }
 }
 
-/// Everything that the image of one environment at one instant is drawn of, except the viewpoint.
+/// State of one environment at the instant of a frame: everything that its image depends on, except the viewpoint.
 #[derive(Clone, Debug)]
 pub(super) struct CapturedFrame {
     /// World from instance.
     pub(super) poses: Vec<PoseF32>,
     pub(super) lights: Vec<Light>,
-    /// Scene of the environment's own, instead of that of all.
+    /// The environment's own scene, if it differs from the shared scene.
     pub(super) scene: OwnScene,
     /// Pose of the parent; the identity for a free camera, `None` before the first capture.
     pub(super) world_from_parent: Option<Pose>,
@@ -45,14 +45,14 @@ pub(super) struct CapturedFrame {
     pub(super) stamp: f64,
     /// Key of the random numbers of the image.
     pub(super) ticket: Ticket,
-    /// Markers of other sensors; empty for a camera that does not draw them.
+    /// Markers of other sensors; empty for a camera that does not render markers.
     pub(super) markers: Vec<Marker>,
-    /// Poses at shutter opening, for a shutter that takes time.
+    /// Poses at shutter opening, for a shutter of nonzero span.
     opening: Option<OpeningPoses>,
 }
 
 impl CapturedFrame {
-    /// Room for a frame of a scene, by a shutter that takes time or not.
+    /// Allocates a frame of a scene; `slow_shutter` also allocates the poses at shutter opening.
     fn new(scene: &RenderScene, ticket: Ticket, slow_shutter: bool) -> Self {
         let instances = scene.instances().len();
         Self {
@@ -67,7 +67,7 @@ impl CapturedFrame {
         }
     }
 
-    /// Captures an environment; the state was checked.
+    /// Captures an environment. The state must be checked before.
     fn capture(&mut self, seen: &Observation<'_>, ticket: Ticket, opening: Option<&OpeningPoses>) {
         let Observation { state, env, .. } = *seen;
         let Some(visible) = &state.visible else { return };
@@ -85,7 +85,7 @@ impl CapturedFrame {
         }
     }
 
-    /// Copies another frame of the same scene into this one's memory.
+    /// Copies another frame of the same scene, reusing memory.
     fn assign(&mut self, other: &Self) {
         self.poses.copy_from_slice(&other.poses);
         self.lights.clone_from_slice(&other.lights);
@@ -99,13 +99,13 @@ impl CapturedFrame {
         }
     }
 
-    /// Poses of instances and parent at shutter opening; `None` for a frame of one instant.
+    /// Returns poses of instances and parent at shutter opening; `None` for a frame of one instant.
     pub(super) fn opened(&self) -> Option<(&[PoseF32], Pose)> {
         self.opening.as_ref()?.get()
     }
 }
 
-/// A captured frame, and the viewpoint and lens that it is drawn with.
+/// A captured frame with its viewpoint and lens.
 #[derive(Clone, Copy)]
 pub(super) struct FrameSource<'a> {
     pub(super) row: usize,
@@ -115,13 +115,13 @@ pub(super) struct FrameSource<'a> {
 }
 
 impl<'a> FrameSource<'a> {
-    /// A frame of a row, from the row's present viewpoint.
+    /// Combines a frame of a row with the current viewpoint of the row.
     pub(super) fn present(row: usize, frame: &'a CapturedFrame, viewpoints: &'a Viewpoints) -> Self {
         Self { row, frame, viewpoint: viewpoints.row(row), rays: viewpoints.rays(row) }
     }
 }
 
-/// A frame that has arrived, with the viewpoint and the lens at that time: later setters do not change it.
+/// A delivered frame, with its viewpoint and lens at that time. Later setters do not change it.
 #[derive(Clone, Debug)]
 struct ArrivedFrame {
     frame: CapturedFrame,
@@ -141,26 +141,26 @@ impl ArrivedFrame {
     }
 }
 
-/// Frames of a camera in all its environments, row by row. All memory is taken at construction.
+/// Frames of a camera in all its environments, row by row. All memory is allocated at construction.
 #[derive(Debug)]
 pub(super) struct FrameBuffer {
     shown: Vec<CapturedFrame>,
     /// Times of the shown frames \[s\].
     stamps: Array1<f64>,
-    /// Frames on their way, with a latency.
+    /// Frames in flight; `None` without a latency.
     delay: Option<DelayLine<CapturedFrame>>,
-    /// Probability that a frame gets lost on its way.
+    /// Probability that a frame is lost on its way.
     dropout: f64,
     arrived: Arrived,
-    /// True where the frame that arrived last is shown, from the viewpoint that it arrived with.
+    /// True if the latest delivered frame is shown, from the viewpoint of its delivery.
     shows_latest: Vec<bool>,
 }
 
-/// Frames that have arrived.
+/// Delivered frames.
 #[derive(Debug)]
 struct Arrived {
     counts: Array1<u64>,
-    /// The frame that arrived last, with a latency; without one, it is the shown frame.
+    /// The latest delivered frame, with a latency; without a latency this is the shown frame.
     latest: History<ArrivedFrame>,
     history: History<ArrivedFrame>,
     stamps: History<f64>,
@@ -180,13 +180,13 @@ impl Arrived {
 }
 
 impl FrameBuffer {
-    /// How many frames of an environment are on their way at once, where a frame is captured every `period` steps.
+    /// Returns the number of frames of an environment that are in flight at once.
     pub(super) fn pending(cfg: &CameraCfg, schedule: Schedule) -> usize {
         let keeps_frames = cfg.latency_steps > 0 || cfg.history_length > 0 || cfg.dropout > 0.0;
         if keeps_frames { delay::capacity(cfg.latency_steps.into(), schedule.period_steps()) } else { 0 }
     }
 
-    /// Room for the frames that `cfg` asks for.
+    /// Allocates the frames that `cfg` needs.
     pub(super) fn new(
         cfg: &CameraCfg,
         schedule: Schedule,
@@ -213,7 +213,8 @@ impl FrameBuffer {
         }
     }
 
-    /// Captures a frame of a row that is due: it is on its way, or gets lost, or is shown at once, where it says so.
+    /// Captures a frame of a row that is due. The frame is put in flight, lost, or shown at once; returns true if it is
+    /// shown.
     pub(super) fn capture(
         &mut self,
         row: usize,
@@ -235,7 +236,7 @@ impl FrameBuffer {
         true
     }
 
-    /// Takes the frames of a row that have arrived by `step`; gives whether another one is shown.
+    /// Takes the frames of a row that are due for delivery by `step`; returns true if another frame is shown.
     pub(super) fn receive(&mut self, row: usize, step: u64, viewpoints: &Viewpoints) -> bool {
         let mut shows = false;
         while let Some((frame, is_newest)) = self.delay.as_mut().and_then(|delay| delay.take(row, step)) {
@@ -249,7 +250,7 @@ impl FrameBuffer {
         shows
     }
 
-    /// Shows an environment as it is now, which is not a measurement: after a reset, or a write to its state.
+    /// Shows the current state of an environment after a reset or a write. This is not a measurement.
     pub(super) fn refresh(&mut self, row: usize, seen: &Observation<'_>, ticket: Ticket) {
         if let Some(delay) = &mut self.delay {
             delay.refresh(row, seen.state.step[seen.env]);
@@ -258,7 +259,7 @@ impl FrameBuffer {
         self.stamps[row] = self.shown[row].stamp;
     }
 
-    /// Forgets the frames of a row that are on their way or past.
+    /// Clears the frames of a row that are in flight or past.
     pub(super) fn reset(&mut self, row: usize) {
         let Arrived { counts, latest, history, stamps } = &mut self.arrived;
         counts[row] = 0;
@@ -270,17 +271,18 @@ impl FrameBuffer {
         }
     }
 
-    /// Steps until the next frame arrives, at least 1, when the rows are at `steps`; `None` where none is on its way.
+    /// Returns the steps until the next frame is delivered, at least 1, with the rows at `steps`; `None` if no frame is
+    /// in flight.
     pub(super) fn arrives_in(&self, steps: impl Iterator<Item = u64>) -> Option<u64> {
         self.delay.as_ref()?.due_in(steps)
     }
 
-    /// The shown frame of a row.
+    /// Returns the shown frame of a row.
     pub(super) fn shown(&self, row: usize) -> &CapturedFrame {
         &self.shown[row]
     }
 
-    /// True where the frame that arrived last is shown, from the viewpoint that it arrived with.
+    /// Returns true if the latest delivered frame is shown, from the viewpoint of its delivery.
     pub(super) fn shows_latest(&self, row: usize) -> bool {
         self.shows_latest[row]
     }
@@ -289,13 +291,13 @@ impl FrameBuffer {
         self.shows_latest[row] = shows_latest;
     }
 
-    /// The frame that arrived last in a row, where another one is shown.
+    /// Returns the latest delivered frame of a row if it is not the shown one.
     pub(super) fn unseen(&self, row: usize) -> Option<FrameSource<'_>> {
         let [latest] = self.arrived.latest.slice(row, 0).filter(|_| !self.shows_latest[row])? else { return None };
         Some(latest.source(row))
     }
 
-    /// The frame of the history of a row that is `age` frames old.
+    /// Returns the frame of the history of a row that is `age` frames old; 0 is the newest.
     pub(super) fn past(&self, row: usize, age: usize) -> Option<FrameSource<'_>> {
         let [past] = self.arrived.history.slice(row, age)? else { return None };
         Some(past.source(row))
@@ -306,7 +308,7 @@ impl FrameBuffer {
         self.stamps.view()
     }
 
-    /// Frames that arrived since the last reset, shape (rows).
+    /// Frames delivered since the last reset, shape (rows).
     pub(super) fn counts(&self) -> ArrayView1<'_, u64> {
         self.arrived.counts.view()
     }

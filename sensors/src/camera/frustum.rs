@@ -1,4 +1,4 @@
-//! What a camera shows of itself.
+//! Markers of a camera's frame and view frustum.
 
 use kinetoscope_render::lens::Optics;
 use kinetoscope_scene::{Marker, Pose};
@@ -10,8 +10,9 @@ const DEPTH: f64 = 0.3;
 const AXES: f32 = 0.1;
 const COLOR: [f32; 4] = [0.95, 0.8, 0.1, 1.0];
 
-/// The optical frame (blue is where it looks), and arrows from the eye along the four edges of what the picture shows, to a
-/// depth of 0.3 m, or as long where rays go aside or back. Corners that show nothing have none.
+/// Returns the axes of the optical frame (blue is the viewing direction), and arrows from the camera center along the
+/// four edges of the view frustum. Arrows end at a depth of 0.3 m, or at this distance if rays do not all go forward.
+/// Image corners without a ray get no arrow.
 pub(crate) fn frustum(world_from_camera: &Pose, optics: &Optics, height: usize, width: usize) -> Vec<Marker> {
     let (w, h) = (width as f64, height as f64);
     let eye = world_from_camera.translation.vector;

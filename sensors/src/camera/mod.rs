@@ -1,4 +1,4 @@
-//! Cameras: the sensor, its configuration, channels, frames and the rasterizer that fills them.
+//! Cameras: sensor, configuration, frame buffer, imperfections, calibration, segmentation, bounding boxes and stereo.
 
 mod accessors;
 mod arrivals;

@@ -1,5 +1,5 @@
-//! Poses of earlier instants that frames are drawn with: those of the frame before, for optical flow, and those of shutter
-//! opening, for motion blur and rolling shutters.
+//! Poses of earlier instants: those of the previous frame, for optical flow, and those at shutter opening, for motion
+//! blur and rolling shutters.
 
 use super::cfg::CameraCfg;
 use super::error::CameraError;
@@ -10,7 +10,7 @@ use kinetoscope_render::Shutter;
 use kinetoscope_render::View;
 use kinetoscope_scene::{Pose, PoseF32, RenderScene};
 
-/// Steps may be a little shorter than the shutter's span, which is a sum: this part of one.
+/// Tolerance for the rounding of the shutter span, which is a sum, as a fraction of a step.
 const ROUNDING: f64 = 1e-6;
 
 /// Poses at shutter opening.
@@ -27,12 +27,12 @@ impl OpeningPoses {
         Self { poses: vec![PoseF32::IDENTITY; instances], parent: None }
     }
 
-    /// Poses of instances and parent.
+    /// Returns the poses of instances and parent.
     pub(super) fn get(&self) -> Option<(&[PoseF32], Pose)> {
         Some((&self.poses, self.parent?))
     }
 
-    /// Copies `other`, or nothing where it cannot be drawn.
+    /// Copies `other`; clears the poses if they cannot be rendered.
     pub(super) fn assign_valid(&mut self, other: Option<&Self>) {
         self.parent = None;
         if let Some(other) = other.filter(|other| other.poses.iter().all(PoseF32::is_rigid)) {
@@ -52,10 +52,10 @@ impl OpeningPoses {
     }
 }
 
-/// Earlier instants of all rows, as far as the camera needs them.
+/// Earlier instants of all rows, for flow and for a shutter of nonzero span.
 #[derive(Clone, Debug)]
 pub(super) struct Motion {
-    /// The frame before, row by row; empty for a camera without flow.
+    /// Previous frames, row by row; empty for a camera without flow.
     previous: Vec<PreviousFrame>,
     shutter: Option<SlowShutter>,
 }
@@ -65,9 +65,9 @@ pub(super) struct Motion {
 struct PreviousFrame {
     /// World from instance.
     poses: Vec<PoseF32>,
-    /// `None` where the shown frame is the first.
+    /// View of the previous frame; `None` if the shown frame is the first.
     view: Option<View>,
-    /// View with which the shown frame was captured: setters since move the shown frame, and not the start of the next flow.
+    /// View at the capture of the shown frame. Later setters move the shown frame, but not the start of the next flow.
     shown_view: Option<View>,
 }
 
@@ -78,16 +78,16 @@ struct SlowShutter {
     steps: u64,
     /// The same \[s\].
     seconds: f64,
-    /// Poses at the opening, row by row; none while the shutter is closed.
+    /// Poses at the opening, row by row; empty while the shutter is closed.
     opened: Vec<OpeningPoses>,
 }
 
 impl Motion {
-    /// The history that `cfg` asks for, in `rows` environments.
+    /// Allocates the poses that `cfg` needs, in `rows` environments.
     ///
     /// # Errors
     ///
-    /// [`CameraError::ShutterTooSlow`] where frames overlap.
+    /// [`CameraError::ShutterTooSlow`] if consecutive frames would overlap.
     pub(super) fn new(
         cfg: &CameraCfg,
         schedule: Schedule,
@@ -111,22 +111,22 @@ impl Motion {
         Ok(Self { previous: vec![previous; if cfg.channels.flow { rows } else { 0 }], shutter })
     }
 
-    /// Time from the opening of the shutter until a frame is due \[s\]; `None` for frames of one instant.
+    /// Returns the time from shutter opening until a frame is due \[s\]; `None` for frames of one instant.
     pub(super) fn shutter_seconds(&self) -> Option<f64> {
         self.shutter.as_ref().map(|shutter| shutter.seconds)
     }
 
-    /// Steps until the shutter opens or a frame is due, given the steps until the latter.
+    /// Returns the steps until the shutter opens or a frame is due, given the steps until the frame is due.
     pub(super) fn wait(&self, due: u64) -> u64 {
         self.shutter.as_ref().filter(|shutter| due > shutter.steps).map_or(due, |shutter| due - shutter.steps)
     }
 
-    /// Poses at the opening of the open shutter of a row.
+    /// Returns the poses at the opening of the shutter of a row.
     pub(super) fn opening(&self, row: usize) -> Option<&OpeningPoses> {
         self.shutter.as_ref().map(|shutter| &shutter.opened[row])
     }
 
-    /// Opens the shutter of a row whose next frame is due in as many steps as that takes.
+    /// Opens the shutter of a row if its next frame is due after the span of the shutter.
     pub(super) fn open_if_due(&mut self, row: usize, phases: &Phases, seen: &Observation<'_>) {
         if let Some(shutter) = &mut self.shutter
             && phases.wait(row, seen.state.step[seen.env]) == shutter.steps
@@ -135,7 +135,7 @@ impl Motion {
         }
     }
 
-    /// Takes the poses of an open shutter anew, after a write to the state: what is seen now was there since it opened.
+    /// Replaces the poses of an open shutter after a write to the state: the written state counts since the opening.
     pub(super) fn refresh(&mut self, row: usize, seen: &Observation<'_>) {
         if let Some(shutter) = &mut self.shutter
             && shutter.opened[row].parent.is_some()
@@ -151,7 +151,7 @@ impl Motion {
         }
     }
 
-    /// The shown frame of a row becomes the one before; one that cannot be drawn counts as missing.
+    /// Makes the shown frame of a row the previous frame. A frame that cannot be rendered counts as missing.
     pub(super) fn advance(&mut self, row: usize, shown: &CapturedFrame) {
         if let Some(previous) = self.previous.get_mut(row) {
             previous.poses.copy_from_slice(&shown.poses);
@@ -160,14 +160,14 @@ impl Motion {
         }
     }
 
-    /// A frame of a row is shown that was captured with this view.
+    /// Records the view of a newly shown frame.
     pub(super) fn show(&mut self, row: usize, view: View) {
         if let Some(previous) = self.previous.get_mut(row) {
             previous.shown_view = Some(view);
         }
     }
 
-    /// Makes the next frame of a row its first.
+    /// Makes the next frame of a row its first frame.
     pub(super) fn reset(&mut self, row: usize) {
         if let Some(previous) = self.previous.get_mut(row) {
             previous.view = None;
@@ -175,14 +175,14 @@ impl Motion {
         self.close(row);
     }
 
-    /// The frame before the shown one of a row.
+    /// Returns the previous frame of a row.
     pub(super) fn before(&self, row: usize) -> Option<Before<'_>> {
         let PreviousFrame { poses, view, .. } = self.previous.get(row)?;
         Some(Before { poses, view: view.as_ref()? })
     }
 }
 
-/// Physics steps of a shutter's span, rounded up; `None` for an instant.
+/// Returns the physics steps of the span of a shutter, rounded up; `None` for a shutter of one instant.
 fn shutter_steps(shutter: Shutter, height: usize, dt: f64) -> Option<u64> {
     let steps = (shutter.span(height) / dt - ROUNDING).ceil().max(1.0);
     (!shutter.is_instant() && shutter.span(height) > 0.0).then_some(steps as u64)

@@ -1,4 +1,4 @@
-//! Noise of the numbers of pictures, channel by channel: [`NoiseCfg`] of other sensors, looked up instead of drawn.
+//! Noise of image channels: [`NoiseCfg`] as in other sensors, with random numbers computed from keys.
 
 use super::cfg::CameraCfg;
 use crate::error::SensorError;
@@ -9,27 +9,27 @@ use kinetoscope_render::frame::{Color, Depth, Distance};
 use kinetoscope_render::{Stream, Ticket};
 use std::collections::BTreeMap;
 
-/// The noise of each channel that has some.
+/// Noise of each channel; `None` for channels without noise.
 #[derive(Clone, Debug)]
 pub(crate) struct PictureNoise {
     color: Option<NoiseCfg>,
     depth: Option<NoiseCfg>,
     distance: Option<NoiseCfg>,
-    /// Square root of the time between pictures.
+    /// Square root of the time between images, \[√s\].
     sqrt_period: f64,
-    /// Depths and distances that can be measured.
+    /// Ranges of measured depth and distance \[m\].
     ranges: [[f64; 2]; 2],
 }
 
-/// Bytes of a colour.
+/// Range of color bytes.
 const BYTES: [f64; 2] = [0.0, 255.0];
 
 impl PictureNoise {
-    /// The noise that `cfg` asks for, where pictures are `period` \[s\] apart; `None` where it asks for none.
+    /// Creates the noise that `cfg` describes, with `period` \[s\] between images; `None` without noise.
     pub(crate) fn new(cfg: &CameraCfg, period: f64) -> Result<Option<Self>, SensorError> {
         let [near, far] = [f64::from(cfg.near as f32), f64::from(cfg.far as f32)];
-        // Rays through corners are longer than their depth, by how much depends on the lens; where near and far are along the
-        // ray, what is beside the camera has no depth, and what is behind it less than none.
+        // Rays through corners are longer than their depth, depending on the lens. If near and far are along the ray,
+        // points beside the camera have depth 0, and points behind it a negative depth.
         let depths = if cfg.lens.is_forward() { [near, far] } else { [-far, far] };
         let ranges = [depths, [near, f64::from(f32::MAX)]];
         let candidates = [
@@ -38,7 +38,7 @@ impl PictureNoise {
             (cfg.channels.distance, Channel::within(Distance::NAME, 0, ranges[1])),
         ];
         let measured: Vec<Channel> = candidates.into_iter().filter(|(on, _)| *on).map(|(_, channel)| channel).collect();
-        // By their own names, for those that have others.
+        // Alternative channel names are replaced by the canonical ones.
         let named = cfg.noise.iter().map(|(name, noise)| (own_name(name), noise));
         check(cfg.dropout, named.clone(), &measured)?;
         let of = |channel: &str| {
@@ -60,10 +60,10 @@ impl PictureNoise {
         }))
     }
 
-    /// Adds the noise of a picture to a frame in which misses are infinite.
+    /// Adds noise to a frame in which misses are infinite.
     pub(crate) fn disturb(&self, frame: &mut FrameMut<'_>, ticket: &Ticket) {
         if let (Some(noise), Some(bytes)) = (&self.color, frame.color.as_deref_mut()) {
-            // Four pixels have twelve numbers: their opacity is none.
+            // Four pixels have twelve numbers: alpha has no noise.
             for (k, pixels) in (0..).zip(bytes.chunks_mut(16)) {
                 let blocks = [0, 1, 2].map(|b| self.errors(noise, 0, ticket, 3 * k + b));
                 let errors = blocks.as_flattened().chunks_exact(3);
@@ -79,7 +79,7 @@ impl PictureNoise {
             let (Some(noise), Some(numbers)) = (noise, numbers) else { continue };
             for (block, numbers) in (0..).zip(numbers.chunks_mut(4)) {
                 let errors = self.errors(noise, channel, ticket, block);
-                // Nothing was hit: noise does not make a hit of it.
+                // Misses have no noise.
                 for (number, error) in numbers.iter_mut().zip(errors).filter(|(number, _)| number.is_finite()) {
                     *number = noise.settle(f64::from(*number) + error, range) as f32;
                 }
@@ -87,7 +87,7 @@ impl PictureNoise {
         }
     }
 
-    /// What is added to four numbers of a channel.
+    /// Returns the noise of a block of four numbers of a channel.
     fn errors(&self, noise: &NoiseCfg, channel: u8, ticket: &Ticket, block: u32) -> [f64; 4] {
         let mut errors = [0.0; 4];
         let mut add = |size: f64, numbers: [f64; 4]| {
@@ -106,13 +106,13 @@ impl PictureNoise {
     }
 }
 
-/// What of some noise there is of a camera with these channels; what is no channel stays, for whoever checks names.
+/// Returns the noise of the measured channels. Names that are not channels stay and are rejected by `check`.
 pub(crate) fn of_channels(noise: &BTreeMap<String, NoiseCfg>, channels: Channels) -> BTreeMap<String, NoiseCfg> {
     let off = |name: &str| Channels::NAMES.contains(&own_name(name)) && !channels.names().contains(&own_name(name));
     noise.iter().filter(|(name, _)| !off(name)).map(|(name, noise)| (name.clone(), *noise)).collect()
 }
 
-/// The name of a channel that may be called otherwise; what is no channel stays as it is.
+/// Returns the canonical name of a channel; other names stay unchanged.
 fn own_name(name: &str) -> &str {
     Channels::from_names(&[name]).ok().and_then(|channels| channels.names().first().copied()).unwrap_or(name)
 }
@@ -124,8 +124,8 @@ mod tests {
     use kinetoscope_render::frame::Frame;
     use kinetoscope_render::lens::Lens;
 
-    /// Root cause: depths were clamped to near and far, which of lenses that see backward are along the ray: objects beside the
-    /// camera came out `near` away.
+    /// Root cause: depths were clamped to near and far, which are distances along the ray for lenses that see backward.
+    /// Objects beside the camera came out at depth `near`.
     #[test]
     fn wide_lens_depths() {
         let disturbed = |lens: &str| {
@@ -146,7 +146,7 @@ mod tests {
         for (found, was) in disturbed("equidistant").into_iter().zip([-2.0, 0.0, 0.5, 3.0]) {
             assert!((found - was).abs() < 1e-6, "{found}, not {was}");
         }
-        // The control: a pinhole measures nothing nearer than `near`.
+        // Control: a pinhole measures nothing nearer than `near`.
         assert_eq!(disturbed("pinhole")[..2], [0.1, 0.1]);
     }
 }

@@ -8,16 +8,16 @@ use kinetoscope_render::Intrinsics;
 use kinetoscope_scene::Pose;
 use ndarray::Array2;
 
-/// Frame in which poses are given.
+/// Reference frame of given poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoseFrame {
-    /// The parent's frame; the environment's for a free camera.
+    /// Frame of the parent; of the environment for a free camera.
     Parent,
-    /// The environment's frame.
+    /// Frame of the environment.
     Environment,
 }
 
-/// The steps of [`CameraPlacement`] that differ between sensors.
+/// Operations of [`CameraPlacement`] that differ between sensors.
 pub trait PlaceRows {
     /// Environments that the sensor sees.
     fn env_rows(&self) -> &EnvRows;
@@ -26,42 +26,43 @@ pub trait PlaceRows {
     ///
     /// # Errors
     ///
-    /// A wrong number of poses, a parent without a known pose; nothing is changed then.
+    /// A wrong number of poses, or a parent whose pose is unknown. Nothing is changed then.
     fn place_rows(&mut self, rows: &[usize], poses: &[Pose], frame: PoseFrame) -> Result<(), SensorError>;
 
-    /// Sets the configured poses and intrinsics.
+    /// Restores the configured poses and intrinsics.
     fn restore_rows(&mut self, rows: &[usize]);
 }
 
-/// Placement of a camera sensor: its pose and its intrinsics in each environment, settable at any time.
+/// Pose and intrinsics of a camera sensor in each environment, settable at any time.
 ///
-/// A [`Camera`](crate::camera::Camera) and a [`StereoCamera`](crate::camera::StereoCamera) show the captured instant from the new pose at the
-/// next read; a [`RayCasterCamera`](crate::ray::RayCasterCamera) uses it from the next image on. A stereo camera is placed by the
-/// [origin](super::StereoOrigin) of its rig. What was set stays over a reset, until [`restore`](Self::restore).
+/// After a change, a [`Camera`](crate::camera::Camera) or a [`StereoCamera`](crate::camera::StereoCamera) shows the
+/// captured instant from the new pose at the next read. A [`RayCasterCamera`](crate::ray::RayCasterCamera) uses the new
+/// pose from the next image on. A stereo camera is placed by the [origin](super::StereoOrigin) of its rig. Values
+/// persist over a reset, until [`restore`](Self::restore).
 pub trait CameraPlacement: PlaceRows {
-    /// Poses in the frame of the parent (of the environment, for a free camera), rows `[x, y, z, qw, qx, qy, qz]` \[m\],
-    /// shape (N, 7).
+    /// Poses in the frame of the parent (of the environment, for a free camera), rows `[x, y, z, qw, qx, qy, qz]`
+    /// \[m\], shape (N, 7).
     fn local_pose(&self, convention: CameraConvention) -> Array2<f64>;
 
-    /// Sets intrinsics: one for each of `env_ids` (`None` is all environments of the camera), or one for all. Both eyes of a
-    /// stereo camera get them.
+    /// Sets intrinsics: one for each of `env_ids` (`None` is all environments of the camera), or one for all. Both
+    /// cameras of a stereo camera get them.
     ///
     /// # Errors
     ///
-    /// [`CameraError::Optics`](super::CameraError::Optics), also where a camera with a lens cannot have them;
-    /// [`CameraError::View`](super::CameraError::View), [`CameraError::Count`](super::CameraError::Count), an environment that
-    /// the camera does not see or that is named twice. Nothing is changed then.
+    /// [`CameraError::Optics`](super::CameraError::Optics), also if the lens does not support them;
+    /// [`CameraError::View`](super::CameraError::View), [`CameraError::Count`](super::CameraError::Count), an
+    /// environment that the camera does not see or that is named twice. Nothing is changed then.
     fn set_intrinsics(&mut self, intrinsics: &[Intrinsics], env_ids: Option<&[usize]>) -> Result<(), SensorError>;
 
-    /// Places cameras in the frame of their parent (of the environment, for free ones).
+    /// Sets poses in the frame of the parent (of the environment, for a free camera).
     ///
-    /// `poses` are typed or rows `[x, y, z, qw, qx, qy, qz]`: one for each of `env_ids` (`None` is all environments of the
-    /// camera), or one for all. `convention` is the meaning of their axes.
+    /// `poses` are typed or rows `[x, y, z, qw, qx, qy, qz]` \[m\]: one for each of `env_ids` (`None` is all
+    /// environments of the camera), or one for all. `convention` defines their axes.
     ///
     /// # Errors
     ///
-    /// [`CameraError::Pose`](super::CameraError::Pose), [`CameraError::Count`](super::CameraError::Count), an environment that
-    /// the camera does not see or that is named twice; nothing is changed then.
+    /// [`CameraError::Pose`](super::CameraError::Pose), [`CameraError::Count`](super::CameraError::Count), an
+    /// environment that the camera does not see or that is named twice. Nothing is changed then.
     fn set_local_pose(
         &mut self,
         poses: &(impl Poses + ?Sized),
@@ -71,14 +72,15 @@ pub trait CameraPlacement: PlaceRows {
         place_in(self, poses, env_ids, convention, PoseFrame::Parent)
     }
 
-    /// Places cameras in the environment, as [`set_local_pose`](Self::set_local_pose). An attached camera gets the local pose
-    /// that puts it there at the captured instant (of a camera of rays, when rays were cast last), and moves with its parent
-    /// from then on.
+    /// Sets poses in the environment, with arguments as in [`set_local_pose`](Self::set_local_pose). An attached camera
+    /// gets the local pose that puts it there at the captured instant, and moves with its parent from then on. For a
+    /// ray-caster camera, this is the instant of the last ray cast.
     ///
     /// # Errors
     ///
-    /// As [`set_local_pose`](Self::set_local_pose), and [`CameraError::NothingCaptured`](super::CameraError::NothingCaptured)
-    /// for an attached camera whose parent was not seen yet.
+    /// Same as [`set_local_pose`](Self::set_local_pose), and
+    /// [`CameraError::NothingCaptured`](super::CameraError::NothingCaptured) for an attached camera whose parent was
+    /// not captured yet.
     fn set_world_poses(
         &mut self,
         poses: &(impl Poses + ?Sized),
@@ -88,18 +90,21 @@ pub trait CameraPlacement: PlaceRows {
         place_in(self, poses, env_ids, convention, PoseFrame::Environment)
     }
 
-    /// Places each camera at `eye`, looking at `target`, in the frame of its parent (of the environment, for free ones). A
-    /// stereo camera has its origin there, and the left eye's optical axis is parallel to the line to `target`. See
-    /// [`look_at_pose`](super::look_at_pose) for `up`; the pose of one environment never depends on another. To look from an
-    /// attached camera at a point of the environment, give [`look_at_pose`](super::look_at_pose) to
+    /// Places each camera at `eye`, looking at `target`, in the frame of its parent (of the environment, for a free
+    /// camera). For a stereo camera, `eye` is its origin, and the left optical axis is parallel to the line to
+    /// `target`.
+    ///
+    /// See [`look_at_pose`](super::look_at_pose) for `up`; the pose of one environment never depends on another. To
+    /// point an attached camera at a point of the environment, pass [`look_at_pose`](super::look_at_pose) to
     /// [`set_world_poses`](Self::set_world_poses).
     ///
-    /// One `eye`, `target` and `up` for each of `env_ids` (`None` is all environments of the camera), or one for all \[m\].
+    /// One `eye`, `target` and `up` for each of `env_ids` (`None` is all environments of the camera), or one for all
+    /// \[m\].
     ///
     /// # Errors
     ///
-    /// [`CameraError::LookAt`](super::CameraError::LookAt), [`CameraError::Count`](super::CameraError::Count), an environment
-    /// that the camera does not see or that is named twice; nothing is changed then.
+    /// [`CameraError::LookAt`](super::CameraError::LookAt), [`CameraError::Count`](super::CameraError::Count), an
+    /// environment that the camera does not see or that is named twice. Nothing is changed then.
     fn look_at(
         &mut self,
         eye: &[[f64; 3]],
@@ -114,11 +119,11 @@ pub trait CameraPlacement: PlaceRows {
         self.place_rows(&rows, &poses?, PoseFrame::Parent)
     }
 
-    /// Sets the configured poses and intrinsics in `env_ids` (`None` is all environments of the camera).
+    /// Restores the configured poses and intrinsics in `env_ids` (`None` is all environments of the camera).
     ///
     /// # Errors
     ///
-    /// An environment that the camera does not see or that is named twice; nothing is changed then.
+    /// An environment that the camera does not see or that is named twice. Nothing is changed then.
     fn restore(&mut self, env_ids: Option<&[usize]>) -> Result<(), SensorError> {
         let rows = self.env_rows().chosen(env_ids)?;
         self.restore_rows(&rows);

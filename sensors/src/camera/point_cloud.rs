@@ -1,4 +1,4 @@
-//! Depth pictures, turned back into points.
+//! Point clouds from depth images.
 
 use super::sensor::Camera;
 use crate::error::SensorError;
@@ -7,25 +7,25 @@ use kinetoscope_render::frame::{Depth, Distance};
 use kinetoscope_scene::Pose;
 use ndarray::{Array2, Array3, ArrayView3, Axis};
 
-/// The frame that points are given in.
+/// Reference frame of points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum PointFrame {
-    /// The camera's optical frame: x right, y down, z forward.
+    /// Optical frame of the camera: x right, y down, z forward.
     #[default]
     Camera,
-    /// The environment's frame.
+    /// Frame of the environment.
     World,
 }
 
 impl Camera {
-    /// The point at every pixel of environment `env` \[m\], shape (H, W, 3): the depth along the ray through the pixel's
-    /// centre, or the distance, of a lens whose rays do not all go forward ([`Lens::is_forward`](kinetoscope_render::lens::Lens::is_forward)).
-    /// (+inf, +inf, +inf) where nothing was hit.
+    /// Returns the point at every pixel of environment `env` \[m\], shape (H, W, 3); (+inf, +inf, +inf) where nothing
+    /// was hit. Points come from the depth along the ray through the pixel center. If rays of the lens do not all go
+    /// forward ([`Lens::is_forward`](kinetoscope_render::lens::Lens::is_forward)), they come from the distance.
     ///
     /// # Errors
     ///
-    /// As [`channel`](Self::channel) of [`Depth`], or of [`Distance`] where distances are needed, and an environment that the
-    /// camera does not see.
+    /// Same as [`channel`](Self::channel) for [`Depth`], or for [`Distance`] if distances are needed, and an
+    /// environment that the camera does not see.
     pub fn point_map(&self, env: usize, frame: PointFrame) -> Result<Array3<f32>, SensorError> {
         let (row, (height, width)) = (self.row(env)?, self.image_shape());
         let rays = self.rays_of(row);
@@ -48,20 +48,21 @@ impl Camera {
         Ok(points)
     }
 
-    /// The points that environment `env` shows \[m\], shape (points, 3): those of [`point_map`](Self::point_map) where
-    /// something was hit, row by row from the top left.
+    /// Returns the points seen in environment `env` \[m\], shape (points, 3): the hits of
+    /// [`point_map`](Self::point_map), row by row from the top left.
     ///
     /// # Errors
     ///
-    /// As [`point_map`](Self::point_map).
+    /// Same as [`point_map`](Self::point_map).
     pub fn point_cloud(&self, env: usize, frame: PointFrame) -> Result<Array2<f32>, SensorError> {
         let map = self.point_map(env, frame)?;
         Ok(seen(map.view()))
     }
 }
 
-/// Writes the points of a picture of `width` pixels per row to `points`, three numbers each: depths \[m\] along the rays
-/// through the centres of the pixels, in the frame that `pose` maps to. Where there is no depth, nothing is written.
+/// Writes the points of an image of `width` pixels per row to `points`, three numbers each. `depths` \[m\] are along
+/// the optical axis, and `pose` maps the optical frame to the frame of the points. Pixels without a depth are not
+/// written.
 pub(crate) fn unproject(
     lens: &PixelIntrinsics,
     pose: &Pose,
@@ -76,7 +77,7 @@ pub(crate) fn unproject(
     follow(ray, pose, width, depths, points);
 }
 
-/// As [`unproject`], along rays in the optical frame, in lengths of each.
+/// Writes points along rays of the optical frame, given in multiples of the ray vector.
 fn follow(
     ray: impl Fn([usize; 2]) -> [f64; 3],
     pose: &Pose,
@@ -94,7 +95,7 @@ fn follow(
     }
 }
 
-/// The points of a map that are there, shape (points, 3).
+/// Returns the finite points of a map, shape (points, 3).
 pub(crate) fn seen(map: ArrayView3<'_, f32>) -> Array2<f32> {
     let points = map.rows().into_iter().map(|p| [p[0], p[1], p[2]]).filter(|p| p[0].is_finite());
     Array2::from(points.collect::<Vec<[f32; 3]>>())

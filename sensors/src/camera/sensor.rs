@@ -1,4 +1,4 @@
-//! The camera: captures what there is to see, draws when somebody looks.
+//! Camera sensor: captures the state when a frame is due, renders it when it is read.
 
 pub(super) mod drawing;
 
@@ -34,20 +34,21 @@ use std::sync::{Arc, Mutex};
 
 /// A camera in each of several environments.
 ///
-/// When a picture is due, the camera *captures*: it keeps where everything is. Pictures are drawn from that at the first
-/// reading afterwards, once, and only where something changed ([`CameraCfg::lazy`]). So a reading always shows the instant
-/// of [`stamps`](Self::stamps), however late it comes. After a setter of [`CameraPlacement`] the next reading shows the same
-/// instant from the new place. Places and lenses set that way stay over a reset, until
+/// When a frame is due, the camera *captures* it: it stores the poses of everything visible. The image is rendered from
+/// them at the first read afterwards, once, and only if the frame changed ([`CameraCfg::lazy`]). So a read always shows
+/// the instant of [`stamps`](Self::stamps), however late it comes. After a setter of [`CameraPlacement`], the next read
+/// shows the same instant from the new pose. Poses and intrinsics set that way persist over a reset, until
 /// [`restore`](CameraPlacement::restore).
 ///
-/// A camera is perfect unless it is told otherwise: it may have a [`history`](Self::history), pictures may come late or get
-/// lost, and be noisy or spoilt as those of real cameras ([`CameraCfg::imperfections`]). Then it is lazy still, and
-/// shows the same bits: each capture is kept until it arrives, or until somebody looks. Setters act on what is shown and on
-/// what is on its way; the history stays as it was seen.
+/// A camera is perfect by default. Optionally it has a [`history`](Self::history), latency, dropout, noise, and
+/// imperfections of real cameras ([`CameraCfg::imperfections`]). It stays lazy and gives the same bits: each capture is
+/// kept until it is delivered or read. Setters affect the shown frame and frames in flight; the history stays as it was
+/// captured.
 ///
-/// Views that were read borrow the camera: nothing draws over them. The first axis of everything is the camera's own
-/// environments, [`env_ids`](Self::env_ids); the frame is that of the environment, units are metres. An environment whose
-/// state cannot be drawn (a pose that is not finite) makes reading an error, until it was captured anew.
+/// Returned views borrow the camera, so images are not overwritten while they are read. The first axis of all arrays is
+/// the environments of the camera, [`env_ids`](Self::env_ids). Poses are in the frame of the environment, lengths in
+/// meters. If the state of an environment cannot be rendered (a pose that is not finite), reads fail until the next
+/// capture.
 pub struct Camera {
     pub(super) cfg: CameraCfg,
     pub(super) path: String,
@@ -62,18 +63,18 @@ pub struct Camera {
     pub(super) tickets: Vec<Ticket>,
     pub(super) frames: FrameBuffer,
     pub(super) motion: Motion,
-    /// Images of the shown frames, of the frames that arrived last where others are shown, and of the history.
+    /// Images of the shown frames, of the latest delivered frames where others are shown, and of the history.
     pub(super) images: Cached<DrawnImages>,
     pub(super) latest_images: Cached<DrawnImages>,
     pub(super) past_images: Cached<PastImages>,
     pub(super) renderer: Mutex<FrameRenderer>,
     pub(super) progress: RenderProgress,
     pub(super) draws: AtomicU64,
-    /// Rows that show another frame, between updates without meaning: its memory is kept.
+    /// Rows that show another frame. Only used within an update, kept for its memory.
     pub(super) changed: Vec<usize>,
 }
 
-/// What all views have in common.
+/// Image size and depth range, common to all views.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lens {
     width: usize,
@@ -85,7 +86,7 @@ pub(super) struct Lens {
 impl Lens {
     pub(super) fn new(cfg: &CameraCfg) -> Result<Self, CameraError> {
         let (near, far) = (cfg.near as f32, cfg.far as f32);
-        // The rasterizer holds the depth against 1/near: it must be a number.
+        // The rasterizer compares the depth with 1/near, which must be finite.
         if near > 0.0 && near < far && far.is_finite() {
             return Ok(Self { width: cfg.width, height: cfg.height, near, far });
         }
@@ -153,8 +154,8 @@ impl Sensor for Camera {
         self.frames.arrives_in(steps()).map_or(due, |arrival| arrival.min(due))
     }
 
-    /// The optical frame, and an arrow along each edge of the picture's pyramid, at the captured instant; none in an
-    /// environment that it does not look into.
+    /// Axes of the optical frame and an arrow along each edge of the view frustum, at the captured instant. Empty for
+    /// an environment that the camera does not see.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let row = self.viewpoints.envs.of(env);
         let placed = row.and_then(|row| Some((self.world_from_camera(row)?, self.optics_of(row)?)));
@@ -203,22 +204,22 @@ impl Camera {
         Requires::VISIBLE | part(attached, Requires::POSES) | part(draws_markers, Requires::MARKERS)
     }
 
-    /// The environments that it looks into: the first axis of everything it measures.
+    /// Environments of the camera: the first axis of all its arrays.
     pub fn env_ids(&self) -> &[usize] {
         self.viewpoints.envs.env_ids()
     }
 
-    /// Path: `uid/link/name` on a body, the camera's name without one.
+    /// Path: `uid/link/name` for an attached camera, else the name of the camera.
     pub fn path(&self) -> &str {
         &self.path
     }
 
-    /// What it measures.
+    /// Measured channels.
     pub fn channels(&self) -> Channels {
         self.cfg.channels
     }
 
-    /// When it measures.
+    /// Schedule of the frames.
     pub fn schedule(&self) -> Schedule {
         self.phases.schedule()
     }
@@ -228,40 +229,39 @@ impl Camera {
         self.schedule().period_steps() as f64 * self.dt
     }
 
-    /// Rows and pixels per row: (H, W).
+    /// Image shape (height, width) \[pixels\].
     pub fn image_shape(&self) -> (usize, usize) {
         (self.lens.height, self.lens.width)
     }
 
-    /// Whether it hangs on a body.
+    /// True if the camera is attached to a body.
     pub fn is_attached(&self) -> bool {
         self.viewpoints.parent.is_some()
     }
 
-    /// Time of the instant that pictures show \[s\] since the last reset of the environment, shape (N).
+    /// Time of the shown frames \[s\] since the last reset of the environment, shape (N).
     pub fn stamps(&self) -> ArrayView1<'_, f64> {
         self.frames.stamps()
     }
 
-    /// Pictures since the last reset, shape (N): those that were due and have arrived, whether somebody looked or not. The
-    /// refresh of a reset is none.
+    /// Number of frames delivered since the last reset, read or not, shape (N). The refresh of a reset does not count.
     pub fn frame_counts(&self) -> ArrayView1<'_, u64> {
         self.frames.counts()
     }
 
-    /// How many pictures were drawn since the camera was built, each environment counted: a measure of work.
+    /// Number of images rendered since the camera was built, summed over environments: a measure of work.
     pub fn draws(&self) -> u64 {
         self.draws.load(Ordering::Relaxed)
     }
 
-    /// How far the drawing of pictures by path tracing is, and a way to break it off from another thread. A reading that was
-    /// broken off is [`CameraError::Draw`] with [`RenderError::Cancelled`]; the next one draws again.
+    /// Progress of path tracing, and a way to cancel it from another thread. A cancelled read returns
+    /// [`CameraError::Draw`] with [`RenderError::Cancelled`]; the next read renders again.
     pub fn progress(&self) -> &RenderProgress {
         &self.progress
     }
 
-    /// The pictures of one channel: `camera.channel::<Depth>()?`, shape (N, H, W) or (N, H, W, components). Draws what was
-    /// captured since the last reading.
+    /// Images of one channel: `camera.channel::<Depth>()?`, shape (N, H, W) or (N, H, W, components). Renders the
+    /// frames captured since the last read.
     ///
     /// # Errors
     ///
@@ -272,7 +272,7 @@ impl Camera {
         self.pictures()?.get::<C>().ok_or_else(|| self.channel_off::<C>().into())
     }
 
-    /// Refuses a channel that is not measured.
+    /// Returns an error if the channel is not measured.
     pub(super) fn must_have<C: Listed>(&self) -> Result<(), CameraError> {
         if self.cfg.channels.has::<C>() { Ok(()) } else { Err(self.channel_off::<C>()) }
     }
@@ -281,7 +281,7 @@ impl Camera {
         CameraError::ChannelOff { channel: C::NAME, enabled: self.cfg.channels.names() }
     }
 
-    /// All pictures. Draws what was captured since the last reading.
+    /// Images of all channels. Renders the frames captured since the last read.
     ///
     /// # Errors
     ///
@@ -305,7 +305,7 @@ impl Camera {
         self.viewpoints.lens()
     }
 
-    /// The lens of environment `env` in front of its pixels: from directions to pixels and back.
+    /// Optics of environment `env`: the lens with its intrinsics, mapping directions to pixels and back.
     ///
     /// # Errors
     ///
@@ -315,18 +315,18 @@ impl Camera {
         Ok(Optics::new(self.viewpoints.lens(), pixels)?)
     }
 
-    /// Whether its colours show what other sensors show of their measurements.
+    /// True if the color channel shows the markers of other sensors.
     pub fn draws_markers(&self) -> bool {
         self.cfg.draw_markers
     }
 
-    /// Memory of the rays of a lens \[bytes\]: 0 for a pinhole.
+    /// Memory of the lens rays \[bytes\]; 0 for a pinhole.
     pub fn lens_bytes(&self) -> usize {
         self.viewpoints.ray_bytes()
     }
 
-    /// Poses in the environment at the captured instant, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7). NaN where an
-    /// attached camera has captured nothing yet.
+    /// Poses in the environment at the captured instant, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7). NaN for
+    /// an attached camera before its first capture.
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         let pose = |row| self.world_from_camera(row).map(|pose| to_row(&convention.of_optical(&pose)));
         Array2::from(
@@ -334,7 +334,7 @@ impl Camera {
         )
     }
 
-    /// The view of environment `env` at the captured instant: what a renderer draws.
+    /// The view of environment `env` at the captured instant, as the renderer uses it.
     ///
     /// # Errors
     ///
@@ -350,7 +350,7 @@ impl Camera {
         self.viewpoints.envs.row(env)
     }
 
-    /// Whether a number of the depth channel is that of a surface.
+    /// Returns true if a number of the depth channel is a hit.
     pub(super) fn is_hit(&self, depth: f32) -> bool {
         match self.cfg.depth_miss {
             DepthMiss::Inf => depth.is_finite(),
@@ -359,18 +359,18 @@ impl Camera {
         }
     }
 
-    /// Whether straight lines are bent in the picture.
+    /// Returns true if straight lines are bent in the image.
     pub(super) fn bends_lines(&self) -> bool {
         !self.viewpoints.lens().is_pinhole()
     }
 
-    /// Refuses what is only known of pictures without a lens.
+    /// Returns an error for a lens other than a pinhole; `what` names the feature.
     pub(super) fn must_be_pinhole(&self, what: &'static str) -> Result<(), CameraError> {
         let lens = self.viewpoints.lens();
         if lens.is_pinhole() { Ok(()) } else { Err(CameraError::PinholeOnly { what, lens: lens.name() }) }
     }
 
-    /// The lens of a row, in front of its pixels.
+    /// Returns the optics of a row.
     fn optics_of(&self, row: usize) -> Option<Optics> {
         match self.rays_of(row) {
             Some(rays) => Some(*rays.optics()),
@@ -378,17 +378,17 @@ impl Camera {
         }
     }
 
-    /// The rays of a row; none for a pinhole.
+    /// Returns the lens rays of a row; `None` for a pinhole.
     pub(super) fn rays_of(&self, row: usize) -> Option<&LensRays> {
         self.viewpoints.rays(row).map(|rays| &**rays)
     }
 
-    /// Where the optical frame is at the captured instant.
+    /// Returns the pose of the optical frame at the captured instant.
     pub(super) fn world_from_camera(&self, row: usize) -> Option<Pose> {
         self.viewpoints.world_from(self.viewpoints.row(row), self.frames.shown(row).world_from_parent)
     }
 
-    /// Whether the state is of the scene that the camera was built for.
+    /// Checks that the state belongs to the scene that the camera was built for.
     fn check(&self, state: &SceneState) -> Result<(), SensorError> {
         let missing = Self::requires(self.is_attached(), self.cfg.draw_markers).without(Requires::present_in(state));
         let Some(VisibleState { instance_poses, lights, .. }) = state.visible.as_ref().filter(|_| missing.is_empty())
@@ -425,7 +425,7 @@ impl Camera {
         Observation { state, env: self.env_ids()[row], parent: self.viewpoints.parent }
     }
 
-    /// Captures a frame of a row that is due; gives whether it is shown at once.
+    /// Captures a frame of a row that is due; returns true if it is shown at once.
     fn capture(&mut self, row: usize, seen: &Observation<'_>) -> bool {
         let Self { frames, motion, viewpoints, tickets, .. } = self;
         tickets[row].due();
@@ -438,7 +438,7 @@ impl Camera {
         shown
     }
 
-    /// Shows some environments as they are now; the state was checked.
+    /// Shows the current state of some environments. The state must be checked before.
     fn show_now(&mut self, rows: &[usize], state: &SceneState) {
         for &row in rows {
             self.frames.refresh(row, &self.observe(row, state), self.tickets[row]);
@@ -460,7 +460,7 @@ impl Camera {
         }
     }
 
-    /// The images of some rows are outdated: another frame is shown, or another viewpoint.
+    /// Marks the images of some rows as outdated, after a change of frame or viewpoint.
     fn outdate(&mut self, rows: &[usize]) {
         if rows.is_empty() {
             return;
@@ -473,18 +473,18 @@ impl Camera {
         }
     }
 
-    /// Fails before the first reset or update of a row, when poses of things are not known yet.
+    /// Returns an error before the first reset or update of a row, while poses are unknown.
     pub(super) fn must_have_captured(&self, row: usize) -> Result<(), CameraError> {
         let captured = self.frames.shown(row).world_from_parent.is_some();
         captured.then_some(()).ok_or(CameraError::NothingCaptured { env: self.env_ids()[row] })
     }
 
-    /// The shown frame of a row, from its present viewpoint.
+    /// Returns the shown frame of a row, with its current viewpoint.
     fn shown_source(&self, row: usize) -> FrameSource<'_> {
         FrameSource::present(row, self.frames.shown(row), &self.viewpoints)
     }
 
-    /// The view of a row that was captured.
+    /// Returns the view of a captured row.
     pub(super) fn view_of(&self, row: usize) -> View {
         self.view_from(&self.shown_source(row))
     }

@@ -1,4 +1,4 @@
-//! The text of a camera: a summary for users, and a short one for programmers.
+//! Text forms of a camera: a summary for users and a short debug form.
 
 use super::Camera;
 use crate::summary;

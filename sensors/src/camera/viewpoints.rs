@@ -75,7 +75,8 @@ impl Viewpoints {
         self.rays.forget();
     }
 
-    /// Pose of the optical frame of a viewpoint in the environment; `None` where the parent's pose is needed and not known.
+    /// Returns the pose of the optical frame of a viewpoint in the environment; `None` if the pose of the parent is
+    /// needed but unknown.
     pub(crate) fn world_from(&self, viewpoint: &Viewpoint, world_from_parent: Option<Pose>) -> Option<Pose> {
         let local = viewpoint.parent_from_camera;
         match self.parent {
@@ -84,14 +85,14 @@ impl Viewpoints {
         }
     }
 
-    /// Poses in the frame of the parent, shape (rows, 7).
+    /// Poses in the frame of the parent, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (rows, 7).
     pub(crate) fn local_pose(&self, convention: CameraConvention) -> Array2<f64> {
         let local = |viewpoint: &Viewpoint| to_row(&convention.of_optical(&viewpoint.parent_from_camera));
         Array2::from(self.rows.iter().map(local).collect::<Vec<[f64; 7]>>())
     }
 
-    /// Sets poses of optical frames: one for each of `rows`, or one for all. `world_from_parent` is the pose of the parent of
-    /// a row, once it is known.
+    /// Sets poses of optical frames: one for each of `rows`, or one for all. `world_from_parent` returns the pose of
+    /// the parent of a row, if known.
     pub(crate) fn place(
         &mut self,
         rows: &[usize],
@@ -117,7 +118,7 @@ impl Viewpoints {
         Ok(())
     }
 
-    /// Sets intrinsics: one for each of `rows`, or one for all. `check` refuses those that the sensor cannot use.
+    /// Sets intrinsics: one for each of `rows`, or one for all. `check` rejects intrinsics that the sensor cannot use.
     pub(crate) fn set_intrinsics(
         &mut self,
         rows: &[usize],
@@ -136,14 +137,14 @@ impl Viewpoints {
         Ok(())
     }
 
-    /// Sets the configured poses and intrinsics.
+    /// Restores the configured poses and intrinsics.
     pub(crate) fn restore(&mut self, rows: &[usize]) {
         rows.iter().for_each(|&row| self.rows[row] = self.configured);
         self.rays.set(Vec::new(), rows, |row| self.rows[row].pixels);
     }
 }
 
-/// Values for `count` environments: one each, or one for all.
+/// Returns values for `count` environments: one each, or one for all.
 pub(crate) fn one_each<'a, T>(
     what: &'static str,
     values: &'a [T],

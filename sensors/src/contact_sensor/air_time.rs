@@ -1,20 +1,20 @@
-//! Since when bodies touch and do not, counted in physics steps.
+//! Air and contact times of bodies, counted in physics steps.
 
-/// Phases of contact of all bodies in all environments.
+/// Contact phases of all bodies in all environments.
 #[derive(Clone, Debug)]
 pub(super) struct AirTimes {
     bodies: usize,
     dt: f64,
     threshold: f64,
-    /// Step at which each environment was last looked at.
+    /// Step of the last update of each environment.
     seen: Vec<u64>,
-    /// Body after body, environment after environment.
+    /// Phases, environment by environment, body by body.
     phases: Vec<Phase>,
-    /// Net forces of one environment.
+    /// Net forces of one environment \[N\], reused.
     net: Vec<f64>,
 }
 
-/// What a body has been doing, in physics steps.
+/// Contact phase of a body, in physics steps.
 #[derive(Clone, Copy, Debug, Default)]
 struct Phase {
     touches: bool,
@@ -22,13 +22,13 @@ struct Phase {
     contact: u64,
     last_air: u64,
     last_contact: u64,
-    /// Whether contact began, or ended, since the last measurement.
+    /// True if contact began since the last measurement; `ended` is the same for the end of contact.
     began: bool,
     ended: bool,
 }
 
 impl AirTimes {
-    /// Names and units of the numbers of a measurement, one per body each.
+    /// Names and units of the channels of a measurement, each with one number per body.
     pub(super) const CHANNELS: [(&'static str, &'static str); 6] = [
         ("current_air_time", "s"),
         ("current_contact_time", "s"),
@@ -43,7 +43,7 @@ impl AirTimes {
         Self { bodies, dt, threshold, seen, phases, net: vec![0.0; 3 * bodies] }
     }
 
-    /// Looks at environment `env` at `step`; `net_forces` adds the net forces on its bodies.
+    /// Updates environment `env` at `step`; `net_forces` adds the net forces on its bodies \[N\].
     pub(super) fn look(&mut self, env: usize, step: u64, net_forces: impl FnOnce(&mut [f64])) {
         let steps = step.saturating_sub(self.seen[env]);
         if steps == 0 {
@@ -58,7 +58,7 @@ impl AirTimes {
         }
     }
 
-    /// Starts environment `env` anew at `step`: bodies have been touching, or not, for no time at all.
+    /// Resets environment `env` at `step`. All times restart at 0, and bodies in contact report no first contact.
     pub(super) fn reset(&mut self, env: usize, step: u64, net_forces: impl FnOnce(&mut [f64])) {
         self.seen[env] = step;
         self.net.fill(0.0);
@@ -69,7 +69,7 @@ impl AirTimes {
         }
     }
 
-    /// Writes [`CHANNELS`](Self::CHANNELS) of environment `env` to `row`, all bodies of one after all of the other.
+    /// Writes [`CHANNELS`](Self::CHANNELS) of environment `env` to `row`, channel by channel, body by body.
     pub(super) fn read(&self, env: usize, row: &mut [f64]) {
         let phases = &self.phases[env * self.bodies..(env + 1) * self.bodies];
         for (b, phase) in phases.iter().enumerate() {
@@ -81,7 +81,7 @@ impl AirTimes {
         }
     }
 
-    /// Forgets what began and ended in environment `env`: a measurement has told it.
+    /// Clears the `began` and `ended` flags of environment `env`, after a measurement has reported them.
     pub(super) fn told(&mut self, env: usize) {
         for phase in &mut self.phases[env * self.bodies..(env + 1) * self.bodies] {
             (phase.began, phase.ended) = (false, false);
@@ -89,13 +89,13 @@ impl AirTimes {
     }
 }
 
-/// Whether a force counts as contact.
+/// Returns true if a force exceeds the contact threshold \[N\].
 fn touches(force: &[f64], threshold: f64) -> bool {
     force.iter().map(|f| f * f).sum::<f64>() > threshold * threshold
 }
 
 impl Phase {
-    /// The body touched, or did not, in the last `steps` steps.
+    /// Updates the phase with the contact state of the last `steps` steps.
     fn look(&mut self, touches: bool, steps: u64) {
         if touches && !self.touches {
             (self.began, self.last_air, self.contact) = (true, self.air, 0);
@@ -127,7 +127,8 @@ mod tests {
             times.told(0);
             reads.push(row);
         }
-        // Air, contact, last air, last contact, first contact, first air; exactly 1 N is not above the threshold.
+        // Air, contact, last air, last contact, first contact, first air. A force of exactly 1 N does not exceed the
+        // threshold.
         let expected = [
             [0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
             [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -142,7 +143,7 @@ mod tests {
         assert_eq!(reads, expected);
     }
 
-    /// The next measurement reports a touch between two; a touch at the reset is no first contact.
+    /// A contact between two measurements is reported by the next one. A contact at the reset is no first contact.
     #[test]
     fn first_contact() {
         let mut row = [0.0; 6];

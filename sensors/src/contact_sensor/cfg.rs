@@ -1,4 +1,4 @@
-//! What a contact sensor watches, and how it is built.
+//! Contact sensor configuration.
 
 use super::air_time::AirTimes;
 use super::pairs::{Layout, Pairs, count};
@@ -15,36 +15,37 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ContactSensorCfg {
-    /// The bodies to watch, by patterns of their names (`uid/link`, `link` alone, or the uid of an object), in the order
-    /// they are reported. Links that are fused to others, such as feet behind a fixed joint, are bodies of their own here.
+    /// Name patterns of the bodies to watch (`uid/link`, `link` alone, or the uid of an object), in the order they are
+    /// reported. Links that are fused to others, such as feet behind a fixed joint, are separate bodies here.
     pub bodies: Vec<String>,
-    /// Groups of other bodies, one pattern each, for [`ContactSensor::force_matrix_w`]. `ground` and `world` stand for all that
-    /// belongs to the world itself. They change nothing else: net forces count every contact.
+    /// Filters: groups of counterpart bodies, one name pattern each, for [`ContactSensor::force_matrix_w`]. `ground`
+    /// and `world` match everything that belongs to the world. Filters do not affect net forces, which include every
+    /// contact.
     pub filters: Vec<String>,
-    /// Report the poses of the bodies.
+    /// Reports the poses of the bodies.
     pub track_pose: bool,
-    /// Report since when bodies touch or do not. Contact is then looked at in every physics step, whatever the period, and
-    /// the sensor is never lazy.
+    /// Reports air and contact times. Contact is then checked in every physics step, whatever the period, and the
+    /// sensor is never lazy.
     pub track_air_time: bool,
-    /// Report where bodies are touched, and where by the bodies of each filter.
+    /// Reports the mean contact point of each body, and of each body with each filter.
     pub track_contact_points: bool,
-    /// Report friction forces by filter, for [`ContactSensor::friction_matrix_w`]. Their sum over all counterparts is always
-    /// there.
+    /// Reports friction forces by filter, for [`ContactSensor::friction_matrix_w`]. The sum over all counterparts is
+    /// always reported.
     pub track_friction_forces: bool,
-    /// A body counts as touched where its net normal force is above this \[N\].
+    /// Contact threshold: a body is in contact if its net normal force exceeds this \[N\].
     pub force_threshold: f64,
     /// Rate, history, latency and noise. Channels that can have noise: `net_forces_w`, `friction_forces_w`,
     /// `total_forces_w`, `force_matrix_w`, and, where they are tracked, `friction_matrix_w`, `contact_points_w`,
     /// `contact_point_matrix_w` and `pos_w`.
     pub sampling: SamplingCfg,
-    /// Show a red ball at every body that is touched and a green one at every other, and an arrow of the net normal force, 1 m
-    /// for 500 N ([`Sensor::markers`](crate::Sensor::markers)): the forces of the last measurement, where the bodies are at
-    /// present.
+    /// Shows a red ball at every body in contact and a green ball at every other body
+    /// ([`Sensor::markers`](crate::Sensor::markers)). An arrow shows the net normal force, 1 m for 500 N. The forces
+    /// are those of the last measurement, at the current positions of the bodies.
     pub debug_vis: bool,
 }
 
 impl Default for ContactSensorCfg {
-    /// Nothing to watch yet; contact from 1 N on.
+    /// No bodies yet; a contact threshold of 1 N.
     fn default() -> Self {
         Self {
             bodies: Vec::new(),
@@ -84,8 +85,10 @@ impl SensorCfg for ContactSensorCfg {
 
     /// # Errors
     ///
-    /// No body to watch, a pattern that matches nothing or what another one matches, a filter that can see nothing but the
-    /// body itself, friction by filter without filters, a threshold that is negative, and what is wrong with the sampling.
+    /// - An empty selection of bodies.
+    /// - A pattern that matches nothing, or a body that another pattern matches.
+    /// - A filter that matches only the watched body itself, or friction by filter without filters.
+    /// - A negative threshold, or an invalid sampling configuration.
     fn build(&self, context: &SensorContext) -> Result<ContactSensor, SensorError> {
         let bodies = select(&self.bodies, &context.bodies, "body")?;
         if bodies.is_empty() {
@@ -140,7 +143,7 @@ impl SensorCfg for ContactSensorCfg {
     }
 }
 
-/// The bodies that a filter means: indices of the body axis, and its length for the world.
+/// Returns the bodies that a filter matches, as indices of the body axis; the length of the axis stands for the world.
 fn group(filter: &str, bodies: &[usize], context: &SensorContext) -> Result<Vec<usize>, SensorError> {
     let world = context.bodies.len();
     let mut names = context.bodies.to_vec();

@@ -1,4 +1,4 @@
-//! Contact forces on bodies: net, per pair, friction, where, and since when.
+//! Contact sensor: net forces, forces by filter, friction, contact points and air times.
 
 mod air_time;
 mod cfg;

@@ -1,23 +1,23 @@
-//! From the list of contacts to forces per body and per pair.
+//! Sums of contact forces per body, and per pair of body and filter.
 
 use kinetoscope_scene::Contact;
 use kinetoscope_scene::SceneState;
 use ndarray::Axis;
 
-/// Which numbers a measurement has.
+/// Layout of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
     pub bodies: usize,
     pub groups: usize,
-    /// Friction by group.
+    /// True if friction is reported by filter.
     pub friction: bool,
-    /// Points of each body, and by group.
+    /// True if contact points are reported, per body and by filter.
     pub points: bool,
     pub poses: bool,
     pub air: bool,
 }
 
-/// Numbers of a measurement.
+/// Returns the number of values of a measurement.
 pub(super) fn count(layout: &Layout) -> usize {
     let per_body = 9
         + 3 * layout.groups
@@ -28,20 +28,21 @@ pub(super) fn count(layout: &Layout) -> usize {
     layout.bodies * per_body
 }
 
-/// The bodies that are watched and the groups that are told apart.
+/// Watched bodies and filter groups, with lookup tables.
 #[derive(Clone, Debug)]
 pub(super) struct Pairs {
     layout: Layout,
     /// Watched bodies as indices of the body axis.
     bodies: Vec<usize>,
-    /// Place among the watched ones of every body of the axis, and of the world behind them.
+    /// Index in `bodies` of every body of the axis, with the world last; `None` for bodies that are not watched.
     slots: Vec<Option<usize>>,
-    /// Groups that every body of the axis is in, and the world behind them.
+    /// Filter groups of every body of the axis, with the world last.
     groups: Vec<Vec<usize>>,
 }
 
 impl Pairs {
-    /// `groups` holds indices of the body axis, `axis` for the world.
+    /// Creates the lookup tables. `groups` holds indices of the body axis, whose length is `axis`; `axis` stands for
+    /// the world.
     pub(super) fn new(layout: Layout, bodies: Vec<usize>, groups: &[Vec<usize>], axis: usize) -> Self {
         let slots = (0..=axis).map(|body| bodies.iter().position(|&b| b == body)).collect();
         let of = |body| (0..groups.len()).filter(|&g| groups[g].contains(&body)).collect();
@@ -53,18 +54,19 @@ impl Pairs {
         &self.bodies
     }
 
-    /// The watched body and its side of every end of a contact, with the index of the body at the other end.
+    /// Returns the watched ends of a contact: index of the watched body, sign of the force on it, and axis index of the
+    /// other body.
     fn ends<'c>(&'c self, contact: &'c Contact) -> impl Iterator<Item = (usize, f64, usize)> + 'c {
         let world = self.slots.len() - 1;
         let index = move |side: usize| contact.bodies[side].map_or(world, |body| (body as usize).min(world));
-        // The force is that on the second body.
+        // The contact force acts on the second body.
         [(0, -1.0), (1, 1.0)].into_iter().filter_map(move |(side, sign)| {
             let slot = self.slots[index(side)]?;
             Some((slot, sign, index(1 - side)))
         })
     }
 
-    /// Adds the normal forces on the watched bodies of environment `env` to `net`, 3 numbers per body.
+    /// Adds the normal forces on the watched bodies of environment `env` to `net`, 3 numbers per body \[N\].
     pub(super) fn net_forces(&self, state: &SceneState, env: usize, net: &mut [f64]) {
         for contact in state.contacts.iter().flat_map(|contacts| contacts.of(env)) {
             for (slot, sign, _) in self.ends(contact) {
@@ -73,7 +75,7 @@ impl Pairs {
         }
     }
 
-    /// Writes forces, points and poses of environment `env` to `row`, which is zero before; gives what is left of the row.
+    /// Writes forces, points and poses of environment `env` to `row`, which must be zero; returns the rest of the row.
     pub(super) fn read<'r>(&self, state: &SceneState, env: usize, row: &'r mut [f64]) -> &'r mut [f64] {
         let Layout { bodies: b, groups: m, .. } = self.layout;
         let tracked = |tracked: bool, numbers: usize| if tracked { numbers } else { 0 };
@@ -127,14 +129,14 @@ impl Pairs {
     }
 }
 
-/// Adds a multiple of a vector to one of a list.
+/// Adds a multiple of a vector to the vector at `index` of a list.
 fn add(list: &mut [f64], index: usize, factor: f64, vector: &[f64; 3]) {
     for (sum, component) in list[3 * index..3 * index + 3].iter_mut().zip(vector) {
         *sum += factor * component;
     }
 }
 
-/// Makes means of the sums of a list of vectors; one of nothing stays 0.
+/// Divides sums of vectors by their counts; sums without a count stay 0.
 fn divide(list: &mut [f64], counts: &[f64]) {
     for (sum, count) in list.chunks_exact_mut(3).zip(counts).filter(|(_, count)| **count > 0.0) {
         sum.iter_mut().for_each(|x| *x /= count);

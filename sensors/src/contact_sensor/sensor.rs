@@ -1,4 +1,4 @@
-//! The contact sensor and what can be read of it.
+//! Contact sensor.
 
 use super::air_time::AirTimes;
 use super::pairs::Pairs;
@@ -11,10 +11,10 @@ use kinetoscope_scene::{Marker, Pose, SceneState};
 use ndarray::{Array2, ArrayView2, ArrayView3, ArrayView4, ArrayView5};
 use std::fmt;
 
-/// Contact forces on bodies in all environments, world axes; [`Sampled`] has their stamps and counts.
+/// Contact forces on bodies in all environments, world axes; [`Sampled`] gives their stamps and counts.
 ///
-/// Forces act **on** the body: a foot that stands on the ground reads +z. Shapes: N environments, B bodies, M filters, T
-/// measurements of history, newest first.
+/// Forces act **on** the body: a foot that stands on the ground reads +z. Shapes: N environments, B bodies, M filters,
+/// T measurements of history, newest first.
 #[derive(Clone, Debug)]
 pub struct ContactSensor {
     pub(super) names: Vec<String>,
@@ -60,7 +60,7 @@ impl Sensor for ContactSensor {
         sampler.refresh(env_ids, state, |env, row| read(pairs, air.as_ref(), state, env, row))
     }
 
-    /// Where air times are tracked, every step.
+    /// One step if air times are tracked.
     fn due_in(&self, step: &[u64]) -> u64 {
         if self.air.is_some() { 1 } else { self.sampler.due_in(step) }
     }
@@ -69,7 +69,8 @@ impl Sensor for ContactSensor {
         Some(self)
     }
 
-    /// A red ball at every body that is touched, and an arrow for the force: 1 m for 500 N; a green ball at every other.
+    /// A red ball at every body in contact, with an arrow of the force, 1 m for 500 N; a green ball at every other
+    /// body.
     fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let forces = self.net_forces_w();
         let mut markers = Vec::new();
@@ -88,7 +89,7 @@ impl Sensor for ContactSensor {
     }
 }
 
-/// Writes what the sensor measures in environment `env` to `row`.
+/// Writes the measurement of environment `env` to `row`.
 fn read(pairs: &Pairs, air: Option<&AirTimes>, state: &SceneState, env: usize, row: &mut [f64]) {
     let row = pairs.read(state, env, row);
     if let Some(air) = air {
@@ -116,11 +117,11 @@ impl ContactSensor {
         &self.names
     }
 
-    /// Places on the axis B of the bodies that a pattern matches, by full or bare name.
+    /// Indices on the axis B of the bodies that a pattern matches, by full name or by link name.
     ///
     /// # Errors
     ///
-    /// The pattern is no regular expression or matches none of the watched bodies.
+    /// A pattern that is not a regular expression or matches no watched body.
     pub fn find_bodies(&self, pattern: &str) -> Result<Vec<usize>, SensorError> {
         matching(pattern, &self.names, "watched body")
     }
@@ -130,7 +131,7 @@ impl ContactSensor {
         &self.filters
     }
 
-    /// Net force above which a body counts as touched \[N\].
+    /// Contact threshold of the net normal force \[N\].
     pub fn force_threshold(&self) -> f64 {
         self.threshold
     }
@@ -144,7 +145,7 @@ impl ContactSensor {
         self.sampler.history_as(channel, (n, t, self.names.len(), 3))
     }
 
-    /// Sum of the normal forces on each body \[N\], shape (N, B, 3): all counterparts, friction left out.
+    /// Sum of the normal forces on each body \[N\], shape (N, B, 3), over all counterparts, without friction.
     pub fn net_forces_w(&self) -> ArrayView3<'_, f64> {
         self.vectors("net_forces_w")
     }
@@ -154,7 +155,7 @@ impl ContactSensor {
         self.past_vectors("net_forces_w")
     }
 
-    /// Sum of the friction forces on each body \[N\], shape (N, B, 3): what contacts exert across their normals.
+    /// Sum of the friction forces on each body \[N\], shape (N, B, 3): the tangential parts of the contact forces.
     pub fn friction_forces_w(&self) -> ArrayView3<'_, f64> {
         self.vectors("friction_forces_w")
     }
@@ -164,7 +165,7 @@ impl ContactSensor {
         self.past_vectors("friction_forces_w")
     }
 
-    /// Sum of the contact forces on each body with friction \[N\], shape (N, B, 3).
+    /// Sum of the contact forces on each body, including friction \[N\], shape (N, B, 3).
     pub fn total_forces_w(&self) -> ArrayView3<'_, f64> {
         self.vectors("total_forces_w")
     }
@@ -193,9 +194,9 @@ impl ContactSensor {
         self.past_pairs("force_matrix_w")
     }
 
-    /// Sum of the friction forces that the bodies of each filter exert on each body \[N\], shape (N, B, M, 3): what their
-    /// contacts exert across their normals; `None` unless tracked. With [`force_matrix_w`](Self::force_matrix_w) it is the
-    /// whole force.
+    /// Sum of the friction forces that the bodies of each filter exert on each body \[N\], shape (N, B, M, 3): the
+    /// tangential parts of the contact forces; `None` unless tracked. The whole force is the sum with
+    /// [`force_matrix_w`](Self::force_matrix_w).
     pub fn friction_matrix_w(&self) -> Option<ArrayView4<'_, f64>> {
         self.sampler.has("friction_matrix_w").then(|| self.pairs("friction_matrix_w"))
     }
@@ -206,9 +207,9 @@ impl ContactSensor {
         self.sampler.has("friction_matrix_w").then(|| self.past_pairs("friction_matrix_w"))
     }
 
-    /// Mean of the points where each body is touched, each of the same weight \[m\], shape (N, B, 3), in the environment;
-    /// `None` unless tracked. Where nothing touches, [`contact_counts`](Self::contact_counts) is 0, and the point says
-    /// nothing: it is 0, plus the noise of the channel. Isaac Lab has NaN there.
+    /// Mean of the contact points of each body, with equal weights \[m\], shape (N, B, 3), in the environment; `None`
+    /// unless tracked. Without a contact, [`contact_counts`](Self::contact_counts) is 0, and the point is meaningless:
+    /// 0, plus the noise of the channel. Isaac Lab returns NaN instead.
     pub fn contact_points_w(&self) -> Option<ArrayView3<'_, f64>> {
         self.sampler.has("contact_points_w").then(|| self.vectors("contact_points_w"))
     }
@@ -218,24 +219,24 @@ impl ContactSensor {
         self.optional("contact_counts")
     }
 
-    /// Mean of the points where the bodies of each filter touch each body, each of the same weight \[m\], shape
-    /// (N, B, M, 3), in the environment; `None` unless points are tracked. Where they do not touch,
-    /// [`contact_count_matrix`](Self::contact_count_matrix) is 0, and the point says nothing, as in
+    /// Mean of the contact points between the bodies of each filter and each body, with equal weights \[m\], shape
+    /// (N, B, M, 3), in the environment; `None` unless points are tracked. Without a contact,
+    /// [`contact_count_matrix`](Self::contact_count_matrix) is 0, and the point is meaningless, as in
     /// [`contact_points_w`](Self::contact_points_w).
     pub fn contact_point_matrix_w(&self) -> Option<ArrayView4<'_, f64>> {
         self.sampler.has("contact_point_matrix_w").then(|| self.pairs("contact_point_matrix_w"))
     }
 
-    /// Number of points where the bodies of each filter touch each body, shape (N, B, M), whole numbers; `None` unless
-    /// points are tracked.
+    /// Number of contact points between the bodies of each filter and each body, shape (N, B, M), whole numbers; `None`
+    /// unless points are tracked.
     pub fn contact_count_matrix(&self) -> Option<ArrayView3<'_, f64>> {
         let shape = (self.sampler.num_envs(), self.names.len(), self.filters.len());
         let counts = "contact_count_matrix";
         self.sampler.has(counts).then(|| self.sampler.values_as(counts, shape))
     }
 
-    /// Positions of the bodies \[m\], shape (N, B, 3); `None` unless tracked. They are of [`Sampled::stamps`], forces of
-    /// [`Sampled::force_stamps`].
+    /// Positions of the bodies \[m\], shape (N, B, 3); `None` unless tracked. Positions are captured at
+    /// [`Sampled::stamps`], forces at [`Sampled::force_stamps`].
     pub fn pos_w(&self) -> Option<ArrayView3<'_, f64>> {
         self.sampler.has("pos_w").then(|| self.vectors("pos_w"))
     }
@@ -250,42 +251,43 @@ impl ContactSensor {
         self.sampler.has(channel).then(|| self.sampler.values(channel))
     }
 
-    /// How long each body has not been touched \[s\], shape (N, B), 0 where it is; `None` unless air times are tracked. Times
-    /// are whole numbers of physics steps, counted from the reset on.
+    /// Time since the last contact of each body \[s\], shape (N, B), 0 in contact; `None` unless air times are tracked.
+    /// Times are whole numbers of physics steps, counted from the reset on.
     pub fn current_air_time(&self) -> Option<ArrayView2<'_, f64>> {
         self.optional("current_air_time")
     }
 
-    /// How long each body has been touched \[s\], shape (N, B), 0 where it is not; `None` unless air times are tracked.
+    /// Duration of the current contact of each body \[s\], shape (N, B), 0 without a contact; `None` unless air times
+    /// are tracked.
     pub fn current_contact_time(&self) -> Option<ArrayView2<'_, f64>> {
         self.optional("current_contact_time")
     }
 
-    /// How long each body was in the air before its last contact began \[s\], shape (N, B); `None` unless air times are
-    /// tracked.
+    /// Duration of the air phase of each body before its last contact began \[s\], shape (N, B); `None` unless air
+    /// times are tracked.
     pub fn last_air_time(&self) -> Option<ArrayView2<'_, f64>> {
         self.optional("last_air_time")
     }
 
-    /// How long the last contact of each body lasted \[s\], shape (N, B); `None` unless air times are tracked.
+    /// Duration of the last finished contact of each body \[s\], shape (N, B); `None` unless air times are tracked.
     pub fn last_contact_time(&self) -> Option<ArrayView2<'_, f64>> {
         self.optional("last_contact_time")
     }
 
-    /// Whether contact of each body began since the measurement before, however short it was, shape (N, B); `None` unless
-    /// air times are tracked. What touches at a reset begins nothing.
+    /// True where contact of a body began since the previous measurement, however short it was, shape (N, B); `None`
+    /// unless air times are tracked. A contact that exists at a reset does not count.
     pub fn first_contact(&self) -> Option<Array2<bool>> {
         self.optional("first_contact").map(|flags| flags.mapv(|flag| flag > 0.0))
     }
 
-    /// Whether contact of each body ended since the measurement before, however short the time in the air was, shape (N, B);
-    /// `None` unless air times are tracked.
+    /// True where contact of a body ended since the previous measurement, however short the air phase was, shape
+    /// (N, B); `None` unless air times are tracked.
     pub fn first_air(&self) -> Option<Array2<bool>> {
         self.optional("first_air").map(|flags| flags.mapv(|flag| flag > 0.0))
     }
 }
 
-/// A summary of several lines.
+/// Writes a summary of several lines.
 impl fmt::Display for ContactSensor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         summary::write_sampled(

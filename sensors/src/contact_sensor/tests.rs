@@ -1,4 +1,4 @@
-//! The contact sensor on lists of contacts written by hand.
+//! The contact sensor with hand-written contacts.
 
 use super::*;
 use crate::error::SensorError;
@@ -26,7 +26,7 @@ fn contact(first: Option<u32>, second: Option<u32>, normal_force: f64, friction:
     }
 }
 
-/// Environment 0 has `list`, environment 1 nothing.
+/// A state with the contacts `list` in environment 0, and none in environment 1.
 fn state(step: u64, list: Vec<Contact>) -> SceneState {
     let n = list.len();
     SceneState {
@@ -38,7 +38,7 @@ fn state(step: u64, list: Vec<Contact>) -> SceneState {
     }
 }
 
-/// Two contacts of the left foot with the ground, in either order, one of the right foot with the cube.
+/// Two contacts of the left foot with the ground, in both body orders, and a contact of the right foot with the cube.
 fn standing() -> Vec<Contact> {
     vec![
         contact(None, Some(1), 10.0, 2.0, 1.0),
@@ -71,11 +71,11 @@ fn values() {
     let friction = [&[1.0, 0.0, 0.0, -0.5, 0.0, 0.0][..], &zeros(6)].concat();
     assert_eq!(flat(sensor.friction_forces_w().into_dyn()), friction);
     assert_eq!(sensor.total_forces_w(), &sensor.net_forces_w() + &sensor.friction_forces_w());
-    // By ground, cube and anything; left foot, then right foot.
+    // By the filters ground, cube and any body; left foot, then right foot.
     let left = [0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0];
     let right = [0.0, 0.0, 0.0, 0.0, 0.0, -4.0, 0.0, 0.0, -4.0];
     assert_eq!(flat(sensor.force_matrix_w().into_dyn()), [&left[..], &right, &zeros(18)].concat());
-    // Of friction, the same pairs: 2 - 1 N from the ground, and from the cube what is -0.5 N for the right foot.
+    // Friction of the same pairs: 2 - 1 N from the ground; from the cube, the opposite of the -0.5 N on the right foot.
     let left = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
     let right = [0.0, 0.0, 0.0, -0.5, 0.0, 0.0, -0.5, 0.0, 0.0];
     let friction = sensor.friction_matrix_w().unwrap();
@@ -111,7 +111,8 @@ fn untracked() {
     assert_eq!(sensor.net_forces_w_history().dim(), (2, 0, 1, 3));
 }
 
-/// With a period of 3 steps, contact is looked at in every step: the next measurement reports a touch between two.
+/// With a period of 3 steps, contact is checked in every step: the next measurement reports a contact between two
+/// measurements.
 #[test]
 fn air_times() {
     let sampling = SamplingCfg { history_length: 2, ..SamplingCfg::every(1.5) };

@@ -1,4 +1,4 @@
-//! The joint state sensor, and with it the contract of every sensor with a sampler.
+//! Tests of the joint state sensor, and through it of every sensor with a sampler.
 
 use super::*;
 use ndarray::{Array2, Axis, array};
@@ -10,8 +10,8 @@ fn context() -> SensorContext {
     SensorContext { num_envs: 2, dt: DT, joints: joints.into(), ..SensorContext::default() }
 }
 
-/// A state whose numbers tell where they come from: position 100 env + 10 joint + step, velocity negative, effort
-/// a thousand more.
+/// A state whose numbers encode their origin: position 100 env + 10 joint + step, velocity its negative, effort 1000
+/// more.
 fn state(steps: [u64; 2]) -> SceneState {
     let position = Array2::from_shape_fn((2, 3), |(e, j)| (100 * e + 10 * j) as f64 + steps[e] as f64);
     SceneState {
@@ -73,7 +73,7 @@ fn resets() {
     assert_eq!(sensor.stamp_history(), array![[0.03, 0.02, 0.01], [0.01, 0.0, 0.0]]);
 }
 
-/// An environment that stands still measures nothing; a reset alone keeps the steps of the environment.
+/// A quarantined environment measures nothing; a reset of the sensor alone keeps the steps of the environment.
 #[test]
 fn phases() {
     let mut sensor = built(JointStateCfg::default());
@@ -109,7 +109,7 @@ fn mistakes() {
     assert!(matches!(error, SensorError::MissingFields { .. }));
     assert_eq!(error.to_string(), "the joint state sensor was given a state without joint_efforts, joint_state");
     assert_eq!(sensor.positions(), before);
-    // Root cause: an empty list was accepted, which gave a sensor of no numbers.
+    // Root cause: an empty list was accepted, which created a sensor without values.
     let nothing = JointStateCfg { joints: Some(vec![]), ..JointStateCfg::default() };
     let error = nothing.build(&context()).unwrap_err();
     assert!(matches!(&error, SensorError::NothingChosen { candidates, .. } if *candidates == *context().joints));

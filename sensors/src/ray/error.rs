@@ -1,70 +1,70 @@
-//! What can be wrong with a ray caster.
+//! Ray caster errors.
 
 use kinetoscope_render::OpticsError;
 
-/// Why a ray caster cannot be built.
+/// Errors of building a ray caster.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RayError {
-    /// A number of a pattern or of the configuration that makes no sense.
+    /// A number of a pattern or of the configuration is invalid.
     #[error("{what} of the {of} is {value}; it must be {allowed}")]
     Number {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
-        /// Of what.
+        /// Pattern or sensor that the number belongs to.
         of: &'static str,
-        /// The number.
+        /// Value of the number.
         value: f64,
         /// Accepted values.
         allowed: &'static str,
     },
-    /// More rays than fit into memory, or none.
+    /// A pattern has no rays, or too many.
     #[error("the {pattern} pattern has {count:e} rays; it must have between 1 and {limit}")]
     Count {
-        /// The kind of pattern.
+        /// Name of the pattern.
         pattern: &'static str,
-        /// How many rays it has; beyond the range of integers for some parameters.
+        /// Number of rays; exceeds the range of integers for some parameters.
         count: f64,
-        /// The most that is allowed.
+        /// Maximum number of rays.
         limit: usize,
     },
-    /// Starts and directions that do not belong together.
+    /// The numbers of ray origins and directions differ.
     #[error("a custom pattern has {starts} starts and {directions} directions; give as many of both")]
     Lengths {
-        /// How many starts.
+        /// Number of origins.
         starts: usize,
-        /// How many directions.
+        /// Number of directions.
         directions: usize,
     },
-    /// A ray without a direction, or with a number that is not finite.
+    /// A ray has no direction, or a number that is not finite.
     #[error(
         "ray {ray} of the {pattern} pattern begins at {start:?} and goes along {direction:?}; a ray needs finite numbers \
              and a direction other than zero"
     )]
     Ray {
-        /// The kind of pattern.
+        /// Name of the pattern.
         pattern: &'static str,
-        /// Which ray.
+        /// Index of the ray.
         ray: usize,
         /// Origin \[m\].
         start: [f64; 3],
-        /// Where it goes.
+        /// Direction of the ray.
         direction: [f64; 3],
     },
     /// The rays of all environments do not fit into memory.
     #[error("{envs} environments with {rays} rays each do not fit into memory (at most {limit} bytes)")]
     Memory {
-        /// How many environments.
+        /// Number of environments.
         envs: usize,
-        /// Rays in each.
+        /// Rays per environment.
         rays: usize,
-        /// The most that is allowed.
+        /// Memory limit \[bytes\].
         limit: u64,
     },
-    /// Something is wrong with the lens of a pattern.
+    /// The intrinsics of a pattern are invalid.
     #[error(transparent)]
     Lens(#[from] OpticsError),
-    /// There is no scene to cast rays into.
+    /// The ray caster was built without a scene.
     #[error("the ray caster was built without a scene")]
     NoScene,
 }

@@ -1,4 +1,4 @@
-//! Ray casters, and cameras made of rays. The geometry is in [`kinetoscope_render::geometry`].
+//! Ray casters and ray-caster cameras. The ray geometry is in [`kinetoscope_render::geometry`].
 
 mod camera;
 mod caster;

@@ -1,20 +1,21 @@
-//! The order in which rays are cast: those that run side by side in one packet, whatever the order of the pattern.
+//! Cast order of rays: neighboring rays share a packet, whatever the order of the pattern.
 
 use kinetoscope_render::geometry::packet::WIDTH;
 use kinetoscope_scene::Ray;
 
-/// What a difference of directions counts, in metres of difference between starts: rays of a fan are that far apart where
-/// they are likely to hit.
+/// Weight of a direction difference, in meters of an origin difference: rays of a fan are this far apart at a typical
+/// hit distance.
 const REACH: f64 = 10.0;
 
-/// Indices of all rays, so that each [`WIDTH`] of them are neighbours: halves of halves, each time across the longer side.
+/// Returns the indices of all rays, ordered so that each [`WIDTH`] of them are neighbors. The rays are halved
+/// recursively, each time across the longer side.
 pub(super) fn neighbours_together(rays: &[Ray]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..rays.len() as u32).collect();
     split(rays, &mut order);
     order
 }
 
-/// Start and direction of a ray in metres.
+/// Returns the origin and the weighted direction of a ray \[m\].
 fn place(ray: &Ray) -> [f64; 6] {
     std::array::from_fn(|k| if k < 3 { ray.origin[k] } else { REACH * ray.direction[k - 3] })
 }
@@ -32,9 +33,9 @@ fn split(rays: &[Ray], order: &mut [u32]) {
     let long = |axis: usize| high[axis] - low[axis];
     let axis = (1..6).fold(0, |best, axis| if long(axis) > long(best) { axis } else { best });
     let at = |k: u32| place(&rays[k as usize])[axis];
-    // Rays of the same place stay in their order.
+    // Rays at the same place keep their order.
     order.sort_unstable_by(|&a, &b| at(a).total_cmp(&at(b)).then(a.cmp(&b)));
-    // Whole packets on the left.
+    // The left half has whole packets.
     let middle = (order.len() / 2).next_multiple_of(WIDTH);
     let (left, right) = order.split_at_mut(middle);
     split(rays, left);
@@ -47,7 +48,7 @@ mod tests {
     use crate::ray::RayPattern;
     use crate::ray::pattern::{Grid, Lidar};
 
-    /// Sum over packets of the length of the sides of the box around starts and directions.
+    /// Sum over packets of the side lengths of the boxes around origins and directions.
     fn spread(rays: &[Ray], order: &[u32]) -> f64 {
         let of = |packet: &[u32], axis: usize| {
             let at = |k: &u32| place(&rays[*k as usize])[axis];

@@ -1,5 +1,5 @@
-//! Sampling along rays: casts the rays of a sensor where it is due, and samples their hits. Ray casters and cameras of rays
-//! share it.
+//! Sampling along rays: casts the rays of a sensor in the environments that are due, and samples their hits. Shared by
+//! ray casters and ray-caster cameras.
 
 use super::scan::{Rays, Scan};
 use super::{HitTargets, RayError};
@@ -10,28 +10,29 @@ use kinetoscope_render::geometry::RayTargets;
 use kinetoscope_scene::Requires;
 use kinetoscope_scene::SceneState;
 
-/// The most memory that the rays of a sensor may take \[bytes\].
+/// Limit of the memory of the rays of a sensor \[bytes\].
 const MAX_BYTES: u64 = 64 << 30;
 
-/// The parts of a sensor of rays that are its own: the frames of its rays, and what it makes of their hits.
+/// The parts of a ray sensor that differ between sensors: the frames of its rays, and the outputs computed from their
+/// hits.
 pub(crate) trait RayModel {
     /// Rays of the sensor.
     type Rays: Rays;
 
-    /// The frame of the rays in an environment, where the parent has the pose row `parent`; `None` for a sensor without a
-    /// parent. The numbers of the frame that are sampled are written to `values`.
+    /// Returns the view of the rays in an environment. `parent` is the pose row of the parent, `None` for a sensor
+    /// without a parent. The sampled numbers of the frame are written to `values`.
     fn frame(&mut self, env: usize, parent: Option<[f64; 7]>, values: &mut [f64]) -> <Self::Rays as Rays>::View;
 
-    /// Makes what is read of the current values of an environment.
+    /// Updates the outputs of an environment from the current values of the sampler.
     fn show(&mut self, env: usize, sampler: &Sampler, rays: &Self::Rays);
 
-    /// Draws what is random per reset in an environment.
+    /// Samples the random numbers of an environment that change at a reset.
     fn reset(&mut self, env: usize) {
         let _ = env;
     }
 }
 
-/// Configuration that all sensors of rays have.
+/// Configuration of all ray sensors.
 pub(crate) struct RaySamplerCfg<'a, R> {
     /// Kind of sensor, for errors.
     pub(crate) kind: &'static str,
@@ -47,24 +48,24 @@ pub(crate) struct RaySamplerCfg<'a, R> {
     pub(crate) frame_channels: &'a [Channel],
 }
 
-/// Rays of a sensor and the sampler of their hits, in all environments. The channels are `distances`, `normals` and `ids`,
-/// then those of the frame.
+/// Rays of a sensor and the sampler of their hits, in all environments. The channels are `distances`, `normals` and
+/// `ids`, then those of the frame.
 #[derive(Clone, Debug)]
 pub(crate) struct RaySampler<R: Rays> {
     scan: Scan<R>,
     sampler: Sampler,
     parent: Option<usize>,
     due: Vec<usize>,
-    /// Sampled numbers of the frames in which rays were cast last, environment after environment.
+    /// Sampled frame numbers of the last cast, environment by environment.
     frames: Vec<f64>,
-    /// Number of numbers per frame.
+    /// Count of numbers per frame.
     frame_width: usize,
-    /// Number of the sample that each environment shows.
+    /// Count of the sample that each environment shows.
     shown: Vec<u64>,
 }
 
 impl<R: Rays> RaySampler<R> {
-    /// A sampler that has cast nothing yet.
+    /// Creates a sampler that has not cast rays yet.
     ///
     /// # Errors
     ///
@@ -104,7 +105,7 @@ impl<R: Rays> RaySampler<R> {
         &self.sampler
     }
 
-    /// As [`Sensor::update`](crate::Sensor::update).
+    /// Implements [`Sensor::update`](crate::Sensor::update).
     pub(crate) fn update(
         &mut self,
         state: &SceneState,
@@ -126,7 +127,7 @@ impl<R: Rays> RaySampler<R> {
         Ok(())
     }
 
-    /// As [`Sensor::reset`](crate::Sensor::reset).
+    /// Implements [`Sensor::reset`](crate::Sensor::reset).
     pub(crate) fn reset(
         &mut self,
         env_ids: &[usize],
@@ -143,7 +144,7 @@ impl<R: Rays> RaySampler<R> {
         Ok(())
     }
 
-    /// As [`Sensor::refresh`](crate::Sensor::refresh).
+    /// Implements [`Sensor::refresh`](crate::Sensor::refresh).
     pub(crate) fn refresh(
         &mut self,
         env_ids: &[usize],
@@ -159,7 +160,7 @@ impl<R: Rays> RaySampler<R> {
         Ok(())
     }
 
-    /// Casts the rays of some environments; the state was checked. An environment that is named twice is cast once.
+    /// Casts the rays of some environments, each once. The state must be checked before.
     fn cast(&mut self, envs: &[usize], state: &SceneState, model: &mut impl RayModel<Rays = R>) {
         let Some(poses) = &state.instance_poses else { return };
         let Self { scan, parent, frames, frame_width, .. } = self;
@@ -170,7 +171,7 @@ impl<R: Rays> RaySampler<R> {
         });
     }
 
-    /// The same, after a write to the state, which may have moved fixed instances.
+    /// Casts as [`cast`](Self::cast), after a write to the state, which may have moved fixed instances.
     fn cast_anew(&mut self, envs: &[usize], state: &SceneState, model: &mut impl RayModel<Rays = R>) {
         let Some(poses) = &state.instance_poses else { return };
         envs.iter().for_each(|&env| self.scan.settle(env, poses, state.own_scene(env)));
@@ -183,7 +184,7 @@ impl<R: Rays> RaySampler<R> {
     }
 }
 
-/// Writes the hits of an environment that was cast, and the numbers of its frame, to a row of the sampler.
+/// Writes the hits of an environment and the numbers of its frame to a row of the sampler.
 fn write<R: Rays>(scan: &Scan<R>, frames: &[f64], frame_width: usize, env: usize, row: &mut [f64]) {
     let count = scan.rays().count();
     let (distances, row) = row.split_at_mut(count);
@@ -197,7 +198,7 @@ fn write<R: Rays>(scan: &Scan<R>, frames: &[f64], frame_width: usize, env: usize
     frame.copy_from_slice(&frames[env * frame_width..][..frame_width]);
 }
 
-/// Refuses an allocation that would end the process: `rays` in each of `envs` environments.
+/// Rejects an allocation that would abort the process: `rays` in each of `envs` environments.
 pub(crate) fn check_memory(envs: usize, rays: usize, bytes_per_ray: usize) -> Result<(), RayError> {
     let bytes = rays.checked_mul(envs).and_then(|n| n.checked_mul(bytes_per_ray)).filter(|&b| b as u64 <= MAX_BYTES);
     let granted = bytes.is_some_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok());

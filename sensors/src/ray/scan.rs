@@ -1,4 +1,4 @@
-//! Rays of many environments at once, on several threads.
+//! Parallel ray casting in many environments.
 
 use super::order::neighbours_together;
 use crate::sensor::SensorContext;
@@ -11,31 +11,32 @@ use ndarray::Array2;
 use std::fmt;
 use std::sync::Arc;
 
-/// Rays that one thread takes at a time, at most.
+/// Maximum number of rays per job.
 const PART: usize = 1024;
-/// Fewer rays than this for each thread are cast by the calling one: waking another takes some 0.05 ms, a ray 0.1 µs.
+/// Minimum number of rays per thread. Below it, the calling thread casts them: waking a thread takes some 0.05 ms, a
+/// ray 0.1 µs.
 const WORTH_A_THREAD: usize = 4 * PART;
-/// The slot of an environment where nothing was cast.
+/// Slot of an environment without a cast.
 const NOWHERE: usize = usize::MAX;
 
-/// The rays of a sensor: as many in every environment.
+/// The rays of a sensor, the same number in every environment.
 pub(crate) trait Rays: Clone + fmt::Debug + Send + Sync + 'static {
-    /// What is different in every environment: where they are, at least.
+    /// Data that differs between environments: at least the pose of the rays.
     type View: Copy + fmt::Debug + Send + Sync;
 
-    /// How many there are.
+    /// Number of rays.
     fn count(&self) -> usize;
 
-    /// In which order they are cast best, neighbours together; `None` for their own. It changes no hit.
+    /// Efficient cast order, with neighbors together; `None` is the order of the rays. The order does not change hits.
     fn order(&self) -> Option<Vec<u32>> {
         None
     }
 
-    /// Adds some of the rays to `out`, in the frame of the environment.
+    /// Appends some of the rays to `out`, in the frame of the environment.
     fn add(&self, view: &Self::View, which: impl Iterator<Item = usize>, out: &mut Vec<Ray>);
 }
 
-/// Rays of a frame, which is somewhere else in every environment.
+/// Rays in a frame whose pose differs between environments.
 impl Rays for Vec<Ray> {
     type View = PoseF64;
 
@@ -52,44 +53,44 @@ impl Rays for Vec<Ray> {
     }
 }
 
-/// Casts the rays of a sensor in many environments. The bits do not depend on the number of threads, and nothing is
-/// allocated after the first times.
+/// Casts the rays of a sensor in many environments. The bits do not depend on the number of threads. Only the first
+/// casts allocate memory.
 #[derive(Clone)]
 pub(crate) struct Scan<R: Rays> {
     pool: ThreadPool,
     targets: Arc<RayTargets>,
-    /// Where trees over meshes are, for targets of environments that look otherwise.
+    /// BVHs of meshes, for the targets of environments with their own scene.
     assets: RayAssets,
     rays: R,
-    /// The order in which they are cast.
+    /// Cast order.
     order: Option<Vec<u32>>,
-    /// What rays hit in each environment; mostly one and the same.
+    /// Targets of the rays in each environment; mostly the same for all.
     looks: Vec<Look>,
-    /// What does not move, in each environment; mostly one and the same.
+    /// Fixed instances of each environment; mostly the same for all.
     fixed: Vec<Arc<FixedWorld>>,
     max_distance: f64,
     task: Task<R::View>,
-    /// What a thread needs, for each of them.
+    /// Scratch memory of the threads.
     desks: Vec<Desk>,
-    /// Hits of up to [`PART`] rays each: all parts of a view, then those of the next.
+    /// Hits of up to [`PART`] rays each: all parts of a view, then those of the next view.
     parts: Vec<Vec<RayHit>>,
 }
 
-/// What was cast last.
+/// Input of the last cast.
 #[derive(Clone, Debug)]
 struct Task<V> {
     /// Environments and their views.
     views: Vec<(usize, V)>,
-    /// Where an environment is among the views.
+    /// Index of each environment in `views`.
     slots: Vec<usize>,
-    /// Where the targets are that may move, view after view.
+    /// Poses of the moving targets, view by view.
     poses: Vec<PoseF64>,
 }
 
-/// What rays hit in an environment.
+/// Targets of the rays in an environment.
 #[derive(Clone, Debug)]
 struct Look {
-    /// What it was made of.
+    /// Scene that the targets were created from.
     scene: OwnScene,
     targets: Arc<RayTargets>,
 }
@@ -97,13 +98,13 @@ struct Look {
 #[derive(Clone, Debug)]
 struct Desk {
     world: RayWorld,
-    /// The view that the world is placed for.
+    /// Index of the view that the world is placed for.
     placed: usize,
     rays: Vec<Ray>,
 }
 
 impl<R: Rays> Scan<R> {
-    /// Nothing is known yet of where things are that do not move.
+    /// Creates a scan; the poses of fixed instances are still unknown.
     pub(crate) fn new(targets: RayTargets, rays: R, max_distance: f64, context: &SensorContext) -> Self {
         let (n, count) = (context.num_envs, rays.count());
         let (targets, nothing) = (Arc::new(targets), Arc::new(FixedWorld::default()));
@@ -135,8 +136,8 @@ impl<R: Rays> Scan<R> {
         &self.rays
     }
 
-    /// Looks where things are that do not move, in an environment where somebody may have moved them or changed how they
-    /// look; `scene` is the environment's own.
+    /// Updates the fixed instances of an environment after a write that may have moved them or changed their
+    /// appearance. `scene` is the environment's own scene.
     pub(crate) fn settle(&mut self, env: usize, poses: &Array2<PoseF64>, scene: &OwnScene) {
         let poses = row(poses, env);
         let other = self.looks[env].scene != *scene;
@@ -150,7 +151,7 @@ impl<R: Rays> Scan<R> {
         if !other && is_here(&self.fixed[env]) {
             return;
         }
-        // They are the same things at the same places in most environments.
+        // Most environments have the same instances at the same poses.
         let known = self.fixed.first().filter(|first| {
             let alike = env > 0 && Arc::ptr_eq(&self.looks[0].targets, targets);
             alike && is_here(first)
@@ -158,8 +159,8 @@ impl<R: Rays> Scan<R> {
         self.fixed[env] = known.map_or_else(|| Arc::new(FixedWorld::new(targets, poses)), Arc::clone);
     }
 
-    /// Casts the rays of the environments `envs`, with the view that `view` gives for each; `poses` are those of the
-    /// instances in all environments. One that is named twice is cast once.
+    /// Casts the rays of the environments `envs`, each once, with the view that `view` returns. `poses` are those of
+    /// the instances in all environments.
     pub(crate) fn cast(&mut self, envs: &[usize], poses: &Array2<PoseF64>, mut view: impl FnMut(usize) -> R::View) {
         let Task { views, slots, poses: moved } = &mut self.task;
         for (env, _) in views.drain(..) {
@@ -199,7 +200,7 @@ impl<R: Rays> Scan<R> {
         });
     }
 
-    /// Shows the hits of an environment of the last cast, in any order, with the index of the ray.
+    /// Passes the hits of an environment in the last cast to `show`, with the index of the ray, in any order.
     pub(crate) fn each_hit(&self, env: usize, mut show: impl FnMut(usize, &RayHit)) {
         let (slot, per_view) = (self.task.slots[env], self.per_view());
         let first = if slot == NOWHERE { self.parts.len() } else { slot * per_view };
@@ -212,13 +213,13 @@ impl<R: Rays> Scan<R> {
         }
     }
 
-    /// Parts of a view.
+    /// Returns the number of parts per view.
     fn per_view(&self) -> usize {
         self.rays.count().div_ceil(PART)
     }
 }
 
-/// Short: hits are many.
+/// Short, because there are many hits.
 impl<R: Rays> fmt::Debug for Scan<R> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Scan")
@@ -229,7 +230,7 @@ impl<R: Rays> fmt::Debug for Scan<R> {
     }
 }
 
-/// A row of an array in C order.
+/// Returns a row of an array in C order.
 fn row(poses: &Array2<PoseF64>, env: usize) -> &[PoseF64] {
     let width = poses.ncols();
     poses.as_slice().map_or(&[], |flat| &flat[env * width..(env + 1) * width])

@@ -1,4 +1,4 @@
-//! What rays hit.
+//! Targets of ray sensors.
 
 use crate::error::SensorError;
 use crate::select::{Choice, at_least_one, matching};
@@ -6,19 +6,21 @@ use crate::sensor::SensorContext;
 use kinetoscope_scene::RenderScene;
 use serde::{Deserialize, Serialize};
 
-/// What rays hit: always what cameras see (the visuals of robots, not their collision shapes), of some geom groups.
+/// Targets of rays: visual geometry as seen by cameras (the visuals of robots, not their collision shapes), of some
+/// geom groups.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum HitTargets {
-    /// What is welded to the world: the ground, terrain, static objects, and the parts of robots that cannot move.
+    /// Instances fixed to the world: the ground, terrain, static objects, and the parts of robots that cannot move.
     StaticOnly,
-    /// What these patterns name: links `uid/link` (or `link` alone), objects by their uid, geoms of the world by their name
-    /// (`ground`). Regular expressions that must match the whole name. What is invisible is hit wherever an environment shows
-    /// it; a pattern for nothing that some environment shows when the sensor is added is refused.
+    /// Instances matched by name patterns: links `uid/link` (or `link` alone), objects by their uid, geoms of the world
+    /// by their name (`ground`). Patterns are regular expressions that must match the whole name. Hidden instances are
+    /// hit in environments that show them. When the sensor is added, each pattern must match an instance that some
+    /// environment shows.
     Named(Vec<String>),
-    /// Everything that can be seen, but tendons, skins and flexes, whose shapes change.
+    /// All instances, except tendons, skins and flexes, whose shapes change.
     Everything {
-        /// But not the body that the sensor hangs on, with all that is fused to it.
+        /// Excludes the parent body of the sensor, with everything fused to it.
         exclude_parent: bool,
     },
 }
@@ -30,11 +32,11 @@ impl Default for HitTargets {
 }
 
 impl HitTargets {
-    /// Indices of the instances, in order.
+    /// Returns the indices of the target instances, in ascending order.
     ///
     /// # Errors
     ///
-    /// A pattern that is no regular expression or matches nothing that can be hit, or no pattern at all.
+    /// A pattern that is not a regular expression or matches no possible target, or an empty list of patterns.
     pub(crate) fn select(
         &self,
         scene: &RenderScene,
@@ -42,7 +44,7 @@ impl HitTargets {
         parent: Option<usize>,
         context: &SensorContext,
     ) -> Result<Vec<usize>, SensorError> {
-        // Rays of casters meet what stays as it is.
+        // Ray casters support rigid shapes only.
         let in_groups = |instance: &kinetoscope_scene::Instance| {
             !instance.deforms && 1u32.checked_shl(instance.group.into()).is_some_and(|bit| groups & bit != 0)
         };
@@ -52,7 +54,7 @@ impl HitTargets {
         };
         let carrier = |body: usize| context.carriers.get(body).copied().unwrap_or(body);
         let wanted = |(index, instance): &(usize, &kinetoscope_scene::Instance)| {
-            // Not only what is nominally visible: it may be in an environment of its own looks.
+            // Hidden instances count too: they may be visible in an environment with its own scene.
             in_groups(instance)
                 && match self {
                     Self::StaticOnly => instance.fixed,
@@ -67,10 +69,10 @@ impl HitTargets {
     }
 }
 
-/// Which instances the patterns name. What is in no group that is hit has no name to match.
+/// Returns true for each instance that the patterns match. Instances outside the geom groups cannot be matched.
 ///
-/// A new sensor is refused where a pattern is only for what no environment shows: it would miss everything. One that was there
-/// before is not: what is shown may have changed since, and may change again.
+/// A new sensor is rejected if a pattern matches only instances that no environment shows: it would miss everything. A
+/// rebuilt sensor is accepted, because visibility may have changed since, and may change again.
 fn names(
     scene: &RenderScene,
     patterns: &[String],

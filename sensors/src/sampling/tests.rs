@@ -1,4 +1,4 @@
-//! Latency, lost samples and noise: exact where they are exact, with bounds where they are not.
+//! Tests of latency, dropout and noise: exact values, or statistical bounds.
 
 use super::*;
 use ndarray::array;
@@ -27,7 +27,7 @@ fn state(steps: &[u64]) -> SceneState {
     }
 }
 
-/// Measures zeros, so that all that is read is noise.
+/// Measures zeros, so that all values are noise.
 fn zeros(_env: usize, _row: &mut [f64]) {}
 
 impl Sampled for Sampler {
@@ -69,8 +69,8 @@ fn latency() {
     }
 }
 
-/// Measurements that were pending at a write arrive one after the other, into the history and `arrived`; those from before
-/// the write do not replace the written value.
+/// Measurements in flight at a write are delivered one after the other, in the history and in `arrived`. Those from
+/// before the write do not replace the written value.
 #[test]
 fn refresh() {
     let read = |s: &Sampler| (s.arrived("b")[(0, 1)], s.arrived_stamps()[0], s.values("b")[(0, 1)], s.stamps()[0]);
@@ -86,7 +86,7 @@ fn refresh() {
         assert_eq!(read(&sampler), (captured, captured, shown, stamp), "step {now}");
         assert_eq!(sampler.arrived_force_stamps()[0], captured - 0.5);
     }
-    // Without a latency nothing is pending: both are the same.
+    // Without a latency nothing is in flight: both are the same.
     let mut sampler = self::sampler(1, &SamplingCfg::default());
     step(&mut sampler, &[3]);
     assert_eq!(read(&sampler), (3.0, 3.0, 3.0, 3.0));
@@ -107,7 +107,7 @@ fn refresh() {
     }
 }
 
-/// An owner that updates only when something is due sees the same at every step.
+/// An owner that updates only at due steps gets the same values at every step.
 #[test]
 fn due() {
     let cfg = SamplingCfg { latency_steps: 5, ..SamplingCfg::every(4.0 * DT) };
@@ -125,11 +125,11 @@ fn due() {
         assert_eq!(lazy.values("b"), eager.values("b"), "step {now}");
         assert_eq!(lazy.sample_counts(), eager.sample_counts());
     }
-    // Captures at 4, 8, .., 100 and arrivals at 9, 13, .., 97.
+    // Captures at 4, 8, .., 100 and deliveries at 9, 13, .., 97.
     assert_eq!(updates, 25 + 23);
 }
 
-/// A reset drops pending measurements.
+/// A reset drops measurements in flight.
 #[test]
 fn resets() {
     let cfg = SamplingCfg { latency_steps: 6, ..SamplingCfg::every(2.0 * DT) };
@@ -145,7 +145,8 @@ fn resets() {
     assert_eq!((sampler.values("a"), sampler.sample_counts()), (array![[10.0], [2.0]].view(), array![5, 1].view()));
 }
 
-/// A lost measurement never arrives. The share lost of n scatters by sqrt(p (1 - p) / n): six times that.
+/// A lost measurement is never delivered. The standard deviation of the lost fraction of n is sqrt(p (1 - p) / n); the
+/// bound is six times that.
 #[test]
 fn dropout() {
     let mut sampler = sampler(1, &SamplingCfg { dropout: 0.3, history_length: 2, ..SamplingCfg::default() });
@@ -169,7 +170,8 @@ fn with_noise(channel: &str, noise: NoiseCfg) -> SamplingCfg {
     SamplingCfg { noise: [(channel.to_string(), noise)].into(), ..SamplingCfg::default() }
 }
 
-/// The mean of n numbers scatters by std / sqrt(n), their standard deviation by std / sqrt(2 n); six times that.
+/// Bounds are six standard deviations: std / sqrt(n) for the mean of n numbers, std / sqrt(2 n) for their standard
+/// deviation.
 #[track_caller]
 fn assert_normal(values: &[f64], std: f64) {
     let n = values.len() as f64;
@@ -179,7 +181,7 @@ fn assert_normal(values: &[f64], std: f64) {
     assert!((found - std).abs() < 6.0 * std / (2.0 * n).sqrt(), "std {found} instead of {std}");
 }
 
-/// White noise has its mean and deviation, touches its channel only, and is independent of the other environment.
+/// White noise has its mean and deviation, affects only its channel, and is independent between environments.
 #[test]
 fn white_noise() {
     let mut sampler = sampler(2, &with_noise("b", NoiseCfg::white(0.2)));
@@ -198,8 +200,8 @@ fn white_noise() {
     values.iter().for_each(|values| assert_normal(values, 0.2));
 }
 
-/// After t seconds the walk of `bias_walk` per sqrt(s) has the standard deviation `bias_walk * sqrt(t)`, whatever the
-/// period; at a reset the bias is drawn again.
+/// After t seconds, the walk of `bias_walk` per sqrt(s) has the standard deviation `bias_walk * sqrt(t)`, whatever the
+/// period. A reset samples the bias again.
 #[test]
 fn biases() {
     let n = 4000;
@@ -233,8 +235,8 @@ fn resolution() {
     }
 }
 
-/// Noise depends on seed, environment and name only: environment 5 of a simulation and environment 2 of a shard that begins
-/// at 3 are the same.
+/// Noise depends on seed, environment and name only: environment 5 of a simulation equals environment 2 of a shard that
+/// begins at 3.
 #[test]
 fn first_env() {
     let noise = NoiseCfg { std: 0.1, bias_std: 1.0, bias_walk: 0.1, resolution: 0.0 };

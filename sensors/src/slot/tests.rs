@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const ENVS: usize = 3;
 const NOT_WRITTEN: [u64; ENVS] = [0; ENVS];
 
-/// Environments at these steps; every number tells environment, step and the number of writes to it.
+/// A state with environments at these steps; every number encodes environment, step and number of writes.
 fn state(steps: [u64; ENVS], written: [u64; ENVS]) -> SceneState {
     let number =
         |env: usize, joint| (1000 * env + joint) as f64 + 0.001 * steps[env] as f64 + 1e6 * written[env] as f64;
@@ -33,15 +33,15 @@ fn joints(lazy: bool, sampling: SamplingCfg) -> SensorSlot {
     SensorSlot::new(Box::new(cfg.build(&context).unwrap()), cfg.requires(), cfg.lazy(context.dt), ENVS)
 }
 
-/// Counts, stamps and positions.
+/// Sample counts, stamps and positions.
 fn measured(slot: &SensorSlot) -> (Vec<u64>, Vec<f64>, Vec<f64>) {
     let any: &dyn Any = slot.sensor().unwrap();
     let sensor = any.downcast_ref::<JointState>().unwrap();
     (sensor.sample_counts().to_vec(), sensor.stamps().to_vec(), sensor.positions().iter().copied().collect())
 }
 
-/// Steps, resets, writes of single environments and reads in any order: a lazy sensor equals an eager one. Sensors whose
-/// values depend on earlier measurements are never lazy.
+/// Steps, resets, writes of single environments and reads in random order: a lazy sensor equals an eager one. Sensors
+/// whose values depend on earlier measurements are never lazy.
 #[test]
 fn lazy_and_eager() {
     for (seed, period) in [(1, 0.0), (2, 0.01), (3, 0.02), (4, 0.035)] {
@@ -66,7 +66,7 @@ fn lazy_and_eager() {
                     reads += 1;
                     assert_eq!(measured(&slots[0]), measured(&slots[1]));
                 }
-                // Sometimes an environment stands still.
+                // Sometimes an environment does not step.
                 x => {
                     let stands = if x < 0.4 { env } else { ENVS };
                     (0..ENVS).filter(|&env| env != stands).for_each(|env| steps[env] += 1);
@@ -90,7 +90,7 @@ fn lazy_and_eager() {
     }
 }
 
-/// A user's own sensor: counts its measurements.
+/// A user-defined sensor that counts its measurements.
 #[derive(Debug, Default)]
 struct Counting {
     count: Arc<AtomicUsize>,
@@ -151,7 +151,7 @@ fn measurements_on_demand() {
     }
 }
 
-/// Errors of a lazy sensor are returned when it is read; those of the state are those of an eager sensor.
+/// Errors of a lazy sensor are returned when it is read; errors of the state are the same as for an eager sensor.
 #[test]
 fn errors() {
     let (mut slot, _) = counting(true, false);
@@ -170,7 +170,7 @@ fn errors() {
     let mut slot = reset();
     slot.update(&SceneState::new(2));
     assert!(slot.has_failed());
-    // A panic is known at once, and for good.
+    // A panic is reported at once and stays.
     let (mut slot, _) = counting(false, true);
     slot.update(&state([2; ENVS], NOT_WRITTEN));
     let cause = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| slot.sensor().is_ok())).unwrap_err();

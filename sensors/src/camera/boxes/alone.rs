@@ -1,6 +1,7 @@
-//! Pictures of one thing, as if nothing else were there.
+//! Renders of single segments without occluders.
 //!
-//! They are of the instants that the camera's own pictures are of: with a shutter that takes time each row is of its own.
+//! The renders show the same instants as the images of the camera. With a shutter of nonzero span, each row has its own
+//! instant.
 
 use crate::camera::error::CameraError;
 use crate::camera::segmentation::Segment;
@@ -9,7 +10,7 @@ use kinetoscope_render::Shot;
 use kinetoscope_render::frame::{Channels, Frame};
 use kinetoscope_scene::RenderScene;
 
-/// Draws segments alone, by the camera's own renderer and through its lens.
+/// Renders segments in isolation, with the renderer and the lens of the camera.
 pub(super) struct Alone<'a> {
     camera: &'a Camera,
     row: usize,
@@ -18,14 +19,14 @@ pub(super) struct Alone<'a> {
 }
 
 impl<'a> Alone<'a> {
-    /// Of the picture of a row, which is that of environment `env`.
+    /// Creates the renderer for the image of `row`, which shows environment `env`.
     pub(super) fn new(camera: &'a Camera, row: usize, env: usize) -> Self {
         let (height, width) = camera.image_shape();
         let frame = Frame::new(width, height, Channels { mask: true, ..Channels::default() });
         Self { camera, row, env, frame }
     }
 
-    /// The pixels (u, v) that would see a segment, with its mask ids there.
+    /// Returns the pixels (u, v) that would see the segment if it were alone, each with its mask id.
     pub(super) fn pixels(
         &mut self,
         segment: &Segment,
@@ -43,12 +44,12 @@ impl<'a> Alone<'a> {
     }
 }
 
-/// The scene with everything but a segment hidden; poses stay those of the scene.
+/// Returns the scene with all instances hidden except those of the segment; poses stay unchanged.
 fn hide_others(scene: &RenderScene, segment: &Segment) -> RenderScene {
     let mut instances = scene.instances().to_vec();
     for instance in &mut instances {
         instance.visible &= segment.mask_ids.contains(&instance.mask_id);
     }
-    // Every instance was in a scene already.
+    // Cannot fail: every instance was part of a scene before.
     scene.with_instances(instances).unwrap_or_else(|_| RenderScene::empty())
 }

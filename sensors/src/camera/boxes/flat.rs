@@ -1,4 +1,4 @@
-//! Boxes in the picture.
+//! 2D bounding boxes of segments in the image.
 
 use super::alone::Alone;
 use super::outline::outline;
@@ -8,47 +8,52 @@ use crate::error::SensorError;
 use kinetoscope_render::Layer;
 use ndarray::Axis;
 
-/// A rectangle of a picture \[pixels\]: from the edge where its first pixel begins to the edge where its last one ends, u to
-/// the right, v down; the whole picture is \[0, 0\] to \[W, H\]. Isaac's `x_max` and `y_max` are the last pixel itself, one
-/// less.
+/// A rectangle in the image \[pixels\], u to the right, v down. It reaches from the outer edge of its first pixel to
+/// the outer edge of its last one; the whole image is \[0, 0\] to \[W, H\]. Isaac's `x_max` and `y_max` are the index
+/// of the last pixel, which is one less.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelBox {
-    /// Left and upper edge.
+    /// Left and upper edge (u, v).
     pub min: [f64; 2],
-    /// Right and lower edge.
+    /// Right and lower edge (u, v).
     pub max: [f64; 2],
 }
 
-/// Where a segment is in a picture.
+/// 2D bounding boxes of a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Box2d {
-    /// The segment, see [`Segmentation::segments`].
+    /// Segment id, see [`Segmentation::segments`].
     pub id: i32,
-    /// Around the pixels that see it, with a shutter that takes time each row at its own instant; `None` where none does.
+    /// Box around the pixels that see the segment; `None` if no pixel does. With a shutter of nonzero span, each row
+    /// has its own instant.
     pub tight: Option<PixelBox>,
-    /// Around all of it that is in the frustum (between the near and the far plane, within the edges of the picture),
-    /// whatever hides it: of shapes and the triangles of meshes, not of pixels; level of detail is not looked at. Exact for
-    /// what is wholly in the frustum; what is round and cut is a polyhedron with 256 edges around, inside by 7.5e-5 of its
-    /// radius at most. Behind a lens that bends lines, and of a camera whose [shutter](crate::camera::CameraCfg::shutter) takes time:
-    /// around the pixels that would see it if it were alone, each row at its own instant, as
-    /// [`Occlusion::alone_pixels`](super::Occlusion::alone_pixels) counts them. `None` where all of it is outside.
+    /// Box around the whole part of the segment in the view frustum, occluded or not; `None` if all of it is outside.
+    ///
+    /// The frustum ends at the near plane, the far plane and the edges of the image. The box is that of shapes and mesh
+    /// triangles, not of pixels; level of detail is ignored. The box is exact for segments entirely in the frustum.
+    /// Round shapes cut by the frustum are approximated by a polyhedron with 256 edges around, which is inside by at
+    /// most 7.5e-5 of the radius.
+    ///
+    /// If the lens bends lines or the [shutter](crate::camera::CameraCfg::shutter) has a nonzero span, the segment is
+    /// rendered in isolation, each row at its own instant. The box then surrounds the pixels that
+    /// [`Occlusion::alone_pixels`](super::Occlusion::alone_pixels) counts.
     pub loose: Option<PixelBox>,
-    /// How many pixels see it.
+    /// Number of pixels that see the segment.
     pub visible_pixels: usize,
 }
 
 impl Segmentation {
-    /// Where the segments of a level are in the picture of environment `env`, those that are in it at all (one of the two
-    /// boxes is there), in the order of [`segments`](Self::segments).
+    /// Returns the 2D boxes of the segments of a level in the image of environment `env`, in the order of
+    /// [`segments`](Self::segments). Segments without a box are left out.
     ///
-    /// Behind a lens that bends lines, and with a shutter that takes time, each segment is drawn once more, alone, for its loose
-    /// box: see [`occlusions`](Self::occlusions).
+    /// If the lens bends lines or the shutter has a nonzero span, each segment is rendered once more in isolation for
+    /// its loose box: see [`occlusions`](Self::occlusions).
     ///
     /// # Errors
     ///
-    /// [`ChannelOff`](crate::camera::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
-    /// an environment that the camera does not see; where segments are drawn, [`Draw`](crate::camera::CameraError::Draw) for one that
-    /// cannot be.
+    /// [`ChannelOff`](crate::camera::CameraError::ChannelOff) if the camera does not measure the mask, errors of
+    /// reading the mask, and an environment that the camera does not see. [`Draw`](crate::camera::CameraError::Draw) if
+    /// an isolated segment cannot be rendered.
     pub fn boxes_2d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box2d>, SensorError> {
         let row = camera.row(env)?;
         let mask = camera.mask()?;
@@ -79,22 +84,22 @@ impl Segmentation {
     }
 }
 
-/// Boxes while they grow.
+/// Accumulates the boxes of the segments of a level.
 struct Boxes<'a> {
     segmentation: &'a Segmentation,
     level: SegmentLevel,
     list: Vec<Growing>,
-    /// The mask id that was last looked for, and where its segment is in the list.
+    /// Mask id of the last lookup, and the index of its segment in `list`.
     last: (i32, Option<usize>),
 }
 
-/// A box while it grows.
+/// Box of one segment, accumulated pixel by pixel and instance by instance.
 #[derive(Clone, Copy)]
 struct Growing {
     id: i32,
     pixels: usize,
     seen: [[usize; 2]; 2],
-    /// Smallest and largest u, then v.
+    /// Smallest and largest u, then v, of the loose box.
     whole: Option<[[f64; 2]; 2]>,
 }
 
@@ -113,7 +118,7 @@ impl<'a> Boxes<'a> {
         self.last.1.map(|at| &mut self.list[at])
     }
 
-    /// A pixel sees something.
+    /// Adds a pixel that sees a mask id.
     fn see(&mut self, mask_id: i32, at: [usize; 2]) {
         let Some(growing) = self.of(mask_id) else { return };
         growing.pixels += 1;
@@ -123,7 +128,7 @@ impl<'a> Boxes<'a> {
         }
     }
 
-    /// Something in the picture reaches from smallest to largest u, then v.
+    /// Extends the loose box of a mask id by `extent`: smallest and largest u, then v.
     fn reach(&mut self, mask_id: i32, extent: [[f64; 2]; 2]) {
         let Some(growing) = self.of(mask_id) else { return };
         let before = growing.whole.unwrap_or(extent);

@@ -1,4 +1,4 @@
-//! Boxes around things: in the picture, and in the environment.
+//! Bounding boxes of segments, in the image and in the environment, and their occlusion.
 
 mod alone;
 mod flat;

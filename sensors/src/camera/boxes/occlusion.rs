@@ -1,4 +1,4 @@
-//! How much of a thing is hidden.
+//! Occlusion of segments in the image.
 
 use super::alone::Alone;
 use crate::camera::segmentation::{SegmentLevel, Segmentation};
@@ -6,37 +6,38 @@ use crate::camera::sensor::Camera;
 use crate::error::SensorError;
 use ndarray::Axis;
 
-/// How much of a segment other things hide in a picture. Both numbers are of the same instants: with a shutter that takes time each
-/// row is of its own, as the mask is.
+/// Occlusion of a segment in an image. Both counts refer to the same instants: with a shutter of nonzero span, each row
+/// has its own instant, as in the mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Occlusion {
-    /// The segment, see [`Segmentation::segments`].
+    /// Segment id, see [`Segmentation::segments`].
     pub id: i32,
-    /// How many pixels see it.
+    /// Number of pixels that see the segment.
     pub visible_pixels: usize,
-    /// How many would see it if it were alone; at least 1.
+    /// Number of pixels that would see the segment if it were alone; at least 1.
     pub alone_pixels: usize,
 }
 
 impl Occlusion {
-    /// The part of it that is hidden, as Isaac's occlusion ratio: 0 where all of what is in the picture is seen, 1 where
-    /// nothing is. What the picture's edges cut off counts nowhere, nor does what it hides of itself.
+    /// Hidden fraction of the segment, as Isaac's occlusion ratio: 0 if everything inside the image is visible, 1 if
+    /// nothing is. Parts outside the image do not count, nor does self-occlusion.
     pub fn ratio(&self) -> f64 {
         1.0 - self.visible_pixels as f64 / self.alone_pixels as f64
     }
 }
 
 impl Segmentation {
-    /// How much of the segments of a level is hidden in the picture of environment `env`, those that would be in it if they
-    /// were alone, in the order of [`segments`](Self::segments).
+    /// Returns the occlusion of the segments of a level in the image of environment `env`, in the order of
+    /// [`segments`](Self::segments). Segments that would not be in the image if they were alone are left out.
     ///
-    /// Each segment is drawn once more, alone, by the camera's own renderer: that takes as long as that many pictures of the
-    /// mask, and allocates.
+    /// Each segment is rendered once more in isolation by the renderer of the camera. This takes as long as one mask
+    /// image per segment, and allocates memory.
     ///
     /// # Errors
     ///
-    /// [`ChannelOff`](crate::camera::CameraError::ChannelOff) for a camera that does not measure the mask, what reading it says, and
-    /// an environment that the camera does not see; [`Draw`](crate::camera::CameraError::Draw) where a segment cannot be drawn.
+    /// [`ChannelOff`](crate::camera::CameraError::ChannelOff) if the camera does not measure the mask, errors of
+    /// reading the mask, and an environment that the camera does not see. [`Draw`](crate::camera::CameraError::Draw) if
+    /// a segment cannot be rendered.
     pub fn occlusions(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Occlusion>, SensorError> {
         let row = camera.row(env)?;
         let mask = camera.mask()?;

@@ -1,15 +1,15 @@
-//! Where in the picture a thing is, as if nothing else were there.
+//! Extent of an instance in the image, without occluders.
 
 use kinetoscope_render::View;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{HullPart, Plane};
 use kinetoscope_scene::{Instance, PoseF32};
 
-/// Edges around a circle of what is cut by a side of the frustum and has no corners of its own: the polygon is inside of
-/// the circle by 1 - cos(pi / 256) of its radius at most, 7.5e-5.
+/// Number of edges of circles that the frustum cuts. The polygon is inside the circle by at most 1 - cos(pi / 256) of
+/// its radius, which is 7.5e-5.
 const SEGMENTS: usize = 256;
 
-/// A thing in the camera's optical frame, double precision.
+/// Pose of an instance in the optical frame of the camera, double precision.
 struct Seen {
     rotation: [[f64; 3]; 3],
     translation: [f64; 3],
@@ -20,7 +20,7 @@ impl Seen {
         [0, 1, 2].map(|i| self.translation[i] + (0..3).map(|j| self.rotation[i][j] * p[j]).sum::<f64>())
     }
 
-    /// R diag(radii²) Rᵀ: n · M n is the square of how far an ellipsoid reaches along n.
+    /// Returns R diag(radii²) Rᵀ. n · M n is the squared extent of an ellipsoid along n.
     fn spread(&self, radii: [f64; 3]) -> [[f64; 3]; 3] {
         let r = &self.rotation;
         [0, 1, 2].map(|i| [0, 1, 2].map(|j| (0..3).map(|k| r[i][k] * r[j][k] * radii[k] * radii[k]).sum()))
@@ -44,10 +44,11 @@ impl Extent {
         self.add(1, y / z);
     }
 
-    /// A ball stretched along axes, or a disc, wholly in front of the camera.
+    /// Adds an ellipsoid, or a disc, that is entirely in front of the camera.
     ///
-    /// A plane through the eye with the normal n touches it where (n · c)² = n · M n, c its centre. With n = (1, 0, -s), which
-    /// is the plane x = s z, that is a quadratic equation in s, whose roots are the ends of what is seen.
+    /// A plane through the camera center with normal n touches the ellipsoid where (n · c)² = n · M n, with its center
+    /// c. For n = (1, 0, -s), the plane x = s z, this is a quadratic equation in s. Its roots are the ends of the
+    /// extent.
     fn ellipsoid(&mut self, seen: &Seen, center: [f64; 3], radii: [f64; 3]) {
         let (c, m) = (seen.point(center), seen.spread(radii));
         for axis in 0..2 {
@@ -60,8 +61,8 @@ impl Extent {
     }
 }
 
-/// Smallest and largest u, then v, of the picture \[pixels\] of what an instance has in the frustum: between the near and the
-/// far plane and the four edges of the picture; `None` where that is nothing.
+/// Returns the extent of the part of an instance that is in the frustum \[pixels\]: smallest and largest u, then v. The
+/// frustum ends at the near plane, the far plane and the four edges of the image. `None` if no part is in the frustum.
 pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &PoseF32) -> Option<[[f64; 2]; 2]> {
     let pose = view.world_from_camera.inverse_times(world_from_instance);
     let seen =
@@ -81,7 +82,7 @@ pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &Po
     let endless = shape.bounds().is_none();
     if low > near && high < far && !endless {
         let mut extent = Extent::NONE;
-        // x / z has its extremes over a convex hull among those over its parts.
+        // x / z takes its extremes over a convex hull at the hull's parts.
         shape.hull(&mut |part| match part {
             HullPart::Point(at) => extent.point(seen.point(at)),
             HullPart::Ellipsoid { center, radii } => extent.ellipsoid(&seen, center, radii),
@@ -95,18 +96,18 @@ pub(super) fn outline(view: &View, instance: &Instance, world_from_instance: &Po
             return Some(found);
         }
     }
-    // The extremes of what is left of a thing are not those of the thing.
+    // A clipped shape has other extremes than the whole shape.
     let mut cutter = Cutter { sides: sides(view), polygon: Vec::new(), rest: Vec::new(), extent: Extent::NONE };
     cutter.shape(shape, &seen, view);
     let [x, _] = cutter.extent.0;
     (x[0] <= x[1]).then(|| {
-        // Rounding only: polygons end at the edges.
+        // Only rounding errors are clamped: polygons end at the edges.
         let found = pixels(cutter.extent);
         [0, 1].map(|axis| found[axis].map(|x| x.clamp(0.0, size[axis])))
     })
 }
 
-/// The six sides of the frustum as [a, b, c, d]: a x + b y + c z + d is not negative on the inside, in the optical frame.
+/// Returns the six planes of the frustum as [a, b, c, d]: a x + b y + c z + d >= 0 inside, in the optical frame.
 fn sides(view: &View) -> [[f64; 4]; 6] {
     let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
     let (near, far) = (f64::from(view.near), f64::from(view.far));
@@ -120,16 +121,16 @@ fn sides(view: &View) -> [[f64; 4]; 6] {
     ]
 }
 
-/// Whether the camera is on the side of a plane that is seen.
+/// Returns true if the camera is on the visible side of a one-sided plane.
 fn is_before(seen: &Seen) -> bool {
-    // The camera in the plane's frame: -Rᵀ t.
+    // Camera position in the frame of the plane: -Rᵀ t.
     (0..3).map(|i| seen.rotation[i][2] * seen.translation[i]).sum::<f64>() < 0.0
 }
 
-/// Cuts what is on the surface of shapes to the frustum, and measures it.
+/// Clips the surfaces of shapes to the frustum and accumulates their extent.
 struct Cutter {
     sides: [[f64; 4]; 6],
-    /// What is left of a polygon, and what is left of that behind one more side.
+    /// The polygon being clipped, and the result of clipping it at one more plane.
     polygon: Vec<[f64; 3]>,
     rest: Vec<[f64; 3]>,
     extent: Extent,
@@ -161,8 +162,9 @@ impl Cutter {
         }
     }
 
-    /// What a convex polygon has in the frustum: side after side, the corners within it and where edges cross it
-    /// (Sutherland and Hodgman, "Reentrant polygon clipping", 1974).
+    /// Adds the part of a convex polygon inside the frustum. At each plane, the polygon keeps its corners inside and
+    /// gains the points where its edges cross the plane. Source: Sutherland and Hodgman, "Reentrant polygon clipping",
+    /// 1974.
     fn polygon(&mut self, corners: &[[f64; 3]]) {
         self.polygon.clear();
         self.polygon.extend_from_slice(corners);
@@ -191,7 +193,7 @@ impl Cutter {
     }
 }
 
-/// Half the side of a square that has all of an endless plane that the picture shows.
+/// Returns half the side of a square that contains all of an infinite plane that the image shows \[m\].
 fn horizon(view: &View, seen: &Seen, far: f64) -> f64 {
     let wide = |c: f32, f: f32, n: usize| f64::from(c.abs().max((n as f32 - c).abs()) / f);
     let (x, y) = (wide(view.cx, view.fx, view.width), wide(view.cy, view.fy, view.height));
@@ -224,13 +226,13 @@ mod tests {
         outline(&view(), &Instance::new(shape, Material::default(), 1), pose)
     }
 
-    /// A rotation of some angles and a place.
+    /// A pose from roll, pitch, yaw and a position.
     fn pose(rpy: [f64; 3], at: [f64; 3]) -> PoseF32 {
         PoseF32::from(&kinetoscope_scene::pose::from_xyz_rpy(at, rpy))
     }
 
-    /// The rays to a ball fill a cone of half the angle asin(r / d) about the direction of its centre, in the plane of y = 0
-    /// too: so u is cx + fx tan(atan2(x, z) ± asin(r / hypot(x, z))).
+    /// The rays to a ball fill a cone around the direction of its center with the half-angle asin(r / d). The same
+    /// holds in the plane y = 0. So u is cx + fx tan(atan2(x, z) ± asin(r / hypot(x, z))).
     #[test]
     fn balls() {
         for (at, radius) in [([0.3, -0.2, 2.0], 0.25), ([-3.0, 1.0, 1.5], 0.4), ([0.0, 0.0, 0.6], 0.45)] {
@@ -240,15 +242,15 @@ mod tests {
             for (axis, (f, c)) in [(500.0, 4310.5), (520.0, 4250.25)].into_iter().enumerate() {
                 for (side, sign) in [-1.0, 1.0].into_iter().enumerate() {
                     let expected = f * end(at[axis], sign) + c;
-                    // The pose is in single precision: 1e-7 of metres, magnified by f / z and by the slant.
+                    // The pose has single precision: 1e-7 of meters, magnified by f / z and by the slant.
                     assert!((found[axis][side] - expected).abs() < 2e-3, "{at:?}: {found:?}, {expected}");
                 }
             }
         }
     }
 
-    /// Points of fine triangles are on the surface, so they are inside of the outline; the outermost is near its edge: a
-    /// circle's polygon is inside by R (1 - cos(pi / n)), times f / z and the slant of what is seen.
+    /// Vertices of a fine tessellation lie on the surface, so they are inside the extent. The outermost vertex is near
+    /// its edge: the polygon of a circle is inside by R (1 - cos(pi / n)), times f / z and the slant of the surface.
     #[test]
     fn shapes() {
         let shapes: Vec<Shape> = vec![
@@ -262,7 +264,7 @@ mod tests {
         for (k, shape) in shapes.iter().enumerate() {
             for turn in 0..12 {
                 let t = f64::from(turn);
-                // The last ones reach through the near plane.
+                // The last poses reach through the near plane.
                 let z = if turn < 8 { 1.2 + 0.3 * t } else { 0.1 + 0.03 * (t - 8.0) };
                 let pose = pose([0.5 * t + 0.3, 0.7 * t, 1.1 * t + k as f64], [0.2 * t.sin(), 0.3 * t.cos(), z]);
                 let Some(found) = of(shape.clone(), &pose) else {
@@ -285,7 +287,8 @@ mod tests {
                 }
                 for axis in 0..2 {
                     let ([low, high], [least, most]) = (found[axis], extremes[axis]);
-                    // What is cut is a polygon of 256 edges: 7.5e-5 of 0.3 m, at 0.1 m and 520 pixels, some more at a slant.
+                    // Clipped shapes have 256 edges: 7.5e-5 of 0.3 m, at 0.1 m and 520 pixels, somewhat more at a
+                    // slant.
                     let slack = if nearest < 0.11 { 0.5 } else { 2e-3 };
                     assert!(low <= least + slack && high >= most - slack, "{shape:?} {turn}: {found:?} {extremes:?}");
                     if nearest > 0.5 {
@@ -307,8 +310,8 @@ mod tests {
         assert_eq!(of(Plane { half: [1.0, 1.0] }, &pose([0.0; 3], [0.0, 0.0, 2.0])), None, "from behind");
     }
 
-    /// A camera 1 m above the ground that looks ahead sees it up to its far plane, 20 m away: v = cy + fy / 20, and to the
-    /// edges of the image to the sides and below.
+    /// A camera 1 m above the ground looks ahead and sees the ground up to its far plane, 20 m away: v = cy + fy / 20.
+    /// The ground reaches the left, right and lower edges of the image.
     #[test]
     fn infinite_plane() {
         // z of the plane is up, which is -y of the camera.
@@ -323,29 +326,29 @@ mod tests {
         outline(&view, &Instance::new(shape, Material::default(), 1), pose)
     }
 
-    /// A strip askew, 1 m before the camera, between the lines u + v = s ± 500 w sqrt(2): the visible part is a triangle at
-    /// the upper left corner, however long the strip is. Beside the corner its ends are left and above, and their rectangle
-    /// would be the whole image.
+    /// A slanted strip 1 m in front of the camera, between the lines u + v = s ± 500 w sqrt(2). The visible part is a
+    /// triangle at the upper left corner, however long the strip is. A strip beside the corner is outside, although the
+    /// bounding rectangle of its ends would be the whole image.
     #[test]
     fn strip() {
         let half_width = 0.01f32;
         let wide = 500.0 * f64::from(half_width) * 2f64.sqrt();
         let strip = |s: f64| {
-            // Along (1, -1), through the middle of the line u + v = s; its z looks at the camera.
+            // Along (1, -1), through the middle of the line u + v = s, with z toward the camera.
             let h = std::f32::consts::FRAC_1_SQRT_2;
             let at = [((0.5 * s - 320.0) / 500.0) as f32, ((0.5 * s - 240.0) / 500.0) as f32, 1.0];
             let pose = PoseF32 { rotation: [[h, -h, 0.0], [-h, -h, 0.0], [0.0, 0.0, -1.0]], translation: at };
             in_narrow(0.1, Plane { half: [5.0, half_width] }, &pose)
         };
-        // Single precision of the pose: 1e-7 of 1 m and of 5 m at a slant, 500 pixels.
+        // Single precision of the pose: 1e-7 of 1 m, and of 5 m at a slant, times 500 pixels.
         let found = strip(30.0).unwrap();
         assert!(found.iter().all(|[a, b]| *a == 0.0 && (b - 30.0 - wide).abs() < 1e-3), "{found:?}");
         assert_eq!(strip(-30.0), None);
     }
 
-    /// A rod that passes the camera on its right, from behind: 0.1 m aside and 0.02 m thick, 1 m of it ahead. Its near end is
-    /// seen at x / z = 0.09; it leaves the image where 500 * 0.09 / z = 320, and is 500 * 0.01 / z high there. At the near
-    /// plane, 5 mm away, x / z is 22.
+    /// A rod passes the camera on its right, from behind: 0.1 m aside, 0.02 m thick, 1 m of it ahead. Its far end is at
+    /// x / z = 0.09. The rod leaves the image where 500 * 0.09 / z = 320, with a half height of 500 * 0.01 / z there.
+    /// At the near plane, 5 mm away, x / z is 22.
     #[test]
     fn rod() {
         let rod = Box { half: [0.01, 0.01, 1.0] };

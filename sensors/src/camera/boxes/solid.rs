@@ -1,4 +1,4 @@
-//! Boxes in the environment.
+//! 3D bounding boxes of segments in the environment.
 
 use crate::camera::error::CameraError;
 use crate::camera::segmentation::{SegmentLevel, Segmentation};
@@ -8,13 +8,13 @@ use kinetoscope_render::Layer;
 use kinetoscope_scene::{Instance, Pose, PoseF32};
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-/// A box around a segment, along the axes of the segment's own frame: that of the link; of an object with several links that
-/// of its first one; of a class that of its first object.
+/// A box around a segment, aligned with the axes of the segment's frame. This is the frame of the link; for an object
+/// with several links the frame of its first link; for a class the frame of its first object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Box3d {
-    /// The segment, see [`Segmentation::segments`].
+    /// Segment id, see [`Segmentation::segments`].
     pub id: i32,
-    /// Where the segment's frame is in the environment.
+    /// Pose of the segment's frame in the environment.
     pub pose: Pose,
     /// Smallest coordinates in that frame \[m\].
     pub min: [f64; 3],
@@ -31,12 +31,12 @@ impl Box3d {
         })
     }
 
-    /// Lengths of its sides \[m\].
+    /// Side lengths \[m\].
     pub fn size(&self) -> [f64; 3] {
         [0, 1, 2].map(|k| self.max[k] - self.min[k])
     }
 
-    /// Its middle in the environment \[m\].
+    /// Center in the environment \[m\].
     pub fn center(&self) -> [f64; 3] {
         let middle = [0, 1, 2].map(|k| 0.5 * (self.min[k] + self.max[k]));
         (self.pose * Point3::from(middle)).coords.into()
@@ -44,14 +44,14 @@ impl Box3d {
 }
 
 impl Segmentation {
-    /// Boxes around the segments of a level in environment `env` at the instant that the camera captured, in the order of
-    /// [`segments`](Self::segments): of everything that the camera could draw, in its picture or not, but for what is without
-    /// end. They are those of exact shapes and of the vertices of meshes. No picture is drawn.
+    /// Returns the 3D boxes of the segments of a level in environment `env` at the captured instant, in the order of
+    /// [`segments`](Self::segments). Everything that the camera can render counts, inside the image or not; infinite
+    /// segments are left out. The boxes are those of exact shapes and of mesh vertices. No image is rendered.
     ///
     /// # Errors
     ///
-    /// An environment that the camera does not see; [`NothingCaptured`](CameraError::NothingCaptured) before the first reset
-    /// or update; [`ThingPose`](CameraError::ThingPose) for a thing whose pose is not finite.
+    /// An environment that the camera does not see; [`NothingCaptured`](CameraError::NothingCaptured) before the first
+    /// reset or update; [`ThingPose`](CameraError::ThingPose) if the pose of an instance is not finite.
     pub fn boxes_3d(&self, level: SegmentLevel, camera: &Camera, env: usize) -> Result<Vec<Box3d>, SensorError> {
         let row = camera.row(env)?;
         camera.must_have_captured(row)?;
@@ -60,7 +60,7 @@ impl Segmentation {
             let all = shot.scene.instances().iter().zip(shot.poses).filter(|(instance, _)| drawn(instance));
             let of = |id: i32| -> Option<Box3d> {
                 let parts = all.clone().filter(|(instance, _)| self.segment_of(level, instance.mask_id) == id);
-                // The first thing of the segment that is drawn gives the frame.
+                // The first rendered instance of the segment, by mask id, gives the frame.
                 let (first, place) = parts.clone().min_by_key(|(instance, _)| instance.mask_id)?;
                 let pose = frame_of(first, place);
                 let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -84,12 +84,12 @@ impl Segmentation {
     }
 }
 
-/// Where the frame of the thing that an instance belongs to is.
+/// Returns the pose of the frame of the link or object that an instance belongs to.
 fn frame_of(instance: &Instance, world_from_instance: &PoseF32) -> Pose {
     pose_of(world_from_instance) * instance.frame_from_instance.inverse()
 }
 
-/// The pose of a matrix.
+/// Converts a single-precision pose.
 fn pose_of(pose: &PoseF32) -> Pose {
     let r = pose.rotation.map(|row| row.map(f64::from));
     let matrix = Rotation3::from_matrix_unchecked(Matrix3::from_fn(|i, j| r[i][j]));
@@ -97,7 +97,7 @@ fn pose_of(pose: &PoseF32) -> Pose {
     Pose::from_parts(Vector3::from(pose.translation.map(f64::from)).into(), rotation)
 }
 
-/// Smallest and largest x, y and z of an instance in a frame.
+/// Returns the smallest and largest x, y and z of an instance in a frame \[m\].
 fn extent(frame: &Pose, instance: &Instance, world_from_instance: &PoseF32) -> [[f64; 2]; 3] {
     let relative = frame.inverse() * pose_of(world_from_instance);
     let rotation = relative.rotation.to_rotation_matrix();

@@ -1,9 +1,9 @@
-//! What can be wrong with a calibration file.
+//! Errors of calibration files.
 
 use crate::camera::CameraError;
 use std::path::PathBuf;
 
-/// The fields of a file.
+/// Fields of a calibration file.
 pub(super) const FIELDS: [&str; 8] = [
     "image_width",
     "image_height",
@@ -15,71 +15,71 @@ pub(super) const FIELDS: [&str; 8] = [
     "projection_matrix",
 ];
 
-/// Why a calibration file cannot be read or written.
+/// Errors of reading or writing a calibration file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
-    /// The file cannot be opened, or not be written.
+    /// The file cannot be opened or written.
     #[error("{}: {error}", .path.display())]
     File {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Message of the operating system.
         error: String,
     },
-    /// It is no YAML, or YAML that no calibration file has.
+    /// The text is not valid YAML, or uses YAML that calibration files do not support.
     #[error("{file}:{line}:{column}: {message}")]
     Yaml {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// Line, counted from 1.
         line: usize,
         /// Column, counted from 1.
         column: usize,
-        /// What is wrong.
+        /// The problem.
         message: String,
     },
-    /// A field is not there.
+    /// A field is missing.
     #[error("{file}: {field} is missing; a camera_info file has {}", FIELDS.join(", "))]
     Missing {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The field.
+        /// Name of the field.
         field: String,
     },
-    /// A field is no good.
+    /// A field is invalid.
     #[error("{file}:{line}: {field} {problem}")]
     Field {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// Line, counted from 1.
         line: usize,
-        /// The field.
+        /// Name of the field.
         field: String,
-        /// What is wrong with it, and what would be right.
+        /// The problem, and the accepted values.
         problem: String,
     },
-    /// A distortion model that nobody knows here.
+    /// The distortion model is unknown.
     #[error("{file}:{line}: there is no distortion model {model:?}; known are {}", .candidates.join(", "))]
     Model {
-        /// The file.
+        /// Name of the file.
         file: String,
         /// Line, counted from 1.
         line: usize,
-        /// The model.
+        /// Name of the model.
         model: String,
-        /// Models that exist, nearest first.
+        /// Known models, nearest first.
         candidates: Vec<&'static str>,
     },
-    /// A lens that camera_info has no model for.
+    /// The lens has no `camera_info` distortion model.
     #[error("camera_info cannot say what the {lens} lens does: {reason}")]
     Lens {
-        /// The lens.
+        /// Name of the lens.
         lens: &'static str,
-        /// Why.
+        /// Reason.
         reason: &'static str,
     },
-    /// Numbers that no camera has.
+    /// The numbers describe no valid camera.
     #[error(transparent)]
     Camera(#[from] CameraError),
 }

@@ -1,4 +1,4 @@
-//! ROS's calibration files: `camera_info` as `camera_calibration` and `camera_info_manager` write it.
+//! ROS calibration files: `camera_info` as written by `camera_calibration` and `camera_info_manager`.
 //!
 //! Source: ROS, package `camera_calibration_parsers` (`parse_yml.cpp`), and the message `sensor_msgs/CameraInfo`.
 
@@ -21,15 +21,15 @@ use nalgebra::{Matrix3, Matrix3x4};
 use std::fmt;
 use std::path::Path;
 
-/// How far a rectification matrix may be from a rotation: files have six digits or more.
+/// Tolerance of rotation matrices: files have six digits or more.
 const ROTATION: f64 = 1e-3;
 
-/// ROS's names of distortions. Files may have the names of other tools too, which are those of [`Lens::from_name`]: `radtan`,
-/// `fisheye`, `kannala_brandt4` and more; `equidistant` is ROS's, and so OpenCV's fisheye.
+/// Distortion model of ROS. Files may also use the names of other tools, see [`Lens::from_name`]: `radtan`, `fisheye`,
+/// `kannala_brandt4` and more. `equidistant` has its ROS meaning, OpenCV's fisheye model.
 ///
-/// The first two are one lens, and may have as many numbers as OpenCV takes for it: none, 4, 5, 8, 12 or 14, of which the last
-/// two have to be 0, for tilted sensors are not supported. Where a file names none of the two it is the one that ROS's nodes
-/// write for so many numbers.
+/// `plumb_bob` and `rational_polynomial` describe the same lens. Both accept as many coefficients as OpenCV: 0, 4, 5,
+/// 8, 12 or 14. The last two of 14 must be 0, because tilted sensors are not supported. If a file names no model, the
+/// number of coefficients selects the one that ROS nodes write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DistortionModel {
     /// k1, k2, p1, p2, k3 of [`OpenCv`].
@@ -43,7 +43,7 @@ pub enum DistortionModel {
 impl DistortionModel {
     const ALL: [Self; 3] = [Self::PlumbBob, Self::RationalPolynomial, Self::Equidistant];
 
-    /// Its name in files.
+    /// Name in calibration files.
     pub fn name(self) -> &'static str {
         match self {
             Self::PlumbBob => "plumb_bob",
@@ -52,7 +52,7 @@ impl DistortionModel {
         }
     }
 
-    /// How many coefficients it may have.
+    /// Accepted numbers of coefficients.
     fn counts(self) -> &'static [usize] {
         match self {
             Self::PlumbBob | Self::RationalPolynomial => &[0, 4, 5, 8, 12, 14],
@@ -60,12 +60,12 @@ impl DistortionModel {
         }
     }
 
-    /// That of OpenCV's lens for so many numbers.
+    /// Returns the model of OpenCV's lens with `count` coefficients.
     fn of_open_cv(count: usize) -> Self {
         if count > 5 { Self::RationalPolynomial } else { Self::PlumbBob }
     }
 
-    /// The model that a file with so many numbers calls so.
+    /// Finds the model by its name in a file with `count` coefficients.
     fn from_name(name: &str, count: usize) -> Option<Self> {
         let own = Self::ALL.into_iter().find(|model| model.name() == name);
         own.or_else(|| match Lens::from_name(name).ok()? {
@@ -75,7 +75,7 @@ impl DistortionModel {
         })
     }
 
-    /// All names that files may have.
+    /// Returns all names accepted in files.
     fn names() -> impl Iterator<Item = &'static str> {
         let lenses = [OpenCv::NAME, OpenCvFisheye::NAME].into_iter();
         let aliases = [OpenCv::ALIASES, OpenCvFisheye::ALIASES].into_iter().flatten().copied();
@@ -87,11 +87,11 @@ impl DistortionModel {
     }
 }
 
-/// A camera's calibration, with the numbers of a file.
+/// Calibration of a camera, with the numbers of a calibration file.
 ///
-/// There the *centre* of the first pixel is at (0, 0), as OpenCV's pictures have it; in [`Intrinsics`] and [`Lens`] its corner is.
-/// So principal points are half a pixel less here: that of a centred camera of 640 pixels is 319.5. [`of`](Self::of),
-/// [`intrinsics`](Self::intrinsics) and [`apply_to`](Self::apply_to) go from one to the other.
+/// In a file, the *center* of the first pixel is at (0, 0), as in OpenCV. In [`Intrinsics`] and [`Lens`], its corner
+/// is. So principal points are half a pixel less here: that of a centered camera of 640 pixels is 319.5.
+/// [`of`](Self::of), [`intrinsics`](Self::intrinsics) and [`apply_to`](Self::apply_to) convert between the two.
 ///
 /// ```
 /// use kinetoscope_sensors::camera::{CameraCfg, CameraInfo};
@@ -107,11 +107,11 @@ impl DistortionModel {
 /// projection_matrix: { rows: 3, cols: 4, data: [580.1, 0, 323.0, 0, 0, 592.3, 238.0, 0, 0, 0, 1, 0] }
 /// ";
 /// let info = CameraInfo::parse(text, "wrist.yaml")?;
-/// // The simulated twin: raw pictures of that camera, as its driver publishes them.
+/// // The simulated camera with this calibration: raw images, as its driver publishes them.
 /// let mut cfg = CameraCfg::default();
 /// info.apply_to(&mut cfg);
 /// assert_eq!((cfg.width, cfg.lens.name()), (640, "opencv"));
-/// // The same point of the picture, counted from the corner of the first pixel.
+/// // The same point of the image, counted from the corner of the first pixel.
 /// assert_eq!(info.intrinsics().to_pixels(640, 480)?.cx, 324.6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -119,45 +119,48 @@ impl DistortionModel {
 pub struct CameraInfo {
     /// Name of the camera; may be empty.
     pub name: String,
-    /// Pixels per row.
+    /// Image width \[pixels\].
     pub width: usize,
-    /// Rows.
+    /// Image height \[pixels\].
     pub height: usize,
-    /// K: `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of raw pictures \[pixels\], cx and cy from the centre of the first pixel.
+    /// K: `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of raw images \[pixels\], cx and cy from the center of the first
+    /// pixel.
     pub camera_matrix: Matrix3<f64>,
-    /// What D means.
+    /// Model of the coefficients D.
     pub distortion_model: DistortionModel,
     /// D, in the order of the model.
     pub distortion_coefficients: Vec<f64>,
-    /// R: the rotation that rectified pictures are turned by. Raw pictures do not depend on it.
+    /// R: rotation of the rectified images. Raw images do not depend on it.
     pub rectification_matrix: Matrix3<f64>,
-    /// P: of rectified pictures \[pixels\], from the centre of the first one. Raw pictures do not depend on it.
+    /// P: projection of the rectified images \[pixels\], from the center of the first pixel. Raw images do not depend
+    /// on it.
     pub projection_matrix: Matrix3x4<f64>,
 }
 
 impl CameraInfo {
-    /// Where the centre of the first pixel is for [`Intrinsics`] \[pixels\], along both axes of the picture; here it is at 0.
+    /// Center of the first pixel in [`Intrinsics`] \[pixels\], along both axes of the image; in a file it is at 0.
     pub const FIRST_CENTRE: f64 = 0.5;
 
-    /// Reads a file.
+    /// Reads a calibration file.
     ///
     /// # Errors
     ///
-    /// Of the first thing that is wrong, with file and line, or field.
+    /// The first problem, with file and line, or field.
     pub fn read(path: &Path) -> Result<Self, CalibrationError> {
         let text = std::fs::read_to_string(path)
             .map_err(|error| CalibrationError::File { path: path.into(), error: error.to_string() })?;
         Self::parse(&text, &path.display().to_string())
     }
 
-    /// Reads the text of a file; errors call it `file`. Fields other than those of `camera_info` do not count.
+    /// Parses the text of a calibration file; errors name it `file`. Fields other than those of `camera_info` are
+    /// ignored.
     ///
-    /// A file without `distortion_model` is of OpenCV's lens, as ROS has it, and one without numbers is of none: see
-    /// [`DistortionModel`]. `binning_x`, `binning_y` and `roi` have to say that pictures are those of the calibration.
+    /// A file without `distortion_model` uses OpenCV's lens, as in ROS. Without coefficients it has no distortion, see
+    /// [`DistortionModel`]. `binning_x`, `binning_y` and `roi` must describe the full images of the calibration.
     ///
     /// # Errors
     ///
-    /// As [`read`](Self::read).
+    /// Same as [`read`](Self::read).
     pub fn parse(text: &str, file: &str) -> Result<Self, CalibrationError> {
         let root = yaml::parse(text, file)?;
         let reader = Reader { file };
@@ -210,11 +213,12 @@ impl CameraInfo {
         })
     }
 
-    /// The calibration of a simulated camera: R is the identity and P is K, as of a camera alone. Where a lens ends (`max_angle`) is
-    /// not said: K and D are the same, some pixels are dark.
+    /// Returns the calibration of a simulated camera: R is the identity and P is K, as for a single camera. The end of
+    /// the lens (`max_angle`) is not represented: K and D are the same, and some pixels are dark.
     ///
-    /// The lens [`Equidistant`](kinetoscope_render::lens::Equidistant) is `equidistant` with four zeros. `cv::fisheye` takes that for what it is; ROS's `image_geometry` takes
-    /// zeros of any model for no distortion at all, and does not rectify.
+    /// The lens [`Equidistant`](kinetoscope_render::lens::Equidistant) becomes `equidistant` with four zeros.
+    /// `cv::fisheye` reads that correctly. ROS's `image_geometry` takes zeros of any model for no distortion, and does
+    /// not rectify.
     ///
     /// # Errors
     ///
@@ -242,14 +246,14 @@ impl CameraInfo {
         })
     }
 
-    /// Focal lengths and principal point of raw pictures.
+    /// Focal lengths and principal point of raw images.
     pub fn intrinsics(&self) -> Intrinsics {
         let k = &self.camera_matrix;
         let [cx, cy] = [0, 1].map(|axis| k[(axis, 2)] + Self::FIRST_CENTRE);
         Intrinsics::Pixels { fx: k[(0, 0)], fy: k[(1, 1)], cx, cy }
     }
 
-    /// The lens of raw pictures.
+    /// Lens of raw images.
     pub fn lens(&self) -> Lens {
         let d = &self.distortion_coefficients;
         match self.distortion_model {
@@ -261,8 +265,9 @@ impl CameraInfo {
         }
     }
 
-    /// Makes a camera the simulated twin of this one: its size, intrinsics and lens. A lens that bends lines is nothing for
-    /// [`Renderer::Raster`], the default: it becomes [`Renderer::FastRayTraced`], which has the same light. Other renderers stay.
+    /// Sets size, intrinsics and lens of a camera configuration to this calibration. [`Renderer::Raster`], the default,
+    /// cannot render a lens that bends lines: it is replaced by [`Renderer::FastRayTraced`], which has the same
+    /// lighting. Other renderers stay.
     pub fn apply_to(&self, cfg: &mut CameraCfg) {
         (cfg.width, cfg.height) = (self.width, self.height);
         (cfg.intrinsics, cfg.lens) = (self.intrinsics(), self.lens());
@@ -273,7 +278,8 @@ impl CameraInfo {
 }
 
 impl Camera {
-    /// The calibration of the camera in environment `env`, called `name`: what ROS's nodes need to read its pictures.
+    /// Returns the calibration of the camera in environment `env`, named `name`, as ROS nodes need it to read its
+    /// images.
     ///
     /// # Errors
     ///
@@ -284,7 +290,7 @@ impl Camera {
     }
 }
 
-/// ROS's model of a lens, and its coefficients.
+/// Returns the ROS distortion model of a lens and its coefficients.
 fn of_lens(lens: &Lens) -> Result<(DistortionModel, Vec<f64>), CalibrationError> {
     match *lens {
         Lens::Pinhole(_) => Ok((DistortionModel::PlumbBob, vec![0.0; 5])),
@@ -306,7 +312,7 @@ fn of_lens(lens: &Lens) -> Result<(DistortionModel, Vec<f64>), CalibrationError>
     }
 }
 
-/// Reads fields.
+/// Reads fields; errors name the file.
 struct Reader<'a> {
     file: &'a str,
 }
@@ -338,7 +344,7 @@ impl Reader<'_> {
             .ok_or_else(|| self.wrong(node.line, field, format!("has {text:?}; it must be a finite number")))
     }
 
-    /// `rows`, `cols` and `data` of a matrix.
+    /// Reads `rows`, `cols` and `data` of a matrix.
     fn numbers(&self, field: &str, node: &Node) -> Result<([usize; 2], Vec<f64>), CalibrationError> {
         let Value::Table(parts) = &node.value else {
             let problem = format!("is {}, not a table of rows, cols and data", node.value.describe());
@@ -371,7 +377,7 @@ impl Reader<'_> {
         Ok((shape, numbers))
     }
 
-    /// A matrix of a shape, row by row.
+    /// Reads a matrix of the expected shape, row by row.
     fn matrix(&self, field: &str, node: &Node, expected: [usize; 2]) -> Result<Vec<f64>, CalibrationError> {
         let (shape, numbers) = self.numbers(field, node)?;
         if shape != expected {
@@ -426,7 +432,7 @@ impl Reader<'_> {
             .map_err(|_| self.wrong(node.line, field, format!("is {text:?}; it must be a whole number of pixels")))
     }
 
-    /// Refuses pixels of several pixels of the calibration.
+    /// Rejects pixels that combine several pixels of the calibration.
     fn not_binned(&self, fields: [(&str, Option<&Node>); 2]) -> Result<(), CalibrationError> {
         for (field, node) in fields {
             let Some(node) = node else { continue };
@@ -442,7 +448,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Refuses a part of the picture of the calibration.
+    /// Rejects a region that is only a part of the calibrated image.
     fn not_a_part(&self, roi: &Node, [width, height]: [usize; 2]) -> Result<(), CalibrationError> {
         let Value::Table(parts) = &roi.value else {
             let problem =
@@ -454,7 +460,7 @@ impl Reader<'_> {
             None => Ok(0),
         };
         let [x, y, w, h] = [part("x_offset")?, part("y_offset")?, part("width")?, part("height")?];
-        // 0 is as far as it goes.
+        // A size of 0 reaches to the edge of the image.
         let [w, h] =
             [(w, width, x), (h, height, y)].map(|(size, all, at)| if size > 0 { size } else { all.saturating_sub(at) });
         if [x, y, w, h] != [0, 0, width, height] {

@@ -1,11 +1,12 @@
-//! Calibration files as ROS writes them.
+//! Writer of ROS calibration files.
 
 use super::{CalibrationError, CameraInfo};
 use std::fmt::Write as _;
 use std::path::Path;
 
 impl CameraInfo {
-    /// The text of a file. Numbers have as many digits as they need: reading it again gives the same bits.
+    /// Returns the text of a calibration file. Numbers have as many digits as they need to read back with the same
+    /// bits.
     pub fn to_yaml(&self) -> String {
         let mut out = String::new();
         let Self { width, height, distortion_model, .. } = self;
@@ -23,7 +24,7 @@ impl CameraInfo {
         out
     }
 
-    /// Writes a file.
+    /// Writes a calibration file.
     ///
     /// # Errors
     ///
@@ -34,13 +35,13 @@ impl CameraInfo {
     }
 }
 
-/// A matrix, row by row.
+/// Writes a matrix, row by row.
 fn matrix(out: &mut String, name: &str, [rows, cols]: [usize; 2], data: &[f64]) {
     let data: Vec<String> = data.iter().map(|&x| number(x)).collect();
     let _ = writeln!(out, "{name}:\n  rows: {rows}\n  cols: {cols}\n  data: [{}]", data.join(", "));
 }
 
-/// A number as YAML 1.1 has them too: with a point, and a sign in the exponent.
+/// Formats a number for YAML 1.1 readers too: with a decimal point, and a sign in the exponent.
 fn number(x: f64) -> String {
     let text = format!("{x:?}");
     let Some((digits, exponent)) = text.split_once('e') else { return text };
@@ -49,7 +50,7 @@ fn number(x: f64) -> String {
     format!("{digits}{point}e{sign}{exponent}")
 }
 
-/// A word, quoted where it could be something else.
+/// Formats a string, quoted unless it is a plain word.
 fn word(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
     if text.chars().all(plain) && text.starts_with(|c: char| c.is_ascii_alphabetic()) {

@@ -1,17 +1,17 @@
-//! YAML of calibration files.
+//! YAML parser of calibration files.
 
 use super::CalibrationError;
 use kinetoscope_scene::yaml::{self, Dialect, Node};
 
 const DIALECT: Dialect = Dialect { files: "calibration files", aliases: false, tags: true };
 
-/// Whether a word means that there is none.
+/// Returns true if a scalar means null.
 pub(super) fn is_nothing(text: &str) -> bool {
     ["", "~", "null"].contains(&text)
 }
 
-/// A text without byte order mark, and with spaces where tabs stand between a key and its value: YAML allows both, the parser
-/// neither. Lines and columns stay.
+/// Removes the byte order mark, and replaces tabs between a key and its value by spaces. YAML allows both, but the
+/// parser rejects them. Lines and columns stay the same.
 fn readable(text: &str) -> String {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let spaced = |line: &str| {
@@ -24,7 +24,7 @@ fn readable(text: &str) -> String {
     text.split_inclusive('\n').map(|line| spaced(line).unwrap_or_else(|| line.into())).collect()
 }
 
-/// The only document of a text.
+/// Parses a text with a single document.
 pub(super) fn parse(text: &str, file: &str) -> Result<Node, CalibrationError> {
     let wrong = |line, column, message: String| CalibrationError::Yaml { file: file.into(), line, column, message };
     let root = yaml::parse(&readable(text), &DIALECT).map_err(|e| wrong(e.line, e.column, e.message))?;

@@ -1,16 +1,17 @@
-//! Noise that grows with the square of the depth.
+//! Depth noise that grows with the square of the depth.
 
 use super::{OfDepth, Picture, within};
 use kinetoscope_render::Stream;
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
-/// Noise of depth from triangulation: disparities have errors of the same size everywhere, so that those of depth z grow with
-/// its square. The standard deviation is `constant + quadratic (z - offset)²`. What comes out nearer than the near plane or
-/// beyond the far plane saturates there. Behind a lens whose rays do not all go forward z is the distance along the ray: errors
-/// of angles grow with its square too.
+/// Depth noise of triangulation. Disparity errors have the same size everywhere, so errors of a depth z grow with its
+/// square. The standard deviation is `constant + quadratic (z - offset)²`. Results outside the near and far plane are
+/// clamped to them. If rays of the lens do not all go forward, z is the distance along the ray: errors of angles also
+/// grow with its square.
 ///
-/// By default [`DepthNoise::KHOSHELHAM`]. Errors of neighbouring pixels are independent; on a real sensor they are not quite.
+/// The default is [`DepthNoise::KHOSHELHAM`]. Errors of neighboring pixels are independent; on a real sensor they are
+/// slightly correlated.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DepthNoise {
@@ -18,18 +19,18 @@ pub struct DepthNoise {
     pub constant: f64,
     /// Growth with the square of the depth \[1/m\], 0 to 1000.
     pub quadratic: f64,
-    /// The depth at which the parabola has its bottom \[m\], -1000 to 1000.
+    /// Depth of the minimum of the parabola \[m\], -1000 to 1000.
     pub offset: f64,
 }
 
 impl DepthNoise {
-    /// Kinect: 1.425e-3 z², which is 36 mm at 5 m. Source: Khoshelham and Oude Elberink 2012, "Accuracy and resolution of
-    /// Kinect depth data for indoor mapping applications", Sensors 12: sigma = m/(f b) z² sigma_d with m/(f b) = 2.85e-5 per
-    /// centimetre and sigma_d = 1/2.
+    /// Kinect: 1.425e-3 z², which is 36 mm at 5 m. Source: Khoshelham and Oude Elberink 2012, "Accuracy and resolution
+    /// of Kinect depth data for indoor mapping applications", Sensors 12: sigma = m/(f b) z² sigma_d with m/(f b) =
+    /// 2.85e-5 per centimeter and sigma_d = 1/2.
     pub const KHOSHELHAM: Self = Self { constant: 0.0, quadratic: 1.425e-3, offset: 0.0 };
-    /// Kinect, facing a wall: 1.2 mm + 1.9e-3 (z - 0.4 m)². Source: Nguyen, Izadi and Lovell 2012, "Modeling Kinect sensor noise
-    /// for improved 3D reconstruction and tracking", 3DIMPVT. Their growth at grazing angles is not in here: see
-    /// [`Holes::max_angle`](super::Holes::max_angle).
+    /// Kinect, facing a wall: 1.2 mm + 1.9e-3 (z - 0.4 m)². Source: Nguyen, Izadi and Lovell 2012, "Modeling Kinect
+    /// sensor noise for improved 3D reconstruction and tracking", 3DIMPVT. Their growth at grazing angles is not
+    /// included: see [`Holes::max_angle`](super::Holes::max_angle).
     pub const NGUYEN: Self = Self { constant: 1.2e-3, quadratic: 1.9e-3, offset: 0.4 };
 }
 

@@ -1,17 +1,18 @@
-//! Longer or shorter exposure.
+//! Exposure compensation.
 
 use super::{OfLight, Place, within};
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
-/// Longer or shorter exposure than that in which a white surface in full light is 1.
+/// Longer or shorter exposure, relative to the exposure at which a fully lit white surface has radiance 1.
 ///
-/// The renderers multiply light by it before the tone curve ([`Rasterizer::stops`](kinetoscope_render::Rasterizer::stops)): what is
-/// white on the screen at 0 stops is told apart at less. All other imperfections come after it.
+/// The renderers multiply radiance by this factor before the tone curve
+/// ([`Rasterizer::stops`](kinetoscope_render::Rasterizer::stops)), so highlights that clip at 0 stops keep their detail
+/// at fewer stops. All other imperfections are applied after it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Exposure {
-    /// Stops, -20 to 20: light is multiplied by 2 to this power.
+    /// Stops, -20 to 20: radiance is multiplied by 2 to this power.
     pub stops: f64,
 }
 
@@ -20,6 +21,6 @@ impl OfLight for Exposure {
         within("stops of the exposure", self.stops, [-20.0, 20.0], "it must be -20 to 20")
     }
 
-    /// The light that comes here was multiplied already.
+    /// Does nothing: the renderer has applied the exposure.
     fn spoil(&self, _light: &mut [f64; 3], _place: &Place<'_>) {}
 }

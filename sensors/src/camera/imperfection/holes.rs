@@ -1,4 +1,4 @@
-//! Where a projector and a camera beside it measure nothing.
+//! Depth holes of structured-light cameras.
 
 use super::{OfDepth, Picture, within};
 use crate::error::SensorError;
@@ -6,24 +6,25 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
-/// Where structured light measures nothing, although the camera sees something: holes say what a miss says.
+/// Pixels where a structured-light camera measures nothing although it sees a surface. Holes have the value of a miss.
 ///
-/// - **Grazing surfaces** send back too little of the pattern: where the angle between the ray and the normal is larger than
-///   `max_angle`. The normal is that of the depths around: of the neighbour beside and of that above or below whose inverse
-///   depths differ less.
-/// - **Shadows of the projector**: a pinhole beside the camera, on its x axis, in line with its rows. A pixel whose ray from
-///   the projector meets something else before has no pattern on it: a band beside the edge of what is in front, of
-///   `fx baseline (1/z_front - 1/z_behind)` pixels. Shadows of what the camera does not see are missing. Behind a lens that
-///   bends rows there are none: `baseline` must be 0 there.
+/// - **Grazing surfaces** reflect too little of the pattern: the angle between the ray and the normal exceeds
+///   `max_angle`. The normal is estimated from the depth and two neighbors. Of the left and right neighbor, and of the
+///   upper and lower one, the one with the more similar inverse depth is used.
+/// - **Shadows of the projector**, a pinhole beside the camera on its x axis, in line with its rows. A pixel has no
+///   pattern if its ray from the projector meets another surface first. This gives a band beside the edge of the front
+///   surface, of `fx baseline (1/z_front - 1/z_behind)` pixels. Surfaces that the camera does not see cast no shadow. A
+///   lens that bends rows has no projector shadows: `baseline` must be 0.
 ///
-/// Source: Khoshelham and Oude Elberink 2012, section 2 (geometry: a projector 75 mm beside the camera) and 3.1 (gaps from
-/// occlusions and surfaces' properties); Nguyen, Izadi and Lovell 2012 (little is measured beyond some 80 degrees).
+/// Source: Khoshelham and Oude Elberink 2012, section 2 (geometry: a projector 75 mm beside the camera) and 3.1 (gaps
+/// from occlusions and surface properties); Nguyen, Izadi and Lovell 2012 (little is measured beyond some 80 degrees).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Holes {
-    /// Largest angle between the ray and the normal of what is measured \[rad\], 0 to pi/2.
+    /// Largest measured angle between the ray and the surface normal \[rad\], 0 to pi/2.
     pub max_angle: f64,
-    /// Where the projector is on the camera's x axis \[m\], -1000 to 1000: to the right where positive; 0 for no shadows.
+    /// Position of the projector on the camera's x axis \[m\], -1000 to 1000: positive is to the right; 0 disables
+    /// shadows.
     pub baseline: f64,
 }
 
@@ -41,7 +42,7 @@ impl OfDepth for Holes {
     }
 
     fn spoil(&self, depths: &mut [f32], picture: &Picture<'_>) {
-        // Holes are marked by their sign first: what is around them still tells of the truth.
+        // Holes are first marked by a negative sign, so that the depths around them stay available.
         if self.max_angle < FRAC_PI_2 {
             let least = self.max_angle.cos();
             for pixel in 0..depths.len() {
@@ -58,19 +59,19 @@ impl OfDepth for Holes {
     }
 }
 
-/// Inverse of the depth that was there, \[1/m\]; `None` for a miss.
+/// Returns the inverse of the measured or marked depth \[1/m\]; `None` for a miss.
 fn inverse(depth: f32) -> Option<f64> {
     depth.is_finite().then(|| 1.0 / f64::from(depth.abs()))
 }
 
-/// Cosine of the angle between a pixel's ray and the normal of the surface there; `None` for a miss.
+/// Returns the cosine of the angle between a pixel's ray and the surface normal; `None` for a miss.
 ///
-/// On a plane the inverse depth is a linear function of the ray, whose coefficients n are its normal: three rays give them, by
-/// Cramer's rule.
+/// On a plane, the inverse depth is a linear function of the ray, and its coefficients n are the normal. Three rays
+/// determine them, by Cramer's rule.
 fn facing(depths: &[f32], pixel: usize, picture: &Picture<'_>) -> Option<f64> {
     let width = picture.view.width;
     let here = inverse(depths[pixel])?;
-    // The neighbour whose inverse depth differs less: the other may be across an edge.
+    // Uses the neighbor with the more similar inverse depth: the other neighbor may be across an edge.
     let nearer = |before: Option<usize>, after: Option<usize>| {
         let at = |pixel: Option<usize>| Some((pixel?, inverse(*depths.get(pixel?)?)?));
         match (at(before), at(after)) {
@@ -83,19 +84,19 @@ fn facing(depths: &[f32], pixel: usize, picture: &Picture<'_>) -> Option<f64> {
     let below = nearer(pixel.checked_sub(width), Some(pixel + width))?;
     let ray = Vector3::from(picture.ray(pixel));
     let [a, b] = [beside, below].map(|(other, inverse)| (Vector3::from(picture.ray(other)) - ray, inverse - here));
-    // Differences instead of rays and inverses: the same plane, and nothing cancels.
+    // Differences instead of rays and inverse depths describe the same plane and avoid cancellation.
     let volume = ray.dot(&a.0.cross(&b.0));
     let normal = here * a.0.cross(&b.0) + a.1 * b.0.cross(&ray) + b.1 * ray.cross(&a.0);
     let cosine = here * volume.abs() / (normal.norm() * ray.norm());
     cosine.is_finite().then_some(cosine)
 }
 
-/// Marks the pixels of a row that the projector does not reach. Something at depth z is seen by it `reach / z` pixels to the
-/// left of where the camera sees it, so the order along the row tells what is in front of what: coming from the projector's
-/// side, what lies behind the farthest reached so far is in a shadow.
+/// Marks the pixels of a row that the projector does not reach. The projector sees a point at depth z `reach / z`
+/// pixels to the left of its position in the camera image. So the order along the row, starting at the side of the
+/// projector, gives the occlusion: a point that does not extend the farthest position so far is in a shadow.
 fn shade(row: &mut [f32], reach: f64) {
     let count = row.len();
-    // Seen from its left side, a projector to the left is one to the right.
+    // A projector to the left is the mirror image of a projector to the right.
     let mut first = f64::INFINITY;
     for k in 0..count {
         let pixel = if reach > 0.0 { count - 1 - k } else { k };

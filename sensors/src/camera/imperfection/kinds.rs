@@ -1,47 +1,48 @@
-//! The traits of imperfections, and the image and pixel that they are told of.
+//! Traits of imperfections, and the image and pixel that they work on.
 
 use crate::error::SensorError;
 use kinetoscope_render::Ticket;
 use kinetoscope_render::View;
 use kinetoscope_render::lens::LensRays;
 
-/// An imperfection of light.
+/// An imperfection of light, applied to each pixel.
 pub(super) trait OfLight {
-    /// Checks its numbers.
+    /// Checks the parameters.
     fn check(&self) -> Result<(), SensorError>;
 
-    /// Spoils the linear light (red, green, blue) of a pixel.
+    /// Modifies the linear RGB radiance of a pixel.
     fn spoil(&self, light: &mut [f64; 3], place: &Place<'_>);
 }
 
-/// An imperfection of measured depth.
+/// An imperfection of measured depth, applied to an image.
 pub(super) trait OfDepth {
-    /// Checks its numbers.
+    /// Checks the parameters.
     fn check(&self) -> Result<(), SensorError>;
 
-    /// Spoils a picture of reaches \[m\], row by row; where nothing is measured they are infinite.
+    /// Modifies an image of reaches \[m\], row by row; misses are infinite. The reach is the depth, or the distance
+    /// along the ray if rays of the lens do not all go forward.
     fn spoil(&self, depths: &mut [f32], picture: &Picture<'_>);
 }
 
-/// An image and its lens.
+/// View, lens and random key of an image.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::camera) struct Picture<'a> {
     pub(in crate::camera) view: &'a View,
-    /// The rays of its lens; `None` is a pinhole.
+    /// Rays of the lens; `None` is a pinhole.
     pub(in crate::camera) rays: Option<&'a LensRays>,
     pub(in crate::camera) ticket: &'a Ticket,
 }
 
-/// A pixel of a picture.
+/// A pixel of an image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place<'a> {
     pub(super) picture: Picture<'a>,
-    /// Counted row by row from the top left.
+    /// Pixel index, row by row from the top left.
     pub(super) pixel: usize,
 }
 
 impl Picture<'_> {
-    /// The direction through the centre of a pixel whose reach is 1; 0 where the lens sees nothing.
+    /// Returns the ray through the center of a pixel, scaled to reach 1; 0 if the lens has no ray there.
     pub(super) fn ray(&self, pixel: usize) -> [f64; 3] {
         let View { width, fx, fy, cx, cy, .. } = *self.view;
         let [column, row] = [pixel % width, pixel / width];
@@ -52,18 +53,18 @@ impl Picture<'_> {
         [(u - f64::from(cx)) / f64::from(fx), (v - f64::from(cy)) / f64::from(fy), 1.0]
     }
 
-    /// True if rays go aside, so that reach is distance, not depth.
+    /// Returns true if rays do not all go forward: the reach is then the distance, not the depth.
     pub(super) fn reaches_aside(&self) -> bool {
         self.rays.is_some_and(|rays| !rays.is_forward())
     }
 
-    /// Distance of what has depth 1, where rays go forward; depth of what has distance 1, where they go aside.
+    /// Returns the distance of a point at depth 1 if all rays go forward, else the depth of a point at distance 1.
     pub(super) fn other_than_reach(&self, pixel: usize) -> f64 {
         let [x, y, z] = self.ray(pixel);
         if self.reaches_aside() { z } else { (x * x + y * y + z * z).sqrt() }
     }
 
-    /// How much of the light of the optical axis falls on a pixel: see `Vignetting`.
+    /// Returns the irradiance of a pixel relative to the optical axis: see `Vignetting`.
     pub(super) fn falloff(&self, pixel: usize) -> f64 {
         match self.rays {
             None => self.other_than_reach(pixel).powi(-4),
@@ -72,7 +73,7 @@ impl Picture<'_> {
     }
 }
 
-/// Checks that `field` of an imperfection is from `range[0]` to `range[1]`; `expected` says so in the error.
+/// Checks that `field` of an imperfection is from `range[0]` to `range[1]`; `expected` states the range in the error.
 pub(super) fn within(
     field: &'static str,
     value: f64,

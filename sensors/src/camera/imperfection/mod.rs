@@ -1,13 +1,16 @@
-//! What a real camera does to a perfect picture: one imperfection per file, all of them in one list.
+//! Imperfections of real cameras, applied to rendered images; one file per imperfection.
 //!
-//! Those of light work on linear light, where 1 is a white surface in full light: colours are taken back through the tone curve
-//! and sRGB, spoilt, and brought to the screen again. So they see what the bytes still tell, 256 levels, and of what is white
-//! on the screen the least light that is. Only the exposure is the renderers' own, before the tone curve. Those of depth work
-//! on what near and far count, the *reach*: depth along the optical axis, or behind lenses whose rays do not all go forward
-//! distance along the ray. The other of the two follows from it. All other channels stay the truth.
+//! Imperfections of light work on linear radiance, where 1 is a fully lit white surface. The color bytes are converted
+//! back through sRGB and the tone curve, modified, and encoded again. The radiance therefore has 256 levels, and a
+//! white pixel counts as the smallest radiance that is white. Only the exposure is applied by the renderers, before the
+//! tone curve.
 //!
-//! Motion blur is none of them: light that falls in while the shutter is open is of several instants, which a finished picture
-//! does not know any more. It is [`CameraCfg::shutter`](super::CameraCfg::shutter)'s.
+//! Imperfections of depth work on the *reach*, the quantity that near and far limit: depth along the optical axis, or
+//! distance along the ray if rays of the lens do not all go forward. The other of the two is recomputed from it. All
+//! other channels keep the ground truth.
+//!
+//! Motion blur is not an imperfection, because it needs several instants that a finished image does not contain. See
+//! [`CameraCfg::shutter`](super::CameraCfg::shutter).
 
 mod kinds;
 mod tone;
@@ -22,7 +25,7 @@ use kinetoscope_render::frame::{Color, Depth};
 use serde::{Deserialize, Serialize};
 use tone::Tone;
 
-/// Declares the imperfections: a module with a type of its own each, in the order in which they come about.
+/// Declares the imperfections, in the order of their application: one module and one type each.
 macro_rules! imperfections {
     (
         light { $($(#[$of_light:meta])* $light:ident :: $Light:ident,)* }
@@ -31,10 +34,10 @@ macro_rules! imperfections {
         $(mod $light; pub use $light::$Light;)*
         $(mod $depth; pub use $depth::$Depth;)*
 
-        /// What is not perfect about a camera; `None`, as by default, for what is.
+        /// Imperfections of a camera; `None`, the default, for those that are absent.
         ///
-        /// Random numbers depend on the seed of the simulation, the environment, the name of the camera, which picture it is
-        /// and which pixel, and on nothing else.
+        /// The random numbers depend only on the seed of the simulation, the environment, the camera name, the image
+        /// index and the pixel.
         #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
         #[serde(default, deny_unknown_fields)]
         pub struct Imperfections {
@@ -43,17 +46,17 @@ macro_rules! imperfections {
         }
 
         impl Imperfections {
-            /// Whether there is one of light.
+            /// Returns true if there is an imperfection of light.
             fn of_light(&self) -> bool {
                 false $(|| self.$light.is_some())*
             }
 
-            /// Whether there is one of depth.
+            /// Returns true if there is an imperfection of depth.
             fn of_depth(&self) -> bool {
                 false $(|| self.$depth.is_some())*
             }
 
-            /// What of it there is of a camera with these channels.
+            /// Returns the imperfections that apply to a camera with these channels.
             pub(crate) fn of_channels(&self, channels: Channels) -> Self {
                 Self {
                     $($light: self.$light.filter(|_| channels.color),)*
@@ -61,7 +64,7 @@ macro_rules! imperfections {
                 }
             }
 
-            /// Checks all numbers.
+            /// Checks all parameters.
             fn check_numbers(&self) -> Result<(), SensorError> {
                 $(self.$light.as_ref().map_or(Ok(()), OfLight::check)?;)*
                 $(self.$depth.as_ref().map_or(Ok(()), OfDepth::check)?;)*
@@ -85,30 +88,30 @@ macro_rules! imperfections {
 
 imperfections! {
     light {
-        /// Less light away from the optical axis.
+        /// Light falloff away from the optical axis.
         vignetting::Vignetting,
-        /// Longer or shorter exposure.
+        /// Exposure compensation.
         exposure::Exposure,
-        /// Noise of the light itself, which comes in quanta.
+        /// Photon noise.
         shot_noise::ShotNoise,
         /// Noise of the electronics.
         read_noise::ReadNoise,
     }
     depth {
-        /// Where a projector and a camera beside it measure nothing.
+        /// Depth holes of structured-light cameras.
         holes::Holes,
-        /// Noise that grows with the square of the depth.
+        /// Depth noise that grows with the square of the depth.
         depth_noise::DepthNoise,
     }
 }
 
 impl Imperfections {
-    /// Whether there is none.
+    /// Returns true if the camera is perfect.
     pub(crate) fn is_empty(&self) -> bool {
         !self.of_light() && !self.of_depth()
     }
 
-    /// Checks numbers, and that a camera with these channels measures what is spoilt.
+    /// Checks all parameters, and that a camera with these channels measures the affected channels.
     pub(crate) fn check(&self, channels: Channels) -> Result<(), SensorError> {
         let off = |channel| Err(CameraError::ChannelOff { channel, enabled: channels.names() }.into());
         if self.of_light() && !channels.color {
@@ -120,7 +123,7 @@ impl Imperfections {
         self.check_numbers()
     }
 
-    /// Spoils a frame in which misses are infinite.
+    /// Applies all imperfections to a frame in which misses are infinite.
     pub(super) fn spoil(&self, frame: &mut FrameMut<'_>, curve: ToneCurve, picture: Picture<'_>) {
         let tone = Tone::of(curve);
         if let Some(color) = frame.color.as_deref_mut().filter(|_| self.of_light()) {
@@ -148,7 +151,7 @@ impl Imperfections {
             }
             (None, Some(other)) => {
                 for (pixel, number) in other.iter_mut().enumerate() {
-                    // At a right angle depth is 0 and tells of no reach; nor does any reach change it.
+                    // At a right angle depth is 0 for any reach, so the reach is unknown and has no effect.
                     let factor = picture.other_than_reach(pixel).recip();
                     *number = match factor.is_finite() || number.is_infinite() {
                         true => times(*number, factor),

@@ -1,17 +1,17 @@
-//! Noise of the electronics.
+//! Read noise of the electronics.
 
 use super::{OfLight, Place, within};
 use kinetoscope_render::Stream;
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
-/// Noise of the electronics: normal, the same at every brightness. Red, green and blue have their own. What falls below no
-/// light is black.
+/// Normally distributed noise of the electronics, the same at every brightness and independent for red, green and blue.
+/// Negative radiance becomes black.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReadNoise {
-    /// Standard deviation, in linear light (1 is a white surface in full light, as exposed), 0 to 100: electrons of read noise
-    /// divided by [`ShotNoise::electrons`](super::ShotNoise::electrons).
+    /// Standard deviation in linear radiance (1 is a fully lit white surface, as exposed), 0 to 100: electrons of read
+    /// noise divided by [`ShotNoise::electrons`](super::ShotNoise::electrons).
     pub std: f64,
 }
 

@@ -1,20 +1,20 @@
-//! Noise of the light itself.
+//! Photon noise.
 
 use super::{OfLight, Place, within};
 use kinetoscope_render::Stream;
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
-/// Noise of the light itself, which comes in quanta: how many electrons a pixel counts is Poisson distributed, so that the
-/// variance of light x is `x / electrons`. Red, green and blue count by themselves. Source: EMVA standard 1288, release 3.1,
-/// section 2.2; plotting variance against signal (a photon transfer curve, Janesick 2007) gives the slope `1 / electrons`.
+/// Photon noise: the number of electrons in a pixel is Poisson distributed, so the variance of radiance x is
+/// `x / electrons`. Red, green and blue are independent. Source: EMVA standard 1288, release 3.1, section 2.2; plotting
+/// variance against signal (a photon transfer curve, Janesick 2007) gives the slope `1 / electrons`.
 ///
-/// The numbers are those of Poisson's distribution below 50 electrons, and above of the normal distribution with the same mean
-/// and variance.
+/// Up to a mean of 50 electrons the distribution is Poisson's, above it a normal distribution with the same mean and
+/// variance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ShotNoise {
-    /// Electrons that light of 1 (a white surface in full light, as exposed) frees in a pixel, 1 to 1e9.
+    /// Electrons in a pixel at a radiance of 1 (a fully lit white surface, as exposed), 1 to 1e9.
     pub electrons: f64,
 }
 
@@ -25,7 +25,7 @@ impl Default for ShotNoise {
     }
 }
 
-/// From so many electrons on, the normal distribution does: nothing of it is below 0 then, with normal numbers of 32 bits.
+/// Mean from which the normal distribution is used: none of its values is below 0 then, with 32-bit normal numbers.
 const MANY: f64 = 50.0;
 
 impl OfLight for ShotNoise {
@@ -36,7 +36,7 @@ impl OfLight for ShotNoise {
     fn spoil(&self, light: &mut [f64; 3], place: &Place<'_>) {
         let (ticket, block) = (place.picture.ticket, place.pixel as u32);
         let mean = light.map(|light| light * self.electrons);
-        // Numbers that most pixels do not need are not looked up.
+        // Random numbers are only computed if a channel needs them.
         let normals = mean.iter().any(|mean| *mean >= MANY).then(|| ticket.normals(Stream::SHOT, block));
         let uniforms = mean.iter().any(|mean| *mean < MANY).then(|| ticket.uniforms(Stream::SHOT_IN_THE_DARK, block));
         for (k, light) in light.iter_mut().enumerate() {
@@ -50,11 +50,11 @@ impl OfLight for ShotNoise {
     }
 }
 
-/// The number at the quantile `uniform` of Poisson's distribution, whose mean is small.
+/// Returns the quantile `uniform` of a Poisson distribution with a small mean.
 fn poisson(mean: f64, uniform: f64) -> f64 {
     let (mut count, mut probability) = (0.0, (-mean).exp());
     let mut below = probability;
-    // What is left of the distribution at twenty times its mean is less than numbers of 32 bits tell.
+    // The rest of the distribution at twenty times its mean is smaller than 32-bit numbers resolve.
     while uniform > below && count < 20.0 * MANY {
         count += 1.0;
         probability *= mean / count;

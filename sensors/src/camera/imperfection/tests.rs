@@ -1,4 +1,4 @@
-//! Every imperfection against its law.
+//! Tests of every imperfection against its closed form.
 
 use super::*;
 use kinetoscope_render::PixelIntrinsics;
@@ -27,21 +27,21 @@ fn tone() -> &'static Tone {
     Tone::of(ToneCurve::Soft)
 }
 
-/// The ticket of frame `number`.
+/// Random key of frame `number`.
 fn ticket(number: u64) -> Ticket {
     let mut ticket = Ticket::first(11, 3, "eye");
     (0..number).for_each(|_| ticket.due());
     ticket
 }
 
-/// These imperfections and no others.
+/// Imperfections with only the fields that `set` changes.
 fn only(set: impl FnOnce(&mut Imperfections)) -> Imperfections {
     let mut imperfections = Imperfections::default();
     set(&mut imperfections);
     imperfections
 }
 
-/// A grey image with imperfections.
+/// A gray image with imperfections.
 fn spoilt(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<[u8; 4]> {
     let mut frame = Frame::new(SIDE, SIDE, Channels { color: true, ..Channels::default() });
     frame.color = Some([byte, byte, byte, 255].repeat(SIDE * SIDE));
@@ -49,7 +49,7 @@ fn spoilt(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<[u8; 4]>
     frame.color.unwrap().as_chunks().0.to_vec()
 }
 
-/// The light of all pixels and colours of a grey image with imperfections.
+/// Radiance of all pixels and colors of a gray image with imperfections.
 fn lights(imperfections: &Imperfections, byte: u8, picture: u64) -> Vec<f64> {
     spoilt(imperfections, byte, picture).iter().flat_map(|p| [p[0], p[1], p[2]]).map(|b| tone().light(b)).collect()
 }
@@ -61,8 +61,8 @@ fn moments(numbers: &[f64]) -> [f64; 2] {
     [mean, numbers.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n]
 }
 
-/// Mean, variance and number of the light of all pixels and colours. The bytes of an image are steps, which add a twelfth of
-/// their square to the variance (Sheppard): that is taken off.
+/// Mean, variance and count of the radiance of all pixels and colors. The quantization of the bytes adds a twelfth of
+/// the squared step to the variance (Sheppard's correction); this is subtracted.
 fn photon_transfer(imperfections: &Imperfections, byte: u8) -> [f64; 3] {
     let lights = lights(imperfections, byte, u64::from(byte));
     let [mean, variance] = moments(&lights);
@@ -70,10 +70,11 @@ fn photon_transfer(imperfections: &Imperfections, byte: u8) -> [f64; 3] {
     [mean, variance - step * step / 12.0, lights.len() as f64]
 }
 
-/// The line through points (mean, variance), each weighted by its own scatter: intercept, slope, and the scatter of both.
+/// Weighted least-squares line through points (mean, variance): intercept and slope, and their standard deviations.
 ///
-/// The variance of n numbers scatters by sqrt((2 + 1/N) / n) of itself, where N electrons, at least a hundred here, make the
-/// distribution less normal; least squares with these weights give the scatter of the line.
+/// The standard deviation of the variance of n numbers is sqrt((2 + 1/N) / n) of the variance. N is the number of
+/// electrons, at least a hundred here, which make the distribution less normal. Least squares with these weights give
+/// the standard deviations of the line.
 fn line(points: &[[f64; 3]]) -> ([f64; 2], [f64; 2]) {
     let mut s = [0.0; 5];
     for [x, y, n] in points {
@@ -85,12 +86,12 @@ fn line(points: &[[f64; 3]]) -> ([f64; 2], [f64; 2]) {
     ([(xx * y - x * xy) / d, (w * xy - x * y) / d], [(xx / d).sqrt(), (w / d).sqrt()])
 }
 
-/// Shot noise grows with the signal, and read noise does not.
+/// Shot noise grows with the signal; read noise does not.
 #[test]
 fn photon_transfer_curve() {
     let (electrons, std) = (1000.0, 0.01);
     let (shot, read) = (Some(ShotNoise { electrons }), Some(ReadNoise { std }));
-    // Far enough from black that nothing is cut off there: at byte 100, light of 0.127 is more than eight deviations.
+    // Far enough from black that nothing is cut off: at byte 100, a radiance of 0.127 is more than eight deviations.
     let levels = [100, 130, 160, 190];
     for (shot_noise, read_noise, slope, intercept) in
         [(shot, read, 1.0 / electrons, std * std), (shot, None, 1.0 / electrons, 0.0), (None, read, 0.0, std * std)]
@@ -99,19 +100,20 @@ fn photon_transfer_curve() {
         let points = levels.map(|byte| photon_transfer(&imperfections, byte));
         for (byte, [mean, variance, n]) in levels.into_iter().zip(points) {
             let (light, bound) = (tone().light(byte), 6.0 * (variance / n).sqrt());
-            // A byte's middle and the mean of its light differ by an eighth of the change of the step: below 1e-5 here.
+            // The middle of a byte and the mean of its radiance differ by an eighth of the change of the step: below
+            // 1e-5 here.
             assert!((mean - light).abs() < bound + 1e-5, "{byte}: {mean} is not {light}");
         }
         let (found, scatter) = line(&points);
         for (k, expected) in [intercept, slope].into_iter().enumerate() {
             assert!((found[k] - expected).abs() < 6.0 * scatter[k], "{found:?}, not {expected} ± {scatter:?}");
         }
-        // The control: either noise would be missed.
+        // Control: a missing shot or read noise would be detected.
         assert!(6.0 * scatter[1] < 0.2 / electrons && 6.0 * scatter[0] < 0.5 * std * std);
     }
 }
 
-/// Noise is independent in each frame and colour.
+/// Noise is independent between frames and between colors.
 #[test]
 fn correlations() {
     let shot = only(|all| all.shot_noise = Some(ShotNoise { electrons: 200.0 }));
@@ -134,7 +136,7 @@ fn correlations() {
     }
 }
 
-/// Poisson's distribution, every quantile of it: mean and variance are equal.
+/// Every quantile of the Poisson distribution: mean and variance are equal.
 #[test]
 fn few_electrons() {
     for electrons in [0.5, 3.0, 20.0] {
@@ -149,13 +151,13 @@ fn few_electrons() {
         }
         assert!(counts.iter().all(|count| (count - count.round()).abs() < 1e-9), "whole electrons");
         let (n, [mean, variance]) = (counts.len() as f64, moments(&counts));
-        // Means scatter by sqrt(N / n); variances by sqrt((2 + 1 / N) / n) of themselves.
+        // Standard deviation of means: sqrt(N / n); of variances: sqrt((2 + 1 / N) / n) of the variance.
         assert!((mean - electrons).abs() < 6.0 * (electrons / n).sqrt(), "{mean}");
         assert!((variance / electrons - 1.0).abs() < 6.0 * ((2.0 + 1.0 / electrons) / n).sqrt(), "{variance}");
     }
 }
 
-/// Light falls with the fourth power of the cosine.
+/// Radiance falls with the fourth power of the cosine.
 #[test]
 fn vignetting() {
     let of = |strength| spoilt(&only(|all| all.vignetting = Some(Vignetting { strength })), 200, 1);
@@ -169,10 +171,10 @@ fn vignetting() {
             assert!(close && found[3] == 255, "{pixel}: {found:?}, {expected}");
             off += usize::from(found[0] != expected);
         }
-        // Only where the two ways to compute it round to different sides.
+        // Differences are only allowed where the two computations round to different sides.
         assert!(off < SIDE, "{off}");
     }
-    // The control: at a corner, 43 degrees off the axis, 0.28 of the light is left.
+    // Control: at a corner, 43 degrees off the axis, 0.28 of the radiance is left.
     let left = tone().light(of(Vignetting::default().strength)[0][0]) / tone().light(200);
     assert!((left - 0.28).abs() < 0.01, "{left}");
 }
@@ -190,7 +192,7 @@ fn zero_imperfections() {
     }
 }
 
-/// Depths and distances of reaches: of a lens whose rays go aside these are distances, of others depths.
+/// Depths and distances of reaches: the reaches are distances if rays of the lens do not all go forward, else depths.
 fn both(reaches: &[f32], picture: Picture<'_>) -> [Vec<f32>; 2] {
     let of_pixel = |(pixel, reach): (usize, &f32)| {
         let [x, y, z] = picture.ray(pixel);
@@ -207,7 +209,7 @@ fn both(reaches: &[f32], picture: Picture<'_>) -> [Vec<f32>; 2] {
     [0, 1].map(|k| pixels.iter().map(|pixel| pixel[k]).collect())
 }
 
-/// Reaches with imperfections, from both channels and from each alone: all of them must be the same.
+/// Reaches with imperfections, computed from both channels and from each channel alone: all results must be equal.
 fn spoilt_behind(imperfections: &Imperfections, reaches: &[f32], picture: Picture<'_>) -> Vec<f32> {
     let seen = |(pixel, reach): (usize, &f32)| if picture.ray(pixel) == [0.0; 3] { f32::INFINITY } else { *reach };
     let reaches: Vec<f32> = reaches.iter().enumerate().map(seen).collect();
@@ -226,7 +228,7 @@ fn spoilt_behind(imperfections: &Imperfections, reaches: &[f32], picture: Pictur
     for (k, all) in [found_depths.clone(), found_distances.clone()].into_iter().enumerate() {
         for pixel in 0..all.len() {
             let (one, expected) = (alone[k][pixel], expected[k][pixel]);
-            // Rounded to single precision a few times, 6e-8 of it, before it is spoilt and after it.
+            // Rounded to single precision a few times, 6e-8 each, before and after the imperfections.
             let before = [&depths, &distances][k][pixel];
             let near = |x: f32| x == expected || (x - expected).abs() < 1e-6 * before.abs().max(expected.abs());
             assert!(near(all[pixel]), "{pixel}: {} is not {expected}", all[pixel]);
@@ -236,12 +238,12 @@ fn spoilt_behind(imperfections: &Imperfections, reaches: &[f32], picture: Pictur
     found.clone()
 }
 
-/// Depths through a pinhole, with imperfections.
+/// Depths of a pinhole, with imperfections.
 fn spoilt_depths(imperfections: &Imperfections, depths: &[f32], view: &View) -> Vec<f32> {
     spoilt_behind(imperfections, depths, pinhole(view, &ticket(1)))
 }
 
-/// Holes and noise are the same in depth and distance of a camera, and in each alone.
+/// Holes and noise are consistent between depth and distance, and the same if only one channel is measured.
 #[test]
 fn distances() {
     let (view, n) = (view([60, 40], 50.0), 60 * 40);
@@ -258,10 +260,10 @@ fn distances() {
     }
 }
 
-/// The standard deviation of depth, as a function of depth \[m\].
+/// Standard deviation of the depth \[m\] as a function of the depth \[m\].
 type Law = fn(f64) -> f64;
 
-/// Deviations scatter by sqrt(1 / 2n) of themselves, means by sigma / sqrt(n): six times that.
+/// Bounds are six standard deviations: sqrt(1 / 2n) of itself for deviations, sigma / sqrt(n) for means.
 #[test]
 fn depth_noise() {
     let (view, n) = (view([SIDE; 2], 150.0), (SIDE * SIDE) as f64);
@@ -282,14 +284,15 @@ fn depth_noise() {
             assert!((sigma / law(z) - 1.0).abs() < 6.0 / (2.0 * n).sqrt(), "{z} m: {sigma}");
         }
     }
-    // The control: the deviations at 1 m and 2 m are four times apart, not twice.
+    // Control: the deviations at 1 m and 2 m differ by a factor of four, not two.
     assert_eq!((laws[0].1)(2.0) / (laws[0].1)(1.0), 4.0);
     let huge = only(|all| all.depth_noise = Some(DepthNoise { constant: 1000.0, quadratic: 0.0, offset: 0.0 }));
     let found = spoilt_depths(&huge, &[50.0; SIDE * SIDE], &view);
     assert!(found.iter().all(|z| (0.01..=100.0).contains(z)), "saturated");
 }
 
-/// A box 1 m away before a wall 2 m away: the shadow is fx b (1/1 - 1/2) pixels wide, on the side that the projector is not on.
+/// A box 1 m away in front of a wall 2 m away: the shadow is fx b (1/1 - 1/2) pixels wide, on the side opposite to the
+/// projector.
 #[test]
 fn projector_shadow() {
     let view = view([100, 8], 100.0);
@@ -303,7 +306,7 @@ fn projector_shadow() {
         let width = 100.0 * f64::abs(baseline) * (1.0 - 0.5);
         for (k, depth) in found.iter().enumerate() {
             let u = (k % 100) as f64;
-            // Of the pixels beside the first of the box, whose own centre is lit.
+            // Pixels beside the first pixel of the box, whose own center is lit.
             let shaded = match baseline {
                 b if b > 0.0 => u < 20.0 && 20.0 - u <= width,
                 b if b < 0.0 => u > 39.0 && u - 39.0 <= width,
@@ -316,7 +319,7 @@ fn projector_shadow() {
     assert_eq!(holes_with(0.15).iter().filter(|depth| depth.is_infinite()).count(), 7 * 8, "the control");
 }
 
-/// Tilted planes: the angle between ray and normal is known at every pixel, behind any lens.
+/// On tilted planes, the angle between ray and normal is known at every pixel, for any lens.
 #[test]
 fn grazing_holes() {
     let view = view([80, 60], 60.0);
@@ -330,7 +333,7 @@ fn grazing_holes() {
             let picture = Picture { rays: rays.as_ref(), ..pinhole(&view, &ticket) };
             let ray = |pixel| nalgebra::Vector3::from(picture.ray(pixel));
             let normal = nalgebra::Vector3::from(normal).normalize();
-            // A plane 2 m from the camera; what it does not reach is missed.
+            // A plane 2 m from the camera; rays that do not reach the plane are misses.
             let depth = |pixel| -2.0 / normal.dot(&ray(pixel));
             let reached = |depth: f64| depth > 0.0 && depth < 1e3;
             let depths: Vec<f32> =
@@ -339,7 +342,7 @@ fn grazing_holes() {
             let hits = found.iter().zip(&depths).enumerate().filter(|(_, (_, depth))| depth.is_finite());
             for (pixel, (found, depth)) in hits {
                 let angle = (-normal.dot(&ray(pixel)) / ray(pixel).norm()).acos();
-                // Depths and rays in single precision tell the angle to this: 6e-8 of each, over a pixel of 1/60.
+                // Single precision of depths and rays limits the angle: 6e-8 of each, over a pixel of 1/60.
                 if (angle - max_angle).abs() > 1e-3 {
                     assert_eq!(found.is_infinite(), angle > max_angle, "{normal:?}, {pixel}: {angle}");
                     *(if angle > max_angle { &mut inside } else { &mut outside }) += 1;
@@ -351,7 +354,7 @@ fn grazing_holes() {
     }
 }
 
-/// No lens, one whose rays go forward, and one whose rays go aside too: of images of a view.
+/// A pinhole, a lens whose rays all go forward, and a lens whose rays do not, for images of a view.
 fn lenses(view: &View) -> [Option<LensRays>; 3] {
     let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
     let rays = |lens: Lens, by: f64| {
@@ -362,7 +365,7 @@ fn lenses(view: &View) -> [Option<LensRays>; 3] {
     [None, Some(warped), Some(rays(Equidistant { max_angle: 1.9 }.into(), 0.4))]
 }
 
-/// Behind lenses too the deviation of what is measured is the law's: of depths where rays go forward, of distances elsewhere.
+/// The standard deviation follows the law for lenses too: for depths if all rays go forward, else for distances.
 #[test]
 fn lens_depth_noise() {
     let (view, law) = (view([120, 90], 60.0), DepthNoise { constant: 1e-3, quadratic: 2e-3, offset: 0.0 });
@@ -384,7 +387,7 @@ fn lens_depth_noise() {
     }
 }
 
-/// Light on a white image, by pixel.
+/// Radiance of a white image with vignetting, by pixel.
 fn left(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
     let (view, ticket) = (view(size, 1.0), ticket(1));
     let picture = Picture { rays: Some(rays), ..pinhole(&view, &ticket) };
@@ -397,9 +400,9 @@ fn left(rays: &LensRays, size: [usize; 2]) -> Vec<f64> {
     (0..size[0] * size[1]).map(shade).collect()
 }
 
-/// Fisheyes by their formulas, lenses of zero distortion as a pinhole, and all of them by their mapping from directions to
-/// points, which the falloff does not use: a patch of the sky of solid angle d omega, seen at the angle theta, lights an area of
-/// the image, and gets there cos theta d omega of the light.
+/// Vignetting of fisheyes follows their formulas, and of lenses without distortion that of a pinhole. All lenses follow
+/// their mapping from directions to points, which the falloff does not use. A patch of the sky of solid angle d omega
+/// at the angle theta illuminates an area of the image. This area receives cos theta d omega of the light.
 #[test]
 fn lens_vignetting() {
     let size = [64, 48];
@@ -434,7 +437,7 @@ fn lens_vignetting() {
                 assert!((found - expected).abs() < 1e-6, "{}: {theta}: {found} is not {expected}", lens.name());
                 by_law += 1;
             }
-            // The area of the image that a unit of solid angle lights there, and on the axis.
+            // Area of the image per solid angle in this direction, and on the axis.
             let area = |ray: nalgebra::Vector3<f64>| {
                 let beside = ray.cross(&nalgebra::Vector3::new(0.3, -0.5, 0.2)).normalize();
                 let slope = |along: nalgebra::Vector3<f64>| {
@@ -454,12 +457,12 @@ fn lens_vignetting() {
     assert!(by_law > 5000 && by_mapping > 15_000 && dark > 100, "{by_law} {by_mapping} {dark}");
 }
 
-/// A pixel on the very edge of the image circle has nothing beside it, above or below; it is as bright as the law has it.
+/// A pixel at the edge of the image circle has no neighbors on one side; its brightness still follows the law.
 #[test]
 fn image_circle_edge() {
     let size = [65, 65];
     for max_angle in [0.5, 1.0, 1.5] {
-        // The middle of the first pixel of row 32 is 32 pixels from the principal point.
+        // The center of the first pixel of row 32 is 32 pixels from the principal point.
         let f = 32.0 / max_angle;
         let pixels = PixelIntrinsics { fx: f, fy: f, cx: 32.5, cy: 32.5 };
         let rays = LensRays::new(&Optics::new(Equidistant { max_angle }.into(), pixels).unwrap(), size, 1).unwrap();
@@ -472,7 +475,7 @@ fn image_circle_edge() {
     }
 }
 
-/// The normalised image of a lens may be as large or as small as its focal length makes it: the light is the same.
+/// The normalized image of a lens scales with its focal length; the radiance stays the same.
 #[test]
 fn focal_length_unit() {
     let size = [64, 48];
@@ -490,8 +493,8 @@ fn focal_length_unit() {
     }
 }
 
-/// Under a sky that is equally bright everywhere, a lens that sees up to the angle theta collects pi sin² theta of light, up to
-/// a right angle, however it spreads it: the sum over all pixels times the area of one.
+/// Under a uniformly bright sky, a lens with the half field of view theta collects the irradiance pi sin² theta. This
+/// holds for any mapping, up to a right angle. The irradiance is the sum over all pixels times the area of a pixel.
 #[test]
 fn light_of_sky() {
     use kinetoscope_render::lens::{Equisolid, Orthographic, Stereographic};
@@ -510,8 +513,8 @@ fn light_of_sky() {
         let rays = LensRays::new(&Optics::new(lens, pixels).unwrap(), size, 1).unwrap();
         let found = left(&rays, size).iter().sum::<f64>() / (f * f);
         let expected = PI * most.sin().powi(2);
-        // Of a sharp edge at radius r only pixels on it, 2 pi r of them, may be counted wrong, by half each at most and
-        // by chance: their square root is enough six times.
+        // At a sharp edge at radius r, only the 2 pi r edge pixels can be counted wrong, randomly and by half a pixel
+        // each. The bound is six times the square root.
         let edge = (2.0 * PI * rays.optics().domain().radius * f).sqrt() * 0.5 * 6.0 / (f * f);
         assert!((found - expected).abs() < edge.min(0.01 * expected), "{}: {found} is not {expected}", lens.name());
     }
@@ -539,7 +542,7 @@ fn refusals() {
     let noise = only(|all| all.depth_noise = Some(DepthNoise { quadratic: -1.0, ..DepthNoise::default() }));
     let error = noise.check(depth).unwrap_err().to_string();
     assert_eq!(error, "quadratic of the depth noise is -1; it must be 0 to 1000");
-    // Channels that are not measured have no imperfections.
+    // Imperfections of channels that are not measured are rejected.
     let shot = only(|all| all.shot_noise = Some(ShotNoise::default()));
     assert_eq!(shot.check(depth).unwrap_err().to_string(), "the camera does not measure color; it measures depth");
     let holes = only(|all| all.holes = Some(Holes::default()));

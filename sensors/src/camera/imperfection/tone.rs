@@ -1,26 +1,26 @@
-//! Bytes of the screen as linear light, and back: the inverse of the renderers' own curve.
+//! Conversion between color bytes and linear radiance: the tone curve of the renderers and its inverse.
 
 use kinetoscope_render::ToneCurve;
 use std::sync::LazyLock;
 
-/// The curves, read backwards once.
+/// Lookup tables of all curves, computed on first use.
 static TONES: [LazyLock<Tone>; ToneCurve::ALL.len()] = [
     LazyLock::new(|| Tone::new(ToneCurve::ALL[0])),
     LazyLock::new(|| Tone::new(ToneCurve::ALL[1])),
     LazyLock::new(|| Tone::new(ToneCurve::ALL[2])),
 ];
 
-/// The curve in both directions. A byte that becomes light becomes the same byte again.
+/// A tone curve in both directions. A byte that is decoded encodes to the same byte again.
 #[derive(Debug)]
 pub(super) struct Tone {
-    /// Light of each byte: in the middle of what becomes that byte, and for 255 the least.
+    /// Radiance of each byte: the middle of its interval, and for 255 the smallest.
     lights: [f64; 256],
-    /// The least light of each byte from 1 on.
+    /// Smallest radiance of each byte from 1 on.
     least: [f32; 255],
 }
 
 impl Tone {
-    /// That of a curve.
+    /// Returns the lookup table of a curve.
     pub(super) fn of(curve: ToneCurve) -> &'static Self {
         let place = ToneCurve::ALL.iter().position(|one| *one == curve);
         &TONES[place.unwrap_or_default()]
@@ -28,7 +28,7 @@ impl Tone {
 
     fn new(curve: ToneCurve) -> Self {
         let least = std::array::from_fn(|k| reach(curve, k as f32 + 1.0));
-        // The curve adds half a byte, which rounds.
+        // The curve adds half a byte for rounding.
         let light = |byte: usize| if byte == 255 { least[254] } else { reach(curve, byte as f32 + 0.5) };
         Self { lights: std::array::from_fn(|byte| f64::from(light(byte))), least }
     }
@@ -43,9 +43,9 @@ impl Tone {
     }
 }
 
-/// The least light whose byte, before it is cut off, is `value` at least.
+/// Returns the smallest radiance whose byte, before truncation, is at least `value`.
 fn reach(curve: ToneCurve, value: f32) -> f32 {
-    // Positive numbers are in the order of their bits; the curve never falls.
+    // Positive floats are ordered as their bits; the curve is monotonic.
     let (mut below, mut above) = (0, 1000f32.to_bits());
     if curve.encode(0.0) >= value {
         return 0.0;
@@ -75,8 +75,9 @@ mod tests {
         assert!(lights[0] != lights[1] && lights[1] != lights[2], "each has its own: {lights:?}");
     }
 
-    /// Against the closed form of the curve: sRGB's own inverse, and above 0.7 that of y = 0.7 + 0.3 k / (k + 0.3). The
-    /// renderers' polynomial is within 0.2 of 255 of the standard, and the middle of a byte is found to far less.
+    /// Compares with the closed form of the curve: the inverse of sRGB, and above 0.7 that of
+    /// `y = 0.7 + 0.3 k / (k + 0.3)`. The polynomial of the renderers is within 0.2 of 255 of the standard, and the
+    /// middle of a byte is far more precise.
     #[test]
     fn curve() {
         let tone = Tone::of(ToneCurve::Soft);

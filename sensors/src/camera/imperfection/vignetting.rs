@@ -1,22 +1,29 @@
-//! Less light away from the optical axis.
+//! Light falloff away from the optical axis.
 
 use super::{OfLight, Place, within};
 use crate::error::SensorError;
 use serde::{Deserialize, Serialize};
 
-/// Less light away from the optical axis. Light is multiplied by `1 + strength (falloff - 1)`.
+/// Light falloff away from the optical axis. Radiance is multiplied by `1 + strength (falloff - 1)`.
 ///
-/// Of what is equally bright, the light on a pixel is proportional to the solid angle that it sees times the area of the
-/// aperture as seen from there, which is as the cosine of the angle theta between the pixel's ray and the axis; the falloff is
-/// that product, 1 on the axis, and 0 beyond a right angle. So it is cos⁴ theta of a pinhole (Horn 1986, "Robot Vision",
-/// chapter 10), cos theta sin theta / theta of the equidistant fisheye, cos theta of the equisolid one, 1 of the orthographic
-/// one, cos theta cos⁴(theta / 2) of the stereographic one, and of others what their mapping makes of it: more than 1 where a
-/// barrel distortion crowds more of the view into a pixel than it has on the axis. A panorama has no optical axis, and is
-/// refused.
+/// For a uniformly bright scene, the irradiance of a pixel is proportional to two factors. One is its solid angle. The
+/// other is the projected area of the aperture, which is the cosine of the angle theta between ray and axis. The
+/// falloff is their product, normalized to 1 on the axis, and 0 beyond a right angle:
+///
+/// | lens | falloff |
+/// |---|---|
+/// | pinhole | cos⁴ theta (Horn 1986, "Robot Vision", chapter 10) |
+/// | equidistant fisheye | cos theta sin theta / theta |
+/// | equisolid | cos theta |
+/// | orthographic | 1 |
+/// | stereographic | cos theta cos⁴(theta / 2) |
+///
+/// For other lenses it follows from their mapping. It exceeds 1 if a barrel distortion gives a pixel a larger solid
+/// angle than on the axis. A panorama has no optical axis, and is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Vignetting {
-    /// How much of the law holds: 0 for nothing of it, 1 (as by default) for a plain thin lens.
+    /// Strength, from 0 for no falloff to 1 (the default) for a plain thin lens.
     pub strength: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What mask ids stand for, by instance, link and class.
+//! Meaning of mask ids: segments by instance, link and class.
 
 use crate::camera::error::CameraError;
 use crate::error::SensorError;
@@ -7,40 +7,41 @@ use kinetoscope_scene::pattern::{PatternError, closest};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// Something that has a mask id of its own: a link of a robot, a rigid object, a geom of the world.
+/// An entity with its own mask id: a link of a robot, a rigid object, a geom of the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Thing {
-    /// What the mask channel says, from 1 on.
+    /// Mask id, from 1 on.
     pub id: i32,
-    /// The robot, the object, the geom of the world.
+    /// Name of the robot, of the object or of the geom of the world.
     pub object: String,
-    /// The link, where the object has several.
+    /// Name of the link, if the object has several.
     pub link: Option<String>,
-    /// Its semantic class, where no label gives it another.
+    /// Semantic class, unless a label assigns another one.
     pub class: String,
 }
 
 impl Thing {
-    /// `object/link`, or the object where it has no links.
+    /// Full name: `object/link`, or the object if it has no links.
     pub fn name(&self) -> String {
         self.link.as_ref().map_or_else(|| self.object.clone(), |link| format!("{}/{link}", self.object))
     }
 }
 
-/// What is one segment.
+/// Granularity of segments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum SegmentLevel {
-    /// Each object: a robot is one. Its id is the smallest mask id of its links, so it stays when more is added.
+    /// One segment per object, such as a whole robot. Its id is the smallest mask id of its links, so it stays when
+    /// more is added.
     #[default]
     Instance,
-    /// Each link and each object without links. Ids are mask ids.
+    /// One segment per link, and per object without links. Ids are mask ids.
     Link,
-    /// Each class. Ids count from 1 in the order in which the classes first appear among mask ids.
+    /// One segment per class. Ids count from 1 in the order in which the classes first appear among mask ids.
     Semantic,
 }
 
-/// Which things belong to which class.
+/// Assignment of entities to classes.
 ///
 /// ```
 /// use kinetoscope_sensors::camera::{SegmentLevel, Segmentation, SegmentationCfg, Thing};
@@ -55,14 +56,14 @@ pub enum SegmentLevel {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentationCfg {
-    /// Patterns and classes. A pattern is a regular expression that must match the whole name of an object (`arm`, which
-    /// means all its links), `object/link`, or the link alone. What none matches keeps its own class.
+    /// Patterns and classes. A pattern is a regular expression. It must match the whole name of an object (`arm`, which
+    /// means all its links), `object/link`, or the link alone. Entities without a match keep their own class.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub labels: Vec<(String, String)>,
 }
 
 impl SegmentationCfg {
-    /// Labels by pattern.
+    /// Creates a configuration from pairs of pattern and class.
     pub fn labeled(labels: &[(&str, &str)]) -> Self {
         Self { labels: labels.iter().map(|(pattern, class)| ((*pattern).into(), (*class).into())).collect() }
     }
@@ -71,32 +72,33 @@ impl SegmentationCfg {
 /// One segment of a level.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Segment {
-    /// Its number in segmented pictures, never 0.
+    /// Segment id in segmented images, never 0.
     pub id: i32,
-    /// The object, `object/link`, or the class. Two segments may have one name where two things have; ids are their own.
+    /// Name of the object, `object/link`, or the class. Two segments have the same name if two entities have; ids are
+    /// unique.
     pub name: String,
-    /// Its class; of an object whose links have several, that of the first.
+    /// Class; for an object whose links have several classes, the class of the first link.
     pub class: String,
-    /// The mask ids that it is made of, in order.
+    /// Mask ids of the segment, in ascending order.
     pub mask_ids: Vec<i32>,
 }
 
-/// What mask ids stand for: turns pictures of the mask channel into segmented ones, and says which number means what.
+/// Mapping from mask ids to segments, with names and classes. Converts images of the mask channel to segmented images.
 #[derive(Clone, Debug)]
 pub struct Segmentation {
     levels: [Level; 3],
 }
 
-/// One level.
+/// Segments of one level.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Level {
     segments: Vec<Segment>,
-    /// Mask id and segment, by mask id.
+    /// Pairs of mask id and segment id, sorted by mask id.
     of_mask: Vec<(i32, i32)>,
 }
 
 impl Level {
-    /// The segment that a mask id belongs to.
+    /// Returns the segment id of a mask id.
     pub(super) fn of(&self, mask_id: i32) -> i32 {
         if mask_id == 0 {
             return 0;
@@ -107,15 +109,16 @@ impl Level {
 }
 
 impl Segmentation {
-    /// The segment of mask ids that are not among the things: what was added later.
+    /// Segment id of unknown mask ids, such as those of entities added later.
     pub const UNKNOWN: i32 = -1;
 
-    /// Segments of some things.
+    /// Creates the segments of the given entities.
     ///
     /// # Errors
     ///
-    /// [`CameraError::MaskId`] for a mask id that is 0, negative or given twice, or whose class has no name; [`SensorError::Pattern`] for a pattern that is no
-    /// regular expression or matches nothing (with the nearest names), and a thing that two patterns match.
+    /// [`CameraError::MaskId`] for a mask id that is 0, negative or given twice, or whose class has no name;
+    /// [`SensorError::Pattern`] for a pattern that is not a regular expression or matches nothing (with the nearest
+    /// names), and an entity that two patterns match.
     pub fn new(things: impl IntoIterator<Item = Thing>, cfg: &SegmentationCfg) -> Result<Self, SensorError> {
         let mut things: Vec<Thing> = things.into_iter().collect();
         things.sort_by_key(|thing| thing.id);
@@ -133,8 +136,8 @@ impl Segmentation {
         if let Some(nameless) = things.iter().find(|thing| thing.class.is_empty()) {
             return wrong(nameless.id, "has a class without a name");
         }
-        // Links of one object are one instance. Things without links stay apart whatever they are called: a geom of the world
-        // may have the name of a robot.
+        // Links of one object are one instance. Entities without links stay separate whatever their names: a geom of
+        // the world may have the name of a robot.
         let alone = |thing: &Thing| thing.link.is_none().then_some(thing.id);
         let instances = level(&things, |thing| (thing.object.clone(), alone(thing)), false);
         let links = level(&things, |thing| (thing.name(), Some(thing.id)), false);
@@ -142,13 +145,12 @@ impl Segmentation {
         Ok(Self { levels: [instances, links, classes] })
     }
 
-    /// What there is on a level: which id means what.
+    /// Returns all segments of a level.
     pub fn segments(&self, level: SegmentLevel) -> &[Segment] {
         &self.level(level).segments
     }
 
-    /// The segment that a mask id belongs to: 0 for 0 (nothing was hit), [`UNKNOWN`](Self::UNKNOWN) for what is not
-    /// among the things.
+    /// Returns the segment id of a mask id: 0 for 0 (nothing was hit), [`UNKNOWN`](Self::UNKNOWN) for unknown mask ids.
     pub fn segment_of(&self, level: SegmentLevel, mask_id: i32) -> i32 {
         self.level(level).of(mask_id)
     }
@@ -162,7 +164,7 @@ impl Segmentation {
     }
 }
 
-/// Gives things the classes of the labels that match them.
+/// Assigns classes to the entities that labels match.
 fn label(things: &mut [Thing], labels: &[(String, String)]) -> Result<(), SensorError> {
     let names: Vec<String> = things.iter().map(Thing::name).collect();
     let objects: Vec<String> = things.iter().map(|thing| thing.object.clone()).collect();
@@ -197,8 +199,8 @@ fn label(things: &mut [Thing], labels: &[(String, String)]) -> Result<(), Sensor
     Ok(())
 }
 
-/// Things that share a key, which begins with the name, are one segment, whose id is their first mask id, or a number from 1
-/// on.
+/// Groups entities with the same key into segments. The key begins with the name. The segment id is the first mask id,
+/// or, if `numbered`, an index from 1 on.
 fn level(things: &[Thing], key: impl Fn(&Thing) -> (String, Option<i32>), numbered: bool) -> Level {
     let mut level = Level::default();
     let mut known: HashMap<(String, Option<i32>), usize> = HashMap::new();
@@ -268,7 +270,8 @@ mod tests {
     fn patterns() {
         let found = classes(&[("table|shelf", "furniture"), ("finger.*", "hand")]);
         assert_eq!(found, "1 ground [1], 2 robot [2], 3 hand [3, 4], 4 furniture [5, 6], 5 toy [7]");
-        // An object is all its links; a link may be named in full; classes may be those of others.
+        // A pattern for an object matches all its links. A link may be given by its full name. Existing class names may
+        // be reused.
         assert_eq!(classes(&[("arm|cube", "toy"), ("ground", "object")]), "1 object [1, 5, 6], 2 toy [2, 3, 4, 7]");
         assert!(classes(&[("arm/finger_l", "left")]).contains(", 3 left [3],"));
     }

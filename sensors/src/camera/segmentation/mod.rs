@@ -1,4 +1,4 @@
-//! From mask ids to instances, links and semantic classes: what the mask channel says, in the words of whoever trains on it.
+//! Segmentation: conversion of the mask channel to instances, links and semantic classes.
 
 mod labels;
 mod palette;

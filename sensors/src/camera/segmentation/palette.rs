@@ -1,13 +1,12 @@
-//! Colours of segments.
+//! Colors of segments.
 
 use super::labels::Segmentation;
 
-/// The colour of a segment, red, green, blue and opacity: another one for each of the ids 1 to 2²⁴ - 1, always the same, and
-/// those of small ids far apart. Nothing (0) is black and transparent; what a segmentation does not know is black, as Isaac
-/// has both.
+/// Returns the RGBA color of a segment. The ids 1 to 2²⁴ - 1 have distinct, constant colors, and those of small ids are
+/// far apart. The background (0) is black and transparent; unknown segments are black and opaque, both as in Isaac.
 ///
-/// The 24 bits of an id are the 24 bits of its colour in another order: bit 3 i + c is bit 7 - i of channel c. Source: the
-/// colour map of the PASCAL VOC challenge.
+/// The 24 bits of an id are the 24 bits of its color in another order: bit 3 i + c is bit 7 - i of channel c. Source:
+/// the color map of the PASCAL VOC challenge.
 pub fn segment_color(id: i32) -> [u8; 4] {
     match id {
         0 => [0; 4],

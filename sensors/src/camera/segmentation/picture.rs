@@ -1,20 +1,20 @@
-//! Segmented pictures, as numbers and as colours.
+//! Segmented images, as ids and as colors.
 
 use super::labels::{SegmentLevel, Segmentation};
 use super::palette::segment_color;
 use ndarray::{Array, Array4, ArrayView, ArrayView3, Dimension, Zip};
 
 impl Segmentation {
-    /// Segments of a level, from pictures of the mask channel (or one of them), in the same shape: 0 where nothing was hit,
-    /// [`UNKNOWN`](Self::UNKNOWN) for what is not among the things.
+    /// Converts images of the mask channel (or one image) to segment ids of a level, in the same shape: 0 where nothing
+    /// was hit, [`UNKNOWN`](Self::UNKNOWN) for unknown mask ids.
     pub fn segment<D: Dimension>(&self, level: SegmentLevel, mask: ArrayView<'_, i32, D>) -> Array<i32, D> {
         let mut out = Array::zeros(mask.raw_dim());
         self.segment_into(level, mask, &mut out);
         out
     }
 
-    /// As [`segment`](Self::segment), into an array that is there already: allocates nothing where the shapes agree, and
-    /// takes the mask's shape where they do not.
+    /// Converts as [`segment`](Self::segment), into an existing array. Allocates only if the shapes differ; `out` then
+    /// takes the shape of the mask.
     pub fn segment_into<D: Dimension>(
         &self,
         level: SegmentLevel,
@@ -25,7 +25,7 @@ impl Segmentation {
             *out = Array::zeros(mask.raw_dim());
         }
         let level = self.level(level);
-        // Neighbouring pixels see the same thing.
+        // Neighboring pixels mostly have the same id.
         let (mut last, mut segment) = (0, 0);
         Zip::from(out).and(mask).for_each(|out, &id| {
             if id != last {
@@ -35,8 +35,8 @@ impl Segmentation {
         });
     }
 
-    /// Segments of a level as colours ([`segment_color`]), u8, red, green, blue and opacity, shape (N, H, W, 4), from
-    /// pictures of the mask channel, shape (N, H, W).
+    /// Converts images of the mask channel, shape (N, H, W), to segment colors of a level ([`segment_color`]): RGBA,
+    /// u8, shape (N, H, W, 4).
     pub fn colorize(&self, level: SegmentLevel, mask: ArrayView3<'_, i32>) -> Array4<u8> {
         let (n, height, width) = mask.dim();
         let mut out = Array4::zeros((n, height, width, 4));
@@ -44,8 +44,8 @@ impl Segmentation {
         out
     }
 
-    /// As [`colorize`](Self::colorize), into an array that is there already: allocates nothing where the shapes agree, and
-    /// takes the mask's shape where they do not.
+    /// Converts as [`colorize`](Self::colorize), into an existing array. Allocates only if the shapes differ; `out`
+    /// then takes the shape of the mask.
     pub fn colorize_into(&self, level: SegmentLevel, mask: ArrayView3<'_, i32>, out: &mut Array4<u8>) {
         let (n, height, width) = mask.dim();
         if out.dim() != (n, height, width, 4) {
@@ -55,7 +55,7 @@ impl Segmentation {
         paint(mask, out, |id| segment_color(level.of(id)));
     }
 
-    /// Colours of segments that are numbers already, as [`segment`](Self::segment) gives them, shape (N, H, W, 4).
+    /// Converts segment ids, as returned by [`segment`](Self::segment), to RGBA colors, shape (N, H, W, 4).
     pub fn colors_of(segments: ArrayView3<'_, i32>) -> Array4<u8> {
         let (n, height, width) = segments.dim();
         let mut out = Array4::zeros((n, height, width, 4));
@@ -64,7 +64,7 @@ impl Segmentation {
     }
 }
 
-/// Writes the colours of ids; neighbouring pixels mostly have the same.
+/// Writes the colors of ids; neighboring pixels mostly have the same id.
 fn paint(ids: ArrayView3<'_, i32>, out: &mut Array4<u8>, color_of: impl Fn(i32) -> [u8; 4]) {
     let (mut last, mut color) = (0, color_of(0));
     for (&id, out) in ids.iter().zip(out.rows_mut()) {

@@ -1,4 +1,4 @@
-//! Drawing what a camera captured.
+//! Rendering of captured frames.
 
 use super::Camera;
 use crate::camera::cfg::{CameraCfg, DepthMiss};
@@ -17,7 +17,7 @@ use std::ops::Range;
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
 
-/// Images, and which of them are outdated.
+/// Images with a flag for outdated ones.
 #[derive(Debug)]
 pub(in crate::camera) struct DrawnImages {
     pictures: Pictures,
@@ -27,13 +27,13 @@ pub(in crate::camera) struct DrawnImages {
 }
 
 impl DrawnImages {
-    /// `count` images, all of them outdated.
+    /// Allocates `count` images, all of them outdated.
     pub(in crate::camera) fn new(cfg: &CameraCfg, count: usize) -> Self {
         let pictures = Pictures::new(cfg.channels, count, cfg.width, cfg.height);
         Self { pictures, stale: vec![true; count], failure: None }
     }
 
-    /// The images, or why they could not be drawn.
+    /// Returns the images, or the error of rendering them.
     pub(in crate::camera) fn pictures(&self) -> Result<&Pictures, CameraError> {
         self.failure.clone().map_or(Ok(&self.pictures), Err)
     }
@@ -46,13 +46,13 @@ impl DrawnImages {
         self.stale[image] = stale;
     }
 
-    /// Copies image `from` of `count` others.
+    /// Copies image `from` of the `count` images of `others`.
     pub(in crate::camera) fn copy(&mut self, image: usize, others: &Pictures, count: usize, from: usize) {
         self.pictures.copy_view(self.stale.len(), image, others, count, from);
         self.stale[image] = false;
     }
 
-    /// Moves some images up by `by` places; the last ones fall out, and the first ones are outdated.
+    /// Shifts a range of images by `by` places. The last ones are dropped, the first ones become outdated.
     pub(in crate::camera) fn move_up(&mut self, images: Range<usize>, by: usize) {
         self.pictures.move_up(self.stale.len(), images.clone(), by);
         let stale = &mut self.stale[images];
@@ -60,14 +60,14 @@ impl DrawnImages {
         stale[..by].fill(true);
     }
 
-    /// Makes zeros of some images, which are not outdated then.
+    /// Clears a range of images to zero; they are not outdated then.
     pub(in crate::camera) fn forget(&mut self, images: Range<usize>) {
         self.pictures.forget(self.stale.len(), images.clone());
         self.stale[images].fill(false);
     }
 }
 
-/// The rasterizer of a camera, its noise, and memory that is kept between drawings.
+/// The rasterizer of a camera, its noise, and buffers that are reused between renders.
 #[derive(Debug)]
 pub(in crate::camera) struct FrameRenderer {
     rasterizer: ParallelRasterizer,
@@ -75,7 +75,7 @@ pub(in crate::camera) struct FrameRenderer {
     jobs: Vec<Job<'static>>,
     takes: Vec<Take<'static>>,
     tickets: Vec<Ticket>,
-    /// Noise and imperfections of drawn images.
+    /// Noise and imperfections of rendered images.
     faults: Option<Faults>,
 }
 
@@ -87,11 +87,11 @@ impl FrameRenderer {
 }
 
 impl Camera {
-    /// Draws the outdated ones of some images, each from its `source`. Their failure is kept with them.
+    /// Renders the outdated images, each from its `source`. An error is stored with the images.
     ///
     /// # Errors
     ///
-    /// A drawing that was cancelled.
+    /// [`CameraError::Draw`] if rendering was cancelled.
     pub(in crate::camera) fn redraw<'a>(
         &'a self,
         images: &mut DrawnImages,
@@ -110,13 +110,13 @@ impl Camera {
         match failure {
             None => stale.fill(false),
             Some(failure) if failure.is_cancelled() => return Err(failure.clone()),
-            // It is not known which of them are good.
+            // It is unknown which images are valid, so all stay outdated.
             Some(_) => {}
         }
         Ok(())
     }
 
-    /// Draws frames into images, with the noise and the imperfections of the camera.
+    /// Renders frames into images, with the noise and the imperfections of the camera.
     fn develop<'a>(
         &'a self,
         sources: impl Iterator<Item = FrameSource<'a>> + Clone,
@@ -168,7 +168,7 @@ impl Camera {
         Shot { scene, poses: &frame.poses, view, lights: Some(&frame.lights), lens: rays.map(|rays| &**rays), before }
     }
 
-    /// The shutter and the key of the noise of a frame.
+    /// Returns the shutter poses and the path tracing seed of a frame.
     fn take_of<'a>(&self, source: &FrameSource<'a>) -> Take<'a> {
         let opened = source.frame.opened().and_then(|(poses, parent)| {
             let camera = self.viewpoints.world_from(source.viewpoint, Some(parent))?;
@@ -178,12 +178,12 @@ impl Camera {
         Take { noise: source.frame.ticket.bits(Stream::PATHS), opened }
     }
 
-    /// Whether rows of its pictures may be of several instants.
+    /// Returns true if the shutter has a nonzero span: image rows may show several instants.
     pub(in crate::camera) fn takes_time(&self) -> bool {
         self.motion.shutter_seconds().is_some()
     }
 
-    /// The shown frame of a row and its rasterizer: for what is computed of more than pictures.
+    /// Calls `act` with the render request of the shown frame of a row, for results other than the camera's images.
     pub(in crate::camera) fn shot_of<T>(
         &self,
         row: usize,
@@ -196,8 +196,8 @@ impl Camera {
     }
 }
 
-/// Draws jobs, and the markers of each into its colours and nothing else: the colours with markers are jobs of their own. All
-/// are drawn together, so that one that fails costs no other, and none is counted twice.
+/// Renders jobs, with the markers of each job in its color only. The color images with markers are separate jobs. All
+/// jobs are rendered together, so a failing job does not affect others, and each image is counted once.
 fn render_marked(
     rasterizer: &mut ParallelRasterizer,
     jobs: &mut [Job<'_>],
@@ -213,7 +213,7 @@ fn render_marked(
             Ok(stage) => stages.push((index, Some(stage))),
             Err(error) => {
                 failed = failed.or(Some((index, error)));
-                // Its colour stays as it was, and what else there is to it is drawn.
+                // The color stays unchanged; all other channels are rendered.
                 stages.push((index, None));
             }
         }
@@ -235,11 +235,11 @@ fn render_marked(
     first.map_or(Ok(()), Err)
 }
 
-/// A scene with markers in it.
+/// A scene with markers added.
 struct Stage {
     scene: RenderScene,
     poses: Vec<PoseF32>,
-    /// Where everything was when the shutter opened: markers stand still.
+    /// Poses at shutter opening; markers do not move.
     opened: Option<Vec<PoseF32>>,
 }
 
@@ -248,15 +248,15 @@ impl Stage {
         let (added, places): (Vec<Instance>, Vec<PoseF32>) = markers.iter().flat_map(Marker::instances).unzip();
         let added = added.into_iter().map(|instance| Instance { group: Marker::GROUP, ..instance });
         let instances = shot.scene.instances().iter().cloned().chain(added).collect();
-        // Each of them can be drawn; there may be too many triangles together.
+        // Each marker can be rendered, but the total number of triangles may be too large.
         let scene = shot.scene.with_instances(instances).map_err(|error| RenderError::Markers(error.to_string()))?;
         let with = |poses: &[PoseF32]| poses.iter().chain(&places).copied().collect();
         Ok(Self { scene, poses: with(shot.poses), opened: take.opened.as_ref().map(|opened| with(opened.poses)) })
     }
 }
 
-/// Keeps what was hit nearer than the far plane, whose number means that nothing was: noise ends there. What counts to the far
-/// plane is depth, or distance where rays go aside.
+/// Clamps hits below the far plane, whose value means a miss; noise is clamped at the far plane. The clamped quantity
+/// is depth, and also distance if rays do not all go forward.
 fn keep_before(far: f32, aside: bool, frame: &mut FrameMut<'_>) {
     let last = far.next_down();
     let reach = frame.distance.as_deref_mut().filter(|_| aside);
@@ -265,9 +265,9 @@ fn keep_before(far: f32, aside: bool, frame: &mut FrameMut<'_>) {
     }
 }
 
-/// The memory of a list for another list: of the same type, but for what it borrows.
+/// Reuses the memory of a vector for a vector of the same type with another lifetime.
 fn emptied<T, U>(mut list: Vec<T>) -> Vec<U> {
     list.clear();
-    // Collected in place.
+    // The in-place `collect` keeps the allocation.
     list.into_iter().filter_map(|_| None).collect()
 }

@@ -1,4 +1,4 @@
-//! What a pair of eyes is, before it exists.
+//! Stereo camera configuration.
 
 use super::sensor::StereoCamera;
 use crate::camera::cfg::CameraCfg;
@@ -19,18 +19,18 @@ use nalgebra::{Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Which point of the pair the extrinsics place.
+/// Point of the stereo rig that the extrinsics place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum StereoOrigin {
-    /// The middle between the eyes, with the axes of the left eye: EmbodiChain's.
+    /// Midpoint between the cameras, with the axes of the left camera, as in EmbodiChain.
     #[default]
     Middle,
-    /// The left eye: what calibrations of real pairs say.
+    /// Left camera, as in stereo calibrations.
     Left,
 }
 
-/// Configuration of a [`StereoCamera`]: a camera, and how its right eye differs from its left one.
+/// Configuration of a [`StereoCamera`]: a camera, and the differences of its right camera.
 ///
 /// ```
 /// use kinetoscope_sensors::camera::{CameraCfg, StereoCameraCfg};
@@ -46,33 +46,34 @@ pub enum StereoOrigin {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StereoCameraCfg {
-    /// The left eye, and everything that both have in common: size, range, rate, renderer... Its extrinsics place
+    /// The left camera, and everything common to both cameras: size, range, rate, renderer. Its extrinsics place
     /// [`origin`](Self::origin).
     pub camera: CameraCfg,
-    /// Focal lengths and principal point of the right eye; `None` is the left one's.
+    /// Focal lengths and principal point of the right camera; `None` copies the left camera.
     pub intrinsics_right: Option<Intrinsics>,
-    /// The right eye's lens, as [`CameraCfg::lens`]; `None` is the left one's.
+    /// Lens of the right camera, as [`CameraCfg::lens`]; `None` copies the left camera.
     pub lens_right: Option<Lens>,
-    /// What the right eye measures; `None` is what the left one does.
+    /// Channels of the right camera; `None` copies the left camera.
     pub channels_right: Option<Channels>,
-    /// What is not perfect about the right eye, as [`CameraCfg::imperfections`]; `None` is what the left one has, of the channels
-    /// that the right one measures. A projector's [place](crate::camera::imperfection::Holes::baseline) is counted from each
-    /// eye.
+    /// Imperfections of the right camera, as [`CameraCfg::imperfections`]; `None` copies the left camera, for the
+    /// channels that the right camera measures. The [baseline](crate::camera::imperfection::Holes::baseline) of a
+    /// projector is relative to each camera.
     pub imperfections_right: Option<Imperfections>,
-    /// Noise of the right eye, as [`CameraCfg::noise`]; `None` is the left one's, of the channels that the right one measures.
+    /// Noise of the right camera, as [`CameraCfg::noise`]; `None` copies the left camera, for the channels that the
+    /// right camera measures.
     pub noise_right: Option<BTreeMap<String, NoiseCfg>>,
-    /// Where the right eye is in the optical frame of the left one (x right, y down, z forward), whatever the convention of
-    /// the extrinsics \[m\].
+    /// Position of the right camera in the optical frame of the left camera (x right, y down, z forward) \[m\],
+    /// independent of the convention of the extrinsics.
     pub left_to_right_pos: [f64; 3],
-    /// How the right eye is turned against the left one: axes of its optical frame in that of the left eye.
+    /// Rotation from the optical frame of the right camera to that of the left camera.
     #[serde(with = "kinetoscope_scene::file_format::rotation")]
     pub left_to_right_rot: UnitQuaternion<f64>,
-    /// What the extrinsics place.
+    /// Point of the rig that the extrinsics place.
     pub origin: StereoOrigin,
 }
 
 impl Default for StereoCameraCfg {
-    /// EmbodiChain's pair: two of its cameras side by side, 5 cm apart, placed by their middle.
+    /// EmbodiChain's stereo camera: two of its cameras side by side, 5 cm apart, placed by their midpoint.
     fn default() -> Self {
         Self {
             camera: CameraCfg::default(),
@@ -88,11 +89,11 @@ impl Default for StereoCameraCfg {
     }
 }
 
-/// Between the seeds of paths of the eyes: 2^32 over the golden ratio, far from the small steps between seeds that people
-/// choose.
+/// Offset between the path tracing seeds of the two cameras: 2^32 over the golden ratio, far from the small steps that
+/// users choose between seeds.
 const RIGHT_SEED: u32 = 0x9e37_79b9;
 
-/// How the eyes of a pair stand to each other and to what places them.
+/// Relative poses of the two cameras and of the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rig {
     pub(super) left_from_right: Pose,
@@ -100,15 +101,15 @@ pub(super) struct Rig {
 }
 
 impl StereoCameraCfg {
-    /// The rig.
+    /// Returns the relative poses.
     ///
     /// # Errors
     ///
-    /// [`CameraError::Pose`] for a pose of the right eye that is none.
+    /// [`CameraError::Pose`] for an invalid pose of the right camera.
     pub(super) fn rig(&self) -> Result<Rig, CameraError> {
         let [x, y, z] = self.left_to_right_pos;
         let pose = Pose::from_parts(Translation3::new(x, y, z), self.left_to_right_rot);
-        // Checked, and its quaternion normalised.
+        // Checks the pose and normalizes its quaternion.
         let left_from_right = pose.to_poses()?.first().copied().unwrap_or(pose);
         let origin_from_left = match self.origin {
             StereoOrigin::Left => Pose::identity(),
@@ -117,11 +118,12 @@ impl StereoCameraCfg {
         Ok(Rig { left_from_right, origin_from_left })
     }
 
-    /// The eyes as cameras of their own: left, right. Where paths are traced, the right one has a seed of its own.
+    /// Returns the configurations of the left and the right camera. With path tracing, the right camera gets another
+    /// seed.
     ///
     /// # Errors
     ///
-    /// [`CameraError::Pose`] or [`CameraError::LookAt`] for places that are none.
+    /// [`CameraError::Pose`] or [`CameraError::LookAt`] for an invalid pose.
     pub fn eyes(&self) -> Result<[CameraCfg; 2], CameraError> {
         let Rig { left_from_right, origin_from_left } = self.rig()?;
         let left = self.camera.extrinsics.parent_from_camera()? * origin_from_left;
@@ -164,11 +166,12 @@ impl SensorCfg for StereoCameraCfg {
 
     /// # Errors
     ///
-    /// A place of the right eye that is none, and [`SensorError::Eye`] with what is wrong with either eye as a [`CameraCfg`].
+    /// An invalid pose of the right camera, and [`SensorError::Eye`] with the error of either camera as a
+    /// [`CameraCfg`].
     fn build(&self, context: &SensorContext) -> Result<StereoCamera, SensorError> {
         let [left, right] = self.eyes()?;
-        // Noise and dropout are drawn by the name of the sensor: they must not be the same in both eyes. That of paths is by
-        // the seed of the renderer, which `eyes` makes another one.
+        // Noise and dropout are keyed by the name of the sensor, so the cameras need different names. Path tracing
+        // noise is keyed by the seed of the renderer, which `eyes` changes.
         let name = format!("{}/right", context.name).into();
         let other = SensorContext { name, ..context.clone() };
         let [left, right] = [("left", left.build(context)), ("right", right.build(&other))]

@@ -1,4 +1,4 @@
-//! How far apart the eyes of a pair see the same point.
+//! Disparity of a stereo camera.
 
 use super::sensor::StereoCamera;
 use crate::camera::error::CameraError;
@@ -6,10 +6,10 @@ use crate::error::SensorError;
 use kinetoscope_render::frame::Depth;
 use ndarray::{Array1, Array3, ArrayView3, Axis};
 
-/// Lengths and angles smaller than this part of the baseline, or this many rad, are rounding.
+/// Rounding tolerance: as a fraction of the baseline for lengths, in \[rad\] for angles.
 pub(super) const ROUNDING: f64 = 1e-9;
 
-/// Disparities, and of which pictures they are.
+/// Disparity image, and the version of the images that it was computed from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct DisparityMap {
     /// \[pixels\], shape (N, H, W).
@@ -19,23 +19,25 @@ pub(super) struct DisparityMap {
 }
 
 impl StereoCamera {
-    /// Disparities \[pixels\], f32, shape (N, H, W): for every pixel of the left eye, how much farther left the right eye
-    /// sees the same point, d = fx b / z with the focal length fx, the baseline b = `left_to_right_pos.x` and the depth z of
-    /// the left eye (so that z = fx b / d). The point is at (u - d, v) in the right eye's picture, and at
-    /// (u - d + cx_right - cx_left, v) where principal points differ. 0 where nothing was hit, which is where infinitely far
-    /// points are, whatever [`depth_miss`](crate::camera::CameraCfg::depth_miss) says.
+    /// Disparities of the left image \[pixels\], f32, shape (N, H, W): how much farther left the right camera sees the
+    /// same point.
     ///
-    /// It is of the depth that the left eye measures, at every pixel: exact where that is, and with its noise, its holes and its
-    /// imperfections where it has some (so an error of depth e is one of about d e / z of disparity). Nothing is matched: it says
-    /// nothing of whether the right eye sees the point, which something may be in the way of.
+    /// The disparity is d = fx b / z, so z = fx b / d. Here fx is the focal length, b = `left_to_right_pos.x` the
+    /// baseline, and z the depth of the left camera. The point is at (u - d, v) in the right image; if principal points
+    /// differ, it is at (u - d + cx_right - cx_left, v). Misses have the disparity 0 of infinitely far points, for
+    /// every [`depth_miss`](crate::camera::CameraCfg::depth_miss).
     ///
-    /// Draws the left eye's pictures if nobody has yet.
+    /// Disparities are computed from the measured depth of the left camera, with its noise, holes and imperfections. A
+    /// depth error e gives a disparity error of about d e / z. There is no stereo matching: points that are occluded in
+    /// the right image have a disparity too.
+    ///
+    /// Renders the left images if they were not read before.
     ///
     /// # Errors
     ///
-    /// [`CameraError::NotRectified`] where the eyes are not parallel and side by side, or their lenses differ;
-    /// [`CameraError::PinholeOnly`] where either has a lens that is no pinhole; [`CameraError::ChannelOff`] where the left eye
-    /// does not measure depth; what reading the depth says.
+    /// [`CameraError::NotRectified`] if the cameras are not parallel and side by side, or their fx, fy or cy differ;
+    /// [`CameraError::PinholeOnly`] if either lens is not a pinhole; [`CameraError::ChannelOff`] if the left camera
+    /// does not measure depth; errors of reading the depth.
     pub fn disparity(&self) -> Result<ArrayView3<'_, f32>, SensorError> {
         let baseline = self.baseline()?;
         let depth = self.left().depth()?;
@@ -46,12 +48,12 @@ impl StereoCamera {
         Ok(self.disparities.get_or_update(|| Ok(DisparityMap::default()), update)?.pixels.view())
     }
 
-    /// [`disparity`](Self::disparity) of the pictures that arrived last, as [`Camera::arrived`](crate::camera::Camera::arrived) has their
-    /// depth; made when asked.
+    /// [`disparity`](Self::disparity) of the latest delivered images, from the depth of
+    /// [`Camera::arrived`](crate::camera::Camera::arrived); computed at every call.
     ///
     /// # Errors
     ///
-    /// As [`disparity`](Self::disparity).
+    /// Same as [`disparity`](Self::disparity).
     pub fn arrived_disparity(&self) -> Result<Array3<f32>, SensorError> {
         let baseline = self.baseline()?;
         let matrices = self.left().arrived_intrinsic_matrices();
@@ -63,13 +65,13 @@ impl StereoCamera {
         Ok(pixels)
     }
 
-    /// Whether there is a [`disparity`](Self::disparity): whether the eyes are parallel and side by side, their lenses are equal,
-    /// and the left one measures depth.
+    /// True if [`disparity`](Self::disparity) is available: the cameras are parallel and side by side, their fx, fy and
+    /// cy are equal, and the left camera measures depth.
     pub fn has_disparity(&self) -> bool {
         self.left().channels().depth && self.baseline().is_ok()
     }
 
-    /// Where the right eye is along x \[m\], if there is a disparity: if rows of the pictures of both are the same.
+    /// Returns the x position of the right camera \[m\] if the images are rectified.
     fn baseline(&self) -> Result<f64, CameraError> {
         self.left().must_be_pinhole("disparity")?;
         self.right().must_be_pinhole("disparity")?;
@@ -103,7 +105,7 @@ impl StereoCamera {
 
     fn update_disparities(&self, map: &mut DisparityMap, baseline: f64, depth: ArrayView3<'_, f32>) {
         let (draws, stamps) = (self.left().draws(), self.left().stamps());
-        // Nothing was drawn since, nor is anything else shown.
+        // No image was rendered, and no other frame is shown since.
         if map.draws == draws && map.stamps == stamps && map.pixels.dim() == depth.dim() {
             return;
         }

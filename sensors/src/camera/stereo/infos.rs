@@ -1,4 +1,4 @@
-//! Calibrations of a pair: the pair of two of them, and those of a pair.
+//! Conversion between stereo cameras and pairs of ROS calibrations.
 
 use super::cfg::{StereoCameraCfg, StereoOrigin};
 use super::rectify::Rectification;
@@ -10,19 +10,21 @@ use crate::error::SensorError;
 use kinetoscope_render::Renderer;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, UnitQuaternion, Vector3};
 
-/// How far R may be from a rotation: files have six digits or more.
+/// Tolerance of R from a rotation: files have six digits or more.
 const ROTATION: f64 = 1e-3;
-/// How far numbers of both P may be apart that are the same in a rectified pair \[pixels\]: files round both alike.
+/// Tolerance of numbers that are equal in both P of a rectified stereo pair \[pixels\]: files round both the same way.
 const ALIKE: f64 = 1e-3;
 
 impl StereoCameraCfg {
-    /// The simulated twin of a real, calibrated pair: raw pictures of both eyes, as their drivers publish them.
+    /// Creates the configuration of a stereo camera from two calibrations: raw images of both cameras, as their drivers
+    /// publish them.
     ///
-    /// Sizes, intrinsics and lenses are those of K and D, as [`CameraInfo::apply_to`] has them. Where the right eye is follows from
-    /// what rectifies the pair: with R of each eye, and the baseline b = -P\[0\]\[3\] / P\[0\]\[0\] of the right one, a point at X of its
-    /// optical frame is at R_leftᵀ (R_right X + (b, 0, 0)) of the left one's. Extrinsics place the left eye
-    /// ([`StereoOrigin::Left`]). The renderer is [`Renderer::FastRayTraced`] where an eye has a lens, else the default one; all
-    /// else is as by default.
+    /// Sizes, intrinsics and lenses are those of K and D, as in [`CameraInfo::apply_to`]. The pose of the right camera
+    /// follows from the rectification. The baseline is b = -P\[0\]\[3\] / P\[0\]\[0\] of the right camera. With R of
+    /// each camera, a point X of the right optical frame is at `R_leftᵀ (R_right X + (b, 0, 0))` in the left one.
+    ///
+    /// The extrinsics place the left camera ([`StereoOrigin::Left`]). The renderer is [`Renderer::FastRayTraced`] if a
+    /// camera has a lens other than a pinhole, else the default one. All other fields have their defaults.
     ///
     /// Source: ROS, message `sensor_msgs/CameraInfo`.
     ///
@@ -40,20 +42,24 @@ impl StereoCameraCfg {
     /// # projection_matrix: {{ rows: 3, cols: 4, data: [580.0, 0, 323.0, {tx}, 0, 580.0, 238.0, 0, 0, 0, 1, 0] }}
     /// # ");
     /// # let (left, right) = (eye("left", 324.1, 0.0), eye("right", 319.8, -34.8));
-    /// // Of files: `CameraInfo::read("left.yaml".as_ref())?`.
+    /// // From files: `CameraInfo::read("left.yaml".as_ref())?`.
     /// let [left, right] = [CameraInfo::parse(&left, "left.yaml")?, CameraInfo::parse(&right, "right.yaml")?];
     /// let mut cfg = StereoCameraCfg::of_infos(&left, &right)?;
     /// cfg.camera.update_period = 1.0 / 30.0;
-    /// // P of the right eye has -34.8 = -580 b.
+    /// // P of the right camera has -34.8 = -580 b.
     /// assert!((cfg.left_to_right_pos[0] - 0.06).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
     ///
-    /// [`CameraError::NotAPair`]: sizes that differ, R that is no rotation, P of the right eye whose fourth column does not say that
-    /// it is to the right of the left one, P of the left eye whose fourth column is not 0 (are they exchanged?), and focal lengths or
-    /// rows of principal points of both P that are not the same.
+    /// [`CameraError::NotAPair`] for
+    ///
+    /// - sizes that differ,
+    /// - R that is not a rotation,
+    /// - P of the right camera whose fourth column does not place it to the right of the left camera,
+    /// - P of the left camera whose fourth column is not 0 (maybe the files are swapped),
+    /// - focal lengths or vertical principal points of both P that differ.
     pub fn of_infos(left: &CameraInfo, right: &CameraInfo) -> Result<Self, CameraError> {
         if (left.width, left.height) != (right.width, right.height) {
             let size = |info: &CameraInfo| format!("{} x {}", info.width, info.height);
@@ -82,7 +88,7 @@ impl StereoCameraCfg {
     }
 }
 
-/// How far the right eye is to the right \[m\], by P of both.
+/// Returns the baseline \[m\], from P of both cameras.
 fn baseline(left: &Matrix3x4<f64>, right: &Matrix3x4<f64>) -> Result<f64, CameraError> {
     let wrong =
         |what, value: f64, expected: String| Err(CameraError::NotAPair { what, value: value.to_string(), expected });
@@ -119,12 +125,12 @@ fn baseline(left: &Matrix3x4<f64>, right: &Matrix3x4<f64>) -> Result<f64, Camera
     Ok(-right[(0, 3)] / focal)
 }
 
-/// The rotation that is nearest to a matrix.
+/// Returns the rotation nearest to a matrix.
 fn rotation(what: &'static str, matrix: &Matrix3<f64>) -> Result<UnitQuaternion<f64>, CameraError> {
     let off = (matrix * matrix.transpose() - Matrix3::identity()).amax();
     let nearest = matrix.svd(true, true);
     match (nearest.u, nearest.v_t) {
-        // The product of the outer factors, which is orthogonal.
+        // The product of the outer factors is orthogonal.
         (Some(u), Some(v_t)) if off <= ROTATION && matrix.determinant() > 0.0 => {
             Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * v_t)))
         }
@@ -137,18 +143,18 @@ fn rotation(what: &'static str, matrix: &Matrix3<f64>) -> Result<UnitQuaternion<
 }
 
 impl StereoCamera {
-    /// The calibrations of both eyes in environment `env`, left and right, called `name` and `/left` or `/right`: K and D of raw
-    /// pictures, and R and P of what [rectifies](Rectification) them, so that ROS's nodes read the pair as one that was
-    /// calibrated. [`StereoCameraCfg::of_infos`] makes the pair of them again. Of eyes that are parallel and side by side, with the
-    /// same fx, fy and cy, rectified pictures have the principal points and focal lengths of raw ones.
+    /// Returns the calibrations of both cameras in environment `env`, named `name` with `/left` or `/right` added: K
+    /// and D of raw images, and R and P of the [rectification](Rectification). ROS nodes read them as a calibrated
+    /// stereo pair. [`StereoCameraCfg::of_infos`] is the inverse. Rectified images keep the principal points and focal
+    /// lengths of raw images if the cameras are parallel and side by side, with the same fx, fy and cy.
     ///
-    /// P brings points of the rectified frame of the *left* eye into rectified pictures: that of the right eye is
-    /// `[fx, 0, cx, -fx b; 0, fy, cy, 0; 0, 0, 1, 0]` with the distance b of the eyes \[m\]. Source: ROS, message
+    /// P projects points of the rectified *left* frame to rectified images. For the right camera it is
+    /// `[fx, 0, cx, -fx b; 0, fy, cy, 0; 0, 0, 1, 0]` with the baseline b \[m\]. Source: ROS, message
     /// `sensor_msgs/CameraInfo`.
     ///
     /// # Errors
     ///
-    /// As [`Camera::camera_info`](crate::camera::Camera::camera_info), and [`CameraError::NotRectifiable`].
+    /// Same as [`Camera::camera_info`](crate::camera::Camera::camera_info), and [`CameraError::NotRectifiable`].
     pub fn camera_info(&self, name: &str, env: usize) -> Result<[CameraInfo; 2], SensorError> {
         let left = self.left().camera_info(&format!("{name}/left"), env)?;
         let right = self.right().camera_info(&format!("{name}/right"), env)?;

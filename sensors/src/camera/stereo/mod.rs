@@ -1,4 +1,4 @@
-//! Two cameras on one rig, and what only a pair can measure.
+//! Stereo cameras: two cameras on one rig, with disparity, rectification and ROS calibrations.
 
 mod cfg;
 mod disparity;

@@ -1,4 +1,4 @@
-//! How the pictures of a pair of eyes are turned so that both show a point in the same row.
+//! Stereo rectification.
 
 use super::disparity::ROUNDING;
 use super::sensor::StereoCamera;
@@ -9,48 +9,50 @@ use kinetoscope_render::{Intrinsics, PixelIntrinsics};
 use kinetoscope_scene::Pose;
 use nalgebra::{Matrix3, Matrix3x4, Unit, UnitQuaternion, Vector3};
 
-/// An optical axis is turned by this at most \[rad\], 80 degrees. Beyond it nothing of a usual picture is left: what was in its
-/// middle is 5.7 focal lengths aside.
+/// Largest rotation of an optical axis by the rectification \[rad\], 80 degrees. Beyond it, the image center is at
+/// least 5.7 focal lengths aside, outside any usual image.
 const MOST: f64 = 80.0 * std::f64::consts::PI / 180.0;
 
-/// How the pictures of a pair of eyes are turned so that both show a point in the same row: what ROS calls R and P.
+/// Stereo rectification: rotations and projections with which both images show a point in the same row. ROS calls them
+/// R and P.
 ///
-/// The eyes get common axes, x from the left eye to the right one. Then a point at (x, y, z) of the rectified frame of the left
-/// eye is at (u, v) = (f x / z + cx, f y / z + cy) of the left rectified picture, and f b / z farther left in the same row of the
-/// right one, where b is the distance of the eyes.
+/// Both cameras get common axes, with x from the left camera to the right one. A point (x, y, z) of the rectified left
+/// frame is at `(u, v) = (f x / z + cx, f y / z + cy)` in the rectified left image. In the rectified right image it is
+/// `f b / z` farther left in the same row, with the baseline b.
 ///
-/// Source: Bouguet's algorithm as OpenCV's `stereoRectify` has it: either eye turns by half of the angle between both, then both by the
-/// smallest angle that brings the line between them to x. Its way to choose f and the principal points is not taken over: they
-/// are free, and here
+/// Source: Bouguet's algorithm, as in OpenCV's `stereoRectify`. Each camera rotates by half of the angle between both,
+/// then both rotate by the smallest angle that aligns the baseline with x. The choice of f and the principal points is
+/// free, and differs from OpenCV:
 ///
-/// - f is the smaller fy of both eyes, along both axes of the picture,
-/// - (cx, cy) are common, so that points at infinity have no disparity, and such that what raw pictures have at their principal
-///   points stays where it is, on the mean of both eyes.
+/// - f is the smaller fy of both cameras, for both image axes.
+/// - (cx, cy) are common, so points at infinity have no disparity. They keep the content at the raw principal points in
+///   place, on the mean of both cameras.
 ///
-/// Lenses do not matter: of a raw picture, R takes over after its distortion is undone. Eyes that are parallel and side by side with the
-/// same fx, fy and cy are rectified as they are: nothing turns, and each keeps its fx, fy, cx and cy.
+/// Lenses have no influence: R applies after a raw image is undistorted. Cameras that are parallel and side by side
+/// with the same fx, fy and cy need no rotation. Each of them keeps its fx, fy, cx and cy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rectification {
-    /// R of the left and the right eye: from its optical frame to its rectified one.
+    /// R of the left and the right camera: from its optical frame to its rectified frame.
     pub rotations: [Matrix3<f64>; 2],
-    /// P of the left and the right eye \[pixels\]: from points of the rectified frame of the *left* one to the rectified pictures,
-    /// with the centre of the first pixel at (0.5, 0.5). In [`CameraInfo`](crate::camera::CameraInfo) it is at (0, 0).
+    /// P of the left and the right camera \[pixels\]: from points of the rectified *left* frame to the rectified
+    /// images, with the center of the first pixel at (0.5, 0.5). In [`CameraInfo`](crate::camera::CameraInfo) it is at
+    /// (0, 0).
     pub projections: [Matrix3x4<f64>; 2],
 }
 
 impl Rectification {
-    /// Of eyes that stand so to each other, with these intrinsics (left, right).
+    /// Computes the rectification of two cameras from their relative pose and their intrinsics (left, right).
     ///
     /// # Errors
     ///
-    /// [`CameraError::NotRectifiable`] where the right eye is not to the right of the left one, or an eye would turn by more than
-    /// 80 degrees; [`CameraError::Pose`] and [`CameraError::Optics`] for numbers that are none.
+    /// [`CameraError::NotRectifiable`] if the right camera is not to the right of the left one, or an optical axis
+    /// would rotate by more than 80 degrees; [`CameraError::Pose`] and [`CameraError::Optics`] for invalid numbers.
     pub fn of(left_from_right: &Pose, [left, right]: [PixelIntrinsics; 2]) -> Result<Self, CameraError> {
         left_from_right.to_poses()?;
         [left, right].into_iter().try_for_each(|pixels| Intrinsics::from(pixels).to_pixels(1, 1).map(|_| ()))?;
         let (between, angle) = (left_from_right.translation.vector, left_from_right.rotation.angle());
         let is_level = angle <= ROUNDING && between.yz().amax() <= ROUNDING * between.x;
-        // As pictures have them, in single precision.
+        // Compared in single precision, as images use it.
         let same = |of: fn(&PixelIntrinsics) -> f64| of(&left) as f32 == of(&right) as f32;
         if is_level && between.x > 0.0 && same(|k| k.fx) && same(|k| k.fy) && same(|k| k.cy) {
             let projections = [projection(&left, 0.0), projection(&right, between.x)];
@@ -64,7 +66,7 @@ impl Rectification {
         }
         let turn = to_x(&level);
         let rotations = [turn * half.inverse(), turn * half];
-        // Where the raw optical axes are then.
+        // Directions of the raw optical axes after the rotation.
         let axes = rotations.map(|rotation| rotation * Vector3::z());
         for (axis, what) in axes.iter().zip([
             "the angle by which the left eye turns to be rectified [rad]",
@@ -88,16 +90,16 @@ impl Rectification {
     }
 }
 
-/// P of an eye that is `beside` \[m\] to the right of the left one.
+/// Returns P of a camera that is `beside` \[m\] to the right of the left one.
 fn projection(pixels: &PixelIntrinsics, beside: f64) -> Matrix3x4<f64> {
     let mut projection = Matrix3x4::zeros();
     projection.fixed_columns_mut::<3>(0).copy_from(&pixels.matrix());
-    // Not a product with -1: that of the left eye is 0, not -0.
+    // Not a product with -1: P of the left camera is 0, not -0.
     projection[(0, 3)] = 0.0 - pixels.fx * beside;
     projection
 }
 
-/// The smallest rotation that brings a direction to the right to x. By a sine, which keeps its digits where the angle is small.
+/// Returns the smallest rotation that maps a direction to x. The sine keeps its digits for small angles.
 fn to_x(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
     let axis = direction.cross(&Vector3::x());
     let angle = axis.norm().atan2(direction.x);
@@ -106,11 +108,11 @@ fn to_x(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
 }
 
 impl StereoCamera {
-    /// How pictures of environment `env` are rectified.
+    /// Returns the rectification of the images of environment `env`.
     ///
     /// # Errors
     ///
-    /// An environment that the eyes do not see, and [`CameraError::NotRectifiable`].
+    /// An environment that the cameras do not see, and [`CameraError::NotRectifiable`].
     pub fn rectification(&self, env: usize) -> Result<Rectification, SensorError> {
         let row = self.left().row(env)?;
         let pixels = [self.left(), self.right()].map(|eye| eye.viewpoints.row(row).pixels);

@@ -1,4 +1,4 @@
-//! Two cameras that move, measure and are late together.
+//! Stereo camera sensor.
 
 use super::cfg::Rig;
 use super::disparity::DisparityMap;
@@ -15,12 +15,12 @@ use kinetoscope_scene::{Marker, Pose, SceneState};
 use ndarray::Array2;
 use std::fmt;
 
-/// A pair of eyes in each of several environments: two [`Camera`]s on one rig.
+/// A stereo camera in each of several environments: two [`Camera`]s on one rig.
 ///
-/// Each eye is a camera with everything a camera has: channels of the same names, types and shapes, drawn when somebody
-/// reads them, of the instant that [`Camera::stamps`] tells. `stereo.left().depth()?` is the left eye's depth,
-/// `stereo.right().color()?` the right eye's colour, [`disparity`](Self::disparity) what both tell together. Eyes are moved
-/// by their rig only.
+/// Each is a complete camera, with channels of the same names, types and shapes. Images are rendered on read and show
+/// the instant of [`Camera::stamps`]. `stereo.left().depth()?` is the depth of the left camera,
+/// `stereo.right().color()?` the color of the right camera, and [`disparity`](Self::disparity) combines both. The
+/// cameras are placed by their rig only.
 pub struct StereoCamera {
     left: Camera,
     right: Camera,
@@ -33,33 +33,33 @@ impl StereoCamera {
         Self { left, right, rig, disparities: Cached::outdated(DisparityMap::default()) }
     }
 
-    /// The left eye.
+    /// The left camera.
     pub fn left(&self) -> &Camera {
         &self.left
     }
 
-    /// The right eye.
+    /// The right camera.
     pub fn right(&self) -> &Camera {
         &self.right
     }
 
-    /// The optical frame of the right eye in that of the left one.
+    /// Pose of the right optical frame in the left optical frame.
     pub fn left_from_right(&self) -> Pose {
         self.rig.left_from_right
     }
 
     /// Poses of the rig's [origin](super::StereoOrigin) in the environment at the captured instant, as
-    /// [`Camera::pose_w`]. Those of the eyes are `left().pose_w(..)` and `right().pose_w(..)`.
+    /// [`Camera::pose_w`]. The poses of the cameras are `left().pose_w(..)` and `right().pose_w(..)`.
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         self.origins(&self.left.pose_w(CameraConvention::Ros), convention)
     }
 
-    /// Where origins are, given where left eyes are.
+    /// Returns the poses of the origins from poses of the left cameras.
     fn origins(&self, left: &Array2<f64>, convention: CameraConvention) -> Array2<f64> {
         let left_from_origin = self.rig.origin_from_left.inverse();
         let rows = left.rows().into_iter().map(|row| {
             let pose: [f64; 7] = std::array::from_fn(|k| row[k]);
-            // No pose yet is no pose here either.
+            // NaN marks an unknown pose.
             if pose.iter().any(|x| x.is_nan()) {
                 return [f64::NAN; 7];
             }
@@ -68,12 +68,12 @@ impl StereoCamera {
         Array2::from(rows.collect::<Vec<[f64; 7]>>())
     }
 
-    /// Sets different intrinsics of left and right eyes: otherwise as
+    /// Sets different intrinsics for the left and the right camera, with arguments as in
     /// [`CameraPlacement::set_intrinsics`].
     ///
     /// # Errors
     ///
-    /// [`SensorError::Eye`] with those of [`CameraPlacement::set_intrinsics`]; nothing is changed then.
+    /// [`SensorError::Eye`] with the errors of [`CameraPlacement::set_intrinsics`]. Nothing is changed then.
     pub fn set_eye_intrinsics(
         &mut self,
         left: &[Intrinsics],
@@ -86,7 +86,7 @@ impl StereoCamera {
         })
     }
 
-    /// Changes both eyes, or none.
+    /// Changes both cameras; an error restores both.
     fn both(
         &mut self,
         change: impl FnOnce(&mut Camera, &mut Camera) -> Result<(), SensorError>,
@@ -97,7 +97,7 @@ impl StereoCamera {
         if result.is_err() {
             [self.left.viewpoints, self.right.viewpoints] = before;
         } else {
-            // What was held for the case of failure is not needed any more.
+            // The copies for the error case are not needed any more.
             drop(before);
             self.left.viewpoints.free_unused_rays();
             self.right.viewpoints.free_unused_rays();
@@ -106,13 +106,13 @@ impl StereoCamera {
         result
     }
 
-    /// What was computed may be of other pictures than those shown.
+    /// Marks the disparities as outdated, because other images may be shown.
     fn outdate(&mut self) {
         self.disparities.invalidate();
     }
 }
 
-/// Places rigs by their origins: both eyes move, or none.
+/// Places the rig by its origin. An error changes neither camera.
 impl PlaceRows for StereoCamera {
     fn env_rows(&self) -> &EnvRows {
         self.left.env_rows()
@@ -169,7 +169,7 @@ impl Sensor for StereoCamera {
         self.left.due_in(step).min(self.right.due_in(step))
     }
 
-    /// Those of both eyes.
+    /// Markers of both cameras.
     fn markers(&self, env: usize, pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let mut markers = self.left.markers(env, pose);
         markers.extend(self.right.markers(env, pose));
@@ -177,7 +177,7 @@ impl Sensor for StereoCamera {
     }
 }
 
-/// Short, as that of a camera.
+/// Short, as for a camera.
 impl fmt::Debug for StereoCamera {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("StereoCamera")

@@ -1,4 +1,4 @@
-//! Boxes around things and occlusions, against brute force over images of each thing alone and against closed forms.
+//! Bounding boxes and occlusions, against brute force over images of each object alone, and against closed forms.
 
 use super::super::{
     Box2d, Camera, CameraCfg, CameraError, Extrinsics, Occlusion, PixelBox, Placement, SegmentLevel, Segmentation,
@@ -23,7 +23,7 @@ const SIZE: [usize; 2] = [96, 72];
 const LEVELS: [SegmentLevel; 3] = [SegmentLevel::Instance, SegmentLevel::Link, SegmentLevel::Semantic];
 const DT: f64 = 0.01;
 
-/// A camera of masks and positions in a scene, after so many steps; poses by step.
+/// A camera with masks and positions in a scene after `step` steps; `poses` gives poses by step.
 fn seen_by(cfg: &CameraCfg, scene: &RenderScene, poses: &dyn Fn(u64) -> Vec<PoseF32>, steps: u64) -> Camera {
     let mut camera = cfg.build(&context(scene)).unwrap();
     let state = |step: u64| {
@@ -41,7 +41,7 @@ fn context(scene: &RenderScene) -> SensorContext {
     SensorContext { num_envs: 1, dt: DT, scene: Some(Arc::new(scene.clone())), threads: 1, ..SensorContext::default() }
 }
 
-/// A camera at `eye` that looks at `target`, meshes as they are.
+/// A camera at `eye` that looks at `target`, without level of detail.
 fn cfg(eye: [f64; 3], target: [f64; 3]) -> CameraCfg {
     let placement = Placement::LookAt { eye, target, up: [0.0, 0.0, 1.0] };
     CameraCfg {
@@ -62,7 +62,7 @@ fn ahead() -> CameraCfg {
     cfg([0.0; 3], [1.0, 0.0, 0.0])
 }
 
-/// The same camera behind a lens under which pixels are as many radians from the axis as they are focal lengths: by rays.
+/// The same camera with an equidistant lens, where an angle of 1 rad is a focal length; needs a ray tracer.
 fn behind_a_lens(cfg: CameraCfg) -> CameraCfg {
     CameraCfg { lens: Lens::from_name("equidistant").unwrap(), renderer: Renderer::FastRayTraced, ..cfg }
 }
@@ -71,14 +71,14 @@ fn seen(cfg: &CameraCfg, (scene, poses): &(RenderScene, Vec<PoseF32>)) -> Camera
     seen_by(cfg, scene, &|_| poses.clone(), 0)
 }
 
-/// Things of a scene with these mask ids, and their poses.
+/// The instances of a scene with these mask ids, and their poses.
 fn only((scene, poses): &(RenderScene, Vec<PoseF32>), is: impl Fn(i32) -> bool) -> (RenderScene, Vec<PoseF32>) {
     let all = scene.instances().iter().cloned().zip(poses.iter().copied());
     let (instances, poses) = all.filter(|(instance, _)| is(instance.mask_id)).unzip();
     (RenderScene::new(instances).unwrap(), poses)
 }
 
-/// Everything is an object of its own; those of even mask ids are of one class.
+/// A segmentation in which every instance is an object; objects with even mask ids share a class.
 fn table(scene: &RenderScene) -> Segmentation {
     let ids: std::collections::BTreeSet<i32> = scene.instances().iter().map(|instance| instance.mask_id).collect();
     let class = |id| if id % 2 == 0 { "even" } else { "odd" }.into();
@@ -86,7 +86,7 @@ fn table(scene: &RenderScene) -> Segmentation {
     Segmentation::new(ids.into_iter().map(thing), &SegmentationCfg::default()).unwrap()
 }
 
-/// The smallest rectangle around pixels of a mask, and their number.
+/// The bounding rectangle of pixels of a mask, and their number.
 fn around(mask: &[i32], width: usize, is: impl Fn(i32) -> bool) -> Option<(PixelBox, usize)> {
     let (mut min, mut max, mut count) = ([usize::MAX; 2], [0; 2], 0);
     for (v, row) in mask.chunks(width).enumerate() {
@@ -98,14 +98,15 @@ fn around(mask: &[i32], width: usize, is: impl Fn(i32) -> bool) -> Option<(Pixel
     (count > 0).then(|| (PixelBox { min: min.map(|x| x as f64), max: max.map(|x| x as f64) }, count))
 }
 
-/// [`around`] pixels of the mask of a camera.
+/// Applies [`around`] to the mask of a camera.
 fn around_in(camera: &Camera, is: impl Fn(i32) -> bool) -> Option<(PixelBox, usize)> {
     let mask = camera.mask().unwrap();
     around(mask.as_slice().unwrap(), mask.dim().2, is)
 }
 
-/// All three levels: boxes and occlusions are those of the mask, and of images that hold nothing else. Those of a pinhole are
-/// drawn by another rasterizer, and loose boxes hold an image that is eight times as fine; of a lens they are the same camera's.
+/// On all three levels, boxes and occlusions equal those of the mask and of images with single segments. For a pinhole,
+/// these images are rendered by another rasterizer, and loose boxes contain an image eight times as fine. For a lens,
+/// they are rendered by the same camera.
 #[test]
 fn brute_force() {
     let (mut tights, mut looses, mut hidden, mut clipped) = ([0; 2], [0; 2], [0; 2], 0);
@@ -117,7 +118,7 @@ fn brute_force() {
         let scene = random(&mut Random(seed), 1.0);
         let camera = seen(&cfg, &scene);
         let (segmentation, kind) = (table(&scene.0), usize::from(lens));
-        // Of the images of things alone, also eight times as fine. Those of an instance are those of a link.
+        // From images of single segments, also eight times as fine. Segments of instances equal those of links here.
         let mut images = BTreeMap::new();
         for level in LEVELS {
             let boxes = segmentation.boxes_2d(level, &camera, 0).unwrap();
@@ -156,7 +157,7 @@ fn brute_force() {
                     looses[kind] += usize::from(loose.is_some());
                     continue;
                 }
-                // Pixels are hit at their centres, and vertices snapped to 1/256 pixel.
+                // Pixels are hit at their centers, and vertices snap to 1/256 pixel.
                 let Some((fine, _)) = fine else { continue };
                 let (loose, slack) = (loose.unwrap(), (0.5 + 1.0 / 128.0) / 8.0);
                 looses[kind] += 1;
@@ -169,7 +170,7 @@ fn brute_force() {
             }
         }
     }
-    // That loose boxes are no larger than they must be is shown by the closed forms of outlines.
+    // The closed forms of outlines show that loose boxes are as small as possible.
     assert!(tights[0] > 150 && looses[0] > 150 && hidden[0] > 20 && clipped > 6, "{tights:?} {looses:?} {hidden:?}");
     assert!(looses[1] > 60 && hidden[1] > 10, "{looses:?} {hidden:?}");
 }
@@ -182,8 +183,8 @@ fn ball(radius: f32, pose: PoseF32) -> (Shape, Material, PoseF32) {
     (Sphere { radius }.into(), Material::default(), pose)
 }
 
-/// A wall of 2 by 2 m before the camera, 3.9 m away, and a screen in front of its half y < 0: the edge is at u = cx, between two
-/// pixels, so that exactly half of the wall's pixels are hidden.
+/// A wall of 2 by 2 m, 3.9 m in front of the camera, and a screen in front of its half y < 0. The edge is at u = cx,
+/// between two pixels, so exactly half of the wall's pixels are hidden.
 #[test]
 fn half_hidden_wall() {
     let scene = things([block([0.1, 1.0, 1.0], [4.0, 0.0, 0.0]), block([0.1, 2.0, 2.0], [2.0, -2.0, 0.0])]);
@@ -193,7 +194,7 @@ fn half_hidden_wall() {
     assert_eq!((screen.id, screen.ratio()), (2, 0.0), "parts that the image cuts off are not hidden");
     let boxes = segmentation.boxes_2d(SegmentLevel::Instance, &camera, 0).unwrap();
     let Box2d { tight: Some(tight), loose: Some(loose), .. } = boxes[0] else { panic!("{:?}", boxes[0]) };
-    // y points left; the wall's front is 3.9 m away.
+    // y points left; the front of the wall is 3.9 m away.
     let (u, v) = (80.0 / 3.9, 84.0 / 3.9);
     assert_box(loose, [48.0 - u, 36.0 - v, 48.0 + u, 36.0 + v], 1e-4);
     assert_eq!((tight.min, tight.max), ([(48.0 - u).round(), (36.0 - v).round()], [48.0, (36.0 + v).round()]));
@@ -206,11 +207,11 @@ fn assert_box(found: PixelBox, expected: [f64; 4], tolerance: f64) {
     assert!(edges.iter().zip(expected).all(|(a, b)| (a - b).abs() < tolerance), "{found:?}, {expected:?}");
 }
 
-/// A ball on the axis of a lens, 2 m away, and one 20 degrees to the left, with screens before the right half of each: the lens
-/// shows a ball of radius r at distance d as wide as the cone around it, 2 f asin(r / d).
+/// A ball on the axis of a lens, 2 m away, and a ball 20 degrees to the left. A screen is in front of the right half of
+/// each ball. The lens shows a ball of radius r at distance d as wide as the cone around it, 2 f asin(r / d).
 #[test]
 fn lens_cones() {
-    // y points left. A screen from the axis to the right, and the same turned with the second ball.
+    // y points left. One screen reaches from the axis to the right; the other is rotated with the second ball.
     let aside = -20f64.to_radians();
     let turned = |angle: f64, place: [f64; 3]| {
         let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -angle);
@@ -225,8 +226,8 @@ fn lens_cones() {
     let cone = (0.3f64 / 2.0).asin();
     for (found, middle) in boxes.iter().zip([0.0, aside]) {
         let Box2d { tight: Some(tight), loose: Some(loose), visible_pixels, .. } = *found else { panic!("{found:?}") };
-        // Edges are those of whole pixels: of those whose middle is inside, in the rows whose middle is half a pixel from the
-        // axis, where the cone is narrower by (1/2)²/(2 f sin(cone)) pixels, 0.01.
+        // Edges are those of whole pixels whose center is inside. In the rows next to the axis, whose center is half a
+        // pixel from it, the cone is narrower by (1/2)²/(2 f sin(cone)) pixels, 0.01.
         let edges = [48.0 + 80.0 * (middle - cone), 48.0 + 80.0 * (middle + cone)];
         assert_box(loose, [edges[0], loose.min[1], edges[1], loose.max[1]], 0.52);
         assert!((tight.max[0] - (48.0 + 80.0 * middle)).abs() < 0.52, "{tight:?}");
@@ -239,7 +240,8 @@ fn lens_cones() {
     }
 }
 
-/// Two cubes of one class, the second wholly beside the image and higher: the class ends where the first cube does.
+/// Two cubes of one class; the second cube is higher and outside the image. The box of the class ends where the first
+/// cube does.
 #[test]
 fn class_beside_image() {
     let (scene, poses) = things([[2.0, -0.2, -0.4], [2.0, 9.0, 0.5]].map(|place| block([0.1; 3], place)));
@@ -272,7 +274,7 @@ fn without_box() {
     let error = segmentation.boxes_2d(SegmentLevel::Link, &blind, 0).unwrap_err().to_string();
     assert_eq!(error, "the camera does not measure mask; it measures color");
     assert!(segmentation.boxes_3d(SegmentLevel::Link, &blind, 3).is_err());
-    // Before a capture, and without a pose.
+    // Errors before a capture, and for a pose that is not finite.
     let scene = things([ball(0.2, at(0.0, f32::NAN, 0.0))]);
     let boxes = |camera: &Camera| table(&scene.0).boxes_3d(SegmentLevel::Link, camera, 0).unwrap_err();
     let early = super::stage::cfg().build(&context(&scene.0)).unwrap();
@@ -280,8 +282,8 @@ fn without_box() {
     assert_eq!(boxes(&seen(&ahead(), &scene)), CameraError::ThingPose { env: 0, id: 1 }.into());
 }
 
-/// A link of an ellipsoid and a capsule that stand askew in it: half lengths along the link's axes are those of the shapes,
-/// sqrt(sum of (R a)²) and r + h |R z|.
+/// A link with a rotated ellipsoid and a rotated capsule. Their half lengths along the axes of the link are sqrt(sum of
+/// (R a)²) and r + h |R z|.
 #[test]
 fn solid_boxes() {
     let link_from =
@@ -311,13 +313,13 @@ fn solid_boxes() {
         for axis in 0..3 {
             let side = |sign: f64| [0, 1].map(|k| link_from[k].translation.vector[axis] + sign * reach(k, axis));
             let ([a, b], [c, d]) = (side(-1.0), side(1.0));
-            // Poses are in single precision: some 1e-7 m, and as many rad.
+            // Poses have single precision: some 1e-7 m, and as many rad.
             assert!(
                 (found.min[axis] - a.min(b)).abs() < 2e-6 && (found.max[axis] - c.max(d)).abs() < 2e-6,
                 "{found:?}"
             );
         }
-        // Corners: the box, mapped.
+        // The corners are those of the box, transformed.
         let corners = found.corners().map(Point3::from);
         for (k, corner) in corners.iter().enumerate() {
             let local = [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { found.max[axis] } else { found.min[axis] });
@@ -328,7 +330,7 @@ fn solid_boxes() {
         assert!((across - Vector3::from(found.size()).norm()).abs() < 4e-6, "{across}");
         let middle = nalgebra::center(&corners[0], &corners[7]);
         assert!((Point3::from(found.center()) - middle).norm() < 1e-12);
-        // All visible points of the link are in it.
+        // The box contains all visible points of the link.
         let mask = camera.mask().unwrap();
         let shown: Vec<_> = mask.indexed_iter().filter(|(_, id)| **id == 7).map(|(at, _)| at).collect();
         for &(row, v, u) in &shown {
@@ -339,8 +341,8 @@ fn solid_boxes() {
     }
 }
 
-/// Every shape: fine triangles of it touch all six sides of its box from inside, to the gap of their polygons, R (1 -
-/// cos(pi / 256)) < 4e-5 m.
+/// A fine tessellation of every shape touches all six sides of its box from inside. The gap of its polygons is
+/// `R (1 - cos(pi / 256))` < 4e-5 m.
 #[test]
 fn tight_solids() {
     for (k, shape) in every_shape().into_iter().enumerate() {
@@ -359,10 +361,12 @@ fn tight_solids() {
     }
 }
 
-/// A bar, a ball, a screen that stands still, and a bar that leaves the image while it is read, by step; the image's right is -y.
+/// A moving bar, a moving ball, a fixed screen, and a bar that leaves the image during readout, by step. The right of
+/// the image is -y.
 ///
-/// Root cause: the mask was drawn row by row, each at its own instant, and the images of each thing alone as of the stamp. So more
-/// of a thing was seen than there was of it, and things that had left the image by then were not in the list.
+/// Root cause: the mask was rendered row by row, each at its own instant, but the images of single segments at the
+/// stamp. More pixels were visible than the segment had alone, and segments that had left the image by then were
+/// missing.
 #[test]
 fn rolling_shutter() {
     const STEPS: u64 = 10;
@@ -405,7 +409,7 @@ fn rolling_shutter() {
     }
     let ratios: Vec<f64> = occlusions.iter().map(Occlusion::ratio).collect();
     assert!([0, 1, 3].iter().all(|k| ratios[*k] > 0.1) && ratios[2] == 0.0, "{ratios:?}");
-    // The controls: at the stamp things are elsewhere, and one of them has left the image.
+    // Controls: at the stamp, segments are elsewhere, and one of them has left the image.
     let instant = image(&|_| true, Shutter::default());
     let then = segmentation.boxes_2d(SegmentLevel::Instance, &instant, 0).unwrap();
     assert_eq!(then.iter().map(|found| found.id).collect::<Vec<_>>(), [1, 2, 3]);

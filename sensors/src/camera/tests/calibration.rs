@@ -1,4 +1,4 @@
-//! Calibration files: real ones of each model, all the ways in which they are written, and errors of broken ones.
+//! Calibration files: real files of each model, all supported notations, and errors of broken files.
 
 use super::super::{CalibrationError, CameraCfg, CameraInfo, DistortionModel};
 use super::stage::{built, cfg, context, point, pose_of};
@@ -10,7 +10,7 @@ use kinetoscope_render::{Intrinsics, PixelIntrinsics, Renderer};
 use kinetoscope_testkit::opencv::opencv;
 use kinetoscope_testkit::urdf::Files;
 
-/// As `cameracalibrator` writes it, with what some drivers add.
+/// As `cameracalibrator` writes it, with additions of some drivers.
 const FILE: &str = "\
 # oST version 5.0 parameters
 image_width: 64
@@ -42,15 +42,15 @@ projection_matrix:
 binning_x: 0
 ";
 
-/// The camera of a calibration.
+/// The simulated camera of a calibration.
 fn twin(info: &CameraInfo, renderer: Renderer) -> CameraCfg {
     let mut twin = CameraCfg { renderer, ..cfg() };
     info.apply_to(&mut twin);
     twin
 }
 
-/// OpenCV and ROS count pixels from the centre of the first one: the camera sees in pixel (i, j) the point that the model of
-/// OpenCV's documentation brings to (i, j) with the numbers of the file, not one that is half a pixel beside it.
+/// OpenCV and ROS count pixels from the center of the first pixel. The camera sees in pixel (i, j) the point that
+/// OpenCV's documented model projects to (i, j) with the numbers of the file. There is no offset of half a pixel.
 #[test]
 fn real_file() {
     let info = CameraInfo::parse(FILE, "left.yaml").unwrap();
@@ -73,23 +73,23 @@ fn real_file() {
         let x2 = x * radial + 2.0 * d[2] * x * y + d[3] * (r2 + 2.0 * x * x);
         let y2 = y * radial + d[2] * (r2 + 2.0 * y * y) + 2.0 * d[3] * x * y;
         let off = [k[(0, 0)] * x2 + k[(0, 2)] - column as f64, k[(1, 1)] * y2 + k[(1, 2)] - row as f64];
-        // Points and rays have 24 bits, of an image of 64 pixels: some 1e-5 of a pixel.
+        // Points and rays have 24 bits, for an image of 64 pixels: some 1e-5 of a pixel.
         assert!(off.iter().all(|off| off.abs() < 1e-4), "({column}, {row}): {off:?}");
     }
     assert!(seen > 1000, "{seen}");
-    // The camera has the same calibration, to the rounding of half a pixel there and back.
+    // The camera has the same calibration, up to the rounding of half a pixel there and back.
     let own = camera.camera_info("twin", 0).unwrap();
     assert_eq!(own.distortion_model, info.distortion_model);
     assert_eq!(own.distortion_coefficients, info.distortion_coefficients);
     assert!((own.camera_matrix - info.camera_matrix).amax() < 1e-14);
-    // A centred camera of 640 x 480 pixels.
+    // A centered camera of 640 x 480 pixels.
     let pixels = PixelIntrinsics { fx: 600.0, fy: 600.0, cx: 320.0, cy: 240.0 };
     let centred = CameraInfo::of("", [640, 480], &pixels, &Lens::default()).unwrap();
     assert_eq!([centred.camera_matrix[(0, 2)], centred.camera_matrix[(1, 2)]], [319.5, 239.5]);
     assert_eq!([centred.projection_matrix[(0, 2)], centred.projection_matrix[(1, 2)]], [319.5, 239.5]);
 }
 
-/// A camera of each model and its numbers of OpenCV, to the last digits that OpenCV's iterations give.
+/// A camera of each model with reference numbers of OpenCV, up to the accuracy of OpenCV's iterations.
 #[test]
 fn opencv_numbers() {
     macro_rules! camera {
@@ -110,7 +110,7 @@ fn opencv_numbers() {
         let undistorted: Vec<[f64; 4]> = opencv(&format!("{file} undistorted")).collect();
         for &[u, v, x, y] in &undistorted {
             let [a, b, c] = optics.unproject([u + 0.5, v + 0.5]).unwrap();
-            // OpenCV's own way back is 3e-12 pixels off or less, which the slope makes ten times as much at 77 degrees.
+            // OpenCV's own inverse is off by at most 3e-12 pixels, which the slope multiplies by ten at 77 degrees.
             assert!((a / c - x).hypot(b / c - y) < 1e-13 * (1.0 + x * x + y * y), "{file} ({u}, {v}): {a} {b} {c}");
             let [back_u, back_v] = optics.project([x, y, 1.0]).unwrap();
             assert!((back_u - 0.5 - u).hypot(back_v - 0.5 - v) < 1e-11, "{file} ({u}, {v}): {back_u} {back_v}");
@@ -122,12 +122,12 @@ fn opencv_numbers() {
             projected += 1;
         }
         assert!(undistorted.len() == 9 && projected >= 3, "{file}: {projected}");
-        // Controls: half a pixel beside, and without the lens.
+        // Controls: half a pixel aside, and without the lens.
         let [u, v, x, _] = undistorted[0];
         let [a, _, c] = optics.unproject([u, v]).unwrap();
         assert!((a / c - x).abs() > 5e-4, "{file}");
         assert!(((u + 0.5 - pixels.cx) / pixels.fx - x).abs() > 5e-4, "{file}");
-        // The whole image is seen.
+        // The whole image is visible.
         let rays = LensRays::new(&optics, [info.width, info.height], 1).unwrap();
         assert_ne!(rays.direction(0, [info.width - 1, info.height - 1]), [0.0; 3], "{file}");
     }
@@ -136,7 +136,7 @@ fn opencv_numbers() {
 #[test]
 fn round_trip() {
     let mut info = CameraInfo::parse(FILE, "left.yaml").unwrap();
-    // Numbers of all sizes, and a name that needs quotes.
+    // Numbers of all magnitudes, and a name that needs quotes.
     info.camera_matrix[(0, 2)] = 1.0 / 3.0;
     info.distortion_coefficients = vec![1e-7, -2.5e-300, 1e16, 123_456.789, -0.0];
     info.name = "7: \"wrist\" \\ \u{7} é # no".into();
@@ -169,8 +169,8 @@ fn round_trip() {
     assert!(matches!(&error, CalibrationError::File { path: p, .. } if *p == path), "{error}");
 }
 
-/// Root cause: `max_angle`, beyond which pixels are dark, was taken for a part of the mapping, which K and D describe in full. So
-/// the repair that errors of folding lenses advise took the camera's calibration away.
+/// Root cause: `max_angle`, beyond which pixels are dark, was treated as a part of the mapping, which K and D describe
+/// completely. So the fix that errors of folding lenses suggest made the calibration unavailable.
 #[test]
 fn short_lenses() {
     let pixels = PixelIntrinsics { fx: 300.0, fy: 301.0, cx: 320.0, cy: 240.0 };
@@ -181,11 +181,11 @@ fn short_lenses() {
         (Lens::from(OpenCv { max_angle: Some(0.5), ..barrel }), barrel.into()),
         (OpenCv { max_angle: Some(0.5), ..OpenCv::default() }.into(), Lens::default()),
         (OpenCvFisheye { max_angle: Some(1.4), ..fisheye }.into(), fisheye.into()),
-        // r = theta: four zeros, wherever it ends.
+        // r = theta gives four zeros for any `max_angle`.
         (Equidistant { max_angle: 1.2 }.into(), OpenCvFisheye::default().into()),
     ] {
         assert_eq!(of(short).unwrap(), of(long).unwrap());
-        // Points that both see are seen in the same place.
+        // Points visible through both lenses project to the same pixel.
         let [short, long] = [short, of(short).unwrap().lens()].map(|lens| Optics::new(lens, pixels).unwrap());
         for direction in [[0.0, 0.0, 1.0], [0.3, -0.1, 1.0], [-0.1, 0.4, 0.9]] {
             let [a, b] = [short, long].map(|optics| optics.project(direction).unwrap());
@@ -194,11 +194,11 @@ fn short_lenses() {
     }
     let info = of(Equidistant::default().into()).unwrap();
     assert_eq!((info.distortion_model, info.distortion_coefficients), (DistortionModel::Equidistant, vec![0.0; 4]));
-    // The camera's own calibration.
+    // The calibration of the camera itself.
     let lens = OpenCv { k1: -0.9, max_angle: Some(0.4), ..OpenCv::default() }.into();
     let camera = built(&CameraCfg { renderer: Renderer::FastRayTraced, lens, ..cfg() }, &context(1));
     assert_eq!(camera.camera_info("dark", 0).unwrap().distortion_coefficients, [-0.9, 0.0, 0.0, 0.0, 0.0]);
-    // Lenses that ROS has no model for stay refused.
+    // Lenses without a ROS model stay rejected.
     let lenses: [Lens; 5] = [
         Stereographic::default().into(),
         Equisolid::default().into(),
@@ -212,15 +212,15 @@ fn short_lenses() {
     }
 }
 
-/// Root cause: the default renderer refuses lenses, and `apply_to` left it, so that the twin of every distorted camera began with
-/// an error.
+/// Root cause: the default renderer rejects lenses other than a pinhole, and `apply_to` kept it. The simulated camera
+/// of every distorted calibration started with an error.
 #[test]
 fn renderer_of_twins() {
     let info = CameraInfo::parse(FILE, "left.yaml").unwrap();
     let plain = twin(&info, Renderer::default());
     assert_eq!((Renderer::default(), plain.renderer), (Renderer::Raster, Renderer::FastRayTraced));
     assert!(built(&plain, &context(1)).depth().unwrap().iter().any(|depth| depth.is_finite()));
-    // Any other follows rays already, and lenses that bend nothing are for all.
+    // Other renderers trace rays already, and lenses without distortion work with all renderers.
     for renderer in [Renderer::FastRayTraced, Renderer::Hybrid, Renderer::RAY_TRACED] {
         assert_eq!(twin(&info, renderer).renderer, renderer);
     }
@@ -228,7 +228,7 @@ fn renderer_of_twins() {
     assert_eq!(twin(&straight, Renderer::Raster).renderer, Renderer::Raster);
 }
 
-/// A file without its end, where the distortion and additions of some files stand.
+/// A file without its end, which contains the distortion and, in some files, additions.
 const HEAD: &str = "\
 image_width: 640
 image_height: 480
@@ -242,7 +242,7 @@ fn parse(end: &str) -> Result<CameraInfo, CalibrationError> {
     CameraInfo::parse(&format!("{HEAD}{end}"), "wrist.yaml")
 }
 
-/// A file with a model, if it is named, and so many numbers: 0.01, 0.02, ..., and zeros from the thirteenth on.
+/// A file with an optional model and `count` coefficients: 0.01, 0.02, ..., and zeros from the thirteenth on.
 fn distortion(model: Option<&str>, count: usize) -> Result<CameraInfo, CalibrationError> {
     let numbers = (1..=count).map(|k| if k > 12 { "0".into() } else { format!("0.{k:02}") });
     let numbers = numbers.collect::<Vec<_>>().join(", ");
@@ -250,13 +250,13 @@ fn distortion(model: Option<&str>, count: usize) -> Result<CameraInfo, Calibrati
     parse(&format!("{model}distortion_coefficients: {{ rows: 1, cols: {count}, data: [{numbers}] }}\n"))
 }
 
-/// The lens of [`distortion`].
+/// The lens of [`distortion`] with `count` coefficients.
 fn first(count: usize) -> Lens {
     let numbers: Vec<f64> = (1..=count.min(12)).map(|k| format!("0.{k:02}").parse().unwrap()).collect();
     OpenCv::from_coefficients(&numbers).into()
 }
 
-/// Every mistake is named with file, line and field.
+/// Every mistake is reported with file, line and field.
 #[test]
 fn refusals() {
     for (from, to, expected) in [
@@ -302,7 +302,7 @@ fn refusals() {
         let tilt = "wrist.yaml:8: distortion_coefficients tilts the sensor (tau_x = 0.1, tau_y = 0)";
         assert!(error.contains(tilt) && error.contains("tilted sensors are not supported"), "{error}");
     }
-    // Lenses that are no distortion of ROS's.
+    // Lenses without a ROS distortion model.
     for name in ["panorama", "stereographic", "ftheta", "fish_eye", "pinhole"] {
         let error = distortion(Some(name), 4).unwrap_err();
         assert!(matches!(&error, CalibrationError::Model { line: 7, model, .. } if model == name), "{error}");
@@ -314,14 +314,15 @@ fn refusals() {
     assert!(error("a: 1\n---\nb: 2\n").contains("second document"));
 }
 
-/// Root cause: each model had a few counts of its own, and a file without the model was an error. OpenCV takes 4, 5, 8, 12 or 14
-/// numbers for the same lens, and ROS hands them to it; for a file without a model it assumes plumb_bob (image_common,
-/// `parse_yml.cpp`). Other tools have other names; ROS's `equidistant` is OpenCV's fisheye, not the lens of that name.
+/// Root cause: each model accepted only a few coefficient counts, and a file without a model was an error. OpenCV takes
+/// 4, 5, 8, 12 or 14 numbers for the same lens, and ROS passes them on; for a file without a model, ROS assumes
+/// plumb_bob (image_common, `parse_yml.cpp`). Other tools use other names; `equidistant` of ROS is OpenCV's fisheye,
+/// not the lens of that name.
 #[test]
 fn models() {
     let (plumb_bob, rational) = (DistortionModel::PlumbBob, DistortionModel::RationalPolynomial);
     for count in [4, 5, 8, 12, 14] {
-        // ROS's own nodes write the rational model for more than 5.
+        // ROS nodes write the rational model for more than 5 coefficients.
         let by_count = if count > 5 { rational } else { plumb_bob };
         for (model, expected) in [
             (Some("plumb_bob"), plumb_bob),
@@ -335,7 +336,7 @@ fn models() {
             assert_eq!(CameraInfo::parse(&info.to_yaml(), "again").unwrap(), info);
         }
     }
-    // ROS's writer has an empty D for a camera without distortion.
+    // The ROS writer leaves D empty for a camera without distortion.
     for model in ["distortion_model: plumb_bob\n", "distortion_model: \"\"\n", "distortion_model:\n", ""] {
         let info = parse(&format!("{model}distortion_coefficients:\n  rows: 1\n  cols: 0\n  data: []\n")).unwrap();
         assert!(info.lens().is_pinhole() && info.distortion_model == plumb_bob, "{model:?}");
@@ -351,14 +352,14 @@ fn models() {
     for name in ["equidistant", "fisheye", "kannala_brandt", "kannala_brandt4", "opencv_fisheye"] {
         let info = distortion(Some(name), 4).unwrap();
         assert_eq!((info.distortion_model, info.lens()), (DistortionModel::Equidistant, fisheye.into()), "{name}");
-        // They are lenses of scene files too, but for the first.
+        // These are lens names in scene files too, except for the first.
         assert_eq!(Lens::from_name(name).unwrap().name() == "opencv_fisheye", name != "equidistant");
     }
     assert_eq!(Lens::from_name("radtan").unwrap(), OpenCv::default().into());
 }
 
-/// Root cause: fields of newer files of ROS 2 were left unread, so that the twin of a camera that delivers a part of the
-/// calibrated image had the size and centre of the whole.
+/// Root cause: fields of newer ROS 2 files were ignored. A camera that delivers a part of the calibrated image was
+/// simulated with the size and center of the whole image.
 #[test]
 fn binning_and_roi() {
     let with = |text: &str| {
@@ -368,7 +369,7 @@ fn binning_and_roi() {
     let roi = |x: u32, y: u32, height: u32, width: u32| {
         format!("roi:\n  x_offset: {x}\n  y_offset: {y}\n  height: {height}\n  width: {width}\n  do_rectify: true\n")
     };
-    // The whole image, in every way in which that is written (REP 104).
+    // The whole image, in all notations (REP 104).
     let whole = ["", "binning_x: 0\nbinning_y: 0\n", "binning_x: 1\nbinning_y: 1\n", "roi: {}\n"].map(String::from);
     let sizes = [[0, 0], [480, 640], [0, 640], [480, 0]].map(|[height, width]| roi(0, 0, height, width));
     for good in whole.iter().chain(&sizes) {
@@ -394,8 +395,8 @@ fn binning_and_roi() {
     }
 }
 
-/// Ends of lines of Windows, a byte order mark, tabs between tokens, comments, lists and tables of both kinds, quotes, numbers of
-/// all kinds: the same camera.
+/// Windows line endings, a byte order mark, tabs between tokens, comments, flow and block lists and tables, quotes, and
+/// numbers of all kinds give the same camera.
 #[test]
 fn notations() {
     let distortion = "distortion_coefficients: { rows: 1, cols: 5, data: [-0.5, 0.25, 1e-3, 2, 0] }";
@@ -453,12 +454,12 @@ projection_matrix:
         let info = CameraInfo::parse(text, "other").unwrap_or_else(|error| panic!("{error}\n{text:?}"));
         assert_eq!(info, expected, "{text:?}");
     }
-    // Tabs that indent are no YAML, for ROS neither; the error has the place.
+    // Tabs as indentation are invalid YAML, in ROS too; the error has the position.
     let tabs =
         plain.replace("camera_matrix: { rows: 3, cols: 3, data:", "camera_matrix:\n\trows: 3\n\tcols: 3\n\tdata:");
     let error = CameraInfo::parse(&tabs.replace("0, 0, 1] }\nrect", "0, 0, 1]\nrect"), "tabs").unwrap_err();
     assert!(matches!(error, CalibrationError::Yaml { line: 4 | 5, .. }), "{error}");
-    // Lines are counted as they are, whatever they end with.
+    // Lines are counted correctly with any line ending.
     let error = CameraInfo::parse(&crlf.replace("611.0", "x"), "crlf").unwrap_err().to_string();
     assert!(error.starts_with("crlf:4: camera_matrix.data has \"x\""), "{error}");
 }

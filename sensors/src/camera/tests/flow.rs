@@ -15,8 +15,8 @@ use ndarray::{Array2, Axis};
 
 const WANTED: Channels = Channels { flow: true, mask: true, position: true, depth: true, ..Channels::NONE };
 
-/// Pixels by which single precision may be off: coordinates of some metres have 5e-7 m, which are 1e-5 pixels for each pixel
-/// of focal length and metre of distance; those of 100 pixels at 0.5 m 1e-4, some of them added.
+/// Tolerance of single precision \[pixels\]. Coordinates of some meters have 5e-7 m, which is 1e-5 pixels for each
+/// pixel of focal length and meter of distance. For 100 pixels at 0.5 m this is 1e-4, and several such errors add up.
 const ROUNDING: f64 = 1e-3;
 
 /// The flow of an environment, by pixel.
@@ -25,8 +25,8 @@ fn flow_of(camera: &Camera, row: usize) -> Vec<[f32; 2]> {
     flow.iter().copied().collect::<Vec<f32>>().as_chunks().0.to_vec()
 }
 
-/// Every pixel of an environment that shows `id`, against the pixel that showed its point before, if that is judged. Returns the
-/// flows that were judged.
+/// Compares every pixel of an environment that shows `id` with the pixel that showed its point in the previous frame,
+/// if `before` returns it. Returns the compared flows.
 fn judge(camera: &Camera, row: usize, id: i32, before: impl Fn(Point3<f64>) -> Option<[f64; 2]>) -> Vec<[f32; 2]> {
     let pixels = (0..SIZE[1]).flat_map(|v| (0..SIZE[0]).map(move |u| (v, u)));
     let shown = pixels.zip(flow_of(camera, row)).filter(|((v, u), _)| camera.mask().unwrap()[(row, *v, *u)] == id);
@@ -40,7 +40,7 @@ fn judge(camera: &Camera, row: usize, id: i32, before: impl Fn(Point3<f64>) -> O
     shown.filter_map(judged).collect()
 }
 
-/// A ball that moves along y before a camera that stands: its points were at 0.01 m less along y for each step.
+/// A ball moves along y in front of a fixed camera: in each step, its points move by 0.01 m along y.
 #[test]
 fn moving_ball() {
     let context = context(2);
@@ -53,7 +53,7 @@ fn moving_ball() {
             camera.update(&state(&[step, step])).unwrap();
         }
     }
-    // Frames are of steps 4 and 8.
+    // Frames are captured at steps 4 and 8.
     let mut balls = 0;
     for row in 0..2 {
         let flow = flow_of(&lazy, row);
@@ -71,9 +71,9 @@ fn moving_ball() {
     assert!(balls > 100, "{balls}");
 }
 
-/// A fisheye with everything that lenses have of their own: the ball's points were where the lens sees them now and saw them
-/// before, although the intrinsics of one environment were set meanwhile; depths are noisy along the ray; and no light comes
-/// from beyond a right angle. The same camera without imperfections is the control.
+/// A fisheye with all lens-specific effects: intrinsics set in one environment between frames, depth noise along the
+/// ray, and no light from beyond a right angle. The flow still connects the pixels that show the same point. Control:
+/// the same camera without imperfections.
 #[test]
 fn imperfect_fisheye() {
     let clean = CameraCfg {
@@ -108,7 +108,7 @@ fn imperfect_fisheye() {
             let Some(ray) = now.unproject([u as f64 + 0.5, v as f64 + 0.5]) else { continue };
             let light = [&camera, &imperfect].map(|camera| camera.color().unwrap()[(row, v, u, 0)]);
             match ray[2] {
-                // A pixel sees 4 degrees. Only the ground and the sky are there, and no pixel of theirs is black.
+                // A pixel covers 4 degrees. These directions see only ground and sky, so no pixel is black.
                 z if z < -0.06 => {
                     assert!(light[0] > 0 && light[1] == 0, "{light:?}");
                     dark += 1;
@@ -143,7 +143,7 @@ fn resets_and_writes() {
         flows.iter().sum::<f32>() / flows.len() as f32
     };
     let three = moved(&camera, 0);
-    // A write to the state leaves the frame before as it is.
+    // A write to the state keeps the previous frame.
     camera.refresh(&[0], &state(&[6, 3])).unwrap();
     assert!((moved(&camera, 0) / three - 2.0).abs() < 0.1);
     camera.reset(&[1], &state(&[6, 0])).unwrap();
@@ -152,12 +152,13 @@ fn resets_and_writes() {
     for row in 0..2 {
         assert!((moved(&camera, row) * 3.0 / three - 1.0).abs() < 0.1, "{row}");
     }
-    // A camera that does not measure it says so.
+    // A camera without the channel returns an error.
     let without = built(&CameraCfg { channels: Channels { depth: true, ..Channels::NONE }, ..cfg() }, &context);
     assert_eq!(without.flow().unwrap_err().to_string(), "the camera does not measure flow; it measures depth");
 }
 
-/// A camera on a link that moves, over a ground that does not: the points of the image, seen by the camera as it was.
+/// A camera on a moving link over a fixed ground: the points of the image, projected by the camera at its previous
+/// pose.
 #[test]
 fn camera_on_link() {
     let rotation = CameraConvention::World.to_optical(&Pose::identity()).rotation;
@@ -177,8 +178,8 @@ fn camera_on_link() {
     assert!(judged[0] + judged[1] > 500, "{judged:?}");
 }
 
-/// A free camera that a program moves between its frames: before an update, or between an update and reading. Nothing else
-/// moves, so a pixel shows the ground where its own position says, and flow is from where the old camera saw that.
+/// A program moves a free camera between its frames: before an update, or between an update and a read. Nothing else
+/// moves, so a pixel shows the ground given by its position, and flow comes from the projection by the previous camera.
 #[test]
 fn moved_camera() {
     let mut camera = built(&CameraCfg { channels: WANTED, ..cfg() }, &context(1));
@@ -199,10 +200,10 @@ fn moved_camera() {
         camera.update(&state(&[step as u64])).unwrap();
         assert_from(&camera, step - 1);
     }
-    // Moved after it was captured from place 3: the image from place 5, and flow from the frame before that capture.
+    // Moved after the capture from place 3: the image is from place 5, and flow from the frame before that capture.
     put(&mut camera, 5);
     assert_from(&camera, 2);
-    // The next one starts from where the last was captured, read meanwhile or not.
+    // The next flow starts at the place of the last capture, whether that frame was read or not.
     camera.update(&state(&[5])).unwrap();
     assert_from(&camera, 3);
 }

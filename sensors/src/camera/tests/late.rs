@@ -1,4 +1,4 @@
-//! Images that come late, get lost or are kept in the history, against those of a perfect camera.
+//! Latency, dropout and history of images, compared with a perfect camera.
 
 use super::super::imperfection::{Exposure, Holes, Imperfections, ShotNoise};
 use super::super::{Camera, CameraCfg, CameraConvention, CameraError, CameraPlacement, Extrinsics};
@@ -34,7 +34,7 @@ fn past_bits(camera: &Camera, row: usize, age: usize) -> Vec<u32> {
     .concat()
 }
 
-/// A camera with noise, loss, latency, history and every imperfection.
+/// A camera with noise, dropout, latency, history and every imperfection.
 fn troubled() -> CameraCfg {
     let noise = NoiseCfg { std: 0.02, bias_std: 0.01, bias_walk: 0.05, resolution: 0.001 };
     let color = NoiseCfg { std: 3.0, bias_std: 2.0, bias_walk: 1.0, resolution: 0.0 };
@@ -56,7 +56,7 @@ fn troubled() -> CameraCfg {
     }
 }
 
-/// Late images are those of a perfect camera so many steps ago; images of the reset are shown at once.
+/// Late images equal those of a perfect camera the same number of steps ago; images of the reset are shown at once.
 #[test]
 fn latency() {
     let context = context(2);
@@ -92,7 +92,7 @@ fn latency() {
             }
         }
         assert!(seen.windows(2).all(|two| two[0] != two[1]), "the control: images differ");
-        // An image that is shown and in the history is drawn once.
+        // An image that is shown and in the history is rendered once.
         assert_eq!(late.draws(), 2 * (1 + late.frame_counts()[0]), "period {period}, latency {latency}");
     }
 }
@@ -116,7 +116,7 @@ fn history_shapes() {
     assert_eq!(error, "the camera does not measure mask; it measures depth");
 }
 
-/// Images of the history are drawn when they are read, each once.
+/// Images of the history are rendered when they are read, each once.
 #[test]
 fn lazy_history() {
     let mut camera = built(&CameraCfg { history_length: 3, ..cfg() }, &context(1));
@@ -135,7 +135,7 @@ fn lazy_history() {
     assert_eq!(camera.draws(), 5, "12, once");
 }
 
-/// An owner that updates only what is due sees the same.
+/// An owner that updates only at due steps gets the same images.
 #[test]
 fn due() {
     let context = context(2);
@@ -152,12 +152,12 @@ fn due() {
         assert!(bits(&rare, 0..2) == bits(&often, 0..2), "step {now}");
         assert_eq!((rare.frame_counts(), rare.stamps()), (often.frame_counts(), often.stamps()));
     }
-    // Captures at 4, 8, .., 40 and arrivals at 9, 13, .., 37.
+    // Captures at 4, 8, .., 40 and deliveries at 9, 13, .., 37.
     assert_eq!(updates, 10 + 8);
 }
 
-/// A lost image leaves the one before. Of 300 images that get lost with probability 0.4, 180 arrive, with a deviation of
-/// sqrt(300 0.4 0.6) = 8.5: six times that.
+/// A lost image keeps the previous one. Of 300 images lost with probability 0.4, 180 are delivered, with a standard
+/// deviation of sqrt(300 0.4 0.6) = 8.5; the bound is six times that.
 #[test]
 fn dropout() {
     let context = context(2);
@@ -191,7 +191,7 @@ fn depth_only() -> Channels {
     Channels { depth: true, ..Channels::default() }
 }
 
-/// A reset drops pending images and the history.
+/// A reset drops frames in flight and the history.
 #[test]
 fn resets() {
     let context = context(2);
@@ -217,7 +217,7 @@ fn resets() {
     assert_ne!(bits(&camera, [1]), start, "the control");
 }
 
-/// As samplers have it: an image captured before a write does not replace the image of the write, but is in the history.
+/// As in samplers: an image captured before a write does not replace the image of the write, but is in the history.
 #[test]
 fn refresh() {
     let context = context(1);
@@ -242,7 +242,7 @@ fn refresh() {
     assert_eq!(past_bits(&camera, 0, 1), bits(&perfect, [0]));
 }
 
-/// Setters act on the shown image and on pending ones, not on the history.
+/// Setters act on the shown image and on images in flight, not on the history.
 #[test]
 fn setters() {
     let context = context(1);
@@ -265,7 +265,7 @@ fn setters() {
     assert_ne!(at(3), at(2), "the control");
 }
 
-/// A lazy camera shows the bits of one that draws at once, through resets, refreshes and setters.
+/// A lazy camera has the same bits as an eager camera, through resets, refreshes and setters.
 #[test]
 fn lazy_and_eager() {
     let context = context(2);
@@ -288,7 +288,7 @@ fn lazy_and_eager() {
                 _ => {}
             }
         }
-        // At odd times, so that some images are never drawn.
+        // Irregular reads, so that some images are never rendered.
         if [3, 9, 10, 13, 18, 19, 27, 40].contains(&now) {
             assert!(bits(&lazy, 0..2) == bits(&eager, 0..2), "step {now}");
             for (env, age) in [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)] {
@@ -300,7 +300,7 @@ fn lazy_and_eager() {
     assert!(lazy.draws() < eager.draws(), "{} {}", lazy.draws(), eager.draws());
 }
 
-/// Threads change no bit, and some environments are those of all.
+/// The number of threads changes no bit, and a subset of the environments has the same images.
 #[test]
 fn threads_and_environments() {
     let images = |context: &SensorContext| {

@@ -1,4 +1,4 @@
-//! Cameras behind lenses, against closed forms.
+//! Images of cameras with lenses, against closed forms.
 
 use super::super::{Camera, CameraCfg, CameraError, CameraPlacement, DepthMiss, PointFrame};
 use super::lenses::{WARPED, all};
@@ -18,10 +18,10 @@ use std::f64::consts::FRAC_PI_2;
 
 const FEW_PATHS: Renderer = Renderer::RayTraced { samples: 4, max_bounces: 1, denoise: false, seed: 3 };
 const SIZE: [usize; 2] = [64, 48];
-/// Samples of colours, beside the middle of a pixel \[1/256 pixel\].
+/// Offsets of the color samples from the pixel center \[1/256 pixel\].
 const SAMPLES: [[i32; 2]; 4] = [[-32, -96], [96, -32], [-96, 32], [32, 96]];
 
-/// The stage's camera behind a lens.
+/// The camera of the test scene, with a lens.
 fn cfg_of(lens: impl Into<Lens>, pixels: PixelIntrinsics) -> CameraCfg {
     CameraCfg {
         width: SIZE[0],
@@ -35,7 +35,8 @@ fn cfg_of(lens: impl Into<Lens>, pixels: PixelIntrinsics) -> CameraCfg {
     }
 }
 
-/// The first of the stage's things that a ray meets within a range of multiples of its length: multiple, id, and normal.
+/// The first instance of the test scene that a ray hits within a range of multiples of its length: multiple, id and
+/// normal.
 fn meets(eye: Point3<f64>, ray: Vector3<f64>, range: [f64; 2]) -> Option<(f64, i32, Vector3<f64>)> {
     let inside = |t: &f64| *t >= range[0] && *t <= range[1];
     let middle = Point3::from(stage::ball(0, 0));
@@ -51,9 +52,9 @@ fn meets(eye: Point3<f64>, ray: Vector3<f64>, range: [f64; 2]) -> Option<(f64, i
     }
 }
 
-/// A ball on an endless ground, by formulas along the double-precision ray of each pixel: depth, distance, mask, normal,
-/// position, and the point cloud. Directions are single precision (6e-8), and so is the sum of some ten products of numbers
-/// near 4 m: 1e-5 m at most, more where the ray grazes the surface.
+/// A ball on an infinite ground, by closed forms along the double-precision ray of each pixel: depth, distance, mask,
+/// normal, position, and point cloud. Directions have single precision (6e-8), and so has the sum of some ten products
+/// of numbers near 4 m: 1e-5 m at most, more where the ray grazes the surface.
 #[test]
 fn channels() {
     for (lens, pixels) in all() {
@@ -81,7 +82,8 @@ fn channels() {
             let (world, range) = (pose.rotation * ray, [cfg.near, cfg.far]);
             let met = meets(eye, world, range);
             let id_of = |met: Option<(f64, i32, Vector3<f64>)>| met.map_or(0, |m| m.1);
-            // Single precision may differ if a ray a ten-thousandth beside, or a range as much longer, hits something else.
+            // Single precision may differ if a ray offset by 1e-4, or a range longer by the same, hits another
+            // instance.
             let mut others = (0..8).map(|n| {
                 let beside = Vector3::from([n & 1, n >> 1 & 1, n >> 2 & 1].map(|b| f64::from(b) - 0.5)) * 2e-4;
                 let by = 1.0 + f64::from(n & 1) * 2e-4 - 1e-4;
@@ -121,12 +123,12 @@ fn lens_without_distortion() {
     for renderer in [Renderer::FastRayTraced, FEW_PATHS, Renderer::Raster, Renderer::Hybrid] {
         assert!(bits(Lens::default(), renderer) == bits(OpenCv::default().into(), renderer), "{renderer:?}");
     }
-    // A control: a little bends.
+    // Control: a small distortion already makes a difference.
     let little = OpenCv { k1: 1e-3, ..OpenCv::default() }.into();
     assert!(bits(Lens::default(), Renderer::FastRayTraced) != bits(little, Renderer::FastRayTraced));
 }
 
-/// The rasterizer draws straight lines; a lens that folds has two rays for a point.
+/// The rasterizer renders straight lines only; a folding lens has two rays for a point.
 #[test]
 fn refused_lenses() {
     let pixels = PixelIntrinsics { fx: 50.0, fy: 50.0, cx: 32.0, cy: 24.0 };
@@ -139,7 +141,7 @@ fn refused_lenses() {
     assert!(matches!(error, SensorError::Camera(CameraError::Optics(OpticsError::LensFolds { .. }))), "{error}");
 }
 
-/// Intrinsics of one environment behind a lens: the others keep theirs, and all come back.
+/// Intrinsics of one environment with a lens: the other environments keep theirs, and `restore` resets all.
 #[test]
 fn own_intrinsics() {
     let pixels = PixelIntrinsics { fx: 18.0, fy: 20.0, cx: 32.0, cy: 24.0 };
@@ -157,11 +159,11 @@ fn own_intrinsics() {
     assert_eq!(camera.lens_bytes(), 2 * bytes);
     let now = rows(&camera);
     assert!(now[0] == before[0] && now[1] != before[1] && now[2] == before[2]);
-    // As a camera that was built so.
+    // Equal to a camera built with these intrinsics.
     let alone = built(&CameraCfg { intrinsics: other, ..cfg }, &context(3));
     assert!(rows(&alone)[1] == now[1]);
     assert_eq!(camera.optics(1).unwrap().pixels(), other.to_pixels(64, 48).unwrap());
-    // A mistake changes nothing.
+    // An invalid value changes nothing.
     let bad = Intrinsics::Pixels { fx: 25.0, fy: 22.0, cx: 3000.0, cy: 20.0 };
     let error = camera.set_intrinsics(&[bad], Some(&[0])).unwrap_err();
     assert!(matches!(error, SensorError::Camera(CameraError::Optics(OpticsError::LensBlind { .. }))), "{error}");
@@ -171,7 +173,7 @@ fn own_intrinsics() {
     assert!(rows(&camera) == before && camera.lens_bytes() == bytes);
 }
 
-/// Points need distances if depth has no value. Misses give no point, in every notation of a miss.
+/// Point clouds use distances if depth is not defined. Misses give no point, for every value of a miss.
 #[test]
 fn point_clouds() {
     let cfg = cfg_of(Panorama {}, Panorama::intrinsics(64, 48).to_pixels(64, 48).unwrap());
@@ -185,10 +187,10 @@ fn point_clouds() {
     assert!(matches!(error, SensorError::Camera(CameraError::ChannelOff { channel: "distance", .. })), "{error}");
 }
 
-/// The arrows along the edges go where the corners look; corners that show nothing have none.
+/// Arrows along the edges follow the rays of the corners; corners without a ray have no arrow.
 #[test]
 fn markers() {
-    // Corners are 40 pixels from the middle: 2 rad.
+    // Corners are 40 pixels from the center: 2 rad.
     let pixels = PixelIntrinsics { fx: 20.0, fy: 20.0, cx: 32.0, cy: 24.0 };
     let count = |max_angle| {
         built(&cfg_of(Equidistant { max_angle }, pixels), &context(1)).markers(0, &|_| Pose::identity()).len()

@@ -1,4 +1,4 @@
-//! Lenses of cameras: one of each kind, and how files name them.
+//! Lenses of cameras: one of each kind, and their names in files.
 
 use super::super::CameraCfg;
 use kinetoscope_render::PixelIntrinsics;
@@ -7,7 +7,7 @@ use kinetoscope_render::lens::{
     Equidistant, Equisolid, FTheta, OpenCv, OpenCvFisheye, Orthographic, Panorama, Stereographic,
 };
 
-/// All twelve of a cheap camera.
+/// A strongly distorting lens with all twelve coefficients, as in a cheap camera.
 pub(super) const WARPED: OpenCv = OpenCv {
     k1: -0.28,
     k2: 0.09,
@@ -26,7 +26,7 @@ pub(super) const WARPED: OpenCv = OpenCv {
 
 const FISHEYE: OpenCvFisheye = OpenCvFisheye { k1: 0.03, k2: -0.012, k3: 0.004, k4: -0.0011, max_angle: Some(1.6) };
 
-/// One of each kind, and the pixels of an image of 64 x 48 that it fills, or more than fills.
+/// One lens of each kind, with intrinsics for a 64 x 48 image that the lens fills, or more than fills.
 pub(in crate::camera) fn all() -> Vec<(Lens, PixelIntrinsics)> {
     let f = |f: f64| PixelIntrinsics { fx: f, fy: 1.1 * f, cx: 30.25, cy: 25.5 };
     let panorama = Panorama::intrinsics(64, 48).to_pixels(64, 48).unwrap();
@@ -45,7 +45,7 @@ pub(in crate::camera) fn all() -> Vec<(Lens, PixelIntrinsics)> {
     ]
 }
 
-/// As scene files have them: a name, an alias, or a table with numbers; and back.
+/// Notations in scene files: a name, an alias, or a table with numbers; and the way back.
 #[test]
 fn files() {
     let read = |text: &str| toml::from_str::<CameraCfg>(text).map(|cfg| cfg.lens);

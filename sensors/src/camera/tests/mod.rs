@@ -1,4 +1,4 @@
-//! Images, compared with analytic answers and other renderers.
+//! Tests of camera sensors, against closed forms and other renderers.
 
 mod boxes;
 mod calibration;

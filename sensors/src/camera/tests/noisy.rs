@@ -1,7 +1,7 @@
-//! The noise of cameras, against its distribution.
+//! Noise of cameras, against its distribution.
 //!
-//! Means of n numbers scatter by sigma / sqrt(n), variances by sqrt(2 / n) of themselves, correlations by 1 / sqrt(n): bounds
-//! are six times that, which fails once in 5e8 seeds, and the seeds here are fixed.
+//! Standard deviations for n numbers: sigma / sqrt(n) of the mean, sqrt(2 / n) of the variance as a fraction, 1 /
+//! sqrt(n) of a correlation. Bounds are six times that, which fails for one of 5e8 seeds; the seeds here are fixed.
 
 use super::super::imperfection::{DepthNoise, Exposure, ReadNoise, ShotNoise};
 use super::super::{Camera, CameraCfg, DepthMiss, Extrinsics, Imperfections, Placement, PointFrame};
@@ -15,7 +15,7 @@ use ndarray::Axis;
 
 const PIXELS: f64 = (SIZE[0] * SIZE[1]) as f64;
 
-/// Straight down onto the ground, 2 m away, from where no ball is seen.
+/// A camera straight above the ground, 2 m away, that sees no ball.
 fn down(noise: &[(&str, NoiseCfg)]) -> CameraCfg {
     let placement = Placement::LookAt { eye: [50.0, 0.0, 2.0], target: [50.0, 0.0, 0.0], up: [0.0, 0.0, 1.0] };
     let noise = noise.iter().map(|(name, noise)| (name.to_string(), *noise)).collect();
@@ -57,7 +57,7 @@ fn white() {
     assert!(mean(&first).abs() < bound * std, "{}", mean(&first));
     assert!((alike(&first, &first) - 1.0).abs() < bound * 2f64.sqrt(), "variance");
     assert!((fourth - 3.0).abs() < bound * 96f64.sqrt(), "{fourth}");
-    // Of neighbours, of rows, of images, of environments, of sensors, of seeds.
+    // Correlations between neighbors, rows, images, environments, sensors and seeds.
     for apart in [1, SIZE[0], PIXELS as usize] {
         assert!(alike(&first, &first[apart..]).abs() < bound * 1.1, "{apart} numbers apart");
     }
@@ -71,7 +71,7 @@ fn white() {
     }
 }
 
-/// An environment has its noise and its imperfections whichever process it is in.
+/// The noise and imperfections of an environment do not depend on the process that simulates it.
 #[test]
 fn first_env() {
     let cfg = down(&[("depth", NoiseCfg::white(0.1))]);
@@ -119,7 +119,8 @@ fn biases() {
     camera.reset(&[0], &state(&[0])).unwrap();
     let second = depths(&camera, 0);
     assert!((product(&first, &second) / bias_std.powi(2)).abs() < 6.0 / PIXELS.sqrt());
-    // A walk of 0.2 m per root second is sqrt(t) times that after t seconds; images are 4 steps apart.
+    // A random walk of 0.2 m per sqrt(s) has the deviation sqrt(t) times that after t seconds; images are 4 steps
+    // apart.
     let walk = NoiseCfg { bias_walk: 0.2, ..NoiseCfg::default() };
     let cfg = CameraCfg { update_period: 4.0 * DT, ..down(&[("depth", walk)]) };
     let mut camera = built(&cfg, &context);
@@ -136,7 +137,7 @@ fn biases() {
         let found = product(walked, walked);
         assert!((found / variance - 1.0).abs() < 6.0 * (2.0 / PIXELS).sqrt(), "{found} is not {variance}");
     }
-    // The covariance of a walk at two times is the variance at the earlier one.
+    // The covariance of a walk at two times is the variance at the earlier time.
     let together = product(&at[0], &at[1]);
     assert!((together - early).abs() < 6.0 * ((early * late + early * early) / PIXELS).sqrt(), "{together}");
 }
@@ -156,8 +157,8 @@ fn resolution() {
     assert!(ends.iter().all(|count| *count > 50), "the control: noise reaches both ends, {ends:?}");
 }
 
-/// Noise makes no miss of a hit. Root cause: noise saturates at the far plane, whose depth is also the value of
-/// [`DepthMiss::Far`], so that half of the hits there became misses.
+/// Noise does not turn hits into misses. Root cause: noise saturates at the far plane, whose depth is also the value of
+/// [`DepthMiss::Far`], so half of the hits there became misses.
 #[test]
 fn saturated_hits() {
     let context = context(1);
@@ -189,7 +190,7 @@ fn saturated_hits() {
                 DepthMiss::Zero => x == 0.0,
             };
             assert!(misses.into_iter().all(|(x, _)| missed(*x)));
-            // The control: noise reaches the far plane at many pixels.
+            // Control: noise reaches the far plane at many pixels.
             let last = reach.iter().filter(|x| x.is_finite() && **x >= far.next_down()).count();
             assert!(depth_miss == DepthMiss::Zero || last > 100, "{last}");
         }
@@ -198,7 +199,7 @@ fn saturated_hits() {
     }
 }
 
-/// Channels have noise of their own, misses stay misses, and what has no noise is the truth.
+/// Channels have independent noise, misses stay misses, and channels without noise are exact.
 #[test]
 fn channels() {
     let context = context(2);
@@ -230,7 +231,7 @@ fn channels() {
     assert_eq!((noisy.normal(), noisy.position()), (perfect.normal(), perfect.position()));
 }
 
-/// Bytes are rounded, which adds a twelfth to the variance.
+/// Rounding of bytes adds a twelfth to the variance.
 #[test]
 fn colors() {
     let context = context(1);
@@ -266,7 +267,7 @@ fn colors() {
     assert!(bytes.iter().all(|byte| byte.is_multiple_of(16) || *byte == 255), "whole steps, or the end");
 }
 
-/// Noise of zero leaves the bits of the perfect camera.
+/// Noise of zero keeps the bits of the perfect camera.
 #[test]
 fn zero() {
     let nothing = ["depth", "distance", "color"].map(|name| (name.to_string(), NoiseCfg::white(0.0)));
@@ -274,7 +275,8 @@ fn zero() {
     assert_eq!(bits(&camera, [0]), bits(&built(&cfg(), &context(1)), [0]));
 }
 
-/// A camera's exposure is that of its renderer: the sky, 0.8 on the screen, is taken twice as long and half as long.
+/// The exposure of a camera is that of its renderer: the sky, 0.8 on the screen, is exposed twice as long and half as
+/// long.
 #[test]
 fn camera_exposure() {
     let context = context(1);
@@ -293,7 +295,8 @@ fn camera_exposure() {
                 assert_eq!(found, 255);
                 continue;
             }
-            // A byte of the plain image stands for light that is half a byte more or less; white may be brighter. 1.5 as in `close`.
+            // A byte of the plain image stands for a radiance within half a byte; white may be brighter. 1.5 as in
+            // `close`.
             let [low, high] = [-0.5, 0.5].map(|half| {
                 let byte = (f64::from(*before) + half).clamp(0.0, 255.0);
                 srgb((linear((byte / 255.0) as f32) * f64::exp2(stops)).min(1.0))

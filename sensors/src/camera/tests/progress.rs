@@ -1,4 +1,4 @@
-//! Long renderings report their progress and can be cancelled.
+//! Progress and cancellation of long renders.
 
 use super::stage::{built, cfg, context, state};
 use crate::camera::{CameraCfg, CameraError};
@@ -24,10 +24,10 @@ fn cameras() {
     let expected = CameraError::Draw { env: 0, error: RenderError::Cancelled { samples: 0, total } };
     assert_eq!(camera.color().unwrap_err(), expected.into());
     progress.resume();
-    // A cancelled image is drawn by the next reader.
+    // A cancelled image is rendered by the next reader.
     let fresh = built(&CameraCfg { renderer: paths(2), ..cfg() }, &context(1));
     assert_eq!((camera.color().unwrap(), progress.samples()), (fresh.color().unwrap(), total));
-    // The control: an image that cannot be drawn is tried once.
+    // Control: an image that cannot be rendered is tried once.
     let draws = camera.draws();
     let mut state = state(&[1]);
     state.visible.as_mut().unwrap().instance_poses[(0, 1)].translation[0] = f32::NAN;
@@ -36,14 +36,14 @@ fn cameras() {
     assert_eq!(camera.draws(), draws + 1);
 }
 
-/// Cancelled pending images and images of the history are drawn when they are read again.
+/// Cancelled images in flight and images of the history are rendered at the next read.
 #[test]
 fn late_and_past() {
     let cfg = CameraCfg { renderer: paths(2), latency_steps: 2, history_length: 2, ..cfg() };
     let run = |cancelled: bool| {
         let mut camera = built(&cfg, &context(1));
         (1..=3).for_each(|step| camera.update(&state(&[step])).unwrap());
-        // After a write, the shown image is not the one that arrived.
+        // After a write, the shown image is not the latest delivered one.
         camera.refresh(&[0], &state(&[3])).unwrap();
         assert!(camera.color().is_ok() && camera.arrived_stamps() != camera.stamps());
         if cancelled {
@@ -62,8 +62,8 @@ fn late_and_past() {
     assert_eq!(run(true), run(false));
 }
 
-/// An image with markers is drawn twice: without its colour, which takes no paths, and its colour with the markers. Root
-/// cause: these were counted after the others had been, from 0 again.
+/// An image with markers is rendered twice: without its color, which needs no path tracing, and the color with the
+/// markers. Root cause: the markers were counted after the others, starting from 0 again.
 #[test]
 fn markers() {
     let channels = Channels { mask: true, color: true, ..Channels::default() };

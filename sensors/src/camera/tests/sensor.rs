@@ -1,4 +1,4 @@
-//! The camera as a sensor: when it captures and draws, measured values against closed forms, and refused mistakes.
+//! The camera as a sensor: capture and rendering times, measured values against closed forms, and rejected mistakes.
 
 use super::super::*;
 use super::stage::{BALL, DT, GROUND, LENS, RADIUS, SIZE, ball, bits, built, cfg, context, pose_of, state, tip};
@@ -24,7 +24,7 @@ fn on(parent: &str) -> CameraCfg {
     CameraCfg { extrinsics: Extrinsics { parent: Some(parent.into()), ..Default::default() }, ..cfg() }
 }
 
-/// A camera draws when it is read, once, and only what changed.
+/// A camera renders when it is read, once, and only changed images.
 #[test]
 fn lazy_draws() {
     let mut camera = built(&cfg(), &context(3));
@@ -37,13 +37,13 @@ fn lazy_draws() {
     assert_eq!((camera.draws(), camera.frame_counts()), (3, array![5, 5, 5].view()));
     camera.color().unwrap();
     assert_eq!(camera.draws(), 6);
-    // An environment that stands still is not drawn again.
+    // A quarantined environment is not rendered again.
     for _ in 0..2 {
         camera.update(&state(&[6, 5, 6])).unwrap();
         camera.color().unwrap();
         assert_eq!((camera.draws(), camera.frame_counts()), (8, array![6, 5, 6].view()));
     }
-    // A setter makes the environments that it changes be drawn again, of the same instant.
+    // After a setter, the changed environments are rendered again, at the same instant.
     camera.set_local_pose(&Pose::identity(), Some(&[2]), CameraConvention::World).unwrap();
     camera.set_intrinsics(&[Intrinsics::ISAAC], Some(&[2])).unwrap();
     camera.color().unwrap();
@@ -79,7 +79,7 @@ fn instant_of_capture() {
     assert_eq!(lazy.color().unwrap().as_ptr(), memory, "memory stays where it is");
 }
 
-/// Resets and refreshes show the state and count nothing; poses stay over a reset until they are restored.
+/// Resets and refreshes show the state and count nothing; set poses persist over a reset until they are restored.
 #[test]
 fn resets() {
     let context = context(2);
@@ -129,7 +129,7 @@ fn some_environments() {
     assert_eq!(bits(&alone, [0]), bits(&built(&cfg(), &context), [2]), "alone or among others");
 }
 
-/// Readers on several threads share one drawing.
+/// Readers on several threads share one render.
 #[test]
 fn concurrent_readers() {
     let camera = built(&cfg(), &context(2));
@@ -194,13 +194,13 @@ fn channel_names() {
     assert_eq!(Channels::ALL.bytes_per_pixel(), 4 + 4 + 4 + 4 + 12 + 12 + 12 + 4 + 8);
 }
 
-/// The direction through the centre of a pixel whose depth is 1, in the optical frame.
+/// The ray through the center of a pixel at depth 1, in the optical frame.
 fn ray(matrix: &Matrix3<f64>, u: usize, v: usize) -> Vector3<f64> {
     let (x, y) = (u as f64 + 0.5 - matrix[(0, 2)], v as f64 + 0.5 - matrix[(1, 2)]);
     Vector3::new(x / matrix[(0, 0)], y / matrix[(1, 1)], 1.0)
 }
 
-/// Depth, normal and mask id of the ground and the ball in closed form; `None` near a silhouette or the horizon.
+/// Depth, normal and mask id of ground and ball in closed form; `None` near a silhouette or the horizon.
 fn closed_form(pose: &Pose, direction: &Vector3<f64>, center: [f64; 3]) -> Option<(f64, Vector3<f64>, i32)> {
     let (o, d) = (pose.translation.vector, pose.rotation * direction);
     let to = Vector3::from(center) - o;
@@ -217,7 +217,7 @@ fn closed_form(pose: &Pose, direction: &Vector3<f64>, center: [f64; 3]) -> Optio
     Some((ground, Vector3::z(), if ground < 100.0 { GROUND } else { 0 }))
 }
 
-/// Every channel of every environment, against the closed forms.
+/// Checks every channel of every environment against the closed forms.
 fn check(camera: &Camera, steps: &[u64]) {
     let lenses = camera.intrinsic_matrices();
     let (mut judged, mut hits) = (0, [0; 2]);
@@ -253,7 +253,7 @@ fn check(camera: &Camera, steps: &[u64]) {
     assert!(judged > 0 && hits[0] > 100 && hits[1] > 20, "{judged} pixels, {hits:?}");
 }
 
-/// Values, shapes, and lenses and poses of single environments.
+/// Values, shapes, and intrinsics and poses of single environments.
 #[test]
 fn channels() {
     let context = context(3);
@@ -281,7 +281,7 @@ fn channels() {
     assert_eq!(bits(&camera, 0..3), bits(&built(&cfg(), &context), 0..3));
 }
 
-/// The ground seen from straight above, in all conventions.
+/// The ground seen straight from above, in all conventions.
 #[test]
 fn conventions() {
     // The right of the image is +x.
@@ -306,7 +306,7 @@ fn conventions() {
     }
 }
 
-/// An attached camera is a free one that moves.
+/// An attached camera equals a free camera that moves.
 #[test]
 fn attached() {
     let context = context(2);
@@ -321,7 +321,7 @@ fn attached() {
         for steps in [[0, 0], [3, 2], [4, 5]] {
             attached.refresh(&[0, 1], &state(&steps)).unwrap();
             free.refresh(&[0, 1], &state(&steps)).unwrap();
-            // As the state has it: in a row, from which it is normalised.
+            // As in the state: a row, from which the quaternion is normalized.
             let link = |env: usize| from_row(&to_row(&tip(env, steps[env])));
             let composed = [0, 1].map(|env| link(env) * convention.to_optical(&local));
             free.set_local_pose(&composed, None, ROS).unwrap();
@@ -332,7 +332,7 @@ fn attached() {
     }
 }
 
-/// A world pose puts an attached camera there; from then on it moves with its link.
+/// A world pose places an attached camera; from then on the camera moves with its link.
 #[test]
 fn world_pose_of_attached() {
     let mut camera = built(&on("tip"), &context(2));
@@ -352,7 +352,7 @@ fn world_pose_of_attached() {
     assert!(close(found.row(1), to_row(&moved)) && close(found.row(0), to_row(&there)));
 }
 
-/// Straight up and straight down; the other environments stay.
+/// Straight up and straight down; the other environments stay unchanged.
 #[test]
 fn vertical() {
     let mut camera = built(&cfg(), &context(3));
@@ -387,7 +387,7 @@ fn misses() {
     }
 }
 
-/// Points are those of the position channel; in the camera's own frame z is the depth.
+/// Points equal the position channel; in the frame of the camera, z is the depth.
 #[test]
 fn points() {
     let context = context(3);
@@ -403,7 +403,7 @@ fn points() {
                 assert_eq!(a, [f32::INFINITY; 3]);
                 continue;
             }
-            // The distance sets how much of the digits is left.
+            // The distance limits the remaining digits.
             let scale = camera.distance().unwrap()[(row, v, u)].max(1.0);
             for k in 0..3 {
                 let b = position[(row, v, u, k)];
@@ -487,7 +487,7 @@ fn bad_configurations() {
     assert!(CameraCfg { round_period: true, ..odd }.build(&context(2)).is_ok());
     let nothing = crate::SensorContext { scene: None, ..context(2) };
     assert_eq!(cfg().build(&nothing).unwrap_err(), CameraError::NoScene.into());
-    // Path tracing keeps 64 bytes of a pixel: its result and the input of the denoiser.
+    // Path tracing keeps 64 bytes per pixel: its result and the input of the denoiser.
     for (renderer, paths) in [(cfg().renderer, ""), (Renderer::RAY_TRACED, ", with 4096000000 bytes for paths,")] {
         let huge = CameraCfg { width: 8000, height: 8000, renderer, ..cfg() };
         let error = huge.build(&context(100)).unwrap_err().to_string();
@@ -535,7 +535,7 @@ fn bad_states() {
     assert!(matches!(camera.refresh(&[5], &state(&[0, 0])), Err(SensorError::IndexOutOfRange { index: 5, .. })));
     assert_eq!((bits(&camera, 0..2), camera.frame_counts().sum()), (before, 0));
 
-    // An environment that cannot be drawn is an error until it can.
+    // An environment that cannot be rendered is an error until it can be.
     let context = context(3);
     let mut camera = built(&CameraCfg { lazy: false, ..cfg() }, &context);
     let mut bad = state(&[1, 1, 1]);
@@ -551,7 +551,7 @@ fn bad_states() {
     assert_eq!(bits(&camera, 0..3), bits(&good, 0..3));
 }
 
-/// Setters change all or nothing.
+/// Setters change all values or none.
 #[test]
 fn bad_setters() {
     let context = context(3);

@@ -19,7 +19,7 @@ fn refusals() {
         SensorError::Camera(CameraError::View(error)) => error,
         error => panic!("{error}"),
     };
-    // Renderers without paths say which one to use.
+    // Renderers without path tracing name the renderer to use.
     let good = Aperture { focal_length: 0.05, f_number: 2.0, focus_distance: 2.0 };
     let slow = Shutter { row_time: 1e-4, exposure_time: 0.0 };
     for (aperture, shutter) in [(Some(good), Shutter::default()), (None, slow)] {
@@ -47,7 +47,7 @@ fn refusals() {
         let error = view_error(CameraCfg { shutter, renderer: PATHS, ..cfg() });
         assert!(matches!(error, RenderError::Shutter { .. }), "{error}");
     }
-    // A frame every 4 steps, which takes 5.
+    // A frame every 4 steps, whose exposure takes 5.
     let shutter = Shutter { row_time: 0.0, exposure_time: 4.5 * DT };
     let error = CameraCfg { shutter, renderer: PATHS, update_period: 4.0 * DT, ..cfg() }.build(&context(1));
     assert_eq!(error.unwrap_err(), CameraError::ShutterTooSlow { span: 4.5 * DT, period: 4.0 * DT }.into());
@@ -70,8 +70,8 @@ fn rolling() -> CameraCfg {
     }
 }
 
-/// Asserts that a camera shows, in environment `env`, what the renderer draws of the stage at step `step` with the shutter open
-/// since step `opened`; all channels but the colour, whose noise is the camera's own.
+/// Asserts that a camera shows, in environment `env`, the render of the test scene at step `step` with the shutter open
+/// since step `opened`. Compares all channels except color, whose noise depends on the camera.
 #[track_caller]
 fn assert_shown(camera: &Camera, env: usize, step: u64, opened: Option<u64>) {
     assert!(shown(camera, env) == expected(camera, env, step, opened), "environment {env}, step {step}, {opened:?}");
@@ -97,11 +97,12 @@ fn shown(camera: &Camera, row: usize) -> Vec<u32> {
     mask.iter().map(|&x| x as u32).chain(position.iter().map(|x| x.to_bits())).collect()
 }
 
-/// Cameras ask to be woken when the shutter opens, remember poses of then, and are still after a reset or a refresh.
+/// Cameras request an update when the shutter opens, store the poses of that instant, and show one instant after a
+/// reset or refresh.
 #[test]
 fn wake_ups() {
     let mut camera = built(&rolling(), &context(2));
-    // After a reset nothing moved.
+    // After a reset, no motion is shown.
     assert_shown(&camera, 0, 0, None);
     let (mut step, mut woken) = (0, Vec::new());
     while step < 3 * PERIOD {
@@ -110,24 +111,24 @@ fn wake_ups() {
         camera.update(&state(&[step, step])).unwrap();
         let last = step - step % PERIOD;
         (0..2).for_each(|env| assert_shown(&camera, env, last, last.checked_sub(3)));
-        // A control: it is not the image of the instant.
+        // Control: the image differs from that of the instant.
         assert!(step != last || shown(&camera, 0) != expected(&camera, 0, step, None));
         assert_eq!(camera.frame_counts()[0], step / PERIOD);
     }
-    // Three steps before, which are the next more than two and a half.
+    // The shutter opens three steps earlier, two and a half rounded up.
     assert_eq!(woken, [2, 5, 7, 10, 12, 15]);
-    // An update at every step is the same.
+    // An update at every step gives the same images.
     let mut often = built(&rolling(), &context(2));
     (1..=3 * PERIOD).for_each(|step| often.update(&state(&[step, step])).unwrap());
     assert!(bits(&often, 0..2) == bits(&camera, 0..2));
-    // A write while the shutter is open: the frame shows motion from there only.
+    // A write while the shutter is open: the frame shows only the motion since then.
     camera.update(&state(&[17, 17])).unwrap();
     camera.refresh(&[1], &state(&[17, 30])).unwrap();
     assert_shown(&camera, 1, 30, None);
     let mut late = state(&[20, 20]);
     late.visible.as_mut().unwrap().instance_poses[(1, 1)] = PoseF32::from_translation(ball(1, 30).map(|x| x as f32));
     camera.update(&late).unwrap();
-    // It stands there since it was put there.
+    // The written pose counts since the shutter opened.
     assert_shown(&camera, 1, 30, None);
     assert_shown(&camera, 0, 20, Some(17));
     // A reset closes the shutter.
@@ -136,7 +137,7 @@ fn wake_ups() {
     assert_shown(&camera, 0, 0, None);
 }
 
-/// Frames that come late, and the history, are those that come at once; a latency of three frames.
+/// Late frames and the history equal frames without latency; the latency is three frames.
 #[test]
 fn latency() {
     let late = CameraCfg { latency_steps: 2 * PERIOD as u32 + 1, history_length: 2, ..rolling() };
@@ -153,10 +154,10 @@ fn latency() {
     assert_eq!(late.history::<Mask>().unwrap().index_axis(Axis(1), 0), late.mask().unwrap());
 }
 
-/// Noise of paths is another one in each environment and frame, and the same in any batch and for any number of threads.
+/// Path tracing noise differs between environments and frames, and is the same for any batch and any number of threads.
 #[test]
 fn noise_keys() {
-    // The same things in all environments.
+    // The same state in all environments.
     let at = |envs: usize, step: u64| {
         let mut state = state(&vec![step; envs]);
         let visible = state.visible.as_mut().unwrap();
@@ -169,7 +170,7 @@ fn noise_keys() {
     let raster = RasterCfg { groups: u32::MAX, ..RasterCfg::default() };
     let channels = Channels { color: true, ..Channels::default() };
     let cfg = CameraCfg { renderer: PATHS, channels, raster, ..cfg() };
-    // By step and environment.
+    // Images by step and environment.
     let images = |cfg: &CameraCfg, context: &SensorContext| {
         let mut camera = cfg.build(context).unwrap();
         let envs: Vec<usize> = (0..context.num_envs).collect();
@@ -187,7 +188,7 @@ fn noise_keys() {
     // Environment 2 alone, as a part of a larger batch, with more threads.
     let alone = images(&cfg, &SensorContext { first_env: 2, threads: 3, ..context(1) });
     assert!((0..3).all(|step| alone[step][0] == three[step][2]));
-    // Controls: other seeds, of the simulation or the renderer, have other noise.
+    // Controls: other seeds of the simulation or of the renderer give other noise.
     assert!(images(&cfg, &SensorContext { seed: 9, ..context(3) })[1][0] != three[1][0]);
     let renderer = Renderer::RayTraced { samples: 2, max_bounces: 1, denoise: false, seed: 4 };
     assert!(images(&CameraCfg { renderer, ..cfg }, &context(3))[1][0] != three[1][0]);

@@ -1,4 +1,4 @@
-//! A scene for the camera as a sensor: a ground and a ball that is elsewhere in every environment.
+//! Test scene of the camera sensor: a ground, and a ball at a different position in every environment.
 
 use super::super::{Camera, CameraCfg, CameraConvention, Extrinsics, Placement};
 use crate::sensor::{SensorCfg, SensorContext};
@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub(super) const DT: f64 = 0.005;
 pub(super) const RADIUS: f64 = 0.3;
 pub(super) const SIZE: [usize; 2] = [48, 32];
-/// Neither square nor centred.
+/// Intrinsics of a camera that is neither square nor centered.
 pub(super) const LENS: Intrinsics = Intrinsics::Pixels { fx: 40.0, fy: 52.0, cx: 22.25, cy: 17.5 };
 pub(super) const GROUND: i32 = 7;
 pub(super) const BALL: i32 = 9;
@@ -36,18 +36,18 @@ pub(super) fn context(num_envs: usize) -> SensorContext {
     }
 }
 
-/// Where the ball is in environment `env` at step `step`.
+/// Position of the ball in environment `env` at step `step`.
 pub(super) fn ball(env: usize, step: u64) -> [f64; 3] {
     [0.1 * env as f64, 0.01 * step as f64, 0.5]
 }
 
-/// Where the link `arm/tip` is in environment `env` at step `step`.
+/// Pose of the link `arm/tip` in environment `env` at step `step`.
 pub(super) fn tip(env: usize, step: u64) -> Pose {
     let (k, s) = (env as f64, step as f64);
     kinetoscope_scene::pose::from_xyz_rpy([-1.0 - 0.1 * k, 0.05 * s, 0.8], [0.1 * k, 0.2 - 0.03 * s, 0.15])
 }
 
-/// Every environment at a step of its own.
+/// A state with the given step in each environment.
 pub(super) fn state(steps: &[u64]) -> SceneState {
     let n = steps.len();
     let mut poses = Array3::zeros((n, 3, 7));
@@ -85,7 +85,7 @@ pub(super) fn cfg() -> CameraCfg {
     }
 }
 
-/// Built and reset at step 0, as the owner does.
+/// Builds a camera and resets it at step 0, as its owner does.
 pub(super) fn built(cfg: &CameraCfg, context: &SensorContext) -> Camera {
     use crate::sensor::Sensor;
     let mut camera = cfg.build(context).unwrap();
@@ -94,13 +94,13 @@ pub(super) fn built(cfg: &CameraCfg, context: &SensorContext) -> Camera {
     camera
 }
 
-/// Where the camera of a row is.
+/// Pose of the camera of a row.
 pub(super) fn pose_of(camera: &Camera, row: usize) -> Pose {
     let poses = camera.pose_w(CameraConvention::Ros);
     from_row(&std::array::from_fn(|k| poses[(row, k)]))
 }
 
-/// All channels as bits, of some rows of the camera.
+/// All channels as bits, for some rows of the camera.
 pub(super) fn bits(camera: &Camera, rows: impl IntoIterator<Item = usize>) -> Vec<u32> {
     let all = ndarray::Axis(0);
     let mut out = Vec::new();
@@ -117,7 +117,7 @@ pub(super) fn bits(camera: &Camera, rows: impl IntoIterator<Item = usize>) -> Ve
     out
 }
 
-/// The pixel of a point in the frame of a camera without a lens.
+/// The pixel of a point in the frame of a pinhole camera.
 pub(super) fn pinhole(camera: &Camera, row: usize, p: Point3<f64>) -> [f64; 2] {
     let k = camera.intrinsic_matrices();
     [0, 1].map(|axis| k[(row, axis, axis)] * p[axis] / p.z + k[(row, axis, 2)])
@@ -129,7 +129,7 @@ pub(super) fn point(camera: &Camera, [row, v, u]: [usize; 3]) -> Point3<f64> {
     Point3::from([0, 1, 2].map(|axis| f64::from(position[(row, v, u, axis)])))
 }
 
-/// The frame of a shot by a rasterizer alone.
+/// Renders a request with a separate rasterizer.
 pub(super) fn frame_of(
     cfg: RasterCfg,
     (renderer, shutter): (Renderer, Shutter),

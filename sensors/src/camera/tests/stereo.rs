@@ -1,4 +1,4 @@
-//! Pairs of eyes, against cameras that stand alone, the geometry of pairs, and OpenCV's rectification.
+//! Stereo cameras, against single cameras, stereo geometry, and OpenCV's rectification.
 
 use super::super::{
     CalibrationError, Camera, CameraCfg, CameraConvention, CameraError, CameraInfo, CameraPlacement, DepthMiss,
@@ -25,10 +25,10 @@ use ndarray::{Axis, array};
 use std::collections::BTreeMap;
 
 const BASELINE: f64 = 0.2;
-/// The same lens as [`LENS`], its principal point farther to the right.
+/// The same intrinsics as [`LENS`], with the principal point farther to the right.
 const SHIFTED: Intrinsics = Intrinsics::Pixels { fx: 40.0, fy: 52.0, cx: 26.5, cy: 17.5 };
 
-/// A pair of small cameras, 20 cm apart.
+/// A stereo camera of two small cameras, 20 cm apart.
 fn pair() -> StereoCameraCfg {
     StereoCameraCfg { camera: cfg(), left_to_right_pos: [BASELINE, 0.0, 0.0], ..StereoCameraCfg::default() }
 }
@@ -54,7 +54,7 @@ fn apart(a: &Pose, b: &Pose) -> [f64; 2] {
     [between.translation.vector.norm(), between.rotation.angle()]
 }
 
-/// Asserts that the eyes of an environment stand there.
+/// Asserts the poses of the two cameras in an environment.
 #[track_caller]
 fn assert_eyes(stereo: &StereoCamera, env: usize, expected: [Pose; 2]) {
     for (eye, expected) in [stereo.left(), stereo.right()].into_iter().zip(expected) {
@@ -82,7 +82,7 @@ fn single_cameras() {
         let origins = stereo.pose_w(CameraConvention::Ros);
         let [moved, turned] = apart(&from_row(&std::array::from_fn(|k| origins[(1, k)])), &there);
         assert!(moved < 1e-12 && turned < 1e-7, "{moved} {turned}");
-        // Each eye is the camera that stands where it stands, in all channels, bit for bit.
+        // Each camera equals a single camera at the same pose, in all channels, bit for bit.
         for (eye, pose, intrinsics) in [(stereo.left(), left, LENS), (stereo.right(), left * offset, right_lens)] {
             let placement = Placement::Pose { pos: pose.translation.into(), rotation: pose.rotation };
             let extrinsics = Extrinsics { placement, ..Extrinsics::default() };
@@ -92,21 +92,23 @@ fn single_cameras() {
             assert_eq!((eye.stamps(), eye.frame_counts()), (alone.stamps(), alone.frame_counts()));
             assert_eq!(eye.depth().unwrap().dim(), (2, SIZE[1], SIZE[0]));
         }
-        // The control: the eyes do not see the same.
+        // Control: the two images differ.
         let [left, right] = both_bits(&stereo, 2);
         assert!(left != right);
     }
 }
 
-/// Number of judged pixels of the left eye, and of those that the right eye does not see where they should be. Disparities are
-/// multiplied by `scale`: 1, or something else as a control.
+/// Returns the number of compared pixels of the left image, and the number of errors among them: pixels that the right
+/// camera does not see at the expected position. Disparities are multiplied by `scale`: 1, or another value as a
+/// control.
 ///
-/// A point P that the left eye sees is projected to the right eye. Rows of a rectified pair are the same, so that P falls
-/// between two pixels of its row, which see Q and R. Both surfaces are convex (a plane, a ball), so that the right eye
-/// sees P exactly where it is on the near side of its surface and both pixels see that surface. Then P, Q and R are on the
-/// curve in which the epipolar plane cuts the surface: a line, or a circle of radius r <= R0. P is between Q and R in the
-/// image and so on the arc between them, whose distance from the chord L is at most r - sqrt(r² - L²/4) <= L²/(4 r).
-/// Single precision adds some ulps of coordinates below 100 m, of which only those nearer than 10 m are judged: 1e-4.
+/// A point P seen by the left camera is projected to the right camera. Rows of a rectified stereo pair correspond, so P
+/// falls between two pixels of its row, which see Q and R. Both surfaces are convex (a plane, a ball). So the right
+/// camera sees P exactly if P is on the near side of its surface and both pixels see that surface. Then P, Q and R are
+/// on the curve in which the epipolar plane cuts the surface: a line, or a circle of radius r <= R0. In the image, P is
+/// between Q and R, so it is on the arc between them. The distance of the arc from the chord L is at most r - sqrt(r² -
+/// L²/4) <= L²/(4 r). Single precision adds some ulps of coordinates below 100 m; only those nearer than 10 m are
+/// compared: 1e-4.
 fn reproject(stereo: &StereoCamera, steps: &[u64], scale: f64) -> (usize, usize) {
     let (left, right) = (stereo.left(), stereo.right());
     let disparity = stereo.disparity().unwrap();
@@ -132,7 +134,7 @@ fn reproject(stereo: &StereoCamera, steps: &[u64], scale: f64) -> (usize, usize)
             if normal.dot(&(c - point)) < 0.02 {
                 continue;
             }
-            // Where the right eye should see it, by the disparity; the principal point may be elsewhere.
+            // Expected position in the right image, from the disparity and the difference of the principal points.
             let shift = matrices[(row, 0, 2)] - left.intrinsic_matrices()[(row, 0, 2)];
             let x = u as f64 + 0.5 - d + shift;
             let first = (x - 0.5).floor();
@@ -144,7 +146,7 @@ fn reproject(stereo: &StereoCamera, steps: &[u64], scale: f64) -> (usize, usize)
                 continue;
             }
             judged += 1;
-            // The projection itself.
+            // Direct projection.
             let projected = pinhole(right, row, eyes[1].inverse() * Point3::from(point));
             let missed = (projected[0] - x).abs().max((projected[1] - (v as f64 + 0.5)).abs());
             let [q, r] = columns.map(|column| at(right, v, column));
@@ -158,7 +160,8 @@ fn reproject(stereo: &StereoCamera, steps: &[u64], scale: f64) -> (usize, usize)
                 let away = plane.dot(&(center - o));
                 chord.norm_squared() / (4.0 * (RADIUS * RADIUS - away * away).max(1e-12).sqrt())
             };
-            // 1e-3 pixels: the disparity is some 10 pixels in single precision, the point some ulps of 10 m at 40 pixels.
+            // 1e-3 pixels: the disparity is some 10 pixels in single precision, the point some ulps of 10 m at
+            // 40 pixels.
             if missed > 1e-3 || off > sagitta + 1e-4 {
                 wrong += 1;
             }
@@ -182,14 +185,15 @@ fn matching_points() {
             assert!(judged > 1000 && wrong == 0, "{wrong} of {judged} pixels");
             let seen = stereo.left().mask().unwrap().iter().filter(|&&id| id == BALL).count();
             assert!(seen > 100, "{seen} pixels of the ball");
-            // The control: one percent more is seen to be wrong at nearly every pixel.
+            // Control: an error of one percent is detected at nearly every pixel.
             let (judged, wrong) = reproject(&stereo, &steps, 1.01);
             assert!(10 * wrong > 9 * judged, "{wrong} of {judged} pixels");
         }
     }
 }
 
-/// Disparity is that of the left eye's depth, noise included, which ends at the far plane: hits have one there too.
+/// Disparity uses the depth of the left camera including noise, which ends at the far plane; hits there have a
+/// disparity too.
 #[test]
 fn disparity_formula() {
     let misses = [DepthMiss::Inf, DepthMiss::Far, DepthMiss::Zero];
@@ -225,7 +229,7 @@ fn lazy_disparity() {
     assert_ne!(stereo.disparity().unwrap(), before);
     assert_eq!(stereo.disparity().unwrap().as_ptr(), address, "memory stays where it is");
     assert_eq!((stereo.left().draws(), stereo.left().frame_counts()), (4, array![1, 1].view()));
-    // Other intrinsics change it, of the same instant.
+    // Other intrinsics change the disparity at the same instant.
     let other = [Intrinsics::Pixels { fx: 20.0, fy: 26.0, cx: 22.25, cy: 17.5 }];
     let before = stereo.disparity().unwrap().to_owned();
     stereo.set_intrinsics(&other, Some(&[1])).unwrap();
@@ -234,7 +238,7 @@ fn lazy_disparity() {
     assert_ne!(after.index_axis(Axis(0), 1), before.index_axis(Axis(0), 1));
 }
 
-/// Both eyes at one place see the same, bit for bit; random numbers are not the same in both.
+/// Two cameras at one pose see the same, bit for bit, but have different random numbers.
 #[test]
 fn independent_noise() {
     let one_place = |camera: CameraCfg| {
@@ -253,8 +257,8 @@ fn independent_noise() {
     assert!(left.0 == right.0 && left.1 != right.1, "depth has no noise of paths, colour has");
 }
 
-/// Root cause: the right eye took over the left one's noise and imperfections whatever it measures, so that no pair could be built
-/// whose right eye measures less.
+/// Root cause: the right camera copied the noise and imperfections of the left one for all channels. No stereo camera
+/// could be built whose right camera measures fewer channels.
 #[test]
 fn own_imperfections() {
     let context = context(1);
@@ -266,24 +270,24 @@ fn own_imperfections() {
     let camera = CameraCfg { channels: both, imperfections, noise: all_noise, ..cfg() };
     let cfg = StereoCameraCfg { channels_right: Some(colors), ..pair_of(camera.clone()) };
     let stereo = of(&cfg, &context);
-    // The judge is a camera that stands alone where the right eye is, under its name, with all imperfections of colours.
+    // Reference: a single camera at the pose of the right camera, with its name and all imperfections of color.
     let extrinsics = cfg.eyes().unwrap()[1].extrinsics.clone();
     let alone = CameraCfg { channels: colors, imperfections: of_light, noise: noise(&["color"]), extrinsics, ..camera };
     let named = SensorContext { name: "/right".into(), ..context.clone() };
     let color = |cfg: &CameraCfg| built(cfg, &named).color().unwrap().to_owned();
     assert_eq!(stereo.right().color().unwrap(), color(&alone));
     assert!(stereo.left().depth().is_ok() && stereo.right().depth().is_err());
-    // The controls: noise and imperfections are both seen.
+    // Controls: noise and imperfections are both visible.
     let quiet = CameraCfg { noise: BTreeMap::new(), ..alone.clone() };
     let clean = CameraCfg { imperfections: Imperfections::default(), ..alone };
     assert!(stereo.right().color().unwrap() != color(&quiet) && stereo.right().color().unwrap() != color(&clean));
-    // Imperfections of its own.
+    // Imperfections specific to the right camera.
     let (noise_right, imperfections_right) = (Some(BTreeMap::new()), Some(clean.imperfections.clone()));
     let stereo = of(&StereoCameraCfg { noise_right, imperfections_right, ..cfg }, &context);
     assert_eq!(stereo.right().color().unwrap(), color(&CameraCfg { noise: BTreeMap::new(), ..clean }));
 }
 
-/// Root cause: errors of an eye named a camera, whichever of the two it was.
+/// Root cause: errors of a stereo camera did not state which of the two cameras they belong to.
 #[test]
 fn errors_of_eyes() {
     let context = context(1);
@@ -301,7 +305,8 @@ fn errors_of_eyes() {
     let left = StereoCameraCfg { channels_right, ..pair_of(with_depth_noise) };
     let right = StereoCameraCfg { imperfections_right, ..pair_of(camera) };
     let lens = StereoCameraCfg { lens_right, ..pair_of(with_shadows) };
-    // The left eye has its own imperfections only, whatever the right one measures; those of the right one are not left out.
+    // The left camera has only its own imperfections, whatever the right one measures; those of the right camera are
+    // kept.
     for (cfg, expected) in [
         (&left, format!("the left eye: {off}")),
         (&right, format!("the right eye: {off}")),
@@ -310,11 +315,11 @@ fn errors_of_eyes() {
         let error = cfg.build(&context).unwrap_err().to_string();
         assert!(error.starts_with(&expected), "{error}");
     }
-    // All of them are possible with settings of the right eye.
+    // All of them are possible with settings of the right camera.
     assert!(of(&StereoCameraCfg { channels_right, ..right }, &context).right().depth().is_ok());
     let cfg = StereoCameraCfg { imperfections_right: Some(shadows(0.0)), ..lens };
     assert!(of(&cfg, &context).right().depth().is_ok());
-    // As scene files have them.
+    // As in scene files.
     let text = "imperfections_right.holes.baseline = 0.0\nnoise_right.depth.std = 0.01\n[camera]\nchannels = ['depth']";
     let read: StereoCameraCfg = toml::from_str(text).unwrap();
     assert_eq!(read.imperfections_right, cfg.imperfections_right);
@@ -323,7 +328,7 @@ fn errors_of_eyes() {
     assert_eq!(toml::from_str::<StereoCameraCfg>("").unwrap(), StereoCameraCfg::default());
 }
 
-/// Rigs are placed as a whole or not at all.
+/// A rig is placed completely or not at all.
 #[test]
 fn placement() {
     let context = context(2);
@@ -340,7 +345,7 @@ fn placement() {
         let (now, expected) = (attached.pose_w(convention), to_row(&convention.of_optical(&there)));
         assert!(now.row(1).iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{now}");
     }
-    // They move with the link.
+    // The cameras move with the link.
     attached.refresh(&[1], &state(&[3, 9])).unwrap();
     assert_eyes(&attached, 1, eyes(tip(1, 9) * tip(1, 2).inverse() * there));
 
@@ -379,7 +384,7 @@ fn without_disparity() {
         let stereo = of(&cfg, &context);
         let error = stereo.disparity().unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
-        // Everything else can be read.
+        // All other channels can be read.
         assert!(stereo.right().depth().is_ok());
     }
     let camera = CameraCfg { channels: Channels { color: true, ..Channels::default() }, ..cfg() };
@@ -395,7 +400,7 @@ fn without_disparity() {
     assert!(matches!(*error, SensorError::Camera(CameraError::Optics(OpticsError::Lens { .. }))), "{error}");
 }
 
-/// A fisheye lens, which needs rays.
+/// A fisheye lens, which needs a ray tracer.
 fn fisheye() -> Lens {
     OpenCvFisheye { k1: 0.05, ..OpenCvFisheye::default() }.into()
 }
@@ -410,9 +415,9 @@ fn own_lenses() {
     assert_eq!((stereo.left().lens(), stereo.right().lens()), (Lens::default(), fisheye()));
     let alone = built(&CameraCfg { lens: fisheye(), ..cfg.eyes().unwrap()[1].clone() }, &context);
     assert!(both_bits(&stereo, 1) == [bits(without.left(), 0..1), bits(&alone, 0..1)]);
-    // The control: another image than without it.
+    // Control: the image differs from that without the lens.
     assert!(bits(stereo.right(), 0..1) != bits(without.right(), 0..1));
-    // Disparity is of two pinholes, whichever eye is none.
+    // Disparity needs two pinholes, whichever camera has another lens.
     assert!(without.has_disparity() && !stereo.has_disparity());
     let swapped = pair_of(CameraCfg { lens: fisheye(), ..camera });
     let swapped = StereoCameraCfg { lens_right: Some(Lens::default()), ..swapped };
@@ -422,25 +427,25 @@ fn own_lenses() {
     }
 }
 
-/// Images through lenses are of tables of rays: a change that fails leaves those too.
+/// Images of lenses use ray tables: a failed change keeps those too.
 #[test]
 fn failed_changes() {
     let camera = CameraCfg { renderer: Renderer::FastRayTraced, lens: fisheye(), ..cfg() };
     let mut stereo = of(&pair_of(camera), &context(2));
     let lens = |fx| Intrinsics::Pixels { fx, fy: 44.0, cx: 20.0, cy: 16.0 };
-    // The intrinsics that were set before stay, not those of the configuration.
+    // Intrinsics set before are kept, not replaced by the configured ones.
     stereo.set_intrinsics(&[lens(44.0)], Some(&[1])).unwrap();
     let (before, bytes) = (both_bits(&stereo, 2), stereo.left().lens_bytes());
     assert!(stereo.set_eye_intrinsics(&[lens(30.0)], &[lens(-1.0)], None).is_err());
     stereo.set_local_pose(&stereo.local_pose(CameraConvention::Ros), None, CameraConvention::Ros).unwrap();
     assert!(both_bits(&stereo, 2) == before && stereo.left().lens_bytes() == bytes);
-    // The control: one that does not fail is seen, and tables that are not needed are freed.
+    // Control: a successful change is visible, and unused tables are freed.
     stereo.set_intrinsics(&[lens(30.0)], Some(&[1])).unwrap();
     assert!(bits(stereo.left(), 0..2) != before[0] && stereo.left().lens_bytes() == bytes);
 }
 
-/// By the definition of P in ROS's `sensor_msgs/CameraInfo`: (u, v, w) = P (X, Y, Z, 1) of a point in the frame of the left eye,
-/// against where the right eye sees it from where it stands.
+/// Definition of P in `sensor_msgs/CameraInfo`: (u, v, w) = P (X, Y, Z, 1) of a point in the left frame. It must match
+/// the projection by the right camera at its pose.
 #[test]
 fn projection_matrices() {
     let stereo = of(&StereoCameraCfg { intrinsics_right: Some(SHIFTED), ..pair() }, &context(2));
@@ -453,10 +458,10 @@ fn projection_matrices() {
         for (info, eye) in [(&left, stereo.left()), (&right, stereo.right())] {
             let seen = pinhole(eye, 1, pose_of(eye, 1).inverse() * (pose_of(stereo.left(), 1) * point));
             let p = projected(&info.projection_matrix, point.coords);
-            // ROS counts from the centre of the first pixel. Some ulps of 100 pixels, and of poses.
+            // ROS counts from the center of the first pixel. Tolerance: some ulps of 100 pixels, and of poses.
             assert!((0..2).all(|axis| (p[axis] + 0.5 - seen[axis]).abs() < 1e-10), "{p:?} {seen:?}");
         }
-        // The control: without the fourth column it is 40 * 0.2 / z pixels off, at least 2.
+        // Control: without the fourth column, the point is 40 * 0.2 / z pixels off, at least 2.
         let off = (alone.projection_matrix - right.projection_matrix) * point.to_homogeneous() / point.z;
         assert!(off.x >= 1.999);
     }
@@ -464,8 +469,8 @@ fn projection_matrices() {
     assert!(stereo.camera_info("head", 2).is_err());
 }
 
-/// A pair by OpenCV: rotation and translation that bring points of the left eye to the right one, and the results of
-/// `stereoRectify`.
+/// A stereo camera of OpenCV: rotation and translation that map points from the left to the right frame, and the
+/// results of `stereoRectify`.
 struct Known {
     r: [f64; 9],
     t: [f64; 3],
@@ -473,7 +478,7 @@ struct Known {
     r2: [f64; 9],
     /// fx, cx, cy of both P, and P\[0\]\[3\] of the right one.
     p: [f64; 4],
-    /// Pixels of `projectPoints` for three points of the left eye's frame in the raw images of both.
+    /// Pixels of `projectPoints` for three points of the left frame, in the raw images of both cameras.
     seen: [[f64; 6]; 2],
 }
 
@@ -497,7 +502,7 @@ impl Known {
         })
     }
 
-    /// Its calibrations.
+    /// Calibrations of both cameras.
     fn infos(&self) -> [CameraInfo; 2] {
         let [f, cx, cy, tx] = self.p;
         let info = |k: usize, r: &[f64; 9], tx: f64| CameraInfo {
@@ -513,7 +518,7 @@ impl Known {
         [info(0, &self.r1, 0.0), info(1, &self.r2, tx)]
     }
 
-    /// The right eye in the frame of the left one: X_right = R X_left + T the other way round.
+    /// Pose of the right camera in the left frame: the inverse of X_right = R X_left + T.
     fn left_from_right(&self) -> Pose {
         let rotation =
             UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&self.r)));
@@ -529,7 +534,7 @@ fn pixels(intrinsics: Intrinsics) -> PixelIntrinsics {
     intrinsics.to_pixels(640, 480).unwrap()
 }
 
-/// From K, D, R and P to the eyes: they stand as in OpenCV's input, and see points where OpenCV projects them to.
+/// From K, D, R and P to the cameras: poses equal the input of OpenCV, and points project to the pixels of OpenCV.
 #[test]
 fn opencv_pairs() {
     assert_eq!(Known::all().count(), 2);
@@ -537,7 +542,8 @@ fn opencv_pairs() {
         let [left, right] = known.infos();
         let cfg = StereoCameraCfg::of_infos(&left, &right).unwrap();
         let expected = known.left_from_right();
-        // Numbers of 16 digits, and OpenCV's own rounding: R's products are of some ulps, and its baseline is the norm of T.
+        // Numbers of 16 digits, and the rounding of OpenCV: some ulps in products of R, and the baseline is the norm of
+        // T.
         let [moved, turned] = apart(&rig_of(&cfg), &expected);
         assert!(moved < 1e-14 && turned < 1e-14, "{moved} {turned}");
         assert_eq!((cfg.origin, cfg.camera.renderer), (StereoOrigin::Left, Renderer::FastRayTraced));
@@ -553,16 +559,17 @@ fn opencv_pairs() {
                 assert!(off.iter().all(|off| off.abs() < 1e-10), "{point:?}: {off:?} pixels");
             }
         }
-        // The control: a millimetre and a milliradian are seen.
+        // Control: a millimeter and a milliradian are detected.
         let moved =
             expected * Pose::from_parts(Translation3::new(1e-3, 0.0, 0.0), UnitQuaternion::new(Vector3::x() * 1e-3));
         assert!(apart(&rig_of(&cfg), &moved).iter().all(|off| *off > 5e-4));
-        // R of ours are OpenCV's, and so is the baseline; f and the principal points are chosen otherwise, as documented.
+        // R and the baseline equal those of OpenCV; f and the principal points are chosen differently, as documented.
         let [left, right] = K.map(|[fx, fy, cx, cy]| PixelIntrinsics { fx, fy, cx, cy });
         let found = Rectification::of(&known.left_from_right(), [left, right]).unwrap();
         for (rotation, expected) in found.rotations.iter().zip([&known.r1, &known.r2]) {
             let off = (rotation - Matrix3::from_row_slice(expected)).amax();
-            // OpenCV has the last angle by an arc cosine, which is some ulps over that angle: 0.03 rad or more here.
+            // OpenCV computes the last angle by an arc cosine, which has some ulps over that angle: 0.03 rad or more
+            // here.
             assert!(off < 1e-14, "{off}");
         }
         let baseline = |p: f64, f: f64| -p / f;
@@ -582,7 +589,7 @@ fn of_two(cfg: &StereoCameraCfg) -> StereoCamera {
     of(cfg, &context(2))
 }
 
-/// Pairs of eyes that are not parallel, stand askew, or have other lenses.
+/// Stereo cameras that are not parallel, are rotated, or have other lenses.
 fn pairs() -> Vec<StereoCameraCfg> {
     let other = |fx, fy, cx, cy| Some(Intrinsics::Pixels { fx, fy, cx, cy });
     let turned = UnitQuaternion::from_euler_angles;
@@ -609,13 +616,13 @@ fn pairs() -> Vec<StereoCameraCfg> {
         pair([0.3, -0.2, 0.1], turned(-0.2, 0.3, 0.4), other(41.0, 52.0, 23.0, 18.5), fish.into(), Some(barrel.into())),
         // Parallel, with another focal length.
         pair([0.06, 0.0, 0.0], UnitQuaternion::identity(), other(40.5, 52.0, 22.25, 17.5), Lens::default(), None),
-        // Above each other, almost: images lie on their side.
+        // Almost above each other: images lie on their side.
         pair([0.01, 0.2, 0.0], turned(0.05, 0.0, 0.0), None, barrel.into(), None),
     ]
 }
 
-/// By the definitions of R and P, with the eyes where they stand: a point is in the same row of both rectified images, and f b / z
-/// farther left in the right one; and the way there by raw pixels, whose distortion is undone, is the same.
+/// Definitions of R and P for cameras at their poses: a point is in the same row of both rectified images, and f b / z
+/// farther left in the right one. Undistorting raw pixels gives the same result.
 #[test]
 fn rectified_rows() {
     for cfg in pairs() {
@@ -628,12 +635,12 @@ fn rectified_rows() {
         let (mut by_raw, mut skew, mut middle) = (0, 0.0f64, [0.0; 2]);
         for point in [[0.1, 0.0, 1.0], [-0.2, 0.1, 0.8], [0.05, -0.1, 3.0], [0.6, 0.4, 2.0], [-1.0, -0.5, 6.0]] {
             let world = pose_of(eyes[0], 1) * Point3::from(point);
-            // Of each eye: where it is in its rectified frame.
+            // Position in the rectified frame of each camera.
             let rectified =
                 [0, 1].map(|k| infos[k].rectification_matrix * (pose_of(eyes[k], 1).inverse() * world).coords);
             let z = rectified[0].z;
             assert!(z > 0.1 && (rectified[1] - rectified[0] + Vector3::x() * baseline).norm() < 1e-13);
-            // P of both is of points of the left eye.
+            // P of both cameras takes points of the left frame.
             let [left, right] = [0, 1].map(|k| projected(&infos[k].projection_matrix, rectified[0]));
             let [shift, drop] = [left[0] - right[0] - f * baseline / z, left[1] - right[1]];
             assert!(shift.abs() < 1e-10 && drop.abs() < 1e-10, "{shift} {drop}");
@@ -642,21 +649,21 @@ fn rectified_rows() {
                 let raw = optics.project((pose_of(eyes[k], 1).inverse() * world).coords.into());
                 let Some(ray) = raw.and_then(|raw| optics.unproject(raw)) else { continue };
                 let mut own = infos[k].projection_matrix;
-                // The position of the eye already contains the fourth column.
+                // The position in the right frame already contains the fourth column.
                 own.set_column(3, &Vector3::zeros());
                 let found = projected(&own, infos[k].rectification_matrix * Vector3::from(ray));
                 let off = [found[0] - expected[0], found[1] - expected[1]];
-                // Distortions are undone to 1e-12 of the normalised image or so.
+                // Distortions are inverted to about 1e-12 of the normalized image.
                 assert!(off.iter().all(|off| off.abs() < 1e-8), "{off:?}");
                 by_raw += 1;
-                // The control: raw rows are not the same.
+                // Control: raw rows differ.
                 skew = skew.max((raw.unwrap()[1] - ros - expected[1]).abs());
             }
         }
         assert!(by_raw >= 8, "{by_raw}");
         let straight = cfg.left_to_right_rot == UnitQuaternion::identity();
         assert!(straight || skew > 0.5, "{skew}");
-        // Common principal points, so that what is far away has no disparity.
+        // Common principal points: infinitely far points have no disparity.
         let [left, right] = [0, 1].map(|k| infos[k].projection_matrix.fixed_columns::<3>(0).into_owned());
         assert_eq!(left, right);
         // Both rectified principal points are the mean of the raw ones.
@@ -671,7 +678,7 @@ fn rectified_rows() {
     }
 }
 
-/// The pair of the calibrations of a pair is that pair, through the text of files too.
+/// The calibrations of a stereo camera give the same stereo camera, through the text of files too.
 #[test]
 fn calibration_round_trip() {
     for cfg in pairs() {
@@ -693,7 +700,7 @@ fn calibration_round_trip() {
         let same = |a: Lens, b: Lens| a == b || a.is_pinhole() && b.is_pinhole();
         assert!(same(again.camera.lens, cfg.camera.lens));
         assert!(same(again.lens_right.unwrap(), cfg.lens_right.unwrap_or(cfg.camera.lens)));
-        // It can be built, and has the same calibrations.
+        // The result can be built, and has the same calibrations.
         let own = CameraCfg { channels: cfg.camera.channels, ..again.camera.clone() };
         let said = of_two(&StereoCameraCfg { camera: own, ..again }).camera_info("head", 0).unwrap();
         for (said, info) in said.iter().zip(&infos) {
@@ -725,15 +732,15 @@ fn not_rectifiable() {
             said.starts_with("the pictures of these eyes cannot be rectified: ") && said.contains(expected),
             "{said}"
         );
-        // Only errors of the disparity mention it.
+        // Only errors of the disparity mention disparity.
         assert!(!said.contains("disparity") && stereo.disparity().unwrap_err().to_string().contains("disparity"));
     }
-    // Lenses that ROS has no model for are refused as of a camera alone, whatever the eyes' places.
+    // Lenses without a ROS model are rejected as for a single camera, whatever the poses.
     let camera = CameraCfg { lens: Equisolid::default().into(), renderer: Renderer::FastRayTraced, ..cfg() };
     let stereo = of_two(&StereoCameraCfg { camera, ..pairs()[2].clone() });
     let error = stereo.camera_info("head", 0).unwrap_err();
     assert!(matches!(error, SensorError::Calibration(CalibrationError::Lens { lens: "equisolid", .. })), "{error}");
-    // How they are rectified is known all the same.
+    // Their rectification is still available.
     assert!(stereo.rectification(1).is_ok() && stereo.rectification(2).is_err());
 }
 
@@ -767,7 +774,7 @@ fn refused_pairs() {
             "{said}"
         );
     }
-    // Files of few digits are read: R is the rotation that is nearest.
+    // Files with few digits are accepted: R becomes the nearest rotation.
     let [left, mut right] = Known::all().next().unwrap().infos();
     right.rectification_matrix.iter_mut().for_each(|x| *x = (*x * 1e4).round() / 1e4);
     let cfg = StereoCameraCfg::of_infos(&left, &right).unwrap();

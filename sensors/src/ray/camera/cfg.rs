@@ -1,4 +1,4 @@
-//! What a camera made of rays is, before it exists.
+//! Ray-caster camera configuration.
 
 use super::pixels::Pixels;
 use super::sensor::RayCasterCamera;
@@ -17,45 +17,47 @@ use kinetoscope_render::lens::RaysOfRows;
 use kinetoscope_scene::Requires;
 use serde::{Deserialize, Serialize};
 
-/// A hit of 40 bytes; five numbers of the sampler; depth, distance, normal and mask.
+/// Memory per ray \[bytes\]: a hit of 40 bytes; five numbers of the sampler; depth, distance, normal and mask.
 const BYTES_PER_RAY: usize = 40 + 40 + 24;
 
-/// Configuration of a [`RayCasterCamera`]: a pinhole camera that casts one ray through the centre of every pixel.
+/// Configuration of a [`RayCasterCamera`]: a pinhole camera that casts one ray through the center of every pixel.
 ///
-/// Unlike [`CameraCfg`](crate::camera::CameraCfg) it measures only geometry, of the chosen targets, and every number is that of
-/// an exact ray. Where all of a scene is to be seen, the rasterizer is faster.
+/// Unlike [`CameraCfg`](crate::camera::CameraCfg), it measures only the geometry of the chosen targets, and every
+/// number comes from an exact ray. To see a whole scene, the rasterizer is faster.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RayCasterCameraCfg {
-    /// Pixels per row.
+    /// Image width \[pixels\].
     pub width: usize,
-    /// Rows.
+    /// Image height \[pixels\].
     pub height: usize,
-    /// The lens.
+    /// Focal lengths and principal point.
     pub intrinsics: Intrinsics,
-    /// Where it is.
+    /// Pose of the camera, and the body that it is attached to.
     pub extrinsics: Extrinsics,
-    /// Nothing farther away is seen, along the ray \[m\].
+    /// Largest distance along the ray \[m\].
     pub max_distance: f64,
-    /// What depth and distance say where nothing is hit; [`DepthMiss::Far`] is `max_distance`.
+    /// Value of depth and distance where nothing is hit; [`DepthMiss::Far`] is `max_distance`.
     pub depth_miss: DepthMiss,
-    /// What is hit.
+    /// Targets of the rays.
     pub targets: HitTargets,
-    /// Geom groups that are hit: bit k is group k.
+    /// Geom groups of the targets: bit k is group k.
     pub groups: u32,
-    /// Rate, history, latency and noise. The channel that may have noise is `distances`: the distance along the ray of each
-    /// pixel \[m\], from which depth and points follow. With noise it is from 0 to `max_distance` still: what comes out beyond
-    /// saturates. Normals, masks and misses are exact: what is hit stays a hit, what is missed a miss, and the mask tells a hit
-    /// at `max_distance` from a [`DepthMiss::Far`]. The numbers of the history and of pictures on their way are in double
-    /// precision: 40 bytes for each pixel and picture.
+    /// Rate, history, latency and noise. Only the channel `distances` can have noise: the distance along the ray of
+    /// each pixel \[m\], from which depth and points follow. Noisy distances are clamped to the range from 0 to
+    /// `max_distance`.
+    ///
+    /// Normals, masks and misses are exact: hits stay hits and misses stay misses. The mask distinguishes a hit at
+    /// `max_distance` from a [`DepthMiss::Far`]. The history and images in flight are in double precision: 40 bytes for
+    /// each pixel and image.
     pub sampling: SamplingCfg,
-    /// Show where it is and what it sees: its frame, and an arrow along each edge of the picture's pyramid
+    /// Shows the camera's frame and an arrow along each edge of its view frustum
     /// ([`Sensor::markers`](crate::Sensor::markers)).
     pub debug_vis: bool,
 }
 
 impl Default for RayCasterCameraCfg {
-    /// 160 by 120 pixels behind Isaac's default lens; everything but what it hangs on, up to 1000 km.
+    /// 160 by 120 pixels with Isaac's default intrinsics; all targets except the parent body, up to 1000 km.
     fn default() -> Self {
         Self {
             width: 160,
@@ -75,7 +77,7 @@ impl Default for RayCasterCameraCfg {
 impl SensorCfg for RayCasterCameraCfg {
     type Sensor = RayCasterCamera;
 
-    /// Where things are; the poses of bodies only where it hangs on one.
+    /// Poses of instances; body poses only if the camera is attached to a body.
     fn requires(&self) -> Requires {
         if self.extrinsics.parent.is_some() { Requires::INSTANCES | Requires::POSES } else { Requires::INSTANCES }
     }
@@ -90,8 +92,8 @@ impl SensorCfg for RayCasterCameraCfg {
 
     /// # Errors
     ///
-    /// Sizes, lens, distance or placement that are no good; an unknown parent or target; a period that is no whole number
-    /// of steps and what else is wrong with the sampling; pictures that do not fit into memory.
+    /// An invalid size, intrinsics, distance or pose; an unknown parent or target; a period that is not a whole number
+    /// of steps or another invalid sampling parameter; images that do not fit into memory.
     fn build(&self, context: &SensorContext) -> Result<RayCasterCamera, SensorError> {
         let parent = self.extrinsics.parent.as_deref().map(|name| context.body(name)).transpose()?;
         if !(self.max_distance > 0.0 && self.max_distance < f64::from(f32::MAX)) {

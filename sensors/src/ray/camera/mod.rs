@@ -1,4 +1,4 @@
-//! Cameras made of rays: depth, distances, normals and masks in double precision, of chosen targets.
+//! Ray-caster cameras: depth, distances, normals and masks of chosen targets, computed in double precision.
 
 mod cfg;
 mod pictures;

@@ -1,4 +1,4 @@
-//! Pictures of a camera of rays, made of what its rays measured.
+//! Images of a ray-caster camera, computed from its hits.
 
 use super::pixels::Pixels;
 use super::sensor::Taken;
@@ -7,7 +7,7 @@ use kinetoscope_render::PixelIntrinsics;
 use kinetoscope_scene::pose::{from_row, to_row};
 use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, ArrayView4};
 
-/// The pictures of one measurement in all environments.
+/// Images of one measurement in all environments.
 #[derive(Clone, Debug)]
 pub struct RayPictures {
     pub(super) taken: Vec<Taken>,
@@ -43,13 +43,13 @@ impl RayPictures {
         Array3::from_shape_fn((self.taken.len(), 3, 3), |(env, i, j)| self.taken[env].lens.matrix()[(i, j)])
     }
 
-    /// From where they were taken, in the environment, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
+    /// Camera poses in the environment at the measurement, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         let row = |taken: &Taken| to_row(&convention.of_optical(&taken.world_from_camera));
         Array2::from(self.taken.iter().map(row).collect::<Vec<[f64; 7]>>())
     }
 
-    /// Makes those of an environment of the values that were measured; `miss` is what depth and distance say of a miss.
+    /// Computes the images of an environment from sampled values; `miss` is the depth and distance of a miss.
     pub(super) fn develop(
         &mut self,
         env: usize,

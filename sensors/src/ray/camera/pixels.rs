@@ -1,4 +1,4 @@
-//! The rays of a camera: one through the centre of every pixel.
+//! Rays of a camera: one through the center of every pixel.
 
 use crate::ray::scan::Rays;
 use kinetoscope_render::PixelIntrinsics;
@@ -6,7 +6,8 @@ use kinetoscope_scene::PoseF64;
 use kinetoscope_scene::Ray;
 use nalgebra::Vector3;
 
-/// The pixels of a picture, row by row. Rays are made when they are cast: every environment may have a lens of its own.
+/// Pixels of an image, row by row. Rays are generated at each cast, because every environment may have its own
+/// intrinsics.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pixels {
     pub(crate) width: usize,
@@ -14,7 +15,7 @@ pub(crate) struct Pixels {
 }
 
 impl Pixels {
-    /// The direction of pixel number `k` in the optical frame, of length 1.
+    /// Returns the unit direction of pixel number `k` in the optical frame.
     #[inline]
     pub(crate) fn direction(&self, lens: &PixelIntrinsics, k: usize) -> [f64; 3] {
         let (u, v) = ((k % self.width) as f64 + 0.5, (k / self.width) as f64 + 0.5);
@@ -23,7 +24,7 @@ impl Pixels {
 }
 
 impl Rays for Pixels {
-    /// World from the optical frame, and the lens.
+    /// World from the optical frame, and the intrinsics.
     type View = (PoseF64, PixelIntrinsics);
 
     fn count(&self) -> usize {

@@ -1,4 +1,4 @@
-//! Points of cameras of rays: as with [`Camera`](crate::camera::Camera), by the same code.
+//! Point clouds of ray-caster cameras, with the same code as for [`Camera`](crate::camera::Camera).
 
 use super::sensor::RayCasterCamera;
 use crate::camera::PointFrame;
@@ -9,8 +9,9 @@ use kinetoscope_scene::Pose;
 use ndarray::{Array2, Array3};
 
 impl RayCasterCamera {
-    /// The points of all pixels \[m\], shape (N, H * W, 3), row by row from the top left: the depth along the ray through the
-    /// pixel's centre, noise included. (+inf, +inf, +inf) where nothing was hit, which the mask says too.
+    /// Returns the points of all pixels \[m\], shape (N, H * W, 3), row by row from the top left: the depth along the
+    /// ray through the pixel center, noise included. (+inf, +inf, +inf) where nothing was hit, which is where the mask
+    /// is 0.
     pub fn points(&self, frame: PointFrame) -> Array3<f32> {
         let (height, width) = self.image_shape();
         let count = self.sampler().num_envs();
@@ -23,7 +24,7 @@ impl RayCasterCamera {
         points
     }
 
-    /// The point at every pixel of environment `env` \[m\], shape (H, W, 3), as [`points`](Self::points) has them.
+    /// Returns the point at every pixel of environment `env` \[m\], shape (H, W, 3), as in [`points`](Self::points).
     ///
     /// # Errors
     ///
@@ -38,12 +39,12 @@ impl RayCasterCamera {
         Ok(points)
     }
 
-    /// The points that environment `env` shows \[m\], shape (points, 3): those of [`point_map`](Self::point_map) where
-    /// something was hit, row by row from the top left.
+    /// Returns the points seen in environment `env` \[m\], shape (points, 3): the hits of
+    /// [`point_map`](Self::point_map), row by row from the top left.
     ///
     /// # Errors
     ///
-    /// As [`point_map`](Self::point_map).
+    /// Same as [`point_map`](Self::point_map).
     pub fn point_cloud(&self, env: usize, frame: PointFrame) -> Result<Array2<f32>, SensorError> {
         Ok(seen(self.point_map(env, frame)?.view()))
     }

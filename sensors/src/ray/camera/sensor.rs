@@ -1,4 +1,4 @@
-//! The camera made of rays as a sensor.
+//! Ray-caster camera sensor.
 
 use super::cfg::RayCasterCameraCfg;
 use super::pictures::RayPictures;
@@ -21,17 +21,17 @@ use ndarray::{Array2, Array3, Array4, ArrayView1, ArrayView3, ArrayView4, Axis};
 use std::borrow::Cow;
 use std::fmt;
 
-/// A camera in every environment that casts one ray per pixel; [`Sampled`] has the stamps and counts of its pictures.
+/// A camera in every environment that casts one ray per pixel; [`Sampled`] gives the stamps and counts of its images.
 ///
-/// Pictures are made when they are due. The first axis is the environment; the frame is that of the environment, units are
-/// metres. Nothing is ever NaN.
+/// Images are measured when they are due. The first axis of all arrays is the environment. Poses are in the frame of
+/// the environment, lengths in meters. No value is ever NaN.
 ///
-/// What is measured is the distance along the ray of each pixel: noise of the channel `distances` is added to it, and depth
-/// and points follow, so that all three stay on the ray. Noisy distances are from 0 to the largest that rays reach, and
-/// misses stay misses. Normals, masks, poses and lenses are exact.
+/// The measured quantity is the distance along the ray of each pixel. Noise of the channel `distances` is added to it,
+/// and depth and points follow, so all three stay on the ray. Noisy distances are from 0 to the largest distance of the
+/// rays, and misses stay misses. Normals, masks, poses and intrinsics are exact.
 ///
-/// Setters of [`CameraPlacement`] act from the next picture on. Poses, intrinsics and points that are read are those of the
-/// pictures that are read, however late these come.
+/// Setters of [`CameraPlacement`] take effect with the next image. Poses, intrinsics and points belong to the shown
+/// images, whatever their latency.
 #[derive(Clone, Debug)]
 pub struct RayCasterCamera {
     path: String,
@@ -43,21 +43,21 @@ pub struct RayCasterCamera {
 #[derive(Clone, Debug)]
 struct Images {
     viewpoints: Viewpoints,
-    /// Poses of the parents when rays were cast last; `None` before.
+    /// Poses of the parents at the last ray cast; `None` before.
     world_from_parent: Vec<Option<Pose>>,
-    /// What depth and distance say of a miss.
+    /// Depth and distance of a miss.
     miss: f32,
     pictures: RayPictures,
 }
 
-/// From where a picture is taken, and through which lens.
+/// Camera pose and intrinsics of an image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Taken {
     pub(super) world_from_camera: Pose,
     pub(super) lens: PixelIntrinsics,
 }
 
-/// Channels of the sampler that pictures are made of.
+/// Sampler channels from which images are computed.
 const CHANNELS: [&str; 5] = ["distances", "normals", "ids", "poses", "lenses"];
 
 impl RayModel for Images {
@@ -79,7 +79,7 @@ impl RayModel for Images {
     }
 }
 
-/// A summary of several lines.
+/// Writes a summary of several lines.
 impl fmt::Display for RayCasterCamera {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (height, width) = self.image_shape();
@@ -128,8 +128,9 @@ impl RayCasterCamera {
         Self { path, rays, images: Images { viewpoints, world_from_parent: vec![None; n], miss, pictures } }
     }
 
-    /// The pictures of the measurement that arrived last, in all environments; made when asked. They are what the camera shows,
-    /// except with a latency after somebody wrote to the state: what was on its way then arrives, and is not shown.
+    /// Images of the latest delivered measurement, in all environments. They equal the shown images, except with a
+    /// latency after a write to the state: images in flight are then delivered but not shown. With a latency, they are
+    /// computed at every call.
     pub fn arrived(&self) -> Cow<'_, RayPictures> {
         if !self.sampler().is_late() {
             return Cow::Borrowed(&self.images.pictures);
@@ -142,33 +143,33 @@ impl RayCasterCamera {
         Cow::Owned(pictures)
     }
 
-    /// The pictures that it shows.
+    /// Shown images.
     pub fn pictures(&self) -> &RayPictures {
         &self.images.pictures
     }
 
-    /// Whether it hangs on a body.
+    /// True if the camera is attached to a body.
     pub fn is_attached(&self) -> bool {
         self.images.viewpoints.parent.is_some()
     }
 
-    /// Rows and pixels per row: (H, W).
+    /// Image shape (height, width) \[pixels\].
     pub fn image_shape(&self) -> (usize, usize) {
         (self.rays.rays().height, self.rays.rays().width)
     }
 
-    /// Distance along the optical axis, shape (N, H, W) \[m\]; for a miss what the configuration says.
+    /// Distance along the optical axis, shape (N, H, W) \[m\]; misses have the configured value.
     pub fn depth(&self) -> ArrayView3<'_, f32> {
         self.images.pictures.depth.view()
     }
 
-    /// Distance along the ray of the pixel, shape (N, H, W) \[m\]; for a miss what the configuration says.
+    /// Distance along the ray of the pixel, shape (N, H, W) \[m\]; misses have the configured value.
     pub fn distance(&self) -> ArrayView3<'_, f32> {
         self.images.pictures.distance.view()
     }
 
-    /// Past distances along the rays, newest first, shape (N, history_length, H * W) \[m\]: +inf for a miss, 0 where not
-    /// filled yet.
+    /// Past distances along the rays, newest first, shape (N, history_length, H * W) \[m\]: +inf for a miss, 0 where
+    /// not filled yet.
     pub fn distance_history(&self) -> ArrayView3<'_, f64> {
         self.sampler().history("distances")
     }
@@ -183,27 +184,27 @@ impl RayCasterCamera {
         self.images.pictures.mask.view()
     }
 
-    /// Pictures that arrived since the last reset, shape (N); the refresh of a reset is none.
+    /// Number of images delivered since the last reset, shape (N); the refresh of a reset does not count.
     pub fn frame_counts(&self) -> ArrayView1<'_, u64> {
         self.sample_counts()
     }
 
-    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of the pictures \[pixels\], shape (N, 3, 3).
+    /// Intrinsic matrices `[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]` of the images \[pixels\], shape (N, 3, 3).
     pub fn intrinsic_matrices(&self) -> Array3<f64> {
         self.images.pictures.intrinsic_matrices()
     }
 
-    /// Poses in the environment at the instant of the pictures, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
+    /// Poses in the environment at the instant of the images, rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     pub fn pose_w(&self, convention: CameraConvention) -> Array2<f64> {
         self.images.pictures.pose_w(convention)
     }
 
-    /// From where the picture of an environment was taken, through which lens.
+    /// Returns the camera pose and intrinsics of the image of an environment.
     pub(super) fn taken(&self, env: usize) -> &Taken {
         &self.images.pictures.taken[env]
     }
 
-    /// The depths of the pixels of an environment, row by row; `None` for a miss.
+    /// Returns the depths of the pixels of an environment, row by row; `None` for a miss.
     pub(super) fn depths(&self, env: usize) -> impl Iterator<Item = Option<f32>> {
         let RayPictures { depth, mask, .. } = &self.images.pictures;
         let (depth, mask) = (depth.index_axis(Axis(0), env), mask.index_axis(Axis(0), env));
@@ -211,7 +212,7 @@ impl RayCasterCamera {
     }
 }
 
-/// Acts from the next image on.
+/// Changes take effect with the next image.
 impl PlaceRows for RayCasterCamera {
     fn env_rows(&self) -> &EnvRows {
         &self.images.viewpoints.envs
@@ -259,7 +260,7 @@ impl Sensor for RayCasterCamera {
         Some(self)
     }
 
-    /// The optical frame, and an arrow along each edge of the picture's pyramid, when the picture was taken.
+    /// Axes of the optical frame and an arrow along each edge of the view frustum, at the instant of the image.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let taken = self.images.pictures.taken.get(env);
         let placed = taken.and_then(|taken| Some((taken, Optics::new(Lens::default(), taken.lens).ok()?)));

@@ -29,7 +29,7 @@ fn context(num_envs: usize) -> SensorContext {
     SensorContext { num_envs, dt: 0.01, bodies, scene, threads: 1, ..SensorContext::default() }
 }
 
-/// The ball is a decimetre higher in every further environment.
+/// The ball is a decimeter higher in each further environment.
 fn state(steps: &[u64]) -> SceneState {
     let n = steps.len();
     let pose = |env: usize| Pose::translation(0.2, 0.0, 0.5 + 0.1 * env as f64);
@@ -62,8 +62,8 @@ fn built(cfg: &RayCasterCameraCfg, n: usize) -> RayCasterCamera {
     camera
 }
 
-/// The point of every pixel, from its depth and in the point map, lies on the surface of its mask id; the normal is that
-/// of the surface. Depths are single precision: 5 m times 6e-8, and as much again along the ray.
+/// The point of every pixel, from its depth and in the point map, lies on the surface of its mask id. The normal is
+/// that of the surface. Depths have single precision: 5 m times 6e-8, and as much again along the ray.
 #[test]
 fn pixels() {
     let camera = built(&cfg(), 2);
@@ -128,7 +128,7 @@ fn attached() {
     assert!(camera.depth() == before && camera.frame_counts() == array![0, 0], "not due yet");
     camera.update(&state(&[2, 2])).unwrap();
     assert_eq!((camera.frame_counts(), camera.stamps()[1]), (array![1, 1].view(), 0.02));
-    // One metre above the middle of the ball, at 0.6 m, looking straight down at the floor.
+    // One meter above the center of the ball, at 0.6 m, looking straight down at the floor.
     assert!((f64::from(camera.depth()[(1, 20, 30)]) - 1.6).abs() < 1e-6, "{}", camera.depth()[(1, 20, 30)]);
 
     let mut camera = built(&RayCasterCameraCfg { extrinsics: extrinsics(), ..cfg() }, 2);
@@ -167,7 +167,7 @@ fn mistakes() {
         Err(SensorError::Camera(CameraError::Optics(OpticsError::Lens { .. })))
     ));
     assert!(camera.restore(Some(&[1])).is_err() && camera.point_map(1, PointFrame::World).is_err());
-    // Before the first capture, the pose of the parent is not known.
+    // Before the first capture, the pose of the parent is unknown.
     let mut attached = on("ball").build(&context(1)).unwrap();
     let early = attached.set_world_poses(&two[0], None, CameraConvention::Ros);
     assert_eq!(early, Err(CameraError::NothingCaptured { env: 0 }.into()));
@@ -176,7 +176,8 @@ fn mistakes() {
     assert!(error(RayCasterCameraCfg { sampling, ..cfg() }).contains("\"distances\""));
 }
 
-/// Straight down at the floor from `z` metres above the point (x, y), the top of the image along +y.
+/// Eye, target and up of a camera `z` meters above the point (x, y) that looks straight down, with the top of the image
+/// along +y.
 fn down(x: f64, y: f64, z: f64) -> [[[f64; 3]; 1]; 3] {
     [[[x, y, z]], [[x, y, 0.0]], [[0.0, 1.0, 0.0]]]
 }
@@ -188,13 +189,13 @@ fn wide() -> Intrinsics {
     Intrinsics::Pixels { fx, fy, cx, cy }
 }
 
-/// Only the floor.
+/// Only the floor is a target.
 fn floor_only() -> RayCasterCameraCfg {
     RayCasterCameraCfg { targets: crate::ray::HitTargets::StaticOnly, ..cfg() }
 }
 
-/// From 2 m and from 1.5 m above the floor, through two lenses: depths, distances and points of every pixel in closed form,
-/// to three roundings of single precision, 3 m times 6e-8.
+/// From 2 m and from 1.5 m above the floor, with two intrinsics: depths, distances and points of every pixel in closed
+/// form, up to three roundings of single precision, 3 m times 6e-8.
 #[test]
 fn lenses() {
     let mut camera = built(&floor_only(), 2);
@@ -239,8 +240,8 @@ fn noisy(noise: NoiseCfg) -> RayCasterCameraCfg {
     RayCasterCameraCfg { sampling: SamplingCfg { noise, history_length: 1, ..SamplingCfg::default() }, ..cfg() }
 }
 
-/// Noise is along the rays: depth and points follow, normals, masks and misses do not. The deviation is judged by five
-/// sigma of that of as many normal numbers.
+/// Noise is along the rays: it affects depth and points, but not normals, masks and misses. The bound of the deviation
+/// is five sigma of that of as many normal numbers.
 #[test]
 fn noise() {
     let (noisy, exact) = (built(&noisy(NoiseCfg::white(0.05)), 1), built(&cfg(), 1));
@@ -265,8 +266,8 @@ fn noise() {
     assert!((spread - 0.05).abs() < 5.0 * 0.05 / (2.0 * f64::from(hits)).sqrt(), "{spread} of {hits}");
 }
 
-/// Noisy distances stay between zero and the largest. Root cause: the sum of distance and noise was not limited, so that a
-/// near wall came out behind the camera, a far one beyond `max_distance`, and huge noise made infinite depths of hits.
+/// Noisy distances stay between zero and the maximum. Root cause: the sum of distance and noise was not clamped. A near
+/// wall came out behind the camera, a far wall beyond `max_distance`, and large noise made infinite depths of hits.
 #[test]
 fn saturation() {
     let near = |cfg| RayCasterCameraCfg { max_distance: 3.0, ..cfg };
@@ -289,13 +290,13 @@ fn saturation() {
             at_most += usize::from(distance == 3.0);
             between += usize::from(distance > 0.0 && distance < 3.0);
         }
-        // The control: noise as large as the distances does reach both ends.
+        // Control: noise as large as the distances reaches both ends.
         assert!(at_zero > 50 && at_most > 50, "{at_zero} {at_most}");
         assert!(between > 50 || std > 2.0, "{between}");
     }
 }
 
-/// A late image keeps its stamp, its pose and its lens.
+/// A late image keeps its stamp, its pose and its intrinsics.
 #[test]
 fn latency() {
     let sampling = SamplingCfg { history_length: 2, latency_steps: 2, ..SamplingCfg::every(0.01) };
@@ -309,7 +310,7 @@ fn latency() {
     for step in 2..=4 {
         camera.update(&state(&[step])).unwrap();
         read.push((camera.stamps()[0], camera.frame_counts()[0], camera.intrinsic_matrices()[(0, 0, 0)]));
-        // Points are on the floor all the time: depths, pose and lens belong together.
+        // Points are always on the floor: depths, pose and intrinsics belong together.
         let points = camera.point_cloud(0, PointFrame::World).unwrap();
         assert!(points.nrows() > 1000 && points.column(2).iter().all(|z| z.abs() < 2e-6), "step {step}");
         assert_eq!(camera.depth() == first, step < 4, "step {step}");

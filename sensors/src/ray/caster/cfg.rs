@@ -1,4 +1,4 @@
-//! What a ray caster is, before it exists.
+//! Ray caster configuration.
 
 use super::RayAlignment;
 use super::sensor::RayCaster;
@@ -14,12 +14,12 @@ use kinetoscope_scene::Requires;
 use kinetoscope_scene::{Pose, PoseF64};
 use serde::{Deserialize, Serialize};
 
-/// A hit of 40 bytes; twice five numbers of the sampler; point, id and mask.
+/// Memory per ray \[bytes\]: a hit of 40 bytes; twice five numbers of the sampler; point, id and mask.
 const BYTES_PER_RAY: usize = 40 + 80 + 32;
 
 /// Configuration of a [`RayCaster`].
 ///
-/// The height scanner of Isaac's tutorials, 20 m over its robot so that it looks at the ground from above:
+/// The height scanner of Isaac's tutorials, 20 m above its robot so that it sees the ground from above:
 ///
 /// ```
 /// use kinetoscope_scene::Pose;
@@ -40,42 +40,41 @@ const BYTES_PER_RAY: usize = 40 + 80 + 32;
 /// # Ok::<(), kinetoscope_sensors::SensorError>(())
 /// ```
 ///
-/// When rays first run side by side within about 7° of an axis of a mesh, lists of what is seen along that axis are made, once
-/// for each mesh and axis: that allocates, mostly at the reset right after the sensor is built, but in a later step where rays
-/// or meshes turn to another axis only then.
+/// Lists of the geometry seen along an axis of a mesh are built once for each mesh and axis. This happens when
+/// neighboring rays first run within about 7° of that axis. It allocates memory, mostly at the reset right after the
+/// sensor is built, but also in a later step if rays or meshes rotate to another axis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RayCasterCfg {
-    /// The body that the rays move with: `uid/link`, or the link alone where only one is called so; links that were fused
-    /// into another count too. `None` is the environment's frame.
+    /// Body that the rays move with: `uid/link`, or the link alone if only one body has this name. Links that were
+    /// fused into another link count too. `None` is the frame of the environment.
     pub parent: Option<String>,
-    /// Where the pattern is on the body: starts and directions are both turned by its rotation.
+    /// Pose of the pattern on the body; it rotates both origins and directions.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub offset: Pose,
-    /// How the rays turn with the body.
+    /// Alignment of the rays with the body.
     pub alignment: RayAlignment,
-    /// How the rays are laid out, x forward, y left, z up.
+    /// Pattern of the rays, x forward, y left, z up.
     pub pattern: RayPattern,
-    /// Nothing farther away is hit \[m\]; may be infinite.
+    /// Largest distance of a hit \[m\]; may be infinite.
     pub max_distance: f64,
-    /// Smallest and largest error of the sensor's position, drawn for each axis at every reset \[m\].
+    /// Smallest and largest position error of the sensor, sampled for each axis at every reset \[m\].
     pub drift: [f64; 2],
-    /// What is hit.
+    /// Targets of the rays.
     pub targets: HitTargets,
-    /// Geom groups that are hit: bit k is group k. MuJoCo's own viewers show the first three; collision shapes are usually
-    /// in group 3 or above.
+    /// Geom groups of the targets: bit k is group k. MuJoCo's viewers show the first three; collision shapes are
+    /// usually in group 3 or above.
     pub groups: u32,
-    /// Rate, history, latency and noise; the channels are `distances`, `normals`, `ids`, `pos_w` and `quat_w`, of which
-    /// `distances` may have noise. Points are along the ray at the noisy distance, which is from 0 to `max_distance` still;
-    /// misses stay misses.
+    /// Rate, history, latency and noise. The channels are `distances`, `normals`, `ids`, `pos_w` and `quat_w`, of which
+    /// only `distances` can have noise. Points lie on the ray at the noisy distance, which is clamped to the range from
+    /// 0 to `max_distance`; misses stay misses.
     pub sampling: SamplingCfg,
-    /// Show a red ball where a ray hits
-    /// ([`Sensor::markers`](crate::Sensor::markers)).
+    /// Shows a red ball at every hit ([`Sensor::markers`](crate::Sensor::markers)).
     pub debug_vis: bool,
 }
 
 impl Default for RayCasterCfg {
-    /// A grid of 17 by 11 rays straight down from where the sensor is, at everything but what it hangs on.
+    /// A grid of 17 by 11 rays straight down from the origin of the sensor, at all targets except the parent body.
     fn default() -> Self {
         Self {
             parent: None,
@@ -95,7 +94,7 @@ impl Default for RayCasterCfg {
 impl SensorCfg for RayCasterCfg {
     type Sensor = RayCaster;
 
-    /// Where things are; the poses of bodies only where it hangs on one.
+    /// Poses of instances; body poses only if the sensor is attached to a body.
     fn requires(&self) -> Requires {
         if self.parent.is_some() { Requires::INSTANCES | Requires::POSES } else { Requires::INSTANCES }
     }
@@ -110,8 +109,8 @@ impl SensorCfg for RayCasterCfg {
 
     /// # Errors
     ///
-    /// A pattern, a distance, an offset or a drift that is no good; an unknown parent or target; a period that is no whole
-    /// number of steps; rays that do not fit into memory.
+    /// An invalid pattern, distance, offset or drift; an unknown parent or target; a period that is not a whole number
+    /// of steps; rays that do not fit into memory.
     fn build(&self, context: &SensorContext) -> Result<RayCaster, SensorError> {
         let parent = self.parent.as_deref().map(|name| context.body(name)).transpose()?;
         let number = |what, value, allowed| RayError::Number { what, of: "ray caster", value, allowed };
@@ -129,7 +128,7 @@ impl SensorCfg for RayCasterCfg {
             let wrong = wrong.copied().find(|x| !x.is_finite()).unwrap_or(self.offset.rotation.norm());
             return Err(number("a number of the offset", wrong, "finite, and its quaternion of length 1").into());
         }
-        // A pattern of more rays than any may have says so itself, on every machine.
+        // A pattern with too many rays is rejected by `rays` below, on every machine.
         if self.pattern.count() <= RayPattern::MAX_RAYS {
             check_memory(context.num_envs, self.pattern.count(), BYTES_PER_RAY)?;
         }

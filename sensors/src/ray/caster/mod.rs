@@ -1,4 +1,4 @@
-//! The ray caster: a sensor that measures distances along rays that move with a body.
+//! Ray caster: a sensor of distances along rays that move with a body.
 
 mod alignment;
 mod cfg;

@@ -1,4 +1,4 @@
-//! The ray caster as a sensor.
+//! Ray caster sensor.
 
 use super::RayAlignment;
 use super::cfg::RayCasterCfg;
@@ -13,16 +13,16 @@ use kinetoscope_scene::{Marker, Pose, PoseF64, Random, SceneState};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
 use std::fmt;
 
-/// Distances along rays that move with a body, in all environments; [`Sampled`] has their stamps and counts.
+/// Distances along rays that move with a body, in all environments; [`Sampled`] gives their stamps and counts.
 ///
-/// Everything is in the frame of the environment \[m\]. A ray that hits nothing has the distance +inf, the point
-/// (+inf, +inf, +inf), the normal 0 and the id 0; nothing is ever NaN.
+/// All values are in the frame of the environment \[m\]. A ray without a hit has the distance +inf, the point
+/// (+inf, +inf, +inf), the normal 0 and the id 0. No value is ever NaN.
 #[derive(Clone, Debug)]
 pub struct RayCaster {
     path: String,
-    /// The kind of pattern.
+    /// Name of the pattern.
     pattern: &'static str,
-    /// The pattern with its offset, in the frame that [`RayAlignment::align`] gives.
+    /// Rays of the pattern with its offset, in the frame of [`RayAlignment::align`].
     rays: RaySampler<Vec<Ray>>,
     hits: Hits,
 }
@@ -37,7 +37,7 @@ struct Hits {
     mask: Array2<bool>,
 }
 
-/// Errors of the sensor's position.
+/// Position drift of the sensor.
 #[derive(Clone, Debug)]
 struct Drift {
     range: [f64; 2],
@@ -85,18 +85,18 @@ impl Drift {
     }
 }
 
-/// World from the frame of the rays, of sampled positions and rotations of the body.
+/// Returns the pose of the ray frame in the world, from sampled positions and rotations of the body.
 fn frame(alignment: RayAlignment, env: usize, pos: &ArrayView2<'_, f64>, quat: &ArrayView2<'_, f64>) -> PoseF64 {
     let row = std::array::from_fn(|k| if k < 3 { pos[(env, k)] } else { quat[(env, k - 3)] });
     alignment.align(&from_row(&row))
 }
 
-/// Where a ray ends in the frame that `frame` maps to.
+/// Returns the end of a ray in the frame that `frame` maps to; infinite for a miss.
 fn hit(ray: &Ray, frame: &PoseF64, distance: f64, id: f64) -> [f64; 3] {
     if id != 0.0 { ray.mapped_by(frame).at(distance) } else { [f64::INFINITY; 3] }
 }
 
-/// The numbers of an environment in an array in C order.
+/// Returns the values of an environment in an array in C order.
 fn part_of<T>(all: Option<&mut [T]>, env: usize, width: usize) -> &mut [T] {
     all.map_or(&mut [], |all| &mut all[env * width..(env + 1) * width])
 }
@@ -122,7 +122,7 @@ impl Sensor for RayCaster {
         Some(self)
     }
 
-    /// Red balls where rays hit, as in Isaac Lab; none where they miss.
+    /// Red balls at the hits, as in Isaac Lab.
     fn markers(&self, env: usize, _pose: &dyn Fn(usize) -> Pose) -> Vec<Marker> {
         let hits = self.hits.points.index_axis(Axis(0), env);
         let places = hits.axis_iter(Axis(0)).map(|p| [p[0], p[1], p[2]]);
@@ -161,17 +161,18 @@ impl RayCaster {
         }
     }
 
-    /// Number of rays in an environment: the second axis of what is measured.
+    /// Number of rays per environment, the axis B.
     pub fn num_rays(&self) -> usize {
         self.rays.rays().len()
     }
 
-    /// Where rays hit, shape (N, B, 3) \[m\]; (+inf, +inf, +inf) for a miss.
+    /// Hit points, shape (N, B, 3) \[m\]; (+inf, +inf, +inf) for a miss.
     pub fn hits(&self) -> ArrayView3<'_, f64> {
         self.hits.points.view()
     }
 
-    /// [`hits`](Self::hits) of the measurement that arrived last, as [`Sampler::arrived`] has its distances; made when asked.
+    /// [`hits`](Self::hits) of the latest delivered measurement, from the distances of [`Sampler::arrived`]; computed
+    /// at every call.
     pub fn arrived_hits(&self) -> Array3<f64> {
         let [distances, ids, pos, quat] =
             ["distances", "ids", "pos_w", "quat_w"].map(|channel| self.sampler().arrived(channel));
@@ -192,27 +193,27 @@ impl RayCaster {
         self.sampler().values("distances")
     }
 
-    /// Which rays hit something, shape (N, B).
+    /// True for rays that hit a target, shape (N, B).
     pub fn hit_mask(&self) -> ArrayView2<'_, bool> {
         self.hits.mask.view()
     }
 
-    /// Mask ids of what was hit, shape (N, B): those of the mask channel of cameras. 0 for a miss.
+    /// Mask ids of the hits, shape (N, B), as in the mask channel of cameras; 0 for a miss.
     pub fn hit_ids(&self) -> ArrayView2<'_, i32> {
         self.hits.ids.view()
     }
 
-    /// Unit normals of the surfaces, turned to where the ray comes from, shape (N, B, 3); 0 for a miss.
+    /// Unit normals of the hit surfaces, facing the origin of the ray, shape (N, B, 3); 0 for a miss.
     pub fn normals(&self) -> ArrayView3<'_, f64> {
         self.sampler().values_as("normals", (self.sampler().num_envs(), self.num_rays(), 3))
     }
 
-    /// Where rays begin, shape (N, B, 3) \[m\]; made when asked.
+    /// Origins of the rays, shape (N, B, 3) \[m\]; computed at every call.
     pub fn ray_starts(&self) -> Array3<f64> {
         self.of_rays(|ray| ray.origin)
     }
 
-    /// Where rays go, of length 1, shape (N, B, 3); made when asked.
+    /// Unit directions of the rays, shape (N, B, 3); computed at every call.
     pub fn ray_directions(&self) -> Array3<f64> {
         self.of_rays(|ray| ray.direction)
     }
@@ -230,13 +231,12 @@ impl RayCaster {
         out
     }
 
-    /// Position of the body that the sensor hangs on, with its drift, without the offset, as in Isaac Lab, shape (N, 3)
-    /// \[m\].
+    /// Position of the parent body including drift, without the offset, as in Isaac Lab, shape (N, 3) \[m\].
     pub fn pos_w(&self) -> ArrayView2<'_, f64> {
         self.sampler().values("pos_w")
     }
 
-    /// Rotation of the body that the sensor hangs on, rows w, x, y, z, shape (N, 4).
+    /// Rotation of the parent body, w x y z, shape (N, 4).
     pub fn quat_w(&self) -> ArrayView2<'_, f64> {
         self.sampler().values("quat_w")
     }
@@ -246,13 +246,13 @@ impl RayCaster {
         self.sampler().history("distances")
     }
 
-    /// Indices of the instances of the scene that can be hit.
+    /// Indices of the scene instances that rays can hit.
     pub fn target_instances(&self) -> impl Iterator<Item = usize> {
         self.rays.targets().instances()
     }
 }
 
-/// A summary of several lines.
+/// Writes a summary of several lines.
 impl fmt::Display for RayCaster {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (sensors, rays) = self.hit_ids().dim();

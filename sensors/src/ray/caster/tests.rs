@@ -1,4 +1,4 @@
-//! The ray caster as a sensor: on a floor with a step, a ball that moves and the robot itself.
+//! The ray caster as a sensor: a floor with a step, a moving ball and the robot itself.
 
 use super::{RayAlignment, RayCaster, RayCasterCfg};
 use crate::ray::HitTargets;
@@ -19,7 +19,7 @@ const BASE: i32 = 3;
 const FOOT: i32 = 4;
 const BALL: i32 = 5;
 
-/// Ground at z = 0, a block 0.25 m high for x > 1, a robot's base (a box) with a foot fused to it, a ball.
+/// Ground at z = 0, a block 0.25 m high for x > 1, a robot base (a box) with a foot fused to it, and a ball.
 fn context(num_envs: usize, threads: usize) -> SensorContext {
     let instance = |shape: kinetoscope_scene::shape::Shape, id, name: &str| {
         Instance::new(shape, Material::default(), id).named(name)
@@ -81,7 +81,7 @@ fn built_in(cfg: &RayCasterCfg, context: &SensorContext, state: &SceneState) -> 
     caster
 }
 
-/// The height scanner of the tutorial.
+/// The height scanner of Isaac's tutorial.
 fn scanner() -> RayCasterCfg {
     RayCasterCfg {
         parent: Some("base".into()),
@@ -102,7 +102,7 @@ fn height_scan() {
         let (roll, _, yaw) = pose.rotation.euler_angles();
         assert!(roll.abs() > 0.1, "tilted");
         for k in 0..187 {
-            // x fastest, turned by the yaw alone, about the base's origin.
+            // x fastest, rotated by the yaw alone, about the origin of the base.
             let (x, y) = (-0.8 + 0.1 * (k % 17) as f64, -0.5 + 0.1 * (k / 17) as f64);
             let p = pose.translation.vector;
             let at = [p.x + x * yaw.cos() - y * yaw.sin(), p.y + x * yaw.sin() + y * yaw.cos(), p.z + 20.0];
@@ -121,7 +121,7 @@ fn height_scan() {
         assert_eq!(caster.quat_w()[(env, 0)], pose.rotation.w);
     }
     assert!(caster.hit_mask().iter().all(|hit| *hit));
-    // Straight up there is no yaw, and no NaN.
+    // Looking straight up, the yaw is 0, not NaN.
     let up = |_, _| from_xyz_rpy([0.0, 0.0, 1.0], [0.3, -std::f64::consts::FRAC_PI_2, 0.0]);
     let caster = built_in(&scanner(), &context(1, 1), &state_with(&[0], up));
     assert!(caster.hits().iter().chain(caster.distances().iter()).all(|x| x.is_finite()));
@@ -132,7 +132,7 @@ fn height_scan() {
     assert!(text.contains("number of rays/sensor: 187\n") && text.ends_with("total number of rays : 374"), "{text}");
 }
 
-/// All three alignments, with rays that are not vertical and an offset that turns: starts and directions both turn.
+/// All three alignments, with slanted rays and a rotating offset: origins and directions both rotate.
 #[test]
 fn alignments() {
     let pose = base(1, 3);
@@ -172,7 +172,7 @@ fn targets() {
         (caster.hit_ids()[(0, 0)], caster.target_instances().collect::<Vec<_>>())
     };
     assert_eq!(seen(HitTargets::Everything { exclude_parent: false }), (BASE, vec![0, 1, 2, 3, 4]));
-    // The foot is fused to the base, and goes with it.
+    // The foot is fused to the base, and is excluded with it.
     assert_eq!(seen(HitTargets::Everything { exclude_parent: true }), (GROUND, vec![0, 1, 4]));
     assert_eq!(seen(HitTargets::StaticOnly), (GROUND, vec![0, 1]));
     assert_eq!(seen(HitTargets::Named(vec!["dog/.*".into()])), (BASE, vec![2, 3]));
@@ -206,7 +206,7 @@ fn misses() {
     assert!(misses > 10 && misses < 110, "{misses}");
 }
 
-/// What one environment measures does not depend on the others, nor on threads.
+/// The measurement of an environment does not depend on other environments, nor on threads.
 #[test]
 fn environments_and_threads() {
     let cfg = RayCasterCfg {
@@ -220,12 +220,12 @@ fn environments_and_threads() {
         all.iter().flat_map(|a| kinetoscope_testkit::bits::bits(a.index_axis(Axis(0), env).iter())).collect()
     };
     let one = built_in(&cfg, &context(4, 1), &state(&steps));
-    // 36000 rays in 4 environments are worth four threads.
+    // 36000 rays in 4 environments use four threads.
     let four = built_in(&cfg, &context(4, 4), &state(&steps));
     for (env, &step) in steps.iter().enumerate() {
         assert_eq!(bits(&one, env), bits(&four, env));
         let alone = built_in(&cfg, &context(1, 1), &state_with(&[step], |_, step| base(env, step)));
-        // Alone, the ball is where it is in environment 0: rays that do not hit it are the same.
+        // With only one environment, the ball is as in environment 0: rays that miss the ball are equal.
         let same = (0..one.num_rays()).filter(|&k| one.hit_ids()[(env, k)] != BALL && alone.hit_ids()[(0, k)] != BALL);
         let distances = |k| [one.distances()[(env, k)], alone.distances()[(0, k)]].map(f64::to_bits);
         let equal: Vec<bool> = same.map(distances).map(|[a, b]| a == b).collect();
@@ -282,8 +282,8 @@ fn noisy(std: f64) -> RayCasterCfg {
     RayCasterCfg { sampling: SamplingCfg { noise, ..SamplingCfg::default() }, ..scanner() }
 }
 
-/// Noise moves points along their rays, between zero and the largest distance. Root cause, as for cameras of rays: the sum
-/// of distance and noise was not limited.
+/// Noise moves points along their rays, between zero and the maximum distance. Root cause, as for ray-caster cameras:
+/// the sum of distance and noise was not clamped.
 #[test]
 fn noise() {
     let caster = built_in(&noisy(0.1), &context(1, 1), &state(&[0]));
@@ -304,7 +304,7 @@ fn noise() {
     assert!(caster.distances().iter().all(|d| *d == f64::INFINITY) && !caster.hit_mask().iter().any(|hit| *hit));
 }
 
-/// A fixed target that a write moves in one environment.
+/// A write moves a fixed target in one environment.
 #[test]
 fn moved_fixed_target() {
     let mut caster = built_in(&scanner(), &context(3, 1), &state(&[0; 3]));
@@ -321,7 +321,7 @@ fn mistakes() {
     for (cfg, part) in [
         (RayCasterCfg { parent: Some("bsae".into()), ..scanner() }, "dog/base"),
         (named("gruond"), "ground"),
-        // An object in a group that is not hit.
+        // An object in a geom group that is not selected.
         (RayCasterCfg { groups: 1 << 5, ..named("ground") }, "\"ground\""),
         (RayCasterCfg { pattern: Grid { resolution: 0.0, ..Grid::default() }.into(), ..scanner() }, "resolution"),
         (RayCasterCfg { max_distance: 0.0, ..scanner() }, "max_distance"),
@@ -336,7 +336,7 @@ fn mistakes() {
         assert!(text.contains(part), "{text}");
     }
     assert!(named("ground").build(&context(1, 1)).is_ok());
-    // An invisible object, unless some environment sees it; the candidates are objects that can be hit.
+    // A hidden object is rejected unless an environment shows it; the candidates are objects that can be hit.
     let look = |visible: [bool; 5]| {
         let scene = context(1, 1).scene.unwrap();
         let mut instances = scene.instances().to_vec();

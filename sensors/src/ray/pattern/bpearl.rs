@@ -1,4 +1,4 @@
-//! The hemispherical laser RS-Bpearl.
+//! The hemispherical lidar RS-Bpearl.
 
 use super::{Line, PatternImpl, finite, positive};
 use crate::ray::RayError;
@@ -11,28 +11,28 @@ const VERTICAL_DEG: [f64; 32] = [
     5.125, 2.3125,
 ];
 
-/// The hemispherical laser RS-Bpearl, its dome along z (robots carry it upside down or tilted: turn the sensor). 32 beams at
-/// each azimuth; the beams of an azimuth come one after the other.
+/// The hemispherical lidar RS-Bpearl, with its dome along z (on robots it is mounted upside down or tilted: rotate the
+/// sensor). There are 32 beams at each azimuth; the beams of an azimuth are consecutive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Bpearl {
-    /// The span of azimuths, about -x (backward), as in Isaac Lab; the last one is left out \[deg\].
+    /// Span of azimuths about -x (backward), as in Isaac Lab; the last azimuth is excluded \[deg\].
     pub horizontal_fov_deg: f64,
-    /// Azimuth between neighbours \[deg\].
+    /// Angle between neighboring azimuths \[deg\].
     pub horizontal_resolution_deg: f64,
     /// Elevations of the beams: 0 is level, 90 along z \[deg\].
     pub vertical_deg: Vec<f64>,
 }
 
 impl Default for Bpearl {
-    /// A turn in steps of 10 degrees: 1152 rays.
+    /// A full turn in steps of 10 degrees: 1152 rays.
     fn default() -> Self {
         Self { horizontal_fov_deg: 360.0, horizontal_resolution_deg: 10.0, vertical_deg: VERTICAL_DEG.to_vec() }
     }
 }
 
 impl Bpearl {
-    /// Azimuths from -fov / 2, below fov / 2.
+    /// Returns the number of azimuths from -fov / 2 to below fov / 2.
     fn azimuths(&self) -> f64 {
         (self.horizontal_fov_deg / self.horizontal_resolution_deg - 1e-9).ceil().max(0.0)
     }

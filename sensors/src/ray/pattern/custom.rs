@@ -1,16 +1,16 @@
-//! Any rays.
+//! User-defined rays.
 
 use super::{Line, PatternImpl};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
-/// Any rays.
+/// User-defined rays.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Custom {
-    /// Where they begin \[m\].
+    /// Origins of the rays \[m\].
     pub starts: Vec<[f64; 3]>,
-    /// Where they go; of any length.
+    /// Directions of the rays, of any length except zero.
     pub directions: Vec<[f64; 3]>,
 }
 

@@ -4,33 +4,33 @@ use super::{Line, PatternImpl, finite, positive};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
-/// Which axis runs fastest in the order of the rays.
+/// Order of the rays of a grid: the axis that changes fastest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum GridOrder {
-    /// x fastest: all points of the smallest y first. Isaac's `"xy"`.
+    /// x changes fastest: all points of the smallest y come first. Isaac's `"xy"`.
     #[default]
     Xy,
-    /// y fastest. Isaac's `"yx"`.
+    /// y changes fastest. Isaac's `"yx"`.
     Yx,
 }
 
-/// Parallel rays over a rectangle about the sensor, as height scanners have them.
+/// Parallel rays over a rectangle around the sensor, as in height scanners.
 ///
-/// Along an axis of length L there are ceil((L + 1e-9) / resolution) rays, the first one at -L / 2, as in Isaac Lab: for
-/// a length that is no multiple of the resolution they are not in the middle, unless [`centered`](Self::centered).
+/// Along an axis of length L there are ceil((L + 1e-9) / resolution) rays, the first one at -L / 2, as in Isaac Lab. If
+/// the length is not a multiple of the resolution, the rays are off center, unless [`centered`](Self::centered).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Grid {
-    /// Distance of neighbours \[m\].
+    /// Distance between neighboring rays \[m\].
     pub resolution: f64,
     /// Lengths along x and y \[m\].
     pub size: [f64; 2],
-    /// Where the rays go; of any length.
+    /// Direction of the rays, of any length except zero.
     pub direction: [f64; 3],
-    /// Which axis runs fastest.
+    /// Order of the rays.
     pub order: GridOrder,
-    /// Whether the rays lie symmetrically about the sensor whatever the size.
+    /// Centers the rays at the sensor for any size.
     pub centered: bool,
 }
 
@@ -48,7 +48,7 @@ impl Default for Grid {
 }
 
 impl Grid {
-    /// Rays along x and y.
+    /// Number of rays along x and y.
     pub fn shape(&self) -> [usize; 2] {
         self.counts().map(|n| n as usize)
     }

@@ -1,14 +1,14 @@
-//! A spinning laser.
+//! Spinning lidar.
 
 use super::{Line, PatternImpl, finite, positive};
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
-/// A spinning laser: channels at equal steps of elevation, each a ring of rays at equal steps of azimuth. Channel after
-/// channel, azimuth fastest.
+/// A spinning lidar with channels at equal steps of elevation. Each channel is a ring of rays at equal steps of
+/// azimuth. The rays are ordered by channel, and the azimuth changes fastest.
 ///
-/// The last azimuth is left out for a full turn, where it would be the first one again; otherwise it is there if it falls on
-/// the grid.
+/// For a full turn, the last azimuth is excluded, because it equals the first one. Otherwise it is included if it falls
+/// on the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Lidar {
@@ -16,9 +16,9 @@ pub struct Lidar {
     pub channels: usize,
     /// Lowest and highest elevation, positive above the horizon \[deg\].
     pub vertical_fov_deg: [f64; 2],
-    /// First and last azimuth, from x towards y \[deg\].
+    /// First and last azimuth, from x toward y \[deg\].
     pub horizontal_fov_deg: [f64; 2],
-    /// Azimuth between neighbours \[deg\].
+    /// Angle between neighboring azimuths \[deg\].
     pub horizontal_resolution_deg: f64,
 }
 
@@ -35,11 +35,11 @@ impl Default for Lidar {
 }
 
 impl Lidar {
-    /// Rays of a channel.
+    /// Returns the number of rays per channel.
     fn azimuths(&self) -> f64 {
         let [first, last] = self.horizontal_fov_deg;
         let steps = (last - first) / self.horizontal_resolution_deg;
-        // Decimal degrees are not exact: a step that is almost whole is.
+        // Decimal degrees are not exact: an almost whole number of steps counts as whole.
         let whole = (steps + 1e-6).floor();
         let is_turn = (last - first - 360.0).abs() < 1e-6;
         let ends_on_grid = (steps - whole).abs() < 1e-6;

@@ -1,4 +1,4 @@
-//! How the rays of a ray caster are laid out: one pattern per file, all of them in one list.
+//! Ray patterns of ray casters: one pattern per file, all of them listed in [`RayPattern`].
 //!
 //! Rays are in the frame of the sensor (x forward, y left, z up); all directions have length 1.
 
@@ -12,12 +12,12 @@ use kinetoscope_scene::Ray;
 use kinetoscope_scene::vector::unit;
 use serde::{Deserialize, Serialize};
 
-/// Declares the patterns: a module with a type of its own each.
+/// Declares the patterns: one module and one type each.
 macro_rules! patterns {
     ($($(#[$doc:meta])* $module:ident :: $Name:ident,)*) => {
         $(mod $module; pub use $module::$Name;)*
 
-        /// How the rays are laid out.
+        /// Pattern of the rays of a ray caster.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
         #[non_exhaustive]
@@ -26,7 +26,7 @@ macro_rules! patterns {
         }
 
         impl RayPattern {
-            /// The name of the kind.
+            /// Name of the pattern.
             pub fn name(&self) -> &'static str {
                 match self { $(Self::$Name(_) => stringify!($module),)* }
             }
@@ -47,36 +47,36 @@ macro_rules! patterns {
 patterns! {
     /// Parallel rays over a rectangle.
     grid::Grid,
-    /// A spinning laser: rings of rays.
+    /// Spinning lidar: rings of rays.
     lidar::Lidar,
-    /// The hemispherical laser RS-Bpearl.
+    /// The hemispherical lidar RS-Bpearl.
     bpearl::Bpearl,
-    /// A ray through every pixel of a camera.
+    /// One ray through every pixel of a pinhole camera.
     pinhole::Pinhole,
-    /// Any rays.
+    /// User-defined rays.
     custom::Custom,
 }
 
 impl RayPattern {
-    /// The most rays of a pattern.
+    /// Maximum number of rays of a pattern.
     pub const MAX_RAYS: usize = 1 << 24;
 
-    /// How many rays there are, without making them; 0 where the numbers make no sense.
+    /// Returns the number of rays without generating them; 0 for invalid parameters.
     pub(crate) fn count(&self) -> usize {
-        // A number that is none becomes 0.
+        // NaN converts to 0.
         self.inner().count() as usize
     }
 
-    /// The rays, directions of length 1.
+    /// Generates the rays, with unit directions.
     ///
     /// # Errors
     ///
-    /// [`RayError`]: numbers that make no sense, no rays or more than [`MAX_RAYS`](Self::MAX_RAYS).
+    /// [`RayError`] for invalid parameters, no rays, or more than [`MAX_RAYS`](Self::MAX_RAYS).
     pub fn rays(&self) -> Result<Vec<Ray>, RayError> {
         let (pattern, inner) = (self.name(), self.inner());
         let count = inner.count();
         let possible = |count: f64| (1.0..=Self::MAX_RAYS as f64).contains(&count);
-        // A number that is none is named by the pattern itself.
+        // NaN stands for invalid parameters, which the pattern reports below.
         if !possible(count) && !count.is_nan() {
             return Err(RayError::Count { pattern, count, limit: Self::MAX_RAYS });
         }
@@ -96,7 +96,7 @@ impl RayPattern {
     }
 }
 
-/// A number that must be positive.
+/// Checks that a number is positive and finite.
 fn positive(of: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
     if value > 0.0 && value.is_finite() {
         return Ok(value);
@@ -104,7 +104,7 @@ fn positive(of: &'static str, what: &'static str, value: f64) -> Result<f64, Ray
     Err(RayError::Number { what, of, value, allowed: "positive and finite" })
 }
 
-/// A number that must be one.
+/// Checks that a number is finite.
 fn finite(of: &'static str, what: &'static str, value: f64) -> Result<f64, RayError> {
     if value.is_finite() { Ok(value) } else { Err(RayError::Number { what, of, value, allowed: "finite" }) }
 }

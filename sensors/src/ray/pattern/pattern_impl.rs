@@ -1,15 +1,15 @@
-//! The trait of patterns of rays.
+//! Trait of ray patterns.
 
 use crate::ray::RayError;
 
-/// A start, and a direction of any length.
+/// Origin and direction of a ray; the direction has any length.
 pub(super) type Line = ([f64; 3], [f64; 3]);
 
-/// The operations of a pattern.
+/// Operations of a ray pattern.
 pub(super) trait PatternImpl {
-    /// How many rays there are, before they are made; the numbers were not checked yet.
+    /// Returns the number of rays before they are generated; NaN for parameters that `rays` rejects.
     fn count(&self) -> f64;
 
-    /// The rays; called where the count is possible.
+    /// Generates the rays, or returns an error for invalid parameters.
     fn rays(&self) -> Result<Vec<Line>, RayError>;
 }

@@ -1,24 +1,25 @@
-//! A ray through every pixel of a camera.
+//! One ray through every pixel of a pinhole camera.
 
 use super::{Line, PatternImpl};
 use kinetoscope_render::Intrinsics;
 use crate::ray::RayError;
 use serde::{Deserialize, Serialize};
 
-/// A ray through the centre of every pixel of a pinhole camera that looks along x with z up: row by row from the top left.
+/// One ray through the center of every pixel of a pinhole camera that looks along x with z up, row by row from the top
+/// left.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pinhole {
-    /// Pixels per row.
+    /// Image width \[pixels\].
     pub width: usize,
-    /// Rows.
+    /// Image height \[pixels\].
     pub height: usize,
-    /// The lens.
+    /// Focal lengths and principal point.
     pub intrinsics: Intrinsics,
 }
 
 impl Default for Pinhole {
-    /// 64 by 48 pixels behind Isaac's default lens.
+    /// 64 by 48 pixels with Isaac's default intrinsics.
     fn default() -> Self {
         Self { width: 64, height: 48, intrinsics: Intrinsics::ISAAC }
     }
@@ -32,7 +33,7 @@ impl PatternImpl for Pinhole {
     fn rays(&self) -> Result<Vec<Line>, RayError> {
         let lens = self.intrinsics.to_pixels(self.width, self.height)?;
         let ray = |u: usize, v: usize| {
-            // Right of the axis and below it, for a depth of 1.
+            // Offsets from the optical axis, to the right and down, at a depth of 1.
             let (right, below) = ((u as f64 + 0.5 - lens.cx) / lens.fx, (v as f64 + 0.5 - lens.cy) / lens.fy);
             ([0.0; 3], [1.0, -right, -below])
         };

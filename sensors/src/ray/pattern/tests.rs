@@ -1,4 +1,4 @@
-//! Counts and orders are those of Isaac Lab.
+//! Counts and orders of rays, as in Isaac Lab.
 
 use super::*;
 use kinetoscope_render::Intrinsics;
@@ -7,8 +7,8 @@ fn rays(pattern: impl Into<RayPattern>) -> Vec<Ray> {
     pattern.into().rays().unwrap()
 }
 
-/// The height scanner has 187 rays, x fastest. Grids whose size is no multiple of the resolution begin at the edge or are
-/// centered: a length of 1 at 0.3 has the points -0.5, -0.2, 0.1, 0.4.
+/// The height scanner has 187 rays, x fastest. Grids whose size is not a multiple of the resolution begin at the edge
+/// or are centered: a length of 1 at 0.3 has the points -0.5, -0.2, 0.1, 0.4.
 #[test]
 fn grids() {
     let all = rays(Grid::default());
@@ -26,7 +26,7 @@ fn grids() {
     assert_eq!(rays(grid)[0].direction, [0.0, 0.0, -1.0], "of length 1");
 }
 
-/// A full turn leaves out its end.
+/// A full turn excludes its end.
 #[test]
 fn lidars() {
     let lidar = |horizontal_fov_deg, horizontal_resolution_deg| Lidar {
@@ -62,7 +62,7 @@ fn bpearl() {
     assert!(all.iter().all(|r| r.direction[2] > 0.0), "the upper half");
 }
 
-/// Rays through the centres of pixels.
+/// Rays through the centers of pixels.
 #[test]
 fn pinholes() {
     let intrinsics = Intrinsics::Pixels { fx: 2.0, fy: 4.0, cx: 1.0, cy: 1.0 };

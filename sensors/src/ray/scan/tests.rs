@@ -1,11 +1,11 @@
-//! Scans on several threads, of some environments, and of environments with scenes of their own.
+//! Scans on several threads, of some environments, and of environments with their own scenes.
 
 use super::*;
 use kinetoscope_scene::shape::{Plane, Sphere};
 use kinetoscope_scene::{Instance, Material, RenderScene};
 
 const ENVS: usize = 6;
-/// Not a whole number of parts.
+/// Not a whole number of jobs.
 const RAYS: usize = 3 * PART + 100;
 
 /// A plane and twenty balls.
@@ -31,7 +31,7 @@ fn scan_of(scene: &RenderScene, threads: usize) -> Scan<Vec<Ray>> {
     Scan::new(targets, (0..RAYS).map(ray).collect(), 50.0, &context)
 }
 
-/// Balls that move with time, and are elsewhere in every environment.
+/// Balls that move with time, at different positions in every environment.
 fn poses(step: usize) -> Array2<PoseF64> {
     Array2::from_shape_fn((ENVS, 21), |(env, k)| {
         let at = k as f64 + 0.3 * env as f64 + 0.05 * step as f64;
@@ -92,7 +92,7 @@ fn some_environments() {
     assert_eq!((bits(&scan), count(&other, 4), count(&other, 2)), (before, 0, RAYS));
 }
 
-/// An environment with a scene of its own is hit as in a scan of that scene; the others stay.
+/// An environment with its own scene is hit as in a scan of that scene; the others stay unchanged.
 #[test]
 fn own_scenes() {
     let all: Vec<usize> = (0..ENVS).collect();
