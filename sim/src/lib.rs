@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! URDF files -> RobotDescription -> Mjcf -> Model -> Batch (N x Env) -> SceneState -> sensors
-//!    kinetoscope_robot     mjcf::robot  mujoco  compile           gather
+//!     kinetoscope_robot         mjcf   mujoco   compile            gather      sensor_list
 //! ```
 //!
 //! | modules | content |

@@ -231,7 +231,7 @@ impl SimulationManager {
 
     /// Adds a sensor to all environments. The crate `kinetoscope_sensors` has the built-in sensors; other crates can
     /// add their own. A sensor sees links, movable joints and drives of all robots in insertion order, followed by
-    /// those of attached MJCF files. Adding a robot later clears the history of the sensor.
+    /// those of attached MJCF files. Adding an entity later rebuilds the sensor and clears its history.
     ///
     /// # Errors
     /// The configuration is invalid, the name is taken, or the sensor needs a quantity that the simulation does not
@@ -502,5 +502,6 @@ impl SimulationManager {
     }
 }
 
-/// Largest number of steps done without a return to the observers.
+/// Largest number of steps in one block: it bounds the response time of the caller (Ctrl+C) and the lead of one
+/// environment over the others.
 const BLOCK: u32 = 1000;
