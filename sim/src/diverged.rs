@@ -3,8 +3,8 @@
 use crate::ids::EnvId;
 use std::fmt;
 
-/// An environment in which a step failed. It stays in its last valid state until it is reset. `Display` gives `step 12:
-/// bad acceleration`.
+/// An environment in which a step failed. It stays in its last valid state until it is reset. `Display` gives
+/// `step 12: bad acceleration`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DivergedEnv {
     /// The environment.

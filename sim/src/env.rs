@@ -23,7 +23,7 @@ use std::sync::Arc;
 /// Status of an environment: running or diverged.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum EnvStatus {
-    /// Stepping.
+    /// The environment runs.
     Running,
     /// A step failed. The environment stays in its last valid state until it is reset.
     Diverged {

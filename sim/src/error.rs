@@ -27,10 +27,10 @@ pub enum Error {
     /// The observer was removed, or is handling an event right now.
     #[error("this observer was taken away, or is being told of something right now")]
     NoObserver,
-    /// A URDF file or an assembly of them is wrong.
+    /// A URDF file, or the assembly of several, is invalid.
     #[error(transparent)]
     Urdf(#[from] UrdfError),
-    /// A mesh that collides cannot be used.
+    /// A collision mesh cannot be used.
     #[error("{at}: link {link:?}: {error}")]
     CollisionMesh {
         /// File and line that name the mesh.
@@ -168,7 +168,7 @@ pub enum Error {
     /// A number of the configuration is out of range.
     #[error("{field} is {value}; {expected}")]
     Config {
-        /// The field.
+        /// Name of the field.
         field: &'static str,
         /// The value given.
         value: String,
@@ -221,7 +221,7 @@ pub enum Error {
          that is Kinematic"
     )]
     NotDynamic {
-        /// The method.
+        /// Name of the method or argument.
         argument: &'static str,
         /// The object.
         object: String,
@@ -300,7 +300,7 @@ pub enum Error {
     /// Two columns of an array refer to the same item.
     #[error("{argument} has two columns for {of} (columns {first} and {second}); give it one")]
     RepeatedColumn {
-        /// The argument.
+        /// Name of the argument.
         argument: &'static str,
         /// The item: `actuator "a"`.
         of: String,
@@ -312,7 +312,7 @@ pub enum Error {
     /// A list contains an item twice.
     #[error("{argument} names {of} twice (places {first} and {second} of its list); name it once")]
     Repeated {
-        /// The argument.
+        /// Name of the argument.
         argument: &'static str,
         /// The item: `joint "a"`, `environment 3`.
         of: String,
@@ -324,7 +324,7 @@ pub enum Error {
     /// An array has the wrong shape.
     #[error("{argument} has shape {found:?}; expected {expected:?} ({meaning}), or one row for all environments")]
     Shape {
-        /// The argument.
+        /// Name of the argument.
         argument: &'static str,
         /// Shape given.
         found: Vec<usize>,
@@ -336,7 +336,7 @@ pub enum Error {
     /// A value is NaN or infinite.
     #[error("{argument}[{row}, {column}] ({of}) is {value}; it must be finite")]
     NotFinite {
-        /// The argument.
+        /// Name of the argument.
         argument: &'static str,
         /// Row of the array.
         row: usize,
@@ -350,7 +350,7 @@ pub enum Error {
     /// A value is outside the allowed set.
     #[error("{argument}[{row}, {column}] ({of}) is {value}; it must be {expected}")]
     OutOfRange {
-        /// The argument.
+        /// Name of the argument.
         argument: &'static str,
         /// Row of the array.
         row: usize,
@@ -370,7 +370,7 @@ pub enum Error {
          passive"
     )]
     NotDriven {
-        /// The method.
+        /// Name of the method.
         argument: &'static str,
         /// The robot or articulation.
         robot: Named,
@@ -383,7 +383,7 @@ pub enum Error {
          model that all environments share; use DriveModel::Implicit or an explicit actuator model to change them"
     )]
     GainsInModel {
-        /// The method.
+        /// Name of the method.
         argument: &'static str,
         /// The robot or articulation.
         robot: Named,

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 
-/// Index of an environment.
+/// Index of an environment of this process, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct EnvId(pub usize);
 

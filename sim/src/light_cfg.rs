@@ -79,7 +79,7 @@ impl LightCfg {
     /// Checks every number.
     ///
     /// # Errors
-    /// The first field that is out of range.
+    /// A field is out of range; the first one is reported.
     pub fn validate(&self) -> Result<()> {
         let fail =
             |field, value: &dyn Debug, expected| Err(Error::Config { field, value: format!("{value:?}"), expected });

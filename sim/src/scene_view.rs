@@ -184,8 +184,8 @@ impl<'a> SceneViewMut<'a> {
     }
 
     /// Render scene of an environment, in the order of [`Look::instances`]. All environments without own sizes or
-    /// colors share one scene until an entity is added. Shapes that [deform](kinetoscope_scene::Instance::deforms) have
-    /// their initial form.
+    /// colors share one scene until an entity is added. Shapes that [deform](kinetoscope_scene::Instance::deforms) are
+    /// not updated to the current time.
     ///
     /// # Errors
     /// The environment does not exist.

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 /// Rank of this process among several that simulate together, each with
 /// [`num_envs`](crate::SimulationManagerCfg::num_envs) environments.
 ///
-/// Environments are numbered over all processes: environment `i` of process `rank` has the global index `rank *
-/// num_envs + i`. Random numbers of noise and properties are keyed by the global index, so two processes of four
-/// environments give, bit for bit, the results of one process of eight. [`EnvId`](crate::EnvId) and `env_origins` count
-/// the environments of one process.
+/// Environments are numbered over all processes: environment `i` of process `rank` has the global index
+/// `rank * num_envs + i`. Random numbers of noise and properties are keyed by the global index, so two processes of
+/// four environments give, bit for bit, the results of one process of eight. [`EnvId`](crate::EnvId) and `env_origins`
+/// count the environments of one process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Shard {

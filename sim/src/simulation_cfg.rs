@@ -32,8 +32,8 @@ pub struct SimulationManagerCfg {
     pub solver_iterations: u32,
     /// Sliding, torsional and rolling friction of shapes that set none (MuJoCo's three coefficients).
     pub friction: [f64; 3],
-    /// Seed of random numbers. The physics is deterministic. Sensor noise and randomized properties use random streams
-    /// keyed by this seed, the global index of the environment, and their purpose.
+    /// Seed of random numbers. The physics uses no random numbers. Sensor noise and randomized properties use random
+    /// streams keyed by this seed, the global index of the environment, and their purpose.
     pub seed: u64,
     /// Number of threads that step; every core for `None`.
     pub threads: Option<usize>,
@@ -128,7 +128,7 @@ impl SimulationManagerCfg {
     /// Checks every number.
     ///
     /// # Errors
-    /// The first field that is out of range.
+    /// A field is out of range; the first one is reported.
     pub fn validate(&self) -> Result<()> {
         let fail = |field, value: &dyn std::fmt::Display, expected| {
             Err(Error::Config { field, value: value.to_string(), expected })

@@ -73,7 +73,7 @@ impl SurfaceCfg {
     /// Checks every number.
     ///
     /// # Errors
-    /// The first field that is out of range.
+    /// A field is out of range; the first one is reported.
     pub fn validate(&self) -> Result<()> {
         let least_and_most = [
             ("surface.emission", self.emission, 0.0, f64::from(f32::MAX), "it must be a finite number >= 0"),

@@ -1,8 +1,8 @@
 //! Motion of links from MuJoCo's spatial vectors, whose reference point is the center of mass of the kinematic tree.
 //!
 //! With c the reference point, r the origin of the link, w and v the angular and linear parts of `cvel`, alpha and a
-//! those of `cacc`: the velocity of the origin is `v_r = v + w x (r - c)`. The spatial acceleration at the origin is `a
-//! + alpha x (r - c)`. The acceleration of the body point at the origin is the spatial acceleration plus `w x v_r`
+//! those of `cacc`: the velocity of the origin is `v_r = v + w x (r - c)`. The spatial acceleration at the origin is
+//! `a + alpha x (r - c)`. The acceleration of the body point at the origin is the spatial acceleration plus `w x v_r`
 //! (Featherstone, Rigid Body Dynamics Algorithms, 2.11). MuJoCo accelerates the world by minus gravity, so gravity is
 //! added: the result is 0 at rest and gravity in free fall.
 

@@ -43,10 +43,10 @@ macro_rules! drive_modes {
         }
 
         impl DriveType {
-            /// All modes.
+            /// All drive types.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
-            /// The mode's implementation.
+            /// Implementation of the drive mode.
             pub fn mode(self) -> &'static dyn DriveMode {
                 match self {
                     $(Self::$variant => &$mode,)*

@@ -15,9 +15,9 @@ use std::collections::BTreeMap;
 /// Resolved properties of one drivable joint (revolute, continuous, prismatic), mimic joints included.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointPlan {
-    /// The joint.
+    /// Id of the joint in the description.
     pub joint: JointId,
-    /// Its actuator; `None` for passive and mimic joints.
+    /// Gains of its actuator; `None` for passive and mimic joints.
     pub actuator: Option<ActuatorSpec>,
     /// Explicit actuator model; `None` for a joint with the robot's drive model.
     pub model: Option<ActuatorModel>,
@@ -38,7 +38,8 @@ pub struct JointPlan {
     /// Range of position targets \[rad or m\]: the joint's own limits, narrowed by those of joints that mimic it;
     /// infinite without limits.
     pub usable: [f64; 2],
-    /// For a mimic joint: position = multiplier * position of the driver + offset (chains resolved).
+    /// Mimic relation (driver, multiplier, offset) with chains resolved:
+    /// `position = multiplier * position(driver) + offset`.
     pub mimic: Option<(JointId, f64, f64)>,
     /// Start position \[rad or m\].
     pub initial: f64,

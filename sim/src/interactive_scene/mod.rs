@@ -41,8 +41,7 @@ use std::path::Path;
 /// The same as a file, which [`from_file`](Self::from_file) reads; paths in it are relative to the file:
 ///
 /// ```toml
-/// [simulation]               # fields of SimulationManagerCfg; preset = "legged" or "manipulation" changes the
-/// defaults
+/// [simulation] # fields of SimulationManagerCfg; preset = "legged" or "manipulation" changes the defaults
 /// num_envs = 2
 ///
 /// [entities.cube]            # the name of the entity
@@ -54,8 +53,8 @@ use std::path::Path;
 /// bodies = ["{ENV_REGEX_NS}/cube"]
 /// ```
 ///
-/// Collision exclusions have no name: [`exclude_collision`](Self::exclude_collision) in Rust, `exclude_collisions =
-/// [["cube", "table"]]` above all tables in files.
+/// Collision exclusions have no name: [`exclude_collision`](Self::exclude_collision) in Rust,
+/// `exclude_collisions = [["cube", "table"]]` above all tables in files.
 #[derive(Clone, Debug, Default)]
 pub struct SceneCfg {
     /// The simulation itself: number of environments, time step, ground, lights.

@@ -43,7 +43,8 @@ pub(super) struct EntityType {
 }
 
 impl Default for EntityTypes {
-    /// Robots, articulations, rigid objects and groups of them, terrain, MJCF files, welds and the built-in sensors.
+    /// Robots, articulations, rigid objects and groups of them, terrains, attached MJCF files, welds and the built-in
+    /// sensors.
     fn default() -> Self {
         Self { entries: Vec::new() }
             .with::<RobotCfg>("robot")

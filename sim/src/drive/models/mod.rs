@@ -1,7 +1,7 @@
 //! Explicit actuator models: the effort of a motor and its controller, computed at the start of each step.
 //!
 //! A model reads position, velocity and targets of its joint at the start of a step, and its effort acts during the
-//! whole step, with RK4 as well. It therefore equals a real controller at the rate of the simulation, with the same
+//! whole step, with RK4 as well. It therefore acts like a real controller at the rate of the simulation, with the same
 //! limit of stability. `add_robot` warns by [`stable_timestep`](super::actuator::stable_timestep), which takes the
 //! stiffness of the law and its steepest [damping](ActuatorLaw::damping), the torque-speed line of a motor included.
 //! Only `add_robot` checks: gains, drive types and velocity limits set at run time are accepted without a warning.
