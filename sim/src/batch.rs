@@ -1,8 +1,9 @@
 //! N environments on worker threads, bit-identical for any number of threads and environments.
 //!
-//! Environments are grouped in chunks, and every thread owns a share of the chunks. A thread takes the chunks of its
-//! own share first, so that an environment mostly stays in the cache of one core, then helps with the remaining shares.
-//! The assignment of threads cannot change results, because environments share only the immutable model.
+//! Environments are grouped in chunks, and every thread owns a share of the chunks. A thread first takes the chunks of
+//! its own share, so that an environment mostly stays in the cache of one core. The thread then helps with the
+//! remaining shares. The assignment of threads cannot change results, because environments share only the immutable
+//! model.
 
 use crate::batch_error::BatchError;
 use crate::capture::Capture;
