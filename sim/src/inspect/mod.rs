@@ -48,7 +48,7 @@ pub struct InspectCfg {
     /// True if the root moves freely.
     pub floating_base: bool,
     /// Positions \[rad or m\] by joint name. Joints without a position are at 0, or at `ref` of an MJCF file. Joints
-    /// that follow others (mimic joints, or curves of an MJCF file) have the position that follows.
+    /// that follow others (mimic joints, or curves of an MJCF file) have the implied position.
     pub qpos: Vec<(String, f64)>,
 }
 

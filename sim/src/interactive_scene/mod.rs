@@ -41,7 +41,7 @@ use std::path::Path;
 /// The same as a file, which [`from_file`](Self::from_file) reads; paths in it are relative to the file:
 ///
 /// ```toml
-/// [simulation] # fields of SimulationManagerCfg; preset = "legged" or "manipulation" changes the defaults
+/// [simulation]               # fields of SimulationManagerCfg; preset = "legged" or "manipulation" sets defaults
 /// num_envs = 2
 ///
 /// [entities.cube]            # the name of the entity

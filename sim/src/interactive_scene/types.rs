@@ -25,7 +25,7 @@ use std::any::Any;
 ///
 /// let types = EntityTypes::default();
 /// assert!(types.names().any(|name| name == "ray_caster"));
-/// Any SensorCfg with serde's two traits; here, a built-in sensor under another name.
+/// // Any SensorCfg with serde's two traits; here, a built-in sensor under another name.
 /// let types = types.with_sensor::<kinetoscope_sensors::ImuCfg>("accelerometer");
 /// ```
 #[derive(Clone, Debug)]
