@@ -1,8 +1,9 @@
-//! N environments on worker threads: the same bits for any number of threads and environments.
+//! N environments on worker threads, bit-identical for any number of threads and environments.
 //!
-//! Environments are grouped in chunks. Every thread has a share of the chunks: it takes those first, so that an environment
-//! mostly stays in the cache of one core, and then helps with what is left of the other shares. Which thread steps an
-//! environment decides nothing, since environments share only the immutable model.
+//! Environments are grouped in chunks, and every thread owns a share of the chunks. A thread first takes the chunks of
+//! its own share, so that an environment mostly stays in the cache of one core. The thread then helps with the
+//! remaining shares. The assignment of threads cannot change results, because environments share only the immutable
+//! model.
 
 use crate::batch_error::BatchError;
 use crate::capture::Capture;
@@ -15,30 +16,30 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Environments that one thread takes together.
+/// Consecutive environments that one thread processes together.
 struct Chunk {
     envs: Vec<Env>,
-    /// What [`Batch::step_and_read`] read, environment by environment.
+    /// Values read by [`Batch::step_and_read`], environment by environment.
     read: Vec<f64>,
 }
 
-/// A chunk that a thread has taken.
+/// A chunk that a thread has locked.
 struct Taken<'a> {
-    /// Index of its first environment.
+    /// Index of the first environment of the chunk.
     first: usize,
     chunk: MutexGuard<'a, Chunk>,
-    /// What the thread will probably take next.
+    /// The chunk that the thread will probably take next, for prefetching.
     next: Option<&'a Mutex<Chunk>>,
-    /// Whether environments leave the cache between their steps.
+    /// True if environments leave the cache between their steps.
     cold: bool,
 }
 
-/// From here on the environments of a batch are taken to leave the cache between their steps \[bytes\]. Measured with 64
-/// to 1024 humanoids and arms on 2 MiB of cache for each core: to ask for all arrays of the next one makes a step 5 %
-/// slower at 3 MB and 7 % faster at 11 MB.
+/// Batch size above which environments are assumed to leave the cache between their steps \[bytes\]. Measured with 64
+/// to 1024 humanoids and arms on 2 MiB of cache per core: prefetching all arrays of the next environment makes a step 5
+/// % slower at 3 MB and 7 % faster at 11 MB.
 const CACHE: usize = 8 << 20;
 
-/// N environments of one model.
+/// N environments of one model, stepped in parallel.
 #[derive(Debug)]
 pub struct Batch {
     chunks: Chunks,
@@ -47,20 +48,20 @@ pub struct Batch {
     num_envs: usize,
 }
 
-/// The environments, and how threads share them.
+/// The environments in chunks, with one share of the chunks per thread.
 struct Chunks {
     chunks: Vec<Mutex<Chunk>>,
     chunk_size: usize,
-    /// Whether environments leave the cache between their steps.
+    /// True if environments leave the cache between their steps.
     cold: bool,
     /// One share of the chunks for each thread.
     shares: Vec<Share>,
 }
 
-/// A range of chunks. Each is alone in its cache lines: threads count up their own without slowing down each other.
+/// A range of chunks. The alignment gives each counter its own cache lines, which avoids false sharing between threads.
 #[repr(align(128))]
 struct Share {
-    /// The next chunk to take.
+    /// Index of the next chunk to take.
     next: AtomicUsize,
     chunks: Range<usize>,
 }
@@ -71,17 +72,18 @@ impl std::fmt::Debug for Chunks {
     }
 }
 
-/// A mutex here is poisoned only when a job panicked, and then the pool has raised that panic already.
+/// Locks a mutex even if it is poisoned: only a panicking job poisons it, and the pool has already propagated that
+/// panic.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Batch {
-    /// `num_envs` environments of `model` in its initial state. `threads` threads step them, the calling one included; the
-    /// others are those of `pool`.
+    /// Creates `num_envs` environments in the initial state of `model`. `threads` threads step them: the calling thread
+    /// and threads of `pool`.
     ///
     /// # Errors
-    /// A number is zero, or memory or threads are not to be had.
+    /// A number is zero, or memory or threads cannot be allocated.
     pub fn new(
         model: &Model,
         drives: &Arc<DriveTable>,
@@ -95,8 +97,8 @@ impl Batch {
         if threads == 0 {
             return Err(BatchError::NoThreads);
         }
-        // Several chunks per thread even out environments that take longer. Threads wait for the last chunk of a step: more
-        // than 4 environments in one gain nothing.
+        // Several chunks per thread balance environments of unequal cost. More than 4 environments per chunk bring no
+        // gain, and threads wait longer for the last chunk of a step.
         let chunk_size = num_envs.div_ceil(threads * 8).clamp(1, 4);
         let drives = DriveState::new(drives, model);
         let mut bytes = 0;
@@ -120,7 +122,7 @@ impl Batch {
         Ok(Self { chunks, pool, model: model.clone(), num_envs })
     }
 
-    /// The model all environments were made from.
+    /// The model that all environments were created from.
     pub fn model(&self) -> &Model {
         &self.model
     }
@@ -140,12 +142,12 @@ impl Batch {
         self.run_chunks(|taken| taken.each(|_, env, _| env.step(count)));
     }
 
-    /// As [`step`](Self::step); of the last step, `capture` is kept in the environments.
+    /// As [`step`](Self::step), and captures quantities of the last step in the environments.
     pub(crate) fn step_and_capture(&mut self, count: u32, capture: Capture) {
         self.run_chunks(|taken| taken.each(|_, env, _| env.step_and_capture(count, Some(&capture))));
     }
 
-    /// Captures in the environments `chosen` what MuJoCo solves for their present state.
+    /// Captures the solution of the current state in the environments `chosen`.
     pub(crate) fn capture_present(&mut self, chosen: &[usize], capture: Capture) {
         let mut mask = vec![false; self.num_envs];
         chosen.iter().for_each(|&env| mask[env] = true);
@@ -156,14 +158,14 @@ impl Batch {
         });
     }
 
-    /// Does `count` steps in every environment and copies what `read` picks to `outs`, which have one row for each
+    /// Does `count` steps in every environment and copies the slices that `read` returns to `outs`, one row per
     /// environment: `batch.step_and_read(1, |env| [env.data().qpos(), env.data().qvel()], [&mut qpos, &mut qvel])`.
     ///
-    /// The thread that stepped an environment reads it at once, while it is in that core's cache; to read 1024 humanoids
-    /// after the step takes 2 % of it.
+    /// The thread that stepped an environment reads it immediately, while its data is in that core's cache. A separate
+    /// read of 1024 humanoids after the step takes 2 % of the step time.
     ///
     /// # Panics
-    /// `outs` do not have the sizes that `read` gives, or `read` panicked.
+    /// The sizes of `outs` and of the slices differ, or `read` panics.
     #[track_caller]
     pub fn step_and_read<const K: usize>(
         &mut self,
@@ -183,7 +185,7 @@ impl Batch {
             }
         };
         if self.threads() == 1 {
-            // No other thread: straight to where the numbers go.
+            // A single thread writes directly to the outputs.
             for c in 0..self.chunks.chunks.len() {
                 self.chunks.take(c).each(|index, env, _| {
                     step(env, &mut |k, values| {
@@ -209,7 +211,7 @@ impl Batch {
             }
         };
         let chunk_size = self.chunks.chunk_size;
-        // What this thread read is copied while the others still step.
+        // The calling thread copies the values of its own chunks while the other threads still step.
         self.run_chunks_then(job, |taken| {
             copy(taken.first, &taken.chunk);
             copied[taken.first / chunk_size] = true;
@@ -222,7 +224,7 @@ impl Batch {
     /// Runs `job` once for every environment, in parallel.
     ///
     /// # Panics
-    /// `job` panicked.
+    /// `job` panics.
     pub fn run(&mut self, job: impl Fn(usize, &mut Env) + Sync) {
         self.run_chunks(|taken| taken.each(|i, env, _| job(i, env)));
     }
@@ -231,13 +233,13 @@ impl Batch {
         self.run_chunks_then(job, |_| {});
     }
 
-    /// As [`run_chunks`](Self::run_chunks); `then` sees the chunks that this thread did, right after them.
+    /// As [`run_chunks`](Self::run_chunks); `then` is called after each chunk that the calling thread has processed.
     fn run_chunks_then(&mut self, job: impl Fn(&mut Taken) + Sync, then: impl FnMut(&Taken) + Send) {
         let chunks = &self.chunks;
         for share in &chunks.shares {
             share.next.store(share.chunks.start, Ordering::Relaxed);
         }
-        // Slot 0 alone takes the lock: the calling thread.
+        // No contention: only slot 0, the calling thread, takes this lock.
         let then = Mutex::new(then);
         self.pool.run(chunks.shares.len(), |slot| {
             if slot == 0 {
@@ -274,14 +276,14 @@ impl Batch {
         }
     }
 
-    /// What is read of each environment: shape (N, K).
+    /// Reads K numbers of each environment, shape (N, K).
     pub(crate) fn gather_rows<const K: usize>(&self, mut read: impl FnMut(&Env) -> [f64; K]) -> Array2<f64> {
         let mut rows = Vec::with_capacity(self.num_envs);
         self.for_each(|_, env| rows.push(read(env)));
         rows.into()
     }
 
-    /// What is read of each environment and each of `items`: shape (N, items).
+    /// Reads a value of each environment and each of `items`, shape (N, items).
     pub(crate) fn gather<I, T>(&self, items: &[I], read: impl Fn(&Env, &I) -> T) -> Array2<T>
     where
         T: Copy + Default,
@@ -295,7 +297,7 @@ impl Batch {
         values
     }
 
-    /// What is read of each environment and each of `items`, K numbers: shape (N, items, K).
+    /// Reads K numbers of each environment and each of `items`, shape (N, items, K).
     pub(crate) fn gather_rows_of<I, const K: usize>(
         &self,
         items: &[I],
@@ -322,7 +324,7 @@ impl Batch {
         })
     }
 
-    /// Exchanges what environment `index` is made of, or looks at that: its data may be [stale](Env::freshen).
+    /// Accesses environment `index` without its deferred forward pass: the data may be [stale](Env::freshen).
     ///
     /// # Panics
     /// `index` is not smaller than `num_envs`.
@@ -335,11 +337,11 @@ impl Batch {
 }
 
 impl Taken<'_> {
-    /// Does `act` with every environment, given its index and what the chunk has read.
+    /// Calls `act` for every environment of the chunk, with its index and the read buffer of the chunk.
     fn each(&mut self, mut act: impl FnMut(usize, &mut Env, &mut Vec<f64>)) {
         let Chunk { envs, read } = &mut *self.chunk;
         for i in 0..envs.len() {
-            // Its memory comes while this one steps.
+            // Prefetch the next environment while this one steps.
             if let Some(next) = envs.get(i + 1) {
                 next.prefetch(self.cold);
             } else if let Some(next) = self.next.and_then(|next| next.try_lock().ok()) {
@@ -352,7 +354,7 @@ impl Taken<'_> {
 }
 
 impl Chunks {
-    /// Takes chunk `c`.
+    /// Locks chunk `c`.
     fn take(&self, c: usize) -> Taken<'_> {
         Taken {
             first: c * self.chunk_size,
@@ -362,7 +364,7 @@ impl Chunks {
         }
     }
 
-    /// Does the share of `thread`, then what is left of the shares after it.
+    /// Processes the share of `thread`, then the remaining chunks of the following shares.
     fn take_chunks(&self, thread: usize, mut job: impl FnMut(&mut Taken)) {
         let (before, from) = self.shares.split_at(thread);
         for share in from.iter().chain(before) {
@@ -394,7 +396,7 @@ mod tests {
 
     #[test]
     fn step_and_read() {
-        // The calling thread dawdles, or it would do all of this alone.
+        // Slow down the calling thread, which would otherwise process all chunks alone.
         let caller = std::thread::current().id();
         for (envs, threads) in [(1, 1), (3, 8), (37, 3)] {
             let mut batch = pendulums(envs, threads);

@@ -12,16 +12,16 @@ pub enum BatchError {
     /// `threads` is zero.
     #[error("threads is 0; use at least 1, or leave it out to use every core")]
     NoThreads,
-    /// An environment could not be made.
+    /// An environment could not be allocated.
     #[error("environment {index}: {error}")]
     Environment {
-        /// Which one.
+        /// Index of the environment.
         index: usize,
-        /// Why.
+        /// Error of the engine.
         #[source]
         error: EngineError,
     },
-    /// The operating system gives no thread.
+    /// The operating system refuses to start a thread.
     #[error("cannot start a worker thread: {0}")]
     Thread(String),
 }

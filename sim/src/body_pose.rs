@@ -1,10 +1,10 @@
-//! Poses of MuJoCo's bodies and of frames on them.
+//! Poses of MuJoCo bodies and of frames attached to them.
 
 use kinetoscope_mujoco as mj;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::from_row;
 
-/// A frame on a MuJoCo body, such as that of a link.
+/// A frame attached to a MuJoCo body, such as the frame of a link.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BodyFrame {
     pub(crate) body: usize,
@@ -12,12 +12,12 @@ pub(crate) struct BodyFrame {
 }
 
 impl BodyFrame {
-    /// The frame of the body itself.
+    /// Frame of the body itself.
     pub(crate) fn of_body(body: usize) -> Self {
         Self { body, body_from_frame: Pose::identity() }
     }
 
-    /// Pose in the environment.
+    /// Pose of the frame in the environment.
     pub(crate) fn pose(&self, data: &mj::Data) -> Pose {
         body_pose(data, self.body) * self.body_from_frame
     }

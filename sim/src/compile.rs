@@ -1,4 +1,4 @@
-//! From robots to a running simulation: document, MuJoCo model, drives, batch.
+//! Compiles the entities to a running simulation: document, MuJoCo model, drives, batch.
 
 use crate::batch::Batch;
 use crate::body_pose::BodyFrame;
@@ -41,7 +41,7 @@ pub(crate) fn compile(cfg: &SimulationManagerCfg, contents: &Contents, pool: &Th
     build(cfg, contents, &excluded)?.into_simulation(cfg, pool, excluded)
 }
 
-/// The document of a scene, for running or for an export.
+/// Builds the MJCF document of a scene, for running or for an export.
 pub(crate) fn document(
     cfg: &SimulationManagerCfg,
     contents: &Contents,
@@ -115,7 +115,8 @@ pub(crate) fn document(
     for weld in &contents.welds {
         let body = |name: &str| -> Result<String> { Ok(called(name)?.swap_remove(0)) };
         let (first, second) = (body(&weld.cfg.first)?, body(&weld.cfg.second)?);
-        // MuJoCo holds them in the origin of the second: not in that of something fixed, which may be far away.
+        // MuJoCo evaluates a weld at the origin of the second body, so the fixed body, which may be far away, comes
+        // first.
         let (first, second) = if weld.second_is_fixed { (second, first) } else { (first, second) };
         mjcf.welds.push(WeldEquality { name: weld.cfg.uid.clone(), first, second });
     }
@@ -166,7 +167,7 @@ fn build(cfg: &SimulationManagerCfg, contents: &Contents, excluded: &[(String, S
     Ok(Built { model, table, robots, objects, parts, welds, identities, plan, start, xml, diagnostics, proxies })
 }
 
-/// Geoms that meshes are drawn in the place of.
+/// Marks the geoms that stand in for visual meshes.
 fn find_proxies(model: &mj::Model, contents: &Contents, robots: &[RobotIndex]) -> Vec<bool> {
     let mut proxies = vec![false; model.ngeom()];
     for (data, index) in contents.robots.iter().zip(robots) {
@@ -198,7 +199,7 @@ fn find_objects(compiled: &mj::Compiled, contents: &Contents) -> Result<Vec<Free
     contents.objects.iter().map(|object| find(object)).collect()
 }
 
-/// Damps moving and turning of objects each by its own number, which a free joint of a document cannot say.
+/// Sets linear and angular damping of free joints separately, which MJCF cannot express for a free joint.
 fn damp_objects(compiled: &mut mj::Compiled, contents: &Contents, objects: &[FreeIndex]) {
     for (object, index) in contents.objects.iter().zip(objects) {
         if let Some((_, dof)) = index.joint {
@@ -215,7 +216,7 @@ fn find_weld(model: &mj::Model, weld: &WeldCfg) -> Result<WeldIndex> {
     Ok(WeldIndex { equality, bodies })
 }
 
-/// Finds everything of a part in the compiled model, by its names.
+/// Finds all elements of an attached MJCF file in the compiled model, by name.
 fn find_part(model: &mj::Model, part: &MjcfData) -> Result<PartIndex> {
     let (file, names) = (part.model(), part.names());
     let find = |kind, what, name: &str| model.id(kind, name).ok_or_else(|| missing(what, name));
@@ -226,7 +227,7 @@ fn find_part(model: &mj::Model, part: &MjcfData) -> Result<PartIndex> {
     bodies.extend(all(ObjectKind::Body, "body", &names.bodies[1..])?);
     let actuators = all(ObjectKind::Actuator, "actuator", &names.actuators)?;
     let (mut qpos, mut dofs, mut joints) = (Vec::new(), Vec::new(), Vec::new());
-    // In the file's own order: joint by joint, as their numbers stand there.
+    // Joint by joint in the order of the file.
     for (joint, here) in all(ObjectKind::Joint, "joint", &names.joints)?.into_iter().enumerate() {
         let (nq, nv) = joint_widths(file.jnt_type()[joint]);
         if nq == 1 {
@@ -254,7 +255,7 @@ fn find_part(model: &mj::Model, part: &MjcfData) -> Result<PartIndex> {
     })
 }
 
-/// Who every geom belongs to.
+/// Owner of every geom, for mask ids and labels.
 fn identify(
     model: &mj::Model,
     contents: &Contents,
@@ -295,7 +296,7 @@ fn identify(
                 object: data.uid().into(),
                 link: (of > 0).then(|| data.names().bodies[of].clone()),
                 class: data.cfg().semantic_class.clone().unwrap_or_else(|| "mjcf".into()),
-                // Frames begin with the bodies but the world.
+                // Frames begin with all bodies except the world.
                 body: of.checked_sub(1).map(|frame| (first + frame) as u32),
             };
         }
@@ -310,7 +311,7 @@ fn identify(
     visible::of_simulation(model, &owners, &visible::tendon_owners(model, contents))
 }
 
-/// Finds every joint and link in the compiled model, and moves implicit drives from actuators to rows.
+/// Finds every joint and link in the compiled model, and replaces actuators of implicit drives by constraint rows.
 fn set_up_drives(
     mut compiled: mj::Compiled,
     contents: &Contents,
@@ -435,9 +436,9 @@ impl Built {
     }
 }
 
-/// Pairs of bodies of one robot that touch in the initial pose.
+/// Pairs of bodies of one robot that overlap in the initial pose.
 fn overlapping_pairs(built: &Built, contents: &Contents) -> Result<Vec<(String, String)>> {
-    // An environment, since its buffers grow until all contacts fit.
+    // Uses an environment because its buffers grow until all contacts fit.
     let mut env = Env::new(&with_small_buffers(&built.model), &built.table)?;
     env.write(|data| {
         for &(address, position) in &built.start.qpos {

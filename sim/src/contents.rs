@@ -1,4 +1,4 @@
-//! What was added to a simulation, in the order in which it was added.
+//! Entities of a simulation in insertion order.
 
 use crate::error::{Error, Result};
 use crate::mjcf::robot::RobotLayout;
@@ -16,7 +16,7 @@ use kinetoscope_robot::description::JointKind;
 use kinetoscope_sensors::EngineSensor;
 use std::sync::Arc;
 
-/// Robots (and articulations that are none), objects, terrains, MJCF files, and what holds and what passes through each other.
+/// All entities of the scene, with their welds and collision exclusions.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Contents {
     pub(crate) robots: Vec<Arc<RobotData>>,
@@ -25,22 +25,22 @@ pub(crate) struct Contents {
     pub(crate) parts: Vec<Arc<MjcfData>>,
     pub(crate) groups: Vec<GroupData>,
     pub(crate) welds: Vec<WeldData>,
-    /// Pairs of names of what never collides.
+    /// Pairs of names between which collisions are disabled.
     pub(crate) apart: Vec<[String; 2]>,
 }
 
-/// Checks that a name can be a part of others, in MJCF and in files: of folders too, and of the frames of recordings.
+/// Checks that a uid can be part of MJCF names, file and folder names, and frame names of recordings.
 pub(crate) fn check_usable(uid: &str) -> Result<()> {
     let forbidden = |c: char| c == '/' || c == '\\' || c.is_control();
     let usable = (1..=64).contains(&uid.chars().count()) && !uid.chars().any(forbidden) && uid != "." && uid != "..";
     if usable { Ok(()) } else { Err(Error::InvalidUid(uid.into())) }
 }
 
-/// Mask id of the ground; links, objects and terrains come after it.
+/// Mask id of the ground; links, objects and terrains have higher ids.
 pub(crate) const GROUND_MASK_ID: i32 = 1;
 
 impl Contents {
-    /// What is known of surfaces besides what the model says, by the names that instances have.
+    /// Configured surfaces by instance name, which override the surfaces of the model.
     pub(crate) fn surfaces(&self) -> Surfaces {
         let links = self.robots.iter().flat_map(|robot| {
             let name = |link: usize| format!("{}/{}", robot.uid(), robot.description().links[link].name);
@@ -58,7 +58,7 @@ impl Contents {
         links.chain(bodies).chain(objects).chain(terrains).collect()
     }
 
-    /// Checks that nothing is called `uid` yet.
+    /// Checks that the name `uid` is free and usable.
     pub(crate) fn check_uid(&self, uid: &str) -> Result<()> {
         let objects = self.objects.iter().map(|o| o.uid()).chain(self.terrains.iter().map(|t| t.uid()));
         let objects = objects.chain(self.parts.iter().map(|p| p.uid()));
@@ -71,15 +71,15 @@ impl Contents {
         check_usable(uid)
     }
 
-    /// The first mask id that is not used: ids stay what they are when more is added.
+    /// The lowest unused mask id. Ids never change when entities are added.
     pub(crate) fn next_mask_id(&self) -> i32 {
         let links: usize = self.robots.iter().map(|r| r.description().links.len() + r.tendons().len()).sum();
         let bodies: usize = self.parts.iter().map(|p| p.model().nbody() + p.model().ntendon()).sum();
         GROUND_MASK_ID + 1 + (links + self.objects.len() + self.terrains.len() + bodies) as i32
     }
 
-    /// Names of the bodies in the order in which sensors see them: links of all robots (`uid/link`), then objects,
-    /// then bodies and sites of parts (`uid/body`).
+    /// Names of the bodies in the order of the body axis: links of all robots (`uid/link`), objects, then bodies and
+    /// sites of attached MJCF files (`uid/body`).
     pub(crate) fn body_names(&self) -> Arc<[String]> {
         let links = self.robots.iter().flat_map(|r| {
             let links = r.description().named_links().iter();
@@ -89,8 +89,8 @@ impl Contents {
         links.chain(self.objects.iter().map(|o| o.uid().to_string())).chain(frames).collect()
     }
 
-    /// Names of MuJoCo's bodies of everything in the order of [`body_names`](Self::body_names), of which links that fixed
-    /// joints hold share one.
+    /// Names of the MuJoCo bodies in the order of [`body_names`](Self::body_names). Links connected by fixed joints
+    /// share one MuJoCo body.
     pub(crate) fn mujoco_bodies(&self, layouts: &[RobotLayout]) -> Vec<String> {
         let links = layouts.iter().flat_map(|layout| layout.links.iter().map(|frame| frame.body.clone()));
         let frames = self.parts.iter().flat_map(|part| {
@@ -102,11 +102,10 @@ impl Contents {
         links.chain(self.objects.iter().map(|o| o.uid().to_string())).chain(frames).collect()
     }
 
-    /// Places in [`body_names`](Self::body_names) of what a name means: a body, or all links of a robot; `None` for the
-    /// world.
+    /// Indices in [`body_names`](Self::body_names) of a body, or of all links of a robot; `None` for the world.
     ///
     /// # Errors
-    /// It means nothing.
+    /// The name is unknown.
     pub(crate) fn bodies_called(&self, name: &str) -> Result<Option<Vec<usize>>> {
         let names = self.body_names();
         if name == "world" {
@@ -124,14 +123,14 @@ impl Contents {
         Ok(Some(found))
     }
 
-    /// For every body in the order of [`body_names`](Self::body_names), the one that moves it: the first link above it that
-    /// no fixed joint holds.
+    /// For every body in the order of [`body_names`](Self::body_names), the index of the body that moves it: the
+    /// nearest ancestor link, itself included, that no fixed joint attaches to its parent.
     pub(crate) fn carriers(&self) -> Arc<[usize]> {
         let mut carriers = Vec::new();
         for robot in &self.robots {
             let (description, first) = (robot.description(), carriers.len());
             carriers.extend((0..description.named_links().len()).map(|mut link| {
-                // Behind a frame between joints a body begins.
+                // A frame between joints starts a new body.
                 while let Some(joint) = description.links[link].parent_joint.map(|id| description.joint(id))
                     && joint.kind == JointKind::Fixed
                     && !description.link(joint.parent).between_joints
@@ -150,7 +149,8 @@ impl Contents {
         carriers.into()
     }
 
-    /// MuJoCo's own sensors of all robots from MJCF files, then of all parts, where their values are among all values.
+    /// MuJoCo sensors of all robots from MJCF files, then of all attached MJCF files, with their offsets in
+    /// `sensordata`.
     pub(crate) fn engine_sensors(&self) -> Arc<[EngineSensor]> {
         let mut first = 0;
         let mut sensors = Vec::new();
@@ -162,19 +162,20 @@ impl Contents {
         sensors.into()
     }
 
-    /// Files that MuJoCo reads beside the document, of robots from MJCF files and of parts.
+    /// Asset files of the document, from MJCF robots and attached MJCF files.
     pub(crate) fn files(&self) -> impl Iterator<Item = &Asset> {
         let of_robots = self.robots.iter().filter_map(|robot| robot.file()).flat_map(RobotFile::files);
         of_robots.chain(self.parts.iter().flat_map(|part| part.files()))
     }
 
-    /// Names of the movable joints of all robots, then of the joints of parts that have one degree of freedom, `uid/joint`.
+    /// Names (`uid/joint`) of the movable joints of all robots, then of the joints of attached MJCF files with one
+    /// degree of freedom.
     pub(crate) fn joint_names(&self) -> Arc<[String]> {
         let of_robots = self.robots.iter().flat_map(|r| r.joint_names().iter().map(|j| format!("{}/{j}", r.uid())));
         of_robots.chain(self.parts.iter().flat_map(|p| p.single_joints().map(|j| p.full(j)))).collect()
     }
 
-    /// Names of the drives of all robots, `uid/joint`, then of the actuators of parts, `uid/actuator`.
+    /// Names of the drives of all robots (`uid/joint`), then of the actuators of attached MJCF files (`uid/actuator`).
     pub(crate) fn actuator_names(&self) -> Arc<[String]> {
         let of_robots = self.robots.iter().flat_map(|r| {
             let driven = r.joint_names().iter().zip(r.plans()).filter(|(_, plan)| plan.actuator.is_some());

@@ -3,15 +3,15 @@
 use crate::ids::EnvId;
 use std::fmt;
 
-/// An environment in which a step could not be done. It stands in its last good state until it is reset. Its `Display` is
+/// An environment in which a step failed. It stays in its last valid state until it is reset. `Display` gives
 /// `step 12: bad acceleration`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DivergedEnv {
     /// The environment.
     pub env: EnvId,
-    /// Steps that it did before.
+    /// Number of steps before the failed one, since the last reset.
     pub step: u64,
-    /// Reason, in words.
+    /// Description of the failure.
     pub reason: String,
 }
 

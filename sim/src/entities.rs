@@ -1,4 +1,4 @@
-//! Contents of a simulation by name, for code that did not build it: recorders, inspectors, viewers.
+//! Entities of a simulation by name, for code that did not create them: recorders, inspectors, viewers.
 
 use crate::error::{Error, Result};
 use crate::ids::{MjcfId, ObjectId, RobotId, TerrainId};
@@ -13,13 +13,13 @@ use ndarray::Array2;
 use std::sync::Arc;
 
 impl SimulationManager {
-    /// Contents of the simulation, by name.
+    /// Entities of the simulation by name.
     pub fn entities(&self) -> Entities<'_> {
         Entities::new(self)
     }
 }
 
-/// Contents of a simulation by name; see [`SimulationManager::entities`].
+/// Entities of a simulation by name; see [`SimulationManager::entities`].
 #[derive(Clone, Copy, Debug)]
 pub struct Entities<'a> {
     sim: &'a SimulationManager,
@@ -30,24 +30,24 @@ impl<'a> Entities<'a> {
         Self { sim }
     }
 
-    /// The robot called `uid`.
+    /// Handle of the robot `uid`.
     ///
     /// # Errors
-    /// The uid is unknown; the error lists those there are.
+    /// The uid is unknown; the error lists the known uids.
     pub fn robot_id(&self, uid: &str) -> Result<RobotId> {
         self.sim.find_robot(uid, "robot", RobotData::is_robot)
     }
 
-    /// All robots and articulations with their uids, in the order in which they were added.
+    /// All robots and articulations with their uids, in insertion order.
     pub fn robot_ids(&self) -> Vec<(&'a str, RobotId)> {
         let robots = self.sim.contents.robots.iter().enumerate();
         robots.map(|(index, robot)| (robot.uid(), RobotId { manager: self.sim.serial, index })).collect()
     }
 
-    /// The rigid object called `uid`.
+    /// Handle of the rigid object `uid`.
     ///
     /// # Errors
-    /// The uid is unknown; the error lists those there are.
+    /// The uid is unknown; the error lists the known uids.
     pub fn rigid_object_id(&self, uid: &str) -> Result<ObjectId> {
         let index = self.sim.contents.objects.iter().position(|o| o.uid() == uid);
         index.map(|index| ObjectId { manager: self.sim.serial, index }).ok_or_else(|| Error::UnknownName {
@@ -57,10 +57,10 @@ impl<'a> Entities<'a> {
         })
     }
 
-    /// The MJCF file that is a part called `uid`.
+    /// Handle of the attached MJCF file `uid`.
     ///
     /// # Errors
-    /// The uid is unknown; the error lists those there are.
+    /// The uid is unknown; the error lists the known uids.
     pub fn mjcf_id(&self, uid: &str) -> Result<MjcfId> {
         let index = self.sim.contents.parts.iter().position(|p| p.uid() == uid);
         index.map(|index| MjcfId { manager: self.sim.serial, index }).ok_or_else(|| Error::UnknownName {
@@ -70,45 +70,45 @@ impl<'a> Entities<'a> {
         })
     }
 
-    /// The articulation called `uid`.
+    /// Handle of the passive articulation `uid`.
     ///
     /// # Errors
-    /// The uid is unknown; the error lists those there are.
+    /// The uid is unknown; the error lists the known uids.
     pub fn articulation_id(&self, uid: &str) -> Result<ArticulationId> {
         self.sim.find_robot(uid, "articulation", |robot| !robot.is_robot()).map(ArticulationId)
     }
 
-    /// Names of all robots, then of all passive articulations, each in the order in which they were added.
+    /// Uids of all robots, then of all passive articulations, each in insertion order.
     pub fn jointed_uids(&self) -> Vec<&'a str> {
         let of = |robots: bool| self.sim.contents.robots.iter().filter(move |data| data.is_robot() == robots);
         of(true).chain(of(false)).map(|data| data.uid()).collect()
     }
 
-    /// The robot, or articulation, called `uid`: reading is the same for both.
+    /// Handle of the robot or articulation `uid`, for read access that both share.
     ///
     /// # Errors
-    /// The uid is unknown; the error lists those there are.
+    /// The uid is unknown; the error lists the known uids.
     pub fn jointed_id(&self, uid: &str) -> Result<RobotId> {
         self.sim.find_robot(uid, "robot or articulation", |_: &RobotData| true)
     }
 
-    /// Names of all rigid objects, in the order in which they were added.
+    /// Uids of all rigid objects, in insertion order.
     pub fn rigid_object_uids(&self) -> Vec<&'a str> {
         self.sim.contents.objects.iter().map(|object| object.uid()).collect()
     }
 
-    /// Names of all MJCF parts, in the order in which they were added.
+    /// Uids of all attached MJCF files, in insertion order.
     pub fn mjcf_uids(&self) -> Vec<&'a str> {
         self.sim.contents.parts.iter().map(|part| part.uid()).collect()
     }
 
-    /// Names of all sensors, in the order in which they were added.
+    /// Uids of all sensors, in insertion order.
     pub fn sensor_uids(&self) -> Vec<&'a str> {
         self.sim.sensors.uids().collect()
     }
 
-    /// The sensor called `uid`, whatever its type: `&dyn Sensor` converts to `&dyn Any`. As with
-    /// [`SimulationManager::sensor`], a lazy one measures now what was due.
+    /// The sensor `uid` as a trait object; `&dyn Sensor` converts to `&dyn Any`. As with [`SimulationManager::sensor`],
+    /// a lazy sensor runs its pending measurement now.
     ///
     /// # Errors
     /// The uid is unknown, or the sensor failed, in an earlier step or now.
@@ -116,37 +116,36 @@ impl<'a> Entities<'a> {
         self.sim.sensors.called(uid)
     }
 
-    /// Physics steps until the sensor called `uid` measures next in any environment, at least 1; [`u64::MAX`] where it does
-    /// not.
+    /// Physics steps until the sensor `uid` measures next in any environment, at least 1; [`u64::MAX`] if it never
+    /// does.
     ///
     /// # Errors
-    /// There is no such sensor.
+    /// The uid is unknown.
     pub fn sensor_due_in(&self, uid: &str) -> Result<u64> {
         self.sim.sensors.due_in(uid, &self.sim.simulation)
     }
 
-    /// The sensors of a type with their names, in the order in which they were added; without those that failed.
+    /// Names and handles of all sensors of type `S` in insertion order, without failed sensors.
     pub fn sensor_ids<S: Sensor>(&self) -> Vec<(String, SensorId<S>)> {
         self.sim.sensors.ids()
     }
 
-    /// A terrain.
+    /// Returns a terrain.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn terrain(&self, id: TerrainId) -> &'a Terrain {
         &self.sim.contents.terrains[self.sim.index_of(id.manager, id.index)]
     }
 
-    /// Names of links (`uid/link`, of all robots), of objects, and of bodies and sites of MJCF files (`uid/body`): the order
-    /// in which sensors and viewers number bodies.
+    /// Names of all bodies, in the order in which sensors and viewers number them: links of all robots (`uid/link`),
+    /// objects, then bodies and sites of attached MJCF files (`uid/body`).
     pub fn body_names(&self) -> Arc<[String]> {
         self.sim.contents.body_names()
     }
 
-    /// Positions and velocities of all joints of the scene as MuJoCo has them (`qpos`, `qvel`), one row for each environment: shapes
-    /// (N, nq) and (N, nv).
+    /// Positions and velocities of all joints in MuJoCo's layout (`qpos`, `qvel`), shapes (N, nq) and (N, nv).
     pub fn engine_states(&self) -> [Array2<f64>; 2] {
         let model = self.sim.simulation.batch.model();
         let mut states =
@@ -160,8 +159,8 @@ impl<'a> Entities<'a> {
         states
     }
 
-    /// Names of the columns of a [rollout](SimulationManager::rollout)'s controls: the movable joints of all robots (`uid/joint`), in the
-    /// order in which they were added, then the actuators of all MJCF parts (`uid/actuator`).
+    /// Column names of the controls of a [rollout](SimulationManager::rollout): movable joints of all robots
+    /// (`uid/joint`), then actuators of all attached MJCF files (`uid/actuator`), each in insertion order.
     pub fn control_names(&self) -> Vec<String> {
         let parts = self.sim.contents.parts.iter();
         let actuators = parts.flat_map(|part| part.names().actuators.iter().map(|name| part.full(name)));
@@ -174,9 +173,10 @@ impl<'a> Entities<'a> {
         drives.chain(actuators).collect()
     }
 
-    /// Names of the columns of a [rollout](SimulationManager::rollout)'s states: `qpos uid/joint` for each position, then
-    /// `qvel uid/joint` for each velocity, with a number in brackets where a joint has several: position and quaternion
-    /// w x y z of a free joint \[m\], its velocity in the environment \[m/s\] and its angular velocity in the body \[rad/s\].
+    /// Column names of the states of a [rollout](SimulationManager::rollout): `qpos uid/joint` for each position, then
+    /// `qvel uid/joint` for each velocity. A joint with several columns has an index in brackets. The columns of a free
+    /// joint are its position \[m\] and quaternion w x y z, its velocity in the environment \[m/s\], and its angular
+    /// velocity in the body frame \[rad/s\].
     pub fn state_names(&self) -> Vec<String> {
         let model = self.sim.simulation.batch.model();
         let list = |what: &str, first: &[i32], count: usize| {

@@ -1,14 +1,13 @@
-//! One environment: an `mjData`, its drives, and what to do when a step does not go well.
+//! One environment: an `mjData`, its drives, and the recovery from failed steps.
 //!
-//! The loop is `drives -> mj_step2 -> mj_step1` (with RK4 `drives -> mj_step -> mj_step1`): after it, positions,
-//! velocities, contacts and constraints are those of the new state. A step that needed more room than the buffers have is
-//! done again, from the state before it, with doubled buffers: the result is what large buffers would have given from the
-//! beginning. A step that ends in a state that is not finite is undone, and the environment stands still until it is
-//! reset.
+//! A step is `drives -> mj_step2 -> mj_step1`, and `drives -> mj_step -> mj_step1` with RK4. After it, positions,
+//! velocities, contacts and constraints belong to the new state. A step that overflows a buffer is repeated from its
+//! start state with doubled buffers, so its result equals that of large buffers from the beginning. A step that ends in
+//! a non-finite state is undone, and the environment stays frozen until it is reset.
 //!
-//! When its turn comes, an environment is no longer in the core's own cache: every line of memory that a step touches
-//! beside MuJoCo's is waited for. What a step needs for itself is therefore in memory of the thread, and what it seldom
-//! needs is apart from what it always needs.
+//! A batch steps its environments in turn, so the memory of an environment has left the core's cache when its turn
+//! comes. Every cache line that a step touches beside MuJoCo's then costs a miss. Scratch memory of a step is therefore
+//! per thread, and rarely used fields are stored apart from the hot ones.
 
 use crate::capture::{Capture, Solved};
 use crate::drive::table::{DriveState, DriveTable};
@@ -21,28 +20,28 @@ use kinetoscope_scene::Contact;
 use std::cell::Cell;
 use std::sync::Arc;
 
-/// Whether an environment is being stepped.
+/// Status of an environment: running or diverged.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum EnvStatus {
-    /// Stepping.
+    /// The environment runs.
     Running,
-    /// A step failed: the environment stands in its last good state until it is reset.
+    /// A step failed. The environment stays in its last valid state until it is reset.
     Diverged {
-        /// The step that failed, counted since the last reset.
+        /// Number of steps before the failed one, since the last reset.
         step: u64,
-        /// Why.
+        /// Reason of the failure.
         reason: Divergence,
     },
 }
 
-/// Why an environment was taken out.
+/// Reason of a divergence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Divergence {
-    /// A position, velocity or acceleration was not finite or huge.
+    /// A position, velocity or acceleration is not finite or too large.
     Warning(Warning),
-    /// MuJoCo's engine stopped.
+    /// MuJoCo's engine reported an error.
     Engine(EngineError),
-    /// Contacts or constraints need more room than can be given.
+    /// Contacts or constraints need larger buffers than the memory limit of an environment allows.
     BuffersExhausted(Buffers),
 }
 
@@ -56,7 +55,7 @@ impl std::fmt::Display for Divergence {
     }
 }
 
-/// Growth stops when one environment would take this much memory \[bytes\].
+/// Memory of one environment above which its buffers no longer grow \[bytes\].
 const LARGEST_ENVIRONMENT: usize = 2 << 30;
 
 /// One environment of a batch.
@@ -66,43 +65,44 @@ pub struct Env {
     /// Targets, gains and efforts of the drives.
     pub drives: DriveState,
     steps: u64,
-    /// Why the environment stands still, while it does.
+    /// Divergence status; `None` while the environment runs.
     diverged: Option<Box<EnvStatus>>,
-    /// The rest of the present state is in `data`.
+    /// Quaternions before the last forward pass; the rest of the state is in `data`.
     raw_quats: RawQuats,
-    /// Whether what MuJoCo solves was last solved for the present state, not for the one before the last step.
+    /// True if forces and accelerations were solved for the current state, false if for the state before the last step.
     solved_now: bool,
-    /// Whether the model was exchanged since the last forward pass, which is done when somebody wants to know or to step: who
-    /// changes several properties, or resets afterwards, waits for one. Positions are those before a pass then.
+    /// True after the model was replaced and before the next forward pass. The pass is deferred to the next read or
+    /// step, so that several property changes and a reset share one pass. Until then, quaternions in `qpos` are those
+    /// before a pass.
     stale: bool,
     seldom: Box<Seldom>,
-    /// What a user applies to bodies; most environments have none.
+    /// External wrenches of the user; `None` in most environments.
     wrenches: Option<Box<Wrenches>>,
 }
 
-/// What a good step does not touch.
+/// Fields that a successful step does not touch.
 #[derive(Debug, Default)]
 struct Seldom {
     warnings: WarningCounts,
     growths: u32,
-    /// What the user set, as of the last write: MuJoCo's automatic reset (2.2.2) clears it in a step that fails.
+    /// User inputs as of the last write. MuJoCo 2.2.2 clears inputs in its automatic reset after a failed step.
     inputs: Inputs,
-    /// What was captured of the last step that sensors wanted to see.
+    /// Quantities captured in the last step that sensors needed.
     solved: Solved,
-    /// Welds that hold: their poses are in the model.
+    /// Attached welds; their relative poses are in the model.
     welds: Vec<Weld>,
 }
 
 impl Env {
-    /// An environment in the model's initial state, with one forward pass done.
+    /// Creates an environment in the model's initial state and runs one forward pass.
     ///
     /// # Errors
-    /// MuJoCo cannot allocate it.
+    /// MuJoCo cannot allocate its data.
     pub fn new(model: &Model, drives: &Arc<DriveTable>) -> Result<Self, EngineError> {
         Self::with_drives(model, DriveState::new(drives, model))
     }
 
-    /// As [`new`](Self::new), with drives that share with others what no environment has changed.
+    /// As [`new`](Self::new), with drives whose unmodified arrays are shared with other environments.
     pub(crate) fn with_drives(model: &Model, drives: DriveState) -> Result<Self, EngineError> {
         let mut env = Self {
             data: Data::new(model)?,
@@ -120,16 +120,16 @@ impl Env {
         Ok(env)
     }
 
-    /// The MuJoCo data: the state after the last step, or after the last write.
+    /// MuJoCo data: the state after the last step or the last write.
     pub fn data(&self) -> &Data {
         &self.data
     }
 
-    /// Writes to the state or the inputs, then does one forward pass, so that nothing stale can be read. A state that
-    /// is not finite is not kept: the environment diverges, in the state before the write. `qfrc_applied` and the
-    /// controls of drives are not inputs here: [`DriveState`] sets them in every step.
+    /// Writes state or inputs, followed by one forward pass that updates all derived quantities. A non-finite state is
+    /// rejected: the environment diverges, in the state before the write. Every step overwrites `qfrc_applied` and the
+    /// controls of drives from [`DriveState`].
     pub fn write(&mut self, change: impl FnOnce(&mut Data)) {
-        // To be normalised once, not twice, where `change` leaves them alone.
+        // Quaternions that `change` leaves alone must be normalized once, not twice.
         self.raw_quats.restore(&mut self.data);
         let good = self.saved();
         change(&mut self.data);
@@ -137,8 +137,8 @@ impl Env {
         self.refresh(&good);
     }
 
-    /// Goes on with another model of the same sizes; the forward pass is done by [`freshen`](Self::freshen), which is to follow
-    /// before anything else is asked of the environment but to exchange the model once more.
+    /// Replaces the model by one of the same sizes. The forward pass is deferred: [`freshen`](Self::freshen) must
+    /// follow before any other use except another replacement.
     pub(crate) fn set_model(&mut self, model: Model) {
         if !self.stale {
             self.raw_quats.restore(&mut self.data);
@@ -149,7 +149,7 @@ impl Env {
         self.stale = true;
     }
 
-    /// Does the forward pass that an exchanged model waits for.
+    /// Runs the forward pass that a replaced model needs.
     pub(crate) fn freshen(&mut self) {
         if self.stale {
             self.stale = false;
@@ -158,12 +158,12 @@ impl Env {
         }
     }
 
-    /// Welds that hold.
+    /// Attached welds.
     pub(crate) fn welds(&self) -> &[Weld] {
         &self.seldom.welds
     }
 
-    /// Lets these welds hold, and no others; a forward pass follows.
+    /// Attaches these welds, releases all others, and runs a forward pass.
     pub(crate) fn set_welds(&mut self, welds: Vec<Weld>) {
         if welds == self.seldom.welds {
             return;
@@ -191,19 +191,19 @@ impl Env {
         self.seldom.welds = welds;
     }
 
-    /// Sets controls, which are no state: what was computed of the state stays right.
+    /// Sets controls. They are not part of the state, so no forward pass is needed.
     pub(crate) fn set_controls(&mut self, change: impl FnOnce(&mut [f64])) {
         change(self.data.ctrl_mut());
         self.seldom.inputs.save(&self.data);
     }
 
-    /// What a user applies to bodies.
+    /// External wrenches and weightless bodies.
     pub(crate) fn wrenches(&self) -> &Wrenches {
         static NONE: Wrenches = Wrenches { list: Vec::new(), weightless: Vec::new() };
         self.wrenches.as_deref().unwrap_or(&NONE)
     }
 
-    /// Changes what a user applies to bodies; it is no state: what was computed of the state stays right.
+    /// Changes external wrenches. They are not part of the state, so no forward pass is needed.
     pub(crate) fn set_wrenches(&mut self, change: impl FnOnce(&mut Wrenches)) {
         let wrenches = self.wrenches.get_or_insert_default();
         wrenches.clear(&mut self.data);
@@ -215,7 +215,7 @@ impl Env {
         self.seldom.inputs.save(&self.data);
     }
 
-    /// Makes drives and wrenches act on the next `mj_step2`.
+    /// Writes the efforts of drives and the wrenches to `data`, for the next `mj_step2`.
     fn apply_inputs(&mut self) {
         self.drives.apply(&mut self.data);
         if let Some(wrenches) = &self.wrenches {
@@ -223,12 +223,12 @@ impl Env {
         }
     }
 
-    /// Says that a [`reset`](Self::reset) follows: the forward pass that an exchanged model waits for is not needed.
+    /// Announces a [`reset`](Self::reset), which makes a deferred forward pass unnecessary.
     pub(crate) fn expect_reset(&mut self) {
         self.stale = false;
     }
 
-    /// Back to the model's initial state; `change` then sets the state to start from. Revives a diverged environment.
+    /// Resets to the model's initial state, modified by `change`. A diverged environment runs again.
     pub fn reset(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) {
         self.stale = false;
         self.data.reset();
@@ -247,33 +247,33 @@ impl Env {
         self.refresh(&initial);
     }
 
-    /// Ends external wrenches, and lets actuator models forget their past (delays, motor states); the state stays.
+    /// Ends external wrenches and clears the memory of actuator models (delays, motor states). The state stays.
     pub(crate) fn reset_buffers(&mut self) {
         self.set_wrenches(|wrenches| wrenches.list.clear());
         self.drives.start();
     }
 
-    /// The state that is in `data`.
+    /// Copy of the current state in `data`.
     fn saved(&self) -> Motion {
         let mut motion = Motion::default();
         motion.save(&self.data);
         motion
     }
 
-    /// The present state as it was before its forward pass, to go back to.
+    /// Saves the current state with its quaternions as they were before the forward pass.
     fn save_present(&self, state: &mut Motion) {
         state.save(&self.data);
         state.undo_normalization(&self.raw_quats);
     }
 
-    /// Goes to a state; its forward pass is left to do.
+    /// Restores a state and the user inputs; the caller must run the forward pass.
     fn go_to(&mut self, state: &Motion) {
         self.seldom.inputs.restore(&mut self.data);
         state.restore(&mut self.data);
         self.raw_quats.save(&self.data);
     }
 
-    /// Takes over what happened to `other`, whose state this one was given: steps, warnings, divergence.
+    /// Adds steps, warnings and divergence of `other`, whose state was copied to this environment.
     pub(crate) fn take_history(&mut self, other: &History) {
         self.steps = other.steps;
         self.seldom.warnings.add(&other.warnings);
@@ -283,7 +283,7 @@ impl Env {
         }
     }
 
-    /// What happened since the environment was made.
+    /// Counters and divergence since the environment was created.
     pub(crate) fn history(&self) -> History {
         History {
             diverged: self.diverged.clone(),
@@ -293,7 +293,7 @@ impl Env {
         }
     }
 
-    /// Everything that decides how the environment goes on.
+    /// Saves everything that determines future steps.
     pub(crate) fn remember(&self) -> EnvState {
         let (mut motion, mut inputs) = (Motion::default(), Inputs::default());
         self.save_present(&mut motion);
@@ -303,11 +303,10 @@ impl Env {
         EnvState { motion, inputs, drives, wrenches, welds, steps: self.steps, diverged }
     }
 
-    /// Goes on from `state`, which is of an environment of a model with the same layout, and which
-    /// [fits](EnvState::fits).
+    /// Restores `state`, which comes from a model of the same layout and [fits](EnvState::fits).
     pub(crate) fn recall(&mut self, state: &EnvState) {
         self.drives.set_numbers(&state.drives);
-        // A file that was made by hand may name any body.
+        // A hand-made file may name a body that does not exist.
         let bodies = self.data.model().nbody();
         let wrenches = state.wrenches.moved(|body| (body < bodies).then_some(body));
         self.wrenches = (wrenches != Wrenches::default()).then(|| Box::new(wrenches));
@@ -322,7 +321,7 @@ impl Env {
         self.refresh(&state.motion);
     }
 
-    /// Positions, velocities and warm start, to carry over to another model.
+    /// Positions, velocities and warm start, for a transfer to another model.
     pub(crate) fn saved_arrays(&self) -> SavedArrays {
         let mut state = Motion::default();
         self.save_present(&mut state);
@@ -333,27 +332,27 @@ impl Env {
         }
     }
 
-    /// Running or diverged.
+    /// Status of the environment.
     pub fn status(&self) -> &EnvStatus {
         self.diverged.as_deref().unwrap_or(&EnvStatus::Running)
     }
 
-    /// Steps done since the last reset.
+    /// Number of steps since the last reset.
     pub fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// MuJoCo's warnings since the environment was made; an overflow that was redone is not among them.
+    /// Counts of MuJoCo's warnings since the environment was created, without overflows that a repeated step resolved.
     pub fn warnings(&self) -> &WarningCounts {
         &self.seldom.warnings
     }
 
-    /// How often the buffers were doubled.
+    /// Number of times the buffers were doubled.
     pub fn growths(&self) -> u32 {
         self.seldom.growths
     }
 
-    /// Asks for memory that its next step needs, and waits for nothing; `arrays`: the large part as well.
+    /// Prefetches memory for the next step without waiting; `arrays` includes the large arrays.
     pub(crate) fn prefetch(&self, arrays: bool) {
         if arrays {
             self.data.prefetch_arrays()
@@ -363,12 +362,12 @@ impl Env {
         self.drives.prefetch();
     }
 
-    /// Does `count` steps; a diverged environment stands still.
+    /// Does `count` steps. A diverged environment does none.
     pub fn step(&mut self, count: u32) {
         self.step_and_capture(count, None);
     }
 
-    /// As [`step`](Self::step); of the last step, `capture` is kept.
+    /// As [`step`](Self::step), and captures the quantities of `capture` in the last step.
     pub(crate) fn step_and_capture(&mut self, count: u32, capture: Option<&Capture>) {
         for left in (0..count).rev() {
             if self.diverged.is_some() {
@@ -380,7 +379,7 @@ impl Env {
 
     fn step_once(&mut self, mut capture: Option<&Capture>) {
         if let Some(wanted) = capture.take_if(|_| self.data.model().integrator() == mj::mjINT_RK4) {
-            // RK4 leaves what it solved for a state in the middle of the step.
+            // RK4 ends with the solution of an intermediate state, so the state before the step is captured.
             self.capture_present(wanted);
         }
         let mut scratch = SCRATCH.take();
@@ -417,7 +416,7 @@ impl Env {
         }
     }
 
-    /// One step from `before`, with the efforts the drives gave in it.
+    /// Does one step from `before` and reads the efforts that the drives applied.
     fn attempt(
         &mut self,
         before: &Motion,
@@ -426,12 +425,12 @@ impl Env {
     ) -> Result<(), EngineError> {
         self.apply_inputs();
         if self.data.model().integrator() == mj::mjINT_RK4 {
-            // mj_step2 would integrate with Euler, whatever the model says.
+            // mj_step2 integrates with Euler even if the model says RK4.
             self.data.step()?;
         } else {
             self.data.step2()?;
         }
-        // Before mj_step1 lays out the constraints of the new state: 4.x puts them elsewhere in its arena.
+        // Must precede mj_step1, which lays out the constraints of the new state: 4.x moves them within its arena.
         self.drives.read_efforts(&self.data, efforts);
         if let Some(capture) = capture {
             self.capture(before, capture)?;
@@ -440,14 +439,14 @@ impl Env {
         self.data.step1()
     }
 
-    /// After `mj_step2` of a step from `before`.
+    /// Captures quantities after `mj_step2` of a step from `before`.
     fn capture(&mut self, before: &Motion, capture: &Capture) -> Result<(), EngineError> {
         let qvel = before.qvel(self.data.model());
         capture.take(&mut self.data, qvel, &mut self.seldom.solved)
     }
 
-    /// Captures what MuJoCo solves for the present state, with the drives as they are. The state stays as it is, to the
-    /// last bit. A diverged environment, and one whose next step will fail, has nothing to capture.
+    /// Captures the solution of the current state with the current drives; the state stays the same, bit for bit. The
+    /// capture is empty for a diverged environment and for one whose next step will fail.
     pub(crate) fn capture_present(&mut self, capture: &Capture) {
         self.seldom.solved.clear();
         self.solved_now = true;
@@ -456,8 +455,8 @@ impl Env {
         }
     }
 
-    /// The contacts of the present state with the forces that MuJoCo solves for it; none where it cannot be solved. Nothing
-    /// that was captured changes, and nothing that decides a later step.
+    /// Writes the contacts of the current state with their solved forces to `contacts`; empty if the solve fails.
+    /// Earlier captures and later steps are not affected.
     pub(crate) fn present_contacts(&mut self, capture: &Capture, contacts: &mut Vec<Contact>) {
         let mut solved = Solved::default();
         let take = |env: &mut Self, before: &Motion| {
@@ -469,7 +468,8 @@ impl Env {
         contacts.extend(solved.contacts.iter().filter(|_| done));
     }
 
-    /// Solves the present state, lets `take` look at what was solved, and goes back. Says whether it could be solved.
+    /// Solves the current state, passes the solution to `take`, and restores the state. Returns true if the solve
+    /// succeeded.
     fn solve_aside(&mut self, mut take: impl FnMut(&mut Self, &Motion) -> Result<(), EngineError>) -> bool {
         if self.diverged.is_some() {
             return false;
@@ -490,24 +490,24 @@ impl Env {
             }
         };
         self.go_to(before);
-        // This state had a forward pass before, with this data or a smaller one.
+        // Cannot fail: this state had a forward pass before, with these or smaller buffers.
         let _ = self.data.step1();
         self.data.take_warnings();
         SCRATCH.set(scratch);
         good
     }
 
-    /// What was last captured.
+    /// Quantities of the last capture.
     pub(crate) fn solved(&self) -> &Solved {
         &self.seldom.solved
     }
 
-    /// Time for which forces and accelerations were last solved \[s\].
+    /// Time of the state for which forces and accelerations were last solved \[s\].
     pub(crate) fn solved_time(&self) -> f64 {
         if self.solved_now { self.data.time() } else { self.data.time() - self.data.model().timestep() }
     }
 
-    /// One forward pass over positions and velocities, growing the buffers as needed; back to `good` if it fails.
+    /// Runs one forward pass over positions and velocities, growing the buffers as needed. On failure, restores `good`.
     fn refresh(&mut self, good: &Motion) {
         let state = self.saved();
         self.raw_quats.save(&self.data);
@@ -533,7 +533,7 @@ impl Env {
         }
     }
 
-    /// Goes back to the state before the step, with larger buffers and a forward pass done.
+    /// Restores the state before the step, with larger buffers and a forward pass done.
     fn grow(&mut self, mut what: Overflow, before: &Motion) -> Result<(), Divergence> {
         loop {
             self.enlarge(what, before)?;
@@ -547,7 +547,7 @@ impl Env {
         }
     }
 
-    /// Replaces the data by one with twice as much of `what`, in `state`.
+    /// Replaces the data by data with twice the buffer size of `what`, in `state`.
     fn enlarge(&mut self, what: Overflow, state: &Motion) -> Result<(), Divergence> {
         let buffers = self.data.model().buffers().enlarged(what);
         if self.data.bytes() > LARGEST_ENVIRONMENT {
@@ -560,24 +560,24 @@ impl Env {
         Ok(())
     }
 
-    /// Stands still in `good`, the last good state, from now on.
+    /// Marks the environment as diverged and restores `good`, the last valid state.
     fn quarantine(&mut self, reason: Divergence, good: &Motion) {
         self.diverged = Some(Box::new(EnvStatus::Diverged { step: self.steps, reason }));
         self.seldom.solved.clear();
         self.data.reset();
         self.go_to(good);
-        // The last good state had a forward pass before, with this data or a smaller one.
+        // Cannot fail: the last valid state had a forward pass before, with these or smaller buffers.
         let _ = self.data.step1();
         self.data.take_warnings();
     }
 }
 
-/// What decides how an environment goes on. Quaternions are as they were before the last forward pass.
+/// State that determines future steps. Quaternions are those before the last forward pass.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct EnvState {
     pub motion: Motion,
     pub inputs: Inputs,
-    /// As [`DriveState::numbers`] gives them.
+    /// Flat array of [`DriveState::numbers`].
     pub drives: Vec<f64>,
     pub wrenches: Wrenches,
     pub welds: Vec<Weld>,
@@ -586,7 +586,7 @@ pub(crate) struct EnvState {
 }
 
 impl EnvState {
-    /// Whether it has as many numbers of each kind as `other`.
+    /// True if all arrays have the same lengths as those of `other`.
     pub(crate) fn fits(&self, other: &Self) -> bool {
         let lengths = |state: &Self| {
             let (inputs, active) = state.inputs.values();
@@ -596,7 +596,7 @@ impl EnvState {
     }
 }
 
-/// Copies of the arrays that carry a state from one model to another.
+/// Copies of the arrays that carry a state to another model.
 #[derive(Clone, Debug)]
 pub(crate) struct SavedArrays {
     pub qpos: Vec<f64>,
@@ -604,7 +604,7 @@ pub(crate) struct SavedArrays {
     pub warmstart: Vec<f64>,
 }
 
-/// What happened to an environment.
+/// Counters and divergence of an environment.
 #[derive(Clone, Debug)]
 pub(crate) struct History {
     diverged: Option<Box<EnvStatus>>,
@@ -613,17 +613,17 @@ pub(crate) struct History {
     growths: u32,
 }
 
-/// What a step keeps for itself.
+/// Scratch memory of a step.
 #[derive(Default)]
 struct Scratch {
     /// The state before the step.
     before: Motion,
-    /// Efforts of the drives in the step, kept only where it is good.
+    /// Efforts of the drives in the step; kept only if the step succeeds.
     efforts: Vec<f64>,
 }
 
 thread_local! {
-    /// One per thread, not per environment: a thousand of them would not stay in the cache.
+    /// One per thread, not per environment: a thousand copies would not stay in the cache.
     static SCRATCH: Cell<Scratch> = const { Cell::new(Scratch { before: Motion::EMPTY, efforts: Vec::new() }) };
 }
 
@@ -645,7 +645,7 @@ fn judge(done: Result<(), EngineError>, raised: &WarningCounts) -> Verdict {
     }
 }
 
-/// The model with buffers for [`Env`] to start with: small, they grow on demand.
+/// Returns the model with small initial buffers for [`Env`], which grow on demand.
 pub fn with_small_buffers(model: &mj::Model) -> mj::Model {
     model.with_buffers(model.small_buffers())
 }
@@ -654,7 +654,7 @@ pub fn with_small_buffers(model: &mj::Model) -> mj::Model {
 mod tests {
     use super::*;
 
-    /// Free and ball joints above the ground, so that contacts come one after the other.
+    /// Free and ball joints at increasing heights above the ground, so that contacts appear one after another.
     fn falling() -> Model {
         let mut bodies = String::new();
         for i in 0..9 {
@@ -671,7 +671,7 @@ mod tests {
         mj::compile(&xml, &[]).expect("compiles").into_model()
     }
 
-    /// An environment whose quaternions are far from unit length.
+    /// An environment with quaternions far from unit length.
     fn tumbling(model: &Model, buffers: Buffers) -> Env {
         let mut env = Env::new(&model.with_buffers(buffers), &Arc::default()).expect("small");
         env.reset(|data, _| {
@@ -705,7 +705,7 @@ mod tests {
             tiny.step(1);
             huge.step(1);
             if step % 40 == 20 {
-                // A write leaves alone what it does not mean, too.
+                // A write must keep everything it does not set.
                 tiny.write(|data| data.xfrc_applied_mut()[6] = 0.1);
                 huge.write(|data| data.xfrc_applied_mut()[6] = 0.1);
             }
@@ -728,7 +728,7 @@ mod tests {
             assert!(matches!(other.status(), EnvStatus::Diverged { step, .. } if *step == u64::from(steps)));
             assert_eq!(bits(&other), bits(&env));
             assert_eq!(other.data().xfrc_applied()[6], 1e300, "inputs are those of the write");
-            // A state that is refused is undone as well.
+            // A rejected write is undone as well.
             env.write(|data| data.qpos_mut()[0] = f64::NAN);
             assert_eq!(bits(&other), bits(&env));
             env = tumbling(&falling(), HUGE);

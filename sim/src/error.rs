@@ -1,4 +1,4 @@
-//! The error of the public API: what the user did, where, and what would be right.
+//! Error type of the public API: the failing input, its position, and the fix.
 
 use crate::batch_error::BatchError;
 use crate::drive::plan::PlanError;
@@ -24,20 +24,20 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An observer is not there.
+    /// The observer was removed, or is handling an event right now.
     #[error("this observer was taken away, or is being told of something right now")]
     NoObserver,
-    /// A URDF file or an assembly of them is wrong.
+    /// A URDF file, or the assembly of several, is invalid.
     #[error(transparent)]
     Urdf(#[from] UrdfError),
-    /// A mesh that collides cannot be used.
+    /// A collision mesh cannot be used.
     #[error("{at}: link {link:?}: {error}")]
     CollisionMesh {
-        /// Where the mesh is named.
+        /// File and line that name the mesh.
         at: Source,
         /// The link.
         link: String,
-        /// What is wrong with the file.
+        /// Error of the mesh file.
         #[source]
         error: Box<kinetoscope_scene::mesh::MeshError>,
     },
@@ -46,45 +46,45 @@ pub enum Error {
     ObjectMesh {
         /// The object.
         object: String,
-        /// What is wrong with the file.
+        /// Error of the mesh file.
         #[source]
         error: Box<kinetoscope_scene::mesh::MeshError>,
     },
-    /// A drive property or a start position is wrong.
+    /// A drive property or a start position is invalid.
     #[error("{robot}: {error}")]
     Plan {
         /// The robot or articulation.
         robot: Named,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<PlanError>,
     },
-    /// A control part's patterns are wrong.
+    /// The joint patterns of a control part are invalid.
     #[error("{robot}, control part {part:?}: {error}")]
     ControlPart {
         /// The robot or articulation.
         robot: Named,
-        /// The part.
+        /// Name of the control part.
         part: String,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<PatternError>,
     },
-    /// The patterns of a payload are wrong.
+    /// The patterns of a payload are invalid.
     #[error("{robot}, payload: {error}")]
     Payload {
         /// The robot or articulation.
         robot: Named,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<PatternError>,
     },
-    /// The patterns of surfaces are wrong.
+    /// The patterns of surfaces are invalid.
     #[error("{of}, surfaces: {error}")]
     Surfaces {
-        /// The robot, the articulation or the MJCF file.
+        /// The robot, articulation or attached MJCF file.
         of: Named,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<PatternError>,
     },
@@ -93,11 +93,11 @@ pub enum Error {
     Kinematics {
         /// The robot or articulation.
         robot: Named,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<KinematicsError>,
     },
-    /// Heights of a terrain cannot be made.
+    /// Heights of a terrain cannot be generated.
     #[error(transparent)]
     Terrain(#[from] kinetoscope_scene::terrain::TerrainError),
     /// Two control parts have the same name.
@@ -105,77 +105,77 @@ pub enum Error {
     ControlPartRepeated {
         /// The robot or articulation.
         robot: Named,
-        /// The part.
+        /// Name of the control part.
         part: String,
     },
     /// The robot cannot be written as MJCF.
     #[error(transparent)]
     Emit(#[from] EmitError),
-    /// MuJoCo refuses the model.
+    /// MuJoCo rejects the model.
     #[error(transparent)]
     Compile(#[from] CompileError),
-    /// MuJoCo refuses an MJCF file; its words name element and line.
+    /// MuJoCo rejects an attached MJCF file; its message names element and line.
     #[error("{}", in_file(&format_args!("part {part:?}"), .file, .error))]
     MjcfFile {
-        /// The part.
+        /// Uid of the attached MJCF file.
         part: String,
         /// The file.
         file: String,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<CompileError>,
     },
-    /// An MJCF file is no robot.
+    /// An MJCF file cannot be loaded as a robot.
     #[error("{}", in_file(.robot, .file, .error))]
     RobotFile {
         /// The robot or articulation.
         robot: Named,
         /// The file.
         file: String,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<RobotFileError>,
     },
-    /// Something of an MJCF file cannot be in a scene.
+    /// An MJCF file has an element that cannot be attached to a scene.
     #[error("part {part:?}: {file}: {error}")]
     MjcfPart {
-        /// The part.
+        /// Uid of the attached MJCF file.
         part: String,
         /// The file.
         file: String,
-        /// What it is.
+        /// Cause.
         #[source]
         error: Box<PartError>,
     },
-    /// Patterns of names of a part match nothing, or are none.
+    /// Name patterns for an attached MJCF file are invalid or match nothing.
     #[error("part {part:?}: {error}")]
     MjcfNames {
-        /// The part.
+        /// Uid of the attached MJCF file.
         part: String,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<PatternError>,
     },
-    /// The MuJoCo library is not of the version of the headers.
+    /// The version of the MuJoCo library differs from that of the headers.
     #[error(transparent)]
     MujocoVersion(#[from] VersionError),
-    /// Environments cannot be made.
+    /// The batch of environments cannot be created.
     #[error(transparent)]
     Batch(#[from] BatchError),
-    /// MuJoCo's engine stopped.
+    /// MuJoCo's engine reported an error.
     #[error(transparent)]
     Engine(#[from] EngineError),
     /// A number of the configuration is out of range.
     #[error("{field} is {value}; {expected}")]
     Config {
-        /// The field.
+        /// Name of the field.
         field: &'static str,
         /// The value given.
         value: String,
-        /// What would be right.
+        /// Valid values.
         expected: &'static str,
     },
-    /// The combination of integrator and drives does not work.
+    /// Implicit drives do not support the integrator.
     #[error(
         "{robot}: implicit drives need the integrator Euler{also}, not {integrator}; change the integrator or \
          use DriveModel::Actuator"
@@ -183,100 +183,100 @@ pub enum Error {
     Integrator {
         /// The robot or articulation.
         robot: Named,
-        /// MuJoCo's word for the integrator.
+        /// MuJoCo's name of the integrator.
         integrator: &'static str,
-        /// Further integrators that this MuJoCo offers.
+        /// Further integrators that this MuJoCo version supports.
         also: &'static str,
     },
-    /// This MuJoCo does not know the integrator.
+    /// This MuJoCo version lacks the integrator.
     #[error("MuJoCo {version} has no integrator {integrator}; it has Euler, RK4 and implicit")]
     IntegratorUnknown {
-        /// MuJoCo's word.
+        /// MuJoCo's name of the integrator.
         integrator: &'static str,
-        /// MuJoCo's version.
+        /// Version of MuJoCo.
         version: String,
     },
-    /// A name is used already.
+    /// A uid is already in use.
     #[error(
         "the uid {0:?} is taken; give each robot, object, terrain and sensor a uid of its own (for objects and terrains, \"world\" and \"ground\" are taken)"
     )]
     DuplicateUid(String),
-    /// A name that cannot be written to MJCF, or be a part of the names of files.
+    /// A uid is unusable as a part of MJCF or file names.
     #[error(
         "the uid {0:?} is not usable: it must have 1 to 64 characters, no slash, backslash or control character, and not be a dot or two"
     )]
     InvalidUid(String),
-    /// The environments together are too much to draw.
+    /// The overview of all environments cannot be rendered.
     #[error("the overview cannot be drawn: {0}; choose fewer environments")]
     Overview(String),
-    /// The object or the base of the robot stands fixed.
+    /// The object or the base of the robot is fixed and cannot be moved.
     #[error(
         "{0:?} is fixed where its init_pose says; make an object BodyType::Dynamic (or Kinematic, to move it by hand), give \
          a robot fix_base: false, to move it"
     )]
     FixedBody(String),
-    /// What a body must move for by itself.
+    /// The operation needs a dynamic object, and this object is kinematic or static.
     #[error(
         "{argument}: {object:?} is not BodyType::Dynamic: it has no velocity, mass or force of its own; write the pose of one \
          that is Kinematic"
     )]
     NotDynamic {
-        /// The method.
+        /// Name of the method or argument.
         argument: &'static str,
         /// The object.
         object: String,
     },
-    /// More robots than contact bits.
+    /// The scene has more robots than contact bits.
     #[error(
         "{0} robots and articulations are the most that can tell their own contacts from others' (MuJoCo has 31 contact bits)"
     )]
     TooManyRobots(usize),
-    /// No such name.
+    /// A name does not exist.
     #[error("there is no {what} {name:?}; {}", candidates_sentence(.candidates))]
     UnknownName {
-        /// What kind of thing was looked for.
+        /// Type of the item that was looked up.
         what: &'static str,
         /// The name given.
         name: String,
         /// Names that exist, nearest first.
         candidates: Vec<String>,
     },
-    /// An entity of a scene is something else.
+    /// An entity of a scene has another type than requested.
     #[error("{name:?} is a {found}, not a {wanted}")]
     EntityType {
         /// The entity.
         name: String,
-        /// What it is.
+        /// Its type.
         found: String,
-        /// What it was taken for.
+        /// The requested type.
         wanted: String,
     },
     /// An entity of a scene file cannot be built.
     #[error("{at}: entity {name:?}: {error}")]
     Entity {
-        /// Where it is declared.
+        /// File and line of the declaration.
         at: Source,
         /// The entity.
         name: String,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<Error>,
     },
-    /// A pair that a scene file keeps apart is none.
+    /// A collision exclusion of a scene file is invalid.
     #[error("{at}: pair that never collides: {error}")]
     Exclusion {
-        /// Where it is declared.
+        /// File and line of the declaration.
         at: Source,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<Error>,
     },
-    /// A scene file is wrong.
+    /// A scene file is invalid.
     #[error("{at}: {reason}")]
     SceneFile {
-        /// Where.
+        /// File and line.
         at: Source,
-        /// What is wrong, and what would be right.
+        /// The problem and the fix.
         reason: String,
     },
     /// A scene cannot be written as a file.
@@ -284,113 +284,113 @@ pub enum Error {
     SceneFileWrite {
         /// The part of the scene.
         what: String,
-        /// Why.
+        /// Reason.
         reason: String,
     },
-    /// No such index.
+    /// An index does not exist.
     #[error("{what} {index} does not exist; there are {count} (0 to {})", count.saturating_sub(1))]
     UnknownIndex {
-        /// What kind of index.
+        /// Type of the indexed item.
         what: &'static str,
         /// The index given.
         index: usize,
-        /// How many there are.
+        /// Number of items.
         count: usize,
     },
-    /// Two columns of an array are of one thing.
+    /// Two columns of an array refer to the same item.
     #[error("{argument} has two columns for {of} (columns {first} and {second}); give it one")]
     RepeatedColumn {
-        /// The argument.
+        /// Name of the argument.
         argument: &'static str,
-        /// Whose columns they are: `actuator "a"`.
+        /// The item: `actuator "a"`.
         of: String,
-        /// The first column of it.
+        /// First column of the item.
         first: usize,
-        /// The second one.
+        /// Second column of the item.
         second: usize,
     },
-    /// A list names one thing twice.
+    /// A list contains an item twice.
     #[error("{argument} names {of} twice (places {first} and {second} of its list); name it once")]
     Repeated {
-        /// The argument.
+        /// Name of the argument.
         argument: &'static str,
-        /// What is named twice: `joint "a"`, `environment 3`.
+        /// The item: `joint "a"`, `environment 3`.
         of: String,
-        /// Its first place in the list.
+        /// First position in the list.
         first: usize,
-        /// The second one.
+        /// Second position in the list.
         second: usize,
     },
     /// An array has the wrong shape.
     #[error("{argument} has shape {found:?}; expected {expected:?} ({meaning}), or one row for all environments")]
     Shape {
-        /// The argument.
+        /// Name of the argument.
         argument: &'static str,
         /// Shape given.
         found: Vec<usize>,
-        /// Shape that would be right.
+        /// Expected shape.
         expected: Vec<usize>,
-        /// What the axes are.
+        /// Meaning of the axes.
         meaning: &'static str,
     },
     /// A value is NaN or infinite.
     #[error("{argument}[{row}, {column}] ({of}) is {value}; it must be finite")]
     NotFinite {
-        /// The argument.
+        /// Name of the argument.
         argument: &'static str,
         /// Row of the array.
         row: usize,
         /// Column of the array.
         column: usize,
-        /// Whose value it is: `joint "a"`, `object "cube"`.
+        /// The item that the value belongs to: `joint "a"`, `object "cube"`.
         of: String,
         /// The value.
         value: f64,
     },
-    /// A value is not one of those that are allowed.
+    /// A value is outside the allowed set.
     #[error("{argument}[{row}, {column}] ({of}) is {value}; it must be {expected}")]
     OutOfRange {
-        /// The argument.
+        /// Name of the argument.
         argument: &'static str,
         /// Row of the array.
         row: usize,
         /// Column of the array.
         column: usize,
-        /// Whose value it is: `joint "a"`.
+        /// The item that the value belongs to: `joint "a"`.
         of: String,
         /// The value.
         value: f64,
-        /// What would be right.
+        /// Allowed values.
         expected: String,
     },
-    /// A joint has no drive to change.
+    /// The joint has no drive in the model.
     #[error(
         "{argument}: joint {joint:?} of {robot} has no drive in the model, since it was added with the drive type none, or \
          its file says that nothing drives the joint; add it with another one, and call set_drive_type where joints shall be \
          passive"
     )]
     NotDriven {
-        /// The method.
+        /// Name of the method.
         argument: &'static str,
         /// The robot or articulation.
         robot: Named,
         /// The joint.
         joint: String,
     },
-    /// The gains of a drive are in MuJoCo's model.
+    /// The gains of the drive are part of MuJoCo's model and cannot be changed.
     #[error(
         "{argument}: joint {joint:?} of {robot} is driven by DriveModel::Actuator, whose gains and limits are in the \
          model that all environments share; use DriveModel::Implicit or an explicit actuator model to change them"
     )]
     GainsInModel {
-        /// The method.
+        /// Name of the method.
         argument: &'static str,
         /// The robot or articulation.
         robot: Named,
         /// The joint.
         joint: String,
     },
-    /// A joint's drive delays nothing.
+    /// The actuator model of the joint has no delay.
     #[error(
         "set_delay: joint {joint:?} of {robot} is not driven by the actuator model delayed_pd; name it for this joint \
          in drive.actuators"
@@ -401,25 +401,25 @@ pub enum Error {
         /// The joint.
         joint: String,
     },
-    /// Patterns of names of a robot match nothing, or are none.
+    /// Name patterns for a robot are invalid or match nothing.
     #[error("{robot}: {error}")]
     RobotNames {
         /// The robot or articulation.
         robot: Named,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<PatternError>,
     },
-    /// A sensor's configuration is wrong.
+    /// The configuration of a sensor is invalid.
     #[error("sensor {sensor:?}: {error}")]
     Sensor {
         /// The sensor.
         sensor: String,
-        /// What is wrong.
+        /// Cause.
         #[source]
         error: Box<kinetoscope_sensors::SensorError>,
     },
-    /// Labels of a segmentation name what is not there, or one thing twice.
+    /// Segmentation labels name an unknown item, or one item twice.
     #[error("labels: {0}")]
     Labels(#[source] Box<kinetoscope_sensors::SensorError>),
     /// A sensor needs a quantity that is not gathered.
@@ -427,24 +427,24 @@ pub enum Error {
     SensorRequires {
         /// The sensor.
         sensor: String,
-        /// What it needs.
+        /// The missing quantities.
         missing: String,
     },
-    /// A sensor failed in an earlier step and was not updated since.
+    /// A sensor failed in an earlier step and stopped.
     #[error("sensor {sensor:?} stopped: {fault}")]
     SensorFault {
         /// The sensor.
         sensor: String,
-        /// Why.
+        /// Reason.
         fault: String,
     },
-    /// The launcher's variables say no part of several processes.
+    /// The launcher's variables for several processes are invalid.
     #[error(transparent)]
     Shard(#[from] ShardError),
-    /// A property of an environment cannot be drawn or set.
+    /// A property of an environment cannot be randomized or set.
     #[error(transparent)]
     Randomization(#[from] RandomizationError),
-    /// A snapshot cannot be read, or is of something else.
+    /// A snapshot cannot be read, or belongs to another scene.
     #[error(transparent)]
     Snapshot(#[from] SnapshotError),
     /// A file cannot be read or written.
@@ -452,7 +452,7 @@ pub enum Error {
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         #[source]
         error: std::io::Error,
     },
@@ -461,7 +461,7 @@ pub enum Error {
     Image {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Cause.
         reason: String,
     },
 }
@@ -475,7 +475,8 @@ impl From<LoadError> for Error {
     }
 }
 
-/// An error of a file: the place comes first where it has one, as in all messages that have a place.
+/// Formats an error of an MJCF file. A position (`file:line`) in the message moves to the front, as in all other
+/// messages.
 fn in_file(of: &dyn std::fmt::Display, file: &str, error: &dyn std::fmt::Display) -> String {
     let said = error.to_string();
     let place = said.split_once(": ").filter(|(place, _)| {

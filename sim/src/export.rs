@@ -1,4 +1,4 @@
-//! Every stage of the pipeline as files: URDF, description, MJCF for both MuJoCo lines with real meshes.
+//! Export of every stage of the pipeline: URDF, description, MJCF with meshes for both supported MuJoCo versions.
 
 use crate::compile::document;
 use crate::contents::Contents;
@@ -23,7 +23,7 @@ use std::io::BufWriter;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Writes everything to `dir`, which is made where it is missing.
+/// Writes all files to `dir`, which is created if missing.
 pub(crate) fn dump(
     cfg: &SimulationManagerCfg,
     contents: &Contents,
@@ -35,7 +35,7 @@ pub(crate) fn dump(
     let meshes = dir.join("meshes");
     std::fs::create_dir_all(&meshes).map_err(at(&meshes))?;
     for robot in robots {
-        // One robot is `robot.*`, several go by their names.
+        // A single robot is exported as `robot.*`, several robots under their uids.
         let stem = if robots.len() == 1 { "robot" } else { robot.uid() };
         write_file(&dir.join(format!("{stem}.urdf")), &write_urdf(robot.description()))?;
         write_file(&dir.join(format!("{stem}.description.txt")), &format!("{:#?}\n", robot.description()))?;
@@ -58,7 +58,7 @@ pub(crate) fn dump(
         let purpose = Purpose::Export(&assets);
         let (mut mjcf, _, _) = document(cfg, contents, &simulation.excluded, &purpose, empty.clone())?;
         let heavier = prepare_for_plain_mujoco(&mut mjcf, robots, target, simulation);
-        // The same in both files.
+        // Both files have the same entry, so it is reported once.
         left_out.extend(heavier.filter(|_| target == Target::V2));
         let reduced = reduced(&mjcf, target, file);
         mjcf.comments.extend(reduced.iter().map(|diagnostic| diagnostic.message.clone()));
@@ -70,7 +70,7 @@ pub(crate) fn dump(
     Ok(left_out)
 }
 
-/// What of robots and parts that are MJCF files is not in a file for a line of MuJoCo that does not know it.
+/// Elements of MJCF files that are left out of `file` because the MuJoCo version lacks them.
 fn reduced(mjcf: &Mjcf, target: Target, file: &str) -> Vec<Diagnostic> {
     let version = if target == Target::V2 { "2.2.2" } else { "4.x" };
     let of_part = |part: &Arc<MjcfPart>| {
@@ -93,12 +93,13 @@ fn write_file(path: &Path, text: &str) -> Result<()> {
     std::fs::write(path, text).map_err(at(path))
 }
 
-/// The time step of an export whose drives have armatures of their own \[s\]: MuJoCo's default.
+/// Time step of an export whose drives have additional armature \[s\]: MuJoCo's default.
 const ARMATURE_STEP: f64 = 0.002;
 
-/// Gives the drives of robots with followers an armature of `step` times their damping, where plain MuJoCo needs it: explicit
-/// drives are then as stable as those with implicit damping, `(M + h kd) a = -kp (q - q*) - kd v`, and couplings are solved with
-/// the same inertia. Returns the plans with these armatures, and the uids of the robots that have them.
+/// Adds `step` times its damping to the armature of each drive of robots with mimic joints, if plain MuJoCo is unstable
+/// otherwise. Explicit drives are then as stable as drives with implicit damping, `(M + h kd) a = -kp (q - q*) - kd v`,
+/// and couplings are solved with the same inertia. Returns the plans with these armatures, and the uids of the changed
+/// robots.
 fn add_armatures(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], step: f64) -> (Vec<Vec<JointPlan>>, Vec<String>) {
     let mut heavier = Vec::new();
     let mut of_robot = |robot: &Arc<RobotData>| {
@@ -111,7 +112,7 @@ fn add_armatures(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], step: f64) -> (Vec<
             let Some(actuator) = plan.actuator else { continue };
             let name = format!("{}/{}", robot.uid(), robot.description().joint(plan.joint).name);
             let joints = mjcf.bodies.iter_mut().flat_map(|body| &mut body.joints);
-            // Joints of MJCF files are written as they are.
+            // Joints of MJCF files are written unchanged.
             let Some(joint) = joints.into_iter().find(|joint| joint.name == name) else { continue };
             joint.armature += step * actuator.kd;
             plan.armature += step * actuator.kd;
@@ -125,7 +126,8 @@ fn add_armatures(mjcf: &mut Mjcf, robots: &[Arc<RobotData>], step: f64) -> (Vec<
     (plans, heavier)
 }
 
-/// Adapts an export to viewers without our drives. Returns what was given up for it.
+/// Adapts an export to plain MuJoCo, which lacks the drives of this crate. Returns a diagnostic if drives got
+/// additional armature.
 fn prepare_for_plain_mujoco(
     mjcf: &mut Mjcf,
     robots: &[Arc<RobotData>],
@@ -148,10 +150,10 @@ fn prepare_for_plain_mujoco(
     };
     mjcf.option.integrator = integrator;
     mjcf.comments.push("Written by Kinetoscope. Drives are plain MuJoCo actuators here.".into());
-    // Why each bound holds, and how it was measured: docs/decisions/0004.
+    // Reason and measurement of each bound: docs/decisions/0004.
     let (largest, why) = if followers && explicit.is_finite() {
-        // MuJoCo solves couplings before its implicit damping slows the drivers: followers run away from them. Its
-        // explicit integrator does not have that.
+        // MuJoCo solves couplings before its implicit damping slows the drivers, so followers run away from them. The
+        // explicit integrator does not have this problem.
         mjcf.option.integrator = Integrator::Euler;
         (explicit, ": joints that follow others (mimic) and stiff drives do not go together in implicit integrators.")
     } else if target == Target::V2 {
@@ -180,7 +182,7 @@ fn prepare_for_plain_mujoco(
     if !heavier.is_empty() {
         mjcf.option.timestep = step;
     }
-    // Whoever opens the file finds a robot that holds its start, however slowly its time passes.
+    // At this time step the robot holds its start pose in any viewer.
     let holds_up_to = if followers { explicit } else { implicit };
     if mjcf.option.timestep > 0.9 * holds_up_to {
         mjcf.comments
@@ -195,7 +197,7 @@ fn prepare_for_plain_mujoco(
     let mut ctrl = vec![0.0; model.nu()];
     for (robot, index) in robots.iter().zip(&simulation.robots) {
         for (plan, joint) in robot.plans().iter().zip(&index.joints) {
-            // Without stiffness the control is a velocity or an effort: zero at the start.
+            // Without stiffness, the control is a velocity or an effort, which starts at zero.
             if let (Some(drive), Some(actuator)) = (joint.drive, plan.actuator)
                 && actuator.kp > 0.0
             {
@@ -209,12 +211,12 @@ fn prepare_for_plain_mujoco(
     given_up.map(|message| Diagnostic::new(DiagnosticKind::ExportHeavier, None, message))
 }
 
-/// A number that reads well: two digits, at most 5 % off.
+/// Rounds to two significant digits, at most 5 % off.
 fn two_digits(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
 }
 
-/// Writes every visual mesh once, one file per material, and declares them in `mjcf`.
+/// Writes every visual mesh once, one file per material, and declares the assets in `mjcf`.
 fn export_meshes(
     contents: &Contents,
     mjcf: &mut Mjcf,
@@ -277,7 +279,7 @@ fn export_parts(
 ) -> Result<Vec<crate::mjcf::robot::VisualPart>> {
     let mut parts = Vec::new();
     for (i, part) in mesh.parts.iter().enumerate() {
-        // MuJoCo builds no mesh from fewer than four vertices.
+        // MuJoCo rejects meshes with fewer than four vertices.
         if part.triangles.len() < 2 {
             continue;
         }
@@ -311,7 +313,7 @@ fn export_material(
     Ok(MaterialAsset { name: format!("{name}_material"), rgba: material.rgba.map(f64::from), texture })
 }
 
-/// What is wrong with the textures that a mesh file names.
+/// Error messages for the unreadable textures of a mesh.
 fn unreadable_textures(mesh: &TriMesh) -> Vec<String> {
     let sources = mesh.materials.iter().filter_map(|m| m.texture.as_ref());
     sources
@@ -325,7 +327,8 @@ fn unreadable_textures(mesh: &TriMesh) -> Vec<String> {
         .collect()
 }
 
-/// MuJoCo reads PNG only: other images are converted. A texture that is missing or unreadable leaves the colour.
+/// Writes a texture as PNG, the only image format that MuJoCo reads. Returns `None` if the texture is missing or
+/// unreadable; the material then keeps only its color.
 fn export_texture(
     source: &TextureSource,
     name: &str,
@@ -353,14 +356,15 @@ fn export_texture(
     Ok(Some(texture))
 }
 
-/// A lower-case name of letters, digits and underscores; hulls of collision meshes are called otherwise.
+/// Asset name from lower-case letters, digits and underscores. The prefix keeps it apart from hulls of collision
+/// meshes.
 fn asset_stem(path: &Path) -> String {
     let stem = path.file_stem().map(|s| s.to_string_lossy().to_lowercase()).unwrap_or_default();
     let plain: String = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     format!("visual_{plain}")
 }
 
-/// `wanted`, or with a number behind it where that name is taken.
+/// Returns `wanted`, with a numeric suffix if that name is taken.
 fn unique_name(wanted: String, names: &mut BTreeSet<String>) -> String {
     let mut name = wanted.clone();
     let mut count = 1;

@@ -1,4 +1,4 @@
-//! How types of this crate stand in configuration files where a derive would not read well.
+//! Serde formats for configuration types whose derived form would be hard to read.
 
 use crate::drive::PerJoint;
 use crate::objects::robot_file::MjcfFile;
@@ -9,7 +9,7 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 use serde::ser::{Serialize, Serializer};
 use std::fmt;
 
-/// A number, or a table of numbers by pattern or control part.
+/// Serializes to a number, or a table of numbers by joint pattern or control part.
 impl Serialize for PerJoint {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
@@ -19,7 +19,7 @@ impl Serialize for PerJoint {
     }
 }
 
-/// A number, or a table of numbers by pattern or control part.
+/// Deserializes from a number, or a table of numbers by joint pattern or control part.
 impl<'de> Deserialize<'de> for PerJoint {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct NumberOrTable;
@@ -52,7 +52,7 @@ impl<'de> Deserialize<'de> for PerJoint {
     }
 }
 
-/// The MJCF of a robot: the path of the file, or the table of [`MjcfFile`].
+/// Deserializes the MJCF of a robot from a file path or the table of [`MjcfFile`].
 pub(crate) fn mjcf_file<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<MjcfFile>, D::Error> {
     struct FileOrTable;
 
@@ -79,7 +79,7 @@ pub(crate) fn mjcf_file<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Op
     deserializer.deserialize_any(FileOrTable)
 }
 
-/// The URDF of a robot: the path of its only file, or the table of [`UrdfCfg`].
+/// Deserializes the URDF of a robot from the path of a single file or the table of [`UrdfCfg`].
 pub(crate) fn file_or_table<'de, D: Deserializer<'de>>(deserializer: D) -> Result<UrdfCfg, D::Error> {
     struct FileOrTable;
 

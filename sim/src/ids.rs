@@ -2,39 +2,39 @@
 
 use crate::error::{Error, Result};
 
-/// Index of an environment.
+/// Index of an environment of this process, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct EnvId(pub usize);
 
-/// Handle of a robot; valid for the manager that made it.
+/// Handle of a robot, valid for the manager that created it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct RobotId {
     pub(crate) manager: u64,
     pub(crate) index: usize,
 }
 
-/// Handle of a rigid object; valid for the manager that made it.
+/// Handle of a rigid object, valid for the manager that created it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ObjectId {
     pub(crate) manager: u64,
     pub(crate) index: usize,
 }
 
-/// Handle of an MJCF file that is a part of the scene; valid for the manager that made it.
+/// Handle of an attached MJCF file, valid for the manager that created it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct MjcfId {
     pub(crate) manager: u64,
     pub(crate) index: usize,
 }
 
-/// Handle of a terrain; valid for the manager that made it.
+/// Handle of a terrain, valid for the manager that created it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TerrainId {
     pub(crate) manager: u64,
     pub(crate) index: usize,
 }
 
-/// Which environments are meant, as a mask.
+/// Mask of the selected environments, shape (num_envs,); all are selected for `None`.
 pub(crate) fn env_mask(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<bool>> {
     let Some(ids) = env_ids else { return Ok(vec![true; num_envs]) };
     let mut mask = vec![false; num_envs];
@@ -44,7 +44,7 @@ pub(crate) fn env_mask(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec
     Ok(mask)
 }
 
-/// Which environments are meant, in the order given; all of them where `None`.
+/// Indices of the selected environments in the given order; all environments for `None`.
 pub(crate) fn env_list(env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
     env_mask(env_ids, num_envs)?;
     Ok(env_ids.map_or_else(|| (0..num_envs).collect(), |ids| ids.iter().map(|id| id.0).collect()))

@@ -1,91 +1,91 @@
-//! Places of entities in MuJoCo's arrays.
+//! Indices of entities in MuJoCo's arrays.
 
 use crate::body_pose::BodyFrame;
 use kinetoscope_mujoco as mj;
 
-/// Places of one robot in MuJoCo's arrays.
+/// Indices of one robot in MuJoCo's arrays.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotIndex {
-    /// Position and velocity address of each drivable joint.
+    /// Addresses of each drivable joint.
     pub joints: Vec<JointIndexing>,
     /// Frame of each link.
     pub links: Vec<BodyFrame>,
-    /// The body of its root link.
+    /// The body of the root link.
     pub root: FreeIndex,
-    /// Its geoms.
+    /// All geoms of the robot.
     pub geoms: Vec<GeomIndex>,
 }
 
 /// A geom of a robot.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GeomIndex {
-    /// Its index in MuJoCo's arrays.
+    /// Index in MuJoCo's geom arrays.
     pub geom: usize,
-    /// The link it belongs to.
+    /// Index of the link that owns the geom.
     pub link: usize,
-    /// The link's visual that it stands for; `None` for a collision shape.
+    /// Index of the visual that the geom represents; `None` for a collision geom.
     pub visual: Option<usize>,
 }
 
-/// Places of a body that may be free in MuJoCo's arrays.
+/// Indices of a free, mocap or fixed body in MuJoCo's arrays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FreeIndex {
     pub body: usize,
-    /// First of its seven positions and first of its six velocities; `None` where it is fixed.
+    /// Address of its seven positions and of its six velocities; `None` without a free joint.
     pub joint: Option<(usize, usize)>,
-    /// Its number among the bodies that are moved by hand.
+    /// Mocap index; `None` for a body without mocap pose.
     pub mocap: Option<usize>,
 }
 
 impl FreeIndex {
-    /// True if it neither moves nor is kinematic.
+    /// True if the body has neither a free joint nor a mocap pose.
     pub(crate) fn stands(&self) -> bool {
         self.joint.is_none() && self.mocap.is_none()
     }
 }
 
-/// Places of one joint.
+/// Addresses of one joint with a single degree of freedom.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JointIndexing {
     pub qpos: usize,
     pub dof: usize,
-    /// Index in the drive table.
+    /// Index in the drive table; `None` without a drive.
     pub drive: Option<usize>,
 }
 
-/// Places of an MJCF part in MuJoCo's arrays.
+/// Indices of an attached MJCF file in MuJoCo's arrays.
 #[derive(Clone, Debug)]
 pub(crate) struct PartIndex {
-    /// Each of the file's bodies; the first is the one that what stands in the file's world belongs to.
+    /// Bodies of the file; the first is the body that holds the content of the file's world.
     pub bodies: Vec<usize>,
-    /// Each of the file's geoms.
+    /// Geoms of the file.
     pub geoms: Vec<usize>,
-    /// Each position of the file.
+    /// Addresses in `qpos` of all positions of the file.
     pub qpos: Vec<usize>,
-    /// Each degree of freedom of the file.
+    /// Degrees of freedom of the file.
     pub dofs: Vec<usize>,
-    /// Each actuator of the file.
+    /// Actuators of the file.
     pub actuators: Vec<usize>,
-    /// Each joint of the file with one degree of freedom.
+    /// Joints of the file with one degree of freedom.
     pub joints: Vec<JointIndexing>,
-    /// The control of each actuator of the file.
+    /// Indices in `ctrl` of the file's actuators.
     pub controls: Vec<usize>,
-    /// Each activation of the file's actuators.
+    /// Indices in `act` of the file's actuators.
     pub activations: Vec<usize>,
-    /// Bodies of the file that are moved by hand.
+    /// Mocap bodies of the file.
     pub mocaps: Vec<usize>,
-    /// Bodies and sites as sensors see them.
+    /// Frames of bodies and sites, for sensors.
     pub frames: Vec<BodyFrame>,
 }
 
-/// Which equality a weld is, and MuJoCo's bodies that it holds together.
+/// Equality constraint of a weld and the two MuJoCo bodies that it connects.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WeldIndex {
     pub(crate) equality: usize,
     pub(crate) bodies: [usize; 2],
 }
 
-/// How many positions and degrees of freedom a joint of a type has.
+/// Number of positions and of degrees of freedom of a MuJoCo joint type.
 pub(crate) fn joint_widths(kind: i32) -> (usize, usize) {
     match kind as u32 {
         mj::mjJNT_FREE => (7, 6),

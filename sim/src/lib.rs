@@ -1,16 +1,48 @@
-//! URDF to MJCF to batched MuJoCo: one type per stage, one file per arrow.
+//! Batched robot simulation on MuJoCo: robots, objects and sensors in N parallel environments.
+//!
+//! A [`SimulationManager`] compiles URDF and MJCF files into one MuJoCo model, steps N environments of that model on a
+//! thread pool, and updates the sensors after each step. [`InteractiveScene`] builds a simulation from a declaration in
+//! Rust, TOML or YAML.
 //!
 //! ```text
-//! URDF files -> UrdfFile -> RobotDescription -> Mjcf -> mj::Model -> Batch (N x Env)
-//!  urdf::parse  urdf::merge  mjcf::robot   mj::vfs     batch
+//! URDF files -> RobotDescription -> Mjcf -> Model -> Batch (N x Env) -> SceneState -> sensors
+//!     kinetoscope_robot         mjcf   mujoco   compile            gather      sensor_list
 //! ```
 //!
-//! Any input gives a value or an error that says what was wrong and what would be right, with one exception: a handle
-//! ([`RobotId`], [`ObjectId`], [`SensorId`] and the like) panics where it is given to another
-//! [`SimulationManager`] than the one that made it, as an index beyond the end of a slice does, and for the same reason. No
-//! input makes such a handle, only a mistake in the program that uses it, and an error could not be handled but by mending
-//! the program. [`SimulationManager::robot`] and its like are then used without `?`. Names, numbers, files and environments
-//! that do not exist are errors.
+//! | modules | content |
+//! |---|---|
+//! | `manager`, `simulation_cfg` | [`SimulationManager`] and its configuration |
+//! | `interactive_scene` | declared scenes: [`SceneCfg`], scene files, entities by name |
+//! | `objects` | robots, rigid objects, terrains, attached MJCF files, welds: configurations, data, views |
+//! | `drive` | joint drives: gains, drive laws, actuator models |
+//! | `mjcf`, `compile` | the MJCF document, its writer, and the compiled scene |
+//! | `env`, `batch`, `rollout` | one environment, N environments on worker threads, rollouts on copies |
+//! | `capture`, `gather`, `sensor_list` | quantities of a step, the arrays that sensors read, the sensors themselves |
+//! | `randomization`, `snapshot` | properties per environment, saved and restored states |
+//! | `visible`, `scene_view` | the scene that cameras and viewers render |
+//! | `observer`, `step_result` | events for viewers and recorders |
+//! | [`inspect`] | report on a robot without a simulation |
+//!
+//! ```
+//! use kinetoscope_scene::Pose;
+//! use kinetoscope_sim::{RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+//!
+//! let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 2, ..Default::default() })?;
+//! let cube = RigidObjectCfg { uid: "cube".into(), init_pose: Pose::translation(0.0, 0.0, 1.0), ..Default::default() };
+//! let cube = sim.add_rigid_object(cube)?;
+//! sim.update(10); // 0.1 s of free fall
+//! let poses = sim.rigid_object(cube).pose(); // rows [x, y, z, qw, qx, qy, qz], shape (2, 7)
+//! assert_eq!(poses.dim(), (2, 7));
+//! assert!(poses[(0, 2)] < 1.0);
+//! # Ok::<(), kinetoscope_sim::Error>(())
+//! ```
+//!
+//! # Errors and panics
+//!
+//! Invalid input (names, numbers, files, environment indices) gives an [`Error`] that states the problem and the fix.
+//! The only exception is a handle ([`RobotId`], [`ObjectId`], [`SensorId`] and the like) used with a
+//! [`SimulationManager`] that did not create it. That panics, like a slice index out of bounds, because only a bug in
+//! the calling program can cause it. Methods such as [`SimulationManager::robot`] therefore return no `Result`.
 
 #![cfg_attr(
     not(feature = "internals"),

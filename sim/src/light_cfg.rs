@@ -1,57 +1,58 @@
-//! Lamps of a simulation.
+//! Lights of a simulation.
 
 use crate::error::{Error, Result};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
-/// What kind of lamp a light is.
+/// Type of a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum LampKind {
-    /// Parallel rays along the direction, as of the sun.
+    /// Parallel rays along the direction, such as sunlight.
     #[default]
     Directional,
-    /// In all directions from the position. The rasterizer draws no shadow of it.
+    /// Light in all directions from the position. The rasterizer computes no shadow for it.
     Point,
-    /// A cone around the direction.
+    /// Light in a cone around the direction.
     Spot {
         /// Half angle of the cone \[deg\], above 0 and at most 90.
         cutoff_deg: f64,
-        /// How fast the light falls off from the axis: cos(angle) to this power, a whole number up to
-        /// 128.
+        /// Falloff from the axis: the intensity is cos(angle) to this power, a whole number from 0 to 128.
         exponent: f64,
     },
-    /// Even light from all directions, as of an overcast sky; of the other fields only the color counts, and it casts no sharp
-    /// shadow. Domes take the place of the light that simulations have from all sides without one.
+    /// Uniform light from all directions, such as an overcast sky. It uses only the color of the other fields and casts
+    /// no sharp shadow. Dome lights replace the ambient light that simulations have by default.
     Dome {
-        /// Brightness: a white surface under a white dome of intensity 1 alone is as bright as an image can show, 0 to 1000.
+        /// Brightness, 0 to 1000. A white surface lit only by a white dome of intensity 1 has the largest brightness of
+        /// an image.
         intensity: f64,
     },
 }
 
-/// A lamp. `Default` is white light from above, a little from the side.
+/// Configuration of a light. `Default` is a white directional light from above, slightly tilted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LightCfg {
-    /// What kind of lamp it is.
+    /// Type of the light.
     pub kind: LampKind,
-    /// Where it is in the environment \[m\]; directional lamps are everywhere.
+    /// Position in the environment \[m\]; unused by directional lights and domes.
     #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub position: Vector3<f64>,
-    /// Direction in which it shines.
+    /// Direction of the emitted light; unused by point lights and domes.
     #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub direction: Vector3<f64>,
-    /// Colour, 0..=1.
+    /// Color, 0..=1.
     pub color: [f64; 3],
-    /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation: the intensity at distance d is 1 / (c + l d + q d²). Not of
-    /// directional lamps.
+    /// Constant, linear \[1/m\] and quadratic \[1/m²\] attenuation: the intensity at distance d is 1 / (c + l d + q
+    /// d²). Unused by directional lights and domes.
     pub attenuation: [f64; 3],
-    /// How large it is, for soft shadows in ray-traced pictures: the radius of its disc \[m\]; of a directional lamp, at a distance
-    /// of 1 m (the tangent of its angular radius, 0.00465 for the sun). 0 is a point, whose shadows are sharp.
+    /// Size for soft shadows in ray-traced images: the radius of the light's disc \[m\]. For a directional light, the
+    /// radius at a distance of 1 m (the tangent of its angular radius, 0.00465 for the sun). 0 is a point, which casts
+    /// sharp shadows.
     pub radius: f64,
-    /// Whether things in its light cast a shadow.
+    /// True if objects cast shadows in this light.
     pub cast_shadow: bool,
 }
 
@@ -70,7 +71,7 @@ impl Default for LightCfg {
 }
 
 impl LightCfg {
-    /// A dome: even light from all directions ([`LampKind::Dome`]).
+    /// Creates a dome light: uniform light from all directions ([`LampKind::Dome`]).
     pub fn dome(intensity: f64, color: [f64; 3]) -> Self {
         Self { kind: LampKind::Dome { intensity }, color, ..Self::default() }
     }
@@ -78,7 +79,7 @@ impl LightCfg {
     /// Checks every number.
     ///
     /// # Errors
-    /// The first field that is out of range.
+    /// A field is out of range; the first one is reported.
     pub fn validate(&self) -> Result<()> {
         let fail =
             |field, value: &dyn Debug, expected| Err(Error::Config { field, value: format!("{value:?}"), expected });

@@ -1,50 +1,52 @@
-//! One environment as a viewer sees it.
+//! Visual state of one environment, for viewers.
 
 use kinetoscope_scene::{Light, OwnScene, Pose, PoseF32};
 
-/// One environment as it is now; see [`SceneViewMut::look`](crate::SceneViewMut::look). Everything is in the frame of the environment.
+/// Visual state of one environment at the current time, in the frame of the environment. See
+/// [`SceneViewMut::look`](crate::SceneViewMut::look).
 #[derive(Clone, Debug, Default)]
 pub struct Look {
     /// Simulation time \[s\].
     pub time: f64,
-    /// Why the environment stands still, where it diverged.
+    /// Reason of the divergence; `None` while the environment runs.
     pub diverged: Option<String>,
-    /// What it looks like, where its sizes or colours are its own or a shape [changes](kinetoscope_scene::Instance::deforms).
+    /// Scene with the environment's own sizes or colors, or with shapes that
+    /// [deform](kinetoscope_scene::Instance::deforms).
     pub own_scene: OwnScene,
-    /// World from instance, in the order of the instances of [`Visible::scene`](crate::Visible::scene).
+    /// Poses of the instances in the world, in the order of the instances of [`Visible::scene`](crate::Visible::scene).
     pub instances: Vec<PoseF32>,
-    /// The lamps of that scene where they are now.
+    /// Lights of that scene at their current poses.
     pub lights: Vec<Light>,
     /// Poses of links and objects, in the order of [`Entities::body_names`](crate::Entities::body_names).
     pub bodies: Vec<Pose>,
-    /// Centres of mass \[m\] of what moves as one piece, and its mass \[kg\]; without what has none.
+    /// Center of mass \[m\] and mass \[kg\] of each MuJoCo body with a mass.
     pub masses: Vec<([f64; 3], f64)>,
-    /// Axes of joints that turn or slide.
+    /// Axes of all hinge and slide joints.
     pub joints: Vec<JointAxis>,
 }
 
-/// Axis of a joint with one degree of freedom.
+/// Axis of a joint with one degree of freedom, in the frame of the environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointAxis {
-    /// A point of it \[m\].
+    /// A point on the axis \[m\].
     pub anchor: [f64; 3],
-    /// Its direction, of length 1.
+    /// Direction of the axis, a unit vector.
     pub axis: [f64; 3],
-    /// Whether the joint slides along it instead of turning about it.
+    /// True for a slide joint, false for a hinge joint.
     pub slides: bool,
 }
 
-/// How a link or an object moves; see [`SceneView::body_motion`](crate::SceneView::body_motion).
+/// Motion of a link or object; see [`SceneView::body_motion`](crate::SceneView::body_motion).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyMotion {
-    /// Pose of its frame.
+    /// Pose of the body frame in the environment.
     pub pose: Pose,
-    /// Velocity of its frame's origin \[m/s\], in world axes.
+    /// Velocity of the origin of the body frame \[m/s\], in world axes.
     pub linear: [f64; 3],
     /// Angular velocity \[rad/s\], in world axes.
     pub angular: [f64; 3],
-    /// Mass of it and of all that hangs on it \[kg\].
+    /// Mass of the body and of its subtree \[kg\].
     pub carried_mass: f64,
-    /// Whether nothing that is done to it moves it: it is a part of the world, or moved by hand.
+    /// True if no force moves the body: it is welded to the world, or it is a mocap body.
     pub is_fixed: bool,
 }

@@ -32,36 +32,36 @@ use kinetoscope_sensors::{Sensor, SensorCfg, SensorContext};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Tells managers of one process apart, so that a handle is not used with another one.
+/// Source of the serial numbers that bind a handle to the manager that created it.
 static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
 
-/// Robots and objects in N environments. Environments never touch each other; dropping the manager frees everything.
+/// Robots, objects and sensors in N independent environments. Dropping the manager frees all memory.
 #[derive(Debug)]
 pub struct SimulationManager {
     pub(crate) serial: u64,
     pub(crate) cfg: SimulationManagerCfg,
     pub(crate) contents: Contents,
     visuals: VisualCache,
-    /// What ray casters have built.
+    /// Acceleration structures shared by all ray casters.
     ray_assets: RayAssets,
-    /// Threads of the sensors.
+    /// Thread pool shared by batch, sensors and renderers.
     pool: ThreadPool,
     diagnostics: Vec<Diagnostic>,
     pub(crate) simulation: Simulation,
     pub(crate) sensors: SensorList,
     pub(crate) observers: ObserverSlots,
-    /// How often properties were drawn for each environment.
+    /// Number of randomization passes done in each environment.
     pub(crate) draws: Vec<u64>,
-    /// What came of the last step of the task that runs here.
-    /// Point of view of windows, browser views and screenshots, where the program set one.
+    /// Point of view of windows, browser views and screenshots; `None` until the program sets one.
     pub(crate) viewpoint: Option<Viewpoint>,
 }
 
 impl SimulationManager {
-    /// An empty simulation.
+    /// Creates an empty simulation.
     ///
     /// # Errors
-    /// A number of the configuration is out of range, or MuJoCo is not the one this program was built for.
+    /// A number of the configuration is out of range, or the MuJoCo library differs from the version this program was
+    /// built for.
     pub fn new(cfg: SimulationManagerCfg) -> Result<Self> {
         cfg.validate()?;
         mj::check_version()?;
@@ -102,29 +102,30 @@ impl SimulationManager {
         self.cfg.num_envs
     }
 
-    /// Number of threads that step.
+    /// Number of threads that step, the calling thread included.
     pub fn threads(&self) -> usize {
         self.simulation.batch.threads()
     }
 
-    /// Adds a robot to every environment. The model is compiled here, so that whatever is wrong is said here; on an
-    /// error the simulation is as it was. What exists already keeps its state, to the last bit.
+    /// Adds a robot to every environment, from URDF files ([`RobotCfg::urdf`]) or an MJCF file ([`RobotCfg::mjcf`]).
     ///
-    /// Where it goes from there, as if nothing had been added, is the same to rounding where the scene has no rows of
-    /// constraints. Rows, and implicit drives ([`DriveModel::Implicit`](crate::DriveModel::Implicit)), friction, limits and
-    /// contacts are rows, are solved for the whole scene at once, until what is left is below the solver's tolerance, 1e-8 of
-    /// the mean inertia times the number of degrees of freedom: more in the scene leaves something else. An arm with a hand
-    /// goes on to 1e-6 rad over 1 s.
+    /// The model is compiled in this call, so all errors are reported here. On an error the simulation is unchanged.
+    /// Existing entities keep their state, bit for bit.
     ///
-    /// It is made of URDF files ([`RobotCfg::urdf`]), or is an MJCF file ([`RobotCfg::mjcf`]).
+    /// Adding an entity changes the later motion of existing entities only within solver tolerance. Without constraint
+    /// rows the motion is the same up to rounding. Implicit drives
+    /// ([`DriveModel::Implicit`](crate::DriveModel::Implicit)), friction, limits and contacts are rows, which MuJoCo
+    /// solves for the whole scene at once. The solver stops at a residual below 1e-8 of the mean inertia times the
+    /// number of degrees of freedom, and a larger scene leaves another residual. For an arm with a hand the difference
+    /// is 1e-6 rad after 1 s.
     ///
     /// # Errors
-    /// Anything wrong with the files, names, drives or meshes of the robot.
+    /// The files, names, drives or meshes of the robot are invalid.
     pub fn add_robot(&mut self, cfg: RobotCfg) -> Result<RobotId> {
         self.add_as(cfg, Role::Robot)
     }
 
-    /// Adds a robot, or an articulation that is none.
+    /// Adds a robot or a passive articulation.
     pub(crate) fn add_as(&mut self, cfg: RobotCfg, role: Role) -> Result<RobotId> {
         self.contents.check_uid(&cfg.uid)?;
         if self.contents.robots.len() >= MAX_ROBOTS {
@@ -141,7 +142,7 @@ impl SimulationManager {
         Ok(RobotId { manager: self.serial, index: self.contents.robots.len() - 1 })
     }
 
-    /// Adds a rigid object to every environment, compiled as [`add_robot`](Self::add_robot) does.
+    /// Adds a rigid object to every environment and compiles the model, as [`add_robot`](Self::add_robot) does.
     ///
     /// # Errors
     /// The name is taken, a number is out of range, or a mesh file cannot be used.
@@ -155,11 +156,12 @@ impl SimulationManager {
         Ok(ObjectId { manager: self.serial, index: self.contents.objects.len() - 1 })
     }
 
-    /// Adds a terrain to every environment, compiled as [`add_robot`](Self::add_robot) does. It stands fixed, collides with
-    /// robots and objects, and is seen by cameras and ray casters, for which it is called by its uid.
+    /// Adds a terrain to every environment and compiles the model, as [`add_robot`](Self::add_robot) does. A terrain is
+    /// static and collides with robots and objects. Cameras and ray casters see it under its uid.
     ///
     /// # Errors
-    /// The name is taken, a height is not finite, there are fewer than two rows or columns, or a number is out of range.
+    /// The name is taken, a height is not finite, there are fewer than two rows or columns, or a number is out of
+    /// range.
     pub fn add_terrain(&mut self, cfg: TerrainCfg) -> Result<TerrainId> {
         self.check_world_uid(&cfg.uid)?;
         let terrain = Terrain::new(cfg, self.contents.next_mask_id())?;
@@ -169,19 +171,21 @@ impl SimulationManager {
         Ok(TerrainId { manager: self.serial, index: self.contents.terrains.len() - 1 })
     }
 
-    /// Adds an MJCF file to every environment, compiled as [`add_robot`](Self::add_robot) does: its bodies, joints, contacts,
-    /// couplings, tendons, actuators and sensors, every name with `uid/` before it. Its bodies and named sites are frames that
-    /// cameras and sensors can be attached to. Its geoms collide by the bits that the file gives them: the ground, terrains and
-    /// objects collide with every geom whose `contype` is not 0, robots with every geom that has the lowest bit in its
-    /// `contype`, as MuJoCo's default has.
+    /// Attaches an MJCF file to every environment and compiles the model, as [`add_robot`](Self::add_robot) does.
+    /// Bodies, joints, contacts, couplings, tendons, actuators and sensors of the file are added, with the prefix
+    /// `uid/` on every name. Cameras and sensors can be attached to its bodies and named sites.
     ///
-    /// Settings of the file for its whole model, keyframes and skins are not taken over, nor are sensors that a part cannot
-    /// have (those of the whole world, of a user's own type, and what only 4.x has and nobody writes back): nothing moves
-    /// otherwise without them. [`diagnostics`](Self::diagnostics) names each.
+    /// Geoms of the file collide by their own contact bits. The ground, terrains and objects collide with every geom
+    /// with a nonzero `contype`. Robots collide with every geom that has the lowest bit in its `contype`, which is
+    /// MuJoCo's default.
+    ///
+    /// Global settings, keyframes and skins of the file are not imported. The same holds for sensors that cannot be
+    /// attached: sensors of the whole world, user sensors, and sensors of 4.x that MuJoCo cannot write back. None of
+    /// these changes how the bodies move. [`diagnostics`](Self::diagnostics) lists each.
     ///
     /// # Errors
-    /// The name is taken, MuJoCo refuses the file (with its words, which name element and line), or the file has something
-    /// that a part cannot have, such as flexible bodies and plugins of 4.x.
+    /// The name is taken, MuJoCo rejects the file (its message names element and line), or the file has something that
+    /// cannot be attached, such as flexible bodies and plugins of 4.x.
     pub fn add_mjcf(&mut self, cfg: MjcfCfg) -> Result<MjcfId> {
         self.check_world_uid(&cfg.uid)?;
         let mut diagnostics = Vec::new();
@@ -193,17 +197,17 @@ impl SimulationManager {
         Ok(MjcfId { manager: self.serial, index })
     }
 
-    /// Checks that nothing in the world is called `uid` yet.
+    /// Checks that the name `uid` is free, in the scene and in MuJoCo's world.
     pub(crate) fn check_world_uid(&self, uid: &str) -> Result<()> {
         self.contents.check_uid(uid)?;
-        // MuJoCo's world body and our ground are called so.
+        // Names of MuJoCo's world body and of the ground geom.
         if matches!(uid, "world" | "ground") { Err(Error::DuplicateUid(uid.into())) } else { Ok(()) }
     }
 
-    /// Compiles `contents` and goes on with them; on an error nothing has changed.
+    /// Compiles `contents` and replaces the simulation. On an error nothing changes.
     pub(crate) fn replace_contents(&mut self, contents: Contents, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
         let mut simulation = compile(&self.cfg, &contents, &self.pool)?;
-        // Compiling says again what it said of the robots before.
+        // Compiling repeats the earlier diagnostics of the robots: report only the new ones.
         let mut known = self.simulation.diagnostics.clone();
         for diagnostic in &simulation.diagnostics {
             match known.iter().position(|d| d == diagnostic) {
@@ -225,12 +229,13 @@ impl SimulationManager {
         Ok(())
     }
 
-    /// Adds a sensor of all environments; `sensors` has the built-in ones, and a crate of yours may bring its own. The
-    /// sensor sees links, movable joints and drives of all robots, in the order in which they were added, then what MJCF files
-    /// have of these. Adding a robot later starts its history again.
+    /// Adds a sensor to all environments. The crate `kinetoscope_sensors` has the built-in sensors; other crates can
+    /// add their own. A sensor sees links, movable joints and drives of all robots in insertion order, followed by
+    /// those of attached MJCF files. Adding an entity later rebuilds the sensor and clears its history.
     ///
     /// # Errors
-    /// The configuration is wrong, the name is taken, or the sensor needs a quantity that is not gathered.
+    /// The configuration is invalid, the name is taken, or the sensor needs a quantity that the simulation does not
+    /// gather.
     pub fn add_sensor<C>(&mut self, uid: impl Into<String>, cfg: C) -> Result<SensorId<C::Sensor>>
     where
         C: SensorCfg + Send + 'static,
@@ -241,31 +246,32 @@ impl SimulationManager {
         self.sensors.add(uid, cfg, &mut self.simulation, &context)
     }
 
-    /// A sensor, to read. A [lazy](SensorCfg::lazy) one measures now what was due.
+    /// Returns a sensor for reading. A [lazy](SensorCfg::lazy) sensor runs its pending measurement now.
     ///
     /// # Errors
     /// The sensor failed, in an earlier step or now.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn sensor<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
         self.sensors.get(id)
     }
 
-    /// A sensor, to change: a camera's pose, for instance.
+    /// Returns a sensor for changes, for instance to the pose of a camera.
     ///
     /// # Errors
     /// The sensor failed in an earlier step.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn sensor_mut<S: Sensor>(&mut self, id: SensorId<S>) -> Result<&mut S> {
         self.sensors.get_mut(id)
     }
 
-    /// The scene for a sensor that requires `requires`. What cameras draw is made when the first asks for it.
+    /// Context for sensors that need the quantities `requires`. Builds the visual scene on the first call that needs
+    /// it.
     fn sensor_context(&mut self, requires: Requires) -> SensorContext {
         let sees = !requires.intersection(Requires::VISIBLE | Requires::INSTANCES).is_empty();
         let scene = sees.then(|| Arc::clone(self.visible().scene()));
@@ -291,91 +297,91 @@ impl SimulationManager {
         }
     }
 
-    /// The visual scene, made at the first call, which reads the visual meshes. Meshes that cannot be read are left out, with a
-    /// diagnostic.
+    /// Returns the visual scene. The first call builds it and reads the visual meshes; unreadable meshes are left out
+    /// with a diagnostic.
     pub(crate) fn visible(&mut self) -> Arc<Visible> {
         let visible = self.simulation.make_visible(&self.cfg, &self.contents, &mut self.visuals);
         self.diagnostics.extend(self.visuals.take_diagnostics());
         visible
     }
 
-    /// What an environment looks like, where its sizes or colours are its own.
+    /// Render scene of an environment with its own sizes or colors; `OwnScene(None)` for the shared scene.
     pub(crate) fn own_scene(&self, env: EnvId) -> &OwnScene {
         static AS_ALL: OwnScene = OwnScene(None);
         self.simulation.own_scenes.get(env.0).unwrap_or(&AS_ALL)
     }
 
-    /// A robot, to read.
+    /// Returns a robot for reading.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn robot(&self, id: RobotId) -> Robot<'_> {
         let index = self.index_of(id.manager, id.index);
         Robot::new(&self.contents.robots[index], &self.simulation, index)
     }
 
-    /// A robot, to command and to write.
+    /// Returns a robot for commands and writes.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn robot_mut(&mut self, id: RobotId) -> RobotMut<'_> {
         let index = self.index_of(id.manager, id.index);
         RobotMut::new(&self.contents.robots[index], &mut self.simulation, &mut self.sensors, index)
     }
 
-    /// A rigid object, to read.
+    /// Returns a rigid object for reading.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn rigid_object(&self, id: ObjectId) -> RigidObject<'_> {
         let index = self.index_of(id.manager, id.index);
         RigidObject::new(&self.contents.objects[index], &self.simulation, index)
     }
 
-    /// A rigid object, to write.
+    /// Returns a rigid object for writing.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn rigid_object_mut(&mut self, id: ObjectId) -> RigidObjectMut<'_> {
         let index = self.index_of(id.manager, id.index);
         RigidObjectMut::new(&self.contents.objects[index], &mut self.simulation, &mut self.sensors, index)
     }
 
-    /// An MJCF file that is a part of the scene, to read.
+    /// Returns an attached MJCF file for reading.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn mjcf_part(&self, id: MjcfId) -> MjcfPart<'_> {
         let index = self.index_of(id.manager, id.index);
         MjcfPart::new(&self.contents.parts[index], &self.simulation, index)
     }
 
-    /// An MJCF file that is a part of the scene, to command and to write.
+    /// Returns an attached MJCF file for commands and writes.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn mjcf_part_mut(&mut self, id: MjcfId) -> MjcfPartMut<'_> {
         let index = self.index_of(id.manager, id.index);
         MjcfPartMut::new(&self.contents.parts[index], &mut self.simulation, &mut self.sensors, index)
     }
 
-    /// MuJoCo's model and the data of one environment, to read: for what this API does not have. The model is the environment's
-    /// own where some of its properties are.
+    /// Reads MuJoCo's model and data of one environment directly, for quantities outside this API. An environment with
+    /// randomized properties has a model of its own.
     ///
     /// # Errors
-    /// There is no such environment.
+    /// The environment does not exist.
     pub fn with_mujoco<T>(&self, env: EnvId, read: impl FnOnce(&mj::Model, &mj::Data) -> T) -> Result<T> {
         env_mask(Some(&[env]), self.num_envs())?;
         Ok(self.simulation.batch.read(env.0, |env| read(env.data().model(), env.data())))
     }
 
-    /// Of those robots that are `wanted`, the one called `uid`.
+    /// Finds the robot or articulation `uid` among those that satisfy `wanted`.
     pub(crate) fn find_robot(
         &self,
         uid: &str,
@@ -405,8 +411,8 @@ impl SimulationManager {
         index
     }
 
-    /// Steps all environments by `steps` times `physics_dt`: `update(n)` equals n times `update(1)`, bit for bit.
-    /// Sensors tick after every step; [observers](crate::Observer) are called where they are due.
+    /// Steps all environments `steps` times by `physics_dt`. `update(n)` equals n calls of `update(1)`, bit for bit.
+    /// Sensors measure and [observers](crate::Observer) are called after the steps at which they are due.
     pub fn update(&mut self, steps: u32) {
         let mut left = steps;
         while left > 0 {
@@ -414,7 +420,7 @@ impl SimulationManager {
         }
     }
 
-    /// Steps, and lets sensors measure.
+    /// Steps and updates the sensors, without observers.
     fn advance(&mut self, steps: u32) {
         let mut left = steps;
         while left > 0 {
@@ -427,10 +433,10 @@ impl SimulationManager {
         }
     }
 
-    /// Puts environments back to their initial state, all of them where `env_ids` is `None`; revives diverged ones.
+    /// Resets environments to their initial state, all of them for `env_ids = None`. Diverged environments run again.
     ///
     /// # Errors
-    /// An environment does not exist; then none is reset.
+    /// An environment does not exist; then no environment is reset.
     pub fn reset(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         let chosen = env_mask(env_ids, self.num_envs())?;
         self.simulation.reset(&chosen);
@@ -443,12 +449,12 @@ impl SimulationManager {
         Ok(())
     }
 
-    /// Clears what environments remember beside their state, all of them where `env_ids` is `None`: sensors start anew from the
-    /// present state, external wrenches end, and actuator models forget their past (delays, motor states). Positions,
-    /// velocities, targets and time stay; a diverged environment stays put aside.
+    /// Clears the buffers that environments keep beside their state, in all of them for `env_ids = None`. Sensors
+    /// restart from the current state, external wrenches end, and actuator models lose their memory (delays, motor
+    /// states). Positions, velocities, targets and time stay. A diverged environment stays diverged.
     ///
     /// # Errors
-    /// An environment does not exist; then none is cleared.
+    /// An environment does not exist; then no environment is cleared.
     pub(crate) fn reset_buffers(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         let chosen = env_mask(env_ids, self.num_envs())?;
         let envs: Vec<usize> = chosen.iter().enumerate().filter(|(_, c)| **c).map(|(i, _)| i).collect();
@@ -466,7 +472,7 @@ impl SimulationManager {
         times
     }
 
-    /// Environments that a step could not be done in, with the reason; they stand in their last good state.
+    /// Environments in which a step failed, with the reason. They stay frozen in their last valid state until reset.
     pub fn diverged(&self) -> Vec<DivergedEnv> {
         let mut diverged = Vec::new();
         self.simulation.batch.for_each(|i, env| {
@@ -477,15 +483,17 @@ impl SimulationManager {
         diverged
     }
 
-    /// Everything that was repaired, ignored or unusual when robots were added.
+    /// Diagnostics of all entities added so far: everything repaired, ignored or unusual.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
     }
 
-    /// Writes every stage of the pipeline to `dir`: the merged robots as URDF, the descriptions, the MJCF for both
-    /// MuJoCo lines with its meshes. Returns what had to be left out: visual meshes and textures that cannot be read, and
-    /// what MJCF files compiled by MuJoCo 4.x have that 2.2.2 does not know (a comment in `robot.mjcf2.xml` says it too, and
-    /// `diagnostics.txt` in `dir` has everything, after what was said before).
+    /// Writes every stage of the pipeline to `dir`: the merged robots as URDF, the descriptions, and the MJCF with
+    /// meshes for both supported MuJoCo versions.
+    ///
+    /// Returns diagnostics for everything left out: unreadable visual meshes and textures, and elements of MJCF files
+    /// compiled by MuJoCo 4.x that 2.2.2 lacks. A comment in `robot.mjcf2.xml` lists those elements. `diagnostics.txt`
+    /// in `dir` holds the earlier diagnostics followed by these.
     ///
     /// # Errors
     /// A file cannot be written.
@@ -494,5 +502,6 @@ impl SimulationManager {
     }
 }
 
-/// Steps done in one go: a caller's Ctrl+C and other environments wait no longer.
+/// Largest number of steps in one block: it bounds the response time of the caller (Ctrl+C) and the lead of one
+/// environment over the others.
 const BLOCK: u32 = 1000;

@@ -1,13 +1,13 @@
-//! Whose joints an error is about.
+//! Label of an entity in error messages.
 
 use std::fmt;
 
-/// A robot or another articulation, as errors call it: `robot "arm"`, `articulation "drawer"`.
+/// A robot or passive articulation in error messages: `robot "arm"`, `articulation "drawer"`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
-    /// What it is: `robot` or `articulation`.
+    /// Type of the entity: `robot` or `articulation`.
     pub what: &'static str,
-    /// Its name.
+    /// Uid of the entity.
     pub uid: String,
 }
 
@@ -17,28 +17,28 @@ impl fmt::Display for Named {
     }
 }
 
-/// A robot.
+/// Labels a robot.
 impl From<&str> for Named {
     fn from(uid: &str) -> Self {
         Self { what: "robot", uid: uid.into() }
     }
 }
 
-/// A robot.
+/// Labels a robot.
 impl From<&String> for Named {
     fn from(uid: &String) -> Self {
         uid.as_str().into()
     }
 }
 
-/// By its name.
+/// Compares the uid.
 impl PartialEq<str> for Named {
     fn eq(&self, uid: &str) -> bool {
         self.uid == uid
     }
 }
 
-/// By its name.
+/// Compares the uid.
 impl PartialEq<&str> for Named {
     fn eq(&self, uid: &&str) -> bool {
         self.uid == *uid

@@ -1,4 +1,4 @@
-//! Those who look at a simulation while it runs, and may act on it: windows, browser views, recorders.
+//! Observers of a running simulation, which may also change it: windows, browser views, recorders.
 
 use crate::error::{Error, Result};
 use crate::ids::EnvId;
@@ -7,54 +7,55 @@ use std::any::{Any, TypeId};
 use std::fmt;
 use std::marker::PhantomData;
 
-/// Looks at a simulation between its steps, and may change it: shows it, records it, holds it while somebody presses pause.
+/// Observes a simulation between its steps and may change it: a viewer, a recorder, a pause control.
 ///
-/// The simulation calls it on the thread that steps, with nothing else running, and goes on when it returns. What takes
-/// long belongs on a thread of the observer's own, with copies of what it needs. Adding an observer changes no number: steps
-/// are cut where observers are due, and `update(n)` equals n times `update(1)`.
+/// The simulation calls an observer on the stepping thread, with nothing else running, and continues when the call
+/// returns. Long work belongs on a thread of the observer, with copies of the data. Adding an observer changes no
+/// result: steps are split where observers are due, and `update(n)` equals n calls of `update(1)`.
 pub trait Observer: Any + Send {
-    /// Physics steps from now until it is asked next, at least 1; [`u64::MAX`] for never. Asked before every block of steps.
+    /// Number of physics steps until the next call, at least 1; [`u64::MAX`] for never. Called before every block of
+    /// steps.
     fn due_in(&self, sim: &SimulationManager) -> u64;
 
-    /// Something happened. What an observer does to the simulation in here, steps too, the others are told of, and itself not.
+    /// Handles an event. Changes made here, including steps, are reported to the other observers but not to this one.
     fn observe(&mut self, sim: &mut SimulationManager, moment: &Moment);
 
-    /// Handles an event that another crate publishes ([`ObserversMut::publish`](crate::ObserversMut::publish)), such as a
-    /// [`StepResult`](crate::StepResult). An observer ignores events of types that it does not know.
+    /// Handles an event that another crate publishes ([`ObserversMut::publish`](crate::ObserversMut::publish)), such as
+    /// a [`StepResult`](crate::StepResult). Events of unknown types must be ignored.
     fn receive(&mut self, sim: &mut SimulationManager, event: &dyn Any) {
         let _ = (sim, event);
     }
 
-    /// True if events of this type are published while this observer is in the simulation: the observer of a task says so of
-    /// [`StepResult`](crate::StepResult). See [`Observers::is_published`].
+    /// True if events of this type are published as long as this observer is in the simulation. The observer of a task
+    /// returns true for [`StepResult`](crate::StepResult). See [`Observers::is_published`].
     fn publishes(&self, event: TypeId) -> bool {
         let _ = event;
         false
     }
 }
 
-/// What happened.
+/// An event of a simulation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Moment {
-    /// Steps were done, and the observer is due.
+    /// Steps were done and the observer is due.
     Stepped,
     /// Environments were reset.
     Reset {
-        /// Which, in ascending order.
+        /// The environments, in ascending order.
         env_ids: Vec<EnvId>,
     },
-    /// Somebody wrote to the state of environments since the last step: joints, poses, welds, properties that were drawn, a
-    /// snapshot. Told once, right before the next step, or before an observer comes or goes.
+    /// The state of environments was written since the last step: joints, poses, welds, randomized properties, a
+    /// snapshot. Reported once, directly before the next step or before an observer is added or removed.
     Written {
-        /// Which, in ascending order.
+        /// The environments, in ascending order.
         env_ids: Vec<EnvId>,
     },
-    /// Something was added to the simulation: the model and its arrays are other ones.
+    /// An entity was added, so the model and its arrays are new.
     Compiled,
 }
 
-/// Handle of an observer; valid for the manager that made it.
+/// Handle of an observer, valid for the manager that created it.
 pub struct ObserverId<O> {
     manager: u64,
     number: u64,
@@ -80,13 +81,13 @@ impl<O> fmt::Debug for ObserverId<O> {
 pub(crate) struct ObserverSlots {
     seats: Vec<Seat>,
     next: u64,
-    /// Physics steps that were done since the simulation was made.
+    /// Number of physics steps since the simulation was created.
     pub(crate) steps: u64,
 }
 
 struct Seat {
     number: u64,
-    /// `None` while it is being told.
+    /// `None` while the observer handles an event.
     observer: Option<Box<dyn Observer>>,
 }
 
@@ -97,12 +98,12 @@ impl fmt::Debug for ObserverSlots {
 }
 
 impl SimulationManager {
-    /// Observers of the simulation.
+    /// Observers of the simulation, for reading.
     pub fn observers(&self) -> Observers<'_> {
         Observers::new(self)
     }
 
-    /// Observers of the simulation, to add and to remove.
+    /// Observers of the simulation, for adding, changing and removing.
     pub fn observers_mut(&mut self) -> ObserversMut<'_> {
         ObserversMut::new(self)
     }
@@ -119,13 +120,13 @@ impl<'a> Observers<'a> {
         Self { sim }
     }
 
-    /// An observer, to read.
+    /// Returns an observer for reading.
     ///
     /// # Errors
-    /// It was taken away, or is the one that is being told right now.
+    /// The observer was removed, or is handling an event right now.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn get<O: Observer>(&self, id: ObserverId<O>) -> Result<&'a O> {
         let seat = &self.sim.observers.seats[self.sim.seat_of(id)?];
@@ -133,7 +134,7 @@ impl<'a> Observers<'a> {
         any.and_then(|any| any.downcast_ref()).ok_or(Error::NoObserver)
     }
 
-    /// The observers of a type, in the order in which they were added; without the one that is being told right now.
+    /// Handles of all observers of type `O` in insertion order, without one that is handling an event right now.
     pub fn ids<O: Observer>(&self) -> Vec<ObserverId<O>> {
         let is = |seat: &&Seat| {
             let any: Option<&dyn Any> = seat.observer.as_deref().map(|observer| observer as &dyn Any);
@@ -143,26 +144,26 @@ impl<'a> Observers<'a> {
         self.sim.observers.seats.iter().filter(is).map(id).collect()
     }
 
-    /// Whether an observer is there: added to this simulation, not taken away, and not the one that is being told right now.
+    /// True if the observer belongs to this simulation, was not removed, and is not handling an event right now.
     pub fn contains<O: Observer>(&self, id: ObserverId<O>) -> bool {
         id.manager == self.sim.serial && self.sim.seat_of(id).is_ok()
     }
 
-    /// True if events of a type will be published, by what one of the observers belongs to ([`Observer::publishes`]): recorders
-    /// look here when they begin.
+    /// True if an observer announces events of type `E` ([`Observer::publishes`]). Recorders check this when they
+    /// start.
     pub fn is_published<E: Any>(&self) -> bool {
         let mut observers = self.sim.observers.seats.iter().filter_map(|seat| seat.observer.as_ref());
         observers.any(|observer| observer.publishes(TypeId::of::<E>()))
     }
 
-    /// Physics steps that [`update`](SimulationManager::update) has done since the simulation was made, whatever was reset meanwhile: what
-    /// an observer counts by.
+    /// Number of physics steps done by [`update`](SimulationManager::update) since the simulation was created. Resets
+    /// do not change it, so observers can schedule by it.
     pub fn steps(&self) -> u64 {
         self.sim.observers.steps
     }
 }
 
-/// Observers of a simulation, to add, change and remove; see [`SimulationManager::observers_mut`].
+/// Observers of a simulation, for adding, changing and removing; see [`SimulationManager::observers_mut`].
 #[derive(Debug)]
 pub struct ObserversMut<'a> {
     sim: &'a mut SimulationManager,
@@ -173,14 +174,14 @@ impl<'a> ObserversMut<'a> {
         Self { sim }
     }
 
-    /// Publishes an event of any type to all observers ([`Observer::receive`]). The simulation keeps nothing of it.
+    /// Publishes an event of any type to all observers ([`Observer::receive`]). The simulation does not store it.
     pub fn publish<E: Any>(self, event: &E) {
         self.sim.tell_each(|observer, sim| observer.receive(sim, event));
     }
 
-    /// Adds an observer, which receives the events from now on.
+    /// Adds an observer, which receives all events from now on.
     pub fn add<O: Observer>(&mut self, observer: O) -> ObserverId<O> {
-        // Earlier writes are reported to the observers that were there.
+        // Earlier writes are reported to the existing observers only.
         self.sim.tell_written();
         let number = self.sim.observers.next;
         self.sim.observers.next += 1;
@@ -191,10 +192,10 @@ impl<'a> ObserversMut<'a> {
     /// Removes an observer and returns it, after reporting earlier writes to it.
     ///
     /// # Errors
-    /// It was taken away before, or is the one that is being told right now.
+    /// The observer was removed before, or is handling an event right now.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn remove<O: Observer>(&mut self, id: ObserverId<O>) -> Result<O> {
         self.sim.seat_of(id)?;
@@ -205,13 +206,13 @@ impl<'a> ObserversMut<'a> {
         any.and_then(|any| any.downcast().ok()).map(|observer| *observer).ok_or(Error::NoObserver)
     }
 
-    /// An observer, to change.
+    /// Returns an observer for changes.
     ///
     /// # Errors
     /// As [`Observers::get`].
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn get<O: Observer>(self, id: ObserverId<O>) -> Result<&'a mut O> {
         let index = self.sim.seat_of(id)?;
@@ -229,7 +230,8 @@ impl SimulationManager {
         place.filter(|&i| self.observers.seats[i].observer.is_some()).ok_or(Error::NoObserver)
     }
 
-    /// Steps `steps` times, or fewer until an observer is due, and tells those that are due. Gives the number of steps done.
+    /// Does `steps` steps, or fewer until an observer is due, and notifies the due observers. Returns the number of
+    /// steps done.
     pub(crate) fn step_observed(&mut self, steps: u32, mut step: impl FnMut(&mut Self, u32)) -> u32 {
         if self.observers.seats.is_empty() {
             step(self, steps);
@@ -260,7 +262,7 @@ impl SimulationManager {
         }
     }
 
-    /// Tells all observers of something that happened.
+    /// Notifies all observers of an event.
     pub(crate) fn tell_all(&mut self, moment: &Moment) {
         self.tell_each(|observer, sim| observer.observe(sim, moment));
     }
@@ -273,11 +275,11 @@ impl SimulationManager {
     }
 
     fn tell(&mut self, number: u64, tell: impl FnOnce(&mut dyn Observer, &mut Self)) {
-        // One that is being told hears of nothing that happens inside.
+        // An observer that is handling an event receives no event of its own changes.
         let Some(seat) = self.observers.seats.iter_mut().find(|seat| seat.number == number) else { return };
         let Some(mut observer) = seat.observer.take() else { return };
         tell(observer.as_mut(), self);
-        // It may have been taken away meanwhile: then it is dropped here.
+        // An observer that was removed meanwhile is dropped here.
         if let Some(seat) = self.observers.seats.iter_mut().find(|seat| seat.number == number) {
             seat.observer = Some(observer);
         }

@@ -1,8 +1,9 @@
-//! Rollouts: what would happen under given controls, for planners that try many and keep one.
+//! Rollouts: states that result from given controls, for sampling-based planners.
 //!
-//! As MuJoCo's own `rollout`: initial states and controls in, states out, many rows in parallel. A rollout steps copies of
-//! the environments on threads of its own: the environments and their sensors stay as they are, to the last bit. What it
-//! gives is what stepping by hand would give: `set_qpos_target` and `set_ctrl` with the controls of a step, `update(1)`, read.
+//! The counterpart of MuJoCo's `rollout`: initial states and controls in, states out, many rows in parallel. A rollout
+//! steps copies of the environments on its own threads, so environments and sensors keep their state, bit for bit. The
+//! result equals that of stepping by hand: `set_qpos_target` and `set_ctrl` with the controls of a step, `update(1)`,
+//! read.
 
 use crate::drive::table::DriveState;
 use crate::env::{Env, EnvState, EnvStatus};
@@ -15,30 +16,30 @@ use kinetoscope_mujoco as mj;
 use ndarray::{Array3, ArrayView2, ArrayView3, ArrayViewMut2, AsArray, Ix3};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What came of a [rollout](SimulationManager::rollout). Row k is the k-th environment that was asked for.
+/// Result of a [rollout](SimulationManager::rollout). Row k belongs to the k-th selected environment.
 #[derive(Clone, Debug)]
 pub struct Rollout {
-    /// Positions, then velocities, after every step, shape (N, T, nq + nv); the columns are called as
-    /// [`state_names`](crate::Entities::state_names) says. A row that diverges stays in its last good state.
+    /// Positions, then velocities, after every step, shape (N, T, nq + nv).
+    /// [`state_names`](crate::Entities::state_names) has the column names. A diverged row repeats its last valid state.
     pub states: Array3<f64>,
-    /// The states at the end; [`restore`](SimulationManager::restore) makes them the present ones.
+    /// Final states; [`restore`](SimulationManager::restore) copies them to the environments.
     pub end: Snapshot,
-    /// Rows that diverged, each with the reason.
+    /// Diverged rows, each with the reason.
     pub diverged: Vec<(usize, String)>,
 }
 
-/// What a column of controls does.
+/// Effect of one column of the controls.
 #[derive(Clone, Copy, Debug)]
 enum Column {
-    /// The target of a drive, clamped to the limits that targets have in the environment: those of the state it is in.
+    /// Position target of a drive, clamped to the target range in the row's initial state.
     Target { drive: usize },
-    /// Nothing: the joint follows another, or has no drive.
+    /// No effect: the joint follows another joint or has no drive.
     Ignored,
-    /// A control of an MJCF part.
+    /// Control of an actuator of an attached MJCF file.
     Control { place: usize },
 }
 
-/// One row of a rollout before it starts.
+/// One row of a rollout before its first step.
 struct Row {
     env: usize,
     model: mj::Model,
@@ -46,7 +47,7 @@ struct Row {
     start: EnvState,
 }
 
-/// The columns of controls: joints of all robots, then actuators of all MJCF parts.
+/// Effects of all columns: joints of all robots, then actuators of all attached MJCF files.
 fn columns(simulation: &Simulation) -> Vec<Column> {
     let joints = simulation.robots.iter().flat_map(|robot| &robot.joints);
     let target = |drive| Column::Target { drive };
@@ -74,13 +75,13 @@ fn control(env: &mut Env, columns: &[Column], values: impl Iterator<Item = f64>)
     }
 }
 
-/// The environment's model, in which none of its welds hold: a row has those of its own start.
+/// Model of the environment without attached welds; a row attaches the welds of its own initial state.
 fn without_welds(env: &Env) -> mj::Model {
     let model = env.data().model();
     if env.welds().is_empty() { model.clone() } else { model.with_welds(&[]) }
 }
 
-/// Does one row in `env`, whose model is the row's.
+/// Steps one row in `env`, which has the model of the row.
 fn roll(
     env: &mut Env,
     row: &Row,
@@ -105,22 +106,25 @@ fn roll(
 }
 
 impl SimulationManager {
-    /// Simulates copies of environments under `controls`, shape (N, T, columns of [`control_names`](crate::Entities::control_names)): N rows, each
-    /// with the controls of T physics steps. The controls of a robot are its position targets \[rad or m\], clamped to the
-    /// limits of the row's initial state as [`set_qpos_target`](crate::RobotMut::set_qpos_target) does (columns of joints that follow others or have no drive are
-    /// ignored); those of an MJCF part are as [`set_ctrl`](crate::MjcfPartMut::set_ctrl) takes them. Other targets and
-    /// inputs stay as they are in the initial state.
+    /// Simulates copies of environments under `controls`, shape (N, T, C): N rows with the controls of T physics steps.
+    /// [`control_names`](crate::Entities::control_names) has the names of the C columns.
     ///
-    /// Row k is done in the k-th of `env_ids` (all environments where `None`), with its model; an environment may be named
-    /// many times, to try many controls from its state. A single row of controls is for all. Rows start in the states of
-    /// `start` (the k-th in the k-th, a single one for all), or in the present ones.
+    /// The controls of a robot are position targets \[rad or m\], clamped to the limits in the row's initial state, as
+    /// [`set_qpos_target`](crate::RobotMut::set_qpos_target) does. Columns of joints that follow others or have no
+    /// drive are ignored. The controls of an attached MJCF file are those of
+    /// [`set_ctrl`](crate::MjcfPartMut::set_ctrl). Other targets and inputs stay as they are in the initial state.
     ///
-    /// The environments stay as they are, to the last bit: rollouts are done in copies. To go on from where they ended,
-    /// [`restore`](Self::restore) [`Rollout::end`].
+    /// Row k runs in a copy of the k-th of `env_ids` (all environments for `None`), with its model. An environment can
+    /// be named several times, to try several controls from its state. A single row of controls is used for all
+    /// environments. Row k starts in the k-th state of `start`, or in the current state of its environment for `None`.
+    /// A single state in `start` is used for all rows.
+    ///
+    /// The environments keep their state, bit for bit. To continue from the end of a rollout,
+    /// [`restore`](Self::restore) its [`Rollout::end`].
     ///
     /// # Errors
-    /// Wrong shape, a control that is not finite, an environment that does not exist, a snapshot of another scene or with
-    /// another number of states, or no memory for a copy.
+    /// The shape is wrong, a control is not finite, an environment does not exist, the snapshot belongs to another
+    /// scene or has another number of states, or the memory for a copy cannot be allocated.
     pub fn rollout<'c>(
         &self,
         controls: impl AsArray<'c, f64, Ix3>,
@@ -139,7 +143,7 @@ impl SimulationManager {
         let work = Mutex::new(rows.iter().zip(states.outer_iter_mut()).zip(&mut results).enumerate());
         let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
         let run = || -> Result<()> {
-            // With the model it was made of: a row with welds leaves it with a model of its own.
+            // With the model the copy was made of: a row with welds changes the model of the copy.
             let mut copy: Option<(&mj::Model, Env)> = None;
             while let Some((k, ((row, states), result))) = next() {
                 let mut env = match copy.take().filter(|(model, _)| model.is(&row.model)) {
@@ -148,7 +152,7 @@ impl SimulationManager {
                 };
                 let mine = controls.index_axis(ndarray::Axis(0), if controls.shape()[0] == 1 { 0 } else { k });
                 *result = Some(roll(&mut env, row, &columns, substeps, mine, states));
-                // A row that needed more room leaves a copy with larger buffers: the next one starts with small ones.
+                // A row that needed larger buffers drops its copy, so that the next row starts with small ones.
                 copy = (env.growths() == 0).then_some((&row.model, env));
             }
             Ok(())
@@ -188,7 +192,7 @@ impl SimulationManager {
 
     fn rows(&self, envs: &[usize], start: Option<&Snapshot>) -> Result<Vec<Row>> {
         let states = start.map(|start| start.states_for(envs.len(), &self.simulation)).transpose()?;
-        // One for all rows of an environment, so that they share a copy.
+        // One model for all rows of an environment, so that they share a copy.
         let mut models: Vec<Option<mj::Model>> = vec![None; self.num_envs()];
         let row = |(k, &env): (usize, &usize)| {
             self.simulation.batch.read(env, |here| {

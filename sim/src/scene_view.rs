@@ -1,4 +1,4 @@
-//! The simulation as viewers and renderers see it.
+//! Render scene, visual state and contacts, for viewers and renderers.
 
 use crate::body_pose::BodyFrame;
 use crate::capture::{Capture, body_velocity};
@@ -21,18 +21,18 @@ use nalgebra::Vector3;
 use std::sync::Arc;
 
 impl SimulationManager {
-    /// The simulation as viewers and renderers see it.
+    /// Access for viewers and renderers: visual scene, markers, body motion.
     pub fn scene(&self) -> SceneView<'_> {
         SceneView::new(self)
     }
 
-    /// The simulation as viewers and renderers see it, to change.
+    /// Access for viewers and renderers that change the simulation.
     pub fn scene_mut(&mut self) -> SceneViewMut<'_> {
         SceneViewMut::new(self)
     }
 }
 
-/// The simulation as viewers and renderers see it; see [`SimulationManager::scene`].
+/// Access for viewers and renderers; see [`SimulationManager::scene`].
 #[derive(Clone, Copy, Debug)]
 pub struct SceneView<'a> {
     sim: &'a SimulationManager,
@@ -43,63 +43,65 @@ impl<'a> SceneView<'a> {
         Self { sim }
     }
 
-    /// The MJCF that is being stepped.
+    /// MJCF document of the running simulation.
     pub fn mjcf(&self) -> &'a str {
         &self.sim.simulation.xml
     }
 
-    /// Meaning of each number of the mask channel of cameras, the same in every environment. Numbers stay when more
-    /// is added.
+    /// Entity and link of each value in the mask channel of cameras, the same in all environments. Ids never change
+    /// when entities are added.
     pub fn mask_ids(&self) -> &'a [MaskId] {
         self.sim.simulation.mask_ids()
     }
 
-    /// Numbers of the mask channel by instance, link and semantic class, with labels by pattern: turns masks into
-    /// segmented pictures, and finds boxes around things. Make it anew when something was added.
+    /// Segmentation of mask images by instance, link and semantic class, with labels by pattern. Also computes bounding
+    /// boxes. Rebuild it after entities were added.
     ///
     /// # Errors
-    /// A pattern that is no regular expression or matches nothing, and something that two patterns match.
+    /// A pattern is not a regular expression or matches nothing, or two patterns match the same item.
     pub fn segmentation(&self, cfg: &SegmentationCfg) -> Result<Segmentation> {
         let things = self.mask_ids().iter().map(Thing::from);
         Segmentation::new(things, cfg).map_err(|error| Error::Labels(Box::new(error)))
     }
 
-    /// Markers of the last measurements of all sensors, for [`Still::overview`](crate::Still::overview): those that are
-    /// configured to ([`SensorCfg::debug_vis`](kinetoscope_sensors::SensorCfg::debug_vis)), or told to since.
+    /// Markers of the last measurements of all sensors with enabled markers, for
+    /// [`Still::overview`](crate::Still::overview). [`SensorCfg::debug_vis`](kinetoscope_sensors::SensorCfg::debug_vis)
+    /// or [`SceneViewMut::set_debug_vis`] enables them.
     pub fn markers(&self) -> Vec<(EnvId, Marker)> {
         self.sim.sensors.markers(&self.sim.simulation, None)
     }
 
-    /// The same without those of a sensor: what is drawn into the colours of a camera that draws markers.
+    /// As [`markers`](Self::markers), without those of one sensor: the markers that a camera with visible markers
+    /// renders.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn markers_beside<S: Sensor>(&self, id: SensorId<S>) -> Vec<(EnvId, Marker)> {
         self.sim.sensors.markers(&self.sim.simulation, Some(self.sim.sensors.index_of(id)))
     }
 
-    /// True if the markers of a sensor are among [`markers`](Self::markers).
+    /// True if the markers of a sensor are enabled.
     ///
     /// # Errors
-    /// There is no such sensor.
+    /// The sensor does not exist.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn debug_vis<S: Sensor>(&self, id: SensorId<S>) -> Result<bool> {
         self.sim.sensors.debug_vis(self.sim.sensors.index_of(id))
     }
 
-    /// The point of view that was set last; `None` before the first.
+    /// The point of view that was set last; `None` if none was set.
     pub fn viewpoint(&self) -> Option<Viewpoint> {
         self.sim.viewpoint
     }
 
-    /// How a body moves in an environment; `body` is its place in [`body_names`](crate::Entities::body_names).
+    /// Motion of a body in an environment; `body` is its index in [`body_names`](crate::Entities::body_names).
     ///
     /// # Errors
-    /// There is no such environment or body.
+    /// The environment or the body does not exist.
     pub fn body_motion(&self, env: EnvId, body: usize) -> Result<BodyMotion> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let frame = frame_of(self.sim, body)?;
@@ -117,7 +119,7 @@ impl<'a> SceneView<'a> {
     }
 }
 
-/// The simulation as viewers and renderers see it, to change; see [`SimulationManager::scene_mut`].
+/// Access for viewers and renderers that change the simulation; see [`SimulationManager::scene_mut`].
 #[derive(Debug)]
 pub struct SceneViewMut<'a> {
     sim: &'a mut SimulationManager,
@@ -128,13 +130,13 @@ impl<'a> SceneViewMut<'a> {
         Self { sim }
     }
 
-    /// MuJoCo's model and the data of one environment, to write: for what this API does not have. A forward pass follows. A state
-    /// that is not finite is not kept: the environment diverges, in the state before.
+    /// Writes MuJoCo's data of one environment directly, for quantities outside this API. A forward pass follows. A
+    /// non-finite state is rejected: the environment diverges, in the state before the write.
     ///
-    /// `qfrc_applied` and the controls of drives are overwritten in every step.
+    /// Every step overwrites `qfrc_applied` and the controls of drives.
     ///
     /// # Errors
-    /// There is no such environment.
+    /// The environment does not exist.
     pub fn with_mujoco<T>(&mut self, env: EnvId, write: impl FnOnce(&mut mj::Data) -> T) -> Result<T> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let mut result = None;
@@ -143,16 +145,16 @@ impl<'a> SceneViewMut<'a> {
         Ok(result.expect("the closure was called"))
     }
 
-    /// The visual scene, made at the first call, which reads the visual meshes. Meshes that cannot be read are left out, with a
-    /// diagnostic.
+    /// Returns the visual scene. The first call builds it and reads the visual meshes; unreadable meshes are left out
+    /// with a diagnostic.
     pub fn visible(&mut self) -> Arc<Visible> {
         self.sim.visible()
     }
 
-    /// Copies what there is to see of an environment to `look`, whose memory is used again.
+    /// Copies the visual state of an environment to `look`, whose memory is reused.
     ///
     /// # Errors
-    /// There is no such environment.
+    /// The environment does not exist.
     pub fn look(&mut self, env: EnvId, look: &mut Look) -> Result<()> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let visible = self.sim.visible();
@@ -181,20 +183,22 @@ impl<'a> SceneViewMut<'a> {
         Ok(())
     }
 
-    /// The scene that is drawn of an environment, in the order of [`Look::instances`]: the same value for all whose sizes and colours are not
-    /// their own, until something is added. Shapes that [change](kinetoscope_scene::Instance::deforms) are not those of now.
+    /// Render scene of an environment, in the order of [`Look::instances`]. All environments without own sizes or
+    /// colors share one scene until an entity is added. Shapes that [deform](kinetoscope_scene::Instance::deforms) are
+    /// not updated to the current time.
     ///
     /// # Errors
-    /// There is no such environment.
+    /// The environment does not exist.
     pub fn scene_of(&mut self, env: EnvId) -> Result<Arc<RenderScene>> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let visible = self.sim.visible();
         Ok(self.sim.own_scene(env).0.clone().unwrap_or_else(|| Arc::clone(visible.scene())))
     }
 
-    /// The contacts of environments as they are now, with the forces that the engine solves for this instant: a list for each
-    /// of `env_ids` (all where `None`). Bodies are numbered as in [`body_names`](crate::Entities::body_names). An environment that
-    /// diverged has none. Nothing that a sensor measures changes, nor any later step.
+    /// Contacts of environments at the current time, with the forces that the engine solves for it: one list for each
+    /// of `env_ids` (all environments for `None`). Bodies are indexed as in
+    /// [`body_names`](crate::Entities::body_names). A diverged environment has no contacts. Measurements of sensors and
+    /// later steps are not affected.
     ///
     /// # Errors
     /// An environment does not exist.
@@ -209,16 +213,17 @@ impl<'a> SceneViewMut<'a> {
         Ok(env_list(env_ids, self.sim.cfg.num_envs)?.into_iter().map(of_env).collect())
     }
 
-    /// Pulls at a body with forces, together: each is a point of the environment \[m\], as the body is now, and the force there
-    /// \[N\] in the axes of the environment. They act from the next step on, until the body is pulled otherwise, the environment is
-    /// reset, or something is added to the simulation; none ends it. They stay as they are while the body moves: who means a
-    /// spring pulls anew in every step. What [`RobotMut::set_external_wrench`](crate::RobotMut::set_external_wrench) applies acts
-    /// besides.
+    /// Applies forces to a body. Each is a point \[m\] and a force at that point \[N\], both in the frame of the
+    /// environment, with the body in its current pose. `body` is its index in
+    /// [`body_names`](crate::Entities::body_names).
     ///
-    /// `body` is its place in [`body_names`](crate::Entities::body_names).
+    /// The forces act from the next step on, until other forces are set for the body, the environment is reset, or an
+    /// entity is added. An empty list ends them. Their resultant stays constant in the world frame while the body
+    /// moves; to model a spring, set it again in every step. Wrenches of
+    /// [`RobotMut::set_external_wrench`](crate::RobotMut::set_external_wrench) act in addition.
     ///
     /// # Errors
-    /// There is no such environment or body, or a number is not finite; then nothing has changed.
+    /// The environment or the body does not exist, or a number is not finite; then nothing changes.
     pub fn pull(&mut self, env: EnvId, body: usize, forces: &[([f64; 3], [f64; 3])]) -> Result<()> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let mujoco_body = frame_of(self.sim, body)?.body;
@@ -242,12 +247,12 @@ impl<'a> SceneViewMut<'a> {
         Ok(())
     }
 
-    /// Sets the point of view of windows, browser views and screenshots, those that are open and those to come: from `eye` to
-    /// `target` in the frame of the overview \[m\], up is +z. Users can move on from there; Home brings it back. Isaac Lab's
-    /// `set_camera_view`.
+    /// Sets the point of view of windows, browser views and screenshots, open and future ones: from `eye` to `target`
+    /// in the frame of the overview \[m\], +z up. Users can move away from it; the Home key returns to it. Named as in
+    /// Isaac Lab.
     ///
     /// # Errors
-    /// The points are the same, or not finite; the view stays then.
+    /// The points are equal or not finite; then the view stays.
     pub fn set_camera_view(&mut self, eye: [f64; 3], target: [f64; 3]) -> Result<()> {
         let distance = eye.iter().zip(&target).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
         if !(distance.is_finite() && distance > 1e-9) {
@@ -262,27 +267,26 @@ impl<'a> SceneViewMut<'a> {
         Ok(())
     }
 
-    /// Shows the markers of a sensor from now on, or does not: whatever its configuration said, and nothing of what it measures
-    /// changes.
+    /// Enables or disables the markers of a sensor, regardless of its configuration. Measurements are not affected.
     ///
     /// # Errors
-    /// There is no such sensor.
+    /// The sensor does not exist.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn set_debug_vis<S: Sensor>(&mut self, id: SensorId<S>, shown: bool) -> Result<()> {
         self.sim.sensors.set_debug_vis(self.sim.sensors.index_of(id), shown)
     }
 }
 
-/// The frame of a body.
+/// Frame of a body on the body axis.
 fn frame_of(sim: &SimulationManager, body: usize) -> Result<&BodyFrame> {
     let bodies = sim.simulation.plan.bodies();
     bodies.get(body).ok_or(Error::UnknownIndex { what: "body", index: body, count: bodies.len() })
 }
 
-/// Axes of joints that turn or slide.
+/// Axes of all hinge and slide joints.
 fn axes(data: &Data) -> impl Iterator<Item = JointAxis> {
     let anchors = data.xanchor().as_chunks::<3>().0.iter().zip(data.xaxis().as_chunks::<3>().0);
     anchors.zip(data.model().jnt_type()).filter_map(|((anchor, axis), kind)| {

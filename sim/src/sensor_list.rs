@@ -1,4 +1,4 @@
-//! The sensors of a simulation: built from their configurations, ticked after every step, read by typed handles.
+//! The sensors of a simulation: built from configurations, updated after steps, read through typed handles.
 
 use crate::capture::Capture;
 use crate::contents::check_usable;
@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use std::marker::PhantomData;
 use std::sync::Arc;
 
-/// Handle of a sensor; valid for the manager that made it.
+/// Handle of a sensor of type `S`, valid for the manager that created it.
 pub struct SensorId<S> {
     manager: u64,
     index: usize,
@@ -23,7 +23,7 @@ pub struct SensorId<S> {
 }
 
 impl<S> SensorId<S> {
-    /// Its place in the list.
+    /// Index of the sensor in the list.
     pub(crate) fn index(self) -> usize {
         self.index
     }
@@ -62,16 +62,16 @@ type Builder = Box<dyn Fn(&SensorContext) -> Result<Box<dyn Sensor>, SensorError
 struct Entry {
     uid: String,
     requires: Requires,
-    /// Whether its markers are shown.
+    /// True if the markers of the sensor are enabled.
     debug_vis: bool,
     lazy: Option<Schedule>,
     build: Builder,
-    /// The sensor; why there is none, where it could not be built again.
+    /// The sensor, or the error of its last rebuild.
     slot: Result<SensorSlot, SensorError>,
 }
 
 impl Entry {
-    /// The sensor, unless it is known that it is not asked any more.
+    /// The sensor, unless it is known to have failed.
     fn running(&self) -> Option<&SensorSlot> {
         self.slot.as_ref().ok().filter(|slot| !slot.has_failed())
     }
@@ -81,20 +81,20 @@ impl Entry {
     }
 }
 
-/// All sensors and the state they read.
+/// All sensors and the state that they read.
 #[derive(Default)]
 pub(crate) struct SensorList {
-    /// The manager whose sensors they are.
+    /// Serial number of the manager.
     manager: u64,
     entries: Vec<Entry>,
     state: SceneState,
-    /// Which of them the current steps make due.
+    /// Flags of the sensors that are due after the current steps.
     due: Vec<bool>,
-    /// The step of every environment, [`kinetoscope_sensors::Phases::STANDS`] for one that is put aside.
+    /// Step count of every environment; [`kinetoscope_sensors::Phases::STANDS`] for a diverged environment.
     clocks: Vec<u64>,
-    /// Environments whose state was written to since somebody asked.
+    /// Environments with a written state since the last [`take_written`](Self::take_written).
     written: BTreeSet<usize>,
-    /// MuJoCo steps in a physics step.
+    /// MuJoCo steps per physics step.
     substeps: u32,
 }
 
@@ -105,7 +105,7 @@ impl std::fmt::Debug for SensorList {
 }
 
 impl SensorList {
-    /// No sensors yet, in a simulation of `substeps` MuJoCo steps in a physics step.
+    /// Creates an empty list for a simulation with `substeps` MuJoCo steps per physics step.
     pub(crate) fn new(manager: u64, substeps: u32) -> Self {
         Self { manager, substeps, ..Self::default() }
     }
@@ -114,12 +114,12 @@ impl SensorList {
         self.entries.is_empty()
     }
 
-    /// What all sensors together need to see.
+    /// Union of the quantities that all sensors need.
     pub(crate) fn requires(&self) -> Requires {
         self.entries.iter().fold(Requires::NONE, |sum, e| sum | e.requires)
     }
 
-    /// Checks that a sensor can be called `uid` and gets what it needs.
+    /// Checks that the name `uid` is free and usable, and that the needed quantities are available.
     pub(crate) fn check(&self, uid: &str, requires: Requires) -> Result<()> {
         if self.entries.iter().any(|e| e.uid == uid) {
             return Err(Error::DuplicateUid(uid.into()));
@@ -133,7 +133,7 @@ impl SensorList {
         }
     }
 
-    /// Builds a sensor, checked before, and adds it; on an error nothing was added.
+    /// Builds a checked sensor and adds it. On an error nothing is added.
     pub(crate) fn add<C>(
         &mut self,
         uid: String,
@@ -164,7 +164,7 @@ impl SensorList {
         Ok(SensorId { manager: self.manager, index: self.entries.len() - 1, sensor: PhantomData })
     }
 
-    /// Builds all sensors anew for a simulation that was compiled again; their histories start again.
+    /// Rebuilds all sensors for a newly compiled simulation; their histories restart.
     pub(crate) fn rebuild(&mut self, simulation: &mut Simulation, context: &SensorContext) {
         let all = self.requires();
         let envs: Vec<usize> = (0..context.num_envs).collect();
@@ -179,7 +179,8 @@ impl SensorList {
         self.tell(simulation, |_| true, |slot, state| slot.reset(&envs, state));
     }
 
-    /// Tells those sensors that are `chosen` of the state: first those that measure, then those that draw what these show.
+    /// Passes the state to the `chosen` sensors: first to those that measure, then to those that render the markers of
+    /// the others.
     fn tell(
         &mut self,
         simulation: &Simulation,
@@ -198,12 +199,12 @@ impl SensorList {
                 entries[index].slot.iter_mut().for_each(|slot| act(slot, state));
             }
         }
-        // Of the last one that asked for them.
+        // The markers belong to the last sensor that rendered them.
         self.state.markers = None;
     }
 
-    /// Does as many of `steps` physics steps as until a sensor is due, at least 1; those that are due then measure. Gives
-    /// the number of steps done.
+    /// Does `steps` physics steps, or fewer until a sensor is due, at least 1. Updates the due sensors. Returns the
+    /// number of steps done.
     pub(crate) fn advance(&mut self, simulation: &mut Simulation, steps: u32) -> u32 {
         gather::gather_clocks(simulation, self.substeps, &mut self.clocks);
         let now = &self.clocks;
@@ -231,20 +232,20 @@ impl SensorList {
         block
     }
 
-    /// After a reset of `env_ids`.
+    /// Updates the sensors after a reset of `env_ids`.
     pub(crate) fn reset(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
         self.renew(simulation, env_ids);
         self.tell(simulation, |_| true, |slot, state| slot.reset(env_ids, state));
     }
 
-    /// After somebody wrote to the state of `env_ids`.
+    /// Updates the sensors after a write to the state of `env_ids`.
     pub(crate) fn refresh(&mut self, env_ids: &[usize], simulation: &mut Simulation) {
         self.note_written(env_ids);
-        // Whoever reads makes up for a forward pass, for which there is no need without sensors.
+        // A read runs the deferred forward pass; without sensors it is not needed here.
         if self.entries.is_empty() {
             return;
         }
-        // One that is put aside keeps what was measured last.
+        // A diverged environment keeps its last measurements.
         let runs = |env: &usize| simulation.batch.read(*env, |env| *env.status() == EnvStatus::Running);
         let running: Vec<usize> = env_ids.iter().copied().filter(runs).collect();
         if running.is_empty() {
@@ -254,30 +255,30 @@ impl SensorList {
         self.tell(simulation, |_| true, |slot, state| slot.refresh(&running, state));
     }
 
-    /// Remembers that somebody wrote to the state of `env_ids`.
+    /// Marks the state of `env_ids` as written.
     pub(crate) fn note_written(&mut self, env_ids: &[usize]) {
         self.written.extend(env_ids);
     }
 
-    /// The environments that were written to since this was asked last.
+    /// Returns the environments with a written state since the last call.
     pub(crate) fn take_written(&mut self) -> Vec<EnvId> {
         std::mem::take(&mut self.written).into_iter().map(EnvId).collect()
     }
 
-    /// Gathers the state after `env_ids` were written to.
+    /// Gathers the state after a write to `env_ids`.
     fn renew(&mut self, simulation: &mut Simulation, env_ids: &[usize]) {
         let all = self.requires();
         solve(simulation, all, env_ids);
         gather::gather(simulation, self.substeps, all, &mut self.state);
     }
 
-    /// What they show of their last measurements, without what the sensor at a place in the list does.
+    /// Markers of the last measurements of all sensors with enabled markers, except the sensor at index `own`.
     pub(crate) fn markers(&self, simulation: &Simulation, own: Option<usize>) -> Vec<(EnvId, Marker)> {
         let markers = self.markers_beside(simulation, own).into_iter().enumerate();
         markers.flat_map(|(env, markers)| markers.into_iter().map(move |marker| (EnvId(env), marker))).collect()
     }
 
-    /// The same by environment, without those of the sensor at a place in the list.
+    /// The same markers, grouped by environment.
     fn markers_beside(&self, simulation: &Simulation, own: Option<usize>) -> Vec<Vec<Marker>> {
         let others = self.entries.iter().enumerate().filter(|(index, entry)| entry.debug_vis && Some(*index) != own);
         let shown: Vec<&dyn Sensor> = others.filter_map(|(_, entry)| entry.slot.as_ref().ok()?.sensor().ok()).collect();
@@ -295,12 +296,12 @@ impl SensorList {
         markers
     }
 
-    /// Whether the markers of a sensor are shown.
+    /// True if the markers of a sensor are enabled.
     pub(crate) fn debug_vis(&self, index: usize) -> Result<bool> {
         self.entry(index).map(|entry| entry.debug_vis)
     }
 
-    /// Shows the markers of a sensor, or does not.
+    /// Enables or disables the markers of a sensor.
     pub(crate) fn set_debug_vis(&mut self, index: usize, shown: bool) -> Result<()> {
         self.entry(index)?;
         self.entries.get_mut(index).into_iter().for_each(|entry| entry.debug_vis = shown);
@@ -312,18 +313,18 @@ impl SensorList {
         self.entries.get(index).ok_or(Error::UnknownIndex { what: "sensor", index, count })
     }
 
-    /// Their names, in the order in which they were added.
+    /// Uids of all sensors, in insertion order.
     pub(crate) fn uids(&self) -> impl Iterator<Item = &str> {
         self.entries.iter().map(|entry| entry.uid.as_str())
     }
 
-    /// The sensor of that name, whatever its type.
+    /// The sensor `uid` as a trait object.
     pub(crate) fn called(&self, uid: &str) -> Result<&dyn Sensor> {
         let entry = self.entry_called(uid)?;
         entry.slot.as_ref().and_then(SensorSlot::sensor).map_err(|fault| entry.fault(fault))
     }
 
-    /// Physics steps until the next measurement of the sensor of that name.
+    /// Physics steps until the sensor `uid` measures next, at least 1; `u64::MAX` for a failed sensor.
     pub(crate) fn due_in(&self, uid: &str, simulation: &Simulation) -> Result<u64> {
         let entry = self.entry_called(uid)?;
         let mut clocks = Vec::with_capacity(simulation.batch.num_envs());
@@ -339,17 +340,17 @@ impl SensorList {
         })
     }
 
-    /// The place of a sensor in the list.
+    /// Index of a sensor in the list.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub(crate) fn index_of<S>(&self, id: SensorId<S>) -> usize {
         assert!(id.manager == self.manager, "this handle is of another SimulationManager");
         id.index
     }
 
-    /// The sensors of a type, with their names.
+    /// Uids and handles of all sensors of type `S`.
     pub(crate) fn ids<S: Sensor>(&self) -> Vec<(String, SensorId<S>)> {
         let is = |entry: &Entry| {
             let sensor = entry.slot.as_ref().ok().and_then(|slot| slot.sensor().ok());
@@ -361,10 +362,10 @@ impl SensorList {
         all.map(|(index, entry)| (entry.uid.clone(), id(index))).collect()
     }
 
-    /// The sensor of a handle.
+    /// Returns the sensor of a handle.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub(crate) fn get<S: Sensor>(&self, id: SensorId<S>) -> Result<&S> {
         let entry = self.entry(self.index_of(id))?;
@@ -377,10 +378,10 @@ impl SensorList {
         })
     }
 
-    /// The sensor of a handle, to change.
+    /// Returns the sensor of a handle for changes.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub(crate) fn get_mut<S: Sensor>(&mut self, id: SensorId<S>) -> Result<&mut S> {
         self.get(id)?;
@@ -395,16 +396,16 @@ impl SensorList {
     }
 }
 
-/// What must be captured inside the step for those who require `requires`.
+/// Quantities to capture inside the step for sensors that require `requires`; `None` if no quantity needs a capture.
 fn capture(simulation: &Simulation, requires: Requires) -> Option<Capture> {
     let fields = requires.intersection(Requires::SOLVED);
     (!fields.is_empty()).then(|| Capture { plan: Arc::clone(&simulation.plan), fields })
 }
 
-/// Solves and captures the present state of `envs`, where somebody requires what is solved.
+/// Solves and captures the current state of `envs`, if `requires` contains a solved quantity.
 fn solve(simulation: &mut Simulation, requires: Requires, envs: &[usize]) {
     let fields = requires.intersection(Requires::SOLVED);
-    // MuJoCo's own sensors of what is solved are evaluated where it is solved.
+    // MuJoCo evaluates its own sensors of solved quantities in the same solve.
     if !fields.is_empty() || requires.contains(Requires::SENSORDATA) {
         simulation.batch.capture_present(envs, Capture { plan: Arc::clone(&simulation.plan), fields });
     }

@@ -1,69 +1,69 @@
-//! Which part of the environments this process has, where several processes simulate together.
+//! Distribution of the environments over several processes.
 
 use serde::{Deserialize, Serialize};
 
-/// One of several processes that simulate together, each with as many environments as
-/// [`num_envs`](crate::SimulationManagerCfg::num_envs) says.
+/// Rank of this process among several that simulate together, each with
+/// [`num_envs`](crate::SimulationManagerCfg::num_envs) environments.
 ///
-/// Environments are counted over all processes: environment `i` of process `rank` is number `rank * num_envs + i`, its global
-/// index. Random numbers, of noise and of properties, are keyed by that, so that two processes of four environments
-/// give, bit for bit, what one of eight gives. [`EnvId`](crate::EnvId) counts the environments of one process, and so do
-/// `env_origins` and everything else.
+/// Environments are numbered over all processes: environment `i` of process `rank` has the global index
+/// `rank * num_envs + i`. Random numbers of noise and properties are keyed by the global index, so two processes of
+/// four environments give, bit for bit, the results of one process of eight. [`EnvId`](crate::EnvId) and `env_origins`
+/// count the environments of one process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Shard {
-    /// Number of this process, from 0.
+    /// Rank of this process, from 0.
     pub rank: usize,
     /// Number of processes.
     pub world: usize,
 }
 
 impl Default for Shard {
-    /// The only process.
+    /// A single process.
     fn default() -> Self {
         Self { rank: 0, world: 1 }
     }
 }
 
-/// Environment variables that launchers set: number of the process, number of processes. What launches the innermost
-/// process comes first: `torchrun` inside of a Slurm job sets its own beside those of the job.
+/// Variables of launchers: rank of the process, number of processes. The innermost launcher comes first: `torchrun` in
+/// a Slurm job sets its own variables beside those of the job.
 const VARIABLES: [(&str, &str); 3] =
     [("RANK", "WORLD_SIZE"), ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("SLURM_PROCID", "SLURM_NTASKS")];
 
-/// What `srun` sets for what it starts. A shell of `salloc` has the number of processes of its job without being one of
-/// them, and the script of `sbatch` runs once, with number 0.
+/// Variables that `srun` sets for the processes it starts. A shell of `salloc` has the job's number of processes
+/// without being one of them, and an `sbatch` script runs once with rank 0.
 const STARTED_BY_SRUN: [&str; 2] = ["SLURM_STEP_ID", "SLURM_PROCID"];
 
-/// The variables of a launcher say nothing sensible.
+/// An error in the launcher's variables.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShardError {
     /// One variable of a pair is missing.
     #[error("{present} is set, but {missing} is not; set both, or neither")]
     Incomplete {
-        /// The one that is set.
+        /// The variable that is set.
         present: &'static str,
-        /// The one that is not.
+        /// The variable that is missing.
         missing: &'static str,
     },
     /// A variable is not a number.
     #[error("{variable} is {value:?}; it must be a number such as 0 or 8")]
     NotANumber {
-        /// The variable.
+        /// Name of the variable.
         variable: &'static str,
-        /// Its value.
+        /// Value of the variable.
         value: String,
     },
-    /// The number of the process is not below the number of processes.
+    /// The rank is not below the number of processes.
     #[error(
         "{rank_variable} is {rank} and {world_variable} is {world}; the rank must be 0 to the number of processes - 1"
     )]
     OutOfRange {
-        /// The variable of the rank.
+        /// Name of the variable with the rank.
         rank_variable: &'static str,
         /// The rank.
         rank: usize,
-        /// The variable of the number of processes.
+        /// Name of the variable with the number of processes.
         world_variable: &'static str,
         /// The number of processes.
         world: usize,
@@ -71,13 +71,14 @@ pub enum ShardError {
 }
 
 impl Shard {
-    /// What the launcher of this process says: `RANK` and `WORLD_SIZE` (torchrun), else `OMPI_COMM_WORLD_RANK` and
-    /// `OMPI_COMM_WORLD_SIZE` (mpirun), else `SLURM_PROCID` and `SLURM_NTASKS` (srun: in a job step, which has
-    /// `SLURM_STEP_ID`); the only process where none is set. The first pair that is whole counts.
+    /// Rank and number of processes from the launcher's variables. Tried in this order: `RANK` and `WORLD_SIZE`
+    /// (torchrun), `OMPI_COMM_WORLD_RANK` and `OMPI_COMM_WORLD_SIZE` (mpirun), `SLURM_PROCID` and `SLURM_NTASKS` (srun,
+    /// only in a job step, which has `SLURM_STEP_ID`). The first complete pair is used; without any variable, this is
+    /// the only process.
     ///
     /// # Errors
-    /// Of the first pair that is whole: one is not a number, or the rank is too large. Where none is whole: of the first of
-    /// which one is set, the other is missing.
+    /// A value of the first complete pair is not a number, or its rank is too large. Without a complete pair: one
+    /// variable of a pair is set and the other is missing.
     pub fn from_env() -> Result<Self, ShardError> {
         Self::from_variables(|name| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned()))
     }
@@ -161,7 +162,7 @@ mod tests {
                 assert!(error.to_string().contains(rank) && error.to_string().contains(world), "{error}");
             }
         }
-        // Of two halves the first one is named.
+        // The first incomplete pair is reported.
         let first = ShardError::Incomplete { present: "RANK", missing: "WORLD_SIZE" };
         assert_eq!(of(&[("OMPI_COMM_WORLD_SIZE", "4"), ("RANK", "3")]), Err(first));
     }

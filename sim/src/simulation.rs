@@ -1,4 +1,4 @@
-//! A compiled scene and its environments.
+//! Runtime state of a compiled scene.
 
 use crate::batch::Batch;
 use crate::capture::Plan;
@@ -25,45 +25,46 @@ pub(crate) struct Simulation {
     pub(crate) parts: Vec<PartIndex>,
     pub(crate) welds: Vec<WeldIndex>,
     pub(crate) identities: Identities,
-    /// Bodies and contacts as sensors see them.
+    /// Body frames and geom owners, for contacts and motion of sensors.
     pub(crate) plan: Arc<Plan>,
-    /// The visual scene; made when the first sensor asks for it.
+    /// The visual scene; `None` until a sensor or viewer needs it.
     pub(crate) visible: Option<Arc<Visible>>,
     pub(crate) xml: String,
     pub(crate) diagnostics: Vec<Diagnostic>,
     pub(crate) start: Arc<Start>,
-    /// Which numbers a state has.
+    /// Lengths of the arrays of a saved state.
     pub(crate) layout: Arc<Layout>,
-    /// Places of properties that differ per environment.
+    /// Model elements whose properties can differ per environment; filled on first use.
     pub(crate) tables: OnceLock<Arc<Tables>>,
-    /// Makes models with such properties; made when the first is drawn.
+    /// Builds models with per-environment properties; `None` before the first randomization.
     pub(crate) maker: Option<Maker>,
-    /// Properties of each environment that differ from the model.
+    /// Property overrides of each environment; `None` for an environment with the nominal model.
     pub(crate) own_values: Vec<Option<Box<OwnValues>>>,
-    /// Scenes of environments whose sizes or colours are their own; empty without any, or before they are drawn.
+    /// Render scenes of environments with their own sizes or colors; empty without such environments, or before the
+    /// visual scene exists.
     pub(crate) own_scenes: Vec<OwnScene>,
-    /// True for each geom that only has a pose, for a mesh that is drawn in its place.
+    /// True for each geom that stands in for a visual mesh and has only a pose.
     pub(crate) proxies: Vec<bool>,
-    /// Pairs of bodies that are excluded from contact because they overlap at the start.
+    /// Pairs of body names excluded from contact because the bodies overlap in the initial pose.
     pub(crate) excluded: Vec<(String, String)>,
 }
 
-/// The initial state, as far as it differs from the model's `qpos0`.
+/// Initial state, as differences from the model's `qpos0`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Start {
-    /// (address in qpos, position).
+    /// (address in `qpos`, position \[rad or m\]).
     pub qpos: Vec<(usize, f64)>,
-    /// (drive, position target).
+    /// (drive index, position target \[rad or m\]).
     pub targets: Vec<(usize, f64)>,
 }
 
 impl Simulation {
-    /// The table of mask ids.
+    /// Mask ids of all entities and links.
     pub(crate) fn mask_ids(&self) -> &[MaskId] {
         self.identities.table()
     }
 
-    /// Makes the visual scene at the first call.
+    /// Returns the visual scene and builds it on the first call.
     pub(crate) fn make_visible(
         &mut self,
         cfg: &SimulationManagerCfg,
@@ -105,12 +106,12 @@ impl Simulation {
         visible
     }
 
-    /// The control input of a drive.
+    /// Index in MuJoCo's `ctrl` of a drive.
     pub(crate) fn drive_ctrl(&self, drive: usize) -> usize {
         self.batch.read(0, |env| env.drives.table().drives[drive].ctrl)
     }
 
-    /// Puts the chosen environments in the initial state.
+    /// Resets the chosen environments to the initial state.
     pub(crate) fn reset(&mut self, chosen: &[bool]) {
         let start = &self.start;
         (0..chosen.len()).filter(|&i| chosen[i]).for_each(|i| self.batch.edit(i, Env::expect_reset));
@@ -129,8 +130,8 @@ impl Simulation {
         });
     }
 
-    /// Takes over, by name, the state of everything that `old` has too: positions, velocities, warm start, targets,
-    /// time; and what happened to each environment: a diverged one stays out until it is reset.
+    /// Copies the state of every entity that `old` has too, matched by name: positions, velocities, warm start,
+    /// targets, time. Divergence is copied as well: a diverged environment stays frozen until it is reset.
     pub(crate) fn carry_over(&mut self, old: &Self) {
         let (old_model, model) = (old.batch.model(), self.batch.model());
         let mut qpos = Vec::new();
@@ -157,7 +158,7 @@ impl Simulation {
             .map(|body| old_model.name(ObjectKind::Body, body).and_then(|name| model.id(ObjectKind::Body, &name)))
             .collect();
         let parts = PartTransfer::new(old, self);
-        // In the order in which they were added.
+        // Old and new welds correspond by insertion order.
         let equality = |old_weld: usize| {
             let at = old.welds.iter().position(|weld| weld.equality == old_weld)?;
             self.welds.get(at).map(|weld| weld.equality)
@@ -197,14 +198,14 @@ impl Simulation {
     }
 }
 
-/// Places in the old and in the new simulation of the states, beside joints, of MJCF parts and of objects that are moved by hand.
+/// Index pairs (old, new) of the states besides joints: those of attached MJCF files and of mocap objects.
 struct PartTransfer {
     controls: Vec<(usize, usize)>,
     activations: Vec<(usize, usize)>,
     mocaps: Vec<(usize, usize)>,
 }
 
-/// The values of a [`PartTransfer`] in one environment.
+/// Values of a [`PartTransfer`] in one environment.
 struct PartState {
     controls: Vec<f64>,
     activations: Vec<f64>,

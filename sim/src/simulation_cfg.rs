@@ -1,4 +1,4 @@
-//! Configuration of a simulation: sizes, physics, what every environment has.
+//! Configuration of a simulation: sizes, physics, ground and lights of every environment.
 
 use crate::error::{Error, Result};
 use crate::light_cfg::LightCfg;
@@ -9,42 +9,42 @@ use nalgebra::Vector3;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// Configuration of a simulation. `Default` is EmbodiChain's: 100 Hz, gravity, ground and one light.
+/// Configuration of a simulation. `Default` has the values of EmbodiChain: 100 Hz, gravity, ground and one light.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulationManagerCfg {
     /// Number of environments.
     pub num_envs: usize,
-    /// Step of the simulation \[s\].
+    /// Physics time step \[s\].
     pub physics_dt: f64,
-    /// MuJoCo steps in one `physics_dt`.
+    /// MuJoCo steps per `physics_dt`.
     pub substeps: u32,
     /// Gravity \[m/s²\].
     #[serde(with = "kinetoscope_scene::file_format::vector")]
     pub gravity: Vector3<f64>,
-    /// Integrator.
+    /// Integrator of MuJoCo.
     pub integrator: Integrator,
-    /// Friction cone.
+    /// Friction cone of contacts.
     pub cone: Cone,
-    /// Ratio of frictional to normal impedance; larger values slip less.
+    /// Ratio of frictional to normal contact impedance; larger values slip less.
     pub impratio: f64,
     /// Largest number of solver iterations in a step.
     pub solver_iterations: u32,
     /// Sliding, torsional and rolling friction of shapes that set none (MuJoCo's three coefficients).
     pub friction: [f64; 3],
-    /// Seed of random numbers. The physics has none; the noise of sensors and the draws of properties are keyed by this seed,
-    /// the global index of the environment and what they are for.
+    /// Seed of random numbers. The physics uses no random numbers. Sensor noise and randomized properties use random
+    /// streams keyed by this seed, the global index of the environment, and their purpose.
     pub seed: u64,
-    /// Threads that step; every core where unset.
+    /// Number of threads that step; every core for `None`.
     pub threads: Option<usize>,
-    /// Distance of environments in the overview \[m\].
+    /// Distance between environments in the overview \[m\].
     pub arena_space: f64,
-    /// Which part of the environments this process has, where several simulate together.
+    /// Rank of this process when several processes simulate together.
     pub shard: Shard,
-    /// Ground plane at z = 0; `None` for none.
+    /// Ground plane at z = 0; `None` for a scene without ground.
     #[serde(with = "kinetoscope_scene::file_format::or_false")]
     pub ground: Option<GroundCfg>,
-    /// Lights.
+    /// Lights of every environment.
     pub lights: Vec<LightCfg>,
 }
 
@@ -52,13 +52,13 @@ pub struct SimulationManagerCfg {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GroundCfg {
-    /// Half of the side that is drawn \[m\]; the plane itself is infinite.
+    /// Half of the side length of the rendered plane \[m\]; for collisions the plane is infinite.
     pub half_size: f64,
-    /// Colour, 0..=1.
+    /// Color, 0..=1.
     pub color: [f64; 3],
-    /// Whether cameras see squares of half a metre, a little lighter and darker than the colour.
+    /// True if cameras see a checker pattern with squares of 0.5 m, slightly lighter and darker than the color.
     pub checker: bool,
-    /// What else it looks like.
+    /// Further surface properties.
     pub surface: SurfaceCfg,
 }
 
@@ -91,20 +91,20 @@ impl Default for SimulationManagerCfg {
 }
 
 impl SimulationManagerCfg {
-    /// For hands that hold things: elliptic cones that do not slip.
+    /// Preset for grasping: elliptic friction cones that do not slip.
     pub fn manipulation() -> Self {
         Self { cone: Cone::Elliptic, impratio: 10.0, ..Self::default() }
     }
 
-    /// For robots on legs: 200 Hz, and elliptic friction cones that are a hundred times as stiff along the ground as the
-    /// default, where loaded feet creep apart until the robot kneels.
+    /// Preset for legged robots: 200 Hz, and elliptic friction cones with a tangential stiffness of a hundred times the
+    /// default. With the default, loaded feet creep apart until the robot kneels.
     pub fn legged() -> Self {
         Self { physics_dt: 0.005, cone: Cone::Elliptic, impratio: 100.0, ..Self::default() }
     }
 
-    /// Places of the environments in the overview \[m\], (N, 3): a grid with `arena_space` between neighbours.
+    /// Origins of the environments in the overview \[m\], shape (N, 3): a grid with `arena_space` between neighbors.
     ///
-    /// rows = ceil(n / floor(sqrt n)), cols = ceil(n / rows); environment k stands in row k div cols, column k mod cols.
+    /// rows = ceil(n / floor(sqrt n)), cols = ceil(n / rows); environment k is in row k div cols, column k mod cols.
     pub fn env_origins(&self) -> Array2<f64> {
         let n = self.num_envs;
         let rows = n.div_ceil(n.isqrt().max(1));
@@ -119,8 +119,8 @@ impl SimulationManagerCfg {
         origins
     }
 
-    /// Number of threads for drawing and casting rays: [`threads`](Self::threads), or every core. Steps use at most one thread per
-    /// environment.
+    /// Number of threads for rendering and ray casting: [`threads`](Self::threads), or every core. Stepping uses at
+    /// most one thread per environment.
     pub fn num_threads(&self) -> usize {
         self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get))
     }
@@ -128,7 +128,7 @@ impl SimulationManagerCfg {
     /// Checks every number.
     ///
     /// # Errors
-    /// The first field that is out of range.
+    /// A field is out of range; the first one is reported.
     pub fn validate(&self) -> Result<()> {
         let fail = |field, value: &dyn std::fmt::Display, expected| {
             Err(Error::Config { field, value: value.to_string(), expected })
@@ -214,5 +214,5 @@ impl SimulationManagerCfg {
     }
 }
 
-/// More environments than any machine steps; keeps a typing error from filling the memory.
+/// Upper limit that catches typing errors before they fill the memory; no machine steps this many environments.
 const MAX_ENVS: usize = 1 << 20;

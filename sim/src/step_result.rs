@@ -1,26 +1,27 @@
-//! Event of tasks: rewards and ends of a step. Tasks publish it and recorders receive it; nothing of it is kept here.
+//! Rewards and episode ends of a task step. Tasks publish this event, recorders receive it, and the simulation does not
+//! store it.
 
 use crate::error::{Error, Result};
 use crate::manager::SimulationManager;
 use ndarray::Array1;
 
-/// Rewards and ends of one step of a task, in each environment.
+/// Rewards and episode ends of one task step, in each environment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StepResult {
     /// Rewards, shape (N,).
     pub rewards: Array1<f64>,
-    /// True if the episode ended because the task is done, or failed, shape (N,).
+    /// True if the episode ended by success or failure of the task, shape (N,).
     pub terminated: Array1<bool>,
-    /// True if the episode was cut off, by a limit of time or from outside, shape (N,).
+    /// True if the episode was cut off, by a time limit or from outside, shape (N,).
     pub truncated: Array1<bool>,
 }
 
 impl StepResult {
-    /// Publishes it to the observers of a simulation ([`ObserversMut::publish`](crate::ObserversMut::publish)). A task does so right after the last physics
-    /// step of its step, before environments whose episode ended are reset.
+    /// Publishes the result to the observers of a simulation ([`ObserversMut::publish`](crate::ObserversMut::publish)).
+    /// Tasks call it after the last physics step of a task step, before finished environments are reset.
     ///
     /// # Errors
-    /// There is not one of everything for each environment; then nothing is published.
+    /// An array does not have one element per environment; then nothing is published.
     pub fn publish(&self, sim: &mut SimulationManager) -> Result<()> {
         for (argument, found) in [
             ("rewards", self.rewards.len()),

@@ -1,4 +1,4 @@
-//! What surfaces look like besides their colour: gloss, metal, glass, light of their own.
+//! Surface properties besides color: gloss, metal, glass, emission.
 
 use crate::error::{Error, Result};
 use crate::named::Named;
@@ -7,8 +7,8 @@ use kinetoscope_scene::Material;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What a surface looks like besides its colour and its texture. What is `None` is as the file or the model says, MuJoCo's
-/// defaults where those say nothing. Nothing of it changes how things move.
+/// Surface properties besides color and texture, for rendering only. `None` keeps the value of the file or model, or
+/// MuJoCo's default where these give none.
 ///
 /// ```
 /// use kinetoscope_sim::{RigidObjectCfg, SimulationManager, SimulationManagerCfg, SurfaceCfg};
@@ -21,41 +21,43 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SurfaceCfg {
-    /// Own light, as a multiple of the colour, at least 0.
+    /// Emitted light as a multiple of the color, at least 0.
     pub emission: Option<f64>,
-    /// Strength of highlights, 0..=1.
+    /// Strength of specular highlights, 0..=1.
     pub specular: Option<f64>,
-    /// Sharpness of highlights, 0..=1: the exponent is 128 times this.
+    /// Sharpness of specular highlights, 0..=1: the exponent is 128 times this.
     pub shininess: Option<f64>,
-    /// Share of the light that is mirrored perfectly, 0..=1: by opaque planes and by the +z face of boxes, in all renderers; by
-    /// other shapes in path-traced frames only.
+    /// Fraction of light in perfect mirror reflection, 0..=1. All renderers apply it to opaque planes and the +z face
+    /// of boxes; for other shapes, only path-traced frames do.
     pub reflectance: Option<f64>,
-    /// How much of it is metal, 0..=1: light does not get below it, and what it mirrors has its colour.
+    /// Metalness, 0..=1. A metal has no diffuse reflection, and its color tints the specular reflection.
     pub metallic: Option<f64>,
-    /// How rough it is, 0..=1, instead of `shininess`: alpha of the GGX law is its square.
+    /// Roughness, 0..=1, instead of `shininess`: alpha of the GGX distribution is its square.
     pub roughness: Option<f64>,
-    /// How much of the light goes through, bent as by glass, 0..=1. Of closed shapes, and in path-traced pictures only: other
-    /// renderers draw the surface.
+    /// Fraction of light that is refracted through the surface, as by glass, 0..=1. Only path-traced frames apply it,
+    /// and only to closed shapes; other renderers draw an opaque surface.
     pub transmission: Option<f64>,
-    /// Refractive index of what is inside, 1..=10: 1.5 for glass, 1.33 for water.
+    /// Index of refraction of the inside, 1..=10: 1.5 for glass, 1.33 for water.
     pub refractive_index: Option<f64>,
 }
 
 impl SurfaceCfg {
-    /// Clear glass, where the colour is white.
+    /// Clear glass, if the color is white.
     pub fn glass() -> Self {
         Self { transmission: Some(1.0), refractive_index: Some(1.5), roughness: Some(0.0), ..Self::default() }
     }
 
-    /// Metal in the colour of the surface: roughness 0 is polished, 1 is matt.
+    /// Metal in the color of the surface: roughness 0 is polished, 1 is matt.
     pub fn metal(roughness: f64) -> Self {
         Self { metallic: Some(1.0), roughness: Some(roughness), ..Self::default() }
     }
 
-    /// The surfaces of those of `names` that `patterns` name, by index; `what` is what they are names of, `of` the entity.
+    /// Assigns surfaces to `names` by pattern and returns them with the index of the name. `what` is the type of the
+    /// names, `of` the entity, both for errors.
     ///
     /// # Errors
-    /// A number that is out of range, or a pattern that is bad, matches none of `names`, or one that another matches too.
+    /// A number is out of range, or a pattern is invalid, matches none of `names`, or matches a name that another
+    /// pattern matches too.
     pub(crate) fn assign(
         patterns: &[(String, Self)],
         names: &[impl AsRef<str>],
@@ -71,7 +73,7 @@ impl SurfaceCfg {
     /// Checks every number.
     ///
     /// # Errors
-    /// The first field that is out of range.
+    /// A field is out of range; the first one is reported.
     pub fn validate(&self) -> Result<()> {
         let least_and_most = [
             ("surface.emission", self.emission, 0.0, f64::from(f32::MAX), "it must be a finite number >= 0"),
@@ -91,7 +93,7 @@ impl SurfaceCfg {
         Ok(())
     }
 
-    /// The material with what is given here.
+    /// Returns `material` with all values that are set here.
     pub(crate) fn over(&self, mut material: Material) -> Material {
         let set = |to: &mut f32, value: Option<f64>| {
             if let Some(value) = value {
@@ -108,7 +110,7 @@ impl SurfaceCfg {
         if let Some(roughness) = self.roughness {
             material.roughness = Some(roughness as f32);
         } else if self.shininess.is_some() {
-            // What is said here holds, whatever the model says of its roughness.
+            // A configured shininess overrides the roughness of the model.
             material.roughness = None;
         }
         material

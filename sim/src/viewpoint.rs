@@ -1,12 +1,13 @@
-//! The point of view that a program gives to windows, browser views and screenshots.
+//! Point of view of windows, browser views and screenshots.
 
-/// A point of view onto all environments, in the frame of the overview \[m\].
+/// Point of view onto all environments, in the frame of the overview \[m\], +z up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
     /// Position of the viewer.
     pub eye: [f64; 3],
-    /// Point in the middle of the image.
+    /// Point in the center of the image.
     pub target: [f64; 3],
-    /// Number of calls of [`SceneViewMut::set_camera_view`](crate::SceneViewMut::set_camera_view) so far: open views follow a change.
+    /// Number of calls of [`SceneViewMut::set_camera_view`](crate::SceneViewMut::set_camera_view) so far. Open views
+    /// follow when it changes.
     pub changes: u64,
 }

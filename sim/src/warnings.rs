@@ -9,13 +9,13 @@ use kinetoscope_robot::diagnostic::count_by_name;
 use std::collections::BTreeMap;
 
 impl SimulationManager {
-    /// Warnings since the simulation was made.
+    /// Counts of warnings since the simulation was created.
     pub fn warnings(&self) -> Warnings<'_> {
         Warnings::new(self)
     }
 }
 
-/// Warnings since the simulation was made; see [`SimulationManager::warnings`].
+/// Counts of warnings since the simulation was created; see [`SimulationManager::warnings`].
 #[derive(Clone, Copy, Debug)]
 pub struct Warnings<'a> {
     sim: &'a SimulationManager,
@@ -50,14 +50,14 @@ impl<'a> Warnings<'a> {
     /// Counts of MuJoCo's warnings in one environment, by name.
     ///
     /// # Errors
-    /// There is no such environment.
+    /// The environment does not exist.
     pub fn env_counts(&self, env: EnvId) -> Result<BTreeMap<&'static str, u64>> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let counts = self.sim.simulation.batch.read(env.0, |env| *env.warnings());
         Ok(mj::Warning::ALL.iter().map(|w| (w.name(), counts.get(*w))).filter(|(_, n)| *n > 0).collect())
     }
 
-    /// How often contact and constraint buffers were doubled, over all environments.
+    /// Number of times contact and constraint buffers were doubled, over all environments.
     pub fn buffer_growths(&self) -> u64 {
         let mut growths = 0;
         self.sim.simulation.batch.for_each(|_, env| growths += u64::from(env.growths()));

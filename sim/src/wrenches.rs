@@ -1,52 +1,52 @@
-//! Forces and torques that a user applies to the bodies of one environment, and gravity that is taken from them: they stay
-//! until changed.
+//! External forces and torques on the bodies of one environment, and gravity compensation. Both stay until changed.
 //!
-//! MuJoCo applies `xfrc_applied` in the centre of mass of a body, in world axes. What is given in the axes of a link turns
-//! with it, so it is written anew for every step. Gravity is compensated by the force `-m g` in the same place, on both
-//! lines of MuJoCo: the model, which 4.x could tell to (`body_gravcomp`), is the same for all environments.
+//! MuJoCo applies `xfrc_applied` at the center of mass of a body, in world axes. A wrench in link axes turns with the
+//! link, so it is rewritten in every step. Gravity compensation is the force `-m g` at the center of mass, on both
+//! supported MuJoCo versions. `body_gravcomp` of 4.x is part of the model that all environments share, so it cannot
+//! differ per environment.
 
 use crate::mjcf::scene_names::MAX_ROBOTS;
 use kinetoscope_mujoco::Data;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// In whose axes a wrench is given.
+/// Axes in which a wrench is given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum WrenchFrame {
-    /// Those of the environment: the direction stays when the link turns.
+    /// Axes of the environment: the direction stays constant when the link turns.
     #[default]
     World,
-    /// Those of the link: the direction turns with it.
+    /// Axes of the link: the direction turns with the link.
     Link,
 }
 
-/// A wrench on a body.
+/// External wrench on a body.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Wrench {
-    /// Whose it is: robot and link.
+    /// Owner of the wrench: robot and link.
     pub(crate) of: (usize, usize),
-    /// MuJoCo's body.
+    /// Index of the MuJoCo body.
     pub(crate) body: usize,
-    /// The link's axes in the body, where the wrench is in those.
+    /// Rotation of the link axes in the body frame; `None` for a wrench in world axes.
     pub(crate) axes: Option<UnitQuaternion<f64>>,
-    /// Force in the centre of mass of the body \[N\].
+    /// Force at the center of mass of the body \[N\].
     pub(crate) force: Vector3<f64>,
     /// Torque \[N m\].
     pub(crate) torque: Vector3<f64>,
 }
 
-/// Stands for the robot in [`Wrench::of`] where somebody pulls at a body.
+/// Stands for the robot in [`Wrench::of`] for forces of [`SceneViewMut::pull`](crate::SceneViewMut::pull).
 const PULLED: usize = MAX_ROBOTS;
 
-/// All that is applied in one environment.
+/// All external wrenches and weightless bodies of one environment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Wrenches {
     pub(crate) list: Vec<Wrench>,
-    /// Bodies without weight.
+    /// Bodies with compensated gravity.
     pub(crate) weightless: Vec<usize>,
 }
 
 impl Wrench {
-    /// Force and torque in world axes, with the body where it is.
+    /// Force and torque in world axes, for the current pose of the body.
     pub(crate) fn in_world(&self, data: &Data) -> [Vector3<f64>; 2] {
         let Some(axes) = self.axes else { return [self.force, self.torque] };
         let q = &data.xquat()[4 * self.body..4 * self.body + 4];
@@ -56,7 +56,7 @@ impl Wrench {
 }
 
 impl Wrenches {
-    /// Replaces the wrench of the same owner; a wrench of zeros ends it.
+    /// Replaces the wrench of the same owner; a zero wrench removes it.
     pub(crate) fn replace(&mut self, wrench: Wrench) {
         self.list.retain(|old| old.of != wrench.of);
         if wrench.force != Vector3::zeros() || wrench.torque != Vector3::zeros() {
@@ -64,12 +64,12 @@ impl Wrenches {
         }
     }
 
-    /// Pulls at a body, whatever else acts on it; nothing at all ends it.
+    /// Sets the wrench of user forces on a body, beside other wrenches; a zero wrench removes it.
     pub(crate) fn pull(&mut self, body: usize, mujoco_body: usize, force: Vector3<f64>, torque: Vector3<f64>) {
         self.replace(Wrench { of: (PULLED, body), body: mujoco_body, axes: None, force, torque });
     }
 
-    /// Gives bodies their weight, or takes it.
+    /// Enables or disables gravity compensation of bodies.
     pub(crate) fn set_weightless(&mut self, bodies: &[usize], weightless: bool) {
         self.weightless.retain(|body| !bodies.contains(body));
         if weightless {
@@ -77,8 +77,8 @@ impl Wrenches {
         }
     }
 
-    /// The same on another model, where `body` says which body is which. Nobody pulls any more: what is pulled at has another
-    /// number there.
+    /// Wrenches for another model; `body` maps old to new body indices. User forces ([`pull`](Self::pull)) are dropped,
+    /// because their owner index is invalid there.
     pub(crate) fn moved(&self, body: impl Fn(usize) -> Option<usize>) -> Self {
         let moved = |wrench: &Wrench| Some(Wrench { body: body(wrench.body)?, ..wrench.clone() });
         Self {
@@ -87,7 +87,7 @@ impl Wrenches {
         }
     }
 
-    /// All of it as numbers: 14 of each wrench after their count, then the bodies without weight.
+    /// Flat array: the number of wrenches, 14 numbers per wrench, then the weightless bodies.
     pub(crate) fn numbers(&self) -> Vec<f64> {
         let mut numbers = vec![self.list.len() as f64];
         for Wrench { of, body, axes, force, torque } in &self.list {
@@ -99,7 +99,7 @@ impl Wrenches {
         numbers
     }
 
-    /// What [`numbers`](Self::numbers) gave; `None` where they are no wrenches.
+    /// Inverse of [`numbers`](Self::numbers); `None` for an invalid array.
     pub(crate) fn from_numbers(numbers: &[f64]) -> Option<Self> {
         let (&count, rest) = numbers.split_first()?;
         let (list, weightless) = rest.split_at_checked((count as usize).checked_mul(14)?)?;
@@ -114,7 +114,7 @@ impl Wrenches {
         Some(Self { list, weightless: weightless.iter().map(|&body| body as usize).collect() })
     }
 
-    /// Writes what acts on the bodies that are named here; others keep what they have.
+    /// Writes the wrenches to `data`. Bodies that are not listed here keep their `xfrc_applied`.
     pub(crate) fn apply(&self, data: &mut Data) {
         self.clear(data);
         for wrench in &self.list {
@@ -123,14 +123,14 @@ impl Wrenches {
         }
         let gravity = Vector3::from(data.model().gravity());
         for &body in &self.weightless {
-            // What MuJoCo lifts by itself (4.x) is not lifted twice.
+            // 4.x compensates a part of the weight itself; only the rest is added.
             let felt = 1.0 - data.model().body_gravity_compensation(body);
             let weight = felt * data.model().body_mass()[body] * gravity;
             add(data, body, &-weight, &Vector3::zeros());
         }
     }
 
-    /// Nothing acts on the bodies that are named here.
+    /// Clears `xfrc_applied` of all bodies that are listed here.
     pub(crate) fn clear(&self, data: &mut Data) {
         for &body in self.list.iter().map(|wrench| &wrench.body).chain(&self.weightless) {
             data.xfrc_applied_mut()[6 * body..6 * body + 6].fill(0.0);

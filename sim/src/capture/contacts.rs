@@ -1,10 +1,11 @@
-//! MuJoCo's contacts as pairs of links with forces in world axes.
+//! Contacts of MuJoCo as pairs of bodies, with forces in world axes.
 
 use kinetoscope_mujoco::Data;
 use kinetoscope_scene::Contact;
 use nalgebra::{Matrix3, Vector3};
 
-/// Writes the contacts that the last solve found forces for; what is only near is not among them.
+/// Writes all contacts with a solved force to `contacts`. Contacts without constraint rows, within the margin only, are
+/// left out.
 pub(super) fn capture(owners: &[Option<u32>], data: &Data, contacts: &mut Vec<Contact>) {
     contacts.clear();
     for (index, contact) in data.contact().iter().enumerate() {
@@ -13,8 +14,8 @@ pub(super) fn capture(owners: &[Option<u32>], data: &Data, contacts: &mut Vec<Co
         if contact.efc_address < 0 {
             continue;
         }
-        // The rows of the frame are the normal, from the first geom to the second, and two tangents. The force along them
-        // acts on the second geom.
+        // The rows of `frame` are the normal, from the first geom to the second, and two tangents. The force in these
+        // axes acts on the second geom.
         let [normal_force, tangent1, tangent2, ..] = data.contact_force(index);
         let world_from_contact = Matrix3::from_row_slice(&contact.frame).transpose();
         let force = world_from_contact * Vector3::new(normal_force, tangent1, tangent2);

@@ -1,8 +1,8 @@
-//! What MuJoCo solves for the state before a step, captured inside the step: contacts, accelerations, joint wrenches.
+//! Capture of the quantities that MuJoCo solves inside a step: contacts, accelerations, joint wrenches.
 //!
-//! After `mj_step2` forces and contacts belong together; the `mj_step1` that follows makes a new contact list that nobody
-//! has solved yet. Between the two, positions and all that comes from them are still those of the beginning of the step,
-//! while `qpos` and `qvel` are those of its end.
+//! After `mj_step2`, forces and contacts belong together. The following `mj_step1` replaces the contact list by an
+//! unsolved one, so the capture runs between the two. At that point, positions and all quantities derived from them
+//! still belong to the start of the step, while `qpos` and `qvel` belong to its end.
 
 mod contacts;
 mod motion;
@@ -16,42 +16,42 @@ use std::sync::Arc;
 
 pub(crate) use motion::body_velocity;
 
-/// Where what is captured is in MuJoCo's arrays: the same for all environments.
+/// Indices of the captured quantities in MuJoCo's arrays, the same for all environments.
 #[derive(Debug)]
 pub(crate) struct Plan {
-    /// Index on the body axis of what each geom belongs to; `None` is the world.
+    /// Index on the body axis of the owner of each geom; `None` for the world.
     owners: Vec<Option<u32>>,
-    /// The frame of everything on the body axis.
+    /// Frame of each body on the body axis.
     bodies: Vec<BodyFrame>,
-    /// Whether a body of the axis is a MuJoCo body of its own, not one that is fused to another.
+    /// True if a body of the body axis is a separate MuJoCo body, false if it is fused to another one.
     carries: Vec<bool>,
 }
 
-/// What to capture in a step.
+/// Request to capture quantities in a step.
 #[derive(Clone, Debug)]
 pub(crate) struct Capture {
     pub(crate) plan: Arc<Plan>,
     pub(crate) fields: Requires,
 }
 
-/// What was captured in one environment; empty where nothing was, or where a step failed.
+/// Captured quantities of one environment; empty without a capture or after a failed step.
 #[derive(Debug, Default)]
 pub(crate) struct Solved {
     pub(crate) contacts: Vec<Contact>,
-    /// Rows of 7 per body.
+    /// Poses `[x, y, z, qw, qx, qy, qz]` \[m\], 7 numbers per body.
     pub(crate) poses: Vec<f64>,
-    /// Rows of 6 per body.
+    /// Linear, then angular velocity \[m/s, rad/s\] in world axes, 6 numbers per body.
     pub(crate) velocities: Vec<f64>,
-    /// Rows of 6 per body.
+    /// Linear, then angular acceleration \[m/s², rad/s²\] in world axes, 6 numbers per body.
     pub(crate) accelerations: Vec<f64>,
-    /// Rows of 6 per body.
+    /// Force, then torque \[N, N m\] of the parent joint in link axes, 6 numbers per body.
     pub(crate) wrenches: Vec<f64>,
-    /// Room for the engine's velocities.
+    /// Scratch memory for velocities of the engine.
     spare: Vec<f64>,
 }
 
 impl Plan {
-    /// The plan of a compiled scene; `carriers` is as in [`kinetoscope_sensors::SensorContext`].
+    /// Creates the plan of a compiled scene; `carriers` is defined in [`kinetoscope_sensors::SensorContext`].
     pub(crate) fn new(
         model: &Model,
         robots: &[RobotIndex],
@@ -81,7 +81,7 @@ impl Plan {
         for part in parts {
             for &geom in &part.geoms {
                 let body = model.geom_bodyid()[geom] as usize;
-                // The first body is the file's world, which is part of the world; frame k is body k + 1.
+                // The first body is the file's world, which belongs to the world; frame k is body k + 1.
                 let frame = part.bodies[1..].iter().position(|other| *other == body);
                 owners[geom] = frame.map(|frame| (first + frame) as u32);
             }
@@ -91,14 +91,15 @@ impl Plan {
         Self { owners, bodies, carries }
     }
 
-    /// The frame of everything on the body axis.
+    /// Frame of each body on the body axis.
     pub(crate) fn bodies(&self) -> &[BodyFrame] {
         &self.bodies
     }
 }
 
 impl Capture {
-    /// Captures after `mj_step2` of a step that began with the velocities `qvel`. Nothing that decides a later step changes.
+    /// Captures quantities after `mj_step2` of a step that began with the velocities `qvel`. Later steps are not
+    /// affected.
     pub(crate) fn take(&self, data: &mut Data, qvel: &[f64], solved: &mut Solved) -> Result<(), EngineError> {
         if self.fields.contains(Requires::CONTACTS) {
             contacts::capture(&self.plan.owners, data, &mut solved.contacts);
@@ -119,7 +120,7 @@ impl Capture {
 }
 
 impl Solved {
-    /// Forgets everything: what was captured is of a step that was not done.
+    /// Clears the capture of a step that was not completed.
     pub(crate) fn clear(&mut self) {
         self.contacts.clear();
         for values in [&mut self.poses, &mut self.velocities, &mut self.accelerations, &mut self.wrenches] {

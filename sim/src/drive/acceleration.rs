@@ -1,4 +1,4 @@
-//! Drive mode `acceleration`: gains in acceleration units, so that one set of gains moves light and heavy joints alike.
+//! Drive mode `acceleration`: gains in acceleration units, so that one set of gains suits light and heavy joints alike.
 
 use super::{DriveMode, JointInfo};
 
@@ -10,7 +10,7 @@ impl DriveMode for Acceleration {
         "acceleration"
     }
 
-    /// tau = I (k (q* - q) + d (v* - v)), with I the inertia the joint feels at the initial pose.
+    /// Effective inertia I at the initial pose: tau = I (k (q* - q) + d (v* - v)).
     fn unit(&self, joint: &JointInfo) -> Option<f64> {
         Some(joint.effective_inertia)
     }

@@ -1,6 +1,6 @@
 //! The drive law as MuJoCo's own actuator: `force = clamp(kp ctrl - kp q - kd v)`, evaluated at the start of the step.
 //!
-//! Explicit: stable only while the time step is small against the joint's inertia, see [`stable_timestep`].
+//! The law is explicit, so it is stable only for time steps small against the joint's inertia: see [`stable_timestep`].
 
 use super::gains::{Gains, Target};
 use super::plan::{JointPlan, mass_matrix_at_start};
@@ -12,8 +12,8 @@ use nalgebra::{DMatrix, DVector};
 
 /// Sets the control so that the actuator's force is the drive law: `ctrl = q* + (kd v* + tau_ff) / kp`.
 ///
-/// Without stiffness the actuator's gain is the damping (`ctrl = v* + tau_ff / kd`), without both it is 1
-/// (`ctrl = tau_ff`): see `mjcf::robot`, which writes the gain.
+/// Without stiffness, the actuator's gain is the damping (`ctrl = v* + tau_ff / kd`); without both, it is 1
+/// (`ctrl = tau_ff`). `mjcf::robot` writes the gain.
 pub(super) fn apply(drive: &Drive, gains: &Gains, target: &Target, data: &mut mj::Data) {
     data.ctrl_mut()[drive.ctrl] = if gains.kp > 0.0 {
         target.position + (gains.kd * target.velocity + target.feedforward) / gains.kp
@@ -24,7 +24,7 @@ pub(super) fn apply(drive: &Drive, gains: &Gains, target: &Target, data: &mut mj
     };
 }
 
-/// How MuJoCo integrates an actuator's damping.
+/// Integration of an actuator's damping in MuJoCo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scheme {
     /// At the start of the step: integrator Euler, and saturated actuators of `implicitfast` on 4.x.
@@ -33,8 +33,8 @@ pub enum Scheme {
     ImplicitDamping,
 }
 
-/// The largest time step \[s\] at which the law is stable in MuJoCo; infinite without gains. `damping` is that of the
-/// joints, which MuJoCo takes at the end of the step in either scheme.
+/// Returns the largest time step \[s\] at which the law is stable in MuJoCo; infinite without gains. `damping` is the
+/// damping of the joints, which MuJoCo integrates at the end of the step in both schemes.
 ///
 /// The explicit step `(M + h B) (v' - v) = -h (Kp q + Kd v + B v)`, `q' = q + h v'` is stable exactly while
 /// `4 M + 2 h B - 2 h Kd - h² Kp` is positive definite; with Kd at the end of the step like B, while
@@ -58,7 +58,7 @@ pub fn stable_timestep(
         let margin = 4.0 * mass_matrix + DMatrix::from_diagonal(&(2.0 * h * &implicit - h * h * kp));
         margin.cholesky().is_some()
     };
-    // Bracket in decades, then bisect in the logarithm: the answer spans 1e-10 s (stiff fingers) to seconds.
+    // Bracket in decades, then bisect in the logarithm: the result ranges from 1e-10 s (stiff fingers) to seconds.
     let (mut low, mut high) = (1e-14_f64, 1e3_f64);
     if !stable(low) {
         return 0.0;
@@ -77,8 +77,8 @@ pub fn stable_timestep(
     low
 }
 
-/// [`stable_timestep`] of a robot's drives at its start positions; `None` where the description's dynamics cannot be
-/// computed.
+/// Returns [`stable_timestep`] of a robot's drives at its start positions; `None` if the dynamics of the description
+/// cannot be computed.
 pub fn stable_timestep_of(
     scheme: Scheme,
     description: &RobotDescription,
@@ -88,7 +88,7 @@ pub fn stable_timestep_of(
     let start = mass_matrix_at_start(description, plans, floating_base).ok()?;
     let n = start.matrix.nrows();
     let (mut kp, mut kd, mut damping) = (DVector::zeros(n), DVector::zeros(n), DVector::zeros(n));
-    // A follower moves with its driver, `q = C u`: its inertia and damping are the driver's.
+    // A follower moves with its driver, `q = C u`: inertia and damping add to those of the driver.
     let mut coupling = DMatrix::identity(n, n);
     for (plan, &column) in plans.iter().zip(&start.columns) {
         damping[column] = plan.damping;
@@ -108,7 +108,7 @@ pub fn stable_timestep_of(
     Some(stable_timestep(scheme, &mass_matrix, &kp.select_rows(&free), &kd.select_rows(&free), &damping))
 }
 
-/// A warning where the drives are not stable at the time step `dt` \[s\].
+/// Returns a warning if the drives are unstable at the time step `dt` \[s\].
 pub fn warn_if_unstable(
     description: &RobotDescription,
     plans: &[JointPlan],
@@ -134,8 +134,8 @@ pub fn warn_if_unstable(
 mod tests {
     use super::*;
 
-    /// One joint: `h² kp + 2 h kd = 4 M` has the positive root `h = (sqrt(kd² + 4 M kp) - kd) / kp`; with the sign of kd
-    /// turned for implicit damping. The recurrences themselves decay just below the bound and grow just above it.
+    /// For one joint, `h² kp + 2 h kd = 4 M` has the positive root `h = (sqrt(kd² + 4 M kp) - kd) / kp`; implicit
+    /// damping turns the sign of kd. The simulated recurrences decay just below the bound and grow just above it.
     #[test]
     fn stable_timestep_of_one_joint() {
         let (m, kp, kd) = (0.3, 200.0, 4.0_f64);

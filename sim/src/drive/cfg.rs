@@ -1,4 +1,4 @@
-//! Drive properties as users write them, and their resolution to one set per joint.
+//! Drive configuration of users, and its resolution to one set of properties per joint.
 
 use super::models::ActuatorModel;
 use super::{DriveModel, DriveType};
@@ -6,16 +6,16 @@ use crate::pattern::{self, PatternError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// One number for all joints, or numbers by name pattern or control part.
+/// One number for all joints, or numbers by joint pattern or control part.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PerJoint {
-    /// The same for every joint.
+    /// Same number for every joint.
     All(f64),
-    /// `(pattern or control part, value)`; joints that no key matches keep the default.
+    /// Pairs (pattern or control part, number); joints without a matching key keep the default.
     By(Vec<(String, f64)>),
 }
 
-/// Nothing is said: every joint keeps the default.
+/// Empty: every joint keeps the default.
 impl Default for PerJoint {
     fn default() -> Self {
         Self::By(Vec::new())
@@ -34,36 +34,36 @@ impl<K: Into<String>, const N: usize> From<[(K, f64); N]> for PerJoint {
     }
 }
 
-/// Drive properties of a robot. Every field is a number for all joints or `{pattern: value}`.
+/// Drive properties of a robot. Every field is a number for all joints or a map `{pattern: value}`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DriveCfg {
-    /// The meaning of stiffness and damping.
+    /// Meaning of stiffness and damping.
     pub drive_type: DriveType,
-    /// Who evaluates the law.
+    /// Evaluation of the drive law.
     pub model: DriveModel,
-    /// Explicit actuator models by joint pattern or control part; joints that none matches are driven by `model`. They use
-    /// the gains and limits below; a joint that the drive type leaves passive has none. Exports have MuJoCo's actuators with
-    /// the same gains in their place.
+    /// Explicit actuator models by joint pattern or control part; joints without a match are driven by `model`. The
+    /// models use the gains and limits below. A joint that the drive type leaves passive has no actuator. Exports
+    /// replace the models by MuJoCo actuators with the same gains.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub actuators: Vec<(String, ActuatorModel)>,
-    /// Stiffness \[N m/rad or N/m\] (drive type `force`). Where unset, that of the position actuators in the file of an
-    /// [MJCF robot](crate::RobotCfg::mjcf) (drive type `force` only), or else 10⁴.
+    /// Stiffness \[N m/rad or N/m\] (drive type `force`). If unset, the stiffness of the position actuators in the file
+    /// of an [MJCF robot](crate::RobotCfg::mjcf) (drive type `force` only), or else 10⁴.
     pub stiffness: PerJoint,
-    /// Damping \[N m s/rad or N s/m\] (drive type `force`). Where unset, as for the stiffness, or else 10³.
+    /// Damping \[N m s/rad or N s/m\] (drive type `force`). If unset, as for the stiffness, or else 10³.
     pub damping: PerJoint,
-    /// Largest effort \[N m or N\]; where unset, the file's.
+    /// Effort limit \[N m or N\]; if unset, that of the file.
     pub max_effort: Option<PerJoint>,
-    /// Largest speed \[rad/s or m/s\]; where unset, the URDF's. Reported; of the drive laws, only that of [`DcMotor`] knows
-    /// it.
+    /// Velocity limit \[rad/s or m/s\]; if unset, that of the URDF. It is reported only; [`DcMotor`] is the only drive
+    /// law that uses it.
     ///
     /// [`DcMotor`]: super::DcMotor
     pub max_velocity: Option<PerJoint>,
-    /// Dry friction \[N m or N\]; where unset, the file's. Where anything is given, 0 too, driven joints of the robot can be told
-    /// another while they run: [`RobotMut::set_friction`](crate::RobotMut::set_friction).
+    /// Dry friction \[N m or N\]; if unset, that of the file. If any value is given, even 0,
+    /// [`RobotMut::set_friction`](crate::RobotMut::set_friction) can change the friction of driven joints at run time.
     pub friction: Option<PerJoint>,
-    /// Rotor inertia \[kg m² or kg\]; where unset, that of an MJCF file, or else 0. While they run:
-    /// [`RobotMut::set_armature`](crate::RobotMut::set_armature).
+    /// Rotor inertia \[kg m² or kg\]; if unset, that of an MJCF file, or else 0.
+    /// [`RobotMut::set_armature`](crate::RobotMut::set_armature) changes it at run time.
     pub armature: PerJoint,
 }
 
@@ -83,21 +83,21 @@ impl Default for DriveCfg {
     }
 }
 
-/// EmbodiChain's default stiffness: what a joint has that neither a pattern nor its file says anything of.
+/// EmbodiChain's default stiffness, for joints without a configured stiffness and without one in their file.
 pub(super) const DEFAULT_STIFFNESS: f64 = 1e4;
 /// EmbodiChain's default damping.
 pub(super) const DEFAULT_DAMPING: f64 = 1e3;
 
-/// Drive properties of one joint, as far as the configuration says them.
+/// Drive properties of one joint that the configuration sets; `None` for the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointGains {
     /// Stiffness, if the configuration sets one.
     pub stiffness: Option<f64>,
     /// Damping, if the configuration sets one.
     pub damping: Option<f64>,
-    /// Largest effort, if the configuration sets one.
+    /// Effort limit, if the configuration sets one.
     pub max_effort: Option<f64>,
-    /// Largest speed, if the configuration sets one.
+    /// Velocity limit, if the configuration sets one.
     pub max_velocity: Option<f64>,
     /// Dry friction, if the configuration sets one.
     pub friction: Option<f64>,
@@ -107,16 +107,16 @@ pub struct JointGains {
     pub actuator: Option<ActuatorModel>,
 }
 
-/// An error of drive properties.
+/// An error in drive properties.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DriveCfgError {
-    /// A key of a `{pattern: value}` map is wrong.
+    /// A key of a `{pattern: value}` map is invalid.
     #[error("drive property {property}: {error}")]
     Pattern {
         /// Name of the property.
         property: &'static str,
-        /// What is wrong with the key.
+        /// Cause.
         #[source]
         error: PatternError,
     },
@@ -130,11 +130,11 @@ pub enum DriveCfgError {
     },
 }
 
-/// One set of drive properties for each of `joints`, in their order.
+/// Resolves the drive properties of each of `joints`, in their order.
 ///
 /// # Errors
-/// A key that matches no joint, a joint matched by two keys, a negative or non-finite number (an infinite
-/// `max_effort` or `max_velocity` means unlimited and is allowed).
+/// A key matches no joint, two keys match a joint, or a number is negative or not finite. An infinite `max_effort` or
+/// `max_velocity` means unlimited and is allowed.
 pub fn resolve(
     cfg: &DriveCfg,
     joints: &[&str],

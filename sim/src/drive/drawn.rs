@@ -1,20 +1,21 @@
-//! Gains that an environment has as properties of its own, drawn or set. They are not of its state: a snapshot holds what
-//! they stand in for, and an environment that goes on from a snapshot keeps its own.
+//! Gains that override the nominal ones in one environment, randomized or set as environment properties. They are not
+//! part of the state: a snapshot holds the values below the override, and an environment that restores a snapshot keeps
+//! its own overrides.
 
 use super::DriveType;
 use super::gains::{Gains, Setting};
 use super::table::DriveState;
 
-/// A gain that was drawn.
+/// Override of one gain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Drawn {
-    /// The gain, in torque units.
+    /// The gain in torque units, or the effort limit.
     value: f64,
-    /// What it stands in for: stiffness or damping in the unit of the drive type, or an effort limit.
+    /// The overridden value: stiffness or damping in the unit of the drive type, or an effort limit.
     instead_of: f64,
 }
 
-/// What is drawn of each drive, in the order of [`Kind::ALL`].
+/// Overrides of one drive, in the order of [`Kind::ALL`].
 pub(super) type DrawnGains = [Option<Drawn>; 3];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,7 +36,7 @@ impl Kind {
         }
     }
 
-    /// What a user sets of it.
+    /// User value of the gain: stiffness or damping in the unit of the drive type, or the effort limit.
     fn set_to(self, gains: &Gains, setting: &Setting) -> f64 {
         match self {
             Self::Stiffness => setting.stiffness,
@@ -44,7 +45,8 @@ impl Kind {
         }
     }
 
-    /// Sets the gain; the drive type stays, and gives it back in its unit. A passive joint has no gains.
+    /// Sets the gain in torque units and the matching user value in the unit of the drive type. A passive joint keeps
+    /// its gains.
     fn put(self, value: f64, gains: &mut Gains, setting: &mut Setting) {
         let unit = setting.unit();
         let in_unit = value / unit.unwrap_or(1.0);
@@ -61,7 +63,7 @@ impl Kind {
         }
     }
 
-    /// Sets it as a user would.
+    /// Sets the user value, as a user does.
     fn set(self, value: f64, gains: &mut Gains, setting: &mut Setting) {
         match self {
             Self::Stiffness => setting.stiffness = value,
@@ -78,13 +80,13 @@ impl Kind {
 }
 
 impl DriveState {
-    /// What is drawn of a gain. The record says so, whatever the gain is now: a passive joint has none.
+    /// Override of a gain. It exists even while a passive joint has no gains.
     fn drawn_gain(&self, drive: usize, kind: Kind) -> Option<Drawn> {
         self.drawn[drive][kind as usize]
     }
 
-    /// Draws gains (in torque units) and the effort limit of a drive, those that are given: also to what they are, or to the
-    /// nominal value.
+    /// Overrides the given gains (in torque units) and effort limit of a drive, even if a value equals the current or
+    /// nominal one.
     pub(crate) fn draw_gains(&mut self, drive: usize, values: [Option<f64>; 3]) {
         for (kind, value) in Kind::ALL.into_iter().zip(values) {
             if let Some(value) = value {
@@ -93,7 +95,7 @@ impl DriveState {
         }
     }
 
-    /// Gains and the effort limit of a drive become those that the model starts with, and are drawn no longer.
+    /// Resets gains and effort limit of a drive to those of the model, and removes the overrides.
     pub(crate) fn become_nominal(&mut self, drive: usize) {
         let initial = self.table().drives[drive].initial;
         for kind in Kind::ALL {
@@ -108,7 +110,8 @@ impl DriveState {
         }
     }
 
-    /// One of them is drawn as it was, whatever is below it: also its very value, which stays then when that changes.
+    /// Restores the override of one gain, whatever the value below it, even if both are equal: the override then
+    /// outlasts a change below it.
     pub(crate) fn redraw_gain(&mut self, drive: usize, kind: usize, value: f64) {
         self.draw(drive, Kind::ALL[kind], value);
     }
@@ -125,27 +128,27 @@ impl DriveState {
         self.drawn.put(drive, drawn);
     }
 
-    /// Sets the stiffness of a drive, in the unit of its type, as a user does: it is drawn no longer, also where it was set
-    /// to the very value that was drawn.
+    /// Sets the stiffness of a drive, in the unit of its type, as a user does. Removes the override, even if both
+    /// values are equal.
     pub(crate) fn set_stiffness(&mut self, drive: usize, value: f64) {
         self.set(drive, |setting| setting.stiffness = value);
         self.undraw(drive, Kind::Stiffness);
     }
 
-    /// As [`set_stiffness`](Self::set_stiffness), of the damping.
+    /// As [`set_stiffness`](Self::set_stiffness), for the damping.
     pub(crate) fn set_drive_damping(&mut self, drive: usize, value: f64) {
         self.set(drive, |setting| setting.damping = value);
         self.undraw(drive, Kind::Damping);
     }
 
-    /// As [`set_stiffness`](Self::set_stiffness), of the effort limit.
+    /// As [`set_stiffness`](Self::set_stiffness), for the effort limit.
     pub(crate) fn set_max_effort(&mut self, drive: usize, max_effort: f64) {
         self.set_limits(drive, |gains| Gains { max_effort, ..gains });
         self.undraw(drive, Kind::MaxEffort);
     }
 
-    /// Changes what stiffness and damping of a drive mean: those that were set keep their numbers, those that are drawn what
-    /// they are in torque units.
+    /// Changes the meaning of stiffness and damping of a drive. User values keep their numbers; overrides keep their
+    /// value in torque units.
     pub(crate) fn set_drive_type(&mut self, drive: usize, drive_type: DriveType, inertia: Option<f64>) {
         let (gains, setting) = self.without_drawn(drive);
         self.gains.put(drive, gains);
@@ -160,12 +163,12 @@ impl DriveState {
         self.drawn.put(drive, drawn);
     }
 
-    /// The gains and the effort limit of a drive that are drawn.
+    /// Overridden gains (in torque units) and effort limit of a drive; `None` without override.
     pub(crate) fn drawn_values(&self, drive: usize) -> [Option<f64>; 3] {
         Kind::ALL.map(|kind| self.drawn_gain(drive, kind).map(|drawn| drawn.value))
     }
 
-    /// Gains and settings become what they would be if nothing had been drawn.
+    /// Removes all overrides and restores the values below them.
     pub(crate) fn forget_drawn(&mut self) {
         for drive in 0..self.table().drives.len() {
             let (gains, setting) = self.without_drawn(drive);
@@ -175,7 +178,7 @@ impl DriveState {
         }
     }
 
-    /// Gains and setting of a drive as they would be if nothing had been drawn.
+    /// Gains and settings of a drive without its overrides.
     pub(super) fn without_drawn(&self, drive: usize) -> (Gains, Setting) {
         let (mut gains, mut setting) = (self.gains[drive], self.settings[drive]);
         for kind in Kind::ALL {
@@ -186,7 +189,7 @@ impl DriveState {
         (gains, setting)
     }
 
-    /// Sets gains and setting of a drive; those that are drawn stay, and stand in for these.
+    /// Sets the values below the overrides of a drive; the overrides stay in effect.
     pub(super) fn set_below_drawn(&mut self, drive: usize, mut gains: Gains, mut setting: Setting) {
         let drawn = Kind::ALL.map(|kind| {
             let Drawn { value, .. } = self.drawn_gain(drive, kind)?;

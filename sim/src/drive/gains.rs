@@ -2,26 +2,26 @@
 
 use super::{ActuatorSpec, DriveType, JointInfo};
 
-/// The configuration of one drive, in the user's units; the law takes [`Gains`].
+/// Configuration of one drive in the user's units; [`Gains`] has the values that the drive law uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
-    /// The meaning of stiffness and damping.
+    /// Meaning of stiffness and damping.
     pub drive_type: DriveType,
     /// Stiffness, in the unit of the drive type.
     pub stiffness: f64,
     /// Damping, in the unit of the drive type.
     pub damping: f64,
-    /// Inertia that the joint feels at the initial pose \[kg m² or kg\], once a drive type asked for it.
+    /// Inertia that the joint feels at the initial pose \[kg m² or kg\]; `None` until a drive type needs it.
     pub inertia: Option<f64>,
 }
 
 impl Setting {
-    /// Unit of stiffness and damping in torque units; `None` where the joint is to be passive.
+    /// Factor from stiffness and damping to torque units; `None` for a passive joint.
     pub fn unit(&self) -> Option<f64> {
         self.drive_type.mode().unit(&JointInfo { effective_inertia: self.inertia.unwrap_or(f64::NAN) })
     }
 
-    /// Gains in torque units; `None` where the joint is to be passive.
+    /// Gains in torque units; `None` for a passive joint.
     pub fn actuator(&self) -> Option<ActuatorSpec> {
         self.unit().map(|unit| ActuatorSpec { kp: self.stiffness * unit, kd: self.damping * unit })
     }
@@ -34,9 +34,9 @@ pub struct Gains {
     pub kp: f64,
     /// Derivative gain \[N m s/rad or N s/m\].
     pub kd: f64,
-    /// Largest effort \[N m or N\]; infinite where there is no limit.
+    /// Effort limit \[N m or N\]; infinite without a limit.
     pub max_effort: f64,
-    /// Largest speed \[rad/s or m/s\]; infinite where there is no limit. Reported; it bounds nothing by itself.
+    /// Velocity limit \[rad/s or m/s\]; infinite without a limit. Reported only: it bounds nothing by itself.
     pub max_velocity: f64,
 }
 

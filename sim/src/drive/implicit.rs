@@ -24,10 +24,10 @@ use kinetoscope_mujoco as mj;
 /// A limit that is never reached, for drives without one: MuJoCo's row needs a finite number.
 const UNLIMITED: f64 = 1e15;
 
-/// Stands for `D` of a drive without gains; its row carries no force.
+/// Value of `D` for a drive without gains; its row carries no force.
 const IDLE_STIFFNESS: f64 = 1e-6;
 
-/// Whether the row carries the drive: without gains there is no row to evaluate, only a feed-forward effort.
+/// True if the row carries the drive. Without gains, only the feed-forward effort acts, which needs no row.
 fn has_gains(gains: &Gains) -> bool {
     gains.kp > 0.0 || gains.kd > 0.0
 }
@@ -54,7 +54,7 @@ pub(super) fn apply(drive: &Drive, row: usize, gains: &Gains, target: &Target, d
     data.efc_frictionloss_mut()[efc] = limit;
 }
 
-/// The effort that the row gave in the last `mj_step2`.
+/// Effort of the row in the last `mj_step2` \[N m or N\].
 pub(super) fn effort(row: usize, gains: &Gains, feedforward: f64, data: &mj::Data) -> f64 {
     if has_gains(gains) {
         data.efc_force()[data.ne() + row]
@@ -73,8 +73,8 @@ pub(super) fn apply_damping(table: &DriveTable, coefficients: &[f64], data: &mut
     }
 }
 
-/// Edits a compiled model so that the drives of `dofs` are rows: their actuators' gain and bias become zero (`ctrl`
-/// still holds the target) and every degree of freedom in `dofs` gets a friction row.
+/// Turns the drives of `dofs` in a compiled model into constraint rows: every degree of freedom in `dofs` gets a
+/// friction row, and gain and bias of the actuators become zero (`ctrl` still holds the target).
 pub(crate) fn prepare(compiled: &mut mj::Compiled, dofs: &[usize], actuators: &[usize]) {
     for &dof in dofs {
         // Any positive value makes MuJoCo build the row; `apply` writes the limit.

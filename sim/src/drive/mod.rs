@@ -6,10 +6,11 @@
 //! tau = clamp(kp (q* - q) + kd (v* - v) + tau_ff, -max_effort, +max_effort)
 //! ```
 //!
-//! * [`DriveMode`] says what stiffness and damping mean (`force.rs`, `acceleration.rs`, `none.rs`, listed once below).
-//! * [`DriveModel`] says who evaluates the law: [`implicit`] (a constraint row, at the end of the step, any gains) or
-//!   MuJoCo's own actuator ([`actuator`], gains inside its domain of stability).
-//! * [`models`] has explicit laws of real motors for chosen joints: limits by speed, delays.
+//! * [`DriveMode`] defines the meaning of stiffness and damping (`force.rs`, `acceleration.rs`, `none.rs`, listed once
+//!   below).
+//! * [`DriveModel`] selects the evaluation of the law: [`implicit`] (a constraint row, at the end of the step, any
+//!   gains) or MuJoCo's own actuator ([`actuator`], gains within its domain of stability).
+//! * [`models`] has explicit laws of real motors for selected joints: speed-dependent limits, delays.
 
 mod acceleration;
 mod cfg;
@@ -31,7 +32,7 @@ pub use models::{ActuatorModel, DcMotor, DelayedPd, IdealPd};
 
 use serde::{Deserialize, Serialize};
 
-/// The list of drive modes: `Variant => the mode`.
+/// List of drive modes: `Variant => the mode`.
 macro_rules! drive_modes {
     ($($(#[$doc:meta])* $variant:ident => $mode:expr,)*) => {
         /// The meaning of stiffness and damping.
@@ -42,10 +43,10 @@ macro_rules! drive_modes {
         }
 
         impl DriveType {
-            /// All modes.
+            /// All drive types.
             pub const ALL: &'static [Self] = &[$(Self::$variant,)*];
 
-            /// The mode's implementation.
+            /// Implementation of the drive mode.
             pub fn mode(self) -> &'static dyn DriveMode {
                 match self {
                     $(Self::$variant => &$mode,)*
@@ -76,7 +77,7 @@ impl std::str::FromStr for DriveType {
     }
 }
 
-/// Who evaluates the drive law.
+/// Evaluation of the drive law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum DriveModel {
@@ -84,7 +85,7 @@ pub enum DriveModel {
     /// exact at the effort limit. Integrators: Euler, and implicitfast on MuJoCo 4.x.
     #[default]
     Implicit,
-    /// MuJoCo's own actuator: explicit, every integrator, stable up to [`actuator::stable_timestep`].
+    /// MuJoCo's own actuator: explicit, with every integrator, stable up to [`actuator::stable_timestep`].
     Actuator,
 }
 

@@ -1,4 +1,4 @@
-//! The trait of drive modes.
+//! Trait of drive modes.
 
 /// Properties of a joint that a drive mode uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -7,7 +7,7 @@ pub struct JointInfo {
     pub effective_inertia: f64,
 }
 
-/// Proportional and derivative gain of an actuator in torque units \[N m/rad, N m s/rad\] or \[N/m, N s/m\].
+/// Proportional and derivative gains of an actuator in torque units \[N m/rad, N m s/rad\] or \[N/m, N s/m\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuatorSpec {
     /// Proportional gain.
@@ -16,13 +16,12 @@ pub struct ActuatorSpec {
     pub kd: f64,
 }
 
-/// Meaning of stiffness and damping: one file per mode.
+/// Meaning of stiffness and damping; one file per mode.
 pub trait DriveMode: std::fmt::Debug + Sync {
-    /// Name in configuration files (EmbodiChain's words).
+    /// Name in configuration files, as in EmbodiChain.
     fn name(&self) -> &'static str;
 
-    /// Unit of stiffness and damping in torque units: the gains of [`ActuatorSpec`] are this times stiffness and damping. `None`
-    /// where the joint stays passive.
+    /// Factor from stiffness and damping to the gains of [`ActuatorSpec`], in torque units; `None` for a passive joint.
     fn unit(&self, joint: &JointInfo) -> Option<f64>;
 
     /// True if the unit depends on [`JointInfo::effective_inertia`], which is NaN for other modes.

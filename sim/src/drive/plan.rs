@@ -1,5 +1,5 @@
-//! What every joint of a robot will do: limits, drive, friction, start position, resolved from description and
-//! configuration. The stage between `RobotDescription` and MJCF.
+//! Resolved drive plan of every joint of a robot: limits, drive, friction, start position. The stage between
+//! `RobotDescription` and MJCF.
 
 use super::cfg::{DEFAULT_DAMPING, DEFAULT_STIFFNESS, DriveCfg, DriveCfgError, JointGains, resolve};
 use super::gains::{Gains, Setting};
@@ -12,20 +12,20 @@ use kinetoscope_robot::dynamics::{Configuration, DynamicsError, Kinematics};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
-/// Everything about one drivable joint (revolute, continuous, prismatic), mimic joints included.
+/// Resolved properties of one drivable joint (revolute, continuous, prismatic), mimic joints included.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointPlan {
-    /// The joint.
+    /// Id of the joint in the description.
     pub joint: JointId,
-    /// Its actuator; `None` for passive and mimic joints.
+    /// Gains of its actuator; `None` for passive and mimic joints.
     pub actuator: Option<ActuatorSpec>,
-    /// The actuator's explicit model; `None` where it is driven as the robot is.
+    /// Explicit actuator model; `None` for a joint with the robot's drive model.
     pub model: Option<ActuatorModel>,
-    /// What the actuator's gains are made of.
+    /// User values that the actuator's gains are computed from.
     pub setting: Setting,
-    /// Largest effort \[N m or N\]; infinite where there is none.
+    /// Effort limit \[N m or N\]; infinite without a limit.
     pub max_effort: f64,
-    /// Largest speed \[rad/s or m/s\], infinite where there is none; reported, not enforced.
+    /// Velocity limit \[rad/s or m/s\], infinite without a limit; reported, not enforced.
     pub max_velocity: f64,
     /// Dry friction \[N m or N\].
     pub friction: f64,
@@ -33,12 +33,13 @@ pub struct JointPlan {
     pub armature: f64,
     /// Viscous damping \[N m s/rad or N s/m\].
     pub damping: f64,
-    /// The joint's own position limits \[rad or m\].
+    /// The joint's own position limits \[rad or m\]; `None` without limits.
     pub limit: Option<[f64; 2]>,
-    /// Positions a target may have \[rad or m\]: the own limits, narrowed by those of joints that mimic this one;
-    /// infinite where there are none.
+    /// Range of position targets \[rad or m\]: the joint's own limits, narrowed by those of joints that mimic it;
+    /// infinite without limits.
     pub usable: [f64; 2],
-    /// For a mimic joint: position = multiplier * position of the driver + offset (chains resolved).
+    /// Mimic relation (driver, multiplier, offset) with chains resolved:
+    /// `position = multiplier * position(driver) + offset`.
     pub mimic: Option<(JointId, f64, f64)>,
     /// Start position \[rad or m\].
     pub initial: f64,
@@ -48,13 +49,13 @@ pub struct JointPlan {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// A drive property is wrong.
+    /// A drive property is invalid.
     #[error(transparent)]
     Drive(#[from] DriveCfgError),
-    /// A key of the start positions is wrong.
+    /// A key of the start positions is invalid.
     #[error("init_qpos: {0}")]
     InitialPattern(#[source] PatternError),
-    /// A start position is not finite: one that is given, or one that follows from it.
+    /// A start position is not finite, given or derived.
     #[error("init_qpos of joint {joint:?} is {value}, not a finite number")]
     InitialValue {
         /// The joint.
@@ -62,14 +63,14 @@ pub enum PlanError {
         /// The value given.
         value: f64,
     },
-    /// An actuator model does not go with its joint.
+    /// An actuator model does not fit its joint.
     #[error("drive.actuators: {model} of joint {joint:?}: {reason}")]
     ActuatorModel {
         /// The joint.
         joint: String,
         /// Name of the model.
         model: &'static str,
-        /// What is wrong, and what would be right.
+        /// The problem and the fix.
         reason: String,
     },
     /// The description's dynamics cannot be computed.
@@ -80,7 +81,7 @@ pub enum PlanError {
 /// Resolves all drivable joints of `description`, in its order.
 ///
 /// # Errors
-/// Patterns and values of the configuration that are wrong.
+/// A pattern or a value of the configuration is invalid.
 pub fn plan(
     description: &RobotDescription,
     drive: &DriveCfg,
@@ -146,11 +147,12 @@ pub fn plan(
     Ok((plans, diagnostics))
 }
 
-/// What is asked of a joint's drive: by the configuration, or else by its file, or else EmbodiChain's numbers. A joint that
-/// its file leaves passive is driven where the configuration names it, and one that a coupling moves never is.
+/// User values of a joint's drive: from the configuration, or else the file, or else EmbodiChain's defaults. A joint
+/// that is passive in its file is driven only if the configuration names it. A joint that a coupling moves is never
+/// driven.
 fn setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> Setting {
     let of_file = joint.defaults.map_or(FileDrive::Unsaid, |file| file.drive);
-    // The file's gains are in torque units; in a unit that needs the inertia, they are not known here.
+    // The file's gains are in torque units. For a unit that needs the inertia, they cannot be converted here.
     let mode = drive_type.mode();
     let unit = mode.unit(&JointInfo { effective_inertia: f64::NAN }).filter(|_| !mode.needs_inertia());
     let (stiffness, damping) = match (of_file, unit) {
@@ -171,21 +173,21 @@ fn setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> Setting 
     }
 }
 
-/// Position limits; a continuous joint has none, whatever the file says. A single missing end is 0, URDF's default; with
-/// both missing (or refused with a warning) the joint is not limited.
+/// Position limits of a joint; a continuous joint has none, even if the file gives some. A single missing end is 0, the
+/// default of URDF. With both ends missing (or rejected with a warning), the joint is unlimited.
 pub(crate) fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
     let limit = joint.limit.as_ref().filter(|_| joint.kind != JointKind::Continuous)?;
     (limit.lower.is_some() || limit.upper.is_some()).then(|| [limit.lower.unwrap_or(0.0), limit.upper.unwrap_or(0.0)])
 }
 
-/// Limits are written with few digits: a hair's breadth is not worth a warning \[rad or m\].
+/// Tolerance for limits that are written with few digits \[rad or m\].
 const SLACK: f64 = 1e-6;
 
-/// A driver keeps at least this share of its range where followers narrow it; a follower that leaves less is let go.
+/// Fraction of its own range that a driver keeps at least; limits of a follower that would leave less are ignored.
 const LEAST_RANGE: f64 = 0.01;
 
-/// A driver may only go where every joint that mimics it may follow. A follower whose limits leave no range goes where its
-/// driver takes it: its limits are those of the driver's range.
+/// Narrows the range of every driver to positions that all its followers can reach. A follower that leaves no range is
+/// released: its limits become those of the driver's range.
 fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], diagnostics: &mut Vec<Diagnostic>) {
     let mut released = Vec::new();
     for i in 0..plans.len() {
@@ -201,7 +203,7 @@ fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], dia
             continue;
         }
         let (joint, driver_joint) = (description.joint(plans[i].joint), description.joint(driver));
-        // Positive zeros: a range of -0 reads like a mistake.
+        // Positive zeros: a range from -0 would look like a mistake.
         let narrowed = [old_low.max(low) + 0.0, old_high.min(high) + 0.0];
         let own_extent = plans[d].limit.map_or(0.0, |[low, high]| high - low);
         let outcome = if narrowed[1] - narrowed[0] > (LEAST_RANGE * own_extent).max(SLACK) {
@@ -276,7 +278,7 @@ fn set_initial_positions(
     Ok(())
 }
 
-/// The curve along which a joint follows another.
+/// Coupling curve of a joint that follows another one.
 pub(crate) fn curve(joint: &Joint) -> Option<Curve> {
     match joint.defaults?.drive {
         FileDrive::Coupled(curve) => curve,
@@ -284,8 +286,8 @@ pub(crate) fn curve(joint: &Joint) -> Option<Curve> {
     }
 }
 
-/// Where a joint is that may follow others by mimics and curves, neither of which goes in circles; `of_free` says where
-/// those are that follow nothing.
+/// Position of a joint that may follow others by mimics and curves, both of which are acyclic. `of_free` gives the
+/// positions of joints that follow no other.
 pub(crate) fn followed(description: &RobotDescription, of_free: &dyn Fn(JointId) -> f64, joint: JointId) -> f64 {
     let (driver, multiplier, offset) = description.mimic_driver(joint);
     let at_driver = match curve(description.joint(driver)) {
@@ -298,16 +300,16 @@ pub(crate) fn followed(description: &RobotDescription, of_free: &dyn Fn(JointId)
 /// The joint-space inertia of a robot at its start positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StartInertia {
-    /// The matrix, rotor inertias included; the base's six columns first where it floats.
+    /// The matrix with rotor inertias; a floating base has the first six columns.
     pub matrix: DMatrix<f64>,
-    /// The column of each drivable joint.
+    /// Column of each drivable joint.
     pub columns: Vec<usize>,
 }
 
-/// The joint-space inertia at the start positions.
+/// Computes the joint-space inertia at the start positions.
 ///
 /// # Errors
-/// The description's dynamics cannot be computed.
+/// The dynamics of the description cannot be computed.
 pub(crate) fn mass_matrix_at_start(
     description: &RobotDescription,
     plans: &[JointPlan],
@@ -325,11 +327,11 @@ pub(crate) fn mass_matrix_at_start(
     Ok(StartInertia { matrix, columns })
 }
 
-/// The inertia that each drivable joint feels at the start positions, `1 / (M⁻¹)_ii` \[kg m² or kg\]; the plain diagonal
-/// where the matrix is singular.
+/// Computes the inertia that each drivable joint feels at the start positions, `1 / (M⁻¹)_ii` \[kg m² or kg\]; the
+/// plain diagonal for a singular matrix.
 ///
 /// # Errors
-/// The description's dynamics cannot be computed.
+/// The dynamics of the description cannot be computed.
 pub fn effective_inertias(
     description: &RobotDescription,
     plans: &[JointPlan],

@@ -1,4 +1,4 @@
-//! The drives of a compiled model: which joint, which row or actuator; and their targets in one environment.
+//! Drives of a compiled model (joint, row or actuator), and their gains and targets in one environment.
 
 use super::drawn::DrawnGains;
 use super::gains::{Gains, Setting, Target};
@@ -8,14 +8,14 @@ use kinetoscope_mujoco as mj;
 use std::ops::{Deref, DerefMut, Range};
 use std::sync::Arc;
 
-/// How one drive acts in MuJoCo.
+/// Realization of a drive in MuJoCo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Realization {
-    /// The friction row of its degree of freedom: see [`DriveTable::rows`].
+    /// Friction row of its degree of freedom: see [`DriveTable::rows`].
     Row,
-    /// MuJoCo's actuator.
+    /// MuJoCo actuator with the drive law.
     Actuator,
-    /// MuJoCo's actuator as a plain source of effort, whose control an explicit model computes.
+    /// MuJoCo actuator as a plain effort source; an explicit model computes its control.
     Explicit {
         /// Index among the explicit models.
         model: usize,
@@ -31,42 +31,43 @@ pub struct Drive {
     pub dof: usize,
     /// Index of the control input that holds the target.
     pub ctrl: usize,
-    /// How it acts.
+    /// Realization in MuJoCo.
     pub realization: Realization,
-    /// The gains and limits the model starts with.
+    /// Initial gains and limits.
     pub initial: Gains,
-    /// Where the gains come from.
+    /// User values that the gains are computed from.
     pub setting: Setting,
-    /// Positions a target may have \[rad or m\].
+    /// Range of position targets \[rad or m\].
     pub range: [f64; 2],
 }
 
-/// All drives of a model, and the joints whose damping is integrated with them. Shared by all environments.
+/// All drives of a model, and the joints with damping inside the drive solve; shared by all environments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DriveTable {
     /// The drives, in the order in which they were added.
     pub drives: Vec<Drive>,
-    /// Explicit models of those drives that have one.
+    /// Explicit models of the drives that have one.
     pub models: Vec<DriveActuator>,
-    /// Degrees of freedom whose viscous damping moved from the model to [`implicit`], with its coefficient.
+    /// Degrees of freedom with viscous damping moved from the model to [`implicit`], and the coefficient \[N m s/rad or
+    /// N s/m\].
     pub damped: Vec<(usize, f64)>,
-    /// Of each of them, the armature without what implicit damping adds to it \[kg m² or kg\].
+    /// Armature of each of these without the share of the implicit damping \[kg m² or kg\].
     pub undamped_armature: Vec<f64>,
 }
 
-/// The explicit model of a drive.
+/// Explicit actuator model of a drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveActuator {
-    /// The drive.
+    /// Index of the drive.
     pub drive: usize,
-    /// Its model.
+    /// The model.
     pub model: ActuatorModel,
-    /// Where in the memory of an environment the model keeps what it needs.
+    /// Range of the model's values in the memory of an environment.
     pub memory: Range<usize>,
 }
 
 impl DriveTable {
-    /// Gives a drive an explicit model.
+    /// Assigns an explicit model to a drive.
     pub(crate) fn push_model(&mut self, drive: usize, model: ActuatorModel) {
         let first = self.models.last().map_or(0, |last| last.memory.end);
         let memory = first..first + model.law().memory().len();
@@ -74,15 +75,15 @@ impl DriveTable {
         self.models.push(DriveActuator { drive, model, memory });
     }
 
-    /// The friction row of each drive that is one, in environments of `model`, counted among the rows of degrees of freedom;
-    /// 0 for others. MuJoCo makes a row for each degree of freedom with friction, in their order.
+    /// Friction row of each drive in environments of `model`, counted among the friction rows of degrees of freedom; 0
+    /// for drives without a row. MuJoCo creates a row for each degree of freedom with friction, in their order.
     pub fn rows(&self, model: &mj::Model) -> Vec<usize> {
         let before = |dof: usize| model.dof_frictionloss()[..dof].iter().filter(|friction| **friction > 0.0).count();
         let row = |drive: &Drive| if drive.realization == Realization::Row { before(drive.dof) } else { 0 };
         self.drives.iter().map(row).collect()
     }
 
-    /// The explicit model of a drive.
+    /// Explicit model of a drive.
     pub(crate) fn model_of(&self, drive: usize) -> Option<&DriveActuator> {
         match self.drives[drive].realization {
             Realization::Explicit { model } => Some(&self.models[model]),
@@ -91,8 +92,8 @@ impl DriveTable {
     }
 }
 
-/// A list that environments share until one writes to its own. Nobody sets most of what a drive can be told, and memory
-/// of which there is one for all stays in the cache.
+/// Copy-on-write array shared by all environments. Most settings are never changed, so the shared copy stays in the
+/// cache.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shared<T>(Arc<[T]>);
 
@@ -111,7 +112,7 @@ impl<T: Clone> DerefMut for Shared<T> {
 }
 
 impl<T: Copy + PartialEq> Shared<T> {
-    /// Writes where that changes something.
+    /// Writes `value` if it differs, so that equal values keep the array shared.
     pub(super) fn put(&mut self, index: usize, value: T) {
         if self[index] != value {
             self[index] = value;
@@ -120,7 +121,7 @@ impl<T: Copy + PartialEq> Shared<T> {
 }
 
 impl Shared<f64> {
-    /// Takes these values, bit by bit; shares `common` where they are those.
+    /// Sets all values, bit for bit; shares `common` if the values are equal.
     fn take(&mut self, values: &[f64], common: &Self) {
         let same = |list: &[f64]| list.iter().map(|x| x.to_bits()).eq(values.iter().map(|x| x.to_bits()));
         if same(common) {
@@ -131,28 +132,28 @@ impl Shared<f64> {
     }
 }
 
-/// What environments start with.
+/// Initial values of all environments.
 #[derive(Debug, PartialEq)]
 struct Initial {
     table: Arc<DriveTable>,
     position: Box<[f64]>,
-    /// One zero per drive.
+    /// Zero per drive.
     no_targets: Shared<f64>,
-    /// One zero per degree of freedom.
+    /// Zero per degree of freedom.
     no_forces: Shared<f64>,
 }
 
-/// Targets and gains of the drives in one environment, and the effort they last gave.
+/// Targets and gains of the drives in one environment, and their last efforts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DriveState {
     initial: Arc<Initial>,
     /// Gains, one per drive.
     pub gains: Shared<Gains>,
-    /// What the gains were made of, one per drive.
+    /// User values that the gains are computed from, one per drive.
     pub settings: Shared<Setting>,
-    /// Which of the gains are properties of the environment, not of its state.
+    /// Overrides of gains, which are properties of the environment and not part of its state.
     pub(super) drawn: Shared<DrawnGains>,
-    /// Positions a target may have \[rad or m\], one range per drive.
+    /// Range of position targets \[rad or m\], one per drive.
     pub ranges: Shared<[f64; 2]>,
     /// Position targets \[rad or m\].
     pub position: Box<[f64]>,
@@ -160,21 +161,21 @@ pub struct DriveState {
     pub velocity: Shared<f64>,
     /// Feed-forward efforts \[N m or N\]; they stay until changed.
     pub feedforward: Shared<f64>,
-    /// Effort each drive gave in the last step \[N m or N\].
+    /// Effort of each drive in the last step \[N m or N\].
     pub effort: Box<[f64]>,
-    /// Generalised forces that a user applies, by degree of freedom; the implicit damping adds to them.
+    /// Generalized forces applied by the user, by degree of freedom; the implicit damping adds to them.
     pub applied: Shared<f64>,
-    /// What explicit models keep from step to step.
+    /// Memory of explicit models from step to step.
     pub memory: Box<[f64]>,
-    /// The friction row of each drive that is one, which the dry friction of other joints moves; 0 for others.
+    /// Friction row of each drive; 0 for drives without a row. Dry friction of other joints shifts these indices.
     rows: Shared<usize>,
-    /// Coefficients of the damping that is integrated with the drives, as [`DriveTable::damped`] lists them. The armature of
-    /// the model holds the other half of it: they change together.
+    /// Coefficients of the damping inside the drive solve, in the order of [`DriveTable::damped`]. The model's armature
+    /// holds the other half of this damping, so both change together.
     damping: Shared<f64>,
 }
 
 impl DriveState {
-    /// Drives at rest at the model's initial positions. Clones share what none of them has changed.
+    /// Creates drives at rest at the model's initial positions. Clones share all arrays that none of them has changed.
     pub fn new(table: &Arc<DriveTable>, model: &mj::Model) -> Self {
         let n = table.drives.len();
         let position: Box<[f64]> = table.drives.iter().map(|d| model.qpos0()[d.qpos]).collect();
@@ -199,25 +200,25 @@ impl DriveState {
         state
     }
 
-    /// Asks for the memory that is this environment's own, and waits for nothing.
+    /// Prefetches the memory that this environment does not share, without waiting.
     pub(crate) fn prefetch(&self) {
         mj::prefetch(&self.position);
         mj::prefetch(&self.effort);
         mj::prefetch(&self.memory);
     }
 
-    /// Explicit models forget what was: the present targets are those at the start.
+    /// Resets the memory of explicit models, with the current targets as those at the start.
     pub(crate) fn start(&mut self) {
         self.each_memory(|law, target, memory| law.start(target, memory));
     }
 
-    /// What a drive is asked for.
+    /// Targets of a drive.
     fn target(&self, drive: usize) -> Target {
         let (position, velocity, feedforward) = (self.position[drive], self.velocity[drive], self.feedforward[drive]);
         Target { position, velocity, feedforward }
     }
 
-    /// Each explicit model with what its drive is asked for and what it keeps.
+    /// Calls `act` for each explicit model with the targets and the memory of its drive.
     fn each_memory(&mut self, act: impl Fn(&dyn ActuatorLaw, &Target, &mut [f64])) {
         let mut memory = std::mem::take(&mut self.memory);
         for explicit in &self.initial.table.models {
@@ -226,7 +227,7 @@ impl DriveState {
         self.memory = memory;
     }
 
-    /// Back to rest at the model's initial positions; gains and limits stay.
+    /// Resets targets and forces to rest at the model's initial positions; gains and limits stay.
     pub(crate) fn reset(&mut self) {
         let initial = &*self.initial;
         self.position.copy_from_slice(&initial.position);
@@ -236,13 +237,14 @@ impl DriveState {
         self.applied.clone_from(&initial.no_forces);
     }
 
-    /// Changes what is asked of a drive, and with it its gains; limits stay.
+    /// Changes the user values of a drive and computes its gains from them; limits stay.
     pub fn set(&mut self, drive: usize, change: impl FnOnce(&mut Setting)) {
         let (old, mut setting) = (self.settings[drive], self.settings[drive]);
         change(&mut setting);
         let mut gains = self.gains[drive];
         let (kp, kd) = setting.actuator().map_or((0.0, 0.0), |spec| (spec.kp, spec.kd));
-        // A gain that was drawn is not the product of its setting to the last bit: what was not changed stays.
+        // A randomized gain is not the exact product of its user value, so a gain with an unchanged user value must
+        // stay.
         let same_type = (setting.drive_type, setting.inertia) == (old.drive_type, old.inertia);
         if !same_type || setting.stiffness.to_bits() != old.stiffness.to_bits() {
             gains.kp = kp;
@@ -259,13 +261,13 @@ impl DriveState {
         self.gains.put(drive, change(self.gains[drive]));
     }
 
-    /// Changes the positions that targets of a drive may have; the present target is clamped to them.
+    /// Changes the range of position targets of a drive; the current target is clamped to it.
     pub(crate) fn set_range(&mut self, drive: usize, [low, high]: [f64; 2]) {
         self.ranges.put(drive, [low, high]);
         self.position[drive] = self.position[drive].clamp(low, high);
     }
 
-    /// Takes gains, limits, targets and effort of drive `from` of `other` for drive `to`.
+    /// Copies gains, limits, targets and effort from drive `from` of `other` to drive `to`.
     pub(crate) fn copy_from(&mut self, other: &Self, from: usize, to: usize) {
         self.gains.put(to, other.gains[from]);
         self.settings.put(to, other.settings[from]);
@@ -280,31 +282,31 @@ impl DriveState {
         }
     }
 
-    /// Takes the force applied to degree of freedom `from` of `other` for degree of freedom `to`.
+    /// Copies the applied force from degree of freedom `from` of `other` to degree of freedom `to`.
     pub(crate) fn copy_applied_from(&mut self, other: &Self, from: usize, to: usize) {
         self.applied.put(to, other.applied[from]);
     }
 
-    /// Sets coefficients of the damping that is integrated with the drives.
+    /// Sets the coefficients of the damping inside the drive solve.
     pub(crate) fn set_damping(&mut self, damping: &[f64]) {
         damping.iter().enumerate().for_each(|(index, value)| self.damping.put(index, *value));
     }
 
-    /// Takes the friction rows of a model, as [`DriveTable::rows`] gives them.
+    /// Sets the friction rows, as [`DriveTable::rows`] returns them.
     pub(crate) fn set_rows(&mut self, rows: &[usize]) {
         rows.iter().enumerate().for_each(|(index, row)| self.rows.put(index, *row));
     }
 
-    /// What [`restoring`](Self::set_numbers) a state brings back: ten numbers of each drive (gains and limits, what they
-    /// were made of, range; without what is drawn), its targets (position, velocity, feed-forward) and its effort, then the applied forces and what
-    /// explicit models keep.
+    /// Flat array of the state, for [`set_numbers`](Self::set_numbers). It has ten numbers per drive (gains and limits,
+    /// their user values, target range; without overrides), then targets (position, velocity, feed-forward), efforts,
+    /// applied forces, and the memory of explicit models.
     pub(crate) fn numbers(&self) -> Vec<f64> {
         let settings = self.ranges.iter().enumerate().flat_map(|(drive, range)| {
             let (gains, setting) = self.without_drawn(drive);
             let drive_type = DriveType::ALL.iter().position(|known| *known == setting.drive_type).unwrap_or(0) as f64;
             let Setting { stiffness, damping, inertia, .. } = setting;
             let Gains { kp, kd, max_effort, max_velocity } = gains;
-            // No inertia is 0.
+            // 0 stands for no inertia.
             let inertia = inertia.unwrap_or(0.0);
             [kp, kd, max_effort, max_velocity, drive_type, stiffness, damping, inertia, range[0], range[1]]
         });
@@ -313,7 +315,8 @@ impl DriveState {
         settings.chain(targets.into_iter().flatten().copied()).collect()
     }
 
-    /// Takes what [`numbers`](Self::numbers) gave, of drives of the same number. Gains that are drawn here stay.
+    /// Restores a flat array of [`numbers`](Self::numbers) with the same number of drives. Overrides of gains stay in
+    /// effect.
     pub(crate) fn set_numbers(&mut self, numbers: &[f64]) {
         let n = self.position.len();
         let (settings, rest) = numbers.split_at(10 * n);
@@ -339,12 +342,12 @@ impl DriveState {
         self.memory.copy_from_slice(memory);
     }
 
-    /// The model's drives.
+    /// Drive table of the model.
     pub fn table(&self) -> &Arc<DriveTable> {
         &self.initial.table
     }
 
-    /// Between `mj_step1` and `mj_step2`: makes every drive act on this step.
+    /// Applies every drive to the next step; must run between `mj_step1` and `mj_step2`.
     pub fn apply(&self, data: &mut mj::Data) {
         let table = &*self.initial.table;
         data.qfrc_applied_mut().copy_from_slice(&self.applied);
@@ -365,7 +368,7 @@ impl DriveState {
         }
     }
 
-    /// After a step that stays: the efforts the drives gave in it, and what models keep of it.
+    /// Stores the efforts of a successful step and updates the memory of explicit models.
     pub(crate) fn finish_step(&mut self, efforts: &[f64]) {
         self.effort.copy_from_slice(efforts);
         if !self.memory.is_empty() {
@@ -373,7 +376,7 @@ impl DriveState {
         }
     }
 
-    /// After `mj_step2`: the effort every drive gave.
+    /// Reads the effort of every drive after `mj_step2`.
     pub fn read_efforts(&self, data: &mj::Data, efforts: &mut Vec<f64>) {
         efforts.clear();
         efforts.extend(self.table().drives.iter().enumerate().map(|(i, drive)| match drive.realization {
@@ -383,7 +386,8 @@ impl DriveState {
     }
 }
 
-/// What [`DriveState::numbers`] cannot have given of so many drives.
+/// Error in a flat array that [`DriveState::numbers`] cannot have produced for this number of drives; `None` for a
+/// valid one.
 pub(crate) fn numbers_fault(numbers: &[f64], drives: usize) -> Option<&'static str> {
     let Some((settings, rest)) = numbers.split_at_checked(10 * drives) else {
         return Some("drives have fewer numbers than they need");

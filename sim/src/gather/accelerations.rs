@@ -1,4 +1,4 @@
-//! Accelerations of links and objects, with the poses and velocities that they are of.
+//! Accelerations of links and objects, with the poses and velocities of the same time.
 
 use super::rows::captured;
 use super::{poses, velocities};
@@ -6,11 +6,11 @@ use crate::env::Env;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
-/// Fills the rows of environment number `i`.
+/// Fills the rows of environment `i`.
 pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
     let solved = env.solved();
     if solved.poses.is_empty() {
-        // Nothing can be solved for the state as it is, but it is somewhere.
+        // Nothing was solved for this state, but its poses and velocities exist.
         poses::rows(simulation, env, i, &mut state.force_poses);
         velocities::rows(simulation, env, i, &mut state.force_velocities);
     } else {

@@ -1,26 +1,26 @@
-//! Controls, forces and activations of drives and of the actuators of MJCF files.
+//! Controls, forces and activations of drives and of the actuators of attached MJCF files.
 
 use crate::env::Env;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
-/// The drives of all robots.
+/// Indices of the drives of all robots.
 fn drives(simulation: &Simulation) -> impl Iterator<Item = usize> {
     simulation.robots.iter().flat_map(|robot| &robot.joints).filter_map(|joint| joint.drive)
 }
 
-/// How many actuators there are.
+/// Number of actuators.
 pub(super) fn count(simulation: &Simulation) -> usize {
     drives(simulation).count() + simulation.parts.iter().map(|part| part.actuators.len()).sum::<usize>()
 }
 
-/// Fills the rows of environment number `i`.
+/// Fills the rows of environment `i`.
 pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
     let (model, data) = (simulation.batch.model(), env.data());
     let of_drives = drives(simulation).map(|drive| [env.drives.position[drive], env.drives.effort[drive], 0.0]);
     let of_parts = simulation.parts.iter().flat_map(|part| part.actuators.iter().zip(&part.controls));
     let of_parts = of_parts.map(|(&actuator, &control)| {
-        // Of several, the last one is what MuJoCo's force is made of.
+        // MuJoCo computes the force from the last of several activations.
         let activation = model.actuator_activation(actuator).next_back().map_or(0.0, |place| data.act()[place]);
         [data.ctrl()[control], data.actuator_force()[actuator], activation]
     });

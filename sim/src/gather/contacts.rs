@@ -4,10 +4,10 @@ use crate::env::Env;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
-/// Appends the contacts of environment number `i`; those of the environments before it are there.
+/// Appends the contacts of environment `i` to those of the environments before it.
 pub(super) fn fill(_simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
     if let Some(contacts) = &mut state.contacts {
-        // Those of the last time go with the first environment.
+        // Environment 0 removes all contacts of the previous call.
         contacts.list.truncate(contacts.first[i]);
         contacts.list.extend_from_slice(&env.solved().contacts);
         contacts.first[i + 1] = contacts.list.len();

@@ -6,9 +6,9 @@ use crate::index::JointIndexing;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
-/// Fills the row of environment number `i`.
+/// Fills the row of environment `i`.
 pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
-    // A joint without a drive of ours may have actuators of an MJCF file.
+    // A joint without a drive of this crate may have actuators of an MJCF file.
     let effort = |joint: &JointIndexing| match joint.drive {
         Some(drive) => env.drives.effort[drive],
         None => env.data().qfrc_actuator()[joint.dof],

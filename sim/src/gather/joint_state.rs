@@ -5,7 +5,7 @@ use crate::env::Env;
 use crate::simulation::Simulation;
 use kinetoscope_scene::SceneState;
 
-/// Fills the rows of environment number `i`.
+/// Fills the rows of environment `i`.
 pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
     let data = env.data();
     joints(&mut state.joint_positions, i, simulation, |joint| data.qpos()[joint.qpos]);

@@ -1,4 +1,4 @@
-//! From a batch of environments to the arrays that sensors read: only what somebody asked for.
+//! Copies quantities of a batch to the arrays that sensors read; only requested quantities are gathered.
 
 mod accelerations;
 mod actuators;
@@ -19,10 +19,10 @@ use kinetoscope_scene::Requires;
 use kinetoscope_scene::{Lengths, SceneState};
 use kinetoscope_sensors::Phases;
 
-/// Fills the rows of an environment, with its number, in the arrays of a quantity.
+/// Fills the rows of one environment, given by index, in the arrays of a quantity.
 type Fill = fn(&Simulation, &Env, usize, &mut SceneState);
 
-/// All quantities that are gathered, each by a file of its own. Their arrays are listed in [`kinetoscope_scene::state`].
+/// All gathered quantities, each in a file of its own. [`kinetoscope_scene::state`] lists their arrays.
 const QUANTITIES: [(Requires, Fill); 11] = [
     (Requires::POSES, poses::fill),
     (Requires::VELOCITIES, velocities::fill),
@@ -37,7 +37,7 @@ const QUANTITIES: [(Requires, Fill); 11] = [
     (Requires::INSTANCES, instances::fill),
 ];
 
-/// Quantities that sensors may ask for: those that are gathered, and the markers of other sensors.
+/// Quantities that a sensor may require: the gathered ones, and the markers of other sensors.
 pub(crate) const AVAILABLE: Requires = {
     let (mut all, mut k) = (Requires::MARKERS, 0);
     while k < QUANTITIES.len() {
@@ -47,9 +47,10 @@ pub(crate) const AVAILABLE: Requires = {
     all
 };
 
-/// A state with room for what `requires` names. The body axis has the links of all robots, then objects, then frames of
-/// parts; the joint axis the movable joints of all robots, then those of parts with one degree of freedom; the actuator axis
-/// the drives of all robots, then the actuators of parts.
+/// Allocates a state with the arrays that `requires` names. The body axis has the links of all robots, then objects,
+/// then frames of attached MJCF files. The joint axis has the movable joints of all robots, then the joints of attached
+/// MJCF files with one degree of freedom. The actuator axis has the drives of all robots, then the actuators of
+/// attached MJCF files.
 pub(crate) fn allocate(simulation: &Simulation, requires: Requires) -> SceneState {
     let seen = simulation.visible.as_ref();
     let lengths = Lengths {
@@ -68,7 +69,7 @@ pub(crate) fn allocate(simulation: &Simulation, requires: Requires) -> SceneStat
     state
 }
 
-/// Steps and times of all environments.
+/// Writes steps and times of all environments to `state`.
 pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut SceneState) {
     simulation.batch.for_each(|i, env| {
         state.step[i] = env.steps() / u64::from(substeps);
@@ -77,7 +78,7 @@ pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut S
     });
 }
 
-/// The step of every environment, for sensors that say when they are due.
+/// Writes the step count of every environment to `clocks`, for the schedules of sensors.
 pub(crate) fn gather_clocks(simulation: &Simulation, substeps: u32, clocks: &mut Vec<u64>) {
     clocks.resize(simulation.batch.num_envs(), 0);
     simulation.batch.for_each(|i, env| {
@@ -86,7 +87,7 @@ pub(crate) fn gather_clocks(simulation: &Simulation, substeps: u32, clocks: &mut
     });
 }
 
-/// Fills the arrays that `requires` names, which must be there.
+/// Fills the arrays that `requires` names, which must be allocated.
 pub(crate) fn gather(simulation: &Simulation, substeps: u32, requires: Requires, state: &mut SceneState) {
     gather_steps(simulation, substeps, state);
     if requires.is_empty() {

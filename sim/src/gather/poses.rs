@@ -6,12 +6,12 @@ use kinetoscope_scene::SceneState;
 use kinetoscope_scene::pose::to_row;
 use ndarray::Array3;
 
-/// Fills the rows of environment number `i`.
+/// Fills the rows of environment `i`.
 pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
     rows(simulation, env, i, &mut state.body_poses);
 }
 
-/// Fills the poses of environment number `i`, as they are now.
+/// Writes the current poses of environment `i` to `array`.
 pub(super) fn rows(simulation: &Simulation, env: &Env, i: usize, array: &mut Option<Array3<f64>>) {
     let Some(array) = array else { return };
     for (b, link) in simulation.plan.bodies().iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Poses, lamps and changing shapes that cameras see.
+//! Poses, lights and deforming shapes for cameras.
 
 use crate::env::Env;
 use crate::simulation::Simulation;
@@ -6,7 +6,7 @@ use crate::visible::Visible;
 use kinetoscope_scene::{Light, OwnScene, PoseF32, SceneState, VisibleState};
 use ndarray::Array2;
 
-/// Room for what cameras see of a scene in `num_envs` environments.
+/// Allocates the state that cameras read for a scene in `num_envs` environments.
 pub(super) fn room(visible: &Visible, num_envs: usize) -> VisibleState {
     VisibleState {
         instance_poses: Array2::from_elem((num_envs, visible.scene().instances().len()), PoseF32::IDENTITY),
@@ -15,7 +15,7 @@ pub(super) fn room(visible: &Visible, num_envs: usize) -> VisibleState {
     }
 }
 
-/// Fills the rows of environment number `i`.
+/// Fills the rows of environment `i`.
 pub(super) fn fill(simulation: &Simulation, env: &Env, i: usize, state: &mut SceneState) {
     static AS_ALL: OwnScene = OwnScene(None);
     if let (Some(visible), Some(seen)) = (&simulation.visible, &mut state.visible)

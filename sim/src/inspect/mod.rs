@@ -1,10 +1,11 @@
-//! What a robot is, before MuJoCo sees it: the tree, mass properties, dynamics at a position, and everything odd.
+//! Report on a robot without a simulation: tree, mass properties, dynamics at a position, and warnings.
 //!
-//! [`inspect`] reads the files as [`SimulationManager::add_robot`](crate::SimulationManager::add_robot) does, meshes and
-//! convex hulls included, and finds the same warnings but those of where a simulation starts; of an MJCF file, those that
-//! compiling the scene gives are not among them. Masses and dynamics are those of the files, completed
-//! from shapes where [`MissingInertia`](kinetoscope_robot::urdf::MissingInertia) says so and computed by [`dynamics`](kinetoscope_robot::dynamics):
-//! nothing else is repaired. MuJoCo is used for MJCF files only, which it compiles alone.
+//! [`inspect`] reads the files as [`SimulationManager::add_robot`](crate::SimulationManager::add_robot) does, meshes
+//! and convex hulls included. It finds the same warnings except those about start positions. For an MJCF file, warnings
+//! from compiling the scene are missing too. Masses and dynamics are those of the files, computed by
+//! [`dynamics`](kinetoscope_robot::dynamics). Missing inertias are completed from shapes if
+//! [`MissingInertia`](kinetoscope_robot::urdf::MissingInertia) says so; nothing else is repaired. Only MJCF files need
+//! MuJoCo, which compiles them alone.
 
 mod report;
 mod text;
@@ -32,29 +33,30 @@ use std::path::PathBuf;
 
 /// Gravity \[m/s²\].
 const GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
-/// A position given for a mimic joint may differ this much from what its driver implies \[rad or m\] without a warning.
+/// Largest difference between a given position of a mimic joint and the one that its driver implies without a warning
+/// \[rad or m\].
 const MIMIC_SLACK: f64 = 1e-6;
 
-/// What to inspect.
+/// Robot files and position to inspect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InspectCfg {
-    /// The files.
+    /// The URDF files.
     pub urdf: UrdfCfg,
-    /// The MJCF file, for a robot that is described by one ([`RobotCfg::mjcf`]): then there are no URDF files. Where a body has
-    /// several joints, there is a link without mass behind each but the last.
+    /// The MJCF file of an MJCF robot ([`RobotCfg::mjcf`]), instead of URDF files. A body with several joints has a
+    /// massless link behind each joint but the last.
     pub mjcf: Option<MjcfFile>,
-    /// Whether the root moves freely.
+    /// True if the root moves freely.
     pub floating_base: bool,
-    /// Positions \[rad or m\] by joint name; for joints that are not named 0, or an MJCF file's `ref`. Joints that follow
-    /// others (by mimics, or by the curves of an MJCF file) are where these put them.
+    /// Positions \[rad or m\] by joint name. Joints without a position are at 0, or at `ref` of an MJCF file. Joints
+    /// that follow others (mimic joints, or curves of an MJCF file) have the implied position.
     pub qpos: Vec<(String, f64)>,
 }
 
-/// Why a robot was refused.
+/// An error of [`inspect`].
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InspectError {
-    /// The files cannot be used.
+    /// The files cannot be loaded.
     #[error(transparent)]
     Load(Box<Error>),
     /// A position is given for a joint that does not exist.
@@ -62,37 +64,37 @@ pub enum InspectError {
     JointUnknown {
         /// The name given.
         name: String,
-        /// Joints that have a position, the closest first.
+        /// Joints that have a position, closest name first.
         candidates: Vec<String>,
-        /// How many there are.
+        /// Number of joints that have a position.
         total: usize,
     },
     /// A position is given for a joint without a single degree of freedom.
     #[error("{at}: qpos: joint {name:?} is {kind}; only revolute, continuous and prismatic joints have a position")]
     JointUnmovable {
-        /// The joint.
+        /// File and line of the joint.
         at: Source,
-        /// Its name.
+        /// Name of the joint.
         name: String,
-        /// Its type.
+        /// Type of the joint.
         kind: &'static str,
     },
     /// Two positions are given for one joint.
     #[error("qpos: joint {name:?} has two positions, {first} and {second}; give one")]
     PositionRepeated {
-        /// The joint.
+        /// Name of the joint.
         name: String,
-        /// The first.
+        /// First position \[rad or m\].
         first: f64,
-        /// The second.
+        /// Second position \[rad or m\].
         second: f64,
     },
     /// A position is infinite or not a number.
     #[error("qpos: joint {name:?} is at {value}, which is not finite")]
     PositionNotFinite {
-        /// The joint.
+        /// Name of the joint.
         name: String,
-        /// The position.
+        /// Position given.
         value: f64,
     },
     /// Dynamics cannot be computed.
@@ -101,7 +103,7 @@ pub enum InspectError {
 }
 
 impl InspectCfg {
-    /// All files, as they are named.
+    /// All files, as given.
     fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.urdf.components.iter().map(|c| &c.urdf).chain(self.mjcf.iter().map(|file| &file.path))
     }
@@ -113,10 +115,10 @@ impl From<Error> for InspectError {
     }
 }
 
-/// Reads the files and reports.
+/// Reads the files and creates the report.
 ///
 /// # Errors
-/// Whatever [`add_robot`](crate::SimulationManager::add_robot) refuses in the files, and wrong positions.
+/// [`add_robot`](crate::SimulationManager::add_robot) rejects the files, or a position is invalid.
 pub fn inspect(cfg: &InspectCfg) -> Result<Report, InspectError> {
     let robot = RobotCfg {
         urdf: cfg.urdf.clone(),
@@ -129,7 +131,7 @@ pub fn inspect(cfg: &InspectCfg) -> Result<Report, InspectError> {
     let configuration = configuration(&description, cfg, &mut diagnostics)?;
     hulls.of_collisions(&description).map_err(Error::from)?;
     check_visual_meshes(&description, &mut diagnostics);
-    // Inertias of an MJCF file are those that MuJoCo accepted.
+    // Inertias of an MJCF file have already been checked by MuJoCo.
     if file.is_none() {
         for body in rigid_bodies(&description, cfg.floating_base) {
             fuse(&description, &body, &mut diagnostics);
@@ -142,7 +144,7 @@ pub fn inspect(cfg: &InspectCfg) -> Result<Report, InspectError> {
     Ok(Report::new(cfg, &description, &kinematics, qpos, &GRAVITY, &diagnostics))
 }
 
-/// Where the robot is to be, in the order of the drivable joints.
+/// Configuration with the given positions, in the order of the drivable joints.
 fn configuration(
     description: &RobotDescription,
     cfg: &InspectCfg,
@@ -198,7 +200,7 @@ fn configuration(
     Ok(configuration)
 }
 
-/// A warning for every visual whose mesh exists and cannot be read; those that do not exist have one already.
+/// Adds a warning for every visual mesh that exists but cannot be read. Missing meshes already have a warning.
 fn check_visual_meshes(description: &RobotDescription, diagnostics: &mut Vec<Diagnostic>) {
     let mut faults: HashMap<&std::path::Path, Option<String>> = HashMap::new();
     for link in &description.links {
@@ -219,18 +221,18 @@ fn check_visual_meshes(description: &RobotDescription, diagnostics: &mut Vec<Dia
     }
 }
 
-/// Warnings about limits.
+/// Warnings about joint limits.
 fn joint_diagnostics(description: &RobotDescription, floating_base: bool) -> Result<Vec<Diagnostic>, InspectError> {
     let planned = plan(description, &DriveCfg::default(), &BTreeMap::new(), &[], floating_base);
     let (_, mut diagnostics) =
         planned.map_err(|error| Error::Plan { robot: (&description.name).into(), error: Box::new(error) })?;
-    // Where a simulation starts is no property of the files.
+    // Start positions belong to a simulation, not to the files.
     let of_start = [DiagnosticKind::InitialPositionClamped, DiagnosticKind::FollowerStartsBeyondLimits];
     diagnostics.retain(|d| !of_start.contains(&d.kind));
     Ok(diagnostics)
 }
 
-/// Files in the order given, then lines.
+/// Sorts by file in the given order, then by line.
 fn sort_by_place(diagnostics: &mut [Diagnostic], cfg: &InspectCfg) {
     let files: Vec<_> = cfg.files().collect();
     diagnostics.sort_by_key(|d| {
@@ -238,7 +240,8 @@ fn sort_by_place(diagnostics: &mut [Diagnostic], cfg: &InspectCfg) {
     });
 }
 
-/// Names of the generalized velocities after those of the base and of the drivable joints.
+/// Names of the generalized velocities of floating and planar joints, which follow those of the base and of the
+/// drivable joints.
 fn free_joint_columns(description: &RobotDescription) -> Vec<String> {
     let mut columns = Vec::new();
     for joint in &description.joints {
@@ -252,5 +255,5 @@ fn free_joint_columns(description: &RobotDescription) -> Vec<String> {
     columns
 }
 
-/// Velocity of the origin along x, y, z, then angular velocity about x, y, z.
+/// Components of a free velocity: of the origin along x, y, z, then angular about x, y, z.
 const FREE_COLUMNS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];

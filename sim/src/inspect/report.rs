@@ -1,4 +1,4 @@
-//! The report: plain data, written as JSON by `serde`. Numbers are SI; quaternions are w, x, y, z; `None` is `null`.
+//! Report as plain data that `serde` writes as JSON. Numbers are SI; quaternions are w, x, y, z; `None` is `null`.
 
 use super::{FREE_COLUMNS, InspectCfg, free_joint_columns};
 use crate::drive::plan::own_limit;
@@ -11,61 +11,62 @@ use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// A robot in one position.
+/// Report on a robot in one position.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Name of the robot.
     pub robot: String,
-    /// The files, as they were named.
+    /// The files, as given.
     pub files: Vec<String>,
     /// Sum of the link masses \[kg\].
     pub total_mass: f64,
-    /// Centre of mass in the world \[m\]; `None` where there is no mass.
+    /// Center of mass in the world \[m\]; `None` for a massless robot.
     pub com: Option<[f64; 3]>,
-    /// All links, also those that are fixed to another, in the order of the merged files.
+    /// All links in the order of the merged files, including links fixed to others.
     pub links: Vec<LinkReport>,
-    /// All joints, also fixed ones, in the order of the merged files.
+    /// All joints in the order of the merged files, including fixed joints.
     pub joints: Vec<JointReport>,
-    /// Joints with one degree of freedom, mimic ones included, in the order of the merged files.
+    /// Joints with one degree of freedom in the order of the merged files, including mimic joints.
     pub joint_names: Vec<String>,
     /// Position of each of `joint_names` \[rad or m\].
     pub qpos: Vec<f64>,
-    /// Rows and columns of `mass_matrix` and entries of `gravity_torque`: `joint_names`. With a floating base, ahead of
-    /// them `base.vx` to `base.wz`: the velocity of the root's origin in world axes, then the angular velocity in the
-    /// axes of the root. After them, for each floating joint six, for each planar joint three (`.vx`, `.vy`, `.wz`).
+    /// Names of the generalized velocities: rows and columns of `mass_matrix`, entries of `gravity_torque`. They are
+    /// `joint_names`. With a floating base, `base.vx` to `base.wz` come first: the velocity of the root's origin in
+    /// world axes, then the angular velocity in root axes. Floating joints (six entries each) and planar joints (`.vx`,
+    /// `.vy`, `.wz`) come last.
     pub columns: Vec<String>,
-    /// Joint-space inertia at `qpos`, with the rotor inertias (`armature`) of an MJCF file on the diagonal; mimic joints are
-    /// coordinates of their own.
+    /// Joint-space inertia at `qpos`, with the rotor inertias (`armature`) of an MJCF file on the diagonal; mimic
+    /// joints have columns of their own.
     pub mass_matrix: Vec<Vec<f64>>,
-    /// The generalized force that holds the robot still at `qpos`, gravity being (0, 0, -9.81) m/s².
+    /// Generalized force that holds the robot still at `qpos`, for gravity (0, 0, -9.81) m/s².
     pub gravity_torque: Vec<f64>,
-    /// What was repaired, ignored or missing.
+    /// Warnings about everything repaired, ignored or missing.
     pub warnings: Vec<Warning>,
 }
 
-/// A link.
+/// Report on a link.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LinkReport {
     /// Name.
     pub name: String,
     /// The parent link; `None` for the root.
     pub parent: Option<String>,
-    /// Mass \[kg\]; 0 where the file gives none.
+    /// Mass \[kg\]; 0 if the file gives none.
     pub mass: f64,
-    /// Centre of mass in the link frame \[m\]; `None` where the file gives no inertia.
+    /// Center of mass in the link frame \[m\]; `None` if the file gives no inertia.
     pub com: Option<[f64; 3]>,
-    /// Inertia \[kg m²\] about the centre of mass in link axes; `None` where the file gives none.
+    /// Inertia \[kg m²\] about the center of mass in link axes; `None` if the file gives none.
     pub inertia: Option<[[f64; 3]; 3]>,
     /// Pose in the world, `[x, y, z, qw, qx, qy, qz]`. The root is at the origin.
     pub pose: [f64; 7],
 }
 
-/// A joint.
+/// Report on a joint.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointReport {
     /// Name.
     pub name: String,
-    /// URDF's word for how it moves.
+    /// Joint type, as in URDF.
     #[serde(rename = "type")]
     pub kind: &'static str,
     /// Parent link.
@@ -74,22 +75,22 @@ pub struct JointReport {
     pub child: String,
     /// Axis in the joint frame.
     pub axis: [f64; 3],
-    /// Lower limit \[rad or m\]; `None` where it is not limited. 0 where the file gives the upper one only.
+    /// Lower limit \[rad or m\]; `None` for an unlimited joint. 0 if the file gives only the upper limit.
     pub lower: Option<f64>,
-    /// Upper limit \[rad or m\]; `None` where it is not limited. 0 where the file gives the lower one only.
+    /// Upper limit \[rad or m\]; `None` for an unlimited joint. 0 if the file gives only the lower limit.
     pub upper: Option<f64>,
-    /// Largest effort \[N m or N\] as the file says; `None` where it gives none.
+    /// Effort limit of the file \[N m or N\]; `None` if it gives none.
     pub effort: Option<f64>,
-    /// Largest speed \[rad/s or m/s\] as the file says; `None` where it gives none.
+    /// Velocity limit of the file \[rad/s or m/s\]; `None` if it gives none.
     pub velocity: Option<f64>,
-    /// The joint it follows.
+    /// Mimic relation; `None` for an independent joint.
     pub mimic: Option<MimicReport>,
 }
 
-/// `position = multiplier * position(joint) + offset`.
+/// Mimic relation of a joint: `position = multiplier * position(joint) + offset`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MimicReport {
-    /// The joint that is followed, as the file says.
+    /// The driving joint, as in the file.
     pub joint: String,
     /// Ratio.
     pub multiplier: f64,
@@ -97,16 +98,16 @@ pub struct MimicReport {
     pub offset: f64,
 }
 
-/// Something that was repaired, ignored or missing.
+/// Warning about something repaired, ignored or missing.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Warning {
     /// Stable name of the kind ([`DiagnosticKind::name`](kinetoscope_robot::diagnostic::DiagnosticKind::name)).
     pub kind: &'static str,
-    /// The file; `None` where it is in none.
+    /// The file; `None` if the warning belongs to no file.
     pub file: Option<String>,
     /// Line, counted from 1.
     pub line: Option<u32>,
-    /// A sentence that names the element.
+    /// Sentence that names the element.
     pub message: String,
 }
 
@@ -156,7 +157,7 @@ impl LinkReport {
             parent: parent.map(|p| description.link(p).name.clone()),
             mass: inertia.map_or(0.0, |i| i.mass),
             com: inertia.map(|i| i.com.into()),
-            // nalgebra's arrays are columns; the tensor is symmetric but for rounding.
+            // nalgebra's arrays are columns; the tensor is symmetric up to rounding.
             inertia: inertia.map(|i| i.inertia.transpose().into()),
             pose: to_row(pose),
         }

@@ -1,17 +1,17 @@
-//! The report for people: tree, joints, dynamics and warnings in columns.
+//! Report as text: tree, joints, dynamics and warnings in columns.
 
 use super::{JointReport, LinkReport, Report};
 use nalgebra::Matrix3;
 use std::collections::HashMap;
 use std::fmt;
 
-/// Width that tables are fitted to and sentences are broken at.
+/// Maximum width of tables and sentences \[characters\].
 const WIDTH: usize = 120;
 /// Spaces between columns.
 const GAP: usize = 2;
-/// No column is made narrower than this, nor than its heading.
+/// Minimum width of a shortened column, unless its heading is wider.
 const NARROWEST: usize = 24;
-/// Levels of the tree that are drawn: a deeper link loses those nearest to the root.
+/// Number of tree levels that are drawn; for deeper links, the levels nearest to the root are cut off.
 const DRAWN_LEVELS: usize = 16;
 
 impl fmt::Display for Report {
@@ -40,7 +40,7 @@ fn counted(n: usize, what: &str) -> String {
 }
 
 impl Report {
-    /// The report without its warnings, for who shows them in a way of its own.
+    /// The report without its warnings, for programs that display these in another way.
     pub fn without_warnings(&self) -> impl fmt::Display {
         fmt::from_fn(|f| self.write_robot(f))
     }
@@ -73,7 +73,7 @@ impl Report {
         Ok(())
     }
 
-    /// Links depth first, children in the order of the files.
+    /// Tree of links, depth first, children in the order of the files.
     fn tree(&self) -> Table {
         let mut children: HashMap<&str, Vec<&LinkReport>> = HashMap::new();
         let mut open: Vec<(&LinkReport, String, Branch)> = Vec::new();
@@ -105,7 +105,7 @@ impl Report {
         table
     }
 
-    /// Of each link that has one, from the smallest moment to the largest.
+    /// Principal moments of each link with an inertia, in ascending order.
     fn inertia_table(&self) -> Table {
         let mut table = Table::new("<link >smallest >middle >largest");
         for (link, inertia) in self.links.iter().filter_map(|link| Some((link, link.inertia?))) {
@@ -167,7 +167,7 @@ impl Report {
                 column.clone(),
                 positions.get(column.as_str()).map_or_else(|| "-".to_owned(), |q| format!("{q:.4}")),
                 fixed(self.mass_matrix[i][i], 6),
-                // No negative zero.
+                // Avoids a negative zero.
                 format!("{:.4}", if torque.abs() < 5e-5 { 0.0 } else { *torque }),
             ]);
         }
@@ -175,7 +175,7 @@ impl Report {
     }
 }
 
-/// How a link hangs from its parent.
+/// Position of a link among the children of its parent.
 #[derive(Clone, Copy)]
 enum Branch {
     Root,
@@ -192,7 +192,7 @@ impl Branch {
         }
     }
 
-    /// What stands left of everything below.
+    /// Prefix of the lines of all descendants.
     fn trunk(self) -> &'static str {
         match self {
             Self::Root => "",
@@ -210,7 +210,7 @@ fn shortened(trunk: String) -> String {
     std::iter::once('…').chain(" ".chars()).chain(trunk.chars().skip(2 * (levels - DRAWN_LEVELS + 2))).collect()
 }
 
-/// Lines of cells in columns.
+/// Rows of cells in columns.
 struct Table {
     columns: Vec<Column>,
     rows: Vec<Vec<String>>,
@@ -218,14 +218,14 @@ struct Table {
 
 struct Column {
     heading: String,
-    /// Numbers stand at the right.
+    /// True for right-aligned columns, such as numbers.
     right: bool,
-    /// Left out where the table gets too wide.
+    /// True for a column that is left out if the table is too wide.
     optional: bool,
 }
 
 impl Table {
-    /// Columns such as `<name >mass <?remark`: at the left, at the right, optional.
+    /// Parses column definitions such as `<name >mass <?remark`: `<` left-aligned, `>` right-aligned, `?` optional.
     fn new(columns: &str) -> Self {
         let column = |text: &str| Column {
             heading: text.trim_start_matches(['<', '>', '?']).replace('_', " "),
@@ -239,7 +239,7 @@ impl Table {
         self.rows.push(row.into());
     }
 
-    /// Width of each column so that a line fits; 0 for one that is left out.
+    /// Width of each column so that a line fits; 0 for a left-out column.
     fn widths(&self) -> Vec<usize> {
         let cells = |i: usize| self.rows.iter().map(move |row| row[i].chars().count());
         let mut widths: Vec<usize> =
@@ -256,7 +256,7 @@ impl Table {
         loop {
             let excess = excess(&widths);
             let narrowable = (0..widths.len()).filter(|&i| !self.columns[i].right && widths[i] > NARROWEST);
-            // The first column is what the others are about: it gives way last.
+            // The first column identifies the row, so it is shortened last.
             let Some(widest) = narrowable.max_by_key(|&i| (i > 0, widths[i])).filter(|_| excess > 0) else { break };
             widths[widest] = widths[widest].saturating_sub(excess).max(NARROWEST);
         }
@@ -281,7 +281,7 @@ impl fmt::Display for Table {
     }
 }
 
-/// The text, its middle left out where it is wider than `width`.
+/// Returns the text; the middle is replaced by `…` if the text is wider than `width`.
 fn elided(text: &str, width: usize) -> String {
     let count = text.chars().count();
     if count <= width {
@@ -291,13 +291,13 @@ fn elided(text: &str, width: usize) -> String {
     text.chars().take(head).chain(['…']).chain(text.chars().skip(count - tail)).collect()
 }
 
-/// With `decimals`, so that columns line up; numbers that would lose all but one digit have an exponent.
+/// Formats with `decimals`, so that columns line up. Numbers that would lose all but one digit get an exponent.
 fn fixed(value: f64, decimals: usize) -> String {
     let vanishes = value != 0.0 && value.abs() < 10f64.powi(1 - decimals as i32);
     if vanishes || value.abs() >= 1e9 { format!("{value:.3e}") } else { format!("{value:.decimals$}") }
 }
 
-/// At most `decimals` of them, without trailing zeros.
+/// Formats with at most `decimals`, without trailing zeros.
 fn number(value: f64, decimals: usize) -> String {
     if value != 0.0 && (value.abs() >= 1e9 || value.abs() < 0.5 * 10f64.powi(-(decimals as i32))) {
         return format!("{value:.2e}");
@@ -307,12 +307,12 @@ fn number(value: f64, decimals: usize) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// Components in columns of their own.
+/// Formats the components in aligned columns.
 fn vector(v: &[f64; 3]) -> String {
     v.map(|x| format!("{:7.4}", if x.abs() < 5e-5 { 0.0 } else { x })).join(" ").trim_end().to_owned()
 }
 
-/// Breaks between words; a word longer than `width` stays whole, so that a path can be copied.
+/// Breaks lines between words. A word longer than `width` stays whole, so that paths can be copied.
 fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {

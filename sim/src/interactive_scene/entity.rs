@@ -1,5 +1,5 @@
-//! What a scene can hold: robots, articulations, rigid objects and groups of them, terrain, MJCF files, welds, and sensors
-//! of any crate.
+//! Entities of a scene: robots, articulations, rigid objects and groups of them, terrains, attached MJCF files, welds,
+//! and sensors of any crate.
 
 use crate::error::{Error, Result};
 use crate::ids::{MjcfId, ObjectId, RobotId, TerrainId};
@@ -17,25 +17,25 @@ use kinetoscope_sensors::{Sensor, SensorCfg};
 use std::any::Any;
 use std::fmt::Debug;
 
-/// What one entity of a scene is, before it exists.
+/// Configuration of one entity of a scene.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum EntityCfg {
     /// A robot. Its uid is the name of the entity.
     Robot(Box<RobotCfg>),
-    /// An articulation that is no robot. Its uid is the name of the entity.
+    /// A passive articulation. Its uid is the name of the entity.
     Articulation(Box<ArticulationCfg>),
     /// A rigid object. Its uid is the name of the entity.
     RigidObject(Box<RigidObjectCfg>),
-    /// Several rigid objects. Its uid is the name of the entity; each of them is called by it, a point and its own.
+    /// A group of rigid objects. Its uid is the name of the entity; the uid of each object is `group.object`.
     Group(Box<RigidObjectGroupCfg>),
     /// A terrain. Its uid is the name of the entity.
     Terrain(Box<TerrainCfg>),
-    /// An MJCF file. Its uid is the name of the entity.
+    /// An attached MJCF file. Its uid is the name of the entity.
     Mjcf(Box<MjcfCfg>),
-    /// A weld, which holds nothing until it is attached. Its uid is the name of the entity.
+    /// A weld, initially released. Its uid is the name of the entity.
     Weld(Box<WeldCfg>),
-    /// A sensor of any kind.
+    /// A sensor of any type.
     Sensor(Box<dyn SensorEntity>),
 }
 
@@ -82,7 +82,7 @@ impl From<WeldCfg> for EntityCfg {
 }
 
 impl EntityCfg {
-    /// When it is built: what there is, then what holds that together, then what looks at it.
+    /// Build phase: bodies first, then the welds between them, then the sensors.
     pub(super) fn turn(&self) -> Turn {
         match self {
             Self::Weld(_) => Turn::Weld,
@@ -92,14 +92,14 @@ impl EntityCfg {
     }
 }
 
-/// The turns in which a scene is built.
+/// Build phases of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Turn {
-    /// Robots, objects, terrain, MJCF files.
+    /// Robots, articulations, objects, terrains, attached MJCF files.
     Thing,
-    /// What needs two of them.
+    /// Welds, which need two bodies.
     Weld,
-    /// What looks at any of them.
+    /// Sensors, which may refer to any body.
     Sensor,
 }
 
@@ -109,10 +109,10 @@ impl<C: SensorEntity> From<C> for EntityCfg {
     }
 }
 
-/// The configuration of a sensor whose kind is not known where it is kept: every [`SensorCfg`] that can be cloned, shown and
-/// shared is one. `&dyn SensorEntity` converts to `&dyn Any`, from which the configuration is found back.
+/// Type-erased configuration of a sensor. Every [`SensorCfg`] with `Clone`, `Debug`, `Send` and `Sync` implements it.
+/// `&dyn SensorEntity` converts to `&dyn Any`, for a downcast to the configuration.
 pub trait SensorEntity: Any + Debug + Send + Sync {
-    /// A copy.
+    /// Clones the configuration into a new box.
     fn boxed_clone(&self) -> Box<dyn SensorEntity>;
 
     /// Adds the sensor to a simulation.
@@ -141,7 +141,7 @@ impl Clone for Box<dyn SensorEntity> {
     }
 }
 
-/// The [`SensorId`] of a sensor whose kind is not known where it is kept.
+/// Type-erased [`SensorId`].
 #[derive(Debug)]
 pub struct SensorHandle {
     id: Box<dyn Any + Send + Sync>,
@@ -154,7 +154,7 @@ impl SensorHandle {
         Self { id: Box::new(id), index: id.index(), type_name: short_name::<S>() }
     }
 
-    /// The handle, where the sensor is of this type.
+    /// The handle, if the sensor has type `S`.
     pub fn get<S: Sensor>(&self) -> Option<SensorId<S>> {
         self.id.downcast_ref().copied()
     }
@@ -163,13 +163,13 @@ impl SensorHandle {
         self.index
     }
 
-    /// Name of the type of the sensor, such as `Camera`.
+    /// Name of the sensor's type, such as `Camera`.
     pub fn type_name(&self) -> &'static str {
         self.type_name
     }
 }
 
-/// Name of a type without its path.
+/// Name of a type without its module path.
 pub(super) fn short_name<T>() -> &'static str {
     let full = std::any::type_name::<T>();
     // Arguments of a generic type have paths of their own.
@@ -178,7 +178,7 @@ pub(super) fn short_name<T>() -> &'static str {
     &full[start..]
 }
 
-/// The handle of an entity of a scene.
+/// Handle of an entity of a scene.
 #[derive(Debug)]
 pub(super) enum Handle {
     Robot(RobotId),
@@ -192,7 +192,7 @@ pub(super) enum Handle {
 }
 
 impl Handle {
-    /// Adds what `cfg` says to a simulation, under the name `uid`.
+    /// Adds the entity to a simulation, under the name `uid`.
     pub(super) fn add(sim: &mut SimulationManager, uid: &str, cfg: &EntityCfg) -> Result<Self> {
         match cfg {
             EntityCfg::Robot(cfg) => sim.add_robot(RobotCfg { uid: uid.into(), ..(**cfg).clone() }).map(Self::Robot),
@@ -217,7 +217,7 @@ impl Handle {
         }
     }
 
-    /// The error of somebody who takes the entity `name` for a `wanted`.
+    /// Error for a lookup of the entity `name` as a `wanted`.
     pub(super) fn is_no(&self, name: &str, wanted: String) -> Error {
         let found = match self {
             Self::Robot(_) => "robot".into(),

@@ -1,21 +1,21 @@
-//! Pairs of a scene that never collide.
+//! Collision exclusions of a scene.
 
 use crate::error::{Error, Result};
 use crate::manager::SimulationManager;
 use crate::pattern::in_every_env;
 use kinetoscope_scene::source::Source;
 
-/// Two things of a scene that pass through each other.
+/// Pair of bodies or robots that never collide.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExclusionCfg {
-    /// Their names, as in [`SimulationManager::exclude_collision`]; `{ENV}/` before one changes nothing.
+    /// Names, as in [`SimulationManager::exclude_collision`]; a prefix `{ENV}/` is ignored.
     pub between: [String; 2],
-    /// Where it was declared: errors say it. A scene of Rust needs none.
+    /// File and line of the declaration, for error messages; `None` for a scene from Rust.
     pub at: Option<Source>,
 }
 
 impl ExclusionCfg {
-    /// Excludes the pair in a simulation.
+    /// Adds the exclusion to a simulation.
     pub(super) fn add_to(&self, sim: &mut SimulationManager) -> Result<()> {
         let [one, other] = [&self.between[0], &self.between[1]].map(|name| in_every_env(name));
         sim.exclude_collision(one, other).map_err(|error| match &self.at {

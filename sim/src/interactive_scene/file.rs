@@ -1,4 +1,4 @@
-//! Scenes as TOML or YAML files, read strictly: a key that nobody knows is an error that names its line.
+//! Scenes as TOML or YAML files. Reading is strict: an unknown key is an error with its line.
 
 use super::entity::EntityCfg;
 use super::types::EntityTypes;
@@ -19,16 +19,16 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// What a file may hold at its top.
+/// Top-level keys of a file.
 const SECTIONS: [&str; 3] = ["simulation", "entities", EXCLUSIONS];
 
-/// Key of the pairs that never collide.
+/// Key of the collision exclusions.
 const EXCLUSIONS: &str = "exclude_collisions";
 
-/// Makes a set of defaults.
+/// Constructor of a set of defaults.
 type Preset = fn() -> SimulationManagerCfg;
 
-/// Sets of defaults by the name that files give them.
+/// Sets of defaults by their name in files.
 const PRESETS: [(&str, Preset); 3] = [
     ("default", SimulationManagerCfg::default),
     ("manipulation", SimulationManagerCfg::manipulation),
@@ -36,16 +36,16 @@ const PRESETS: [(&str, Preset); 3] = [
 ];
 
 impl SceneCfg {
-    /// Reads a scene file with the built-in kinds of entities: YAML where its name ends in `.yaml` or `.yml`, JSON, which is
-    /// YAML too, where it ends in `.json`, TOML otherwise.
+    /// Reads a scene file with the built-in entity types. The extension `.yaml`, `.yml` or `.json` selects YAML, of
+    /// which JSON is a subset; all other files are TOML.
     ///
     /// # Errors
-    /// As [`from_toml`](Self::from_toml) and [`from_yaml`](Self::from_yaml), and where the file cannot be read.
+    /// As [`from_toml`](Self::from_toml) and [`from_yaml`](Self::from_yaml), or the file cannot be read.
     pub fn from_file(path: impl AsRef<Path>) -> Result<Self> {
         Self::from_file_with(path, &EntityTypes::default())
     }
 
-    /// Reads a scene file with kinds of entities of your own.
+    /// Reads a scene file with custom entity types.
     ///
     /// # Errors
     /// As [`from_file`](Self::from_file).
@@ -57,21 +57,22 @@ impl SceneCfg {
         if is_yaml { Self::from_yaml(&text, path, types) } else { Self::from_toml(&text, path, types) }
     }
 
-    /// Reads the text of a scene file; paths in it are relative to the folder of `file`, which need not exist.
+    /// Reads the text of a scene file. Paths in it are relative to the folder of `file`, which need not exist.
     ///
     /// # Errors
-    /// [`Error::SceneFile`] with file and line: no TOML, a key or a type that nobody knows (with those there are), a value of
-    /// another form, a terrain that its generator refuses. All other numbers and names are checked when the scene is built.
+    /// [`Error::SceneFile`] with file and line: the text is not TOML, a key or an entity type is unknown (the message
+    /// lists the known ones), a value has the wrong type, or the generator of a terrain rejects its parameters. All
+    /// other numbers and names are checked when the scene is built.
     pub fn from_toml(text: &str, file: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
         let reader = Reader { text: Some(text), file: file.as_ref(), types };
         let root = DeTable::parse(text).map_err(|e| reader.located(&e, 0..0))?;
         reader.scene(root.into_inner())
     }
 
-    /// As [`from_toml`](Self::from_toml), of YAML 1.2: the same tables and lists, in the same words.
+    /// As [`from_toml`](Self::from_toml), for YAML 1.2 with the same tables, lists and keys.
     ///
     /// # Errors
-    /// As [`from_toml`](Self::from_toml); several documents, tags, and `null`, too.
+    /// As [`from_toml`](Self::from_toml); in addition, several documents, tags and `null` are rejected.
     pub fn from_yaml(text: &str, file: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
         let reader = Reader { text: None, file: file.as_ref(), types };
         let wrong = |error: YamlError| reader.at(error.line..error.line, error.message);
@@ -79,12 +80,11 @@ impl SceneCfg {
         reader.scene(yaml::table(root.as_ref()).map_err(wrong)?)
     }
 
-    /// The text of a scene file that declares this scene, with the kinds of entities of `types`. Paths are written as they
-    /// are.
+    /// Writes the scene as the text of a scene file, with the entity types of `types`. Paths are written unchanged.
     ///
     /// # Errors
-    /// [`Error::SceneFileWrite`]: a sensor of a kind that `types` has not, or a value that TOML has not (a seed above
-    /// 2^63 - 1, a path that is no Unicode).
+    /// [`Error::SceneFileWrite`]: `types` lacks the type of a sensor, or TOML cannot represent a value (a seed above
+    /// 2^63 - 1, a path that is not Unicode).
     pub fn to_toml(&self, types: &EntityTypes) -> Result<String> {
         let fail = |what: &str, reason: String| Error::SceneFileWrite { what: what.into(), reason };
         let simulation = toml::Table::try_from(&self.simulation);
@@ -99,7 +99,7 @@ impl SceneCfg {
             })?;
             let mut written = toml::Table::new();
             written.insert("type".into(), kind.into());
-            // The name says it.
+            // The key of the table is the name.
             let fields =
                 table.map_err(|e| fail(name, e.to_string()))?.into_iter().filter(|(key, _)| !has_name(entity, key));
             written.extend(fields);
@@ -116,14 +116,14 @@ impl SceneCfg {
     }
 }
 
-/// Whether a field of an entity is its name, which files give as the key of its table.
+/// True if the field is the name of an entity, which files give as the key of its table.
 fn has_name(entity: &EntityCfg, field: &str) -> bool {
     field == "uid" && !matches!(entity, EntityCfg::Sensor(_))
 }
 
-/// One file that is being read.
+/// Reader of one scene file.
 struct Reader<'a> {
-    /// The text that spans are places of; `None` where spans are lines, as of YAML.
+    /// Text that the spans index; `None` for YAML, whose spans are lines.
     text: Option<&'a str>,
     file: &'a Path,
     types: &'a EntityTypes,
@@ -154,7 +154,7 @@ impl<'a> Reader<'a> {
         Ok(scene)
     }
 
-    /// The simulation: what the table says, on top of a preset.
+    /// Reads the table of the simulation over the defaults of its preset.
     fn simulation(&self, value: Spanned<DeValue<'a>>) -> Result<SimulationManagerCfg> {
         let (mut table, span) = self.table(value, "simulation")?;
         let mut defaults = SimulationManagerCfg::default();
@@ -170,7 +170,7 @@ impl<'a> Reader<'a> {
             .map_err(|e| Error::SceneFileWrite { what: "preset".into(), reason: e.to_string() })?;
         let mut merged = DeTable::parse(&defaults).map_err(|e| self.located(&e, span.clone()))?.into_inner();
         for (key, value) in table {
-            // A key that is there keeps its old place, which is none in the user's file.
+            // Replacing a key keeps the span of the old key, which does not exist in the user's file.
             merged.remove(key.get_ref().as_ref());
             merged.insert(key, value);
         }
@@ -178,7 +178,7 @@ impl<'a> Reader<'a> {
         SimulationManagerCfg::deserialize(Value(value)).map_err(|e| self.wrong(e, span))
     }
 
-    /// Pairs of names, each with its place.
+    /// Reads pairs of names, each with its position in the file.
     fn exclusions(&self, value: Spanned<DeValue<'a>>) -> Result<Vec<ExclusionCfg>> {
         let span = value.span();
         let DeValue::Array(pairs) = value.into_inner() else {
@@ -193,7 +193,7 @@ impl<'a> Reader<'a> {
         pairs.into_iter().map(read).collect()
     }
 
-    /// One entity: its kind reads what is left of the table without `type`.
+    /// Reads one entity: the type reads the table without `type`.
     fn entity(&self, name: &str, value: Spanned<DeValue<'a>>, at: Range<usize>) -> Result<EntityCfg> {
         let (mut table, span) = self.table(value, name)?;
         let known = || self.types.names().collect::<Vec<_>>().join("`, `");
@@ -213,7 +213,7 @@ impl<'a> Reader<'a> {
         Ok(entity)
     }
 
-    /// Gives an entity its name, and makes its paths relative to the file.
+    /// Sets the name of an entity, and makes its paths relative to the file.
     fn name_and_place(&self, entity: &mut EntityCfg, name: &str) {
         let uid = in_every_env(name).to_owned();
         match entity {
@@ -245,14 +245,14 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Makes the path of a mesh relative to the file.
+    /// Makes the path of a mesh relative to the scene file.
     fn place_shape(&self, shape: &mut ObjectShape) {
         if let ObjectShape::Mesh { path, .. } = shape {
             *path = self.beside(path);
         }
     }
 
-    /// Makes the paths of URDF files relative to the file.
+    /// Makes the paths of URDF files relative to the scene file.
     fn place_urdf(&self, urdf: &mut UrdfCfg) {
         let components = urdf.components.iter_mut().map(|component| &mut component.urdf);
         for path in components.chain(urdf.packages.values_mut()).chain(urdf.asset_root.as_mut()) {
@@ -260,14 +260,14 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Makes the path of an MJCF file relative to the file.
+    /// Makes the path of an MJCF file relative to the scene file.
     fn place_mjcf(&self, mjcf: &mut Option<MjcfFile>) {
         if let Some(file) = mjcf {
             file.place_beside(|path| self.beside(path));
         }
     }
 
-    /// A path of the file, relative to its folder; an absolute one stays.
+    /// Path relative to the folder of the scene file; an absolute path stays.
     fn beside(&self, path: &Path) -> PathBuf {
         self.file.parent().map_or_else(|| path.into(), |folder| folder.join(path))
     }
@@ -280,12 +280,12 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// An error of a value, at its own place or at `fallback`.
+    /// Error of a value, at its own position or at `fallback`.
     fn wrong(&self, error: ValueError, fallback: Range<usize>) -> Error {
         self.at(error.span.unwrap_or(fallback), error.message)
     }
 
-    /// An error of TOML, at its own place or at `fallback`.
+    /// Error of the TOML parser, at its own position or at `fallback`.
     fn located(&self, error: &toml::de::Error, fallback: Range<usize>) -> Error {
         self.at(error.span().unwrap_or(fallback), error.message().into())
     }
@@ -294,7 +294,7 @@ impl<'a> Reader<'a> {
         Error::SceneFile { at: Source::new(self.file, self.line(span)), reason }
     }
 
-    /// The line of a place, counted from 1.
+    /// Line of a span, counted from 1.
     fn line(&self, span: Range<usize>) -> u32 {
         let line = match self.text {
             None => span.start,

@@ -1,4 +1,4 @@
-//! Entities of a scene by their names.
+//! Lookup of the entities of a scene by name.
 
 use super::InteractiveScene;
 use super::entity::{Handle, short_name};
@@ -28,10 +28,10 @@ impl InteractiveScene {
         })
     }
 
-    /// The handle of a robot.
+    /// Handle of a robot.
     ///
     /// # Errors
-    /// There is no such entity, or it is no robot.
+    /// The entity does not exist, or is not a robot.
     pub fn robot_id(&self, name: &str) -> Result<RobotId> {
         match self.find(name)? {
             Handle::Robot(id) => Ok(*id),
@@ -39,7 +39,7 @@ impl InteractiveScene {
         }
     }
 
-    /// A robot, to read.
+    /// Returns a robot for reading.
     ///
     /// # Errors
     /// As [`robot_id`](Self::robot_id).
@@ -47,7 +47,7 @@ impl InteractiveScene {
         Ok(self.sim.robot(self.robot_id(name)?))
     }
 
-    /// A robot, to command and to write. What is written acts at once: there is no `write_data_to_sim` to forget.
+    /// Returns a robot for commands and writes. Writes act at once, so there is no counterpart to `write_data_to_sim`.
     ///
     /// # Errors
     /// As [`robot_id`](Self::robot_id).
@@ -56,10 +56,10 @@ impl InteractiveScene {
         Ok(self.sim.robot_mut(id))
     }
 
-    /// The handle of an articulation that is no robot.
+    /// Handle of a passive articulation.
     ///
     /// # Errors
-    /// There is no such entity, or it is no such articulation.
+    /// The entity does not exist, or is not a passive articulation.
     pub fn articulation_id(&self, name: &str) -> Result<ArticulationId> {
         match self.find(name)? {
             Handle::Articulation(id) => Ok(*id),
@@ -67,7 +67,7 @@ impl InteractiveScene {
         }
     }
 
-    /// An articulation, to read.
+    /// Returns an articulation for reading.
     ///
     /// # Errors
     /// As [`articulation_id`](Self::articulation_id).
@@ -75,7 +75,7 @@ impl InteractiveScene {
         Ok(self.sim.articulation(self.articulation_id(name)?))
     }
 
-    /// An articulation, to write.
+    /// Returns an articulation for writing.
     ///
     /// # Errors
     /// As [`articulation_id`](Self::articulation_id).
@@ -84,10 +84,10 @@ impl InteractiveScene {
         Ok(self.sim.articulation_mut(id))
     }
 
-    /// The handle of a rigid object.
+    /// Handle of a rigid object.
     ///
     /// # Errors
-    /// There is no such entity, or it is no rigid object.
+    /// The entity does not exist, or is not a rigid object.
     pub fn rigid_object_id(&self, name: &str) -> Result<ObjectId> {
         match self.find(name)? {
             Handle::RigidObject(id) => Ok(*id),
@@ -95,7 +95,7 @@ impl InteractiveScene {
         }
     }
 
-    /// A rigid object, to read.
+    /// Returns a rigid object for reading.
     ///
     /// # Errors
     /// As [`rigid_object_id`](Self::rigid_object_id).
@@ -103,7 +103,7 @@ impl InteractiveScene {
         Ok(self.sim.rigid_object(self.rigid_object_id(name)?))
     }
 
-    /// A rigid object, to write.
+    /// Returns a rigid object for writing.
     ///
     /// # Errors
     /// As [`rigid_object_id`](Self::rigid_object_id).
@@ -112,10 +112,10 @@ impl InteractiveScene {
         Ok(self.sim.rigid_object_mut(id))
     }
 
-    /// The handle of a group of rigid objects.
+    /// Handle of a group of rigid objects.
     ///
     /// # Errors
-    /// There is no such entity, or it is no group.
+    /// The entity does not exist, or is not a group.
     pub fn rigid_object_group_id(&self, name: &str) -> Result<GroupId> {
         match self.find(name)? {
             Handle::Group(id) => Ok(*id),
@@ -123,7 +123,7 @@ impl InteractiveScene {
         }
     }
 
-    /// A group of rigid objects, to read.
+    /// Returns a group of rigid objects for reading.
     ///
     /// # Errors
     /// As [`rigid_object_group_id`](Self::rigid_object_group_id).
@@ -131,7 +131,7 @@ impl InteractiveScene {
         Ok(self.sim.rigid_object_group(self.rigid_object_group_id(name)?))
     }
 
-    /// A group of rigid objects, to write.
+    /// Returns a group of rigid objects for writing.
     ///
     /// # Errors
     /// As [`rigid_object_group_id`](Self::rigid_object_group_id).
@@ -140,10 +140,10 @@ impl InteractiveScene {
         Ok(self.sim.rigid_object_group_mut(id))
     }
 
-    /// The handle of a terrain.
+    /// Handle of a terrain.
     ///
     /// # Errors
-    /// There is no such entity, or it is no terrain.
+    /// The entity does not exist, or is not a terrain.
     pub fn terrain_id(&self, name: &str) -> Result<TerrainId> {
         match self.find(name)? {
             Handle::Terrain(id) => Ok(*id),
@@ -151,7 +151,7 @@ impl InteractiveScene {
         }
     }
 
-    /// A terrain.
+    /// Returns a terrain.
     ///
     /// # Errors
     /// As [`terrain_id`](Self::terrain_id).
@@ -159,10 +159,10 @@ impl InteractiveScene {
         Ok(self.sim.entities().terrain(self.terrain_id(name)?))
     }
 
-    /// The handle of an MJCF file that is a part of the scene.
+    /// Handle of an attached MJCF file.
     ///
     /// # Errors
-    /// There is no such entity, or it is no MJCF file.
+    /// The entity does not exist, or is not an attached MJCF file.
     pub fn mjcf_id(&self, name: &str) -> Result<MjcfId> {
         match self.find(name)? {
             Handle::Mjcf(id) => Ok(*id),
@@ -170,7 +170,7 @@ impl InteractiveScene {
         }
     }
 
-    /// An MJCF file that is a part of the scene, to read.
+    /// Returns an attached MJCF file for reading.
     ///
     /// # Errors
     /// As [`mjcf_id`](Self::mjcf_id).
@@ -178,7 +178,7 @@ impl InteractiveScene {
         Ok(self.sim.mjcf_part(self.mjcf_id(name)?))
     }
 
-    /// An MJCF file that is a part of the scene, to command and to write.
+    /// Returns an attached MJCF file for commands and writes.
     ///
     /// # Errors
     /// As [`mjcf_id`](Self::mjcf_id).
@@ -187,10 +187,10 @@ impl InteractiveScene {
         Ok(self.sim.mjcf_part_mut(id))
     }
 
-    /// The handle of a weld.
+    /// Handle of a weld.
     ///
     /// # Errors
-    /// There is no such entity, or it is no weld.
+    /// The entity does not exist, or is not a weld.
     pub fn weld_id(&self, name: &str) -> Result<WeldId> {
         match self.find(name)? {
             Handle::Weld(id) => Ok(*id),
@@ -198,7 +198,7 @@ impl InteractiveScene {
         }
     }
 
-    /// A weld, to read.
+    /// Returns a weld for reading.
     ///
     /// # Errors
     /// As [`weld_id`](Self::weld_id).
@@ -206,7 +206,7 @@ impl InteractiveScene {
         Ok(self.sim.weld(self.weld_id(name)?))
     }
 
-    /// A weld, to make and to release.
+    /// Returns a weld for attaching and releasing.
     ///
     /// # Errors
     /// As [`weld_id`](Self::weld_id).
@@ -215,25 +215,25 @@ impl InteractiveScene {
         Ok(self.sim.weld_mut(id))
     }
 
-    /// The handle of a sensor of type `S`, such as `Camera`.
+    /// Handle of a sensor of type `S`, such as `Camera`.
     ///
     /// # Errors
-    /// There is no such entity, or it is no such sensor.
+    /// The entity does not exist, or is not a sensor of this type.
     pub fn sensor_id<S: Sensor>(&self, name: &str) -> Result<SensorId<S>> {
         let handle = self.find(name)?;
         let id = if let Handle::Sensor(sensor) = handle { sensor.get() } else { None };
         id.ok_or_else(|| handle.is_no(name, format!("sensor of type {}", short_name::<S>())))
     }
 
-    /// A sensor of type `S`, to read.
+    /// Returns a sensor of type `S` for reading.
     ///
     /// # Errors
-    /// As [`sensor_id`](Self::sensor_id), and where it failed in an earlier step.
+    /// As [`sensor_id`](Self::sensor_id), or the sensor failed in an earlier step.
     pub fn sensor<S: Sensor>(&self, name: &str) -> Result<&S> {
         self.sim.sensor(self.sensor_id(name)?)
     }
 
-    /// A sensor of type `S`, to change.
+    /// Returns a sensor of type `S` for changes.
     ///
     /// # Errors
     /// As [`sensor`](Self::sensor).
@@ -242,11 +242,11 @@ impl InteractiveScene {
         self.sim.sensor_mut(id)
     }
 
-    /// Shows the markers of a sensor from now on, or does not, whatever kind of sensor it is: see
+    /// Enables or disables the markers of a sensor of any type; see
     /// [`SceneViewMut::set_debug_vis`](crate::SceneViewMut::set_debug_vis).
     ///
     /// # Errors
-    /// There is no such entity, or it is no sensor.
+    /// The entity does not exist, or is not a sensor.
     pub fn set_debug_vis(&mut self, name: &str, shown: bool) -> Result<()> {
         let index = match self.find(name)? {
             Handle::Sensor(sensor) => sensor.index(),

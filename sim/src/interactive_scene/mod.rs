@@ -1,7 +1,7 @@
-//! A scene that is declared, not built: named entities in one configuration, from Rust or from a file.
+//! Declarative scenes: named entities in one configuration, from Rust or from a file.
 //!
-//! The counterpart of Isaac Lab's `InteractiveScene`. [`SceneCfg`] says what there is, [`InteractiveScene`] is what runs;
-//! everything else is done with the handles of the [`SimulationManager`] inside it.
+//! The counterpart of Isaac Lab's `InteractiveScene`. [`SceneCfg`] declares the entities, and [`InteractiveScene`] is
+//! the running scene. Everything else uses the handles of the [`SimulationManager`] inside it.
 
 mod entity;
 mod exclusion;
@@ -26,7 +26,7 @@ use ndarray::Array2;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What a scene holds, in the order of its declaration.
+/// Declaration of a scene: simulation, named entities, collision exclusions.
 ///
 /// ```
 /// use kinetoscope_sim::{ObjectShape, RigidObjectCfg, SceneCfg, SimulationManagerCfg};
@@ -38,14 +38,14 @@ use std::path::Path;
 /// assert_eq!(cfg.keys().collect::<Vec<_>>(), ["cube", "touch"]);
 /// ```
 ///
-/// The same in a file, which [`from_file`](Self::from_file) reads; paths in it are relative to the file:
+/// The same as a file, which [`from_file`](Self::from_file) reads; paths in it are relative to the file:
 ///
 /// ```toml
-/// [simulation]               # the fields of SimulationManagerCfg; preset = "legged" or "manipulation" changes the defaults
+/// [simulation]               # fields of SimulationManagerCfg; preset = "legged" or "manipulation" sets defaults
 /// num_envs = 2
 ///
 /// [entities.cube]            # the name of the entity
-/// type = "rigid_object"      # its kind, see EntityTypes; all else are the fields of its configuration
+/// type = "rigid_object"      # its type, see EntityTypes; all other keys are fields of its configuration
 /// shape.box.size = [0.2, 0.2, 0.2]
 ///
 /// [entities.touch]
@@ -53,52 +53,52 @@ use std::path::Path;
 /// bodies = ["{ENV_REGEX_NS}/cube"]
 /// ```
 ///
-/// Pairs that never collide have no name: [`exclude_collision`](Self::exclude_collision), and in files, above all tables,
-/// `exclude_collisions = [["cube", "table"]]`.
+/// Collision exclusions have no name: [`exclude_collision`](Self::exclude_collision) in Rust,
+/// `exclude_collisions = [["cube", "table"]]` above all tables in files.
 #[derive(Clone, Debug, Default)]
 pub struct SceneCfg {
     /// The simulation itself: number of environments, time step, ground, lights.
     pub simulation: SimulationManagerCfg,
-    /// Names and what they are. `{ENV}/` or `{ENV_REGEX_NS}/` before a name changes nothing: every entity is in every
-    /// environment.
+    /// Names and configurations, in the order of declaration. A prefix `{ENV}/` or `{ENV_REGEX_NS}/` of a name is
+    /// ignored: every entity exists in every environment.
     pub entities: Vec<(String, EntityCfg)>,
     /// Pairs that never collide.
     pub exclusions: Vec<ExclusionCfg>,
-    /// Where entities were declared, by name: errors say it. A scene of Rust needs none.
+    /// File and line of the declaration by entity name, for error messages; empty for a scene from Rust.
     pub sources: BTreeMap<String, Source>,
 }
 
 impl SceneCfg {
-    /// A scene without entities.
+    /// Creates a scene without entities.
     pub fn new(simulation: SimulationManagerCfg) -> Self {
         Self { simulation, ..Self::default() }
     }
 
-    /// The scene with one more entity: a [`RobotCfg`](crate::RobotCfg), an
-    /// [`ArticulationCfg`](crate::ArticulationCfg), a [`RigidObjectCfg`](crate::RigidObjectCfg), a
-    /// [`RigidObjectGroupCfg`](crate::RigidObjectGroupCfg), a [`TerrainCfg`](crate::TerrainCfg), an
-    /// [`MjcfCfg`](crate::MjcfCfg), a [`WeldCfg`](crate::WeldCfg), or the configuration of any sensor.
+    /// Adds an entity: a [`RobotCfg`](crate::RobotCfg), an [`ArticulationCfg`](crate::ArticulationCfg), a
+    /// [`RigidObjectCfg`](crate::RigidObjectCfg), a [`RigidObjectGroupCfg`](crate::RigidObjectGroupCfg), a
+    /// [`TerrainCfg`](crate::TerrainCfg), an [`MjcfCfg`](crate::MjcfCfg), a [`WeldCfg`](crate::WeldCfg), or the
+    /// configuration of any sensor.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, cfg: impl Into<EntityCfg>) -> Self {
         self.entities.push((name.into(), cfg.into()));
         self
     }
 
-    /// The scene in which two things pass through each other: names as in
-    /// [`SimulationManager::exclude_collision`], with or without `{ENV}/` before them.
+    /// Disables collisions between two bodies or robots. Names are as in [`SimulationManager::exclude_collision`]; a
+    /// prefix `{ENV}/` is ignored.
     #[must_use]
     pub fn exclude_collision(mut self, one: impl Into<String>, other: impl Into<String>) -> Self {
         self.exclusions.push(ExclusionCfg { between: [one.into(), other.into()], at: None });
         self
     }
 
-    /// The names of the entities, in the order of their declaration.
+    /// Names of the entities, in the order of declaration.
     pub fn keys(&self) -> impl Iterator<Item = &str> {
         self.entities.iter().map(|(name, _)| in_every_env(name))
     }
 }
 
-/// A scene that runs: a simulation, and the names of what is in it.
+/// A running scene: a simulation and the names of its entities.
 #[derive(Debug)]
 pub struct InteractiveScene {
     sim: SimulationManager,
@@ -106,12 +106,13 @@ pub struct InteractiveScene {
 }
 
 impl InteractiveScene {
-    /// Builds everything that `cfg` declares. Robots, objects and terrain come first, then pairs that never collide, welds, and
-    /// sensors, so that these may be declared before what they are about; within each, the order is that of the declaration.
+    /// Builds all entities that `cfg` declares. The order is bodies (robots, objects, terrains), collision exclusions,
+    /// welds, sensors, so welds and sensors may be declared before the bodies they refer to. Within each phase, the
+    /// order is that of the declaration.
     ///
     /// # Errors
-    /// Two entities of one name, what is wrong with the simulation, and what is wrong with an entity or a pair: in
-    /// [`Error::Entity`] or [`Error::Exclusion`] where it is known where it was declared.
+    /// Two entities have the same name, or the configuration of the simulation, of an entity or of an exclusion is
+    /// invalid. With a known position in a file, the error is [`Error::Entity`] or [`Error::Exclusion`].
     pub fn new(cfg: SceneCfg) -> Result<Self> {
         let mut taken: Vec<&str> = Vec::new();
         for name in cfg.keys() {
@@ -143,7 +144,7 @@ impl InteractiveScene {
         Ok(Self { sim, entities })
     }
 
-    /// Builds what a scene file declares.
+    /// Builds the scene that a file declares.
     ///
     /// # Errors
     /// As [`SceneCfg::from_file`] and [`new`](Self::new).
@@ -151,22 +152,22 @@ impl InteractiveScene {
         Self::new(SceneCfg::from_file(path)?)
     }
 
-    /// The names of the entities, in the order of their declaration.
+    /// Names of the entities, in the order of declaration.
     pub fn keys(&self) -> impl Iterator<Item = &str> {
         self.entities.iter().map(|(name, _)| name.as_str())
     }
 
-    /// The simulation, to read.
+    /// The simulation, for reading.
     pub fn sim(&self) -> &SimulationManager {
         &self.sim
     }
 
-    /// The simulation, to change. What is added to it here has no name in the scene.
+    /// The simulation, for changes. Entities added here have no name in the scene.
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
         &mut self.sim
     }
 
-    /// The simulation alone; names of entities stay those of robots, objects and sensors in it.
+    /// Returns the simulation; its robots, objects and sensors keep their names as uids.
     pub fn into_sim(self) -> SimulationManager {
         self.sim
     }
@@ -176,32 +177,33 @@ impl InteractiveScene {
         self.sim.num_envs()
     }
 
-    /// Places of the environments in the overview \[m\], (N, 3). Poses are local to the environment: nobody adds these.
+    /// Origins of the environments in the overview \[m\], shape (N, 3). Poses are local to the environment and do not
+    /// contain them.
     pub fn env_origins(&self) -> Array2<f64> {
         self.sim.cfg().env_origins()
     }
 
-    /// Clears what environments remember beside their state, all of them where `env_ids` is `None`, as Isaac Lab's `reset` does:
-    /// sensors start anew from the present state, external wrenches end, and actuator models forget their past (delays, motor
-    /// states). Positions, velocities, targets and time stay; a diverged environment stays as it is.
-    /// [`reset_to_default`](Self::reset_to_default) puts robots and objects back.
+    /// Clears the buffers that environments keep beside their state, in all of them for `env_ids = None`, as Isaac
+    /// Lab's `reset` does. Sensors restart from the current state, external wrenches end, and actuator models lose
+    /// their memory (delays, motor states). Positions, velocities, targets and time stay; a diverged environment stays
+    /// diverged. [`reset_to_default`](Self::reset_to_default) resets robots and objects.
     ///
     /// # Errors
-    /// An environment does not exist; then none is reset.
+    /// An environment does not exist; then no environment is reset.
     pub fn reset(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.sim.reset_buffers(env_ids)
     }
 
-    /// Puts environments back to their initial state, all of them where `env_ids` is `None`, and revives diverged ones: see
-    /// [`SimulationManager::reset`].
+    /// Resets environments to their initial state, all of them for `env_ids = None`; see [`SimulationManager::reset`].
+    /// Diverged environments run again.
     ///
     /// # Errors
-    /// An environment does not exist; then none is reset.
+    /// An environment does not exist; then no environment is reset.
     pub fn reset_to_default(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.sim.reset(env_ids)
     }
 
-    /// Steps all environments by `steps` times `physics_dt`; sensors tick after every step.
+    /// Steps all environments `steps` times by `physics_dt`; due sensors measure after each step.
     pub fn update(&mut self, steps: u32) {
         self.sim.update(steps);
     }
@@ -209,11 +211,11 @@ impl InteractiveScene {
     /// Steps all environments by a time \[s\], which must be a whole number of `physics_dt`.
     ///
     /// # Errors
-    /// The time is no whole number of steps; nothing is done then.
+    /// The time is not a whole number of steps; then nothing is done.
     pub fn update_for(&mut self, seconds: f64) -> Result<()> {
         let steps = seconds / self.sim.cfg().physics_dt;
         let whole = steps.round();
-        // The quotient of two rounded numbers: 0.1 / 0.005 need not be 20.
+        // Tolerance for the quotient of two rounded numbers: 0.1 / 0.005 need not be 20.
         if !((steps - whole).abs() <= 1e-6 && (0.0..=f64::from(u32::MAX)).contains(&whole)) {
             return Err(Error::Config {
                 field: "seconds",

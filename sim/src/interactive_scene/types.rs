@@ -1,4 +1,4 @@
-//! The kinds of entities that a scene file can name: one line each.
+//! Entity types of scene files, one line each.
 
 use super::entity::{EntityCfg, SensorEntity};
 use super::value::{Value, ValueError};
@@ -18,14 +18,14 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize as _, Serialize};
 use std::any::Any;
 
-/// The kinds of entities that a scene file can name by `type`: the built-in ones, and those of your crates.
+/// Entity types that a scene file can select by `type`: the built-in ones and those of other crates.
 ///
 /// ```
 /// use kinetoscope_sim::EntityTypes;
 ///
 /// let types = EntityTypes::default();
 /// assert!(types.names().any(|name| name == "ray_caster"));
-/// // Any SensorCfg with serde's two traits; here a built-in one under another name.
+/// // Any SensorCfg with serde's two traits; here, a built-in sensor under another name.
 /// let types = types.with_sensor::<kinetoscope_sensors::ImuCfg>("accelerometer");
 /// ```
 #[derive(Clone, Debug)]
@@ -33,17 +33,18 @@ pub struct EntityTypes {
     entries: Vec<EntityType>,
 }
 
-/// One kind of entity: its name in files, and how it is read and written.
+/// One entity type: its name in files, its reader and its writer.
 #[derive(Clone, Debug)]
 pub(super) struct EntityType {
     pub(super) name: String,
     pub(super) read: fn(Value<'_>) -> Result<EntityCfg, ValueError>,
-    /// `None` for entities of other kinds.
+    /// Returns `None` for entities of other types.
     pub(super) write: fn(&EntityCfg) -> Option<Result<toml::Table, toml::ser::Error>>,
 }
 
 impl Default for EntityTypes {
-    /// Robots, articulations, rigid objects and groups of them, terrain, MJCF files, welds and the built-in sensors.
+    /// Robots, articulations, rigid objects and groups of them, terrains, attached MJCF files, welds and the built-in
+    /// sensors.
     fn default() -> Self {
         Self { entries: Vec::new() }
             .with::<RobotCfg>("robot")
@@ -68,8 +69,8 @@ impl Default for EntityTypes {
 }
 
 impl EntityTypes {
-    /// Adds a kind of sensor under a name; a kind of the same name is replaced. Paths that its configuration holds are not
-    /// made relative to the file: only the sensor knows which of its texts are paths.
+    /// Adds a sensor type under a name; a type of the same name is replaced. Paths in its configuration are not made
+    /// relative to the file, because only the sensor knows which of its strings are paths.
     #[must_use]
     pub fn with_sensor<C>(self, name: impl Into<String>) -> Self
     where
@@ -78,7 +79,7 @@ impl EntityTypes {
         self.with::<Sensor<C>>(name)
     }
 
-    /// The names, in the order in which they were added.
+    /// Names of the types, in insertion order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.entries.iter().map(|entry| entry.name.as_str())
     }
@@ -98,13 +99,13 @@ impl EntityTypes {
         self.entries.iter().find(|entry| entry.name == name)
     }
 
-    /// The name of the kind of an entity and its table.
+    /// Type name and table of an entity; `None` for an unknown type.
     pub(super) fn write(&self, entity: &EntityCfg) -> Option<(&str, Result<toml::Table, toml::ser::Error>)> {
         self.entries.iter().find_map(|entry| Some((entry.name.as_str(), (entry.write)(entity)?)))
     }
 }
 
-/// A kind of entity that can be read, and found back among entities.
+/// An entity type that can be read and recognized among entities.
 trait Kind {
     type Cfg: Serialize + DeserializeOwned + Into<EntityCfg>;
 
@@ -167,7 +168,7 @@ impl Kind for WeldCfg {
     }
 }
 
-/// The kind of a sensor.
+/// Entity type of a sensor with configuration `C`.
 struct Sensor<C>(std::marker::PhantomData<C>);
 
 impl<C: SensorEntity + Serialize + DeserializeOwned> Kind for Sensor<C> {

@@ -1,6 +1,6 @@
-//! Values of a scene file as configurations read them: what is wrong is said in words of the file, with its place.
+//! Deserializer for values of a scene file, whose errors name the position and the possible values.
 //!
-//! TOML's own reader does not know, where one of several kinds is to be named, which there are; this one says them.
+//! The deserializer of the `toml` crate does not list the variants of an enum when one must be selected; this one does.
 
 use serde::de::value::StrDeserializer;
 use serde::de::{
@@ -11,27 +11,27 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-/// A value of a file, to be read.
+/// A value of a file with its span.
 pub(super) struct Value<'a>(pub Spanned<DeValue<'a>>);
 
 impl<'a> Value<'a> {
-    /// Reads the value; what is found wrong with it only after it was read is wrong at its place, too.
+    /// Reads the value; an error found after the deserialization is also reported at the span of the value.
     fn read<T: DeserializeSeed<'a>>(self, seed: T) -> Result<T::Value, ValueError> {
         let span = self.0.span();
         seed.deserialize(self).map_err(|error| error.at(&span))
     }
 }
 
-/// What is wrong with a value, and where it is.
+/// Error in a value, with its position.
 #[derive(Clone, Debug)]
 pub(super) struct ValueError {
     pub message: String,
-    /// `None` where the value has no place in the file.
+    /// `None` if the value has no position in the file.
     pub span: Option<Range<usize>>,
 }
 
 impl ValueError {
-    /// The error, at `span` where it has no better place.
+    /// Sets the position if the error has none.
     fn at(mut self, span: &Range<usize>) -> Self {
         self.span = self.span.or_else(|| Some(span.clone()).filter(|span| !span.is_empty()));
         self
@@ -52,12 +52,12 @@ impl de::Error for ValueError {
     }
 }
 
-/// `` `a`, `b` ``; nothing where there is nothing.
+/// Formats as `` `a`, `b` ``; empty for an empty list.
 fn quoted(names: &[&str]) -> String {
     if names.is_empty() { String::new() } else { format!("`{}`", names.join("`, `")) }
 }
 
-/// What a value is, in the words of TOML.
+/// Description of a value in TOML's terms.
 fn said(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("string {text:?}"),
@@ -97,7 +97,7 @@ impl<'de> Deserializer<'de> for Value<'de> {
         read.map_err(|error| error.at(&span))
     }
 
-    /// A value that stands there is there: TOML has no nothing.
+    /// A value that is present is `Some`: TOML has no null.
     fn deserialize_option<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueError> {
         visitor.visit_some(self)
     }
@@ -165,7 +165,7 @@ impl<'de> IntoDeserializer<'de, ValueError> for Value<'de> {
     }
 }
 
-/// The items of an array.
+/// Iterator over an array.
 struct Items<'a>(<DeArray<'a> as IntoIterator>::IntoIter);
 
 impl<'de> SeqAccess<'de> for Items<'de> {
@@ -180,7 +180,7 @@ impl<'de> SeqAccess<'de> for Items<'de> {
     }
 }
 
-/// The fields of a table.
+/// Iterator over a table.
 struct Fields<'a> {
     rest: <DeTable<'a> as IntoIterator>::IntoIter,
     value: Option<Value<'a>>,
@@ -203,13 +203,13 @@ impl<'de> MapAccess<'de> for Fields<'de> {
     }
 
     fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, ValueError> {
-        // Asked for after its key.
+        // serde reads a value only after its key.
         let value = self.value.take().ok_or_else(|| de::Error::custom("a value without a key"))?;
         value.read(seed)
     }
 }
 
-/// One of several kinds, by its name, with what is said of it.
+/// A variant of an enum: its name and its content.
 struct Variant<'n, 'a> {
     name: &'n str,
     content: Option<Value<'a>>,
@@ -226,14 +226,14 @@ impl<'de> EnumAccess<'de> for Variant<'_, 'de> {
     }
 }
 
-/// What is said of one of several kinds.
+/// Content of a variant.
 struct Content<'a> {
     name: String,
     value: Option<Value<'a>>,
 }
 
 impl<'a> Content<'a> {
-    /// What is said, where something is to be said.
+    /// Content of a variant that must have one.
     fn value(self) -> Result<Value<'a>, ValueError> {
         let name = self.name;
         self.value.ok_or_else(|| {

@@ -1,4 +1,4 @@
-//! Values of a YAML scene file as those of a TOML file: reading them, and their errors, are then the same.
+//! Conversion of YAML scene files to TOML values, so that both formats share readers and error messages.
 //!
 //! The span of a value is its line, `line..line + 1`.
 
@@ -7,13 +7,13 @@ use std::borrow::Cow;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// YAML of scene files.
+/// YAML dialect of scene files.
 pub(super) const DIALECT: Dialect = Dialect { files: "scene files", aliases: true, tags: false };
 
 /// Returns the table of a scene. An empty file is an empty table.
 ///
 /// # Errors
-/// A list or a word instead of a table, and null where a value should be.
+/// The root is a list or a scalar instead of a table, or a value is null.
 pub(super) fn table(root: Option<&Node>) -> Result<DeTable<'_>, YamlError> {
     let Some(Node { line, value }) = root else { return Ok(DeTable::new()) };
     match value {

@@ -1,4 +1,4 @@
-//! A solve allocates nothing.
+//! Solving inverse kinematics allocates no memory.
 
 use kinetoscope_robot::kinematics::{Chain, IkCfg, IkSolver, Posture};
 use kinetoscope_robot::urdf::{UrdfCfg, assemble};

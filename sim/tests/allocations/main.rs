@@ -1,4 +1,4 @@
-//! Memory of steps, solves, sensors and frames: after the first ones, none is allocated.
+//! Memory allocation of steps, solves, sensors and frames: zero after the first ones.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod kinematics;
@@ -10,13 +10,13 @@ use kinetoscope_exec::ThreadPool;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Barrier};
 
-/// Allocations of this thread.
+/// Number of allocations of this thread during `work`.
 fn allocations(work: impl FnOnce()) -> u64 {
     allocation_counter::measure(work).count_total
 }
 
-/// Asserts that 20 calls in a row return 0 within 400 calls: which thread does which share is chance, and the memory of
-/// each thread grows to the need of its largest share.
+/// Asserts that 20 calls in a row return 0 within 400 calls. The assignment of work to threads is random, and the
+/// memory of each thread grows to the need of its largest share.
 #[track_caller]
 fn assert_settles(what: &str, mut allocations: impl FnMut() -> u64) {
     let mut in_a_row = 0;
@@ -29,7 +29,7 @@ fn assert_settles(what: &str, mut allocations: impl FnMut() -> u64) {
     panic!("{what}: no 20 in a row without an allocation");
 }
 
-/// Allocations of all slots of a pool, and the number of slots that worked.
+/// Number of allocations of all slots of a pool, and number of slots that worked.
 #[derive(Debug, Default)]
 struct Counting {
     allocations: AtomicU64,
@@ -37,11 +37,11 @@ struct Counting {
 }
 
 impl Counting {
-    /// A pool for jobs of `slots` slots that counts here.
+    /// Creates a pool that counts the allocations of jobs with `slots` slots.
     fn pool(self: &Arc<Self>, slots: usize) -> ThreadPool {
         let (counting, start) = (Arc::clone(self), Barrier::new(slots));
         let pool = ThreadPool::new().with_hook(move |slot, of, work| {
-            // All start together: the first one would otherwise do it all.
+            // All slots start together; otherwise the first slot could do all the work.
             if of == slots {
                 start.wait();
             }
@@ -53,7 +53,7 @@ impl Counting {
     }
 }
 
-/// The control of all tests here: the counter counts.
+/// Control experiment for all tests here: the counter counts an allocation.
 #[test]
 fn counter() {
     assert_eq!(allocations(|| drop(std::hint::black_box(vec![0u8; 100]))), 1);

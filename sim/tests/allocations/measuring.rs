@@ -1,4 +1,4 @@
-//! Sensors allocate nothing after they were built, whatever is configured.
+//! Sensors allocate no memory after they were built, with any configuration.
 
 use crate::{Counting, allocations, assert_settles};
 use kinetoscope_render::Intrinsics;
@@ -23,7 +23,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 const NOISE: NoiseCfg = NoiseCfg { std: 0.1, bias_std: 0.1, bias_walk: 0.1, resolution: 0.01 };
 
-/// A state with these numbers of contacts.
+/// A state with the given numbers of contacts in two environments.
 fn state([a, b]: [usize; 2]) -> SceneState {
     let (normal, force) = ([0.0, 0.0, 1.0], [1.0, 2.0, 3.0]);
     let bodies = [None, Some(1)];
@@ -41,7 +41,7 @@ fn state([a, b]: [usize; 2]) -> SceneState {
     }
 }
 
-/// Contacts, an IMU, frames, MuJoCo's sensors and wrenches: read at every step, and lazily.
+/// Contact, IMU, frame, MuJoCo and wrench sensors, read at every step, and lazily.
 #[test]
 fn numbers() {
     let bodies = ["a", "b", "c"].map(String::from);
@@ -66,7 +66,7 @@ fn numbers() {
     let wrench = JointWrenchCfg { links, frames: frame, sampling: sampling(), debug_vis: true };
     let own = MujocoSensorCfg { sensors: Some(vec!["own".into()]), sampling: sampling() };
     let schedule = Schedule::new(0.02, context.dt, false).unwrap();
-    // For wrenches, the third body is fused to the second.
+    // For the wrench sensor, the third body is fused to the second.
     let fused = SensorContext { carriers: [0, 1, 1].into(), ..context.clone() };
     let sensors: [Box<dyn Sensor>; 5] = [
         Box::new(contact.build(&context).unwrap()),
@@ -91,7 +91,7 @@ fn numbers() {
     }
 }
 
-/// Read every seven steps and written to every eleven, with changing numbers of contacts.
+/// Lazy sensor that is read every 7 steps and refreshed every 11, with changing numbers of contacts.
 fn lazy(sensor: Box<dyn Sensor>, schedule: Schedule) {
     let mut states = [[3, 3], [0, 5], [6, 1]].map(state);
     let measured = Arc::new(AtomicUsize::new(0));
@@ -113,17 +113,17 @@ fn lazy(sensor: Box<dyn Sensor>, schedule: Schedule) {
                 asked += 1;
             }
         }
-        // Every second step is due, and one that was due lies between any two of these.
+        // Every second step is due, and between any two of these accesses at least one due step lies.
         assert_eq!((asked, measured.load(Ordering::Relaxed) - before), (11, 11), "{slot:?}");
         states[0].step.fill(0);
         slot.reset(&[0, 1], &states[0]);
     };
-    // The list of contacts grows in the first round.
+    // The contact list grows in the first round.
     steps(&mut slot);
     assert_eq!(allocations(|| steps(&mut slot)), 0, "{slot:?}");
 }
 
-/// A sensor that counts its due measurements.
+/// Wrapper that counts the measurements of a sensor.
 #[derive(Debug)]
 struct Counted {
     sensor: Box<dyn Sensor>,
@@ -149,7 +149,7 @@ impl Sensor for Counted {
     }
 }
 
-/// A plane below balls that move with the steps.
+/// Scene of a plane and moving balls.
 fn balls(num_envs: usize, count: usize) -> (SensorContext, Vec<SceneState>) {
     let mut instances = vec![Instance::new(Plane::INFINITE, Material::default(), 1).fixed()];
     let ball = |k: usize| Instance::new(Sphere { radius: 0.3 }, Material::default(), 2 + k as i32).of_body(k as u32);
@@ -183,7 +183,7 @@ fn balls(num_envs: usize, count: usize) -> (SensorContext, Vec<SceneState>) {
     (SensorContext { threads: 1, ..context }, (0..=60).map(state).collect())
 }
 
-/// A perfect camera, and a late one with noise and every imperfection.
+/// An ideal camera, and a delayed camera with noise and every imperfection.
 #[test]
 fn cameras() {
     let (context, states) = balls(2, 1);
@@ -232,7 +232,7 @@ fn cameras() {
     }
 }
 
-/// Rays of 6 environments, worth four threads: no worker allocates.
+/// Rays of 6 environments, enough work for four threads: no worker allocates memory.
 #[test]
 fn rays() {
     let (context, states) = balls(6, 20);

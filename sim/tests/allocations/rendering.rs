@@ -1,4 +1,4 @@
-//! After the first frame, drawing allocates nothing, and keeps little.
+//! After the first frame, rendering allocates no memory, and scratch memory stays small.
 
 use crate::{Counting, allocations, assert_settles};
 use kinetoscope_render::View;
@@ -42,14 +42,14 @@ fn paths(max_bounces: u32) -> Renderer {
     Renderer::RayTraced { samples: 2, max_bounces, denoise: true, seed: 0 }
 }
 
-/// The first call may allocate, the next three must not.
+/// Asserts that the three calls after the first allocate no memory.
 #[track_caller]
 fn assert_steady(what: &str, mut draw: impl FnMut()) {
     draw();
     assert_eq!(allocations(|| (0..3).for_each(|_| draw())), 0, "{what}");
 }
 
-/// Scratch memory is three images at most.
+/// Scratch memory has at most the size of three images.
 #[test]
 fn raster() {
     let (scene, poses) = scene();
@@ -65,7 +65,7 @@ fn raster() {
     }
 }
 
-/// Rays and paths, every channel of moving objects, and the rays of a lens.
+/// Ray tracing and path tracing, every channel of moving objects, and lens rays.
 #[test]
 fn renderers() {
     let (scene, poses) = scene();
@@ -74,7 +74,7 @@ fn renderers() {
     let pixels = kinetoscope_render::PixelIntrinsics { fx: 90.0, fy: 90.0, cx: 160.0, cy: 120.0 };
     let optics = Optics::new(Equidistant { max_angle: 1.9 }.into(), pixels).unwrap();
     let rays = LensRays::new(&optics, [320, 240], 4).unwrap();
-    // A cone of less than 80 bytes for each block of 64 pixels, and five samples of 12 bytes.
+    // Less than 80 bytes per block of 64 pixels for its cone, and five samples of 12 bytes per pixel.
     assert!(rays.bytes() < 320 * 240 * (60 + 2), "{}", rays.bytes());
     let still = Shot { scene: &scene, poses: &poses, view: &small, lights: None, lens: None, before: None };
     let moving = Shot { before: Some(Before { poses: &moved, view: &small }), ..still };
@@ -97,7 +97,7 @@ fn renderers() {
     }
 }
 
-/// Emissive objects, a lens with an aperture and a rolling shutter.
+/// Emissive objects, a lens with an aperture, and a rolling shutter.
 #[test]
 fn rolling_shutter() {
     let (scene, poses) = scene();
@@ -116,7 +116,7 @@ fn rolling_shutter() {
     assert_steady("paths", || rasterizer.render_take(&shot, &take, &mut frame.as_mut()).unwrap());
 }
 
-/// Objects come into the light and into the image, come near and go apart, without one more allocation.
+/// Objects that enter the light and the image, approach and separate cause no further allocation.
 #[test]
 fn moving_objects() {
     let ball = || Instance::new(Sphere { radius: 0.3 }, Material::default(), 2);

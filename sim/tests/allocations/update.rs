@@ -1,4 +1,4 @@
-//! After the first steps, stepping and measuring allocates nothing on the calling thread.
+//! After the first steps, stepping and measuring allocate no memory on the calling thread.
 
 use crate::{allocations, assert_settles};
 use kinetoscope_scene::Requires;
@@ -16,12 +16,12 @@ const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8">
     <geom type="capsule" size="0.03" fromto="0 0 0 0.4 0 0"/><site name="tip" pos="0.4 0 0"/></body></worldbody>
   <actuator><motor joint="hinge"/></actuator><sensor><accelerometer site="tip"/><gyro site="tip"/><force site="tip"/></sensor></mujoco>"#;
 
-/// A weight that sinks on a string.
+/// A weight that sinks on a tendon.
 const STRING: &str = r#"<mujoco><worldbody><site name="hook" pos="0 0.5 0.9"/><body name="weight" pos="0 0.5 0.5">
     <joint type="slide" axis="0 0 1" damping="100"/><geom size="0.05"/><site name="eye"/></body></worldbody>
   <tendon><spatial><site site="hook"/><site site="eye"/></spatial></tendon></mujoco>"#;
 
-/// Four environments with a box that lies and a ball that stands a little off the ground.
+/// Four environments with a resting box and a ball that touches the ground.
 fn world(threads: usize) -> SimulationManager {
     let mut sim =
         SimulationManager::new(SimulationManagerCfg { num_envs: 4, threads: Some(threads), ..Default::default() })
@@ -35,7 +35,7 @@ fn world(threads: usize) -> SimulationManager {
     sim
 }
 
-/// Allocations of ten steps, after thirty.
+/// Number of allocations of ten steps, after thirty steps of warm-up.
 fn of_steps(sim: &mut SimulationManager) -> u64 {
     sim.update(30);
     allocations(|| (0..10).for_each(|_| sim.update(1)))
@@ -52,7 +52,7 @@ fn steps() {
         let sampling = SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
         sim.add_sensor("imu", ImuCfg { sampling, ..ImuCfg::on("ball") }).unwrap();
         assert_eq!(of_steps(&mut sim), 0, "{threads} threads, sensors of numbers");
-        // 10201 rays in each environment, and a camera of 3072: enough for all threads.
+        // 10201 rays per environment, and a camera with 3072: enough work for all threads.
         let grid = Grid { resolution: 0.02, size: [2.0; 2], ..Grid::default() };
         let offset = kinetoscope_scene::Pose::translation(0.0, 0.0, 2.0);
         let scanner = RayCasterCfg { offset, pattern: grid.into(), ..RayCasterCfg::default() };
@@ -60,7 +60,7 @@ fn steps() {
         sim.add_sensor("scanner", scanner).unwrap();
         sim.add_sensor("eye", RayCasterCameraCfg { width: 64, height: 48, ..RayCasterCameraCfg::default() }).unwrap();
         assert_eq!(of_steps(&mut sim), 0, "{threads} threads, rays");
-        // MuJoCo's own sensors and what joints exert, of a part and of a robot; a camera captures what there is to see.
+        // MuJoCo's own sensors and joint wrenches, of an attached MJCF file; a camera that captures the visible state.
         sim.add_mjcf(MjcfCfg::text("m", PENDULUM)).unwrap();
         let sampling = || SamplingCfg { latency_steps: 2, history_length: 3, ..SamplingCfg::default() };
         sim.add_sensor("own", MujocoSensorCfg { sensors: None, sampling: sampling() }).unwrap();
@@ -87,12 +87,12 @@ fn steps() {
     }
 }
 
-/// Images drawn at every step, each environment by one thread or all threads together on one.
+/// Images rendered at every step: one thread per environment, or all threads on one image.
 #[test]
 fn images() {
     for (threads, width, height) in [(1, 64, 48), (3, 64, 48), (3, 320, 240)] {
         let mut sim = world(threads);
-        // Its shape changes in every step, and so does the scene that cameras see.
+        // The tendon changes its shape in every step, and with it the scene that cameras see.
         sim.add_mjcf(MjcfCfg::text("string", STRING)).unwrap();
         let base = CameraCfg { width, height, lazy: false, ..CameraCfg::default() };
         let extrinsics = |x: f64| {
@@ -104,7 +104,7 @@ fn images() {
         let some = sim.add_sensor("some", some).unwrap();
         assert_settles(&format!("{threads} threads, {width} x {height}"), || allocations(|| sim.update(1)));
         let (all, some) = (sim.sensor(all).unwrap(), sim.sensor(some).unwrap());
-        // Also at the reset with which they begin.
+        // One more for the reset at the start.
         let pictures = 1 + all.frame_counts()[0];
         assert_eq!((all.draws(), some.draws()), (4 * pictures, 3 * pictures), "they are drawn when they are due");
     }

@@ -1,31 +1,32 @@
-//! Actuator model `dc_motor`: the effort of a motor falls with its speed.
+//! Actuator model `dc_motor`: the available effort falls with the speed.
 
 use super::{ActuatorLaw, JointMotion, proportional_derivative};
 use crate::drive::gains::{Gains, Target};
 use serde::{Deserialize, Serialize};
 
-/// A direct-current motor with its gear, as Isaac Lab 2 has it: in all four quadrants of speed and effort the effort of
-/// [`IdealPd`](super::IdealPd) is between
+/// DC motor with a gear, as in Isaac Lab 2. In all four quadrants of speed and effort, the effort of
+/// [`IdealPd`](super::IdealPd) is limited to the range
 ///
 /// ```text
-/// max(s (-1 - v / v_max), -max_effort)  and  min(s (1 - v / v_max), max_effort)
+/// max(s (-1 - v / v_max), -max_effort)  to  min(s (1 - v / v_max), max_effort)
 /// ```
 ///
-/// with the stall effort s ([`saturation_effort`](Self::saturation_effort)), the continuous limit `max_effort` and the speed
-/// without load `v_max`, which is the drive's `max_velocity` (`DriveCfg::max_velocity`, or the URDF's velocity limit). The
-/// speed in this formula is held within ±`v_max` (1 + `max_effort` / s), where the motor brakes with all of `max_effort`.
+/// with the stall effort s ([`saturation_effort`](Self::saturation_effort)), the continuous limit `max_effort` and the
+/// no-load speed `v_max`, which is the drive's `max_velocity` (`DriveCfg::max_velocity`, or the velocity limit of the
+/// URDF). The speed in this formula is clamped to ±`v_max` (1 + `max_effort` / s), where the motor brakes with all of
+/// `max_effort`.
 ///
-/// On its line the motor is a damper of s / `v_max`, as explicit as the gains are: a joint of inertia M at the speed without
-/// load is stable while h s / `v_max` < 2 M. `add_robot` warns where s / `v_max` or the gains are too large for the time step.
+/// On its torque-speed line the motor is an explicit damper of s / `v_max`: a joint of inertia M at the no-load speed
+/// is stable for h s / `v_max` < 2 M. `add_robot` warns if s / `v_max` or the gains are too large for the time step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DcMotor {
-    /// Effort at standstill \[N m or N\]. There is no motor whose number would do for others: it must be given.
+    /// Stall effort \[N m or N\]. It depends on the motor, so it has no default.
     pub saturation_effort: f64,
 }
 
 impl DcMotor {
-    /// Least and largest effort at a speed.
+    /// Smallest and largest effort at a speed.
     fn range(&self, velocity: f64, gains: &Gains) -> [f64; 2] {
         let (stall, limit) = (self.saturation_effort, gains.max_effort);
         let fastest = 1.0 + limit / stall;
@@ -67,7 +68,7 @@ impl ActuatorLaw for DcMotor {
 
     fn effort(&self, now: &JointMotion, target: &Target, gains: &Gains, _memory: &[f64]) -> f64 {
         let [least, most] = self.range(now.velocity, gains);
-        // At the ends of the speed the two are equal, up to rounding: `clamp` would not have it.
+        // At the ends of the speed range both limits are equal up to rounding, and `clamp` would panic on swapped ones.
         proportional_derivative(now, target, gains).max(least).min(most)
     }
 }

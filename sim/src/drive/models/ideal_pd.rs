@@ -4,7 +4,7 @@ use super::{ActuatorLaw, JointMotion, proportional_derivative};
 use crate::drive::gains::{Gains, Target};
 use serde::{Deserialize, Serialize};
 
-/// A controller that gives what its law asks for, up to the effort limit:
+/// Ideal PD controller with an effort limit.
 ///
 /// ```text
 /// tau = clamp(kp (q* - q) + kd (v* - v) + tau_ff, ±max_effort)

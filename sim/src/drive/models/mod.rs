@@ -1,11 +1,10 @@
 //! Explicit actuator models: the effort of a motor and its controller, computed at the start of each step.
 //!
-//! A model sees position, velocity and targets of its joint as they are when the step begins, and its effort acts during the
-//! whole step (with RK4, too). It is therefore what a real controller at the rate of the simulation would do, with the same
-//! limit of stability: see [`stable_timestep`](super::actuator::stable_timestep), which `add_robot` warns with. It takes the
-//! law's stiffness together with its steepest [damping](ActuatorLaw::damping), that of a motor's torque-speed line, too.
-//! Only `add_robot` looks: gains, drive types and speed limits that are set while the simulation runs are taken without a
-//! warning, stable or not.
+//! A model reads position, velocity and targets of its joint at the start of a step, and its effort acts during the
+//! whole step, with RK4 as well. It therefore acts like a real controller at the rate of the simulation, with the same
+//! limit of stability. `add_robot` warns by [`stable_timestep`](super::actuator::stable_timestep), which takes the
+//! stiffness of the law and its steepest [damping](ActuatorLaw::damping), the torque-speed line of a motor included.
+//! Only `add_robot` checks: gains, drive types and velocity limits set at run time are accepted without a warning.
 //!
 //! A model is one file with an [`ActuatorLaw`], and one line in the list below.
 
@@ -20,15 +19,15 @@ pub use ideal_pd::IdealPd;
 use super::gains::{Gains, Target};
 use serde::{Deserialize, Serialize};
 
-/// What an actuator model sees of its joint, at the start of the step.
+/// State of a joint at the start of the step, the input of an actuator model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointMotion {
     /// Position \[rad or m\].
     pub position: f64,
     /// Velocity \[rad/s or m/s\].
     pub velocity: f64,
-    /// Positions that a target may have now \[rad or m\], lower and upper end. The present target is among them; one that a
-    /// model remembers need not be.
+    /// Range of position targets at this time \[rad or m\], lower and upper end. The current target is in this range;
+    /// targets in the memory of a model may be outside.
     pub range: [f64; 2],
 }
 
@@ -37,37 +36,36 @@ pub trait ActuatorLaw: std::fmt::Debug {
     /// Name in configuration files.
     fn name(&self) -> &'static str;
 
-    /// What is wrong with the model's numbers, or with the gains and limits of its joint.
+    /// Checks the parameters of the model against the gains and limits of its joint.
     ///
     /// # Errors
-    /// What would be right, as a sentence.
+    /// The problem and the fix, as a sentence.
     fn check(&self, gains: &Gains) -> Result<(), String>;
 
-    /// What the model keeps from step to step, in each environment: as it is before the first step.
+    /// Initial memory of the model, which it keeps from step to step in each environment.
     fn memory(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// Forgets what was before: `target` is what the drive is asked for at the start.
+    /// Resets the memory; `target` is the target of the drive at the start.
     fn start(&self, _target: &Target, _memory: &mut [f64]) {}
 
-    /// How steeply the effort falls with the speed where that is steepest \[N m s/rad or N s/m\]: the damping that decides
-    /// whether the law is stable.
+    /// Largest decrease of the effort per speed \[N m s/rad or N s/m\]: the damping that decides on stability.
     fn damping(&self, gains: &Gains) -> f64 {
         gains.kd
     }
 
-    /// The effort in a step \[N m or N\].
+    /// Effort in a step \[N m or N\].
     fn effort(&self, now: &JointMotion, target: &Target, gains: &Gains, memory: &[f64]) -> f64;
 
-    /// After a step, in which the drive was asked for `target`.
+    /// Updates the memory after a step with the target `target`.
     fn remember(&self, _target: &Target, _memory: &mut [f64]) {}
 }
 
-/// The list of actuator models: `Variant(its configuration and law) = one to try`.
+/// List of actuator models: `Variant(configuration and law) = example`.
 macro_rules! actuator_models {
     ($($(#[$doc:meta])* $variant:ident($model:ty) = $example:expr,)*) => {
-        /// An explicit actuator model and its numbers.
+        /// An explicit actuator model with its parameters.
         #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
         pub enum ActuatorModel {
@@ -75,12 +73,12 @@ macro_rules! actuator_models {
         }
 
         impl ActuatorModel {
-            /// One of each kind, to try what holds for all of them; a motor of 1 N m, or 1 N.
+            /// One example of each model, for tests of all models; the motor has 1 N m or 1 N.
             pub fn examples() -> Vec<Self> {
                 vec![$(Self::$variant($example),)*]
             }
 
-            /// The model's law.
+            /// Drive law of the model.
             pub fn law(&self) -> &dyn ActuatorLaw {
                 match self {
                     $(Self::$variant(model) => model,)*
@@ -99,15 +97,15 @@ macro_rules! actuator_models {
 }
 
 actuator_models! {
-    /// A controller that gives what its law asks for, up to the effort limit.
+    /// Ideal PD controller with an effort limit.
     IdealPd(IdealPd) = IdealPd {},
-    /// A motor that gives less the faster it turns.
+    /// DC motor, with an effort limit that falls with the speed.
     DcMotor(DcMotor) = DcMotor { saturation_effort: 1.0 },
-    /// A controller that hears of its targets some steps later.
+    /// PD controller with delayed targets.
     DelayedPd(DelayedPd) = DelayedPd::default(),
 }
 
-/// `kp (q* - q) + kd (v* - v) + tau_ff`, not clamped.
+/// `kp (q* - q) + kd (v* - v) + tau_ff`, without limit.
 fn proportional_derivative(now: &JointMotion, target: &Target, gains: &Gains) -> f64 {
     gains.kp * (target.position - now.position) + gains.kd * (target.velocity - now.velocity) + target.feedforward
 }
@@ -124,7 +122,7 @@ mod tests {
             assert!(text.starts_with(&format!("{{\"{name}\":{{")), "{text}");
             let again: ActuatorModel = serde_json::from_str(&text).expect("as written");
             assert_eq!(again, *model);
-            // What has a default may be left out; the effort of a motor has none.
+            // Fields with a default may be left out; the stall effort of a motor has no default.
             let plain = serde_json::from_str::<ActuatorModel>(&format!("{{\"{name}\":{{}}}}"));
             match model {
                 ActuatorModel::IdealPd(_) | ActuatorModel::DelayedPd(_) => assert_eq!(plain.expect("defaults"), *model),
