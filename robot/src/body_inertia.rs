@@ -1,4 +1,6 @@
-//! Mass properties of a rigid body made of one or several links, with the warnings MuJoCo would otherwise make of them.
+//! Mass properties of rigid bodies that consist of one or several links joined by fixed joints.
+//!
+//! Inertias that MuJoCo would reject or silently change are reported as warnings.
 
 use crate::description::{JointKind, LinkId, RobotDescription};
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
@@ -7,21 +9,21 @@ use kinetoscope_scene::Pose;
 use kinetoscope_scene::source::Source;
 use nalgebra::Matrix3;
 
-/// Stand-in mass of a moving body without any \[kg\]: a milligram disturbs no robot, and is far above MuJoCo's minimum.
+/// Mass of a moving body without mass \[kg\]. One milligram disturbs no robot and is far above MuJoCo's minimum.
 const MASSLESS_MASS: f64 = 1e-6;
-/// Its moment of inertia \[kg m²\]: that mass at 3 cm.
+/// Moment of inertia of a moving body without mass \[kg m²\]: about that of [`MASSLESS_MASS`] at a distance of 3 cm.
 const MASSLESS_MOMENT: f64 = 1e-9;
 
-/// Links that move as one.
+/// Links joined by fixed joints, which move as one rigid body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigidBody {
-    /// Its links and their poses in the frame of the first.
+    /// Links of the body and their poses in the frame of the first link.
     pub links: Vec<(LinkId, Pose)>,
-    /// Whether anything above it, or its own base, can move.
+    /// False only for the body of the root link of a robot with a fixed base.
     pub moves: bool,
 }
 
-/// Links joined by fixed joints, grouped; the root's group comes first.
+/// Groups the links of a robot into rigid bodies. The body of the root link comes first.
 pub fn rigid_bodies(description: &RobotDescription, floating_base: bool) -> Vec<RigidBody> {
     let mut bodies = vec![RigidBody { links: vec![(description.root, Pose::identity())], moves: floating_base }];
     let mut next = 0;
@@ -43,17 +45,19 @@ pub fn rigid_bodies(description: &RobotDescription, floating_base: bool) -> Vec<
     bodies
 }
 
-/// What MuJoCo is told about a body.
+/// Mass properties of a body as written to the MJCF.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyInertia {
-    /// Mass properties in the body frame, repaired where no rigid body has them.
+    /// Mass properties in the body frame, repaired where they are physically impossible.
     pub inertia: RigidInertia,
-    /// Where the first of its inertias is given.
+    /// Location of the first `<inertial>` of the body; `None` where no link has one.
     pub source: Option<Source>,
 }
 
-/// Fuses the links of a body. A warning for every link whose own inertia no rigid body can have, and for a body that
-/// moves without mass; `None` for one that stands still without mass.
+/// Combines the mass properties of the links of a body.
+///
+/// Adds a warning for each link whose own inertia is physically impossible, and for a moving body without mass. Returns
+/// `None` for a massless body that does not move.
 pub fn fuse(
     description: &RobotDescription,
     body: &RigidBody,

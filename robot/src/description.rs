@@ -1,7 +1,8 @@
-//! `RobotDescription`: the merged robot as the files describe it, unrepaired, before MuJoCo sees it.
+//! Robot description: the merged links and joints as the files define them, before any repair for MuJoCo.
 //!
-//! Made by `urdf::merge` and `mjcf::robot_file`, read by `dynamics`, `kinematics`, `mjcf::robot` and `drive`. Names are
-//! unique, order is the order of the files, every element knows its [`Source`].
+//! The URDF and MJCF readers build it (`urdf::merge`, and `mjcf::robot_file` of the simulation crate). Dynamics,
+//! kinematics, the MJCF writer and the drives read it. Names are unique, elements keep the order of the files, and each
+//! element has its [`Source`].
 
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::source::Source;
@@ -21,12 +22,12 @@ pub struct JointId(pub usize);
 pub struct RobotDescription {
     /// Name of the robot.
     pub name: String,
-    /// All links; `links[root.0]` is the only one without a parent joint. Those that are [`between_joints`](Link::between_joints)
-    /// stand behind all others.
+    /// All links. `links[root.0]` is the only link without a parent joint. Links that are
+    /// [`between_joints`](Link::between_joints) come last.
     pub links: Vec<Link>,
     /// All joints, fixed ones included, in the order of the merged files.
     pub joints: Vec<Joint>,
-    /// The root of the tree.
+    /// Root link of the tree.
     pub root: LinkId,
 }
 
@@ -35,125 +36,125 @@ pub struct RobotDescription {
 pub struct Link {
     /// Unique name.
     pub name: String,
-    /// Where the link is described.
+    /// Location of the link in its file.
     pub source: Source,
-    /// The component it came from (`arm`, `hand`, ...).
+    /// Component of the robot that the link comes from (`arm`, `hand`, ...).
     pub component: String,
     /// Mass properties; `None` where the file has no `<inertial>`.
     pub inertial: Option<Inertial>,
-    /// Mass properties of an `<inertial>` that is not complete; `inertial` is `None` until the rest is computed from the shapes.
+    /// Mass properties of an incomplete `<inertial>`. `inertial` stays `None` until the shapes supply the rest.
     pub partial_inertial: Option<PartialInertial>,
-    /// What is seen.
+    /// Visual shapes.
     pub visuals: Vec<Visual>,
-    /// What collides.
+    /// Collision shapes.
     pub collisions: Vec<Collision>,
     /// The joint whose child this link is; `None` for the root.
     pub parent_joint: Option<JointId>,
     /// Joints whose parent this link is, in file order.
     pub child_joints: Vec<JointId>,
-    /// It is no body but a frame between two joints of one, as MJCF has them: without mass, shape or place of its own in
-    /// MuJoCo, and no user is told of it.
+    /// True for an auxiliary frame between two joints of one body, as MJCF has them. Such a link has no mass, no shape
+    /// and no body of its own in MuJoCo, and lists of links for users omit it.
     pub between_joints: bool,
 }
 
 /// Mass properties of a link as the file gives them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inertial {
-    /// Place of the declaration.
+    /// Location of the declaration.
     pub source: Source,
-    /// Pose of the centre-of-mass frame in the link frame.
+    /// Pose of the center-of-mass frame in the link frame.
     pub link_from_com: Pose,
     /// Mass \[kg\].
     pub mass: f64,
-    /// Inertia tensor \[kg m²\] about the centre of mass, in the axes of the centre-of-mass frame.
+    /// Inertia tensor \[kg m²\] about the center of mass, in the axes of the center-of-mass frame.
     pub inertia: Matrix3<f64>,
 }
 
-/// Mass properties that a file gives in part. Several are `None`; a complete set is an [`Inertial`].
+/// Partly specified mass properties of a link. `None` marks a missing value; a complete set is an [`Inertial`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartialInertial {
-    /// Place of the declaration.
+    /// Location of the declaration.
     pub source: Source,
-    /// Pose of the centre-of-mass frame in the link frame.
+    /// Pose of the center-of-mass frame in the link frame.
     pub link_from_com: Option<Pose>,
     /// Mass \[kg\].
     pub mass: Option<f64>,
     /// Density \[kg/m³\], an extension of Isaac Gym.
     pub density: Option<f64>,
-    /// Inertia tensor \[kg m²\] about the centre of mass, in the axes of the centre-of-mass frame.
+    /// Inertia tensor \[kg m²\] about the center of mass, in the axes of the center-of-mass frame.
     pub inertia: Option<Matrix3<f64>>,
 }
 
-/// A shape that is seen.
+/// Visual shape of a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visual {
-    /// Where it is described.
+    /// Location in the file.
     pub source: Source,
     /// Pose of the shape in the link frame.
     pub link_from_shape: Pose,
-    /// The shape.
+    /// Shape and size.
     pub geometry: Geometry,
-    /// Its look; `None` where the file gives none.
+    /// Material; `None` where the file gives no material.
     pub material: Option<Material>,
 }
 
-/// A shape that collides.
+/// Collision shape of a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Collision {
-    /// Where it is described.
+    /// Location in the file.
     pub source: Source,
     /// Pose of the shape in the link frame.
     pub link_from_shape: Pose,
-    /// The shape.
+    /// Shape and size.
     pub geometry: Geometry,
 }
 
-/// Shapes of a URDF, with URDF's meaning of the numbers.
+/// Shape of a visual or collision element, with the size conventions of URDF.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
-    /// Full edge lengths \[m\].
+    /// Box, centered at the origin of the shape.
     Box {
         /// Edge lengths along x, y, z \[m\].
         size: Vector3<f64>,
     },
-    /// Axis along z, centred.
+    /// Cylinder along z, centered at the origin of the shape.
     Cylinder {
         /// Radius \[m\].
         radius: f64,
         /// Full length \[m\].
         length: f64,
     },
-    /// Axis along z, centred.
+    /// Capsule along z, centered at the origin of the shape.
     Capsule {
         /// Radius \[m\].
         radius: f64,
         /// Length of the cylindrical part \[m\].
         length: f64,
     },
-    /// Centred.
+    /// Sphere, centered at the origin of the shape.
     Sphere {
         /// Radius \[m\].
         radius: f64,
     },
-    /// A file.
+    /// Mesh file.
     Mesh {
-        /// The URI as written.
+        /// URI as written in the file.
         uri: String,
-        /// The resolved file. For visuals it may not exist (a diagnostic says so).
+        /// Resolved path. The file of a visual may be missing; a diagnostic then reports it.
         path: PathBuf,
         /// Scale per axis; negative values mirror.
         scale: Vector3<f64>,
     },
 }
 
-/// The look of a visual.
+/// Material of a visual.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name in the file, if any.
     pub name: Option<String>,
-    /// Linear rgba in 0..=1; `None` where the file gives no colour.
+    /// Linear RGBA in 0..=1; `None` where the file gives no color.
     pub rgba: Option<[f64; 4]>,
-    /// Resolved texture file.
+    /// Resolved path of the texture file.
     pub texture: Option<PathBuf>,
 }
 
@@ -162,9 +163,9 @@ pub struct Material {
 pub struct Joint {
     /// Unique name.
     pub name: String,
-    /// Where it is described.
+    /// Location in the file.
     pub source: Source,
-    /// How it moves.
+    /// Joint type.
     pub kind: JointKind,
     /// Parent link.
     pub parent: LinkId,
@@ -172,67 +173,67 @@ pub struct Joint {
     pub child: LinkId,
     /// Pose of the joint frame (= child link frame at zero) in the parent link frame.
     pub parent_from_joint: Pose,
-    /// Axis in the joint frame; x where the file gives none.
+    /// Unit axis in the joint frame; x where the file has no `<axis>`.
     pub axis: Unit<Vector3<f64>>,
     /// Limits; `None` where the file has no `<limit>`.
     pub limit: Option<JointLimit>,
-    /// Passive viscous damping \[N m s/rad or N s/m\]; `None` where the file has none.
+    /// Passive viscous damping \[N m s/rad or N s/m\]; `None` where the file gives no value.
     pub damping: Option<f64>,
-    /// Dry friction \[N m or N\]; `None` where the file has none.
+    /// Dry friction \[N m or N\]; `None` where the file gives no value.
     pub friction: Option<f64>,
-    /// Coupling to another joint.
+    /// Mimic coupling to another joint.
     pub mimic: Option<Mimic>,
-    /// What the file says beyond URDF; `None` from a URDF.
+    /// Joint properties that only MJCF has; `None` for joints of a URDF file.
     pub defaults: Option<JointDefaults>,
 }
 
-/// What an MJCF file says of a joint beyond what a URDF can say: it holds where the configuration says nothing.
+/// Joint properties that MJCF has and URDF lacks. They apply where the robot configuration sets nothing else.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointDefaults {
     /// Rotor inertia \[kg m² or kg\].
     pub armature: f64,
-    /// Position in which the file starts \[rad or m\].
+    /// Initial position \[rad or m\].
     pub position: f64,
-    /// How it is driven.
+    /// Actuation of the joint in the file.
     pub drive: FileDrive,
 }
 
-/// How a file drives a joint.
+/// Actuation of a joint as a file defines it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FileDrive {
     /// The file has no actuators at all.
     Unsaid,
-    /// The file has actuators, and none of them acts on the joint.
+    /// The file has actuators, but no actuator acts on this joint.
     Passive,
-    /// By an effort: the gains are not the file's.
+    /// Actuated by an effort. The file gives no gains.
     Effort,
-    /// By actuators that follow positions or velocities.
+    /// Actuated by position or velocity actuators.
     Servo {
         /// Stiffness \[N m/rad or N/m\].
         stiffness: f64,
         /// Damping \[N m s/rad or N s/m\].
         damping: f64,
     },
-    /// A coupling that no mimic says decides where it is: nothing may drive it. `None` where no curve says where that is, since
-    /// several couplings do, or they go in a circle.
+    /// Positioned by a coupling that is not a mimic, so the joint must not be driven. The curve is `None` where several
+    /// couplings act on the joint, or where the couplings form a cycle.
     Coupled(Option<Curve>),
 }
 
-/// `position = start + Σ coefficients[k] (position(joint) - at)ᵏ`.
+/// Polynomial coupling of a joint to another joint: `position = start + Σ coefficients[k] (position(joint) - at)ᵏ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Curve {
-    /// The joint that is followed; `None` where the position is `start + coefficients[0]`.
+    /// Followed joint; `None` for the constant position `start + coefficients[0]`.
     pub joint: Option<JointId>,
-    /// Where the followed joint is at the start \[rad or m\].
+    /// Initial position of the followed joint \[rad or m\].
     pub at: f64,
-    /// Where the follower is at the start \[rad or m\].
+    /// Initial position of the following joint \[rad or m\].
     pub start: f64,
-    /// Coefficients, the constant first.
+    /// Coefficients in ascending order, the constant first.
     pub coefficients: [f64; 5],
 }
 
 impl Curve {
-    /// The position \[rad or m\] where the followed joint is at `driver`.
+    /// Position of the following joint where the followed joint is at `driver` \[rad or m\].
     pub fn position(&self, driver: f64) -> f64 {
         let by = driver - self.at;
         self.start + self.coefficients.iter().rev().fold(0.0, |sum, c| sum * by + c)
@@ -257,7 +258,7 @@ pub enum JointKind {
 }
 
 impl JointKind {
-    /// The word URDF uses.
+    /// Name of the joint type in URDF.
     pub fn name(self) -> &'static str {
         match self {
             Self::Fixed => "fixed",
@@ -269,16 +270,16 @@ impl JointKind {
         }
     }
 
-    /// One degree of freedom that a drive can act on.
+    /// True for joint types with one degree of freedom, which a drive can act on.
     pub fn is_drivable(self) -> bool {
         matches!(self, Self::Revolute | Self::Continuous | Self::Prismatic)
     }
 }
 
-/// Limits of a joint as the file gives them: absent is not zero.
+/// Limits of a joint as the file gives them; `None` where the file has no value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimit {
-    /// Place of the declaration.
+    /// Location of the declaration.
     pub source: Source,
     /// Lower position \[rad or m\].
     pub lower: Option<f64>,
@@ -290,12 +291,12 @@ pub struct JointLimit {
     pub velocity: Option<f64>,
 }
 
-/// `position = multiplier * position(joint) + offset`.
+/// Mimic coupling of a joint: `position = multiplier * position(joint) + offset`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mimic {
-    /// Where it is given.
+    /// Location of the declaration.
     pub source: Source,
-    /// The joint that is followed, as the file says (it may itself follow another).
+    /// Followed joint as the file names it. It may itself follow another joint.
     pub joint: JointId,
     /// Ratio.
     pub multiplier: f64,
@@ -304,7 +305,7 @@ pub struct Mimic {
 }
 
 impl Link {
-    /// A link that has nothing yet.
+    /// Creates a link without mass, shapes and joints.
     pub fn new(name: String, source: Source, component: String) -> Self {
         Self {
             name,
@@ -322,35 +323,35 @@ impl Link {
 }
 
 impl RobotDescription {
-    /// The links that a user knows, indexed by [`LinkId`]: all but the frames between joints of one body.
+    /// Links shown to users, indexed by [`LinkId`]: all links except the auxiliary frames between joints.
     pub fn named_links(&self) -> &[Link] {
         let named = self.links.iter().position(|link| link.between_joints).unwrap_or(self.links.len());
         &self.links[..named]
     }
 
-    /// The link called `name`, of those that a user knows.
+    /// Finds the link called `name` among the [`named_links`](Self::named_links).
     pub fn link_id(&self, name: &str) -> Option<LinkId> {
         self.named_links().iter().position(|l| l.name == name).map(LinkId)
     }
 
-    /// The joint called `name`, fixed ones included.
+    /// Finds the joint called `name`, fixed joints included.
     pub fn joint_id(&self, name: &str) -> Option<JointId> {
         self.joints.iter().position(|j| j.name == name).map(JointId)
     }
 
-    /// The link.
+    /// Returns the link with this id.
     ///
     /// # Panics
-    /// There is no such link: the id is of another description.
+    /// The id is out of range: it belongs to another description.
     #[track_caller]
     pub fn link(&self, id: LinkId) -> &Link {
         &self.links[id.0]
     }
 
-    /// The joint.
+    /// Returns the joint with this id.
     ///
     /// # Panics
-    /// There is no such joint: the id is of another description.
+    /// The id is out of range: it belongs to another description.
     #[track_caller]
     pub fn joint(&self, id: JointId) -> &Joint {
         &self.joints[id.0]
@@ -366,13 +367,13 @@ impl RobotDescription {
         self.links.iter().filter_map(|l| l.inertial.as_ref()).map(|i| i.mass).sum()
     }
 
-    /// The joint at the end of a chain of mimic joints, with the composed ratio and offset:
-    /// `position(id) = multiplier * position(driver) + offset`. For a joint that follows none: itself, 1, 0.
+    /// Resolves a chain of mimic joints to its driver, with the composed ratio and offset:
+    /// `position(id) = multiplier * position(driver) + offset`. A joint without a mimic returns itself, 1 and 0.
     ///
-    /// Mimic chains are free of cycles by construction (`urdf::merge` refuses them, and `mjcf::robot_file` makes none).
+    /// Mimic chains are free of cycles: `urdf::merge` rejects cycles, and `mjcf::robot_file` creates none.
     ///
     /// # Panics
-    /// There is no such joint: the id is of another description.
+    /// The id is out of range: it belongs to another description.
     #[track_caller]
     pub fn mimic_driver(&self, id: JointId) -> (JointId, f64, f64) {
         let (mut driver, mut multiplier, mut offset) = (id, 1.0, 0.0);

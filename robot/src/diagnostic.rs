@@ -1,35 +1,36 @@
-//! Warnings: what was repaired, ignored or unusual in a user's input. Collected, never printed behind the user's back.
+//! Warnings about the user's input: repairs, ignored elements and unusual values. They are collected, never printed.
 
 use kinetoscope_scene::source::Source;
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// What kind of thing a [`Diagnostic`] reports. The name is stable: reports count by it.
+/// Kind of a [`Diagnostic`]. Its name is stable: reports count diagnostics by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum DiagnosticKind {
-    /// An inertia tensor that no rigid body can have was repaired in the MJCF (the description keeps what the file says).
+    /// A physically impossible inertia tensor was repaired in the MJCF. The description keeps the values of the file.
     InertiaRepaired,
-    /// A movable body without mass and shapes got minimal values, so that MuJoCo accepts it; they stay out of `total_mass`.
+    /// A moving body without mass and shapes got minimal mass properties, which MuJoCo requires. They are not part of
+    /// `total_mass`.
     MasslessLink,
-    /// Lower limit above upper limit: the limit is ignored.
+    /// The lower limit exceeds the upper limit: the limit is ignored.
     LimitIgnored,
-    /// Effort 0 or absent: the joint's effort is not limited.
+    /// The effort limit is 0 or absent: the joint's effort is not limited.
     EffortUnlimited,
-    /// A mimic joint's implied range exceeds its own limits: the driver's usable range is the intersection, or where that is
-    /// less than 1 % of the driver's range, the limits of the mimic joint are ignored.
+    /// The range that a mimic joint implies exceeds its own limits. The driver's usable range is the intersection.
+    /// Where that is less than 1 % of the driver's range, the limits of the mimic joint are ignored.
     MimicRangeClipped,
     /// A file named by a visual does not exist: the visual is left out.
     VisualMeshMissing,
     /// A visual mesh could not be read: the visual is left out.
     VisualMeshInvalid,
-    /// The own sizes and colours of an environment cannot be drawn: it looks as nominally.
+    /// The sizes and colors of an environment cannot be rendered: it is rendered with the nominal ones.
     LookInvalid,
     /// A name was used by two components and got a prefix or suffix.
     NameClash,
     /// A material is referenced but defined nowhere.
     MaterialUndefined,
-    /// A texture file does not exist or cannot be read; the colour is used.
+    /// A texture file does not exist or cannot be read; the color is used.
     TextureMissing,
     /// An element of the file has no meaning for the simulation and was skipped.
     ElementIgnored,
@@ -39,19 +40,19 @@ pub enum DiagnosticKind {
     ActuatorUnstable,
     /// Two geoms overlap in the initial pose and were excluded from self-collision.
     InitialOverlap,
-    /// A clearance above the ground was asked for of a robot without collision shapes.
+    /// A clearance above the ground was requested for a robot without collision shapes.
     ClearanceIgnored,
-    /// The initial position was outside the joint's limits and was moved to the nearest one.
+    /// The initial position was outside the limits of the joint and was moved to the nearest limit.
     InitialPositionClamped,
-    /// A joint that follows others starts where they put it, beyond its own limits.
+    /// A coupled joint starts beyond its own limits, where the joints that it follows put it.
     FollowerStartsBeyondLimits,
-    /// A position was given for a joint that follows another one elsewhere.
+    /// A position was given for a mimic joint whose driver puts it elsewhere.
     MimicPositionIgnored,
-    /// An element that may be there once is there again: the first is used.
+    /// An element that may occur once occurs again: the first one is used.
     ElementRepeated,
     /// A shape has a size of 0: it is left out.
     ShapeEmpty,
-    /// An XML prefix is bound to no namespace: its elements and attributes are ignored.
+    /// An XML prefix has no namespace: its elements and attributes are ignored.
     NamespaceUnbound,
     /// A xacro element was left in a URDF: it is ignored.
     XacroLeftover,
@@ -59,31 +60,32 @@ pub enum DiagnosticKind {
     DeclarationMisplaced,
     /// An `<inertial>` lacks its mass or its inertia: the rest is computed from the shapes of the link.
     InertialIncomplete,
-    /// Mass properties that the file does not give, or that no body of these shapes has, were computed from the shapes.
+    /// Mass properties that were missing, or impossible for the shapes, were computed from the shapes.
     InertiaFromShapes,
-    /// An inertia behind a joint is that of a rigid body far larger than the shapes of the link: it is kept.
+    /// The inertia of a jointed link is that of a rigid body far larger than its shapes: it is kept.
     InertiaImplausible,
-    /// A mesh has one number for its scale: it holds for all three axes.
+    /// A mesh scale is a single number: it applies to all three axes.
     ScaleUniform,
-    /// The address of a mesh or texture is not a valid one, and what is meant is clear.
+    /// The URI of a mesh or texture is invalid, but its meaning is clear.
     AddressRepaired,
-    /// A robot has no visual shape: pictures do not show it.
+    /// A robot has no visual shape: images do not show it.
     NothingToDraw,
-    /// A unit axis was expected; the axis was normalised.
+    /// An axis was not of unit length and was normalized.
     AxisNormalized,
-    /// A colour was outside 0..1 and was clamped.
+    /// A color was outside 0..1 and was clamped.
     ColorClamped,
-    /// A setting of an MJCF file for its whole model is not the scene's: the scene's holds.
+    /// A global setting of an MJCF file differs from the scene's setting: the scene's setting applies.
     SettingIgnored,
-    /// The surface of an object's mesh is open, encloses nothing, or is inside out in a part: it weighs and turns as its convex
-    /// hull; or it is open, and collides in pieces or triangles: they do not hold all that is behind it.
+    /// The mesh of an object is open, encloses no volume, or is partly inside out: its mass properties are those of its
+    /// convex hull. Also reported for an open mesh that collides as convex pieces or triangles, which do not enclose
+    /// the space behind it.
     OpenMesh,
-    /// The convex pieces of an object's mesh are farther off its surface than they should be, or some of its triangles are too
-    /// thin to collide.
+    /// The convex pieces of an object's mesh deviate too far from its surface, or some of its triangles are too thin to
+    /// collide.
     CoarsePieces,
-    /// Something of an MJCF part is left out of an export, because the line of MuJoCo it is for does not know it.
+    /// An export leaves out an element of an MJCF part that the target MuJoCo version does not support.
     ExportReduced,
-    /// Drives of an export have an armature that the robot has not, so that plain MuJoCo is stable with them.
+    /// An export gives drives an armature that the robot does not have, so that they are stable in plain MuJoCo.
     ExportHeavier,
 }
 
@@ -132,19 +134,19 @@ impl DiagnosticKind {
     }
 }
 
-/// One warning: kind, place, and a sentence that says what was found and what was done.
+/// Warning with its kind, its location, and a sentence on the finding and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// What kind of thing this is.
+    /// Kind of the warning.
     pub kind: DiagnosticKind,
-    /// Where it was found, if in a file.
+    /// Location, if the input is a file.
     pub source: Option<Source>,
-    /// A full sentence that names the element: `link "LF_HIP": ...`.
+    /// Full sentence that names the element: `link "LF_HIP": ...`.
     pub message: String,
 }
 
 impl Diagnostic {
-    /// A warning at `source`.
+    /// Creates a warning at `source`.
     pub fn new(kind: DiagnosticKind, source: impl Into<Option<Source>>, message: impl Into<String>) -> Self {
         Self { kind, source: source.into(), message: message.into() }
     }

@@ -1,7 +1,7 @@
-//! Mass properties of rigid bodies: moving, fusing, checking and repairing them.
+//! Mass properties of rigid bodies: transforming, combining, checking and repairing them.
 //!
-//! MuJoCo refuses a model whose inertias no rigid body can have, and many URDF files have some. [`RigidInertia`] fuses
-//! links (parallel-axis theorem), finds principal axes, says what is wrong, and makes the smallest repair.
+//! MuJoCo rejects a model with physically impossible inertias, and many URDF files have some. [`RigidInertia`] combines
+//! links (parallel-axis theorem), finds principal axes, reports faults, and makes the smallest repair.
 //!
 //! A tensor `I` belongs to a rigid body if and only if the second moment of its mass, `Σ = ∫ r rᵀ dm`, is positive
 //! semidefinite, where `I = tr(Σ) 1 - Σ` and so `Σ = tr(I)/2 1 - I`. In principal axes with moments A, B, C the moments
@@ -15,18 +15,20 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// Smallest mass of a moving body that MuJoCo accepts \[kg\]. Source: `mjMINVAL`.
 const MUJOCO_MIN_MASS: f64 = 1e-15;
-/// Smallest principal moment that MuJoCo accepts \[kg m²\]. Source: `mjEPS` in user_util.h, asked of `fullinertia`;
-/// moving bodies are asked for `mjMINVAL` = 1e-15 only, and the stricter one keeps both ways of writing it open.
+/// Smallest principal moment that MuJoCo accepts \[kg m²\]. Source: `mjEPS` in user_util.h, the threshold for
+/// `fullinertia`. The threshold for other moving bodies is `mjMINVAL` = 1e-15; the stricter value allows both ways of
+/// writing an inertia.
 const MUJOCO_MIN_MOMENT: f64 = 1e-14;
-/// A missing mass becomes a milligram \[kg\]: nine decades above what MuJoCo asks, and less than any scale on a robot.
+/// Mass given to a body without mass \[kg\]: one milligram, nine decades above MuJoCo's minimum and negligible on a
+/// robot.
 const REPAIR_MASS: f64 = 1e-6;
-/// No link is flatter than a sheet of this thickness t \[m\]: its second moment across the sheet is m t²/12.
+/// Smallest thickness t of a repaired body \[m\]: the second moment across a sheet of this thickness is m t²/12.
 const REPAIR_THICKNESS: f64 = 1e-3;
-/// Floor of a repaired second moment \[kg m²\]: the two that make a principal moment are 200 times what MuJoCo asks.
+/// Floor of a repaired second moment \[kg m²\]. Two of them add up to a principal moment of 200 times MuJoCo's minimum.
 const REPAIR_SECOND_MOMENT: f64 = 1e-12;
-/// Smallest ratio of repaired second moments: a smaller one drowns in the rounding of the tensor.
+/// Smallest ratio of repaired second moments. A smaller ratio is lost in the rounding of the tensor.
 const REPAIR_RATIO: f64 = 1e-9;
-/// Relative error allowed to the eigenvalues of a 3x3 matrix: a plate has A + B = C exactly, and must stay one.
+/// Tolerated relative error of the eigenvalues of a 3x3 matrix. A plate has A + B = C exactly and must stay valid.
 const ROUNDING: f64 = 1e-12;
 
 /// Mass properties of a rigid body in some frame.
@@ -34,13 +36,13 @@ const ROUNDING: f64 = 1e-12;
 pub struct RigidInertia {
     /// Mass \[kg\].
     pub mass: f64,
-    /// Centre of mass in the frame \[m\].
+    /// Center of mass in the frame \[m\].
     pub com: Vector3<f64>,
-    /// Inertia tensor \[kg m²\] about the centre of mass, in the axes of the frame.
+    /// Inertia tensor \[kg m²\] about the center of mass, in the axes of the frame.
     pub inertia: Matrix3<f64>,
 }
 
-/// Why MuJoCo would refuse mass properties.
+/// Reason why MuJoCo rejects mass properties.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InertiaFault {
@@ -65,27 +67,27 @@ pub enum InertiaFault {
     /// The two smaller principal moments do not add up to the largest.
     #[error("principal moments {a:.6e} + {b:.6e} < {c:.6e} kg m²: no rigid body has them")]
     Triangle {
-        /// The smallest \[kg m²\].
+        /// Smallest principal moment \[kg m²\].
         a: f64,
-        /// The one in between \[kg m²\].
+        /// Middle principal moment \[kg m²\].
         b: f64,
-        /// The largest \[kg m²\].
+        /// Largest principal moment \[kg m²\].
         c: f64,
     },
 }
 
 impl RigidInertia {
-    /// No mass at all: the neutral element of [`combine`](Self::combine).
+    /// Body without mass: the neutral element of [`combine`](Self::combine).
     pub const ZERO: Self =
         Self { mass: 0.0, com: Vector3::new(0.0, 0.0, 0.0), inertia: Matrix3::new(0., 0., 0., 0., 0., 0., 0., 0., 0.) };
 
-    /// What the file says, in the link frame.
+    /// Mass properties of an `<inertial>`, in the link frame.
     pub fn from_inertial(inertial: &Inertial) -> Self {
         let in_com_axes = Self { mass: inertial.mass, com: Vector3::zeros(), inertia: inertial.inertia };
         in_com_axes.transformed(&inertial.link_from_com)
     }
 
-    /// The same body seen from frame `b`, given in frame `a`.
+    /// Transforms mass properties from frame `a` to frame `b`.
     #[must_use]
     pub fn transformed(&self, b_from_a: &Pose) -> Self {
         let rotation = b_from_a.rotation.to_rotation_matrix();
@@ -96,10 +98,10 @@ impl RigidInertia {
         }
     }
 
-    /// The two bodies, given in the same frame, welded together.
+    /// Combines two rigidly connected bodies, given in the same frame.
     ///
-    /// With d between the centres of mass: `I = I₁ + I₂ + m₁ m₂ / (m₁ + m₂) (d·d 1 - d dᵀ)` (parallel axes, twice).
-    /// Where the masses add up to zero, the inertias are added and the centre of mass of `self` is kept.
+    /// With d between the centers of mass: `I = I₁ + I₂ + m₁ m₂ / (m₁ + m₂) (d·d 1 - d dᵀ)` (parallel-axis theorem,
+    /// twice). If the masses add up to zero, the inertias are added and the center of mass of `self` is kept.
     #[must_use]
     pub fn combine(&self, other: &Self) -> Self {
         let mass = self.mass + other.mass;
@@ -119,11 +121,11 @@ impl RigidInertia {
     /// `inertia = R diag Rᵀ`, R right-handed, also where moments are equal. A tensor that is already diagonal and
     /// sorted gives the identity.
     ///
-    /// MuJoCo compares A + B >= C exactly. Where only the rounding of the eigenvalues breaks it (by less than 1e-12 C,
-    /// as for a thin plate), the middle moment is raised to meet it. So write these numbers to the MJCF
-    /// (`diaginertia`, `quat`), not the tensor, which MuJoCo would round again.
+    /// MuJoCo compares A + B >= C exactly. Where only the rounding of the eigenvalues violates it (by less than 1e-12
+    /// C, as for a thin plate), the middle moment is raised until it holds. Write these numbers to the MJCF
+    /// (`diaginertia`, `quat`) rather than the tensor, which MuJoCo would round again.
     ///
-    /// Only the symmetric part of the tensor counts. Not finite in, not finite out.
+    /// Only the symmetric part of the tensor is used. Input that is not finite gives output that is not finite.
     pub fn principal(&self) -> (Vector3<f64>, UnitQuaternion<f64>) {
         let (mut moments, axes) = sorted_eigen(&symmetric_part(&self.inertia));
         let missing = moments[0] - (moments[1] + moments[2]);
@@ -135,7 +137,8 @@ impl RigidInertia {
         (moments, axes)
     }
 
-    /// Whether MuJoCo accepts a moving body with these mass properties, written as [`principal`](Self::principal) says.
+    /// Checks that MuJoCo accepts a moving body with these mass properties, written as [`principal`](Self::principal)
+    /// returns them.
     ///
     /// # Errors
     ///
@@ -165,18 +168,18 @@ impl RigidInertia {
         Ok(())
     }
 
-    /// The nearest mass properties that MuJoCo accepts, and a sentence that says what was changed; unchanged and an
-    /// empty sentence where [`check`](Self::check) finds no fault.
+    /// Returns the nearest mass properties that MuJoCo accepts, and a sentence that describes the changes. Where
+    /// [`check`](Self::check) finds no fault, the mass properties are unchanged and the sentence is empty.
     ///
     /// 1. Numbers that are not finite become 0; the tensor becomes its symmetric part.
     /// 2. A mass that is not positive becomes 1e-6 kg; the inertia stays (a rotor given by its inertia alone).
-    /// 3. Principal axes are kept. Where a second moment of the mass (module documentation) is below the floor
-    ///    `f = max(m t²/12, 1e-12 kg m², 1e-9 of the largest)`, t = 1 mm, it becomes f: the body is made at least as thick as a sheet of
-    ///    1 mm. For a broken triangle inequality A + B < C this adds `(C - A - B)/2 + f` to A and to B and leaves C
-    ///    alone; a body with no inertia gets 2 f about every axis. The rest of the mass distribution stays.
+    /// 3. Principal axes are kept. A second moment of the mass (module documentation) below the floor `f = max(m t²/12,
+    ///    1e-12 kg m², 1e-9 of the largest)`, t = 1 mm, becomes f: the body is at least as thick as a sheet of 1 mm.
+    ///    For a violated triangle inequality A + B < C this adds `(C - A - B)/2 + f` to A and to B and leaves C
+    ///    unchanged. A body without inertia gets 2 f about every axis. The rest of the mass distribution stays.
     ///
-    /// MuJoCo's own `balanceinertia` makes all three moments equal instead: for moments 3, 0, 0 it takes two thirds of
-    /// the largest away.
+    /// MuJoCo's own `balanceinertia` makes all three moments equal instead: for moments 3, 0, 0 it removes two thirds
+    /// of the largest.
     pub fn repaired(&self) -> (Self, String) {
         let Err(fault) = self.check() else {
             return (*self, String::new());
@@ -217,7 +220,7 @@ impl RigidInertia {
     }
 }
 
-/// `tr(Σ) 1 - Σ`.
+/// Inertia tensor `tr(Σ) 1 - Σ` of a body with the second moment Σ.
 fn second_moment_to_inertia(second_moment: &Matrix3<f64>) -> Matrix3<f64> {
     Matrix3::from_diagonal_element(second_moment.trace()) - second_moment
 }
@@ -288,7 +291,7 @@ mod tests {
         body(mass, Matrix3::from_diagonal(&Vector3::new(a, b, c)))
     }
 
-    /// A uniform box, Source: I_xx = m (y² + z²) / 12.
+    /// Mass properties of a uniform box. Source: I_xx = m (y² + z²) / 12.
     fn box_inertia(mass: f64, size: Vector3<f64>, com: Vector3<f64>) -> RigidInertia {
         let s = size.component_mul(&size) * (mass / 12.0);
         RigidInertia { com, ..diagonal(mass, s.y + s.z, s.x + s.z, s.x + s.y) }
@@ -383,7 +386,7 @@ mod tests {
             fixed.check().unwrap();
             assert!(mujoco_accepts(&fixed));
             assert_eq!(fixed.mass, mass);
-            // Nothing is taken away: the added inertia is positive semidefinite.
+            // No inertia is removed: the added inertia is positive semidefinite.
             let added = sorted_eigen(&symmetric_part(&(fixed.inertia - inertia))).0;
             assert!(added.min() > -1e-18, "{added}");
             // The axes are kept.

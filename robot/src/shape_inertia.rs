@@ -1,4 +1,5 @@
-//! Mass properties of links from their shapes, for files that give none, a part of them, or impossible ones.
+//! Mass properties of links computed from their shapes, for files whose mass properties are missing, incomplete or
+//! impossible.
 
 use crate::body_inertia::{RigidBody, rigid_bodies};
 use crate::description::{Geometry, Inertial, JointKind, Link, RobotDescription};
@@ -13,16 +14,17 @@ use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-/// Density of water \[kg/m³\], for what has a mass and no shape.
+/// Density of water \[kg/m³\], for a link with a mass but without shapes.
 const WATER: f64 = 1000.0;
-/// A radius of gyration this many times the reach of the shapes is an error of the file. The mass of a body is not outside of
-/// it, so that 1 is the physical bound; rotors behind gears are often a part of an inertia, and take it to a few.
+/// Ratio of radius of gyration to reach of the shapes above which an inertia is an error of the file. The mass of a
+/// body lies inside it, so that 1 is the physical bound. Inertias often include rotors behind gears, which raise the
+/// ratio to a few.
 const FAR: f64 = 10.0;
-/// Shapes in which the mass would have more than this density \[kg/m³\] are placeholders, such as boxes of 1 mm: osmium has
-/// 22 600.
+/// Largest plausible density of a link \[kg/m³\]. Shapes that imply more are placeholders, such as boxes of 1 mm:
+/// osmium has 22 600.
 const DENSEST: f64 = 25_000.0;
 
-/// An error of mass properties that are computed from shapes.
+/// Error of mass properties that are computed from shapes.
 #[derive(Debug, thiserror::Error)]
 pub enum ShapeInertiaError {
     /// The density of the configuration is not positive and finite.
@@ -36,11 +38,11 @@ pub enum ShapeInertiaError {
     /// A collision mesh cannot be read or has no hull.
     #[error("{at}: link {link:?}: {error}")]
     Mesh {
-        /// Place of the collision element.
+        /// Location of the collision element.
         at: Source,
         /// Name of the link.
         link: String,
-        /// Fault of the file.
+        /// Error of the mesh file.
         #[source]
         error: Box<kinetoscope_scene::mesh::MeshError>,
     },
@@ -55,12 +57,12 @@ pub struct Hulls<'c> {
 }
 
 impl<'c> Hulls<'c> {
-    /// No hull yet.
+    /// Creates an empty set of hulls.
     pub fn new(cfg: &'c HullCfg) -> Self {
         Self { cache: HullCache::default_location(), cfg, known: BTreeMap::new() }
     }
 
-    /// The hull of every collision mesh of a robot.
+    /// Computes the convex hull of every collision mesh of a robot.
     ///
     /// # Errors
     /// A mesh cannot be read or has no hull.
@@ -89,7 +91,7 @@ impl<'c> Hulls<'c> {
         Ok(hulls)
     }
 
-    /// The hull of a mesh; `None` where it cannot be read, which is reported by those who use it.
+    /// Convex hull of a mesh; `None` where the file cannot be read. Other users of the file report that error.
     fn of_mesh(&mut self, geometry: &Geometry) -> Option<&TriMesh> {
         let Geometry::Mesh { path, scale, .. } = geometry else { return None };
         let key = MeshKey::new(path, scale);
@@ -101,7 +103,7 @@ impl<'c> Hulls<'c> {
     }
 }
 
-/// Completes the mass properties of a robot from URDF files, with a warning for each link.
+/// Completes the mass properties of a robot from URDF files. Adds a warning for each link that changes.
 ///
 /// # Errors
 /// The density of the configuration is not positive and finite.
@@ -135,7 +137,7 @@ pub fn complete(
     Ok(())
 }
 
-/// Mass properties of a link without `<inertial>`.
+/// Computes the mass properties of a link without `<inertial>`.
 fn fill(link: &mut Link, density: f64, hulls: &mut Hulls<'_>, diagnostics: &mut Vec<Diagnostic>) {
     let Some(shapes) = Shapes::of(link, hulls) else { return };
     let mass = shapes.unit.mass * density;
@@ -179,7 +181,7 @@ fn complete_partial(
         warn("it has no shapes, so its inertia is that of a ball of its mass and the density of water".to_owned());
     }
     inertial.source = given.source.clone();
-    // A tensor that is given is about the origin that is given, or else that of the link.
+    // A given tensor is about the given origin, or else about the origin of the link.
     match (given.inertia, given.link_from_com) {
         (Some(inertia), pose) => {
             inertial.inertia = inertia;
@@ -191,9 +193,11 @@ fn complete_partial(
     link.inertial = Some(inertial);
 }
 
-/// Replaces inertias by those of the shapes: those that no rigid body has, where the smallest repair would leave a body that
-/// cannot be simulated (see [`FAR`]), and on a body that moves freely those that no body of its shapes has. On a body that a joint
-/// moves the latter are kept, with a warning: they may hold the rotor of a gear.
+/// Replaces implausible inertias by those of the shapes.
+///
+/// A physically impossible inertia is replaced where the smallest repair would leave a body that cannot be simulated
+/// (see [`FAR`]). On a body that moves freely, an inertia that no body of these shapes has is replaced too. On a body
+/// behind a joint such an inertia is kept, with a warning: it may include the rotor of a gear.
 fn replace_absurd(
     description: &mut RobotDescription,
     body: &RigidBody,
@@ -217,7 +221,7 @@ fn replace_absurd(
         let Some(inertial) = link.inertial.as_ref().filter(|inertial| inertial.mass > 0.0) else { continue };
         let own = RigidInertia::from_inertial(inertial);
         let fault = own.check().err().filter(|_| is_faulty);
-        // Reading visual meshes takes time: they are asked only where an inertia has to be repaired.
+        // Reading visual meshes takes time: they are used only where an inertia needs a repair.
         if fault.is_none() && link.collisions.is_empty() {
             continue;
         }
@@ -265,25 +269,26 @@ fn replace_absurd(
     }
 }
 
-/// A solid ball about the origin of a link.
+/// Mass properties of a solid ball about the origin of a link.
 pub fn ball(link: &Link, mass: f64, density: f64) -> Inertial {
     let radius = (mass / density * 0.75 / PI).cbrt();
     let inertia = Matrix3::from_diagonal_element(0.4 * mass * radius * radius);
     Inertial { source: link.source.clone(), link_from_com: Pose::identity(), mass, inertia }
 }
 
-/// The solid that the shapes of a link are.
+/// Solid formed by the shapes of a link.
 struct Shapes {
-    /// `collision` or `visual`.
+    /// Kind of the shapes: `collision` or `visual`.
     kind: &'static str,
-    /// Mass properties for 1 kg/m³, in the frame of the link.
+    /// Mass properties for a density of 1 kg/m³, in the frame of the link.
     unit: RigidInertia,
     /// Corners of the bounding boxes of the shapes in the frame of the link \[m\].
     corners: Vec<Vector3<f64>>,
 }
 
 impl Shapes {
-    /// The collision shapes, or the visual ones where there are no others; `None` where they hold no volume.
+    /// Collects the collision shapes, or the visual shapes of a link without collision shapes; `None` if they have no
+    /// volume.
     fn of(link: &Link, hulls: &mut Hulls<'_>) -> Option<Self> {
         let kind = if link.collisions.is_empty() { "visual" } else { "collision" };
         let collisions = link.collisions.iter().map(|shape| (&shape.geometry, &shape.link_from_shape));
@@ -299,14 +304,14 @@ impl Shapes {
         is_usable.then_some(shapes)
     }
 
-    /// As a body of some mass, of the same density everywhere.
+    /// Mass properties of the solid with the given mass and uniform density.
     fn inertial(&self, link: &Link, mass: f64) -> Inertial {
         let link_from_com = nalgebra::Translation3::from(self.unit.com).into();
         let inertia = self.unit.inertia * (mass / self.unit.mass);
         Inertial { source: link.source.clone(), link_from_com, mass, inertia }
     }
 
-    /// The farthest corner of all shapes of the link, visual ones too, from a centre of mass \[m\].
+    /// Distance \[m\] from a center of mass to the farthest corner of all shapes of the link, visual shapes included.
     fn reach_of_all(&self, link: &Link, com: &Vector3<f64>, hulls: &mut Hulls<'_>) -> f64 {
         let shapes = link.visuals.iter().map(|shape| (&shape.geometry, &shape.link_from_shape));
         shapes
@@ -316,13 +321,13 @@ impl Shapes {
             .fold(self.reach(com), f64::max)
     }
 
-    /// The farthest corner from a centre of mass \[m\].
+    /// Distance \[m\] from a center of mass to the farthest corner.
     fn reach(&self, com: &Vector3<f64>) -> f64 {
         self.corners.iter().map(|corner| (corner - com).norm()).fold(0.0, f64::max)
     }
 }
 
-/// Corners of a box from its lowest and highest one, at a pose.
+/// Corners of a box at a pose, from its lowest and highest corner.
 fn corners([low, high]: [Vector3<f64>; 2], pose: &Pose) -> [Vector3<f64>; 8] {
     std::array::from_fn(|corner| {
         let end = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
@@ -330,9 +335,10 @@ fn corners([low, high]: [Vector3<f64>; 2], pose: &Pose) -> [Vector3<f64>; 8] {
     })
 }
 
-/// Mass properties of a shape of 1 kg/m³ and its bounding box, in its own frame. Sources of the closed forms: volumes and
-/// moments of solids of uniform density, in any textbook; a capsule is a cylinder and two half balls, each with its centre of
-/// mass 3r/8 from its plane.
+/// Mass properties of a shape for a density of 1 kg/m³ and its bounding box, in its own frame.
+///
+/// The closed forms are those of solids of uniform density in any textbook. A capsule is a cylinder and two half balls,
+/// each with its center of mass 3r/8 from its plane.
 fn solid(geometry: &Geometry, hulls: &mut Hulls<'_>) -> Option<(RigidInertia, [Vector3<f64>; 2])> {
     let body = |mass: f64, moments: [f64; 3], half: Vector3<f64>| {
         let inertia = Matrix3::from_diagonal(&Vector3::from(moments));
@@ -372,7 +378,7 @@ fn solid(geometry: &Geometry, hulls: &mut Hulls<'_>) -> Option<(RigidInertia, [V
     })
 }
 
-/// A number with four digits, for messages.
+/// Formats a number with four digits, for messages.
 fn short(number: f64) -> String {
     if number == 0.0 {
         "0".to_owned()

@@ -1,38 +1,40 @@
-//! Where a robot is: positions of its joints and of its root.
+//! Configuration of a robot: pose of its root and positions of its joints.
 
 use super::DynamicsError;
 use crate::description::{JointKind, RobotDescription};
 use kinetoscope_scene::Pose;
 use nalgebra::{DVector, Translation3, Unit, UnitQuaternion, Vector3};
 
-/// What the positions of mimic joints are.
+/// Interpretation of the positions of mimic joints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MimicPositions {
-    /// Derived from the joint that is followed; the numbers given for mimic joints are ignored.
+    /// Derived from the followed joint; the numbers given for mimic joints are ignored.
     #[default]
     FollowDriver,
-    /// As given, whether they agree with the driver or not (MuJoCo's equalities may be a little off).
+    /// As given, even where they disagree with the driver. MuJoCo's equality constraints may be slightly violated.
     AsGiven,
 }
 
-/// Where a robot is.
+/// Pose of the root and positions of the joints of a robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Configuration {
-    /// `world_from_root`.
+    /// Pose of the root link in the world, `world_from_root`.
     pub root_pose: Pose,
-    /// Whether the root moves freely: six degrees of freedom ahead of all others.
+    /// True if the root moves freely. Its six degrees of freedom then precede all others.
     pub floating_base: bool,
-    /// Position \[rad or m\] of each joint of [`RobotDescription::drivable_joints`], in that order, mimic ones included.
+    /// Position \[rad or m\] of each joint of [`RobotDescription::drivable_joints`], in that order, mimic joints
+    /// included.
     pub joint_positions: Vec<f64>,
-    /// What the positions of mimic joints are.
+    /// Interpretation of the positions of mimic joints.
     pub mimic: MimicPositions,
-    /// `joint_from_child` of each floating and planar joint, in the order of the description: identity at zero. For a
-    /// planar joint, a translation normal to the axis and a rotation about it (not checked).
+    /// Pose `joint_from_child` of each floating and planar joint, in the order of the description; identity at zero. A
+    /// planar joint allows a translation normal to the axis and a rotation about it (not checked).
     pub free_joint_poses: Vec<Pose>,
 }
 
 impl Configuration {
-    /// All joints at zero (mimic joints at their offsets), the root fixed at the origin of the world.
+    /// Creates the configuration with all joints at zero (mimic joints at their offsets) and the root fixed at the
+    /// world origin.
     pub fn zero(description: &RobotDescription) -> Self {
         Self {
             root_pose: Pose::identity(),
@@ -43,11 +45,11 @@ impl Configuration {
         }
     }
 
-    /// Position \[rad or m\] of each drivable joint, with mimic joints resolved as [`Self::mimic`] says.
+    /// Position \[rad or m\] of each drivable joint, with mimic joints resolved according to [`Self::mimic`].
     ///
     /// # Errors
     ///
-    /// [`DynamicsError::WrongLength`] where `joint_positions` has not one number per drivable joint.
+    /// [`DynamicsError::WrongLength`] if `joint_positions` does not have one number per drivable joint.
     pub fn resolved_positions(&self, description: &RobotDescription) -> Result<Vec<f64>, DynamicsError> {
         let drivable: Vec<_> = description.drivable_joints().map(|(id, _)| id).collect();
         check_length("joint_positions", drivable.len(), self.joint_positions.len())?;
@@ -63,18 +65,18 @@ impl Configuration {
                 return self.joint_positions[k];
             }
             let (driver, multiplier, offset) = description.mimic_driver(id);
-            // A joint that cannot move stays at zero.
+            // A driver without a column (a fixed joint) stays at zero.
             multiplier * column[driver.0].map_or(0.0, |c| self.joint_positions[c]) + offset
         };
         Ok(drivable.iter().enumerate().map(follow).collect())
     }
 
-    /// The configuration after moving with the constant generalized velocity `velocity` for `duration` \[s\]; the layout
-    /// of the velocity is that of [`Kinematics`](super::Kinematics).
+    /// Returns the configuration after motion at the constant generalized velocity `velocity` for `duration` \[s\]. The
+    /// layout of the velocity is that of [`Kinematics`](super::Kinematics).
     ///
     /// # Panics
     ///
-    /// If `velocity` has not the length of [`Kinematics::dof_count`](super::Kinematics::dof_count).
+    /// If the length of `velocity` is not [`Kinematics::dof_count`](super::Kinematics::dof_count).
     #[must_use]
     #[track_caller]
     pub fn integrated(&self, description: &RobotDescription, velocity: &DVector<f64>, duration: f64) -> Self {
@@ -114,14 +116,14 @@ impl Configuration {
 /// The two directions of travel of a planar joint: x and y turned by the shortest rotation that takes z to the axis
 /// (a half turn about x where the axis is -z).
 ///
-/// URDF does not name them; whoever writes the joint as two slides and a hinge must use these.
+/// URDF does not define them. A model of the joint as two slides and a hinge must use these directions.
 pub fn planar_axes(axis: &Unit<Vector3<f64>>) -> [Unit<Vector3<f64>>; 2] {
     let turn = UnitQuaternion::rotation_between(&Vector3::z(), axis)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI));
     [turn * Vector3::x_axis(), turn * Vector3::y_axis()]
 }
 
-/// Several degrees of freedom.
+/// True for joint types with several degrees of freedom.
 pub(super) fn is_free(kind: JointKind) -> bool {
     matches!(kind, JointKind::Floating | JointKind::Planar)
 }
@@ -130,7 +132,7 @@ pub(super) fn check_length(what: &'static str, expected: usize, found: usize) ->
     if expected == found { Ok(()) } else { Err(DynamicsError::WrongLength { what, expected, found }) }
 }
 
-/// Translation in the axes of the parent, rotation in the axes of the child.
+/// Moves a pose by `step`: translation in the axes of the parent, then rotation in the axes of the child.
 fn moved_free(pose: &Pose, step: &[f64]) -> Pose {
     Pose::from_parts(
         Translation3::from(pose.translation.vector + Vector3::new(step[0], step[1], step[2])),

@@ -1,7 +1,7 @@
-//! Rigid-body dynamics of a [`RobotDescription`], exactly as the files describe it and without MuJoCo.
+//! Rigid-body dynamics of a [`RobotDescription`], computed from the files alone and without MuJoCo.
 //!
-//! It is the judge of everything downstream: what MuJoCo computes from the MJCF must agree with what the URDF says.
-//! Nothing is repaired here; a link without `<inertial>` has no mass, whatever it carries.
+//! It is the reference for everything downstream: MuJoCo's results for the MJCF must agree with the URDF. Nothing is
+//! repaired here: a link without `<inertial>` has no mass, whatever its shapes.
 //!
 //! **Generalized velocities** (and forces), in this order:
 //!
@@ -13,8 +13,8 @@
 //!    origin in the axes of the joint frame, angular velocity in the axes of the child. Planar: along both
 //!    [`planar_axes`], then about the axis.
 //!
-//! **Equation of motion**: `M(q) a + c(q, v) + g(q) = tau`. `tau` is what the joints exert, damping and friction of the
-//! joints are not part of it; `g` is the force that holds the robot still, the gradient of its potential energy.
+//! **Equation of motion**: `M(q) a + c(q, v) + g(q) = tau`. `tau` is the effort of the joints without their damping and
+//! friction. `g` is the force that holds the robot still, the gradient of its potential energy.
 //!
 //! No function recurses: the depth of the tree is limited by memory only.
 
@@ -33,30 +33,30 @@ use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion, Vector3};
 use spatial::{Force, Inertia, Motion};
 use std::ops::Range;
 
-/// Why dynamics cannot be computed.
+/// Error of a dynamics computation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DynamicsError {
-    /// The links are not a tree below the root.
+    /// The links do not form a tree below the root.
     #[error("link {link:?} is not connected to the root by exactly one chain of joints")]
     NotATree {
-        /// A link that is not reached from the root, or reached twice.
+        /// A link that the root does not reach, or reaches twice.
         link: String,
     },
-    /// A part of the configuration has the wrong length.
+    /// A field of the configuration has the wrong length.
     #[error("{what} has {found} entries, the robot needs {expected}")]
     WrongLength {
-        /// The field.
+        /// Name of the field.
         what: &'static str,
-        /// The length that fits the robot.
+        /// Length that fits the robot.
         expected: usize,
-        /// The length found.
+        /// Length of the field.
         found: usize,
     },
     /// A number of the configuration is infinite or not a number.
     #[error("{what} has a number that is not finite")]
     NotFinite {
-        /// The field.
+        /// Name of the field.
         what: &'static str,
     },
 }
@@ -64,58 +64,59 @@ pub enum DynamicsError {
 /// Velocity of a link in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkVelocity {
-    /// Of the origin of the link \[m/s\].
+    /// Velocity of the link origin \[m/s\].
     pub linear: Vector3<f64>,
-    /// \[rad/s\].
+    /// Angular velocity \[rad/s\].
     pub angular: Vector3<f64>,
 }
 
 /// Momentum of the whole robot in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Momentum {
-    /// \[kg m/s\].
+    /// Linear momentum \[kg m/s\].
     pub linear: Vector3<f64>,
-    /// About the centre of mass \[kg m²/s\]; about the root's origin where there is no mass.
+    /// Angular momentum \[kg m²/s\] about the center of mass; about the root's origin if the robot has no mass.
     pub angular: Vector3<f64>,
 }
 
-/// A robot in one configuration: where its links are, and how it answers to forces.
+/// Kinematics and dynamics of a robot in one configuration.
 #[derive(Clone, Debug)]
 pub struct Kinematics<'a> {
     description: &'a RobotDescription,
-    /// Links in an order where parents come first.
+    /// Links in topological order, parents first.
     order: Vec<LinkId>,
-    /// Parent of each link; the root has none.
+    /// Parent of each link; `None` for the root.
     parent: Vec<Option<LinkId>>,
     world_from_link: Vec<Pose>,
     /// Inertia of each link, in world axes about `origin`.
     inertia: Vec<Inertia>,
     dofs: Vec<Dof>,
-    /// Entries of `dofs` that move each link against its parent.
+    /// Range of `dofs` that moves each link relative to its parent.
     link_dofs: Vec<Range<usize>>,
-    /// First generalized velocity and their number, for each joint.
+    /// Range of generalized velocities of each joint.
     joint_columns: Vec<Range<usize>>,
-    /// Where spatial quantities are taken \[m\]: the origin of the root, so that a robot far from the origin of the world
-    /// loses no digits. It does not move with the root.
+    /// Reference point of all spatial quantities in the world \[m\]: the origin of the root. A robot far from the world
+    /// origin then loses no precision. The point is fixed in the world and does not move with the root.
     origin: Vector3<f64>,
 }
 
 /// One degree of freedom.
 #[derive(Clone, Copy, Debug)]
 struct Dof {
-    /// Its place among the generalized velocities.
+    /// Index of its generalized velocity.
     column: usize,
     axis: Motion,
-    /// Whether the axis is carried along by the parent; otherwise by the child. The same for one degree of freedom.
+    /// True if the axis is fixed in the parent, false if it is fixed in the child. For a joint with one degree of
+    /// freedom both give the same result.
     fixed_in_parent: bool,
 }
 
 impl<'a> Kinematics<'a> {
-    /// The robot in `configuration`.
+    /// Computes the kinematics of the robot in `configuration`.
     ///
     /// # Errors
     ///
-    /// A description that is not a tree, a configuration of the wrong length or with numbers that are not finite.
+    /// The description is not a tree, or the configuration has the wrong length or numbers that are not finite.
     pub fn new(description: &'a RobotDescription, configuration: &Configuration) -> Result<Self, DynamicsError> {
         let positions = configuration.resolved_positions(description)?;
         let free_count = description.joints.iter().filter(|j| is_free(j.kind)).count();
@@ -195,7 +196,7 @@ impl<'a> Kinematics<'a> {
                 JointKind::Floating | JointKind::Planar => pose_of[id.0].unwrap_or_else(Pose::identity),
             };
             let mut world_from_child = world_from_joint * joint_from_child;
-            // Rounding would add up along very long chains.
+            // Without this, rounding errors would add up along very long chains.
             world_from_child.rotation.renormalize();
             self.world_from_link[child.0] = world_from_child;
 
@@ -222,7 +223,7 @@ impl<'a> Kinematics<'a> {
         }
     }
 
-    /// Translations in the axes of the parent, rotations in the axes of the child.
+    /// Adds six degrees of freedom: translations in the axes of the parent, rotations in the axes of the child.
     fn push_free_dofs(&mut self, column: usize, world_from_parent: &UnitQuaternion<f64>, world_from_child: &Pose) {
         let point = world_from_child.translation.vector - self.origin;
         for (k, e) in [Vector3::x(), Vector3::y(), Vector3::z()].into_iter().enumerate() {
@@ -240,17 +241,17 @@ impl<'a> Kinematics<'a> {
         self.dofs.len()
     }
 
-    /// The generalized velocities of a joint: empty for a fixed one.
+    /// Range of generalized velocities of a joint; empty for a fixed joint.
     pub fn columns(&self, joint: JointId) -> Range<usize> {
         self.joint_columns[joint.0].clone()
     }
 
-    /// `world_from_link` of every link, fixed ones included, indexed by [`LinkId`].
+    /// Pose `world_from_link` of every link, indexed by [`LinkId`].
     pub fn link_poses(&self) -> &[Pose] {
         &self.world_from_link
     }
 
-    /// `world_from_link` of a link.
+    /// Pose `world_from_link` of a link.
     pub fn link_pose(&self, link: LinkId) -> Pose {
         self.world_from_link[link.0]
     }
@@ -260,7 +261,7 @@ impl<'a> Kinematics<'a> {
         self.description.total_mass()
     }
 
-    /// Centre of mass of the robot in the world \[m\]; `None` where it has no mass.
+    /// Center of mass of the robot in the world \[m\]; `None` if the robot has no mass.
     pub fn center_of_mass(&self) -> Option<Vector3<f64>> {
         let whole = self.whole();
         (whole.mass != 0.0).then(|| self.origin + whole.first_moment / whole.mass)
@@ -313,7 +314,8 @@ impl<'a> Kinematics<'a> {
         Momentum { linear: sum.force, angular: sum.moment - com.cross(&sum.force) }
     }
 
-    /// The mass matrix M, shape \[dof_count, dof_count\], symmetric. Rows and columns: module documentation.
+    /// Mass matrix M, shape \[dof_count, dof_count\], symmetric. The module documentation gives the order of rows and
+    /// columns.
     ///
     /// Source: composite-rigid-body algorithm, Featherstone 2008, table 6.2.
     pub fn mass_matrix(&self) -> DMatrix<f64> {
@@ -342,14 +344,14 @@ impl<'a> Kinematics<'a> {
         m
     }
 
-    /// The generalized force g(q) that holds the robot still under `gravity` \[m/s²\] (z = -9.81 on earth): the gradient
-    /// of [`potential_energy`](Self::potential_energy). What gravity itself exerts is its negative.
+    /// Generalized force g(q) that holds the robot still under `gravity` \[m/s²\] (z = -9.81 on earth): the gradient of
+    /// [`potential_energy`](Self::potential_energy). Gravity itself exerts the negative of it.
     pub fn gravity_torque(&self, gravity: &Vector3<f64>) -> DVector<f64> {
         let zero = DVector::zeros(self.dof_count());
         self.inverse_dynamics(&zero, &zero, gravity)
     }
 
-    /// c(q, v) + g(q): the generalized force at zero acceleration (`qfrc_bias` of MuJoCo).
+    /// Bias force c(q, v) + g(q): the generalized force at zero acceleration (`qfrc_bias` of MuJoCo).
     ///
     /// # Panics
     ///
@@ -359,11 +361,11 @@ impl<'a> Kinematics<'a> {
         self.inverse_dynamics(velocity, &DVector::zeros(self.dof_count()), gravity)
     }
 
-    /// `tau = M a + c + g`: the generalized force that gives `acceleration`, the rate of `velocity`, under `gravity`
-    /// \[m/s²\].
+    /// Inverse dynamics `tau = M a + c + g`: the generalized force that produces `acceleration`, the rate of change of
+    /// `velocity`, under `gravity` \[m/s²\].
     ///
     /// Source: recursive Newton-Euler algorithm, Featherstone 2008, table 5.1, in world axes (section 5.3's transforms
-    /// become identities); an axis S carried along by a body of velocity v changes by v × S.
+    /// become identities). An axis S that is fixed in a body of velocity v changes at the rate v × S.
     ///
     /// # Panics
     ///
@@ -377,7 +379,7 @@ impl<'a> Kinematics<'a> {
     ) -> DVector<f64> {
         assert_eq!(acceleration.len(), self.dof_count(), "one acceleration per degree of freedom");
         let velocities = self.spatial_velocities(velocity);
-        // The ground accelerates upwards instead of bodies falling.
+        // Gravity enters as an upward acceleration of the ground.
         let ground = Motion { angular: Vector3::zeros(), linear: -gravity };
         let mut accelerations = vec![ground; self.order.len()];
         let mut forces = vec![Force::zero(); self.order.len()];
@@ -456,7 +458,7 @@ fn joint_columns(description: &RobotDescription, floating_base: bool) -> Vec<Ran
     columns
 }
 
-/// Links in an order where parents come first, and the parent of each.
+/// Orders the links so that parents come first, and finds the parent of each link.
 fn parents_first(description: &RobotDescription) -> Result<(Vec<LinkId>, Vec<Option<LinkId>>), DynamicsError> {
     let n = description.links.len();
     let not_a_tree = |link: usize| DynamicsError::NotATree {

@@ -1,4 +1,4 @@
-//! Spatial vectors in Plücker coordinates: the angular part first, everything at one fixed point in world axes.
+//! Spatial vectors in Plücker coordinates: angular part first, all about one fixed point in world axes.
 //!
 //! Source: R. Featherstone, "Rigid Body Dynamics Algorithms", Springer 2008, chapter 2. With one frame for all bodies
 //! no transform appears between them: velocities and inertias are simply added.
@@ -7,15 +7,15 @@ use crate::inertia::RigidInertia;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::{Add, AddAssign, Mul};
 
-/// A velocity, an acceleration, or an axis of motion.
+/// Motion vector: a velocity, an acceleration, or an axis of motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Motion {
     pub(super) angular: Vector3<f64>,
-    /// Of the body point that passes through the origin.
+    /// Velocity of the body point that coincides with the origin.
     pub(super) linear: Vector3<f64>,
 }
 
-/// A force, or a momentum.
+/// Force vector: a force or a momentum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Force {
     /// Moment about the origin.
@@ -23,13 +23,13 @@ pub(super) struct Force {
     pub(super) force: Vector3<f64>,
 }
 
-/// The inertia of a body, or of several, about the origin. Source: equation 2.63.
+/// Spatial inertia of one or several bodies about the origin. Source: equation 2.63.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Inertia {
     pub(super) mass: f64,
-    /// Mass times centre of mass.
+    /// Mass times center of mass \[kg m\].
     pub(super) first_moment: Vector3<f64>,
-    /// About the origin.
+    /// Rotational inertia about the origin.
     pub(super) inertia: Matrix3<f64>,
 }
 
@@ -38,17 +38,18 @@ impl Motion {
         Self { angular: Vector3::zeros(), linear: Vector3::zeros() }
     }
 
-    /// A rotation of 1 rad/s about the unit `axis` through `point`.
+    /// Rotation of 1 rad/s about the unit `axis` through `point`.
     pub(super) fn rotation(axis: Vector3<f64>, point: Vector3<f64>) -> Self {
         Self { angular: axis, linear: point.cross(&axis) }
     }
 
-    /// A translation of 1 m/s along the unit `axis`.
+    /// Translation of 1 m/s along the unit `axis`.
     pub(super) fn translation(axis: Vector3<f64>) -> Self {
         Self { angular: Vector3::zeros(), linear: axis }
     }
 
-    /// `self ×`: how `other` changes when it is carried along. Source: equation 2.31.
+    /// `self × other`: rate of change of the motion vector `other` when it moves with velocity `self`. Source: equation
+    /// 2.31.
     pub(super) fn cross(&self, other: &Self) -> Self {
         Self {
             angular: self.angular.cross(&other.angular),
@@ -56,7 +57,8 @@ impl Motion {
         }
     }
 
-    /// `self ×*`: how a force or a momentum changes when it is carried along. Source: equation 2.32.
+    /// `self ×* other`: rate of change of the force vector `other` when it moves with velocity `self`. Source: equation
+    /// 2.32.
     pub(super) fn cross_force(&self, other: &Force) -> Force {
         Force {
             moment: self.angular.cross(&other.moment) + self.linear.cross(&other.force),
@@ -64,12 +66,12 @@ impl Motion {
         }
     }
 
-    /// Power, or the component of a force along an axis of motion.
+    /// Scalar product: power, or the component of a force along an axis of motion.
     pub(super) fn dot(&self, other: &Force) -> f64 {
         self.angular.dot(&other.moment) + self.linear.dot(&other.force)
     }
 
-    /// Velocity of the body point at `point`.
+    /// Velocity of the body point at `point`, which is relative to the origin.
     pub(super) fn at(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.linear + self.angular.cross(point)
     }
@@ -86,7 +88,7 @@ impl Inertia {
         Self { mass: 0.0, first_moment: Vector3::zeros(), inertia: Matrix3::zeros() }
     }
 
-    /// Mass properties given in axes parallel to the world, from the origin.
+    /// Computes the spatial inertia from mass properties in axes parallel to the world, relative to the origin.
     pub(super) fn new(body: &RigidInertia) -> Self {
         let (m, c) = (body.mass, body.com);
         let parallel_axis = Matrix3::from_diagonal_element(c.norm_squared()) - c * c.transpose();

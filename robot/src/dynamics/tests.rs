@@ -1,5 +1,5 @@
-//! Judges that share nothing with the algorithms: closed forms, and d'Alembert's principle on finite differences of
-//! link poses.
+//! Tests of the dynamics against independent references: closed forms, and d'Alembert's principle on finite differences
+//! of link poses.
 
 use super::*;
 use crate::description::{Inertial, Joint, Link, Mimic};
@@ -12,7 +12,7 @@ use std::f64::consts::FRAC_PI_2;
 const EARTH: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 const NO_GRAVITY: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
 
-/// Numbers, vectors and poses of one seed.
+/// Random numbers, vectors and poses from one seed.
 struct Random(kinetoscope_scene::Random);
 
 impl Random {
@@ -118,14 +118,14 @@ fn random_inertial(random: &mut Random) -> Option<Inertial> {
     inertial(random.range(0.1, 3.0), random.pose(), inertia)
 }
 
-/// A random tree: the mix of joints, its configuration and the description. `free` adds planar and floating joints.
+/// Random tree of joints with a random configuration. `free` adds planar and floating joints.
 fn random_robot(seed: u64, floating_base: bool, free: bool) -> (RobotDescription, Configuration) {
     let random = &mut Random::new(seed);
     let mut builder = Builder::new(random_inertial(random));
     use JointKind::*;
     let kinds = [Revolute, Prismatic, Continuous, Fixed, Planar, Floating];
     for k in 0..14 {
-        // The first ones make sure that every kind occurs.
+        // The first joints make sure that every kind occurs.
         let choice = if free { kinds.len() } else { 4 };
         let kind = kinds[if k < choice { k } else { random.below(choice) }];
         // Branches, and joints whose file order differs from the order of the tree.
@@ -138,7 +138,7 @@ fn random_robot(seed: u64, floating_base: bool, free: bool) -> (RobotDescription
     configuration.floating_base = floating_base;
     configuration.root_pose = random.pose();
     configuration.root_pose.translation.vector *= 50.0;
-    // Any velocity reaches a legal configuration, planar joints included.
+    // Integrating any velocity gives a valid configuration, planar joints included.
     let reach = random.velocities(dof_count(&description, &configuration));
     (description.clone(), configuration.integrated(&description, &reach, 1.0))
 }
@@ -161,7 +161,7 @@ fn dof_count(description: &RobotDescription, configuration: &Configuration) -> u
     Kinematics::new(description, configuration).unwrap().dof_count()
 }
 
-/// All the mixes, each with random velocities.
+/// Robots of every combination of base and joint kinds, each with random velocities.
 fn random_robots(salt: u64) -> impl Iterator<Item = (RobotDescription, Configuration, DVector<f64>)> {
     (0..24).map(move |seed| {
         let (robot, at) = random_robot(seed, seed % 2 == 1, seed % 4 >= 2);
@@ -172,19 +172,20 @@ fn random_robots(salt: u64) -> impl Iterator<Item = (RobotDescription, Configura
 
 type Body = (Pose, f64, Matrix3<f64>);
 
-/// Pose of each centre of mass with the axes of its tensor, mass, tensor: only `link_poses` and the file's numbers.
+/// Pose, mass and tensor of each body, from `link_poses` and the numbers of the file only. The pose has its origin at
+/// the center of mass and the axes of the tensor.
 fn bodies(description: &RobotDescription, at: &Configuration) -> Vec<Body> {
     let kinematics = Kinematics::new(description, at).unwrap();
     let of = |(link, pose): (&Link, &Pose)| link.inertial.as_ref().map(|i| (pose * i.link_from_com, i.mass, i.inertia));
     description.links.iter().zip(kinematics.link_poses()).filter_map(of).collect()
 }
 
-/// The rotation vector that takes `a` to `b`, in world axes.
+/// Rotation vector from `a` to `b`, in world axes.
 fn turn(a: &Pose, b: &Pose) -> Vector3<f64> {
     (b.rotation * a.rotation.inverse()).scaled_axis()
 }
 
-/// Velocity of each centre of mass and angular velocity, by central differences of poses.
+/// Linear velocity of each center of mass and angular velocity, by central differences of poses.
 fn body_velocities(
     description: &RobotDescription,
     at: &Configuration,
@@ -241,7 +242,7 @@ fn dalembert(
     })
 }
 
-/// Two links turning about y, in the x-z plane; angle 0 along x, positive angles turn x to -z.
+/// Planar arm of two links that rotate about y, in the x-z plane. Angle 0 is along x, positive angles turn x to -z.
 fn two_links(m: [f64; 2], l: f64, c: [f64; 2], i: [f64; 2]) -> RobotDescription {
     let about_y = |i| Matrix3::from_diagonal(&Vector3::new(0.0, i, 0.0));
     let mut b = Builder::new(None);
@@ -342,7 +343,7 @@ fn mass_matrix() {
         let k = Kinematics::new(&robot, &at).unwrap();
         let (n, m) = (k.dof_count(), k.mass_matrix());
         assert_eq!(m, m.transpose());
-        // Columns by Newton and Euler.
+        // Columns by the Newton-Euler algorithm.
         for j in 0..n {
             let column = k.inverse_dynamics(&DVector::zeros(n), &unit(n, j), &NO_GRAVITY);
             let limit = Tolerance::mixed(1e-13, "rounding of Newton and Euler against sums of inertias");
@@ -371,7 +372,7 @@ fn inverse_dynamics() {
             "second differences of poses: 1e-16 / h², and h² of fourth derivatives; measured, not derived",
         );
         assert_vector("d'Alembert", &k.inverse_dynamics(&v, &a, &EARTH), &expected, limit);
-        // The control: without the velocity terms the judge must disagree.
+        // Control: without the velocity terms the two must disagree.
         let without = k.inverse_dynamics(&DVector::zeros(v.len()), &a, &EARTH);
         assert!((without - &expected).amax() > 1e-3 * expected.amax());
     }
@@ -444,7 +445,7 @@ fn floating_base() {
         // Held in the air, the base carries the weight.
         let hold = k.gravity_torque(&EARTH);
         assert!((hold.rows(0, 3) + EARTH * total).amax() < 1e-12 * total);
-        // In free fall nothing is held: the whole robot accelerates with gravity.
+        // Free fall needs no effort: the whole robot accelerates with gravity.
         let mut fall = DVector::zeros(k.dof_count());
         fall.rows_mut(0, 3).copy_from(&EARTH);
         assert!(k.inverse_dynamics(&DVector::zeros(k.dof_count()), &fall, &EARTH).amax() < 1e-12 * total * 9.81);
@@ -502,7 +503,7 @@ fn far_away() {
     let near = Kinematics::new(&robot, &at).unwrap().mass_matrix();
     at.root_pose.translation = Translation3::new(1e6, -1e6, 0.0);
     let far = Kinematics::new(&robot, &at).unwrap().mass_matrix();
-    // What is left is the rounding of the poses themselves, 1e6 * 2^-53.
+    // The remaining difference is the rounding of the poses themselves, 1e6 * 2^-53.
     assert!((near - &far).amax() < 1e-8 * far.amax());
 }
 
@@ -561,7 +562,7 @@ fn long_chain() {
     }
     let k = Kinematics::new(&b.0, &Configuration::zero(&b.0)).unwrap();
     assert!((k.link_pose(tip).translation.x - 200.0).abs() < 1e-6);
-    // Hinges along x every millimetre: the first one holds Σ m g d k for k = 0..N, turning x towards -z.
+    // Hinges along x every millimeter: the first one holds Σ m g d k for k = 0..N, turning x towards -z.
     let expected = -1e-3 * 9.81 * 1e-3 * (N * (N - 1) / 2) as f64;
     assert!((k.gravity_torque(&EARTH)[0] / expected - 1.0).abs() < 1e-9);
 }

@@ -1,12 +1,12 @@
-//! What is to be reached, by which joints, and how hard to try.
+//! Target frames and solver settings of inverse kinematics.
 
 use super::KinematicsError;
 use kinetoscope_scene::Pose;
 use serde::{Deserialize, Serialize};
 
-/// A frame of a robot, and the joints that are there to move it.
+/// Frame of a robot, such as a tool center point, and the joints that may move it.
 ///
-/// Where one is wanted a name does too: `"arm"` is the control part of that name, or else the link.
+/// A name converts to a tip: `"arm"` is the control part of that name or, if there is no such part, the link.
 ///
 /// ```
 /// use kinetoscope_scene::Pose;
@@ -18,45 +18,46 @@ use serde::{Deserialize, Serialize};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tip<'n> {
-    /// The part or link that it ends.
+    /// Control part or link that the frame belongs to.
     pub name: TipName<'n>,
-    /// A link of that part to use instead of its last one.
+    /// Link to use instead of the last link of the part.
     pub link: Option<&'n str>,
-    /// Tool centre point in the frame of the link \[m\].
+    /// Pose of the tool center point in the frame of the link \[m\].
     pub tcp: Pose,
 }
 
-/// The name of a tip.
+/// Name that selects the link and the joints of a [`Tip`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TipName<'n> {
-    /// A control part: its last link.
+    /// Control part: selects its last link.
     Part(&'n str),
-    /// A link.
+    /// Link.
     Link(&'n str),
-    /// A control part or, if no part has that name, a link.
+    /// Control part or, if no part has this name, link.
     Either(&'n str),
 }
 
 impl<'n> Tip<'n> {
-    /// The end of a control part, moved by the joints of the part. It is the link that the last joint of the part moves,
-    /// or the one that hangs on it by fixed joints: they are followed as long as there is exactly one, and inside one
-    /// component of the URDF.
+    /// Selects the end of a control part, moved by the joints of the part.
+    ///
+    /// The link is the child of the last joint of the part. Fixed joints below that child are followed while there is
+    /// exactly one of them, within one component of the URDF.
     pub fn of_part(part: &'n str) -> Self {
         Self { name: TipName::Part(part), link: None, tcp: Pose::identity() }
     }
 
-    /// A link, fused ones too, moved by all joints of the robot.
+    /// Selects a link, moved by all joints of the robot. Links that are fused into their parent are allowed.
     pub fn of_link(link: &'n str) -> Self {
         Self { name: TipName::Link(link), link: None, tcp: Pose::identity() }
     }
 
-    /// The same joints, but this link, fused ones too.
+    /// Selects another link for the same joints. Links that are fused into their parent are allowed.
     #[must_use]
     pub fn at(self, link: &'n str) -> Self {
         Self { link: Some(link), ..self }
     }
 
-    /// The same link, but a frame on it: `link_from_frame`, the "tool centre point".
+    /// Sets the frame on the link: `link_from_frame`, the "tool center point".
     #[must_use]
     pub fn with_tcp(self, link_from_frame: Pose) -> Self {
         Self { tcp: link_from_frame, ..self }
@@ -69,24 +70,25 @@ impl<'n> From<&'n str> for Tip<'n> {
     }
 }
 
-/// What of a pose is to be reached.
+/// Part of a target pose to reach.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IkTask {
     /// Position and rotation.
     #[default]
     Pose,
-    /// The position only; the frame may be turned in any way.
+    /// Position only; the rotation of the frame is free.
     Position,
 }
 
-/// Where joints are to be as far as the frame leaves them a choice.
+/// Preferred joint positions, for joints that the target leaves free (null-space posture).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Posture {
-    /// Positions \[rad or m\], one for each column of the joints in question; those of mimic joints count for nothing.
+    /// Preferred positions \[rad or m\], one for each column of the joints in question. Entries of mimic joints are
+    /// ignored.
     pub rest: Vec<f64>,
-    /// Part of the way to go there in one step, above 0 to 1.
+    /// Fraction of the remaining way to go in one step, above 0 and at most 1.
     #[serde(default = "whole")]
     pub gain: f64,
 }
@@ -96,31 +98,32 @@ fn whole() -> f64 {
 }
 
 impl Posture {
-    /// The whole way.
+    /// Creates a posture with gain 1.
     pub fn at(rest: impl Into<Vec<f64>>) -> Self {
         Self { rest: rest.into(), gain: whole() }
     }
 }
 
-/// How inverse kinematics are solved: see [`IkSolver`](super::IkSolver).
+/// Settings of an inverse-kinematics solver; see [`IkSolver`](super::IkSolver).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IkCfg {
-    /// What is to be reached.
+    /// Part of the target pose to reach.
     pub task: IkTask,
-    /// Distance from the target that is near enough \[m\].
+    /// Tolerated distance from the target \[m\].
     pub position_tolerance: f64,
-    /// Angle to the target that is near enough \[rad\].
+    /// Tolerated angle to the target \[rad\].
     pub rotation_tolerance: f64,
-    /// Steps from each start, at least 1.
+    /// Maximum number of steps from each start, at least 1.
     pub max_iterations: u32,
-    /// Damping at each start, in multiples of half the squared error; above 0. Small: bold first steps.
+    /// Initial damping of each start, in multiples of half the squared error; above 0. Small values give large first
+    /// steps.
     pub damping: f64,
-    /// Starts, at least 1: the first from the initial positions, all others from random ones.
+    /// Number of starts, at least 1. The first starts at the initial positions, all others at random positions.
     pub num_seeds: u32,
-    /// Seed of the random starts. The same target from the same initial positions gives the same bits, in any batch.
+    /// Seed of the random starts. The same target and initial positions give bit-identical results in any batch.
     pub seed: u64,
-    /// What to do with joints that the target leaves free.
+    /// Preferred posture of joints that the target leaves free.
     pub posture: Option<Posture>,
 }
 
@@ -139,11 +142,11 @@ impl Default for IkCfg {
     }
 }
 
-/// Rooms for random starts are made at once.
+/// Upper bound of `num_seeds`: memory for all random starts is allocated at once.
 const MOST_SEEDS: u32 = 100_000;
 
 impl IkCfg {
-    /// Checks every number; `joints` is the number of columns.
+    /// Checks every number. `joints` is the number of columns.
     ///
     /// # Errors
     /// A number is out of its range.

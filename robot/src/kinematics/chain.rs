@@ -1,33 +1,33 @@
-//! The way from a base link to a frame.
+//! Kinematic chain from a base link to a frame.
 
 use super::KinematicsError;
 use crate::description::{JointId, JointKind, LinkId, RobotDescription};
 use kinetoscope_scene::Pose;
 use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
 
-/// The joints between a base link and a frame, in a form that is quick to evaluate: fixed joints are folded into the
-/// poses between the others, and joints that mimic have become further places where the joint acts that they follow.
+/// Kinematic chain from a base link to a frame, in a form that is fast to evaluate. Fixed joints are folded into the
+/// poses between moving joints. A mimic joint becomes one more joint of its driver's variable.
 ///
-/// The base is the root link, or the child of the last floating or planar joint above the frame: such joints have no
-/// column, and where their child is has to come from elsewhere.
+/// The base is the root link, or the child of the last floating or planar joint above the frame. Floating and planar
+/// joints have no column; callers must know the pose of their child.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
     pub(super) base: LinkId,
     pub(super) joints: Vec<ChainJoint>,
-    /// Pose of the frame behind the last joint; in the base where there is none.
+    /// Pose of the frame relative to the child of the last joint; relative to the base in a chain without joints.
     pub(super) end: Pose,
 }
 
-/// A place where a variable moves everything behind it.
+/// Joint of a chain, which moves everything behind it by one variable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ChainJoint {
-    /// Pose of the joint behind the joint before it; in the base for the first.
+    /// Pose of the joint relative to the child of the previous joint; relative to the base for the first joint.
     pub(super) before: Pose,
     /// Axis in the joint's frame.
     pub(super) axis: Unit<Vector3<f64>>,
-    /// Translation along the axis; otherwise a rotation about it.
+    /// True for a translation along the axis, false for a rotation about it.
     pub(super) slides: bool,
-    /// The variable.
+    /// Index of the variable.
     pub(super) variable: usize,
     /// Position of the joint = ratio * variable + offset.
     pub(super) ratio: f64,
@@ -35,13 +35,13 @@ pub(super) struct ChainJoint {
 }
 
 impl ChainJoint {
-    /// Pose of what the joint moves, in the joint's frame.
+    /// Pose of the child in the frame of the joint.
     pub(super) fn moved(&self, positions: &[f64]) -> Pose {
         moved(self.slides, &self.axis, self.ratio * positions[self.variable] + self.offset)
     }
 }
 
-/// Pose of a child in the frame of its joint.
+/// Pose of a child in the frame of its joint at `position` \[rad or m\].
 pub(super) fn moved(slides: bool, axis: &Unit<Vector3<f64>>, position: f64) -> Pose {
     if slides {
         Pose::from_parts(Translation3::from(axis.into_inner() * position), UnitQuaternion::identity())
@@ -50,7 +50,8 @@ pub(super) fn moved(slides: bool, axis: &Unit<Vector3<f64>>, position: f64) -> P
     }
 }
 
-/// What a joint's position is made of: `ratio * positions[column] + offset`; the offset alone without a column.
+/// Joint position as a linear function of a column: `ratio * positions[column] + offset`; `offset` alone without a
+/// column.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Follows {
     pub(super) column: Option<usize>,
@@ -58,8 +59,8 @@ pub(super) struct Follows {
     pub(super) offset: f64,
 }
 
-/// The column of every joint, or that of the joint it follows; columns are those of
-/// [`RobotDescription::drivable_joints`].
+/// Finds for every joint the column that determines its position: its own column, or that of its driver. Columns are
+/// those of [`RobotDescription::drivable_joints`].
 pub(super) fn follows(description: &RobotDescription) -> Vec<Follows> {
     let mut column = vec![None; description.joints.len()];
     for (k, (id, _)) in description.drivable_joints().enumerate() {
@@ -67,18 +68,20 @@ pub(super) fn follows(description: &RobotDescription) -> Vec<Follows> {
     }
     let of = |index: usize| {
         let (driver, ratio, offset) = description.mimic_driver(JointId(index));
-        // A joint that cannot move stays at zero.
+        // A driver that cannot move stays at zero and has no column.
         Follows { column: column[driver.0], ratio, offset }
     };
     (0..description.joints.len()).map(of).collect()
 }
 
 impl Chain {
-    /// The chain to a frame that hangs on `link` at `link_from_frame`. Its variables are the columns of
-    /// [`RobotDescription::drivable_joints`]: positions are as many numbers, those of joints elsewhere count for nothing.
+    /// Builds the chain to a frame at `link_from_frame` on `link`.
+    ///
+    /// The variables of the chain are the columns of [`RobotDescription::drivable_joints`]. Positions have as many
+    /// entries; entries of joints outside the chain are ignored.
     ///
     /// # Errors
-    /// There is no such link, or it is not connected to the root.
+    /// The link does not exist, or it is not connected to the root.
     pub fn new(description: &RobotDescription, link: LinkId, link_from_frame: &Pose) -> Result<Self, KinematicsError> {
         let count = description.links.len();
         if link.0 >= count {
@@ -118,36 +121,38 @@ impl Chain {
         Ok(Self { base, joints, end: before * link_from_frame })
     }
 
-    /// The link that everything is relative to.
+    /// Base link, in whose frame the poses of the chain are given.
     pub fn base(&self) -> LinkId {
         self.base
     }
 
-    /// One more than the largest variable: the least number of positions that [`pose`](Self::pose) needs.
+    /// Largest variable index plus one: the minimum number of positions for [`pose`](Self::pose).
     pub fn variables(&self) -> usize {
         self.joints.iter().map(|joint| joint.variable + 1).max().unwrap_or(0)
     }
 
-    /// Whether a variable moves the frame.
+    /// True if a variable moves the frame.
     pub fn is_moved_by(&self, variable: usize) -> bool {
         self.joints.iter().any(|joint| joint.variable == variable && joint.ratio != 0.0)
     }
 
-    /// Sum of the distances between its joints \[m\]: the frame is never farther from the base, slides at zero.
+    /// Sum of the distances between its joints \[m\]: with slides at zero, the frame is never farther from the base.
     pub fn reach(&self) -> f64 {
         let between = |pose: &Pose| pose.translation.vector.norm();
         self.joints.iter().map(|joint| between(&joint.before)).sum::<f64>() + between(&self.end)
     }
 
-    /// Whether a whole turn of the variable changes nothing: it only turns, and its followers turn in whole turns too.
+    /// True if a full turn of the variable leaves the frame unchanged: the variable rotates joints only, and the ratios
+    /// of its followers are integers.
     pub(super) fn has_whole_turns(&self, variable: usize) -> bool {
         self.joints.iter().filter(|joint| joint.variable == variable).all(|j| !j.slides && j.ratio.fract() == 0.0)
     }
 
-    /// The same chain with the variables `free` only, in that order; all others stay at `positions` \[rad or m\].
+    /// Returns the chain with the variables `free` only, in that order. All other variables are fixed at `positions`
+    /// \[rad or m\].
     ///
     /// # Panics
-    /// If `positions` has not as many numbers as the chain has [`variables`](Self::variables).
+    /// If `positions` has fewer numbers than the chain has [`variables`](Self::variables).
     #[must_use]
     #[track_caller]
     pub fn held(&self, free: &[usize], positions: &[f64]) -> Self {
@@ -162,8 +167,8 @@ impl Chain {
         held
     }
 
-    /// As [`held`](Self::held), into a chain that is there; `variable_of` has the new variable of each old one that stays
-    /// free.
+    /// Writes the chain that [`held`](Self::held) returns into an existing chain, without allocating. `variable_of`
+    /// gives the new index of each variable that stays free.
     #[track_caller]
     pub fn hold_into(&self, variable_of: &[Option<usize>], positions: &[f64], held: &mut Self) {
         held.base = self.base;

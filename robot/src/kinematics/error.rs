@@ -1,76 +1,76 @@
-//! Why kinematics cannot be computed.
+//! Errors of kinematics.
 
-/// Why kinematics cannot be computed.
+/// Error of a kinematics computation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum KinematicsError {
-    /// No such link.
+    /// A link does not exist.
     #[error("link {index} does not exist; there are {count}")]
     NoSuchLink {
-        /// The number given.
+        /// Index of the link.
         index: usize,
-        /// How many links there are.
+        /// Number of links of the robot.
         count: usize,
     },
-    /// The links are not a tree below the root.
+    /// The links do not form a tree below the root.
     #[error("link {link:?} is not connected to the root by a chain of joints")]
     NotATree {
-        /// The link.
+        /// Name of the link.
         link: String,
     },
-    /// A control part does not end in one link.
+    /// A control part ends in several links.
     #[error("control part {part:?} ends in several links: {}; say which with Tip::at", quoted(.links))]
     SeveralTips {
-        /// The part.
+        /// Name of the part.
         part: String,
-        /// The last links of its branches.
+        /// Last links of its branches.
         links: Vec<String>,
     },
-    /// No joint that may be moved moves the link.
+    /// The joints that may move do not move the link.
     #[error("no joint of {of} moves link {link:?}; {}", movers_sentence(.movers))]
     NothingMoves {
-        /// Whose joints: `control part "arm"`, `the robot`.
+        /// Owner of the joints: `control part "arm"`, `the robot`.
         of: String,
-        /// The link.
+        /// Name of the link.
         link: String,
-        /// The joints of the robot that move it, those that others follow instead of the followers.
+        /// Joints of the robot that move the link; drivers in place of their followers.
         movers: Vec<String>,
     },
-    /// A joint that moves the link follows by a curve, which the search does not know.
+    /// A joint that moves the link follows a polynomial coupling, which inverse kinematics does not support.
     #[error(
         "joint {joint:?}, which moves link {link:?}, is held on a curve by an equality of its MJCF file; inverse kinematics \
          knows followers by a line only: name a link that it does not move, or a part whose joints it does not follow"
     )]
     CurveFollower {
-        /// The follower.
+        /// Name of the following joint.
         joint: String,
-        /// The link.
+        /// Name of the link.
         link: String,
     },
     /// A number of a configuration is out of range.
     #[error("{field} is {value}; {expected}")]
     OutOfRange {
-        /// The field.
+        /// Name of the field.
         field: &'static str,
-        /// The value given.
+        /// Value of the field.
         value: String,
-        /// What would be right.
+        /// Accepted values.
         expected: &'static str,
     },
     /// A list has the wrong length.
     #[error("{what} has {found} numbers, one for each of {expected} joints is needed")]
     WrongLength {
-        /// The list.
+        /// Name of the list.
         what: &'static str,
-        /// The length that fits.
+        /// Length that fits.
         expected: usize,
-        /// The length found.
+        /// Length of the list.
         found: usize,
     },
     /// A number is infinite or not a number.
     #[error("{what} has a number that is not finite")]
     NotFinite {
-        /// Where.
+        /// Name of the value.
         what: &'static str,
     },
 }

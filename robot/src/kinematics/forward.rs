@@ -1,4 +1,4 @@
-//! Where frames are.
+//! Forward kinematics: poses of frames and of links.
 
 use super::chain::{Chain, Follows, follows, moved};
 use crate::description::{JointKind, LinkId, RobotDescription};
@@ -18,14 +18,16 @@ impl Chain {
             pose = pose * joint.before * joint.moved(positions);
         }
         pose *= self.end;
-        // Rounding would add up along very long chains.
+        // Without this, rounding errors would add up along very long chains.
         pose.rotation.renormalize();
         pose
     }
 }
 
 /// Poses of all links, indexed by [`LinkId`], at `positions` \[rad or m\] of the drivable joints; mimic joints follow.
-/// `standing` tells where the root link is, and the children of floating and planar joints; all poses are in its frame.
+///
+/// `standing` returns the pose of the root link and of the children of floating and planar joints. All poses are in the
+/// frame of those poses.
 pub fn link_poses(description: &RobotDescription, positions: &[f64], standing: impl Fn(LinkId) -> Pose) -> Vec<Pose> {
     let follows = follows(description);
     let mut poses = vec![Pose::identity(); description.links.len()];

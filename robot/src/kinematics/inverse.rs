@@ -1,4 +1,4 @@
-//! Joint positions that put a frame somewhere.
+//! Inverse kinematics: joint positions that bring a frame to a target pose.
 
 use super::cfg::IkCfg;
 use super::chain::Chain;
@@ -7,50 +7,51 @@ use super::least_squares::{Descent, Point, Problem, Stop};
 use kinetoscope_scene::{Pose, Random};
 use std::f64::consts::{PI, TAU};
 
-/// Solves the inverse kinematics of a [`Chain`] again and again; a solve allocates nothing.
+/// Inverse-kinematics solver of a [`Chain`]. Solves can be repeated and allocate no memory.
 ///
-/// A solve goes down by damped least squares, within the limits, from the initial positions, and where that ends
-/// elsewhere than at the target from random ones, until one start leads there. Random starts are uniform within the
-/// limits, at most half a turn from their middle; without limits, from the initial position. The error is weighed as if
-/// the chain's [`reach`](Chain::reach) were two radians. Of positions that differ by whole turns, those are given that
-/// are nearest to the posture, or without one to the initial positions.
+/// A solve descends by damped least squares within the limits. It starts from the initial positions, then from random
+/// positions, until one start reaches the target. Random starts are uniform within the limits; for joints that rotate,
+/// at most half a turn from the middle. Without limits they are uniform about the initial position. The error is
+/// weighted as if the chain's [`reach`](Chain::reach) were two radians. Among positions that differ by full turns, the
+/// result is the one nearest to the posture, or to the initial positions if there is no posture.
 ///
-/// A solve takes at most `num_seeds * max_iterations` steps, and some more for the finish. One that is not solved takes
-/// them all.
+/// A solve takes at most `num_seeds * max_iterations` steps, and some more to refine the result. A target that is not
+/// reached uses all starts.
 #[derive(Clone, Debug)]
 pub struct IkSolver {
     chain: Chain,
     limits: Vec<[f64; 2]>,
     cfg: IkCfg,
-    /// Uniform in 0..1, one for each joint, start by start.
+    /// Random numbers, uniform in 0..1, one for each joint, start by start.
     random: Vec<f64>,
     descent: Descent,
     best: Point,
 }
 
-/// What [`IkSolver::solve`] found.
+/// Result of [`IkSolver::solve`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IkSolution<'s> {
-    /// Positions of the variables \[rad or m\], within the limits; the best that were found where `success` is false.
+    /// Positions of the variables \[rad or m\], within the limits; the best found if `success` is false.
     pub positions: &'s [f64],
-    /// Whether both errors are within the tolerances.
+    /// True if the errors are within the tolerances; for [`IkTask::Position`](super::IkTask::Position), only the
+    /// position error counts.
     pub success: bool,
     /// Distance of the frame from the target \[m\].
     pub position_error: f64,
-    /// Angle between the frame and the target \[rad\]; also where only the position was to be reached.
+    /// Angle between the frame and the target \[rad\]; also given where only the position had to be reached.
     pub rotation_error: f64,
-    /// Steps of all starts together.
+    /// Number of steps of all starts together.
     pub iterations: u32,
-    /// The start that led there: 0 is that of the initial positions.
+    /// Index of the start that led to the result; 0 is the start from the initial positions.
     pub seed: u32,
 }
 
 impl IkSolver {
-    /// A solver for `chain`, whose variables are all to be found, each within its `limits` \[rad or m\], which may be
-    /// infinite.
+    /// Creates a solver for `chain`. It solves for all variables of the chain, each within its `limits` \[rad or m\],
+    /// which may be infinite.
     ///
     /// # Errors
-    /// A variable does not move the frame; limits or numbers of the configuration are wrong.
+    /// A variable does not move the frame, or limits or numbers of the configuration are invalid.
     pub fn new(chain: Chain, limits: Vec<[f64; 2]>, cfg: IkCfg) -> Result<Self, KinematicsError> {
         let joints = limits.len();
         if chain.variables() > joints {
@@ -75,22 +76,22 @@ impl IkSolver {
         Ok(Self { chain, limits, cfg, random, descent: Descent::new(joints), best: Point::new(joints) })
     }
 
-    /// The chain.
+    /// Chain of the solver.
     pub fn chain(&self) -> &Chain {
         &self.chain
     }
 
-    /// Another chain of the same variables.
+    /// Mutable access to the chain. A new chain must have the same variables.
     pub fn chain_mut(&mut self) -> &mut Chain {
         &mut self.chain
     }
 
-    /// Positions that put the frame at `target`, a pose in the base link of the chain. `initial` \[rad or m\] has a
-    /// number for each variable, and is taken into the limits.
+    /// Finds positions that bring the frame to `target`, a pose in the base link of the chain. `initial` \[rad or m\]
+    /// has one number for each variable and is clamped to the limits.
     ///
     /// # Errors
-    /// `initial` has the wrong length; a number is not finite; the rotation of the target is not of length 1. A target
-    /// that is not reached is no error: see [`IkSolution::success`].
+    /// `initial` has the wrong length, a number is not finite, or the rotation of the target is not of length 1. A
+    /// target that is not reached is not an error: see [`IkSolution::success`].
     pub fn solve(&mut self, target: &Pose, initial: &[f64]) -> Result<IkSolution<'_>, KinematicsError> {
         if initial.len() != self.limits.len() {
             let (expected, found) = (self.limits.len(), initial.len());
@@ -134,7 +135,7 @@ impl IkSolver {
         }
         descent.at.copy_from(best);
         if reached {
-            // It converges fast here: some steps more leave little of the error.
+            // Convergence is fast near the target: a few more steps remove most of the remaining error.
             let finish = Stop { position: 0.01 * position, rotation: 0.01 * rotation, iterations: 4, ..near };
             iterations += descent.descend(&problem, &finish, cfg.damping);
             if !descent.at.is_within(&near, cfg.task) {
@@ -162,7 +163,7 @@ impl IkSolver {
     }
 }
 
-/// Where a start is: at the initial positions, or at `random` ones (uniform in 0..1).
+/// Sets the positions of a start: the initial ones, or those of `random` (uniform in 0..1).
 fn place(problem: &Problem<'_>, initial: &[f64], random: Option<&[f64]>, reach: f64, positions: &mut [f64]) {
     for (i, position) in positions.iter_mut().enumerate() {
         let [low, high] = problem.limits[i];
@@ -182,7 +183,7 @@ fn place(problem: &Problem<'_>, initial: &[f64], random: Option<&[f64]>, reach: 
     }
 }
 
-/// Takes off whole turns, where that leads nearer to `reference` and stays within the limits.
+/// Removes full turns where a position then is nearer to `reference` and stays within the limits.
 fn turn_back(problem: &Problem<'_>, reference: &[f64], positions: &mut [f64]) {
     for (i, position) in positions.iter_mut().enumerate().filter(|(i, _)| problem.chain.has_whole_turns(*i)) {
         let [low, high] = problem.limits[i];

@@ -1,17 +1,18 @@
-//! How joints move frames.
+//! Geometric Jacobian of a chain.
 
 use super::chain::Chain;
 use kinetoscope_scene::Pose;
 use nalgebra::{Vector3, Vector6};
 
 impl Chain {
-    /// The geometric Jacobian at `positions` \[rad or m\]: for each variable the velocity of the origin of the frame
-    /// and its angular velocity, both in the axes of the base link, per unit of the variable \[m/rad, rad/rad, m/m\].
-    /// Returns the pose of the frame.
+    /// Computes the geometric Jacobian at `positions` \[rad or m\] and returns the pose of the frame.
     ///
-    /// A turning joint with the axis a through o gives (a × (p - o), a) at the origin p of the frame, a sliding one (a,
-    /// 0). Source: Siciliano et al., "Robotics", Springer 2009, equation 3.30. What follows a variable by a ratio adds
-    /// that much of its own.
+    /// The column of a variable is the velocity of the origin of the frame, then its angular velocity, both in the axes
+    /// of the base link, per unit of the variable \[m/rad, rad/rad, m/m\].
+    ///
+    /// A revolute joint with the axis a through o gives (a × (p - o), a) at the origin p of the frame, a prismatic
+    /// joint (a, 0). Source: Siciliano et al., "Robotics", Springer 2009, equation 3.30. A mimic joint adds its own
+    /// velocity times its ratio to the column of its driver.
     ///
     /// # Panics
     /// If there are fewer positions or columns than [`variables`](Self::variables).
@@ -26,7 +27,7 @@ impl Chain {
             if joint.slides {
                 add(column, 0, &axis);
             } else {
-                // The velocity of the point that passes through the base; it goes to the frame below.
+                // Velocity of the point that coincides with the base; it is moved to the frame below.
                 add(column, 0, &pose.translation.vector.cross(&axis));
                 add(column, 3, &axis);
             }

@@ -1,11 +1,11 @@
-//! Damped least squares within limits: from a start to where the error grows no smaller.
+//! Damped least squares within joint limits: descent from a start to a minimum of the error.
 
 use super::cfg::IkTask;
 use super::chain::Chain;
 use kinetoscope_scene::Pose;
 use nalgebra::{Matrix6, Vector6};
 
-/// What is to be reached.
+/// Target and weights of a descent.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Problem<'p> {
     pub(super) chain: &'p Chain,
@@ -13,36 +13,36 @@ pub(super) struct Problem<'p> {
     /// The target in the base of the chain.
     pub(super) target: Pose,
     pub(super) task: IkTask,
-    /// Radians that count as much as a metre.
+    /// Radians that count as much as one meter.
     pub(super) scale: f64,
 }
 
-/// When to stop.
+/// Stopping criteria of a descent.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stop {
-    /// \[m\]
+    /// Position tolerance \[m\].
     pub(super) position: f64,
-    /// \[rad\]
+    /// Rotation tolerance \[rad\].
     pub(super) rotation: f64,
-    /// Steps, those included that were taken back.
+    /// Maximum number of steps, rejected steps included.
     pub(super) iterations: u32,
-    /// Whether to stop where it goes on too slowly to be worth it.
+    /// True to stop when progress is too slow to be worth it.
     pub(super) impatient: bool,
 }
 
-/// Positions, and what follows from them.
+/// Joint positions and the quantities computed from them.
 #[derive(Clone, Debug)]
 pub(super) struct Point {
     pub(super) positions: Vec<f64>,
-    /// Columns of the Jacobian, weighted as the error is.
+    /// Columns of the Jacobian, weighted like the error.
     columns: Vec<Vector6<f64>>,
-    /// Way to the target: weighted translation, then rotation, in the axes of the base.
+    /// Error to the target: weighted translation, then rotation, in the axes of the base.
     error: Vector6<f64>,
     /// Half the squared length of the error.
     pub(super) cost: f64,
-    /// \[m\]
+    /// Distance to the target \[m\].
     pub(super) position_error: f64,
-    /// \[rad\]
+    /// Angle to the target \[rad\].
     pub(super) rotation_error: f64,
 }
 
@@ -58,7 +58,7 @@ impl Point {
         }
     }
 
-    /// Takes over all of another point of as many joints.
+    /// Copies all values of a point with the same number of joints.
     pub(super) fn copy_from(&mut self, other: &Self) {
         self.positions.copy_from_slice(&other.positions);
         self.columns.copy_from_slice(&other.columns);
@@ -66,7 +66,7 @@ impl Point {
         (self.position_error, self.rotation_error) = (other.position_error, other.rotation_error);
     }
 
-    /// Everything that follows from the positions.
+    /// Computes all quantities that depend on the positions.
     pub(super) fn evaluate(&mut self, problem: &Problem<'_>) {
         let pose = problem.chain.jacobian(&self.positions, &mut self.columns);
         let way = problem.target.translation.vector - pose.translation.vector;
@@ -88,42 +88,42 @@ impl Point {
         self.position_error <= stop.position && (task == IkTask::Position || self.rotation_error <= stop.rotation)
     }
 
-    /// Squared distance to other positions.
+    /// Squared distance to other joint positions.
     fn distance_squared(&self, positions: &[f64]) -> f64 {
         self.positions.iter().zip(positions).map(|(a, b)| (a - b) * (a - b)).sum()
     }
 }
 
-/// Added to the squares of singular values: a matrix without rank, as that of every chain of fewer than six joints, must
-/// have a factor.
+/// Regularization added to the squared singular values. A rank-deficient matrix, as of every chain of fewer than six
+/// joints, must have a Cholesky factor.
 const FLOOR: f64 = 1e-10;
-/// Bounds of the damping, in multiples of half the squared error e. Along a singular direction of value s a step is
-/// e s / (s² + λ), at most e / (2 √λ) = 1 / √(2 damping) whatever the error is: 2.2 where damping is 0.1, 71 at the least. So
-/// it bounds steps far from the target, and hardly where the error is small; there it is the gain that decides, since a
-/// step that gains nothing is taken back. At the most a step is lost in rounding.
+/// Bounds of the damping, in multiples of half the squared error e. Along a singular direction of value s a step is e s
+/// / (s² + λ), at most e / (2 √λ) = 1 / √(2 damping) whatever the error is: 2.2 for a damping of 0.1, 71 for the
+/// smallest damping. So damping bounds steps far from the target and hardly matters where the error is small. There the
+/// gain decides, since a step without gain is rejected. At the largest damping a step is lost in rounding.
 const LEAST_DAMPING: f64 = 1e-4;
 const MOST_DAMPING: f64 = 1e12;
-/// A step that takes off less than this part of the squared error is a slow one ...
+/// A step is slow if it reduces the squared error by less than this fraction.
 const SLOW: f64 = 0.02;
-/// ... and after so many in a row another start is worth more.
+/// Number of slow steps in a row after which another start is more promising.
 const PATIENCE: u32 = 4;
-/// The longest step of a joint towards a posture \[rad or m\]: what is free is so on a curved surface.
+/// Longest step of a joint towards a posture \[rad or m\]: the free positions form a curved surface.
 const LONGEST: f64 = 0.3;
-/// Part of the tolerances that a step towards a posture may leave: what it leaves must not hide what the step gained.
+/// Fraction of the tolerances that may remain after a step towards a posture, so that the error does not hide the gain.
 const EXACT: f64 = 1e-5;
-/// Nearer to a limit \[rad or m\] than this a joint is at it.
+/// A joint nearer to a limit than this \[rad or m\] counts as at the limit.
 const AT_LIMIT: f64 = 1e-9;
-/// Nearer to a posture \[rad or m\] is not worth a step.
+/// A distance to the posture below this \[rad or m\] is not worth a step.
 const NEAR: f64 = 1e-6;
 
-/// The work memory of a search.
+/// Working memory of a search.
 #[derive(Clone, Debug)]
 pub(super) struct Descent {
-    /// Where it is.
+    /// Current positions.
     pub(super) at: Point,
     trial: Point,
     kept: Point,
-    /// Joints that may move: those at a limit that would go beyond it may not.
+    /// True for joints that may move: a joint at a limit must not move beyond it.
     free: Vec<bool>,
 }
 
@@ -133,14 +133,14 @@ impl Descent {
         Self { at: point.clone(), trial: point.clone(), kept: point, free: vec![true; joints] }
     }
 
-    /// Goes down from where it is; returns the number of steps, those included that were taken back.
+    /// Descends from the current positions. Returns the number of steps, rejected steps included.
     ///
     /// Levenberg-Marquardt with the step Jᵀ (J Jᵀ + λ)⁻¹ e, whose matrix has six rows whatever the number of joints. λ
     /// is a multiple of the squared error, so that it vanishes at the target and damps steps far from it (T. Sugihara,
-    /// "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Trans. Robotics 27, 2011);
-    /// the multiple follows the ratio of what a step gained to what the linear model promised, and steps that gain
-    /// nothing are taken back (H. B. Nielsen, "Damping parameter in Marquardt's method", report IMM-REP-1999-05).
-    /// Limits: joints that the error pushes against theirs are left out, and steps are cut at limits.
+    /// "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method", IEEE Trans. Robotics 27, 2011).
+    /// The multiple follows the ratio of actual to predicted gain of a step, and steps without gain are rejected (H. B.
+    /// Nielsen, "Damping parameter in Marquardt's method", report IMM-REP-1999-05). Joints that the error pushes
+    /// against their limits are left out, and steps are cut at limits.
     pub(super) fn descend(&mut self, problem: &Problem<'_>, stop: &Stop, damping: f64) -> u32 {
         let (mut damping, mut growth, mut slow) = (damping, 2.0, 0);
         let mut gram = self.gram_of_free(problem);
@@ -188,7 +188,7 @@ impl Descent {
         stop.iterations
     }
 
-    /// J Jᵀ of the joints that may move.
+    /// Finds the joints that may move, and returns J Jᵀ of them.
     fn gram_of_free(&mut self, problem: &Problem<'_>) -> Matrix6<f64> {
         for (i, free) in self.free.iter_mut().enumerate() {
             let [low, high] = problem.limits[i];
@@ -206,14 +206,15 @@ impl Descent {
         gram
     }
 
-    /// Goes towards the positions `rest` as far as the target leaves it a choice, from where the target is reached;
-    /// returns the number of steps.
+    /// Moves towards the positions `rest` as far as the target leaves the joints free, starting where the target is
+    /// reached. Returns the number of steps.
     ///
-    /// Each step is the part of the way to `rest` that the Jacobian does not see, (1 - J⁺ J) (rest - q) (A. Liégeois,
-    /// "Automatic supervisory control of the configuration and behavior of multibody mechanisms", IEEE Trans. Systems,
-    /// Man and Cybernetics 7, 1977), followed by steps that bring the frame back. One that does not come nearer, or
-    /// whose frame does not come back, is taken back and halved: what was reached stays reached. It ends where there is
-    /// nothing to gain, and near singular positions, where what is free bends too sharply for steps of a thousandth.
+    /// Each step is the part of the way to `rest` in the null space of the Jacobian, (1 - J⁺ J) (rest - q) (A.
+    /// Liégeois, "Automatic supervisory control of the configuration and behavior of multibody mechanisms", IEEE Trans.
+    /// Systems, Man and Cybernetics 7, 1977). Further steps then bring the frame back to the target. A step is rejected
+    /// and halved if it does not come nearer to `rest` or its frame does not come back, so the target stays reached.
+    /// The search ends without further gain, and near singular positions, where the null space curves too sharply for
+    /// steps of a thousandth.
     pub(super) fn relax(&mut self, problem: &Problem<'_>, stop: &Stop, rest: &[f64], gain: f64) -> u32 {
         let (mut part, mut used) = (gain, 0);
         for _ in 0..stop.iterations {
@@ -237,10 +238,11 @@ impl Descent {
         used
     }
 
-    /// Puts `trial` a step nearer to `rest`; `false` where there is nowhere to go.
+    /// Puts `trial` a step nearer to `rest`. Returns `false` if no step is possible, or if the longest step is at most
+    /// [`NEAR`].
     fn aim(&mut self, problem: &Problem<'_>, rest: &[f64], part: f64) -> bool {
         self.free.fill(true);
-        // Every round takes a joint out, or is the last.
+        // Every round excludes one joint, or is the last.
         for _ in 0..=rest.len() {
             let wish = |i: usize| part * (rest[i] - self.at.positions[i]);
             let mut seen = Vector6::zeros();
@@ -259,7 +261,7 @@ impl Descent {
                 continue;
             }
             let longest = (0..rest.len()).map(|i| step(i).abs()).fold(0.0, f64::max);
-            // As far as the first limit: beyond it the frame would not stay where it is.
+            // The step ends at the first limit: beyond it the frame would leave its place.
             let room = |i: usize| {
                 let ([low, high], position) = (problem.limits[i], self.at.positions[i]);
                 (if step(i) > 0.0 { high - position } else { position - low }) / step(i).abs()

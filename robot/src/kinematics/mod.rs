@@ -1,13 +1,13 @@
-//! Where frames of a robot are, how joints move them, and which joint positions put them somewhere: kinematics of a
-//! [`RobotDescription`](crate::description::RobotDescription), of our own and without MuJoCo.
+//! Kinematics of a [`RobotDescription`](crate::description::RobotDescription) without MuJoCo: poses of frames,
+//! Jacobians, and inverse kinematics.
 //!
-//! [`Chain`] is the way from a base link to a frame, with everything that does not move folded together; it gives the
-//! pose of the frame ([`Chain::pose`]) and its Jacobian ([`Chain::jacobian`]). [`IkSolver`] turns it round. All of them
-//! work in the axes of the base link; `Robot::compute_fk`,
-//! `Robot::jacobian` and `Robot::compute_ik` do so for the
-//! environments of a simulation, and in their frames.
+//! [`Chain`] is the kinematic chain from a base link to a frame, with everything that does not move folded together. It
+//! computes the pose of the frame ([`Chain::pose`]) and its Jacobian ([`Chain::jacobian`]). [`IkSolver`] finds
+//! positions for a pose. All of them work in the axes of the base link. `Robot::compute_fk`, `Robot::jacobian` and
+//! `Robot::compute_ik` of the simulation crate apply them to the environments of a simulation, in the frames of the
+//! environments.
 //!
-//! Mimic joints are no variables: they follow, and what they do is part of what the joint does that they follow.
+//! Mimic joints are not variables: the motion of a mimic joint is part of the motion of its driver.
 //!
 //! ```
 //! use nalgebra::Vector3;
@@ -28,7 +28,7 @@
 //! let mut solver = IkSolver::new(chain, vec![[0.0, 2.0]], IkCfg::default())?;
 //! let found = solver.solve(&Pose::translation(0.0, 0.0, 1.1), &[0.0])?;
 //! assert!(found.success && (found.positions[0] - 1.0).abs() < 1e-4);
-//! // Beyond the end of the rail: as near as it gets, and said so.
+//! // Beyond the end of the rail: the solver returns the nearest position and reports the failure.
 //! let found = solver.solve(&Pose::translation(0.0, 0.0, 2.6), &[0.0])?;
 //! assert!(!found.success && (found.position_error - 0.5).abs() < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

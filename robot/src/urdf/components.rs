@@ -1,4 +1,4 @@
-//! The tree of components: who hangs from whom, and in which order they are merged.
+//! Tree of URDF components: the parent of each component and the order of merging.
 
 use super::config::{ComponentCfg, UrdfCfg};
 use super::error::UrdfError;
@@ -6,9 +6,9 @@ use super::tree::owned;
 use kinetoscope_scene::pattern::closest;
 use std::collections::HashMap;
 
-/// The usual parents of a component, best first.
+/// Default parents of a component, best first.
 ///
-/// Source: EmbodiChain's assembly. A torso stands on legs only where the legs stand on a chassis.
+/// Source: EmbodiChain's assembly. Legs are a parent of the torso only in a robot with a chassis.
 fn usual_parents(name: &str, present: impl Fn(&str) -> bool) -> &'static [&'static str] {
     match name {
         "legs" => &["chassis"],
@@ -21,21 +21,21 @@ fn usual_parents(name: &str, present: impl Fn(&str) -> bool) -> &'static [&'stat
     }
 }
 
-/// Names with a place of their own: without their usual parent they are roots.
+/// Component names with a default place: without their default parent they are roots.
 const KNOWN: [&str; 10] =
     ["chassis", "legs", "torso", "head", "left_arm", "right_arm", "left_hand", "right_hand", "arm", "hand"];
 
-/// The parent of each component, and an order in which parents come first.
+/// Parent of each component, and an order in which parents come first.
 #[derive(Debug)]
 pub(super) struct Components {
-    /// Index of the parent of each component.
+    /// Index of the parent of each component; `None` for a root.
     pub(super) parents: Vec<Option<usize>>,
-    /// All components, parents first, else in the order of the configuration.
+    /// All components, parents first, otherwise in the order of the configuration.
     pub(super) order: Vec<usize>,
 }
 
 impl Components {
-    /// Checks the configuration.
+    /// Checks the configuration and arranges its components.
     pub(super) fn arrange(cfg: &UrdfCfg) -> Result<Self, UrdfError> {
         if cfg.components.is_empty() {
             return Err(UrdfError::NoComponents);
@@ -52,7 +52,7 @@ impl Components {
         Ok(Self { parents, order })
     }
 
-    /// Components without a parent.
+    /// Number of components without a parent.
     pub(super) fn roots(&self) -> usize {
         self.parents.iter().filter(|p| p.is_none()).count()
     }
@@ -96,7 +96,7 @@ fn parent(cfg: &UrdfCfg, id: usize, ids: &HashMap<&str, usize>) -> Result<Option
     }
     let usual = usual_parents(&component.name, |name| ids.contains_key(name));
     let found = usual.iter().find_map(|name| ids.get(name).copied());
-    // A name of the user's own can only be a root if it plainly is the first.
+    // A custom name without a parent is a root only as the first component.
     if found.is_none() && id != 0 && !KNOWN.contains(&component.name.as_str()) {
         return Err(UrdfError::ComponentParentRequired {
             component: component.name.clone(),

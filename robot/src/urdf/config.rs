@@ -1,11 +1,11 @@
-//! Which URDF files make a robot, and how they are joined.
+//! Configuration of a robot that is merged from URDF files.
 
 use kinetoscope_scene::Pose;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A robot made of one or several URDF files.
+/// Robot made of one or several URDF files.
 ///
 /// ```
 /// use kinetoscope_robot::urdf::{ComponentCfg, UrdfCfg};
@@ -14,27 +14,27 @@ use std::path::{Path, PathBuf};
 ///     components: vec![ComponentCfg::new("arm", "arm.urdf"), ComponentCfg::new("hand", "hand.urdf")],
 ///     ..Default::default()
 /// };
-/// assert_eq!(cfg.components[1].name, "hand"); // hangs from the tip of "arm" by default
+/// assert_eq!(cfg.components[1].name, "hand"); // attached to the tip of "arm" by default
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct UrdfCfg {
-    /// The files, in any order.
+    /// URDF files of the robot, in any order.
     pub components: Vec<ComponentCfg>,
-    /// Case of the names of the merged robot.
+    /// Letter case of the names of the merged robot.
     pub name_case: NameCaseCfg,
-    /// Folders of `package://` and `model://` packages by name; these win over every search.
+    /// Folders of `package://` and `model://` packages by name. They take precedence over every search.
     pub packages: BTreeMap<String, PathBuf>,
-    /// Folder in which mesh and texture paths and packages are searched that are not found from the URDF, as Isaac Gym's
+    /// Folder to search for packages, meshes and textures that are not found from the URDF, like Isaac Gym's
     /// `asset_root`.
     pub asset_root: Option<PathBuf>,
-    /// Handling of departures from URDF whose meaning is clear.
+    /// Handling of deviations from URDF whose meaning is clear.
     pub strictness: Strictness,
-    /// Mass properties of links whose file gives none.
+    /// Mass properties of links whose file gives no mass properties.
     pub missing_inertia: MissingInertia,
-    /// Name of the robot; by default the names of the files' robots, joined by `_`.
+    /// Name of the robot; by default the robot names of the files, joined by `_`.
     pub name: Option<String>,
-    /// Name of the massless link added below components where one is needed.
+    /// Name of the massless link that is added below components where they need a common base.
     pub base_link_name: String,
 }
 
@@ -54,13 +54,14 @@ impl Default for UrdfCfg {
 }
 
 impl UrdfCfg {
-    /// A robot of one file, as it is.
+    /// Creates the configuration of a robot from one file.
     pub fn single(urdf: impl AsRef<Path>) -> Self {
         Self { components: vec![ComponentCfg::new("robot", urdf)], ..Self::default() }
     }
 
-    /// A robot of files of which each hangs from the tip of the one before. A single one is called `robot`, two are `arm`
-    /// and `hand`, more are `part1`, `part2` and so on.
+    /// Creates the configuration of a serial robot: each file is attached to the tip of the previous file.
+    ///
+    /// A single file is named `robot`, two files `arm` and `hand`, more files `part1`, `part2` and so on.
     ///
     /// ```
     /// use kinetoscope_robot::urdf::UrdfCfg;
@@ -85,9 +86,9 @@ impl UrdfCfg {
     }
 }
 
-/// Handling of departures from URDF whose meaning is clear, such as a second `<material>` in one `<visual>`.
+/// Handling of deviations from URDF whose meaning is clear, such as a second `<material>` in one `<visual>`.
 ///
-/// | departure | lenient reading |
+/// | deviation | lenient reading |
 /// |---|---|
 /// | a second `<material>`, `<inertial>` or `<axis>`, a second element in `<geometry>` | the first is used |
 /// | a box, sphere, cylinder or capsule with a size of 0 | the shape is left out |
@@ -96,28 +97,28 @@ impl UrdfCfg {
 /// | an XML declaration that is not at the beginning | it is ignored |
 /// | an `<inertial>` without `<mass>` or without `<inertia>` | the rest is computed from the shapes of the link |
 /// | `<axis/>` without `xyz` on a fixed or floating joint | it is ignored |
-/// | one number in the `scale` of a mesh | it holds for all three axes |
+/// | one number in the `scale` of a mesh | it applies to all three axes |
 /// | `package:///path` | an absolute path, else a package with one slash too many |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Strictness {
-    /// Each is a warning that says what was done.
+    /// Each deviation is a warning that describes the reading.
     #[default]
     Lenient,
-    /// Each is an error.
+    /// Each deviation is an error.
     Strict,
 }
 
-/// Mass properties of bodies that move and have no `<inertial>` in any of their links.
+/// Mass properties of moving bodies whose links all lack an `<inertial>`.
 ///
-/// A body is a link with all links that fixed joints join to it. Links without `<inertial>` that are fixed to a link with mass
-/// keep no mass of their own: their mass is part of the other's.
+/// A body is a link with all links that fixed joints join to it. A link without `<inertial>` that is fixed to a link
+/// with mass gets no mass of its own: the mass of the other link includes it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum MissingInertia {
-    /// Every link of the body has the mass, centre of mass and inertia of its collision shapes filled with this density
-    /// \[kg/m³\]; of its visual shapes where it has no collision shapes. Meshes count as their convex hulls; shapes that overlap
-    /// count twice. Bodies without shapes are as with [`Minimal`](Self::Minimal).
+    /// Each link of the body has the mass properties of its collision shapes, filled with this density \[kg/m³\]. A
+    /// link without collision shapes uses its visual shapes. Meshes count as their convex hulls; overlapping shapes
+    /// count twice. Bodies without shapes are treated as with [`Minimal`](Self::Minimal).
     Density(f64),
     /// The body has 1e-6 kg and 1e-9 kg m², which are not part of the total mass.
     Minimal,
@@ -129,17 +130,17 @@ impl Default for MissingInertia {
     }
 }
 
-/// Case of the names of a merged robot.
+/// Letter case of the names of a merged robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NameCaseCfg {
-    /// Joints.
+    /// Case of joint names.
     pub joint: NameCase,
-    /// Links.
+    /// Case of link names.
     pub link: NameCase,
 }
 
-/// What becomes of the case of a name.
+/// Conversion of the letter case of a name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum NameCase {
@@ -153,7 +154,7 @@ pub enum NameCase {
 }
 
 impl NameCase {
-    /// The name in this case.
+    /// Converts a name to this case.
     pub fn apply(self, name: &str) -> String {
         match self {
             Self::Original => name.to_owned(),
@@ -163,32 +164,33 @@ impl NameCase {
     }
 }
 
-/// One URDF file of a robot.
+/// One URDF file of a robot and its attachment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ComponentCfg {
-    /// What it is: `chassis`, `legs`, `torso`, `head`, `left_arm`, `right_arm`, `left_hand`, `right_hand`, `arm`, `hand`,
-    /// which know their usual parent, or any other name.
+    /// Name of the component: `chassis`, `legs`, `torso`, `head`, `left_arm`, `right_arm`, `left_hand`, `right_hand`,
+    /// `arm` and `hand` have a default parent; any other name is allowed.
     pub name: String,
-    /// The file.
+    /// Path of the URDF file.
     pub urdf: PathBuf,
-    /// Pose of the root link in the frame of the link it is attached to; for a component without a parent, in the frame
-    /// of the robot.
+    /// Pose of the root link in the frame of the link it is attached to; in the frame of the robot for a component
+    /// without a parent.
     #[serde(default, with = "kinetoscope_scene::file_format::pose")]
     pub transform: Pose,
-    /// The component it is attached to; by default the usual parent, if present.
+    /// Parent component; by default the usual parent, if present.
     pub parent: Option<String>,
-    /// The link of the parent component it is attached to, as named in that file; by default the tip.
+    /// Link of the parent component to attach to, as named in its file; by default the tip.
     pub parent_link: Option<String>,
-    /// The link of this component that is attached, as named in its file; must be its root.
+    /// Link of this component to attach, as named in its file; must be its root.
     pub child_link: Option<String>,
-    /// What its names start with; names that already do, in any case, stay. By default `left_` or `right_` for a
-    /// component of such a name in a robot of several, else nothing.
+    /// Prefix of the names of this component; names that already start with it, in any case, stay unchanged. The
+    /// default is `left_` or `right_` for a component with such a name in a robot of several components, else no
+    /// prefix.
     pub prefix: Option<String>,
 }
 
 impl ComponentCfg {
-    /// A component with the default parent and no transform.
+    /// Creates a component with the default parent and the identity transform.
     pub fn new(name: impl Into<String>, urdf: impl AsRef<Path>) -> Self {
         Self {
             name: name.into(),

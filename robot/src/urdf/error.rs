@@ -1,78 +1,78 @@
-//! What can be wrong with a URDF, its meshes or an assembly, by what the user did.
+//! Errors of URDF files, of their meshes and of their assembly.
 
 use kinetoscope_scene::pattern::list;
 use kinetoscope_scene::source::Source;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Why a URDF could not become a robot. Every variant names the place and what would be right.
+/// Error of reading or merging URDF files. Every variant names the location and the remedy.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum UrdfError {
     /// The file does not exist.
     #[error("{}: there is no such file", path.display())]
     FileMissing {
-        /// The file as the user named it.
+        /// Path as the user gave it.
         path: PathBuf,
     },
     /// A folder was given where a file is needed.
     #[error("{}: is a folder; give the .urdf file inside it{}", path.display(), one_of(.urdfs))]
     FileIsFolder {
-        /// The folder.
+        /// Path of the folder.
         path: PathBuf,
-        /// The .urdf files in it.
+        /// Names of the `.urdf` files in the folder.
         urdfs: Vec<String>,
     },
-    /// The file exists and cannot be read.
+    /// The file exists but cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]
     FileUnreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The file is larger than any robot.
+    /// The file exceeds the size limit.
     #[error("{}: is larger than {limit} bytes; a URDF holds no mesh data, is this the right file?", path.display())]
     FileTooLarge {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The largest size that is read \[bytes\].
+        /// Size limit \[bytes\].
         limit: u64,
     },
     /// The file has no content.
     #[error("{}: is empty; a URDF starts with <robot name=\"...\">", path.display())]
     FileEmpty {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The file is not UTF-8.
     #[error("{at}: {problem}; save the file as UTF-8")]
     Encoding {
-        /// The line of the first wrong byte.
+        /// Location of the first invalid byte.
         at: Source,
-        /// What was found.
+        /// Description of the problem.
         problem: String,
     },
     /// The file is not well-formed XML.
     #[error("{at}: column {column}: not well-formed XML: {source}")]
     Xml {
-        /// Where.
+        /// Location in the file.
         at: Source,
         /// Column, counted from 1 in characters.
         column: u32,
-        /// What the XML parser said.
+        /// Error of the XML parser.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// The file has a document type declaration, which could define entities.
     #[error("{at}: <!DOCTYPE> and entities are refused: no robot needs them and they can exhaust memory; delete it")]
     Doctype {
-        /// Where.
+        /// Location in the file.
         at: Source,
     },
     /// The file is a xacro, not a URDF.
     #[error("{at}: {found} is xacro, not URDF; expand it first: xacro file.xacro > file.urdf")]
     Xacro {
-        /// Where.
+        /// Location in the file.
         at: Source,
         /// The xacro element or expression.
         found: String,
@@ -80,87 +80,87 @@ pub enum UrdfError {
     /// The root element is not `<robot>`.
     #[error("{at}: the root element is <{found}>, a URDF starts with <robot name=\"...\">; {advice}")]
     WrongRoot {
-        /// Where.
+        /// Location in the file.
         at: Source,
-        /// The element found.
+        /// Name of the root element.
         found: String,
-        /// What to use instead.
+        /// Suggested remedy.
         advice: &'static str,
     },
     /// A number is missing, superfluous, unreadable or not finite.
     #[error("{at}: {element}: {problem}")]
     Number {
-        /// Where.
+        /// Location in the file.
         at: Source,
-        /// The element and attribute as written.
+        /// Element and attribute as written.
         element: String,
-        /// What is wrong and what would be right.
+        /// Problem and accepted values.
         problem: String,
     },
-    /// A number or a word has a value that cannot be.
+    /// A number or keyword has an invalid value.
     #[error("{at}: {owner}: {element}: {problem}")]
     Value {
-        /// Where.
+        /// Location in the file.
         at: Source,
-        /// The link or joint.
+        /// Owner of the element, such as `link "base"`.
         owner: String,
-        /// The element and attribute as written.
+        /// Element and attribute as written.
         element: String,
-        /// What is wrong and what would be right.
+        /// Problem and accepted values.
         problem: String,
     },
     /// An attribute is missing.
     #[error("{at}: {owner}: <{element}> has no {attribute}; write {example}")]
     AttributeMissing {
-        /// Where.
+        /// Location in the file.
         at: Source,
-        /// The link or joint.
+        /// Owner of the element, such as `link "base"`.
         owner: String,
-        /// The element without it.
+        /// Name of the incomplete element.
         element: String,
-        /// The attribute that is missing.
+        /// Name of the missing attribute.
         attribute: &'static str,
-        /// What would be right.
+        /// Example of a valid attribute.
         example: &'static str,
     },
     /// A child element is missing.
     #[error("{at}: {owner}: <{element}> has no <{child}>; {fix}")]
     ElementMissing {
-        /// Where.
+        /// Location in the file.
         at: Source,
-        /// The link or joint.
+        /// Owner of the element, such as `link "base"`.
         owner: String,
-        /// The element without it.
+        /// Name of the incomplete element.
         element: String,
-        /// The child that is missing.
+        /// Name of the missing child.
         child: &'static str,
-        /// What would be right.
+        /// Suggested remedy.
         fix: &'static str,
     },
-    /// A child element that may be there once is there twice.
+    /// A child element that may occur once occurs twice.
     #[error("{at}: {owner}: a second <{element}>, the first is at {first}; keep one")]
     ElementRepeated {
-        /// The second one.
+        /// Location of the second element.
         at: Source,
-        /// The link or joint.
+        /// Owner of the element, such as `link "base"`.
         owner: String,
-        /// The element.
+        /// Name of the element.
         element: String,
-        /// The first one.
+        /// Location of the first element.
         first: Source,
     },
-    /// A `<geometry>` has more than its shape.
+    /// A `<geometry>` has more than one element.
     #[error(
         "{at}: {owner}: <geometry> holds one shape, and <{found}> is its second element, the first is at {first}; keep one"
     )]
     GeometryRepeated {
-        /// The second element.
+        /// Location of the second element.
         at: Source,
-        /// The link.
+        /// Link that owns the geometry, such as `link "base"`.
         owner: String,
-        /// The second element.
+        /// Name of the second element.
         found: String,
-        /// The first one.
+        /// Location of the first element.
         first: Source,
     },
     /// A revolute or prismatic joint has no `<limit>`.
@@ -169,47 +169,47 @@ pub enum UrdfError {
          velocity=\"1\"/>{}", if *.kind == "revolute" { " or make it continuous" } else { "" }
     )]
     LimitMissing {
-        /// The joint element.
+        /// Location of the joint element.
         at: Source,
-        /// Its name.
+        /// Name of the joint.
         joint: String,
-        /// Its type.
+        /// Type of the joint.
         kind: &'static str,
     },
-    /// A joint type URDF does not have.
+    /// A joint type does not exist in URDF.
     #[error("{at}: joint \"{joint}\": there is no type \"{found}\"; {}", list(.candidates, .candidates.len()))]
     JointTypeUnknown {
-        /// The joint element.
+        /// Location of the joint element.
         at: Source,
-        /// Its name.
+        /// Name of the joint.
         joint: String,
-        /// The type as written.
+        /// Type as written.
         found: String,
-        /// The types there are, the closest first.
+        /// Joint types of URDF, the closest match first.
         candidates: Vec<String>,
     },
-    /// A shape URDF does not have.
+    /// A shape does not exist in URDF.
     #[error("{at}: {owner}: there is no shape <{found}>; {}", list(.candidates, .candidates.len()))]
     ShapeUnknown {
-        /// The shape element.
+        /// Location of the shape element.
         at: Source,
-        /// The link.
+        /// Link that owns the shape, such as `link "base"`.
         owner: String,
-        /// The element found.
+        /// Name of the element.
         found: String,
-        /// The shapes there are, the closest first.
+        /// Shapes of URDF, the closest match first.
         candidates: Vec<String>,
     },
     /// Two links, joints or materials have the same name.
     #[error("{second}: a second {what} named \"{name}\", the first is at {first}; names must be unique")]
     NameRepeated {
-        /// `link`, `joint` or `material`.
+        /// Kind of the element: `link`, `joint` or `material`.
         what: &'static str,
-        /// The name.
+        /// Repeated name.
         name: String,
-        /// The first one.
+        /// Location of the first element.
         first: Source,
-        /// The second one.
+        /// Location of the second element.
         second: Source,
     },
     /// A link is the child of two joints.
@@ -218,77 +218,77 @@ pub enum UrdfError {
          \"{first_joint}\" at {first}; a link hangs from one joint"
     )]
     TwoParents {
-        /// The link.
+        /// Name of the link.
         link: String,
-        /// The first joint.
+        /// Name of the first joint.
         first_joint: String,
-        /// Where it is.
+        /// Location of the first joint.
         first: Source,
-        /// The second joint.
+        /// Name of the second joint.
         second_joint: String,
-        /// Where it is.
+        /// Location of the second joint.
         second: Source,
     },
     /// A joint names a link that does not exist.
     #[error("{at}: joint \"{joint}\": {role} link \"{link}\" does not exist; {}", list(.candidates, *.total))]
     LinkUnknown {
-        /// The parent or child element.
+        /// Location of the parent or child element.
         at: Source,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// `parent` or `child`.
+        /// Role of the link: `parent` or `child`.
         role: &'static str,
-        /// The name that does not exist.
+        /// Name of the missing link.
         link: String,
-        /// Links there are, the closest first.
+        /// Existing links, the closest match first.
         candidates: Vec<String>,
-        /// How many links there are.
+        /// Number of existing links.
         total: usize,
     },
-    /// Joints form a circle.
+    /// Joints form a cycle.
     #[error("{at}: joint \"{joint}\" closes a circle of links: {}; a URDF is a tree", chain(.links))]
     Cycle {
-        /// The joint of the circle that comes first in the file.
+        /// Location of the joint of the cycle that comes first in the file.
         at: Source,
-        /// Its name.
+        /// Name of the joint.
         joint: String,
-        /// The links of the circle, the child of the joint first.
+        /// Links of the cycle, the child of the joint first.
         links: Vec<String>,
     },
-    /// More than one link has no parent.
+    /// Several links have no parent.
     #[error("{}: {} links have no parent joint, only one may: {}; join them with fixed joints", .roots[0].1, .roots.len(), places(.roots))]
     SeveralRoots {
-        /// The links and where they are.
+        /// Names and locations of these links.
         roots: Vec<(String, Source)>,
     },
     /// The robot has no link.
     #[error("{at}: the robot has no <link>; a robot has at least one")]
     NoLinks {
-        /// The robot element.
+        /// Location of the robot element.
         at: Source,
     },
     /// A mimic names a joint that does not exist.
     #[error("{at}: joint \"{joint}\" mimics \"{followed}\", which does not exist; {}", list(.candidates, *.total))]
     MimicUnknown {
-        /// The mimic element.
+        /// Location of the mimic element.
         at: Source,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// The name that does not exist.
+        /// Name of the missing joint.
         followed: String,
-        /// Joints there are, the closest first.
+        /// Existing joints, the closest match first.
         candidates: Vec<String>,
-        /// How many joints there are.
+        /// Number of existing joints.
         total: usize,
     },
-    /// Joints mimic each other, or one mimics itself.
+    /// Joints mimic each other, or a joint mimics itself.
     #[error("{at}: joint \"{joint}\" mimics itself: {}; one joint of the circle must be free", chain(.joints))]
     MimicCycle {
-        /// The mimic element of the joint.
+        /// Location of the mimic element of the joint.
         at: Source,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// The circle.
+        /// Joints of the cycle.
         joints: Vec<String>,
     },
     /// A mimic names a joint without a single degree of freedom.
@@ -296,126 +296,126 @@ pub enum UrdfError {
         "{at}: joint \"{joint}\" mimics \"{followed}\", which is {kind}; only revolute, continuous and prismatic joints can be followed"
     )]
     MimicUnmovable {
-        /// The mimic element.
+        /// Location of the mimic element.
         at: Source,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// The joint it follows.
+        /// Name of the followed joint.
         followed: String,
-        /// The type of that joint.
+        /// Type of the followed joint.
         kind: &'static str,
     },
     /// The file name of a mesh is empty.
     #[error("{at}: link \"{link}\": <mesh> has an empty filename; write filename=\"meshes/part.stl\"")]
     MeshUnnamed {
-        /// The mesh element.
+        /// Location of the mesh element.
         at: Source,
-        /// The link.
+        /// Name of the link.
         link: String,
     },
     /// The mesh file of a collision does not exist.
     #[error("{at}: link \"{link}\": collision mesh \"{uri}\" does not exist{}; looked at:{}", remark(.hint), lines(.tried))]
     MeshMissing {
-        /// The collision.
+        /// Location of the collision element.
         at: Source,
-        /// The link.
+        /// Name of the link.
         link: String,
-        /// The URI as written.
+        /// URI as written.
         uri: String,
-        /// Every file that was looked at.
+        /// Every path that was tried.
         tried: Vec<String>,
-        /// A remark that helps.
+        /// Additional hint.
         hint: Option<String>,
     },
-    /// The package of a collision mesh was found nowhere.
+    /// The package of a collision mesh was not found.
     #[error(
         "{at}: link \"{link}\": package \"{package}\" of \"{uri}\" was found nowhere; give its folder by \
          UrdfCfg::packages or ROS_PACKAGE_PATH; looked at:{}", lines(.tried)
     )]
     PackageUnknown {
-        /// The collision.
+        /// Location of the collision element.
         at: Source,
-        /// The link.
+        /// Name of the link.
         link: String,
-        /// The URI as written.
+        /// URI as written.
         uri: String,
-        /// The package.
+        /// Name of the package.
         package: String,
-        /// Every folder that was looked at.
+        /// Every folder that was searched.
         tried: Vec<String>,
     },
-    /// The URI of a collision mesh cannot be resolved at all, such as `http://`.
+    /// The URI of a collision mesh has an unsupported form, such as `http://`.
     #[error("{at}: link \"{link}\": \"{uri}\" cannot be read: {problem}")]
     UriUnsupported {
-        /// The collision.
+        /// Location of the collision element.
         at: Source,
-        /// The link.
+        /// Name of the link.
         link: String,
-        /// The URI as written.
+        /// URI as written.
         uri: String,
-        /// What is wrong and what would be right.
+        /// Problem and accepted forms.
         problem: String,
     },
     /// The assembly has no component.
     #[error("the assembly has no component; give at least one, such as UrdfCfg::single(\"robot.urdf\")")]
     NoComponents,
-    /// A component or prefix has a name that cannot be used.
+    /// A component has an invalid name, prefix or transform.
     #[error("component \"{component}\": {problem}")]
     ComponentInvalid {
-        /// The component.
+        /// Name of the component.
         component: String,
-        /// What is wrong and what would be right.
+        /// Problem and accepted values.
         problem: String,
     },
     /// Two components have the same name.
     #[error("two components are named \"{component}\"; give each its own name and the second an explicit parent")]
     ComponentRepeated {
-        /// The name.
+        /// Repeated name.
         component: String,
     },
     /// A component names a parent component that does not exist.
     #[error("component \"{component}\": parent component \"{parent}\" does not exist; {}", list(.candidates, .candidates.len()))]
     ComponentUnknown {
-        /// The component.
+        /// Name of the component.
         component: String,
-        /// Its parent.
+        /// Name of the missing parent.
         parent: String,
-        /// The components there are, the closest first.
+        /// Existing components, the closest match first.
         candidates: Vec<String>,
     },
-    /// A component of a name without a default parent names none.
+    /// A component without a default parent sets no parent.
     #[error(
         "component \"{component}\" has no default parent; set its parent to another component. {}",
         list(.candidates, .candidates.len())
     )]
     ComponentParentRequired {
-        /// The component.
+        /// Name of the component.
         component: String,
-        /// The components there are, the closest first.
+        /// Existing components, the closest match first.
         candidates: Vec<String>,
     },
-    /// Components are each other's parents.
+    /// The parents of components form a cycle.
     #[error("components are each other's parents: {}; one must have no parent", chain(.components))]
     ComponentCycle {
-        /// The circle.
+        /// Components of the cycle.
         components: Vec<String>,
     },
-    /// `parent_link` or `child_link` names a link its component does not have.
+    /// `parent_link` or `child_link` names a link that its component does not have.
     #[error(
         "component \"{component}\": {field} \"{link}\" is not a link of \"{of}\"; {}", list(.candidates, *.total)
     )]
     AttachLinkUnknown {
-        /// The component whose configuration names it.
+        /// Component with this setting.
         component: String,
-        /// `parent_link` or `child_link`.
+        /// Name of the setting: `parent_link` or `child_link`.
         field: &'static str,
-        /// The name.
+        /// Name of the missing link.
         link: String,
-        /// The component it was looked for in.
+        /// Component that was searched for the link.
         of: String,
-        /// Links there are, the closest first.
+        /// Existing links, the closest match first.
         candidates: Vec<String>,
-        /// How many links there are.
+        /// Number of existing links.
         total: usize,
     },
     /// `parent_link` is set on a component without a parent.
@@ -423,9 +423,9 @@ pub enum UrdfError {
         "component \"{component}\": parent_link \"{link}\" is set and there is no parent component; set parent too"
     )]
     ParentLinkWithoutParent {
-        /// The component.
+        /// Name of the component.
         component: String,
-        /// The link.
+        /// Name of the link.
         link: String,
     },
     /// `child_link` is not the root of its component.
@@ -434,11 +434,11 @@ pub enum UrdfError {
          use \"{root}\" and put the offset into the transform"
     )]
     ChildLinkNotRoot {
-        /// The component.
+        /// Name of the component.
         component: String,
-        /// The link named.
+        /// Name of the link that was given.
         link: String,
-        /// The root.
+        /// Name of the root link.
         root: String,
     },
     /// The parent component has several tips.
@@ -447,21 +447,21 @@ pub enum UrdfError {
          right one; {}", .total, list(.candidates, *.total)
     )]
     TipAmbiguous {
-        /// The component that is attached.
+        /// Component to attach.
         component: String,
-        /// Its parent component.
+        /// Parent of the component.
         parent: String,
-        /// The deepest leaf links; at most [`MAX_CANDIDATES`](kinetoscope_scene::pattern::MAX_CANDIDATES).
+        /// Deepest leaf links; at most [`MAX_CANDIDATES`](kinetoscope_scene::pattern::MAX_CANDIDATES).
         candidates: Vec<String>,
-        /// How many there are.
+        /// Number of deepest leaf links.
         total: usize,
     },
-    /// The file passed our checks and the URDF model still refused it.
+    /// The URDF model rejected a file that passed all checks: a defect of this program.
     #[error("{}: the URDF model refused this file, which is a defect of this program; please report it: {source}", path.display())]
     Model {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the model said.
+        /// Error of the URDF model.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
 }

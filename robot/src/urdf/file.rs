@@ -1,4 +1,4 @@
-//! `UrdfFile`: one URDF file, checked, with the place of everything and what was absent.
+//! `UrdfFile`: one checked URDF file, with the location of every element and a record of absent values.
 
 use super::tree::Tree;
 use crate::description::PartialInertial;
@@ -9,76 +9,76 @@ use std::sync::Arc;
 
 /// A URDF file that passed every check.
 ///
-/// `robot` holds the values, `links` and `joints` run parallel to `robot.links` and `robot.joints` and hold what the
-/// model cannot tell: places, and which values the file gave.
+/// `robot` holds the values. `links` and `joints` run parallel to `robot.links` and `robot.joints` and hold what the
+/// model cannot express: locations, and which values the file gave.
 #[derive(Clone, Debug)]
 pub struct UrdfFile {
-    /// The file as the user named it.
+    /// Path as the user gave it.
     pub path: Arc<PathBuf>,
-    /// The typed model. Values that the file does not give are filled in.
+    /// Typed model. Values that the file does not give have defaults.
     pub robot: urdf_rs::Robot,
-    /// One per link of `robot`.
+    /// Metadata of each link of `robot`.
     pub links: Vec<LinkNotes>,
-    /// One per joint of `robot`.
+    /// Metadata of each joint of `robot`.
     pub joints: Vec<JointNotes>,
-    /// The tree of links.
+    /// Tree of links.
     pub tree: Tree,
     /// `meshdir` of `<mujoco><compiler>`, where MuJoCo users keep meshes.
     pub meshdir: Option<String>,
-    /// What was repaired or ignored.
+    /// Warnings about repaired or ignored elements.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// What the model cannot tell about a link.
+/// Metadata of a link that the model cannot express.
 #[derive(Clone, Debug)]
 pub struct LinkNotes {
-    /// The link element.
+    /// Location of the link element.
     pub source: Source,
-    /// The inertial element; `None` where the file has none (the model then says mass 0).
+    /// Location of a complete inertial element; otherwise `None`, and the model has mass 0.
     pub inertial: Option<Source>,
-    /// The values of an incomplete inertial element; `inertial` is `None` then.
+    /// Values of an incomplete inertial element; `inertial` is then `None`.
     pub partial_inertial: Option<PartialInertial>,
-    /// One per visual.
+    /// Metadata of each visual.
     pub visuals: Vec<VisualNotes>,
-    /// One per collision.
+    /// Location of each collision element.
     pub collisions: Vec<Source>,
 }
 
-/// What the model cannot tell about a visual.
+/// Metadata of a visual that the model cannot express.
 #[derive(Clone, Debug)]
 pub struct VisualNotes {
-    /// The visual element.
+    /// Location of the visual element.
     pub source: Source,
-    /// The material element, if any.
+    /// Location of the material element, if any.
     pub material: Option<Source>,
 }
 
-/// What the model cannot tell about a joint.
+/// Metadata of a joint that the model cannot express.
 #[derive(Clone, Debug)]
 pub struct JointNotes {
-    /// The joint element.
+    /// Location of the joint element.
     pub source: Source,
-    /// What the limit element gives; `None` where the file has no such element (the model then says 0).
+    /// Metadata of the limit element; `None` for a joint without one, whose limits are 0 in the model.
     pub limit: Option<LimitNotes>,
-    /// The dynamics element gives damping.
+    /// True if the dynamics element gives damping.
     pub damping: bool,
-    /// The dynamics element gives friction.
+    /// True if the dynamics element gives friction.
     pub friction: bool,
-    /// The mimic element; `None` where there is none or where it has no meaning (a fixed joint).
+    /// Location of the mimic element; `None` without a mimic, or where a mimic has no meaning (a fixed joint).
     pub mimic: Option<Source>,
 }
 
-/// Which values a limit element gives.
+/// Location of a limit element, and which values it gives.
 #[derive(Clone, Debug)]
 pub struct LimitNotes {
-    /// The limit element.
+    /// Location of the limit element.
     pub source: Source,
-    /// `lower` is given and usable.
+    /// True if `lower` is given and usable.
     pub lower: bool,
-    /// `upper` is given and usable.
+    /// True if `upper` is given and usable.
     pub upper: bool,
-    /// `effort` is given.
+    /// True if `effort` is given.
     pub effort: bool,
-    /// `velocity` is given.
+    /// True if `velocity` is given.
     pub velocity: bool,
 }

@@ -1,4 +1,4 @@
-//! Reading a `<joint>`.
+//! Reader of `<joint>` elements.
 
 use super::error::UrdfError;
 use super::file::{JointNotes, LimitNotes};
@@ -10,7 +10,7 @@ use crate::diagnostic::DiagnosticKind;
 use kinetoscope_scene::pattern::closest;
 use roxmltree::Node;
 
-/// An axis this much longer or shorter than 1 is worth a word; less is rounding in the file.
+/// Deviation of the length of an axis from 1 that is reported. A smaller deviation is rounding in the file.
 const AXIS_TOLERANCE: f64 = 1e-3;
 /// An axis shorter than this has no direction.
 const AXIS_SHORTEST: f64 = 1e-9;
@@ -24,7 +24,7 @@ const KINDS: [JointKind; 6] = [
     JointKind::Planar,
 ];
 
-/// Elements of a joint that are read or known to mean nothing here.
+/// Child elements of a joint that are read, or that are ignored on purpose.
 const KNOWN: [&str; 12] = [
     "origin",
     "parent",
@@ -40,7 +40,7 @@ const KNOWN: [&str; 12] = [
     "transmission",
 ];
 
-/// Reads a joint and appends its normalised form to `xml`.
+/// Reads a joint and appends its normalized form to `xml`.
 pub(super) fn read_joint(
     reader: &mut Reader<'_>,
     node: Node<'_, '_>,
@@ -90,7 +90,7 @@ fn read_kind(reader: &Reader<'_>, node: Node<'_, '_>, name: &str, owner: &str) -
     })
 }
 
-/// The parent or child link.
+/// Reads the parent or child link.
 fn read_end(
     reader: &Reader<'_>,
     node: Node<'_, '_>,
@@ -108,7 +108,8 @@ fn read_end(
     Ok(Named { name: name.to_owned(), source: reader.source(end) })
 }
 
-/// The axis, as a unit vector. Joints without an axis may carry any, exporters write `0 0 0` for fixed ones.
+/// Reads the axis as a unit vector. Joint types without an axis may have any value: exporters write `0 0 0` for fixed
+/// joints.
 fn read_axis(
     reader: &mut Reader<'_>,
     node: Node<'_, '_>,
@@ -174,7 +175,7 @@ fn read_limit(
     let (mut lower, mut upper) = (reader.number(limit, "lower")?, reader.number(limit, "upper")?);
     let (effort, velocity) =
         (reader.non_negative(limit, "effort", owner)?, reader.non_negative(limit, "velocity", owner)?);
-    // An end that is absent is 0, URDF's default.
+    // An absent bound is 0, URDF's default.
     let (l, u) = (lower.unwrap_or(0.0), upper.unwrap_or(0.0));
     if l > u {
         let message = format!("{owner}: lower limit {l} is above upper limit {u}; both were ignored");
@@ -196,7 +197,7 @@ fn read_limit(
     }))
 }
 
-/// Which of damping and friction the file gives.
+/// Reads joint dynamics. Returns whether the file gives damping, and whether it gives friction.
 fn read_dynamics(
     reader: &Reader<'_>,
     node: Node<'_, '_>,
@@ -213,7 +214,7 @@ fn read_dynamics(
     Ok((damping.is_some(), friction.is_some()))
 }
 
-/// Calibration and safety controller: the simulation has no use for them, the model keeps them.
+/// Copies calibration and safety controller into the model. The simulation does not use them.
 fn read_calibration(reader: &Reader<'_>, node: Node<'_, '_>, owner: &str, xml: &mut String) -> Result<(), UrdfError> {
     if let Some(calibration) = reader.child(node, "calibration", owner)? {
         xml.push_str("<calibration");
@@ -234,7 +235,7 @@ fn read_calibration(reader: &Reader<'_>, node: Node<'_, '_>, owner: &str, xml: &
     Ok(())
 }
 
-/// The followed joint. A mimic of a joint that cannot move on one axis has no meaning and is ignored.
+/// Reads the followed joint. A mimic on a joint that does not move along one axis is ignored with a warning.
 fn read_mimic(
     reader: &mut Reader<'_>,
     node: Node<'_, '_>,

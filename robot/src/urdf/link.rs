@@ -1,4 +1,4 @@
-//! Reading a `<link>`: mass, shapes and looks.
+//! Reader of `<link>` elements: mass properties, shapes and materials.
 
 use super::error::UrdfError;
 use super::file::{LinkNotes, VisualNotes};
@@ -12,7 +12,7 @@ use kinetoscope_scene::source::Source;
 use roxmltree::Node;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// Elements of a link that are read or known to mean nothing here.
+/// Child elements of a link that are read, or that are ignored on purpose.
 const KNOWN: [&str; 12] = [
     "inertial",
     "visual",
@@ -30,28 +30,28 @@ const KNOWN: [&str; 12] = [
 
 const SHAPES: [&str; 5] = ["box", "cylinder", "capsule", "sphere", "mesh"];
 
-/// The colour and texture an element defines.
+/// Color and texture of a material.
 #[derive(Clone, Debug, PartialEq)]
 struct Look {
     rgba: Option<[f64; 4]>,
     texture: Option<String>,
 }
 
-/// The materials of a file.
+/// Materials of a file.
 #[derive(Debug, Default)]
 pub(super) struct Materials {
-    /// Looks defined at the top of the file or inside a visual.
+    /// Materials with values, defined at the top of the file or inside a visual.
     defined: HashMap<String, (Look, Source)>,
     /// Names defined at the top of the file.
     top: HashSet<String>,
-    /// Names used without a look, and where first.
+    /// Names used without values, with the location of their first use.
     referenced: BTreeMap<String, Source>,
-    /// The top-level materials, normalised.
+    /// Top-level materials in normalized form.
     pub(super) xml: String,
 }
 
 impl Materials {
-    /// Reads the top-level materials. The same name twice is fine if the looks are the same.
+    /// Reads the top-level materials. A name may be repeated with equal values.
     pub(super) fn define(&mut self, reader: &mut Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfError> {
         for node in reader.named(root, "material") {
             let name = reader.required_text(node, "name", "robot", "<material name=\"grey\">")?;
@@ -92,8 +92,8 @@ impl Materials {
         Ok(look)
     }
 
-    /// Warns of each name that is used and defined nowhere, and adds those defined inside visuals to the normalised
-    /// form, so that the model resolves every name in one place.
+    /// Warns about each name that is used but not defined. Materials that are defined inside visuals are added to the
+    /// normalized form, so that the model resolves every name in one place.
     pub(super) fn check(&mut self, reader: &mut Reader<'_>) {
         for (name, source) in &self.referenced {
             if !self.defined.contains_key(name) {
@@ -123,7 +123,7 @@ fn read_look(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str) -> Result
         }
     }
     let texture = match reader.child(node, "texture", owner)? {
-        // Exporters write an empty name where there is no texture.
+        // Exporters write an empty file name for a material without texture.
         Some(texture) => reader.text(texture, "filename")?.map(str::trim).filter(|f| !f.is_empty()).map(str::to_owned),
         None => None,
     };
@@ -147,7 +147,7 @@ fn write_material(xml: &mut String, name: &str, look: &Look) {
     xml.push_str("</material>");
 }
 
-/// Reads a link and appends its normalised form to `xml`.
+/// Reads a link and appends its normalized form to `xml`.
 pub(super) fn read_link(
     reader: &mut Reader<'_>,
     node: Node<'_, '_>,
@@ -201,7 +201,7 @@ pub(super) fn read_link(
     Ok(LinkNotes { source: reader.source(node), inertial, partial_inertial, visuals, collisions })
 }
 
-/// Warns of child elements that nobody reads: most are typing errors, such as `<colision>`.
+/// Warns about child elements that are not read: most are typing errors, such as `<colision>`.
 pub(super) fn warn_unknown(reader: &mut Reader<'_>, node: Node<'_, '_>, owner: &str, known: &[&str]) {
     let unknown = reader.elements(node).filter(|n| !known.contains(&n.tag_name().name()));
     for child in unknown.collect::<Vec<_>>() {
@@ -229,7 +229,8 @@ pub(super) fn read_origin(
     Ok(())
 }
 
-/// Position, and roll, pitch, yaw of the origin of `node`; a quaternion (URDF 1.1) becomes roll, pitch, yaw.
+/// Reads position, and roll, pitch, yaw of the origin of `node`. A quaternion (URDF 1.1) is converted to roll, pitch,
+/// yaw.
 pub(super) fn read_pose(
     reader: &Reader<'_>,
     node: Node<'_, '_>,
@@ -251,7 +252,7 @@ pub(super) fn read_pose(
     Ok(Some([xyz.unwrap_or_default(), rpy.unwrap_or_default()]))
 }
 
-/// Reads the shape of `node`; `false` where it has a size of 0 and is left out.
+/// Reads the shape of `node`. Returns `false` for a shape of size 0, which is left out.
 fn read_geometry(
     reader: &mut Reader<'_>,
     node: Node<'_, '_>,
@@ -296,14 +297,14 @@ fn read_geometry(
             true
         }
         "sphere" => read_size(reader, shape, owner, "radius", xml)?,
-        // Both are read, so that a wrong length is found behind a radius of 0.
+        // Both sizes are read, so that an invalid length is reported even if the radius is 0.
         _ => read_size(reader, shape, owner, "radius", xml)? & read_size(reader, shape, owner, "length", xml)?,
     };
     xml.push_str("/></geometry>");
     Ok(has_size)
 }
 
-/// The edges of a box; `false` where one is 0.
+/// Reads the edge lengths of a box. Returns `false` if one is 0.
 fn read_box(reader: &mut Reader<'_>, shape: Node<'_, '_>, owner: &str, xml: &mut String) -> Result<bool, UrdfError> {
     let Some(size) = reader.numbers::<3>(shape, "size")? else {
         return Err(missing(reader, shape, owner, "size", "size=\"0.1 0.1 0.1\""));
@@ -335,7 +336,7 @@ fn read_mesh(
     Ok(())
 }
 
-/// The scale of a mesh; a single number holds for all axes.
+/// Reads the scale of a mesh. A single number applies to all axes.
 fn read_scale(reader: &mut Reader<'_>, mesh: Node<'_, '_>) -> Result<Option<[f64; 3]>, UrdfError> {
     let error = match reader.numbers::<3>(mesh, "scale") {
         Ok(scale) => return Ok(scale),
@@ -347,7 +348,7 @@ fn read_scale(reader: &mut Reader<'_>, mesh: Node<'_, '_>) -> Result<Option<[f64
     Ok(Some([scale; 3]))
 }
 
-/// A size of a shape; `false` where it is 0.
+/// Reads a size of a shape. Returns `false` if it is 0.
 fn read_size(
     reader: &mut Reader<'_>,
     shape: Node<'_, '_>,
@@ -362,7 +363,7 @@ fn read_size(
     check_size(reader, shape, owner, name, &[size], "must be positive, in metres")
 }
 
-/// Negative sizes are errors; `false` for sizes of 0.
+/// Checks sizes. Negative sizes are errors; sizes of 0 give `false`.
 fn check_size(
     reader: &mut Reader<'_>,
     shape: Node<'_, '_>,

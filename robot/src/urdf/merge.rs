@@ -1,9 +1,10 @@
-//! Several URDF files become one [`RobotDescription`].
+//! Merging of several URDF files into one [`RobotDescription`].
 //!
-//! Components are merged parents first. Each hangs by one fixed joint, `<parent>_TO_<child>_CONNECTOR`, from the tip of
-//! its parent: the leaf at the end of the longest chain of joints. A chassis is attached to at its root instead, since
-//! its leaves are wheels. Several components without a parent, or a single one with a transform, stand on an added
-//! massless link (`base_link`) which the connectors `BASE_TO_<child>_CONNECTOR` start from.
+//! Components are merged parents first. A fixed joint, `<parent>_TO_<child>_CONNECTOR`, attaches each component to the
+//! tip of its parent: the leaf at the end of the longest chain of joints. The attachment to a chassis is its root
+//! instead, since the leaves of a chassis are wheels. Several components without a parent, or a single component with a
+//! transform, stand on an added massless link (`base_link`), from which the connectors `BASE_TO_<child>_CONNECTOR`
+//! start.
 
 use super::components::Components;
 use super::config::{ComponentCfg, UrdfCfg};
@@ -21,10 +22,10 @@ use kinetoscope_scene::pose::from_xyz_rpy;
 use kinetoscope_scene::source::Source;
 use nalgebra::{Matrix3, Unit, Vector3};
 
-/// A merged robot and what was repaired or unusual on the way.
+/// Merged robot with the warnings about its files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assembly {
-    /// The robot.
+    /// Merged robot.
     pub description: RobotDescription,
     /// Warnings, file by file in the order of merging.
     pub diagnostics: Vec<Diagnostic>,
@@ -32,14 +33,14 @@ pub struct Assembly {
 
 /// Reads and merges the files of a robot.
 ///
-/// Mass properties are those of the files: [`MissingInertia`](super::MissingInertia) holds for robots that are added to a
-/// simulation, whose `description` is complete.
+/// Mass properties are those of the files. [`MissingInertia`](super::MissingInertia) is applied when a robot is added
+/// to a simulation, whose `description` is complete.
 ///
-/// The order of links and joints is that of the components (parents first, else as given) and, within one, that of its
-/// file.
+/// Links and joints have the order of the components (parents first, else as given) and, within a component, the order
+/// of its file.
 ///
 /// # Errors
-/// Anything wrong in a file or in the configuration, and a collision mesh that does not exist.
+/// A file or the configuration is invalid, or a collision mesh does not exist.
 pub fn assemble(cfg: &UrdfCfg) -> Result<Assembly, UrdfError> {
     let components = Components::arrange(cfg)?;
     let mut files = Vec::with_capacity(cfg.components.len());
@@ -67,7 +68,7 @@ pub fn assemble(cfg: &UrdfCfg) -> Result<Assembly, UrdfError> {
         merge.add(id, &files)?;
     }
     if needs_base {
-        // Named last: a file's own `base_link` keeps its name.
+        // The base is named last: a `base_link` of a file keeps its name.
         let source = merge.links[0].source.clone();
         merge.links[0].name = merge.link_names.claim(&cfg.base_link_name, "", "", &source, &mut merge.diagnostics);
     }
@@ -77,7 +78,7 @@ pub fn assemble(cfg: &UrdfCfg) -> Result<Assembly, UrdfError> {
     Ok(Assembly { description, diagnostics: merge.diagnostics })
 }
 
-/// The names of the files' robots, joined.
+/// Joins the names of the files' robots.
 fn name_of(components: &Components, files: &[UrdfFile]) -> String {
     let names = components.order.iter().map(|&c| files[c].robot.name.trim()).filter(|n| !n.is_empty());
     let name = names.collect::<Vec<_>>().join("_");
@@ -91,7 +92,7 @@ struct Merge<'c> {
     joints: Vec<Joint>,
     link_names: Names,
     joint_names: Names,
-    /// Where the links of each component start.
+    /// Index of the first link of each component.
     first_link: Vec<usize>,
     diagnostics: Vec<Diagnostic>,
 }
@@ -118,7 +119,7 @@ impl Merge<'_> {
         Ok(())
     }
 
-    /// The merged link that the component hangs from; `None` for a root that needs no base.
+    /// Finds the merged link that the component is attached to; `None` for a root that needs no base.
     fn attach_link(&self, id: usize, files: &[UrdfFile]) -> Result<Option<usize>, UrdfError> {
         let component = &self.cfg.components[id];
         let Some(parent) = self.components.parents[id] else {
@@ -126,7 +127,7 @@ impl Merge<'_> {
                 Some(link) => {
                     Err(UrdfError::ParentLinkWithoutParent { component: component.name.clone(), link: link.clone() })
                 }
-                // The base link is there before the first component, if it is needed.
+                // The base link, if needed, is added before the first component.
                 None => Ok((!self.links.is_empty()).then_some(0)),
             };
         };
@@ -134,7 +135,7 @@ impl Merge<'_> {
         let first = self.first_link[parent];
         let merged = &self.links[first..first + file.links.len()];
         if let Some(wanted) = &component.parent_link {
-            // The name in the file, or the one it has after merging.
+            // The name in the file, or the name after merging.
             let in_file = file.robot.links.iter().position(|l| l.name == *wanted);
             return match in_file.or_else(|| merged.iter().position(|l| l.name == *wanted)) {
                 Some(link) => Ok(Some(first + link)),
@@ -174,7 +175,7 @@ impl Merge<'_> {
         Ok(())
     }
 
-    /// The fixed joint between `attach` and the root of the component.
+    /// Adds the fixed joint between `attach` and the root of the component.
     fn connect(&mut self, id: usize, attach: usize, file: &UrdfFile) {
         let component = &self.cfg.components[id];
         let parent = self.components.parents[id].map_or("BASE", |p| self.cfg.components[p].name.as_str());
@@ -221,7 +222,7 @@ impl Merge<'_> {
                 parent: LinkId(first_link + parent),
                 child: LinkId(first_link + child),
                 parent_from_joint: pose_of(&model.origin),
-                // The parser normalised it; a second division would only move the last digit.
+                // The parser normalized the axis; a second division would only change the last digit.
                 axis: Unit::new_unchecked(Vector3::from(model.axis.xyz.0)),
                 limit,
                 damping: dynamics.filter(|_| notes.damping).map(|d| d.damping),
@@ -285,7 +286,7 @@ fn inertial(model: &urdf_rs::Inertial, source: Source) -> Inertial {
     }
 }
 
-/// The pose of an origin element.
+/// Converts an origin element to a pose.
 pub(super) fn pose_of(origin: &urdf_rs::Pose) -> Pose {
     from_xyz_rpy(origin.xyz.0, origin.rpy.0)
 }
@@ -297,7 +298,7 @@ fn kind_of(model: &urdf_rs::JointType) -> JointKind {
         urdf_rs::JointType::Prismatic => JointKind::Prismatic,
         urdf_rs::JointType::Floating => JointKind::Floating,
         urdf_rs::JointType::Planar => JointKind::Planar,
-        // The parser lets no spherical joint through.
+        // The parser rejects spherical joints.
         urdf_rs::JointType::Fixed | urdf_rs::JointType::Spherical => JointKind::Fixed,
     }
 }

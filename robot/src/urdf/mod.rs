@@ -1,8 +1,8 @@
-//! URDF files: read and checked, meshes resolved, components merged into one robot, and written back.
+//! URDF files: reading, checking, resolving meshes, merging components into one robot, and writing.
 //!
-//! `parse` checks one file and keeps where everything was said; `resolve` finds mesh files; `merge` turns one or
-//! several files into a [`RobotDescription`](crate::description::RobotDescription); `write` goes the other way. No walk over a tree
-//! recurses, so that neither depth nor size of a file can exhaust the stack.
+//! `parse` checks one file and keeps the location of every element. `resolve` finds mesh files. `merge` turns one or
+//! several files into a [`RobotDescription`](crate::description::RobotDescription), and `write` turns a description
+//! into a URDF. Tree traversals do not recurse, so neither the depth nor the size of a file can exhaust the stack.
 
 mod components;
 mod config;

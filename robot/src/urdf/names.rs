@@ -5,15 +5,15 @@ use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::source::Source;
 use std::collections::HashMap;
 
-/// Gives out names, each once. Links and joints have a book each.
+/// Registry that gives out each name once. Links and joints have separate registries.
 #[derive(Debug)]
 pub(super) struct Names {
-    /// `link` or `joint`.
+    /// Kind of the named elements: `link` or `joint`.
     what: &'static str,
     case: NameCase,
-    /// Who has a name, and where from.
+    /// Component and location of each name in use.
     taken: HashMap<String, (String, Source)>,
-    /// The next number to try after a name, so that a thousand clashes stay cheap.
+    /// Next number to append to each name, so that a thousand clashes stay cheap.
     next: HashMap<String, usize>,
 }
 
@@ -22,7 +22,8 @@ impl Names {
         Self { what, case, taken: HashMap::new(), next: HashMap::new() }
     }
 
-    /// A unique name: prefix, then case, then the name of the component in front of it, then `_2`, `_3`...
+    /// Returns a unique name: with the prefix and in the right case, then with the component's name in front, then with
+    /// `_2`, `_3`...
     pub(super) fn claim(
         &mut self,
         name: &str,
@@ -57,7 +58,7 @@ impl Names {
     }
 }
 
-/// The name with the prefix in front, unless it already starts with it in any case.
+/// Puts the prefix in front of a name, unless the name already starts with it in any case.
 fn with_prefix(name: &str, prefix: &str) -> String {
     let starts = name.to_lowercase().starts_with(&prefix.to_lowercase());
     if starts { name.to_owned() } else { format!("{prefix}{name}") }

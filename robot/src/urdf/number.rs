@@ -1,4 +1,4 @@
-//! Reading attributes: every number parses, is finite, and there are exactly as many as needed.
+//! Reader of XML attributes. Numbers must parse, be finite, and have the expected count.
 
 use super::error::UrdfError;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
@@ -9,18 +9,19 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Reads a document with places. Holds the line starts, because asking the XML library for a line scans the whole text.
+/// Reader of a document with source locations. It stores the starts of lines, because the XML library scans the whole
+/// text to find a line number.
 #[derive(Debug)]
 pub(super) struct Reader<'i> {
     pub(super) file: Arc<PathBuf>,
     line_starts: Vec<usize>,
-    /// The namespace of the root element: elements of it, or of none, are URDF.
+    /// Namespace of the root element. Elements of this namespace, or without a namespace, belong to URDF.
     namespace: Option<&'i str>,
     strictness: Strictness,
     pub(super) diagnostics: Vec<Diagnostic>,
 }
 
-/// Counts in words, for messages.
+/// Counts as words, for messages.
 const COUNTS: [&str; 7] = ["no", "one", "two", "three", "four", "five", "six"];
 
 impl<'i> Reader<'i> {
@@ -30,18 +31,18 @@ impl<'i> Reader<'i> {
         Self { file, line_starts, namespace, strictness, diagnostics: Vec::new() }
     }
 
-    /// The place of a byte of the text.
+    /// Location of a byte of the text.
     pub(super) fn source_at(&self, position: usize) -> Source {
         let line = self.line_starts.partition_point(|&start| start <= position);
         Source { file: self.file.clone(), line: u32::try_from(line).unwrap_or(u32::MAX) }
     }
 
-    /// The place of an element.
+    /// Location of an element.
     pub(super) fn source(&self, node: Node<'_, '_>) -> Source {
         self.source_at(node.range().start)
     }
 
-    /// The place of an attribute, or of its element where it has none.
+    /// Location of an attribute, or of its element if the attribute is missing.
     pub(super) fn attribute_source(&self, node: Node<'_, '_>, attribute: &str) -> Source {
         self.source_at(node.attribute_node(attribute).map_or(node.range().start, |a| a.range().start))
     }
@@ -50,8 +51,8 @@ impl<'i> Reader<'i> {
         self.diagnostics.push(Diagnostic::new(kind, at, message));
     }
 
-    /// Handles a departure from URDF with a clear meaning: a warning with the words of `error` and what was `done`, or in
-    /// strict reading the error.
+    /// Handles a deviation from URDF with a clear meaning. Lenient reading adds a warning with the text of `error` and
+    /// the remedy `done`; strict reading returns the error.
     pub(super) fn tolerate(
         &mut self,
         kind: DiagnosticKind,
@@ -68,7 +69,8 @@ impl<'i> Reader<'i> {
         Ok(())
     }
 
-    /// The first child called `name`; further ones are ignored with a warning, or an error in strict reading.
+    /// Returns the first child called `name`. Further ones are ignored with a warning, or are an error in strict
+    /// reading.
     pub(super) fn first_child<'a, 'input>(
         &mut self,
         node: Node<'a, 'input>,
@@ -84,7 +86,7 @@ impl<'i> Reader<'i> {
         Ok(Some(first))
     }
 
-    /// The URDF elements directly below.
+    /// URDF elements directly below `node`.
     pub(super) fn elements<'a, 'input>(
         &self,
         node: Node<'a, 'input>,
@@ -93,7 +95,7 @@ impl<'i> Reader<'i> {
         node.children().filter(move |&n| is_urdf(n, namespace))
     }
 
-    /// The URDF elements directly below that are called `name`.
+    /// URDF elements called `name` directly below `node`.
     pub(super) fn named<'a, 'input>(
         &self,
         node: Node<'a, 'input>,
@@ -102,7 +104,7 @@ impl<'i> Reader<'i> {
         self.elements(node).filter(move |n| n.tag_name().name() == name)
     }
 
-    /// The only child called `name`.
+    /// Returns the child called `name`, which may occur once.
     pub(super) fn child<'a, 'input>(
         &self,
         node: Node<'a, 'input>,
@@ -126,7 +128,7 @@ impl<'i> Reader<'i> {
         }
     }
 
-    /// The only child called `name`, which must be there.
+    /// Returns the child called `name`, which must occur once.
     pub(super) fn required_child<'a, 'input>(
         &self,
         node: Node<'a, 'input>,
@@ -143,7 +145,7 @@ impl<'i> Reader<'i> {
         })
     }
 
-    /// The text of an attribute; xacro expressions and control characters are refused.
+    /// Returns the text of an attribute. Xacro expressions and control characters are errors.
     pub(super) fn text<'a>(&self, node: Node<'a, '_>, attribute: &str) -> Result<Option<&'a str>, UrdfError> {
         let Some(text) = node.attribute(attribute) else { return Ok(None) };
         if text.contains("${") || text.contains("$(") {
@@ -161,7 +163,7 @@ impl<'i> Reader<'i> {
         Ok(Some(text))
     }
 
-    /// The text of an attribute that must be there and not be empty.
+    /// Returns the text of an attribute that must exist and not be empty.
     pub(super) fn required_text<'a>(
         &self,
         node: Node<'a, '_>,
@@ -181,7 +183,7 @@ impl<'i> Reader<'i> {
         }
     }
 
-    /// Exactly `N` finite numbers.
+    /// Reads exactly `N` finite numbers.
     pub(super) fn numbers<const N: usize>(
         &self,
         node: Node<'_, '_>,
@@ -220,12 +222,12 @@ impl<'i> Reader<'i> {
         Ok(Some(numbers))
     }
 
-    /// One finite number.
+    /// Reads one finite number.
     pub(super) fn number(&self, node: Node<'_, '_>, attribute: &str) -> Result<Option<f64>, UrdfError> {
         Ok(self.numbers::<1>(node, attribute)?.map(|[n]| n))
     }
 
-    /// One finite number that must be there.
+    /// Reads one finite number, which must exist.
     pub(super) fn required_number(
         &self,
         node: Node<'_, '_>,
@@ -242,7 +244,7 @@ impl<'i> Reader<'i> {
         })
     }
 
-    /// One finite number that must not be negative.
+    /// Reads one finite number that must not be negative.
     pub(super) fn non_negative(
         &self,
         node: Node<'_, '_>,
@@ -256,7 +258,7 @@ impl<'i> Reader<'i> {
         }
     }
 
-    /// A [`UrdfError::Value`] at an attribute: `{attribute} {rule}`.
+    /// Creates a [`UrdfError::Value`] for an attribute, with the problem `{attribute} {rule}`.
     pub(super) fn value(&self, node: Node<'_, '_>, attribute: &str, owner: &str, rule: &str) -> UrdfError {
         UrdfError::Value {
             at: self.attribute_source(node, attribute),
@@ -267,12 +269,12 @@ impl<'i> Reader<'i> {
     }
 }
 
-/// Whether the element belongs to URDF and not to another namespace.
+/// True if the element belongs to URDF and not to another namespace.
 fn is_urdf(node: Node<'_, '_>, namespace: Option<&str>) -> bool {
     node.is_element() && (node.tag_name().namespace().is_none() || node.tag_name().namespace() == namespace)
 }
 
-/// `<origin xyz="1 x 2">`: an element as the user would recognise it.
+/// Formats an element for messages: `<origin xyz="1 x 2">`.
 pub(super) fn element(node: Node<'_, '_>, attribute: Option<(&str, &str)>) -> String {
     match attribute {
         Some((name, text)) => format!("<{} {name}=\"{}\">", node.tag_name().name(), cut(text)),
@@ -280,7 +282,7 @@ pub(super) fn element(node: Node<'_, '_>, attribute: Option<(&str, &str)>) -> St
     }
 }
 
-/// At most 60 characters of a text, on one line.
+/// Shortens a text to at most 60 characters on one line.
 fn cut(text: &str) -> String {
     let mut short: String = text.chars().take(60).map(|c| if c.is_control() { ' ' } else { c }).collect();
     if text.chars().nth(60).is_some() {
@@ -289,18 +291,18 @@ fn cut(text: &str) -> String {
     short
 }
 
-/// A number in the fewest digits that read back to the same value.
+/// Formats a number with the fewest digits that read back to the same value.
 pub(super) fn shortest(number: f64) -> String {
     let text = format!("{number:?}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
-/// Numbers in the fewest digits, with spaces between.
+/// Formats numbers with the fewest digits, separated by spaces.
 pub(super) fn row(numbers: &[f64]) -> String {
     numbers.iter().map(|&n| shortest(n)).collect::<Vec<_>>().join(" ")
 }
 
-/// ` name="text"` with the characters escaped that XML does not take.
+/// Appends ` name="text"` with the special characters of XML escaped.
 pub(super) fn attribute(out: &mut String, name: &str, text: &str) {
     let _ = write!(out, " {name}=\"");
     for c in text.chars() {

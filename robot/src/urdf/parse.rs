@@ -1,8 +1,8 @@
-//! One URDF file, read and checked.
+//! Reader and checker of one URDF file.
 //!
-//! Our own pass over the document checks everything and keeps places; what it accepts is then handed to `urdf-rs` in a
-//! normalised form (absent numbers filled in, nothing it would misread), and `urdf-rs` supplies the model values. The
-//! first error ends the reading.
+//! A pass over the document checks everything and records locations. It writes a normalized form (absent numbers filled
+//! in, nothing that `urdf-rs` would misread), from which `urdf-rs` supplies the model values. Reading stops at the
+//! first error.
 
 use super::config::Strictness;
 use super::error::UrdfError;
@@ -20,17 +20,17 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The largest file that is read \[bytes\]. A URDF holds no meshes; more than this is a wrong file or an endless device.
+/// Size limit of a file \[bytes\]. A URDF holds no meshes; a larger file is a wrong file or an endless device.
 const LARGEST_FILE: u64 = 256 << 20;
 
-/// Top-level elements that mean nothing to the simulation and are common enough to be skipped without a word.
+/// Top-level elements without meaning for the simulation, common enough to be skipped without a warning.
 const SKIPPED: [&str; 8] =
     ["gazebo", "plugin", "ros2_control", "drake", "safety_controller", "sensor", "group", "verbose"];
 
 /// Reads a URDF file with the default [`Strictness`].
 ///
 /// # Errors
-/// Any [`UrdfError`] up to the tree checks; meshes are not looked at.
+/// Any [`UrdfError`] up to the tree checks; mesh files are not checked.
 pub fn parse_file(path: &Path) -> Result<UrdfFile, UrdfError> {
     parse_file_with(path, Strictness::default())
 }
@@ -38,7 +38,7 @@ pub fn parse_file(path: &Path) -> Result<UrdfFile, UrdfError> {
 /// Reads a URDF file.
 ///
 /// # Errors
-/// As [`parse_file`]; in strict reading also departures from URDF whose meaning is clear.
+/// As [`parse_file`]; strict reading also rejects deviations from URDF whose meaning is clear.
 pub fn parse_file_with(path: &Path, strictness: Strictness) -> Result<UrdfFile, UrdfError> {
     let owned = || path.to_path_buf();
     if path.is_dir() {
@@ -78,8 +78,8 @@ fn encoding(bytes: &[u8], wrong: usize, path: &Path) -> UrdfError {
     UrdfError::Encoding { at: Source::new(path, u32::try_from(line).unwrap_or(u32::MAX)), problem }
 }
 
-/// Reads a URDF from memory with the default [`Strictness`]; `path` names it in messages and is where relative mesh paths
-/// start.
+/// Reads a URDF from memory with the default [`Strictness`]. `path` names the file in messages, and relative mesh paths
+/// start at its folder.
 ///
 /// # Errors
 /// As [`parse_file`].
@@ -87,7 +87,7 @@ pub fn parse_str(text: &str, path: &Path) -> Result<UrdfFile, UrdfError> {
     parse_str_with(text, path, Strictness::default())
 }
 
-/// Reads a URDF from memory; `path` names it in messages and is where relative mesh paths start.
+/// Reads a URDF from memory. `path` names the file in messages, and relative mesh paths start at its folder.
 ///
 /// # Errors
 /// As [`parse_file_with`].
@@ -157,7 +157,7 @@ pub fn parse_str_with(text: &str, path: &Path, strictness: Strictness) -> Result
     })
 }
 
-/// What the pass over the document collects.
+/// Results of the pass over the document.
 #[derive(Default)]
 struct Pass {
     links: Vec<LinkNotes>,
@@ -165,7 +165,7 @@ struct Pass {
     link_names: Vec<Named>,
     edges: Vec<Edge>,
     meshdir: Option<String>,
-    /// The normalised links and joints.
+    /// Normalized links and joints.
     xml: String,
 }
 
@@ -190,7 +190,7 @@ impl Pass {
         Ok(())
     }
 
-    /// Whether the model has what we saw: the names and the numbers of shapes.
+    /// True if the model has the names and the numbers of shapes that the pass found.
     fn agrees_with(&self, robot: &urdf_rs::Robot) -> bool {
         robot.links.len() == self.links.len()
             && robot.joints.len() == self.joints.len()
@@ -216,7 +216,7 @@ fn malformed(error: roxmltree::Error, text: &str, path: &Path) -> UrdfError {
         roxmltree::Error::UnknownNamespace(prefix, _) if prefix == "xacro" => {
             UrdfError::Xacro { at, found: "an element with prefix xacro:".to_owned() }
         }
-        // The library points at the start, the user must look at the end.
+        // The library reports the start of the root element; the user must look at the end of the file.
         roxmltree::Error::UnclosedRootNode => {
             let line = text.lines().count();
             let column = text.lines().last().map_or(1, |l| l.chars().count() + 1);
@@ -243,13 +243,13 @@ fn check_root(reader: &mut Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfErr
     let is_xacro = |n: &Node<'_, '_>| n.tag_name().namespace().is_some_and(|s| s.contains("xacro"));
     for node in root.descendants().filter(Node::is_element).filter(is_xacro) {
         let Some(parent) = node.parent_element() else { continue };
-        // Those inside another one are ignored with it.
+        // Elements inside another xacro element are ignored with it.
         if is_xacro(&parent) {
             continue;
         }
         let (at, found) = (reader.source(node), format!("<xacro:{}>", node.tag_name().name()));
         let error = UrdfError::Xacro { at: at.clone(), found };
-        // At the top level links and joints may come of it.
+        // At the top level a xacro element may expand to links and joints.
         if parent == root {
             return Err(error);
         }
@@ -259,7 +259,7 @@ fn check_root(reader: &mut Reader<'_>, root: Node<'_, '_>) -> Result<(), UrdfErr
     Ok(())
 }
 
-/// `meshdir` of `<mujoco><compiler>`.
+/// Reads `meshdir` of `<mujoco><compiler>`.
 fn meshdir(reader: &Reader<'_>, node: Node<'_, '_>) -> Result<Option<String>, UrdfError> {
     for compiler in reader.named(node, "compiler") {
         if let Some(folder) = reader.text(compiler, "meshdir")? {
@@ -269,7 +269,8 @@ fn meshdir(reader: &Reader<'_>, node: Node<'_, '_>) -> Result<Option<String>, Ur
     Ok(None)
 }
 
-/// A transmission means nothing to the simulation, but one of an unknown joint is a sign of a broken file.
+/// Warns about transmissions of unknown joints. Transmissions have no meaning for the simulation, but an unknown joint
+/// indicates a broken file.
 fn check_transmissions(reader: &mut Reader<'_>, root: Node<'_, '_>, edges: &[Edge]) -> Result<(), UrdfError> {
     let joints: HashSet<&str> = edges.iter().map(|e| e.joint.name.as_str()).collect();
     for transmission in reader.named(root, "transmission") {

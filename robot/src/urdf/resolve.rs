@@ -1,63 +1,66 @@
-//! From the URI of a mesh or texture to a file.
+//! Resolver of mesh and texture URIs to files.
 //!
-//! | URI | where it is looked for, in this order |
-//! |---|---|
-//! | `package://pkg/rest`, `model://pkg/rest` | the folder given for `pkg` in the configuration, and only there; else `ROS_PACKAGE_PATH`, `AMENT_PREFIX_PATH` (`share/pkg`), then every folder above the URDF: itself, its `pkg`, and its children, where the name or the `<name>` of `package.xml` is `pkg` |
-//! | `file://...` | the absolute path; a relative one starts at the URDF |
-//! | absolute path | there |
-//! | relative path | the folder of the URDF, then the asset root of the configuration |
+//! Search order by form of the URI:
 //!
-//! The asset root is also the last folder in which packages are searched. `package:///path` has no package: in lenient reading
-//! it is an absolute path, or where that does not exist `package://path`.
+//! - `package://pkg/rest`, `model://pkg/rest`: the folder given for `pkg` in the configuration, and only there. Without
+//!   one: `ROS_PACKAGE_PATH`, `AMENT_PREFIX_PATH` (`share/pkg`), then every folder above the URDF. Each such folder
+//!   offers itself, its `pkg`, and its children, where the name or the `<name>` of `package.xml` is `pkg`.
+//! - `file://...`: the absolute path; a relative path starts at the URDF.
+//! - Absolute path: this path.
+//! - Relative path: the folder of the URDF, then the asset root of the configuration.
 //!
-//! What is not found there is looked for in `meshdir` of `<mujoco><compiler>`: the whole path, then only its last part,
-//! as MuJoCo does. `%20` and the like are decoded in URIs, and in plain paths if the path as written does not exist.
+//! The asset root is also the last folder that is searched for packages. `package:///path` has no package: in lenient
+//! reading it is an absolute path or, if that does not exist, `package://path`.
 //!
-//! `..` may leave a package or the folder of the URDF: robots do share meshes that way. The path simply has to exist; if
-//! it does not, the error shows the path with `..` worked out. Nothing is written, so climbing has no danger beyond
-//! reading a file that the user can read anyway.
+//! Files that are not found so far are searched in `meshdir` of `<mujoco><compiler>`: the whole path, then only its
+//! last part, as MuJoCo does. `%20` and similar escapes are decoded in URIs, and in plain paths if the path as written
+//! does not exist.
+//!
+//! `..` may leave a package or the folder of the URDF, since robots share meshes that way. The path only has to exist;
+//! otherwise the error shows the path with `..` resolved. Nothing is written, so `..` reaches only files that the user
+//! can read anyway.
 
 use super::config::Strictness;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Component, Path, PathBuf};
 
-/// How many entries of a folder are looked at in search of a package.
+/// Maximum number of entries of a folder that are examined in search of a package.
 const FOLDER_LIMIT: usize = 4096;
 
-/// What became of a URI.
+/// Result of resolving a URI.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub(super) enum Resolved {
     /// The file exists.
     Found(PathBuf),
-    /// The place is known and has no such file.
+    /// The location is known, but the file does not exist.
     Missing {
-        /// The most likely place.
+        /// Most likely path.
         guess: PathBuf,
-        /// Every file that was looked at.
+        /// Every path that was tried.
         tried: Vec<String>,
-        /// A remark that helps, such as a file whose name differs only in case.
+        /// Additional hint, such as a file whose name differs only in case.
         hint: Option<String>,
     },
-    /// The package was found nowhere.
+    /// The package was not found.
     PackageUnknown {
-        /// The package.
+        /// Name of the package.
         package: String,
-        /// The most likely place.
+        /// Most likely path.
         guess: PathBuf,
-        /// Every folder that was looked at.
+        /// Every folder that was searched.
         tried: Vec<String>,
     },
     /// The URI is empty.
     Empty,
-    /// Nothing that could be a file, such as `http://`.
+    /// The URI cannot name a file, such as `http://`.
     Unsupported {
-        /// What is wrong and what would be right.
+        /// Problem and accepted forms.
         problem: String,
     },
 }
 
-/// Finds the files that a URDF names. Asking twice for the same URI costs nothing.
+/// Resolver of the files that a URDF names. Results are cached by URI.
 #[derive(Debug)]
 pub(super) struct Resolver<'c> {
     packages: &'c BTreeMap<String, PathBuf>,
@@ -73,7 +76,7 @@ pub(super) struct Resolver<'c> {
     searched: HashMap<String, Search>,
 }
 
-/// The folders that may be a package, and all that were looked at.
+/// Folders that match a package, and all folders that were searched.
 #[derive(Clone, Debug, Default)]
 struct Search {
     found: Vec<PathBuf>,
@@ -81,8 +84,8 @@ struct Search {
 }
 
 impl<'c> Resolver<'c> {
-    /// A resolver for the URDF at `urdf`, with folders of packages by name. Reads `ROS_PACKAGE_PATH` and
-    /// `AMENT_PREFIX_PATH`.
+    /// Creates a resolver for the URDF at `urdf`, with package folders by name. Reads the environment variables
+    /// `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
     pub(super) fn new(urdf: &Path, packages: &'c BTreeMap<String, PathBuf>, meshdir: Option<&str>) -> Self {
         let paths = |name: &str| {
             let value = std::env::var_os(name).unwrap_or_default();
@@ -91,7 +94,8 @@ impl<'c> Resolver<'c> {
         Self::with_paths(urdf, packages, meshdir, paths("ROS_PACKAGE_PATH"), paths("AMENT_PREFIX_PATH"))
     }
 
-    /// As [`Resolver::new`], with the two search paths given instead of read from the environment.
+    /// Creates a resolver like [`Resolver::new`], with the two search paths as arguments instead of from the
+    /// environment.
     pub(super) fn with_paths(
         urdf: &Path,
         packages: &'c BTreeMap<String, PathBuf>,
@@ -99,7 +103,7 @@ impl<'c> Resolver<'c> {
         ros_package_path: Vec<PathBuf>,
         ament_prefix_path: Vec<PathBuf>,
     ) -> Self {
-        // Absolute, so that the walk upward does not end at the current folder and results survive a change of it.
+        // Absolute, so that the walk upward does not end at the current folder, and results survive a change of it.
         let absolute = std::path::absolute(urdf).unwrap_or_else(|_| urdf.to_path_buf());
         Self {
             packages,
@@ -114,20 +118,20 @@ impl<'c> Resolver<'c> {
         }
     }
 
-    /// The same resolver with the folder in which it searches what is not found from the URDF.
+    /// Sets the folder to search for files that are not found from the URDF.
     #[must_use]
     pub(super) fn with_asset_root(self, asset_root: Option<&Path>) -> Self {
         let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
         Self { asset_root: asset_root.map(absolute), ..self }
     }
 
-    /// The same resolver with another handling of addresses that are not valid.
+    /// Sets the handling of invalid URIs.
     #[must_use]
     pub(super) fn with_strictness(self, strictness: Strictness) -> Self {
         Self { strictness, ..self }
     }
 
-    /// The file of a URI.
+    /// Resolves a URI to a file.
     pub(super) fn resolve(&mut self, uri: &str) -> Resolved {
         if let Some(known) = self.resolved.get(uri) {
             return known.clone();
@@ -166,7 +170,7 @@ impl<'c> Resolver<'c> {
         }
     }
 
-    /// A path, absolute or from the folder of the URDF or the asset root.
+    /// Resolves a path that is absolute, or relative to the folder of the URDF or to the asset root.
     fn plain(&self, path: &str) -> Resolved {
         let decoded = decode(path);
         let folders = [Some(&self.folder), self.asset_root.as_ref()];
@@ -182,7 +186,7 @@ impl<'c> Resolver<'c> {
         }
         let file = file.trim_start_matches('/');
         let search = match self.packages.get(package) {
-            // A package the user named is there and nowhere else: a file found elsewhere would be a surprise.
+            // A configured package is searched in its folder only: a file from another folder would be a surprise.
             Some(folder) => Search { found: vec![folder.clone()], tried: Vec::new() },
             None => self.search(package),
         };
@@ -196,7 +200,7 @@ impl<'c> Resolver<'c> {
         }
     }
 
-    /// The first candidate that is a file, or what is in `meshdir`.
+    /// Returns the first candidate that is a file, or else the file in `meshdir`.
     fn first_file(&self, candidates: Vec<PathBuf>, path: &str) -> Resolved {
         if let Some(found) = candidates.iter().find(|c| c.is_file()) {
             return Resolved::Found(found.clone());
@@ -231,13 +235,13 @@ impl<'c> Resolver<'c> {
         candidates
     }
 
-    /// Folders that may be the package, best first.
+    /// Finds folders that match a package, best first.
     fn search(&mut self, package: &str) -> Search {
         if let Some(known) = self.searched.get(package) {
             return known.clone();
         }
         let mut search = Search::default();
-        // A package is one folder: `..` or an absolute path is no name, and joining it would leave the search path.
+        // A package is one folder: `..` or an absolute path is not a name, and joining it would leave the search path.
         let plain_name = matches!(Path::new(package).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
         if plain_name {
             for folder in self.ros_package_path.clone() {
@@ -259,7 +263,7 @@ impl<'c> Resolver<'c> {
 }
 
 impl Search {
-    /// The folder itself, the folder of that name in it, and its children whose `package.xml` has that name.
+    /// Checks the folder itself, its child of that name, and its children whose `package.xml` has that name.
     fn around(&mut self, folder: &Path, package: &str, why: &str) {
         if folder.file_name().is_some_and(|n| n == package) || declared_name(folder).as_deref() == Some(package) {
             self.check(folder.to_path_buf(), why);
@@ -285,7 +289,7 @@ impl Search {
     }
 }
 
-/// The `<name>` of the `package.xml` in a folder.
+/// Reads the `<name>` of the `package.xml` in a folder.
 fn declared_name(folder: &Path) -> Option<String> {
     let path = folder.join("package.xml");
     let metadata = std::fs::metadata(&path).ok()?;
@@ -298,7 +302,7 @@ fn declared_name(folder: &Path) -> Option<String> {
     Some(name.trim().to_owned())
 }
 
-/// Decodes `%20` and the like; what is no valid escape or no UTF-8 stays as it is.
+/// Decodes `%20` and similar escapes. Invalid escapes stay as they are, and so does a text that would not be UTF-8.
 fn decode(text: &str) -> String {
     let bytes = text.as_bytes();
     let mut decoded = Vec::with_capacity(bytes.len());
@@ -319,7 +323,7 @@ fn decode(text: &str) -> String {
     String::from_utf8(decoded).unwrap_or_else(|_| text.to_owned())
 }
 
-/// The path with `.` and `..` worked out as text, for messages.
+/// Resolves `.` and `..` in the text of a path, for messages.
 fn work_out(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for component in path.components() {
@@ -334,7 +338,7 @@ fn work_out(path: &Path) -> PathBuf {
     out
 }
 
-/// What is odd about a path that is no file.
+/// Explains why a path is not a file, if the folder shows a reason.
 fn remark(path: &Path) -> Option<String> {
     if path.is_dir() {
         return Some("it is a folder".to_owned());
@@ -354,8 +358,8 @@ mod tests {
     use super::*;
     use kinetoscope_testkit::urdf::Files;
 
-    /// `ws/robot_description/{package.xml,urdf/robot.urdf,meshes/part one.stl}`, `ws/other folder` with the package
-    /// `meshes_pkg`, `ws/install/share/installed`, `ws/ros/rospkg`.
+    /// Creates the test files `ws/robot_description/{package.xml,urdf/robot.urdf,meshes/part one.stl}`, `ws/other
+    /// folder` with the package `meshes_pkg`, `ws/install/share/installed`, and `ws/ros/rospkg`.
     fn workspace() -> Files {
         let files = Files::default();
         for (path, text) in [
@@ -442,7 +446,7 @@ mod tests {
         }
         let Resolved::Missing { tried, .. } = resolve(dir.folder(), "package://mapped/c.stl") else { panic!() };
         assert!(tried[0].ends_with("ws/other folder/c.stl"));
-        // Roots that are one folder: each place is listed once.
+        // Search roots that are one folder: each path is listed once.
         let same = dir.folder().join("ws/robot_description/urdf");
         let packages = BTreeMap::new();
         let resolver = Resolver::with_paths(&same.join("robot.urdf"), &packages, Some("."), vec![], vec![]);

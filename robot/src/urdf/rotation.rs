@@ -1,15 +1,15 @@
-//! Roll, pitch, yaw of a rotation, exact to rounding even where the pitch is a right angle.
+//! Conversion of a rotation to roll, pitch, yaw, exact to rounding even where the pitch is a right angle.
 
 use nalgebra::UnitQuaternion;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Fixed-axis roll, pitch, yaw \[rad\].
 ///
-/// The textbook way takes an arc sine of the pitch and loses half of the digits near a right angle, where many robots
-/// have joints. With the half-angle products of `q = qz(yaw) qy(pitch) qx(roll)`:
-/// `x + z = (c - s) sin(a)`, `w - y = (c - s) cos(a)`, `x - z = (c + s) sin(b)`, `w + y = (c + s) cos(b)` where
-/// `a = (roll + yaw)/2`, `b = (roll - yaw)/2`, `c, s = cos, sin(pitch/2)`: three arc tangents, each well conditioned in
-/// what it contributes to the rotation.
+/// The textbook formula takes an arc sine of the pitch and loses half of the digits near a right angle, where many
+/// robots have joints. With the half-angle products of `q = qz(yaw) qy(pitch) qx(roll)`:
+/// `x + z = (c - s) sin(a)`, `w - y = (c - s) cos(a)`, `x - z = (c + s) sin(b)`, `w + y = (c + s) cos(b)` where `a =
+/// (roll + yaw)/2`, `b = (roll - yaw)/2`, `c, s = cos, sin(pitch/2)`. This gives three arc tangents, each well
+/// conditioned in its contribution to the rotation.
 pub(super) fn rpy_of(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     let (w, x, y, z) = (rotation.w, rotation.i, rotation.j, rotation.k);
     let (a, b) = ((x + z).atan2(w - y), (x - z).atan2(w + y));

@@ -1,4 +1,4 @@
-//! Visuals and collisions of a file, with meshes, textures and materials resolved.
+//! Visual and collision shapes of a file, with meshes, textures and materials resolved.
 
 use super::config::UrdfCfg;
 use super::error::UrdfError;
@@ -12,13 +12,13 @@ use nalgebra::Vector3;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-/// Turns the shapes of one file into those of the description.
+/// Converter of the shapes of one file to those of the description.
 #[derive(Debug)]
 pub(super) struct Shapes<'f> {
     resolver: Resolver<'f>,
-    /// The materials of this file: a name never reaches into another component.
+    /// Materials of this file. A name never refers to a material of another component.
     materials: HashMap<&'f str, &'f urdf_rs::Material>,
-    /// A warning about `package:///` was given: the others of the file are alike.
+    /// True after the first warning about `package:///`; the file gets only one.
     warned_of_slash: bool,
 }
 
@@ -34,7 +34,7 @@ impl<'f> Shapes<'f> {
         Self { resolver, materials, warned_of_slash: false }
     }
 
-    /// The file of an address, with a warning about the first that is `package:///`.
+    /// Resolves a URI, with a warning about the first `package:///` of the file.
     fn resolve(&mut self, uri: &str, at: &Source, diagnostics: &mut Vec<Diagnostic>) -> Resolved {
         let resolved = self.resolver.resolve(uri);
         if let Resolved::Found(path) = &resolved
@@ -51,7 +51,7 @@ impl<'f> Shapes<'f> {
         resolved
     }
 
-    /// A visual. A mesh that does not exist is reported and keeps its most likely path.
+    /// Converts a visual. A missing mesh is reported and keeps its most likely path.
     pub(super) fn visual(
         &mut self,
         model: &urdf_rs::Visual,
@@ -86,7 +86,7 @@ impl<'f> Shapes<'f> {
         Ok(Visual { source: notes.source.clone(), link_from_shape: pose_of(&model.origin), geometry, material })
     }
 
-    /// A collision. Its mesh must exist: without it the robot would fall through things.
+    /// Converts a collision. Its mesh must exist: without the mesh the robot would fall through things.
     pub(super) fn collision(
         &mut self,
         model: &urdf_rs::Collision,
@@ -117,7 +117,7 @@ impl<'f> Shapes<'f> {
         Ok(Collision { source: source.clone(), link_from_shape: pose_of(&model.origin), geometry })
     }
 
-    /// The look of a visual: its own, or else that of the material it names.
+    /// Material of a visual: its own values or, without own values, those of the material it names.
     fn material(
         &mut self,
         model: &urdf_rs::Material,
@@ -147,7 +147,7 @@ impl<'f> Shapes<'f> {
     }
 }
 
-/// The most likely path, and what is wrong with it.
+/// Most likely path of a URI, and the problem with it.
 fn describe(resolved: Resolved, uri: &str) -> (PathBuf, String) {
     match resolved {
         Resolved::Found(path) => (path, "exists".to_owned()),
@@ -163,7 +163,7 @@ fn describe(resolved: Resolved, uri: &str) -> (PathBuf, String) {
     }
 }
 
-/// The first places; a warning need not be complete.
+/// Lists the first paths only: a warning need not be complete.
 fn shortened(tried: &[String]) -> String {
     let first = tried.iter().take(3).map(String::as_str).collect::<Vec<_>>().join(", ");
     if tried.len() > 3 { format!("{first} and {} more", tried.len() - 3) } else { first }

@@ -1,51 +1,54 @@
-//! The graph of a URDF must be a tree, and mimic joints must end at a free one. No walk recurses: a chain of a million
-//! links is as safe as one of ten.
+//! Tree of links and joints of a URDF file, with its checks: links must form a tree, and mimic chains must end at a
+//! free joint.
+//!
+//! Traversals do not recurse: a chain of a million links is as safe as one of ten.
 
 use super::error::UrdfError;
 use kinetoscope_scene::pattern::closest;
 use kinetoscope_scene::source::Source;
 use std::collections::HashMap;
 
-/// Links and joints of one file as indices.
+/// Tree of the links and joints of one file, as indices.
 #[derive(Clone, Debug, Default)]
 pub struct Tree {
-    /// The link without a parent.
+    /// Link without a parent.
     pub root: usize,
     /// Parent and child link of each joint.
     pub joint_links: Vec<(usize, usize)>,
-    /// The joint above each link; `None` for the root.
+    /// Joint above each link; `None` for the root.
     pub parent_joint: Vec<Option<usize>>,
-    /// The joints below each link, in file order.
+    /// Joints below each link, in file order.
     pub child_joints: Vec<Vec<usize>>,
-    /// The joint that each joint mimics.
+    /// Joint that each joint mimics.
     pub mimics: Vec<Option<usize>>,
     /// Number of joints between the root and each link.
     pub depth: Vec<usize>,
 }
 
-/// A named element.
+/// Named element and its location.
 #[derive(Clone, Debug)]
 pub(super) struct Named {
     pub(super) name: String,
     pub(super) source: Source,
 }
 
-/// A joint as the graph sees it.
+/// Joint as an edge of the graph.
 #[derive(Clone, Debug)]
 pub(super) struct Edge {
     pub(super) joint: Named,
-    /// The parent link, and the element that names it.
+    /// Name of the parent link, with the location of the element that names it.
     pub(super) parent: Named,
     pub(super) child: Named,
-    /// The joint that is followed, and the element that names it.
+    /// Name of the followed joint, with the location of the element that names it.
     pub(super) mimic: Option<Named>,
-    /// The word of the joint type, and whether other joints can follow it.
+    /// Name of the joint type.
     pub(super) kind: &'static str,
+    /// True if other joints can follow this joint.
     pub(super) movable: bool,
 }
 
 impl Tree {
-    /// Checks names, the tree and the mimic chains.
+    /// Builds the tree. Checks names, the tree and the mimic chains.
     pub(super) fn build(robot: &Source, links: &[Named], edges: &[Edge]) -> Result<Self, UrdfError> {
         if links.is_empty() {
             return Err(UrdfError::NoLinks { at: robot.clone() });
@@ -86,8 +89,8 @@ impl Tree {
         Ok(tree)
     }
 
-    /// Finds the root and the depths. Every link has at most one parent here, so what cannot be reached from the only
-    /// root is a circle.
+    /// Finds the root and the depths. Every link has at most one parent here, so links that the only root does not
+    /// reach contain a cycle.
     fn find_root(&mut self, links: &[Named], edges: &[Edge]) -> Result<(), UrdfError> {
         let roots: Vec<usize> = (0..links.len()).filter(|&l| self.parent_joint[l].is_none()).collect();
         if roots.len() > 1 {
@@ -112,7 +115,7 @@ impl Tree {
         Err(self.circle(lost, links, edges))
     }
 
-    /// The circle above `lost`, a link that hangs from no root.
+    /// Describes the cycle above `lost`, a link that the root does not reach.
     fn circle(&self, lost: usize, links: &[Named], edges: &[Edge]) -> UrdfError {
         let mut seen = vec![false; links.len()];
         let mut link = lost;
@@ -124,7 +127,7 @@ impl Tree {
             joints.push(joint);
             link = self.joint_links[joint].0;
         }
-        // The walk entered the circle at `link`; what came before it is a tail.
+        // The walk entered the cycle at `link`; earlier joints are a tail.
         let start = joints.iter().position(|&j| self.joint_links[j].1 == link).unwrap_or(0);
         let mut circle = joints.split_off(start);
         circle.reverse();
@@ -161,7 +164,7 @@ impl Tree {
             }
             self.mimics[id] = Some(followed);
         }
-        // Each joint is coloured with the walk that first saw it: meeting the own colour again is a circle.
+        // Each joint is marked with the walk that first reached it: reaching a mark of the same walk is a cycle.
         let mut colour = vec![usize::MAX; edges.len()];
         for start in 0..edges.len() {
             let mut joint = start;
@@ -188,7 +191,7 @@ impl Tree {
         UrdfError::MimicCycle { at, joint: edges[start].joint.name.clone(), joints }
     }
 
-    /// The leaves at the end of the longest chain of joints.
+    /// Finds the leaves at the end of the longest chain of joints.
     pub fn tips(&self) -> Vec<usize> {
         let deepest = self.depth.iter().copied().max().unwrap_or(0);
         (0..self.depth.len()).filter(|&l| self.depth[l] == deepest).collect()

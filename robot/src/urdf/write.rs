@@ -1,7 +1,7 @@
-//! A [`RobotDescription`] as URDF.
+//! Writer of a [`RobotDescription`] as URDF.
 //!
 //! The text is the same for the same description, and reads back to the same robot up to rounding (1e-12). Materials
-//! are written inside the visuals, since two components may use one name for two looks.
+//! are written inside the visuals, since two components may use one name for two materials.
 
 use super::number::{attribute, row, shortest};
 use super::rotation::rpy_of;
@@ -10,14 +10,14 @@ use kinetoscope_scene::Pose;
 use nalgebra::Matrix3;
 use std::path::Path;
 
-/// The robot as URDF, with absolute paths of meshes and textures.
+/// Writes the robot as URDF, with absolute paths of meshes and textures.
 pub fn write_urdf(robot: &RobotDescription) -> String {
     write_urdf_with(robot, |path| {
         std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()).to_string_lossy().into_owned()
     })
 }
 
-/// The robot as URDF; `file_name` says what is written for each mesh and texture file.
+/// Writes the robot as URDF. `file_name` returns the name to write for each mesh and texture file.
 pub fn write_urdf_with(robot: &RobotDescription, file_name: impl Fn(&Path) -> String) -> String {
     let mut writer = Writer { out: "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n".to_owned(), depth: 0 };
     writer.open("robot", &[("name", robot.name.clone())]);
@@ -175,7 +175,7 @@ impl Writer {
         if !matches!(joint.kind, JointKind::Fixed | JointKind::Floating) {
             self.empty("axis", &[("xyz", row(joint.axis.as_slice()))]);
         }
-        // A reader that is as strict as ours wants one for these; without ends it limits nothing.
+        // A strict reader requires `<limit>` for these types; without bounds it limits nothing.
         if joint.limit.is_none() && matches!(joint.kind, JointKind::Revolute | JointKind::Prismatic) {
             self.empty("limit", &[]);
         }
@@ -202,7 +202,7 @@ impl Writer {
         self.close("joint");
     }
 
-    /// An element with the attributes that are there.
+    /// Writes an element with the attributes that have a value.
     fn given(&mut self, element: &str, values: &[(&'static str, Option<f64>)]) {
         let given: Vec<_> = values.iter().filter_map(|&(name, v)| v.map(|v| (name, shortest(v)))).collect();
         self.empty(element, &given);

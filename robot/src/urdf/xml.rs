@@ -1,17 +1,18 @@
-//! XML that a parser of namespaces refuses and other readers of URDF take: repaired in the text before it is parsed.
+//! Repair of XML text that a namespace-aware parser rejects and other readers of URDF accept.
 
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::source::Source;
 use roxmltree::{Document, Error};
 use std::path::Path;
 
-/// The most prefixes that are declared for a file: more are no extension of URDF.
+/// Maximum number of prefixes that are declared for a file; more are not extensions of URDF.
 const MOST_PREFIXES: usize = 32;
 
-/// The text, line for line, without misplaced XML declarations and with all prefixes bound. `error` is the parser's first one.
+/// Removes misplaced XML declarations and binds all prefixes, without changing line numbers. `error` is the parser's
+/// first error.
 ///
 /// # Errors
-/// The first thing that is still not well-formed.
+/// The first remaining error of the parser.
 pub(super) fn repair(
     text: &str,
     mut error: Error,
@@ -23,7 +24,7 @@ pub(super) fn repair(
     let mut found = Vec::new();
     let prolog = Prolog::of(text);
     for &(start, end) in &prolog.misplaced {
-        // As many bytes as before, so that the places of further declarations stay.
+        // Blanks keep the length, so that the offsets of further declarations stay valid.
         let blank = text[start..end].bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }).collect::<String>();
         repaired.replace_range(start..end, &blank);
         let message = "the XML declaration <?xml ..?> is not at the very beginning of the file; it was ignored";
@@ -52,16 +53,16 @@ pub(super) fn repair(
         };
         error = next;
     }
-    // Columns of the line with the insertions are not those of the file.
+    // Columns of the line with the insertions differ from those of the file.
     let is_shifted = error.pos().row == line_of(&repaired, insert_at);
     Err(if is_shifted { check(text).unwrap_or(error) } else { error })
 }
 
-/// The text before the root element.
+/// Text before the root element.
 struct Prolog {
-    /// XML declarations that are not at the beginning.
+    /// Byte ranges of XML declarations that are not at the beginning.
     misplaced: Vec<(usize, usize)>,
-    /// Its length in bytes.
+    /// Length of the text in bytes.
     end: usize,
 }
 
@@ -88,7 +89,7 @@ impl Prolog {
         }
     }
 
-    /// The end of the name in the first tag; `None` in a text without a tag.
+    /// Finds the end of the name in the first tag; `None` in a text without a tag.
     fn end_of_root_name(&self, text: &str) -> Option<usize> {
         let name = text[self.end..].strip_prefix('<')?;
         let length = name.find(|c: char| c.is_whitespace() || matches!(c, '/' | '>'))?;
@@ -96,7 +97,7 @@ impl Prolog {
     }
 }
 
-/// The line of a byte, counted from 1.
+/// Line of a byte, counted from 1.
 fn line_of(text: &str, at: usize) -> u32 {
     u32::try_from(1 + text[..at].bytes().filter(|&b| b == b'\n').count()).unwrap_or(u32::MAX)
 }

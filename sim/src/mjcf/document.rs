@@ -1,6 +1,7 @@
-//! MJCF as plain data: bodies in a flat list with parents, one struct per element.
+//! MJCF document as plain data: one struct per element, bodies in a flat list with parent indices.
 //!
-//! Only what both MuJoCo lines have in common; [`super::write`](mod@super::write) knows the differences.
+//! It holds what both supported MuJoCo versions have in common; [`super::write`](mod@super::write) handles the
+//! differences.
 
 use super::part::MjcfPart;
 use crate::light_cfg::LampKind;
@@ -10,12 +11,12 @@ use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// A whole document.
+/// MJCF document.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mjcf {
     /// Name of the model.
     pub model: String,
-    /// Lines of a comment at the top.
+    /// Lines of a comment at the top of the document.
     pub comments: Vec<String>,
     /// Physics options.
     pub option: PhysicsOption,
@@ -23,31 +24,31 @@ pub struct Mjcf {
     pub meshes: Vec<MeshAsset>,
     /// Height fields.
     pub height_fields: Vec<HeightFieldAsset>,
-    /// Image files of materials.
+    /// Texture assets.
     pub textures: Vec<TextureAsset>,
-    /// Materials.
+    /// Material assets.
     pub materials: Vec<MaterialAsset>,
-    /// `bodies[0]` is the world; a body's parent stands before it.
+    /// Bodies. `bodies[0]` is the world, and parents precede their children.
     pub bodies: Vec<Body>,
     /// Lights fixed in the world.
     pub lights: Vec<Light>,
     /// Pairs of bodies that never collide.
     pub excludes: Vec<(String, String)>,
-    /// Couplings of joints.
+    /// Equality constraints between joints.
     pub equalities: Vec<JointEquality>,
-    /// Welds that hold when they are told to.
+    /// Weld constraints, inactive until they are switched on.
     pub welds: Vec<WeldEquality>,
-    /// Dry friction of driven joints, as tendons of one joint each.
+    /// Tendons of one joint each, which apply dry friction to driven joints.
     pub friction_tendons: Vec<FrictionTendon>,
     /// Actuators.
     pub actuators: Vec<Actuator>,
-    /// Named positions of all joints.
+    /// Keyframes: named positions of all joints.
     pub keyframes: Vec<Keyframe>,
-    /// MJCF files that are parts of the scene.
+    /// MJCF files that are embedded in the scene.
     pub parts: Vec<Arc<MjcfPart>>,
 }
 
-/// `<option>`.
+/// Physics options: `<option>`, and the default friction of geoms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhysicsOption {
     /// Physics step \[s\].
@@ -62,11 +63,11 @@ pub struct PhysicsOption {
     pub impratio: f64,
     /// Largest number of solver iterations.
     pub iterations: u32,
-    /// Sliding, torsional and rolling friction of geoms that set none.
+    /// Sliding, torsional and rolling friction of geoms without friction of their own.
     pub friction: [f64; 3],
 }
 
-/// Integrators that the two lines know.
+/// Integrators of the supported MuJoCo versions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Integrator {
@@ -77,13 +78,13 @@ pub enum Integrator {
     Rk4,
     /// Implicit in velocity.
     Implicit,
-    /// Implicit in velocity without Coriolis terms: MuJoCo 4.x.
+    /// Implicit in velocity without Coriolis terms; MuJoCo 4.x only.
     #[serde(alias = "implicitfast")]
     ImplicitFast,
 }
 
 impl Integrator {
-    /// MuJoCo's word.
+    /// Name of the integrator in MJCF.
     pub fn name(self) -> &'static str {
         match self {
             Self::Euler => "Euler",
@@ -94,7 +95,7 @@ impl Integrator {
     }
 }
 
-/// Friction cones.
+/// Type of friction cone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Cone {
@@ -105,45 +106,45 @@ pub enum Cone {
     Elliptic,
 }
 
-/// `<mesh>`.
+/// Mesh asset: `<mesh>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshAsset {
     /// Unique name.
     pub name: String,
-    /// The triangles.
+    /// Triangles of the mesh.
     pub content: MeshContent,
-    /// Only seen: may be flat or open.
+    /// True for a mesh of visual geoms only, which may be flat or open.
     pub visual: bool,
-    /// Where the mesh is named.
+    /// Location of the element that names the mesh.
     pub source: Option<Source>,
 }
 
-/// Where a mesh is.
+/// Storage of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeshContent {
-    /// In the document.
+    /// Inline, in the document.
     Inline {
         /// Vertices \[m\].
         vertices: Vec<[f32; 3]>,
-        /// Triangles.
+        /// Triangles as indices of vertices.
         triangles: Vec<[u32; 3]>,
     },
-    /// In a file next to the document.
+    /// File next to the document.
     File(String),
 }
 
-/// `<hfield>`.
+/// Height field asset: `<hfield>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightFieldAsset {
     /// Unique name.
     pub name: String,
-    /// MuJoCo's binary file next to the document.
+    /// File next to the document, in MuJoCo's binary format.
     pub file: String,
     /// Half length along x, half length along y, height of elevation 1, depth of the floor below elevation 0 \[m\].
     pub size: [f64; 4],
 }
 
-/// `<texture type="2d">`.
+/// Texture asset: `<texture type="2d">`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureAsset {
     /// Unique name.
@@ -152,23 +153,23 @@ pub struct TextureAsset {
     pub file: String,
 }
 
-/// `<material>`.
+/// Material asset: `<material>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialAsset {
     /// Unique name.
     pub name: String,
-    /// Colour.
+    /// RGBA color.
     pub rgba: [f64; 4],
     /// Name of the texture.
     pub texture: Option<String>,
 }
 
-/// `<body>`.
+/// Body: `<body>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// Unique name.
     pub name: String,
-    /// Index of the parent.
+    /// Index of the parent in [`Mjcf::bodies`].
     pub parent: usize,
     /// Pose in the parent's frame.
     pub pose: Pose,
@@ -176,54 +177,54 @@ pub struct Body {
     pub inertial: Option<Inertial>,
     /// Joints to the parent, in order.
     pub joints: Vec<Joint>,
-    /// Moved by hand: a child of the world without joints, with a pose of its own in every environment.
+    /// True for a mocap body: a child of the world without joints, whose pose is set in each environment.
     pub mocap: bool,
-    /// Shapes.
+    /// Collision and visual geoms.
     pub geoms: Vec<Geom>,
     /// Named frames.
     pub sites: Vec<Site>,
-    /// The link it comes from.
+    /// Location of the link that the body comes from.
     pub source: Option<Source>,
 }
 
-/// `<inertial>` in principal axes.
+/// Mass properties in principal axes: `<inertial>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inertial {
     /// Mass \[kg\].
     pub mass: f64,
-    /// Centre of mass in the body frame \[m\].
+    /// Center of mass in the body frame \[m\].
     pub com: Vector3<f64>,
-    /// Principal axes in the body frame.
+    /// Principal axes in the body frame, `body_from_principal`.
     pub axes: UnitQuaternion<f64>,
     /// Principal moments \[kg m²\].
     pub moments: Vector3<f64>,
-    /// Where it is given.
+    /// Location of the declaration.
     pub source: Option<Source>,
 }
 
-/// `<joint>`.
+/// Joint: `<joint>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Unique name.
     pub name: String,
-    /// Kind.
+    /// Type of the joint.
     pub kind: JointType,
     /// Axis in the body frame (hinge, slide).
     pub axis: Vector3<f64>,
-    /// Limits \[rad or m\].
+    /// Limits \[rad or m\]; `None` without limits.
     pub range: Option<[f64; 2]>,
-    /// Viscous damping.
+    /// Viscous damping \[N m s/rad or N s/m\].
     pub damping: f64,
-    /// Dry friction.
+    /// Dry friction \[N m or N\].
     pub frictionloss: f64,
-    /// Rotor inertia.
+    /// Rotor inertia \[kg m² or kg\].
     pub armature: f64,
-    /// Where it is described.
+    /// Location of the declaration.
     pub source: Option<Source>,
 }
 
 impl Joint {
-    /// A joint that leaves a child of the world free.
+    /// Creates a free joint, for a child of the world.
     pub fn free(name: impl Into<String>, source: Option<Source>) -> Self {
         Self {
             name: name.into(),
@@ -238,12 +239,12 @@ impl Joint {
     }
 }
 
-/// Kinds of joints.
+/// Types of joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum JointType {
     /// Six degrees of freedom, on a child of the world only.
     Free,
-    /// Rotation.
+    /// Rotation with three degrees of freedom.
     Ball,
     /// Rotation about an axis.
     Hinge,
@@ -251,7 +252,7 @@ pub enum JointType {
     Slide,
 }
 
-/// `<geom>`.
+/// Shape of a body: `<geom>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Geom {
     /// Unique name, if any.
@@ -260,76 +261,77 @@ pub struct Geom {
     pub shape: Shape,
     /// Pose in the body frame.
     pub pose: Pose,
-    /// What it is for.
+    /// Role of the geom: collision or visual.
     pub role: GeomRole,
-    /// Sliding, torsional and rolling friction; the document's default if unset.
+    /// Sliding, torsional and rolling friction; `None` for the document's default.
     pub friction: Option<[f64; 3]>,
-    /// How contacts give way; MuJoCo's defaults if unset.
+    /// Contact compliance; `None` for MuJoCo's defaults.
     pub surface: Option<Surface>,
-    /// Colour; MuJoCo's grey if unset.
+    /// RGBA color; `None` for MuJoCo's gray.
     pub rgba: Option<[f64; 4]>,
-    /// Name of a material.
+    /// Name of the material.
     pub material: Option<String>,
-    /// Where it is described.
+    /// Location of the declaration.
     pub source: Option<Source>,
 }
 
-/// How contacts of a geom give way.
+/// Contact compliance of a geom.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Surface {
-    /// Distance at which contacts begin to push \[m\].
+    /// Distance at which contact forces begin \[m\]: MuJoCo's `margin`.
     pub margin: f64,
-    /// MuJoCo's `solref`, `solimp` and `solmix`; its defaults if unset.
+    /// MuJoCo's `solref`, `solimp` and `solmix`; `None` for its defaults.
     pub solver: Option<ContactSolver>,
 }
 
-/// Reference, impedance and weight of contacts, as MuJoCo has them.
+/// Contact solver parameters of MuJoCo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSolver {
-    /// `solref`.
+    /// Reference: MuJoCo's `solref`.
     pub reference: [f64; 2],
-    /// `solimp`.
+    /// Impedance: MuJoCo's `solimp`.
     pub impedance: [f64; 5],
-    /// `solmix`.
+    /// Weight in a contact with another geom: MuJoCo's `solmix`.
     pub weight: f64,
 }
 
-/// What a geom is for.
+/// Role of a geom.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GeomRole {
-    /// Collides, by bits: two geoms collide if one's `contype` and the other's `conaffinity` share a bit.
+    /// Geom that collides, by bits: two geoms collide if one's `contype` and the other's `conaffinity` share a bit.
     Collision {
         /// MuJoCo's `contype`.
         contype: i32,
         /// MuJoCo's `conaffinity`.
         conaffinity: i32,
-        /// It is seen as well: the ground, objects. Collision shapes of robots stand behind their visuals.
+        /// True if the geom is visible as well, like the ground and objects. Collision shapes of robots are not: the
+        /// visuals stand in their place.
         seen: bool,
     },
-    /// Is only seen.
+    /// Visible geom without collisions.
     Visual,
 }
 
-/// Shapes of geoms, with MuJoCo's meaning of the numbers (half lengths).
+/// Shape of a geom, with the size conventions of MuJoCo (half lengths) \[m\].
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// Half lengths of what is drawn; the plane itself is infinite.
+    /// Infinite plane, with half lengths of the rendered part.
     Plane([f64; 2]),
-    /// Radius.
+    /// Sphere with its radius.
     Sphere(f64),
-    /// Radius and half length of the cylindrical part.
+    /// Capsule with its radius and the half length of the cylindrical part.
     Capsule(f64, f64),
-    /// Radius and half length.
+    /// Cylinder with its radius and half length.
     Cylinder(f64, f64),
-    /// Half lengths.
+    /// Box with its half lengths.
     Box([f64; 3]),
-    /// Name of a mesh.
+    /// Mesh with the name of its asset.
     Mesh(String),
-    /// Name of a height field.
+    /// Height field with the name of its asset.
     HeightField(String),
 }
 
-/// `<site>`: a named frame.
+/// Named frame: `<site>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Site {
     /// Unique name.
@@ -338,91 +340,91 @@ pub struct Site {
     pub pose: Pose,
 }
 
-/// `<light>`.
+/// Light: `<light>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
     /// Unique name.
     pub name: String,
     /// Position \[m\].
     pub position: Vector3<f64>,
-    /// Direction in which it shines.
+    /// Direction of the light.
     pub direction: Vector3<f64>,
-    /// Diffuse colour.
+    /// Diffuse color.
     pub diffuse: [f64; 3],
-    /// What kind of lamp it is.
+    /// Type of the light.
     pub kind: LampKind,
     /// Constant, linear and quadratic attenuation.
     pub attenuation: [f64; 3],
-    /// Radius of the lamp \[m\], which MuJoCo 2.2.2 does not know.
+    /// Radius of the light \[m\]; not supported by MuJoCo 2.2.2.
     pub radius: f64,
-    /// Whether it casts shadows.
+    /// True if the light casts shadows.
     pub cast_shadow: bool,
 }
 
-/// `<equality><joint>`: `follower = offset + multiplier * driver`.
+/// Equality constraint between joints, `<equality><joint>`: `follower = offset + multiplier * driver`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointEquality {
     /// Unique name.
     pub name: String,
-    /// The joint that follows.
+    /// Name of the following joint.
     pub follower: String,
-    /// The joint that is followed.
+    /// Name of the followed joint.
     pub driver: String,
     /// Ratio.
     pub multiplier: f64,
     /// Offset \[rad or m\].
     pub offset: f64,
-    /// Where it is given.
+    /// Location of the declaration.
     pub source: Option<Source>,
 }
 
-/// `<equality><weld>` that does not hold at first.
+/// Weld constraint that is inactive at first: `<equality><weld>`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WeldEquality {
     /// Unique name.
     pub name: String,
-    /// The one body.
+    /// Name of the first body.
     pub first: String,
-    /// The other one.
+    /// Name of the second body.
     pub second: String,
 }
 
-/// `<tendon><fixed>` of one joint, with dry friction.
+/// Tendon of one joint with dry friction: `<tendon><fixed>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionTendon {
     /// Unique name.
     pub name: String,
-    /// The joint.
+    /// Name of the joint.
     pub joint: String,
     /// Dry friction \[N m or N\].
     pub frictionloss: f64,
 }
 
-/// `<actuator><general>`: force = clamp(gain ctrl - kp q - kd v).
+/// Actuator, `<actuator><general>`: force = clamp(gain ctrl - kp q - kd v).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Actuator {
     /// Unique name.
     pub name: String,
-    /// The joint.
+    /// Name of the joint.
     pub joint: String,
     /// Gain of the control.
     pub gain: f64,
-    /// Stiffness.
+    /// Stiffness \[N m/rad or N/m\].
     pub kp: f64,
-    /// Damping.
+    /// Damping \[N m s/rad or N s/m\].
     pub kd: f64,
-    /// Largest force.
+    /// Largest force \[N m or N\]; `None` without a limit.
     pub force_limit: Option<f64>,
-    /// Range of the control.
+    /// Range of the control; `None` without a limit.
     pub ctrl_range: Option<[f64; 2]>,
-    /// The joint's place.
+    /// Location of the joint.
     pub source: Option<Source>,
 }
 
-/// `<key>`.
+/// Keyframe: `<key>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keyframe {
-    /// Name.
+    /// Name of the keyframe.
     pub name: String,
     /// Positions of all joints in MuJoCo's order.
     pub qpos: Vec<f64>,
@@ -431,7 +433,7 @@ pub struct Keyframe {
 }
 
 impl Mjcf {
-    /// An empty world.
+    /// Creates a document with an empty world.
     pub fn new(model: impl Into<String>, option: PhysicsOption) -> Self {
         let world = Body {
             name: "world".into(),

@@ -1,9 +1,8 @@
-//! From a robot description to the MJCF that MuJoCo compiles.
+//! MJCF: the document as plain data, its writer, and the readers of MJCF files.
 //!
-//! [`document`] mirrors MJCF as plain data, `robot` and `scene` fill it, `part` adds files that are MJCF already, and
-//! [`robot_file`] those that are robots;
-//! [`write`](mod@write) turns it into text for one of the two MuJoCo lines and remembers which line came from which element
-//! of the user's file.
+//! [`document`] mirrors MJCF as plain data, and `robot` and `scene` fill it. `part` embeds MJCF files in a scene, and
+//! [`robot_file`] reads MJCF files of robots. [`write`](mod@write) turns the document into text for one of the two
+//! supported MuJoCo versions, and records which line came from which element of the user's file.
 
 pub mod document;
 pub mod error;

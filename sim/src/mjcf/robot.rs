@@ -1,4 +1,4 @@
-//! A robot as MJCF bodies: fixed joints fused, inertias in principal axes, one actuator per driven joint.
+//! Converter of a robot to MJCF bodies: fixed joints fused, inertias in principal axes, one actuator per driven joint.
 
 use super::document::{
     Actuator, Body, FrictionTendon, Geom, GeomRole, Inertial, Integrator, Joint, JointEquality, JointType,
@@ -17,97 +17,97 @@ use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What the document is for.
+/// Use of the document: simulation or export.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Purpose<'a> {
-    /// To be stepped by us: each visual that is a mesh becomes a proxy geom that only has a pose; where `friction_tendons`, dry
-    /// friction of driven joints is a tendon, since the joint's own friction row carries the drive, and damping is left to
-    /// us.
+    /// Simulation by this crate. Each visual mesh becomes a proxy geom that only has a pose. With `friction_tendons`,
+    /// dry friction of driven joints is a tendon, since the joint's own friction row carries the drive, and this crate
+    /// applies the damping.
     Run {
-        /// Drives are friction rows.
+        /// True if drives are friction rows.
         friction_tendons: bool,
     },
-    /// To be opened elsewhere: real meshes, a site for every link.
+    /// Export to other programs: real meshes, and a site for every link.
     Export(&'a VisualAssets),
 }
 
-/// Visual meshes written next to an exported document: parts by file and scale.
+/// Visual meshes written next to an exported document, by file and scale.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct VisualAssets {
-    /// The parts of each mesh.
+    /// Parts of each mesh.
     pub parts: BTreeMap<MeshKey, Vec<VisualPart>>,
 }
 
-/// One part of a visual mesh with one look.
+/// Part of a visual mesh with one material.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct VisualPart {
     /// Name of the mesh asset.
     pub mesh: String,
-    /// Name of the material asset, where the mesh file gives one.
+    /// Name of the material asset; `None` if the mesh file gives no material.
     pub material: Option<String>,
 }
 
-/// How a robot enters the document.
+/// Settings for adding a robot to the document.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotCfg<'a> {
     /// Prefix of all names: `uid/link`.
     pub uid: &'a str,
     /// Contact bits of all its geoms.
     pub contact: GeomRole,
-    /// Does not move in the world.
+    /// True if the root link is fixed in the world.
     pub fix_base: bool,
     /// Pose of the root link in the environment.
     pub base_pose: Pose,
-    /// One per drivable joint.
+    /// Plan of each drivable joint.
     pub plans: &'a [JointPlan],
     /// Convex hulls of collision meshes.
     pub hulls: &'a BTreeMap<MeshKey, TriMesh>,
-    /// Driven joints have a tendon for dry friction, whether they have some or not.
+    /// True if every driven joint gets a tendon for dry friction, even without friction at first.
     pub room_for_friction: bool,
-    /// What the document is for.
+    /// Use of the document.
     pub purpose: Purpose<'a>,
 }
 
-/// Where the robot's parts are in the document.
+/// Names of the robot's elements in the document.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct RobotLayout {
-    /// For every link (fused ones included): the body it is part of, and its frame there.
+    /// Body and frame of every link, fused links included.
     pub links: Vec<LinkFrame>,
-    /// The joint that leaves the root link free; `None` where it is fixed.
+    /// Name of the free joint of the root link; `None` for a fixed base.
     pub free_joint: Option<String>,
     /// Pairs of bodies that touch by construction: a fixed base and its first children.
     pub base_pairs: Vec<(String, String)>,
-    /// What every named geom is.
+    /// Owner of every named geom.
     pub geoms: Vec<GeomOwner>,
-    /// Joints whose damping is integrated with the drives: see [`crate::drive::implicit`].
+    /// Joints whose damping is integrated with the drives; see [`crate::drive::implicit`].
     pub damped: Vec<DampedJoint>,
 }
 
-/// Whose shape a geom is.
+/// Link and visual that a geom belongs to.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GeomOwner {
     /// Name of the geom.
     pub geom: String,
-    /// The link, fused or not.
+    /// Link of the geom, fused or not.
     pub link: LinkId,
-    /// Which of the link's visuals; `None` for a collision shape.
+    /// Index of the visual of the link; `None` for a collision shape.
     pub visual: Option<usize>,
 }
 
-/// A joint whose viscous damping was left out of the document; its armature holds the implicit half.
+/// Joint whose viscous damping is left out of the document; its armature there includes the implicit part.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct DampedJoint {
     /// Name of the joint.
     pub joint: String,
     /// Number of its degrees of freedom.
     pub dofs: usize,
-    /// The damping of each \[N m s/rad or N s/m\].
+    /// Damping of each degree of freedom \[N m s/rad or N s/m\].
     pub damping: f64,
-    /// The armature of each without that half \[kg m² or kg\].
+    /// Armature of each degree of freedom without the implicit part \[kg m² or kg\].
     pub armature: f64,
 }
 
-/// A link's frame in its body.
+/// Frame of a link in its body.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LinkFrame {
     /// Name of the body.
@@ -147,7 +147,7 @@ pub(crate) fn add(
         .placed
         .iter()
         .map(|placed| {
-            // Every link is reachable from the root: `urdf::merge` refuses anything else.
+            // Every link is reachable from the root: `urdf::merge` rejects any other robot.
             let (body, body_from_link) = placed.unwrap_or((0, Pose::identity()));
             LinkFrame { body: emitter.mjcf.bodies[body].name.clone(), body_from_link }
         })
@@ -162,7 +162,7 @@ struct Emitter<'a, 'm> {
     mjcf: &'m mut Mjcf,
     diagnostics: &'m mut Vec<Diagnostic>,
     plan_of: BTreeMap<JointId, &'a JointPlan>,
-    /// The joint that leaves the root link free.
+    /// Name of the free joint of the root link.
     free_joint: Option<String>,
     /// Number of bodies above each body of this robot.
     depth: BTreeMap<usize, usize>,
@@ -183,7 +183,7 @@ impl Emitter<'_, '_> {
         unused_joint(self.description, self.cfg.uid, own)
     }
 
-    /// Links depth first from the root, a body for each that moves.
+    /// Adds the links depth first from the root, with a body for each link that moves.
     fn bodies(&mut self) -> Result<(), EmitError> {
         let root = self.description.root;
         let root_joints = if self.cfg.fix_base { Vec::new() } else { vec![Joint::free(self.unused("base"), None)] };
@@ -210,8 +210,8 @@ impl Emitter<'_, '_> {
         Ok(())
     }
 
-    /// MuJoCo allows a free joint only on a child of the world: below a part that does not move, such a link becomes
-    /// one.
+    /// Parent and pose of the body behind a joint. MuJoCo allows free joints only on children of the world: a floating
+    /// link below a fixed base becomes a child of the world.
     fn parent_for(&self, kind: JointKind, parent: usize, pose: Pose) -> (usize, Pose) {
         let is_root = self.mjcf.bodies[parent].parent == 0;
         if kind == JointKind::Floating && self.cfg.fix_base && is_root {
@@ -247,7 +247,7 @@ impl Emitter<'_, '_> {
         Ok(index)
     }
 
-    /// Puts a link's shapes into its body.
+    /// Adds the shapes of a link to its body.
     fn place(&mut self, link: LinkId, body: usize, body_from_link: Pose) {
         self.placed[link.0] = Some((body, body_from_link));
         self.masses.entry(body).or_default().push(link);
@@ -301,11 +301,11 @@ impl Emitter<'_, '_> {
         }
     }
 
-    /// The hull of a collision mesh as an inline asset, once per file and scale.
+    /// Adds the hull of a collision mesh as an inline asset, once per file and scale. Returns the name of the asset.
     fn hull_asset(&mut self, path: &Path, scale: &Vector3<f64>, source: &Source) -> String {
         let key = MeshKey::new(path, scale);
         let index = self.cfg.hulls.keys().position(|k| *k == key).unwrap_or(usize::MAX);
-        // The slash keeps it apart from the names of exported meshes, the uid from other robots' hulls.
+        // The slash keeps the name distinct from exported meshes, the uid from hulls of other robots.
         let name = format!("{}/hull{index}", self.cfg.uid);
         if !self.mjcf.meshes.iter().any(|m| m.name == name)
             && let Some(hull) = self.cfg.hulls.get(&key)
@@ -346,7 +346,7 @@ impl Emitter<'_, '_> {
         }
     }
 
-    /// The MuJoCo joints of one URDF joint.
+    /// MuJoCo joints of one URDF joint.
     fn joints(&self, id: JointId, parent: usize) -> Vec<Joint> {
         let joint = self.description.joint(id);
         let name = self.name(&joint.name);
@@ -363,7 +363,7 @@ impl Emitter<'_, '_> {
         match joint.kind {
             JointKind::Fixed => Vec::new(),
             JointKind::Floating if parent == 0 => vec![Joint::free(name, Some(joint.source.clone()))],
-            // Below a moving part the six degrees of freedom are three slides and a ball.
+            // Below a moving body, the six degrees of freedom are three slides and a ball.
             JointKind::Floating => vec![
                 plain(".x", JointType::Slide, Vector3::x()),
                 plain(".y", JointType::Slide, Vector3::y()),
@@ -393,15 +393,16 @@ impl Emitter<'_, '_> {
         }
     }
 
-    /// Where drives are rows, damping B acts inside the solve as well: `h B` as armature (in the document, so that every
-    /// constant MuJoCo derives from the inertia has it) and `-B v` applied in each step.
+    /// Moves viscous damping out of the document where drives are friction rows. Damping B then acts inside the solve
+    /// as well: `h B` as armature (in the document, so that every constant that MuJoCo derives from the inertia
+    /// includes it) and `-B v` applied in each step.
     fn move_damping(&mut self, joints: &mut [Joint]) {
-        // RK4 evaluates forces inside its step, where nothing of ours is called (and it takes no row drives).
+        // RK4 evaluates forces inside its step, where no code of this crate runs, and row drives do not support RK4.
         if !self.friction_is_tendon() || self.mjcf.option.integrator == Integrator::Rk4 {
             return;
         }
         for joint in joints.iter_mut().filter(|joint| joint.kind != JointType::Free) {
-            // Those without damping as well: an environment may be told some while it runs.
+            // Joints without damping too: an environment may set damping at run time.
             let (damping, armature) = (std::mem::take(&mut joint.damping), joint.armature);
             joint.armature += self.mjcf.option.timestep * damping;
             let dofs = if joint.kind == JointType::Ball { 3 } else { 1 };
@@ -413,7 +414,8 @@ impl Emitter<'_, '_> {
         matches!(self.cfg.purpose, Purpose::Run { friction_tendons: true })
     }
 
-    /// Mass properties of every body from the links fused into it, repaired where no rigid body has them.
+    /// Sets the mass properties of every body from the links fused into it, repaired where they are physically
+    /// impossible.
     fn inertias(&mut self) {
         let masses = std::mem::take(&mut self.masses);
         for (body, links) in masses {
@@ -449,7 +451,8 @@ impl Emitter<'_, '_> {
         }
     }
 
-    /// MuJoCo does not exclude contacts of a body with its parent where the parent is fixed in the world.
+    /// Pairs of a fixed base and its child bodies. MuJoCo does not exclude contacts of a body with a parent that is
+    /// fixed in the world.
     fn base_pairs(&self) -> Vec<(String, String)> {
         let Some((base, _)) = self.placed[self.description.root.0].filter(|_| self.cfg.fix_base) else {
             return Vec::new();
@@ -462,7 +465,7 @@ impl Emitter<'_, '_> {
     }
 }
 
-/// The full name of a joint that the files do not have: `own`, with primes where a joint of them is called that.
+/// Full name of an added joint: `own`, with primes appended while a joint of the files has that name.
 pub(super) fn unused_joint(description: &RobotDescription, uid: &str, own: &str) -> String {
     let mut own = own.to_owned();
     while description.joint_id(&own).is_some() {
@@ -471,7 +474,7 @@ pub(super) fn unused_joint(description: &RobotDescription, uid: &str, own: &str)
     format!("{uid}/{own}")
 }
 
-/// Adds the actuator of a joint that is driven, and where wanted a tendon that holds its dry friction.
+/// Adds the actuator of a driven joint and, with `friction_tendon`, a tendon for its dry friction.
 pub(super) fn add_drive(
     mjcf: &mut Mjcf,
     uid: &str,
@@ -481,7 +484,7 @@ pub(super) fn add_drive(
 ) {
     let Some(actuator) = plan.actuator else { return };
     let name = format!("{uid}/{}", joint.name);
-    // Without stiffness the control is a velocity, without both an effort.
+    // Without stiffness the control is a velocity; without stiffness and damping it is an effort.
     let gain = [actuator.kp, actuator.kd, 1.0].into_iter().find(|&g| g > 0.0).unwrap_or(1.0);
     let positions = actuator.kp > 0.0 && plan.usable.iter().all(|end| end.is_finite());
     mjcf.actuators.push(Actuator {
@@ -503,17 +506,17 @@ pub(super) fn add_drive(
     }
 }
 
-/// MuJoCo refuses a force range of nothing \[N m or N\].
+/// Smallest force limit \[N m or N\]: MuJoCo rejects an empty force range.
 const SMALLEST_EFFORT: f64 = 1e-12;
 
-/// MuJoCo refuses a range without extent: limits that are equal, which lock a joint, are moved apart by a hair.
+/// Widens equal limits, which lock a joint, by a tiny amount: MuJoCo rejects an empty range.
 fn open_range([low, high]: [f64; 2]) -> [f64; 2] {
     const HAIR: f64 = 1e-9;
     let hair = HAIR * low.abs().max(1.0);
     if high - low < hair { [low - hair, high + hair] } else { [low, high] }
 }
 
-/// The body or one above it has a joint.
+/// True if the body or a body above it has a joint.
 fn is_moving(bodies: &[Body], mut body: usize) -> bool {
     while body != 0 {
         if !bodies[body].joints.is_empty() {

@@ -1,4 +1,4 @@
-//! What is in the world beside robots: the ground, terrain, objects, lights.
+//! Ground, terrain, objects and lights of the MJCF document.
 
 use super::document::{
     Body, ContactSolver, Geom, GeomRole, HeightFieldAsset, Inertial, Joint, Light, MeshAsset, MeshContent, Mjcf, Shape,
@@ -15,15 +15,15 @@ use kinetoscope_scene::Pose;
 
 /// Contact bit of the ground and of objects.
 pub(crate) const WORLD_BIT: i32 = 1;
-/// Bits that can be used: MuJoCo's are signed 32-bit numbers.
+/// All usable bits: MuJoCo's are signed 32-bit numbers.
 const ALL_BITS: i32 = i32::MAX;
 
-/// Contact bits of the ground and of objects: they collide with everything.
+/// Contact bits of the ground and of objects, which collide with everything.
 pub(crate) const WORLD_CONTACT: GeomRole =
     GeomRole::Collision { contype: WORLD_BIT, conaffinity: ALL_BITS, seen: true };
 
-/// Contact bits of robot number `index`: it collides with the world and with other robots, and with itself where
-/// `self_collision`.
+/// Contact bits of robot `index`. It collides with the world and with other robots, and with itself if `self_collision`
+/// is set.
 pub(crate) fn robot_contact(index: usize, self_collision: bool) -> GeomRole {
     let bit = 1 << (index + 1).min(MAX_ROBOTS);
     let conaffinity = if self_collision { ALL_BITS } else { ALL_BITS & !bit };
@@ -45,12 +45,12 @@ pub(crate) fn add_ground(mjcf: &mut Mjcf, half_size: f64, [r, g, b]: [f64; 3]) {
     });
 }
 
-/// File of terrain number `index`, next to the document.
+/// Name of the height field file of terrain `index`, next to the document.
 pub(crate) fn terrain_file(index: usize) -> String {
     format!("terrain{index}.bin")
 }
 
-/// Adds a terrain: a height field and a geom of the world, both called by its uid.
+/// Adds a terrain: a height field and a geom of the world, both named by its uid.
 pub(crate) fn add_terrain(mjcf: &mut Mjcf, index: usize, terrain: &Terrain) {
     let cfg = terrain.cfg();
     let [x, y] = cfg.size.map(|length| length / 2.0);
@@ -59,7 +59,7 @@ pub(crate) fn add_terrain(mjcf: &mut Mjcf, index: usize, terrain: &Terrain) {
         file: terrain_file(index),
         size: [x, y, terrain.rise(), cfg.thickness],
     });
-    // MuJoCo's elevation 0 is the lowest point.
+    // Elevation 0 of MuJoCo is the lowest point.
     let lowest = Pose::translation(0.0, 0.0, terrain.height_range()[0]);
     mjcf.bodies[0].geoms.push(Geom {
         name: Some(cfg.uid.clone()),
@@ -74,8 +74,8 @@ pub(crate) fn add_terrain(mjcf: &mut Mjcf, index: usize, terrain: &Terrain) {
     });
 }
 
-/// Adds a rigid object: a body called by its uid, with the geom `uid/shape` (and `uid/shape1`... where it collides in pieces),
-/// the joint `uid/free`, and, where a file says what it looks like, geoms called `uid/visual`.
+/// Adds a rigid object: a body named by its uid, with the geom `uid/shape` (and `uid/shape1`... for several collision
+/// shapes) and the joint `uid/free`. An object with visual meshes has geoms named `uid/visual` as well.
 pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Purpose<'_>) {
     let cfg = object.cfg();
     let MassProperties { mass, com, axes, moments } = *object.mass_properties();
@@ -129,8 +129,8 @@ pub(crate) fn add_object(mjcf: &mut Mjcf, object: &RigidObjectData, purpose: &Pu
     });
 }
 
-/// What is seen of an object that does not look like what collides: in a run a proxy that only has a pose, elsewhere the
-/// parts of its file.
+/// Visual geoms of an object that looks different from its collision shapes. A simulation has a proxy that only has a
+/// pose, an export has the parts of the mesh file.
 fn visuals(object: &RigidObjectData, purpose: &Purpose<'_>) -> Vec<Geom> {
     let cfg = object.cfg();
     let Some(key) = object.mesh_key() else { return Vec::new() };
@@ -163,7 +163,7 @@ fn visuals(object: &RigidObjectData, purpose: &Purpose<'_>) -> Vec<Geom> {
 /// Size of a proxy \[m\]: it has a pose, no mass and no contact.
 const PROXY: f64 = 1e-3;
 
-/// Adds a lamp. MuJoCo has no dome: that is of our renderers alone.
+/// Adds a light. Dome lights are skipped: MuJoCo does not have them, and only the renderers of this project use them.
 pub(crate) fn add_light(mjcf: &mut Mjcf, index: usize, cfg: &LightCfg) {
     if matches!(cfg.kind, LampKind::Dome { .. }) {
         return;
@@ -171,7 +171,7 @@ pub(crate) fn add_light(mjcf: &mut Mjcf, index: usize, cfg: &LightCfg) {
     mjcf.lights.push(Light {
         name: light_name(index),
         position: cfg.position,
-        // MuJoCo takes a short direction for none.
+        // MuJoCo treats a short direction as no direction.
         direction: cfg.direction.normalize(),
         diffuse: cfg.color,
         kind: cfg.kind,

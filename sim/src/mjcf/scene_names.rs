@@ -1,9 +1,9 @@
-//! Names and limits of what a simulation adds to its document.
+//! Names and limits of elements that a simulation adds to its document.
 
-/// How many robots can have a bit of their own.
+/// Maximum number of robots with a contact bit of their own.
 pub(crate) const MAX_ROBOTS: usize = 30;
 
-/// Name of a lamp of the simulation.
+/// Name of a light of the simulation.
 pub(crate) fn light_name(index: usize) -> String {
     format!("light{index}")
 }

@@ -1,6 +1,6 @@
-//! MJCF text: deterministic, one element per line, with the place each line came from.
+//! Writer of MJCF text: deterministic, one element per line, with the location that each line came from.
 //!
-//! What differs between the lines of MuJoCo is decided here and nowhere else.
+//! Differences between the supported MuJoCo versions are handled here, and for parts in `part`.
 
 use super::document::{
     Actuator, Body, Cone, ContactSolver, Geom, GeomRole, Inertial, Joint, JointType, MeshAsset, MeshContent, Mjcf,
@@ -13,17 +13,17 @@ use kinetoscope_scene::Pose;
 use kinetoscope_scene::source::Source;
 use std::fmt::Write as _;
 
-/// Text and the source of each of its lines.
+/// MJCF text with the source of each of its lines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Text {
-    /// The XML.
+    /// XML text.
     pub xml: String,
-    /// For each line of `xml`, the element of the user's file that caused it.
+    /// Element of the user's file that caused each line of `xml`.
     pub sources: Vec<Option<Source>>,
 }
 
 impl Text {
-    /// Adds to a compile error the place in the user's file that caused the line MuJoCo names.
+    /// Adds to a compile error the location in the user's file that caused the line in MuJoCo's message.
     #[must_use]
     pub fn locate(&self, mut error: CompileError) -> CompileError {
         error.source_line = error
@@ -48,9 +48,10 @@ pub fn write(mjcf: &Mjcf, target: Target) -> Text {
     Text { xml: out.xml, sources: out.sources }
 }
 
-/// Impedance of dry friction: MuJoCo's largest. At rest friction is a stiff damper: a joint under a load below its friction
-/// creeps by (1 - d) / d of the speed that the load would give it in the damper's time constant, here one time step. With
-/// MuJoCo's defaults (0.9, 10 ms) it slides out of the band in which friction holds it within a second.
+/// Impedance of dry friction: MuJoCo's largest. Friction at rest is a stiff damper: under a load below its friction, a
+/// joint creeps. Its speed is (1 - d) / d of the speed that the load would give it in the time constant of the damper,
+/// here one time step. With MuJoCo's defaults (0.9, 10 ms) the joint slides out of the band in which friction holds
+/// within a second.
 const FRICTION_IMPEDANCE: &str = "0.9999 0.9999 0.001 0.5 2";
 
 /// Impedance of a mimic coupling: MuJoCo's largest, 0.9999. The coupling yields by (1 - d) / d of the acceleration that
@@ -66,7 +67,7 @@ struct Writer {
     friction: [f64; 2],
 }
 
-/// One element under construction.
+/// Builder of one element.
 pub(super) struct Element {
     text: String,
 }
@@ -105,18 +106,18 @@ impl Element {
         }
     }
 
-    /// The text of an element without content.
+    /// Returns the text of an element without content.
     pub(super) fn leaf(self) -> String {
         self.text + "/>"
     }
 
-    /// The text that opens an element.
+    /// Returns the opening tag of an element.
     pub(super) fn open(self) -> String {
         self.text + ">"
     }
 }
 
-/// Shortest text that reads back as the same number; -0 is 0.
+/// Formats a number with the shortest text that reads back to the same value; -0 becomes 0.
 pub(super) fn number(value: f64) -> String {
     let value = value + 0.0;
     if value != 0.0 && !(1e-4..1e9).contains(&value.abs()) { format!("{value:e}") } else { format!("{value}") }
@@ -194,7 +195,7 @@ impl Writer {
             self.close("actuator");
         }
         self.parts(mjcf, "actuator", |part| &part.actuators);
-        // 2.2.2 wants those with an activation behind all others.
+        // MuJoCo 2.2.2 requires actuators with an activation after all others.
         self.parts(mjcf, "actuator", |part| &part.actuators_with_state);
         self.parts(mjcf, "sensor", |part| &part.sensors);
         if !mjcf.keyframes.is_empty() {
@@ -223,13 +224,14 @@ impl Writer {
                 .attr("iterations", o.iterations),
             None,
         );
-        // 2.2.2's defaults (500 rows, 100 contacts) drop contacts silently in plain viewers; 4.x sizes its arena itself.
+        // 2.2.2's defaults (500 rows, 100 contacts) drop contacts silently in plain viewers; 4.x sizes its arena on its
+        // own.
         if self.target == Target::V2 {
             self.leaf(Element::new("size").attr("njmax", 1500).attr("nconmax", 300), None);
         }
     }
 
-    /// What the parts that were MJCF files bring to a section of the document.
+    /// Writes the lines of all parts for a section of the document.
     fn parts(&mut self, mjcf: &Mjcf, section: &str, lines: impl Fn(&PartLines) -> &Vec<String>) {
         let target = self.target;
         if mjcf.parts.iter().all(|part| lines(part.lines(target)).is_empty()) {
@@ -240,7 +242,7 @@ impl Writer {
         self.close(section);
     }
 
-    /// As [`parts`](Self::parts), in a section that is open.
+    /// Writes the lines of all parts into a section that is open.
     fn part_lines(&mut self, mjcf: &Mjcf, lines: impl Fn(&PartLines) -> &Vec<String>) {
         let target = self.target;
         for part in &mjcf.parts {
@@ -288,7 +290,8 @@ impl Writer {
     fn mesh(&mut self, mesh: &MeshAsset) {
         let mut element = Element::new("mesh").attr("name", &mesh.name);
         if mesh.visual && self.target == Target::V4 {
-            // A flat or open mesh has no volume: 4.x asks for its inertia as a shell, 2.2.2 does not know the attribute.
+            // A flat or open mesh has no volume: 4.x needs its inertia as a shell; 2.2.2 does not support the
+            // attribute.
             element = element.attr("inertia", "shell");
         }
         element = match &mesh.content {
@@ -302,7 +305,7 @@ impl Writer {
         self.leaf(element, mesh.source.as_ref());
     }
 
-    /// Bodies depth first with a stack of our own: a chain of any length must not exhaust the call stack.
+    /// Writes the bodies depth first with an explicit stack: a chain of any length must not exhaust the call stack.
     fn bodies(&mut self, mjcf: &Mjcf) {
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); mjcf.bodies.len()];
         for (i, body) in mjcf.bodies.iter().enumerate().skip(1) {
@@ -317,12 +320,12 @@ impl Writer {
                     element.attr("directional", "false").attr("cutoff", cutoff_deg).attr("exponent", exponent)
                 }
                 (LampKind::Point, Target::V4) => element.attr("type", "point"),
-                // As OpenGL's: a cone all around. Domes are not among the lights of a document.
+                // As in OpenGL: a cone in all directions. A document has no dome lights.
                 (LampKind::Point | LampKind::Dome { .. }, _) => {
                     element.attr("directional", "false").attr("cutoff", 180).attr("exponent", 0)
                 }
             };
-            // What is as MuJoCo has it anyway is not said. A directional lamp has an angle, not a radius.
+            // Defaults of MuJoCo are omitted. A directional light has an angle, not a radius.
             let attenuation = light.attenuation.map(|x| x.to_string()).join(" ");
             let radius = self.target == Target::V4 && light.kind != LampKind::Directional;
             let element = element
@@ -364,8 +367,8 @@ impl Writer {
         }
         let is_free = body.joints.iter().any(|joint| joint.kind == JointType::Free);
         if self.target == Target::V4 && is_free && is_leaf {
-            // Else 4.x keeps only the diagonal of the inertia matrix of a centred body that carries no other, and an
-            // environment cannot have another centre of mass; 2.2.2 does not know the attribute.
+            // Otherwise 4.x keeps only the diagonal of the inertia matrix of a centered body without children, and an
+            // environment cannot have another center of mass. 2.2.2 does not support the attribute.
             element = element.attr("simple", "false");
         }
         element

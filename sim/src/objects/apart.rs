@@ -1,16 +1,18 @@
-//! Pairs of things that never collide.
+//! Collision exclusions between bodies.
 
 use crate::error::{Error, Result};
 use crate::manager::SimulationManager;
 
 impl SimulationManager {
-    /// Lets two things pass through each other from now on, in all environments: objects by their uid, links as `uid/link`,
-    /// all links of a robot by its uid, bodies of MJCF parts as `uid/body`, and `world`, which is the ground and all terrains.
-    /// Between links of one robot it takes pairs out of its self-collision. A link that a fixed joint holds is one body with
-    /// the link that carries it. A robot and itself are all pairs of its links. A pair that is known already changes nothing.
+    /// Excludes collisions between two entities from now on, in all environments.
+    ///
+    /// Names are those of objects (`uid`), links (`uid/link`), all links of a robot (`uid`), bodies of MJCF parts
+    /// (`uid/body`), and `world` for the ground and all terrains. Between links of one robot, this removes pairs from
+    /// its self-collision. A link behind a fixed joint is one body with its parent link. A robot with itself stands for
+    /// all pairs of its links. A pair that is excluded already changes nothing.
     ///
     /// # Errors
-    /// Nothing is called so; the error lists the nearest names. Or both are the same one body.
+    /// A name is unknown (the error lists the nearest names), or both names are the same single body.
     pub fn exclude_collision(&mut self, one: &str, other: &str) -> Result<()> {
         let bodies = self.contents.bodies_called(one)?;
         if bodies == self.contents.bodies_called(other)? && bodies.is_none_or(|all| all.len() == 1) {

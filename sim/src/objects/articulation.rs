@@ -1,4 +1,4 @@
-//! Articulations that are no robots: drawers, doors, lids, whatever has joints that are moved from outside.
+//! Articulations: jointed objects without drives of their own, such as drawers, doors and lids.
 
 use crate::drive::{DriveCfg, DriveType, PerJoint};
 use crate::error::Result;
@@ -13,46 +13,47 @@ use kinetoscope_scene::Pose;
 use kinetoscope_scene::mesh::HullCfg;
 use serde::{Deserialize, Serialize};
 
-/// Configuration of an articulation.
+/// Configuration of an articulation: a jointed object that is passive by default.
 ///
-/// It is passive unless `drive` says otherwise: its joints have the limits, the damping and the dry friction of the file,
-/// and nothing holds or moves them but what touches them.
+/// Without `drive`, its joints have the limits, the damping and the dry friction of the file, and no drive moves or
+/// holds them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArticulationCfg {
     /// Name of the articulation, unique in the simulation; prefix of its names in MuJoCo.
     pub uid: String,
-    /// The URDF files.
+    /// URDF files of the articulation.
     #[serde(deserialize_with = "crate::file_format::file_or_table")]
     pub urdf: UrdfCfg,
-    /// The MJCF file, for an articulation that is described by one, as [`RobotCfg::mjcf`] says: then there are no URDF files.
-    /// Its actuators drive nothing where [`drive`](Self::drive) is `None`; its springs, friction and equalities hold.
+    /// MJCF file of the articulation, instead of URDF files; see [`RobotCfg::mjcf`]. If [`drive`](Self::drive) is
+    /// `None`, its actuators drive nothing; its springs, friction and equalities apply.
     #[serde(default, deserialize_with = "crate::file_format::mjcf_file")]
     pub mjcf: Option<MjcfFile>,
-    /// Whether the root link stands fixed in the environment. One that stands free can be put elsewhere in each environment.
+    /// True if the root link is fixed in the environment. A free root link can be placed in each environment.
     pub fix_base: bool,
-    /// Pose of the root link in the environment; of an MJCF file that of the file's world.
+    /// Pose of the root link in the environment; for an MJCF file, pose of the file's world.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Start positions by joint pattern \[rad or m\]; where none matches 0, or an MJCF file's `ref`.
+    /// Initial positions by joint pattern \[rad or m\]. Joints without a match start at 0, or at the `ref` of an MJCF
+    /// file.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
-    /// Drives, such as the spring of a door that closes by itself (a stiffness, and a target at 0); `None` is passive. One
-    /// that is given has the stiffness and damping of [`DriveCfg::default`], a robot's, where it names no others.
+    /// Drives, such as the spring of a door closer (a stiffness, and a target at 0); `None` for passive joints.
+    /// Stiffness and damping that it does not set are those of [`DriveCfg::default`], which are made for robots.
     pub drive: Option<DriveCfg>,
-    /// Dry friction \[N m or N\]; where unset, that of `drive`, or else the file's. It leaves joints passive.
+    /// Dry friction \[N m or N\]. If unset, that of `drive`, or else that of the file. It leaves joints passive.
     pub friction: Option<PerJoint>,
-    /// Rotor inertia \[kg m² or kg\]; where unset, that of `drive`, or else 0 for joints of a URDF and the
-    /// MJCF file's own. It leaves joints passive.
+    /// Rotor inertia \[kg m² or kg\]. If unset, that of `drive`, or else 0 for joints of a URDF and the value of an
+    /// MJCF file. It leaves joints passive.
     pub armature: Option<PerJoint>,
-    /// What surfaces of links look like besides their colours, by link pattern. No link may be matched twice.
+    /// Surface properties of links besides their colors, by link pattern. A link may match only one pattern.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
-    /// Whether its links collide with each other.
+    /// True if the links collide with each other.
     pub self_collision: bool,
-    /// How collision meshes become convex hulls.
+    /// Settings for the convex hulls of collision meshes.
     pub hull: HullCfg,
-    /// Semantic class, for the table of mask ids; `articulation` where `None`.
+    /// Semantic class in the table of mask ids; `None` for `articulation`.
     pub semantic_class: Option<String>,
 }
 
@@ -78,7 +79,7 @@ impl Default for ArticulationCfg {
 }
 
 impl ArticulationCfg {
-    /// The robot that moves like it, and its class.
+    /// Converts to the equivalent robot configuration and the semantic class.
     pub(crate) fn into_robot(self) -> (RobotCfg, String) {
         let passive = || DriveCfg { drive_type: DriveType::None, ..Default::default() };
         let drive = self.drive.unwrap_or_else(passive);
@@ -100,22 +101,24 @@ impl ArticulationCfg {
     }
 }
 
-/// Handle of an articulation; valid for the manager that made it.
+/// Handle of an articulation; valid for the manager that created it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ArticulationId(pub(crate) RobotId);
 
-/// An articulation, to read: everything that can be read of a robot. It has no control parts.
+/// Read access to an articulation: all read methods of a robot. It has no control parts.
 pub type Articulation<'a> = Robot<'a>;
 
-/// An articulation, to write: everything that can be done with a robot. Joints without a drive have no targets:
-/// [`write_qpos`](RobotMut::write_qpos) puts them somewhere, [`set_qf_target`](RobotMut::set_qf_target) pushes them, and
-/// [`set_qpos_target`](RobotMut::set_qpos_target) does nothing.
+/// Write access to an articulation: all write methods of a robot.
+///
+/// Joints without a drive have no targets: [`write_qpos`](RobotMut::write_qpos) sets their state,
+/// [`set_qf_target`](RobotMut::set_qf_target) applies efforts, and [`set_qpos_target`](RobotMut::set_qpos_target) has
+/// no effect.
 pub type ArticulationMut<'a> = RobotMut<'a>;
 
 impl SimulationManager {
-    /// Adds an articulation that is no robot to every environment, such as a cabinet with drawers or a door, compiled as
-    /// [`add_robot`](Self::add_robot) does. Sensors and [`properties`](Self::properties) know its links and joints as those
-    /// of robots, as `uid/link` and `uid/joint`. There may be 30 robots and articulations.
+    /// Adds an articulation, such as a cabinet with drawers or a door, to every environment. It is compiled as by
+    /// [`add_robot`](Self::add_robot). Sensors and [`properties`](Self::properties) name its links and joints like
+    /// those of robots, `uid/link` and `uid/joint`. A simulation holds up to 30 robots and articulations.
     ///
     /// # Errors
     /// As [`add_robot`](Self::add_robot).
@@ -124,19 +127,19 @@ impl SimulationManager {
         self.add_as(cfg, Role::Articulation(class)).map(ArticulationId)
     }
 
-    /// An articulation, to read.
+    /// Read access to an articulation.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn articulation(&self, id: ArticulationId) -> Articulation<'_> {
         self.robot(id.0)
     }
 
-    /// An articulation, to write.
+    /// Write access to an articulation.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn articulation_mut(&mut self, id: ArticulationId) -> ArticulationMut<'_> {
         self.robot_mut(id.0)

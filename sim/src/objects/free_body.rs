@@ -1,4 +1,4 @@
-//! Bodies that stand or move freely in the world: pose and velocity of objects and of the root links of robots.
+//! Poses and velocities of bodies that are placed in the world: objects and root links of robots.
 
 use crate::body_pose::body_pose;
 use crate::env::Env;
@@ -14,7 +14,7 @@ use kinetoscope_scene::pose::{from_row, to_row};
 use nalgebra::Vector3;
 use ndarray::{Array2, ArrayView2};
 
-/// One body in all environments, to read.
+/// Read access to one body in all environments.
 #[derive(Clone, Copy)]
 pub(super) struct FreeBody<'a> {
     pub(super) simulation: &'a Simulation,
@@ -22,17 +22,17 @@ pub(super) struct FreeBody<'a> {
 }
 
 impl FreeBody<'_> {
-    /// Poses, (N, 7).
+    /// Poses `[x, y, z, qw, qx, qy, qz]`, shape (N, 7).
     pub(super) fn poses(&self) -> Array2<f64> {
         self.rows(|env| to_row(&body_pose(env.data(), self.index.body)))
     }
 
-    /// Velocities of the frame, then angular velocities, in world axes, (N, 6); 0 where the body is fixed.
+    /// Velocities of the frame, then angular velocities, in world axes, shape (N, 6); 0 for a fixed body.
     pub(super) fn velocities(&self) -> Array2<f64> {
         self.rows(|env| {
             let Some((_, dof)) = self.index.joint else { return [0.0; 6] };
             let v = &env.data().qvel()[dof..dof + 6];
-            // MuJoCo gives the angular velocity of a free joint in the body's axes.
+            // MuJoCo stores the angular velocity of a free joint in the axes of the body.
             let angular = body_pose(env.data(), self.index.body).rotation * Vector3::new(v[3], v[4], v[5]);
             [v[0], v[1], v[2], angular.x, angular.y, angular.z]
         })
@@ -43,40 +43,41 @@ impl FreeBody<'_> {
     }
 }
 
-/// Where a body that can be put somewhere keeps its pose.
+/// Storage of the pose of a body that can be placed.
 #[derive(Clone, Copy)]
 enum Place {
-    /// First position and first degree of freedom of its joint.
+    /// Indices of the first position and the first degree of freedom of its free joint.
     Joint(usize, usize),
-    /// Its number among the bodies that are moved by hand.
+    /// Mocap index of the body.
     Mocap(usize),
-    /// The model of each environment.
+    /// Model of each environment.
     Model,
 }
 
-/// Poses that were checked, with unit quaternions.
+/// Checked poses with unit quaternions, by environment.
 pub(super) struct Poses {
     place: Place,
     rows: Vec<(usize, [f64; 7])>,
 }
 
-/// Velocities that were checked, of the six degrees of freedom from `dof` on.
+/// Checked velocities of the six degrees of freedom from `dof` on, by environment.
 pub(super) struct Velocities {
     dof: usize,
     rows: Vec<(usize, [f64; 6])>,
 }
 
-/// One body in all environments, to write.
+/// Write access to one body in all environments.
 pub(super) struct FreeBodyMut<'a> {
     pub(super) simulation: &'a mut Simulation,
     pub(super) sensors: &'a mut SensorList,
     pub(super) index: FreeIndex,
-    /// Whose body it is, as errors say it.
+    /// Owner of the body in error messages.
     pub(super) owner: &'a str,
 }
 
 impl FreeBodyMut<'_> {
-    /// Writes poses, rows `[x, y, z, qw, qx, qy, qz]`; quaternions are normalised, velocities in world axes stay.
+    /// Writes poses, rows `[x, y, z, qw, qx, qy, qz]`. Quaternions are normalized; velocities in world axes are
+    /// preserved.
     pub(super) fn write_poses(
         &mut self,
         argument: &'static str,
@@ -90,7 +91,7 @@ impl FreeBodyMut<'_> {
         Ok(())
     }
 
-    /// Poses that can be written: everything is checked.
+    /// Checks poses before they are written.
     pub(super) fn check_poses(
         &self,
         argument: &'static str,
@@ -113,13 +114,13 @@ impl FreeBodyMut<'_> {
         Ok(Poses { place, rows: rows.arrays::<7>().map(|(env, pose)| (env, to_row(&from_row(&pose)))).collect() })
     }
 
-    /// Writes poses that were checked; sensors are to be told. Only MuJoCo itself may still refuse those of an object that
-    /// stands; then none of them is written.
+    /// Writes checked poses; the caller refreshes the sensors. MuJoCo may still reject the poses of a static object;
+    /// then no pose is written.
     pub(super) fn put_poses(&mut self, poses: &Poses) -> Result<()> {
         let (place, body) = (poses.place, self.index.body);
         if matches!(place, Place::Model) {
             let envs: Vec<usize> = poses.rows.iter().map(|(env, _)| *env).collect();
-            // Environments come in this order.
+            // Environments are visited in this order.
             let mut rows = poses.rows.iter();
             return self.simulation.change_properties(&envs, |_, properties| {
                 let Some((_, row)) = rows.next() else { return Ok(()) };
@@ -131,7 +132,8 @@ impl FreeBodyMut<'_> {
             self.simulation.batch.write(env, |env| {
                 env.write(|data| match place {
                     Place::Joint(qpos, dof) => {
-                        // The angular velocity is kept in the world, as it is read; MuJoCo keeps it in the body.
+                        // The angular velocity is preserved in world axes, as it is read; MuJoCo stores it in the axes
+                        // of the body.
                         let before = body_pose(data, body).rotation;
                         let turned = from_row(&row).rotation.inverse() * before;
                         let v = &mut data.qvel_mut()[dof + 3..dof + 6];
@@ -162,7 +164,7 @@ impl FreeBodyMut<'_> {
         self.write_velocities_of(argument, velocities, env_ids, |_| Vector3::zeros())
     }
 
-    /// As [`write_velocities`](Self::write_velocities) for a point of the body: `arm` is from it to the frame \[m\], in world
+    /// Writes the velocities of a point of the body. `arm` is the vector from the point to the frame \[m\], in world
     /// axes.
     pub(super) fn write_velocities_of(
         &mut self,
@@ -178,7 +180,7 @@ impl FreeBodyMut<'_> {
         Ok(())
     }
 
-    /// Velocities that can be written: everything is checked.
+    /// Checks velocities before they are written.
     pub(super) fn check_velocities(
         &self,
         argument: &'static str,
@@ -194,7 +196,8 @@ impl FreeBodyMut<'_> {
         Ok(Velocities { dof, rows: rows.arrays::<6>().collect() })
     }
 
-    /// Writes velocities that were checked, as [`write_velocities_of`](Self::write_velocities_of); sensors are to be told.
+    /// Writes checked velocities as [`write_velocities_of`](Self::write_velocities_of) does; the caller refreshes the
+    /// sensors.
     pub(super) fn put_velocities(&mut self, velocities: &Velocities, arm: impl Fn(&mj::Data) -> Vector3<f64>) {
         let (dof, body) = (velocities.dof, self.index.body);
         for &(env, v) in &velocities.rows {
@@ -213,13 +216,13 @@ impl FreeBodyMut<'_> {
     fn place(&self) -> Result<Place> {
         let FreeIndex { joint, mocap, .. } = self.index;
         let joint = joint.map(|(qpos, dof)| Place::Joint(qpos, dof));
-        // Of what is fixed only objects can be put elsewhere: a robot's base is where its description says.
+        // Among fixed bodies, only objects can be moved: the base of a robot is where its description says.
         let stands = self.simulation.objects.iter().any(|object| object.stands() && object.body == self.index.body);
         let place = joint.or(mocap.map(Place::Mocap)).or(stands.then_some(Place::Model));
         place.ok_or_else(|| Error::FixedBody(self.owner.into()))
     }
 
-    /// Checks the shape and the numbers of an argument that holds poses and velocities.
+    /// Checks the shape and the numbers of an argument with poses and velocities.
     pub(super) fn check_columns(
         &self,
         argument: &'static str,
@@ -231,7 +234,7 @@ impl FreeBodyMut<'_> {
         self.check(argument, columns, meaning, values, env_ids).map(drop)
     }
 
-    /// Lets sensors measure anew in the environments of poses that were written.
+    /// Refreshes the sensors in the environments of written poses.
     pub(super) fn refresh(&mut self, poses: &Poses) {
         let envs: Vec<usize> = poses.rows.iter().map(|(env, _)| *env).collect();
         self.sensors.refresh(&envs, self.simulation);

@@ -1,4 +1,4 @@
-//! Kinematics of robots in a simulation: where frames would be, how joints move them, and how to get them somewhere.
+//! Forward kinematics, Jacobians and inverse kinematics of robots in a simulation.
 
 use crate::env::Env;
 use crate::error::{Error, Result};
@@ -14,43 +14,44 @@ use kinetoscope_sensors::camera::{CameraError, Poses};
 use nalgebra::Vector6;
 use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2, AsArray, Ix2};
 
-/// What [`Robot::compute_ik`] found: one entry per environment that was asked for.
+/// Result of [`Robot::compute_ik`], with one entry per selected environment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IkResult {
-    /// Positions of the joints \[rad or m\], shape (N, dof of the part): those that do not move the frame stay at their
-    /// initial positions, mimic ones follow. Where `success` is false, the best that were found.
+    /// Positions of the joints \[rad or m\], shape (N, dof of the part). Joints that do not move the frame keep their
+    /// initial positions; mimic joints follow. Where `success` is false, these are the best positions found.
     pub qpos: Array2<f64>,
-    /// Whether the frame is within the tolerances of its target, shape (N,).
+    /// True where the frame is within the tolerances of its target, shape (N,).
     pub success: Array1<bool>,
     /// Distance between the frame and its target \[m\], shape (N,).
     pub position_error: Array1<f64>,
-    /// Angle between the frame and its target \[rad\], shape (N,); also where only the position was to be reached.
+    /// Angle between the frame and its target \[rad\], shape (N,); also given where only the position had to be
+    /// reached.
     pub rotation_error: Array1<f64>,
-    /// Steps of all starts together, shape (N,).
+    /// Number of steps of all starts together, shape (N,).
     pub iterations: Array1<u32>,
-    /// The start that led there, shape (N,): 0 is that of the initial positions, others are random.
+    /// Index of the start that led to the result, shape (N,): 0 is the start from the initial positions, others are
+    /// random.
     pub seed: Array1<u32>,
 }
 
-/// A [`Tip`] of a robot.
+/// [`Tip`] that is resolved for a robot.
 struct Resolved {
     chain: Chain,
-    /// The joints that were named, as columns of `qpos`: the columns of all arrays.
+    /// Columns of `qpos` of the selected joints, which are the columns of all arrays.
     columns: Vec<usize>,
-    /// Whose joints they are, as errors say it.
+    /// Owner of the joints in error messages.
     of: String,
     link: LinkId,
 }
 
 impl Robot<'_> {
-    /// Poses of a frame at joint positions `qpos` \[rad or m\]: rows `[x, y, z, qw, qx, qy, qz]` in the environment
-    /// \[m\], shape (N, 7). Where the robot's root is in each environment is part of them.
+    /// Forward kinematics of a frame: poses at joint positions `qpos` \[rad or m\], rows `[x, y, z, qw, qx, qy, qz]` in
+    /// the environment \[m\], shape (N, 7). They include the pose of the robot's root in each environment.
     ///
-    /// `qpos` has a row for each of `env_ids` (all environments where `None`), or one for all of them, and a column for
-    /// each joint of the control part that `tip` names ([`joint_ids`](Self::joint_ids)), or for each joint of
-    /// the robot. Other joints are where they are in the environment, mimic joints where those are that they follow:
-    /// their own columns are accepted and ignored. Positions beyond the limits are taken as they are. The state does
-    /// not change.
+    /// `qpos` has a row for each of `env_ids` (`None` for all environments), or one for all of them. It has a column
+    /// for each joint of the control part that `tip` names ([`joint_ids`](Self::joint_ids)), or for each joint of the
+    /// robot. Other joints keep their current positions in the environment. Mimic joints follow their drivers; their
+    /// own columns are accepted and ignored. Positions beyond the limits are not clamped. The state does not change.
     ///
     /// # Errors
     /// Unknown part, link or environment; wrong shape; a number that is not finite; a part that ends in several links.
@@ -73,9 +74,9 @@ impl Robot<'_> {
         Ok(poses)
     }
 
-    /// Poses of all links, fused ones too, in the order of [`link_names`](Self::link_names), at positions `qpos` of all
-    /// joints \[rad or m\]: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, links, 7). For rows
-    /// and mimic joints see [`compute_fk`](Self::compute_fk).
+    /// Forward kinematics of all links, fused links included, in the order of [`link_names`](Self::link_names): poses
+    /// at positions `qpos` of all joints \[rad or m\], rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape
+    /// (N, links, 7). [`compute_fk`](Self::compute_fk) explains rows and mimic joints.
     ///
     /// # Errors
     /// Unknown environment; wrong shape; a number that is not finite.
@@ -103,11 +104,11 @@ impl Robot<'_> {
     }
 
     /// Jacobians of a frame, shape (N, 6, columns): velocity of its origin, then its angular velocity, both in the axes
-    /// of the environment, per unit of each joint's velocity, with the root standing still. At joint positions `qpos`
-    /// \[rad or m\], or where the joints are where it is `None`; rows and columns as in
-    /// [`compute_fk`](Self::compute_fk).
+    /// of the environment, per unit of each joint's velocity, with a fixed root.
     ///
-    /// The column of a mimic joint is 0: what it does is in the column of the joint that it follows.
+    /// They are evaluated at joint positions `qpos` \[rad or m\], or at the current positions if `qpos` is `None`. Rows
+    /// and columns are those of [`compute_fk`](Self::compute_fk). The column of a mimic joint is 0: its motion is part
+    /// of the column of its driver.
     ///
     /// # Errors
     /// As [`compute_fk`](Self::compute_fk).
@@ -145,32 +146,31 @@ impl Robot<'_> {
         Ok(jacobians)
     }
 
-    /// Joint positions that put a frame at `targets`: poses in the environment, typed or as rows `[x, y, z, qw, qx, qy,
-    /// qz]` \[m\], one for each of `env_ids` (all environments where `None`), or one for all of them. Quaternions are
-    /// normalised.
+    /// Inverse kinematics: joint positions that bring a frame to `targets`.
     ///
-    /// The joints of the control part that `tip` names, or all of the robot, are found within the limits that the robot was
-    /// added with (joints' own, narrowed by their followers'). Tighter ones of
-    /// [`set_qpos_limits`](crate::RobotMut::set_qpos_limits) are not looked at: a success may be outside of
-    /// [`qpos_limits`](Self::qpos_limits), and `set_qpos_target` would clamp it. Other joints stay where they are in the
-    /// environment. The search starts from `initial` \[rad or m\], with rows and columns as in
-    /// [`compute_fk`](Self::compute_fk), or from where the joints are. How: [`IkSolver`], on the calling thread. Contacts
-    /// are not considered, and the state does not change: give what comes out to
-    /// [`set_qpos_target`](crate::RobotMut::set_qpos_target), where [`success`](IkResult::success)
-    /// says that it is right.
+    /// `targets` are poses in the environment, typed or as rows `[x, y, z, qw, qx, qy, qz]` \[m\], one for each of
+    /// `env_ids` (`None` for all environments), or one for all of them. Quaternions are normalized.
     ///
-    /// No [`Property`](crate::Property) moves a joint or a link's frame, and neither masses nor sizes are looked at: what is
-    /// drawn for an environment changes nothing here.
+    /// The search covers the joints of the control part that `tip` names, or all joints of the robot, within the limits
+    /// that the robot was added with (joints' own, narrowed by their followers'). Tighter limits of
+    /// [`set_qpos_limits`](crate::RobotMut::set_qpos_limits) are ignored: a solution may be outside of
+    /// [`qpos_limits`](Self::qpos_limits), and `set_qpos_target` would clamp it. Other joints keep their current
+    /// positions in the environment. The search starts from `initial` \[rad or m\], with rows and columns as in
+    /// [`compute_fk`](Self::compute_fk), or from the current positions. [`IkSolver`] runs on the calling thread.
+    /// Contacts are not considered, and the state does not change: pass the result to
+    /// [`set_qpos_target`](crate::RobotMut::set_qpos_target) where [`success`](IkResult::success) is true.
     ///
-    /// Targets that are next to each other may have solutions that are far apart. Where the frame has lost a direction (an arm
-    /// that is stretched, two axes in one line, or parallel ones beside another pair) a small part of a way may take a turn of
-    /// a joint by a right angle, or may have no solution nearby at all: beyond a limit, or on the side to which the arm
-    /// does not bend. Then a random start may lead to another posture of the arm. Who follows a path solves from the
-    /// positions before, in small steps, and compares what comes out with them; with one start
-    /// ([`num_seeds`](IkCfg::num_seeds) 1) no other posture is looked for.
+    /// Randomized properties have no effect here: no [`Property`](crate::Property) moves a joint or a link's frame, and
+    /// masses and sizes are not used.
     ///
-    /// The same target from the same positions gives the same bits in any environment and in any batch, wherever the
-    /// robot's root is, up to the rounding of the target's pose in the frame of the root.
+    /// Nearby targets may have distant solutions. At a singularity (a stretched arm, two collinear axes, or parallel
+    /// axes beside another pair), a small part of a path may need a quarter turn of a joint. Or it may have no solution
+    /// nearby: beyond a limit, or on the side to which the arm does not bend. A random start may then lead to another
+    /// posture of the arm. To follow a path, solve in small steps from the previous positions and compare the results
+    /// with them. With one start ([`num_seeds`](IkCfg::num_seeds) 1) no other posture is tried.
+    ///
+    /// The same target and initial positions give bit-identical results in any environment and in any batch, wherever
+    /// the robot's root is, up to the rounding of the target's pose in the frame of the root.
     ///
     /// ```
     /// use ndarray::array;
@@ -180,9 +180,11 @@ impl Robot<'_> {
     /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-arm-{}.urdf", std::process::id()));
     /// # let link = |name: &str| format!("<link name='{name}'><inertial><mass value='1'/>
     /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link>");
-    /// # let joint = |name: &str, a: &str, b: &str, x: f64| format!("<joint name='{name}' type='continuous'><parent link='{a}'/>
+    /// # let joint = |name: &str, a: &str, b: &str, x: f64| format!(
+    /// #   "<joint name='{name}' type='continuous'><parent link='{a}'/>
     /// #   <child link='{b}'/><origin xyz='{x} 0 0'/><axis xyz='0 0 1'/></joint>");
-    /// # std::fs::write(&urdf, format!("<robot name='r'>{}{}{}{}{}</robot>", link("foot"), link("upper"), link("lower"),
+    /// # std::fs::write(&urdf, format!("<robot name='r'>{}{}{}{}{}</robot>", link("foot"), link("upper"),
+    /// #   link("lower"),
     /// #   joint("shoulder", "foot", "upper", 0.0), joint("elbow", "upper", "lower", 0.5)))?;
     ///
     /// let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
@@ -203,9 +205,9 @@ impl Robot<'_> {
     ///
     /// # Errors
     /// Unknown part, link or environment; wrong shape; a number that is not finite, or out of its range; a quaternion
-    /// of length zero; a part that ends in several links, or none of whose joints moves the frame; a joint that an equality of an
-    /// MJCF file holds on a curve, where it would have to move with those that are searched. A target that cannot
-    /// be reached is no error.
+    /// of length zero. A part that ends in several links, or without a joint that moves the frame. A joint with a
+    /// polynomial coupling of an MJCF file, if it would have to move with the searched joints. A target that cannot be
+    /// reached is not an error.
     pub fn compute_ik<'n>(
         &self,
         targets: &(impl Poses + ?Sized),
@@ -229,7 +231,7 @@ impl Robot<'_> {
         let rows = initial.map(|rows| self.part_rows("compute_ik, initial", rows, &columns, env_ids)).transpose()?;
         cfg.validate(columns.len()).map_err(|error| self.kinematics_error(error))?;
 
-        // Entries of `columns` that are to be found.
+        // Entries of `columns` to solve for.
         let free: Vec<usize> = (0..columns.len())
             .filter(|&k| self.data.plans()[columns[k]].mimic.is_none() && chain.is_moved_by(columns[k]))
             .collect();
@@ -286,7 +288,7 @@ impl Robot<'_> {
         Ok(result)
     }
 
-    /// Finds what `tip` names.
+    /// Resolves the link and the joints that `tip` names.
     fn resolve(&self, tip: &Tip<'_>) -> Result<Resolved> {
         check_pose("tcp", &tip.tcp)?;
         let part = match tip.name {
@@ -317,7 +319,7 @@ impl Robot<'_> {
         Ok(Resolved { chain, columns, of, link })
     }
 
-    /// The link where a part ends: see [`Tip::of_part`].
+    /// Link at the end of a part: see [`Tip::of_part`].
     fn end_of(&self, part: &str, columns: &[usize]) -> Result<LinkId> {
         let description = self.description();
         let child = |column: usize| description.joint(self.data.plans()[column].joint).child;
@@ -326,7 +328,7 @@ impl Robot<'_> {
                 move |link: &LinkId| description.link(*link).parent_joint.map(|id| description.joint(id).parent);
             std::iter::successors(parent(&link), parent)
         };
-        // Ends of branches: links that no other joint of the part is below.
+        // Ends of branches: links without another joint of the part below them.
         let moved: Vec<LinkId> = columns.iter().map(|&column| child(column)).collect();
         let ends: Vec<LinkId> =
             moved.iter().copied().filter(|end| !moved.iter().any(|&other| above(other).any(|l| l == *end))).collect();
@@ -358,7 +360,8 @@ impl Robot<'_> {
         }
     }
 
-    /// A joint that moves the end of the chain, follows by a curve, and is either to be found itself or follows what is.
+    /// Finds a joint that moves the end of the chain by a polynomial coupling, and that is searched or follows a
+    /// searched joint.
     fn curve_follower(&self, chain: &Chain, free: &[usize]) -> Option<usize> {
         let (description, plans) = (self.description(), self.data.plans());
         let column_of = |joint: JointId| plans.iter().position(|plan| plan.joint == joint);
@@ -383,7 +386,8 @@ impl Robot<'_> {
         Error::Kinematics { robot: self.data.named(), error: Box::new(error) }
     }
 
-    /// Fills `positions` with where all joints are, and returns where the link `base` is, in an environment.
+    /// Fills `positions` with the current positions of all joints in an environment, and returns the pose of the link
+    /// `base`.
     fn present(&self, env: usize, base: LinkId, positions: &mut [f64]) -> Pose {
         self.simulation.batch.read(env, |env| {
             for (position, joint) in positions.iter_mut().zip(&self.indexing().joints) {
@@ -417,7 +421,7 @@ fn put(columns: &[usize], row: ArrayView1<'_, f64>, positions: &mut [f64]) {
     }
 }
 
-/// What is wrong with targets, as this room says it.
+/// Converts an error of target poses to an error of this crate.
 fn target_error(error: CameraError, envs: usize) -> Error {
     let argument = "compute_ik";
     match error {

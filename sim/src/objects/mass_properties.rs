@@ -1,4 +1,4 @@
-//! What a rigid object weighs and how it turns: from its shape, and what the user says instead.
+//! Mass properties of rigid objects, from the shape and from values of the configuration.
 
 use super::object_mesh::ObjectMesh;
 use super::rigid_object_data::RigidObjectCfg;
@@ -10,16 +10,16 @@ use nalgebra::{UnitQuaternion, Vector3};
 pub(crate) struct MassProperties {
     /// Mass \[kg\].
     pub(crate) mass: f64,
-    /// Centre of mass \[m\].
+    /// Center of mass \[m\].
     pub(crate) com: Vector3<f64>,
-    /// Principal axes.
+    /// Principal axes, `object_from_principal`.
     pub(crate) axes: UnitQuaternion<f64>,
-    /// Moments about the centre of mass along them \[kg m²\].
+    /// Principal moments about the center of mass \[kg m²\].
     pub(crate) moments: Vector3<f64>,
 }
 
 impl MassProperties {
-    /// Those of a configuration whose numbers are finite.
+    /// Computes the mass properties of a configuration whose numbers are finite.
     pub(crate) fn of(cfg: &RigidObjectCfg, mesh: Option<&ObjectMesh>) -> Self {
         let mut found = match mesh.and_then(|mesh| mesh.inertia) {
             Some(unit) => Self::of_mesh(cfg, &unit),
@@ -35,7 +35,7 @@ impl MassProperties {
     }
 
     fn of_shape(cfg: &RigidObjectCfg) -> Self {
-        // Shapes without a mesh have all three.
+        // Shapes without a mesh have a volume, a center and moments.
         let volume = cfg.shape.volume().unwrap_or(0.0);
         let mass = cfg.mass.unwrap_or(cfg.density * volume);
         Self {

@@ -1,4 +1,4 @@
-//! What collides of an object that is a mesh file.
+//! Collision shapes of objects from mesh files.
 
 use crate::error::{Error, Result};
 use crate::objects::rigid_object_data::{BodyType, RigidObjectCfg};
@@ -9,26 +9,28 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 
-/// What collides of an object that is a mesh file. MuJoCo's contacts are those of convex shapes: a mesh that is not convex
-/// collides as one, as several, or as very many of them. Mass and moments are those of the mesh, whatever collides.
+/// Collision geometry of an object from a mesh file.
+///
+/// MuJoCo's contacts are those of convex shapes: a mesh that is not convex collides as one, as several, or as very many
+/// of them. Mass and moments are those of the mesh in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum MeshCollision {
-    /// Its convex hull: nothing lies in its hollows.
+    /// Convex hull of the mesh: other bodies cannot enter its hollows.
     #[default]
     Hull,
-    /// Convex pieces that together are nowhere higher above the surface than a tolerance; each is a hull, as
-    /// [`ObjectShape::Mesh`] says it. They are kept on disk with the hulls. A diagnostic says so where there are not pieces
-    /// enough for the tolerance. Each costs time where something is near the object. Together they hold all that a closed
-    /// mesh encloses; of an open one, which a diagnostic names, the surface.
+    /// Convex pieces that together rise above the surface by at most a tolerance. Each piece is a hull, computed as for
+    /// [`ObjectShape::Mesh`], and cached on disk with the hulls. A diagnostic reports when the pieces are too few for
+    /// the tolerance. Each piece costs time while another body is near the object. Together they contain everything
+    /// that a closed mesh encloses; for an open mesh, which a diagnostic names, they contain the surface.
     Pieces(PiecesCfg),
-    /// Every triangle, exactly as it stands in the file, as the front of a prism: for what stands or is moved by hand, of up
-    /// to 2000 triangles. Where the mesh is thinner than `thickness`, prisms reach out behind it, and what comes through the
-    /// front by more than that falls through. What lies is where it should be; what slides over edges between triangles is
-    /// braked, since MuJoCo does not know that they are one surface: a ball of 5 cm radius that slides along a smooth valley
-    /// at 0.5 m/s, over an edge every 5 cm on both sides, still has more than 0.3 m/s after 0.6 m. Triangles too thin for MuJoCo
-    /// are left out, which a diagnostic says.
+    /// Every triangle exactly as in the file, as the front of a prism. This is for static and kinematic objects of up
+    /// to 2000 triangles. Where the mesh is thinner than `thickness`, prisms reach out behind it. A body that
+    /// penetrates the front by more than that falls through. Bodies at rest lie where they should. Bodies that slide
+    /// over edges between triangles are braked, since MuJoCo does not treat the triangles as one surface: a ball of 5
+    /// cm radius that slides along a smooth valley at 0.5 m/s, over an edge every 5 cm on both sides, still has more
+    /// than 0.3 m/s after 0.6 m. Triangles too thin for MuJoCo are left out, with a diagnostic.
     Triangles {
         /// Thickness of the prisms \[m\].
         thickness: f64,
@@ -36,10 +38,10 @@ pub enum MeshCollision {
 }
 
 impl MeshCollision {
-    /// The most triangles that are exact: each is a shape of MuJoCo's.
+    /// Maximum number of exact triangles: each is a geom of MuJoCo.
     pub const MAX_TRIANGLES: usize = 2000;
 
-    /// Checks the numbers, and whether the object can have it.
+    /// Checks the numbers, and that the object supports this collision geometry.
     pub(crate) fn check(&self, cfg: &RigidObjectCfg) -> Result<()> {
         let fail = |expected| Err(Error::Config { field: "mesh_collision", value: format!("{self:?}"), expected });
         match self {
@@ -61,7 +63,7 @@ impl MeshCollision {
         }
     }
 
-    /// The convex shapes of a mesh file, whose triangles are `mesh`.
+    /// Convex shapes of a mesh file with the triangles `mesh`.
     pub(super) fn shapes(
         &self,
         uid: &str,

@@ -1,4 +1,4 @@
-//! MJCF files as parts of a scene: configuration, the loaded file, and its views of a running simulation.
+//! MJCF parts in a running simulation: read and write access.
 
 use super::mjcf_part_data::{ActuatorIndex, MjcfCfg, MjcfData};
 use crate::body_pose::BodyFrame;
@@ -16,7 +16,7 @@ use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A part, to read. Arrays have one row per environment.
+/// Read access to an MJCF part. Arrays have one row per environment.
 #[derive(Clone, Copy, Debug)]
 pub struct MjcfPart<'a> {
     data: &'a Arc<MjcfData>,
@@ -38,12 +38,12 @@ impl<'a> MjcfPart<'a> {
         self.data.uid()
     }
 
-    /// The configuration it was added with.
+    /// Configuration that the part was added with.
     pub fn cfg(&self) -> &'a MjcfCfg {
         self.data.cfg()
     }
 
-    /// The compiled model of the file alone.
+    /// Compiled model of the file alone.
     pub fn model(&self) -> &'a Model {
         self.data.model()
     }
@@ -58,7 +58,7 @@ impl<'a> MjcfPart<'a> {
         &self.data.names.bodies[1..]
     }
 
-    /// Names of its sites, in MuJoCo's order; those that the file does not name are called `site` and their number.
+    /// Names of its sites, in MuJoCo's order; a site without a name is called `site` with its index.
     pub fn site_names(&self) -> &'a [String] {
         &self.data.names.sites
     }
@@ -73,7 +73,7 @@ impl<'a> MjcfPart<'a> {
         &self.data.sensor_names
     }
 
-    /// Numbers of the actuators that patterns match, in the order of the patterns.
+    /// Indices of the actuators that match patterns, in the order of the patterns.
     ///
     /// # Errors
     /// A pattern matches nothing (with the nearest names), or an actuator is matched twice.
@@ -82,8 +82,8 @@ impl<'a> MjcfPart<'a> {
         Ok(found.into_iter().map(ActuatorIndex).collect())
     }
 
-    /// Columns of [`qpos`](Self::qpos) of the joints that patterns match: 7 for a free joint (position, then w x y
-    /// z), 4 for a ball, 1 for others.
+    /// Columns of [`qpos`](Self::qpos) for the joints that match patterns: 7 for a free joint (position, then w x y z),
+    /// 4 for a ball, 1 for others.
     ///
     /// # Errors
     /// A pattern matches nothing (with the nearest names), or a joint is matched twice.
@@ -91,7 +91,7 @@ impl<'a> MjcfPart<'a> {
         self.columns(patterns, self.model().jnt_qposadr(), [7, 4, 1])
     }
 
-    /// Columns of [`qvel`](Self::qvel) of the joints that patterns match: 6 for a free joint (velocity in the
+    /// Columns of [`qvel`](Self::qvel) for the joints that match patterns: 6 for a free joint (velocity in the
     /// environment, then angular velocity in the body), 3 for a ball, 1 for others.
     ///
     /// # Errors
@@ -119,19 +119,19 @@ impl<'a> MjcfPart<'a> {
             .map_err(|error| Error::MjcfNames { part: self.uid().into(), error: Box::new(error) })
     }
 
-    /// Sum of the masses of its bodies \[kg\], as the file has them. Masses that were drawn for an environment are not in it:
-    /// see [`properties`](crate::SimulationManager::properties).
+    /// Sum of the masses of its bodies \[kg\] in the file. Randomized masses of environments are not included: see
+    /// [`properties`](crate::SimulationManager::properties).
     pub fn total_mass(&self) -> f64 {
         self.model().body_mass().iter().sum()
     }
 
-    /// Positions of its joints as MuJoCo has them \[m, rad, quaternions w x y z\], in the environment, shape (N, nq).
+    /// Positions of its joints in MuJoCo's layout \[m, rad, quaternions w x y z\], in the environment, shape (N, nq).
     #[doc(alias = "get_qpos")]
     pub fn qpos(&self) -> Array2<f64> {
         self.rows(&self.places().qpos, |env, place| env.data().qpos()[place])
     }
 
-    /// Velocities of its joints as MuJoCo has them \[m/s, rad/s\], shape (N, nv).
+    /// Velocities of its joints in MuJoCo's layout \[m/s, rad/s\], shape (N, nv).
     #[doc(alias = "get_qvel")]
     pub fn qvel(&self) -> Array2<f64> {
         self.rows(&self.places().dofs, |env, place| env.data().qvel()[place])
@@ -143,8 +143,8 @@ impl<'a> MjcfPart<'a> {
         self.rows(&self.places().controls, |env, place| env.data().ctrl()[place])
     }
 
-    /// Forces of its actuators as MuJoCo last solved them \[N or N m\], shape (N, nu): in the last step; after a reset or a
-    /// write 0, or those of the state as it is where a sensor asks for what is solved.
+    /// Forces of its actuators as MuJoCo last solved them \[N or N m\], shape (N, nu): those of the last step. After a
+    /// reset or a write they are 0, or those of the current state if a sensor needs solved quantities.
     #[doc(alias = "get_actuator_force")]
     pub fn actuator_force(&self) -> Array2<f64> {
         self.rows(&self.places().actuators, |env, place| env.data().actuator_force()[place])
@@ -157,7 +157,7 @@ impl<'a> MjcfPart<'a> {
     /// Pose of a body in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     ///
     /// # Errors
-    /// There is no such body; the error lists the nearest names.
+    /// The body does not exist; the error lists the nearest names.
     pub fn body_pose(&self, name: &str) -> Result<Array2<f64>> {
         let body = self.find("body", name, self.body_names())? + 1;
         Ok(self.poses(&BodyFrame::of_body(self.places().bodies[body])))
@@ -166,7 +166,7 @@ impl<'a> MjcfPart<'a> {
     /// Pose of a site in the environment: rows `[x, y, z, qw, qx, qy, qz]` \[m\], shape (N, 7).
     ///
     /// # Errors
-    /// There is no such site; the error lists the nearest names.
+    /// The site does not exist; the error lists the nearest names.
     pub fn site_pose(&self, name: &str) -> Result<Array2<f64>> {
         let site = self.find("site", name, self.site_names())?;
         let (p, q) = (&self.model().site_pos()[3 * site..], &self.model().site_quat()[4 * site..]);
@@ -197,7 +197,7 @@ impl<'a> MjcfPart<'a> {
     }
 }
 
-/// A part, to command and to write.
+/// Write access to an MJCF part.
 #[derive(Debug)]
 pub struct MjcfPartMut<'a> {
     data: &'a Arc<MjcfData>,
@@ -216,17 +216,18 @@ impl<'a> MjcfPartMut<'a> {
         Self { data, simulation, sensors, index }
     }
 
-    /// The part, to read.
+    /// Read access to the part.
     pub fn read(&self) -> MjcfPart<'_> {
         MjcfPart::new(self.data, self.simulation, self.index)
     }
 
-    /// Sets controls, which stay until changed or reset, and are 0 at first: rows for `env_ids` (all where `None`; a single
-    /// row is for all of them), columns for `actuators` (all where `None`). MuJoCo clamps them to the ranges of the file.
+    /// Sets controls, which stay until changed or reset, and are 0 at first.
+    ///
+    /// Rows are for `env_ids` (`None` for all environments; a single row applies to all of them), columns for
+    /// `actuators` (`None` for all). MuJoCo clamps controls to the ranges of the file.
     ///
     /// # Errors
-    /// Wrong shape, unknown actuator or environment, or one that is named twice, a value that is not finite; then nothing
-    /// is set.
+    /// Wrong shape, an unknown or repeated actuator or environment, or a value that is not finite; then nothing is set.
     pub fn set_ctrl<'t>(
         &mut self,
         controls: impl AsArray<'t, f64, Ix2>,
@@ -258,12 +259,12 @@ impl<'a> MjcfPartMut<'a> {
         Ok(())
     }
 
-    /// Writes positions of all joints into the state, as [`qpos`](MjcfPart::qpos) gives them: rows of nq numbers for
-    /// `env_ids` (all where `None`; a single row is for all of them). Quaternions are normalised. A forward pass follows,
-    /// so that everything that is read afterwards belongs to the new state.
+    /// Writes positions of all joints into the state, in the layout of [`qpos`](MjcfPart::qpos): rows of nq numbers for
+    /// `env_ids` (`None` for all environments; a single row applies to all of them). Quaternions are normalized. A
+    /// forward pass follows, so that later reads belong to the new state.
     ///
     /// # Errors
-    /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite, a quaternion of length zero;
+    /// Wrong shape, an unknown or repeated environment, a value that is not finite, or a quaternion of length zero;
     /// then nothing is written.
     pub fn write_qpos<'t>(&mut self, positions: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let places = self.simulation.parts[self.index].qpos.clone();
@@ -289,11 +290,11 @@ impl<'a> MjcfPartMut<'a> {
         Ok(())
     }
 
-    /// Writes velocities of all joints into the state, as [`qvel`](MjcfPart::qvel) gives them: rows of nv numbers, as
-    /// in [`write_qpos`](Self::write_qpos).
+    /// Writes velocities of all joints into the state, in the layout of [`qvel`](MjcfPart::qvel): rows of nv numbers,
+    /// as in [`write_qpos`](Self::write_qpos).
     ///
     /// # Errors
-    /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite; then nothing is written.
+    /// Wrong shape, an unknown or repeated environment, or a value that is not finite; then nothing is written.
     pub fn write_qvel<'t>(&mut self, velocities: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let places = self.simulation.parts[self.index].dofs.clone();
         let rows = self.checked("write_qvel", velocities.into(), &places, env_ids)?;
@@ -309,13 +310,13 @@ impl<'a> MjcfPartMut<'a> {
         Ok(())
     }
 
-    /// Puts a body that the file says is moved by hand (`mocap="true"`) somewhere: rows `[x, y, z, qw, qx, qy, qz]` in the
-    /// environment \[m\] for `env_ids` (all where `None`; a single row is for all of them), where it stays until it is put
-    /// elsewhere or reset. Quaternions are normalised. A forward pass follows.
+    /// Sets the pose of a mocap body (`mocap="true"` in the file): rows `[x, y, z, qw, qx, qy, qz]` in the environment
+    /// \[m\] for `env_ids` (`None` for all environments; a single row applies to all of them). The body stays there
+    /// until the next write or reset. Quaternions are normalized. A forward pass follows.
     ///
     /// # Errors
-    /// There is no such body, or it is not moved by hand (with those that are); wrong shape, unknown environment, or one that
-    /// is named twice, a value that is not finite, a quaternion of length zero; then nothing is written.
+    /// The body does not exist or is not a mocap body (the error lists mocap bodies); wrong shape, an unknown or
+    /// repeated environment, a value that is not finite, or a quaternion of length zero. Then nothing is written.
     pub fn write_mocap_pose<'t>(
         &mut self,
         body: &str,
@@ -382,7 +383,7 @@ impl<'a> MjcfPartMut<'a> {
     }
 }
 
-/// Makes the quaternion at `first` in a row one of length 1.
+/// Normalizes the quaternion at `first` in a row.
 fn normalise(argument: &'static str, row: &mut [f64], first: usize) -> Result<()> {
     let quaternion = &mut row[first..first + 4];
     let norm = quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();

@@ -1,4 +1,4 @@
-//! MJCF files as they were added: configuration, model, frames.
+//! Data of MJCF parts: configuration, compiled model, frames.
 
 use crate::error::{Error, Result};
 use crate::mjcf::part::{MjcfPart as PartDocument, PartNames, PartOf, compare, sensors_left_out};
@@ -18,9 +18,9 @@ use std::sync::Arc;
 
 /// Configuration of an MJCF file as a part of a scene.
 ///
-/// MuJoCo itself reads the file; what it made of it is put into the scene, every name with `uid/` before it. Bodies that the
-/// file leaves free are free, others stand as the file says. Settings for the whole model (`option`, `visual`, ...) are the
-/// scene's: what differs is a diagnostic.
+/// MuJoCo reads the file, and its compiled elements are added to the scene with `uid/` before every name. Bodies that
+/// are free in the file are free; all others are attached as in the file. Global settings (`option`, `visual`, ...) are
+/// those of the scene; diagnostics report the differences.
 ///
 /// ```
 /// use kinetoscope_sim::{MjcfCfg, SimulationManager, SimulationManagerCfg};
@@ -41,23 +41,23 @@ use std::sync::Arc;
 pub struct MjcfCfg {
     /// Name of the part, unique in the simulation; prefix of its names.
     pub uid: String,
-    /// The file; with `text` only what errors call it.
+    /// Path of the file; with `text`, only its name in error messages.
     pub path: PathBuf,
-    /// The MJCF itself, which names no files; the file's content where `None`.
+    /// MJCF text, which must not refer to files; `None` for the content of the file.
     pub text: Option<String>,
     /// Pose of the file's world in the environment.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Looks of surfaces of bodies besides those of the file, by pattern of their names; `world` is what stands in the
-    /// file's world. No body may be matched twice.
+    /// Surface properties of bodies besides those of the file, by pattern of body names; `world` selects the geoms of
+    /// the file's world. A body may match only one pattern.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
-    /// Semantic class, for the table of mask ids; `mjcf` where `None`.
+    /// Semantic class in the table of mask ids; `None` for `mjcf`.
     pub semantic_class: Option<String>,
 }
 
 impl Default for MjcfCfg {
-    /// No file yet.
+    /// Configuration without a file.
     fn default() -> Self {
         Self {
             uid: "mjcf".into(),
@@ -71,35 +71,35 @@ impl Default for MjcfCfg {
 }
 
 impl MjcfCfg {
-    /// A file where its own world is the environment.
+    /// Creates the configuration of a file whose world is the environment.
     pub fn file(uid: impl Into<String>, path: impl Into<PathBuf>) -> Self {
         Self { uid: uid.into(), path: path.into(), ..Self::default() }
     }
 
-    /// MJCF text, which names no files.
+    /// Creates the configuration of MJCF text, which must not refer to files.
     pub fn text(uid: impl Into<String>, text: impl Into<String>) -> Self {
         Self { uid: uid.into(), path: "text".into(), text: Some(text.into()), ..Self::default() }
     }
 }
 
-/// Number of an actuator of a part: its column in `ctrl`.
+/// Index of an actuator of a part: its column in `ctrl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ActuatorIndex(pub usize);
 
-/// A body or a site of a part, as sensors see it.
+/// Body or site of a part, as a frame for sensors.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
-    /// `uid/body` or `uid/site`.
+    /// Name of the frame: `uid/body` or `uid/site`.
     pub(crate) name: String,
-    /// The body in the file.
+    /// Index of the body in the file.
     pub(crate) body: usize,
-    /// Its pose in the body's frame.
+    /// Pose of the frame in the body.
     pub(crate) body_from_frame: Pose,
-    /// Which frame of the part moves it.
+    /// Index of the frame of the moving body that carries this frame; the own index of a static frame.
     pub(crate) carrier: usize,
 }
 
-/// A file that was added: what does not change while the simulation runs.
+/// MJCF file of a part: everything that does not change while the simulation runs.
 #[derive(Debug)]
 pub(crate) struct MjcfData {
     cfg: MjcfCfg,
@@ -111,17 +111,17 @@ pub(crate) struct MjcfData {
     sensors: Vec<EngineSensor>,
     pub(super) sensor_names: Vec<String>,
     first_mask_id: i32,
-    /// Surfaces of some bodies, in addition to those of the file.
+    /// Surface properties of some bodies, in addition to those of the file.
     surfaces: Vec<(usize, SurfaceCfg)>,
 }
 
 impl MjcfData {
-    /// Surfaces of some bodies, in addition to those of the file.
+    /// Surface properties of some bodies, in addition to those of the file.
     pub(crate) fn surfaces(&self) -> &[(usize, SurfaceCfg)] {
         &self.surfaces
     }
 
-    /// Reads and compiles the file, part number `index` of the simulation, whose model is `scene` so far.
+    /// Reads and compiles the file of part `index` of the simulation. `scene` is the current model.
     pub(crate) fn load(
         cfg: MjcfCfg,
         index: usize,
@@ -171,17 +171,17 @@ impl MjcfData {
         &self.cfg.uid
     }
 
-    /// The configuration it was added with.
+    /// Configuration that the part was added with.
     pub(crate) fn cfg(&self) -> &MjcfCfg {
         &self.cfg
     }
 
-    /// The compiled model of the file alone.
+    /// Compiled model of the file alone.
     pub(crate) fn model(&self) -> &Model {
         &self.model
     }
 
-    /// Names of everything in the file, without the uid.
+    /// Names of all elements of the file, without the uid.
     pub(crate) fn names(&self) -> &PartNames {
         &self.names
     }
@@ -190,17 +190,17 @@ impl MjcfData {
         &self.document
     }
 
-    /// The files that its lines name.
+    /// Asset files that the lines of the part refer to.
     pub(crate) fn files(&self) -> &[mj::Asset] {
         &self.files
     }
 
-    /// Its bodies but the world, then its sites that have a name, as sensors see them.
+    /// Frames for sensors: all bodies except the world, then the sites with a name.
     pub(crate) fn frames(&self) -> &[Frame] {
         &self.frames
     }
 
-    /// MuJoCo's own sensors that the scene has; the first value is that among those of the part.
+    /// MuJoCo's own sensors of the part in the scene. The first value of each is counted among the values of the part.
     pub(crate) fn sensors(&self) -> &[EngineSensor] {
         &self.sensors
     }
@@ -211,18 +211,18 @@ impl MjcfData {
         names.filter(|(_, kind)| matches!(words::joint(**kind), Some("hinge" | "slide"))).map(|(name, _)| name.as_str())
     }
 
-    /// Name in the scene of something of the file.
+    /// Name in the scene of an element of the file.
     pub(crate) fn full(&self, name: &str) -> String {
         format!("{}/{name}", self.cfg.uid)
     }
 
-    /// Value of the mask channel of cameras for a body of the file; body 0 is what stands in its world.
+    /// Value of the mask channel of cameras for a body of the file; body 0 stands for the geoms of the file's world.
     pub(crate) fn mask_id(&self, body: usize) -> i32 {
         self.first_mask_id + body as i32
     }
 }
 
-/// The text of a file, or the text itself, and what MuJoCo makes of it; `refused` is the error that its refusal is.
+/// Reads MJCF from a file or from `text`, and compiles it. `refused` wraps the compile errors of MuJoCo.
 pub(crate) fn read(
     path: &Path,
     text: Option<&str>,
@@ -245,15 +245,16 @@ pub(crate) fn read(
     Ok((text, compiled.into_model()))
 }
 
-/// With the line of the file that MuJoCo names; of a file that includes others it does not say whose line that is.
+/// Adds the location of the line that MuJoCo names. In a file with includes the file of that line is unknown, so
+/// nothing is added.
 fn located(error: CompileError, path: &Path, text: &str) -> CompileError {
     let line = error.line.filter(|_| !text.contains("<include")).map(|line| Source::new(path, line));
     CompileError { source_line: error.source_line.clone().or(line), ..error }
 }
 
-/// Bodies and sites as frames. A site that is called as a body gets `.site` behind its name.
+/// Frames of the bodies and the named sites. A site with the name of a body gets the suffix `.site`.
 fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Diagnostic>) -> Vec<Frame> {
-    // Frame k is body k + 1. A body that is welded to another moves with it; what never moves stands for itself.
+    // Frame k is body k + 1. A body that is welded to a moving body moves with it; each static body carries itself.
     let carrier = |body: usize| match model.body_weldid()[body] as usize {
         0 => body - 1,
         moving => moving - 1,
@@ -286,13 +287,13 @@ fn frames(uid: &str, model: &Model, names: &PartNames, diagnostics: &mut Vec<Dia
     frames
 }
 
-/// MuJoCo's own sensors of a file, those of `kept`.
+/// Describes MuJoCo's own sensors of a file with the indices `kept`.
 pub(crate) fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: &[usize]) -> Vec<EngineSensor> {
     let mut next = 0;
     kept.iter()
         .filter_map(|&s| {
             let word = words::sensor(model.sensor_type()[s])?;
-            // Angles and lengths have different units; what is observed decides.
+            // Angles and lengths have different units: the observed joint decides.
             let hinge = || {
                 let joint = usize::try_from(model.sensor_objid()[s]).ok()?;
                 words::joint(model.jnt_type()[joint]).map(|kind| kind == "hinge")
@@ -320,7 +321,7 @@ pub(crate) fn engine_sensors(uid: &str, model: &Model, names: &PartNames, kept: 
 }
 
 impl MjcfCfg {
-    /// Makes its path relative to a folder; an absolute one stays, and text has none.
+    /// Replaces its path by the result of `beside`; MJCF text has no path.
     pub(crate) fn place_beside(&mut self, beside: impl Fn(&Path) -> PathBuf) {
         if self.text.is_none() {
             self.path = beside(&self.path);

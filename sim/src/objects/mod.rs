@@ -1,4 +1,5 @@
-//! What is added to a simulation: handle, configuration and data views of each kind in one file.
+//! Entities of a simulation, such as robots, objects and terrains: handle, configuration, data, and read and write
+//! access.
 
 mod apart;
 pub(crate) mod articulation;

@@ -1,4 +1,4 @@
-//! Groups: several rigid objects behind one name, written and read together.
+//! Groups of rigid objects with one name, read and written together.
 
 use super::free_body::{FreeBody, FreeBodyMut};
 use super::object_group_data::{GroupData, GroupId, RigidObjectGroupCfg};
@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Axis, Ix3};
 use std::sync::Arc;
 
-/// A group of rigid objects, to read. Arrays have one row per environment and object.
+/// Read access to a group of rigid objects. Arrays have one row per environment and object.
 #[derive(Clone, Copy, Debug)]
 pub struct RigidObjectGroup<'a> {
     data: &'a GroupData,
@@ -37,7 +37,7 @@ impl<'a> RigidObjectGroup<'a> {
         self.data.objects.len()
     }
 
-    /// Whether it has no objects, which no group that was added is.
+    /// True for a group without objects, which cannot be added to a simulation.
     pub fn is_empty(&self) -> bool {
         self.data.objects.is_empty()
     }
@@ -68,7 +68,7 @@ impl<'a> RigidObjectGroup<'a> {
     }
 }
 
-/// A group of rigid objects, to write.
+/// Write access to a group of rigid objects.
 #[derive(Debug)]
 pub struct RigidObjectGroupMut<'a> {
     data: &'a GroupData,
@@ -87,19 +87,19 @@ impl<'a> RigidObjectGroupMut<'a> {
         Self { data, contents, simulation, sensors }
     }
 
-    /// The group, to read.
+    /// Read access to the group.
     pub fn read(&self) -> RigidObjectGroup<'_> {
         RigidObjectGroup::new(self.data, self.contents, self.simulation)
     }
 
-    /// Puts the objects somewhere, as [`RigidObjectMut::write_pose`](crate::RigidObjectMut::write_pose) does one: poses
-    /// `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (environments, K, 7), for `env_ids` (all where `None`; a
-    /// single row is for all of them).
+    /// Sets the poses of the objects, as [`RigidObjectMut::write_pose`](crate::RigidObjectMut::write_pose) does for one
+    /// object: poses `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (environments, K, 7), for `env_ids`
+    /// (`None` for all environments; a single row applies to all of them).
     ///
     /// # Errors
-    /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite,
-    /// a quaternion of length zero; then nothing is written. Where MuJoCo itself refuses the pose of an object that stands, those
-    /// of objects before it in the group are written.
+    /// Wrong shape, an unknown or repeated environment, a value that is not finite, or a quaternion of length zero;
+    /// then nothing is written. If MuJoCo itself rejects the pose of a static object, the poses of earlier objects of
+    /// the group are already written.
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix3>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let (argument, poses): (_, ArrayView3<'_, f64>) = ("write_pose", poses.into());
         let envs = self.check_shape(argument, poses, 7, "environments, objects, x y z qw qx qy qz", env_ids)?;
@@ -112,12 +112,12 @@ impl<'a> RigidObjectGroupMut<'a> {
         written
     }
 
-    /// Sets the velocities of the objects' frames and their angular velocities, in world axes: `[vx, vy, vz, wx, wy, wz]`
-    /// \[m/s, rad/s\], shape (environments, K, 6), as in [`write_pose`](Self::write_pose).
+    /// Sets the velocities of the objects' frames and their angular velocities, in world axes: `[vx, vy, vz, wx, wy,
+    /// wz]` \[m/s, rad/s\], shape (environments, K, 6), as in [`write_pose`](Self::write_pose).
     ///
     /// # Errors
-    /// One of the objects is not dynamic; wrong shape, unknown environment, or one that is named twice, a value that is not
-    /// finite; then nothing is written.
+    /// An object is not dynamic; wrong shape, an unknown or repeated environment, or a value that is not finite. Then
+    /// nothing is written.
     pub fn write_velocity<'t>(
         &mut self,
         velocities: impl AsArray<'t, f64, Ix3>,
@@ -136,7 +136,7 @@ impl<'a> RigidObjectGroupMut<'a> {
         Ok(())
     }
 
-    /// The environments that are meant, where the array has a place for `numbers` of every object.
+    /// Checks the shape of an array with `numbers` values for every object. Returns the selected environments.
     fn check_shape(
         &self,
         argument: &'static str,
@@ -163,11 +163,13 @@ impl<'a> RigidObjectGroupMut<'a> {
 }
 
 impl SimulationManager {
-    /// Adds several rigid objects that are read and written together, compiled as [`add_robot`](Self::add_robot) does; by
-    /// [`rigid_object_id`](crate::Entities::rigid_object_id) each of them is an object as any other, called `group.object`.
+    /// Adds several rigid objects that are read and written together, compiled as by [`add_robot`](Self::add_robot).
+    /// Each is also available as a single object, called `group.object`, by
+    /// [`rigid_object_id`](crate::Entities::rigid_object_id).
     ///
     /// # Errors
-    /// There are none, a name is taken or used twice, or something is wrong with one of them; then none is added.
+    /// The group is empty, a name is taken or used twice, or the configuration of an object is invalid; then nothing is
+    /// added.
     pub fn add_rigid_object_group(&mut self, cfg: RigidObjectGroupCfg) -> Result<GroupId> {
         self.check_world_uid(&cfg.uid)?;
         if cfg.objects.is_empty() {
@@ -187,20 +189,20 @@ impl SimulationManager {
         Ok(GroupId { manager: self.serial, index: self.contents.groups.len() - 1 })
     }
 
-    /// A group of rigid objects, to read.
+    /// Read access to a group of rigid objects.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn rigid_object_group(&self, id: GroupId) -> RigidObjectGroup<'_> {
         let index = self.index_of(id.manager, id.index);
         RigidObjectGroup::new(&self.contents.groups[index], &self.contents, &self.simulation)
     }
 
-    /// A group of rigid objects, to write.
+    /// Write access to a group of rigid objects.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn rigid_object_group_mut(&mut self, id: GroupId) -> RigidObjectGroupMut<'_> {
         let index = self.index_of(id.manager, id.index);

@@ -1,4 +1,4 @@
-//! Groups of rigid objects as they were added.
+//! Data of groups of rigid objects.
 
 use crate::objects::rigid_object_data::RigidObjectCfg;
 use serde::{Deserialize, Serialize};
@@ -10,26 +10,26 @@ use std::ops::Range;
 pub struct RigidObjectGroupCfg {
     /// Name of the group, unique in the simulation.
     pub uid: String,
-    /// Its objects, in the order in which they are read and written. In the simulation each is called by the group's name, a
-    /// point and its own: `blocks.red`.
+    /// Objects of the group, in the order in which they are read and written. The name of an object in the simulation
+    /// is the group's name, a point and its own name: `blocks.red`.
     pub objects: Vec<RigidObjectCfg>,
 }
 
 impl Default for RigidObjectGroupCfg {
-    /// A group of nothing, which is to be filled in.
+    /// Empty group, to be filled in.
     fn default() -> Self {
         Self { uid: "group".into(), objects: Vec::new() }
     }
 }
 
-/// Handle of a group of rigid objects; valid for the manager that made it.
+/// Handle of a group of rigid objects; valid for the manager that created it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct GroupId {
     pub(super) manager: u64,
     pub(super) index: usize,
 }
 
-/// A group that was added: which of the objects it is.
+/// Group of a simulation, as a range of its objects.
 #[derive(Clone, Debug)]
 pub(crate) struct GroupData {
     pub(crate) uid: String,

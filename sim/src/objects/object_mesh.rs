@@ -1,4 +1,4 @@
-//! Meshes of rigid objects: what collides, what is seen, what is inside.
+//! Meshes of rigid objects: collision shapes, visual mesh and mass properties.
 
 use super::rigid_object_data::RigidObjectCfg;
 use super::shape::{ObjectShape, cone};
@@ -9,19 +9,19 @@ use kinetoscope_scene::mesh::{HullCache, Solid, TriMesh};
 use nalgebra::Matrix3;
 use std::sync::Arc;
 
-/// The mesh of an object.
+/// Meshes of an object.
 #[derive(Clone, Debug)]
 pub(crate) struct ObjectMesh {
-    /// What collides: convex, one or several.
+    /// Convex collision shapes.
     pub(crate) shapes: Vec<Arc<TriMesh>>,
-    /// What is seen, where it is not the hull: the triangles of a file.
+    /// Visual mesh: the triangles of a file; `None` if the hull is visible.
     pub(crate) seen: Option<Arc<TriMesh>>,
-    /// What it would weigh with 1 kg/m³; `None` where the shape says it.
+    /// Mass properties for a density of 1 kg/m³; `None` if the shape gives them.
     pub(crate) inertia: Option<RigidInertia>,
 }
 
 impl ObjectMesh {
-    /// The mesh of a shape; `None` where MuJoCo has the shape.
+    /// Creates the meshes of a shape; `None` for a shape that MuJoCo has.
     pub(crate) fn of(cfg: &RigidObjectCfg, diagnostics: &mut Vec<Diagnostic>) -> Result<Option<Self>> {
         cfg.mesh_collision.check(cfg)?;
         let (uid, collision) = (&cfg.uid, &cfg.mesh_collision);
@@ -52,7 +52,7 @@ impl ObjectMesh {
                 hull.solid()
             }
         };
-        // Hulls are closed and have a volume: what is flat was made thicker.
+        // Hulls are closed and have a volume: flat ones were made thicker.
         let inertia = Some(solid.map_or(RigidInertia::ZERO, |solid| inertia(&solid)));
         Ok(Some(Self { shapes, seen: Some(Arc::new(seen)), inertia }))
     }

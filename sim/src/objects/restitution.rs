@@ -1,33 +1,33 @@
-//! Restitution by MuJoCo's contacts, which have none.
+//! Restitution by MuJoCo's contacts, which have no restitution parameter.
 //!
-//! A contact of MuJoCo is a spring and a damper that can only push: with `solref = (-k, -b)` and a constant impedance the
-//! distance x of two surfaces that meet with a load between them obeys `x'' = -b x' - k x` while the force is above zero
-//! (MuJoCo's documentation, "Constraint model": `a1 = d aref + (1 - d) a0` with `aref = -b/d x' - k/d x`; k and b
-//! are per unit of mass). What flies off again has the part
+//! A contact of MuJoCo is a spring and a damper that can only push. With `solref = (-k, -b)` and a constant impedance,
+//! the distance x of two surfaces that meet with a load between them obeys `x'' = -b x' - k x` while the force is above
+//! zero (MuJoCo's documentation, "Constraint model": `a1 = d aref + (1 - d) a0` with `aref = -b/d x' - k/d x`; k and b
+//! are per unit of mass). The surfaces separate with the fraction
 //!
 //! ```text
 //! e = exp(-β/ω atan2(2 β ω, β² - ω²)),   β = b/2, ω = sqrt(k - β²)
 //! ```
 //!
-//! of its velocity: 1 without damping, exp(-2) = 0.135 at critical damping. Source: Schwager, Pöschel, "Coefficient of
-//! restitution and linear-dashpot model revisited", Granular Matter 9, 2007, equation 21. It depends on the damping ratio
-//! `ζ = β/sqrt k` alone; the stiffness is chosen for the time step.
+//! of their impact velocity: 1 without damping, exp(-2) = 0.135 at critical damping. It depends on the damping ratio `ζ
+//! = β/sqrt k` only; the stiffness is chosen for the time step. Source: Schwager, Pöschel, "Coefficient of restitution
+//! and linear-dashpot model revisited", Granular Matter 9, 2007, equation 21.
 
 use std::f64::consts::PI;
 
-/// The least restitution there is a damping for below the critical one: a little above exp(-2).
+/// Smallest restitution of a contact below critical damping: a little above exp(-2).
 pub(crate) const LEAST: f64 = 0.14;
 
-/// Steps that a contact without damping takes. More are more exact, and softer: what comes with v sinks in by
-/// `v STEPS h / π`.
+/// Duration of a contact without damping, in steps. Longer contacts are more exact, and softer: a body with impact
+/// velocity v penetrates by `v STEPS h / π`.
 const STEPS: f64 = 10.0;
 
-/// Impedance d of such a contact, the same at every depth: the formula asks for a constant. It is the largest that MuJoCo
-/// takes (`mjMAXIMP`): with pyramidal cones a contact yields `mu² (1 + mu²) / 2` times as much as `(1 - d) / d` says (the
-/// rows of its edges), so that a smaller d would make the bounce depend on the friction.
+/// Impedance d of such a contact, the same at every depth, since the formula needs a constant. It is the largest that
+/// MuJoCo accepts (`mjMAXIMP`). With pyramidal cones a contact yields by `mu² (1 + mu²) / 2` times `(1 - d) / d` (the
+/// rows of its edges), so a smaller d would make the bounce depend on the friction.
 pub(crate) const IMPEDANCE: [f64; 5] = [0.9999, 0.9999, 0.001, 0.5, 2.0];
 
-/// Weight of its impedance against that of other surfaces, which have 1.
+/// Weight of these contact parameters (`solmix`) against those of other surfaces, which have 1.
 pub(crate) const WEIGHT: f64 = 1e6;
 
 /// Restitution of a contact with a damping ratio of 0 to below 1.
@@ -36,9 +36,9 @@ fn restitution(ratio: f64) -> f64 {
     (-ratio / omega * (2.0 * ratio * omega).atan2(ratio * ratio - omega * omega)).exp()
 }
 
-/// MuJoCo's `solref` of surfaces with this restitution, [`LEAST`] to 1, in steps of `timestep` \[s\].
+/// MuJoCo's `solref` for surfaces with this restitution, [`LEAST`] to 1, at time steps of `timestep` \[s\].
 pub(crate) fn solref(restitution_wanted: f64, timestep: f64) -> [f64; 2] {
-    // Falls from 1 to exp(-2): halving finds the damping ratio to the last bit.
+    // The restitution falls from 1 to exp(-2): bisection finds the damping ratio to the last bit.
     let (mut low, mut high) = (0.0, 1.0 - 1e-12);
     for _ in 0..60 {
         let middle = (low + high) / 2.0;
@@ -46,7 +46,7 @@ pub(crate) fn solref(restitution_wanted: f64, timestep: f64) -> [f64; 2] {
     }
     let ratio = if restitution_wanted >= 1.0 { 0.0 } else { (low + high) / 2.0 };
     let frequency = PI / (STEPS * timestep);
-    // MuJoCo takes 0 for a positive number, which means something else.
+    // MuJoCo treats 0 like a positive number, which has another meaning.
     let damping = (2.0 * ratio * frequency).max(1e-9);
     [-frequency * frequency, -damping]
 }
@@ -55,7 +55,8 @@ pub(crate) fn solref(restitution_wanted: f64, timestep: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Integrates the contact with steps of a ten-thousandth of it.
+    /// Integrates a contact in steps of a ten-thousandth of its duration. Returns the separation velocity for unit
+    /// impact velocity.
     fn bounce(stiffness: f64, damping: f64) -> f64 {
         let h = PI / stiffness.sqrt() * 1e-4;
         let (mut x, mut v) = (0.0_f64, -1.0_f64);
@@ -64,7 +65,7 @@ mod tests {
             if force <= 0.0 {
                 return v;
             }
-            // The midpoint rule: an error of the square of the step.
+            // Midpoint rule: the error is quadratic in the step.
             let (xm, vm) = (x + v * h / 2.0, v + force * h / 2.0);
             x += vm * h;
             v += (-stiffness * xm - damping * vm) * h;
@@ -81,7 +82,7 @@ mod tests {
         }
         assert_eq!(solref(1.0, 0.01)[1], -1e-9);
         assert!((restitution(1.0 - 1e-9) - (-2.0_f64).exp()).abs() < 1e-4);
-        // Control: twice the damping is another restitution.
+        // Control: twice the damping gives another restitution.
         let [stiffness, damping] = solref(0.5, 0.002).map(|x| -x);
         assert!((bounce(stiffness, 2.0 * damping) - 0.5).abs() > 0.1);
     }

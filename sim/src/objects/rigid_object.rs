@@ -9,7 +9,7 @@ use crate::simulation::Simulation;
 use ndarray::{Array2, AsArray, Ix2};
 use std::sync::Arc;
 
-/// A rigid object, to read. Arrays have one row per environment.
+/// Read access to a rigid object. Arrays have one row per environment.
 #[derive(Clone, Copy, Debug)]
 pub struct RigidObject<'a> {
     pub(super) data: &'a Arc<RigidObjectData>,
@@ -31,18 +31,17 @@ impl<'a> RigidObject<'a> {
         self.data.uid()
     }
 
-    /// The configuration it was added with.
+    /// Configuration that the object was added with.
     pub fn cfg(&self) -> &'a RigidObjectCfg {
         self.data.cfg()
     }
 
-    /// What the mask channel of cameras says of it, the same in every environment.
+    /// Value of the mask channel of cameras for the object, the same in every environment.
     pub fn mask_id(&self) -> i32 {
         self.data.mask_id
     }
 
-    /// Configured mass \[kg\]. The mass of each environment is
-    /// [`mass`](Self::mass).
+    /// Configured mass \[kg\]. [`mass`](Self::mass) gives the mass in each environment.
     pub fn nominal_mass(&self) -> f64 {
         self.data.mass_properties.mass
     }
@@ -53,15 +52,15 @@ impl<'a> RigidObject<'a> {
         self.body().poses()
     }
 
-    /// Velocity of its frame, then angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 where it is
-    /// not dynamic.
+    /// Velocity of its frame, then angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 for an object that
+    /// is not dynamic.
     #[doc(alias = "get_velocity")]
     pub fn velocity(&self) -> Array2<f64> {
         self.body().velocities()
     }
 }
 
-/// A rigid object, to write.
+/// Write access to a rigid object.
 #[derive(Debug)]
 pub struct RigidObjectMut<'a> {
     pub(super) data: &'a Arc<RigidObjectData>,
@@ -80,22 +79,23 @@ impl<'a> RigidObjectMut<'a> {
         Self { data, simulation, sensors, index }
     }
 
-    /// The object, to read.
+    /// Read access to the object.
     pub fn read(&self) -> RigidObject<'_> {
         RigidObject::new(self.data, self.simulation, self.index)
     }
 
-    /// Puts the object somewhere: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\] for `env_ids` (all where `None`;
-    /// a single row is for all of them). Quaternions are normalised; velocities, which are in world axes, stay. A forward
-    /// pass follows, so that everything that is read afterwards belongs to the new state. A kinematic object stays there until
-    /// it is put elsewhere or reset. A static one stays over resets, until it is put elsewhere or
-    /// [`reset_properties`](crate::EnvPropertiesMut::reset) is called: its place is
-    /// [`Property::Position`](crate::Property) and `Rotation`, an environment where it differs gets a model of its own, and
-    /// what already touches it is pushed out as from anything else.
+    /// Sets the pose of the object: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\] for `env_ids` (`None` for
+    /// all environments; a single row applies to all of them). Quaternions are normalized; velocities, which are in
+    /// world axes, are preserved. A forward pass follows, so that later reads belong to the new state.
+    ///
+    /// A kinematic object stays there until the next write or reset. A static object stays there over resets, until the
+    /// next write or [`reset_properties`](crate::EnvPropertiesMut::reset). Its pose is
+    /// [`Property::Position`](crate::Property) and `Rotation`, and an environment with another pose gets a model of its
+    /// own. A body that touches the object at its new pose is pushed out as in any contact.
     ///
     /// # Errors
-    /// Wrong shape, unknown environment, or one that is named twice, a value that is not finite, a
-    /// quaternion of length zero; then nothing is written.
+    /// Wrong shape, an unknown or repeated environment, a value that is not finite, or a quaternion of length zero;
+    /// then nothing is written.
     pub fn write_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.body().write_poses("write_pose", poses.into(), env_ids)
     }

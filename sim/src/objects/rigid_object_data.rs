@@ -1,4 +1,4 @@
-//! Rigid objects as they were added: configuration, mesh, mass.
+//! Data of rigid objects: configuration, meshes, mass properties.
 
 use super::mass_properties::MassProperties;
 use super::mesh_collision::MeshCollision;
@@ -13,20 +13,21 @@ use kinetoscope_robot::mesh_key::MeshKey;
 use kinetoscope_scene::Pose;
 use serde::{Deserialize, Serialize};
 
-/// The way in which an object moves.
+/// Type of motion of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum BodyType {
-    /// Falls, is pushed and held.
+    /// Moves by forces and contacts.
     #[default]
     Dynamic,
-    /// Is where it is put, in every environment by itself, and pushes others without being pushed. MuJoCo gives such a body
-    /// a place and no velocity: it pushes what it is put into, which sinks in by 0.04 s times the speed, and does not drag
-    /// along what lies on it. It does not collide with what is fixed or moved by hand, too.
+    /// Has the pose that is set in each environment, and pushes other bodies without being pushed. MuJoCo gives such a
+    /// body (a mocap body) a pose but no velocity. Other bodies are pushed out of it, after they sink in by 0.04 s
+    /// times the speed, and bodies on top of it are not dragged along. It does not collide with fixed bodies or other
+    /// kinematic bodies.
     Kinematic,
-    /// Stands fixed, and is in the way of others. Where it stands is a [property](crate::Property) of the environment:
-    /// one in which it stands elsewhere has it there after resets, too.
+    /// Stays fixed, and collides with other bodies. Its pose is a [property](crate::Property) of the environment, which
+    /// survives resets.
     Static,
 }
 
@@ -36,54 +37,56 @@ pub enum BodyType {
 pub struct RigidObjectCfg {
     /// Name of the object, unique in the simulation.
     pub uid: String,
-    /// Its shape.
+    /// Shape of the object.
     pub shape: ObjectShape,
-    /// Collision shape of a mesh file.
+    /// Collision geometry of a mesh file.
     pub mesh_collision: MeshCollision,
     /// Type of motion.
     pub body_type: BodyType,
-    /// Mass \[kg\]; from `density` where `None`.
+    /// Mass \[kg\]; `None` to compute it from `density`.
     pub mass: Option<f64>,
     /// Density \[kg/m³\].
     pub density: f64,
-    /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three); the simulation's where `None`.
-    /// MuJoCo takes the larger of the two surfaces that touch.
+    /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three); `None` for the simulation's
+    /// default. In a contact, MuJoCo takes the larger value of the two surfaces.
     pub friction: Option<[f64; 3]>,
-    /// Centre of mass in the object's frame \[m\]; that of the shape where `None`.
+    /// Center of mass in the object's frame \[m\]; `None` for that of the shape.
     pub center_of_mass: Option<[f64; 3]>,
-    /// Moments of inertia about the centre of mass along x, y and z of the object's frame \[kg m²\]; those of the shape,
-    /// filled evenly, where `None`.
+    /// Moments of inertia about the center of mass along x, y and z of the object's frame \[kg m²\]; `None` for those
+    /// of the shape with uniform density.
     pub inertia: Option<[f64; 3]>,
-    /// Force against the velocity of the object's frame \[N s/m\]: `-linear_damping v`. Of single environments, and later:
-    /// [`RigidObjectMut::set_damping`](crate::RigidObjectMut::set_damping), or the [property](crate::Property).
+    /// Linear damping \[N s/m\]: the force `-linear_damping v` against the velocity of the object's frame.
+    /// [`RigidObjectMut::set_damping`](crate::RigidObjectMut::set_damping) or the [property](crate::Property) changes
+    /// it at run time, in single environments.
     pub linear_damping: f64,
-    /// Torque against its angular velocity \[N m s/rad\]: `-angular_damping w`.
+    /// Angular damping \[N m s/rad\]: the torque `-angular_damping w` against the angular velocity.
     pub angular_damping: f64,
-    /// The part of the velocity that is left after a bounce, 0.14 to 1; MuJoCo's soft contacts, which leave about 0.1, where
-    /// `None`.
+    /// Coefficient of restitution, 0.14 to 1: the fraction of the velocity that is left after a bounce. `None` for
+    /// MuJoCo's soft contacts, which leave about 0.1.
     ///
-    /// MuJoCo has no restitution: this is a contact that is a spring and a damper (`solref` below 0) for about ten steps.
-    /// A body that arrives at speed v \[m/s\] sinks in by up to `3.2 v dt` meanwhile, so bouncing balls need a small time step.
-    /// The instant of the step at which the surfaces meet makes up to 0.08 less or 0.04 more of it below 0.3, 0.06 less or 0.04 more at 0.5,
-    /// 0.02 less or 0.03 more at 0.8, and 0.003 at 1. It holds for an impact through the centre of mass. Of two such surfaces
-    /// the one that bounces less counts; against one that has none, this one's.
+    /// MuJoCo has no restitution: this value turns the contact into a spring and a damper (`solref` below 0) for about
+    /// ten steps. Meanwhile a body that arrives at speed v \[m/s\] sinks in by up to `3.2 v dt`, so bouncing balls need
+    /// a small time step. The instant within the step at which the surfaces meet changes the coefficient: by -0.08 to
+    /// 0.04 below 0.3, by -0.06 to 0.04 at 0.5, by -0.02 to 0.03 at 0.8, and by 0.003 at 1. The coefficient applies to
+    /// an impact through the center of mass. Of two such surfaces the smaller coefficient applies; against a surface
+    /// without a coefficient, this one applies.
     pub restitution: Option<f64>,
-    /// Distance at which contacts begin to push \[m\], as if the shape were larger by it. The larger of the two surfaces
-    /// counts on MuJoCo 2.2.2, their sum on 4.x.
+    /// Contact margin \[m\]: distance at which contact forces begin, as if the shape were larger by it. MuJoCo 2.2.2
+    /// uses the larger margin of the two surfaces, 4.x their sum.
     pub contact_margin: f64,
-    /// Pose at the start, in the environment.
+    /// Initial pose in the environment.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Colour and opacity, 0..=1; of a mesh, where its file gives none.
+    /// RGBA color in 0..=1; for a mesh, it applies where the file gives no color.
     pub rgba: [f64; 4],
-    /// Look of its surface besides the colour.
+    /// Surface properties besides the color.
     pub surface: SurfaceCfg,
-    /// Semantic class, for the table of mask ids; `object` where `None`.
+    /// Semantic class in the table of mask ids; `None` for `object`.
     pub semantic_class: Option<String>,
 }
 
 impl Default for RigidObjectCfg {
-    /// A grey cube of 10 cm with the density of water.
+    /// Gray cube of 10 cm with the density of water.
     fn default() -> Self {
         Self {
             uid: "object".into(),
@@ -107,7 +110,7 @@ impl Default for RigidObjectCfg {
     }
 }
 
-/// An object that was added: what does not change while the simulation runs.
+/// Rigid object of a simulation: everything that does not change while the simulation runs.
 #[derive(Debug)]
 pub(crate) struct RigidObjectData {
     cfg: RigidObjectCfg,
@@ -117,7 +120,7 @@ pub(crate) struct RigidObjectData {
 }
 
 impl RigidObjectData {
-    /// Checks every number and reads the mesh.
+    /// Checks every number, and reads the mesh.
     pub(crate) fn new(cfg: RigidObjectCfg, mask_id: i32, diagnostics: &mut Vec<Diagnostic>) -> Result<Self> {
         let fail = |field, value: &dyn std::fmt::Debug, expected| {
             Err(Error::Config { field, value: format!("{value:?}"), expected })
@@ -139,7 +142,7 @@ impl RigidObjectData {
             return fail("center_of_mass", &com, "the three coordinates must be finite");
         }
         if let Some(moments) = cfg.inertia {
-            // As MuJoCo asks it, rounding included.
+            // The same check as in MuJoCo, rounding included.
             let [a, b, c] = moments;
             let triangle = a + b >= c && a + c >= b && b + c >= a;
             if !(moments.iter().all(|m| m.is_finite() && *m > 1e-14) && triangle) {
@@ -189,7 +192,7 @@ impl RigidObjectData {
         &self.cfg.uid
     }
 
-    /// The configuration it was added with.
+    /// Configuration that the object was added with.
     pub(crate) fn cfg(&self) -> &RigidObjectCfg {
         &self.cfg
     }
@@ -203,12 +206,12 @@ impl RigidObjectData {
         &self.mass_properties
     }
 
-    /// Geometry that collides and is seen, for a mesh.
+    /// Collision and visual meshes; `None` for a shape without a mesh.
     pub(crate) fn mesh(&self) -> Option<&ObjectMesh> {
         self.mesh.as_ref()
     }
 
-    /// The file that says what it looks like.
+    /// Key of the mesh file that the object is rendered with.
     pub(crate) fn mesh_key(&self) -> Option<MeshKey> {
         match &self.cfg.shape {
             ObjectShape::Mesh { path, scale, .. } => Some(MeshKey::new(path, &(*scale).into())),

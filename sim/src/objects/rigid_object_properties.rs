@@ -1,7 +1,7 @@
-//! What a rigid object weighs and how it rubs in each environment, while the simulation runs; forces on it.
+//! Mass properties, friction and damping of a rigid object in each environment at run time, and external wrenches.
 //!
-//! An environment whose object differs from the others gets a model of its own, in which only the arrays that differ are its
-//! own memory: see [`randomization`](crate::randomization), whose properties these are.
+//! An environment whose object differs from the others gets a model of its own, which owns only the arrays that differ:
+//! see [`randomization`](crate::randomization), whose properties these are.
 
 use crate::env::Env;
 use crate::error::{Error, Result};
@@ -15,11 +15,11 @@ use kinetoscope_mujoco::Model;
 use nalgebra::{UnitQuaternion, Vector3};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix1, Ix2};
 
-/// What stands for the robot in the wrenches of objects: there are fewer robots.
+/// Robot index of the wrenches on objects, larger than the number of robots.
 const OBJECTS: usize = 1 << 20;
 
 impl RigidObject<'_> {
-    /// Mass in each environment \[kg\], shape (N), as MuJoCo has it; that of the configuration where the object is not
+    /// Mass in each environment \[kg\], shape (N), as in MuJoCo's model; the configured mass for an object that is not
     /// dynamic.
     #[doc(alias = "get_mass")]
     pub fn mass(&self) -> Array1<f64> {
@@ -27,16 +27,16 @@ impl RigidObject<'_> {
         self.numbers(1, [nominal].into(), |model, body| model.body_mass()[body..=body].to_vec()).remove_axis(Axis(1))
     }
 
-    /// Centre of mass in the object's frame in each environment \[m\], shape (N, 3).
+    /// Center of mass in the object's frame in each environment \[m\], shape (N, 3).
     #[doc(alias = "get_center_of_mass")]
     pub fn center_of_mass(&self) -> Array2<f64> {
         let nominal = self.data.mass_properties().com.iter().copied().collect();
         self.numbers(3, nominal, |model, body| model.body_ipos()[3 * body..3 * body + 3].to_vec())
     }
 
-    /// Principal moments of inertia about the centre of mass in each environment \[kg m²\], shape (N, 3). They are
-    /// those along x, y and z of the object's frame; those of a mesh whose configuration names no `inertia` are along its
-    /// principal axes, the largest first.
+    /// Principal moments of inertia about the center of mass in each environment \[kg m²\], shape (N, 3), along x, y
+    /// and z of the object's frame. For a mesh without a configured `inertia`, they are along its principal axes, the
+    /// largest first.
     #[doc(alias = "get_inertia")]
     pub fn inertia(&self) -> Array2<f64> {
         let nominal = self.data.mass_properties().moments.iter().copied().collect();
@@ -50,7 +50,7 @@ impl RigidObject<'_> {
         let body = self.simulation.objects[self.index].body;
         self.simulation.batch.for_each(|i, env| {
             let model = env.data().model();
-            // The first shape is the one that collides.
+            // The first geom is the collision shape.
             if let Ok(geom) = usize::try_from(model.body_geomadr()[body]) {
                 (0..3).for_each(|k| values[(i, k)] = model.geom_friction()[3 * geom + k]);
             }
@@ -58,8 +58,8 @@ impl RigidObject<'_> {
         values
     }
 
-    /// Linear damping \[N s/m\] and angular damping \[N m s/rad\] in each environment, shape (N, 2); 0 where the object is not
-    /// dynamic.
+    /// Linear damping \[N s/m\] and angular damping \[N m s/rad\] in each environment, shape (N, 2); 0 for an object
+    /// that is not dynamic.
     #[doc(alias = "get_damping")]
     pub fn damping(&self) -> Array2<f64> {
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), 2));
@@ -72,8 +72,8 @@ impl RigidObject<'_> {
         values
     }
 
-    /// Forces and torques of [`set_external_wrench`](RigidObjectMut::set_external_wrench), in world axes with the object where
-    /// it is \[N, N m\], shape (N, 6).
+    /// Forces and torques of [`set_external_wrench`](RigidObjectMut::set_external_wrench), in world axes at the current
+    /// pose of the object \[N, N m\], shape (N, 6).
     #[doc(alias = "get_external_wrench")]
     pub fn external_wrench(&self) -> Array2<f64> {
         let mut wrenches = Array2::zeros((self.simulation.batch.num_envs(), 6));
@@ -86,7 +86,7 @@ impl RigidObject<'_> {
         wrenches
     }
 
-    /// Numbers of its body in each environment; those of the configuration where MuJoCo has none.
+    /// Reads numbers of the body in each environment; an object that is not dynamic has the configured numbers.
     fn numbers(&self, width: usize, nominal: Vec<f64>, read: impl Fn(&Model, usize) -> Vec<f64>) -> Array2<f64> {
         let body = self.simulation.objects[self.index].body;
         let moves = self.cfg().body_type == BodyType::Dynamic;
@@ -100,23 +100,23 @@ impl RigidObject<'_> {
 }
 
 impl RigidObjectMut<'_> {
-    /// Sets the mass \[kg\] of the object in `env_ids` (all where `None`): one number for each, or one for all of them. The
-    /// moments of inertia change in the same proportion, from those of the configuration, as with another density. It stays
-    /// through a reset; a forward pass follows.
+    /// Sets the mass \[kg\] of the object in `env_ids` (`None` for all environments): one number for each, or one for
+    /// all of them. The configured moments of inertia are scaled in proportion, as with another density. The mass
+    /// survives resets; a forward pass follows.
     ///
     /// # Errors
-    /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a mass that is not finite or
-    /// below 1e-15 kg; then nothing is set.
+    /// The object is not dynamic; wrong shape, an unknown or repeated environment, or a mass that is not finite or
+    /// below 1e-15 kg. Then nothing is set.
     pub fn set_mass<'t>(&mut self, masses: impl AsArray<'t, f64, Ix1>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let masses = masses.into().insert_axis(Axis(1));
         self.set("set_mass", "environments, 1", &[Property::Mass], masses, env_ids)
     }
 
-    /// Sets the centre of mass in the object's frame \[m\]: rows of 3, as in [`set_mass`](Self::set_mass).
+    /// Sets the center of mass in the object's frame \[m\]: rows of 3, as in [`set_mass`](Self::set_mass).
     ///
     /// # Errors
-    /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a number that is not finite;
-    /// then nothing is set.
+    /// The object is not dynamic; wrong shape, an unknown or repeated environment, or a number that is not finite. Then
+    /// nothing is set.
     pub fn set_center_of_mass<'t>(
         &mut self,
         centers: impl AsArray<'t, f64, Ix2>,
@@ -126,41 +126,41 @@ impl RigidObjectMut<'_> {
         self.set(argument, meaning, &[Property::CenterOfMass], centers.into(), env_ids)
     }
 
-    /// Sets the principal moments of inertia \[kg m²\], as [`inertia`](RigidObject::inertia) gives them: rows of 3, as in
-    /// [`set_mass`](Self::set_mass).
+    /// Sets the principal moments of inertia \[kg m²\], along the axes of [`inertia`](RigidObject::inertia): rows of 3,
+    /// as in [`set_mass`](Self::set_mass).
     ///
     /// # Errors
-    /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, moments that no body has; then
-    /// nothing is set.
+    /// The object is not dynamic; wrong shape, an unknown or repeated environment, or physically impossible moments.
+    /// Then nothing is set.
     pub fn set_inertia<'t>(&mut self, moments: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let (argument, meaning) = ("set_inertia", "environments, three moments");
         self.set(argument, meaning, &[Property::Inertia], moments.into(), env_ids)
     }
 
-    /// Sets sliding friction, torsional \[m\] and rolling \[m\]: rows of 3, as in [`set_mass`](Self::set_mass). MuJoCo takes the
-    /// larger of the two surfaces that touch: for a slippery object the ground must be slippery, too.
+    /// Sets sliding friction, torsional \[m\] and rolling \[m\]: rows of 3, as in [`set_mass`](Self::set_mass). In a
+    /// contact, MuJoCo takes the larger value of the two surfaces: a slippery object needs a slippery ground, too.
     ///
     /// # Errors
-    /// Wrong shape, unknown environment, or one that is named twice, a coefficient that is negative or not finite; then
-    /// nothing is set.
+    /// Wrong shape, an unknown or repeated environment, or a coefficient that is negative or not finite; then nothing
+    /// is set.
     pub fn set_friction<'t>(&mut self, frictions: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let properties = [Property::Friction, Property::TorsionalFriction, Property::RollingFriction];
         let meaning = "environments, sliding torsional rolling";
         self.set("set_friction", meaning, &properties, frictions.into(), env_ids)
     }
 
-    /// Sets linear damping \[N s/m\], a force against the velocity of the object's frame, and angular damping \[N m s/rad\],
-    /// a torque against its angular velocity: rows of 2, as in [`set_mass`](Self::set_mass).
+    /// Sets linear damping \[N s/m\] and angular damping \[N m s/rad\]: rows of 2, as in [`set_mass`](Self::set_mass).
+    /// They give a force against the velocity of the object's frame, and a torque against its angular velocity.
     ///
     /// # Errors
-    /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a number that is negative or
-    /// not finite; then nothing is set.
+    /// The object is not dynamic; wrong shape, an unknown or repeated environment, or a number that is negative or not
+    /// finite. Then nothing is set.
     pub fn set_damping<'t>(&mut self, dampings: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         let properties = [Property::LinearDamping, Property::AngularDamping];
         self.set("set_damping", "environments, linear angular", &properties, dampings.into(), env_ids)
     }
 
-    /// Sets properties from rows, one after the other.
+    /// Sets properties from rows, which hold the values of the properties one after the other.
     fn set(
         &mut self,
         argument: &'static str,
@@ -175,7 +175,7 @@ impl RigidObjectMut<'_> {
         let uid = self.data.uid();
         let columns = properties.iter().map(|property| property.width()).sum();
         let rows = self.rows(argument, meaning, columns, values, env_ids)?;
-        // Environments come in this order.
+        // Environments are visited in this order.
         let mut given = rows.iter();
         self.simulation.change_properties(rows.envs(), |_, changed| {
             let row = given.next().map_or_else(Vec::new, |(_, row)| row.to_vec());
@@ -191,13 +191,14 @@ impl RigidObjectMut<'_> {
         Ok(())
     }
 
-    /// Applies a force \[N\] in the centre of mass and a torque \[N m\] from the next step on, until they are set again or the
-    /// environment is reset; zeros end them. Both have rows of 3 for `env_ids` (all where `None`; a single row is for all of
-    /// them). With [`WrenchFrame::Link`] both are in the axes of the object and turn with it, from step to step.
+    /// Applies a force \[N\] at the center of mass and a torque \[N m\] from the next step on, until they are set again
+    /// or the environment is reset; zeros end them. Both have rows of 3 for `env_ids` (`None` for all environments; a
+    /// single row applies to all of them). With [`WrenchFrame::Link`] both are in the axes of the object and turn with
+    /// it, from step to step.
     ///
     /// # Errors
-    /// The object is not dynamic; wrong shape, unknown environment, or one that is named twice, a value that is not finite;
-    /// then nothing is set.
+    /// The object is not dynamic; wrong shape, an unknown or repeated environment, or a value that is not finite. Then
+    /// nothing is set.
     pub fn set_external_wrench<'f, 't>(
         &mut self,
         forces: impl AsArray<'f, f64, Ix2>,

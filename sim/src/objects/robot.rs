@@ -1,4 +1,4 @@
-//! Robots: the loaded robot, and its views of a running simulation.
+//! Robots in a running simulation: read and write access.
 
 pub use super::robot_cfg::RobotCfg;
 
@@ -18,7 +18,7 @@ use kinetoscope_scene::pose::to_row;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::sync::Arc;
 
-/// A robot, to read. Arrays have one row per environment and one column per joint, in the order of
+/// Read access to a robot. Arrays have one row per environment and one column per joint, in the order of
 /// [`joint_names`](Self::joint_names).
 #[derive(Clone, Copy, Debug)]
 pub struct Robot<'a> {
@@ -32,7 +32,7 @@ impl<'a> Robot<'a> {
         Self { data, simulation, index }
     }
 
-    /// Which of the simulation's robots it is.
+    /// Index of the robot in the simulation.
     pub(super) fn index(&self) -> usize {
         self.index
     }
@@ -46,12 +46,12 @@ impl<'a> Robot<'a> {
         self.data.uid()
     }
 
-    /// The merged robot as its files describe it, with its payloads.
+    /// Merged robot as its files describe it, with its payloads.
     pub fn description(&self) -> &'a RobotDescription {
         self.data.description()
     }
 
-    /// Number of movable joints with one degree of freedom, mimic ones included: the columns of `qpos`.
+    /// Number of movable joints with one degree of freedom, mimic joints included: the columns of `qpos`.
     pub fn dof(&self) -> usize {
         self.data.plans.len()
     }
@@ -61,8 +61,8 @@ impl<'a> Robot<'a> {
         &self.data.joint_names
     }
 
-    /// Names of all links, fused ones included, in the order of the merged URDF; of an MJCF file its bodies, then its named
-    /// sites.
+    /// Names of all links, fused links included, in the order of the merged URDF; for an MJCF file, its bodies, then
+    /// its named sites.
     pub fn link_names(&self) -> Vec<&'a str> {
         self.data.description.named_links().iter().map(|l| l.name.as_str()).collect()
     }
@@ -72,11 +72,11 @@ impl<'a> Robot<'a> {
         self.data.parts.keys().map(String::as_str).collect()
     }
 
-    /// Columns of the joints of a control part, mimic joints included, in the order of its patterns; of all joints where
-    /// `part` is `None`. Without the mimic joints: [`active_joint_ids`](Self::active_joint_ids).
+    /// Columns of the joints of a control part, mimic joints included, in the order of its patterns; `None` for all
+    /// joints. [`active_joint_ids`](Self::active_joint_ids) leaves out the mimic joints.
     ///
     /// # Errors
-    /// There is no such part; the error lists those there are.
+    /// The part does not exist; the error lists the existing parts.
     #[doc(alias = "get_joint_ids")]
     pub fn joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
         let Some(part) = part.into() else { return Ok((0..self.dof()).map(JointIndex).collect()) };
@@ -87,7 +87,7 @@ impl<'a> Robot<'a> {
     /// Column of the joint called `name`.
     ///
     /// # Errors
-    /// There is no such joint; the error lists the nearest names.
+    /// The joint does not exist; the error lists the nearest names.
     pub fn joint_id(&self, name: &str) -> Result<JointIndex> {
         self.joint_names()
             .iter()
@@ -96,21 +96,21 @@ impl<'a> Robot<'a> {
             .ok_or_else(|| unknown("joint", name, self.joint_names().iter().map(String::as_str)))
     }
 
-    /// Whether a joint follows another one.
+    /// True if a joint follows another joint.
     ///
     /// # Errors
-    /// There is no such joint.
+    /// The joint does not exist.
     pub fn is_mimic(&self, joint: JointIndex) -> Result<bool> {
         Ok(self.plan(joint)?.mimic.is_some())
     }
 
-    /// What was made of a joint of the description.
+    /// Plan of a joint of the description.
     pub(super) fn plan(&self, joint: JointIndex) -> Result<&JointPlan> {
         let (what, index, count) = ("joint", joint.0, self.data.plans.len());
         self.data.plans.get(index).ok_or(Error::UnknownIndex { what, index, count })
     }
 
-    /// For every joint: the joint it follows, ratio and offset; itself, 1 and 0 where it follows none.
+    /// Driver, ratio and offset of every joint; itself, 1 and 0 for a joint that follows no other.
     pub fn mimic_drivers(&self) -> Vec<(JointIndex, f64, f64)> {
         (0..self.dof())
             .map(|i| match self.data.plans[i].mimic {
@@ -141,8 +141,8 @@ impl<'a> Robot<'a> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |d| env.drives.effort[d]))
     }
 
-    /// Position targets \[rad or m\], shape (N, dof); for a mimic joint, what its driver's target implies; the present
-    /// position for a joint without a drive.
+    /// Position targets \[rad or m\], shape (N, dof). A mimic joint has the position that its driver's target implies;
+    /// a joint without a drive has its current position.
     #[doc(alias = "get_target_qpos")]
     pub fn qpos_target(&self) -> Array2<f64> {
         let mut targets = self.gather(|env, joint| match joint.drive {
@@ -159,14 +159,14 @@ impl<'a> Robot<'a> {
         targets
     }
 
-    /// Sum of the link masses in the files, and of payloads \[kg\]. Masses that were drawn for an environment are not in it:
+    /// Sum of the link masses in the files, and of payloads \[kg\]. Randomized masses of environments are not included:
     /// see [`properties`](crate::SimulationManager::properties).
     pub fn total_mass(&self) -> f64 {
         self.data.description.total_mass()
     }
 
-    /// Joint positions at the start, which [`reset`](crate::SimulationManager::reset) goes back to \[rad or m\], shape
-    /// (N, dof).
+    /// Initial joint positions \[rad or m\], to which [`reset`](crate::SimulationManager::reset) returns, shape (N,
+    /// dof).
     #[doc(alias = "default_joint_pos")]
     #[doc(alias = "get_default_qpos")]
     pub fn default_qpos(&self) -> Array2<f64> {
@@ -174,7 +174,7 @@ impl<'a> Robot<'a> {
         Array2::from_shape_fn((n, self.dof()), |(_, joint)| self.data.plans[joint].initial)
     }
 
-    /// Pose of the root link at the start: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, 7).
+    /// Initial pose of the root link: rows `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, 7).
     #[doc(alias = "get_default_root_pose")]
     pub fn default_root_pose(&self) -> Array2<f64> {
         let row = to_row(&self.data.root_pose());
@@ -187,17 +187,17 @@ impl<'a> Robot<'a> {
         self.root().poses()
     }
 
-    /// Velocity of the root link's frame, then its angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 where
-    /// the base is fixed.
+    /// Velocity of the root link's frame, then its angular velocity, in world axes \[m/s, rad/s\], shape (N, 6); 0 for
+    /// a fixed base.
     #[doc(alias = "get_root_velocity")]
     pub fn root_velocity(&self) -> Array2<f64> {
         self.root().velocities()
     }
 
-    /// Place of the link called `name` in [`link_names`](Self::link_names), fused ones included.
+    /// Index of the link called `name` in [`link_names`](Self::link_names), fused links included.
     ///
     /// # Errors
-    /// There is no such link; the error lists the nearest names.
+    /// The link does not exist; the error lists the nearest names.
     pub fn link_id(&self, name: &str) -> Result<LinkId> {
         self.data.description.link_id(name).ok_or_else(|| unknown("link", name, self.link_names()))
     }
@@ -206,10 +206,10 @@ impl<'a> Robot<'a> {
         FreeBody { simulation: self.simulation, index: self.indexing().root }
     }
 
-    /// Pose of a link, fused ones included, in the environment: rows `[x, y, z, qw, qx, qy, qz]`, shape (N, 7).
+    /// Pose of a link, fused links included, in the environment: rows `[x, y, z, qw, qx, qy, qz]`, shape (N, 7).
     ///
     /// # Errors
-    /// There is no such link; the error lists the nearest names.
+    /// The link does not exist; the error lists the nearest names.
     pub fn link_pose(&self, name: &str) -> Result<Array2<f64>> {
         let link = self.link_id(name)?;
         let frame = self.indexing().links[link.0];
@@ -221,8 +221,8 @@ impl<'a> Robot<'a> {
     }
 }
 
-/// A robot, to command and to write. Positions and velocities are its state; accelerations follow from it and from forces,
-/// and [writing](Self::write_qacc) them moves nothing.
+/// Write access to a robot: commands and state. Positions and velocities are its state. Accelerations follow from the
+/// state and the forces, so [writing](Self::write_qacc) them moves nothing.
 #[derive(Debug)]
 pub struct RobotMut<'a> {
     pub(super) data: &'a Arc<RobotData>,
@@ -241,18 +241,17 @@ impl<'a> RobotMut<'a> {
         Self { data, simulation, sensors, index }
     }
 
-    /// The robot, to read.
+    /// Read access to the robot.
     pub fn read(&self) -> Robot<'_> {
         Robot::new(self.data, self.simulation, self.index)
     }
 
-    /// Sets position targets \[rad or m\]: rows for `env_ids` (all where `None`; a single row is for all of them), columns
-    /// for `joint_ids` (all where `None`). Targets are clamped to the limits; columns of mimic joints are accepted and
-    /// ignored.
+    /// Sets position targets \[rad or m\]: rows for `env_ids` (`None` for all environments; a single row applies to all
+    /// of them), columns for `joint_ids` (`None` for all joints). Targets are clamped to the limits; columns of mimic
+    /// joints are accepted and ignored.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
-    /// set.
+    /// Wrong shape, an unknown or repeated joint or environment, or a value that is not finite; then nothing is set.
     #[doc(alias = "set_qpos")]
     pub fn set_qpos_target<'t>(
         &mut self,
@@ -268,12 +267,12 @@ impl<'a> RobotMut<'a> {
         })
     }
 
-    /// Sets velocity targets \[rad/s or m/s\] of the drives; they stay until changed or reset, and are 0 at first. Rows
-    /// and columns as in [`set_qpos_target`](Self::set_qpos_target); columns of joints without a drive are accepted and ignored.
+    /// Sets velocity targets \[rad/s or m/s\] of the drives. They stay until changed or reset, and are 0 at first. Rows
+    /// and columns as in [`set_qpos_target`](Self::set_qpos_target); columns of joints without a drive are accepted and
+    /// ignored.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
-    /// set.
+    /// Wrong shape, an unknown or repeated joint or environment, or a value that is not finite; then nothing is set.
     #[doc(alias = "set_qvel")]
     pub fn set_qvel_target<'t>(
         &mut self,
@@ -288,14 +287,13 @@ impl<'a> RobotMut<'a> {
         })
     }
 
-    /// Sets efforts \[N m or N\] that are added to what the drives give, before the sum is clamped to their limits; they
-    /// stay until changed or reset, and are 0 at first. A joint without a drive (drive type `None`) gets the effort as it
-    /// is, clamped to its own limit. Rows and columns as in [`set_qpos_target`](Self::set_qpos_target); columns of mimic joints are
-    /// accepted and ignored.
+    /// Sets efforts \[N m or N\] that are added to the efforts of the drives, before the sum is clamped to their
+    /// limits. They stay until changed or reset, and are 0 at first. A joint without a drive (drive type `None`) gets
+    /// the effort itself, clamped to its own limit. Rows and columns as in [`set_qpos_target`](Self::set_qpos_target);
+    /// columns of mimic joints are accepted and ignored.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
-    /// set.
+    /// Wrong shape, an unknown or repeated joint or environment, or a value that is not finite; then nothing is set.
     #[doc(alias = "set_qf")]
     pub fn set_qf_target<'t>(
         &mut self,
@@ -312,7 +310,7 @@ impl<'a> RobotMut<'a> {
         })
     }
 
-    /// Changes what is asked of joints by one number each, after everything was checked.
+    /// Changes the commands of joints by one number each, after all checks.
     fn set_targets(
         &mut self,
         argument: &'static str,
@@ -334,11 +332,11 @@ impl<'a> RobotMut<'a> {
     }
 
     /// Writes joint positions \[rad or m\] into the state, clamped to the limits; targets stay. Rows and columns as in
-    /// [`set_qpos_target`](Self::set_qpos_target); mimic joints are written as given. A forward pass follows, so that everything that
-    /// is read afterwards belongs to the new state.
+    /// [`set_qpos_target`](Self::set_qpos_target); mimic joints are written as given. A forward pass follows, so that
+    /// later reads belong to the new state.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is not finite; then nothing is
+    /// Wrong shape, an unknown or repeated joint or environment, or a value that is not finite; then nothing is
     /// written.
     pub fn write_qpos<'t>(
         &mut self,
@@ -378,19 +376,19 @@ impl<'a> RobotMut<'a> {
         self.simulation.robots[self.index].joints.iter().map(of).collect()
     }
 
-    /// Puts the root link of a robot without a fixed base somewhere: rows `[x, y, z, qw, qx, qy, qz]` in the environment
-    /// \[m\] for `env_ids` (all where `None`; a single row is for all of them). Quaternions are normalised; velocities,
-    /// which are in world axes, stay. A forward pass follows.
+    /// Sets the pose of the root link of a robot without a fixed base: rows `[x, y, z, qw, qx, qy, qz]` in the
+    /// environment \[m\] for `env_ids` (`None` for all environments; a single row applies to all of them). Quaternions
+    /// are normalized; velocities, which are in world axes, are preserved. A forward pass follows.
     ///
     /// # Errors
-    /// The base is fixed; wrong shape, unknown environment, or one that is named twice, a value that is not finite, a
-    /// quaternion of length zero; then nothing is written.
+    /// The base is fixed; wrong shape, an unknown or repeated environment, a value that is not finite, or a quaternion
+    /// of length zero. Then nothing is written.
     pub fn write_root_pose<'t>(&mut self, poses: impl AsArray<'t, f64, Ix2>, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.root().write_poses("write_root_pose", poses.into(), env_ids)
     }
 
-    /// Sets the velocity of the root link's frame and its angular velocity, in world axes: rows of 6 \[m/s, rad/s\], as in
-    /// [`write_root_pose`](Self::write_root_pose).
+    /// Sets the velocity of the root link's frame and its angular velocity, in world axes: rows of 6 \[m/s, rad/s\], as
+    /// in [`write_root_pose`](Self::write_root_pose).
     ///
     /// # Errors
     /// As [`write_root_pose`](Self::write_root_pose).
@@ -407,7 +405,7 @@ impl<'a> RobotMut<'a> {
         FreeBodyMut { simulation: self.simulation, sensors: self.sensors, index, owner: self.data.uid() }
     }
 
-    /// Changes the state of each environment that `write` is for, joint by joint; one forward pass each.
+    /// Changes the state of each selected environment joint by joint, with one forward pass each.
     pub(super) fn write_joints(&mut self, write: &JointRows<'_>, change: impl Fn(&mut mj::Data, usize, f64)) {
         for (env, row) in write.rows.iter() {
             self.simulation.batch.write(env, |env| {
@@ -417,7 +415,7 @@ impl<'a> RobotMut<'a> {
         self.sensors.refresh(write.rows.envs(), self.simulation);
     }
 
-    /// Checks an argument of a writer before anything is written.
+    /// Checks an argument of finite numbers before anything is written.
     pub(super) fn checked<'v>(
         &self,
         argument: &'static str,
@@ -428,7 +426,7 @@ impl<'a> RobotMut<'a> {
         self.checked_numbers(argument, Numbers::Finite, values, joint_ids, env_ids)
     }
 
-    /// As [`checked`](Self::checked), of numbers of another kind.
+    /// Checks an argument like [`checked`](Self::checked), for numbers of another kind.
     pub(super) fn checked_numbers<'v>(
         &self,
         argument: &'static str,
@@ -446,7 +444,7 @@ impl<'a> RobotMut<'a> {
         Ok(JointRows { joints, rows })
     }
 
-    /// The joints that are meant, each once, in the order given; all of them where `None`.
+    /// Columns of the selected joints in the given order, each once; all columns for `None`.
     pub(super) fn joint_columns(&self, argument: &'static str, joint_ids: Option<&[JointIndex]>) -> Result<Vec<usize>> {
         let count = self.data.plans.len();
         let exists =
@@ -462,7 +460,7 @@ impl<'a> RobotMut<'a> {
     }
 }
 
-/// A checked argument: columns, and one row of values per environment.
+/// Checked argument: joint columns, and one row of values per environment.
 pub(super) struct JointRows<'v> {
     pub(super) joints: Vec<usize>,
     pub(super) rows: Rows<'v>,

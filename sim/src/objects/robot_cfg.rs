@@ -14,43 +14,48 @@ use serde::{Deserialize, Serialize};
 pub struct RobotCfg {
     /// Name of the robot, unique in the simulation; prefix of its names in MuJoCo.
     pub uid: String,
-    /// The URDF files.
+    /// URDF files of the robot.
     #[serde(deserialize_with = "crate::file_format::file_or_table")]
     pub urdf: UrdfCfg,
-    /// The MJCF file, for a robot that is described by one: then there are no URDF files.
+    /// MJCF file of the robot, instead of URDF files.
     ///
-    /// MuJoCo itself compiles the file, and what it made of it is in the scene: geoms with their materials and contact
-    /// settings, sites, joints with anchors, references, springs and limits, equalities, tendons, sensors. The robot is the
-    /// only body in the file's world and what hangs on it.
+    /// MuJoCo compiles the file, and its compiled elements are in the scene: geoms with their materials and contact
+    /// settings, sites, joints with anchors, references, springs and limits, equalities, tendons, sensors. The robot is
+    /// the only child body of the file's world, with everything below it.
     ///
-    /// - **Links** are its bodies, then its named sites. Where hinges or slides hold the root body in the world, the root link
-    ///   is the file's `world`. **Joints** are its hinges and slides. What has no name is called by its kind and its number in
-    ///   MuJoCo's order: `joint3`.
-    /// - **Drives** take the place of its actuators. Where [`drive`](Self::drive) says nothing of a joint, position and velocity
-    ///   actuators of the file give stiffness and damping, force ranges (and control ranges of motors) the largest effort, and
-    ///   joints that no actuator of the file acts on stay passive. In a file without any actuator all joints are driven, as in
-    ///   a URDF. One number for all joints (`stiffness: 100.0.into()`) names the passive ones too, and drives them.
-    /// - An actuator of a joint that **follows** another, or of a **tendon** over joints, is in the drive of the joint that is
-    ///   followed: with J, the effort there by the force of the actuator, gains times J² and efforts times |J|. A tendon over
-    ///   joints that do not follow each other becomes a drive of each, whose targets do not know of each other. Limits of
-    ///   efforts are symmetric, activations (filters, integrators, muscles) are gone, targets are not limited by control
-    ///   ranges: [`diagnostics`](crate::SimulationManager::diagnostics) names each actuator of which that is not the whole.
-    /// - **Equalities** of two joints by a line are mimics; a joint that another equality of joints moves has no drive,
-    ///   and starts where that curve is for the start of the joint that it follows, whatever [`init_qpos`](Self::init_qpos)
-    ///   says of itself; kinematics take it for a joint of its own, and [`compute_ik`](crate::Robot::compute_ik) refuses to
-    ///   move it or what it follows. Where several equalities are of one joint, or they go in a circle, it starts at its own `ref`.
-    /// - **The base** is fixed or free as [`fix_base`](Self::fix_base) says: the file's free joint is left out or made.
-    /// - **Contacts**: geoms that collide in the file collide as those of all robots do, whatever their bits, also those that
-    ///   collide in pairs with what stands in the file's world alone; friction and softness of such pairs are not kept.
-    ///   Other pairs of geoms hold where [`self_collision`](Self::self_collision) is on. What the file excludes from colliding
-    ///   with its own world collides with the scene.
+    /// - **Links** are its bodies, then its named sites. If hinges or slides attach the root body to the world, the
+    ///   root link is the file's `world`. **Joints** are its hinges and slides. An element without a name is called by
+    ///   its kind and its index in MuJoCo's order: `joint3`.
+    /// - **Drives** replace its actuators. For joints that [`drive`](Self::drive) does not configure, position and
+    ///   velocity actuators of the file give stiffness and damping. Force ranges (and control ranges of motors) give
+    ///   the largest effort, and joints without an actuator stay passive. In a file without any actuator all joints are
+    ///   driven, as in a URDF. One number for all joints (`stiffness: 100.0.into()`) configures the passive joints too,
+    ///   and drives them.
+    /// - An actuator on a joint that **follows** another, or on a **tendon** over joints, becomes part of the drive of
+    ///   the followed joint. With J, the effort there per force of the actuator, gains are multiplied by J² and efforts
+    ///   by |J|. A tendon over joints that do not follow each other becomes one drive for each joint, with independent
+    ///   targets. Effort limits are symmetric, activations (filters, integrators, muscles) are dropped, and control
+    ///   ranges do not limit targets. [`diagnostics`](crate::SimulationManager::diagnostics) names each actuator that
+    ///   its drive does not fully reproduce.
+    /// - **Equalities** that couple two joints linearly are mimics. A joint with any other joint equality has no drive.
+    ///   It starts where that polynomial is for the initial position of the followed joint, and
+    ///   [`init_qpos`](Self::init_qpos) does not apply to it. Kinematics treat it as an independent joint, and
+    ///   [`compute_ik`](crate::Robot::compute_ik) refuses to move it or the joint that it follows. A joint with several
+    ///   equalities, or in a cycle of equalities, starts at its own `ref`.
+    /// - **The base** is fixed or free according to [`fix_base`](Self::fix_base): the file's free joint is left out, or
+    ///   a free joint is added.
+    /// - **Contacts**: geoms that collide in the file collide like those of all robots, whatever their bits. This
+    ///   includes geoms that collide only in pairs with geoms of the file's world; friction and softness of such pairs
+    ///   are dropped. Other pairs of geoms apply if [`self_collision`](Self::self_collision) is on. Bodies that the
+    ///   file excludes from collisions with its own world collide with the scene.
     /// - Dry friction of joints with implicit drives is as soft as that of all drives: the file's `solreffriction` and
-    ///   `solimpfriction` hold for the others.
-    /// - Named sites are links on fixed joints, which the end of a control part
-    ///   ([`Tip::of_part`](kinetoscope_robot::kinematics::Tip::of_part)) follows where there is exactly one: to add a site to the last body,
-    ///   for a touch sensor say, moves that end. Name the link ([`Tip::at`](kinetoscope_robot::kinematics::Tip::at)) where it matters.
-    /// - What stands in the file's world (a floor, lights) is no part of the robot, nor are settings for the whole model and
-    ///   keyframes. [`diagnostics`](crate::SimulationManager::diagnostics) names all that is left out.
+    ///   `solimpfriction` apply to the other joints.
+    /// - Named sites are links on fixed joints. The end of a control part
+    ///   ([`Tip::of_part`](kinetoscope_robot::kinematics::Tip::of_part)) follows such a joint if there is exactly one.
+    ///   So a site that is added to the last body, for a touch sensor say, moves that end. Name the link
+    ///   ([`Tip::at`](kinetoscope_robot::kinematics::Tip::at)) where this matters.
+    /// - Elements of the file's world (a floor, lights), global settings and keyframes are not part of the robot.
+    ///   [`diagnostics`](crate::SimulationManager::diagnostics) names everything that is left out.
     ///
     /// ```
     /// use kinetoscope_sim::{RobotCfg, SimulationManager, SimulationManagerCfg};
@@ -75,31 +80,32 @@ pub struct RobotCfg {
     pub control_parts: Vec<(String, Vec<String>)>,
     /// Drive properties.
     pub drive: DriveCfg,
-    /// Whether the root link stands fixed in the environment.
+    /// True if the root link is fixed in the environment.
     pub fix_base: bool,
-    /// Pose of the root link in the environment; of an MJCF file the pose of the file's world, in which the root link stands
-    /// as the file says.
+    /// Pose of the root link in the environment; for an MJCF file, pose of the file's world, in which the root link is
+    /// placed as in the file.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Height of the lowest collision point of the robot above the ground at z = 0 at the start \[m\]; then the z of
-    /// [`init_pose`](Self::init_pose) is not used. `None` leaves the robot where `init_pose` puts it.
+    /// Initial height of the lowest collision point of the robot above the ground at z = 0 \[m\], instead of the z of
+    /// [`init_pose`](Self::init_pose). `None` leaves the robot at `init_pose`.
     pub ground_clearance: Option<f64>,
-    /// Start positions by joint pattern or control part \[rad or m\]; where none matches 0, or an MJCF file's `ref`.
+    /// Initial positions by joint pattern or control part \[rad or m\]. Joints without a match start at 0, or at the
+    /// `ref` of an MJCF file.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub init_qpos: Vec<(String, f64)>,
-    /// Masses that links carry besides their own, by link pattern \[kg\]: a point in the link's centre of mass; a ball of
-    /// the density of water in the origin of a link without mass.
+    /// Payloads by link pattern \[kg\]: a point mass at the link's center of mass, or a ball with the density of water
+    /// at the origin of a link without mass.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub payload: Vec<(String, f64)>,
-    /// What surfaces of links look like besides their colours, by link pattern. No link may be matched twice.
+    /// Surface properties of links besides their colors, by link pattern. A link may match only one pattern.
     #[serde(with = "kinetoscope_scene::file_format::pairs")]
     pub surfaces: Vec<(String, SurfaceCfg)>,
-    /// Share of the range of each joint that is left between its soft limits, 0 to 1: see
+    /// Fraction of the range of each joint between its soft limits, 0 to 1: see
     /// [`Robot::soft_qpos_limits`](crate::Robot::soft_qpos_limits).
     pub soft_limit_factor: f64,
-    /// Whether links of this robot collide with each other.
+    /// True if the links of this robot collide with each other.
     pub self_collision: bool,
-    /// How collision meshes become convex hulls.
+    /// Settings for the convex hulls of collision meshes.
     pub hull: HullCfg,
 }
 

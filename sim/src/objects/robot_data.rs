@@ -1,4 +1,4 @@
-//! Robots as they were added: configuration, description, drives.
+//! Data of robots: configuration, description, drives.
 
 use crate::drive::gains::Gains;
 use crate::drive::plan::{JointPlan, plan};
@@ -22,11 +22,11 @@ use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::pose::to_row;
 use std::collections::BTreeMap;
 
-/// Column of a joint in `qpos` and its kin.
+/// Index of a joint: its column in `qpos` and in similar arrays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct JointIndex(pub usize);
 
-/// A loaded robot: everything about it that does not change while the simulation runs.
+/// Loaded robot: everything that does not change while the simulation runs.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotData {
     cfg: RobotCfg,
@@ -35,25 +35,25 @@ pub(crate) struct RobotData {
     pub(super) joint_names: Vec<String>,
     pub(super) parts: BTreeMap<String, Vec<usize>>,
     hulls: BTreeMap<MeshKey, TriMesh>,
-    /// The MJCF file that it is; `None` where it is made of URDF files.
+    /// MJCF file of the robot; `None` for a robot from URDF files.
     file: Option<RobotFile>,
     first_mask_id: i32,
     role: Role,
-    /// Surfaces of some links, in addition to those of the files.
+    /// Surface properties of some links, in addition to those of the files.
     surfaces: Vec<(usize, SurfaceCfg)>,
 }
 
-/// The kind of entity that it was added as.
+/// Kind of entity that a robot was added as.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
-    /// By `add_robot`.
+    /// Added by `add_robot`.
     Robot,
-    /// By `add_articulation`, with its semantic class.
+    /// Added by `add_articulation`, with its semantic class.
     Articulation(String),
 }
 
 impl Role {
-    /// How errors call it.
+    /// Label of the robot in errors.
     fn named(&self, uid: &str) -> Named {
         let what = match self {
             Self::Robot => "robot",
@@ -64,8 +64,8 @@ impl Role {
 }
 
 impl RobotData {
-    /// Reads the files, resolves names, drives and meshes of robot number `index` of a simulation, whose model is `scene` so
-    /// far.
+    /// Reads the files, and resolves names, drives and meshes of robot `index` of a simulation. `scene` is the current
+    /// model.
     pub(crate) fn load(
         cfg: RobotCfg,
         role: Role,
@@ -125,17 +125,17 @@ impl RobotData {
         &self.cfg.uid
     }
 
-    /// The configuration it was added with.
+    /// Configuration that the robot was added with.
     pub(crate) fn cfg(&self) -> &RobotCfg {
         &self.cfg
     }
 
-    /// Surfaces of some links, in addition to those of the files.
+    /// Surface properties of some links, in addition to those of the files.
     pub(crate) fn surfaces(&self) -> &[(usize, SurfaceCfg)] {
         &self.surfaces
     }
 
-    /// Semantic class, for the table of mask ids.
+    /// Semantic class in the table of mask ids.
     pub(crate) fn semantic_class(&self) -> &str {
         match &self.role {
             Role::Robot => "robot",
@@ -143,17 +143,17 @@ impl RobotData {
         }
     }
 
-    /// How errors call it.
+    /// Label of the robot in errors.
     pub(crate) fn named(&self) -> Named {
         self.role.named(self.uid())
     }
 
-    /// True if it was added as a robot, not as another articulation.
+    /// True if it was added as a robot, false for another articulation.
     pub(crate) fn is_robot(&self) -> bool {
         self.role == Role::Robot
     }
 
-    /// The merged robot as its files describe it, with its payloads.
+    /// Merged robot as its files describe it, with its payloads.
     pub(crate) fn description(&self) -> &RobotDescription {
         &self.description
     }
@@ -173,27 +173,27 @@ impl RobotData {
         self.first_mask_id + link as i32
     }
 
-    /// Names of the tendons of its MJCF file. Their numbers in the mask channel follow those of its links.
+    /// Names of the tendons of its MJCF file. Their mask ids follow those of its links.
     pub(crate) fn tendons(&self) -> &[String] {
         self.file.as_ref().map_or(&[], |file| file.tendon_names())
     }
 
-    /// The MJCF file that it is; `None` where it is made of URDF files.
+    /// MJCF file of the robot; `None` for a robot from URDF files.
     pub(crate) fn file(&self) -> Option<&RobotFile> {
         self.file.as_ref()
     }
 
-    /// Something of its MJCF file is wrong.
+    /// Wraps an error of its MJCF file.
     pub(crate) fn file_error(&self, error: RobotFileError) -> Error {
         file_error(&self.cfg, self.named(), error)
     }
 
-    /// Pose of the root link at the start.
+    /// Initial pose of the root link.
     pub(crate) fn root_pose(&self) -> Pose {
         self.file.as_ref().map_or(self.cfg.init_pose, |file| self.cfg.init_pose * file.root_pose())
     }
 
-    /// Moves the start along z \[m\].
+    /// Moves the initial pose along z \[m\].
     pub(super) fn raise(&mut self, by: f64) {
         self.cfg.init_pose.translation.z += by;
     }
@@ -208,8 +208,8 @@ fn file_error(cfg: &RobotCfg, robot: Named, error: RobotFileError) -> Error {
     Error::RobotFile { robot, file: path.unwrap_or_default(), error: Box::new(error) }
 }
 
-/// The robot as its files describe it, without payloads, and what is odd in them; where there is a `scene`, also what of the
-/// settings of its MJCF file is not the scene's.
+/// Describes a robot from its files, without payloads, with diagnostics about the files. With a `scene`, the
+/// diagnostics include settings of its MJCF file that differ from the scene's.
 pub(crate) fn described(
     cfg: &RobotCfg,
     named: &Named,
@@ -234,8 +234,8 @@ pub(crate) fn described(
     Ok((Some(file), description, found))
 }
 
-/// The joints with the gains of those drives that are evaluated at the start of a step, and of no others; the damping is the
-/// largest that the model of the joint can show.
+/// Plans in which only the explicit drives, evaluated at the start of a step, have gains. The damping is the largest
+/// that the model of the joint can produce.
 fn explicitly_driven(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan> {
     let explicit = |plan: &JointPlan| {
         let spec = plan.actuator?;
@@ -251,7 +251,7 @@ fn explicitly_driven(plans: &[JointPlan], model: DriveModel) -> Vec<JointPlan> {
     plans.iter().map(|plan| JointPlan { actuator: explicit(plan), ..plan.clone() }).collect()
 }
 
-/// Adds what links carry.
+/// Adds the payloads of links.
 fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
     if let Some((_, mass)) = cfg.payload.iter().find(|(_, mass)| !(mass.is_finite() && *mass >= 0.0)) {
         let expected = "a payload must be a finite mass >= 0 kg";
@@ -263,7 +263,7 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
     for (link, payload) in description.links.iter_mut().zip(payloads) {
         let Some(payload) = payload.filter(|mass| *mass > 0.0) else { continue };
         match &mut link.inertial {
-            // A point in the centre of mass: neither the centre nor the inertia about it change.
+            // A point at the center of mass changes neither the center of mass nor the inertia about it.
             Some(inertial) => inertial.mass += payload,
             None => link.inertial = Some(ball(link, payload, 1000.0)),
         }
@@ -271,7 +271,7 @@ fn load_up(description: &mut RobotDescription, cfg: &RobotCfg) -> Result<()> {
     Ok(())
 }
 
-/// There is no such name; the nearest of those there are.
+/// Creates an error about an unknown name, with the nearest existing names.
 pub(super) fn unknown<'n>(what: &'static str, name: &str, names: impl IntoIterator<Item = &'n str>) -> Error {
     let candidates = pattern::closest(name, names).into_iter().map(str::to_string).collect();
     Error::UnknownName { what, name: name.into(), candidates }
@@ -288,14 +288,14 @@ pub(crate) fn check_pose(field: &'static str, pose: &Pose) -> Result<()> {
     Ok(())
 }
 
-/// Implicit drives need an integrator that adds nothing to the acceleration that the solver found.
+/// Checks the integrator: implicit drives need one that adds nothing to the acceleration that the solver found.
 fn check_integrator(cfg: &RobotCfg, role: &Role, plans: &[JointPlan], integrator: Integrator) -> Result<()> {
     let allowed = match integrator {
         Integrator::Euler => true,
         Integrator::ImplicitFast => mj::TARGET == mj::Target::V4,
         Integrator::Rk4 | Integrator::Implicit => false,
     };
-    // Joints that are passive, follow others or have an explicit model have no row.
+    // Joints that are passive, follow other joints or have an explicit model have no friction row.
     let row = |plan: &JointPlan| plan.actuator.is_some() && plan.model.is_none();
     if cfg.drive.model == DriveModel::Implicit && plans.iter().any(row) && !allowed {
         let also = if mj::TARGET == mj::Target::V4 { " or implicitfast" } else { "" };

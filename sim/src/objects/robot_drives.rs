@@ -1,7 +1,7 @@
-//! Drives of a robot while it runs: gains and drive types per joint and per environment.
+//! Drives of a robot at run time: gains and drive types per joint and per environment.
 //!
-//! Gains are in the memory of each environment, not in MuJoCo's model, so that environments may differ at no cost to those
-//! that do not. Friction and rotor inertia are in the model: see [`set_friction`](RobotMut::set_friction) and
+//! Gains are in the memory of each environment, not in MuJoCo's model, so an environment with other gains costs nothing
+//! elsewhere. Friction and rotor inertia are in the model: see [`set_friction`](RobotMut::set_friction) and
 //! [`set_armature`](RobotMut::set_armature).
 
 use crate::drive::plan::{PlanError, effective_inertias};
@@ -16,21 +16,21 @@ use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::sync::Arc;
 
 impl Robot<'_> {
-    /// Stiffness of the drives, in the unit of each one's drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
+    /// Stiffness of the drives, in the unit of each drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
     /// joints without a drive.
     #[doc(alias = "get_stiffness")]
     pub fn stiffness(&self) -> Array2<f64> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].stiffness))
     }
 
-    /// Damping of the drives, in the unit of each one's drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
+    /// Damping of the drives, in the unit of each drive type ([`DriveCfg`](crate::DriveCfg)), shape (N, dof); 0 for
     /// joints without a drive. The viscous friction of the joint itself is not part of it.
     #[doc(alias = "get_damping")]
     pub fn damping(&self) -> Array2<f64> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].damping))
     }
 
-    /// What stiffness and damping of each drive mean, shape (N, dof); `None` for joints without a drive.
+    /// Drive types, which give stiffness and damping their meaning, shape (N, dof); `None` for joints without a drive.
     #[doc(alias = "get_drive_types")]
     pub fn drive_types(&self) -> Array2<DriveType> {
         self.simulation.batch.gather(&self.indexing().joints, |env, joint| {
@@ -38,7 +38,7 @@ impl Robot<'_> {
         })
     }
 
-    /// Delays of the drives \[MuJoCo steps\], shape (N, dof); 0 for joints that [`DelayedPd`] does not drive.
+    /// Delays of the drives \[MuJoCo steps\], shape (N, dof); 0 for joints without a [`DelayedPd`] drive.
     #[doc(alias = "get_delay")]
     pub fn delay(&self) -> Array2<u32> {
         let delays = self.gather(|env, joint| match joint.drive.and_then(|drive| env.drives.table().model_of(drive)) {
@@ -52,13 +52,14 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Sets the stiffness of drives \[N m/rad or N/m for drive type `force`\]; everything else about them stays, and so
-    /// does this through a reset. Rows are for `env_ids` (all where `None`; a single row is for all of them), columns for
-    /// `joint_ids` (all where `None`); columns of mimic joints are accepted and ignored.
+    /// Sets the stiffness of drives \[N m/rad or N/m for drive type `force`\]; all other settings stay. The stiffness
+    /// survives resets. Rows are for `env_ids` (`None` for all environments; a single row applies to all of them),
+    /// columns for `joint_ids` (`None` for all joints); columns of mimic joints are accepted and ignored.
     ///
-    /// Rows of [`DriveModel::Implicit`](crate::DriveModel::Implicit) are stable with any gains. Explicit actuator models
-    /// are not, and only [`add_robot`](crate::SimulationManager::add_robot) warns of it: what is set here is not checked
-    /// against the time step. [`stable_timestep`](crate::drive::actuator::stable_timestep) computes the limit.
+    /// Drives of [`DriveModel::Implicit`](crate::DriveModel::Implicit) are stable with any gains. Explicit actuator
+    /// models are not, and only [`add_robot`](crate::SimulationManager::add_robot) warns about them: gains that are set
+    /// here are not checked against the time step. [`stable_timestep`](crate::drive::actuator::stable_timestep)
+    /// computes the limit.
     ///
     /// ```
     /// use ndarray::array;
@@ -80,8 +81,8 @@ impl RobotMut<'_> {
     /// ```
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is negative or not finite; a
-    /// joint that was added without a drive, or is driven by [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then
+    /// Wrong shape, an unknown or repeated joint or environment, or a value that is negative or not finite. A joint
+    /// that was added without a drive, or has a drive of [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then
     /// nothing is set.
     pub fn set_stiffness<'t>(
         &mut self,
@@ -95,8 +96,8 @@ impl RobotMut<'_> {
     }
 
     /// Sets the damping of drives \[N m s/rad or N s/m for drive type `force`\]; otherwise as
-    /// [`set_stiffness`](Self::set_stiffness), also in that nothing warns where an explicit model becomes unstable. The
-    /// viscous friction of the joint itself stays.
+    /// [`set_stiffness`](Self::set_stiffness). Nothing warns about an explicit model that becomes unstable. The viscous
+    /// friction of the joint itself stays.
     ///
     /// # Errors
     /// As [`set_stiffness`](Self::set_stiffness).
@@ -111,16 +112,18 @@ impl RobotMut<'_> {
         })
     }
 
-    /// Sets what stiffness and damping of drives mean, for `joint_ids` (all where `None`; mimic joints are left out) in
-    /// `env_ids` (all where `None`). Their numbers stay, and so does everything else; gains that were drawn
-    /// ([`randomize`](crate::EnvPropertiesMut::randomize)) stay what they are in torque units. With `None` a drive gives nothing but
-    /// the effort of [`set_qf_target`](Self::set_qf_target), until it gets another type. `Acceleration` multiplies the gains by the
-    /// inertia that the joint feels at the robot's initial positions, with the masses of the files and payloads: those that
-    /// were drawn for an environment do not count. Nothing warns where that makes an explicit model
+    /// Sets the drive type, which gives stiffness and damping their meaning, for `joint_ids` (`None` for all joints;
+    /// mimic joints are left out) in `env_ids` (`None` for all environments).
+    ///
+    /// The numbers of the gains and all other settings stay; randomized gains
+    /// ([`randomize`](crate::EnvPropertiesMut::randomize)) keep their values in torque units. A drive of type `None`
+    /// gives only the effort of [`set_qf_target`](Self::set_qf_target), until it gets another type. `Acceleration`
+    /// multiplies the gains by the effective inertia of the joint at the robot's initial positions, with the masses of
+    /// the files and payloads; randomized masses do not count. Nothing warns about an explicit model that becomes
     /// unstable: see [`set_stiffness`](Self::set_stiffness).
     ///
     /// # Errors
-    /// Unknown joint or environment, or one that is named twice; a joint that was added without a drive, or is driven by
+    /// An unknown or repeated joint or environment; a joint that was added without a drive, or has a drive of
     /// [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
     pub fn set_drive_type(
         &mut self,
@@ -143,14 +146,15 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// Sets the delay of joints that [`DelayedPd`] drives \[MuJoCo steps\]; it stays through a reset. Step n hears the
-    /// targets of step n - delay, whatever the delay was before: where it grows by k, the last k targets that have acted
-    /// act once more, in their order; where it falls by k, the next k never act. Rows and columns as in
+    /// Sets the delay of joints with a [`DelayedPd`] drive \[MuJoCo steps\]; it survives resets. Rows and columns as in
     /// [`set_stiffness`](Self::set_stiffness).
     ///
+    /// Step n uses the targets of step n - delay, whatever the delay was before. If the delay grows by k, the last k
+    /// targets that were used are used once more, in their order. If it falls by k, the next k targets are skipped.
+    ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice; a joint of another model, or a delay above
-    /// the model's `max_delay`. Then nothing is set.
+    /// Wrong shape, an unknown or repeated joint or environment, a joint with another model, or a delay above the
+    /// model's `max_delay`. Then nothing is set.
     pub fn set_delay<'t>(
         &mut self,
         steps: impl AsArray<'t, u32, Ix2>,
@@ -196,7 +200,7 @@ impl RobotMut<'_> {
             .map_err(|error| Error::Plan { robot: data.named(), error: Box::new(PlanError::Dynamics(error)) })
     }
 
-    /// Changes drives by one number each, after everything was checked.
+    /// Changes drives by one number each, after all checks.
     pub(super) fn set_drives(
         &mut self,
         argument: &'static str,
@@ -212,7 +216,7 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// Changes `drives`, each by its column of what was checked.
+    /// Changes `drives`, each by its column of the checked argument.
     pub(super) fn change_drives(
         &mut self,
         write: &JointRows<'_>,
@@ -226,7 +230,8 @@ impl RobotMut<'_> {
         }
     }
 
-    /// `(column, joint, drive)` of the `joints` but the mimic ones, each with gains that may change.
+    /// Returns `(column, joint, drive)` of `joints` without the mimic joints. The gains of all these drives must be
+    /// changeable.
     pub(super) fn drives_of(&self, argument: &'static str, joints: &[usize]) -> Result<Vec<(usize, usize, usize)>> {
         let native = |drive: usize| {
             self.simulation.batch.read(0, |env| env.drives.table().drives[drive].realization == Realization::Actuator)
@@ -241,7 +246,7 @@ impl RobotMut<'_> {
         }
     }
 
-    /// `(column, joint, drive)` of the `joints` but the mimic ones.
+    /// Returns `(column, joint, drive)` of `joints` without the mimic joints.
     pub(super) fn driven(&self, argument: &'static str, joints: &[usize]) -> Result<Vec<(usize, usize, usize)>> {
         let mut drives = Vec::with_capacity(joints.len());
         for (column, &joint) in joints.iter().enumerate() {

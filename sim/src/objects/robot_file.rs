@@ -1,30 +1,30 @@
-//! Which MJCF file a robot is.
+//! MJCF file of a robot, as part of its configuration.
 
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// An MJCF file that is a robot: see [`RobotCfg::mjcf`](crate::RobotCfg::mjcf).
+/// MJCF file of a robot: see [`RobotCfg::mjcf`](crate::RobotCfg::mjcf).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MjcfFile {
-    /// The file; with `text` only what errors call it.
+    /// Path of the file; with `text`, only its name in error messages.
     pub path: PathBuf,
-    /// The MJCF itself, which names no files; the file's content where `None`.
+    /// MJCF text, which must not refer to files; `None` for the content of the file.
     pub text: Option<String>,
 }
 
 impl MjcfFile {
-    /// A file.
+    /// Creates the configuration of a file.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into(), text: None }
     }
 
-    /// MJCF text, which names no files.
+    /// Creates the configuration of MJCF text, which must not refer to files.
     pub fn text(text: impl Into<String>) -> Self {
         Self { path: "text".into(), text: Some(text.into()) }
     }
 
-    /// Makes its path relative to a folder; an absolute one stays, and text has none.
+    /// Replaces its path by the result of `beside`; MJCF text has no path.
     pub(crate) fn place_beside(&mut self, beside: impl Fn(&Path) -> PathBuf) {
         if self.text.is_none() {
             self.path = beside(&self.path);

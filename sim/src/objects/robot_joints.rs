@@ -1,8 +1,8 @@
-//! What resists the joints of a robot beside its drives, while it runs: dry friction, damping and rotor inertia, per joint
-//! and per environment.
+//! Passive properties of the joints of a robot at run time: dry friction, damping and rotor inertia, per joint and per
+//! environment.
 //!
-//! They are in MuJoCo's model: an environment that gets others has these arrays for itself. They are among its
-//! [`properties`](crate::SimulationManager::properties), so that random draws and these setters work on the same numbers.
+//! They are in MuJoCo's model: an environment with other values owns these arrays. They are among its
+//! [`properties`](crate::SimulationManager::properties), so randomization and these setters change the same numbers.
 
 use crate::error::Result;
 use crate::ids::EnvId;
@@ -13,14 +13,14 @@ use crate::randomization::Property;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 
 impl Robot<'_> {
-    /// Dry friction of the joints \[N m or N\], shape (N, dof); 0 for joints that have none.
+    /// Dry friction of the joints \[N m or N\], shape (N, dof); 0 for joints without friction.
     #[doc(alias = "get_friction")]
     pub fn friction(&self) -> Array2<f64> {
         self.property(Property::DryFriction)
     }
 
-    /// Viscous damping of the joints themselves \[N m s/rad or N s/m\], shape (N, dof); 0 for joints that have none. The
-    /// damping of the drives is not part of it: see [`damping`](Self::damping).
+    /// Viscous damping of the joints themselves \[N m s/rad or N s/m\], shape (N, dof); 0 for joints without damping.
+    /// The damping of the drives is not part of it: see [`damping`](Self::damping).
     #[doc(alias = "get_joint_damping")]
     pub fn joint_damping(&self) -> Array2<f64> {
         self.property(Property::JointDamping)
@@ -32,7 +32,7 @@ impl Robot<'_> {
         self.property(Property::Armature)
     }
 
-    /// A property of one number of every joint in every environment.
+    /// Reads a scalar property of every joint in every environment.
     fn property(&self, property: Property) -> Array2<f64> {
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), self.dof()));
         for (joint, mut column) in values.columns_mut().into_iter().enumerate() {
@@ -43,18 +43,19 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Sets the dry friction of joints \[N m or N\]. Rows are for `env_ids` (all where `None`; a single row is for all
-    /// of them), columns for `joint_ids` (all where `None`). A forward pass follows.
+    /// Sets the dry friction of joints \[N m or N\]. Rows are for `env_ids` (`None` for all environments; a single row
+    /// applies to all of them), columns for `joint_ids` (`None` for all joints). A forward pass follows.
     ///
-    /// It is a property of the environment: it stays through a reset, and, unlike
-    /// [`set_stiffness`](Self::set_stiffness), when a [snapshot](crate::Snapshot) is restored (but with its properties);
-    /// [`reset_properties`](crate::EnvPropertiesMut::reset) gives back what the robot was added with.
+    /// Dry friction is a property of the environment and survives resets. Unlike
+    /// [`set_stiffness`](Self::set_stiffness), it also stays when a [snapshot](crate::Snapshot) is restored without its
+    /// properties. [`reset_properties`](crate::EnvPropertiesMut::reset) restores the values that the robot was added
+    /// with.
     ///
-    /// All joints that no implicit drive moves may have some, those of passive articulations too. An implicit drive takes the
-    /// place that MuJoCo has for it, so that a joint with one has dry friction only where the model has another place:
-    /// where [`DriveCfg::friction`](crate::DriveCfg::friction) is given for the robot, 0 will do, or the file's
-    /// `<dynamics friction="..">` is above 0. The others can be told 0, which they have: what
-    /// [`friction`](Robot::friction) returns can be set.
+    /// All joints without an implicit drive may have dry friction, those of passive articulations too. An implicit
+    /// drive uses MuJoCo's friction constraint of the joint. Such a joint has dry friction only if the model has a
+    /// friction tendon for it. The model has one if [`DriveCfg::friction`](crate::DriveCfg::friction) is set for the
+    /// robot (0 is enough), or if the file's `<dynamics friction="..">` is above 0. All other joints accept 0, the
+    /// value that they have, so the result of [`friction`](Robot::friction) can always be set.
     ///
     /// ```
     /// use ndarray::array;
@@ -62,7 +63,8 @@ impl RobotMut<'_> {
     /// use kinetoscope_robot::urdf::UrdfCfg;
     /// # let urdf = std::env::temp_dir().join(format!("kinetoscope-joints-{}.urdf", std::process::id()));
     /// # std::fs::write(&urdf, "<robot name='r'><link name='a'/><link name='b'><inertial><mass value='1'/>
-    /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link><joint name='slide' type='prismatic'>
+    /// #   <inertia ixx='.1' ixy='0' ixz='0' iyy='.1' iyz='0' izz='.1'/></inertial></link>
+    /// #   <joint name='slide' type='prismatic'>
     /// #   <parent link='a'/><child link='b'/><axis xyz='1 0 0'/><limit lower='0' upper='1' effort='9' velocity='1'/>
     /// #   <dynamics damping='0' friction='2'/></joint></robot>")?;
     ///
@@ -75,8 +77,8 @@ impl RobotMut<'_> {
     /// ```
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is not finite or negative; more
-    /// than 0 for a joint whose model has no place for it. Then nothing is set.
+    /// Wrong shape, an unknown or repeated joint or environment, or a value that is not finite or negative. More than 0
+    /// for a joint without a friction constraint of its own in the model. Then nothing is set.
     pub fn set_friction<'t>(
         &mut self,
         values: impl AsArray<'t, f64, Ix2>,
@@ -86,12 +88,12 @@ impl RobotMut<'_> {
         self.set_property("set_friction", Property::DryFriction, values.into(), joint_ids, env_ids)
     }
 
-    /// Sets the viscous damping of joints themselves \[N m s/rad or N s/m\]; that of drives stays. Joints that
-    /// were added without (the file's `<dynamics damping="..">`) may have some as well. Otherwise as
-    /// [`set_friction`](Self::set_friction): it is a property.
+    /// Sets the viscous damping of the joints themselves \[N m s/rad or N s/m\]; the damping of drives stays. Joints
+    /// that were added without damping (the file's `<dynamics damping="..">`) may get some as well. It is a property
+    /// with the rules of [`set_friction`](Self::set_friction).
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is negative or not finite. Then
+    /// Wrong shape, an unknown or repeated joint or environment, or a value that is negative or not finite. Then
     /// nothing is set.
     pub fn set_joint_damping<'t>(
         &mut self,
@@ -102,13 +104,13 @@ impl RobotMut<'_> {
         self.set_property("set_joint_damping", Property::JointDamping, values.into(), joint_ids, env_ids)
     }
 
-    /// Sets the rotor inertia of joints \[kg m² or kg\], also of joints that were added without
-    /// ([`DriveCfg::armature`](crate::DriveCfg::armature)). Otherwise as [`set_friction`](Self::set_friction): it is a
-    /// property. What was derived from it when the robot was added stays: gains
-    /// of drive type `acceleration`, warnings of instability.
+    /// Sets the rotor inertia of joints \[kg m² or kg\], also of joints that were added without one
+    /// ([`DriveCfg::armature`](crate::DriveCfg::armature)). It is a property with the rules of
+    /// [`set_friction`](Self::set_friction). Values that were derived from it when the robot was added stay: gains of
+    /// drive type `acceleration`, and warnings about instability.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice; a value that is negative or not finite. Then
+    /// Wrong shape, an unknown or repeated joint or environment, or a value that is negative or not finite. Then
     /// nothing is set.
     pub fn set_armature<'t>(
         &mut self,
@@ -119,7 +121,7 @@ impl RobotMut<'_> {
         self.set_property("set_armature", Property::Armature, values.into(), joint_ids, env_ids)
     }
 
-    /// Sets a property of one number of joints, after everything was checked.
+    /// Sets a scalar property of joints, after all checks.
     fn set_property(
         &mut self,
         argument: &'static str,
@@ -131,11 +133,11 @@ impl RobotMut<'_> {
         let write = self.checked_numbers(argument, Numbers::Gain, values, joint_ids, env_ids)?;
         let names: Vec<String> = write.joints.iter().map(|&joint| property_name(&self.read(), joint)).collect();
         let known = self.simulation.properties_named(property, &names);
-        // Environments come in this order.
+        // Environments are visited in this order.
         let mut rows = write.rows.iter();
         self.simulation.change_properties(write.rows.envs(), |_, properties| {
             let Some((_, row)) = rows.next() else { return Ok(()) };
-            // A joint without the property has 0 of it.
+            // A joint without the property has the value 0.
             let mut changes = names.iter().zip(&known).zip(row).filter(|((_, known), value)| **known || **value != 0.0);
             changes.try_for_each(|((name, _), value)| properties.set(property, name, &[*value]))
         })?;
@@ -144,7 +146,7 @@ impl RobotMut<'_> {
     }
 }
 
-/// What a joint is called among properties.
+/// Name of a joint among the properties.
 fn property_name(robot: &Robot<'_>, joint: usize) -> String {
     format!("{}/{}", robot.uid(), robot.joint_names()[joint])
 }

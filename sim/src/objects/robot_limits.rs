@@ -12,27 +12,26 @@ use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix2, Ix3};
 use std::sync::Arc;
 
 impl Robot<'_> {
-    /// Positions that targets may have \[rad or m\], shape (N, dof, 2): the joint's own limits, narrowed by the limits of
-    /// joints that mimic this one, or what [`set_qpos_limits`](RobotMut::set_qpos_limits) says; infinite where there are
-    /// none.
+    /// Range of position targets \[rad or m\], shape (N, dof, 2): the joint's own limits, narrowed by the limits of
+    /// joints that mimic it, or the range of [`set_qpos_limits`](RobotMut::set_qpos_limits); infinite without limits.
     pub fn qpos_limits(&self) -> Array3<f64> {
         self.ends(|range| range)
     }
 
-    /// Soft limits \[rad or m\], shape (N, dof, 2): around the middle of [`qpos_limits`](Self::qpos_limits), the share
-    /// `soft_limit_factor` of the robot's configuration of its range. They bound nothing: they are for rewards and
-    /// planners to stay inside of. Infinite where there is no limit.
+    /// Soft limits \[rad or m\], shape (N, dof, 2): the fraction `soft_limit_factor` of the range of
+    /// [`qpos_limits`](Self::qpos_limits), around its middle. Nothing enforces them: they are for rewards and planners.
+    /// Infinite without limits.
     pub fn soft_qpos_limits(&self) -> Array3<f64> {
         let factor = self.data.cfg().soft_limit_factor;
         self.ends(|[low, high]| {
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * factor);
-            // An end that is missing is missing in the soft range, too.
+            // A range with an infinite end has the same soft range.
             if half.is_finite() && middle.is_finite() { [middle - half, middle + half] } else { [low, high] }
         })
     }
 
-    /// Speed limits \[rad/s or m/s\], infinite where there are none, shape (N, dof): the files', unless the configuration
-    /// or [`set_qvel_limits`](RobotMut::set_qvel_limits) says otherwise. Reported; see there.
+    /// Speed limits \[rad/s or m/s\], shape (N, dof); infinite without a limit. They are those of the files, unless the
+    /// configuration or [`set_qvel_limits`](RobotMut::set_qvel_limits) gives others. They are reported only; see there.
     pub fn qvel_limits(&self) -> Array2<f64> {
         let mut limits = self.gather(|env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_velocity));
         for ((_, joint), limit) in limits.indexed_iter_mut().filter(|(_, limit)| limit.is_nan()) {
@@ -41,8 +40,9 @@ impl Robot<'_> {
         limits
     }
 
-    /// Effort limits of the drives \[N m or N\], infinite where there are none, shape (N, dof). A passive joint has that of
-    /// its file or configuration, which bounds what [`set_qf_target`](RobotMut::set_qf_target) gives it; a mimic joint has none.
+    /// Effort limits of the drives \[N m or N\], shape (N, dof); infinite without a limit. A passive joint has the
+    /// limit of its file or configuration, which bounds the effort of [`set_qf_target`](RobotMut::set_qf_target). A
+    /// mimic joint has no limit.
     pub fn qf_limits(&self) -> Array2<f64> {
         let mut limits = self.gather(|env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_effort));
         for ((_, joint), limit) in limits.indexed_iter_mut().filter(|(_, limit)| limit.is_nan()) {
@@ -52,7 +52,7 @@ impl Robot<'_> {
         limits
     }
 
-    /// Two numbers made of each joint's range.
+    /// Computes two numbers from the range of each joint.
     fn ends(&self, of: impl Fn([f64; 2]) -> [f64; 2]) -> Array3<f64> {
         let joints: Vec<_> = self.indexing().joints.iter().zip(self.data.plans()).collect();
         self.simulation.batch.gather_rows_of(&joints, |env, (joint, plan)| {
@@ -62,18 +62,19 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Sets the positions that targets may have \[rad or m\], shape (environments, joints, 2): rows for `env_ids` (all
-    /// where `None`; a single row is for all of them), joints as `joint_ids` (all where `None`). Present targets are
-    /// clamped to them at once, and so is what [`DelayedPd`](crate::DelayedPd) has under way, when it acts. They may be
-    /// tighter than the robot's own and be widened again, up to those. Mimic joints are accepted and ignored.
+    /// Sets the range of position targets \[rad or m\], shape (environments, joints, 2): rows for `env_ids` (`None` for
+    /// all environments; a single row applies to all of them), joints as `joint_ids` (`None` for all joints). Current
+    /// targets are clamped at once; delayed targets of [`DelayedPd`](crate::DelayedPd) are clamped when they act. The
+    /// range may be tighter than the robot's own limits and be widened again, up to those. Mimic joints are accepted
+    /// and ignored.
     ///
-    /// These are limits of what is asked for. The stops that a joint hits are in MuJoCo's model and stay where they are: a
-    /// load may push a joint beyond a tighter limit. [`compute_ik`](Robot::compute_ik) searches within the limits that the
-    /// robot was added with.
+    /// The range limits commands only. The joint stops are in MuJoCo's model and stay unchanged: a load may push a
+    /// joint beyond a tighter range. [`compute_ik`](Robot::compute_ik) searches within the limits that the robot was
+    /// added with.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice, NaN, a lower end above the upper one, an end
-    /// beyond the robot's own limits; a joint without a drive. Then nothing is set.
+    /// Wrong shape, an unknown or repeated joint or environment, NaN, a lower end above the upper end, or an end beyond
+    /// the robot's own limits; a joint without a drive. Then nothing is set.
     pub fn set_qpos_limits<'t>(
         &mut self,
         limits: impl AsArray<'t, f64, Ix3>,
@@ -114,7 +115,7 @@ impl RobotMut<'_> {
                 if ends[low] > ends[high] {
                     return refuse(low, format!("at most the upper end, {}", ends[high]));
                 }
-                // A target must be somewhere.
+                // The range must contain a finite target.
                 if ends[low] == f64::INFINITY {
                     return refuse(low, "below infinity".into());
                 }
@@ -133,16 +134,16 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// Sets the speed limits of drives \[rad/s or m/s\], infinite for none; rows and columns as in
-    /// [`set_stiffness`](Self::set_stiffness), which also names the errors.
+    /// Sets the speed limits of drives \[rad/s or m/s\], infinite for no limit. Rows and columns as in
+    /// [`set_stiffness`](Self::set_stiffness).
     ///
-    /// They are reported ([`qvel_limits`](Robot::qvel_limits)), for planners and rewards: neither MuJoCo nor the drive law
-    /// bounds the speed of a joint. Of actuator models, [`DcMotor`](crate::DcMotor) takes them for the speed without load;
-    /// nothing warns where that makes its torque-speed line too steep for the time step.
+    /// They are reported ([`qvel_limits`](Robot::qvel_limits)), for planners and rewards: neither MuJoCo nor the drive
+    /// law limits the speed of a joint. The actuator model [`DcMotor`](crate::DcMotor) uses them as its no-load speed;
+    /// nothing warns if its torque-speed line becomes too steep for the time step.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is negative or NaN, or that its
-    /// actuator model cannot take; a joint without a drive. Then nothing is set.
+    /// Wrong shape, an unknown or repeated joint or environment, a value that is negative or NaN, or that the actuator
+    /// model does not accept; a joint without a drive. Then nothing is set.
     #[doc(alias = "max_velocity")]
     pub fn set_qvel_limits<'t>(
         &mut self,
@@ -160,14 +161,14 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// Sets the effort limits of drives \[N m or N\], infinite for none; rows and columns as in
-    /// [`set_stiffness`](Self::set_stiffness). The sum that a drive gives, with the effort of [`set_qf_target`](Self::set_qf_target), is
-    /// clamped to them.
+    /// Sets the effort limits of drives \[N m or N\], infinite for no limit. Rows and columns as in
+    /// [`set_stiffness`](Self::set_stiffness). The sum of the drive's effort and the effort of
+    /// [`set_qf_target`](Self::set_qf_target) is clamped to them.
     ///
     /// # Errors
-    /// Wrong shape, unknown joint or environment, or one that is named twice, a value that is negative or NaN, or that its
-    /// actuator model cannot take ([`DcMotor`](crate::DcMotor) needs a finite one); a joint without a drive, or one that is
-    /// driven by [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
+    /// Wrong shape, an unknown or repeated joint or environment, a value that is negative or NaN, or that the actuator
+    /// model does not accept ([`DcMotor`](crate::DcMotor) needs a finite limit). A joint without a drive, or with a
+    /// drive of [`DriveModel::Actuator`](crate::DriveModel::Actuator). Then nothing is set.
     #[doc(alias = "max_effort")]
     pub fn set_qf_limits<'t>(
         &mut self,
@@ -183,7 +184,7 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// Whether the explicit models of `drives` can take what `change` makes of their limits.
+    /// Checks that the explicit models of `drives` accept the limits that `change` gives them.
     fn check_models(
         &self,
         argument: &'static str,

@@ -1,4 +1,4 @@
-//! Heights of the lowest collision points of a robot: how far it is above the ground, or in it.
+//! Heights of the lowest collision points of a robot: clearance above the ground, or penetration.
 
 use crate::compile::compile;
 use crate::contents::Contents;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 impl Robot<'_> {
     /// Heights of the lowest collision points of links in the environment \[m\], in the order of
-    /// [`link_names`](Self::link_names), shape (N, links); +∞ where a link has no collision shape.
+    /// [`link_names`](Self::link_names), shape (N, links); +∞ for a link without collision shapes.
     ///
     /// They are exact for MuJoCo's primitives, and for meshes, which collide as their convex hulls.
     #[doc(alias = "get_link_lowest_heights")]
@@ -28,19 +28,20 @@ impl Robot<'_> {
         })
     }
 
-    /// Height of the lowest collision point of the robot in the environment \[m\], shape (N,); +∞ where it has no collision
-    /// shape. Above the ground plane at z = 0 it is the robot's clearance, below it the depth of the penetration.
+    /// Height of the lowest collision point of the robot in the environment \[m\], shape (N,); +∞ for a robot without
+    /// collision shapes. With the ground plane at z = 0, a positive height is the clearance of the robot, and a
+    /// negative height the penetration.
     #[doc(alias = "get_lowest_heights")]
     pub fn lowest_heights(&self) -> Array1<f64> {
         let heights = self.simulation.batch.gather(&[()], |env, ()| lowest(env.data(), &self.indexing().geoms));
         heights.index_axis(Axis(1), 0).to_owned()
     }
 
-    /// True if a link is a part of the world: the robot's base is fixed, and no joint moves the link. Such links do not collide
-    /// with the ground.
+    /// True if a link is fixed in the world: the robot's base is fixed, and no joint moves the link. Such links do not
+    /// collide with the ground.
     ///
     /// # Errors
-    /// There is no such link.
+    /// The link does not exist.
     pub fn is_link_fixed(&self, link: LinkId) -> Result<bool> {
         let links = &self.indexing().links;
         let frame = links.get(link.0).ok_or(Error::UnknownIndex { what: "link", index: link.0, count: links.len() })?;
@@ -49,8 +50,8 @@ impl Robot<'_> {
 }
 
 impl RobotData {
-    /// The robot with its start moved along z until its lowest collision point has the configured clearance. `others` is what
-    /// else is in the scene.
+    /// Moves the initial pose along z until the lowest collision point has the configured clearance. `others` has the
+    /// other entities of the scene.
     pub(crate) fn with_clearance(
         self,
         manager: &SimulationManagerCfg,
@@ -58,7 +59,7 @@ impl RobotData {
         diagnostics: &mut Vec<Diagnostic>,
     ) -> Result<Self> {
         let Some(clearance) = self.cfg().ground_clearance else { return Ok(self) };
-        // One environment, in which the robot touches no ground.
+        // Trial scene with one environment and without a ground.
         let one = SimulationManagerCfg { num_envs: 1, threads: Some(1), ground: None, ..manager.clone() };
         let (mut contents, index) = (others.clone(), others.robots.len());
         contents.robots.push(Arc::new(self));
@@ -79,7 +80,7 @@ impl RobotData {
     }
 }
 
-/// Height of the lowest point of collision shapes \[m\].
+/// Height of the lowest point of the collision geoms among `geoms` \[m\].
 fn lowest<'g>(data: &Data, geoms: impl IntoIterator<Item = &'g GeomIndex>) -> f64 {
     let model = data.model();
     let collides = |geom: usize| model.geom_contype()[geom] != 0 || model.geom_conaffinity()[geom] != 0;
@@ -87,10 +88,10 @@ fn lowest<'g>(data: &Data, geoms: impl IntoIterator<Item = &'g GeomIndex>) -> f6
     shapes.map(|geom| lowest_of(model, data, geom.geom)).fold(f64::INFINITY, f64::min)
 }
 
-/// Height of the lowest point of a geom \[m\]; +∞ of planes and height fields, which are not moved.
+/// Height of the lowest point of a geom \[m\]; +∞ for planes and height fields, which do not move.
 fn lowest_of(model: &Model, data: &Data, geom: usize) -> f64 {
     let middle = data.geom_xpos().as_chunks::<3>().0[geom][2];
-    // The world's z in the axes of the geom.
+    // The world's z axis in the axes of the geom.
     let [.., x, y, z] = data.geom_xmat().as_chunks::<9>().0[geom];
     let [a, b, c] = model.geom_size().as_chunks::<3>().0[geom];
     let below = match model.geom_type()[geom] as u32 {

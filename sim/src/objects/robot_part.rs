@@ -1,4 +1,4 @@
-//! A control part of a robot, to command by its name.
+//! Control part of a robot, commanded by its name.
 
 use super::robot::RobotMut;
 use super::robot_data::JointIndex;
@@ -6,8 +6,8 @@ use crate::error::Result;
 use crate::ids::EnvId;
 use ndarray::{AsArray, Ix2};
 
-/// A control part of a robot, to command: as [`RobotMut`] with `joint_ids` of the part. The columns of all values are the
-/// part's joints, mimic joints included, in the order of [`joint_ids`](Self::joint_ids).
+/// Write access to a control part of a robot, like [`RobotMut`] with the `joint_ids` of the part. The columns of all
+/// values are the part's joints, mimic joints included, in the order of [`joint_ids`](Self::joint_ids).
 #[derive(Debug)]
 pub struct RobotPartMut<'a> {
     robot: RobotMut<'a>,
@@ -15,10 +15,10 @@ pub struct RobotPartMut<'a> {
 }
 
 impl<'a> RobotMut<'a> {
-    /// The control part `name`.
+    /// Selects the control part `name`.
     ///
     /// # Errors
-    /// There is no such part; the error lists those there are.
+    /// The part does not exist; the error lists the existing parts.
     pub fn into_part(self, name: &str) -> Result<RobotPartMut<'a>> {
         let joints = self.read().joint_ids(name)?;
         Ok(RobotPartMut { robot: self, joints })
@@ -31,8 +31,9 @@ impl RobotPartMut<'_> {
         &self.joints
     }
 
-    /// Sets position targets \[rad or m\], clamped to the limits: rows for `env_ids` (all where `None`; a single row is for
-    /// all of them), a column for each joint of the part; those of mimic joints are accepted and ignored.
+    /// Sets position targets \[rad or m\], clamped to the limits: rows for `env_ids` (`None` for all environments; a
+    /// single row applies to all of them), a column for each joint of the part. Columns of mimic joints are accepted
+    /// and ignored.
     ///
     /// # Errors
     /// As [`RobotMut::set_qpos_target`]; then nothing is set.
@@ -59,8 +60,8 @@ impl RobotPartMut<'_> {
         self.robot.set_qvel_target(velocities, Some(&self.joints), env_ids)
     }
 
-    /// Sets efforts \[N m or N\], which stay until changed or reset, beside what drives give; rows and columns as in
-    /// [`set_qpos_target`](Self::set_qpos_target).
+    /// Sets efforts \[N m or N\] that are added to the efforts of the drives. They stay until changed or reset. Rows
+    /// and columns as in [`set_qpos_target`](Self::set_qpos_target).
     ///
     /// # Errors
     /// As [`RobotMut::set_qf_target`]; then nothing is set.

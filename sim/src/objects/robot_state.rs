@@ -1,4 +1,4 @@
-//! The state of a robot beside its joints' positions: accelerations, targets, root and links, and what is called how.
+//! Names, targets, accelerations, and states of the root and the links of a robot.
 
 use crate::body_pose::{BodyFrame, body_pose};
 use crate::capture::body_velocity;
@@ -16,21 +16,21 @@ use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;
 use ndarray::{Array1, Array2, Array3, AsArray, Axis, Ix2, concatenate};
 
-/// What joints are called, and which of them follow others.
+/// Names and indices of joints and links.
 impl Robot<'_> {
-    /// Joints whose names match `patterns` (whole names, case counts): in their order within a pattern, patterns one after
-    /// the other.
+    /// Finds the joints whose names match `patterns` (whole names, case-sensitive): in joint order within a pattern,
+    /// patterns one after the other.
     ///
     /// # Errors
-    /// A pattern that is wrong or matches nothing, with the nearest names; a joint that two patterns match.
+    /// An invalid pattern, or a pattern without a match, with the nearest names; a joint that two patterns match.
     pub fn find_joints<P: AsRef<str>>(&self, patterns: &[P]) -> Result<Vec<JointIndex>> {
         let found = pattern::select(patterns, self.joint_names(), "joint").map_err(|error| self.name_error(error))?;
         Ok(found.into_iter().map(JointIndex).collect())
     }
 
-    /// Links whose names match `patterns`, fused ones too; otherwise as [`find_joints`](Self::find_joints). A [`LinkId`] is
-    /// the link's place in [`link_names`](Self::link_names) and on the second axis of
-    /// [`link_poses`](Self::link_poses).
+    /// Finds the links whose names match `patterns`, fused links included; otherwise as
+    /// [`find_joints`](Self::find_joints). A [`LinkId`] is the index of the link in [`link_names`](Self::link_names)
+    /// and on the second axis of [`link_poses`](Self::link_poses).
     ///
     /// # Errors
     /// As [`find_joints`](Self::find_joints).
@@ -44,31 +44,32 @@ impl Robot<'_> {
         self.active_joints().map(|joint| self.joint_names()[joint.0].as_str()).collect()
     }
 
-    /// The joints that follow another one; [`mimic_drivers`](Self::mimic_drivers) says which, and how.
+    /// Indices of the joints that follow another joint; [`mimic_drivers`](Self::mimic_drivers) gives their drivers and
+    /// ratios.
     #[doc(alias = "mimic_ids")]
     pub fn mimic_joint_ids(&self) -> Vec<JointIndex> {
         (0..self.dof()).map(JointIndex).filter(|joint| self.data.plans()[joint.0].mimic.is_some()).collect()
     }
 
-    /// Number of joints that follow no other joint: [`dof`](Self::dof) without the mimic ones.
+    /// Number of joints that follow no other joint: [`dof`](Self::dof) without the mimic joints.
     pub fn active_dof(&self) -> usize {
         self.active_joints().count()
     }
 
-    /// True if a joint has a drive, which [`set_qpos_target`](crate::RobotMut::set_qpos_target) gives a target; a passive joint and one that
-    /// follows another have none.
+    /// True if a joint has a drive, for which [`set_qpos_target`](crate::RobotMut::set_qpos_target) sets a target.
+    /// Passive joints and joints that follow another have no drive.
     ///
     /// # Errors
-    /// There is no such joint.
+    /// The joint does not exist.
     pub fn is_driven(&self, joint: JointIndex) -> Result<bool> {
         Ok(self.plan(joint)?.actuator.is_some())
     }
 
-    /// The joints of a control part that follow no other joint, in the order of its patterns; of all joints where `part` is
-    /// `None`. It is what EmbodiChain's `get_joint_ids` gives with `remove_mimic`.
+    /// Indices of the joints of a control part that follow no other joint, in the order of its patterns; `None` for all
+    /// joints. It is equivalent to EmbodiChain's `get_joint_ids` with `remove_mimic`.
     ///
     /// # Errors
-    /// There is no such part; the error lists those there are.
+    /// The part does not exist; the error lists the existing parts.
     #[doc(alias = "remove_mimic")]
     #[doc(alias = "get_active_joint_ids")]
     pub fn active_joint_ids<'p>(&self, part: impl Into<Option<&'p str>>) -> Result<Vec<JointIndex>> {
@@ -86,20 +87,20 @@ impl Robot<'_> {
     }
 }
 
-/// Joints.
+/// Accelerations and targets of joints.
 impl Robot<'_> {
-    /// Accelerations of the joints that MuJoCo's solver found in the last step \[rad/s² or m/s²\] (`qacc`), shape (N, dof); 0
-    /// before the first one. They are what the solver makes of positions, velocities and forces: a write to the state leaves
-    /// them as they are until the next step, or until [`write_qacc`](RobotMut::write_qacc).
+    /// Joint accelerations that MuJoCo's solver found in the last step \[rad/s² or m/s²\] (`qacc`), shape (N, dof); 0
+    /// before the first step. The solver computes them from positions, velocities and forces. A write to the state
+    /// leaves them unchanged until the next step, or until [`write_qacc`](RobotMut::write_qacc).
     ///
-    /// With integrator Euler and [`DriveModel::Implicit`](crate::DriveModel::Implicit) they are the change of the velocity in
-    /// the step, (v' - v) / h. They are not where something acts on the velocity after the solver: the viscous damping of
-    /// joints of a robot of [`DriveModel::Actuator`](crate::DriveModel::Actuator) (v' - v is h M a / (M + h B) for a single
-    /// joint), velocity terms of the integrators implicit and implicitfast; nor with RK4, where they are those of a stage
-    /// inside of the step. Take the difference of [`qvel`](Robot::qvel) there.
+    /// With the integrator Euler and [`DriveModel::Implicit`](crate::DriveModel::Implicit) they are the change of the
+    /// velocity in the step, (v' - v) / h. They differ from it where something acts on the velocity after the solver:
+    /// the viscous damping of joints of a robot of [`DriveModel::Actuator`](crate::DriveModel::Actuator) (v' - v is h M
+    /// a / (M + h B) for a single joint), and velocity terms of the integrators implicit and implicitfast. With RK4
+    /// they are those of a stage inside the step. Use the difference of [`qvel`](Robot::qvel) in these cases.
     #[doc(alias = "get_qacc")]
     pub fn qacc(&self) -> Array2<f64> {
-        // The warm start is the acceleration of the last step, and what an environment keeps when it is done again.
+        // The warm start is the acceleration of the last step, and a new forward pass keeps it.
         self.gather(|env, joint| env.data().qacc_warmstart()[joint.dof])
     }
 
@@ -109,8 +110,8 @@ impl Robot<'_> {
         self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.velocity[drive]))
     }
 
-    /// Efforts that [`set_qf_target`](RobotMut::set_qf_target) asked for \[N m or N\], shape (N, dof); 0 for mimic joints. A passive
-    /// joint has what it really gets, within its limit.
+    /// Effort targets of [`set_qf_target`](RobotMut::set_qf_target) \[N m or N\], shape (N, dof); 0 for mimic joints. A
+    /// passive joint has the applied effort, clamped to its limit.
     #[doc(alias = "get_target_qf")]
     pub fn qf_target(&self) -> Array2<f64> {
         self.gather(|env, joint| match joint.drive {
@@ -120,10 +121,10 @@ impl Robot<'_> {
     }
 }
 
-/// The root link.
+/// State of the root link.
 impl Robot<'_> {
-    /// Pose, velocity and angular velocity of the root link at the start, as [`root_state`](Self::root_state) has
-    /// them, shape (N, 13): the pose of the configuration, at rest.
+    /// Initial pose, velocity and angular velocity of the root link in the layout of [`root_state`](Self::root_state),
+    /// shape (N, 13): the pose of the configuration, at rest.
     #[doc(alias = "get_default_root_state")]
     pub fn default_root_state(&self) -> Array2<f64> {
         let pose = to_row(&self.data.root_pose());
@@ -135,19 +136,19 @@ impl Robot<'_> {
     /// rows `[x, y, z, qw, qx, qy, qz, vx, vy, vz, wx, wy, wz]` \[m, m/s, rad/s\], shape (N, 13).
     #[doc(alias = "get_root_state")]
     pub fn root_state(&self) -> Array2<f64> {
-        // Both have one row for each environment.
+        // Both arrays have one row for each environment.
         concatenate(Axis(1), &[self.root_pose().view(), self.root_velocity().view()]).unwrap_or_default()
     }
 
-    /// Centre of mass of the root link and of what is fixed to it, in the environment \[m\], shape (N, 3).
+    /// Center of mass of the root link and of the links fixed to it, in the environment \[m\], shape (N, 3).
     #[doc(alias = "get_root_com_position")]
     pub fn root_com_position(&self) -> Array2<f64> {
         self.rows(|env, robot| centre_of_mass(env, robot).into())
     }
 
-    /// Velocity of the centre of mass of the root link and of what is fixed to it, then its angular velocity, in world axes
-    /// \[m/s, rad/s\], shape (N, 6); 0 where the base is fixed. [`root_velocity`](Self::root_velocity) has that of
-    /// the link's frame.
+    /// Velocity of the center of mass of the root link and of the links fixed to it, then its angular velocity, in
+    /// world axes \[m/s, rad/s\], shape (N, 6); 0 for a fixed base. [`root_velocity`](Self::root_velocity) is the
+    /// velocity of the link's frame.
     #[doc(alias = "get_root_com_velocity")]
     pub fn root_com_velocity(&self) -> Array2<f64> {
         self.rows(|env, robot| {
@@ -156,21 +157,22 @@ impl Robot<'_> {
         })
     }
 
-    /// Velocity of the root link's frame in its own axes \[m/s\], shape (N, 3): what a sensor of speed on the root would
-    /// measure.
+    /// Velocity of the root link's frame in its own axes \[m/s\], shape (N, 3), as an ideal velocity sensor on the root
+    /// would measure it.
     #[doc(alias = "get_root_lin_vel_b")]
     pub fn root_lin_vel_b(&self) -> Array2<f64> {
         self.in_root_axes(|env, robot, root| body_velocity(env.data(), robot.root.body, &root.translation.vector)[0])
     }
 
-    /// Angular velocity of the root link in its own axes \[rad/s\], shape (N, 3): what an ideal gyroscope would measure.
+    /// Angular velocity of the root link in its own axes \[rad/s\], shape (N, 3), as an ideal gyroscope would measure
+    /// it.
     #[doc(alias = "get_root_ang_vel_b")]
     pub fn root_ang_vel_b(&self) -> Array2<f64> {
         self.in_root_axes(|env, robot, root| body_velocity(env.data(), robot.root.body, &root.translation.vector)[1])
     }
 
-    /// Direction of gravity in the axes of the root link, a unit vector, shape (N, 3): (0, 0, -1) where it stands upright;
-    /// 0 where there is no gravity.
+    /// Direction of gravity in the axes of the root link, a unit vector, shape (N, 3): (0, 0, -1) for an upright root;
+    /// 0 without gravity.
     #[doc(alias = "get_projected_gravity_b")]
     pub fn projected_gravity_b(&self) -> Array2<f64> {
         self.in_root_axes(|env, _, _| {
@@ -201,27 +203,27 @@ impl Robot<'_> {
     }
 }
 
-/// Links.
+/// States of links.
 impl Robot<'_> {
-    /// Poses of all links, fused ones too, in the order of [`link_names`](Self::link_names): rows
-    /// `[x, y, z, qw, qx, qy, qz]` in the environment \[m\], shape (N, links, 7).
+    /// Poses of all links, fused links included, in the order of [`link_names`](Self::link_names): rows `[x, y, z, qw,
+    /// qx, qy, qz]` in the environment \[m\], shape (N, links, 7).
     #[doc(alias = "get_link_poses")]
     pub fn link_poses(&self) -> Array3<f64> {
         self.of_links(|env, link| to_row(&link.pose(env.data())))
     }
 
-    /// Velocities of the frames of all links, fused ones too, then their angular velocities, in world axes \[m/s, rad/s\],
-    /// shape (N, links, 6).
+    /// Velocities of the frames of all links, fused links included, then their angular velocities, in world axes \[m/s,
+    /// rad/s\], shape (N, links, 6).
     #[doc(alias = "get_link_velocities")]
     pub fn link_velocities(&self) -> Array3<f64> {
         self.of_links(link_velocity)
     }
 
-    /// Velocity of the frame of a link, fused ones included, then its angular velocity, in world axes \[m/s, rad/s\], shape
-    /// (N, 6).
+    /// Velocity of the frame of a link, fused links included, then its angular velocity, in world axes \[m/s, rad/s\],
+    /// shape (N, 6).
     ///
     /// # Errors
-    /// There is no such link; the error lists the nearest names.
+    /// The link does not exist; the error lists the nearest names.
     pub fn link_velocity(&self, name: &str) -> Result<Array2<f64>> {
         let link = self.link_id(name)?;
         Ok(self.rows(|env, robot| link_velocity(env, &robot.links[link.0])))
@@ -242,17 +244,19 @@ fn centre_of_mass(env: &Env, robot: &RobotIndex) -> Vector3<f64> {
 }
 
 impl RobotMut<'_> {
-    /// Writes the accelerations that [`qacc`](Robot::qacc) tells \[rad/s² or m/s²\], from which MuJoCo's solver begins
-    /// its search in the next step (its warm start, and `qacc`). Rows and columns as in [`write_qpos`](Self::write_qpos).
+    /// Writes the accelerations that [`qacc`](Robot::qacc) reads \[rad/s² or m/s²\], from which MuJoCo's solver starts
+    /// in the next step (its warm start, and `qacc`). Rows and columns as in [`write_qpos`](Self::write_qpos).
     ///
-    /// They are a result, not a state: each step finds its own from positions, velocities and forces, within the solver's
-    /// tolerance wherever it begins, and puts them in the place of these. To push a joint there is
-    /// [`set_qf_target`](Self::set_qf_target). Written together with the positions and velocities of another simulation's robot, they let
-    /// this one go on to the last bit as that one does, where its base is fixed, it touches nothing else that moves, and targets
-    /// are the same; of everything else there is [`snapshot`](crate::SimulationManager::snapshot).
+    /// Accelerations are a result, not a state: each step computes its own from positions, velocities and forces,
+    /// within the solver's tolerance from any start, and replaces these. To push a joint, use
+    /// [`set_qf_target`](Self::set_qf_target).
+    ///
+    /// Written together with the positions and velocities of a robot in another simulation, they let this robot
+    /// continue bit-identically to that robot. This holds for a fixed base, without contact to other moving bodies, and
+    /// for equal targets. In all other cases, use [`snapshot`](crate::SimulationManager::snapshot).
     ///
     /// # Errors
-    /// As [`write_qpos`](Self::write_qpos); an acceleration beyond ±1e10, which MuJoCo takes for a diverged one.
+    /// As [`write_qpos`](Self::write_qpos); an acceleration beyond ±1e10, which MuJoCo treats as divergence.
     pub fn write_qacc<'t>(
         &mut self,
         accelerations: impl AsArray<'t, f64, Ix2>,
@@ -269,9 +273,9 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// Sets the velocity of the centre of mass of the root link and of what is fixed to it, and its angular velocity, in
-    /// world axes: rows of 6 \[m/s, rad/s\], as in [`write_root_velocity`](Self::write_root_velocity), which takes that of
-    /// the link's frame.
+    /// Sets the velocity of the center of mass of the root link and of the links fixed to it, and its angular velocity,
+    /// in world axes: rows of 6 \[m/s, rad/s\], as in [`write_root_velocity`](Self::write_root_velocity), which takes
+    /// the velocity of the link's frame.
     ///
     /// # Errors
     /// As [`write_root_pose`](Self::write_root_pose).
@@ -281,7 +285,7 @@ impl RobotMut<'_> {
         env_ids: Option<&[EnvId]>,
     ) -> Result<()> {
         let body = self.simulation.robots[self.index].root.body;
-        // The frame's origin is at `arm` from the centre of mass: v_frame = v_com + w x arm.
+        // The origin of the frame is at `arm` from the center of mass: v_frame = v_com + w x arm.
         self.root().write_velocities_of("write_root_com_velocity", velocities.into(), env_ids, |data| {
             let com = Vector3::from_column_slice(&data.xipos()[3 * body..3 * body + 3]);
             body_pose(data, body).translation.vector - com

@@ -1,4 +1,4 @@
-//! Whole states of a robot in one call, as Isaac Lab writes them: root pose with velocity, joint positions with velocities.
+//! Complete states of a robot in one call, as in Isaac Lab: root pose with velocity, joint positions with velocities.
 
 use crate::error::Result;
 use crate::ids::EnvId;
@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use ndarray::{Array2, ArrayView2, AsArray, Axis, Ix2};
 
 impl Robot<'_> {
-    /// Velocities of the joints at the start: zero, shape (N, dof).
+    /// Initial velocities of the joints: zero, shape (N, dof).
     #[doc(alias = "get_default_qvel")]
     pub fn default_qvel(&self) -> Array2<f64> {
         Array2::zeros((self.simulation.batch.num_envs(), self.dof()))
@@ -17,8 +17,8 @@ impl Robot<'_> {
 
 impl RobotMut<'_> {
     /// Writes pose and velocity of the root link of a robot without a fixed base: rows of 13 as in
-    /// [`root_state`](Robot::root_state), for `env_ids` (all where `None`; a single row is for all of them). Poses are in the
-    /// environment: `env_origins` are not added.
+    /// [`root_state`](Robot::root_state), for `env_ids` (`None` for all environments; a single row applies to all of
+    /// them). Poses are relative to the environment: `env_origins` are not added.
     ///
     /// # Errors
     /// As [`write_root_pose`](Self::write_root_pose); then nothing is written.
@@ -49,7 +49,7 @@ impl RobotMut<'_> {
     /// [`write_qvel`](Self::write_qvel), shape (N, joints) each.
     ///
     /// # Errors
-    /// As [`write_qpos`](Self::write_qpos), of either argument; then nothing is written.
+    /// As [`write_qpos`](Self::write_qpos), for either argument; then nothing is written.
     pub fn write_joint_state<'t, 'v>(
         &mut self,
         positions: impl AsArray<'t, f64, Ix2>,

@@ -1,4 +1,4 @@
-//! Forces and torques on links of a robot, and gravity compensation, per environment.
+//! External forces and torques on links of a robot, and gravity compensation, per environment.
 
 use crate::body_pose::BodyFrame;
 use crate::error::{Error, Result};
@@ -11,8 +11,8 @@ use nalgebra::Vector3;
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix3};
 
 impl Robot<'_> {
-    /// Forces and torques of [`set_external_wrench`](RobotMut::set_external_wrench), in world axes with the links where
-    /// they are \[N, N m\], shape (N, links, 6). Gravity compensation is not among them.
+    /// Forces and torques of [`set_external_wrench`](RobotMut::set_external_wrench), in world axes at the current poses
+    /// of the links \[N, N m\], shape (N, links, 6). Gravity compensation is not included.
     #[doc(alias = "get_external_wrenches")]
     pub fn external_wrenches(&self) -> Array3<f64> {
         let (n, links) = (self.simulation.batch.num_envs(), self.indexing().links.len());
@@ -29,7 +29,7 @@ impl Robot<'_> {
         wrenches
     }
 
-    /// Whether gravity is compensated for each link, shape (N, links).
+    /// True for links with gravity compensation, shape (N, links).
     #[doc(alias = "get_gravity_compensation")]
     pub fn gravity_compensation(&self) -> Array2<bool> {
         let links = &self.indexing().links;
@@ -44,13 +44,14 @@ impl Robot<'_> {
 }
 
 impl RobotMut<'_> {
-    /// Applies forces \[N\] and torques \[N m\] to links from the next step on, until they are set again or the environment
-    /// is reset; zeros end them. Both have the shape (environments, links, 3): rows for `env_ids` (all where `None`; a
-    /// single row is for all of them), links as `link_ids` (all where `None`). Other links keep what they have.
+    /// Applies forces \[N\] and torques \[N m\] to links from the next step on, until they are set again or the
+    /// environment is reset; zeros end them. Both have the shape (environments, links, 3): rows for `env_ids` (`None`
+    /// for all environments; a single row applies to all of them), links as `link_ids` (`None` for all links). Other
+    /// links keep their wrenches.
     ///
-    /// A force acts in the centre of mass of the link's body: of the link and of all that is fixed to it. Links that are
-    /// fused to one body add up. To push at a point that is `r` away from there, add `r x F` to the torque. With
-    /// [`WrenchFrame::Link`] both are in the axes of the link and turn with it, from step to step.
+    /// A force acts at the center of mass of the link's body: of the link and of all links fixed to it. Wrenches on
+    /// links that are fused into one body add up. To push at a point at the offset `r` from there, add `r x F` to the
+    /// torque. With [`WrenchFrame::Link`] both are in the axes of the link and turn with it, from step to step.
     ///
     /// ```
     /// use ndarray::array;
@@ -73,8 +74,7 @@ impl RobotMut<'_> {
     /// ```
     ///
     /// # Errors
-    /// Wrong shape, unknown link or environment, or one that is named twice, a value that is not finite; then nothing is
-    /// set.
+    /// Wrong shape, an unknown or repeated link or environment, or a value that is not finite; then nothing is set.
     pub fn set_external_wrench<'f, 't>(
         &mut self,
         forces: impl AsArray<'f, f64, Ix3>,
@@ -92,7 +92,7 @@ impl RobotMut<'_> {
         let frames = &self.simulation.robots[robot].links;
         let vector = |row: &[f64], k: usize| Vector3::new(row[3 * k], row[3 * k + 1], row[3 * k + 2]);
         for (i, env) in envs.into_iter().enumerate() {
-            // A single row is for all environments.
+            // A single row applies to all environments.
             let [force_row, torque_row] = [&forces, &torques].map(|rows| &rows[i.min(rows.len() - 1)]);
             self.simulation.batch.write(env, |env| {
                 env.set_wrenches(|wrenches| {
@@ -108,15 +108,15 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// Switches gravity compensation of links on or off, for `link_ids` (all where `None`) in `env_ids` (all where `None`);
-    /// off at first. It stays through a reset.
+    /// Switches gravity compensation of links on or off, for `link_ids` (`None` for all links) in `env_ids` (`None` for
+    /// all environments); off at first. The setting survives resets.
     ///
-    /// A compensated link is held by the force `-m g` in its centre of mass: the drives do not feel its weight, while its
-    /// inertia stays. A link that is fused to another takes all of their body with it. Gravity itself stays as it is, for
-    /// objects and for what the robot holds.
+    /// The force `-m g` at its center of mass holds a compensated link: the drives do not carry its weight, while its
+    /// inertia stays. For a link that is fused with others, the setting applies to their whole body. Gravity still acts
+    /// on objects and on loads that the robot holds.
     ///
     /// # Errors
-    /// Unknown link or environment, or one that is named twice; then nothing is changed.
+    /// An unknown or repeated link or environment; then nothing is changed.
     pub fn set_gravity_compensation(
         &mut self,
         on: bool,
@@ -137,7 +137,7 @@ impl RobotMut<'_> {
         Ok(())
     }
 
-    /// The links that are meant, each once, in the order given; all of them where `None`.
+    /// Indices of the selected links in the given order, each once; all links for `None`.
     fn links(&self, argument: &'static str, link_ids: Option<&[LinkId]>) -> Result<Vec<usize>> {
         let known = self.data.description().named_links();
         let count = known.len();
@@ -153,7 +153,7 @@ impl RobotMut<'_> {
         }
     }
 
-    /// One row of vectors per environment, or one for all, after everything was checked.
+    /// Checks vectors, and returns one row of them per environment, or one row for all.
     fn vectors(
         &self,
         argument: &'static str,

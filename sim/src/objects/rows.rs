@@ -1,34 +1,34 @@
-//! Rows of numbers that a user gives, one for each environment: checked before anything is written.
+//! Arguments with one row of numbers per environment, which are checked before anything is written.
 
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list};
 use ndarray::{ArrayView1, ArrayView2};
 
-/// What a table of numbers must look like.
+/// Expected layout of a table of numbers.
 #[derive(Clone, Copy)]
 pub(super) struct Table<'a> {
-    /// The method, as errors call it.
+    /// Name of the method in errors.
     pub(super) argument: &'static str,
-    /// What rows and columns are.
+    /// Meaning of rows and columns, for errors.
     pub(super) meaning: &'static str,
     /// Number of columns.
     pub(super) columns: usize,
-    /// What a column is of, such as `joint "elbow"`.
+    /// Description of a column, such as `joint "elbow"`.
     pub(super) of: &'a dyn Fn(usize) -> String,
 }
 
-/// Which numbers a table may have.
+/// Kind of numbers that a table may contain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Numbers {
-    /// Finite ones.
+    /// Finite numbers.
     Finite,
-    /// Those that MuJoCo goes on with as accelerations: its `mjMAXVAL` bounds them.
+    /// Accelerations that MuJoCo accepts: its `mjMAXVAL` bounds them.
     Acceleration,
-    /// Finite ones that are not negative.
+    /// Finite numbers that are not negative.
     Gain,
-    /// Numbers above or at 0, and infinity for no limit.
+    /// Limits: numbers of at least 0, and infinity for no limit.
     Limit,
-    /// All but NaN: infinite where there is no end.
+    /// Ends of a range: all numbers except NaN, infinite for no limit.
     End,
 }
 
@@ -54,13 +54,13 @@ impl Numbers {
     }
 }
 
-/// The two places of the first thing that a list of indices has twice.
+/// Positions of the first repeated index in a list: first occurrence and repetition.
 fn first_repeat(chosen: &[usize]) -> Option<(usize, usize)> {
     let mut places = vec![None; chosen.iter().max().map_or(0, |most| most + 1)];
     chosen.iter().enumerate().find_map(|(second, &index)| places[index].replace(second).map(|first| (first, second)))
 }
 
-/// Refuses lists that choose something twice: which of its columns would hold is nobody's to guess.
+/// Rejects columns that are selected twice: it would be ambiguous which of them applies. `of` describes a column.
 pub(super) fn check_distinct(argument: &'static str, chosen: &[usize], of: &dyn Fn(usize) -> String) -> Result<()> {
     match first_repeat(chosen) {
         Some((first, second)) => Err(Error::RepeatedColumn { argument, of: of(second), first, second }),
@@ -68,7 +68,7 @@ pub(super) fn check_distinct(argument: &'static str, chosen: &[usize], of: &dyn 
     }
 }
 
-/// Refuses lists of indices, known to exist, that name something twice; `of` says what an index is of.
+/// Rejects repeated indices in a list of valid indices. `of` describes an index.
 pub(super) fn check_named_once(argument: &'static str, chosen: &[usize], of: &dyn Fn(usize) -> String) -> Result<()> {
     match first_repeat(chosen) {
         Some((first, second)) => Err(Error::Repeated { argument, of: of(chosen[second]), first, second }),
@@ -76,7 +76,7 @@ pub(super) fn check_named_once(argument: &'static str, chosen: &[usize], of: &dy
     }
 }
 
-/// The environments that are meant, each once.
+/// Selected environments, each once.
 pub(super) fn distinct_envs(argument: &'static str, env_ids: Option<&[EnvId]>, num_envs: usize) -> Result<Vec<usize>> {
     let envs = env_list(env_ids, num_envs)?;
     if env_ids.is_some() {
@@ -85,7 +85,7 @@ pub(super) fn distinct_envs(argument: &'static str, env_ids: Option<&[EnvId]>, n
     Ok(envs)
 }
 
-/// A checked table: every number is finite, every environment exists.
+/// Checked table: every number is valid, every environment exists.
 #[derive(Debug)]
 pub(super) struct Rows<'v> {
     envs: Vec<usize>,
@@ -93,7 +93,8 @@ pub(super) struct Rows<'v> {
 }
 
 impl<'v> Rows<'v> {
-    /// Checks `values`: a row for each of `env_ids` (all `num_envs` where `None`), or one row for all of them.
+    /// Checks finite `values`: a row for each of `env_ids` (`None` for all `num_envs` environments), or one row for all
+    /// of them.
     pub(super) fn check(
         table: Table<'_>,
         values: ArrayView2<'v, f64>,
@@ -103,7 +104,7 @@ impl<'v> Rows<'v> {
         Self::check_numbers(table, Numbers::Finite, values, env_ids, num_envs)
     }
 
-    /// As [`check`](Self::check), of numbers of another kind.
+    /// Checks values like [`check`](Self::check), for numbers of another kind.
     pub(super) fn check_numbers(
         table: Table<'_>,
         numbers: Numbers,
@@ -129,21 +130,21 @@ impl<'v> Rows<'v> {
         Ok(Self { envs, values })
     }
 
-    /// The environments, in the order given.
+    /// Selected environments, in the given order.
     pub(super) fn envs(&self) -> &[usize] {
         &self.envs
     }
 
-    /// Each environment with its row.
+    /// Iterates over the environments with their rows.
     pub(super) fn iter(&self) -> impl Iterator<Item = (usize, ArrayView1<'_, f64>)> {
         let single = self.values.nrows() == 1;
         self.envs.iter().enumerate().map(move |(i, &env)| (env, self.values.row(if single { 0 } else { i })))
     }
 
-    /// Each environment with its row of `K` numbers.
+    /// Iterates over the environments with their rows as arrays of `K` numbers.
     ///
     /// # Panics
-    /// The table has not `K` columns.
+    /// The table has fewer than `K` columns.
     pub(super) fn arrays<const K: usize>(&self) -> impl Iterator<Item = (usize, [f64; K])> {
         self.iter().map(|(env, row)| (env, std::array::from_fn(|k| row[k])))
     }

@@ -1,4 +1,4 @@
-//! Shapes of rigid objects: what they weigh and how they turn.
+//! Shapes of rigid objects, with their volumes and moments of inertia.
 
 use crate::mjcf::document::Shape;
 use kinetoscope_scene::mesh::{HullCfg, TriMesh};
@@ -7,62 +7,63 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 
-/// The shape of a rigid object; its frame is in the middle of its extent, the axis of round shapes is z. The frame of a mesh
-/// is that of its file.
+/// Shape of a rigid object. Its frame is in the middle of its extent, and the axis of round shapes is z. The frame of a
+/// mesh is that of its file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum ObjectShape {
-    /// Edge lengths \[m\].
+    /// Box.
     Box {
-        /// Along x, y and z \[m\].
+        /// Edge lengths along x, y and z \[m\].
         size: [f64; 3],
     },
-    /// A ball.
+    /// Sphere.
     Sphere {
         /// Radius \[m\].
         radius: f64,
     },
-    /// A cylinder with flat ends.
+    /// Cylinder with flat ends.
     Cylinder {
         /// Radius \[m\].
         radius: f64,
         /// Length \[m\].
         length: f64,
     },
-    /// A cylinder with round ends.
+    /// Capsule: a cylinder with round ends.
     Capsule {
         /// Radius \[m\].
         radius: f64,
         /// Length of the cylindrical part \[m\].
         length: f64,
     },
-    /// A cone, base down: the base is at -height/2, the tip at +height/2. MuJoCo has none: what collides and is seen is the
-    /// pyramid with 64 sides inside of it, 0.12 % of the radius within. It weighs and turns as the round one.
+    /// Cone with its base at -height/2 and its tip at +height/2. MuJoCo has no cones: the shape that collides and is
+    /// rendered is an inscribed pyramid with 64 sides, up to 0.12 % of the radius inside the cone. The mass properties
+    /// are those of the cone.
     Cone {
         /// Radius of the base \[m\].
         radius: f64,
-        /// From the base to the tip \[m\].
+        /// Height from the base to the tip \[m\].
         height: f64,
     },
     /// A mesh file: STL, OBJ, DAE or GLB.
     ///
-    /// What is seen, by cameras and by ray casters, are the triangles of the file. What collides is their convex hull, as with
-    /// the links of a robot, unless [`RigidObjectCfg::mesh_collision`](crate::RigidObjectCfg::mesh_collision) says that convex
-    /// pieces or the triangles do: MuJoCo's contacts are those of convex shapes, so that nothing lies in the hollow of a bowl
-    /// that is one hull.
+    /// Cameras and ray casters see the triangles of the file. The collision shape is their convex hull, as for links of
+    /// a robot, unless [`RigidObjectCfg::mesh_collision`](crate::RigidObjectCfg::mesh_collision) selects convex pieces
+    /// or triangles. MuJoCo's contacts are those of convex shapes: nothing can lie in the hollow of a bowl that is one
+    /// hull.
     ///
-    /// Mass and moments are those of what the triangles enclose, filled evenly. Where the surface is open, encloses nothing,
-    /// or has numbers that no body has (a part beside the others is inside out), they are those of the hull, and a diagnostic
-    /// says so. Parts that overlap count twice where the bounds have room for it; a part beside the others that is inside out
-    /// and small goes unseen.
+    /// Mass and moments are those of the enclosed volume with uniform density. If the surface is open, encloses no
+    /// volume, or has impossible mass properties (a separate part is inside out), they are those of the hull, and a
+    /// diagnostic reports it. Overlapping parts count twice where the bounds have room for it. A small separate part
+    /// that is inside out is not detected.
     Mesh {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Factors along the axes of the file; they may be negative, which mirrors.
+        /// Scale factors along the axes of the file; negative factors mirror.
         #[serde(default = "no_scale")]
         scale: [f64; 3],
-        /// How the hull is simplified.
+        /// Simplification of the hull.
         #[serde(default)]
         hull: HullCfg,
     },
@@ -72,21 +73,21 @@ fn no_scale() -> [f64; 3] {
     [1.0; 3]
 }
 
-/// Corners of the base of a cone.
+/// Number of corners of the base of a cone.
 const CONE_SIDES: u32 = 64;
 
 impl ObjectShape {
-    /// A cube with edges of `size` \[m\].
+    /// Creates a cube with edges of `size` \[m\].
     pub const fn cube(size: f64) -> Self {
         Self::Box { size: [size; 3] }
     }
 
-    /// A mesh file as it is.
+    /// Creates the shape of a mesh file without scaling.
     pub fn mesh(path: impl Into<PathBuf>) -> Self {
         Self::Mesh { path: path.into(), scale: no_scale(), hull: HullCfg::default() }
     }
 
-    /// The sizes that must be positive.
+    /// Sizes that must be positive.
     pub(crate) fn sizes(&self) -> Vec<f64> {
         match *self {
             Self::Box { size } => size.to_vec(),
@@ -97,7 +98,7 @@ impl ObjectShape {
         }
     }
 
-    /// Volume \[m³\]; `None` for a mesh, whose file says it.
+    /// Volume \[m³\]; `None` for a mesh, whose volume depends on its file.
     pub fn volume(&self) -> Option<f64> {
         let ball = |r: f64| 4.0 / 3.0 * PI * r.powi(3);
         let tube = |r: f64, l: f64| PI * r * r * l;
@@ -111,8 +112,8 @@ impl ObjectShape {
         })
     }
 
-    /// Centre of mass where the shape is filled evenly \[m\]: that of a cone is a quarter of its height above the base.
-    /// `None` for a mesh.
+    /// Center of mass for uniform density \[m\]: that of a cone is a quarter of its height above the base. `None` for a
+    /// mesh.
     pub fn center(&self) -> Option<Vector3<f64>> {
         match *self {
             Self::Cone { height, .. } => Some(Vector3::new(0.0, 0.0, -height / 4.0)),
@@ -121,9 +122,9 @@ impl ObjectShape {
         }
     }
 
-    /// Principal moments of inertia of a body of this shape, filled evenly with mass 1 kg, about its centre of mass along x,
-    /// y, z \[m²\]; `None` for a mesh. Source: the textbook formulas; a capsule is a cylinder and two half balls, whose centres
-    /// of mass are 3/8 of the radius from their flat sides.
+    /// Principal moments of inertia for uniform density and a mass of 1 kg, about the center of mass along x, y, z
+    /// \[m²\]; `None` for a mesh. Source: the textbook formulas; a capsule is a cylinder and two half balls, whose
+    /// centers of mass are 3/8 of the radius from their flat sides.
     pub fn unit_moments(&self) -> Option<Vector3<f64>> {
         Some(match *self {
             Self::Box { size: [x, y, z] } => {
@@ -150,7 +151,7 @@ impl ObjectShape {
         })
     }
 
-    /// MuJoCo's shape; `mesh` is the name of the hull where it has none.
+    /// Converts to a shape of MuJoCo; `mesh` is the name of the mesh for a shape that MuJoCo does not have.
     pub(crate) fn to_mjcf(&self, mesh: String) -> Shape {
         match *self {
             Self::Box { size } => Shape::Box(size.map(|s| s / 2.0)),
@@ -162,7 +163,7 @@ impl ObjectShape {
     }
 }
 
-/// The pyramid that stands for a cone.
+/// Pyramid that approximates a cone.
 pub(crate) fn cone(radius: f64, height: f64) -> TriMesh {
     let corner = |k: u32| {
         let (sin, cos) = (TAU * f64::from(k) / f64::from(CONE_SIDES)).sin_cos();
@@ -181,7 +182,7 @@ mod tests {
     use super::*;
     use kinetoscope_mujoco as mj;
 
-    /// MuJoCo computes mass and moments of a geom by itself.
+    /// MuJoCo computes mass and moments of a geom independently.
     #[test]
     fn moments_by_mujoco() {
         let shapes = [
@@ -208,8 +209,9 @@ mod tests {
         }
     }
 
-    /// The pyramid has the volume of a cone over a polygon: n/2 r² sin(2π/n) h/3, and its moments go to those of the cone as
-    /// the base goes to a circle: with 64 corners by 2π²/(3·64²) = 0.16 % in area, twice that in the moment about the axis.
+    /// The pyramid has the volume of a cone over a polygon: n/2 r² sin(2π/n) h/3. Its moments converge to those of the
+    /// cone as the base converges to a circle: with 64 corners by 2π²/(3·64²) = 0.16 % in area, twice that in the
+    /// moment about the axis.
     #[test]
     fn pyramid_and_cone() {
         let (radius, height) = (0.3, 0.8);
@@ -225,7 +227,7 @@ mod tests {
         for (k, moment) in shape.unit_moments().expect("no mesh").iter().enumerate() {
             assert!((tensor(k) / moment - 1.0).abs() < 0.004, "axis {k}: {} {moment}", tensor(k));
         }
-        // Control: about the middle of the extent the moment across is another one.
+        // Control: about the middle of the extent, the transverse moment differs.
         let middle = 3.0 / 20.0 * 0.09 + 3.0 / 80.0 * 0.64 + 0.04;
         assert!((tensor(0) / middle - 1.0).abs() > 0.3);
     }

@@ -1,4 +1,4 @@
-//! Terrain: ground that is not flat.
+//! Terrain: uneven ground as a height field.
 
 use crate::error::{Error, Result};
 use crate::objects::robot_data::check_pose;
@@ -9,10 +9,10 @@ use kinetoscope_scene::terrain::{MAX_POINTS, TerrainGenerator};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// Configuration of a terrain: a height field that stands fixed in every environment.
+/// Configuration of a terrain: a height field that is fixed in every environment.
 ///
-/// Contact sensors count it as part of the `world`. [`kinetoscope_scene::terrain`] has generators of heights. The ground plane at z = 0 hides what is below it: leave it out
-/// (`ground: None`) or lay the terrain over it.
+/// Contact sensors treat it as part of the `world`. [`kinetoscope_scene::terrain`] has generators of heights. The
+/// ground plane at z = 0 hides everything below it: leave the plane out (`ground: None`) or place the terrain above it.
 ///
 /// ```
 /// use kinetoscope_scene::terrain::RoughTerrain;
@@ -22,36 +22,37 @@ use serde::{Deserialize, Serialize};
 /// let rough = RoughTerrain { seed: 7, ..RoughTerrain::default() };
 /// let heights = rough.heights()?;
 /// let terrain = sim.add_terrain(TerrainCfg { heights: heights.clone(), size: rough.size, ..Default::default() })?;
-/// // Points are 0.2 m apart; the middle of 41 is number 20.
+/// // Points are 0.2 m apart; the middle of 41 has index 20.
 /// let height = sim.entities().terrain(terrain).height_at([0.2, -0.4]).unwrap_or(f64::NAN);
 /// assert!((height - heights[(18, 21)]).abs() < 1e-9);
 /// # Ok::<(), kinetoscope_sim::Error>(())
 /// ```
 ///
-/// In a file, `heights` is a list of rows with `size` beside it, or a generator: `heights.rough = { seed = 7 }`. What is
-/// written is always rows, each number with all its digits.
+/// In a file, `heights` is a list of rows with `size` beside it, or a generator: `heights.rough = { seed = 7 }`. Files
+/// are always written with rows, each number with all its digits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "TerrainFile")]
 pub struct TerrainCfg {
     /// Name of the terrain, unique in the simulation.
     pub uid: String,
-    /// Heights \[m\] over a regular grid, rows along y, columns along x; the first ones at -y and -x. Between the points the
-    /// surface is made of two triangles per cell, which meet in the diagonal from (-x, -y) to (+x, +y). MuJoCo keeps heights in
-    /// single precision, as parts of the range from the lowest to the highest.
+    /// Heights \[m\] over a regular grid, rows along y, columns along x, starting at -y and -x. Between the points the
+    /// surface consists of two triangles per cell, which meet in the diagonal from (-x, -y) to (+x, +y). MuJoCo stores
+    /// heights in single precision, as fractions of the range from the lowest to the highest.
     #[serde(serialize_with = "rows")]
     pub heights: Array2<f64>,
     /// Lengths along x and y, from the first point to the last \[m\].
     pub size: [f64; 2],
-    /// How far the ground reaches below its lowest point \[m\]: what falls fast must not fall through.
+    /// Depth of the ground below its lowest point \[m\]; it keeps fast bodies from falling through.
     pub thickness: f64,
-    /// Pose of the frame in the environment: in the middle of the field, at height 0.
+    /// Pose of the terrain frame in the environment. The frame is in the middle of the field, at height 0.
     #[serde(with = "kinetoscope_scene::file_format::pose")]
     pub init_pose: Pose,
-    /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three); the simulation's where `None`.
+    /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] (MuJoCo's three); `None` for the simulation's
+    /// default.
     pub friction: Option<[f64; 3]>,
-    /// Colour and opacity, 0..=1.
+    /// RGBA color in 0..=1.
     pub rgba: [f64; 4],
-    /// Look of its surface besides the colour.
+    /// Surface properties besides the color.
     pub surface: SurfaceCfg,
 }
 
@@ -72,10 +73,10 @@ impl Default for TerrainCfg {
 }
 
 impl TerrainCfg {
-    /// The ground that a generator makes, called `uid`.
+    /// Creates the terrain of a generator, called `uid`.
     ///
     /// # Errors
-    /// [`Error::Terrain`]: those of the generator.
+    /// [`Error::Terrain`] for an error of the generator.
     pub fn generated(uid: impl Into<String>, generator: impl Into<TerrainGenerator>) -> Result<Self> {
         let generator = generator.into();
         let (heights, size) = (generator.heights()?, generator.size());
@@ -83,7 +84,7 @@ impl TerrainCfg {
     }
 }
 
-/// A terrain that was added. Nothing of it changes while the simulation runs.
+/// Terrain of a simulation. It does not change while the simulation runs.
 #[derive(Debug)]
 pub struct Terrain {
     cfg: TerrainCfg,
@@ -143,12 +144,12 @@ impl Terrain {
         &self.cfg.uid
     }
 
-    /// The configuration it was added with.
+    /// Configuration that the terrain was added with.
     pub fn cfg(&self) -> &TerrainCfg {
         &self.cfg
     }
 
-    /// What the mask channel of cameras says of it, the same in every environment.
+    /// Value of the mask channel of cameras for the terrain, the same in every environment.
     pub fn mask_id(&self) -> i32 {
         self.mask_id
     }
@@ -158,7 +159,7 @@ impl Terrain {
         self.range
     }
 
-    /// Height of the surface at (x, y) \[m\], all in the terrain's frame; `None` beside it.
+    /// Height of the surface at (x, y) \[m\], all in the terrain's frame; `None` outside of the terrain.
     pub fn height_at(&self, [x, y]: [f64; 2]) -> Option<f64> {
         let (rows, columns) = self.cfg.heights.dim();
         let cell = |at: f64, length: f64, points: usize| {
@@ -180,16 +181,17 @@ impl Terrain {
         })
     }
 
-    /// How much higher than the lowest point elevation 1 is \[m\]. MuJoCo wants it positive for flat ground too.
+    /// Height difference between the elevations 0 and 1 \[m\]. MuJoCo requires a positive value for flat ground too.
     pub(crate) fn rise(&self) -> f64 {
         let rise = self.range[1] - self.range[0];
         if rise > 0.0 { rise } else { 1e-3 }
     }
 
-    /// MuJoCo's binary file of height fields: numbers of rows and columns, then elevations of 0 to 1, in single precision.
+    /// Height field in MuJoCo's binary format: numbers of rows and columns, then elevations of 0 to 1, in single
+    /// precision.
     pub(crate) fn file(&self) -> Vec<u8> {
         let (rows, columns) = self.cfg.heights.dim();
-        // At most `MAX_POINTS`.
+        // `MAX_POINTS` bounds both numbers, so they fit into 32 bits.
         let mut bytes: Vec<u8> = [rows, columns].iter().flat_map(|&n| (n as i32).to_le_bytes()).collect();
         let elevation = |height: &f64| ((height - self.range[0]) / self.rise()) as f32;
         bytes.extend(self.cfg.heights.iter().flat_map(|height| elevation(height).to_le_bytes()));

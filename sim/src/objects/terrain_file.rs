@@ -1,4 +1,4 @@
-//! How a terrain stands in configuration files: with rows of heights, or with a generator of them.
+//! Terrain in configuration files: with rows of heights, or with a generator of heights.
 
 use super::terrain::TerrainCfg;
 use crate::surface_cfg::SurfaceCfg;
@@ -10,7 +10,7 @@ use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, IgnoredAny, M
 use serde::ser::Serializer;
 use std::fmt;
 
-/// The table of a terrain.
+/// Table of a terrain in a configuration file.
 #[derive(serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct TerrainFile {
@@ -25,7 +25,7 @@ pub(super) struct TerrainFile {
     surface: SurfaceCfg,
 }
 
-/// Heights, or what makes them.
+/// Heights, or their generator.
 enum Heights {
     Rows(Array2<f64>),
     Generated(TerrainGenerator),
@@ -56,7 +56,7 @@ impl TryFrom<TerrainFile> for TerrainCfg {
     }
 }
 
-/// Writes rows.
+/// Serializes heights as rows.
 pub(super) fn rows<S: Serializer>(heights: &Array2<f64>, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(heights.rows().into_iter().map(|row| row.to_vec()))
 }
@@ -103,7 +103,7 @@ impl<'de> Visitor<'de> for RowsOrGenerator {
     }
 }
 
-/// A table that remembers whether it had a key at all.
+/// Map access that records whether the table has any key.
 struct Keys<'a, A> {
     map: &'a mut A,
     any: bool,
@@ -114,7 +114,7 @@ impl<'de, A: MapAccess<'de>> MapAccess<'de> for Keys<'_, A> {
 
     fn next_key_seed<K: DeserializeSeed<'de>>(&mut self, seed: K) -> Result<Option<K::Value>, A::Error> {
         let key = self.map.next_key_seed(seed);
-        // A key that nobody knows is one, too.
+        // An unknown key counts as well.
         self.any |= !matches!(key, Ok(None));
         key
     }

@@ -1,4 +1,4 @@
-//! Welds: two bodies that are held together while somebody says so, in each environment by itself.
+//! Welds: rigid connections of two bodies that can be switched in each environment.
 
 use super::weld_data::{WeldCfg, WeldData, WeldId};
 use crate::body_pose::body_pose;
@@ -15,7 +15,7 @@ use kinetoscope_scene::pose::to_row;
 use ndarray::Array1;
 use std::sync::Arc;
 
-/// A weld, to read.
+/// Read access to a weld.
 #[derive(Clone, Copy, Debug)]
 pub struct Weld<'a> {
     cfg: &'a Arc<WeldCfg>,
@@ -28,12 +28,12 @@ impl<'a> Weld<'a> {
         Self { cfg, simulation, index }
     }
 
-    /// The configuration it was added with.
+    /// Configuration that the weld was added with.
     pub fn cfg(&self) -> &'a WeldCfg {
         self.cfg
     }
 
-    /// Whether it holds in each environment, shape (N).
+    /// True where the weld holds, shape (N).
     pub fn is_attached(&self) -> Array1<bool> {
         let WeldIndex { equality, .. } = self.simulation.welds[self.index];
         let mut attached = Array1::from_elem(self.simulation.batch.num_envs(), false);
@@ -44,7 +44,7 @@ impl<'a> Weld<'a> {
     }
 }
 
-/// A weld, to make and to release.
+/// Write access to a weld, to attach and release it.
 #[derive(Debug)]
 pub struct WeldMut<'a> {
     cfg: &'a Arc<WeldCfg>,
@@ -63,26 +63,28 @@ impl<'a> WeldMut<'a> {
         Self { cfg, simulation, sensors, index }
     }
 
-    /// The weld, to read.
+    /// Read access to the weld.
     pub fn read(&self) -> Weld<'_> {
         Weld::new(self.cfg, self.simulation, self.index)
     }
 
-    /// Holds the two bodies as they now lie to each other, in `env_ids` (all where `None`), until it is released, the
-    /// environment is reset, or a snapshot is restored in which it does not hold: a snapshot has which welds hold, and how. A
-    /// weld that holds already holds as they lie now. A forward pass follows.
+    /// Attaches the two bodies at their current relative pose, in `env_ids` (`None` for all environments). A weld that
+    /// already holds gets the current relative pose. A forward pass follows.
     ///
-    /// It is MuJoCo's weld with its stiffest numbers: it gives way by about 1e-4 of the acceleration that its load would
-    /// cause. The bodies still collide; [`exclude_collision`](crate::SimulationManager::exclude_collision) is for pairs that
-    /// are in each other's way.
+    /// The weld holds until it is released, the environment is reset, or a snapshot is restored in which it does not
+    /// hold: a snapshot records the welds that hold and their relative poses.
+    ///
+    /// It is MuJoCo's weld with its stiffest parameters: it yields by about 1e-4 of the acceleration that its load
+    /// would cause. The bodies still collide; use [`exclude_collision`](crate::SimulationManager::exclude_collision)
+    /// for bodies that are in each other's way.
     ///
     /// # Errors
-    /// Unknown environment, or one that is named twice; then nothing is changed.
+    /// An unknown or repeated environment; then nothing is changed.
     pub fn attach(&mut self, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.change("attach", env_ids, true)
     }
 
-    /// Lets the two bodies go, in `env_ids` (all where `None`). A forward pass follows.
+    /// Releases the two bodies, in `env_ids` (`None` for all environments). A forward pass follows.
     ///
     /// # Errors
     /// As [`attach`](Self::attach).
@@ -110,12 +112,12 @@ impl<'a> WeldMut<'a> {
 }
 
 impl SimulationManager {
-    /// Adds a weld between two bodies that are there, compiled as [`add_robot`](Self::add_robot) does. It holds nothing until
+    /// Adds a weld between two existing bodies, compiled as by [`add_robot`](Self::add_robot). It does not hold until
     /// it is [attached](WeldMut::attach).
     ///
     /// # Errors
-    /// The name is taken, a body is not there, it is a whole robot, both are the same or held together by fixed joints, or
-    /// none of them can move.
+    /// The name is taken, a body does not exist or is a whole robot, both bodies are the same or connected by fixed
+    /// joints, or neither of them can move.
     pub fn add_weld(&mut self, cfg: WeldCfg) -> Result<WeldId> {
         self.check_world_uid(&cfg.uid)?;
         let model = self.simulation.batch.model();
@@ -129,7 +131,8 @@ impl SimulationManager {
             }),
         };
         let (first, second) = (body(&cfg.first)?, body(&cfg.second)?);
-        // What no joint holds apart moves as one; with 0 it is fixed or moved by hand (4.x gives that its own number).
+        // Bodies without a joint between them move as one. 0 means fixed or kinematic; 4.x gives mocap bodies an index
+        // of their own.
         let [one, other] = [first, second].map(|body| {
             let carrier = model.body_weldid()[body] as usize;
             if model.body_mocapid()[carrier] >= 0 { 0 } else { carrier }
@@ -150,20 +153,20 @@ impl SimulationManager {
         Ok(WeldId { manager: self.serial, index: self.contents.welds.len() - 1 })
     }
 
-    /// A weld, to read.
+    /// Read access to a weld.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn weld(&self, id: WeldId) -> Weld<'_> {
         let index = self.index_of(id.manager, id.index);
         Weld::new(&self.contents.welds[index].cfg, &self.simulation, index)
     }
 
-    /// A weld, to make and to release.
+    /// Write access to a weld, to attach and release it.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     #[track_caller]
     pub fn weld_mut(&mut self, id: WeldId) -> WeldMut<'_> {
         let index = self.index_of(id.manager, id.index);

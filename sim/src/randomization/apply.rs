@@ -1,4 +1,4 @@
-//! From properties to the model and the drives of an environment.
+//! Application of property values to the model and the drives of an environment.
 
 use super::Property;
 use super::error::RandomizationError;
@@ -10,35 +10,36 @@ use crate::env::Env;
 use crate::error::Result;
 use kinetoscope_mujoco::{DiagonalInertia, Editor, Model};
 
-/// Makes models of environments of one compiled scene.
+/// Creator of environment models for one compiled scene.
 #[derive(Debug)]
 pub(crate) struct Maker {
     editor: Editor,
     base: Model,
 }
 
-/// What an environment gets.
+/// Model and drive settings that are prepared for an environment.
 pub(crate) struct Made {
-    /// `None` where the one it has will do.
+    /// New model; `None` if the environment keeps its model.
     model: Option<Model>,
-    /// Of each drive: proportional and derivative gain, effort limit, where they are drawn anew.
+    /// Proportional gain, derivative gain and effort limit of each drive; `None` for values that stay.
     gains: Vec<(usize, [Option<f64>; 3])>,
-    /// Whether they become nominal instead, and are drawn no longer.
+    /// True if all drives first return to their nominal gains, which are not randomized.
     nominal_gains: bool,
-    /// As [`DriveState::set_damping`](crate::drive::table::DriveState::set_damping) takes it.
+    /// Damping of joints, in the layout of [`DriveState::set_damping`](crate::drive::table::DriveState::set_damping).
     damping: Vec<f64>,
-    /// As [`DriveState::set_rows`](crate::drive::table::DriveState::set_rows) takes them, of the model.
+    /// Friction rows of the model, in the layout of
+    /// [`DriveState::set_rows`](crate::drive::table::DriveState::set_rows).
     rows: Vec<usize>,
 }
 
 impl Maker {
-    /// For environments of what `base` was compiled as.
+    /// Creates models for environments of the compiled model `base`.
     pub(crate) fn new(base: &Model) -> Result<Self> {
         Ok(Self { editor: Editor::new(base)?, base: base.clone() })
     }
 
-    /// What environment `index`, which is `env`, needs to have these properties. `own` are those it has, as
-    /// [`Properties::own`] gives them.
+    /// Prepares environment `index`, which is `env`, for these properties. `own` are its own values, from
+    /// [`Properties::own`].
     pub(crate) fn make(&mut self, properties: &Properties, own: &OwnValues, index: usize, env: &Env) -> Result<Made> {
         let drives = env.drives.table();
         properties.check(index)?;
@@ -63,7 +64,8 @@ impl Maker {
         Ok(Made { model, gains: gains.collect(), nominal_gains: properties.nominal_gains, damping, rows })
     }
 
-    /// Writes what differs from the nominal values; gives whether constants follow from it.
+    /// Writes the values that differ from the nominal ones. Returns true if MuJoCo's derived constants must be
+    /// recomputed.
     fn edit(
         &mut self,
         properties: &Properties,
@@ -74,7 +76,7 @@ impl Maker {
         let (editor, base) = (&mut self.editor, &self.base);
         let damped = |dof: usize| drives.damped.iter().position(|(of, _)| *of == dof);
         let mut constants = false;
-        // Before armatures, which hold a part of it.
+        // Joint damping comes before armature, which contains a part of it.
         for property in Property::ALL.into_iter().filter(|property| !property.is_gain()) {
             let (table, width) = (properties.tables.get(property), property.width());
             for (element, &place) in table.places.iter().enumerate() {
@@ -108,7 +110,7 @@ impl Maker {
                     }
                     Property::Armature => {
                         for dof in dofs() {
-                            // The half of the implicit damping that is in the armature: see `drive::implicit`.
+                            // The part of the implicit damping that the armature contains: see `drive::implicit`.
                             let implicit = damped(dof).map_or(0.0, |k| base.timestep() * damping[k]);
                             editor.dof_armature_mut()[dof] = value[0] + implicit;
                         }
@@ -153,7 +155,7 @@ impl Maker {
     }
 }
 
-/// What the explicit models of drives say of gains and limits that are drawn or set.
+/// Checks randomized gains and limits, and those that are set, against the explicit models of the drives.
 fn check_models(properties: &Properties, drives: &DriveState, env: usize) -> Result<(), RandomizationError> {
     let table = properties.tables.get(Property::MaxEffort);
     for (element, (name, &drive)) in table.names.iter().zip(&table.places).enumerate() {
@@ -177,7 +179,7 @@ fn check_models(properties: &Properties, drives: &DriveState, env: usize) -> Res
 }
 
 impl Made {
-    /// Gives it to the environment.
+    /// Applies the model and the drive settings to the environment.
     pub(crate) fn give(self, env: &mut Env) {
         for (drive, gains) in self.gains {
             if self.nominal_gains {

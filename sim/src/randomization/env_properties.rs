@@ -1,4 +1,4 @@
-//! Properties of environments through the manager.
+//! Access to properties of environments through the manager.
 
 use super::{OwnValues, Properties, Property, Randomization};
 use crate::error::Result;
@@ -8,34 +8,36 @@ use crate::snapshot::Snapshot;
 use kinetoscope_scene::Random;
 
 impl SimulationManager {
-    /// Properties of environments: masses, frictions, sizes, gains.
+    /// Read access to properties of environments: masses, frictions, sizes, gains.
     pub fn properties(&self) -> EnvProperties<'_> {
         EnvProperties::new(self)
     }
 
-    /// Properties of environments, to draw and to reset.
+    /// Write access to properties of environments: randomizes, sets and resets them.
     pub fn properties_mut(&mut self) -> EnvPropertiesMut<'_> {
         EnvPropertiesMut::new(self)
     }
 }
 
-/// Properties of environments: masses, frictions, sizes, gains; see [`SimulationManager::properties`].
+/// Read access to properties of environments: masses, frictions, sizes, gains; see [`SimulationManager::properties`].
 ///
-/// The environments of a simulation share one compiled model. One that has properties of its own gets a shallow copy of the
-/// model's struct, in which only the arrays that differ are its own memory; what follows from masses (MuJoCo's
-/// `mj_setConst`) is computed for it. Environments that were not touched share everything.
+/// The environments of a simulation share one compiled model. An environment with properties of its own gets a shallow
+/// copy of the model's struct, which owns only the arrays that differ. Constants that follow from masses (MuJoCo's
+/// `mj_setConst`) are computed for it. All other environments share everything.
 ///
-/// Random numbers are keyed by the seed of the simulation, the global index of the environment, how often that environment
-/// was drawn for, and the property and name they are for. So they depend neither on the number of environments and
-/// processes, nor on what other environments do, nor on what else is random.
+/// Random numbers are keyed by the seed of the simulation, the global index of the environment, the number of its
+/// previous randomizations, and the property and name. So they depend neither on the number of environments and
+/// processes, nor on other environments, nor on other random quantities.
 ///
-/// Properties stay until they are drawn or set again: [`reset`](crate::SimulationManager::reset) and
-/// [`restore`](crate::SimulationManager::restore) leave them alone
-/// ([`EnvPropertiesMut::restore`] does not), gains of drives included, and when more is added to the scene they are carried over by
-/// name. A gain that was drawn and is then set at run time is that of the drive's setting again; one that is set to its
-/// nominal value, too. Cameras, ray casters and overviews see the sizes, colours and places of each
-/// environment. What sees the scene without MuJoCo keeps the nominal values: inverse kinematics and dynamics of descriptions,
-/// `total_mass` and `mass` of robots and objects, and the gravity that an `Imu` adds.
+/// Properties stay until they are randomized or set again, gains of drives included.
+/// [`reset`](crate::SimulationManager::reset) and [`restore`](crate::SimulationManager::restore) keep them
+/// ([`EnvPropertiesMut::restore`] does not), and when entities are added to the scene, they are carried over by name. A
+/// randomized gain that is then set at run time is a setting of the drive again, also if it is set to its nominal
+/// value.
+///
+/// Cameras, ray casters and overviews use the sizes, colors and poses of each environment. Computations without MuJoCo
+/// use the nominal values: inverse kinematics and dynamics of descriptions, `total_mass` of robots, `nominal_mass` of
+/// objects, and the gravity that an `Imu` adds.
 #[derive(Clone, Copy, Debug)]
 pub struct EnvProperties<'a> {
     sim: &'a SimulationManager,
@@ -46,22 +48,22 @@ impl<'a> EnvProperties<'a> {
         Self { sim }
     }
 
-    /// The properties of an environment.
+    /// Returns the properties of an environment.
     ///
     /// # Errors
-    /// There is no such environment.
+    /// The environment does not exist.
     pub fn of(&self, env: EnvId) -> Result<Properties> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let tables = self.sim.simulation.tables();
         Ok(self.sim.simulation.batch.edit(env.0, |here| self.sim.simulation.properties_of(tables, env.0, here)))
     }
 
-    /// Memory that an environment's properties take \[bytes\]: the struct and the arrays of the model that it does not share
-    /// (with those of the welds that hold in it), and the values as they were set; 0 where all properties are nominal, whatever
-    /// welds hold. One whole copy of the model is kept beside, for all.
+    /// Memory of an environment's own properties \[bytes\]: the struct and the arrays of the model that it does not
+    /// share (with those of the welds that hold), and the values. 0 if all properties are nominal, whatever welds hold.
+    /// One whole copy of the model is kept in addition, for all environments.
     ///
     /// # Errors
-    /// There is no such environment.
+    /// The environment does not exist.
     pub fn bytes(&self, env: EnvId) -> Result<usize> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let Some(own) = &self.sim.simulation.own_values[env.0] else { return Ok(0) };
@@ -71,7 +73,8 @@ impl<'a> EnvProperties<'a> {
     }
 }
 
-/// Properties of environments, to draw, reset and restore; see [`SimulationManager::properties_mut`].
+/// Write access to properties of environments: randomizes, resets and restores them; see
+/// [`SimulationManager::properties_mut`].
 #[derive(Debug)]
 pub struct EnvPropertiesMut<'a> {
     sim: &'a mut SimulationManager,
@@ -82,16 +85,16 @@ impl<'a> EnvPropertiesMut<'a> {
         Self { sim }
     }
 
-    /// Draws properties for environments, all of them where `env_ids` is `None`. Properties that no term names stay as they
-    /// are; a forward pass follows, when the environment is read or stepped.
+    /// Randomizes properties of environments (`None` for all environments). Properties without a term stay unchanged. A
+    /// forward pass follows, when the environment is read or stepped.
     ///
     /// # Errors
-    /// An environment does not exist, a pattern matches nothing or one name twice, a range is empty, or a value cannot be,
-    /// such as a negative mass; then nothing changes.
+    /// An environment does not exist, a pattern matches nothing or one name twice, a range is empty, or a value is
+    /// invalid, such as a negative mass; then nothing changes.
     pub fn randomize(&mut self, randomization: &Randomization, env_ids: Option<&[EnvId]>) -> Result<()> {
         let resolved = randomization.resolve(&self.sim.properties().of(EnvId(0))?)?;
         let keys = self.keys();
-        // One text for all: there is a key for each environment, property and name.
+        // One buffer for all texts: there is a key for each environment, property and name.
         let mut what = String::new();
         self.draw(env_ids, |env, properties| {
             resolved.draw(properties, |property, name| {
@@ -103,11 +106,12 @@ impl<'a> EnvPropertiesMut<'a> {
         })
     }
 
-    /// As [`randomize`](Self::randomize), by a function that gets random numbers of the environment, its number in this
-    /// manager, and its properties to change. To set properties it need not use the random numbers.
+    /// Changes properties by a function. Its arguments are random numbers of the environment, the index of the
+    /// environment in this manager, and its properties. The function may ignore the random numbers, and just set
+    /// properties.
     ///
     /// # Errors
-    /// An environment does not exist, the function fails, or a value cannot be; then nothing changes.
+    /// An environment does not exist, the function fails, or a value is invalid; then nothing changes.
     pub fn randomize_with(
         &mut self,
         env_ids: Option<&[EnvId]>,
@@ -117,7 +121,7 @@ impl<'a> EnvPropertiesMut<'a> {
         self.draw(env_ids, |env, properties| change(&mut keys(env, ""), EnvId(env), properties))
     }
 
-    /// Gives environments the nominal properties again, gains of drives included; they share the whole model then.
+    /// Resets environments to the nominal properties, gains of drives included. They then share the whole model again.
     ///
     /// # Errors
     /// An environment does not exist.
@@ -129,39 +133,46 @@ impl<'a> EnvPropertiesMut<'a> {
         })
     }
 
-    /// As [`SimulationManager::restore`], with the properties of each environment when the snapshot was taken: what it had for
-    /// itself, gains that were drawn included, and how often it was drawn for, so that what is drawn next is what was drawn
-    /// then. What was nominal becomes nominal. Going on is bit-identical, also from a file in a manager that was built
-    /// alike, and whatever was drawn or set in between.
+    /// Restores a snapshot like [`SimulationManager::restore`], together with the properties of each environment at the
+    /// time of the snapshot.
+    ///
+    /// These are its own values, randomized gains included, and the number of its randomizations, so that the next
+    /// randomization gives the values that it gave then. Properties that were nominal become nominal. The simulation
+    /// continues bit-identically, also from a file in a manager that was built alike, whatever was randomized or set in
+    /// between.
     ///
     /// ```
-    /// use kinetoscope_sim::{Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+    /// use kinetoscope_sim::{
+    ///     Draw, EnvId, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg,
+    /// };
     ///
     /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 4, ..Default::default() })?;
-    /// sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), shape: ObjectShape::cube(0.1), ..Default::default() })?;
+    /// let shape = ObjectShape::cube(0.1);
+    /// sim.add_rigid_object(RigidObjectCfg { uid: "cube".into(), shape, ..Default::default() })?;
     /// let draw = Randomization::new().with(Property::Mass, "cube", Draw::Scale([0.5, 2.0]));
     /// sim.properties_mut().randomize(&draw, None)?;
-    /// let (snapshot, mass) = (sim.snapshot(None)?, sim.properties().of(kinetoscope_sim::EnvId(2))?.get(Property::Mass, "cube")?.to_vec());
+    /// let mass = sim.properties().of(EnvId(2))?.get(Property::Mass, "cube")?.to_vec();
+    /// let snapshot = sim.snapshot(None)?;
     /// sim.properties_mut().randomize(&draw, None)?;
     /// sim.properties_mut().restore(&snapshot, None)?;
-    /// assert_eq!(sim.properties().of(kinetoscope_sim::EnvId(2))?.get(Property::Mass, "cube")?, mass);
+    /// assert_eq!(sim.properties().of(EnvId(2))?.get(Property::Mass, "cube")?, mass);
     /// # Ok::<(), kinetoscope_sim::Error>(())
     /// ```
     ///
     /// # Errors
-    /// As [`SimulationManager::restore`]; and where nothing of this scene has one of the properties, or not such a value. Then
-    /// nothing is restored.
+    /// As [`SimulationManager::restore`]. Also an error if no element of this scene has one of the properties, or if a
+    /// value is invalid for it. Then nothing is restored.
     pub fn restore(&mut self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<()> {
         self.sim.restore_with_properties(snapshot, env_ids)
     }
 
-    /// The random numbers of the next draw for an environment, and what they are for.
+    /// Random numbers of the next randomization, by environment and purpose.
     fn keys(&self) -> impl Fn(usize, &str) -> Random + use<> {
         let (seed, first, draws) = (self.sim.cfg.seed, self.sim.cfg.first_env(), self.sim.draws.clone());
         move |env, what| Random::keyed(seed, (first + env) as u64, &format!("properties/{}{what}", draws[env]))
     }
 
-    /// Changes properties by random numbers: counts the draws.
+    /// Changes properties with random numbers, and counts the randomization.
     fn draw(
         &mut self,
         env_ids: Option<&[EnvId]>,

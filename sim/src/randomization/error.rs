@@ -1,96 +1,96 @@
-//! What can be wrong with properties of environments.
+//! Errors of properties of environments.
 
 use crate::pattern::PatternError;
 use kinetoscope_scene::RenderSceneError;
 
-/// A property cannot be drawn or set.
+/// Error of randomizing or setting a property.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RandomizationError {
     /// The patterns of a property match nothing, or one name twice.
     #[error("{property}: {error}")]
     Pattern {
-        /// The property.
+        /// Name of the property.
         property: &'static str,
-        /// What is wrong.
+        /// Error of the patterns.
         #[source]
         error: Box<PatternError>,
     },
-    /// The ends of a range are not finite, or the first is the larger one.
+    /// The ends of a range are not finite, or in the wrong order.
     #[error("{property} of {pattern:?}: the range {low}..{high} must have finite ends, the smaller one first")]
     Range {
-        /// The property.
+        /// Name of the property.
         property: &'static str,
-        /// Whose.
+        /// Pattern of the names.
         pattern: String,
         /// First end.
         low: f64,
         /// Second end.
         high: f64,
     },
-    /// A value is not one that the property can have.
+    /// A value is invalid for the property.
     #[error("environment {env}: {property} of {name:?} would be {value:?}; {expected}")]
     Value {
-        /// The environment.
+        /// Index of the environment.
         env: usize,
-        /// The property.
+        /// Name of the property.
         property: &'static str,
-        /// Whose.
+        /// Name of the element.
         name: String,
-        /// The value.
+        /// Invalid value.
         value: Vec<f64>,
-        /// What would be right.
+        /// Accepted values.
         expected: &'static str,
     },
-    /// Gains or limits of a drive with an explicit model are not right for the model.
+    /// Gains or limits of a drive are invalid for its explicit model.
     #[error("environment {env}: what the drive of {name:?} would have is not right for its model: {expected}")]
     Model {
-        /// The environment.
+        /// Index of the environment.
         env: usize,
-        /// The joint.
+        /// Name of the joint.
         name: String,
-        /// What is wrong, and what would be right.
+        /// Problem and accepted values.
         expected: String,
     },
-    /// The size of what is called so is no property: a mesh, a plane or a height field.
+    /// The size of a mesh, a plane or a height field is not a property.
     #[error("the size of {name:?} cannot differ between environments: {reason}")]
     Unsized {
-        /// Whose.
+        /// Name of the element.
         name: String,
-        /// Why, and what to do.
+        /// Reason and remedy.
         reason: &'static str,
     },
-    /// Another number of numbers than the property has.
+    /// The number of values is not that of the property.
     #[error("{property} of {name:?} is {expected} numbers, not {found}")]
     Width {
-        /// The property.
+        /// Name of the property.
         property: &'static str,
-        /// Whose.
+        /// Name of the element.
         name: String,
-        /// How many were given.
+        /// Number of values given.
         found: usize,
-        /// How many it has.
+        /// Number of values of the property.
         expected: usize,
     },
-    /// What an environment would look like cannot be drawn.
+    /// The scene of an environment cannot be rendered.
     #[error("environment {env} cannot be drawn as it would be: {error}")]
     Look {
-        /// The environment.
+        /// Index of the environment.
         env: usize,
-        /// What is wrong.
+        /// Error of the scene.
         #[source]
         error: RenderSceneError,
     },
-    /// MuJoCo 4.x keeps only the diagonal of the inertia matrix of a body that moves freely with its centre of mass in its
-    /// origin: there is no room for another centre of mass.
+    /// The center of mass of a body cannot be moved. MuJoCo 4.x keeps only the diagonal of the inertia matrix of a
+    /// freely moving body with its center of mass at its origin.
     #[error(
         "environment {env}: the centre of mass of {name:?} cannot be moved: it is nominally in the origin, and MuJoCo 4.x \
          keeps only the diagonal of such a body's inertia matrix; give the body a nominal centre of mass beside its origin"
     )]
     DiagonalInertia {
-        /// The environment.
+        /// Index of the environment.
         env: usize,
-        /// The body.
+        /// Name of the body.
         name: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Properties of single environments: masses, friction, gravity, gains, sizes, colours and more, drawn at random or set.
+//! Properties of single environments: masses, friction, gravity, gains, sizes, colors and more, randomized or set.
 
 mod apply;
 mod env_properties;
@@ -28,7 +28,7 @@ use kinetoscope_scene::{OwnScene, RenderSceneError};
 use std::sync::Arc;
 
 impl Simulation {
-    /// Where properties are; found out when somebody first asks.
+    /// Tables of the properties of the scene, created on first use.
     pub(crate) fn tables(&self) -> &Arc<Tables> {
         self.tables.get_or_init(|| {
             let drives = self.batch.read(0, |env| Arc::clone(env.drives.table()));
@@ -43,12 +43,13 @@ impl Simulation {
         Properties::new(tables, own, &env.drives)
     }
 
-    /// What an environment, `here`, has for itself, by name.
+    /// Own property values of an environment, `here`, by name.
     pub(crate) fn named_properties(&self, env: usize, here: &Env) -> Vec<NamedValue> {
         self.tables().named(self.own_values[env].as_deref().unwrap_or(&NOTHING), &here.drives)
     }
 
-    /// Reads a property of one number, no gain, of what is called `name` in every environment; nothing where it has none.
+    /// Reads a scalar property (not a gain) of the element `name` in every environment. Does nothing if no such element
+    /// has it.
     pub(crate) fn property_of_all(&self, property: Property, name: &str, mut read: impl FnMut(usize, f64)) {
         let table = self.tables().get(property);
         let Some(element) = table.names.iter().position(|of| of == name) else { return };
@@ -58,13 +59,13 @@ impl Simulation {
         }
     }
 
-    /// Whether there is something of each of these names that has the property.
+    /// True for each name of an element that has the property.
     pub(crate) fn properties_named(&self, property: Property, names: &[String]) -> Vec<bool> {
         let table = self.tables().get(property);
         names.iter().map(|name| table.names.contains(name)).collect()
     }
 
-    /// Changes the properties of environments; on an error none has changed.
+    /// Changes the properties of environments. On an error no environment is changed.
     pub(crate) fn change_properties(
         &mut self,
         envs: &[usize],
@@ -74,7 +75,7 @@ impl Simulation {
             Some(maker) => maker,
             None => Maker::new(self.batch.model())?,
         };
-        // Before an environment is locked: it looks at one.
+        // Created before an environment is locked: the creation reads an environment.
         let tables = Arc::clone(self.tables());
         let made: Result<Vec<_>> = envs
             .iter()
@@ -107,7 +108,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// What environments look like with these own values, where somebody looks.
+    /// Render scenes of environments with these own values; empty while the scene is not rendered.
     fn looks(&self, envs: &[(usize, &OwnValues)]) -> Vec<(usize, Result<OwnScene, RenderSceneError>)> {
         let of = |own: &&OwnValues, property: Property| own[property as usize].is_some();
         let looks_own = |own: &&OwnValues| of(own, Property::Size) || of(own, Property::Color);
@@ -129,7 +130,7 @@ impl Simulation {
         envs.iter().map(|(env, own)| (*env, scene(own))).collect()
     }
 
-    /// From now on environments look so.
+    /// Sets the render scenes of these environments.
     fn look_so(&mut self, looks: Vec<(usize, OwnScene)>) {
         if !looks.is_empty() {
             self.own_scenes.resize(self.own_values.len(), OwnScene(None));
@@ -137,8 +138,8 @@ impl Simulation {
         looks.into_iter().for_each(|(env, look)| self.own_scenes[env] = look);
     }
 
-    /// Makes what all environments look like, now that somebody looks; gives the faults of those that cannot be drawn as they
-    /// are, and look as nominally.
+    /// Builds the render scenes of all environments when rendering starts. An environment whose scene is invalid is
+    /// rendered with the nominal scene; its error is returned.
     pub(crate) fn look_anew(&mut self) -> Vec<(usize, RenderSceneError)> {
         let own = self.own_values.iter().map(|own| own.as_deref().unwrap_or(&NOTHING));
         let (mut looks, mut faults) = (Vec::new(), Vec::new());
@@ -152,7 +153,7 @@ impl Simulation {
         faults
     }
 
-    /// Takes over, by name, what environments of `old` have for themselves.
+    /// Carries over the own property values of the environments of `old`, by name.
     pub(crate) fn carry_properties(&mut self, old: &Self) -> Result<()> {
         let envs: Vec<usize> = (0..old.own_values.len()).filter(|&env| old.own_values[env].is_some()).collect();
         if envs.is_empty() {
@@ -173,5 +174,5 @@ impl Simulation {
     }
 }
 
-/// No values of its own.
+/// Own values of an environment without any.
 const NOTHING: OwnValues = [const { None }; Property::ALL.len()];

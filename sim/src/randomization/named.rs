@@ -1,4 +1,4 @@
-//! What an environment has for itself, by name: to be kept in a snapshot and found again.
+//! Own property values of environments by name, for snapshots.
 
 use super::Property;
 use super::properties::OwnValues;
@@ -6,22 +6,22 @@ use super::tables::Tables;
 use crate::drive::table::DriveState;
 use std::collections::BTreeMap;
 
-/// A value of a property that an environment has for itself.
+/// Own value of a property in an environment.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct NamedValue {
     pub(crate) property: Property,
-    /// Whose.
+    /// Name of the element.
     pub(crate) name: String,
-    /// Which of those that are called so: shapes of one body are called alike.
+    /// Index among the elements of this name: shapes of one body have the same name.
     pub(crate) nth: u32,
     pub(crate) value: Box<[f64]>,
 }
 
-/// Elements of a property, by name and number among those of the name.
+/// Elements of a property, by name and index among the elements of that name.
 pub(crate) type Elements<'t> = BTreeMap<(&'t str, u32), usize>;
 
 impl Tables {
-    /// The elements of a property.
+    /// Indexes the elements of a property.
     pub(crate) fn elements(&self, property: Property) -> Elements<'_> {
         let (mut seen, mut elements) = (BTreeMap::<&str, u32>::new(), Elements::new());
         for (element, name) in self.get(property).names.iter().enumerate() {
@@ -32,7 +32,7 @@ impl Tables {
         elements
     }
 
-    /// What is not nominal, bit by bit, and the gains that are drawn.
+    /// Collects the values that are not nominal, bit by bit, and the randomized gains.
     pub(crate) fn named(&self, own: &OwnValues, drives: &DriveState) -> Vec<NamedValue> {
         let mut values = Vec::new();
         for property in Property::ALL {

@@ -1,4 +1,4 @@
-//! The properties of one environment, to read and to change.
+//! Properties of one environment, to read and to change.
 
 use super::Property;
 use super::error::RandomizationError;
@@ -9,25 +9,28 @@ use crate::pattern;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// What an environment has for itself, property by property in the order of [`Property::ALL`]; nominal where `None`.
-/// Gains are not among it: they are kept with the drives.
+/// Own property values of an environment, in the order of [`Property::ALL`]; `None` for nominal properties. Gains are
+/// stored with the drives instead.
 pub(crate) type OwnValues = [Option<Box<[f64]>>; Property::ALL.len()];
 
-/// The properties of one environment. Names are `uid/link` and `uid/joint` of robots and MJCF parts, and the uid of objects
-/// and terrains; `ground` and `gravity` are called so. Links that fixed joints hold are part of the link they are fused to.
+/// Properties of one environment.
+///
+/// Names are `uid/link` and `uid/joint` of robots and MJCF parts, and the uid of objects and terrains; the names of the
+/// ground and of gravity are `ground` and `gravity`. Links behind fixed joints are part of the link they are fused to.
 #[derive(Clone, Debug)]
 pub struct Properties {
     pub(super) tables: Arc<Tables>,
-    /// In the order of [`Property::ALL`].
+    /// Values in the order of [`Property::ALL`].
     pub(super) values: [Vec<f64>; Property::ALL.len()],
-    /// Gains that were drawn or set here, by property and element: what is drawn is so also where it is what was before.
+    /// Gains that were randomized or set here, by property and element. They count as randomized even if they have the
+    /// same value.
     asked: BTreeSet<(Property, usize)>,
-    /// Whether gains are to be nominal and drawn no longer, but for those that are asked for.
+    /// True if all gains except those in `asked` become nominal and are no longer randomized.
     pub(super) nominal_gains: bool,
 }
 
 impl Properties {
-    /// Those of an environment with these own values and drives.
+    /// Properties of an environment with these own values and drives.
     pub(super) fn new(tables: &Arc<Tables>, own: &OwnValues, drives: &DriveState) -> Self {
         let values = Property::ALL.map(|property| {
             let table = tables.get(property);
@@ -48,12 +51,12 @@ impl Properties {
         Self { tables: Arc::clone(tables), values, asked: BTreeSet::new(), nominal_gains: false }
     }
 
-    /// Whether a gain was drawn or set here.
+    /// True if a gain was randomized or set here.
     pub(super) fn is_asked(&self, gain: Property, element: usize) -> bool {
         self.asked.contains(&(gain, element))
     }
 
-    /// What differs from the nominal values, bit by bit.
+    /// Collects the values that differ from the nominal values, bit by bit.
     pub(super) fn own(&self) -> OwnValues {
         Property::ALL.map(|property| {
             let (mine, nominal) = (&self.values[property as usize], &self.tables.get(property).nominal);
@@ -62,7 +65,7 @@ impl Properties {
         })
     }
 
-    /// Names of everything that has a property, each once.
+    /// Names of all elements that have a property, each once.
     pub fn names(&self, property: Property) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for name in &self.tables.get(property).names {
@@ -73,8 +76,8 @@ impl Properties {
         names
     }
 
-    /// Names of what draws of a property change. A draw leaves opacities as they nominally are, so it changes no colour that
-    /// can be seen of what is nominally invisible.
+    /// Names of the elements that a randomization of a property changes. It keeps nominal opacities, so it does not
+    /// change the visible color of an element that is nominally invisible.
     pub(super) fn names_to_draw(&self, property: Property) -> Vec<&str> {
         let table = self.tables.get(property);
         let is_seen = |name: &str| {
@@ -86,8 +89,8 @@ impl Properties {
         names
     }
 
-    /// The first thing that a pattern matches and that cannot have the property, with the reason, where it matches nothing
-    /// that can.
+    /// First element that a pattern matches and that cannot have the property, with the reason. `None` if the pattern
+    /// matches an element that can have it.
     pub(super) fn only_without(&self, property: Property, pattern: &str) -> Option<(String, &'static str)> {
         let without = &self.tables.get(property).without;
         let matched = |names: &[&str]| pattern::select(&[pattern], names, property.owner()).unwrap_or_default();
@@ -98,15 +101,15 @@ impl Properties {
         matched(&names).first().map(|&first| without[first].clone())
     }
 
-    /// The value in this environment; of the first shape where a body has several.
+    /// Value in this environment; that of the first shape for a body with several.
     ///
     /// # Errors
-    /// Nothing of this name has the property; the error lists the nearest names.
+    /// No element of this name has the property; the error lists the nearest names.
     pub fn get(&self, property: Property, name: &str) -> Result<&[f64]> {
         self.value(property, name, &self.values[property as usize])
     }
 
-    /// The value in the model as it was compiled.
+    /// Value in the model as it was compiled.
     ///
     /// # Errors
     /// As [`get`](Self::get).
@@ -128,11 +131,10 @@ impl Properties {
         Ok(&values[element * property.width()..(element + 1) * property.width()])
     }
 
-    /// Sets a value, of all shapes where a body has several. Whether MuJoCo can have it is said when the environment takes
-    /// it over.
+    /// Sets a value, for all shapes of a body with several. The value is checked when the environment takes it over.
     ///
     /// # Errors
-    /// Nothing of this name has the property, or another number of numbers.
+    /// No element of this name has the property, or the number of values is not that of the property.
     pub fn set(&mut self, property: Property, name: &str, value: &[f64]) -> Result<()> {
         self.get(property, name)?;
         let (found, expected) = (value.len(), property.width());
@@ -147,7 +149,7 @@ impl Properties {
         Ok(())
     }
 
-    /// Sets the value of one element, and with a mass the moments that go with it.
+    /// Sets the value of one element; a mass changes the moments in proportion.
     pub(super) fn set_element(&mut self, property: Property, element: usize, value: &[f64]) {
         let width = property.width();
         let at = element * width..(element + 1) * width;
@@ -156,7 +158,7 @@ impl Properties {
             self.asked.insert((property, element));
         }
         if property == Property::Size {
-            // Numbers that the shape does not have.
+            // Sizes that the shape does not have.
             let nominal = &self.tables.get(property).nominal[at.clone()];
             let numbers = self.values[property as usize][at].iter_mut().zip(nominal);
             numbers.filter(|(_, nominal)| **nominal == 0.0).for_each(|(number, _)| *number = 0.0);
@@ -167,36 +169,36 @@ impl Properties {
         }
     }
 
-    /// Everything nominal but gains.
+    /// Resets all properties except gains to their nominal values.
     pub(crate) fn become_nominal(&mut self) {
         for property in Property::ALL.into_iter().filter(|property| !property.is_gain()) {
             self.values[property as usize].clone_from(&self.tables.get(property).nominal);
         }
     }
 
-    /// Sets the value of one element and nothing that goes with it.
+    /// Sets the value of one element without side effects on other properties.
     pub(crate) fn put(&mut self, property: Property, element: usize, value: &[f64]) {
         let width = property.width();
         self.values[property as usize][element * width..(element + 1) * width].copy_from_slice(value);
     }
 
-    /// Nominal moments of a body in the proportion of its mass to the nominal one. Bodies stand in the tables of masses and
-    /// of moments in the same order.
+    /// Nominal moments of a body, scaled by the ratio of its mass to the nominal mass. Bodies have the same order in
+    /// the tables of masses and of moments.
     pub(super) fn proportional_moments(&self, element: usize) -> [f64; 3] {
         let nominal: &Table = self.tables.get(Property::Mass);
         let (mass, before) = (self.values[Property::Mass as usize][element], nominal.nominal[element]);
         let moments = &self.tables.get(Property::Inertia).nominal;
-        // One factor of exactly 1 leaves every bit.
+        // A single factor of exactly 1 preserves every bit.
         std::array::from_fn(|k| moments[3 * element + k] * (mass / before))
     }
 
-    /// The first value that cannot be.
+    /// Checks all values, and reports the first invalid one.
     pub(super) fn check(&self, env: usize) -> Result<(), RandomizationError> {
         for property in Property::ALL {
             let (table, width) = (self.tables.get(property), property.width());
             let values = self.values[property as usize].chunks(width).zip(table.nominal.chunks(width));
             for (name, (value, nominal)) in table.names.iter().zip(values) {
-                // What the compiler took is good.
+                // Nominal values passed the compiler.
                 if value != nominal
                     && let Some(expected) = property.fault(value, nominal)
                 {
@@ -208,8 +210,8 @@ impl Properties {
         Ok(())
     }
 
-    /// The same values, by name, of another scene; what is new there is nominal. Of shapes of one name, the k-th takes over
-    /// from the k-th.
+    /// Transfers own values to another scene, by name; elements that are new there are nominal. Among shapes of one
+    /// name, the k-th takes over from the k-th.
     pub(super) fn carried_to(own: &OwnValues, from: &Tables, to: &Tables) -> OwnValues {
         Property::ALL.map(|property| {
             let values = own[property as usize].as_ref()?;

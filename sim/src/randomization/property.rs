@@ -1,24 +1,25 @@
-//! What may differ between environments: one list.
+//! List of the properties that can differ between environments.
 
 use serde::{Deserialize, Serialize};
 
-/// A property of the model that an environment may have for itself.
+/// Property of the model that can differ between environments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Property {
-    /// Mass of a link or object \[kg\], 1 number. Setting it scales the moments of inertia in the same proportion, from
-    /// their nominal ones, as another density would. What is computed from the files stays nominal: `mass` and `total_mass`,
-    /// the inertias behind the gains of [`DriveType::Acceleration`](crate::DriveType), and
+    /// Mass of a link or object \[kg\], 1 number. Setting it scales the nominal moments of inertia in proportion, as
+    /// another density would. Values computed from the files stay nominal: `total_mass` and `nominal_mass`, the
+    /// inertias behind the gains of [`DriveType::Acceleration`](crate::DriveType), and
     /// [`dynamics`](kinetoscope_robot::dynamics) of a description.
     Mass,
-    /// Centre of mass in the link's (object's) own frame \[m\], 3 numbers. With MuJoCo 4.x not of a body of an MJCF
-    /// file that moves freely and is nominally centred: see [`RandomizationError::DiagonalInertia`](super::RandomizationError).
+    /// Center of mass in the link's (object's) own frame \[m\], 3 numbers. MuJoCo 4.x does not support it for a freely
+    /// moving body of an MJCF file that is nominally centered: see
+    /// [`RandomizationError::DiagonalInertia`](super::RandomizationError).
     CenterOfMass,
-    /// Principal moments of inertia about the centre of mass \[kg m²\], 3 numbers; the axes stay.
+    /// Principal moments of inertia about the center of mass \[kg m²\], 3 numbers; the axes stay.
     Inertia,
-    /// Sliding friction of the shapes of a link, an object, a terrain or the ground, 1 number. MuJoCo takes the larger of
-    /// the two that touch: for a slippery object the ground must be slippery, too.
+    /// Sliding friction of the shapes of a link, an object, a terrain or the ground, 1 number. In a contact, MuJoCo
+    /// takes the larger value of the two surfaces: a slippery object needs a slippery ground, too.
     Friction,
     /// Torsional friction of shapes \[m\], 1 number.
     TorsionalFriction,
@@ -28,45 +29,49 @@ pub enum Property {
     JointDamping,
     /// Rotor inertia of a joint \[kg m² or kg\], 1 number.
     Armature,
-    /// Dry friction of a joint \[N m or N\], 1 number. A joint whose implicit drive takes the place of it has some only where
-    /// [`DriveCfg::friction`](crate::DriveCfg::friction) or its file said so: 0 there makes room for more.
+    /// Dry friction of a joint \[N m or N\], 1 number. A joint with an implicit drive has dry friction only if
+    /// [`DriveCfg::friction`](crate::DriveCfg::friction) or its file sets a value; 0 in the configuration is enough.
     DryFriction,
-    /// Gravity \[m/s²\], 3 numbers; the name is `gravity`. An [`Imu`](kinetoscope_sensors::Imu) still adds the nominal one, unless its
-    /// `gravity_bias` says otherwise.
+    /// Gravity \[m/s²\], 3 numbers; the name is `gravity`. An [`Imu`](kinetoscope_sensors::Imu) still adds the nominal
+    /// gravity, unless its `gravity_bias` gives another.
     Gravity,
-    /// Proportional gain of an implicit drive \[N m/rad or N/m\], 1 number; the name is the joint's.
+    /// Proportional gain of a drive \[N m/rad or N/m\], 1 number; the name is that of the joint. Drives of
+    /// [`DriveModel::Actuator`](crate::DriveModel::Actuator) do not have the properties of gains and limits.
     Stiffness,
-    /// Derivative gain of an implicit drive \[N m s/rad or N s/m\], 1 number.
+    /// Derivative gain of a drive \[N m s/rad or N s/m\], 1 number.
     DriveDamping,
-    /// Largest effort of an implicit drive \[N m or N\], 1 number, which may be infinite.
+    /// Largest effort of a drive \[N m or N\], 1 number, which may be infinite.
     MaxEffort,
-    /// Sizes of a shape of a link or object \[m\], 3 numbers as MuJoCo has them: half lengths of a box, radii of an
-    /// ellipsoid; radius, half length of a cylinder and of the straight part of a capsule; radius of a ball. Numbers that a
-    /// shape does not have are 0 and stay 0. Cameras, ray casters and contacts have them alike. A body with several shapes has
-    /// them scaled by one factor where that is drawn, each about its own middle, which stays.
+    /// Sizes of a shape of a link or object \[m\], 3 numbers as in MuJoCo: half lengths of a box, radii of an
+    /// ellipsoid; radius and half length of a cylinder, and of the straight part of a capsule; radius of a sphere.
+    /// Numbers that a shape does not have are 0 and stay 0. Cameras, ray casters and contacts use the same sizes. A
+    /// random factor scales all shapes of a body alike, each about its own center, which stays.
     ///
-    /// Meshes, planes and height fields have no size of their own in an environment; where a body has other shapes, too,
-    /// they stay as they are. MuJoCo keeps the vertices of a mesh, and the heights of a field, once for all that is made of
-    /// them, with what its compiler derived from them; and a plane touches things everywhere, whatever its size. To ask for
-    /// the size of what has no other shape is
-    /// [`RandomizationError::Unsized`](super::RandomizationError::Unsized), which says what to do instead.
+    /// Meshes, planes and height fields have no size of their own in an environment; in a body with other shapes they
+    /// stay as they are. MuJoCo stores the vertices of a mesh and the heights of a field once for all uses, with the
+    /// values that its compiler derives from them. A plane collides everywhere, whatever its size. A size for a body
+    /// without any other shape is the error [`RandomizationError::Unsized`](super::RandomizationError::Unsized), which
+    /// suggests alternatives.
     ///
-    /// Mass, centre of mass and moments stay: they are properties of their own. So do the sizes of sites: a touch sensor of an
-    /// MJCF file feels contacts in its nominal volume. Frames of links and joints stay where they are, so that
-    /// [`compute_fk`](crate::Robot::compute_fk) and [`compute_ik`](crate::Robot::compute_ik) are right in every environment;
-    /// the tip of a link that became longer is where [`Tip::with_tcp`](kinetoscope_robot::kinematics::Tip::with_tcp) says.
+    /// Mass, center of mass and moments stay: they are properties of their own. Sizes of sites stay too: a touch sensor
+    /// of an MJCF file measures contacts in its nominal volume. Frames of links and joints stay in place, so that
+    /// [`compute_fk`](crate::Robot::compute_fk) and [`compute_ik`](crate::Robot::compute_ik) are valid in every
+    /// environment. Use [`Tip::with_tcp`](kinetoscope_robot::kinematics::Tip::with_tcp) for the tip of a link that
+    /// became longer.
     Size,
-    /// Colour and opacity of what is seen of a link, an object or a terrain, 4 numbers from 0 to 1 for the screen (sRGB);
-    /// it multiplies a texture, and goes over what a material or a mesh file says, for all parts of a mesh. Nominally what
-    /// MuJoCo has: the grey 0.5 where a mesh file brings its own colours, which come back with it.
+    /// Color and opacity of the visible shapes of a link, an object or a terrain, 4 sRGB numbers from 0 to 1. It
+    /// multiplies a texture, and overrides the colors of materials and mesh files, for all parts of a mesh. The nominal
+    /// color is MuJoCo's: gray 0.5 for a mesh file with colors of its own, which return with that color.
     Color,
-    /// Where a static object stands in the environment \[m\], 3 numbers.
+    /// Position of a static object in the environment \[m\], 3 numbers.
     Position,
-    /// How a static object is turned: a quaternion w, x, y, z of length 1, 4 numbers. It is to be set, rather than drawn.
+    /// Rotation of a static object: a quaternion w, x, y, z of length 1, 4 numbers. It is meant to be set rather than
+    /// randomized.
     Rotation,
-    /// Force against the velocity of the frame of an object, or of another body that moves freely \[N s/m\], 1 number.
+    /// Linear damping of an object, or of another freely moving body \[N s/m\], 1 number: a force against the velocity
+    /// of its frame.
     LinearDamping,
-    /// Torque against its angular velocity \[N m s/rad\], 1 number.
+    /// Angular damping of such a body \[N m s/rad\], 1 number: a torque against its angular velocity.
     AngularDamping,
 }
 
@@ -119,7 +124,7 @@ impl Property {
         }
     }
 
-    /// How many numbers it is.
+    /// Number of values of the property.
     pub fn width(self) -> usize {
         match self {
             Self::CenterOfMass | Self::Inertia | Self::Gravity | Self::Size | Self::Position => 3,
@@ -128,10 +133,10 @@ impl Property {
         }
     }
 
-    /// No property has more numbers.
+    /// Largest number of values of any property.
     pub(super) const WIDEST: usize = 4;
 
-    /// Whose property it is, as messages say it.
+    /// Description of the elements that have the property, for messages.
     pub(super) fn owner(self) -> &'static str {
         match self {
             Self::Mass | Self::CenterOfMass | Self::Inertia => "body that moves and is called",
@@ -149,22 +154,22 @@ impl Property {
         }
     }
 
-    /// Whether it is kept with the environment's drives, not with its model.
+    /// True for a property that is stored with the environment's drives instead of its model.
     pub(super) fn is_gain(self) -> bool {
         self.gain().is_some()
     }
 
-    /// Its number among proportional gain, derivative gain and effort limit.
+    /// Index among proportional gain, derivative gain and effort limit; `None` for other properties.
     pub(crate) fn gain(self) -> Option<usize> {
         [Self::Stiffness, Self::DriveDamping, Self::MaxEffort].iter().position(|gain| *gain == self)
     }
 
-    /// What a value must be, where this one is not; of a size, numbers that are nominally 0 are none.
+    /// Describes the accepted values if these are invalid. A size that is nominally 0 may be 0.
     pub(crate) fn fault(self, values: &[f64], nominal: &[f64]) -> Option<&'static str> {
         let all = |good: fn(f64) -> bool| values.iter().all(|&value| good(value));
         match self {
             Self::Mass => {
-                // MuJoCo's mjMINVAL, below which a body that moves is refused by its compiler.
+                // MuJoCo's mjMINVAL: its compiler rejects a moving body with less mass.
                 (!all(|m| m.is_finite() && m >= 1e-15)).then_some("a mass must be finite and at least 1e-15 kg")
             }
             Self::Inertia => {

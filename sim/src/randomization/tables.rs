@@ -1,4 +1,4 @@
-//! Where the properties of a compiled scene are, what they are called, and what they nominally are.
+//! Tables of the properties of a compiled scene: names, array indices and nominal values.
 
 use super::Property;
 use crate::drive::table::{Drive, DriveTable, Realization};
@@ -6,47 +6,47 @@ use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{Model, ObjectKind};
 use std::collections::BTreeMap;
 
-/// All that has one property.
+/// Elements that have one property.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Table {
-    /// What each element is called; shapes of one body are called alike.
+    /// Name of each element; shapes of one body have the same name.
     pub(super) names: Vec<String>,
-    /// Where each element is in MuJoCo's arrays, or among the drives.
+    /// Index of each element in MuJoCo's arrays, or among the drives.
     pub(super) places: Vec<usize>,
     /// Nominal values, element by element.
     pub(super) nominal: Vec<f64>,
-    /// What is called so and cannot have the property, with the reason.
+    /// Elements that cannot have the property, with the reason.
     pub(super) without: Vec<(String, &'static str)>,
 }
 
-/// What the model alone does not say.
+/// Facts about the scene that the model does not contain.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beside<'a> {
-    /// Whether each geom only has a pose, for something else that is drawn in its place.
+    /// True for each proxy geom, which only has a pose and is replaced by another shape in rendering.
     pub(crate) proxies: &'a [bool],
-    /// Bodies that stand fixed and may do so elsewhere in each environment.
+    /// Static bodies, whose poses can differ between environments.
     pub(crate) standing: &'a [usize],
 }
 
-/// The properties of a compiled scene.
+/// Properties of a compiled scene.
 #[derive(Clone, Debug)]
 pub(crate) struct Tables {
-    /// In the order of [`Property::ALL`].
+    /// Tables in the order of [`Property::ALL`].
     tables: [Table; Property::ALL.len()],
 }
 
 impl Tables {
-    /// The properties of a model with its drives.
+    /// Creates the tables for a model with its drives.
     pub(crate) fn of(model: &Model, drives: &DriveTable, beside: Beside<'_>) -> Self {
         Self { tables: Property::ALL.map(|property| table(property, model, drives, beside)) }
     }
 
-    /// Where an element is in MuJoCo's arrays, or among the drives.
+    /// Index of an element in MuJoCo's arrays, or among the drives.
     pub(crate) fn place(&self, property: Property, element: usize) -> usize {
         self.get(property).places[element]
     }
 
-    /// The nominal value of an element.
+    /// Nominal value of an element.
     pub(crate) fn nominal(&self, property: Property, element: usize) -> &[f64] {
         let width = property.width();
         &self.get(property).nominal[element * width..(element + 1) * width]
@@ -58,13 +58,13 @@ impl Tables {
 }
 
 impl Table {
-    /// Where elements differ from the nominal values: the values, `width` numbers each, by place.
+    /// Values that differ from the nominal values, `width` numbers each, by index in MuJoCo's arrays.
     pub(super) fn changes<'v>(&self, width: usize, values: &'v [f64]) -> BTreeMap<usize, &'v [f64]> {
         let elements = values.chunks(width).zip(self.nominal.chunks(width)).zip(&self.places);
         elements.filter(|((value, nominal), _)| value != nominal).map(|((value, _), &place)| (place, value)).collect()
     }
 
-    /// Why what is called so cannot have the property, where there is a reason.
+    /// Reason why the element `name` cannot have the property, if there is a reason.
     pub(super) fn why_not(&self, name: &str) -> Option<&'static str> {
         self.without.iter().find(|(of, _)| of == name).map(|(_, reason)| *reason)
     }
@@ -131,7 +131,7 @@ fn table(property: Property, model: &Model, drives: &DriveTable, beside: Beside<
         }
         Property::Color => {
             for geom in 0..model.ngeom() {
-                // The ground's colour is in its squares.
+                // The color of the ground is in its checkerboard squares.
                 if let Some(name) = geom_name(model, geom).filter(|name| name != "ground") {
                     table.push(name, geom, &crate::visible::color_of(model, geom).map(f64::from));
                 }
@@ -145,7 +145,7 @@ fn table(property: Property, model: &Model, drives: &DriveTable, beside: Beside<
     table
 }
 
-/// How many sizes a geom of a type has; 0 for one whose size is no property.
+/// Number of sizes of a geom type; 0 for a type whose size is not a property.
 fn sizes(kind: i32) -> usize {
     match kind as u32 {
         mj::mjGEOM_SPHERE => 1,
@@ -155,7 +155,7 @@ fn sizes(kind: i32) -> usize {
     }
 }
 
-/// Why the size of a geom of a type is no property.
+/// Reason why the size of a geom type is not a property, if there is a reason.
 fn no_sizes(kind: i32) -> Option<&'static str> {
     match kind as u32 {
         mj::mjGEOM_MESH => Some(
@@ -174,7 +174,7 @@ fn no_sizes(kind: i32) -> Option<&'static str> {
     }
 }
 
-/// A geom is called as its body, or, in the world, as itself.
+/// Name of the element that a geom belongs to: its body or, in the world, the geom itself.
 fn geom_name(model: &Model, geom: usize) -> Option<String> {
     match usize::try_from(model.geom_bodyid()[geom]) {
         Ok(body) if body > 0 => model.name(ObjectKind::Body, body),
@@ -182,7 +182,7 @@ fn geom_name(model: &Model, geom: usize) -> Option<String> {
     }
 }
 
-/// Bodies that stand where they are put.
+/// Adds the static bodies.
 fn standing<'m>(model: &'m Model, table: &mut Table, beside: Beside<'_>, values: impl Fn(usize) -> &'m [f64]) {
     for &body in beside.standing {
         if let Some(name) = model.name(ObjectKind::Body, body) {
@@ -191,7 +191,7 @@ fn standing<'m>(model: &'m Model, table: &mut Table, beside: Beside<'_>, values:
     }
 }
 
-/// Bodies that can move and have a mass.
+/// Adds the bodies that can move and have a mass.
 fn bodies<'m>(model: &'m Model, table: &mut Table, values: impl Fn(usize) -> &'m [f64]) {
     for body in 1..model.nbody() {
         if model.body_weldid()[body] != 0
@@ -203,8 +203,8 @@ fn bodies<'m>(model: &'m Model, table: &mut Table, values: impl Fn(usize) -> &'m
     }
 }
 
-/// Free joints, called as the bodies that they move; places are degrees of freedom, the `first` of each joint's six and the two
-/// after it.
+/// Adds the free joints, named after the bodies that they move. Their indices are degrees of freedom: the `first` of
+/// each joint's six, together with the two after it.
 fn free_bodies(model: &Model, table: &mut Table, first: usize) {
     for joint in 0..model.njnt() {
         let name = model.name(ObjectKind::Body, usize::try_from(model.jnt_bodyid()[joint]).unwrap_or(0));
@@ -215,7 +215,7 @@ fn free_bodies(model: &Model, table: &mut Table, first: usize) {
     }
 }
 
-/// Geoms that collide, called as their body, or, in the world, as themselves.
+/// Adds the geoms that collide, named after their body or, in the world, after themselves.
 fn shapes(model: &Model, table: &mut Table, coefficient: usize) {
     for geom in 0..model.ngeom() {
         if model.geom_contype()[geom] == 0 && model.geom_conaffinity()[geom] == 0 {
@@ -227,7 +227,8 @@ fn shapes(model: &Model, table: &mut Table, coefficient: usize) {
     }
 }
 
-/// Joints but free ones, where `value` gives one; all degrees of freedom of a joint have the same.
+/// Adds the joints for which `value` returns a value, except free joints. All degrees of freedom of a joint have this
+/// value.
 fn joints(model: &Model, table: &mut Table, value: impl Fn(usize) -> Option<f64>) {
     for joint in 0..model.njnt() {
         if model.jnt_type()[joint] as u32 != mj::mjJNT_FREE
@@ -244,25 +245,25 @@ pub(super) fn dofs_of(model: &Model, joint: usize) -> std::ops::Range<usize> {
     first..first + if model.jnt_type()[joint] as u32 == mj::mjJNT_BALL { 3 } else { 1 }
 }
 
-/// The armature without what implicit damping adds to it: `h B`, see [`crate::drive::implicit`].
+/// Armature without the part `h B` that implicit damping adds to it; see [`crate::drive::implicit`].
 pub(super) fn user_armature(model: &Model, drives: &DriveTable, dof: usize) -> f64 {
     match drives.damped.iter().position(|(of, _)| *of == dof) {
-        // To take `h B` off again would lose bits.
+        // Subtracting `h B` again would lose bits.
         Some(k) => drives.undamped_armature[k],
         None => model.dof_armature()[dof],
     }
 }
 
-/// Where the dry friction of a joint is.
+/// Location of the dry friction of a joint in the model.
 pub(super) enum FrictionPlace {
-    /// Its own.
+    /// The friction of the joint itself.
     Joint,
-    /// A fixed tendon's: the joint's own row carries its drive, or could.
+    /// A fixed tendon, because the joint's own friction row carries its drive, or could.
     Tendon(usize),
 }
 
-/// Where the dry friction of a joint is; `None` where its drive takes the place and there is none. Which joints have a tendon
-/// was decided when the scene was written: wherever drives are rows, all that have a drive, an explicit model's too.
+/// Finds the dry friction of a joint; `None` if its drive uses the friction row and it has no tendon. The writer of the
+/// scene adds the tendons: wherever drives are rows, every joint with a drive has one, also with an explicit model.
 pub(super) fn friction_place(model: &Model, drives: &DriveTable, joint: usize) -> Option<FrictionPlace> {
     let tendon = format!("{}/friction", model.name(ObjectKind::Joint, joint)?);
     if let Some(tendon) = model.id(ObjectKind::Tendon, &tendon) {

@@ -1,4 +1,4 @@
-//! Randomisations as data.
+//! Randomizations as data.
 
 use super::Property;
 use super::error::RandomizationError;
@@ -8,16 +8,16 @@ use kinetoscope_scene::Random;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// What is drawn, uniformly from a range, and what it does to the nominal value, not to what was drawn before. Of a colour,
-/// red, green and blue are drawn; its opacity is the nominal one.
+/// Random operation on a property. Numbers are sampled uniformly from a range and change the nominal value, not the
+/// previous random value. For a color, red, green and blue are randomized; the opacity stays nominal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Draw {
-    /// One factor of all numbers of the property.
+    /// Multiplies all numbers of the property by one random factor.
     Scale([f64; 2]),
-    /// A summand of each number.
+    /// Adds a random summand to each number.
     Add([f64; 2]),
-    /// A value of each number.
+    /// Replaces each number by a random value.
     Set([f64; 2]),
 }
 
@@ -29,22 +29,24 @@ impl Draw {
     }
 }
 
-/// One property of all names that a pattern matches.
+/// Randomization of one property for all names that a pattern matches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Term {
-    /// The property.
+    /// Property to randomize.
     pub property: Property,
-    /// Whose: a regular expression that matches the whole name (see [`Properties`]).
+    /// Regular expression that matches whole names (see [`Properties`]).
     pub pattern: String,
-    /// What is drawn. What has one name draws once.
+    /// Random operation. All elements of one name share one sample.
     pub draw: Draw,
 }
 
-/// Properties to draw for an environment.
+/// Randomization of the properties of environments.
 ///
 /// ```
-/// use kinetoscope_sim::{Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+/// use kinetoscope_sim::{
+///     Draw, ObjectShape, Property, Randomization, RigidObjectCfg, SimulationManager, SimulationManagerCfg,
+/// };
 ///
 /// let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 4, ..Default::default() })?;
 /// let shape = ObjectShape::cube(0.1);
@@ -61,24 +63,24 @@ pub struct Term {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Randomization {
-    /// The terms; no two of one property may match the same name.
+    /// Terms; two terms of one property must not match the same name.
     pub terms: Vec<Term>,
 }
 
 impl Randomization {
-    /// Nothing yet.
+    /// Creates a randomization without terms.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// This and one more term.
+    /// Adds a term.
     #[must_use]
     pub fn with(mut self, property: Property, pattern: impl Into<String>, draw: Draw) -> Self {
         self.terms.push(Term { property, pattern: pattern.into(), draw });
         self
     }
 
-    /// What is drawn for each element, property by property.
+    /// Resolves the patterns to elements, property by property.
     pub(super) fn resolve(&self, properties: &Properties) -> Result<Resolved, RandomizationError> {
         for Term { property, pattern, draw } in &self.terms {
             let [low, high] = draw.range();
@@ -113,10 +115,10 @@ impl Randomization {
     }
 }
 
-/// A randomisation of a scene: what is drawn, property by property.
+/// Randomization that is resolved for a scene, property by property.
 pub(super) struct Resolved(Vec<(Property, Vec<ResolvedDraw>)>);
 
-/// What is drawn for a name: once, for all elements of that name.
+/// Random operation for a name: one sample for all elements of that name.
 struct ResolvedDraw {
     name: String,
     elements: Vec<usize>,
@@ -124,12 +126,12 @@ struct ResolvedDraw {
 }
 
 impl Resolved {
-    /// Draws for an environment. `random` makes the generator of a property and a name.
+    /// Randomizes an environment. `random` creates the generator of a property and a name.
     pub(super) fn draw(&self, properties: &mut Properties, mut random: impl FnMut(Property, &str) -> Random) {
         let tables = std::sync::Arc::clone(&properties.tables);
         for (property, draws) in &self.0 {
             let (table, width) = (tables.get(*property), property.width());
-            // Opacity is set, not drawn: a factor of a colour is none of it.
+            // Opacity is never randomized: a factor of a color does not apply to it.
             let drawn = if *property == Property::Color { 3 } else { width };
             for ResolvedDraw { name, elements, draw } in draws {
                 let mut random = random(*property, name);

@@ -1,6 +1,6 @@
-//! Numbers and texts as bytes, little-endian, and back; reading never trusts a length.
+//! Little-endian encoding of numbers and texts; the reader never trusts a length.
 
-/// What is written.
+/// Writer of encoded values.
 #[derive(Debug, Default)]
 pub(super) struct Writer(pub(super) Vec<u8>);
 
@@ -33,11 +33,11 @@ impl Writer {
     }
 }
 
-/// What is left to read.
+/// Reader of the remaining bytes.
 #[derive(Debug)]
 pub(super) struct Reader<'b>(pub(super) &'b [u8]);
 
-/// The content ends early, or is not what it should be.
+/// The content ends early, or is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Malformed(pub(super) &'static str);
 
@@ -68,7 +68,7 @@ impl<'b> Reader<'b> {
         self.array().map(u64::from_le_bytes)
     }
 
-    /// A count of things that take `bytes` each.
+    /// Reads a count of elements that take at least `bytes` each.
     pub(super) fn count(&mut self, bytes: usize) -> Result<usize, Malformed> {
         let count = usize::try_from(self.u64()?).map_err(|_| SHORT)?;
         if count.checked_mul(bytes).is_some_and(|all| all <= self.0.len()) { Ok(count) } else { Err(SHORT) }

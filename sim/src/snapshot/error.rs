@@ -1,68 +1,68 @@
-//! What can be wrong with a snapshot.
+//! Errors of snapshots.
 
 use std::path::PathBuf;
 
-/// A snapshot cannot be read, or does not belong where it is put.
+/// Error of reading or restoring a snapshot.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SnapshotError {
-    /// The file is something else.
+    /// The file is not a snapshot.
     #[error("{path}: not a snapshot; snapshots are files that Snapshot::save wrote")]
     Foreign {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// The file ends too early.
     #[error("{path}: the file ends after {bytes} bytes of {expected}; it was not copied as a whole")]
     Truncated {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its length \[bytes\].
+        /// Length of the file \[bytes\].
         bytes: u64,
-        /// The length it should have \[bytes\].
+        /// Expected length \[bytes\].
         expected: u64,
     },
-    /// The checksum or the length is not that of the content.
+    /// The checksum or the length does not match the content.
     #[error("{path}: the file is damaged: its content is not what was saved")]
     Damaged {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// The file is in a format of another version of this program.
+    /// The file has the format of another version of this program.
     #[error("{path}: a snapshot in format {found}; this program reads format {supported}")]
     Format {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The format of the file.
+        /// Format of the file.
         found: u32,
-        /// The format of this program.
+        /// Format of this program.
         supported: u32,
     },
-    /// The file was saved by a program with another MuJoCo, which would go on with other bits.
+    /// The file was saved with another MuJoCo version, which would continue with other bits.
     #[error("{path}: saved with MuJoCo {found}; this program runs MuJoCo {running}, which would go on differently")]
     Mujoco {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The version of the program that saved it.
+        /// MuJoCo version of the file.
         found: String,
-        /// The version of this program.
+        /// MuJoCo version of this program.
         running: String,
     },
-    /// The checksum is right, but what is in the file is not a snapshot: another program wrote it.
+    /// The checksum is right, but the content is not a snapshot: another program wrote it.
     #[error("{path}: {what}, though the checksum is right: not written by Snapshot::save")]
     Malformed {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the problem.
         what: &'static str,
     },
-    /// The snapshot is of another scene.
+    /// The snapshot belongs to another scene.
     #[error("the snapshot is of another scene: {difference}; build the scene as it was when the snapshot was taken")]
     OtherScene {
-        /// The first thing that differs.
+        /// First difference.
         difference: String,
     },
-    /// The snapshot has another number of environments than are to be restored.
+    /// The snapshot has another number of environments than the number to restore.
     #[error("the snapshot holds {held} environments, and {wanted} are to be restored; take as many, or one for all")]
     Count {
         /// Number of environments in the snapshot.

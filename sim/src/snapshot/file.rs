@@ -1,12 +1,12 @@
-//! Snapshots as files.
+//! Snapshot files.
 //!
 //! ```text
 //! magic (8 bytes) | length of the file (u64) | format (u32) | content | SHA-256 of all before (32 bytes)
 //! ```
 //!
-//! All numbers are little-endian. Magic, length and checksum stand in these places in every format, so that a damaged file
-//! is told from one of another version. The content of format 3: MuJoCo's version, the lines of the layout, the
-//! environments, each with its properties.
+//! All numbers are little-endian. Magic, length and checksum have these positions in every format, so that a damaged
+//! file can be distinguished from one of another version. The content of format 3: MuJoCo's version, the lines of the
+//! layout, the environments, each with its properties.
 
 use super::bytes::{Malformed, Reader, Writer};
 use super::layout::Layout;
@@ -24,15 +24,15 @@ use std::io::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
-/// As PNG's: a byte that is no text, a name, and ends of lines that programs which treat files as text change.
+/// Like the signature of PNG: a byte outside of text, a name, and line ends that text-mode programs change.
 const MAGIC: [u8; 8] = *b"\x89KTS\r\n\x1a\n";
 const FORMAT: u32 = 3;
 const CHECKSUM: usize = 32;
-/// Magic, length, format.
+/// Length of magic, length and format \[bytes\].
 const HEADER: usize = 8 + 8 + 4;
 
 impl Snapshot {
-    /// Writes the snapshot to a file: all of it, or, on an error, nothing (a file that was there stays).
+    /// Writes the snapshot to a file. On an error, nothing is written, and an existing file stays.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -41,7 +41,7 @@ impl Snapshot {
         let failed = |error| Error::File { path: path.into(), error };
         let mut file = AtomicFile::create(path).map_err(failed)?;
         file.file().write_all(&self.encode(FORMAT, &mj::version_string())).map_err(failed)?;
-        // Before its name: a machine that stops in between leaves the old file, not an empty one.
+        // Before the rename: a machine that stops in between leaves the old file, not an empty one.
         file.file().sync_all().map_err(failed)?;
         file.persist().map_err(failed)
     }
@@ -49,8 +49,8 @@ impl Snapshot {
     /// Reads a file that [`save`](Self::save) wrote.
     ///
     /// # Errors
-    /// The file cannot be read, or is not a whole, undamaged snapshot of this format and this MuJoCo: each of these is a
-    /// [`SnapshotError`] of its own.
+    /// The file cannot be read, or is not a complete, undamaged snapshot of this format and this MuJoCo version. Each
+    /// case is a [`SnapshotError`] of its own.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let bytes = std::fs::read(path).map_err(|error| Error::File { path: path.into(), error })?;
@@ -166,10 +166,10 @@ fn write_entry(entry: &Entry, out: &mut Writer) {
     out.u64(*step);
 }
 
-/// More steps than any run does, and far from where counting them ends: a step of a microsecond for 285 years.
+/// Maximum number of steps, far from overflow and beyond any run: a step of a microsecond for 285 years.
 const MOST_STEPS: u64 = 1 << 53;
 
-/// An environment of a scene with this many drives.
+/// Reads an environment of a scene with this many drives.
 fn read_entry(reader: &mut Reader<'_>, drive_count: usize) -> Result<Entry, Malformed> {
     let finite = |reader: &mut Reader<'_>, what| {
         let numbers = reader.numbers()?;
@@ -192,7 +192,7 @@ fn read_entry(reader: &mut Reader<'_>, drive_count: usize) -> Result<Entry, Malf
     }
     let wrenches = finite(reader, "a wrench is not finite")?;
     let wrenches = Wrenches::from_numbers(&wrenches).ok_or(Malformed("a wrench has not all its numbers"))?;
-    // A number, and seven of a list with its length.
+    // An index, and a list of seven numbers with its length.
     let welds = (0..reader.count(8 * 9)?).map(|_| read_weld(reader)).collect::<Result<Vec<_>, _>>()?;
     let draws = match reader.u64()? {
         draws if draws <= MOST_STEPS => draws,
@@ -232,7 +232,7 @@ fn read_property(reader: &mut Reader<'_>) -> Result<NamedValue, Malformed> {
     if value.len() != property.width() {
         return Err(Malformed("a property has not all its numbers"));
     }
-    // Of sizes, zeros are told by the scene.
+    // The scene decides which numbers of a size must be 0.
     match property.fault(&value, &value) {
         None => Ok(NamedValue { property, name, nth, value: value.into() }),
         Some(_) => Err(Malformed("a property has a value that cannot be")),
@@ -258,7 +258,7 @@ mod tests {
     use crate::drive::{DelayedPd, DriveType};
     use crate::env::Env;
 
-    /// An environment of a small model, with a joint that a drive with a delay moves.
+    /// Environment of a small model, with a joint that a delayed drive moves.
     fn env() -> (Env, Layout) {
         let text = r#"<mujoco><worldbody><body name="b"><joint name="j" type="ball"/><geom size="0.1"/>
             <body name="c"><joint name="k" axis="0 1 0"/><geom size="0.1" pos="0.1 0 0"/></body></body></worldbody>
@@ -274,7 +274,7 @@ mod tests {
         (Env::new(&model, &Arc::new(table)).expect("small"), layout)
     }
 
-    /// Two such environments, one of which has diverged for `reason`.
+    /// Snapshot of two such environments, one of which has diverged for `reason`.
     fn snapshot(reason: Divergence) -> Snapshot {
         let (mut env, layout) = env();
         env.write(|data| data.qvel_mut()[1] = 0.3);
@@ -339,7 +339,7 @@ mod tests {
             let error = decode(&bytes).expect_err("damaged");
             match (bit / 8, &error) {
                 (0..8, SnapshotError::Foreign { .. }) => {}
-                // A length that grew cannot be told from a file that was cut.
+                // An increased length cannot be distinguished from a truncated file.
                 (8..16, SnapshotError::Truncated { .. } | SnapshotError::Damaged { .. }) => {}
                 (16.., SnapshotError::Damaged { .. }) => {}
                 _ => panic!("bit {bit}: {error}"),
@@ -357,8 +357,9 @@ mod tests {
         assert!(matches!(other, Err(SnapshotError::Mujoco { found, .. }) if found == "3.9.9"));
     }
 
-    /// Every byte of the content is changed, and the checksum made right again: an error or another snapshot, never a panic
-    /// or an allocation beyond the file; and an environment that goes on from what is another snapshot steps, or diverges.
+    /// Changes every byte of the content, and corrects the checksum. The result is an error or another snapshot, never
+    /// a panic or an allocation beyond the file. An environment that continues from another snapshot steps, or
+    /// diverges.
     #[test]
     fn right_checksum_of_wrong_content() {
         let good = bytes();
@@ -389,7 +390,7 @@ mod tests {
         assert_eq!(env.remember(), like, "what was restored meanwhile left nothing behind");
     }
 
-    /// The fault of a snapshot whose entries were changed.
+    /// Error of a snapshot with changed entries.
     fn fault(change: &dyn Fn(&mut Vec<Entry>)) -> Option<String> {
         let mut snapshot = snapshot(Divergence::Warning(Warning::BadVelocity));
         let mut entries = snapshot.entries.to_vec();
@@ -405,7 +406,7 @@ mod tests {
     #[test]
     fn impossible_numbers() {
         let fault = |change: &dyn Fn(&mut EnvState)| fault(&|entries| change(&mut entries[1].state));
-        // Control: what is not changed is read.
+        // Control: unchanged entries are read.
         assert_eq!(fault(&|_| {}), None);
         let motion = |value| {
             move |state: &mut EnvState| {
@@ -427,7 +428,7 @@ mod tests {
         assert!(fault(&motion(nan)).is_some_and(|what| what.contains("position")));
         assert!(fault(&motion(infinite)).is_some());
         assert!(fault(&input(nan)).is_some_and(|what| what.contains("control")));
-        // Gains, limits, drive type, stiffness, damping, inertia, range; targets; what the delay keeps.
+        // Gains, limits, drive type, stiffness, damping, inertia, range; targets; memory of the delay.
         let bad: [(usize, &[f64]); 15] = [
             (0, &[nan, -1.0, infinite]),
             (1, &[-1.0]),

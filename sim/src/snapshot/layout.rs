@@ -1,15 +1,14 @@
-//! Which numbers a state has, and how it is stepped: sizes, names and steps of a compiled scene, to tell one scene from
-//! another.
+//! Layout of states: sizes, names and step settings of a compiled scene, which distinguish one scene from another.
 
 use crate::drive::table::DriveTable;
 use kinetoscope_mujoco::{Model, ObjectKind, words};
 
-/// How a scene is stepped, then sizes and names of everything that has numbers in a state, one line each.
+/// Step settings, then sizes and names of everything that has numbers in a state, one line each.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Layout(Vec<String>);
 
 impl Layout {
-    /// The layout of a model with its drives, `substeps` of whose steps are one of the simulation.
+    /// Layout of a model with its drives. One step of the simulation is `substeps` steps of the model.
     pub(crate) fn of(model: &Model, drives: &DriveTable, substeps: u32) -> Self {
         let sizes = [
             ("positions", model.nq()),
@@ -19,7 +18,7 @@ impl Layout {
             ("bodies", model.nbody()),
             ("equalities", model.neq()),
         ];
-        // Every bit of the step: Rust writes the shortest number that is read as the same.
+        // Every bit of the step counts: Rust writes the shortest number that reads back to the same value.
         let stepped = |(name, _): &(&str, String)| matches!(*name, "timestep" | "integrator" | "cone");
         let options = model.options().into_iter().filter(stepped);
         let mut lines: Vec<String> = options.map(|(name, value)| format!("{name} {value}")).collect();
@@ -35,7 +34,7 @@ impl Layout {
             lines.push(format!("body {:?}{by_hand}", name(ObjectKind::Body, body)));
         }
         for weld in (0..model.neq()).filter(|&equality| model.is_weld(equality)) {
-            // The pose of a weld is that of the one in the other: it means nothing between other bodies.
+            // The pose of a weld is relative to its bodies: it has no meaning for other bodies.
             let sites = model.equality_is_between_sites(weld);
             let kind = if sites { ObjectKind::Site } else { ObjectKind::Body };
             let held = |of: &[i32]| name(kind, usize::try_from(of[weld]).unwrap_or(0));
@@ -52,22 +51,22 @@ impl Layout {
         Self(lines)
     }
 
-    /// How many drives there are.
+    /// Number of drives.
     pub(super) fn drives(&self) -> usize {
         self.0.iter().filter(|line| line.starts_with("drive of ")).count()
     }
 
-    /// The lines, as they stand in a file.
+    /// Lines as in a file.
     pub(super) fn lines(&self) -> &[String] {
         &self.0
     }
 
-    /// What [`lines`](Self::lines) gave.
+    /// Creates a layout from the result of [`lines`](Self::lines).
     pub(super) fn from_lines(lines: Vec<String>) -> Self {
         Self(lines)
     }
 
-    /// The first thing in which a snapshot's layout (this one) differs from that of a scene.
+    /// First difference of a snapshot's layout (`self`) from the layout of a scene.
     pub(super) fn difference(&self, scene: &Self) -> Option<String> {
         if self == scene {
             return None;

@@ -1,4 +1,4 @@
-//! Snapshots: states of environments, to go back to, to go on from elsewhere, and to keep in a file.
+//! Snapshots: states of environments, to restore, to continue elsewhere, and to save in files.
 
 mod bytes;
 mod error;
@@ -17,42 +17,42 @@ use crate::manager::SimulationManager;
 use crate::simulation::Simulation;
 use std::sync::Arc;
 
-/// States of environments. Cheap to clone.
+/// States of environments, cheap to clone.
 ///
-/// A snapshot holds everything that decides how an environment goes on: time, positions with quaternions as they were
-/// before they were normalised, velocities, activations, the solver's warm start, what users set (controls, applied forces,
-/// bodies moved by hand, welds that hold and how, active equalities), targets, gains, limits, efforts and delays of drives as they were set, wrenches
-/// on links, the count of steps, and whether and why it has diverged. Going on from it is bit-identical in any environment
-/// with the same properties, of any manager that was built by the same program with the same MuJoCo, for any number of
-/// threads.
+/// A snapshot holds everything that determines how an environment continues: time, positions with quaternions before
+/// normalization, velocities, activations, and the solver's warm start. It holds user inputs: controls, applied forces,
+/// poses of mocap bodies, welds that hold with their relative poses, active equalities, targets, gains, limits, efforts
+/// and delays of drives as they were set, and wrenches on links. It also holds the count of steps, and the divergence
+/// with its reason. An environment with the same properties continues from it bit-identically, in any manager that was
+/// built by the same program with the same MuJoCo version, for any number of threads.
 ///
-/// It also holds the [properties](crate::EnvProperties) of each environment, by name: masses, friction, sizes, gains that were
-/// drawn, and how often it was drawn for. They belong to the environment, not to its state:
-/// [`restore`](SimulationManager::restore) leaves those of the environment it goes to alone (of a drive whose gain is drawn,
-/// what was set before is restored), as who resets to the same start after every draw wants it.
-/// [`EnvPropertiesMut::restore`](crate::EnvPropertiesMut::restore) restores them too.
+/// It also holds the [properties](crate::EnvProperties) of each environment, by name: masses, friction, sizes,
+/// randomized gains, and the number of randomizations. They belong to the environment, not to its state:
+/// [`restore`](SimulationManager::restore) keeps the properties of the target environment, so that every randomization
+/// can be followed by a reset to the same start. (For a drive with a randomized gain, the setting before the
+/// randomization is restored.) [`EnvPropertiesMut::restore`](crate::EnvPropertiesMut::restore) restores properties too.
 ///
 /// It does not hold:
 ///
-/// * Sensors. Those of restored environments start again as after a reset: they show the restored state at once, histories
-///   are empty, and their periods count from there. A sensor may be a type of the user's own, whose memory is unknown
-///   here; and measurements of one run would not belong to the other.
-/// * The model that all environments share. A snapshot of a scene with other steps, another integrator or other friction
-///   cones is refused, as that of another scene.
-/// * What happened on the way: counts of warnings and of buffers that grew.
+/// * Sensors. Those of restored environments restart as after a reset: they show the restored state at once, histories
+///   are empty, and their periods count from there. A sensor may have a user's own type with unknown memory, and
+///   measurements of one run would not belong to the other.
+/// * The model that all environments share. A snapshot of a scene with other steps, another integrator or other
+///   friction cones is rejected, as one of another scene.
+/// * Events on the way: counts of warnings and of buffers that grew.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     layout: Arc<Layout>,
     entries: Arc<[Entry]>,
 }
 
-/// The state of one environment.
+/// State of one environment.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entry {
-    /// Where it was taken.
+    /// Index of the environment that the state was taken from.
     pub(crate) env: usize,
     pub(crate) state: EnvState,
-    /// What the environment had for itself.
+    /// Own properties of the environment.
     pub(crate) own: Arc<OwnProperties>,
 }
 
@@ -61,17 +61,17 @@ impl Snapshot {
         Self { layout: Arc::clone(&simulation.layout), entries: entries.into() }
     }
 
-    /// Number of environments in it.
+    /// Number of environments in the snapshot.
     pub fn len(&self) -> usize {
         self.entries.len()
     }
 
-    /// Whether it holds nothing.
+    /// True for a snapshot without environments.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
 
-    /// The environments it was taken of, in the order given then.
+    /// Environments that the snapshot was taken from, in the order given then.
     pub fn env_ids(&self) -> Vec<EnvId> {
         self.entries.iter().map(|entry| EnvId(entry.env)).collect()
     }
@@ -81,7 +81,8 @@ impl Snapshot {
         self.entries.iter().map(|entry| entry.state.motion.values().first().copied().unwrap_or(0.0)).collect()
     }
 
-    /// The state for each of `wanted` environments, after checking that it is of this scene; a single one is for all.
+    /// Index of the state for each of `wanted` environments, after a check that the snapshot is of this scene; a single
+    /// state applies to all.
     pub(crate) fn states_for(&self, wanted: usize, simulation: &Simulation) -> Result<Vec<usize>> {
         if let Some(difference) = self.layout.difference(&simulation.layout) {
             return Err(SnapshotError::OtherScene { difference }.into());
@@ -104,8 +105,8 @@ impl Snapshot {
 }
 
 impl SimulationManager {
-    /// The present state of environments, in the order given; of all where `env_ids` is `None`. What it holds and what not
-    /// is written at [`Snapshot`].
+    /// Takes a snapshot of the current state of environments, in the given order; `None` for all environments.
+    /// [`Snapshot`] describes its content.
     ///
     /// # Errors
     /// An environment does not exist.
@@ -118,13 +119,14 @@ impl SimulationManager {
         Ok(Snapshot::new(&self.simulation, envs.into_iter().map(entry).collect()))
     }
 
-    /// Puts environments into states of a snapshot: the k-th of `env_ids` into the k-th state, or all of them into a single
-    /// one; each where it was taken where `env_ids` is `None`. Of an environment that is named twice the last state counts.
-    /// A forward pass follows, and sensors of these environments start again, as after a reset.
+    /// Restores environments from a snapshot: the k-th of `env_ids` from the k-th state, or all of them from a single
+    /// state. If `env_ids` is `None`, each state is restored to the environment that it was taken from. For a repeated
+    /// environment, the last state counts. A forward pass follows, and the sensors of these environments restart, as
+    /// after a reset.
     ///
     /// # Errors
-    /// An environment does not exist, the snapshot is of another scene, or it holds another number of states; then nothing
-    /// is restored.
+    /// An environment does not exist, the snapshot is of another scene, or it holds another number of states; then
+    /// nothing is restored.
     pub fn restore(&mut self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<()> {
         let sources = self.sources(snapshot, env_ids)?;
         let chosen: Vec<usize> = (0..sources.len()).filter(|&env| sources[env].is_some()).collect();
@@ -140,7 +142,7 @@ impl SimulationManager {
         Ok(())
     }
 
-    /// Which entry of the snapshot each environment goes on from, if any.
+    /// Index of the snapshot entry that each environment is restored from, if any.
     fn sources(&self, snapshot: &Snapshot, env_ids: Option<&[EnvId]>) -> Result<Vec<Option<usize>>> {
         let taken = snapshot.env_ids();
         let envs = env_list(Some(env_ids.unwrap_or(&taken)), self.num_envs())?;

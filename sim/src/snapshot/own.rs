@@ -8,7 +8,7 @@ use crate::randomization::{NamedValue, Property, RandomizationError, Tables};
 use crate::simulation::Simulation;
 use std::sync::Arc;
 
-/// What an environment has for itself, and how often it was drawn for.
+/// Own property values of an environment, and the number of its randomizations.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct OwnProperties {
     pub(crate) values: Vec<NamedValue>,
@@ -19,7 +19,7 @@ pub(crate) struct OwnProperties {
 type Found<'s> = Vec<(Property, usize, &'s [f64])>;
 
 impl OwnProperties {
-    /// Where the values are in a scene.
+    /// Finds the elements of the values in a scene.
     fn found_in<'s>(&'s self, tables: &Tables, env: usize) -> Result<Found<'s>> {
         let mut found = Vec::with_capacity(self.values.len());
         for values in self.values.chunk_by(|a, b| a.property == b.property) {
@@ -45,9 +45,9 @@ impl OwnProperties {
 }
 
 impl Simulation {
-    /// The properties of an environment as a snapshot keeps them.
+    /// Properties of an environment as a snapshot stores them.
     pub(crate) fn own_properties(&self, env: usize, draws: u64) -> Arc<OwnProperties> {
-        // Before an environment is locked: it looks at one.
+        // Created before an environment is locked: the creation reads an environment.
         self.tables();
         let values = self.batch.read(env, |here| self.named_properties(env, here));
         Arc::new(OwnProperties { values, draws })
@@ -66,7 +66,7 @@ impl SimulationManager {
         for &env in &chosen {
             found.push(own(env).map_or_else(|| Ok(Vec::new()), |own| own.found_in(&tables, env))?);
         }
-        // Environments come in this order.
+        // Environments are visited in this order.
         let mut values = found.iter();
         self.simulation.change_properties(&chosen, |_, properties| {
             properties.become_nominal();

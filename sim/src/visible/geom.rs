@@ -1,4 +1,4 @@
-//! Shapes of MuJoCo's geoms.
+//! Shapes of MuJoCo's geoms for rendering.
 
 use super::identity::GeomIdentity;
 use kinetoscope_mujoco as mj;
@@ -11,7 +11,7 @@ use kinetoscope_scene::{Instance, Material};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// The shapes of a model's geoms; meshes and height fields are prepared once.
+/// Shapes of a model's geoms. Meshes and height fields are prepared once.
 pub(super) struct Shapes<'a> {
     model: &'a Model,
     meshes: HashMap<usize, Arc<RenderMesh>>,
@@ -23,11 +23,11 @@ impl<'a> Shapes<'a> {
         Self { model, meshes: HashMap::new(), fields: HashMap::new() }
     }
 
-    /// The shape of a geom.
+    /// Shape of a geom.
     ///
     /// # Errors
-    /// The reason why it cannot be drawn: a signed distance field, a mesh without triangles, a height field with an elevation
-    /// that is negative or not finite.
+    /// The reason why it cannot be rendered: a signed distance field, a mesh without triangles, a height field with an
+    /// elevation that is negative or not finite.
     pub(super) fn get(&mut self, geom: usize) -> Result<Shape, &'static str> {
         let size = &self.model.geom_size()[3 * geom..3 * geom + 3];
         let data = usize::try_from(self.model.geom_dataid()[geom]).ok();
@@ -52,7 +52,7 @@ impl<'a> Shapes<'a> {
     fn height_field(&mut self, field: usize) -> Option<HeightField> {
         if !self.fields.contains_key(&field) {
             let arrays = self.model.height_field(field);
-            // Several assets may be of one file.
+            // Several assets may use one file.
             let is_same = |known: &&HeightField| {
                 let size = (known.size(), known.rows(), known.columns());
                 size == (arrays.size, arrays.rows, arrays.columns) && **known.elevation() == *arrays.elevation
@@ -65,7 +65,7 @@ impl<'a> Shapes<'a> {
     }
 }
 
-/// The shape of a kind that is all sizes \[m\]; `None` for others.
+/// Shape of a geom type that its sizes \[m\] define; `None` for other types.
 pub(super) fn sized(kind: u32, size: &[f64]) -> Option<Shape> {
     let [x, y, z] = [0, 1, 2].map(|k| size[k] as f32);
     Some(match kind {
@@ -78,7 +78,7 @@ pub(super) fn sized(kind: u32, size: &[f64]) -> Option<Shape> {
     })
 }
 
-/// The instance of a site; `None` for a kind of shape that sites do not have.
+/// Instance of a site; `None` for a type of shape that sites do not have.
 pub(super) fn of_site(model: &Model, site: usize, identity: &GeomIdentity, material: Material) -> Option<Instance> {
     let shape = sized(model.site_type()[site] as u32, &model.site_size()[3 * site..3 * site + 3])?;
     let body = model.site_bodyid()[site] as usize;
@@ -101,8 +101,8 @@ pub(super) fn of_site(model: &Model, site: usize, identity: &GeomIdentity, mater
     })
 }
 
-/// Triangles with a vertex for each combination of position and texture coordinates. Normals are ours, smooth up to a
-/// crease: MuJoCo 2.2.2 smooths over every edge, which makes machined parts look inflated.
+/// Triangles with a vertex for each combination of position and texture coordinates. Normals are recomputed, smooth up
+/// to a crease: MuJoCo 2.2.2 smooths over every edge, which makes machined parts look inflated.
 fn render_mesh(model: &Model, mesh: usize) -> RenderMesh {
     let arrays = model.mesh(mesh);
     let mut vertices: HashMap<(i32, i32), u32> = HashMap::new();
@@ -116,7 +116,7 @@ fn render_mesh(model: &Model, mesh: usize) -> RenderMesh {
                 out.positions.push(arrays.positions.get(position as usize).copied().unwrap_or_default());
                 if let (Some(uvs), Some(all)) = (&mut out.uvs, arrays.texcoords) {
                     let [u, v] = all.get(texcoord as usize).copied().unwrap_or_default();
-                    // MuJoCo's v points down the image.
+                    // MuJoCo's v axis points down the image.
                     uvs.push([u, 1.0 - v]);
                 }
                 out.positions.len() as u32 - 1

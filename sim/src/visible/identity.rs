@@ -1,4 +1,4 @@
-//! Mask ids: which number stands for what.
+//! Mask ids: the numbers in the mask channel of cameras, and the elements that they identify.
 
 use super::{deforming, shown, surface};
 use crate::contents::Contents;
@@ -7,26 +7,26 @@ use kinetoscope_sensors::camera::Thing;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// What a number of the mask channel stands for, the same in every environment.
+/// Element that a number in the mask channel identifies, the same in every environment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MaskId {
-    /// The number, never 0.
+    /// Number in the mask channel, never 0.
     pub id: i32,
-    /// The robot, rigid object or geom of the world; in a model that was loaded as it is, the first body of the tree.
+    /// Robot, rigid object or geom of the world; in a model without a simulation, the first body of the tree.
     pub object: String,
-    /// The link, for robots; the tendon, for tendons of robots and parts.
+    /// Link of a robot; tendon of a robot or a part.
     pub link: Option<String>,
-    /// What kind of thing it is: `ground`, `terrain`, `robot`, `object` or the class that the object was given; `world`, `body`,
-    /// `tendon`, `skin` and `flex` in a model that was loaded as it is.
+    /// Class: `ground`, `terrain`, `robot`, `object` or the configured class of the object; `world`, `body`, `tendon`,
+    /// `skin` and `flex` in a model without a simulation.
     pub class: String,
-    /// MuJoCo's body.
+    /// Name of the body in MuJoCo.
     pub body: String,
-    /// MuJoCo's geoms; unnamed ones by number.
+    /// Names of the geoms in MuJoCo; an unnamed geom has its number.
     pub geoms: Vec<String>,
 }
 
 impl MaskId {
-    /// What it is called: the object, or `object/link`.
+    /// Full name: the object, or `object/link`.
     pub fn name(&self) -> String {
         self.link.as_ref().map_or_else(|| self.object.clone(), |link| format!("{}/{link}", self.object))
     }
@@ -38,18 +38,18 @@ impl From<&MaskId> for Thing {
     }
 }
 
-/// Who owns each geom.
+/// Mask ids of the elements of a model.
 #[derive(Clone, Debug)]
 pub(crate) struct Identities {
     table: Arc<[MaskId]>,
     of_geom: Vec<GeomIdentity>,
-    /// Sites that are drawn.
+    /// Rendered sites.
     of_site: Vec<(usize, GeomIdentity)>,
-    /// Drawn elements that change their shape.
+    /// Rendered elements whose shape changes.
     of_drawable: Vec<(Drawable, GeomIdentity)>,
 }
 
-/// An element of a model that is drawn and changes its shape, by its number in MuJoCo's arrays.
+/// Rendered element whose shape changes, by its index in MuJoCo's arrays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Drawable {
     Tendon(usize),
@@ -58,7 +58,7 @@ pub(crate) enum Drawable {
 }
 
 impl Drawable {
-    /// The kind of element, for a table of mask ids.
+    /// Class of the element in a table of mask ids.
     pub(crate) fn class(self) -> &'static str {
         match self {
             Self::Tendon(_) => "tendon",
@@ -67,7 +67,7 @@ impl Drawable {
         }
     }
 
-    /// The name of the element; of one without a name, its kind and number.
+    /// Name of the element; its class and index if it has no name.
     pub(crate) fn name(self, model: &Model) -> String {
         let (kind, number) = match self {
             Self::Tendon(tendon) => (ObjectKind::Tendon, tendon),
@@ -78,33 +78,33 @@ impl Drawable {
     }
 }
 
-/// Who owns a geom.
+/// Mask id and owner of a rendered element.
 #[derive(Clone, Debug)]
 pub(super) struct GeomIdentity {
     pub(super) mask_id: i32,
-    /// `uid/link`, the uid of an object, the name of a geom of the world.
+    /// Name: `uid/link`, the uid of an object, or the name of a geom of the world.
     pub(super) name: Arc<str>,
-    /// On the body axis of sensors; `None` for the world, and where there are no sensors.
+    /// Index on the body axis of sensors; `None` for the world, and for a model without sensors.
     pub(super) body: Option<u32>,
 }
 
 impl Identities {
-    /// Who owns a geom.
+    /// Mask id and owner of a geom.
     pub(super) fn of(&self, geom: usize) -> &GeomIdentity {
         &self.of_geom[geom]
     }
 
-    /// Sites that are drawn.
+    /// Rendered sites.
     pub(super) fn sites(&self) -> impl Iterator<Item = (usize, &GeomIdentity)> {
         self.of_site.iter().map(|(site, identity)| (*site, identity))
     }
 
-    /// Drawn elements that change their shape.
+    /// Rendered elements whose shape changes.
     pub(super) fn drawables(&self) -> impl Iterator<Item = (Drawable, &GeomIdentity)> {
         self.of_drawable.iter().map(|(drawable, identity)| (*drawable, identity))
     }
 
-    /// What each mask id is, in order.
+    /// Mask ids and their elements, in ascending order.
     pub(crate) fn table(&self) -> &[MaskId] {
         &self.table
     }
@@ -114,18 +114,18 @@ impl Identities {
     }
 }
 
-/// Name of a geom.
+/// Name of a geom, generated if it has no name.
 fn geom_name(model: &Model, geom: usize) -> String {
     model.name(ObjectKind::Geom, geom).unwrap_or_else(|| format!("geom {geom}"))
 }
 
-/// Name of a body.
+/// Name of a body, generated if it has no name.
 fn body_name(model: &Model, body: usize) -> String {
     model.name(ObjectKind::Body, body).unwrap_or_else(|| format!("body {body}"))
 }
 
-/// Each body has a number of its own, and so has each geom of the world, tendon, skin and flex; with `sites`, so have bodies with nothing but sites, and
-/// each site of the world.
+/// Assigns a mask id to each body, each geom of the world, tendon, skin and flex. With `sites`, bodies with sites only
+/// and sites of the world have mask ids as well.
 pub(super) fn by_body(model: &Model, sites: bool) -> Identities {
     let mut table: Vec<MaskId> = Vec::new();
     let mut of_body = vec![0; model.nbody()];
@@ -194,18 +194,18 @@ pub(super) fn by_body(model: &Model, sites: bool) -> Identities {
     Identities { table: table.into(), of_geom, of_site, of_drawable }
 }
 
-/// Who a geom of a simulation belongs to.
+/// Owner of a geom in a simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct Owner {
     pub(crate) id: i32,
     pub(crate) object: String,
     pub(crate) link: Option<String>,
     pub(crate) class: String,
-    /// On the body axis of sensors; `None` for the world.
+    /// Index on the body axis of sensors; `None` for the world.
     pub(crate) body: Option<u32>,
 }
 
-/// Identities of a simulation, given the owner of every geom, and of what is drawn and changes its shape.
+/// Mask ids of a simulation, from the owners of all geoms and of rendered elements whose shape changes.
 pub(crate) fn of_simulation(model: &Model, owners: &[Owner], of_drawables: &[(Drawable, Owner)]) -> Identities {
     let mut table: BTreeMap<i32, MaskId> = BTreeMap::new();
     for (geom, owner) in owners.iter().enumerate() {
@@ -244,7 +244,7 @@ pub(crate) fn of_simulation(model: &Model, owners: &[Owner], of_drawables: &[(Dr
     }
 }
 
-/// The owners of spatial tendons that are drawn: robots and parts of MJCF files have some.
+/// Owners of the visible spatial tendons, which belong to robots and parts from MJCF files.
 pub(crate) fn tendon_owners(model: &Model, contents: &Contents) -> Vec<(Drawable, Owner)> {
     let of_robots = contents.robots.iter().map(|robot| {
         (robot.uid(), robot.tendons(), robot.mask_id(robot.description().links.len()), robot.semantic_class())

@@ -1,4 +1,4 @@
-//! Lamps, headlight and sky of MuJoCo models.
+//! Lights, headlight and sky of MuJoCo models.
 
 use super::surface;
 use crate::contents::Contents;
@@ -9,26 +9,27 @@ use kinetoscope_mujoco::{Data, LightType, Model, ObjectKind, TextureType};
 use kinetoscope_scene::decode_srgb;
 use kinetoscope_scene::{Headlight, Hemisphere, HorizonHaze, Light, LightKind, LightSum, RenderScene, Sky};
 
-/// The light of a scene besides its lamps.
+/// Lighting of a scene besides its lights.
 #[derive(Clone, Debug)]
 pub(crate) enum Look<'a> {
-    /// That of simulations: our headlight, ambient light and sky, or the first skybox of these models. Light is added up in
-    /// linear light.
+    /// Lighting of simulations: their own headlight, ambient light and sky, or the first skybox of these models. Light
+    /// is summed in linear color space.
     Own {
-        /// Models of MJCF files, of which lamps are in the scene's model already.
+        /// Models of the MJCF files, whose lights are already in the scene's model.
         files: Vec<&'a Model>,
     },
-    /// That of MuJoCo's renderer: the lamps, the headlight, the skybox and the haze of one file, before a black background
-    /// without a skybox. Light is added up as numbers of the screen.
+    /// Lighting of MuJoCo's renderer: the lights, the headlight, the skybox and the haze of one file, and a black
+    /// background without a skybox. Light is summed in display color space.
     Mujoco {
-        /// The model of the file.
+        /// Model of the file.
         file: &'a Model,
     },
 }
 
 impl<'a> Look<'a> {
-    /// The look of a simulation. One that shows nothing but an MJCF file and the ground, with the lights that simulations have by
-    /// default, has MuJoCo's look without those; every other has ours, such as a recorded scene with no lights of its own.
+    /// Selects the lighting of a simulation. A simulation that shows only one MJCF file and the ground, with the
+    /// default lights, has MuJoCo's lighting without those lights. Every other simulation has the lighting of
+    /// simulations, such as a recorded scene without lights of its own.
     pub(crate) fn of(cfg: &SimulationManagerCfg, contents: &'a Contents) -> Self {
         let Contents { robots, objects, terrains, parts, .. } = contents;
         let by_default = cfg.lights == SimulationManagerCfg::default().lights;
@@ -45,10 +46,11 @@ impl<'a> Look<'a> {
     }
 }
 
-/// Distance of a skybox in MuJoCo's renderer, as a part of that of the far clipping plane, by its pictures.
+/// Distance of a skybox in MuJoCo's renderer relative to that of the far clipping plane, measured in its images.
 const SKYBOX_RADIUS: f64 = 0.99 * std::f64::consts::FRAC_1_SQRT_2;
 
-/// Sets the lamps, the headlight, the ambient light and the sky of `scene` to the model's. Returns what cannot be drawn.
+/// Sets the lights, the headlight, the ambient light and the sky of `scene` from the model. Returns a message about a
+/// skybox that cannot be rendered.
 pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> Option<String> {
     let linear = |color: [f32; 3]| if look.is_mujoco() { color } else { linear(color) };
     scene.lights = (0..model.nlight())
@@ -57,7 +59,7 @@ pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> 
             let spot = LightKind::Spot { cutoff_deg: light.cutoff_deg.min(90.0), exponent: light.exponent };
             let kind = match light.kind {
                 LightType::Directional => LightKind::Directional,
-                // OpenGL's spots of 180 degrees shine everywhere.
+                // In OpenGL, spot lights of 180 degrees shine in all directions.
                 LightType::Spot if light.cutoff_deg > 90.0 => LightKind::Point,
                 LightType::Spot => spot,
                 LightType::Point | LightType::Image => LightKind::Point,
@@ -70,16 +72,16 @@ pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> 
                 diffuse: linear(light.diffuse),
                 specular: linear(light.specular),
                 attenuation: light.attenuation,
-                // That of a directional lamp is an angle here, a length there.
+                // The radius of a directional light is an angle there, a length here.
                 radius: if kind == LightKind::Directional { 0.0 } else { light.radius.max(0.0) },
                 cast_shadow: light.cast_shadow,
-                // An image around everything is no lamp.
+                // An image-based light is not a light of the scene.
                 active: light.active && light.kind != LightType::Image,
             }
         })
         .collect();
     let files = match look {
-        // Not the headlight that MuJoCo gives to models that ask for none: ours goes with our ambient light.
+        // MuJoCo's default headlight is not used: this one matches the ambient light of simulations.
         Look::Own { files } => {
             scene.headlight = Headlight::default();
             &files[..]
@@ -95,7 +97,8 @@ pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> 
             scene.ambient = Hemisphere { sky: [0.0; 3], ground: [0.0; 3] };
             scene.sky = Sky::uniform([0.0; 3]);
             scene.light_sum = LightSum::Display;
-            // The lamp of a simulation: files of parts have no such name, for theirs begin with that of the part.
+            // The light of a simulation: lights of parts cannot have its name, since their names begin with that of the
+            // part.
             if !std::ptr::eq(*file, model)
                 && let Some(own) = model.id(ObjectKind::Light, &light_name(0)).and_then(|k| scene.lights.get_mut(k))
             {
@@ -118,20 +121,21 @@ pub(super) fn light(model: &Model, look: &Look<'_>, scene: &mut RenderScene) -> 
     }
     if look.is_mujoco() {
         let (color, width) = file.haze();
-        // Where there is a skybox, endless planes of MuJoCo's renderer end at it.
+        // With a skybox, infinite planes of MuJoCo's renderer end at it.
         let radius = (SKYBOX_RADIUS * file.clip()[1]) as f32;
         scene.horizon = Some(HorizonHaze { color, radius, width });
     }
     None
 }
 
-/// MuJoCo multiplies colours as they are on the screen; ours are multiplied in linear light. For one light the result is
-/// the same up to the small linear part of sRGB: (c l)^2.2 = c^2.2 l^2.2.
+/// Converts a light color to linear color space. MuJoCo multiplies colors in display space, the renderer here
+/// multiplies them in linear space. For one light the results agree up to the small linear part of sRGB: (c l)^2.2 =
+/// c^2.2 l^2.2.
 fn linear(color: [f32; 3]) -> [f32; 3] {
     color.map(decode_srgb)
 }
 
-/// Light of all domes together, linear; `None` without one.
+/// Sum of all dome lights, linear; `None` without a dome light.
 pub(super) fn domes(lamps: &[LightCfg]) -> Option<[f32; 3]> {
     let domes = lamps.iter().filter_map(|lamp| match lamp.kind {
         LampKind::Dome { intensity } => Some(linear(lamp.color.map(|c| c as f32)).map(|c| c * intensity as f32)),
@@ -140,7 +144,7 @@ pub(super) fn domes(lamps: &[LightCfg]) -> Option<[f32; 3]> {
     domes.reduce(|sum, dome| std::array::from_fn(|k| sum[k] + dome[k]))
 }
 
-/// Where the lamps are in `data`.
+/// Copies the poses of the lights in `data`.
 pub(super) fn read(data: &Data, lamps: &[Light], out: &mut [Light]) {
     let (positions, directions) = (data.light_xpos().as_chunks::<3>().0, data.light_xdir().as_chunks::<3>().0);
     for (index, (to, lamp)) in out.iter_mut().zip(lamps).enumerate() {
@@ -166,10 +170,10 @@ mod tests {
         <worldbody><light name="lamp" pos="0 0 3"/><geom type="plane" size="0 0 1"/>
             <body pos="0 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
 
-    /// The image of a skybox is MuJoCo's, texel for texel, and haze is where its renderer has it: endless planes end at
-    /// 0.99 zfar extent / sqrt(2).
+    /// The image of a skybox is MuJoCo's, texel for texel, and haze begins where MuJoCo's renderer has it: infinite
+    /// planes end at 0.99 zfar extent / sqrt(2).
     ///
-    /// Root cause once: every skybox was a gradient of three colours, and there was no haze.
+    /// Regression: every skybox was a gradient of three colors, and there was no haze.
     #[test]
     fn skybox_and_haze() {
         let model = mj::compile(STARS, &[]).expect("compiles").into_model();
@@ -186,16 +190,16 @@ mod tests {
         let haze = scene.horizon.expect("haze");
         assert_eq!((haze.color, haze.width), ([0.1, 0.2, 0.3], 0.4));
         assert!((haze.radius - 59.4 / 2.0f32.sqrt()).abs() < 1e-4, "{haze:?}");
-        // Without a skybox MuJoCo draws no haze.
+        // Without a skybox MuJoCo renders no haze.
         let plain = mj::compile("<mujoco><worldbody><geom type='plane' size='0 0 1'/></worldbody></mujoco>", &[]);
         let plain = Visible::of_model(&plain.expect("compiles").into_model());
         assert!(plain.scene().horizon.is_none() && plain.scene().skybox.is_none());
     }
 
-    /// A simulation that shows one MJCF file has the look of that file alone: its lamps, headlight, skybox and haze. With
-    /// anything else it has our light and the file's lamps and skybox.
+    /// A simulation that shows one MJCF file has the lighting of that file alone: its lights, headlight, skybox and
+    /// haze. With any other content it has the lighting of simulations, and the file's lights and skybox.
     ///
-    /// Root cause once: the headlight of files and their skyboxes were left out of simulations.
+    /// Regression: the headlight of files and their skyboxes were left out of simulations.
     #[test]
     fn look_of_simulations() {
         let scene = |change: &dyn Fn(&mut SimulationManagerCfg), ball: bool| {

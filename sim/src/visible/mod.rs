@@ -1,8 +1,9 @@
-//! From MuJoCo's geoms to the scene that cameras draw: `mj::Model -> Visible -> (RenderScene, poses per environment)`.
+//! Conversion of MuJoCo's geoms to the scene that cameras render: `mj::Model -> Visible -> (RenderScene, poses per
+//! environment)`.
 //!
-//! Every geom of the model is an instance, whatever file the model came from, and so are tendons, skins and flexes; geoms that stand for a visual of a URDF
-//! (see `mjcf::robot`) are replaced by its real shape. What does not change is extracted once; [`Visible::read`] copies
-//! the poses of one environment.
+//! Every geom of the model is an instance, whatever file the model came from, and so are tendons, skins and flexes.
+//! Proxy geoms of URDF visuals (see `mjcf::robot`) are replaced by the real shapes. Constant data is extracted once;
+//! [`Visible::read`] copies the poses of one environment.
 
 mod deforming;
 mod geom;
@@ -39,11 +40,11 @@ use kinetoscope_scene::{
 };
 use std::sync::Arc;
 
-/// What can be seen of a model.
+/// Render scene of a model, whose instances move with elements of the model.
 #[derive(Clone, Debug)]
 pub struct Visible {
     scene: Arc<RenderScene>,
-    /// The element of the model that each instance moves with.
+    /// Element of the model that each instance moves with.
     anchors: Vec<Anchor>,
     ids: Arc<[MaskId]>,
     left_out: Vec<String>,
@@ -51,24 +52,23 @@ pub struct Visible {
     buffers: Arc<Buffers>,
 }
 
-/// The element of a model that an instance moves with.
+/// Element of a model that an instance moves with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Anchor {
     Geom(usize),
     Site(usize),
-    /// The world, for what changes its shape.
+    /// World, for elements whose shape changes.
     World,
 }
 
-/// One thing that is drawn for a geom.
+/// Shape and material that are rendered for a geom.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
     pub(crate) shape: Shape,
     pub(crate) material: Material,
 }
 
-/// Pose of a geom in the frame of the link that it belongs to; in the frame of its body if there is no link, and the identity
-/// in the world.
+/// Pose of a geom in the frame of its link; in the frame of its body without a link, and the identity in the world.
 fn frame_from_geom(model: &Model, geom: usize, link: Option<&BodyFrame>) -> Pose {
     let body = model.geom_bodyid()[geom] as usize;
     let body_from_frame = match link {
@@ -81,7 +81,7 @@ fn frame_from_geom(model: &Model, geom: usize, link: Option<&BodyFrame>) -> Pose
     body_from_frame.inverse() * from_row(&[x, y, z, qw, qx, qy, qz])
 }
 
-/// The ground of a simulation.
+/// Ground of a simulation.
 pub(crate) fn ground(cfg: &GroundCfg) -> Part {
     let [r, g, b] = cfg.color.map(|c| c as f32);
     let material = Material { specular: 0.05, shininess: 0.1, ..Material::from_rgba([r, g, b, 1.0]) };
@@ -91,13 +91,13 @@ pub(crate) fn ground(cfg: &GroundCfg) -> Part {
         return Part { shape, material: cfg.surface.over(material) };
     }
     let shade = |k: f32| [r, g, b].map(|c| ((c * k).clamp(0.0, 1.0) * 255.0).round() as u8);
-    // Two by two squares of half a metre repeat once per metre. The texture brings the colour.
+    // Two by two squares of half a meter repeat once per meter. The texture supplies the color.
     let texture = Some(Arc::new(Texture::checker(256, shade(0.94), shade(1.08))));
     let material = Material { rgba: [1.0; 4], texture, tex_repeat: [2.0; 2], tex_uniform: true, ..material };
     Part { shape, material: cfg.surface.over(material) }
 }
 
-/// Position \[m\] and rotation matrix of elements in `data`.
+/// Positions \[m\] and rotation matrices of elements in `data`.
 fn places(data: &Data) -> impl Fn(Anchor) -> ([f64; 3], [f64; 9]) + '_ {
     let (positions, rotations) = (data.geom_xpos().as_chunks::<3>().0, data.geom_xmat().as_chunks::<9>().0);
     let sites = (data.site_xpos().as_chunks::<3>().0, data.site_xmat().as_chunks::<9>().0);
@@ -109,13 +109,14 @@ fn places(data: &Data) -> impl Fn(Anchor) -> ([f64; 3], [f64; 9]) + '_ {
 }
 
 impl Visible {
-    /// The geoms of `model` in the light of MuJoCo's renderer: each body has one mask id, each geom of the world its own.
+    /// Creates the scene of the geoms of `model` with the lighting of MuJoCo's renderer. Each body has one mask id,
+    /// each geom of the world its own.
     pub fn of_model(model: &Model) -> Self {
         Self::in_mujoco_look(model, &identity::by_body(model, false))
     }
 
-    /// The geoms and sites of `model`, as MuJoCo's viewers draw them. Mask ids are those of [`of_model`](Self::of_model);
-    /// bodies with nothing but sites and sites of the world have further ones.
+    /// Creates the scene of the geoms and sites of `model`, as in MuJoCo's viewers. Mask ids are those of
+    /// [`of_model`](Self::of_model); bodies with sites only, and sites of the world, have further ones.
     pub fn with_sites(model: &Model) -> Self {
         Self::in_mujoco_look(model, &identity::by_body(model, true))
     }
@@ -124,8 +125,8 @@ impl Visible {
         Self::extract(model, identities, &Replacements::new(), &[], &Surfaces::new(), &Look::Mujoco { file: model })
     }
 
-    /// The visual scene of `model`, with the geoms in `replacements` drawn as these parts. `frames` are those of
-    /// everything on the body axis of sensors; `painted` is what is known of surfaces besides, `look` the light.
+    /// Extracts the render scene of `model`. The geoms in `replacements` are rendered as these parts. `frames` are the
+    /// frames on the body axis of sensors, `painted` has additional surface properties, and `look` is the lighting.
     pub(crate) fn extract(
         model: &Model,
         identities: &Identities,
@@ -197,7 +198,7 @@ impl Visible {
             instances.push(instance);
             anchors.push(Anchor::Site(site));
         }
-        // Every instance was checked; there may still be too many triangles for 31 bits.
+        // Every instance was checked, but the triangles may still be too many for 31 bits.
         let mut scene = RenderScene::new(instances).unwrap_or_else(|error| {
             left_out.push(format!("nothing is drawn: {error}"));
             anchors.clear();
@@ -215,7 +216,7 @@ impl Visible {
         }
     }
 
-    /// This, with other instances in the place of its own, each moving with no geom. The lamps stay.
+    /// Returns this scene with other instances, which do not move with geoms. The lights stay.
     fn with_instances(&self, instances: Vec<Instance>) -> Result<Self, kinetoscope_scene::RenderSceneError> {
         let scene = Arc::new(self.scene.with_instances(instances)?);
         Ok(Self {
@@ -228,7 +229,7 @@ impl Visible {
         })
     }
 
-    /// With what MuJoCo does not know of lamps: their sizes, by name, and domes.
+    /// Adds the properties of lights that MuJoCo does not have: their radii, by name, and dome lights.
     pub(crate) fn with_lamps_of(mut self, model: &Model, lamps: &[LightCfg]) -> Self {
         let scene = Arc::make_mut(&mut self.scene);
         if let Some(light) = lighting::domes(lamps) {
@@ -243,13 +244,14 @@ impl Visible {
         self
     }
 
-    /// What the renderer draws, the same for all environments. Where a shape [changes](Instance::deforms), the scene of a moment
-    /// is [`scene_at`](Self::scene_at).
+    /// Render scene, the same for all environments. [`scene_at`](Self::scene_at) has the current shapes of instances
+    /// that [change their shape](Instance::deforms).
     pub fn scene(&self) -> &Arc<RenderScene> {
         &self.scene
     }
 
-    /// The scene with the shapes that tendons, skins and flexes have in `data`; [`scene`](Self::scene) if there are none.
+    /// Render scene with the shapes of tendons, skins and flexes in `data`; [`scene`](Self::scene) for a model without
+    /// them.
     pub fn scene_at(&self, data: &Data) -> Arc<RenderScene> {
         let mut out = OwnScene(None);
         self.shape(data, 0, &OwnScene(None), &mut out);
@@ -261,8 +263,8 @@ impl Visible {
         !self.deforming.is_empty()
     }
 
-    /// Puts the scene of environment `env`, whose own scene is `own`, into `out` with the shapes of `data`; `own` where no shape
-    /// changes. The memory of scenes that nothing holds any more is used again.
+    /// Puts the scene of environment `env`, whose own scene is `own`, into `out` with the shapes of `data`; `own`
+    /// itself if no shape changes. The memory of scenes without other holders is reused.
     pub(crate) fn shape(&self, data: &Data, env: usize, own: &OwnScene, out: &mut OwnScene) {
         if self.deforms() {
             let scene = own.0.as_ref().unwrap_or(&self.scene);
@@ -272,22 +274,22 @@ impl Visible {
         }
     }
 
-    /// What each mask id is.
+    /// Mask ids, and the elements that they identify.
     pub fn ids(&self) -> &Arc<[MaskId]> {
         &self.ids
     }
 
-    /// Elements that are not drawn, and why: textures or meshes that cannot be read; signed distance fields, which cameras do
-    /// not draw.
+    /// Messages about elements that are not rendered: textures or meshes that cannot be read, and signed distance
+    /// fields, which cameras do not support.
     pub fn left_out(&self) -> &[String] {
         &self.left_out
     }
 
-    /// Copies where everything is in `data`, in double precision: a pose for each instance, world from instance; the identity
-    /// for what [changes its shape](Instance::deforms).
+    /// Copies the poses in `data` in double precision: world from instance, for each instance; the identity for
+    /// instances that [change their shape](Instance::deforms).
     ///
     /// # Panics
-    /// The slice has another length than the scene's instances.
+    /// The slice does not have the length of the scene's instances.
     #[track_caller]
     pub fn read_exact(&self, data: &Data, poses: &mut [PoseF64]) {
         assert_eq!(poses.len(), self.anchors.len(), "a slice of another scene");
@@ -298,10 +300,10 @@ impl Visible {
         }
     }
 
-    /// Copies where everything is in `data`: a pose for each instance, world from instance, and the lamps.
+    /// Copies the poses in `data`: world from instance, for each instance, and the lights.
     ///
     /// # Panics
-    /// The slices have other lengths than the scene's instances and lights.
+    /// The slices do not have the lengths of the scene's instances and lights.
     #[track_caller]
     pub fn read(&self, data: &Data, poses: &mut [PoseF32], lights: &mut [Light]) {
         assert!(

@@ -5,18 +5,18 @@ use crate::contents::GROUND_MASK_ID;
 use crate::error::{Error, Result};
 use kinetoscope_scene::{Marker, PoseF32, RenderScene};
 
-/// An environment in the overview.
+/// Environment in the overview.
 pub(super) struct Place<'a> {
-    /// Where it is \[m\].
+    /// Position of the environment \[m\].
     pub(super) origin: [f32; 3],
-    /// What is in it.
+    /// Scene of the environment.
     pub(super) scene: &'a RenderScene,
-    /// Where its instances are, in the environment.
+    /// Poses of its instances, in the frame of the environment.
     pub(super) poses: &'a [PoseF32],
     pub(super) markers: Vec<Marker>,
 }
 
-/// Repeats the instances of `visible` at every place, and puts markers among them; the ground is there once.
+/// Repeats the instances of `visible` at every place, and adds markers; the ground is included once.
 pub(super) fn side_by_side(visible: &Visible, places: &[Place<'_>]) -> Result<(Visible, Vec<PoseF32>)> {
     let (mut instances, mut poses) = (Vec::new(), Vec::new());
     for (index, Place { origin, scene, poses: own, markers }) in places.iter().enumerate() {

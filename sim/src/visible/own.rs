@@ -1,4 +1,4 @@
-//! What an environment looks like whose sizes or colours are its own.
+//! Render scenes of environments with sizes or colors of their own.
 
 use super::{Anchor, Visible, geom};
 use kinetoscope_mujoco::{Data, Model};
@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 impl Visible {
-    /// The scene with other sizes \[m\] and colours, by geom of `model`. Meshes and textures are shared.
+    /// Creates the scene with other sizes \[m\] and colors, by geom of `model`. Meshes and textures are shared.
     ///
     /// # Errors
-    /// A size or a colour that cannot be drawn. Those of [`Properties`](crate::Properties) can.
+    /// A size or a color is invalid for rendering. Those of [`Properties`](crate::Properties) are valid.
     pub(crate) fn own_scene(
         &self,
         model: &Model,
@@ -33,7 +33,7 @@ impl Visible {
         Ok(OwnScene(Some(Arc::new(self.scene.with_instances(instances)?))))
     }
 
-    /// This with the shapes of `data`, of which nothing else has a part.
+    /// Returns this scene with the shapes of `data`, in memory that is not shared.
     pub(super) fn at(self: &Arc<Self>, data: &Data) -> Arc<Self> {
         if !self.deforms() {
             return Arc::clone(self);
@@ -43,7 +43,7 @@ impl Visible {
         Arc::new(Self { scene, buffers: Arc::default(), ..(**self).clone() })
     }
 
-    /// This as it is in an environment whose scene is `own`.
+    /// Returns this scene as in an environment whose own scene is `own`.
     pub(super) fn seen_as(self: &Arc<Self>, own: &OwnScene) -> Arc<Self> {
         match &own.0 {
             None => Arc::clone(self),
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use kinetoscope_mujoco as mj;
 
-    /// A look that cannot be drawn is an error, not the nominal one.
+    /// Sizes and colors that cannot be rendered are an error; the scene does not fall back to the nominal ones.
     #[test]
     fn invalid_appearance() {
         let text = r#"<mujoco><worldbody><geom type="box" size="0.1 0.2 0.3"/></worldbody></mujoco>"#;

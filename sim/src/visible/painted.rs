@@ -1,7 +1,7 @@
-//! Surfaces that configurations give to what a model has.
+//! Surface properties that configurations give to elements of a model.
 
 use crate::surface_cfg::SurfaceCfg;
 use std::collections::BTreeMap;
 
-/// Looks of surfaces, by the name of their instance.
+/// Surface properties, by the name of their instance.
 pub(crate) type Surfaces = BTreeMap<String, SurfaceCfg>;

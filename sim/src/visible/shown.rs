@@ -1,9 +1,9 @@
-//! The rule of groups: which sites, tendons, skins and flexes are drawn.
+//! Visibility of sites, tendons, skins and flexes by group.
 
-/// The largest geom group that is drawn by default, as in MuJoCo's viewers.
+/// Largest group that is rendered by default, as in MuJoCo's viewers.
 const LAST_SHOWN_GROUP: i32 = 2;
 
-/// True if a site, tendon, skin or flex is shown by MuJoCo's viewers.
+/// True if MuJoCo's viewers show a site, tendon, skin or flex.
 pub(super) fn is_shown(group: i32, rgba: &[f32]) -> bool {
     group <= LAST_SHOWN_GROUP && rgba[3] > 0.0
 }
@@ -24,10 +24,10 @@ mod tests {
         </worldbody>
         <tendon><spatial name="string"><site site="hidden"/><site site="end"/></spatial></tendon></mujoco>"#;
 
-    /// Sites of groups 0 to 2 are drawn where they are, the others are not; a spatial tendon is drawn; geoms and tendons have
-    /// the mask ids that they have beside sites.
+    /// Sites of groups 0 to 2 are rendered at their positions, others are not. A spatial tendon is rendered. Geoms and
+    /// tendons have the same mask ids with and without sites.
     ///
-    /// Root cause once: only geoms were drawn, and nothing said so.
+    /// Regression: only geoms were rendered, without a message about the rest.
     #[test]
     fn sites_and_tendons() {
         let model = mj::compile(SCENE, &[]).expect("compiles").into_model();
@@ -53,7 +53,7 @@ mod tests {
         assert_eq!([named(2), named(3)], [("string".into(), "tendon"), ("goal".into(), "world")]);
     }
 
-    /// A model alone is drawn in its own light, before a black background.
+    /// A model alone is rendered with its own lighting, before a black background.
     #[test]
     fn light_of_the_file() {
         let model = mj::compile(SCENE, &[]).expect("compiles").into_model();
@@ -61,7 +61,7 @@ mod tests {
         let scene = visible.scene();
         assert_eq!((scene.sky, scene.light_sum), (Sky::uniform([0.0; 3]), LightSum::Display));
         assert_eq!(scene.ambient, Hemisphere { sky: [0.0; 3], ground: [0.0; 3] });
-        // MuJoCo's numbers, as they are.
+        // MuJoCo's values, unchanged.
         assert_eq!((scene.headlight.diffuse, scene.lights[0].diffuse), ([0.4; 3], [0.7; 3]));
         assert!(scene.headlight.active, "also beside lights");
     }

@@ -1,4 +1,4 @@
-//! A model at one moment, ready to be drawn without a simulation around it.
+//! Model at one moment, which can be rendered without a simulation.
 
 use super::{MaskId, Visible, overview};
 use crate::error::{Error, Result};
@@ -15,7 +15,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::path::Path;
 use std::sync::Arc;
 
-/// A model at one moment: what can be seen, and where it is.
+/// Posed scene: a model at one moment, with its render scene, poses, lights and cameras.
 #[derive(Clone, Debug)]
 pub struct Still {
     visible: Arc<Visible>,
@@ -23,42 +23,42 @@ pub struct Still {
     lights: Vec<Light>,
     cameras: Vec<ModelCamera>,
     free_camera: FreeCamera,
-    /// Direction of first views.
+    /// Viewing direction of [`first_view`](Self::first_view).
     forward: [f64; 3],
 }
 
-/// A camera that a model file describes.
+/// Camera that a model file defines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelCamera {
-    /// Its name; empty where the file gives none.
+    /// Name of the camera; empty if the file gives no name.
     pub name: String,
-    /// Where it is, with ROS's optical axes (x right, y down, z forward).
+    /// Pose in the world, with ROS's optical axes (x right, y down, z forward).
     pub world_from_camera: Pose,
     /// Vertical field of view \[rad\].
     pub fovy: f64,
 }
 
-/// Where MuJoCo's viewers look from when they open a model.
+/// Free camera: the initial viewpoint of MuJoCo's viewers for a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeCamera {
-    /// Where the camera is \[m\].
+    /// Position of the camera \[m\].
     pub eye: [f64; 3],
-    /// Where it looks \[m\].
+    /// Point that the camera looks at \[m\].
     pub target: [f64; 3],
     /// Vertical field of view \[rad\].
     pub fovy: f64,
-    /// Nearest and farthest depth that is seen \[m\].
+    /// Depths of the near and the far clipping plane \[m\].
     pub clip: [f64; 2],
 }
 
-/// Direction of first views of simulations, that of windows: from the front, the side and above.
+/// Viewing direction of first views of simulations, as in windows: from the front, the side and above.
 const ASIDE: [f64; 3] = [-0.664, 0.608, -0.435];
 
 impl Still {
-    /// The model of an MJCF file, at the positions `qpos` (those of the file where `None`).
+    /// Creates the posed scene of an MJCF file, at the positions `qpos` (`None` for those of the file).
     ///
     /// # Errors
-    /// MuJoCo refuses the file; `qpos` has not one finite number for each position of the model.
+    /// MuJoCo rejects the file, or `qpos` does not have one finite number for each position of the model.
     pub fn of_mjcf(path: impl AsRef<Path>, qpos: Option<&[f64]>) -> Result<Self> {
         let path = path.as_ref();
         if let Err(error) = std::fs::metadata(path) {
@@ -80,26 +80,27 @@ impl Still {
         data.step1()?;
         let still = Self::of_data(&Arc::new(Visible::with_sites(&model)), &data);
         let FreeCamera { eye, target, .. } = still.free_camera;
-        // The author of the file chose the angles.
+        // The author of the file chose the viewing direction.
         Ok(Self { forward: [0, 1, 2].map(|k| target[k] - eye[k]), ..still })
     }
 
-    /// One environment of a simulation as it is now.
+    /// Creates the posed scene of one environment of a simulation in its current state.
     ///
     /// # Errors
-    /// There is no such environment.
+    /// The environment does not exist.
     pub fn of_env(sim: &mut SimulationManager, env: EnvId) -> Result<Self> {
         env_mask(Some(&[env]), sim.num_envs())?;
         let visible = sim.scene_mut().visible().seen_as(sim.own_scene(env));
         Ok(sim.simulation.batch.read(env.0, |env| Self::of_data(&visible, env.data())))
     }
 
-    /// Several environments side by side, as [`SimulationManagerCfg::env_origins`](crate::SimulationManagerCfg::env_origins) places them (all of them where `envs` is
-    /// `None`), with markers in them. What belongs to the ground is drawn once; lamps and cameras are those of environment 0. Everything else is drawn in every environment: terrain that
-    /// is larger than the space between them overlaps.
+    /// Creates the posed scene of several environments side by side (`None` for all environments), placed by
+    /// [`SimulationManagerCfg::env_origins`](crate::SimulationManagerCfg::env_origins), with markers in them. The
+    /// ground is rendered once; lights and cameras are those of environment 0. Everything else is rendered in every
+    /// environment: a terrain that is larger than the space between environments overlaps.
     ///
     /// # Errors
-    /// An environment does not exist, or there are more triangles than can be drawn.
+    /// An environment does not exist, or there are more triangles than can be rendered.
     pub fn overview(sim: &mut SimulationManager, envs: Option<&[EnvId]>, markers: &[(EnvId, Marker)]) -> Result<Self> {
         let envs = env_list(envs, sim.num_envs())?;
         env_list(Some(&markers.iter().map(|(env, _)| *env).collect::<Vec<_>>()), sim.num_envs())?;
@@ -142,25 +143,25 @@ impl Still {
         }
     }
 
-    /// What can be seen.
+    /// Render scene of the model.
     pub fn visible(&self) -> &Arc<Visible> {
         &self.visible
     }
 
-    /// What each mask id is.
+    /// Mask ids, and the elements that they identify.
     pub fn mask_ids(&self) -> &[MaskId] {
         self.visible.ids()
     }
 
-    /// The cameras of the file.
+    /// Cameras of the model file.
     pub fn cameras(&self) -> &[ModelCamera] {
         &self.cameras
     }
 
-    /// The camera of the file called `name`.
+    /// Camera of the model file called `name`.
     ///
     /// # Errors
-    /// There is none; the error lists those there are.
+    /// The camera does not exist; the error lists the nearest names.
     pub fn camera(&self, name: &str) -> Result<&ModelCamera> {
         self.cameras.iter().find(|c| c.name == name).ok_or_else(|| Error::UnknownName {
             what: "camera",
@@ -172,14 +173,14 @@ impl Still {
         })
     }
 
-    /// Where MuJoCo's viewers look from when they open the model.
+    /// Initial viewpoint of MuJoCo's viewers for the model.
     pub fn free_camera(&self) -> FreeCamera {
         self.free_camera
     }
 
-    /// From where everything that is drawn, but the ground and what surrounds the rest, fills an image of `size` pixels: in the
-    /// direction of [`free_camera`](Self::free_camera) for an MJCF file, from the front, the side and above for a simulation. The
-    /// clipping planes leave room to look from elsewhere.
+    /// Viewpoint from which all rendered shapes, except the ground and shapes that surround the rest, fill an image of
+    /// `size` pixels. The direction is that of [`free_camera`](Self::free_camera) for an MJCF file; it is from the
+    /// front, the side and above for a simulation. The clipping planes leave room for other viewpoints.
     pub fn first_view(&self, size: [usize; 2]) -> FreeCamera {
         let FreeCamera { eye, target, fovy, clip: [near, far] } = self.free_camera;
         let [width, height] = size.map(|n| n.max(1) as f64);
@@ -189,17 +190,17 @@ impl Still {
         };
         let distance = Vector3::from(placement.eye).metric_distance(&Vector3::from(placement.target));
         let extent = placement.extent.max(distance);
-        // The drawn shapes may be larger or smaller than the geoms of MuJoCo's model.
+        // The rendered shapes may be larger or smaller than the geoms of MuJoCo's model.
         let clip = [near.min(0.01 * placement.extent).max(1e-6), far.max(100.0 * extent)];
         FreeCamera { eye: placement.eye, target: placement.target, fovy, clip }
     }
 
-    /// Drawn instances with their poses.
+    /// Rendered instances with their poses.
     pub fn placed(&self) -> Placed<'_> {
         Placed { scene: self.visible.scene(), poses: &self.poses, origin: [0.0; 3], reach: f32::INFINITY }
     }
 
-    /// What a rasterizer needs to draw it.
+    /// Render request for the scene from `view`.
     pub fn shot<'a>(&'a self, view: &'a View) -> Shot<'a> {
         Shot {
             scene: self.visible.scene(),
@@ -226,7 +227,8 @@ fn model_camera(data: &Data, camera: usize) -> ModelCamera {
     }
 }
 
-/// Source: `mjv_defaultFreeCamera` and `mjv_cameraInModel`: 1.5 extents away from the middle, by azimuth and elevation.
+/// Free camera of a model: 1.5 extents away from the middle, by azimuth and elevation. Source: `mjv_defaultFreeCamera`
+/// and `mjv_cameraInModel`.
 fn free_camera(model: &Model) -> FreeCamera {
     let [fovy, azimuth, elevation] = model.free_camera().map(f64::to_radians);
     let (target, distance) = (model.center(), 1.5 * model.extent());

@@ -5,7 +5,7 @@ use kinetoscope_mujoco::{Model, TextureType};
 use kinetoscope_scene::{Material, Texture, TextureKind};
 use std::sync::Arc;
 
-/// The materials of a model.
+/// Materials of a model, for rendering.
 pub(super) struct Surfaces<'a> {
     model: &'a Model,
     materials: Vec<Material>,
@@ -44,13 +44,13 @@ impl<'a> Surfaces<'a> {
         Self { model, materials, left_out }
     }
 
-    /// The look of a geom.
+    /// Material of a geom.
     pub(super) fn of_geom(&self, geom: usize) -> Material {
         let rgba = color_of(self.model, geom);
         match usize::try_from(self.model.geom_matid()[geom]).ok().and_then(|m| self.materials.get(m)) {
             None => Material::from_rgba(rgba),
             Some(material) => {
-                // MuJoCo mirrors the scene in planes and in the upper face of boxes only.
+                // MuJoCo reflects the scene in planes and in the upper face of boxes only.
                 let mirrors = matches!(self.model.geom_type()[geom] as u32, mj::mjGEOM_PLANE | mj::mjGEOM_BOX);
                 let reflectance = if mirrors { material.reflectance } else { 0.0 };
                 Material { rgba, reflectance, ..material.clone() }
@@ -58,12 +58,12 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// The look of a site.
+    /// Material of a site.
     pub(super) fn of_site(&self, site: usize) -> Material {
         self.material(&self.model.site_rgba()[4 * site..4 * site + 4], self.model.site_matid()[site])
     }
 
-    /// The look of an element with this colour and material.
+    /// Material of an element with this color and material.
     pub(super) fn material(&self, rgba: &[f32], material: i32) -> Material {
         let rgba = color(self.model, rgba, material);
         match usize::try_from(material).ok().and_then(|m| self.materials.get(m)) {
@@ -72,24 +72,24 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// What cannot be drawn.
+    /// Messages about textures that cannot be rendered.
     pub(super) fn left_out(&self) -> &[String] {
         &self.left_out
     }
 }
 
-/// Colour and opacity of a geom. A colour of the geom's own goes over its material's, as in MuJoCo's viewer.
+/// Color and opacity of a geom. A color of the geom's own overrides that of its material, as in MuJoCo's viewer.
 pub(crate) fn color_of(model: &Model, geom: usize) -> [f32; 4] {
     color(model, &model.geom_rgba()[4 * geom..4 * geom + 4], model.geom_matid()[geom])
 }
 
-/// Colour and opacity of a site, as those of a geom.
+/// Color and opacity of a site, by the rule for geoms.
 pub(super) fn color_of_site(model: &Model, site: usize) -> [f32; 4] {
     color(model, &model.site_rgba()[4 * site..4 * site + 4], model.site_matid()[site])
 }
 
 pub(super) fn color(model: &Model, own: &[f32], material: i32) -> [f32; 4] {
-    /// MuJoCo's grey of geoms that say nothing.
+    /// MuJoCo's gray of geoms without a color.
     const UNSET: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
     let own = [own[0], own[1], own[2], own[3]].map(|c| c.clamp(0.0, 1.0));
     match usize::try_from(material) {
@@ -100,7 +100,7 @@ pub(super) fn color(model: &Model, own: &[f32], material: i32) -> [f32; 4] {
     }
 }
 
-/// A texture of surfaces; `None` for a skybox.
+/// Texture of surfaces; `None` for a skybox.
 fn texture(model: &Model, index: usize) -> Result<Option<Arc<Texture>>, String> {
     let kind = match model.texture(index).map(|arrays| arrays.kind) {
         Some(TextureType::Skybox) => return Ok(None),
@@ -110,7 +110,7 @@ fn texture(model: &Model, index: usize) -> Result<Option<Arc<Texture>>, String> 
     image(model, index, kind).map(Some)
 }
 
-/// The image of a skybox.
+/// Image of a skybox.
 pub(super) fn skybox(model: &Model, index: usize) -> Result<Arc<Texture>, String> {
     image(model, index, TextureKind::Cube)
 }
@@ -118,13 +118,13 @@ pub(super) fn skybox(model: &Model, index: usize) -> Result<Arc<Texture>, String
 fn image(model: &Model, index: usize, kind: TextureKind) -> Result<Arc<Texture>, String> {
     let Some(arrays) = model.texture(index) else { return Err("its pixels are not in the model".into()) };
     let size = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-    // Grey images have one channel, or two with opacity.
+    // Gray images have one channel, or two with opacity.
     let colors: Vec<u8> = match arrays.channels {
         1 | 2 => arrays.pixels.chunks_exact(arrays.channels).flat_map(|p| [p[0]; 3]).collect(),
         _ => Vec::new(),
     };
     let (channels, pixels) = if colors.is_empty() { (arrays.channels, arrays.pixels) } else { (3, &colors[..]) };
-    // A square is the same on all faces of the cube.
+    // A square image is the same on all faces of the cube.
     let is_square = kind == TextureKind::Cube && arrays.height == arrays.width;
     let (faces, repeated) = if is_square { (6, pixels.repeat(6)) } else { (1, Vec::new()) };
     let pixels = if is_square { &repeated[..] } else { pixels };

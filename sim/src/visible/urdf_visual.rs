@@ -1,4 +1,4 @@
-//! Visuals of URDF files and of objects that are meshes: what is drawn in place of their proxy geoms.
+//! Visuals of URDF files and of mesh objects, which are rendered in place of their proxy geoms.
 
 use super::Part;
 use crate::objects::rigid_object_data::RigidObjectData;
@@ -15,10 +15,10 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
-/// What is drawn in place of a geom.
+/// Parts that are rendered in place of geoms, by geom.
 pub(crate) type Replacements = HashMap<usize, Vec<Part>>;
 
-/// Visual meshes and textures that were read: adding a robot reads only what is new.
+/// Cache of visual meshes and textures: adding a robot reads only new files.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct VisualCache {
     meshes: BTreeMap<MeshKey, Arc<[MeshPart]>>,
@@ -26,14 +26,14 @@ pub(crate) struct VisualCache {
     diagnostics: Vec<Diagnostic>,
 }
 
-/// A part of a mesh file, and its material where the file has one.
+/// Part of a mesh file, and its material if the file has one.
 #[derive(Clone, Debug)]
 struct MeshPart {
     shape: kinetoscope_scene::shape::Shape,
     material: Option<Material>,
 }
 
-/// Whose look is read, as diagnostics say it.
+/// Owner of a visual in diagnostics.
 struct Of {
     name: String,
     source: Option<Source>,
@@ -46,18 +46,18 @@ enum TextureSourceKey {
 }
 
 impl VisualCache {
-    /// What could not be read since the last call.
+    /// Takes the diagnostics since the last call.
     pub(crate) fn take_diagnostics(&mut self) -> Vec<Diagnostic> {
         std::mem::take(&mut self.diagnostics)
     }
 
-    /// An environment does not look as its properties say.
+    /// Reports that an environment is rendered with nominal sizes and colors.
     pub(crate) fn say_look(&mut self, env: usize, error: &kinetoscope_scene::RenderSceneError) {
         let message = format!("environment {env} is drawn with nominal sizes and colours: its own cannot be: {error}");
         self.diagnostics.push(Diagnostic::new(DiagnosticKind::LookInvalid, None, message));
     }
 
-    /// Warns of a robot from URDF files that cameras do not see.
+    /// Warns about a robot from URDF files without visual shapes.
     pub(crate) fn check_robot(&mut self, robot: &RobotData) {
         let description = robot.description();
         if robot.file().is_some() || description.links.iter().any(|link| !link.visuals.is_empty()) {
@@ -72,7 +72,7 @@ impl VisualCache {
         self.diagnostics.push(Diagnostic::new(DiagnosticKind::NothingToDraw, source, message));
     }
 
-    /// What is drawn for a visual.
+    /// Parts that are rendered for a visual.
     pub(crate) fn parts(&mut self, link: &str, visual: &Visual) -> Vec<Part> {
         let of = Of { name: format!("link {link:?}"), source: Some(visual.source.clone()) };
         let own = visual.material.as_ref().map(|m| {
@@ -104,7 +104,7 @@ impl VisualCache {
                     parts
                 });
                 let mut parts = drawn(&parts, &Material::default());
-                // A material of the URDF goes over those of the mesh file, as in exports.
+                // A material of the URDF overrides those of the mesh file, as in exports.
                 if let Some((rgba, texture)) = own {
                     for part in &mut parts {
                         if let Some(rgba) = rgba {
@@ -120,7 +120,7 @@ impl VisualCache {
         }
     }
 
-    /// What is drawn for an object that is a mesh.
+    /// Parts that are rendered for a mesh object.
     pub(crate) fn object_parts(&mut self, object: &RigidObjectData) -> Vec<Part> {
         let of = Of { name: format!("object {:?}", object.uid()), source: None };
         let Some((key, mesh)) = object.mesh_key().zip(object.mesh().and_then(|mesh| mesh.seen.as_ref())) else {
@@ -135,11 +135,11 @@ impl VisualCache {
         drawn(&parts, &Material::from_rgba(object.cfg().rgba.map(|c| c as f32)))
     }
 
-    /// The parts of a mesh file, one for each material.
+    /// Reads the parts of a mesh file, one for each material.
     fn load(&mut self, of: &Of, path: &Path, scale: [f64; 3]) -> Vec<MeshPart> {
         match kinetoscope_scene::mesh::load(path) {
             Ok(mesh) => self.mesh_parts(of, &mesh.scaled(scale)),
-            // A warning about it was given when the robot was read.
+            // The reader of the robot already warned about a missing file.
             Err(_) if !path.exists() => Vec::new(),
             Err(error) => {
                 self.diagnostics.push(Diagnostic::new(
@@ -193,7 +193,7 @@ impl VisualCache {
     }
 }
 
-/// Parts with their own materials, or `otherwise`.
+/// Parts with their own materials, or with `otherwise`.
 fn drawn(parts: &[MeshPart], otherwise: &Material) -> Vec<Part> {
     let material = |part: &MeshPart| part.material.clone().unwrap_or_else(|| otherwise.clone());
     parts.iter().map(|part| Part { shape: part.shape.clone(), material: material(part) }).collect()

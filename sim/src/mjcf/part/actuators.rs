@@ -1,11 +1,11 @@
-//! Actuators, all as MuJoCo's general one: its shortcuts only choose parameters.
+//! Writer of the actuators of a part, all as `<general>`: MuJoCo's shortcuts only choose parameters of it.
 
 use super::super::write::{Element, number};
 use super::{PartError, Writing, row, row_of, some};
 use kinetoscope_mujoco::words;
 
 impl Writing<'_> {
-    /// Actuators without and with an activation; a robot has drives in their place.
+    /// Writes actuators without an activation state, and actuators with one. A robot has drives in their place.
     pub(super) fn actuators(&self) -> Result<[Vec<String>; 2], PartError> {
         let mut lists = [Vec::new(), Vec::new()];
         if self.rig.is_some() {
@@ -27,7 +27,7 @@ impl Writing<'_> {
         let gain = words::gain(m.actuator_gaintype()[a]).ok_or_else(|| beyond("a gaintype"))?;
         let bias = words::bias(m.actuator_biastype()[a]).ok_or_else(|| beyond("a biastype"))?;
         let dynamics = match dynamics {
-            // The same filter, which 2.2.2 integrates with Euler's rule.
+            // The same filter, which MuJoCo 2.2.2 integrates with Euler's rule.
             "filterexact" if !self.newer("actuator", a, "dyntype filterexact, for which filter stands") => "filter",
             known => known,
         };

@@ -1,4 +1,4 @@
-//! Meshes, height fields, textures and materials, as MuJoCo keeps them.
+//! Writer of the meshes, height fields, textures and materials of a part.
 
 use super::super::write::Element;
 use super::{PartError, Writing, row, singles};
@@ -6,7 +6,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use kinetoscope_mujoco::{Asset, MeshArrays, Target, TextureType, words};
 use std::collections::HashMap;
 
-/// Order in which MuJoCo stacks the squares of a cube.
+/// Order in which MuJoCo stacks the faces of a cube texture.
 const CUBE: &str = "RLUDFB";
 
 impl Writing<'_> {
@@ -25,7 +25,8 @@ impl Writing<'_> {
         textures.chain(materials).chain(meshes).chain(fields).collect()
     }
 
-    /// Whether a texture belongs to the part: a sky is around everything, and pixels may not be in the model.
+    /// True if a texture is written with the part. A skybox surrounds the whole scene, and pixels may be missing in the
+    /// model.
     fn is_written(&self, texture: usize) -> bool {
         self.model.texture(texture).is_some_and(|t| t.kind != TextureType::Skybox && color(t.channels).is_some())
     }
@@ -79,7 +80,7 @@ impl Writing<'_> {
         let Corners { positions, texcoords, triangles } = corners(&self.model.mesh(mesh));
         let mut element = Element::new("mesh").attr("name", self.full(&self.names.meshes[mesh]));
         if self.target == Target::V4 && !self.collides(mesh) {
-            // As for visuals of robots: what is only seen may be flat or open.
+            // As for visuals of robots: a mesh without collisions may be flat or open.
             element = element.attr("inertia", "shell");
         }
         if let Some(texcoords) = texcoords {
@@ -100,7 +101,7 @@ impl Writing<'_> {
         })
     }
 
-    /// The files that the assets name.
+    /// Creates the files that the assets refer to.
     pub(super) fn files(&self) -> Result<Vec<Asset>, PartError> {
         let m = self.model;
         let mut files = Vec::new();
@@ -125,7 +126,7 @@ impl Writing<'_> {
     }
 }
 
-/// What a number of bytes per pixel means.
+/// Color type for a number of channels of 8 bits.
 fn color(channels: usize) -> Option<ExtendedColorType> {
     match channels {
         1 => Some(ExtendedColorType::L8),
@@ -135,7 +136,7 @@ fn color(channels: usize) -> Option<ExtendedColorType> {
     }
 }
 
-/// Triangles with one index for position and texture coordinate, as MJCF has them.
+/// Triangles with one index for position and texture coordinate, as in MJCF.
 struct Corners {
     positions: Vec<[f32; 3]>,
     texcoords: Option<Vec<[f32; 2]>>,

@@ -1,4 +1,4 @@
-//! Bodies with what is in them: mass, joints, geoms, sites, cameras, lights.
+//! Writer of the bodies of a part, with mass properties, joints, geoms, sites, cameras and lights.
 
 use super::super::write::{Element, number};
 use super::{Base, PartError, Passive, Writing, row, row_of, singles, some};
@@ -6,10 +6,10 @@ use kinetoscope_mujoco::{LightType, Target, words};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
 
-/// MuJoCo's grey of geoms that say nothing: a material's colour shows through.
+/// MuJoCo's gray of geoms without a color; it lets the color of the material show through.
 const UNSET: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
 
-/// What each body of the file has of a kind, by the bodies of that kind.
+/// Indices of the elements of one kind in each body. `of` has the body of each element.
 fn by_body(bodies: usize, of: &[i32]) -> Vec<Vec<usize>> {
     let mut lists = vec![Vec::new(); bodies];
     for (index, body) in of.iter().enumerate() {
@@ -33,7 +33,7 @@ impl Tree {
 }
 
 impl Writing<'_> {
-    /// The bodies of the world, depth first with a stack of our own, as the document's writer goes.
+    /// Writes the bodies depth first with an explicit stack, like the writer of the document.
     pub(super) fn bodies(&self) -> Result<Vec<String>, PartError> {
         enum Visit {
             Enter(usize),
@@ -61,7 +61,7 @@ impl Writing<'_> {
         }
         tree.push("</body>");
         if self.rig.is_none() {
-            // In the world itself: 2.2.2 finds the contacts of planes in other bodies twice.
+            // In the world body: MuJoCo 2.2.2 finds the contacts of planes in other bodies twice.
             self.shapes(0, &contents, &mut tree)?;
         }
         let mut stack: Vec<Visit> = children[0].iter().rev().map(|&b| Visit::Enter(b)).collect();
@@ -142,7 +142,8 @@ impl Writing<'_> {
         Ok(())
     }
 
-    /// A pose in a body of the file as one in the same body of the scene, where the file's world stands at the part's pose.
+    /// Transforms a pose in a body of the file to the same body of the scene. The pose of the part applies to children
+    /// of the world.
     fn in_body(&self, body: i32, place: [f64; 7]) -> [f64; 7] {
         let moved = body == 0 && *self.pose != Pose::identity();
         if moved { to_row(&(self.pose * from_row(&place))) } else { place }
@@ -178,7 +179,7 @@ impl Writing<'_> {
             true => element.attr("limited", "true").numbers("range", row(m.jnt_range(), 2, joint)),
             false => element.attr("limited", "false"),
         };
-        // A robot's drives have that limit in their largest effort, which the configuration may raise.
+        // A robot's drives have that limit as their largest effort, which the configuration may raise.
         if self.rig.is_none()
             && let Some(range) = m.joint_actuator_force(joint)
             && self.newer("joint", joint, &format!("actuatorfrcrange {range:?}"))
@@ -239,7 +240,7 @@ impl Writing<'_> {
             .numbers("solimp", row_of(m.geom_solimp(), m.ngeom(), geom))
             .attr("margin", number(m.geom_margin()[geom]))
             .attr("gap", number(m.geom_gap()[geom]));
-        // The first number says whether the others are used; those after the five coefficients come from the size.
+        // The first number enables the coefficients; the numbers after the five coefficients follow from the size.
         let fluid = row_of(m.geom_fluid(), m.ngeom(), geom);
         if let Some(coefficients) = fluid.get(1..6).filter(|_| fluid[0] > 0.0) {
             element = element.attr("fluidshape", "ellipsoid").numbers("fluidcoef", coefficients);
@@ -280,7 +281,7 @@ impl Writing<'_> {
         Ok(pose(element, &place))
     }
 
-    /// A light; none where it is a picture all around, which lights whole scenes.
+    /// Writes a light; `None` for an image-based light, which lights whole scenes.
     fn light(&self, light: usize) -> Result<Option<Element>, PartError> {
         let m = self.model;
         let mode = words::follow(m.light_mode()[light]).ok_or_else(|| self.beyond("light", light, "a mode"))?;
@@ -310,7 +311,7 @@ impl Writing<'_> {
     }
 }
 
-/// What the bodies of the file have.
+/// Indices of the elements in each body of the file.
 struct Contents {
     joints: Vec<Vec<usize>>,
     geoms: Vec<Vec<usize>>,
@@ -323,7 +324,7 @@ fn place(position: &[f64], quat: &[f64]) -> [f64; 7] {
     [position[0], position[1], position[2], quat[0], quat[1], quat[2], quat[3]]
 }
 
-/// Numbers as they are: nobody normalises them again.
+/// Writes a pose with its numbers unchanged, without normalizing them again.
 fn pose(element: Element, place: &[f64; 7]) -> Element {
     let element = if place[..3] == [0.0; 3] { element } else { element.numbers("pos", &place[..3]) };
     if place[3..] == [1.0, 0.0, 0.0, 0.0] { element } else { element.numbers("quat", &place[3..]) }

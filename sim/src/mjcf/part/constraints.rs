@@ -1,4 +1,4 @@
-//! What couples bodies: contact pairs, equalities, tendons.
+//! Writer of the constraints of a part: contact pairs, equalities, tendons.
 
 use super::super::write::{Element, number};
 use super::{PartError, Writing, row, row_of, singles, some};
@@ -7,7 +7,7 @@ use kinetoscope_mujoco::words;
 use kinetoscope_mujoco::words::PathPoint;
 
 impl Writing<'_> {
-    /// Pairs of geoms with parameters of their own, and pairs of bodies that never collide.
+    /// Writes pairs of geoms with their own contact parameters, and pairs of bodies that never collide.
     pub(super) fn contacts(&self) -> Vec<String> {
         let m = self.model;
         let geom = |id: i32| some(id).map(|id| self.full(&self.names.geoms[id]));
@@ -23,13 +23,13 @@ impl Writing<'_> {
                 .attr("gap", number(m.pair_gap()[p]))
                 .leaf()
         };
-        // Shapes of the file's world are in the scene's.
+        // Geoms of the file's world are in the scene's world.
         let body = |body: usize| if body == 0 { "world".into() } else { self.body(body) };
         let exclude = |[first, second]: [usize; 2]| {
             Element::new("exclude").attr("body1", body(first)).attr("body2", body(second)).leaf()
         };
         let is_kept = |p: &usize| self.rig.is_none_or(|rig| !rig.pairs.contains(p));
-        // The world of the scene is not that of a robot's file.
+        // The world of a robot's file is not the world of the scene.
         let excluded = m.excluded_bodies().filter(|bodies| self.rig.is_none() || !bodies.contains(&0));
         (0..m.npair()).filter(is_kept).map(pair).chain(excluded.map(exclude)).collect()
     }
@@ -38,7 +38,7 @@ impl Writing<'_> {
         (0..self.model.neq()).filter_map(|e| self.equality(e).transpose()).collect()
     }
 
-    /// An equality; none where it couples sites and the document's line of MuJoCo only knows bodies.
+    /// Writes an equality; `None` if it couples sites and the target MuJoCo version supports bodies only.
     fn equality(&self, e: usize) -> Result<Option<String>, PartError> {
         let m = self.model;
         let kind = words::equality(m.eq_type()[e])
@@ -105,7 +105,7 @@ impl Writing<'_> {
             false => element.attr("limited", "false"),
         };
         let rest = row_of(m.tendon_lengthspring(), m.ntendon(), t);
-        // 2.2.2 has one length; 4.x a range without force.
+        // 2.2.2 has one rest length; 4.x has a range of lengths without force.
         let rest = if self.target == Target::V2 { &rest[..1] } else { rest };
         element = element
             .numbers("springlength", rest)
@@ -141,7 +141,7 @@ impl Writing<'_> {
                 Some(PathPoint::Site) => Element::new("site").opt("site", id.map(site)),
                 Some(PathPoint::Geom) => Element::new("geom")
                     .opt("geom", id.map(|id| self.full(&self.names.geoms[id])))
-                    // MuJoCo keeps the index of a site among numbers.
+                    // MuJoCo stores the index of the side site as a floating-point number.
                     .opt("sidesite", some(parameter.round() as i32).map(site)),
                 None => return Err(self.beyond("tendon", t, "a path of unknown points")),
             };

@@ -1,9 +1,9 @@
-//! MJCF files as parts of a scene: from the model that MuJoCo compiled of the file to lines of the scene's document.
+//! MJCF files as parts of a scene: from the compiled model of a file to XML lines of the scene's document.
 //!
-//! What is written is what MuJoCo made of the file, in full precision: includes, default classes, angles, local or global
-//! coordinates, composite bodies and the compiler's settings are resolved then, and none of them touches the rest of the
-//! scene. Every name gets the part's uid and a slash before it. What stands in the file's world and the bodies of it
-//! are in the scene's, moved by the pose of the part; a body that does not move and is called by the uid is its frame.
+//! The lines have the values of the compiled model in full precision. MuJoCo has resolved includes, default classes,
+//! angle units, local or global coordinates, composite bodies and compiler settings, so they do not affect the rest of
+//! the scene. Every name is prefixed by the part's uid and a slash. Geoms of the file's world and its bodies are in the
+//! scene's world, moved by the pose of the part. A static body named by the uid is the frame of the part.
 
 mod actuators;
 mod assets;
@@ -25,28 +25,28 @@ use kinetoscope_scene::source::Source;
 use std::cell::RefCell;
 use std::fmt;
 
-/// Lines of a part for both lines of MuJoCo.
+/// XML lines of a part for both supported MuJoCo versions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MjcfPart {
     uid: String,
     v2: PartLines,
     v4: PartLines,
-    /// Sensors of the file that are in neither, by their numbers.
+    /// Sensors of the file that are left out for both versions, with their indices.
     sensors_left_out: Vec<(usize, LeftOut)>,
 }
 
-/// Lines of a part, by the section of the document where they belong.
+/// XML lines of a part, by section of the document.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartLines {
-    /// The file.
+    /// Location of the MJCF file.
     pub source: Source,
     /// Meshes, height fields, textures, materials.
     pub assets: Vec<String>,
     /// Bodies of the world.
     pub bodies: Vec<String>,
-    /// Pairs of geoms with contact parameters, pairs of bodies that never collide.
+    /// Pairs of geoms with contact parameters, and pairs of bodies that never collide.
     pub contacts: Vec<String>,
-    /// Equalities.
+    /// Equality constraints.
     pub equalities: Vec<String>,
     /// Tendons.
     pub tendons: Vec<String>,
@@ -56,58 +56,58 @@ pub struct PartLines {
     pub actuators_with_state: Vec<String>,
     /// Sensors.
     pub sensors: Vec<String>,
-    /// What these lines do not say of the file, because this line of MuJoCo does not know it.
+    /// Elements and attributes of the file that this MuJoCo version does not support.
     pub left_out: Vec<LeftOut>,
 }
 
-/// Something of a file that is not written, and that the rest is written without.
+/// Element or attribute of a file that is left out of a part.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LeftOut {
-    /// The kind of element, as MJCF calls it.
+    /// Kind of the element, as in MJCF.
     pub element: &'static str,
-    /// Its name in the file, or one made up for it.
+    /// Name in the file, or a generated name.
     pub name: String,
-    /// What of it, and why.
+    /// Omitted property and the reason.
     pub what: String,
 }
 
-/// `body "arm": gravcomp`.
+/// Formatted as `body "arm": gravcomp`.
 impl fmt::Display for LeftOut {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {:?}: {}", self.element, self.name, self.what)
     }
 }
 
-/// Something of a file that cannot be written back.
+/// Element of a file that a part cannot represent.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{element} {name:?} has {what}, which a part of a scene cannot have")]
 pub struct PartError {
-    /// The kind of element, as MJCF calls it.
+    /// Kind of the element, as in MJCF.
     pub element: &'static str,
-    /// Its name in the file; its number where it has none.
+    /// Name in the file; the index of an element without a name.
     pub name: String,
-    /// What it has.
+    /// Unsupported property.
     pub what: String,
 }
 
-/// A file, and how it becomes a part.
+/// Compiled MJCF file with the settings that turn it into a part.
 #[derive(Clone, Copy, Debug)]
 pub struct PartOf<'a> {
-    /// What MuJoCo made of it.
+    /// Model that MuJoCo compiled from the file.
     pub model: &'a Model,
-    /// Names of everything in it.
+    /// Names of all elements of the file.
     pub names: &'a PartNames,
     /// Name of the part.
     pub uid: &'a str,
-    /// Pose of its world in the scene's.
+    /// Pose of the file's world in the scene's world.
     pub pose: &'a Pose,
-    /// Beginning of the names of its files.
+    /// Prefix of the names of its asset files.
     pub stem: &'a str,
-    /// What differs from the file, in a part that is a robot.
+    /// Differences from the file, for a part that is a robot.
     pub rig: Option<&'a Rig>,
 }
 
-/// A file that is being written as a part.
+/// Writer of a file as a part, for one MuJoCo version.
 struct Writing<'a> {
     model: &'a Model,
     names: &'a PartNames,
@@ -115,17 +115,17 @@ struct Writing<'a> {
     pose: &'a Pose,
     stem: &'a str,
     rig: Option<&'a Rig>,
-    /// The line of MuJoCo that is to read it, which need not be the one that compiled the file.
+    /// MuJoCo version that reads the lines; another version may have compiled the file.
     target: Target,
     sensors_left_out: &'a [(usize, LeftOut)],
     left_out: RefCell<Vec<LeftOut>>,
 }
 
 impl MjcfPart {
-    /// The part that a file becomes, without the sensors `sensors_left_out`.
+    /// Converts a file to a part, without the sensors `sensors_left_out`.
     ///
     /// # Errors
-    /// Something of the model is not written back.
+    /// The model has an element that a part cannot represent.
     pub fn new(of: &PartOf<'_>, sensors_left_out: Vec<(usize, LeftOut)>, source: &Source) -> Result<Self, PartError> {
         of.check()?;
         let lines = |target| of.writing(target, &sensors_left_out).lines(source);
@@ -138,12 +138,12 @@ impl MjcfPart {
         &self.uid
     }
 
-    /// Sensors of the file that a scene has without them, by their numbers.
+    /// Sensors of the file that the scene does not have, with their indices.
     pub(crate) fn sensors_left_out(&self) -> &[(usize, LeftOut)] {
         &self.sensors_left_out
     }
 
-    /// The lines for a line of MuJoCo.
+    /// Returns the XML lines for a MuJoCo version.
     pub fn lines(&self, target: Target) -> &PartLines {
         match target {
             Target::V2 => &self.v2,
@@ -153,10 +153,10 @@ impl MjcfPart {
 }
 
 impl<'a> PartOf<'a> {
-    /// Checks that the model has nothing that nobody writes back.
+    /// Checks that a part can represent every element of the model.
     ///
     /// # Errors
-    /// It has.
+    /// The model has an element that a part cannot represent.
     pub fn check(&self) -> Result<(), PartError> {
         match self.model.beyond() {
             None => Ok(()),
@@ -167,7 +167,7 @@ impl<'a> PartOf<'a> {
         }
     }
 
-    /// The files that the lines of the part name.
+    /// Creates the files that the lines of the part refer to.
     ///
     /// # Errors
     /// A texture cannot be written.
@@ -199,7 +199,8 @@ impl Writing<'_> {
         Ok(PartLines { left_out: self.left_out.into_inner(), ..lines })
     }
 
-    /// Whether 4.x is to read what is written. If not, notes that `what` of something is left out: only models of 4.x have it.
+    /// True if the target is MuJoCo 4.x. Otherwise records that `what` of an element is left out, since only models of
+    /// 4.x have it.
     fn newer(&self, element: &'static str, index: usize, what: &str) -> bool {
         if self.target == Target::V2 {
             let (name, what) = (self.names.of(element, index), what.into());
@@ -208,17 +209,17 @@ impl Writing<'_> {
         self.target == Target::V4
     }
 
-    /// Name in the scene of something of the file.
+    /// Name in the scene of an element of the file.
     fn full(&self, name: &str) -> String {
         format!("{}/{name}", self.uid)
     }
 
-    /// Name in the scene of a body of the file; the world is what stands still.
+    /// Name in the scene of a body of the file; the file's world is the static body of the part.
     fn body(&self, body: usize) -> String {
         if body == 0 { self.uid.into() } else { self.full(&self.names.bodies[body]) }
     }
 
-    /// An error about something of the file.
+    /// Creates an error about an element of the file.
     fn beyond(&self, element: &'static str, index: usize, what: impl Into<String>) -> PartError {
         PartError { element, name: self.names.of(element, index), what: what.into() }
     }
@@ -234,12 +235,12 @@ fn row_of<T>(values: &[T], count: usize, index: usize) -> &[T] {
     row(values, values.len() / count.max(1), index)
 }
 
-/// An index of MuJoCo's, where -1 is none.
+/// Converts an index of MuJoCo, which is -1 for no object.
 fn some(index: i32) -> Option<usize> {
     usize::try_from(index).ok()
 }
 
-/// Single precision numbers with the shortest text that reads back as the same.
+/// Formats single-precision numbers with the shortest text that reads back to the same values.
 fn singles(values: &[f32]) -> String {
     values.iter().map(f32::to_string).collect::<Vec<_>>().join(" ")
 }

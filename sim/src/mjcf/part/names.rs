@@ -1,9 +1,9 @@
-//! Names of everything in a file: its own, and made-up ones for what has none.
+//! Names of all elements of a file: given or generated.
 
 use kinetoscope_mujoco::{Model, ObjectKind};
 use std::collections::BTreeSet;
 
-/// Names of a file's objects in MuJoCo's order, without the part's uid; no two of a kind are the same.
+/// Names of a file's elements in MuJoCo's order, without the part's uid; unique within each kind.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PartNames {
     /// Bodies; the first is the world.
@@ -14,7 +14,7 @@ pub struct PartNames {
     pub geoms: Vec<String>,
     /// Sites.
     pub sites: Vec<String>,
-    /// Whether each site has a name in the file.
+    /// True for each site that has a name in the file.
     pub named_sites: Vec<bool>,
     /// Cameras.
     pub cameras: Vec<String>,
@@ -38,7 +38,7 @@ pub struct PartNames {
     pub sensors: Vec<String>,
 }
 
-/// Names of the objects of one kind; those without a name are called by the kind and their number.
+/// Names of the elements of one kind. An element without a name gets the kind and its index.
 fn of_kind(model: &Model, kind: ObjectKind, word: &str, count: usize) -> Vec<String> {
     let given: Vec<Option<String>> = (0..count).map(|i| model.name(kind, i)).collect();
     let mut taken: BTreeSet<String> = given.iter().flatten().cloned().collect();
@@ -55,7 +55,7 @@ fn of_kind(model: &Model, kind: ObjectKind, word: &str, count: usize) -> Vec<Str
 }
 
 impl PartNames {
-    /// The names of a model.
+    /// Collects the names of a model.
     pub fn of_model(model: &Model) -> Self {
         let named = |kind, word, count| of_kind(model, kind, word, count);
         Self {
@@ -77,7 +77,7 @@ impl PartNames {
         }
     }
 
-    /// The name of an object, by MJCF's word for its kind.
+    /// Name of an element, by MJCF's keyword for its kind.
     pub(super) fn of(&self, element: &str, index: usize) -> String {
         let names = match element {
             "body" => &self.bodies,

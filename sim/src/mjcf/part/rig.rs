@@ -1,23 +1,25 @@
-//! How a part is written that is a robot: what differs from its file.
+//! Differences between the MJCF file of a robot and the part written from it.
 
 use super::super::document::Inertial;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What differs from the file in a part that is a robot: what stands in the file's world, actuators, the joints' limits of
-/// actuators' forces, excluded bodies together with the world, and the pairs in `pairs` are not written at all.
+/// Differences from the file in a part that is a robot.
+///
+/// Elements that are not written at all: geoms and sites of the file's world, actuators, actuator force limits of
+/// joints, excluded pairs with the world, and the geom pairs in `pairs`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// Passive properties of each joint of the file.
     pub joints: Vec<Passive>,
-    /// What holds its root body.
+    /// Attachment of the root body.
     pub base: Base,
-    /// MuJoCo's `contype` and `conaffinity` of every geom that collides in the file.
+    /// MuJoCo's `contype` and `conaffinity` for every geom that collides in the file.
     pub contact: [i32; 2],
-    /// Pairs of geoms that are left out, by their numbers.
+    /// Indices of the geom pairs that are left out.
     pub pairs: BTreeSet<usize>,
-    /// Geoms that collide though the file's bits say that they do not, by their numbers.
+    /// Indices of geoms that collide although the bits in the file disable their collisions.
     pub colliding: BTreeSet<usize>,
-    /// Mass properties of bodies that are not the file's.
+    /// Mass properties that replace those of the file, by body.
     pub inertials: BTreeMap<usize, Inertial>,
 }
 
@@ -32,16 +34,16 @@ pub struct Passive {
     pub frictionloss: f64,
 }
 
-/// What holds a root body.
+/// Attachment of a root body to the world.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Base {
-    /// The joints that the file gives it.
+    /// Joints as in the file.
     AsFile,
-    /// Nothing lets it move: its free joint, of this number, is not written.
+    /// Fixed in the world: the free joint with this index is not written.
     Fixed(usize),
-    /// A free joint of this name, which the file does not have.
+    /// Free joint that the file does not have.
     Free {
-        /// The body.
+        /// Index of the body.
         body: usize,
         /// Full name of the joint.
         name: String,

@@ -1,6 +1,6 @@
-//! MuJoCo's own sensors.
+//! Writer of MuJoCo's own sensors.
 //!
-//! Nothing moves otherwise because of a sensor: a file is a part without those that cannot be written.
+//! Sensors do not affect the motion, so a part leaves out the sensors that cannot be written.
 
 use super::super::write::{Element, number};
 use super::{LeftOut, PartError, PartNames, Writing, some};
@@ -8,10 +8,10 @@ use kinetoscope_mujoco::Model;
 use kinetoscope_mujoco::words;
 use kinetoscope_mujoco::words::SensorObjects;
 
-/// Sensors that only 4.x knows.
+/// Sensors that only MuJoCo 4.x supports.
 const NEWER: [&str; 4] = ["jointactuatorfrc", "tendonactuatorfrc", "e_potential", "e_kinetic"];
 
-/// The sensors of a file that a part cannot have, by their numbers.
+/// Finds the sensors of a file that a part cannot have, with their indices.
 pub(crate) fn left_out(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)> {
     let reason = |s: usize| {
         let what = obstacle(model, s)?;
@@ -20,7 +20,7 @@ pub(crate) fn left_out(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)
     (0..model.nsensor()).filter_map(reason).collect()
 }
 
-/// Why a sensor cannot be written.
+/// Reason why a sensor cannot be written, if any.
 fn obstacle(m: &Model, s: usize) -> Option<String> {
     let code = m.sensor_type()[s];
     let Some(word) = words::sensor(code) else {
@@ -48,7 +48,7 @@ impl Writing<'_> {
         (0..self.model.nsensor()).filter(is_kept).filter_map(|s| self.sensor(s).transpose()).collect()
     }
 
-    /// A sensor; none where the document's line of MuJoCo does not know its type.
+    /// Writes a sensor; `None` if the target MuJoCo version does not support its type.
     fn sensor(&self, s: usize) -> Result<Option<String>, PartError> {
         let m = self.model;
         let word = words::sensor(m.sensor_type()[s]).ok_or_else(|| self.beyond("sensor", s, "an unknown type"))?;
@@ -59,7 +59,7 @@ impl Writing<'_> {
         let reference = self.observed(s, m.sensor_reftype()[s], m.sensor_refid()[s])?;
         let mut element = Element::new(word.word).attr("name", self.full(&self.names.sensors[s]));
         match (word.objects, object) {
-            // Subtrees are called by their body.
+            // Sensors of subtrees name a body.
             (SensorObjects::Named, Some((kind, name))) => {
                 element = element.attr(if kind == "xbody" { "body" } else { kind }, name);
             }

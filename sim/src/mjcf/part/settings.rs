@@ -1,4 +1,5 @@
-//! What a file says of the whole model, which is the scene's to say: found again in the text, to name file and line.
+//! Warnings about global settings and sensors of a file that the scene does not take over, with their locations in the
+//! text.
 
 use super::LeftOut;
 use kinetoscope_mujoco::Model;
@@ -7,22 +8,22 @@ use kinetoscope_scene::source::Source;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Most files that include each other; MuJoCo refuses a file that is included twice.
+/// Maximum number of included files; MuJoCo rejects a file that is included twice.
 const MOST_FILES: usize = 100;
 
-/// Before the kind of each sensor of a file.
+/// Prefix of the element name of a sensor.
 const SENSOR: &str = "sensor ";
 
-/// An element at the top of a file, or a sensor.
+/// Element at the top of a file, or a sensor.
 #[derive(Clone, Debug)]
 struct Stated {
     element: String,
-    /// Its attributes, and those of `<flag>` in it with that word before them.
+    /// Attributes of the element. Attributes of a nested `<flag>` have that word as prefix.
     attributes: Vec<String>,
     source: Source,
 }
 
-/// Everything at the top of a file and of the files it includes, in order.
+/// Collects the elements at the top of a file and of its included files, in order.
 fn stated(text: &str, file: &Path, folder: &Path, found: &mut Vec<Stated>, files: &mut usize) {
     *files += 1;
     let Ok(document) = roxmltree::Document::parse(text) else { return };
@@ -59,8 +60,8 @@ fn stated(text: &str, file: &Path, folder: &Path, found: &mut Vec<Stated>, files
     }
 }
 
-/// Says what of a file is not taken over: settings, for the scene's hold for all of its parts, and sensors. Says it of
-/// `owner`, such as `part "arm"`.
+/// Warns about settings of a file that the scene overrides for all of its parts, and about sensors that are left out.
+/// `owner` names the part in the messages, such as `part "arm"`.
 pub(crate) fn compare(
     owner: &str,
     text: &str,
@@ -72,7 +73,7 @@ pub(crate) fn compare(
     let mut found = Vec::new();
     stated(text, file, file.parent().unwrap_or(Path::new("")), &mut found, &mut 0);
     let mut diagnostics = Vec::new();
-    // Sensors stand in the model in the order of the file.
+    // Sensors of the model have the order of the file.
     let sensors: Vec<&Stated> = found.iter().filter(|s| s.element.starts_with(SENSOR)).collect();
     for (index, left_out) in sensors_left_out {
         let at = sensors.get(*index).filter(|_| sensors.len() == model.nsensor()).map(|s| s.source.clone());

@@ -1,8 +1,8 @@
-//! The law of one actuator of a file, and what of it no drive says.
+//! Force law of one actuator of a file, and its features that a drive does not reproduce.
 //!
-//! MuJoCo's actuator with gear g on a length `l = g Σ cᵢ qᵢ` (of a joint: c = 1) has the force `gain u + b0 + b1 l + b2 l̇`,
-//! clamped. Where `b0 = 0` and `b1 < 0` it follows positions, with the stiffness `-b1` and the damping `-b2`; its gain is the
-//! scale of its control alone. One that follows velocities has no `b1` and `gain = -b2`.
+//! MuJoCo's actuator with gear g on a length `l = g Σ cᵢ qᵢ` (on a joint: c = 1) has the force `gain u + b0 + b1 l + b2
+//! l̇`, clamped. With `b0 = 0` and `b1 < 0` it is a position servo with the stiffness `-b1` and the damping `-b2`; its
+//! gain only scales its control. A velocity servo has no `b1` and `gain = -b2`.
 
 use kinetoscope_mujoco::Model;
 use kinetoscope_mujoco::words;
@@ -13,20 +13,20 @@ fn row_of<T>(values: &[T], count: usize, index: usize) -> &[T] {
     &values[width * index..width * (index + 1)]
 }
 
-/// What an actuator does along its length.
+/// Force law of an actuator along its length.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Law {
-    /// Stiffness \[N/m or N m/rad\]; 0 where it follows no position.
+    /// Stiffness \[N/m or N m/rad\]; 0 without a position servo.
     pub(super) stiffness: f64,
-    /// Damping \[N s/m or N m s/rad\]; 0 where it follows nothing.
+    /// Damping \[N s/m or N m s/rad\]; 0 without a servo.
     pub(super) damping: f64,
-    /// Largest force either way \[N or N m\]; `None` where there is none.
+    /// Largest force in both directions \[N or N m\]; `None` without a limit.
     pub(super) force: Option<f64>,
-    /// What a drive with these numbers does not do as the actuator does.
+    /// Features of the actuator that a drive with these numbers does not reproduce, as texts for messages.
     pub(super) unsaid: Vec<String>,
 }
 
-/// The law of an actuator on the length `gear Σ cᵢ qᵢ` with the joints and coefficients `path`.
+/// Determines the law of an actuator on the length `gear Σ cᵢ qᵢ` with the joints and coefficients `path`.
 pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64)]) -> Law {
     let count = model.nactuator();
     let unknown = "unknown";
@@ -79,7 +79,7 @@ pub(super) fn law(model: &Model, actuator: usize, gear: f64, path: &[(usize, f64
     Law { stiffness, damping, force, unsaid }
 }
 
-/// The lengths that the limits of joints leave to an actuator.
+/// Range of lengths of an actuator within the limits of the joints.
 fn lengths(model: &Model, gear: f64, path: &[(usize, f64)]) -> [f64; 2] {
     path.iter().fold([0.0; 2], |[low, high], &(joint, coefficient)| {
         if !model.jnt_limited(joint) {
@@ -90,7 +90,7 @@ fn lengths(model: &Model, gear: f64, path: &[(usize, f64)]) -> [f64; 2] {
     })
 }
 
-/// Whether a range is within another, but for a thousandth of that: ranges are written with few digits.
+/// True if `inner` is within `outer`, with a slack of a thousandth of `outer`: files write ranges with few digits.
 fn is_within(inner: [f64; 2], outer: [f64; 2]) -> bool {
     let slack = 1e-3 * (outer[1] - outer[0]);
     inner[0] >= outer[0] - slack && inner[1] <= outer[1] + slack

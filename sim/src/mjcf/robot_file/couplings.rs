@@ -1,6 +1,7 @@
-//! Equalities of joints: those that a mimic says, and those that only hold.
+//! Joint equalities of a file: those that a mimic can express, and all others.
 //!
-//! MuJoCo's is `y - y0 = c0 + c1 (x - x0) + c2 (x - x0)² + ...` with the positions y0 and x0 of the file's start.
+//! MuJoCo's equality is `y - y0 = c0 + c1 (x - x0) + c2 (x - x0)² + ...` with the initial positions y0 and x0 of the
+//! file.
 
 use super::drives::is_single;
 use super::places::Places;
@@ -9,34 +10,34 @@ use kinetoscope_mujoco::{Model, words};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::source::Source;
 
-/// How a joint follows another.
+/// Coupling of a joint to another joint.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Coupling {
-    /// By `ratio * position + offset` of a joint of the file.
+    /// Linear coupling, `ratio * position + offset`, to a joint of the file.
     Mimic {
-        /// Where it is said.
+        /// Location of the equality.
         source: Source,
-        /// The joint that is followed.
+        /// Index of the followed joint.
         driver: usize,
         /// Ratio.
         multiplier: f64,
         /// Offset \[rad or m\].
         offset: f64,
     },
-    /// In another way: along one curve, where there is only one, and it does not lead back.
+    /// Any other coupling. It has a polynomial if it is the only coupling of the joint and does not close a cycle.
     Other(Option<Follows>),
 }
 
-/// How a joint follows along a curve: `y - y0 = Σ coefficients[k] (x - x0)ᵏ`.
+/// Polynomial coupling of a joint: `y - y0 = Σ coefficients[k] (x - x0)ᵏ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Follows {
-    /// The joint that is followed; `None` where it stays where it is, at c0.
+    /// Index of the followed joint; `None` for a joint that stays at c0.
     pub(super) driver: Option<usize>,
-    /// Coefficients, the constant first.
+    /// Coefficients in ascending order, the constant first.
     pub(super) coefficients: [f64; 5],
 }
 
-/// How each joint of the file follows others; `None` for one that does not.
+/// Finds the coupling of each joint of the file; `None` for a joint without a coupling.
 pub(super) fn of_joints(
     owner: &str,
     model: &Model,
@@ -77,7 +78,8 @@ pub(super) fn of_joints(
     couplings
 }
 
-/// The joint that `joint` follows in the end, or itself, and the ratio of the chain; `None` where something else holds it.
+/// Joint at the end of the mimic chain of `joint`, or `joint` itself, and the ratio of the chain. `None` if another
+/// kind of coupling holds a joint of the chain.
 pub(super) fn followed(couplings: &[Option<Coupling>], mut joint: usize) -> Option<(usize, f64)> {
     let mut ratio = 1.0;
     loop {
@@ -92,7 +94,7 @@ pub(super) fn followed(couplings: &[Option<Coupling>], mut joint: usize) -> Opti
     }
 }
 
-/// Whether following mimics and curves from `joint` ends at `end`, or passes it.
+/// True if the mimics and polynomial couplings from `joint` reach `end`.
 fn leads_to(couplings: &[Option<Coupling>], mut joint: usize, end: usize) -> bool {
     loop {
         if joint == end {

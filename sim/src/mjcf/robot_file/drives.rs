@@ -1,10 +1,11 @@
-//! What the actuators of a file say of the drives that take their place.
+//! Drives that replace the actuators of a file.
 //!
-//! An actuator on the length `l = g Σ cᵢ qᵢ` (of a joint: c = 1) with the force F along it gives each joint the effort
-//! `g cᵢ F`. Joints that follow another by `qᵢ = mᵢ q + oᵢ` have no drive of their own: by virtual work the joint that they
-//! follow feels `J F` with `J = g Σ cᵢ mᵢ`, over all joints of the length that follow it and itself. A drive of it with the
-//! stiffness `k J²`, the damping `d J²` and the largest effort `|J| Fmax` does the same. Where a length is of several joints
-//! that do not follow each other, each has the drive that the actuator is while the others stand.
+//! An actuator on the length `l = g Σ cᵢ qᵢ` (on a joint: c = 1) with the force F along it gives each joint the effort
+//! `g cᵢ F`. Joints that follow another joint by `qᵢ = mᵢ q + oᵢ` have no drive of their own. By virtual work the
+//! followed joint receives `J F` with `J = g Σ cᵢ mᵢ`, summed over itself and all joints of the length that follow it.
+//! A drive of the followed joint with the stiffness `k J²`, the damping `d J²` and the largest effort `|J| Fmax` is
+//! equivalent. If a length has several joints that do not follow each other, each gets the drive that is equivalent
+//! while the other joints stand still.
 
 use super::actuator::law;
 use super::couplings::{Coupling, followed};
@@ -18,37 +19,38 @@ use kinetoscope_robot::description::FileDrive;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use std::collections::BTreeMap;
 
-/// What acts on a joint.
+/// Actuation of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Acting {
-    /// The drive that does the same.
+    /// Drive that is equivalent to the actuators.
     pub(super) drive: FileDrive,
-    /// Largest effort \[N m or N\]; `None` where one of the actuators has no limit.
+    /// Largest effort \[N m or N\]; `None` if an actuator has no limit.
     pub(super) effort: Option<f64>,
 }
 
-/// How an actuator acts on a joint and those that follow it.
+/// Effect of an actuator on a joint and on the joints that follow it.
 #[derive(Clone, Debug, Default)]
 struct Arm {
-    /// Effort by force: J.
+    /// Effort per force, J.
     total: f64,
-    /// The sum of the sizes of its terms.
+    /// Sum of the absolute values of the terms of J.
     size: f64,
-    /// The joints of the file, and how each follows.
+    /// Joints of the file, and the ratio by which each follows.
     joints: Vec<(usize, f64)>,
-    /// The largest effort that the joints' own limits leave, with the force at its limit; infinite where there is none.
+    /// Largest effort within the joints' own limits, with the force at its limit; infinite without limits.
     effort: f64,
 }
 
-/// What an actuator acts on.
+/// Joints that an actuator acts on.
 struct Target {
     /// Joints and their coefficients.
     path: Vec<(usize, f64)>,
-    /// Name of the tendon that they are the path of.
+    /// Name of the tendon with this path; `None` for an actuator on a joint.
     tendon: Option<String>,
 }
 
-/// What acts on each joint of the file that follows no other. Says which actuators are gone, and what no drive does as they do.
+/// Finds the actuation of each joint of the file that follows no other joint. Warns about actuators that are replaced,
+/// and about features that no drive reproduces.
 pub(super) fn of_joints(
     owner: &str,
     model: &Model,
@@ -61,7 +63,7 @@ pub(super) fn of_joints(
     let own_limit = |joint: usize| model.joint_actuator_force(joint).map(|[low, high]| low.abs().max(high.abs()));
     let mut acting: Vec<Acting> =
         (0..model.njnt()).map(|joint| Acting { drive: unsaid, effort: own_limit(joint) }).collect();
-    // Joints that are acted on, by the joint that they follow.
+    // Actuated joints, by the joint that they follow.
     let mut acted: BTreeMap<usize, BTreeMap<usize, f64>> = BTreeMap::new();
     let mut replaced = Vec::new();
     for actuator in 0..model.nactuator() {
@@ -94,7 +96,7 @@ pub(super) fn of_joints(
                 arm.joints.push((joint, ratio));
             }
         }
-        // What is left of terms that cancel is their rounding.
+        // A sum of terms that cancel leaves rounding only.
         arms.retain(|&driver, arm| {
             let acts = arm.total.abs() > 1e-12 * arm.size && law.force != Some(0.0);
             if !acts {
@@ -137,7 +139,7 @@ pub(super) fn of_joints(
     Ok(acting)
 }
 
-/// What an actuator acts on; the words for what no drive acts on.
+/// Joints that an actuator acts on, or a description of a target that drives do not support.
 fn target(model: &Model, names: &PartNames, actuator: usize) -> Result<Target, String> {
     let id = usize::try_from(model.actuator_trnid()[2 * actuator]).unwrap_or(0);
     match words::transmission(model.actuator_trntype()[actuator]) {
@@ -157,12 +159,12 @@ fn target(model: &Model, names: &PartNames, actuator: usize) -> Result<Target, S
     }
 }
 
-/// A hinge or a slide.
+/// True for a hinge or a slide.
 pub(super) fn is_single(model: &Model, joint: usize) -> bool {
     matches!(words::joint(model.jnt_type()[joint]), Some("hinge" | "slide"))
 }
 
-/// One more actuator of a joint; `limit` is infinite where there is none.
+/// Adds an actuator to a joint; `limit` is infinite without a limit.
 fn add(acting: &mut Acting, first: bool, stiffness: f64, damping: f64, limit: f64) {
     let old = if first { 0.0 } else { acting.effort.unwrap_or(f64::INFINITY) };
     acting.effort = Some(old + limit).filter(|effort| effort.is_finite());

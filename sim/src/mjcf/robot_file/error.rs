@@ -1,93 +1,93 @@
-//! Why an MJCF file is no robot.
+//! Errors of MJCF files that cannot be loaded as robots.
 
 use crate::mjcf::part::PartError;
 use kinetoscope_mujoco::CompileError;
 use kinetoscope_scene::source::Source;
 
-/// The other use of a file: [`add_mjcf`](crate::SimulationManager::add_mjcf).
+/// Advice on another use of a file: [`add_mjcf`](crate::SimulationManager::add_mjcf).
 const AS_A_PART: &str = "such a file is a scene, or a part of one";
 
-/// Why an MJCF file is no robot.
+/// Error of loading an MJCF file as a robot.
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RobotFileError {
-    /// MuJoCo refuses the file; its words name element and line.
+    /// MuJoCo rejects the file; its message names element and line.
     #[error("{0}")]
     Compile(#[source] CompileError),
-    /// Something of it cannot be written back.
+    /// A part cannot represent an element of the file.
     #[error(transparent)]
     Part(#[from] PartError),
-    /// There is no body.
+    /// The file has no body.
     #[error("the file has no body; a robot is one body in the file's world and what hangs on it")]
     NoBody,
-    /// Several bodies stand in the file's world.
+    /// The file's world has several child bodies.
     #[error("the file has {} bodies in its world ({}); a robot is one and what hangs on it: give each a file, or {AS_A_PART}", .roots.len(), few(.roots))]
     SeveralRoots {
-        /// Their names.
+        /// Names of these bodies.
         roots: Vec<String>,
     },
-    /// Nothing moves but the base.
+    /// The file has no hinge and no slide joint.
     #[error("the file has no hinge and no slide joint, so there is nothing to drive; {AS_A_PART}")]
     NoJoint,
-    /// A joint that robots do not have.
+    /// A joint is a ball joint, which robots do not support.
     #[error(
         "{at}: joint {joint:?} is a ball; robots have hinges and slides, and a free joint of the root body: write three hinges, or {AS_A_PART}"
     )]
     BallJoint {
-        /// Where it is.
+        /// Location of the joint.
         at: Source,
-        /// Its name.
+        /// Name of the joint.
         joint: String,
     },
-    /// A body that is moved by hand.
+    /// A body is a mocap body.
     #[error("{at}: body {body:?} is a mocap body, which no joint moves; {AS_A_PART}")]
     MocapBody {
-        /// Where it is.
+        /// Location of the body.
         at: Source,
-        /// Its name.
+        /// Name of the body.
         body: String,
     },
-    /// The base shall be free, and is held by a joint.
+    /// The base is configured as free, but a joint attaches the root body to the world.
     #[error(
         "{at}: joint {joint:?} holds the root body {body:?} in the world, so the base cannot be free; set fix_base: true, or move the joint to a body below"
     )]
     BaseIsJointed {
-        /// Where the joint is.
+        /// Location of the joint.
         at: Source,
-        /// The joint.
+        /// Name of the joint.
         joint: String,
-        /// The body.
+        /// Name of the body.
         body: String,
     },
-    /// An actuator that no drive stands for.
+    /// An actuator acts on a target that drives do not support.
     #[error(
         "{at}: actuator {actuator:?} acts on {target}; the drives of a robot act on hinges and slides: leave it out, or {AS_A_PART}"
     )]
     Actuator {
-        /// Where it is.
+        /// Location of the actuator.
         at: Source,
-        /// Its name.
+        /// Name of the actuator.
         actuator: String,
-        /// What it acts on.
+        /// Description of the target.
         target: String,
     },
-    /// Something of the robot needs what is left out.
+    /// An element of the robot depends on an element of the file's world, which a robot leaves out.
     #[error(
         "{at}: {element} {name:?} needs {needs:?} in the file's world, which a robot leaves out: put it into a body, or {AS_A_PART}"
     )]
     NeedsWorld {
-        /// Where it is.
+        /// Location of the element.
         at: Source,
-        /// The kind of element.
+        /// Kind of the element, as in MJCF.
         element: &'static str,
-        /// Its name.
+        /// Name of the element.
         name: String,
-        /// What it needs.
+        /// Name of the element that it depends on.
         needs: String,
     },
 }
 
-/// The first of some names, and how many more there are.
+/// Lists the first names and the number of further ones.
 fn few(names: &[String]) -> String {
     const SHOWN: usize = 5;
     let first = names[..names.len().min(SHOWN)].join(", ");

@@ -1,4 +1,4 @@
-//! How soft dry friction is: where implicit drives hold it, as the drives are.
+//! Warnings about solver parameters of dry friction that implicit drives replace.
 
 use super::couplings::Coupling;
 use super::drives::is_single;
@@ -7,10 +7,10 @@ use kinetoscope_mujoco::Model;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::source::Source;
 
-/// MuJoCo's `solref` and `solimp` where nothing is said.
+/// MuJoCo's default `solref` and `solimp`.
 const DEFAULTS: ([f64; 2], [f64; 5]) = ([0.02, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0]);
 
-/// Says of which joints the file's own softness of dry friction holds only without an implicit drive.
+/// Warns about joints whose own `solreffriction` and `solimpfriction` apply only without an implicit drive.
 pub(super) fn say(
     owner: &str,
     model: &Model,

@@ -1,7 +1,9 @@
-//! MJCF files as robots: MuJoCo compiles the file, what it made of it is described ([`RobotDescription`]), and written into
-//! the scene as MJCF parts are (`super::part`), with drives in the place of its actuators.
+//! MJCF files as robots.
 //!
-//! Why a part and not bodies of our own: docs/decisions/0012.
+//! MuJoCo compiles the file. The compiled model becomes a description ([`RobotDescription`]), and is written into the
+//! scene like an MJCF part (`super::part`), with drives in place of its actuators.
+//!
+//! The reasons for a part instead of bodies of the document are in docs/decisions/0012.
 
 mod actuator;
 mod couplings;
@@ -34,43 +36,43 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tree::{Described, Describing, Root};
 
-/// An MJCF file that is a robot, as MuJoCo compiled it alone.
+/// MJCF file of a robot, with the model that MuJoCo compiled from the file alone.
 #[derive(Clone, Debug)]
 pub struct RobotFile {
     source: Source,
     model: Model,
     names: PartNames,
     root: Root,
-    /// Body of the file and place in it of each link that a user knows.
+    /// Body of the file, and pose in that body, for each named link.
     links: Vec<(usize, Pose)>,
-    /// The joint of the description that each joint of the file is.
+    /// Joint of the description for each joint of the file; `None` for a free joint.
     joints: Vec<Option<JointId>>,
-    /// Beginning of the names of its files.
+    /// Prefix of the names of its asset files.
     stem: String,
     files: Vec<Asset>,
     sensors: Vec<EngineSensor>,
     sensors_left_out: Vec<(usize, LeftOut)>,
 }
 
-/// What a file is loaded for.
+/// Settings for loading a file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Loading<'a> {
     /// Name of the robot.
     pub(crate) uid: &'a str,
-    /// How diagnostics call it.
+    /// Label of the robot in diagnostics.
     pub(crate) named: &'a Named,
-    /// Its number in the simulation.
+    /// Index of the robot in the simulation.
     pub(crate) index: usize,
-    /// Whether its base stands fixed.
+    /// True for a fixed base.
     pub(crate) fix_base: bool,
-    /// Whether its links collide with each other.
+    /// True if the links collide with each other.
     pub(crate) self_collision: bool,
-    /// The scene so far, if there is one.
+    /// Model of the current scene, if there is a scene.
     pub(crate) scene: Option<&'a Model>,
 }
 
 impl RobotFile {
-    /// Reads and compiles a file, and describes the robot in it; `wrong` is the error that something of it is.
+    /// Reads and compiles a file, and describes its robot. `wrong` wraps the errors of the file.
     pub(crate) fn load(
         file: &MjcfFile,
         of: &Loading<'_>,
@@ -112,17 +114,18 @@ impl RobotFile {
         Ok((this, description))
     }
 
-    /// The compiled model of the file alone.
+    /// Compiled model of the file alone.
     pub fn model(&self) -> &Model {
         &self.model
     }
 
-    /// The files that its lines name.
+    /// Asset files that the lines of the robot refer to.
     pub(crate) fn files(&self) -> &[Asset] {
         &self.files
     }
 
-    /// MuJoCo's own sensors that the scene has; the first value is that among those of the robot.
+    /// MuJoCo's own sensors of the robot in the scene. The first value of each is counted among the values of the
+    /// robot.
     pub(crate) fn sensors(&self) -> &[EngineSensor] {
         &self.sensors
     }
@@ -132,10 +135,10 @@ impl RobotFile {
         if self.root.is_world { Pose::identity() } else { tree::body_pose(&self.model, self.root.body) }
     }
 
-    /// Adds the robot to `mjcf`; the base pose is that of the file's world.
+    /// Adds the robot to `mjcf`. The base pose of `cfg` is the pose of the file's world.
     ///
     /// # Errors
-    /// Something of the file is not written back.
+    /// A part cannot represent an element of the file.
     pub(crate) fn add(
         &self,
         description: &RobotDescription,
@@ -186,7 +189,7 @@ impl RobotFile {
         })
     }
 
-    /// Names of its tendons.
+    /// Names of the tendons of the file.
     pub(crate) fn tendon_names(&self) -> &[String] {
         &self.names.tendons
     }
@@ -200,7 +203,7 @@ impl RobotFile {
         if body == 0 { cfg.uid.into() } else { self.full(cfg, &self.names.bodies[body]) }
     }
 
-    /// Passive properties of all joints, and those whose damping is integrated with the drives.
+    /// Passive properties of all joints, and the joints whose damping is integrated with the drives.
     fn passive(&self, cfg: &RobotCfg<'_>, rows: bool, mjcf: &Mjcf) -> (Vec<Passive>, Vec<DampedJoint>) {
         let m = &self.model;
         let mut damped = Vec::new();
@@ -219,7 +222,7 @@ impl RobotFile {
             passive
         };
         let mut joints: Vec<Passive> = (0..m.njnt()).map(of_joint).collect();
-        // As for robots from URDF files, where `mjcf::robot` says why.
+        // As for robots from URDF files; `mjcf::robot` gives the reason.
         if rows && mjcf.option.integrator != Integrator::Rk4 {
             for (joint, passive) in joints.iter_mut().enumerate() {
                 let is_written = !(cfg.fix_base && self.root.free_joint == Some(joint));
@@ -236,7 +239,7 @@ impl RobotFile {
         (joints, damped)
     }
 
-    /// Mass properties of the bodies whose links carry something besides what the file says.
+    /// Mass properties of the bodies whose links carry mass beyond that of the file.
     fn loaded_bodies(
         &self,
         description: &RobotDescription,
@@ -248,7 +251,7 @@ impl RobotFile {
             let of_body = self.links.iter().enumerate().filter(|(_, (other, _))| *other == body);
             let links: Vec<(LinkId, Pose)> = of_body.map(|(link, (_, pose))| (LinkId(link), *pose)).collect();
             let mass = |(link, _): &(LinkId, Pose)| description.link(*link).inertial.as_ref().map_or(0.0, |i| i.mass);
-            // The file holds its root body, which may be a frame without mass; a free one needs some, as in a URDF.
+            // The file holds its root body, which may be a massless frame; a free body needs mass, as in a URDF.
             let is_freed = body == self.root.body && !fix_base && self.root.free_joint.is_none() && !self.root.is_world;
             let sum = links.iter().map(mass).sum::<f64>();
             if sum == self.model.body_mass()[body] && !(is_freed && sum == 0.0) {
@@ -264,15 +267,15 @@ impl RobotFile {
         loaded
     }
 
-    /// Which bodies never move.
+    /// True for each body that never moves.
     fn still_bodies(&self, fix_base: bool) -> Vec<bool> {
         let m = &self.model;
         let root = if self.root.free_joint.is_some() { self.root.body } else { 0 };
         (0..m.nbody()).map(|body| body == 0 || fix_base && m.body_weldid()[body] as usize == root).collect()
     }
 
-    /// Bodies that never move with those that are joined to them: MuJoCo does not exclude their contacts. Without those that
-    /// the file excludes itself.
+    /// Pairs of a body that never moves and a moving child body: MuJoCo does not exclude their contacts. Pairs that the
+    /// file excludes itself are omitted.
     fn base_pairs(&self, cfg: &RobotCfg<'_>) -> Vec<(String, String)> {
         let still = self.still_bodies(cfg.fix_base);
         let parent = |body: usize| self.model.body_parentid()[body] as usize;

@@ -1,22 +1,23 @@
-//! Lines of the named elements of a file and of the files it includes.
+//! Locations of the named elements of a file and of the files it includes.
 
 use kinetoscope_scene::source::Source;
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Most files that are looked at: MuJoCo refuses a file that is included twice.
+/// Maximum number of files that are read; MuJoCo rejects a file that is included twice.
 const MOST_FILES: usize = 100;
 
-/// Where the named elements of a file are.
+/// Locations of the named elements of a file.
 pub(super) struct Places {
     file: Source,
-    /// By kind and name.
+    /// Locations by kind and name.
     named: HashMap<(String, String), Source>,
 }
 
 impl Places {
-    /// Looks through `text`, which is `file` or is called so. What MuJoCo read and this does not find is at its first line.
+    /// Searches `text`, the content of `file`. Elements that this search misses are located at the first line of the
+    /// file.
     pub(super) fn of(text: &str, file: &Path) -> Self {
         let mut places = Self { file: Source::new(file, 1), named: HashMap::new() };
         places.add(text, file, file.parent().unwrap_or(Path::new("")), &mut 0);
@@ -38,7 +39,7 @@ impl Places {
             }
             let Some(name) = node.attribute("name") else { continue };
             let section = node.parent().map_or("", |parent| parent.tag_name().name());
-            // In these sections the kind is the section's, in bodies the element's.
+            // In these sections the kind is that of the section, in bodies that of the element.
             let kind = match section {
                 "actuator" | "equality" | "tendon" => section,
                 _ if tag == "freejoint" => "joint",
@@ -50,12 +51,12 @@ impl Places {
         }
     }
 
-    /// Where the `kind` called `name` is; the file where it has no name there.
+    /// Location of the `kind` called `name`; the first line of the file if the search missed it.
     pub(super) fn get(&self, kind: &str, name: &str) -> Source {
         self.named.get(&(kind.to_string(), name.to_string())).unwrap_or(&self.file).clone()
     }
 
-    /// The first line of the file.
+    /// Location of the first line of the file.
     pub(super) fn file(&self) -> Source {
         self.file.clone()
     }

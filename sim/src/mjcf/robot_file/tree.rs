@@ -1,9 +1,10 @@
-//! Bodies, joints and sites of a compiled file as links and joints of a description.
+//! Converter of bodies, joints and sites of a compiled file to links and joints of a description.
 //!
-//! MuJoCo's body stands at `T J1 J2 ...` in its parent: T is its pose in the file, and each joint turns about its axis
-//! through its anchor p by q - ref, or slides along it by that (`mj_kinematics`). A link of a description turns about its own
-//! origin. So the k-th joint of a body has its frame in p, turned or moved back by ref, and between two joints of one body
-//! there is a frame that is no body; so there is behind the last where its anchor is not the body's origin.
+//! In MuJoCo, the pose of a body in its parent is `T J1 J2 ...`. T is the pose in the file. Each joint rotates about
+//! its axis through its anchor p by q - ref, or translates along it by that amount (`mj_kinematics`). A link of a
+//! description rotates about its own origin. So the k-th joint of a body has its frame in p, rotated or translated back
+//! by ref. Two joints of one body have an auxiliary frame without a body between them. Another auxiliary frame follows
+//! the last joint if its anchor is not the origin of the body.
 
 use super::couplings::{Coupling, Follows};
 use super::drives::{Acting, is_single};
@@ -22,18 +23,18 @@ use kinetoscope_scene::source::Source;
 use nalgebra::{Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::collections::BTreeSet;
 
-/// What holds the tree of a file.
+/// Root of the tree of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Root {
-    /// The only body in the file's world.
+    /// Only child body of the file's world.
     pub(super) body: usize,
-    /// Its free joint.
+    /// Free joint of that body, if any.
     pub(super) free_joint: Option<usize>,
-    /// The root link is the file's world, since hinges or slides hold the body in it.
+    /// True if the root link is the file's world, because hinges or slides attach the body to it.
     pub(super) is_world: bool,
 }
 
-/// Finds the root, and refuses what no robot has.
+/// Finds the root, and rejects features that robots do not support.
 pub(super) fn root(model: &Model, names: &PartNames, places: &Places, fix_base: bool) -> Result<Root, RobotFileError> {
     let roots: Vec<usize> = (1..model.nbody()).filter(|&body| model.body_parentid()[body] == 0).collect();
     let body = match roots[..] {
@@ -73,7 +74,7 @@ fn joints_of(model: &Model, body: usize) -> Vec<usize> {
     (0..model.njnt()).filter(|&joint| model.jnt_bodyid()[joint] as usize == body).collect()
 }
 
-/// A position and a rotation in MuJoCo's arrays.
+/// Pose at `index` in MuJoCo's arrays of positions and quaternions.
 fn pose_of(positions: &[f64], rotations: &[f64], index: usize) -> Pose {
     let (p, q) = (&positions[3 * index..3 * index + 3], &rotations[4 * index..4 * index + 4]);
     from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]])
@@ -91,20 +92,20 @@ fn translation(by: Vector3<f64>) -> Pose {
     Pose::from_parts(Translation3::from(by), UnitQuaternion::identity())
 }
 
-/// A description, and where it comes from.
+/// Description with its relation to the file.
 #[derive(Debug)]
 pub(super) struct Described {
     pub(super) description: RobotDescription,
-    /// Body of the file and place in it of each link that a user knows.
+    /// Body of the file, and pose in that body, for each named link.
     pub(super) links: Vec<(usize, Pose)>,
-    /// The joint of the description that each joint of the file is.
+    /// Joint of the description for each joint of the file; `None` for a free joint.
     pub(super) joints: Vec<Option<JointId>>,
 }
 
-/// Describes a file.
+/// Converter of a compiled file to a description.
 pub(super) struct Describing<'a> {
     pub(super) uid: &'a str,
-    /// How diagnostics call the robot.
+    /// Label of the robot in diagnostics.
     pub(super) owner: &'a str,
     pub(super) model: &'a Model,
     pub(super) names: &'a PartNames,
@@ -114,11 +115,11 @@ pub(super) struct Describing<'a> {
     pub(super) couplings: &'a [Option<Coupling>],
 }
 
-/// Names that are taken.
+/// Set of names in use.
 struct Names(BTreeSet<String>);
 
 impl Names {
-    /// `name`, with `suffix` behind it as often as it is taken.
+    /// Returns `name`, with `suffix` appended until the name is unused.
     fn unused(&mut self, name: &str, suffix: &str) -> String {
         let mut name = name.to_string();
         while !self.0.insert(name.clone()) {
@@ -134,7 +135,7 @@ impl Describing<'_> {
         let mut names = Names(BTreeSet::new());
         let mut links = Vec::new();
         let mut placed = Vec::new();
-        // Body b is link b - 1, or b where the file's world is the root.
+        // Body b is link b - 1, or link b if the file's world is the root.
         let first = if self.root.is_world { 0 } else { 1 };
         for body in first..m.nbody() {
             let name = names.unused(&self.names.bodies[body], "'");
@@ -163,7 +164,7 @@ impl Describing<'_> {
         let all = (1..m.nbody()).filter(|&body| self.root.is_world || body != self.root.body);
         for body in all {
             let (mut parent, child) = (link_of(m.body_parentid()[body] as usize), link_of(body));
-            // Pose of the next frame in the parent: the body's own, moved by `at` in its axes.
+            // Pose of the next frame in the parent: the pose of the body, moved by `at` in its axes.
             let (mut before, mut at) = (body_pose(m, body), Vector3::zeros());
             let of_body = joints_of(m, body);
             for (k, &joint) in of_body.iter().enumerate() {
@@ -230,7 +231,7 @@ impl Describing<'_> {
             links[joint.parent.0].child_joints.push(JointId(index));
             links[joint.child.0].parent_joint = Some(JointId(index));
         }
-        // The root stands first: the world, or the first body.
+        // The root is the first link: the world, or the first body.
         let description = RobotDescription { name: self.uid.into(), links, joints, root: LinkId(0) };
         Described { description, links: placed, joints: of_file }
     }
@@ -250,7 +251,7 @@ impl Describing<'_> {
         })
     }
 
-    /// Position of a joint in which the file starts.
+    /// Initial position of a joint in the file \[rad or m\].
     fn start(&self, joint: usize) -> f64 {
         self.model.qpos0()[self.model.jnt_qposadr()[joint] as usize]
     }

@@ -1,4 +1,4 @@
-//! What of a file is left out because it stands in the file's world, and what needs it.
+//! Elements of the file's world, which a robot leaves out, and elements that depend on them.
 
 use super::error::RobotFileError;
 use super::places::Places;
@@ -10,12 +10,12 @@ use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::source::Source;
 use std::collections::BTreeSet;
 
-/// An index of MuJoCo's, where -1 is none.
+/// Converts an index of MuJoCo, which is -1 for no object.
 fn some(index: i32) -> Option<usize> {
     usize::try_from(index).ok()
 }
 
-/// Says what stands in the file's world; refuses what couples the robot to it by a site or a geom.
+/// Warns about elements of the file's world. Rejects tendons and equalities that depend on its sites or geoms.
 pub(super) fn check(
     owner: &str,
     model: &Model,
@@ -68,14 +68,15 @@ pub(super) fn check(
     Ok(())
 }
 
-/// Sensors that a robot cannot have: those that no part can, and those of actuators and of what stands in the file's world.
+/// Sensors that a robot cannot have: those that no part can have, and those of actuators and of elements of the file's
+/// world.
 pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)> {
     let mut left_out = sensors_left_out(model, names);
     for sensor in 0..model.nsensor() {
         if left_out.iter().any(|(other, _)| *other == sensor) {
             continue;
         }
-        // Drives are rows or forces of ours, of which MuJoCo's sum over actuators knows nothing.
+        // Drives are friction rows or forces of this crate, which MuJoCo's sum over actuators does not include.
         let word = words::sensor(model.sensor_type()[sensor]).map_or("", |word| word.word);
         if matches!(word, "jointactuatorfrc" | "tendonactuatorfrc") {
             let what = format!("the type {word}, the force of actuators, whose place drives take");
@@ -105,8 +106,8 @@ pub(super) fn sensors(model: &Model, names: &PartNames) -> Vec<(usize, LeftOut)>
     left_out
 }
 
-/// Says which contacts of the file are not those of the robot: pairs of geoms that are left out, and bodies that the file
-/// keeps from colliding with what stands in its world.
+/// Warns about contacts of the file that the robot does not have: geom pairs that are left out, and excluded pairs with
+/// the file's world.
 pub(super) fn say_contacts(
     owner: &str,
     model: &Model,
@@ -150,7 +151,7 @@ pub(super) fn say_contacts(
     }
 }
 
-/// Geoms of the robot that the file's bits let collide with nothing, and its pairs with what stands in its world.
+/// Geoms of the robot whose bits disable collisions, but which the file pairs with geoms of its world.
 pub(super) fn colliding(model: &Model) -> BTreeSet<usize> {
     let mut geoms = BTreeSet::new();
     for pair in pairs(model, true) {
@@ -162,8 +163,7 @@ pub(super) fn colliding(model: &Model) -> BTreeSet<usize> {
     geoms
 }
 
-/// Pairs of geoms that are left out: those with what stands in the file's world, and all where the robot does not collide
-/// with itself.
+/// Geom pairs that are left out: pairs with geoms of the file's world, and all pairs of a robot without self-collision.
 pub(super) fn pairs(model: &Model, self_collision: bool) -> BTreeSet<usize> {
     let of_world = |geom: i32| some(geom).is_some_and(|geom| model.geom_bodyid()[geom] == 0);
     let is_left_out =

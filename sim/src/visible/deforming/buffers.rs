@@ -1,15 +1,15 @@
-//! Copies of the scene with the shapes of a moment, whose memory is used again.
+//! Copies of the scene with the current shapes, whose memory is reused.
 
 use super::{Deforming, Scratch};
 use kinetoscope_mujoco::Data;
 use kinetoscope_scene::{OwnScene, RenderScene};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Copies that an environment keeps, at most: those that cameras show, those on their way to one, and the next. Further ones
-/// are made anew each time.
+/// Maximum number of copies that an environment keeps: those that cameras show, those on their way to a camera, and the
+/// next one. Further copies are allocated each time.
 const KEPT: usize = 8;
 
-/// The copies of all environments.
+/// Scene copies of all environments.
 #[derive(Debug, Default)]
 pub(in crate::visible) struct Buffers(Mutex<All>);
 
@@ -19,7 +19,7 @@ struct All {
     scratch: Scratch,
 }
 
-/// A copy, and the scene that it is a copy of.
+/// Copy of a scene, with its original.
 #[derive(Debug)]
 struct Buffer {
     of: Arc<RenderScene>,
@@ -27,7 +27,7 @@ struct Buffer {
 }
 
 impl Buffers {
-    /// Puts a copy of `scene` with the shapes of `data` into `out`, which is that of environment `env`.
+    /// Puts a copy of `scene` with the shapes of `data` into `out`, the scene of environment `env`.
     pub(in crate::visible) fn fill(
         &self,
         deforming: &Deforming,
@@ -36,7 +36,7 @@ impl Buffers {
         data: &Data,
         out: &mut OwnScene,
     ) {
-        // The copy of the moment before is free again unless a camera holds it.
+        // The previous copy is free again, unless a camera holds it.
         out.0 = None;
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let All { of_env, scratch } = &mut *all;

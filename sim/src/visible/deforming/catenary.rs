@@ -1,19 +1,19 @@
-//! Slack tendons hang as catenaries.
+//! Slack tendons as catenaries.
 //!
-//! Source of the conditions: `mjv_isCatenary` of `engine_vis_visualize.c`. A slack tendon between two sites that is limited to
-//! lengths from 0, or has a spring that acts beyond a length only, hangs between them; one with damping, friction or an
-//! actuator does not.
+//! Source of the conditions: `mjv_isCatenary` of `engine_vis_visualize.c`. A slack tendon between two sites hangs if it
+//! is limited to lengths from 0, or has a spring that acts beyond a length only. A tendon with damping, friction or an
+//! actuator does not hang.
 
 use kinetoscope_mujoco::{Data, Model, words};
 
-/// Segments of a hanging tendon; MuJoCo has as many as its round shapes have slices, 28 by default.
+/// Number of segments of a hanging tendon; MuJoCo has as many as its round shapes have slices, 28 by default.
 pub(super) const SEGMENTS: usize = 28;
-/// A tendon whose length is above that of a straight one by this part of it is straight: it would sag by a part in 50 000.
+/// Relative excess over the straight length up to which a tendon is straight: it would sag by 1/50 000 of its length.
 const TAUT: f64 = 1e-9;
-/// A tendon this many times longer than its ends are apart horizontally hangs as two straight lines, as in MuJoCo.
+/// Ratio of length to horizontal distance above which a tendon hangs as two straight lines, as in MuJoCo.
 const STEEP: f64 = 100.0;
 
-/// True if a tendon hangs where it is slack.
+/// True if a tendon hangs when it is slack.
 pub(super) fn may_hang(model: &Model, tendon: usize) -> bool {
     let acts = |actuator: usize| {
         words::transmission(model.actuator_trntype()[actuator]) == Some("tendon")
@@ -27,13 +27,13 @@ pub(super) fn may_hang(model: &Model, tendon: usize) -> bool {
         && !(0..model.nactuator()).any(acts)
 }
 
-/// The length of a tendon that may hang \[m\]; `None` where it is straight.
+/// Length of a tendon that may hang \[m\]; `None` if it is straight.
 pub(super) fn slack(data: &Data, tendon: usize) -> Option<f64> {
     let model = data.model();
     let [lower, upper] = [0, 1].map(|k| model.tendon_range()[2 * tendon + k]);
     if model.tendon_stiffness()[tendon] != 0.0 {
         let rest = model.tendon_lengthspring();
-        // 2.2.2 has one length for both ends.
+        // 2.2.2 has one rest length for both ends of the range.
         let ends = rest.len() / model.ntendon().max(1);
         let [low, high] = [rest[ends * tendon], rest[ends * tendon + ends - 1]];
         return (low == 0.0 && high > 0.0).then_some(high);
@@ -42,8 +42,8 @@ pub(super) fn slack(data: &Data, tendon: usize) -> Option<f64> {
     is_slack.then_some(upper)
 }
 
-/// The pieces of a string of a length \[m\] that hangs between two points. It is straight where it is not longer than their
-/// distance.
+/// Segments of a string of a length \[m\] that hangs between two points. A string that is not longer than their
+/// distance is straight.
 pub(super) fn segments([from, to]: [[f64; 3]; 2], gravity: [f64; 3], length: f64, each: &mut dyn FnMut([[f64; 3]; 2])) {
     let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
     let pull = dot(gravity, gravity).sqrt();
@@ -82,10 +82,12 @@ pub(super) fn segments([from, to]: [[f64; 3]; 2], gravity: [f64; 3], length: f64
     }
 }
 
-/// The u with sinh(u) / u = `ratio`, which is above 1. A catenary y = a cosh(x / a) of a length over a run and a rise has
-/// u = run / 2a, since 2 a sinh(run / 2a) is the square root of length² - rise². Newton's method.
+/// Solves sinh(u) / u = `ratio` for u, with a ratio above 1, by Newton's method.
+///
+/// A catenary y = a cosh(x / a) of a length over a run and a rise has u = run / 2a, since 2 a sinh(run / 2a) is the
+/// square root of length² - rise².
 fn half_angle(ratio: f64) -> f64 {
-    // From above: sinh(u) / u >= 1 + u²/6, and sinh(u) / u > exp(u) / 2u - 1/2 for large u.
+    // Starts from above: sinh(u) / u >= 1 + u²/6, and sinh(u) / u > exp(u) / 2u - 1/2 for large u.
     let mut u = if ratio < 3.0 {
         (6.0 * (ratio - 1.0)).max(1e-12).sqrt()
     } else {

@@ -1,8 +1,8 @@
-//! Flexes of MuJoCo 4: cables, cloth and solids, as its viewers draw them.
+//! Flexes of MuJoCo 4 (cables, cloth and solids), rendered as in its viewers.
 //!
-//! Source: `mjv_updateActiveFlex` of `engine_vis_visualize.c` and `render_gl3.c` with the default options: a cable is a round
-//! bar along each edge; cloth has two sides, a radius away from its elements along smooth normals, and a rim; of a solid the
-//! boundary is drawn, a radius outside.
+//! Source: `mjv_updateActiveFlex` of `engine_vis_visualize.c` and `render_gl3.c` with the default options. A cable is a
+//! round bar along each edge. Cloth has two sides, a radius away from its elements along smooth normals, and a rim. For
+//! a solid the boundary is rendered, a radius outside.
 
 use super::{Scratch, Segment};
 use kinetoscope_mujoco::{Data, FlexArrays};
@@ -10,7 +10,7 @@ use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::smooth_normals;
 use std::collections::HashMap;
 
-/// A flex of one dimension.
+/// Flex of one dimension.
 #[derive(Clone, Debug)]
 pub(super) struct Cable(usize);
 
@@ -31,35 +31,35 @@ impl Cable {
     }
 }
 
-/// Positions of a flex's vertices \[m\].
+/// Positions of the vertices of a flex \[m\].
 fn points(data: &Data, first: usize, count: usize) -> &[[f64; 3]] {
     data.flex_vertices().get(first..first + count).unwrap_or(&[])
 }
 
-/// A flex of two or three dimensions: the vertices of the mesh that is drawn, each beside a vertex of the flex.
+/// Flex of two or three dimensions: the vertices of the rendered mesh, each beside a vertex of the flex.
 #[derive(Clone, Debug)]
 pub(super) struct Cloth {
     first_vertex: usize,
-    /// Triangles of the flex's vertices whose normals are added up.
+    /// Triangles of flex vertices, whose normals are averaged.
     faces: Vec<[u32; 3]>,
     count: usize,
     corners: Vec<Corner>,
-    /// The triangles that are drawn, of `corners`.
+    /// Triangles of the rendered mesh, as indices of `corners`.
     triangles: Vec<[u32; 3]>,
 }
 
-/// A vertex of the mesh that is drawn.
+/// Vertex of the rendered mesh.
 #[derive(Clone, Copy, Debug)]
 struct Corner {
-    /// The vertex of the flex.
+    /// Index of the flex vertex.
     vertex: u32,
     /// Distance along the smooth normal \[m\].
     offset: f32,
-    /// Side of the smooth normal that its own one is on; 0 where its own one is that of its triangle.
+    /// Side of the smooth normal on which its own normal is; 0 for a vertex with the normal of its triangle.
     side: f32,
 }
 
-/// Collects the vertices of the mesh that is drawn: one for each place, side and texture coordinate.
+/// Collector of the vertices of the rendered mesh: one for each position, side and texture coordinate.
 struct Builder<'a> {
     flex: &'a FlexArrays<'a>,
     known: HashMap<(u32, i32, u32, u32), u32>,
@@ -68,11 +68,11 @@ struct Builder<'a> {
     triangles: Vec<[u32; 3]>,
 }
 
-/// Smooth normals: vertices are shared by triangles.
+/// Triangle number of vertices with smooth normals, which triangles share.
 const SHARED: u32 = u32::MAX;
 
 impl Builder<'_> {
-    /// Adds a triangle of vertices, each on a side of the flex, with their texture coordinates.
+    /// Adds a triangle of flex vertices, each on a side of the flex, with their texture coordinates.
     fn add(&mut self, vertices: [(u32, i32); 3], texcoords: [u32; 3], smooth: bool) {
         let number = if smooth { SHARED } else { self.triangles.len() as u32 };
         let triangle = [0, 1, 2].map(|k| {
@@ -82,7 +82,7 @@ impl Builder<'_> {
                 let offset = side as f32 * self.flex.radius as f32;
                 self.corners.push(Corner { vertex, offset, side: if smooth { side as f32 } else { 0.0 } });
                 let [u, v] = self.flex.texcoords.get(texcoord as usize).copied().unwrap_or_default();
-                // MuJoCo's v points down the image.
+                // MuJoCo's v axis points down the image.
                 self.uvs.push([u, 1.0 - v]);
                 self.corners.len() as u32 - 1
             })
@@ -92,7 +92,7 @@ impl Builder<'_> {
 }
 
 impl Cloth {
-    /// The flex, and its mesh for drawing, with all vertices in one place.
+    /// Converts a flex. The mesh for rendering has all vertices at one position at first.
     pub(super) fn of(flex: &FlexArrays<'_>) -> (Self, TriMesh) {
         let count = flex.vertices;
         let index = |n: i32| u32::try_from(n).unwrap_or(u32::MAX);
@@ -157,7 +157,7 @@ impl Cloth {
     }
 }
 
-/// The means of the unit normals of the triangles around each vertex, of length 1.
+/// Computes the mean of the unit normals of the triangles around each vertex, normalized to length 1.
 fn mean_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]], normals: &mut [[f32; 3]]) {
     let unit = |v: [f64; 3]| {
         let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -1,8 +1,8 @@
-//! Elements that change their shape from frame to frame: spatial tendons, skins, flexes.
+//! Elements whose shape changes from frame to frame: spatial tendons, skins, flexes.
 //!
-//! Each is one or several instances of the scene: a tendon has a fixed number of capsules, of which it shows as many as its
-//! path has segments; a skin or a flex is a mesh whose vertices move. Every environment has a copy of the scene with the
-//! shapes of the moment, which is used again ([`buffers`]) as soon as no camera holds it any more.
+//! Each element is one or several instances of the scene. A tendon has a fixed number of capsules, of which as many are
+//! visible as its path has segments. A skin or a flex is a mesh whose vertices move. Every environment has a copy of
+//! the scene with the current shapes, which is reused ([`buffers`]) as soon as no camera holds it.
 
 mod buffers;
 mod catenary;
@@ -23,14 +23,14 @@ use kinetoscope_scene::shape::{Capsule, Mesh};
 use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, RenderSceneError};
 use std::sync::Arc;
 
-/// The instances of a model whose shapes change.
+/// Instances of a model whose shapes change.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Deforming {
     paths: Vec<Path>,
     meshes: Vec<MovingMesh>,
 }
 
-/// Capsules along a line that changes.
+/// Capsules along a path that changes.
 #[derive(Clone, Debug)]
 struct Path {
     first: usize,
@@ -38,35 +38,35 @@ struct Path {
     line: Line,
 }
 
-/// The line that capsules follow.
+/// Path that capsules follow.
 #[derive(Clone, Debug)]
 enum Line {
     Tendon(tendon::Tendon),
     Cable(flex::Cable),
 }
 
-/// A mesh whose vertices move.
+/// Mesh whose vertices move.
 #[derive(Clone, Debug)]
 struct MovingMesh {
     instance: usize,
     surface: Surface,
 }
 
-/// The law by which the vertices of a mesh move.
+/// Element that moves the vertices of a mesh.
 #[derive(Clone, Debug)]
 enum Surface {
     Skin(usize),
     Flex(Arc<flex::Cloth>),
 }
 
-/// A piece of a path.
+/// Straight segment of a path.
 struct Segment {
     ends: [[f64; 3]; 2],
     /// Radius \[m\].
     width: f64,
 }
 
-/// Memory for the vertices of one mesh.
+/// Working memory for the vertices of one mesh.
 #[derive(Debug, Default)]
 struct Scratch {
     positions: Vec<[f32; 3]>,
@@ -94,7 +94,7 @@ impl Surface {
     }
 }
 
-/// The elements of a model that are drawn and change their shape.
+/// Finds the visible elements of a model whose shape changes.
 pub(super) fn shown(model: &Model) -> Vec<Drawable> {
     let tendons = (0..model.ntendon()).filter(|&t| {
         let rgba = &model.tendon_rgba()[4 * t..4 * t + 4];
@@ -121,10 +121,11 @@ impl Deforming {
         self.paths.is_empty() && self.meshes.is_empty()
     }
 
-    /// Adds the instances of an element to a scene's. `like` has all but the shape, the material and the group.
+    /// Adds the instances of an element to those of a scene. `like` has all fields except the shape, the material and
+    /// the group.
     ///
     /// # Errors
-    /// A size or a number of the material that cannot be drawn; nothing is added then.
+    /// A size or the material is invalid for rendering; then nothing is added.
     pub(super) fn add(
         &mut self,
         model: &Model,
@@ -185,7 +186,7 @@ impl Deforming {
         }
     }
 
-    /// Moves the capsules of paths to where they are in `data`. Meshes are in the world frame.
+    /// Moves the capsules of paths to their poses in `data`. Meshes are in the world frame.
     pub(super) fn place(&self, data: &Data, poses: &mut [PoseF32]) {
         for path in &self.paths {
             let poses = &mut poses[path.first..path.first + path.capsules];
@@ -196,14 +197,14 @@ impl Deforming {
                 }
                 used += 1;
             });
-            // A capsule that comes back moves from the end of the path.
+            // Unused capsules stay at the end of the path, so that a capsule that reappears moves from there.
             if let Some(last) = used.checked_sub(1).and_then(|last| poses.get(last)).copied() {
                 poses[used.min(path.capsules)..].fill(last);
             }
         }
     }
 
-    /// Gives a scene the shapes of `data`.
+    /// Sets the shapes of a scene to those of `data`.
     fn shape(&self, data: &Data, scene: &mut RenderScene, scratch: &mut Scratch) {
         for path in &self.paths {
             let mut used = 0;
@@ -222,7 +223,7 @@ impl Deforming {
         for MovingMesh { instance, surface } in &self.meshes {
             surface.vertices(data, scratch);
             let Scratch { positions, normals, .. } = scratch;
-            // An environment that diverged keeps its last shape; the poses of its bodies say that it cannot be drawn.
+            // A diverged environment keeps its last shape; the poses of its bodies show that it cannot be rendered.
             if positions.iter().flatten().all(|x| x.is_finite()) {
                 scene.deform(*instance, |mesh| mesh.deform(positions, normals));
             }
@@ -231,7 +232,7 @@ impl Deforming {
 }
 
 impl Segment {
-    /// World from the capsule's frame: its axis is turned from z by the smallest angle.
+    /// Pose of the capsule in the world: its axis is rotated from z by the smallest angle.
     fn pose(&self) -> PoseF32 {
         let [from, to] = self.ends;
         let along = [0, 1, 2].map(|k| to[k] - from[k]);
@@ -249,14 +250,14 @@ impl Segment {
         PoseF32 { rotation: rotation.map(|row| row.map(|x| x as f32)), translation: middle.map(|x| x as f32) }
     }
 
-    /// The capsule in its own frame. One without a length is a ball, or nearly.
+    /// Capsule in its own frame. A segment without length gives a sphere, or nearly one.
     fn capsule(&self) -> Capsule {
         let [from, to] = self.ends;
         let length = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
         let radius = self.width as f32;
         let half = (0.5 * length) as f32;
         let shortest = 1e-6 * radius;
-        // Where it is says that it cannot be drawn, if it cannot.
+        // The pose reports a position that is not finite.
         Capsule { radius, half_length: if half.is_finite() { half.max(shortest) } else { shortest } }
     }
 }

@@ -1,7 +1,7 @@
-//! Vertices of skins: each is moved by bodies, and stands at the weighted mean of the places where they put it.
+//! Vertices of skins: each is the weighted mean of the positions that its bodies give it.
 //!
-//! Source: `mjv_updateActiveSkin` of `engine_vis_visualize.c`, from the bodies' pose in the bind pose to that of now. Sums are
-//! of single precision in MuJoCo's order.
+//! Source: `mjv_updateActiveSkin` of `engine_vis_visualize.c`, from the bind pose of the bodies to their current pose.
+//! Sums are of single precision in MuJoCo's order.
 
 use super::Scratch;
 use kinetoscope_mujoco::{Data, SkinArrays};
@@ -9,22 +9,22 @@ use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::smooth_normals;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// The mesh of a skin in its bind pose.
+/// Mesh of a skin in its bind pose.
 pub(super) fn bind_pose(skin: &SkinArrays<'_>) -> TriMesh {
     let mut mesh = TriMesh::from_triangles(skin.positions.to_vec(), triangles(skin).collect());
-    // MuJoCo's v points down the image.
+    // MuJoCo's v axis points down the image.
     mesh.uvs = (!skin.texcoords.is_empty()).then(|| skin.texcoords.iter().map(|&[u, v]| [u, 1.0 - v]).collect());
     mesh
 }
 
-/// The triangles of a skin; those with a vertex that does not exist are left out.
+/// Triangles of a skin, without those that refer to missing vertices.
 fn triangles(skin: &SkinArrays<'_>) -> impl Iterator<Item = [u32; 3]> {
     let count = skin.positions.len();
     let exists = move |t: &[u32; 3]| t.iter().all(|&vertex| (vertex as usize) < count);
     skin.faces.iter().map(|face| face.map(|vertex| u32::try_from(vertex).unwrap_or(u32::MAX))).filter(exists)
 }
 
-/// Positions and normals of the vertices of a skin.
+/// Computes positions and normals of the vertices of a skin.
 pub(super) fn vertices(data: &Data, skin: usize, scratch: &mut Scratch) {
     let skin = data.model().skin(skin);
     let Scratch { positions, normals, triangles: faces, .. } = scratch;

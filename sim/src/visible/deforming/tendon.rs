@@ -1,34 +1,34 @@
-//! Segments of spatial tendons, as MuJoCo's viewers draw them.
+//! Segments of spatial tendons, rendered as in MuJoCo's viewers.
 //!
-//! Source: `addSpatialTendonGeoms` of `engine_vis_visualize.c`. Two things of it are left out: a tendon without a material and
-//! a colour of its own stays grey at its limit, and no colour shows islands or activations.
+//! Source: `addSpatialTendonGeoms` of `engine_vis_visualize.c`, without two features: a tendon without a material and a
+//! color of its own stays gray at its limit, and colors do not show islands or activations.
 
 use super::{Segment, catenary};
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{Data, Model};
 
-/// A tendon, and the most that its path can be.
+/// Spatial tendon, with the maximum size of its path.
 #[derive(Clone, Debug)]
 pub(super) struct Tendon {
     tendon: usize,
-    /// Points of the longest path.
+    /// Number of points of the longest path.
     most_points: usize,
-    /// True if it hangs like a string where it is slack.
+    /// True if it hangs like a string when it is slack.
     may_hang: bool,
 }
 
-/// True if a tendon has a path in space: others are sums of joint positions.
+/// True for a tendon with a path in space: other tendons are sums of joint positions.
 pub(super) fn is_spatial(model: &Model, tendon: usize) -> bool {
     let first = model.tendon_adr()[tendon] as usize;
     model.wrap_type().get(first).is_some_and(|kind| *kind as u32 != mj::mjWRAP_JOINT)
 }
 
-/// The geom, site or pulley of a point: MuJoCo's numbers of those that are no geom.
+/// MuJoCo's object number of a pulley in a path; geoms have numbers from 0.
 const PULLEY: i32 = -2;
 
 impl Tendon {
     pub(super) fn of(model: &Model, tendon: usize) -> Self {
-        // Every element of a path gives two points at most: those where the path meets a geom.
+        // Every element of a path gives at most two points: the tangent points on a geom.
         Self {
             tendon,
             most_points: 2 * model.tendon_num()[tendon] as usize,
@@ -42,7 +42,7 @@ impl Tendon {
         self.most_points.saturating_sub(1).max(hanging)
     }
 
-    /// The segments of the path in `data`, in order.
+    /// Segments of the path in `data`, in order.
     pub(super) fn segments(&self, data: &Data, each: &mut dyn FnMut(Segment)) {
         let model = data.model();
         let width = model.tendon_width()[self.tendon];
@@ -61,7 +61,7 @@ impl Tendon {
             if objects.contains(&PULLEY) {
                 continue;
             }
-            // Thinner inside of what the path is wrapped around.
+            // Thinner inside the geom that the tendon wraps around.
             let inside = objects.iter().all(|object| *object >= 0);
             each(Segment { ends: *ends, width: if inside { 0.5 * width } else { width } });
         }

@@ -1,4 +1,4 @@
-//! Tendons, skins and flexes against closed forms.
+//! Tests of tendons, skins and flexes against closed forms.
 
 use super::super::Visible;
 use kinetoscope_mujoco as mj;
@@ -7,7 +7,7 @@ use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::{Instance, PoseF32, RenderScene};
 use std::sync::Arc;
 
-/// A model and its state, moved to `qpos`.
+/// Model and its state at `qpos`.
 fn state(mjcf: &str, qpos: &[f64]) -> (Model, Data) {
     let model = mj::compile(mjcf, &[]).expect("compiles").into_model();
     let mut data = Data::new(&model).expect("data");
@@ -16,7 +16,7 @@ fn state(mjcf: &str, qpos: &[f64]) -> (Model, Data) {
     (model, data)
 }
 
-/// The scene of a state, with its poses.
+/// Scene of a state, with its poses.
 fn seen(visible: &Visible, data: &Data) -> (Arc<RenderScene>, Vec<PoseF32>) {
     let scene = visible.scene_at(data);
     let (mut poses, mut lights) = (vec![PoseF32::IDENTITY; scene.instances().len()], scene.lights.clone());
@@ -28,7 +28,7 @@ fn is_shown(instance: &Instance) -> bool {
     instance.deforms && instance.visible
 }
 
-/// Ends and radii of the capsules that are shown.
+/// Ends and radii of the visible capsules.
 fn capsules(visible: &Visible, data: &Data) -> Vec<([[f64; 3]; 2], f64)> {
     let (scene, poses) = seen(visible, data);
     let shown = scene.instances().iter().zip(&poses).filter(|(instance, _)| is_shown(instance));
@@ -69,11 +69,11 @@ const PATHS: &str = r#"<mujoco><compiler autolimits="true"/><worldbody>
     <spatial name="string" width="0.005" range="0 2"><site site="right"/><site site="ball"/></spatial>
     <fixed name="sum"><joint joint="lift" coef="1"/></fixed></tendon></mujoco>"#;
 
-/// A tendon around a cylinder touches it where a tangent does: at 60 degrees from the axis to a point two radii away; between
-/// these points it is half as wide. A pulley has no segment. Tendons of group 3 and clear ones are not drawn, nor sums of
-/// joint positions. A taut string is straight.
+/// A tendon around a cylinder touches it at tangent points: at 60 degrees from the axis to a point two radii away.
+/// Between these points it is half as wide. A pulley has no segment. Tendons of group 3, transparent tendons and sums
+/// of joint positions are not rendered. A taut string is straight.
 ///
-/// Root cause once: cameras drew geoms only.
+/// Regression: cameras rendered geoms only.
 #[test]
 fn tendons() {
     // The string from x = 1 to x = 2 is 2 m long.
@@ -98,13 +98,13 @@ fn tendons() {
     assert_eq!(names(&scene), ["over", "parts", "string"]);
     let red = scene.instances().iter().find(|i| i.deforms).expect("a tendon").material.rgba;
     assert_eq!(red, [1.0, 0.0, 0.0, 1.0]);
-    // The scene of all environments shows none.
+    // The scene of all environments has no visible capsule.
     assert!(!visible.scene().instances().iter().any(is_shown), "capsules without a place are hidden");
 }
 
-/// A string of 2 m between two points that are 1 m apart at the same height hangs as y = a cosh(x / a), where 2 a sinh(1 / 2a)
-/// is 2; one that is lifted on one side keeps its length; one between points above each other hangs straight down. Every
-/// segment's ends lie on the curve.
+/// A string of 2 m between two points that are 1 m apart at the same height hangs as y = a cosh(x / a), where 2 a
+/// sinh(1 / 2a) is 2. A string that is lifted on one side keeps its length. A string between points above each other
+/// hangs straight down. The ends of every segment lie on the curve.
 #[test]
 fn slack_strings() {
     let string = |qpos: f64| {
@@ -130,7 +130,7 @@ fn slack_strings() {
     for (rise, pieces) in [0.0, 0.5, 1.5, -1.0].map(|rise| (rise, string(rise))) {
         let ends = [pieces[0][0], pieces[pieces.len() - 1][1]];
         near(&[(ends, 0.0)], &[([[1.0, 0.0, 0.0], [2.0, 0.0, rise]], 0.0)]);
-        // A polygon in the curve is a little shorter.
+        // A polygon inscribed in the curve is a little shorter.
         let length = length(&pieces);
         assert!((1.99..2.0001).contains(&length), "{rise}: {length}");
     }
@@ -138,11 +138,11 @@ fn slack_strings() {
     let ends = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
     super::catenary::segments(ends, [0.0, 0.0, -9.81], 3.0, &mut |ends| steep.push((ends, 0.0)));
     near(&steep, &[([ends[0], [0.0, 0.0, -1.0]], 0.0), ([[0.0, 0.0, -1.0], ends[1]], 0.0)]);
-    // The control: a taut string is straight.
+    // Control: a taut string is straight.
     assert_eq!(string(3.0).len(), 1);
 }
 
-/// Two bodies, of which the second turns about -y at x = 1, and a strip over both.
+/// Two bodies and a strip over both. The second body rotates about -y at x = 1.
 const STRIP: &str = r#"<mujoco><compiler angle="radian"/><worldbody>
     <body name="first"><geom size="0.1"/>
       <body name="second" pos="1 0 0"><joint type="hinge" axis="0 -1 0"/><geom size="0.1"/></body></body>
@@ -153,13 +153,13 @@ const STRIP: &str = r#"<mujoco><compiler angle="radian"/><worldbody>
     <bone body="second" bindpos="1 0 0" bindquat="1 0 0 0" vertid="2 3 4 5" vertweight="0.5 0.5 1 1"/>
   </skin></PLACE></mujoco>"#;
 
-/// A skin over two bones: vertices of one bone go with it; those in the joint stay, since both bones put them there. Inflated,
-/// the ends are moved along the normals of their triangles.
+/// A skin over two bones. Vertices of one bone move with it. Vertices at the joint stay, since both bones put them
+/// there. Inflation moves the ends along the normals of their triangles.
 ///
-/// Root cause once: cameras drew geoms only.
+/// Regression: cameras rendered geoms only.
 #[test]
 fn skin_of_two_bones() {
-    // Of each vertex at y = -1, x and z.
+    // x and z of each vertex at y = -1.
     let line = |inflate: &str, angle: f64| {
         let place = if mj::TARGET == mj::Target::V4 { "deformable" } else { "asset" };
         let (model, data) = state(&STRIP.replace("PLACE", place).replace("INFLATE", inflate), &[angle]);
@@ -178,14 +178,14 @@ fn skin_of_two_bones() {
     };
     let up = std::f64::consts::FRAC_PI_2;
     close(&line("0", 0.0), &[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]);
-    // The second body turns its x axis to z.
+    // The second body rotates its x axis to z.
     close(&line("0", up), &[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
     let inflated = line("0.1", up);
     close(&[inflated[0], inflated[2]], &[[0.0, 0.1], [0.9, 1.0]]);
 }
 
-/// Copies of a scene are used again when nothing holds them, and not before; those of environments with looks of their own
-/// have these.
+/// Copies of a scene are reused when no camera holds them, and not before. Copies for an environment with a scene of
+/// its own are made from that scene.
 #[test]
 fn memory_of_scenes() {
     use kinetoscope_scene::OwnScene;
