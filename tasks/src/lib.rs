@@ -12,10 +12,10 @@
 //! | [`Env`], [`EnvBuilder`], [`EnvCfg`] | the implementation of [`VectorEnv`] with a simulation and terms |
 //! | [`ActionTerm`], [`CommandTerm`], [`EventTerm`] | write to the simulation: actions, goals, resets, pushes |
 //! | [`ObservationTerm`], [`RewardTerm`], [`TerminationTerm`] | read from the simulation, through [`Now`] |
-//! | [`terms`](mod@terms) | ready-made terms for robots |
+//! | [`mod@terms`] | ready-made terms for robots |
 //! | [`Space`], [`Step`] | named columns with bounds; the result of a step |
 //! | [`Dice`] | random numbers of one environment, episode and term |
-//! | [`check`](fn@check) | tests an implementation of [`VectorEnv`] |
+//! | [`fn@check`] | tests an implementation of [`VectorEnv`] |
 //!
 //! An environment whose episode ends begins the next one in the same step; [`Env`] documents the order of a step.
 //!
