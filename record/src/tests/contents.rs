@@ -1,4 +1,4 @@
-//! Content of recordings, held against what was read from the simulation meanwhile.
+//! Content of recordings, compared with values that were read from the simulation meanwhile.
 
 use super::*;
 
