@@ -3,7 +3,7 @@
 /// The clock of a recording.
 ///
 /// The recorded time of an environment equals its simulation time until the environment is reset or put into another
-/// state. Its simulation time then jumps back, which viewers do not support. Its recorded time continues from the time
+/// state. Its simulation time then jumps, which viewers do not support. Its recorded time continues from the time
 /// of the reset.
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {

@@ -76,7 +76,7 @@ pub enum RecordError {
         /// Reason, or the invalid number.
         what: String,
     },
-    /// The configuration selects nothing that exists.
+    /// The configuration selects no existing stream that the format supports.
     #[error("{path}: there is nothing to record for {}", .format.name())]
     Nothing {
         /// The file.

@@ -135,7 +135,7 @@ pub struct Recorder {
     failure: Option<RecordError>,
     recorded: Recorded,
     format: Format,
-    /// Recorded environments whose divergence was recorded.
+    /// Environments whose divergence was recorded already.
     diverged: Vec<usize>,
     /// Scenes of the environments that were written for viewers; `None` if the file has none.
     scenes: Option<Scenes>,

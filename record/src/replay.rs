@@ -96,8 +96,7 @@ type Of = fn(&SimulationManager, &str, &[usize]) -> Result<Source>;
 /// difference shows when they mattered.
 ///
 /// # Errors
-/// The file is not a complete recording, or is of another scene, another MuJoCo version or another time step. A NaN
-/// fails this check, too.
+/// The file is not a complete recording, or is of another scene, another MuJoCo version or another time step.
 pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Verdict> {
     let archive = Archive::of_any(path.as_ref())?;
     let dt = sim.cfg().physics_dt;
@@ -130,7 +129,7 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
     if steps.first() != Some(&0.0) {
         return Err(archive.malformed("its rows do not begin at step 0".into()));
     }
-    // One that is no number is in no such order.
+    // A NaN fails this check, too.
     if !steps.windows(2).all(|pair| [0.0, 1.0].contains(&(pair[1] - pair[0]))) {
         return Err(archive.malformed("it does not hold every step: record with `every: 1`".into()));
     }

@@ -56,7 +56,7 @@ mod tests {
         let mut file = tempfile::tempfile().unwrap();
         let mut out: Out = BufWriter::new(Box::new(file.try_clone().unwrap()));
         let mut encoder = begin([64, 64]).unwrap();
-        // 4096 reds and greens, and no other colors of a fixed palette.
+        // 4096 combinations of red and green, which a fixed palette of all colors represents poorly.
         let rgba: Vec<u8> =
             (0..64 * 64_u32).flat_map(|k| [(4 * (k % 64)) as u8, (4 * (k / 64)) as u8, 40, 255]).collect();
         encoder.frame(&mut out, &rgba, [0.0, 0.25]).unwrap();

@@ -48,7 +48,7 @@ impl<F: FnMut(&Packet) + Send> Sink for Calls<F> {
     }
 }
 
-/// Begins to record the ball to a function, with room for this number of packets.
+/// Records the ball with a function as the writer, and with this number of packets.
 fn record_to(
     sim: &mut SimulationManager,
     packets: usize,
@@ -61,7 +61,7 @@ fn record_to(
     sim.observers_mut().add(recorder)
 }
 
-/// A simulation waits for a slow disk, reports it, and loses nothing.
+/// A simulation waits for a slow disk, reports the waits, and loses no data.
 #[test]
 fn slow_disk() {
     let (steps, pause) = (20, Duration::from_millis(3));
@@ -85,13 +85,13 @@ fn slow_disk() {
     // Steps of one ball take microseconds: 21 rows with 2 packets wait 19 times, less where this thread was held up.
     assert!(slow.waits >= 10 && slow.waited >= pause * 10, "{slow}");
     assert!(slow.to_string().contains("the simulation waited for it"), "{slow}");
-    // Control: with room for all packets there is no wait, and the same is written.
+    // Control: with a packet for every row there is no wait, and the same data is written.
     let (roomy, same) = recorded(32);
     assert_eq!((roomy.waits, roomy.waited, &same), (0, Duration::ZERO, &heights));
 }
 
 fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) -> Result<Recorded> {
-    // Without the scene, which would fill the disk alone.
+    // Records no scene, which alone would fill the disk.
     let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(path) };
     let recorder = Recorder::start(sim, cfg, &Disk::full_after(left))?;
     let recorder = sim.observers_mut().add(recorder);
@@ -99,7 +99,7 @@ fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) 
     sim.finish_recording(recorder)
 }
 
-/// Asserts that a disk with this room is too small for a recording, and that what remains is kept as `part`, if anything.
+/// Asserts that a disk with this room is too small for a recording. `part` is the expected partial file, if any.
 #[track_caller]
 fn assert_too_small(sim: &mut SimulationManager, path: &Path, left: usize, part: Option<&Path>) {
     let error = record_to_a_full_disk(sim, path, left).unwrap_err();
@@ -108,7 +108,7 @@ fn assert_too_small(sim: &mut SimulationManager, path: &Path, left: usize, part:
     assert_eq!((kept.as_deref(), path.exists()), (part, false), "{left}");
 }
 
-/// A folder of images on a full disk holds whole images, under another name.
+/// On a full disk, the partial folder of images contains complete images only.
 #[test]
 fn full_disk_images() {
     let folder = tempfile::tempdir().unwrap();
@@ -143,7 +143,7 @@ fn full_disk_images() {
     }
 }
 
-/// A dataset on a full disk has neither its name nor the file that makes it a dataset.
+/// On a full disk, a dataset has neither its final name nor the file that makes it a dataset.
 #[test]
 fn full_disk_dataset() {
     let folder = tempfile::tempdir().unwrap();
@@ -166,7 +166,7 @@ fn full_disk_dataset() {
     }
 }
 
-/// Of files, only messages remain, under another name.
+/// On a full disk, MCAP is the only file format that leaves a partial file.
 #[test]
 fn full_disk_files() {
     let camera = CameraCfg { width: 64, height: 64, update_period: 0.05, ..CameraCfg::default() };
@@ -294,7 +294,7 @@ fn late_sensors() {
     sim.update(6);
     put(&mut sim, [0.3, 0.1, 1.1], Some(&[EnvId(0)]));
     sim.update(2);
-    // Again, while measurements of the time in between are on their way, and in the other environment too.
+    // A second write, while earlier measurements are pending, and in the other environment too.
     put(&mut sim, [-0.2, 0.1, 1.1], Some(&[EnvId(0)]));
     put(&mut sim, [0.2, 0.1, 1.1], Some(&[EnvId(1)]));
     sim.update(1);

@@ -102,7 +102,7 @@ fn entity_poses() {
     assert_eq!(steps, [0.0, f64::from(STEPS), f64::from(STEPS + 1)]);
     let far = farthest(&mut world, 1, &updates[2]["entities"]);
     assert!(far < NEAR, "{far}");
-    // Controls: the poses of the other environment, and a geom of a group that cameras do not draw.
+    // Controls: the poses of environment 0, and a geom of a group that is not drawn.
     assert!(farthest(&mut world, 0, &updates[2]["entities"]) > 100.0 * NEAR);
     let frames: Vec<&str> = entities(&updates[2]).map(|entity| entity["frame"].as_str().unwrap()).collect();
     for frame in ["env_1", "env_1/cube", "env_1/toys/mobile", "env_1/toys/tip", "env_1/arm/link6"] {

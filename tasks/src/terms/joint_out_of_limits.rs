@@ -6,8 +6,8 @@ use crate::termination::TerminationTerm;
 use ndarray::{Array1, Axis};
 use kinetoscope_sim::{RobotId, SimulationManager};
 
-/// Terminates where a joint that matches one of `patterns` (whole names) is beyond its [soft
-/// limits](kinetoscope_sim::Robot::soft_qpos_limits). Joints without limits never terminate an episode.
+/// Terminates where a joint that matches one of `patterns` (whole names) is beyond its limits
+/// ([`soft_qpos_limits`](kinetoscope_sim::Robot::soft_qpos_limits)). Joints without limits never terminate an episode.
 ///
 /// # Errors
 /// A pattern matches no joint.
