@@ -87,8 +87,9 @@ impl EnvBuilder {
     /// Checks the terms, builds the environments, and runs the [`When::Startup`](crate::When::Startup) events.
     ///
     /// # Errors
-    /// There is no action or observation column, two terms of one kind have the same name, a name is empty or contains
-    /// a slash, a number is out of range, or an event fails.
+    /// - There is no action or observation column.
+    /// - Two terms of one kind have the same name, or a name is empty or contains a slash.
+    /// - A number is out of range, or an event fails.
     pub fn build(self) -> Result<Env> {
         let Self { sim, cfg, terms } = self;
         cfg.check()?;

@@ -3,8 +3,10 @@
 use crate::reward::RewardTerm;
 use kinetoscope_sim::RobotId;
 
-/// exp(-d² / std²), where d \[m/s\] is the distance between the x and y velocity of the root link, in its own frame,
-/// and the first two columns of a command. The reward is 1 where both are equal.
+/// Reward exp(-d² / std²) for tracking a velocity command.
+///
+/// d is the distance between the x and y velocity of the root link, in its own frame, and the first two columns of the
+/// command \[m/s\]. The term is `weight` where both are equal.
 pub fn track_lin_vel(name: &str, weight: f64, robot: RobotId, command: impl Into<String>, std: f64) -> RewardTerm {
     let command = command.into();
     RewardTerm::new(name, weight, move |now| {
