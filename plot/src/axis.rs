@@ -1,47 +1,48 @@
-//! One axis: from values to pixels, and the values that have a tick.
+//! Axis scaling and ticks.
 
-/// From values to the picture.
+/// A linear or logarithmic map from values to pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axis {
     /// Logarithmic: `low` and `high` are decimal logarithms.
     log: bool,
     low: f64,
     high: f64,
-    /// Where `low` and `high` are \[pixels\].
+    /// Pixel coordinates of `low` and `high`.
     ends: [f64; 2],
 }
 
-/// Ticks are about as far apart as this \[pixels\].
+/// Approximate distance between ticks \[pixels\].
 const BETWEEN: f64 = 80.0;
 
 impl Axis {
-    /// An axis on which all values have a place, with a margin; `ends` are where it begins and ends \[pixels\]. Values of a
-    /// logarithmic axis are above 0.
+    /// Creates an axis that shows all `values` with a margin, from pixel `ends[0]` to pixel `ends[1]`. The values of a
+    /// logarithmic axis must be above 0.
     pub(super) fn new(values: impl Iterator<Item = f64>, log: bool, ends: [f64; 2]) -> Self {
         let values = values.map(|x| if log { x.log10() } else { x });
         let (mut low, mut high) = values.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
         if low > high {
             (low, high) = (0.0, 1.0);
         }
-        // Values that are all the same, or nearly: there must be something between two ticks.
+        // The range of (nearly) equal values is widened, so that it contains different ticks.
         let least = 1e-9 * high.abs().max(low.abs());
         if high / 2.0 - low / 2.0 <= least {
             let half = if least > 0.0 { (0.5_f64).min(high.abs()).max(2.0 * least) } else { 0.5 };
             (low, high) = (low - half, high + half);
         }
-        // Half as large, so that the largest numbers there are have a difference.
+        // Halved values, so that the difference of the largest floats does not overflow.
         let margin = 0.04 * (high / 2.0 - low / 2.0);
         Self { log, low: (low - margin).max(f64::MIN / 4.0), high: (high + margin).min(f64::MAX / 4.0), ends }
     }
 
-    /// Where a value is \[pixels\].
+    /// Pixel coordinate of a value.
     pub(super) fn place(&self, value: f64) -> f64 {
         let value = if self.log { value.log10() } else { value };
         let share = (value - self.low) / (self.high - self.low);
         self.ends[0] + share * (self.ends[1] - self.ends[0])
     }
 
-    /// Values with a tick and their labels: 1, 2 or 5 times a power of ten; whole powers of ten on a logarithmic axis.
+    /// Ticks with their labels, at multiples of 1, 2 or 5 times a power of ten. A logarithmic axis has its ticks at
+    /// integer powers of ten.
     pub(super) fn ticks(&self) -> Vec<(f64, String)> {
         let wanted = ((self.ends[1] - self.ends[0]).abs() / BETWEEN).clamp(2.0, 20.0);
         let raw = (self.high - self.low) / wanted;
@@ -49,7 +50,7 @@ impl Axis {
         let step = [1.0, 2.0, 5.0].map(|k| k * power).into_iter().find(|step| *step >= raw).unwrap_or(10.0 * power);
         let step = if self.log { step.max(1.0).round() } else { step };
         let (first, last) = ((self.low / step).ceil(), (self.high / step).floor());
-        // Not more than a screen is wide, whatever was rounded.
+        // Bounds the number of ticks in case of rounding errors.
         let count = (last - first).clamp(0.0, 100.0) as u32;
         let ticks = (0..=count).map(|k| (first + f64::from(k)) * step).filter(|tick| tick.is_finite());
         if self.log {
@@ -58,11 +59,11 @@ impl Axis {
         ticks.map(|tick| (tick, self.label(tick, step))).collect()
     }
 
-    /// So many digits that neighbours differ.
+    /// Formats a tick with as many digits as neighboring ticks need to differ.
     fn label(&self, tick: f64, step: f64) -> String {
-        // Adding 0 makes -0 a 0.
+        // Adding 0 turns -0 into 0.
         let (tick, largest) = (tick + 0.0, self.low.abs().max(self.high.abs()));
-        // A tenth more than a whole power is that power: logarithms are rounded.
+        // The small addend corrects rounding errors of the logarithm of a power of ten.
         let of_step = (step.log10() + 1e-9).floor();
         if largest < 1e6 && of_step >= -6.0 {
             return format!("{tick:.*}", (-of_step).clamp(0.0, 6.0) as usize);
@@ -76,7 +77,7 @@ impl Axis {
 mod tests {
     use super::*;
 
-    /// Ticks are round numbers that differ.
+    /// Ticks are round and distinct numbers.
     #[test]
     fn ticks() {
         let labels = |values: [f64; 2]| -> Vec<String> {

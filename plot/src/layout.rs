@@ -1,61 +1,61 @@
-//! Places of lines and letters of a plot, before they are text or pixels.
+//! Layout of a plot: positions of lines and texts in pixels.
 
 use super::Plot;
 use super::axis::Axis;
 use super::thin::thinned;
 
-/// Everything that is drawn, in pixels from the top left.
+/// The geometry of a plot, in pixels from the top left corner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawing {
-    /// Pixels per row, rows.
+    /// Width and height.
     pub size: [usize; 2],
     /// Left, top, right and bottom of the frame.
     pub frame: [f64; 4],
     /// Lines of the grid.
     pub grid: Vec<[[f64; 2]; 2]>,
-    /// All texts.
+    /// All texts: tick labels, title, axis labels and legend.
     pub labels: Vec<Label>,
     /// The curves.
     pub curves: Vec<Curve>,
-    /// The strokes of the legend, with their colors.
+    /// Line samples of the legend, with their colors.
     pub keys: Vec<([[f64; 2]; 2], [u8; 3])>,
 }
 
-/// A text.
+/// A text at a position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Label {
     /// The text.
     pub text: String,
-    /// A point of the line that letters stand on.
+    /// A point on the baseline of the text.
     pub at: [f64; 2],
-    /// The part of the text at that point.
+    /// Horizontal alignment of the text at that point.
     pub anchor: Anchor,
 }
 
-/// The part of a text that is at its place.
+/// Horizontal alignment of a text at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
-    /// Its left end.
+    /// The text starts at the position.
     Start,
-    /// Its middle.
+    /// The text is centered at the position.
     Middle,
-    /// Its right end.
+    /// The text ends at the position.
     End,
 }
 
-/// A curve in connected pieces.
+/// A curve as polylines, broken at gaps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// Red, green, blue.
+    /// Color as red, green, blue.
     pub color: [u8; 3],
-    /// Points of each piece.
+    /// Points of each polyline.
     pub pieces: Vec<Vec<[f64; 2]>>,
-    /// Points with a mark.
+    /// Positions of the markers.
     pub marks: Vec<[f64; 2]>,
 }
 
-/// Colors of curves: seven that are distinct in any color vision, then others that differ from these and from each other in
-/// hue or lightness. Source of the seven: Okabe and Ito, Color Universal Design.
+/// Colors of curves. The first seven are distinguishable with any color vision; the others differ from these and from
+/// each other in hue or lightness. Source of the seven: Okabe and Ito, Color Universal Design.
 const COLORS: [[u8; 3]; 24] = [
     [0, 114, 178],
     [213, 94, 0],
@@ -82,9 +82,9 @@ const COLORS: [[u8; 3]; 24] = [
     [110, 200, 90],
     [190, 170, 160],
 ];
-/// Width and height of a letter \[pixels\].
+/// Width and height of a character \[pixels\].
 const LETTER: [f64; 2] = [7.0, 13.0];
-/// A stroke of the legend, and the gaps around it \[pixels\].
+/// Length of a line sample of the legend \[pixels\].
 const KEY: f64 = 24.0;
 const GAP: f64 = 8.0;
 const TOP: f64 = 46.0;
@@ -151,7 +151,7 @@ impl Drawing {
     }
 }
 
-/// The end of a name, where it is too long: there names differ.
+/// Shortens a name to `room` characters. Keeps its end, because long names usually differ there.
 fn shortened(name: &str, room: usize) -> String {
     let count = name.chars().count();
     if count <= room {

@@ -1,4 +1,4 @@
-//! Line plots as SVG text, and the places of their lines and letters for other formats.
+//! Line plots as SVG text, or as lines and texts in pixels for other output formats.
 //!
 //! ```
 //! use kinetoscope_plot::{Plot, Series};
@@ -9,7 +9,14 @@
 //! # Ok::<(), kinetoscope_plot::SizeError>(())
 //! ```
 //!
-//! Letters have one width that no font decides, so that a plot is the same on every machine.
+//! All characters have the same assumed width, independent of fonts, so that a plot is the same on every machine.
+//!
+//! | module | content |
+//! |---|---|
+//! | `axis` | linear and logarithmic axes, ticks |
+//! | `layout` | positions of lines and texts: [`Drawing`] |
+//! | `thin` | reduction of long curves to what is visible |
+//! | `svg` | SVG output |
 #![forbid(unsafe_code)]
 
 mod axis;
@@ -20,37 +27,37 @@ mod thin;
 pub use layout::{Anchor, Curve, Drawing, Label};
 use std::fmt;
 
-/// A curve.
+/// A curve with a name.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     /// Name in the legend.
     pub name: String,
-    /// Points in the order in which the line goes through them, each in the units of the two axes. At one that is not finite the
-    /// line is broken; on logarithmic axes, also at one that is not above 0.
+    /// Points of the line in drawing order, in the units of the two axes. The line is broken at a point that is not
+    /// finite. On logarithmic axes it is also broken at a point with a coordinate that is not positive.
     pub points: Vec<[f64; 2]>,
 }
 
 impl Series {
-    /// A curve through points.
+    /// Creates a curve through points.
     pub fn new(name: impl Into<String>, points: impl IntoIterator<Item = [f64; 2]>) -> Self {
         Self { name: name.into(), points: points.into_iter().collect() }
     }
 }
 
-/// Curves in one frame, with a legend beside it.
+/// A plot of curves with a legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
     /// Title above the frame.
     pub title: String,
     /// Labels of the horizontal and the vertical axis, with units.
     pub axes: [String; 2],
-    /// Makes both axes logarithmic.
+    /// True for two logarithmic axes.
     pub log: bool,
-    /// Draws a mark at each point.
+    /// True for a marker at each point.
     pub marks: bool,
     /// The curves.
     pub series: Vec<Series>,
-    /// Pixels per row, rows.
+    /// Width and height \[pixels\].
     pub size: [usize; 2],
 }
 
@@ -67,16 +74,16 @@ impl Default for Plot {
     }
 }
 
-/// A size that is too small to read or too large to draw.
+/// Error of a plot whose width or height is outside the supported range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SizeError {
-    /// Pixels per row.
+    /// Width \[pixels\].
     pub width: usize,
-    /// Rows.
+    /// Height \[pixels\].
     pub height: usize,
-    /// The smallest side.
+    /// Smallest supported width and height \[pixels\].
     pub least: usize,
-    /// The largest one.
+    /// Largest supported width and height \[pixels\].
     pub most: usize,
 }
 
@@ -89,16 +96,16 @@ impl fmt::Display for SizeError {
 
 impl std::error::Error for SizeError {}
 
-/// Shortest and longest side \[pixels\].
+/// Smallest and largest supported width and height \[pixels\].
 const SIDES: [usize; 2] = [200, 16384];
 
 impl Plot {
-    /// A plot of something over time \[s\]; `label` is the label of the vertical axis, with its unit.
+    /// Creates an empty plot over time \[s\]; `label` is the label of the vertical axis, with its unit.
     pub fn over_time(title: impl Into<String>, label: impl Into<String>) -> Self {
         Self { title: title.into(), axes: ["time [s]".into(), label.into()], ..Self::default() }
     }
 
-    /// The same with one more curve.
+    /// Adds a curve.
     #[must_use]
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
@@ -108,15 +115,15 @@ impl Plot {
     /// Returns the plot as SVG text.
     ///
     /// # Errors
-    /// A side is too short or too long.
+    /// The width or the height is below 200 or above 16384 pixels.
     pub fn to_svg(&self) -> Result<String, SizeError> {
         Ok(svg::text(&self.drawing()?))
     }
 
-    /// Returns the places of all lines and letters.
+    /// Returns the positions of all lines and texts.
     ///
     /// # Errors
-    /// A side is too short or too long.
+    /// The width or the height is below 200 or above 16384 pixels.
     pub fn drawing(&self) -> Result<Drawing, SizeError> {
         let ([width, height], [least, most]) = (self.size, SIDES);
         if ![width, height].iter().all(|side| (least..=most).contains(side)) {

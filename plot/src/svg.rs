@@ -1,16 +1,16 @@
-//! A plot as SVG text.
+//! SVG output.
 
 use super::layout::{Anchor, Curve, Drawing, Label};
 use std::fmt::Write as _;
 
-/// The text.
+/// Formats a drawing as an SVG document.
 pub(super) fn text(drawing: &Drawing) -> String {
     let Drawing { size: [width, height], frame: [left, top, right, bottom], grid, labels, curves, keys } = drawing;
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
          font-family=\"monospace\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
     );
-    // Writing to a text does not fail.
+    // Writing to a `String` does not fail.
     for [from, to] in grid {
         let _ = writeln!(out, "<path d=\"M{} L{}\" stroke=\"#ddd\"/>", point(from), point(to));
     }
@@ -64,7 +64,7 @@ fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// Text of XML: what has a meaning there is written otherwise, and what may not stand there at all is left out.
+/// Escapes XML characters, and removes control characters, which XML does not allow.
 fn escaped(text: &str) -> String {
     let text: String = text.chars().filter(|c| !c.is_control()).collect();
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")

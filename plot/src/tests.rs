@@ -13,19 +13,19 @@ fn closed_form() {
     let svg = sine(300).to_svg().unwrap();
     let lines = curves(&svg);
     assert_eq!((lines.len(), lines[0].len()), (1, 300));
-    // Pixels have two decimals, and so have the labels: 2 s on some 800 pixels, 0.6 rad on some 430.
+    // Pixel coordinates and labels have two decimals: 2 s on some 800 pixels, 0.6 rad on some 430.
     let (time, angle) = (0.02 * 2.0 / 700.0, 0.02 * 0.6 / 400.0);
     for (k, [t, y]) in (0..).zip(&lines[0]) {
         let exact = f64::from(k) * 2.0 / 300.0;
         assert!((t - exact).abs() < time, "{t} instead of {exact}");
         assert!((y - 0.3 * (5.0 * exact).sin()).abs() < angle, "{y} at {t}");
     }
-    // The control: a wave that is a thousandth faster does not.
+    // Control: the comparison detects a frequency that is 0.1 % higher.
     let off = lines[0].iter().map(|[t, y]| (y - 0.3 * (5.005 * t).sin()).abs()).fold(0.0, f64::max);
     assert!(off > 10.0 * angle, "{off}");
 }
 
-/// Cause: 17 curves had 7 colors.
+/// Regression test: 17 curves shared 7 colors.
 #[test]
 fn colors_of_many_curves() {
     let wave = |k: u32| Series::new(format!("joint {k}"), [[0.0, f64::from(k)], [1.0, f64::from(k) + 1.0]]);
@@ -46,7 +46,7 @@ fn gaps_and_frame() {
     let plot = Plot::over_time("a < b & c", "x").with(Series::new("one", points)).with(Series::new("two", []));
     let svg = plot.to_svg().unwrap();
     assert!(svg.contains("a &lt; b &amp; c") && !svg.contains("NaN") && !svg.contains("inf"), "{svg}");
-    // Two points alone, one line.
+    // Two isolated points, one line.
     assert_eq!((svg.matches("<circle").count(), svg.matches("<polyline").count()), (2, 1));
     let drawing = plot.drawing().unwrap();
     let [left, top, right, bottom] = drawing.frame;
@@ -66,7 +66,7 @@ fn long_legend() {
     assert!(right - left > 0.4 * 960.0);
     let small = Plot { size: [200, 200], ..plot.clone() };
     small.to_svg().unwrap();
-    // Nothing at all is a frame.
+    // A plot without curves is valid.
     assert!(Plot::default().to_svg().unwrap().ends_with("</svg>\n"));
 }
 

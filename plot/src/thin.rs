@@ -1,7 +1,7 @@
-//! Lines of millions of points, of which a picture shows a few thousand.
+//! Reduction of curves with far more points than pixels.
 
-/// Of all points that follow each other in one column of pixels, the first, the lowest, the highest and the last: the line
-/// covers the same pixels. Source: Jugel et al., "M4: A Visualization-Oriented Time Series Data Aggregation", VLDB 2014.
+/// Keeps the first, lowest, highest and last of the consecutive points in each column of pixels. The line covers the
+/// same pixels. Source: Jugel et al., "M4: A Visualization-Oriented Time Series Data Aggregation", VLDB 2014.
 pub(super) fn thinned(points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let mut out: Vec<[f64; 2]> = Vec::new();
     for run in points.chunk_by(|a, b| a[0].floor() == b[0].floor()) {
@@ -37,9 +37,9 @@ mod tests {
             };
             assert_eq!(of(&few), of(&points), "column {column}");
         }
-        // The order is that of the points.
+        // The order of the points is unchanged.
         assert!(few.windows(2).all(|pair| pair[0][0] < pair[1][0]));
-        // The control: few points stay as they are.
+        // Control: a curve with few points is unchanged.
         assert_eq!(thinned(points[..4].to_vec()), points[..4]);
     }
 }

@@ -1,4 +1,4 @@
-//! NumPy archives of a recorder, read again.
+//! Reading of NumPy archives of a recorder.
 
 use crate::error::{RecordError, Result};
 use crate::format::Format;
@@ -16,25 +16,25 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-/// Kinds of events after which an environment has another state: resets, and what somebody wrote.
+/// Numbers of the event kinds that change the state of an environment: resets and writes.
 const CHANGES: [f64; 2] = [0.0, 1.0];
 
-/// An archive whose directory was read; the numbers of an array are read when somebody asks for them, pictures never.
+/// A NumPy archive whose directory was read. Arrays of numbers are read on first use, images never.
 #[derive(Debug)]
 pub(crate) struct Archive {
     pub(crate) path: PathBuf,
-    /// What `recording.json` says.
+    /// Content of `recording.json`.
     pub(crate) about: Value,
     content: Content,
     /// By name.
     arrays: BTreeMap<String, Array>,
 }
 
-/// Where what is not read yet comes from.
+/// Source of data that was not read yet.
 #[derive(Debug)]
 enum Content {
     Npz(Mutex<Reader<'static>>),
-    /// All arrays of an MCAP file were read; this is the state at its beginning.
+    /// Initial state of an MCAP file, whose arrays were read completely.
     Mcap(Vec<u8>),
 }
 
@@ -45,11 +45,11 @@ struct Array {
     numbers: OnceLock<Vec<f64>>,
 }
 
-/// Heads of arrays are no longer, whatever their shape \[bytes\].
+/// Upper limit of the length of an array header \[bytes\].
 const LONGEST_HEAD: u64 = 1024;
 
 impl Archive {
-    /// What actions are done again from: a NumPy archive, or the rows of an MCAP file as one.
+    /// Opens a NumPy archive, or the rows of an MCAP file as one, for replay.
     pub(crate) fn of_any(path: &Path) -> Result<Self> {
         if !matches!(Format::of_path(path), Ok(Format::Mcap)) {
             return Self::read(path);
@@ -65,7 +65,7 @@ impl Archive {
         Self::of(path, file)
     }
 
-    /// An archive that is read from somewhere; `path` is what it is called in errors.
+    /// Opens an archive from any source; `path` is its name in error messages.
     pub(crate) fn of(path: &Path, from: impl From + 'static) -> Result<Self> {
         let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: what.into() };
         let none = "this is no NumPy archive of a recorder, or is damaged";
@@ -81,7 +81,7 @@ impl Archive {
         for name in names {
             let head = file.first(&format!("{name}.npy"), LONGEST_HEAD).map_err(|error| wrong(path, none, error))?;
             let Some((descr, shape, _)) = head.as_deref().and_then(npy::parse) else { continue };
-            // Pictures are not compared.
+            // Images are not used by replay.
             if descr == "<f8" || (name.starts_with("events/") && ["<i4", "|u1"].contains(&descr)) {
                 arrays.insert(name, Array { shape, numbers: OnceLock::new() });
             }
@@ -89,7 +89,7 @@ impl Archive {
         Ok(Self { path: path.into(), about, content: Content::Npz(Mutex::new(file)), arrays })
     }
 
-    /// A file of the archive.
+    /// Reads a member of the archive; `None` if there is no such member.
     pub(crate) fn member(&self, name: &str) -> Result<Option<Vec<u8>>> {
         let file = match &self.content {
             Content::Npz(file) => file,
@@ -99,7 +99,7 @@ impl Archive {
         read.map_err(|error| wrong(&self.path, &error.to_string(), error))
     }
 
-    /// The shape of an array, if there is one.
+    /// Shape of an array, if it exists.
     pub(crate) fn shape(&self, name: &str) -> Option<&[usize]> {
         self.arrays.get(name).map(|array| array.shape.as_slice())
     }
@@ -115,7 +115,7 @@ impl Archive {
             _ => data.iter().map(|byte| f64::from(*byte)).collect(),
         };
         let product = |shape: &[usize]| shape.iter().try_fold(1_usize, |all, axis| all.checked_mul(*axis));
-        // Also where an axis is empty, the others have a product.
+        // The product of the other axes must not overflow, even if one axis is empty.
         let filled: Vec<usize> = shape.iter().copied().filter(|length| *length > 0).collect();
         if product(shape) != Some(numbers.len()) || product(&filled).is_none() {
             return Err(self.malformed(format!("{name} has not as many numbers as its shape says")));
@@ -123,7 +123,7 @@ impl Archive {
         Ok(numbers)
     }
 
-    /// The state in which the recording begins.
+    /// Initial state of the recording.
     pub(crate) fn start(&self) -> Result<Snapshot> {
         let failed = |error| RecordError::file(&self.path, error);
         let start = self.member(START)?.unwrap_or_default();
@@ -136,11 +136,11 @@ impl Archive {
         RecordError::Malformed { path: self.path.clone(), what }
     }
 
-    /// The shape and the numbers of an array.
+    /// Shape and values of an array.
     pub(crate) fn array(&self, name: &str) -> Result<(&[usize], &[f64])> {
         let array = self.arrays.get(name).ok_or_else(|| self.malformed(format!("there is no array {name}")))?;
         if array.numbers.get().is_none() {
-            // Somebody else may have read it meanwhile: the same numbers.
+            // Another thread may have set the same values meanwhile.
             let _ = array.numbers.set(self.numbers(name, &array.shape)?);
         }
         Ok((&array.shape, array.numbers.get().map_or(&[], Vec::as_slice)))
@@ -150,7 +150,7 @@ impl Archive {
         Ok(self.array(&format!("{stream}/step"))?.1)
     }
 
-    /// Checks that the arrays of a stream have the shapes that they have in this simulation.
+    /// Checks that the arrays of a stream have the shapes that they would have in this simulation.
     pub(crate) fn check(&self, source: &Source, rows: usize) -> Result<()> {
         for part in &source.stream.parts {
             let name = crate::npz::member(&source.stream, &part.name);
@@ -163,7 +163,7 @@ impl Archive {
         Ok(())
     }
 
-    /// A row of an array, one line for each environment.
+    /// Row of an array, shape (environments, values).
     pub(crate) fn rows(&self, name: &str, row: usize) -> Result<ArrayView2<'_, f64>> {
         let (shape, numbers) = self.array(name)?;
         let [rows, envs, ..] = shape[..] else { return Err(self.malformed(format!("{name} has no environments"))) };
@@ -175,25 +175,25 @@ impl Archive {
             .ok_or_else(|| self.malformed(format!("{name} has no row {row}")))
     }
 
-    /// What happened to an environment: steps, and the simulation time afterwards \[s\], in order.
+    /// Resets and writes of an environment, in order: their steps, and the simulation times afterwards \[s\].
     pub(crate) fn happened(&self, env: usize) -> Result<Vec<(f64, f64)>> {
         let of = |name: &str| Ok::<_, RecordError>(self.array(&format!("events/{name}"))?.1);
         let (steps, envs, times) = (of("step")?, of("env")?, of("time")?);
         let kinds = of("kind")?;
         let of_env = steps.iter().zip(envs).zip(times.iter().zip(kinds));
-        // Other events leave the state as it is.
+        // Events of other kinds do not change the state.
         let of_env = of_env.filter(|((_, of), (_, kind))| **of == env as f64 && CHANGES.contains(*kind));
         Ok(of_env.map(|((step, _), (time, _))| (*step, *time)).collect())
     }
 
-    /// The environments that were reset, and those that were written to, at a step.
+    /// Environments that were reset, and those that were written to, at a step.
     pub(crate) fn events(&self, step: f64) -> Result<(Vec<EnvId>, Vec<EnvId>)> {
         let of = |name: &str| Ok::<_, RecordError>(self.array(&format!("events/{name}"))?.1);
         let (steps, envs, kinds) = (of("step")?, of("env")?, of("kind")?);
         let (mut reset, mut written) = (Vec::new(), Vec::new());
         for ((at, env), kind) in steps.iter().zip(envs).zip(kinds) {
             if *at == step && CHANGES.contains(kind) {
-                // Negative numbers become 0: no recorder writes them.
+                // Negative numbers, which no recorder writes, become 0.
                 let to = if *kind == 0.0 { &mut reset } else { &mut written };
                 to.push(EnvId(*env as usize));
             }
@@ -204,7 +204,7 @@ impl Archive {
     }
 }
 
-/// What is wrong with an archive that cannot be read: `what` where it is damaged.
+/// Converts a read error; `what` is the message for a damaged archive.
 fn wrong(path: &Path, what: &str, error: io::Error) -> RecordError {
     match error.kind() {
         io::ErrorKind::InvalidData | io::ErrorKind::UnexpectedEof => {
@@ -246,7 +246,7 @@ mod tests {
         }
     }
 
-    /// Root cause: the whole file was brought into memory, pictures and all, to give a few numbers of it.
+    /// Root cause: the whole file, with all images, was read to get a few numbers.
     #[test]
     fn lazy_reading() {
         let (_folder, path) = scratch("run.npz");
@@ -259,7 +259,7 @@ mod tests {
         };
         sim.add_sensor("camera", camera).unwrap();
         let whole = record(&mut sim, RecorderCfg::new(&path), |sim| sim.update(40)).bytes;
-        // 40 pictures of 128 x 96 f32 in two environments.
+        // 40 images of 128 x 96 f32 in two environments.
         assert!(whole > 40 * 2 * 4 * 128 * 96, "{whole}");
         let bytes = Arc::new(AtomicU64::new(0));
         let counted = Counted { file: File::open(&path).unwrap(), bytes: Arc::clone(&bytes) };
@@ -268,20 +268,21 @@ mod tests {
         let Content::Npz(file) = &archive.content else { panic!("{archive:?}") };
         let members = file.lock().unwrap().names().count() as u64;
         let about = archive.member(ABOUT).unwrap().unwrap().len() as u64;
-        // Of each file its line in the directory (46 + 28 bytes and a name of at most 64), what stands before it (30) and the head of
-        // the array; the end of the archive (42 + 56), and what says what is in it.
+        // For each file: its directory entry (46 + 28 bytes and a name of at most 64), its local header (30) and the
+        // array header. In addition the end of the archive (42 + 56) and `recording.json`.
         let most = members * (46 + 28 + 64 + 30 + LONGEST_HEAD) + 98 + 30 + about;
         assert!(opened <= most && most < whole / 10, "{opened} bytes, at most {most} of {whole}");
-        // An array is its numbers: 41 rows of two environments, of seven positions, its head, and what stands before it.
+        // An array takes its numbers (41 rows of two environments and seven positions), its header and its local
+        // header.
         let before = bytes.load(Ordering::Relaxed);
         let (shape, numbers) = archive.array("ball/state/positions").unwrap();
         assert_eq!((shape, numbers.len()), (&[41, 2, 7][..], 41 * 2 * 7));
         let after = bytes.load(Ordering::Relaxed);
         assert_eq!(after - before, 30 + 8 * 41 * 2 * 7 + 128);
-        // Once.
+        // A second use does not read it again.
         archive.array("ball/state/positions").unwrap();
         assert_eq!(bytes.load(Ordering::Relaxed), after);
-        // The control: a picture, which nobody asks for, would be seen.
+        // Control: reading an image would be noticed.
         assert!(archive.member("camera/depth.npy").unwrap().unwrap().len() > 1_000_000);
         assert!(bytes.load(Ordering::Relaxed) > whole / 2);
     }

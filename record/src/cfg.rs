@@ -1,4 +1,4 @@
-//! What a recorder is, before it exists.
+//! Configuration of recorders.
 
 use crate::format::Format;
 use crate::stage::StageCfg;
@@ -6,51 +6,57 @@ use crate::topic::Topic;
 use kinetoscope_sim::EnvId;
 use std::path::PathBuf;
 
-/// Configuration of a recorder: plain data.
+/// Configuration of a recorder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecorderCfg {
-    /// The file, or for [`Format::Pictures`] and [`Format::LeRobot`] the folder.
+    /// Output file; a folder for [`Format::Pictures`] and [`Format::LeRobot`].
     pub path: PathBuf,
-    /// How it is written; `None` for what the end of the name says: [`Format::all`] lists them, nothing is a folder of
-    /// pictures.
+    /// Output format; `None` to choose it by the extension of the path ([`Format::all`]). A path without an extension
+    /// is a folder of images.
     pub format: Option<Format>,
-    /// What is recorded.
+    /// Recorded topics.
     pub topics: Vec<Topic>,
-    /// Of which environments; `None` for all.
+    /// Recorded environments; `None` for all.
     pub envs: Option<Vec<EnvId>>,
-    /// Physics steps from one row of states, targets and poses to the next. Sensors are recorded whenever they measure. Where
-    /// something has a rate of its own, see [`rates`](Self::rates).
+    /// Physics steps between two rows of states, targets and poses. Sensors are recorded whenever they measure. See
+    /// [`rates`](Self::rates) for other rates.
     pub every: u64,
-    /// Physics steps from one row to the next of what has a rate of its own: the names that things have in files, such as
-    /// `arm/link_poses`, or `camera` for everything of it, and numbers of steps; the last one counts that names something. Of
-    /// sensors, what was measured last is recorded at these steps, if it is new. Not of datasets of episodes, whose frames have
-    /// one rate.
+    /// Rates of single streams: the name of a stream, and the number of physics steps between two of its rows.
+    ///
+    /// A name is that of the file, such as `arm/link_poses`, or a prefix such as `camera` for all its streams. The last
+    /// entry that matches a stream applies. A sensor with a rate is recorded at these steps, with its last measurement,
+    /// if that is new. Datasets of episodes have a single frame rate and do not support this.
     pub rates: Vec<(String, u64)>,
-    /// Packets of the pool, at least 2: each has room for one row of everything that is recorded. When all of them wait to be
-    /// written, the simulation waits too. All together may take 16 GiB.
+    /// Number of packets in the pool, at least 2. Each holds one row of everything that is recorded. When all of them
+    /// wait to be written, the simulation waits. The pool may take up to 16 GiB.
     pub packets: usize,
-    /// Whether the scene is put into the file. As MJCF with its meshes, so that the file is enough to show the recording
-    /// (`kinetoscope replay`): of MCAP files and NumPy archives, taken once, when the recording begins. And in MCAP files for viewers
-    /// (Foxglove): what cameras draw by default, in the frames whose poses are recorded, and again whenever it looks otherwise or
-    /// something is added. What moves and has no recorded pose is left out there; so are environments for which the 64 MiB of all
-    /// such messages do not suffice. Both are told ([`Recorded::left_out`](crate::Recorded::left_out)).
+    /// True to store the scene in the file.
+    ///
+    /// MCAP files and NumPy archives get the scene as MJCF with its meshes, once, when the recording begins. Such a
+    /// file is enough to show the recording (`kinetoscope replay`).
+    ///
+    /// MCAP files additionally get scene messages for viewers (Foxglove): what cameras draw by default, attached to the
+    /// recorded frames. A message is repeated when the appearance changes or an entity is added. Moving entities
+    /// without a recorded pose are left out, and so are environments beyond the limit of 64 MiB for all messages.
+    /// [`Recorded::left_out`](crate::Recorded::left_out) lists both.
     pub scene: bool,
-    /// How the stage is drawn, where that is recorded ([`Topic::Stage`]).
+    /// Settings of the overview image, if it is recorded ([`Topic::Stage`]).
     pub stage: StageCfg,
-    /// What is being done, in words: the task of all episodes of a LeRobot dataset. Other formats do not say it.
+    /// Description of the task in words, for all episodes of a LeRobot dataset or an HDF5 file. Other formats ignore
+    /// it.
     pub task: String,
-    /// Whether a file of that name may be replaced, when the new one is whole; and what an earlier recording that was killed
-    /// has left. Of folders, only those of a recorder are replaced.
+    /// True to replace an existing file when the new one is complete, and to replace the partial file of a killed
+    /// recording. Folders are replaced only if a recorder wrote them.
     pub overwrite: bool,
 }
 
 impl RecorderCfg {
-    /// Everything that the format can hold, in all environments, at every step.
+    /// Records everything that the format supports, in all environments, at every step.
     pub fn new(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into(), ..Self::default() }
     }
 
-    /// The same with these topics.
+    /// Sets the recorded topics.
     pub fn with_topics(self, topics: impl IntoIterator<Item = Topic>) -> Self {
         Self { topics: topics.into_iter().collect(), ..self }
     }

@@ -1,17 +1,18 @@
-//! The time of a recording: simulation time that goes on over a reset.
+//! Time stamps of a recording, which continue over resets.
 
 /// The clock of a recording.
 ///
-/// Until an environment is reset, or put into another state, its recorded times are its simulation times. Afterwards its
-/// simulation time starts anew, which no viewer follows; its recorded times go on from the moment of the reset.
+/// The recorded time of an environment equals its simulation time until the environment is reset or put into another
+/// state. Its simulation time then jumps, which viewers do not support. Its recorded time continues from the time
+/// of the reset.
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {
     dt: f64,
-    /// Steps of the simulation when the recording began.
+    /// Number of simulation steps when the recording began.
     first: u64,
-    /// Simulation time of every environment when the recording began \[s\].
+    /// Simulation time of each environment when the recording began \[s\].
     start: Vec<f64>,
-    /// What is added to simulation times \[s\].
+    /// Difference of recorded time and simulation time of each environment \[s\].
     offsets: Vec<f64>,
 }
 
@@ -20,26 +21,27 @@ impl Clock {
         Self { dt, first: steps, start: times.to_vec(), offsets: vec![0.0; times.len()] }
     }
 
-    /// Steps since the recording began.
+    /// Number of steps since the recording began.
     pub(crate) fn step(&self, steps: u64) -> u64 {
         steps - self.first
     }
 
-    /// The time of the recording, that of environment 0 \[s\].
+    /// Present time of the recording \[s\]: environment 0's start time plus the elapsed time.
     pub(crate) fn now(&self, steps: u64) -> f64 {
         self.start.first().copied().unwrap_or(0.0) + self.elapsed(steps)
     }
 
-    /// The recorded time of an instant of an environment \[s\].
+    /// Recorded time of a simulation time of an environment \[s\].
     pub(crate) fn stamp(&self, env: usize, time: f64) -> f64 {
         time + self.offsets[env]
     }
 
-    /// After environments were reset or written to: `times` are the simulation times of all now \[s\].
+    /// Adjusts the offsets after resets and writes. `times` are the present simulation times of all environments \[s\].
     pub(crate) fn restarted(&mut self, env_ids: &[usize], times: &[f64], steps: u64) {
         for &env in env_ids {
             let now = self.start[env] + self.elapsed(steps);
-            // Rounded sums of steps differ by far less than half a step: nobody set the time then.
+            // Rounding errors of summed steps are far below half a step. A larger difference means that the time was
+            // set.
             if (times[env] + self.offsets[env] - now).abs() > 0.5 * self.dt {
                 self.offsets[env] = now - times[env];
             }
@@ -61,11 +63,11 @@ mod tests {
         assert_eq!([clock.stamp(0, 2.5), clock.stamp(1, 2.5)], [2.5, 2.5]);
         clock.restarted(&[1], &[2.5, 0.0], 10);
         assert_eq!([clock.stamp(0, 2.75), clock.stamp(1, 0.25)], [2.75, 2.75]);
-        // Joints that were written leave the time alone.
+        // A write to joints does not change the time.
         clock.restarted(&[0], &[2.5, 0.0], 10);
         assert_eq!(clock.stamp(0, 2.75), 2.75);
         assert_eq!((clock.step(10), clock.now(10)), (2, 2.5));
-        // Put to 7 s when 3 s are recorded: what is 0.25 s later is at 3.25 s.
+        // Set to 7 s at the recorded time of 3 s: 0.25 s later is the recorded time 3.25 s.
         clock.restarted(&[0], &[7.0, 0.5], 12);
         assert_eq!(clock.stamp(0, 7.25), 3.25);
     }

@@ -1,37 +1,37 @@
-//! What can be wrong with a recording.
+//! Errors of recording, reading and replay.
 
 use crate::format::{Format, ends};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A result of this crate.
+/// Result of this crate.
 pub type Result<T, E = RecordError> = std::result::Result<T, E>;
 
-/// A recording cannot be begun, or not be finished.
+/// Error of recording, reading or replaying.
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// There is a file of that name.
+    /// The output path exists already.
     #[error("{path}: there is such a file already; choose another name, or set `overwrite`")]
     Exists {
         /// The file or folder.
         path: PathBuf,
     },
-    /// A recording that was killed has left a file.
+    /// The partial file of a killed recording exists.
     #[error("{part}: an earlier recording was not finished; {}", advice(.recoverable))]
     Unfinished {
-        /// What it left.
+        /// The partial file.
         part: PathBuf,
-        /// Whether [`recover`](crate::recover) makes a whole file of it.
+        /// True if [`recover`](crate::recover) can make a complete file of it.
         recoverable: bool,
     },
-    /// Somebody is recording there.
+    /// Another recorder writes to this path.
     #[error("{part}: another recorder is writing this; choose another name")]
     Busy {
-        /// What it writes.
+        /// The partial file or folder that it writes.
         part: PathBuf,
     },
-    /// The end of the name is of no format.
+    /// No format has this file name extension.
     #[error(
         "{path}: nothing is recorded as .{end}; known are {}, and a name without end for a folder of PNG files",
         ends()
@@ -39,30 +39,30 @@ pub enum RecordError {
     Format {
         /// The file.
         path: PathBuf,
-        /// The end of its name.
+        /// Extension of its name.
         end: String,
     },
-    /// This build does not write the format.
+    /// This build does not support the format.
     #[error("{path}: this build does not write {}: build with the feature `{feature}` (`--features {feature}`)", .format.name())]
     NotBuilt {
         /// The file.
         path: PathBuf,
         /// Its format.
         format: Format,
-        /// What to build with.
+        /// Cargo feature that adds the format.
         feature: &'static str,
     },
-    /// The format has no place for something that was asked for by name.
+    /// The format does not support a topic that was requested by name.
     #[error("{path}: {} has no place for {topic}", .format.name())]
     NoPlace {
         /// The file.
         path: PathBuf,
         /// Its format.
         format: Format,
-        /// What has no place in it.
+        /// The unsupported topic.
         topic: String,
     },
-    /// Nobody tells what comes of steps.
+    /// Rewards were requested, but no task publishes them.
     #[error(
         "{path}: no task runs in this simulation, so there are no rewards: record the simulation of an Env (Env::sim_mut)"
     )]
@@ -70,13 +70,13 @@ pub enum RecordError {
         /// The file.
         path: PathBuf,
     },
-    /// The stage cannot be drawn.
+    /// The overview image cannot be drawn.
     #[error("the picture of the stage: {what}")]
     Stage {
-        /// Why, or which number is wrong.
+        /// Reason, or the invalid number.
         what: String,
     },
-    /// There is nothing to record.
+    /// The configuration selects no existing stream that the format supports.
     #[error("{path}: there is nothing to record for {}", .format.name())]
     Nothing {
         /// The file.
@@ -84,43 +84,43 @@ pub enum RecordError {
         /// Its format.
         format: Format,
     },
-    /// More than one picture at a time for a file that shows one.
+    /// An animation was requested for more than one camera or environment.
     #[error(
         "{path}: an animation shows one camera in one environment; these are {found}: choose a topic and an environment"
     )]
     TooMany {
         /// The file.
         path: PathBuf,
-        /// What was chosen.
+        /// The selected streams.
         found: String,
     },
-    /// Pictures of a size that the format does not have.
+    /// The format does not support images of this size.
     #[error("{path}: {} has no pictures of {width} x {height} pixels: {fits}", .format.name())]
     Size {
         /// The file.
         path: PathBuf,
         /// Its format.
         format: Format,
-        /// Pixels per row.
+        /// Width \[pixels\].
         width: usize,
-        /// Rows.
+        /// Height \[pixels\].
         height: usize,
-        /// Which it has.
+        /// Supported sizes.
         fits: String,
     },
-    /// Rows of a rate that the format does not have.
+    /// The format requires a whole number of rows per second.
     #[error("{path}: with `every` {every} there are {found:.3} rows per second, which is no whole number; {}", whole(.near))]
     Rate {
         /// The file.
         path: PathBuf,
         /// [`RecorderCfg::every`](crate::RecorderCfg::every).
         every: u64,
-        /// Rows in a second \[Hz\].
+        /// Rows per second \[Hz\].
         found: f64,
-        /// Values of `every` that would do, the nearest first.
+        /// Values of `every` that give a whole rate, the nearest first.
         near: Vec<u64>,
     },
-    /// A dataset in which every row has everything, and something that is not measured in every environment.
+    /// A stream is missing in an environment of a dataset, whose rows must be complete.
     #[error(
         "{path}: every row of a dataset has everything, but {stream} is not in environment {env}; record environments and topics \
          that go together"
@@ -128,44 +128,44 @@ pub enum RecordError {
     NotEverywhere {
         /// The folder.
         path: PathBuf,
-        /// What is missing, such as `camera/color`.
+        /// The missing stream, such as `camera/color`.
         stream: String,
-        /// Where.
+        /// The environment.
         env: usize,
     },
-    /// Something is not called so.
+    /// There is no entity, topic or field of this name.
     #[error("there is no {what} {name:?}{}", known(.candidates))]
     UnknownName {
-        /// What was looked for.
+        /// Kind of name.
         what: &'static str,
         /// The name.
         name: String,
-        /// The names there are.
+        /// Existing names.
         candidates: Vec<String>,
     },
-    /// More than one is called so.
+    /// A name is ambiguous.
     #[error("there is more than one {what} {name:?}: {}; say which", .found.join(", "))]
     Ambiguous {
-        /// What was looked for.
+        /// Kind of name.
         what: &'static str,
         /// The name.
         name: String,
-        /// Those that are called so.
+        /// Full names that match.
         found: Vec<String>,
     },
-    /// A sensor that tells nobody its numbers.
+    /// The type of a sensor does not provide its channels.
     #[error("sensor {sensor:?} cannot be recorded: its type says nothing of its channels (Sensor::sampled)")]
     Unreadable {
-        /// Its name.
+        /// Name of the sensor.
         sensor: String,
     },
-    /// A camera that looks into other environments.
+    /// A camera renders none of the recorded environments.
     #[error("sensor {sensor:?} is in none of the environments that are recorded")]
     Elsewhere {
-        /// Its name.
+        /// Name of the sensor.
         sensor: String,
     },
-    /// Two things would have the same name in the file.
+    /// Two streams would have the same name in the file.
     #[error("{path}: two things that are recorded are called {name:?} there; choose topics, or rename one of them")]
     SameName {
         /// The file.
@@ -173,95 +173,95 @@ pub enum RecordError {
         /// The name.
         name: String,
     },
-    /// The pool does not fit into memory.
+    /// The packet pool is larger than the limit.
     #[error(
         "{packets} packets of {bytes} bytes are more than the {most} bytes that a pool may have; choose fewer packets"
     )]
     TooLarge {
         /// [`RecorderCfg::packets`](crate::RecorderCfg::packets).
         packets: usize,
-        /// What each of them takes.
+        /// Size of a packet \[bytes\].
         bytes: u64,
-        /// What all may take.
+        /// Largest size of the pool \[bytes\].
         most: u64,
     },
-    /// An environment that does not exist, or is named twice.
+    /// An environment does not exist, or is listed twice.
     #[error("environment {env} is not one of {count}, or is named twice")]
     Env {
-        /// Its index.
+        /// Index of the environment.
         env: usize,
-        /// How many there are.
+        /// Number of environments.
         count: usize,
     },
     /// A number of the configuration is out of range.
     #[error("{field} is {value}: it must be at least {least}")]
     OutOfRange {
-        /// Which.
+        /// The field.
         field: &'static str,
         /// Its value.
         value: u64,
-        /// The least one.
+        /// Its smallest valid value.
         least: u64,
     },
-    /// Something that is recorded is not there any more, or has another shape.
+    /// A recorded stream was removed or has another shape.
     #[error("{path}: {stream} is not what it was when the recording began: something was added to the scene")]
     Changed {
         /// The file.
         path: PathBuf,
-        /// What has changed.
+        /// The changed stream.
         stream: String,
     },
-    /// The file cannot be written.
+    /// The file cannot be read or written.
     #[error("{path}: {error}{}", left(.kept))]
     File {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         error: Arc<std::io::Error>,
-        /// What was written until then, where it can be read.
+        /// The partial file, if it can be read.
         kept: Option<PathBuf>,
     },
-    /// The recording was broken off.
+    /// The recording was aborted.
     #[error("{error}{}{}", unwritten(.also), left(.kept))]
     BrokenOff {
-        /// Why.
+        /// Cause.
         error: Box<RecordError>,
-        /// Why the file could not be written either, if so.
+        /// Error of writing the rest of the file, if any.
         also: Option<String>,
-        /// What was written until then, where it can be read.
+        /// The partial file, if it can be read.
         kept: Option<PathBuf>,
     },
-    /// There is more of something than the format has a place for.
+    /// A limit of the format is exceeded.
     #[error("{path}: {what}")]
     Limit {
         /// The file or folder.
         path: PathBuf,
-        /// Of what, how much there may be, and what would help.
+        /// The limit, and what to change.
         what: String,
     },
-    /// An animation or a dataset without a frame.
+    /// An animation or a dataset has no frame.
     #[error("{path}: there is no frame: {why}")]
     NoFrame {
         /// The file or folder.
         path: PathBuf,
-        /// What never came, and every frame needs.
+        /// The data that every frame needs and that was never measured.
         why: &'static str,
     },
-    /// The thread that writes has ended by a fault of the program.
+    /// The writer thread panicked.
     #[error("{path}: the thread that writes has panicked")]
     Panicked {
         /// The file or folder.
         path: PathBuf,
     },
-    /// The simulation said no.
+    /// The simulation returned an error.
     #[error("{0}")]
     Sim(Arc<kinetoscope_sim::Error>),
-    /// What is read is not a recording of this program, or not whole.
+    /// The file is not a recording of this program, or is damaged.
     #[error("{path}: {what}")]
     Malformed {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Problem.
         what: String,
     },
 }
@@ -273,7 +273,7 @@ impl From<kinetoscope_sim::Error> for RecordError {
 }
 
 impl RecordError {
-    /// A file that cannot be written or read.
+    /// Creates [`File`](Self::File) without a partial file.
     pub(crate) fn file(path: &std::path::Path, error: std::io::Error) -> Self {
         Self::File { path: path.into(), error: Arc::new(error), kept: None }
     }

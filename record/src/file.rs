@@ -1,4 +1,4 @@
-//! Files that have their name when they are whole, not before.
+//! Files that get their name when they are complete.
 
 use crate::error::{RecordError, Result};
 use kinetoscope_scene::AtomicFile;
@@ -7,9 +7,9 @@ use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What a file is written to.
+/// Destination of written data.
 pub(crate) trait Storage: Write + Seek + Send {
-    /// Brings what was written to the disk.
+    /// Flushes the data to the disk.
     fn sync(&self) -> io::Result<()>;
 }
 
@@ -19,10 +19,10 @@ impl Storage for File {
     }
 }
 
-/// What files are written through.
+/// A wrapper of files.
 type Through = dyn Fn(File) -> Box<dyn Storage> + Send + Sync;
 
-/// Where the files of a recording are: tests put something between them and the disk.
+/// Storage of the files of a recording. Tests insert a wrapper that simulates a full disk.
 #[derive(Clone, Default)]
 pub(crate) struct Disk(Option<Arc<Through>>);
 
@@ -33,7 +33,7 @@ impl std::fmt::Debug for Disk {
 }
 
 impl Disk {
-    /// What a file is written to.
+    /// Wraps a file.
     pub(crate) fn storage(&self, file: File) -> Box<dyn Storage> {
         match &self.0 {
             Some(through) => through(file),
@@ -42,25 +42,25 @@ impl Disk {
     }
 }
 
-/// A file on its way: called `NAME.part` until it is whole. Dropped before, it is taken away, unless somebody can read what
-/// there is of it.
+/// A file that is called `NAME.part` until it is complete. Dropping it before deletes it, unless its content is
+/// readable.
 #[derive(Debug)]
 pub(crate) struct PartFile {
-    /// Locked as long as it is written, so that no other recorder takes it for one that was left.
+    /// Locked while it is written, so that other recorders do not take it for a remainder.
     file: AtomicFile,
     overwrite: bool,
 }
 
 impl PartFile {
-    /// Begins a file; `recoverable`: whether [`recover`](crate::recover) makes something of it where it was left.
+    /// Creates the partial file. `recoverable` is true if [`recover`](crate::recover) can restore it after a kill.
     ///
     /// # Errors
-    /// There is a file of that name, or what an earlier recording has left, and neither may be replaced; another recorder
-    /// writes it; or the folder does not let anybody write.
+    /// A file of that name or a partial file of an earlier recording exists and may not be replaced, another recorder
+    /// writes it, or the folder is not writable.
     pub(crate) fn create(path: &Path, overwrite: bool, recoverable: bool) -> Result<(Self, File)> {
         let part = part_of(path);
         if let Some(left) = lock_left(&part)? {
-            // In what is empty nothing is lost: so archives and animations are before they are finished.
+            // An empty file has nothing to lose. Archives and animations are empty until they are finished.
             if !overwrite && left.metadata().is_ok_and(|left| left.len() > 0) {
                 return Err(RecordError::Unfinished { part, recoverable });
             }
@@ -69,7 +69,7 @@ impl PartFile {
         Self::create_as(path, part, overwrite)
     }
 
-    /// As [`create`](Self::create), called `part` on the way, of which there is none.
+    /// Creates the file as [`create`](Self::create) does, with the temporary name `part`, which must not exist.
     pub(crate) fn create_as(path: &Path, part: PathBuf, overwrite: bool) -> Result<(Self, File)> {
         if !overwrite && path.symlink_metadata().is_ok() {
             return Err(RecordError::Exists { path: path.into() });
@@ -80,7 +80,7 @@ impl PartFile {
         }
         let begin = || {
             let mut file = AtomicFile::create_as(path, part.clone())?;
-            // If another recorder was faster, the file is its own.
+            // If another recorder has locked the file first, it owns the file.
             file.file().try_lock().inspect_err(|_| file.keep())?;
             Ok((file.file().try_clone()?, file))
         };
@@ -88,12 +88,12 @@ impl PartFile {
         Ok((Self { file: mine, overwrite }, file))
     }
 
-    /// What was written can be read, whole or not: it stays.
+    /// Keeps the partial file when this is dropped, because its content is readable.
     pub(crate) fn keep(&mut self) {
         self.file.keep();
     }
 
-    /// Gives the file its name: it is whole. Gives its size \[bytes\].
+    /// Gives the complete file its final name; returns its size \[bytes\].
     pub(crate) fn commit(&mut self) -> io::Result<u64> {
         self.file.file().sync_all()?;
         self.file.keep();
@@ -107,27 +107,27 @@ impl PartFile {
         Ok(bytes)
     }
 
-    /// What the file is to be called.
+    /// Final path of the file.
     pub(crate) fn path(&self) -> &Path {
         self.file.path()
     }
 
-    /// What it is called until then.
+    /// Path of the partial file.
     #[cfg(feature = "hdf5")]
     pub(crate) fn part(&self) -> &Path {
         self.file.part()
     }
 
-    /// What was written, where it stays.
+    /// Path of the partial file, if it remains.
     pub(crate) fn kept(&self) -> Option<PathBuf> {
         self.file.is_kept().then(|| self.file.part().into())
     }
 }
 
-/// The file that an earlier recording has left, locked; `None` where there is none.
+/// Opens and locks the partial file of an earlier recording; `None` if there is no such file.
 ///
 /// # Errors
-/// A recorder writes it now, or it cannot be opened.
+/// Another recorder writes it, or it cannot be opened.
 pub(crate) fn lock_left(part: &Path) -> Result<Option<File>> {
     let left = match OpenOptions::new().read(true).write(true).open(part) {
         Ok(left) => left,
@@ -141,7 +141,7 @@ pub(crate) fn lock_left(part: &Path) -> Result<Option<File>> {
     }
 }
 
-/// Takes a file away, which may be gone already.
+/// Deletes a file, if it exists.
 pub(crate) fn remove(file: &Path) -> Result<()> {
     match fs::remove_file(file) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(RecordError::file(file, error)),
@@ -149,20 +149,20 @@ pub(crate) fn remove(file: &Path) -> Result<()> {
     }
 }
 
-/// Brings the name of a file to the disk, where that can be asked for.
+/// Flushes the name of a file to the disk, where the system supports it.
 pub(crate) fn sync_folder(file: &Path) {
-    // The file is whole and has its name: that a crash of the machine may still undo the name is no error of it.
+    // The file is complete and has its name. A crash of the machine may undo the name, which is no error of the file.
     let _ = File::open(folder_of(file)).and_then(|folder| folder.sync_all());
 }
 
-/// What a file is called until it is whole.
+/// Path of the partial file.
 pub(crate) fn part_of(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".part");
     name.into()
 }
 
-/// The folder of a file.
+/// Folder of a file.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -174,7 +174,7 @@ pub(crate) mod tests {
     use std::io::SeekFrom;
     use std::sync::Mutex;
 
-    /// A file on a disk that is full after some bytes, of all its files together.
+    /// A file on a disk that is full after a number of bytes, which all its files share.
     #[derive(Debug)]
     struct OnFullDisk {
         file: File,
@@ -182,7 +182,7 @@ pub(crate) mod tests {
     }
 
     impl Disk {
-        /// One that takes so many bytes, of all its files together.
+        /// A disk with room for a number of bytes, which all its files share.
         pub(crate) fn full_after(bytes: usize) -> Self {
             let left = Arc::new(Mutex::new(bytes));
             Self(Some(Arc::new(move |file| Box::new(OnFullDisk { file, left: Arc::clone(&left) }))))
@@ -228,11 +228,11 @@ pub(crate) mod tests {
         drop(part);
         assert_eq!((fs::read(&path).unwrap(), fs::read(&kept).unwrap()), (b"precious".to_vec(), b"whole".to_vec()));
         drop(file);
-        // It is not written over, and what to do is said: there is no way to recover it.
+        // The partial file is not overwritten. The message does not suggest `recover`, which cannot help here.
         fs::remove_file(&path).unwrap();
         let error = PartFile::create(&path, false, false).unwrap_err().to_string();
         assert!(error.contains("run.npz.part") && !error.contains("recover"), "{error}");
-        // The control: with its name free, it has it.
+        // Control: with the name free again, the file gets it.
         fs::remove_file(kept).unwrap();
         let (mut part, mut file) = PartFile::create(&path, false, false).unwrap();
         file.write_all(b"whole").unwrap();

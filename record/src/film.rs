@@ -1,4 +1,4 @@
-//! A recording that can be shown: a simulation of its scene, put where it was at each recorded time.
+//! Playback of a recording: a simulation of its scene, set to the recorded states.
 
 use crate::error::{RecordError, Result};
 use crate::read::{Recording, Samples, Wanted};
@@ -6,22 +6,22 @@ use crate::scene_file::{self, SCENE};
 use kinetoscope_sim::{MjcfId, MjcfPart, SimulationManager};
 use ndarray::Array2;
 
-/// Recorded motion in its scene: [`show`](Self::show) puts the simulation where it was.
+/// Recorded motion in its scene. [`show`](Self::show) sets the simulation to a recorded time.
 ///
-/// What moves by itself is shown: joints of robots, articulations and MJCF files, free bases and objects, objects that are moved by
-/// hand. What was changed per environment (sizes, colours) looks as in the scene.
+/// It includes everything that moves by itself: joints of robots, articulations and MJCF files, free bases and objects,
+/// and kinematic objects. Properties that were changed per environment (sizes, colors) appear as in the scene.
 #[derive(Debug)]
 pub struct Film {
     part: MjcfId,
     times: Vec<f64>,
     tracks: Vec<Track>,
-    /// Positions of all joints, as MuJoCo has them, shape (N, nq).
+    /// Positions of all joints in MuJoCo's order, shape (N, nq).
     qpos: Array2<f64>,
     hands: Vec<Hand>,
     unmoved: Vec<String>,
 }
 
-/// One number over time, and where it belongs.
+/// One recorded number over time, and its destination.
 #[derive(Debug)]
 struct Track {
     env: usize,
@@ -31,32 +31,32 @@ struct Track {
 
 #[derive(Clone, Copy, Debug)]
 enum Column {
-    /// Of `qpos`.
+    /// Column of `qpos`.
     Joint(usize),
-    /// Of the pose of a body that is moved by hand: which, and which number.
+    /// Index of a kinematic body, and column of its pose.
     Hand(usize, usize),
 }
 
-/// A body that is moved by hand.
+/// A kinematic (MuJoCo: mocap) body.
 #[derive(Debug)]
 struct Hand {
     body: String,
-    /// Rows x, y, z, qw, qx, qy, qz, shape (N, 7).
+    /// Poses as rows x, y, z, qw, qx, qy, qz, shape (N, 7).
     poses: Array2<f64>,
-    /// Whether anything was recorded of it.
+    /// True if any value of it was recorded.
     known: bool,
 }
 
-/// What joints have in `qpos`, by MuJoCo's numbers of their types: free, ball, slide, hinge.
+/// Number of values of a joint in `qpos`, by MuJoCo's joint type: free, ball, slide, hinge.
 const WIDTHS: [usize; 4] = [7, 4, 1, 1];
 const FREE: i32 = 0;
 
 impl Film {
-    /// What a recording shows, in the scene that it holds, or in one that is given: a simulation that is built as the recorded one
-    /// was. Gives what shows it, and the simulation that it is shown in.
+    /// Opens the playback of a recording, in the scene that the file contains or in `scene`, a simulation that is built
+    /// as the recorded one was. Returns the playback and the simulation that displays it.
     ///
     /// # Errors
-    /// The recording holds no scene and none is given; the scene cannot be compiled; nothing that moves was recorded.
+    /// The recording contains no scene and none is given, the scene cannot be compiled, or no motion was recorded.
     pub fn of(recording: &Recording, scene: Option<&SimulationManager>) -> Result<(Self, SimulationManager)> {
         let malformed = |what: &str| RecordError::Malformed { path: recording.path().into(), what: what.into() };
         let packed = match scene {
@@ -110,41 +110,42 @@ impl Film {
         }
         let samples = recording.samples(&wanted)?;
         let mut times: Vec<f64> = samples.iter().flat_map(|samples| samples.times.iter().copied()).collect();
-        // What diverged may have no time any more.
+        // Times of a diverged environment may be NaN.
         times.retain(|time| time.is_finite());
         times.sort_by(f64::total_cmp);
-        // Of two formats, one has whole nanoseconds.
+        // One of the formats rounds times to nanoseconds.
         times.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
         let track = |(samples, (env, column))| Track { env, column, samples };
         let tracks = samples.into_iter().zip(places).map(track).collect();
         Ok(Self { part, times, tracks, qpos, hands, unmoved })
     }
 
-    /// The times at which something was recorded \[s\], in ascending order, on the clock of the recording.
+    /// Times with recorded values \[s\], in ascending order, on the clock of the recording.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// Joints of the scene that nothing was recorded of: they stay where they begin.
+    /// Joints of the scene without recorded values. They stay in their initial state.
     pub fn unmoved(&self) -> &[String] {
         &self.unmoved
     }
 
-    /// The number of the last recorded time that is not later than `time` \[s\]; 0 before the first.
+    /// Index of the last recorded time that is not later than `time` \[s\]; 0 before the first.
     pub fn frame_at(&self, time: f64) -> usize {
         self.times.partition_point(|frame| *frame <= time + 1e-9).saturating_sub(1)
     }
 
-    /// Puts the simulation where it was at one of the [`times`](Self::times): each number is the last that was recorded until then.
+    /// Sets the simulation to one of the [`times`](Self::times): each number has its last value recorded until then.
+    /// Numbers that are not finite are skipped.
     ///
     /// # Errors
-    /// What was recorded is no position: a quaternion of length zero. Numbers that are not finite are passed over.
+    /// A recorded quaternion has length zero.
     pub fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<()> {
         let Some(&time) = self.times.get(frame.min(self.times.len().saturating_sub(1))) else { return Ok(()) };
         for Track { env, column, samples } in &self.tracks {
-            // Before its first time, it is where it will be then.
+            // Before its first time, a number has its first value.
             let last = samples.times.partition_point(|sample| *sample <= time + 1e-9).saturating_sub(1);
-            // What diverged stays where it last was, also where somebody seeks to a time after that.
+            // A diverged number keeps its last finite value, also after a jump to a later time.
             let until = samples.values.get(..=last);
             let value = until.and_then(|until| until.iter().rev().find(|value| value.is_finite()));
             let Some(&value) = value else { continue };
@@ -174,10 +175,10 @@ fn bodies_by_hand(view: &MjcfPart<'_>) -> Vec<String> {
 struct Joint {
     /// `uid/joint`.
     name: String,
-    /// The body that it moves, `uid/link` or the uid of an object.
+    /// The body that it moves: `uid/link`, or the uid of an object.
     body: String,
     kind: i32,
-    /// Its first number in `qpos`.
+    /// Index of its first number in `qpos`.
     first: usize,
 }
 
@@ -197,13 +198,13 @@ fn joints(view: &MjcfPart<'_>) -> Vec<Joint> {
     .collect()
 }
 
-/// Where the numbers of a pose stand in a recording, in the order x, y, z, qw, qx, qy, qz.
+/// Topics and fields of the seven numbers of a pose in a recording, in the order x, y, z, qw, qx, qy, qz.
 fn pose(recording: &Recording, env: usize, frame: &str) -> [(String, String); 7] {
     if recording.is_archive() {
-        // The stream of an object, whose name may have a stroke, or that of a robot's links.
+        // The stream of an object, whose name may contain a slash, or the link poses of a robot.
         let object = format!("{frame}/pose");
         let is_object = recording.topics().iter().any(|topic| topic.name == format!("/env_{env}/{object}"));
-        // Of a robot or of an MJCF part.
+        // The body poses of an MJCF part.
         let part = frame.split_once('/').map(|(uid, _)| format!("{uid}/body_poses"));
         let part =
             part.filter(|part| recording.topics().iter().any(|topic| topic.name == format!("/env_{env}/{part}")));
@@ -218,8 +219,8 @@ fn pose(recording: &Recording, env: usize, frame: &str) -> [(String, String); 7]
 }
 
 impl Joint {
-    /// Where its numbers stand in a recording, and in which columns of `qpos` they belong: more places than one where they may
-    /// stand in either.
+    /// Topics, fields and `qpos` columns of its numbers in a recording. A number has several entries if several topics
+    /// may contain it.
     fn numbers(&self, recording: &Recording, env: usize, view: &MjcfPart<'_>) -> Vec<(String, String, usize)> {
         let mut places = Vec::new();
         let width = usize::try_from(self.kind).ok().and_then(|kind| WIDTHS.get(kind)).copied().unwrap_or(0);
@@ -231,7 +232,7 @@ impl Joint {
         } else if width == 1 {
             places.push((format!("/env_{env}/{uid}/joint_states"), format!("position[{own}]"), self.first));
         }
-        // The state of an MJCF file: its own positions, in its own order, which begin with its first joint's.
+        // The state of an MJCF part has the part's own positions, in the order of its joints.
         let start = joints(view)
             .iter()
             .filter(|joint| joint.name.starts_with(&format!("{uid}/")))

@@ -1,4 +1,4 @@
-//! Folders that have their name when they are whole, not before.
+//! Folders that get their name when they are complete.
 
 use crate::error::{RecordError, Result};
 use crate::file::{folder_of, lock_left, part_of, sync_folder};
@@ -6,24 +6,26 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What a folder is called that is put aside.
+/// Name of a replaced folder while it is set aside.
 const REPLACED: &str = "replaced";
 
-/// A folder on its way: called `NAME.part` until it is whole.
+/// A folder that is called `NAME.part` until it is complete.
 #[derive(Debug)]
 pub(crate) struct PartFolder {
     path: PathBuf,
     part: PathBuf,
     overwrite: bool,
-    /// The file that says that it is a recorder's.
+    /// File that identifies the folder as that of a recorder.
     marker: &'static str,
 }
 
 impl PartFolder {
-    /// Makes the folder, which must be new or empty, or may be replaced: only a folder of a recorder is, which has the file
-    /// `marker`. Gives that file, which is locked as long as there is a recorder.
+    /// Creates the folder, and the file `marker` in it, which is locked while the recorder exists.
+    ///
+    /// # Errors
+    /// The folder exists and is not empty. With `overwrite`, a folder with the marker of a recorder is replaced.
     pub(crate) fn create(path: &Path, overwrite: bool, marker: &'static str) -> Result<(Self, File)> {
-        // Without a separator at the end.
+        // Removes a separator at the end.
         let path: PathBuf = path.components().collect();
         if path.file_name().is_none() {
             let error = io::Error::new(io::ErrorKind::InvalidInput, "a folder needs a name of its own");
@@ -43,7 +45,7 @@ impl PartFolder {
         if !folder.is_free(part).map_err(failed)? {
             return Err(RecordError::Unfinished { part: part.clone(), recoverable: false });
         }
-        // Its lock would keep the folder on some systems.
+        // Some systems do not delete a folder with a locked file.
         drop(left);
         let begin = || {
             take_away(part)?;
@@ -57,17 +59,17 @@ impl PartFolder {
         Ok((folder, file))
     }
 
-    /// Where it is until it is whole.
+    /// Path of the folder until it is complete.
     pub(crate) fn part(&self) -> &Path {
         &self.part
     }
 
-    /// Gives it its name: it is whole.
+    /// Renames the complete folder to its final name.
     pub(crate) fn commit(&self) -> io::Result<()> {
         if !self.is_free(&self.path)? {
             return Err(io::Error::new(io::ErrorKind::AlreadyExists, "a folder of that name has appeared meanwhile"));
         }
-        // What is replaced is put aside until the new one has its name: whatever happens meanwhile, one of them is there.
+        // A replaced folder is set aside until the new one has its name, so that one of them exists at any time.
         let aside = match self.path.symlink_metadata() {
             Ok(_) => {
                 let aside = tempfile::tempdir_in(folder_of(&self.path))?;
@@ -79,7 +81,7 @@ impl PartFolder {
         if let Err(error) = fs::rename(&self.part, &self.path) {
             if let Some(aside) = aside {
                 let aside = aside.keep();
-                // Where it cannot go back, it stays where it is.
+                // If the old folder cannot be moved back, it stays set aside.
                 fs::rename(aside.join(REPLACED), &self.path)?;
                 fs::remove_dir(aside)?;
             }
@@ -89,7 +91,8 @@ impl PartFolder {
         Ok(())
     }
 
-    /// Whether a folder may be made at a place: nothing is there, or an empty folder, or one of a recorder that may be replaced.
+    /// True if the folder may be created: nothing is there, or an empty folder, or a recorder's folder that may be
+    /// replaced.
     fn is_free(&self, path: &Path) -> io::Result<bool> {
         match fs::read_dir(path) {
             Ok(mut entries) => Ok(entries.next().is_none() || (self.overwrite && path.join(self.marker).is_file())),
@@ -99,7 +102,7 @@ impl PartFolder {
     }
 }
 
-/// Takes away a folder that is free.
+/// Removes a folder, if it exists.
 fn take_away(path: &Path) -> io::Result<()> {
     match fs::remove_dir_all(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
@@ -112,7 +115,7 @@ fn take_away(path: &Path) -> io::Result<()> {
 mod tests {
     use super::*;
 
-    /// Root cause: what was to be replaced was deleted before the new one had its name.
+    /// Root cause: the old folder was deleted before the new one had its name.
     #[test]
     fn replacement() {
         let folder = tempfile::tempdir().unwrap();
@@ -128,7 +131,7 @@ mod tests {
         fs::remove_dir_all(broken.part()).unwrap();
         assert_eq!(broken.commit().unwrap_err().kind(), io::ErrorKind::NotFound);
         assert_eq!(fs::read_to_string(path.join("what")).unwrap(), "old");
-        // The control: with a new one, it is replaced, and nothing else is left.
+        // Control: the next complete folder replaces the old one, and nothing else remains.
         make("new").commit().unwrap();
         assert_eq!(fs::read_to_string(path.join("what")).unwrap(), "new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);

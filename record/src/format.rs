@@ -1,48 +1,49 @@
-//! The formats, and which one a name means.
+//! File formats and their file name extensions.
 
 use crate::episodes::holds;
 use crate::error::{RecordError, Result};
 use crate::stream::{Kind, Stream};
 use std::path::Path;
 
-/// How a recording is written.
+/// File format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Format {
-    /// An MCAP file of ROS 2 messages, which Foxglove and Rerun open. If the process is killed, [`recover`](crate::recover) reads
-    /// what the thread of the file had got half a second before; rows that waited for it are lost.
+    /// MCAP file of ROS 2 messages, for Foxglove and Rerun. After the process is killed, [`recover`](crate::recover)
+    /// restores what the writer thread had received half a second before. Rows that waited for that thread are lost.
     Mcap,
-    /// A NumPy archive: arrays (T, N, ...), one for each quantity, and their times.
+    /// NumPy archive: arrays (T, N, ...), one for each field, and their times.
     Npz,
-    /// A folder of PNG files: colour as 8-bit RGB, depth and distance as 16-bit millimetres, and `times.csv` with their times.
+    /// Folder of PNG files: color as 8-bit RGB, depth and distance as 16-bit millimeters, and `times.csv` with their
+    /// times.
     Pictures,
-    /// A LeRobot dataset, version 3.0: a folder of Parquet files. Each episode, from one reset of an environment to the next, is a
-    /// file; frames are the rows of the recording, from the first that has everything on, whose rate must be whole.
+    /// LeRobot dataset, version 3.0: a folder of Parquet files, one for each episode. An episode lasts from one reset
+    /// of an environment to the next. Frames are the rows of the recording, from the first complete one on. Their rate
+    /// must be a whole number per second.
     LeRobot,
-    /// An HDF5 file as robomimic reads them: the same episodes and frames, at any rate, as one file. Only in builds with the feature
-    /// `hdf5`.
+    /// HDF5 file for robomimic, with the same episodes and frames, at any rate. Requires the feature `hdf5`.
     Hdf5,
-    /// An animated PNG of one camera's colour in one environment, without loss.
+    /// Animated PNG of the color of one camera in one environment, lossless.
     Apng,
-    /// An animated GIF of the same: 256 colours in a picture, times in hundredths of a second.
+    /// Animated GIF of the same: 256 colors per frame, times in 1/100 s.
     Gif,
-    /// An animated WebP of the same, without loss.
+    /// Animated WebP of the same, lossless.
     Webp,
-    /// An MP4 file of the same: H.264, which has colours at half the resolution. The sides must be even.
+    /// MP4 video of the same: H.264 with 4:2:0 chroma subsampling. Width and height must be even.
     Mp4,
 }
 
-/// What is known of a format.
+/// Properties of a format.
 struct Known {
     format: Format,
-    /// The end of names that mean it; an empty one is a folder.
+    /// File name extension; empty for a folder of images.
     end: &'static str,
-    /// Its name in messages.
+    /// Name in messages.
     name: &'static str,
-    /// What it has a place for.
+    /// True for the streams that the format supports.
     holds: fn(&Stream) -> bool,
 }
 
-/// All of them.
+/// All formats.
 const ALL: [Known; 9] = [
     Known { format: Format::Mcap, end: "mcap", name: "an MCAP file", holds: |_| true },
     Known { format: Format::Npz, end: "npz", name: "a NumPy archive", holds: |_| true },
@@ -68,15 +69,15 @@ fn is_seen(stream: &Stream) -> bool {
 }
 
 impl Format {
-    /// All formats, with the ends of names that mean them: `mcap`, `npz`; an empty one is a folder.
+    /// All formats with their file name extensions, such as `mcap`. An empty extension is a folder of images.
     pub fn all() -> impl Iterator<Item = (Self, &'static str)> {
         ALL.iter().map(|known| (known.format, known.end))
     }
 
-    /// The format that the end of a name means.
+    /// Format of a path, by its extension.
     ///
     /// # Errors
-    /// No format is called so; the error lists those there are.
+    /// No format has this extension; the error lists the known ones.
     pub fn of_path(path: &Path) -> Result<Self> {
         let end = path.extension().map(|end| end.to_string_lossy().to_lowercase()).unwrap_or_default();
         let found = ALL.iter().find(|known| known.end == end);
@@ -84,42 +85,42 @@ impl Format {
     }
 
     fn known(self) -> &'static Known {
-        // Each is in the list, which a test sees to.
+        // A test checks that the list is complete.
         ALL.iter().find(|known| known.format == self).unwrap_or(&ALL[0])
     }
 
-    /// Its name in messages.
+    /// Name in messages.
     pub fn name(self) -> &'static str {
         self.known().name
     }
 
-    /// Whether this build writes it: HDF5 takes a feature.
+    /// True if this build supports the format: HDF5 requires a feature.
     pub fn is_built(self) -> bool {
         self.feature().is_none()
     }
 
-    /// The feature that this build lacks for it.
+    /// Cargo feature that this build lacks for the format.
     pub(crate) fn feature(self) -> Option<&'static str> {
         (self == Self::Hdf5 && !cfg!(feature = "hdf5")).then_some("hdf5")
     }
 
-    /// Whether it has a place for a stream.
+    /// True if the format supports a stream.
     pub(crate) fn holds(self, stream: &Stream) -> bool {
         (self.known().holds)(stream)
     }
 
-    /// Whether it tells what happens to environments: [`Topic::Events`](crate::Topic::Events).
+    /// True if the format contains events of environments ([`Topic::Events`](crate::Topic::Events)).
     pub fn has_events(self) -> bool {
         matches!(self, Self::Mcap | Self::Npz)
     }
 
-    /// Whether it shows one camera in one environment.
+    /// True if the format shows one camera in one environment.
     pub fn is_animation(self) -> bool {
         matches!(self, Self::Apng | Self::Gif | Self::Webp | Self::Mp4)
     }
 }
 
-/// The ends of all names, for a message.
+/// All file name extensions, for a message.
 pub(crate) fn ends() -> String {
     let ends = ALL.iter().filter(|known| !known.end.is_empty()).map(|known| format!(".{}", known.end));
     ends.collect::<Vec<_>>().join(", ")
@@ -135,7 +136,7 @@ mod tests {
         let wanted = [Mcap, Npz, Pictures, LeRobot, Hdf5, Apng, Gif, Webp, Mp4];
         assert!(Format::all().map(|(format, _)| format).eq(wanted));
         for (format, end) in Format::all() {
-            // One that is missing here does not compile.
+            // A missing variant is a compile error here.
             match format {
                 Mcap | Npz | Pictures | LeRobot | Hdf5 | Apng | Gif | Webp | Mp4 => {}
             }

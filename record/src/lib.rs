@@ -1,13 +1,24 @@
-//! Writes what happens in a simulation to files, without losing anything silently.
+//! Recording of simulations to files, and reading, recovery and replay of recordings.
 //!
 //! ```text
-//! SimulationManager -> Recorder (an observer) -> pool of packets -> thread of the file -> mcap | npz | png | ...
-//!                      topic: what is read                          format: how it is written
+//! SimulationManager -> Recorder (an observer) -> bounded pool of packets -> writer thread -> mcap | npz | png | ...
+//!                      topic: what is recorded                              format: how it is written
 //! ```
 //!
-//! A [`Recorder`] is told of steps, copies what is due into a packet of a bounded pool, and a thread of its own writes the
-//! packets in their order. When all packets are on their way, the simulation waits for one, and [`Recorded`] says how often
-//! and how long. [`Recording`] reads the numbers again, [`replay`] does the actions again.
+//! A [`Recorder`] is notified of steps and copies the due values into a packet of a bounded pool. A thread of its own
+//! writes the packets in their order. No packet is dropped: while all packets are in use, the simulation waits.
+//! [`Recorded`] reports the number and the total duration of these waits.
+//!
+//! | modules | content |
+//! |---|---|
+//! | `recorder`, `cfg`, `topic`, `source`, `stream`, `stage`, `clock` | the observer: what is recorded, and when |
+//! | `packet`, `writer`, `file`, `folder` | packets, the writer thread, atomic files and folders |
+//! | `mcap_file`, `ros`, `scene_update` | MCAP files of ROS 2 messages |
+//! | `npz`, [`npy`], `zip` | NumPy archives |
+//! | `picture_folder`, `picture`, `animation` | PNG files and animations |
+//! | `episodes`, `lerobot`, `robomimic` | datasets of episodes for learning |
+//! | `read`, `archive`, `recover` | [`Recording`]: numbers over time, and recovery of unfinished files |
+//! | [`replay`], `film`, `scene_file` | simulation of recorded actions, and display of recorded motion ([`Film`]) |
 //!
 //! ```no_run
 //! use kinetoscope_record::{Record, RecorderCfg, Topic};

@@ -1,33 +1,37 @@
 //! MCAP files of ROS 2 messages.
 //!
-//! | what | topic | type |
+//! | content | topic | type |
 //! |---|---|---|
 //! | joint states, targets | `/env_0/arm/joint_states`, `/env_0/arm/targets` | `sensor_msgs/msg/JointState` |
 //! | poses of links and objects | `/env_0/tf` | `tf2_msgs/msg/TFMessage`, frames `env_0/arm/link` |
-//! | colour | `/env_0/camera/color` | `sensor_msgs/msg/CompressedImage`, PNG |
-//! | colour without light | `/env_0/camera/albedo` | the same; what it shows is opaque where the mask is not 0 |
+//! | color | `/env_0/camera/color` | `sensor_msgs/msg/CompressedImage`, PNG |
+//! | albedo | `/env_0/camera/albedo` | the same; a pixel shows a surface where the mask is not 0 |
 //! | other channels | `/env_0/camera/depth` | `sensor_msgs/msg/Image`, `32FC1`, `32FC2`, `32FC3` |
-//! | masks | `/env_0/camera/mask` | `sensor_msgs/msg/Image`, `16UC1`; `32SC1` where there is an id that has no place in it |
-//! | eyes of a pair | `/env_0/pair/left/depth`, `/env_0/pair/disparity` | as cameras; frames `env_0/sensors/pair/left` |
-//! | lens and pose of a camera | `/env_0/camera/camera_info`, where ROS has words for the lens, `/env_0/tf` | `sensor_msgs/msg/CameraInfo`, frame `env_0/sensors/camera` |
+//! | masks | `/env_0/camera/mask` | `sensor_msgs/msg/Image`, `16UC1`; `32SC1` if an id exceeds 16 bits |
+//! | stereo cameras | `/env_0/pair/left/depth`, `/env_0/pair/disparity` | frames `env_0/sensors/pair/left` |
+//! | camera intrinsics, if ROS has the lens model | `/env_0/camera/camera_info` | `sensor_msgs/msg/CameraInfo` |
+//! | camera pose | `/env_0/tf` | frame `env_0/sensors/camera` |
 //! | IMU | `/env_0/imu`, `/env_0/tf` | `sensor_msgs/msg/Imu` |
-//! | its velocities and accelerations, in its axes | `/env_0/imu/velocity`, `/env_0/imu/acceleration` | `geometry_msgs/msg/TwistStamped`, `AccelStamped` |
-//! | ray caster, what it hit | `/env_0/scanner/points` | `sensor_msgs/msg/PointCloud2`: x, y, z, distance, normal, mask id |
-//! | its distances, of all rays | `/env_0/scanner/distances` | `std_msgs/msg/Float64MultiArray`; infinite for a miss |
-//! | its body | `/env_0/tf` | frame `env_0/sensors/scanner` |
-//! | other sensors | `/env_0/feet/net_forces_w` | `std_msgs/msg/Float64MultiArray`; metadata of the channel: `rows` and `filters` name bodies, `unit` |
+//! | IMU velocity, in its own axes | `/env_0/imu/velocity` | `geometry_msgs/msg/TwistStamped` |
+//! | IMU acceleration, in its own axes | `/env_0/imu/acceleration` | `geometry_msgs/msg/AccelStamped` |
+//! | ray caster hits | `/env_0/scanner/points` | `sensor_msgs/msg/PointCloud2`: x, y, z, distance, normal, mask id |
+//! | distances of all rays | `/env_0/scanner/distances` | `std_msgs/msg/Float64MultiArray`; infinite for a miss |
+//! | ray caster parent body | `/env_0/tf` | frame `env_0/sensors/scanner` |
+//! | other sensors | `/env_0/feet/net_forces_w` | `std_msgs/msg/Float64MultiArray` |
 //! | resets, writes, divergence, notes | `/events` | `rcl_interfaces/msg/Log` |
-//! | names of mask ids | metadata `mask_ids`, `mask_classes` | from the number to the thing and its class |
-//! | places of environments | `/tf_static` | `tf2_msgs/msg/TFMessage`, from `world` to `env_0` |
+//! | names of mask ids | metadata `mask_ids`, `mask_classes` | maps from the id to the name and the class |
+//! | origins of environments | `/tf_static` | `tf2_msgs/msg/TFMessage`, from `world` to `env_0` |
 //! | MJCF parts: poses of bodies | `/env_0/tf` | frames `env_0/part/body` |
-//! | what comes of steps of a task | `/env_0/task/reward`, `/env_0/task/terminated`, `/env_0/task/truncated` | `std_msgs/msg/Float64MultiArray` |
-//! | what it looks like | `/env_0/scene` | `foxglove_msgs/msg/SceneUpdate`: all of it at the beginning and whenever it looks otherwise |
+//! | task results | `/env_0/task/{reward,terminated,truncated}` | `std_msgs/msg/Float64MultiArray` |
+//! | appearance | `/env_0/scene` | `foxglove_msgs/msg/SceneUpdate`: complete, at the beginning and at changes |
 //! | the scene | attachment `scene.zip` | MJCF with meshes: see `scene_file.rs` |
-//! | what is recorded, the state at the beginning | attachments `recording.json`, `start.snapshot` | as in NumPy archives |
+//! | metadata, initial state | attachments `recording.json`, `start.snapshot` | as in NumPy archives |
 //!
-//! Messages have the time of capture, on the clock of the recording (`clock.rs`): forces, efforts and accelerations of sensors
-//! that of the beginning of the step. The message of joint states of a robot has one time, that of its positions; its efforts
-//! are those of the step that led there.
+//! The channel metadata of other sensors has `rows` and `filters` (names of bodies) and `unit`.
+//!
+//! Messages have the time of capture, on the clock of the recording (`clock.rs`). Forces, efforts and accelerations of
+//! sensors have the time of the beginning of the step. A robot's joint state message has a single time, that of its
+//! positions; its efforts are those of the step that led there.
 
 use crate::file::{PartFile, Storage};
 use crate::packet::{Block, Event, Packet, Values};
@@ -44,33 +48,33 @@ use std::collections::BTreeMap;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::PathBuf;
 
-/// Messages that are compressed together \[bytes\].
+/// Size of the messages that are compressed together \[bytes\].
 const CHUNK: u64 = 1 << 20;
-/// The topic of what an environment looks like, behind the environment.
+/// Name of the scene topic, below the environment.
 const SCENE_TOPIC: &str = "scene";
 const PROFILE: &str = "ros2";
 const ENCODING: &str = "cdr";
 const SCHEMA_ENCODING: &str = "ros2msg";
 
-/// An MCAP file on its way.
+/// Writer of an MCAP file.
 pub(crate) struct McapFile {
     part: PartFile,
-    /// `None` once the file is whole.
+    /// `None` once the file is complete.
     writer: Option<Writer<BufWriter<Box<dyn Storage>>>>,
     channels: Channels,
-    /// Channels of every row of every stream, in the order of what a row is written as.
+    /// Channels of each row of each stream, in the order in which a row is written.
     rows: Vec<Vec<Vec<u16>>>,
     events: u16,
     cdr: Cdr,
     png: Png,
 }
 
-/// The channels of a file, by topic.
+/// Channels of a file, by topic.
 #[derive(Default)]
 struct Channels {
     schemas: BTreeMap<Schema, u16>,
     known: BTreeMap<String, u16>,
-    /// Messages in each channel.
+    /// Number of messages in each channel.
     counts: BTreeMap<u16, u32>,
 }
 
@@ -124,7 +128,7 @@ fn finished() -> io::Error {
     io::Error::other("the file is finished already")
 }
 
-/// A time in nanoseconds; times before 0 are 0.
+/// Converts a time to nanoseconds; negative times become 0.
 fn nanos(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
 }
@@ -133,15 +137,15 @@ pub(crate) fn options() -> WriteOptions {
     WriteOptions::new()
         .compression(Some(Compression::Lz4))
         .chunk_size(Some(CHUNK))
-        // Chunks are made in memory and written with their lengths: a killed process leaves no length that is wrong.
+        // Chunks are assembled in memory and written with their lengths, so that a kill leaves no wrong length.
         .disable_seeking(true)
         .profile(PROFILE)
         .library(concat!("kinetoscope ", env!("CARGO_PKG_VERSION")))
 }
 
 impl McapFile {
-    /// Begins a file; `origins` are the places of all environments in the world \[m\], (N, 3), `start` is the time at which the
-    /// recording begins \[s\], and `held` are files that it holds: names, kinds, bytes.
+    /// Creates a file. `origins` are the origins of all environments in the world \[m\], shape (N, 3). `start` is the
+    /// time at which the recording begins \[s\]. `held` are attachments: names, media types, bytes.
     pub(crate) fn create(
         mut part: PartFile,
         storage: Box<dyn Storage>,
@@ -215,7 +219,7 @@ impl McapFile {
         let writer = self.writer.as_mut().ok_or_else(finished)?;
         let channel =
             self.channels.add(writer, format!("/{home}/{SCENE_TOPIC}"), Schema::SceneUpdate, &BTreeMap::new())?;
-        // It is large: its memory is not kept for those that come.
+        // Scene messages are large, so that their memory is not kept.
         let mut cdr = Cdr::default();
         cdr.begin();
         ros::scene_update(&mut cdr, Stamp { nanos: at, frame: &home }, update);
@@ -231,7 +235,7 @@ impl McapFile {
         let states = block.values.states().get(range.clone()).unwrap_or(&[]);
         let home = format!("env_{env}");
         let own = |name: &str| format!("{home}/{name}");
-        // An object may be called as a sensor: their frames are not.
+        // An object may have the name of a sensor. The prefix keeps their frames apart.
         let sensors = own("sensors/");
         let seen_by = |sensor: &str| format!("{sensors}{sensor}");
         let (cdr, in_env) = (&mut self.cdr, Stamp { nanos: at, frame: &home });
@@ -317,13 +321,13 @@ impl McapFile {
     }
 }
 
-/// Mask ids of two bytes, which viewers show; `None` for other numbers, and where an id is larger.
+/// Mask ids as 16-bit numbers, which viewers support; `None` for other types of values, and if an id is larger.
 fn small(values: &Values, range: std::ops::Range<usize>) -> Option<Vec<u16>> {
     let Values::I32(ids) = values else { return None };
     ids.get(range)?.iter().map(|id| u16::try_from(*id).ok()).collect()
 }
 
-/// Metadata of the channel of quantity number `part` of a stream: names, separated by commas, and the unit.
+/// Channel metadata of field number `part` of a stream: names, separated by commas, and the unit.
 fn about(stream: &Stream, part: usize) -> BTreeMap<String, String> {
     let Kind::Numbers { rows, filters } = &stream.kind else { return BTreeMap::new() };
     let unit = stream.parts.get(part).map(|part| part.unit.clone()).unwrap_or_default();
@@ -331,8 +335,7 @@ fn about(stream: &Stream, part: usize) -> BTreeMap<String, String> {
     all.into_iter().filter(|(_, text)| !text.is_empty()).map(|(what, text)| (what.to_string(), text)).collect()
 }
 
-/// A topic that streams would share whose messages are of different types: one of them would be read as the other.
-/// `scenes`: whether viewers are told how environments look.
+/// Finds a topic that streams with different message types would share. With `scenes`, includes the scene topic.
 pub(crate) fn taken(streams: &[&Stream], scenes: bool) -> Option<String> {
     let scene = scenes.then(|| (SCENE_TOPIC.to_string(), Schema::SceneUpdate));
     let mut known: BTreeMap<String, Schema> = scene.into_iter().collect();
@@ -345,7 +348,7 @@ pub(crate) fn taken(streams: &[&Stream], scenes: bool) -> Option<String> {
     })
 }
 
-/// What a row of a stream is written as: topics behind the environment, and types.
+/// Topics below the environment, and message types, of a row of a stream.
 fn topics(stream: &Stream) -> Vec<(String, Schema)> {
     let name = stream.name.clone();
     let transforms = || ("tf".to_string(), Schema::TfMessage);
@@ -392,7 +395,7 @@ impl Sink for McapFile {
         Ok(())
     }
 
-    /// Ends the chunk: what a killed process leaves ends with a whole one.
+    /// Ends the chunk. The remainder of a killed process ends with a complete chunk.
     fn flush(&mut self) -> Written {
         Ok(self.writer.as_mut().ok_or_else(finished)?.flush().map_err(io_error)?)
     }

@@ -1,18 +1,18 @@
-//! Arrays as NumPy keeps them in files: version 1.0 of its `.npy` format, as `numpy.lib.format` describes it.
+//! NumPy's `.npy` array format, version 1.0, as described in `numpy.lib.format`.
 
 use crate::stream::Element;
 use ndarray::{ArrayBase, Data, Dimension};
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-/// The data begin at a multiple of 64 bytes.
+/// Alignment of the data \[bytes\].
 const ALIGN: usize = 64;
-/// Magic, version, length of the header.
+/// Length of magic, version and header length \[bytes\].
 const FIXED: usize = 10;
 const MAGIC: &[u8; 8] = b"\x93NUMPY\x01\x00";
 
 impl Element {
-    /// How NumPy names the type in a file: byte order, kind and bytes.
+    /// NumPy's type descriptor: byte order, kind and size.
     pub(crate) fn descr(self) -> &'static str {
         match self {
             Self::U8 => "|u1",
@@ -23,12 +23,12 @@ impl Element {
     }
 }
 
-/// Numbers that array files hold.
+/// Types of numbers in array files.
 pub trait Number: Copy {
-    /// Type in the file.
+    /// Element type in the file.
     const ELEMENT: Element;
 
-    /// Appends the bytes, lowest first.
+    /// Appends the number as little-endian bytes.
     fn put(self, bytes: &mut Vec<u8>);
 }
 
@@ -46,10 +46,10 @@ macro_rules! numbers {
 
 numbers!(u8: U8, i32: I32, f32: F32, f64: F64);
 
-/// Writes a `.npy` file: the numbers of `array` in C order, independent of their order in memory.
+/// Writes a `.npy` file with the values of `array` in C order, independent of their order in memory.
 ///
 /// # Errors
-/// `to` cannot be written, or the array has more axes than the format has room for.
+/// `to` cannot be written, or the array has more axes than the format supports.
 pub fn write<S, D>(to: &mut impl Write, array: &ArrayBase<S, D>) -> io::Result<()>
 where
     S: Data,
@@ -65,18 +65,18 @@ where
     to.write_all(&bytes)
 }
 
-/// What stands before the numbers of an array in C order; `None` for more axes than the format has room for.
+/// Returns the file header of an array in C order; `None` for more axes than the format supports.
 pub(crate) fn header(element: Element, shape: &[usize]) -> Option<Vec<u8>> {
     let mut axes = String::new();
     for (k, length) in shape.iter().enumerate() {
-        // Writing to a text does not fail. Python writes (2,) and (2, 3).
+        // Writing to a `String` does not fail. Python writes (2,) and (2, 3).
         let _ = write!(axes, "{}{length}", if k == 0 { "" } else { ", " });
     }
     if shape.len() == 1 {
         axes.push(',');
     }
     let mut text = format!("{{'descr': '{}', 'fortran_order': False, 'shape': ({axes}), }}", element.descr());
-    // One byte is for the line's end.
+    // One byte is for the newline.
     let whole = (FIXED + text.len() + 1).next_multiple_of(ALIGN);
     text.extend(std::iter::repeat_n(' ', whole - FIXED - text.len() - 1));
     text.push('\n');
@@ -87,7 +87,7 @@ pub(crate) fn header(element: Element, shape: &[usize]) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// An array that [`header`] stands before: its type as in a file, its shape, its bytes.
+/// Parses a file with such a header: type descriptor, shape, bytes of the values.
 pub(crate) fn parse(bytes: &[u8]) -> Option<(&str, Vec<usize>, &[u8])> {
     let rest = bytes.strip_prefix(MAGIC)?;
     let (length, rest) = rest.split_first_chunk::<2>()?;
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn headers() {
-        // What numpy.save writes for zeros((2,), float64) and zeros((2, 3, 4), float32), without the data.
+        // numpy.save writes these bytes for zeros((2,), float64) and zeros((2, 3, 4), float32), without the data.
         let one = b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (2,), }";
         let header_of_one = header(Element::F64, &[2]).unwrap();
         assert_eq!(&header_of_one[..one.len()], one);

@@ -1,23 +1,25 @@
-//! Archives of arrays for NumPy.
+//! NumPy archives.
 //!
-//! | member | shape | what |
+//! | member | shape | content |
 //! |---|---|---|
-//! | `arm/joint_states/positions` | (T, N, joints) | f64, as all states and sensors of numbers |
+//! | `arm/joint_states/positions` | (T, N, joints) | f64, as all states and numeric sensors |
 //! | `camera/color`, `camera/depth` | (T, N, H, W, 4), (T, N, H, W) | u8, f32 |
 //! | `arm/joint_states/time` | (T, N) | simulation time of capture \[s\] |
-//! | `joints/force_time` | (T, N) | that of efforts and forces, where a sensor measures them at another instant than the rest \[s\] |
+//! | `joints/force_time` | (T, N) | time of efforts and forces, if measured at another instant \[s\] |
 //! | `arm/joint_states/step` | (T,) | physics steps since the recording began, f64 |
-//! | `events/step`, `events/env`, `events/kind`, `events/time` | (E,) | kind 0: reset, 1: written, 2: diverged, 3: note |
+//! | `events/{step,env,kind,time}` | (E,) | kind 0: reset, 1: written, 2: diverged, 3: note |
 //! | `notes.jsonl` | | a line of JSON for each event with a text: `event` is its row |
-//! | `recording.json` | | time step, environments, names of joints, frames and bodies, units of sensors, how lenses distort, what mask ids are |
+//! | `recording.json` | | time step, environments, names of joints, frames and bodies, units, distortion, mask ids |
 //! | `scene.zip` | | the scene, as MJCF with meshes: see `scene_file.rs` |
-//! | `start.snapshot` | | the state of all environments when the recording began, as `Snapshot::load` reads it |
+//! | `start.snapshot` | | initial state of all environments, for `Snapshot::load` |
 //!
-//! An environment that has nothing new in a row, because its sensor measures at other times, has its last value and time again.
-//! What happens to an environment has a row of its own, of the states of all: where states are recorded every few steps,
-//! those of the others are between two of theirs, with the time that they are of.
+//! An environment without a new value in a row, because its sensor measures at other times, repeats its last value and
+//! time.
 //!
-//! Until the end, rows are in files without a name in the same folder: a killed process leaves nothing.
+//! A reset or a write adds a row of the states of all environments. With `every` above 1, the states of the other
+//! environments in such a row lie between two of their regular rows. They have the time at which they were read.
+//!
+//! Until the end, rows are in unnamed files in the same folder. A killed process leaves nothing.
 
 use crate::file::{PartFile, Storage, folder_of};
 use crate::npy;
@@ -33,14 +35,14 @@ use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// The member that says what the others are.
+/// Name of the member that describes the others.
 pub(crate) const ABOUT: &str = "recording.json";
-/// The member with the texts of events.
+/// Name of the member with the texts of events.
 const NOTES: &str = "notes.jsonl";
-/// The member with the state at the beginning.
+/// Name of the member with the initial state.
 pub(crate) const START: &str = "start.snapshot";
 
-/// A NumPy archive on its way.
+/// Writer of a NumPy archive.
 pub(crate) struct NpzFile {
     part: PartFile,
     storage: Option<Box<dyn Storage>>,
@@ -48,21 +50,21 @@ pub(crate) struct NpzFile {
     start: Vec<u8>,
     scene: Option<Vec<u8>>,
     spools: Vec<Spool>,
-    /// The events, one record each: step, environment, kind, time.
+    /// Events, one record each: step, environment, kind, time.
     events: Spool,
-    /// Their texts, a line of JSON each.
+    /// Texts of events, a line of JSON each.
     notes: BufWriter<File>,
 }
 
-/// The rows of a stream, one record each: the step, a time or two for each environment, then the quantities, each of all
-/// environments.
+/// Buffer file for the rows of a stream. A record contains the step, one or two times of each environment, then each
+/// field of all environments.
 struct Spool {
     file: BufWriter<File>,
     rows: usize,
     record: Vec<u8>,
 }
 
-/// Where the numbers of an event stand in its record.
+/// Byte ranges of the numbers in the record of an event.
 const EVENT: [(&str, Element, Range<usize>); 4] = [
     ("step", Element::F64, 0..8),
     ("env", Element::I32, 8..12),
@@ -89,7 +91,7 @@ impl NpzFile {
     }
 }
 
-/// A snapshot as it is in a file.
+/// Serializes a snapshot as a file.
 pub(crate) fn snapshot_bytes(start: &Snapshot, folder: &Path) -> io::Result<Vec<u8>> {
     let scratch = tempfile::tempdir_in(folder)?;
     let path = scratch.path().join(START);
@@ -97,7 +99,7 @@ pub(crate) fn snapshot_bytes(start: &Snapshot, folder: &Path) -> io::Result<Vec<
     std::fs::read(path)
 }
 
-/// What a recording holds, as JSON.
+/// Describes the content of a recording as JSON.
 pub(crate) fn about(streams: &[Stream], masks: &[MaskId], dt: f64) -> Value {
     let stream = |stream: &Stream| {
         let names = Some(stream.kind.names()).filter(|names| !names.is_empty());
@@ -138,7 +140,7 @@ pub(crate) fn about(streams: &[Stream], masks: &[MaskId], dt: f64) -> Value {
     })
 }
 
-/// All arrays of a stream.
+/// Names of all arrays of a stream.
 pub(crate) fn members(stream: &Stream) -> impl Iterator<Item = String> {
     let times = ["step", "time"].into_iter().chain(stream.is_mixed().then_some("force_time"));
     times
@@ -146,7 +148,7 @@ pub(crate) fn members(stream: &Stream) -> impl Iterator<Item = String> {
         .chain(stream.parts.iter().map(|part| member(stream, &part.name)))
 }
 
-/// What a quantity is called in the archive.
+/// Name of the array of a field.
 pub(crate) fn member(stream: &Stream, part: &str) -> String {
     if part.is_empty() { stream.name.clone() } else { format!("{}/{part}", stream.name) }
 }
@@ -188,7 +190,7 @@ impl Spool {
         Ok(())
     }
 
-    /// The bytes of one quantity of all records.
+    /// Reads the byte range `range` of all records.
     fn column(&mut self, range: Range<usize>, record: usize) -> io::Result<Column<'_>> {
         self.file.flush()?;
         let file = self.file.get_mut();
@@ -198,14 +200,14 @@ impl Spool {
     }
 }
 
-/// A part of each record of a file, one after the other.
+/// Reader of a byte range of each record, concatenated.
 struct Column<'f> {
     file: BufReader<&'f mut File>,
     record: Vec<u8>,
     range: Range<usize>,
-    /// Records that were not read yet.
+    /// Number of records that were not read yet.
     left: usize,
-    /// What of the record was given.
+    /// Position in the present record.
     at: usize,
 }
 
@@ -253,7 +255,7 @@ impl Sink for NpzFile {
     }
 
     fn flush(&mut self) -> Written {
-        // Nobody can read it before the end.
+        // An archive is not readable before its end.
         Ok(())
     }
 
@@ -281,7 +283,7 @@ impl Sink for NpzFile {
         for (stream, spool) in streams.iter().zip(&mut self.spools) {
             let (rows, envs) = (spool.rows, stream.env_ids.len());
             let one = stream.element.bytes();
-            // One time for each environment, or two.
+            // One or two times for each environment.
             let times = 8 * envs * (1 + usize::from(stream.is_mixed()));
             let record = 8 + times + envs * stream.width() * one;
             let mut add = |name: String, element, shape: &[usize], range: Range<usize>| -> Written {

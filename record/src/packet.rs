@@ -1,40 +1,40 @@
-//! What travels from the simulation to the thread of the file.
+//! Packets: data on its way from the simulation to the writer thread.
 
 use crate::scene_update::SceneUpdate;
 use crate::stream::{Element, Part, Stream};
 
-/// Something that happened to environments.
+/// An event of some environments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
-    /// What.
+    /// Kind of the event.
     pub kind: EventKind,
-    /// To which environments, in ascending order.
+    /// Environments, in ascending order.
     pub env_ids: Vec<usize>,
-    /// Simulation time of each of them afterwards \[s\].
+    /// Simulation time of each environment after the event \[s\].
     pub times: Vec<f64>,
-    /// Physics steps of the simulation since the recording began.
+    /// Physics steps since the recording began.
     pub step: u64,
-    /// The time of the recording \[s\].
+    /// Time of the recording \[s\].
     pub at: f64,
-    /// What there is to say of it: of a note its text, of a divergence the reason; else empty.
+    /// Text of a note, or reason of a divergence; else empty.
     pub text: String,
 }
 
-/// What happened.
+/// Kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum EventKind {
     /// Environments were reset.
     Reset,
-    /// Somebody wrote to the state of environments.
+    /// The state of environments was written.
     Written,
-    /// A step could not be done in environments: they stand still in their last good state.
+    /// The simulation of environments diverged: they stay in their last good state.
     Diverged,
-    /// Somebody had something to say: see [`Record::note`](crate::Record::note).
+    /// A note was added by [`Record::note`](crate::Record::note).
     Note,
 }
 
 impl EventKind {
-    /// Its name in files.
+    /// Name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Reset => "reset",
@@ -44,7 +44,7 @@ impl EventKind {
         }
     }
 
-    /// Its number in NumPy archives.
+    /// Number in NumPy archives.
     pub fn number(self) -> u8 {
         match self {
             Self::Reset => 0,
@@ -54,43 +54,43 @@ impl EventKind {
         }
     }
 
-    /// Whether it is told as a warning.
+    /// True if the event is logged as a warning.
     pub(crate) fn is_bad(self) -> bool {
         self == Self::Diverged
     }
 }
 
-/// Room for one row of everything that is recorded.
+/// Buffer for one row of every recorded stream.
 #[derive(Debug)]
 pub(crate) struct Packet {
-    /// Physics steps of the simulation since the recording began.
+    /// Physics steps since the recording began.
     pub(crate) step: u64,
     pub(crate) event: Option<Event>,
-    /// What environments look like from now on, where that is another look than before.
+    /// Changed scenes of environments, for viewers.
     pub(crate) scenes: Vec<SceneUpdate>,
     /// One for each stream.
     pub(crate) blocks: Vec<Block>,
 }
 
-/// Room for one row of a stream, of all its environments.
+/// Buffer for one row of a stream, in all its environments.
 #[derive(Debug)]
 pub(crate) struct Block {
-    /// Whether there is something in it.
+    /// True if the buffer has content.
     pub(crate) used: bool,
-    /// Simulation time of capture \[s\], for each environment.
+    /// Simulation time of capture in each environment \[s\].
     pub(crate) times: Vec<f64>,
-    /// The same on the clock of the recording, which goes on over a reset \[s\].
+    /// Recorded time of capture in each environment \[s\].
     pub(crate) stamps: Vec<f64>,
-    /// As `times`, of the parts that are of forces, where the others are of another instant; else empty.
+    /// `times` of the fields with the force time, if the stream has both kinds of fields; else empty.
     pub(crate) force_times: Vec<f64>,
-    /// As `stamps`, likewise.
+    /// `stamps` of the fields with the force time, if the stream has both kinds of fields; else empty.
     pub(crate) force_stamps: Vec<f64>,
-    /// Which environments have something new.
+    /// True for environments with a new row.
     pub(crate) fresh: Vec<bool>,
     pub(crate) values: Values,
 }
 
-/// Numbers of one type.
+/// Values of one type.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Values {
     U8(Vec<u8>),
@@ -100,19 +100,19 @@ pub(crate) enum Values {
 }
 
 impl Packet {
-    /// Empty, with room for the streams.
+    /// Creates an empty packet with capacity for the streams.
     pub(crate) fn new(streams: &[Stream]) -> Self {
         Self { step: 0, event: None, scenes: Vec::new(), blocks: streams.iter().map(Block::new).collect() }
     }
 
-    /// What the row of a stream takes \[bytes\].
+    /// Size of the row of a stream \[bytes\].
     pub(crate) fn bytes(stream: &Stream) -> u64 {
         let numbers = stream.width().saturating_mul(stream.element.bytes());
-        // Four times and whether it is fresh.
+        // For each environment four times (8 bytes each) and the `fresh` flag.
         (stream.env_ids.len() as u64).saturating_mul((numbers as u64).saturating_add(33))
     }
 
-    /// Forgets what is in it, and keeps the memory.
+    /// Clears the packet and keeps its memory.
     pub(crate) fn clear(&mut self) {
         self.event = None;
         self.scenes.clear();
@@ -135,7 +135,7 @@ impl Block {
         Self { used: false, times, stamps, force_times, force_stamps, fresh: Vec::with_capacity(envs), values }
     }
 
-    /// The recorded time of a part in a row \[s\].
+    /// Recorded time of a field in a row \[s\].
     pub(crate) fn stamp(&self, part: &Part, row: usize) -> f64 {
         let of_forces = self.force_stamps.get(row).filter(|_| part.of_forces);
         of_forces.copied().unwrap_or(self.stamps[row])
@@ -158,7 +158,7 @@ impl Block {
 }
 
 impl Values {
-    /// How many there are.
+    /// Number of values.
     pub(crate) fn len(&self) -> usize {
         match self {
             Self::U8(values) => values.len(),
@@ -168,7 +168,7 @@ impl Values {
         }
     }
 
-    /// Appends a range of them as bytes, lowest first.
+    /// Appends a range of the values as little-endian bytes.
     pub(crate) fn put(&self, range: std::ops::Range<usize>, out: &mut Vec<u8>) {
         match self {
             Self::U8(values) => out.extend_from_slice(&values[range]),
@@ -178,17 +178,17 @@ impl Values {
         }
     }
 
-    /// The states among them; nothing where they are of another type.
+    /// The values if they are `F64` (states); else empty.
     pub(crate) fn states(&self) -> &[f64] {
         if let Self::F64(values) = self { values } else { &[] }
     }
 
-    /// The bytes among them; nothing where they are of another type.
+    /// The values if they are `U8` (colors); else empty.
     pub(crate) fn bytes(&self) -> &[u8] {
         if let Self::U8(values) = self { values } else { &[] }
     }
 
-    /// The numbers of pictures among them; nothing where they are of another type.
+    /// The values if they are `F32` (other images); else empty.
     pub(crate) fn floats(&self) -> &[f32] {
         if let Self::F32(values) = self { values } else { &[] }
     }

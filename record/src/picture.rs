@@ -1,14 +1,14 @@
-//! PNG files.
+//! PNG images.
 
 use crate::writer::{Fault, Written};
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use std::io;
 
-/// Depths are written in millimetres.
+/// Depth units of PNG files (millimeters) in a meter.
 const PER_METRE: f32 = 1000.0;
 
-/// Makes PNG files, one after the other in the same memory.
+/// Encodes PNG files, reusing its buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Png {
     pixels: Vec<u8>,
@@ -16,7 +16,7 @@ pub(crate) struct Png {
 }
 
 impl Png {
-    /// Pixels of red, green, blue and opacity, which is left out.
+    /// Encodes RGBA pixels without their alpha channel.
     pub(crate) fn rgb(&mut self, rgba: &[u8], size: [usize; 2]) -> Written<&[u8]> {
         self.pixels.clear();
         for pixel in rgba.as_chunks::<4>().0 {
@@ -25,7 +25,7 @@ impl Png {
         self.encode(size, ExtendedColorType::Rgb8)
     }
 
-    /// Depths \[m\] as 16-bit millimetres: 0 where nothing was hit, 65535 for 65.535 m and more.
+    /// Encodes depths \[m\] as 16-bit millimeters: 0 for a miss, 65535 for 65.535 m and more.
     pub(crate) fn millimetres(&mut self, depths: &[f32], size: [usize; 2]) -> Written<&[u8]> {
         self.pixels.clear();
         for depth in depths {
@@ -45,9 +45,9 @@ impl Png {
     }
 }
 
-/// A depth in whole millimetres, as PNG files have it.
+/// Depth in whole millimeters.
 fn millimetres(depth: f32) -> u16 {
-    // What is beyond becomes the largest number; infinity, where nothing was hit, 0.
+    // Larger depths saturate. An infinite depth, a miss, becomes 0.
     if depth.is_finite() { (depth * PER_METRE).round() as u16 } else { 0 }
 }
 

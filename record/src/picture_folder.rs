@@ -1,4 +1,4 @@
-//! Folders of pictures.
+//! Folders of images.
 
 use crate::error::{RecordError, Result};
 use crate::file::{Disk, Storage, part_of};
@@ -12,26 +12,28 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// The file with the times of all pictures. A folder that has one is that of a recorder.
+/// File with the times of all images. It identifies the folder as that of a recorder.
 const TIMES: &str = "times.csv";
 
-/// A folder of PNG files: `camera/color/env_0/000000.png`, and `times.csv` with the physics step since the recording began, the
-/// simulation time of capture and the same on the clock of the recording \[s\] of each. It is called `NAME.part` until it is
-/// whole; in a folder that was left, what is called `.png` is a whole picture, and the last rows of the list may be missing.
+/// Writer of a folder of PNG files, such as `camera/color/env_0/000000.png`, with `times.csv`.
+///
+/// `times.csv` has for each image the physics step since the recording began, and the simulation time and recorded time
+/// of capture \[s\]. The folder is called `NAME.part` until it is complete. In a remaining partial folder, every `.png`
+/// file is complete, and the last rows of `times.csv` may be missing.
 pub(crate) struct PictureFolder {
     folder: PartFolder,
     png: Png,
-    /// The list, locked.
+    /// `times.csv`, locked.
     _lock: File,
     times: BufWriter<Box<dyn Storage>>,
     disk: Disk,
-    /// Pictures of every row of every stream.
+    /// Number of images of each row of each stream.
     counts: Vec<Vec<usize>>,
     bytes: u64,
 }
 
 impl PictureFolder {
-    /// Makes the folder, which must be new or empty, or may be replaced: only a folder of a recorder is.
+    /// Creates the folder. With `overwrite`, a folder of a recorder is replaced.
     pub(crate) fn create(path: &Path, overwrite: bool, disk: &Disk) -> Result<Self> {
         let (folder, lock) = PartFolder::create(path, overwrite, TIMES)?;
         let failed = |error| RecordError::file(folder.part(), error);
@@ -42,7 +44,7 @@ impl PictureFolder {
     }
 }
 
-/// Writes a file that has its name when it is whole.
+/// Writes a file that gets its name when it is complete.
 fn write_whole(disk: &Disk, path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = AtomicFile::create_as(path, part_of(path))?;
     disk.storage(file.file().try_clone()?).write_all(bytes)?;

@@ -1,4 +1,4 @@
-//! The observer that records.
+//! The recorder: an observer of a simulation.
 
 mod resolve;
 
@@ -24,38 +24,38 @@ use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Handle of a recorder; valid for the manager that it records.
+/// Handle of a recorder; valid for the manager that made it.
 pub type RecorderId = ObserverId<Recorder>;
 
-/// Recording, as methods of a simulation.
+/// Extension trait of a simulation for recordings.
 pub trait Record {
-    /// Begins a recording: states as they are now, then whatever is due.
+    /// Begins a recording with the present states.
     ///
-    /// Observers hear of a step in the order in which they were added. One that was added before, and resets an environment when it
-    /// hears of a step, has done so when the recorder hears of it: of that step, the environment is recorded as it was reset.
+    /// Observers are notified of a step in the order in which they were added. If an earlier observer resets an
+    /// environment in a step, the recorder records the state after that reset for this step.
     ///
     /// # Errors
-    /// A name that is not known, a file that exists or cannot be written, a format that has no place for what is asked for.
+    /// A name is unknown, a file exists or cannot be written, or the format does not support a requested topic.
     fn record(&mut self, cfg: RecorderCfg) -> Result<RecorderId>;
 
-    /// Writes what somebody has to say of an environment, or of all that are recorded, into the recording, at the step that was done
-    /// last: [`Topic::Events`] has it. Of an environment that is not recorded nothing is written.
+    /// Writes a text about an environment, or about all recorded ones, into the recording, at the last step
+    /// ([`Topic::Events`]). Does nothing for an environment that is not recorded.
     ///
     /// # Errors
-    /// There is no such environment, the format has no place for events, or the recorder was removed.
+    /// There is no such environment, the format does not support events, or the recorder was removed.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     fn note(&mut self, recorder: RecorderId, env: Option<EnvId>, text: &str) -> Result<()>;
 
-    /// Ends a recording: the file is whole, and has its name, when this returns.
+    /// Ends a recording. The file is complete and has its name when this returns.
     ///
     /// # Errors
-    /// The file could not be written, something that is recorded has changed its shape, a sensor failed. What is whole or can be
-    /// read stays as `NAME.part`, and the error says so.
+    /// The file could not be written, a recorded stream changed its shape, or a sensor failed. A readable partial file
+    /// remains as `NAME.part`, and the error contains its path.
     ///
     /// # Panics
-    /// The handle is of another manager.
+    /// The handle belongs to another manager.
     fn finish_recording(&mut self, recorder: RecorderId) -> Result<Recorded>;
 }
 
@@ -80,21 +80,22 @@ impl Record for SimulationManager {
     }
 }
 
-/// What came of a recording.
+/// Summary of a recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recorded {
-    /// The file or folder.
+    /// Output file or folder.
     pub path: PathBuf,
-    /// How large it is \[bytes\].
+    /// Size of the output \[bytes\].
     pub bytes: u64,
-    /// How often something was due, or happened, and was recorded.
+    /// Number of recorded packets: steps at which something was due, and events.
     pub packets: u64,
-    /// How often the simulation had to wait because everything before was not written yet.
+    /// Number of times that the simulation waited for a free packet.
     pub waits: u64,
-    /// How long it waited in all.
+    /// Total duration of these waits.
     pub waited: Duration,
-    /// What [`Topic::Everything`], [`Topic::Sensor`] and the scene have left out, with the reason: sensors whose types say nothing of
-    /// their channels or that are in none of the environments, channels that the format has no place for, meshes that cannot be read.
+    /// Parts of [`Topic::Everything`], [`Topic::Sensor`] and the scene that were left out, with the reason. Examples
+    /// are sensors whose types do not provide their channels, sensors outside the recorded environments, channels that
+    /// the format does not support, and meshes that cannot be read.
     pub left_out: Vec<String>,
 }
 
@@ -115,30 +116,30 @@ impl fmt::Display for Recorded {
     }
 }
 
-/// Copies what is due into packets, which a thread of its own writes to a file.
+/// Copies due values into packets, which a writer thread writes to a file.
 ///
-/// [`Record::record`] makes one. Dropped without [`finish`](Self::finish), it breaks the recording off: nothing gets the name of
-/// a whole file. What can be read of it (MCAP, folders of pictures) stays as `NAME.part`.
+/// [`Record::record`] creates a recorder. Dropping it without [`finish`](Self::finish) aborts the recording: no file
+/// gets the final name. A readable partial file (MCAP, folders of images) remains as `NAME.part`.
 pub struct Recorder {
     cfg: RecorderCfg,
     sources: Vec<Source>,
     clock: Clock,
     full: Option<SyncSender<Packet>>,
     free: Receiver<Packet>,
-    /// Empty ones that are here already.
+    /// Free packets that were received already.
     spare: Vec<Packet>,
     thread: Option<JoinHandle<Result<u64, Failure>>>,
     failed: Arc<AtomicBool>,
-    /// Why the thread could not go on.
+    /// Error of the writer thread.
     why: Arc<OnceLock<String>>,
     failure: Option<RecordError>,
     recorded: Recorded,
     format: Format,
-    /// Environments that are recorded and were said to have diverged.
+    /// Environments whose divergence was recorded already.
     diverged: Vec<usize>,
-    /// What viewers were told of how environments look; `None` where the file tells them nothing.
+    /// Scenes of the environments that were written for viewers; `None` if the file has none.
     scenes: Option<Scenes>,
-    /// Environments that may look otherwise than viewers were told.
+    /// Environments whose appearance may have changed since their last scene message.
     restyled: Vec<usize>,
 }
 
@@ -148,10 +149,10 @@ impl fmt::Debug for Recorder {
     }
 }
 
-/// What the packets of a pool may take together \[bytes\]: 16 GiB. What is asked for by mistake is far above.
+/// Largest size of the packets of a pool \[bytes\]: 16 GiB. Mistakes in a configuration are far above this.
 const MAX_POOL: u64 = 1 << 34;
 
-/// What a packet takes beside its numbers, about \[bytes\].
+/// Approximate size of a packet besides its values \[bytes\].
 const PACKET: u64 = 256;
 
 impl Recorder {
@@ -180,7 +181,7 @@ impl Recorder {
         Self::begin(sim, cfg, format, sources, left_out, sink)
     }
 
-    /// Begins to record into `sink`.
+    /// Starts the writer thread and records the initial states into `sink`.
     fn begin(
         sim: &mut SimulationManager,
         cfg: RecorderCfg,
@@ -194,7 +195,7 @@ impl Recorder {
         let (full, filled) = sync_channel(cfg.packets);
         let (empty, free) = channel();
         for _ in 0..cfg.packets {
-            // The other end is in this function.
+            // The receiver is in this function, so that sending cannot fail.
             let _ = empty.send(Packet::new(&streams));
         }
         let failed = Arc::new(AtomicBool::new(false));
@@ -230,17 +231,17 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// What is recorded.
+    /// Recorded streams.
     pub fn streams(&self) -> impl Iterator<Item = &Stream> {
         self.sources.iter().map(|source| &source.stream)
     }
 
-    /// What came of it so far; its size is known at the end.
+    /// Summary so far. The size is known at the end.
     pub fn so_far(&self) -> &Recorded {
         &self.recorded
     }
 
-    /// Why the recording has stopped, as soon as it is known; `None` while it goes on.
+    /// Error that stopped the recording; `None` while it goes on.
     pub fn failure(&self) -> Option<String> {
         if let Some(failure) = &self.failure {
             return Some(failure.to_string());
@@ -252,26 +253,27 @@ impl Recorder {
         }
     }
 
-    /// Whether the recording has stopped because something went wrong; [`failure`](Self::failure) says what.
+    /// True if the recording has stopped because of an error; [`failure`](Self::failure) returns it.
     pub fn has_failed(&self) -> bool {
-        // The thread ends when the recorder does, or panics.
+        // The writer thread ends only with the recorder, or by a panic.
         let ended = self.thread.as_ref().is_none_or(JoinHandle::is_finished);
         self.failure.is_some() || ended || self.failed.load(Ordering::Relaxed)
     }
 
-    /// Waits until the file has got everything that was recorded so far, or something went wrong. These waits are not counted.
+    /// Waits until the file contains everything that was recorded so far, or an error occurs. [`Recorded::waits`] does
+    /// not count this wait.
     pub fn catch_up(&mut self) {
         while self.spare.len() < self.cfg.packets && !self.has_failed() {
-            // Where the thread is gone there is nothing to wait for.
+            // The writer thread is gone if this fails.
             let Ok(packet) = self.free.recv() else { return };
             self.spare.push(packet);
         }
     }
 
-    /// Ends the recording: as [`Record::finish_recording`].
+    /// Ends the recording, as [`Record::finish_recording`].
     ///
     /// # Errors
-    /// As [`Record::finish_recording`].
+    /// The same as [`Record::finish_recording`].
     pub fn finish(mut self) -> Result<Recorded> {
         self.end()
     }
@@ -285,7 +287,7 @@ impl Recorder {
         let path = self.cfg.path.clone();
         let written = thread.join().unwrap_or_else(|_| {
             self.failure.get_or_insert(RecordError::Panicked { path: path.clone() });
-            // What it has left is where it was.
+            // A panic leaves the partial file in place.
             let part = part_of(&path);
             Err(Failure { error: None, kept: part.exists().then_some(part) })
         });
@@ -312,8 +314,8 @@ impl Recorder {
         Err(RecordError::BrokenOff { error: Box::new(failure), also: error.map(|error| error.to_string()), kept })
     }
 
-    /// Records what is due, and everything that is there at any time in environments `renewed`; with the result of a step of a
-    /// task, that result only.
+    /// Records the due streams, and the state streams of environments `renewed`. With the `result` of a step of a task,
+    /// records only that result.
     fn take(
         &mut self,
         sim: &mut SimulationManager,
@@ -352,7 +354,7 @@ impl Recorder {
                 source.due_at = steps.saturating_add(every);
             }
             if source.is_stage() {
-                // It shows several environments: its time is that of the recording.
+                // The overview shows several environments, so its time is that of the recording.
                 block.stamps.push(now);
             } else {
                 let (clock, envs) = (&self.clock, &source.stream.env_ids);
@@ -371,19 +373,20 @@ impl Recorder {
         }
         self.recorded.packets += 1;
         if let Some(full) = &self.full {
-            // There is room for all packets. Where the thread is gone, `end` says why.
+            // The channel holds all packets, so this never waits. It fails if the writer thread is gone; `end` then
+            // returns the reason.
             let _ = full.send(packet);
         }
     }
 
-    /// Breaks the recording off with a packet in hand: whoever waits for all packets waits for this one too.
+    /// Aborts the recording, and returns the packet to the pool, since `catch_up` waits for all packets.
     fn give_up(&mut self, mut packet: Packet, error: RecordError) {
         packet.clear();
         self.spare.push(packet);
         self.fail(error);
     }
 
-    /// An empty packet, as soon as there is one.
+    /// Returns an empty packet, after a wait if necessary.
     fn packet(&mut self) -> Option<Packet> {
         if let Some(packet) = self.spare.pop() {
             return Some(packet);
@@ -401,7 +404,7 @@ impl Recorder {
         }
     }
 
-    /// Something happened to environments.
+    /// Handles resets and writes of environments.
     fn happened(&mut self, sim: &mut SimulationManager, kind: EventKind, env_ids: &[EnvId]) {
         let envs: Vec<usize> = env_ids.iter().map(|env| env.0).collect();
         let (steps, times) = (sim.observers().steps(), sim.time());
@@ -422,7 +425,7 @@ impl Recorder {
         self.cfg.envs.as_ref().is_none_or(|wanted| wanted.contains(&EnvId(env)))
     }
 
-    /// Says which environments have diverged since it was asked last.
+    /// Records the environments that have diverged since the last call.
     fn look_for_divergence(&mut self, sim: &SimulationManager) {
         if !self.format.has_events() {
             return;
@@ -443,7 +446,7 @@ impl Recorder {
         self.diverged = diverged.into_iter().map(|(env, _)| env).collect();
     }
 
-    /// Writes what somebody has to say.
+    /// Records a note.
     fn note(&mut self, steps: u64, times: &[f64], env: Option<EnvId>, text: &str) -> Result<()> {
         if !self.format.has_events() {
             let (path, topic) = (self.cfg.path.clone(), format!("{:?}", Topic::Events));
@@ -457,7 +460,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Records something that happened and changed no state.
+    /// Records an event that changed no state.
     fn tell(&mut self, kind: EventKind, env_ids: Vec<usize>, text: String, steps: u64, times: &[f64]) {
         if self.has_failed() {
             return;
@@ -481,13 +484,13 @@ impl Recorder {
         }
     }
 
-    /// Breaks the recording off; what was wrong first is said.
+    /// Aborts the recording. The first error is reported.
     fn fail(&mut self, error: RecordError) {
         self.failure.get_or_insert(error);
         self.failed.store(true, Ordering::Relaxed);
     }
 
-    /// The scene was compiled anew: what is recorded must still be there.
+    /// Checks after a compilation of the scene that all recorded streams still exist.
     fn compiled(&mut self, sim: &mut SimulationManager) {
         let format = self.cfg.format.map_or_else(|| Format::of_path(&self.cfg.path), Ok);
         match format.and_then(|format| resolve(sim, &self.cfg, format)) {
@@ -503,7 +506,7 @@ impl Recorder {
         self.recount(sim, &(0..sim.num_envs()).collect::<Vec<_>>());
         if self.scenes.is_some() {
             self.restyled = (0..sim.num_envs()).collect();
-            // Nothing else is due: this was recorded after the last step.
+            // Only scene messages are due: the states were recorded after the last step.
             self.take(sim, None, &[], None);
         }
     }
@@ -511,7 +514,7 @@ impl Recorder {
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        // Only what is finished has its name. Nobody is left to be told.
+        // Only a finished recording gets its final name. Errors cannot be reported from here.
         self.failed.store(true, Ordering::Relaxed);
         let _ = self.end();
     }
@@ -527,7 +530,7 @@ impl Observer for Recorder {
             (Some(uid), None) => sim.entities().sensor_due_in(uid).unwrap_or(u64::MAX),
             _ => source.due_at.saturating_sub(now).max(1),
         };
-        // Where nothing but events is recorded, it looks for them as often as it would have recorded.
+        // A recording of events alone checks for divergence every `every` steps.
         self.sources.iter().map(wait).min().unwrap_or(self.cfg.every)
     }
 

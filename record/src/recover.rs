@@ -1,4 +1,4 @@
-//! Whole MCAP files of what killed recordings have left.
+//! Recovery of MCAP files from killed recordings.
 
 use crate::error::{RecordError, Result};
 use crate::file::{PartFile, lock_left, part_of, remove};
@@ -10,34 +10,35 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Chunks are smaller by far, before they are compressed \[bytes\].
+/// Upper limit of the uncompressed size of a chunk \[bytes\].
 const LARGEST_CHUNK: usize = 1 << 30;
 
-/// What was made of a recording that was killed.
+/// Result of a recovery.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recovered {
-    /// Messages in the file.
+    /// Number of messages in the recovered file.
     pub messages: u64,
-    /// What stands in the way of the rest, where that is more than a last chunk that was not written whole: then what was left
-    /// is still there, for other tools.
+    /// Damage beyond a last chunk that was not written completely. The partial file is kept in this case, for other
+    /// tools.
     pub damage: Option<String>,
 }
 
-/// Makes a whole file of what a recording has left that was killed: `path` is the name that it was to have. The scene, and
-/// the messages of all chunks from the beginning that are whole, are in it, and what was left is taken away, unless something in
-/// it is damaged. It is read a chunk at a time: large files take no more memory than small ones.
+/// Makes a complete file of the partial file of a killed recording. `path` is the intended name of the recording.
+///
+/// The file contains the scene and the messages of all complete chunks from the beginning. The partial file is deleted,
+/// unless it is damaged. The file is read by chunks, so that the memory does not depend on its size.
 ///
 /// # Errors
-/// There is no such recording, somebody is writing it, there is a file called `path` already, or no message can be read.
-/// What was left is as it was then.
+/// There is no partial file, a recorder is writing it, a file called `path` exists, or no message can be read. The
+/// partial file is kept then.
 pub fn recover(path: impl AsRef<Path>) -> Result<Recovered> {
     recover_to(&path, &path)
 }
 
-/// As [`recover`], but the whole file is called `to`.
+/// Recovers as [`recover`] does, into a file called `to`.
 ///
 /// # Errors
-/// As [`recover`]; there is a file called `to` already.
+/// The same as [`recover`]; a file called `to` exists.
 pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovered> {
     let (path, to) = (path.as_ref(), to.as_ref());
     let left = part_of(path);
@@ -53,7 +54,7 @@ pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recove
         return Err(nothing("this is no MCAP file".into()));
     }
     locked.seek(SeekFrom::Start(0)).map_err(failed_to_read)?;
-    // What an earlier attempt left that was killed is of no use.
+    // Removes the remainder of an earlier attempt that was killed.
     let on_the_way = part_of(to).with_extension("recovered");
     remove(&on_the_way)?;
     let (mut part, file) = PartFile::create_as(to, on_the_way, false)?;
@@ -76,14 +77,14 @@ pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recove
     Ok(recovered)
 }
 
-/// Which of the two files could not go on.
+/// Error of one of the two files.
 enum Broken {
     Read(io::Error),
     Write(McapError),
 }
 
-/// Copies everything of whole and undamaged chunks from the beginning of a file. Chunks are compared with their checksums before
-/// anything in them is believed: a length that is no length would be asked for as memory.
+/// Copies everything from complete and undamaged chunks at the beginning of a file. Checksums are verified before the
+/// content of a chunk is used, because a wrong length could request any amount of memory.
 fn copy(from: &mut File, to: &mut Writer<impl Write + Seek>) -> std::result::Result<Recovered, Broken> {
     let bytes = from.metadata().map_err(Broken::Read)?.len();
     let options = LinearReaderOptions::default()
@@ -100,7 +101,7 @@ fn copy(from: &mut File, to: &mut Writer<impl Write + Seek>) -> std::result::Res
                 continue;
             }
             Ok(LinearReadEvent::Record { opcode, data }) => (opcode, data),
-            // Where the process was killed.
+            // The process was killed here.
             Err(McapError::UnexpectedEof) => break,
             Err(error) => {
                 recovered.damage = Some(error.to_string());
@@ -126,7 +127,7 @@ fn copy(from: &mut File, to: &mut Writer<impl Write + Seek>) -> std::result::Res
             }
             Ok(Record::Metadata(metadata)) => to.write_metadata(&metadata),
             Ok(_) => Ok(()),
-            // The messages may be whole; that something is lost is said.
+            // Other messages may be complete. The damage is reported.
             Err(error) => {
                 recovered.damage.get_or_insert(error.to_string());
                 Ok(())
@@ -135,7 +136,7 @@ fn copy(from: &mut File, to: &mut Writer<impl Write + Seek>) -> std::result::Res
         match copied {
             Ok(()) => {}
             Err(McapError::Io(error)) => return Err(Broken::Write(McapError::Io(error))),
-            // Records that contradict each other are damage.
+            // Contradicting records are damage.
             Err(error) => {
                 recovered.damage = Some(error.to_string());
                 break;

@@ -1,4 +1,4 @@
-//! Recorded actions run again: do they give the recorded states, bit for bit?
+//! Replay: recorded actions are simulated again, and the states are compared bit by bit.
 //!
 //! ```no_run
 //! use kinetoscope_record::{Record, RecorderCfg};
@@ -21,38 +21,38 @@ use serde_json::Value;
 use std::fmt;
 use std::path::Path;
 
-/// What came of running recorded actions again.
+/// Result of a replay.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// Physics steps that were done again until the end, or until the first difference.
+    /// Number of repeated physics steps, until the end or the first difference.
     pub steps: u64,
-    /// Recorded numbers that were found again, bit for bit.
+    /// Number of recorded values that were reproduced bit by bit.
     pub numbers: u64,
-    /// Where it first differs, if it does.
+    /// First difference, if any.
     pub difference: Option<Difference>,
 }
 
-/// Where a recording and its repetition first differ.
+/// First difference between a recording and its replay.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
-    /// Physics steps after the beginning of the recording.
+    /// Physics steps since the beginning of the recording.
     pub step: u64,
     /// The environment.
     pub env: usize,
-    /// The array, such as `arm/joint_states/positions`.
+    /// Name of the array, such as `arm/joint_states/positions`.
     pub array: String,
-    /// Which number of the environment's row.
+    /// Index of the value in the row of the environment.
     pub column: usize,
-    /// What was recorded.
+    /// Recorded value.
     pub recorded: f64,
-    /// What came instead.
+    /// Value of the replay.
     pub found: f64,
-    /// Whether somebody wrote to the state of the environment at that step: what was written is no action.
+    /// True if the state of the environment was written at that step. Writes are no actions and are not repeated.
     pub written: bool,
 }
 
 impl Verdict {
-    /// Whether everything was found again.
+    /// True if all values were reproduced.
     pub fn is_same(&self) -> bool {
         self.difference.is_none()
     }
@@ -74,7 +74,7 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// The state streams, by the ends of their names.
+/// Streams of states, by the endings of their names.
 const STATES: [(&str, Of); 4] = [
     ("/joint_states", Source::joint_states),
     ("/link_poses", Source::link_poses),
@@ -85,18 +85,18 @@ const TARGETS: &str = "/targets";
 
 type Of = fn(&SimulationManager, &str, &[usize]) -> Result<Source>;
 
-/// Puts `sim`, which must be built as the recorded one, into the state in which a NumPy archive or an MCAP file begins, does the recorded
-/// actions again, and compares the states after every step with the recorded ones. Resets are done again too. The file
-/// must hold the targets of every robot and the controls of every MJCF part that move something, at every step
-/// ([`RecorderCfg::every`](crate::RecorderCfg::every) 1).
+/// Replays a NumPy archive or an MCAP file in `sim`, which must be built as the recorded simulation was.
 ///
-/// Of several rows at a step, where something happened there more than once, the first and the last are compared.
+/// Restores the initial state, applies the recorded actions and resets, and compares the states after every step. The
+/// file must contain the targets of every robot and the controls of every MJCF part that move something, at every step
+/// ([`RecorderCfg::every`](crate::RecorderCfg::every) 1). If a step has several rows because of events, the first and
+/// the last are compared.
 ///
-/// What nobody recorded is not repeated: external wrenches, welds, gains, poses of kinematic objects; the first difference
-/// says when they mattered.
+/// External wrenches, welds, gains and poses of kinematic objects are not recorded and not repeated. The first
+/// difference shows when they mattered.
 ///
 /// # Errors
-/// The file is none of a recorder, or not whole; it is of another scene, another MuJoCo or another time step.
+/// The file is not a complete recording, or is of another scene, another MuJoCo version or another time step.
 pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Verdict> {
     let archive = Archive::of_any(path.as_ref())?;
     let dt = sim.cfg().physics_dt;
@@ -129,7 +129,7 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
     if steps.first() != Some(&0.0) {
         return Err(archive.malformed("its rows do not begin at step 0".into()));
     }
-    // One that is no number is in no such order.
+    // A NaN fails this check, too.
     if !steps.windows(2).all(|pair| [0.0, 1.0].contains(&(pair[1] - pair[0]))) {
         return Err(archive.malformed("it does not hold every step: record with `every: 1`".into()));
     }
@@ -154,20 +154,20 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Ver
     Repetition { archive, states, targets, steps }.run(sim)
 }
 
-/// How many environments a NumPy archive or an MCAP file was recorded of.
+/// Number of environments of a NumPy archive or an MCAP file.
 ///
 /// # Errors
-/// The file is no such archive, or not whole.
+/// The file is not such a recording, or is incomplete.
 pub fn num_envs(path: impl AsRef<Path>) -> Result<usize> {
     Ok(Archive::of_any(path.as_ref())?.start()?.len())
 }
 
-/// Everything that a repetition needs.
+/// Data of a replay.
 struct Repetition {
     archive: Archive,
     states: Vec<Source>,
     targets: Vec<Source>,
-    /// The step of every row.
+    /// Step of each row.
     steps: Vec<f64>,
 }
 
@@ -182,7 +182,7 @@ impl Repetition {
                 sim.update(1);
                 verdict.steps += 1;
             }
-            // What happens at a step has rows of its own behind that of the step.
+            // Events at a step have rows of their own after the row of the step.
             let last = row + self.steps[row..].iter().take_while(|other| **other == step).count() - 1;
             if !self.compare(sim, row, &[], &mut verdict)? {
                 return Ok(verdict);
@@ -201,7 +201,7 @@ impl Repetition {
         Ok(verdict)
     }
 
-    /// Sets the targets of a row.
+    /// Applies the actions of a row.
     fn act(&self, sim: &mut SimulationManager, row: usize) -> Result<()> {
         let Self { archive, states, targets, .. } = self;
         for source in targets {
@@ -224,7 +224,7 @@ impl Repetition {
         Ok(())
     }
 
-    /// Compares all states with those of a row; gives whether they are the same.
+    /// Compares all states with a row; returns true if they are equal.
     fn compare(
         &mut self,
         sim: &mut SimulationManager,
@@ -247,7 +247,7 @@ impl Repetition {
     }
 }
 
-/// The first number of a stream that is not that of the archive.
+/// First value of a stream that differs from the archive.
 fn difference(
     archive: &Archive,
     source: &Source,

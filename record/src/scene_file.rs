@@ -1,8 +1,9 @@
-//! The scene inside of a recording: what is needed to show it without the program that recorded it.
+//! The scene in a recording, which is enough to show it without the program that recorded it.
 //!
-//! A ZIP archive called `scene.zip`, an attachment of an MCAP file or a member of a NumPy archive. In it are the scene as MJCF for
-//! both lines of MuJoCo, as [`SimulationManager::dump`] writes it, with meshes, textures and terrains, and `stage.json` with what
-//! MJCF has no place for. Any program that reads ZIP archives takes them out.
+//! The scene is a ZIP archive called `scene.zip`: an attachment of an MCAP file, or a member of a NumPy archive. It
+//! contains the scene as MJCF for both supported MuJoCo versions, as written by [`SimulationManager::dump`], with
+//! meshes, textures and terrains. The file `stage.json` has the settings that MJCF does not support. Any program that
+//! reads ZIP archives can extract them.
 
 use crate::error::{RecordError, Result};
 use crate::zip;
@@ -14,20 +15,20 @@ use std::fs;
 use std::io::{self, Cursor};
 use std::path::{Component, Path, PathBuf};
 
-/// What the archive is called in a recording.
+/// Name of the archive in a recording.
 pub(crate) const SCENE: &str = "scene.zip";
-/// What MJCF has no place for.
+/// Name of the file with the settings that MJCF does not support.
 const STAGE: &str = "stage.json";
-/// Name of the part that is the recorded scene.
+/// Name of the MJCF part that contains the recorded scene.
 pub(crate) const PART: &str = "scene";
-/// The files that MuJoCo reads, for each of its lines.
+/// Names of the MJCF files, for MuJoCo 2 and for MuJoCo 4.
 const MJCF: [&str; 2] = ["robot.mjcf2.xml", "robot.mjcf4.xml"];
 
-/// The scene of a simulation as an archive, and what could not be put into it.
+/// Packs the scene of a simulation into an archive; also returns what was left out.
 pub(crate) fn pack(sim: &SimulationManager) -> Result<(Vec<u8>, Vec<String>)> {
     let failed = |error: io::Error| RecordError::file(Path::new(SCENE), error);
     let folder = tempfile::tempdir().map_err(failed)?;
-    // A scene that is only shown has no need of its drives.
+    // Drives do not matter for a scene that is only displayed.
     let shows = |diagnostic: &&Diagnostic| diagnostic.kind != DiagnosticKind::ExportHeavier;
     let left_out = sim.dump(folder.path())?.iter().filter(shows).map(|diagnostic| diagnostic.message.clone()).collect();
     let mut archive = zip::Archive::new(Cursor::new(Vec::new()));
@@ -36,7 +37,7 @@ pub(crate) fn pack(sim: &SimulationManager) -> Result<(Vec<u8>, Vec<String>)> {
     archive.add(STAGE, b"", &mut stage.to_string().as_bytes()).map_err(failed)?;
     for file in files(folder.path()).map_err(failed)? {
         let name = file.strip_prefix(folder.path()).unwrap_or(&file).to_string_lossy().replace('\\', "/");
-        // What the run itself used, and what is for people to read, shows nothing.
+        // Files for humans and the MJCF of the run itself are not displayed.
         if name.ends_with(".txt") || name.ends_with(".urdf") || name == "run.mjcf.xml" {
             continue;
         }
@@ -45,7 +46,7 @@ pub(crate) fn pack(sim: &SimulationManager) -> Result<(Vec<u8>, Vec<String>)> {
     Ok((archive.finish().map_err(failed)?.into_inner(), left_out))
 }
 
-/// All files below a folder, in order.
+/// All files below a folder, sorted.
 fn files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let (mut found, mut folders) = (Vec::new(), vec![folder.to_path_buf()]);
     while let Some(folder) = folders.pop() {
@@ -58,11 +59,11 @@ fn files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// A simulation of a packed scene, in as many environments as were recorded: one part that holds everything. It is there to be
-/// shown; nothing in it is driven.
+/// Creates a simulation of a packed scene, for display, with the recorded number of environments. The scene is one MJCF
+/// part without drives. `path` is the recording, for error messages.
 ///
 /// # Errors
-/// The archive is damaged, or its scene cannot be compiled. `path` is the recording, for errors.
+/// The archive is damaged, or its scene cannot be compiled.
 pub(crate) fn unpack(bytes: &[u8], path: &Path) -> Result<(SimulationManager, MjcfId)> {
     let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: format!("its scene: {what}") };
     let failed = |error: io::Error| RecordError::file(Path::new(SCENE), error);
@@ -74,7 +75,7 @@ pub(crate) fn unpack(bytes: &[u8], path: &Path) -> Result<(SimulationManager, Mj
             stage = serde_json::from_slice(data).map_err(|_| malformed("stage.json is no JSON"))?;
             continue;
         }
-        // A name that leads out of the folder is none of a recorder.
+        // A recorder writes no names that lead out of the folder.
         let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
         if !inside {
             return Err(malformed(&format!("{name:?} is no name of a file in it")));
@@ -89,7 +90,7 @@ pub(crate) fn unpack(bytes: &[u8], path: &Path) -> Result<(SimulationManager, Mj
     let num_envs = number("num_envs").ok_or_else(|| malformed("it does not say how many environments there are"))?;
     let arena_space = stage["arena_space"].as_f64().unwrap_or(SimulationManagerCfg::default().arena_space);
     let mjcf = folder.path().join(MJCF[usize::from(TARGET == Target::V4)]);
-    // Older recordings do not say how their ground is drawn: then it is the plane of the MJCF.
+    // Older recordings lack the ground settings. Their ground is the plane of the MJCF.
     let ground: Option<GroundCfg> = serde_json::from_value(stage["ground"].clone()).unwrap_or_default();
     let ground = ground.filter(|_| remove_ground(&mjcf));
     let cfg = SimulationManagerCfg { num_envs, arena_space, ground, lights: Vec::new(), ..Default::default() };
@@ -98,7 +99,7 @@ pub(crate) fn unpack(bytes: &[u8], path: &Path) -> Result<(SimulationManager, Mj
     Ok((sim, part))
 }
 
-/// Takes the ground out of a packed MJCF file, so that the simulation can have its own; returns whether it was there.
+/// Removes the ground from a packed MJCF file, so that the simulation can add its own; returns true if it was there.
 fn remove_ground(mjcf: &Path) -> bool {
     let Ok(text) = fs::read_to_string(mjcf) else { return false };
     let Some(from) = text.find("<geom name=\"ground\" ") else { return false };

@@ -1,4 +1,4 @@
-//! What environments look like, for viewers that draw a file: shapes in the frames whose poses are recorded.
+//! Appearance of environments for viewers: shapes attached to the recorded frames.
 
 use crate::error::Result;
 use crate::stream::{Kind, Stream};
@@ -11,67 +11,67 @@ use kinetoscope_sim::{EnvId, Look, SimulationManager};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// What the messages of a file may take together, before they are packed \[bytes\].
+/// Largest uncompressed size of all scene messages of a file \[bytes\].
 const MOST: u64 = 64 << 20;
-/// Edges around what is round and is drawn by triangles.
+/// Number of segments of tessellated round shapes.
 const SEGMENTS: usize = 32;
-/// What a message says of an entity beside its shape, about \[bytes\].
+/// Approximate size of an entity in a message, besides its shape \[bytes\].
 const ENTITY: u64 = 256;
 
-/// What an environment looks like from now on.
+/// The appearance of an environment from a time on.
 #[derive(Debug)]
 pub(crate) struct SceneUpdate {
     pub(crate) env: usize,
-    /// When, on the clock of the recording \[s\].
+    /// Recorded time \[s\].
     pub(crate) at: f64,
     pub(crate) entities: Vec<Entity>,
-    /// What they look like.
+    /// Appearance of the entities, by instance.
     pub(crate) drawn: Looks,
 }
 
-/// What is drawn of each instance of a scene; nothing where it is not.
+/// Appearance of each instance of a scene; `None` if it is not drawn.
 pub(crate) type Looks = Arc<Vec<Option<Drawn>>>;
 
-/// A thing in a frame.
+/// An instance attached to a frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Entity {
-    /// Its number among all that is drawn.
+    /// Index of the instance in the scene.
     pub(crate) instance: usize,
-    /// Whose it is.
+    /// Name of the entity.
     pub(crate) name: Arc<str>,
     /// Value of the mask channel of cameras.
     pub(crate) mask_id: i32,
-    /// Its frame, without the environment; `None` for that of the environment itself.
+    /// Its frame, without the environment prefix; `None` for the frame of the environment.
     pub(crate) frame: Option<String>,
-    /// Where it is in its frame.
+    /// Pose in that frame.
     pub(crate) pose: Pose,
 }
 
-/// The look of a thing.
+/// Appearance of an instance.
 #[derive(Debug)]
 pub(crate) struct Drawn {
     pub(crate) form: Form,
-    /// In 0..=1, with the mean of its texture, if it has one.
+    /// Color in 0..=1, multiplied by the mean color of its texture, if any.
     pub(crate) rgba: [f64; 4],
 }
 
-/// The surface of a thing, in its own frame.
+/// Surface in the instance's own frame.
 #[derive(Debug)]
 pub(crate) enum Form {
-    /// Sides \[m\].
+    /// Box by its side lengths \[m\].
     Cube([f64; 3]),
-    /// Diameters \[m\]: of a ball, or one that is stretched along its axes.
+    /// Sphere or ellipsoid by its diameters \[m\].
     Ball([f64; 3]),
-    /// Diameters and length along z \[m\].
+    /// Cylinder by its two diameters and its length along z \[m\].
     Cylinder([f64; 3]),
-    /// Triangles that are shared, and the colour of each vertex, where a texture says so.
+    /// Shared mesh, with a color of each vertex if it is textured.
     Mesh(Arc<RenderMesh>, Vec<[f64; 4]>),
-    /// Triangles.
+    /// Other shapes, tessellated.
     Triangles(TriMesh),
 }
 
 impl Form {
-    /// Vertices and triangles; none for what has a word of its own.
+    /// Vertices and triangles; empty for primitives.
     pub(crate) fn triangles(&self) -> (&[[f32; 3]], &[[u32; 3]]) {
         match self {
             Self::Mesh(mesh, _) => (mesh.positions(), mesh.triangles()),
@@ -80,7 +80,7 @@ impl Form {
         }
     }
 
-    /// What a message says of it, about \[bytes\].
+    /// Approximate size in a message \[bytes\].
     fn bytes(&self) -> u64 {
         let (vertices, triangles) = self.triangles();
         let colors = if let Self::Mesh(_, colors) = self { colors.len() } else { 0 };
@@ -118,7 +118,7 @@ impl Drawn {
     }
 }
 
-/// The mean of a texture: of its smallest version.
+/// Mean color of a texture, computed from its smallest mipmap level.
 fn mean_of(texture: &Texture) -> [f64; 3] {
     let Some(last) = texture.levels().last() else { return [1.0; 3] };
     // Rows have one pixel more than the width.
@@ -129,7 +129,7 @@ fn mean_of(texture: &Texture) -> [f64; 3] {
     [0, 1, 2].map(|k| pixels.iter().map(|pixel| f64::from(pixel[k])).sum::<f64>() / (255.0 * count))
 }
 
-/// The colour of a texture at texture coordinates, whose origin is at the lower left; the image repeats.
+/// Color of a texture at texture coordinates, with the origin at the lower left and repetition.
 fn color_at(texture: &Texture, [u, v]: [f32; 2]) -> [f64; 3] {
     let Some(level) = texture.levels().first() else { return [1.0; 3] };
     let place = |x: f32, count: u32| {
@@ -141,20 +141,20 @@ fn color_at(texture: &Texture, [u, v]: [f32; 2]) -> [f64; 3] {
     [0, 1, 2].map(|k| level.bytes().get(at + k).map_or(1.0, |byte| f64::from(*byte) / 255.0))
 }
 
-/// What viewers were told of how environments look.
+/// Tracks the scenes that were written for viewers.
 #[derive(Debug)]
 pub(crate) struct Scenes {
-    /// Frames whose poses are recorded, without the environment.
+    /// Frames with recorded poses, without the environment prefix.
     frames: BTreeSet<String>,
-    /// What each recorded environment looked like when it was told last.
+    /// Last written scene of each recorded environment.
     told: BTreeMap<usize, Option<Arc<RenderScene>>>,
-    /// How much may still be told \[bytes\].
+    /// Remaining size for messages \[bytes\].
     left: u64,
-    /// Things that move, and nobody records where.
+    /// Moving entities without a recorded pose.
     lost: BTreeSet<String>,
-    /// Things whose shape changes from frame to frame.
+    /// Entities with deforming shapes.
     deforming: BTreeSet<String>,
-    /// Environments that were not told of, because it would be too much.
+    /// Environments that were skipped because of the size limit.
     omitted: BTreeSet<usize>,
 }
 
@@ -169,13 +169,13 @@ impl Scenes {
         Self { frames, told, left: MOST, lost: BTreeSet::new(), deforming: BTreeSet::new(), omitted: BTreeSet::new() }
     }
 
-    /// What those of `envs` look like that are recorded and look otherwise than when they were told of last.
+    /// Returns updates for those of `envs` that are recorded and whose appearance has changed since their last message.
     ///
     /// # Errors
     /// There is no such environment.
     pub(crate) fn changed(&mut self, sim: &mut SimulationManager, envs: &[usize], at: f64) -> Result<Vec<SceneUpdate>> {
         let mut updates = Vec::new();
-        // Most look as another one does.
+        // Most environments share one scene.
         let mut known: Vec<(Arc<RenderScene>, Looks)> = Vec::new();
         let groups = RasterCfg::default().groups;
         for &env in envs {
@@ -209,7 +209,7 @@ impl Scenes {
         Ok(updates)
     }
 
-    /// Everything that is drawn of an environment, in its frame.
+    /// All drawn instances of an environment, attached to their frames.
     fn entities(
         &mut self,
         sim: &mut SimulationManager,
@@ -242,7 +242,7 @@ impl Scenes {
         Ok(entities)
     }
 
-    /// What viewers were not told of, and why.
+    /// Describes what the scene messages lack, and the reasons.
     pub(crate) fn left_out(&self) -> Vec<String> {
         let list = |names: Vec<String>| names.join(", ");
         let lost = (!self.lost.is_empty()).then(|| {

@@ -1,4 +1,4 @@
-//! Where the numbers of a stream come from.
+//! Sources of the streams: copies values from the simulation.
 
 mod camera;
 
@@ -14,24 +14,24 @@ use kinetoscope_sim::{MjcfId, ObjectId, RobotId, SimulationManager, StepResult};
 use ndarray::{Array2, ArrayBase, ArrayView2, Axis, Data, Dimension};
 use std::any::Any;
 
-/// One stream and where it comes from.
+/// A stream and the source of its values.
 #[derive(Debug)]
 pub(crate) struct Source {
     pub(crate) stream: Stream,
     what: What,
-    /// The sensor that says when there is something new; `None` for what is there at every step.
+    /// The sensor whose measurements are recorded; `None` for states that are read at any step.
     pub(crate) sensor: Option<String>,
-    /// The row of the source's arrays of every environment of the stream.
+    /// Row of each environment of the stream in the arrays of the source.
     rows: Vec<usize>,
-    /// Measurements of every row until now, for sensors.
+    /// Number of measurements of each row so far, for sensors.
     counts: Vec<u64>,
-    /// Simulation time of every row when it was read last \[s\], for what is there at every step.
+    /// Simulation time at the last read of each row \[s\], for states.
     last: Vec<f64>,
-    /// Steps of the simulation at which it is due.
+    /// Simulation step at which the next row is due.
     pub(crate) due_at: u64,
-    /// Steps from one row to the next; `None` for a sensor that is recorded whenever it measures.
+    /// Steps between two rows; `None` for a sensor that is recorded whenever it measures.
     pub(crate) every: Option<u64>,
-    /// What draws the stage.
+    /// Renderer of the overview image.
     painter: Option<Painter>,
 }
 
@@ -69,12 +69,12 @@ impl Source {
         }
     }
 
-    /// Whether it is told by a task.
+    /// True for the results of task steps.
     pub(crate) fn is_outcome(&self) -> bool {
         self.what == What::Outcomes
     }
 
-    /// Whether it is a picture of all environments.
+    /// True for the overview image.
     pub(crate) fn is_stage(&self) -> bool {
         matches!(self.what, What::Stage(_))
     }
@@ -96,12 +96,12 @@ impl Source {
 
     pub(crate) fn outcomes(envs: &[usize]) -> Self {
         let parts = ["reward", "terminated", "truncated"].map(|part| Part::new(part, [])).to_vec();
-        // Never due by steps.
+        // Results of task steps are never due by a number of steps.
         let due_at = u64::MAX;
         Self { due_at, ..Self::new("task".into(), Kind::Outcome, Element::F64, parts, envs, What::Outcomes) }
     }
 
-    /// All environments in one picture, which is told as that of the first of `envs`.
+    /// The overview image of all environments, recorded as that of the first of `envs`.
     pub(crate) fn stage(sim: &mut SimulationManager, cfg: &StageCfg, envs: &[usize]) -> Result<Self> {
         let painter = Painter::new(sim, cfg)?;
         let [width, height] = cfg.size;
@@ -157,7 +157,7 @@ impl Source {
         Ok(Self::new(format!("{uid}/state"), Kind::unnamed(), Element::F64, parts, envs, What::MjcfState(id)))
     }
 
-    /// Everything that a sensor measures.
+    /// All streams of a sensor.
     pub(crate) fn sensor(sim: &SimulationManager, uid: &str, envs: &[usize]) -> Result<Vec<Self>> {
         let sensor = sim.entities().sensor_called(uid)?;
         let any: &dyn Any = sensor;
@@ -205,7 +205,7 @@ impl Source {
         Ok(sources)
     }
 
-    /// One channel of a camera; of a pair `left/depth`, `right/depth` or `disparity`.
+    /// One channel of a camera; for a stereo camera `left/depth`, `right/depth` or `disparity`.
     pub(crate) fn picture(sim: &SimulationManager, uid: &str, channel: &str, envs: &[usize]) -> Result<Self> {
         let any: &dyn Any = sim.entities().sensor_called(uid)?;
         let (eye, asked) = Eye::in_front_of(channel);
@@ -213,7 +213,7 @@ impl Source {
         if pair && channel == DISPARITY {
             return Self::of_eye(sim, uid, Eye::Left, DISPARITY, envs);
         }
-        // Aliases are the cameras' own.
+        // Resolves aliases of channel names.
         let own = kinetoscope_render::frame::Channels::from_names(&[asked]).map(|one| one.names()).unwrap_or_default();
         let known = eye.channels(any);
         match known.iter().find(|(name, ..)| own.contains(name)) {
@@ -230,14 +230,14 @@ impl Source {
         }
     }
 
-    /// One channel of a camera, which has it, by its own name.
+    /// One existing channel of a camera, by its own name.
     fn of_eye(sim: &SimulationManager, uid: &str, eye: Eye, channel: &'static str, envs: &[usize]) -> Result<Self> {
         let sensor = sim.entities().sensor_called(uid)?;
         let found = eye.channels(sensor).into_iter().find(|(name, ..)| *name == channel);
         let (_, element, components) = found.unwrap_or((DISPARITY, Element::F32, 1));
         let (height, width) = eye.image_shape(sensor);
         let shape = if components == 1 { vec![height, width] } else { vec![height, width, components] };
-        // What both eyes tell together is called as the pair, and is where the left one is.
+        // The disparity belongs to the pair and is in the frame of the left camera.
         let stream =
             if channel == DISPARITY { format!("{uid}/{channel}") } else { format!("{}/{channel}", eye.name(uid)) };
         let kind = Kind::Picture { camera: eye.name(uid), channel: channel.into(), height, width };
@@ -245,7 +245,7 @@ impl Source {
         Self::new(stream, kind, element, vec![Part::new("", shape)], envs, what).of_sensor(uid, sensor)
     }
 
-    /// The same of a sensor, which may not be in all environments.
+    /// Connects the stream to a sensor. A camera may exist in some of the environments only.
     fn of_sensor(mut self, uid: &str, sensor: &dyn Sensor) -> Result<Self> {
         self.sensor = Some(uid.into());
         let any: &dyn Any = sensor;
@@ -258,17 +258,17 @@ impl Source {
         if self.rows.is_empty() {
             return Err(RecordError::Elsewhere { sensor: uid.into() });
         }
-        // What it has measured before is not new.
+        // Earlier measurements are not new.
         self.count(sensor);
         Ok(self)
     }
 
-    /// Whether another one records the same.
+    /// True if another source records the same stream.
     pub(crate) fn is(&self, other: &Self) -> bool {
         self.what == other.what && self.stream == other.stream
     }
 
-    /// Counts measurements; gives whether those of each row are more, or others, than before.
+    /// Updates the measurement counts; returns true for each row whose count has changed.
     fn count(&mut self, sensor: &dyn Sensor) -> Vec<bool> {
         let any: &dyn Any = sensor;
         let counts = match (timed(any), sensor.sampled()) {
@@ -280,8 +280,8 @@ impl Source {
         self.counts.iter_mut().zip(rows).map(|(count, now)| std::mem::replace(count, now) != now).collect()
     }
 
-    /// Counts measurements again after something happened to environments: what sensors show there is no measurement. In the
-    /// others, one that was not recorded yet still is.
+    /// Updates the measurement counts after a reset or a write in `envs`: their sensor values are no new measurements.
+    /// Other environments keep their counts, so that their pending measurements are still recorded.
     pub(crate) fn recount(&mut self, sim: &SimulationManager, envs: &[usize]) -> Result<()> {
         if let Some(uid) = self.sensor.clone() {
             let were = self.counts.clone();
@@ -295,7 +295,7 @@ impl Source {
         Ok(())
     }
 
-    /// Leaves out all environments but the first.
+    /// Removes all environments but the first.
     pub(crate) fn keep_first(&mut self) {
         self.stream.env_ids.truncate(1);
         self.rows.truncate(1);
@@ -303,9 +303,12 @@ impl Source {
         self.last.truncate(1);
     }
 
-    /// Copies what there is now. `times` are the simulation times of all environments; `renewed` are environments whose state
-    /// is another one, whatever their time. What is there at every step is new in the others only where it is `due`. `result` is of
-    /// the step of a task that is over now.
+    /// Copies the present values.
+    ///
+    /// - `times`: simulation times of all environments \[s\].
+    /// - `renewed`: environments whose state was changed by a reset or a write; their states are new in any case.
+    /// - `due`: states of the other environments are new only if this is true.
+    /// - `result`: the result of the task step that has just ended.
     pub(crate) fn read(
         &mut self,
         sim: &mut SimulationManager,
@@ -335,7 +338,7 @@ impl Source {
             let now = self.stream.env_ids.iter().map(|env| times[*env]);
             block.times.extend(now);
             for ((env, last), now) in self.stream.env_ids.iter().zip(&mut self.last).zip(&block.times) {
-                // One that is put aside stands still.
+                // A diverged environment does not advance, so that its rows are not new.
                 let fresh = (due && (*last != *now || self.painter.is_some())) || renewed.binary_search(env).is_ok();
                 if fresh {
                     *last = *now;
@@ -402,7 +405,7 @@ impl Source {
                     }
                 }
             }
-            // It is drawn instead.
+            // The overview image is drawn, not copied.
             What::Stage(_) => {}
             What::Picture { uid, eye, channel } => {
                 self.copy_picture(sim.entities().sensor_called(uid)?, *eye, channel, values)?
@@ -430,7 +433,7 @@ impl Source {
                 let any: &dyn Any = sim.entities().sensor_called(uid)?;
                 let caster = any.downcast_ref::<RayCaster>().ok_or_else(|| self.changed())?;
                 let hits = caster.arrived_hits();
-                // In the order of the parts, behind the hits.
+                // In the order of the fields after `hits`.
                 let others = ["distances", "normals", "ids", "pos_w", "quat_w"];
                 let others = others.map(|channel| caster.sampler().arrived(channel));
                 for &row in self.rows.iter().filter(|row| **row < hits.len_of(Axis(0))) {
@@ -444,7 +447,7 @@ impl Source {
         Ok(())
     }
 
-    /// The rows of tables beside each other.
+    /// Appends the rows of several tables, concatenated by environment.
     fn join(&self, values: &mut Values, tables: &[ArrayView2<'_, f64>]) {
         let Values::F64(values) = values else { return };
         for &row in &self.rows {
@@ -454,7 +457,7 @@ impl Source {
         }
     }
 
-    /// The rows of an array.
+    /// Appends the rows of an array.
     fn put<T: Number, S: Data<Elem = T>, D: Dimension>(&self, values: &mut Values, array: &ArrayBase<S, D>) {
         let Some(values) = T::of(values) else { return };
         let width = self.stream.width();
@@ -472,7 +475,7 @@ impl Source {
     }
 }
 
-/// A number that [`Values`] hold.
+/// A type of numbers in [`Values`].
 trait Number: Copy {
     const ELEMENT: Element;
 
@@ -493,16 +496,16 @@ macro_rules! number {
 
 number!(u8: U8, i32: I32, f32: F32, f64: F64);
 
-/// When a sensor captured what is recorded of it, for all of its rows \[s\].
+/// Capture times of the last arrived measurement, for all rows of a sensor \[s\].
 struct Stamps {
-    /// Positions and velocities.
+    /// Time stamps of positions and velocities.
     states: Vec<f64>,
-    /// Forces, efforts and accelerations.
+    /// Time stamps of forces, efforts and accelerations.
     forces: Vec<f64>,
 }
 
 impl Stamps {
-    /// Those of what arrived last, whether the sensor shows it or not.
+    /// Returns the stamps of the last arrived measurement, even if the sensor does not show it.
     fn of(sensor: &dyn Sensor) -> Self {
         let any: &dyn Any = sensor;
         if let Some(camera) = timed(any) {
@@ -514,7 +517,7 @@ impl Stamps {
     }
 }
 
-/// Numbers of a sensor, with the names of what they are of.
+/// Metadata of a sensor's values, with row names and contact filters.
 fn kind_of(sensor: &dyn Sampled) -> Kind {
     Kind::Numbers { rows: sensor.columns().to_vec(), filters: sensor.filters().to_vec() }
 }

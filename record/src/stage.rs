@@ -1,4 +1,4 @@
-//! Pictures of all environments side by side, as a viewer that stands still sees them.
+//! Overview images: all environments side by side, from a static viewpoint.
 
 use crate::error::{RecordError, Result};
 use kinetoscope_render::View;
@@ -9,17 +9,19 @@ use kinetoscope_scene::framing::Framing;
 use kinetoscope_sensors::camera::look_at_pose;
 use kinetoscope_sim::{SimulationManager, Still};
 
-/// How the stage is drawn.
+/// Settings of the overview image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageCfg {
-    /// Pixels per row, and rows.
+    /// Width and height \[pixels\].
     pub size: [usize; 2],
-    /// Pictures in a second of simulation \[Hz\]; the nearest whole number of physics steps lies between two.
+    /// Images per second of simulation time \[Hz\], rounded to a whole number of physics steps between two.
     pub rate: f64,
-    /// From where \[m\], as environments stand side by side ([`kinetoscope_sim::SimulationManagerCfg::env_origins`]); `None` for a place from which
-    /// everything but the ground fills two thirds of the image when the recording begins: there is room to move.
+    /// Viewpoint \[m\] in the world, where environments stand side by side
+    /// ([`kinetoscope_sim::SimulationManagerCfg::env_origins`]). With `None`, everything but the ground fills two
+    /// thirds of the image when the recording begins, which leaves room for motion.
     pub eye: Option<[f64; 3]>,
-    /// Point in the middle of the image \[m\]; `None` for the middle of everything but the ground when the recording begins.
+    /// Point in the center of the image \[m\]; `None` for the center of everything but the ground when the recording
+    /// begins.
     pub target: Option<[f64; 3]>,
 }
 
@@ -30,7 +32,7 @@ impl Default for StageCfg {
 }
 
 impl StageCfg {
-    /// Physics steps of `dt` seconds from one picture to the next.
+    /// Number of physics steps of `dt` \[s\] between two images.
     pub(crate) fn every(&self, dt: f64) -> u64 {
         (1.0 / (self.rate * dt)).round().max(1.0) as u64
     }
@@ -38,11 +40,11 @@ impl StageCfg {
 
 /// Vertical field of view \[rad\].
 const FOVY: f64 = std::f64::consts::FRAC_PI_4;
-/// Nearest and farthest that is seen \[m\].
+/// Near and far clipping distance \[m\].
 const CLIP: [f32; 2] = [0.05, 500.0];
-/// Share of the image that is filled at the beginning.
+/// Share of the image that the scene fills when the recording begins.
 const FILL: f64 = 0.66;
-/// Draws the stage.
+/// Draws the overview image.
 #[derive(Debug)]
 pub(crate) struct Painter {
     view: View,
@@ -51,7 +53,7 @@ pub(crate) struct Painter {
 
 impl Painter {
     /// # Errors
-    /// A number of the configuration is none that can be drawn.
+    /// The rate, the size or the viewpoint is invalid.
     pub(crate) fn new(sim: &mut SimulationManager, cfg: &StageCfg) -> Result<Self> {
         let wrong = |what: String| RecordError::Stage { what };
         if !(cfg.rate.is_finite() && cfg.rate > 0.0) {
@@ -65,7 +67,7 @@ impl Painter {
         let first = still.first_view(cfg.size);
         let forward = [0, 1, 2].map(|k| first.target[k] - first.eye[k]);
         let framing = Framing { forward, fovy: FOVY, aspect: width as f64 / height as f64, fill: FILL };
-        // Without anything to see: as a model without anything.
+        // An empty scene uses the first view of an empty model.
         let place = framing.place(&[still.placed()]).map(|place| (place.eye, place.target));
         let (first_eye, first_target) = place.unwrap_or((first.eye, first.target));
         let (way, target) = ([0, 1, 2].map(|k| first_eye[k] - first_target[k]), cfg.target.unwrap_or(first_target));
@@ -81,10 +83,10 @@ impl Painter {
         Ok(Self { view, rasterizer: ParallelRasterizer::new(raster, sim.threads()) })
     }
 
-    /// Draws it as it is now: red, green, blue and opacity, row by row from the top left.
+    /// Draws the present state and appends it to `pixels`: RGBA, row by row from the top left.
     ///
     /// # Errors
-    /// There are more triangles than can be drawn.
+    /// The scene has more triangles than the rasterizer supports.
     pub(crate) fn draw(&mut self, sim: &mut SimulationManager, pixels: &mut Vec<u8>) -> Result<()> {
         let stage = Still::overview(sim, None, &[])?;
         let (width, height) = (self.view.width, self.view.height);

@@ -1,52 +1,53 @@
-//! What a file is told of the numbers that it gets.
+//! Metadata of recorded streams: names, shapes and meaning.
 
 use kinetoscope_sensors::{Channel, Stamp};
 
-/// Numbers that are recorded together: their names, shapes and meaning.
+/// Metadata of values that are recorded together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stream {
-    /// Such as `arm/joint_states` or `camera/color`.
+    /// Name, such as `arm/joint_states` or `camera/color`.
     pub name: String,
-    /// What they mean.
+    /// Meaning of the values.
     pub kind: Kind,
-    /// The type of the numbers.
+    /// Type of the values.
     pub element: Element,
-    /// The quantities, one after the other in a row.
+    /// Fields, in their order in a row.
     pub parts: Vec<Part>,
-    /// The environments, one row each.
+    /// Recorded environments. Each has one row at a time.
     pub env_ids: Vec<usize>,
 }
 
 impl Stream {
-    /// Numbers in the row of an environment.
+    /// Number of values in the row of one environment.
     pub fn width(&self) -> usize {
         self.parts.iter().map(Part::width).sum()
     }
 
-    /// The numbers of a part in the row of an environment; nothing where there is no such part.
+    /// Values of the field `name` in the row of an environment; empty if there is no such field.
     pub(crate) fn part<'v>(&self, row: &'v [f64], name: &str) -> &'v [f64] {
         let first: usize = self.parts.iter().take_while(|part| part.name != name).map(Part::width).sum();
         let width = self.parts.iter().find(|part| part.name == name).map_or(0, Part::width);
         row.get(first..first + width).unwrap_or(&[])
     }
 
-    /// Whether its parts are of two instants: see [`Part::of_forces`].
+    /// True if some fields, but not all, are stamped with the force time ([`Part::of_forces`]).
     pub(crate) fn is_mixed(&self) -> bool {
         self.parts.iter().any(|part| part.of_forces) && !self.parts.iter().all(|part| part.of_forces)
     }
 }
 
-/// One quantity of a stream.
+/// One field of a stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// Such as `positions`; empty where the stream has one quantity only, which is called as the stream.
+    /// Name, such as `positions`. Empty for the only field of a stream, which has the name of the stream.
     pub name: String,
-    /// Its shape in one environment.
+    /// Shape in one environment.
     pub shape: Vec<usize>,
-    /// Whether a sensor measures it at [`kinetoscope_scene::SceneState::force_time`]: forces, efforts and accelerations, which the engine
-    /// solves for at the beginning of the step that leads to positions and velocities.
+    /// True if a sensor measures the field at [`kinetoscope_scene::SceneState::force_time`]: forces, efforts and
+    /// accelerations. The engine solves for them at the beginning of the step that leads to positions and velocities.
     pub of_forces: bool,
-    /// Unit that the sensor gives it ([`Channel::unit`](kinetoscope_sensors::Channel::unit)); empty where it gives none.
+    /// Unit, as the sensor reports it ([`Channel::unit`](kinetoscope_sensors::Channel::unit)); empty if it reports
+    /// none.
     pub unit: String,
 }
 
@@ -55,102 +56,104 @@ impl Part {
         Self { name: name.into(), shape: shape.into(), of_forces: false, unit: String::new() }
     }
 
-    /// A channel of a sensor.
+    /// A field for the channel of a sensor.
     pub(crate) fn of_channel(channel: &Channel) -> Self {
         let (of_forces, unit) = (channel.stamp == Stamp::Force, channel.unit.to_string());
         Self { of_forces, unit, ..Self::new(channel.name, [channel.width]) }
     }
 
-    /// How many numbers it has in one environment.
+    /// Number of values in one environment.
     pub fn width(&self) -> usize {
         self.shape.iter().product()
     }
 }
 
-/// The type of the numbers of a stream.
+/// Type of the values of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Element {
-    /// Bytes.
+    /// Unsigned 8-bit integers: color.
     U8,
-    /// Whole numbers.
+    /// Signed 32-bit integers: mask ids.
     I32,
-    /// Numbers of pictures.
+    /// Single precision: images such as depth.
     F32,
-    /// Numbers of states.
+    /// Double precision: states and sensors.
     F64,
 }
 
-/// How a lens distorts pictures, in ROS's words.
+/// Lens distortion in ROS's terms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Distortion {
-    /// `plumb_bob`, `rational_polynomial` or `equidistant`.
+    /// Model: `plumb_bob`, `rational_polynomial` or `equidistant`.
     pub model: String,
-    /// Its coefficients, in the order of the model.
+    /// Coefficients in the order of the model.
     pub coefficients: Vec<f64>,
 }
 
-/// What the numbers of a stream mean.
+/// Meaning of the values of a stream.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Kind {
-    /// Positions, velocities and efforts, of joints or wanted of them.
+    /// Joint positions, velocities and efforts, or their targets.
     Joints {
         /// Names of the joints.
         names: Vec<String>,
     },
-    /// Poses in the environment, rows `[x, y, z, qw, qx, qy, qz]` \[m\].
+    /// Poses in the frame of the environment, rows `[x, y, z, qw, qx, qy, qz]` \[m\].
     Poses {
-        /// Names of what is there.
+        /// Names of the frames.
         frames: Vec<String>,
     },
-    /// A picture, row by row from the top left.
+    /// An image, row by row from the top left.
     Picture {
-        /// The camera.
+        /// Name of the camera.
         camera: String,
-        /// What it shows.
+        /// Name of the channel.
         channel: String,
-        /// Rows.
+        /// Height \[pixels\].
         height: usize,
-        /// Pixels per row.
+        /// Width \[pixels\].
         width: usize,
     },
-    /// The intrinsic matrix of a camera \[pixels\] and its pose in the environment, Ros axes. Of an eye of a pair also what rectifies
-    /// its pictures: `rectification` and `projection`, see [`Rectification`](kinetoscope_sensors::camera::Rectification).
+    /// Intrinsic matrix of a camera \[pixels\] and its pose in the environment, with ROS camera axes. A camera of a
+    /// stereo pair also has `rectification` and `projection`; see
+    /// [`Rectification`](kinetoscope_sensors::camera::Rectification).
     Lens {
-        /// The camera.
+        /// Name of the camera.
         camera: String,
-        /// Rows of its pictures.
+        /// Height of its images \[pixels\].
         height: usize,
-        /// Pixels per row of its pictures.
+        /// Width of its images \[pixels\].
         width: usize,
-        /// What its lens does to them; `None` for a lens that ROS has no words for.
+        /// Lens distortion; `None` for a lens that no distortion model of ROS describes.
         distortion: Option<Distortion>,
     },
-    /// An inertial measurement unit; the quantities are called as its channels.
+    /// Inertial measurement unit; the fields have the names of its channels.
     Imu,
-    /// What rays hit, the quantities called as the channels of a ray caster: points in the environment \[m\] and distances
-    /// \[m\], infinite for a miss, normals and mask ids, 0 for a miss, and the pose of the body that the sensor hangs on.
+    /// Ray caster; the fields have the names of its channels. Hit points in the environment \[m\], distances \[m\],
+    /// normals, mask ids, and the pose of the parent body. A miss has infinite points and distances, and zero normals
+    /// and ids.
     Points,
-    /// Simulation time, positions and velocities of all joints as MuJoCo has them: `clock`, `qpos`, `qvel`.
+    /// Simulation time, positions and velocities of all joints in MuJoCo's order: `clock`, `qpos`, `qvel`.
     EngineState,
-    /// What came of a step of a task: `reward`, and 1 for an episode that was `terminated` or `truncated`, else 0.
+    /// Result of a step of a task: `reward`, and `terminated` and `truncated` as 1 or 0.
     Outcome,
-    /// Numbers of a sensor.
+    /// Values of any other sensor.
     Numbers {
-        /// What they are of, in order: bodies, links, joints, actuators, frames; empty where they have no names.
+        /// Names of the bodies, links, joints, actuators or frames of the rows, in order; empty without names.
         rows: Vec<String>,
-        /// What each of the bodies may touch, in the order of the second axis of matrices; of sensors of contacts.
+        /// Contact sensors: names of the contact filters, in the order of the second axis of matrices.
         filters: Vec<String>,
     },
 }
 
 impl Kind {
-    /// Numbers without names.
+    /// Values without names.
     pub(crate) fn unnamed() -> Self {
         Self::Numbers { rows: Vec::new(), filters: Vec::new() }
     }
 
-    /// What the columns of its quantities are of.
+    /// Names of the columns.
     pub(crate) fn names(&self) -> &[String] {
         match self {
             Self::Joints { names: columns } | Self::Poses { frames: columns } | Self::Numbers { rows: columns, .. } => {

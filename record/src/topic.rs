@@ -1,52 +1,58 @@
-//! What can be recorded.
+//! Recorded topics.
 
-/// Something that can be recorded, by name.
+/// A selection of what is recorded, by name.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Topic {
-    /// Everything below that the simulation has when the recording begins and the format has a place for.
+    /// All topics below that exist when the recording begins and that the format supports.
     Everything,
-    /// Positions, velocities and efforts of the joints of the robot or articulation of this name.
+    /// Joint positions, velocities and efforts of the robot or articulation of this name.
     JointStates(String),
-    /// Targets of positions, velocities and efforts of its joints: the actions.
+    /// Joint position, velocity and effort targets of the robot or articulation of this name: the actions.
     Targets(String),
-    /// Poses of its links.
+    /// Link poses of the robot or articulation of this name.
     LinkPoses(String),
-    /// The pose of the rigid object of this name.
+    /// Pose of the rigid object of this name.
     ObjectPose(String),
     /// Positions, velocities and controls of the MJCF part of this name.
     MjcfState(String),
-    /// Poses of the bodies of the MJCF part of this name.
+    /// Body poses of the MJCF part of this name.
     BodyPoses(String),
-    /// Simulation time, positions and velocities of all joints of the scene as MuJoCo has them
-    /// ([`kinetoscope_sim::Entities::engine_states`](kinetoscope_sim::Entities::engine_states)), called `clock`, `qpos` and `qvel`.
-    /// [`Everything`](Self::Everything) has them in HDF5 files only.
+    /// Simulation time, positions and velocities of all joints of the scene in MuJoCo's order, named `clock`, `qpos`
+    /// and `qvel` ([`kinetoscope_sim::Entities::engine_states`](kinetoscope_sim::Entities::engine_states)).
+    ///
+    /// [`Everything`](Self::Everything) includes them in HDF5 files only.
     EngineStates,
-    /// Rewards and ends of the task that runs in the simulation, which it publishes after each of its steps
-    /// ([`StepResult`](kinetoscope_sim::StepResult)), as an `Env` does by itself.
+    /// Rewards and episode ends of the task in the simulation. A task such as an `Env` publishes them after each of its
+    /// steps ([`StepResult`](kinetoscope_sim::StepResult)).
     Outcomes,
-    /// All environments in one picture, as `RecorderCfg::stage` says; it is called as a camera `stage` of the first environment that is
-    /// recorded. [`Everything`](Self::Everything) has it only where the file shows pictures and there is no camera.
+    /// Overview image of all environments, drawn as `RecorderCfg::stage` says. Its name is that of a camera `stage` in
+    /// the first recorded environment.
+    ///
+    /// [`Everything`](Self::Everything) includes it only in formats of images, and only if there is no camera.
     Stage,
-    /// All channels of the sensor of this name, whenever a measurement arrives: with a latency as it was captured, with that
-    /// stamp, also what was on its way when somebody wrote to the state, which the sensor itself does not show any more. Of cameras
-    /// and ray casters that draw pictures also the lens and the pose.
+    /// All channels of the sensor of this name, at each arrival of a measurement. Cameras and ray-caster cameras also
+    /// record their intrinsics and pose.
+    ///
+    /// A measurement with a latency has the values and the time stamp of its capture. Measurements that were pending
+    /// during a write to the state are recorded, although the sensor itself drops them.
     Sensor(String),
-    /// One channel of a camera, such as `depth`, without lens and pose.
+    /// One channel of a camera, such as `depth`, without intrinsics and pose.
     Channel {
-        /// The camera.
+        /// Name of the camera.
         sensor: String,
-        /// The channel; aliases such as `rgb` are known. Of a pair of eyes `left/depth`, `right/depth` or `disparity`.
+        /// Name of the channel or an alias such as `rgb`. For a stereo camera `left/depth`, `right/depth` or
+        /// `disparity`.
         channel: String,
     },
-    /// What happens to environments: resets, writes to their states, divergence, and what somebody has to say
-    /// ([`Record::note`](crate::Record::note)). MCAP files and NumPy archives have them whatever else is recorded; this is for
-    /// recordings of nothing else.
+    /// Events of environments: resets, writes to the state, divergence, and notes
+    /// ([`Record::note`](crate::Record::note)). MCAP files and NumPy archives always contain events. Use this topic to
+    /// record nothing else.
     Events,
 }
 
 impl Topic {
-    /// Everything about the joints of a robot: [`JointStates`](Self::JointStates), [`Targets`](Self::Targets) and
+    /// Topics of a robot: [`JointStates`](Self::JointStates), [`Targets`](Self::Targets) and
     /// [`LinkPoses`](Self::LinkPoses).
     pub fn robot(uid: &str) -> [Self; 3] {
         [Self::JointStates(uid.into()), Self::Targets(uid.into()), Self::LinkPoses(uid.into())]

@@ -1,4 +1,4 @@
-//! The thread that writes: packets in, a file out.
+//! The writer thread and the interface of file formats.
 
 use crate::error::RecordError;
 use crate::packet::Packet;
@@ -10,22 +10,22 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-/// What is written may be read by others after this long at the latest.
+/// Longest time until written data is flushed to the file.
 const FLUSH_EVERY: Duration = Duration::from_millis(500);
 
-/// What comes of writing.
+/// Result of a writer.
 pub(crate) type Written<T = ()> = std::result::Result<T, Fault>;
 
-/// Why something was not written.
+/// Error of a writer.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Fault {
-    /// The disk says no.
+    /// The file cannot be written.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// The format has no place for so much; what would be right.
+    /// A limit of the format is exceeded; the text says what to change.
     #[error("{0}")]
     Limit(String),
-    /// Of animations and datasets, where every frame needs something that never came; what.
+    /// An animation or a dataset has no frame; the text says what every frame needs.
     #[error("there is no frame: {0}")]
     NoFrame(&'static str),
 }
@@ -35,7 +35,7 @@ impl Fault {
         Self::Limit(what.into())
     }
 
-    /// The error of the recording of a file.
+    /// Converts to the error of a recording, with the path of the file.
     pub(crate) fn of_file(self, path: &Path) -> RecordError {
         let path = path.into();
         match self {
@@ -46,31 +46,33 @@ impl Fault {
     }
 }
 
-/// A file of some format on its way.
+/// Writer of a file format.
 pub(crate) trait Sink: Send {
-    /// Writes what is in a packet.
+    /// Writes the content of a packet.
     fn write(&mut self, streams: &[Stream], packet: &Packet) -> Written;
 
-    /// Brings what was written to where a killed process leaves it.
+    /// Writes buffered data to the file, so that it survives a kill of the process.
     fn flush(&mut self) -> Written;
 
-    /// Makes the file whole and gives it its name; returns its size \[bytes\].
+    /// Completes the file and gives it its name; returns its size \[bytes\].
     fn finish(&mut self, streams: &[Stream]) -> Written<u64>;
 
-    /// After an error: where what was written can be read. What nobody can read is taken away with the sink.
+    /// Path of the partial file after an error, if it can be read. Otherwise it is deleted when the writer is dropped.
     fn kept(&self) -> Option<PathBuf>;
 }
 
-/// Why a file was not finished, and where what can be read of it is.
+/// Error of a writer, and the partial file that remains.
 #[derive(Debug)]
 pub(crate) struct Failure {
-    /// `None` where the recorder broke it off.
+    /// `None` if the recorder aborted the recording.
     pub(crate) error: Option<Fault>,
     pub(crate) kept: Option<PathBuf>,
 }
 
-/// Writes packets until nobody sends any more, then finishes the file. After an error, packets go back unwritten, and
-/// `failed` and `why` are set; if it was set by the recorder, the file is not finished.
+/// Writes packets until the channel closes, then completes the file.
+///
+/// After an error, packets are returned unwritten, and `failed` and `why` are set. If the recorder sets `failed`, the
+/// file is not completed.
 pub(crate) fn run(
     mut sink: Box<dyn Sink>,
     streams: &[Stream],
@@ -98,7 +100,7 @@ pub(crate) fn run(
                     dirty = true;
                 }
                 packet.clear();
-                // The recorder is gone when it does not take it back.
+                // Fails only after the recorder is gone.
                 let _ = free.send(packet);
             }
             Err(RecvTimeoutError::Timeout) => {}
@@ -114,9 +116,9 @@ pub(crate) fn run(
             failed.store(true, Ordering::Relaxed);
         }
     }
-    // The recorder too may have found that the file cannot become what was asked for.
+    // The recorder sets `failed` to abort the recording.
     if result.is_ok() && failed.load(Ordering::Relaxed) {
-        // What is there can be read as far as it goes.
+        // A partial file is readable up to its end.
         result = sink.flush();
         if result.is_ok() {
             return Err(Failure { error: None, kept: sink.kept() });

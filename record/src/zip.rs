@@ -1,6 +1,6 @@
-//! Archives of files that are stored as they are: the ZIP format with its 64-bit extension, as NumPy writes and reads it.
+//! ZIP archives with the 64-bit extension, as NumPy writes and reads them: stored and deflated files.
 //!
-//! Numbers and layout are those of PKWARE's APPNOTE.TXT, sections 4.3 and 4.5.3.
+//! Numbers and layout follow PKWARE's APPNOTE.TXT, sections 4.3 and 4.5.3.
 
 use flate2::Compression;
 use flate2::read::DeflateDecoder;
@@ -12,20 +12,20 @@ const CENTRAL: u32 = 0x0201_4b50;
 const END_64: u32 = 0x0606_4b50;
 const LOCATOR_64: u32 = 0x0706_4b50;
 const END: u32 = 0x0605_4b50;
-/// The version that knows 64-bit sizes.
+/// Version of the format with 64-bit sizes.
 const VERSION: u16 = 45;
-/// The first of January 1980, the earliest date there is: the same bytes at every run.
+/// January 1, 1980, the earliest date. A constant date gives the same bytes in every run.
 const DATE: u16 = 0x21;
-/// The size stands in the 64-bit extension.
+/// Marks a size that is in the 64-bit extension.
 const SEE_64: u32 = u32::MAX;
 const EXTENSION_64: u16 = 1;
-/// How files are in the archive.
+/// Compression methods.
 const STORED: u16 = 0;
 const DEFLATED: u16 = 8;
-/// The files of a scene are together no larger, unpacked \[bytes\].
+/// Upper limit of the uncompressed size of all files of a scene \[bytes\].
 const LARGEST: u64 = 1 << 31;
 
-/// Writes an archive.
+/// Writer of an archive.
 #[derive(Debug)]
 pub(crate) struct Archive<W> {
     to: W,
@@ -37,9 +37,9 @@ pub(crate) struct Archive<W> {
 struct Entry {
     name: String,
     offset: u64,
-    /// In the archive.
+    /// Size in the archive \[bytes\].
     size: u64,
-    /// Of a file that is packed, what it was before.
+    /// Uncompressed size of a deflated file \[bytes\].
     unpacked: Option<u64>,
     crc: u32,
 }
@@ -55,13 +55,13 @@ impl<W: Write + Seek> Archive<W> {
         Self { to, entries: Vec::new(), at: 0 }
     }
 
-    /// Adds a file: `head`, then everything that `data` gives.
+    /// Adds a stored file: `head`, followed by `data`.
     pub(crate) fn add(&mut self, name: &str, head: &[u8], data: &mut dyn Read) -> io::Result<()> {
         let offset = self.at;
         let mut header = Vec::new();
         let fields = [(u64::from(LOCAL), 4), (u64::from(VERSION), 2), (0, 2), (0, 2), (0, 2), (u64::from(DATE), 2)];
         put(&mut header, &fields);
-        // Checksum and sizes come when they are known.
+        // Checksum and sizes are written when they are known.
         let known_later = header.len() as u64;
         put(&mut header, &[(0, 4), (SEE_64.into(), 4), (SEE_64.into(), 4), (name.len() as u64, 2), (20, 2)]);
         header.extend_from_slice(name.as_bytes());
@@ -93,7 +93,7 @@ impl<W: Write + Seek> Archive<W> {
         Ok(())
     }
 
-    /// Adds a file, packed.
+    /// Adds a deflated file.
     pub(crate) fn add_packed(&mut self, name: &str, data: &[u8]) -> io::Result<()> {
         let mut packed = DeflateEncoder::new(Vec::new(), Compression::default());
         packed.write_all(data)?;
@@ -102,14 +102,14 @@ impl<W: Write + Seek> Archive<W> {
         let mut crc = crc32fast::Hasher::new();
         crc.update(data);
         if let Some(entry) = self.entries.last_mut() {
-            // What was written as it is becomes what it was before it was packed.
+            // Replaces checksum and size of the stored bytes by those of the uncompressed data.
             (entry.crc, entry.unpacked) = (crc.finalize(), Some(data.len() as u64));
             let Entry { offset, crc, size, .. } = *entry;
             self.to.seek(SeekFrom::Start(offset + 8))?;
             self.to.write_all(&DEFLATED.to_le_bytes())?;
             self.to.seek(SeekFrom::Start(offset + 14))?;
             self.to.write_all(&crc.to_le_bytes())?;
-            // The 64-bit extension stands behind the name: the size unpacked, then packed.
+            // The 64-bit extension follows the name: uncompressed size, compressed size.
             self.to.seek(SeekFrom::Start(offset + 30 + name.len() as u64 + 4))?;
             self.to.write_all(&(data.len() as u64).to_le_bytes())?;
             self.to.write_all(&size.to_le_bytes())?;
@@ -118,7 +118,7 @@ impl<W: Write + Seek> Archive<W> {
         Ok(())
     }
 
-    /// Writes the directory; gives back what was written to.
+    /// Writes the central directory; returns the underlying writer.
     pub(crate) fn finish(mut self) -> io::Result<W> {
         let start = self.at;
         let mut out = Vec::new();
@@ -131,7 +131,7 @@ impl<W: Write + Seek> Archive<W> {
                 &mut out,
                 &[((*crc).into(), 4), (SEE_64.into(), 4), (SEE_64.into(), 4), (name.len() as u64, 2), (28, 2)],
             );
-            // No comment, on this disk, no attributes.
+            // No comment, disk 0, no attributes.
             put(&mut out, &[(0, 2), (0, 2), (0, 2), (0, 4), (SEE_64.into(), 4)]);
             out.extend_from_slice(name.as_bytes());
             let before = unpacked.unwrap_or(*size);
@@ -149,25 +149,25 @@ impl<W: Write + Seek> Archive<W> {
     }
 }
 
-/// What an archive is read from.
+/// Underlying reader of an archive.
 pub(crate) trait Source: Read + Seek + Send {}
 
 impl<S: Read + Seek + Send> Source for S {}
 
-/// A file in an archive, as the directory says.
+/// Directory entry of a file.
 #[derive(Clone, Debug)]
 struct Found {
     name: String,
     method: u16,
-    /// Where it begins: what stands before its bytes.
+    /// Offset of the local header.
     offset: u64,
-    /// In the archive.
+    /// Size in the archive \[bytes\].
     size: u64,
     unpacked: u64,
     crc: u64,
 }
 
-/// Reads an archive that [`Archive`] has written: first its directory, then the files that are asked for, and nothing else.
+/// Reader of an archive that [`Archive`] has written. It reads the directory first, then only the requested files.
 pub(crate) struct Reader<'s> {
     from: Box<dyn Source + 's>,
     files: Vec<Found>,
@@ -179,14 +179,14 @@ impl std::fmt::Debug for Reader<'_> {
     }
 }
 
-/// The archive is none, or is damaged.
+/// Error of a file that is no archive, or is damaged.
 fn damaged(what: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, what.to_string())
 }
 
-/// What stands at the end of an archive: the directory's place, then the end as it was before 64 bits.
+/// Length of the end of an archive \[bytes\]: the locator of the 64-bit end record, then the 32-bit end record.
 const TAIL: u64 = 20 + 22;
-/// What stands before the name of a file.
+/// Length of a local header without the name \[bytes\].
 const HEAD: usize = 30;
 
 fn number(bytes: &[u8], at: usize, count: usize) -> Option<u64> {
@@ -199,7 +199,7 @@ impl<'s> Reader<'s> {
     /// Reads the directory.
     ///
     /// # Errors
-    /// It cannot be read; `InvalidData` where this is no such archive, or not whole.
+    /// It cannot be read; `InvalidData` if this is no such archive, or is incomplete.
     pub(crate) fn open(from: impl Source + 's) -> io::Result<Self> {
         let mut reader = Self { from: Box::new(from), files: Vec::new() };
         let length = reader.from.seek(SeekFrom::End(0))?;
@@ -215,7 +215,7 @@ impl<'s> Reader<'s> {
         Ok(reader)
     }
 
-    /// So many bytes from a place on.
+    /// Reads `count` bytes at offset `at`, within the file of size `length`.
     fn bytes(&mut self, at: u64, count: u64, length: u64) -> io::Result<Vec<u8>> {
         if at.checked_add(count).is_none_or(|end| end > length) {
             return Err(damaged("its directory leads out of it"));
@@ -226,7 +226,7 @@ impl<'s> Reader<'s> {
         Ok(bytes)
     }
 
-    /// The names of all files, in their order.
+    /// Names of all files, in their order.
     pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
         self.files.iter().map(|file| file.name.as_str())
     }
@@ -235,7 +235,7 @@ impl<'s> Reader<'s> {
         self.files.iter().find(|file| file.name == name).cloned()
     }
 
-    /// Where the bytes of a file begin.
+    /// Offset of the content of a file.
     fn begin(&mut self, file: &Found) -> io::Result<u64> {
         self.from.seek(SeekFrom::Start(file.offset))?;
         let mut head = [0; HEAD];
@@ -244,7 +244,7 @@ impl<'s> Reader<'s> {
         Ok(file.offset + HEAD as u64 + name + extension)
     }
 
-    /// The first bytes of a file that is stored as it is, no more than `count`, unchecked; `None` where there is none, or a packed one.
+    /// The first `count` bytes of a stored file, without a check; `None` if there is no such file, or it is deflated.
     pub(crate) fn first(&mut self, name: &str, count: u64) -> io::Result<Option<Vec<u8>>> {
         let Some(file) = self.find(name).filter(|file| file.method == STORED) else { return Ok(None) };
         let begin = self.begin(&file)?;
@@ -254,10 +254,10 @@ impl<'s> Reader<'s> {
         Ok(Some(bytes))
     }
 
-    /// A file, unpacked and compared with its checksum; `None` where there is none.
+    /// Reads a file, decompresses it and verifies its checksum; `None` if there is no such file.
     ///
     /// # Errors
-    /// It cannot be read; `InvalidData` where it is damaged.
+    /// It cannot be read; `InvalidData` if it is damaged.
     pub(crate) fn read(&mut self, name: &str) -> io::Result<Option<Vec<u8>>> {
         let Some(file) = self.find(name) else { return Ok(None) };
         self.read_file(&file).map(Some)
@@ -270,7 +270,7 @@ impl<'s> Reader<'s> {
         let mut data = Vec::new();
         match file.method {
             STORED => packed.take(file.unpacked).read_to_end(&mut data)?,
-            // One more than there should be tells what lies about its size.
+            // One byte more than declared reveals a wrong size.
             DEFLATED => DeflateDecoder::new(packed).take(file.unpacked.saturating_add(1)).read_to_end(&mut data)?,
             _ => return Err(damaged("it is packed otherwise than recorders do")),
         };
@@ -279,7 +279,7 @@ impl<'s> Reader<'s> {
     }
 }
 
-/// All files of an archive, unpacked; `None` where it is none, or is damaged, or they are too large together.
+/// Reads all files of an archive; `None` if it is no archive, is damaged, or is too large.
 pub(crate) fn unpack(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
     let mut reader = Reader::open(io::Cursor::new(bytes)).ok()?;
     let files = reader.files.clone();
@@ -296,7 +296,7 @@ fn crc_of(data: &[u8]) -> u64 {
     crc.finalize().into()
 }
 
-/// The files of a directory, of an archive of so many bytes.
+/// Parses the directory of an archive of `length` bytes.
 fn entries(directory: &[u8], count: u64, length: u64) -> Option<Vec<Found>> {
     let (mut files, mut sum, mut at) = (Vec::new(), 0_u64, 0_usize);
     for _ in 0..count {
@@ -307,10 +307,10 @@ fn entries(directory: &[u8], count: u64, length: u64) -> Option<Vec<Found>> {
         let [unpacked, size, offset] = [0, 8, 16].map(|k| number(directory, extension + k, 8));
         let (unpacked, size, offset) = (unpacked?, size?, offset?);
         let inside = offset.checked_add(HEAD as u64 + size).is_some_and(|end| end <= length);
-        // Each has its own bytes of the archive: several that share some would be read again and again.
+        // The sum of sizes is limited by that of the archive, so that entries cannot share bytes to be read many times.
         sum = sum.checked_add(size).filter(|sum| inside && *sum <= length)?;
         let method = u16::try_from(number(directory, at + 10, 2)?).ok()?;
-        // What is stored as it is has one size: no more memory is asked for than there are bytes.
+        // The sizes of a stored file are equal, so that no more memory is allocated than there are bytes.
         if method == STORED && unpacked != size {
             return None;
         }
@@ -321,7 +321,7 @@ fn entries(directory: &[u8], count: u64, length: u64) -> Option<Vec<Found>> {
     Some(files)
 }
 
-/// The files of an archive that are stored as they are; `None` where it is none or is damaged.
+/// Reads the stored files of an archive; `None` if it is no archive or is damaged.
 #[cfg(test)]
 pub(crate) fn parse(bytes: &[u8]) -> Option<Vec<(String, Vec<u8>)>> {
     let mut reader = Reader::open(io::Cursor::new(bytes)).ok()?;

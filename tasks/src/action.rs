@@ -1,4 +1,4 @@
-//! What agents do to environments.
+//! Action terms.
 
 use crate::error::TermResult;
 use crate::space::Space;
@@ -8,7 +8,7 @@ use std::fmt;
 
 type Apply = Box<dyn Fn(&mut SimulationManager, ArrayView2<'_, f64>) -> TermResult + Send>;
 
-/// Columns of the actions, and what they do.
+/// A group of action columns and the function that applies them to the simulation.
 pub struct ActionTerm {
     pub(crate) name: String,
     pub(crate) space: Space,
@@ -17,9 +17,10 @@ pub struct ActionTerm {
 }
 
 impl ActionTerm {
-    /// A term with the columns of `space`. `apply` gets rows for all environments, within the bounds, shape
-    /// (N, columns of the term), and tells the simulation of them: targets, efforts, wrenches. It is called once in a step, before
-    /// its first physics step.
+    /// Creates a term with the columns of `space`.
+    ///
+    /// `apply` gets the clamped actions of all environments, shape (N, columns of the term), and writes them to the
+    /// simulation as targets, efforts or wrenches. It is called once per step, before the first physics step.
     pub fn new(
         name: impl Into<String>,
         space: Space,
@@ -28,7 +29,7 @@ impl ActionTerm {
         Self { name: name.into(), space, every_physics_step: false, apply: Box::new(apply) }
     }
 
-    /// `apply` is called before every physics step: for a control law that looks at the state.
+    /// Calls `apply` before every physics step, for a control law that reads the state.
     #[must_use]
     pub fn every_physics_step(self) -> Self {
         Self { every_physics_step: true, ..self }

@@ -1,4 +1,4 @@
-//! Tasks put together from terms.
+//! Builder of tasks from terms.
 
 use crate::action::ActionTerm;
 use crate::cfg::EnvCfg;
@@ -12,7 +12,7 @@ use crate::space::Space;
 use crate::termination::TerminationTerm;
 use kinetoscope_sim::SimulationManager;
 
-/// A task in the making. Terms act in the order in which they are added.
+/// Builds an [`Env`] from terms. Terms act in the order in which they are added.
 #[derive(Debug)]
 pub struct EnvBuilder {
     sim: SimulationManager,
@@ -32,62 +32,64 @@ pub(crate) struct Terms {
 }
 
 impl EnvBuilder {
-    /// A task in the environments of `sim`, with its robots, objects and sensors.
+    /// Starts a task in the environments of `sim`, with its robots, objects and sensors.
     pub fn new(sim: SimulationManager, cfg: EnvCfg) -> Self {
         Self { sim, cfg, terms: Terms::default() }
     }
 
-    /// The simulation so far: for what needs it between the terms.
+    /// The simulation, for terms that need it when they are created.
     pub fn sim(&self) -> &SimulationManager {
         &self.sim
     }
 
-    /// Adds columns to the actions.
+    /// Adds an action term: columns of the actions.
     #[must_use]
     pub fn action(mut self, term: ActionTerm) -> Self {
         self.terms.actions.push(term);
         self
     }
 
-    /// Adds something that is wanted of environments.
+    /// Adds a command term: goals of an episode.
     #[must_use]
     pub fn command(mut self, term: CommandTerm) -> Self {
         self.terms.commands.push(term);
         self
     }
 
-    /// Adds something that happens.
+    /// Adds an event term.
     #[must_use]
     pub fn event(mut self, term: EventTerm) -> Self {
         self.terms.events.push(term);
         self
     }
 
-    /// Adds columns to the observations.
+    /// Adds an observation term: columns of the observations.
     #[must_use]
     pub fn observation(mut self, term: ObservationTerm) -> Self {
         self.terms.observations.push(term);
         self
     }
 
-    /// Adds a part of the reward.
+    /// Adds a reward term.
     #[must_use]
     pub fn reward(mut self, term: RewardTerm) -> Self {
         self.terms.rewards.push(term);
         self
     }
 
-    /// Adds a reason to end.
+    /// Adds a termination term.
     #[must_use]
     pub fn termination(mut self, term: TerminationTerm) -> Self {
         self.terms.terminations.push(term);
         self
     }
 
-    /// Checks everything that can be checked now, and lets the events of [`When::Startup`](crate::When::Startup) happen.
+    /// Checks the terms, builds the environments, and runs the [`When::Startup`](crate::When::Startup) events.
     ///
     /// # Errors
-    /// No action or observation, two terms of one name, numbers that are out of range, an event that fails.
+    /// - There is no action or observation column.
+    /// - Two terms of one kind have the same name, or a name is empty or contains a slash.
+    /// - A number is out of range, or an event fails.
     pub fn build(self) -> Result<Env> {
         let Self { sim, cfg, terms } = self;
         cfg.check()?;
@@ -125,7 +127,7 @@ impl Terms {
 fn distinct<'n>(kind: TermKind, names: impl Iterator<Item = &'n String>) -> Result<()> {
     let mut seen: Vec<&String> = Vec::new();
     for name in names {
-        // Names are parts of the keys of random numbers and of the names of columns, with a slash between.
+        // Names are parts of random number keys and of column names, with a slash as the separator.
         if name.is_empty() || name.contains('/') {
             return Err(EnvError::TermName { kind, name: name.clone() });
         }

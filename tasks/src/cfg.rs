@@ -2,7 +2,7 @@
 
 use crate::error::{EnvError, Result};
 
-/// How a task is stepped.
+/// Configuration of a task: lengths of steps and episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EnvCfg {
     /// Physics steps in one step of the task.
@@ -12,7 +12,7 @@ pub struct EnvCfg {
 }
 
 impl Default for EnvCfg {
-    /// One physics step in a step, and no limit.
+    /// One physics step in a step of the task, and episodes without a limit.
     fn default() -> Self {
         Self { decimation: 1, episode_steps: None }
     }

@@ -1,4 +1,4 @@
-//! Whether a batch of environments keeps what [`VectorEnv`] promises.
+//! A conformance test of [`VectorEnv`] implementations.
 
 use crate::space::Space;
 use crate::step::Step;
@@ -7,94 +7,95 @@ use kinetoscope_scene::Random;
 use ndarray::{Array1, Array2};
 use std::fmt;
 
-/// Steps of a run: ends of episodes are looked at as far as they come within these.
+/// Number of steps of a run. Only episode ends within them are checked.
 const STEPS: usize = 100;
 
-/// Something that [`VectorEnv`] promises and an implementation does not keep.
+/// A violation of the [`VectorEnv`] contract.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Finding {
-    /// There is no environment.
+    /// The batch has no environment.
     NoEnvironments,
-    /// Something that has to work was refused.
+    /// A valid call returned an error.
     Refused {
-        /// What.
+        /// The call.
         what: String,
-        /// What was said.
+        /// The error message.
         error: String,
     },
-    /// Something that has to be refused was not.
+    /// An invalid call returned no error.
     Accepted {
-        /// What.
+        /// The invalid argument.
         what: &'static str,
     },
-    /// What is given has another shape.
+    /// An array has the wrong shape.
     Shape {
-        /// What, and when.
+        /// The array, and the step.
         what: String,
         /// Its shape.
         found: Vec<usize>,
-        /// What it should be.
+        /// The expected shape.
         expected: Vec<usize>,
     },
-    /// What is seen is not in the space of observations, or not finite.
+    /// An observation is not finite, or outside the observation space.
     Outside {
-        /// When.
+        /// The array, and the step.
         when: String,
-        /// Where.
+        /// The environment.
         env: usize,
         /// The column.
         column: String,
-        /// What is seen.
+        /// The value.
         value: f64,
         /// The bounds of the column.
         bounds: [f64; 2],
     },
     /// A reward is not finite.
     Reward {
-        /// When.
+        /// The step.
         when: String,
-        /// Where.
+        /// The environment.
         env: usize,
         /// The reward.
         value: f64,
     },
-    /// The last observation of an episode that goes on is another one than what is seen.
+    /// The final observation of an episode that goes on differs from the observation.
     FinalObservation {
-        /// When.
+        /// The step.
         when: String,
-        /// Where.
+        /// The environment.
         env: usize,
     },
-    /// An episode that ended is not followed by another one: it ends again in every step, and looks as it did.
+    /// An episode that ended was not followed by another one: it ends again in every step, with an unchanged
+    /// observation.
     NoAutoReset {
-        /// When it ended first.
+        /// The step of the third consecutive end.
         when: String,
-        /// Where.
+        /// The environment.
         env: usize,
     },
-    /// The same seed and actions gave other numbers.
+    /// Two runs with the same seed and actions differ.
     Seed(Apart),
     /// A reset of some environments changed others.
     Mask(Apart),
-    /// Actions of one environment changed what others see.
+    /// The actions of one environment changed the results of others.
     Neighbours(Apart),
-    /// Actions beyond their bounds are not taken as the bounds.
+    /// Actions beyond their bounds give other results than actions at the bounds.
     Bounds(Apart),
 }
 
-/// Where two runs that should be the same are not.
+/// The first difference between two runs that should be equal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Apart {
-    /// When.
+    /// The step.
     pub when: String,
-    /// Where.
+    /// The environment.
     pub env: usize,
-    /// What was compared: a column of the observations, `reward`, `terminated` or `truncated` (1 or 0).
+    /// The compared quantity: a column of the observations, `reward`, `terminated` or `truncated` (1 or 0).
     pub what: String,
-    /// In one run.
+    /// Value in one run.
     pub first: f64,
-    /// In the other.
+    /// Value in the other run.
     pub second: f64,
 }
 
@@ -139,13 +140,21 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Holds a batch of environments against what [`VectorEnv`] promises, as Gymnasium's `check_env` does, and gives everything that
-/// it does not keep; of each kind the first. Nothing found is an empty list.
+/// Tests a batch of environments against the [`VectorEnv`] contract, as Gymnasium's `check_env` does. Returns the first
+/// violation of each kind; the list is empty if the contract holds.
 ///
-/// It runs several times 100 steps with random actions of this seed, each time from a reset with it: shapes, spaces that contain
-/// what is seen, finite rewards, the last observations, episodes that begin by themselves, the same bits for the same seed, resets
-/// by mask that touch nothing else, environments that do not know of each other, actions beyond their bounds, and errors for masks
-/// and actions of another shape and for actions that are no numbers. Reset the environments before they are used again.
+/// Each of several runs resets the batch with `seed` and does 100 steps with random actions of that seed. The test
+/// covers:
+///
+/// - shapes, observations within their space, finite rewards;
+/// - final observations, and the automatic reset in the step in which an episode ends;
+/// - the same bits for the same seed;
+/// - resets by mask that leave other environments unchanged;
+/// - environments that do not influence each other;
+/// - actions beyond their bounds, which must act as the bounds;
+/// - errors for masks and actions of another shape, and for actions that are NaN.
+///
+/// Reset the environments before they are used again.
 ///
 /// ```
 /// # use kinetoscope_tasks::{Space, Step, VectorEnv};
@@ -173,7 +182,7 @@ pub fn check<E: VectorEnv + ?Sized>(env: &mut E, seed: u64) -> Vec<Finding> {
         }
     };
     compare(env, &plain, &|_| true, &mut found, Finding::Seed);
-    // Where numbers are others in every run, the rest would say no more than that.
+    // Without reproducible runs, every comparison below would fail for the same reason.
     if !found.iter().any(|finding| matches!(finding, Finding::Seed(_))) {
         if n > 1 {
             let is_even = |env: usize| env.is_multiple_of(2);
@@ -194,18 +203,18 @@ pub fn check<E: VectorEnv + ?Sized>(env: &mut E, seed: u64) -> Vec<Finding> {
     found
 }
 
-/// A finding of two runs.
+/// Constructor of a finding from a difference between two runs.
 type Kind = fn(Apart) -> Finding;
 
-/// What happens in a run.
+/// Variations of a run.
 #[derive(Clone, Copy, Debug, Default)]
 struct Plan {
     seed: u64,
-    /// Odd environments are reset in the middle.
+    /// Odd environments are reset in the middle of the run.
     reset_odd: bool,
-    /// Odd environments act otherwise.
+    /// Odd environments get other actions.
     odd_act_otherwise: bool,
-    /// Actions are bounds where these are finite, or so far beyond them.
+    /// Bounded actions are at their bounds, or beyond them by this distance.
     at_bounds: Option<f64>,
 }
 
@@ -232,20 +241,21 @@ impl Plan {
     }
 }
 
-/// What came of a run: after the reset, and after each step.
+/// Results of a run: observations after the reset, and results of each step.
 struct Run {
     begin: Array2<f64>,
     steps: Vec<Seen>,
 }
 
-/// What a step gave.
+/// Results of a step that are compared.
 struct Seen {
     observations: Array2<f64>,
     rewards: Array1<f64>,
     ends: [Array1<bool>; 2],
 }
 
-/// Runs a plan; says what is wrong with it alone. `None` where it could not be run to the end, or where nothing has the right shape.
+/// Runs a plan, and adds violations within this run to `found`. Returns `None` if a call fails or an array has the
+/// wrong shape.
 fn run<E: VectorEnv + ?Sized>(env: &mut E, plan: &Plan, found: &mut Vec<Finding>) -> Option<Run> {
     let n = env.num_envs();
     let (seen, acted) = (env.observation_space().clone(), env.action_space().clone());
@@ -264,7 +274,7 @@ fn run<E: VectorEnv + ?Sized>(env: &mut E, plan: &Plan, found: &mut Vec<Finding>
             if !has_shape("what reset by mask gives", given.shape(), &[n, seen.len()], found) {
                 return None;
             }
-            // What it gives of the others is what they saw before.
+            // The rows of environments that were not reset repeat their last observations.
             if let Some(last) = run.steps.last_mut() {
                 last.observations = given;
             }
@@ -305,20 +315,20 @@ fn run<E: VectorEnv + ?Sized>(env: &mut E, plan: &Plan, found: &mut Vec<Finding>
     Some(run)
 }
 
-/// Whether an environment begins anew where its episodes end.
+/// Detects an environment that does not begin a new episode after an end.
 #[derive(Clone, Copy, Debug, Default)]
 struct Watch {
-    /// Steps of the longest episode.
+    /// Number of steps of the longest episode.
     longest: usize,
-    /// Steps of this one.
+    /// Number of steps of the present episode.
     steps: usize,
-    /// Ends in a row after which nothing looked otherwise than before.
+    /// Consecutive ends with an unchanged observation.
     stuck: usize,
 }
 
 impl Watch {
-    /// After a step; `same`: what is seen is what was seen last. Three ends one after the other, where episodes were longer before,
-    /// are no episodes.
+    /// Counts a step, and returns true if automatic resets are missing. `same` is true if the observation equals the
+    /// final one. Three ends in consecutive steps are no episodes if an earlier episode was longer than one step.
     fn has_stopped(&mut self, ended: bool, same: bool) -> bool {
         self.steps += 1;
         self.stuck = match ended && same && (self.stuck == 0 || self.steps == 1) {
@@ -333,7 +343,7 @@ impl Watch {
     }
 }
 
-/// What has to be an error.
+/// Checks that invalid arguments give errors.
 fn refusals<E: VectorEnv + ?Sized>(env: &mut E, seed: u64, found: &mut Vec<Finding>) {
     let n = env.num_envs();
     let width = env.action_space().len();
@@ -348,7 +358,7 @@ fn refusals<E: VectorEnv + ?Sized>(env: &mut E, seed: u64, found: &mut Vec<Findi
         ("a table of actions with a row too many", (n + 1, width)),
         ("a table of actions with a column too many", (n, width + 1)),
     ] {
-        // After an error there need not be an episode any more.
+        // After an error the environments may be without an episode.
         if env.reset(None, Some(seed)).is_err() {
             return;
         }
@@ -362,7 +372,7 @@ fn refusals<E: VectorEnv + ?Sized>(env: &mut E, seed: u64, found: &mut Vec<Findi
     }
 }
 
-/// The first number of environments `of` that is another one in two runs.
+/// Returns the first difference between two runs in the environments that `of` selects.
 fn apart(first: &Run, second: &Run, names: &[String], of: &dyn Fn(usize) -> bool) -> Option<Apart> {
     let differ = |when: &str, env, what: &str, one: f64, other: f64| {
         (one.to_bits() != other.to_bits()).then(|| Apart {
@@ -422,7 +432,7 @@ fn refused(what: &str, error: &dyn fmt::Display, found: &mut Vec<Finding>) {
     add(found, Finding::Refused { what: what.into(), error: error.to_string() });
 }
 
-/// Adds a finding, if there is none of its kind.
+/// Adds a finding unless there is one of its kind.
 fn add(found: &mut Vec<Finding>, finding: Finding) {
     let kind = std::mem::discriminant(&finding);
     if !found.iter().any(|known| std::mem::discriminant(known) == kind) {

@@ -1,4 +1,4 @@
-//! What is wanted of an environment in an episode.
+//! Command terms: goals of an episode.
 
 use crate::dice::Dice;
 use crate::error::{EnvError, Result};
@@ -7,8 +7,8 @@ use std::fmt;
 
 type Draw = Box<dyn Fn(&mut Dice) -> Vec<f64> + Send>;
 
-/// Numbers that are drawn for an environment when an episode begins, and stay until it ends: where to reach, how fast to walk.
-/// Other terms read them with [`Now::command`](crate::Now::command).
+/// Numbers that are drawn for an environment when an episode begins and stay until it ends, such as a goal position or
+/// a target velocity. Other terms read them with [`Now::command`](crate::Now::command).
 pub struct CommandTerm {
     pub(crate) name: String,
     pub(crate) columns: Vec<String>,
@@ -16,7 +16,7 @@ pub struct CommandTerm {
 }
 
 impl CommandTerm {
-    /// Named columns that `draw` gives the numbers of.
+    /// Creates a term with named columns. `draw` returns the values for one episode of one environment.
     pub fn new<const K: usize>(
         name: impl Into<String>,
         columns: [&str; K],
@@ -30,7 +30,7 @@ impl CommandTerm {
         Space::uniform(self.columns.iter().map(String::as_str), [f64::NEG_INFINITY, f64::INFINITY]).map(drop)
     }
 
-    /// The numbers of an episode.
+    /// Draws the values of an episode.
     pub(crate) fn values(&self, dice: &mut Dice) -> Result<Vec<f64>> {
         let values = (self.draw)(dice);
         match values.iter().position(|value| !value.is_finite()) {

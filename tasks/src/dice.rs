@@ -1,12 +1,12 @@
-//! Random numbers of a task.
+//! Random numbers of tasks.
 
 use kinetoscope_scene::Random;
 use kinetoscope_sim::EnvId;
 
-/// Random numbers of one environment in one episode, for one term.
+/// A random number generator for one environment, one episode and one term.
 ///
-/// They depend on the seed of the episode, the global index of the environment, the number of the episode since that seed was
-/// given, and what the term is called: on nothing else.
+/// Its numbers depend only on the seed of the episode, the global index of the environment, the number of the episode
+/// since that seed was set, and the name of the term.
 #[derive(Clone, Debug)]
 pub struct Dice {
     env: EnvId,
@@ -14,7 +14,7 @@ pub struct Dice {
     random: Random,
 }
 
-/// Whose episode it is.
+/// Key of the random numbers of one episode in one environment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Key {
     /// Seed of the episodes.
@@ -26,55 +26,56 @@ pub(crate) struct Key {
 }
 
 impl Key {
-    /// The generator of what is called `what`.
+    /// Returns the generator of a stream with the name `what`.
     pub(crate) fn random(&self, what: &str) -> Random {
         Random::keyed(self.seed, self.global as u64, &format!("env/{what}/{}", self.episode))
     }
 
-    /// The dice of what is called `what`, in the environment that has the number `env` in its manager.
+    /// Returns the generator with the name `what` for terms, in environment `env` of the manager.
     pub(crate) fn dice(self, env: usize, what: &str) -> Dice {
         Dice { env: EnvId(env), key: self, random: self.random(what) }
     }
 }
 
 impl Dice {
-    /// The environment, as its manager counts.
+    /// Index of the environment in its manager.
     pub fn env(&self) -> EnvId {
         self.env
     }
 
-    /// Global index of the environment: over all processes that simulate together.
+    /// Global index of the environment, counted over all processes of a distributed simulation.
     pub fn global_env(&self) -> usize {
         self.key.global
     }
 
-    /// Seed of the episode: what [`Env::reset`](crate::Env::reset) was given last for the environment.
+    /// Seed of the episode: the last one given to [`Env::reset`](crate::Env::reset) for this environment, or the
+    /// simulation's.
     pub fn seed(&self) -> u64 {
         self.key.seed
     }
 
-    /// Number of the episode since the seed was given, from 0.
+    /// Number of the episode since the seed was set, from 0.
     pub fn episode(&self) -> u64 {
         self.key.episode
     }
 
-    /// Uniform in 0 (included) to 1 (excluded).
+    /// Returns a uniform number in \[0, 1).
     pub fn uniform(&mut self) -> f64 {
         self.random.uniform()
     }
 
-    /// Uniform from `low` to `high`.
+    /// Returns a uniform number from `low` to `high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         self.random.between(low, high)
     }
 
-    /// Of the normal distribution with mean 0 and standard deviation 1.
+    /// Returns a number of the standard normal distribution (mean 0, standard deviation 1).
     pub fn normal(&mut self) -> f64 {
         self.random.normal()
     }
 }
 
-/// The environments that dice are for.
+/// Returns the environments of the generators that an event gets.
 pub fn env_ids(dice: &[Dice]) -> Vec<EnvId> {
     dice.iter().map(Dice::env).collect()
 }

@@ -1,4 +1,4 @@
-//! The batch of environments with a task.
+//! The batch of environments of a task: [`Env`].
 
 use crate::builder::Terms;
 use crate::cfg::EnvCfg;
@@ -13,20 +13,21 @@ use kinetoscope_scene::Random;
 use kinetoscope_sim::{EnvId, ObserverId, SimulationManager, StepResult};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
 
-/// Environments with a task: reset, then stepped.
+/// A batch of environments with a task, made of terms by an [`EnvBuilder`](crate::EnvBuilder).
 ///
-/// What a [`step`](Self::step) does, in this order (Isaac Lab's, which resets before events of intervals and has no final
-/// observations):
+/// Call [`reset`](Self::reset) before the first [`step`](Self::step). A step does the following, in this order. Isaac
+/// Lab has the same order, except that it resets before interval events and has no final observations.
 ///
-/// 1. actions are put between their bounds and applied, and [`EnvCfg::decimation`] physics steps are done;
-/// 2. episodes are one step longer; terms say which of them end, and why;
-/// 3. rewards are computed; they and the ends are published to observers of the simulation ([`StepResult`]);
-/// 4. events of [`When::Interval`] happen where they are due and the episode goes on;
-/// 5. observations are made: the final ones of episodes that ended are among them;
-/// 6. environments whose episode ended go back to the initial state, get new commands, events of [`When::Reset`] happen, and they
-///    are observed again.
+/// 1. Clamp the actions to their bounds, apply them, and do [`EnvCfg::decimation`] physics steps.
+/// 2. Count the step, and find the episodes that end and the reason of each.
+/// 3. Compute the rewards. Publish rewards and ends to the observers of the simulation ([`StepResult`]).
+/// 4. Run the due [`When::Interval`] events in environments whose episode goes on.
+/// 5. Compute the observations, which include the final ones of the episodes that ended.
+/// 6. Reset the environments whose episode ended to the initial state, draw new commands, run the [`When::Reset`]
+///    events, and observe these environments again.
 ///
-/// So episodes begin in the step in which the last ones end (Gymnasium's `AutoresetMode.SAME_STEP`), and no step is lost.
+/// An episode thus begins in the step in which the previous one ends (Gymnasium's `AutoresetMode.SAME_STEP`). No step
+/// is spent on a reset alone.
 pub struct Env {
     present: Present,
     cfg: EnvCfg,
@@ -36,23 +37,23 @@ pub struct Env {
     rows: Vec<Row>,
     /// Sums of the weighted rewards of each episode, shape (N, reward terms).
     reward_sums: Array2<f64>,
-    /// What was seen last.
+    /// The latest observations, shape (N, observation columns).
     observations: Array2<f64>,
-    /// Who was reset, and how the simulation calls what notes it.
+    /// Records which environments were reset, with its id in the simulation.
     watch: (Watch, ObserverId<Watch>),
 }
 
-/// What an environment has for itself beside the simulation.
+/// State of one environment outside the simulation.
 #[derive(Debug)]
 struct Row {
     key: Key,
     /// Number of the next episode.
     next_episode: u64,
-    /// Whether it has an episode.
+    /// True while the environment has an episode.
     runs: bool,
-    /// Noise of each observation term.
+    /// Noise generator of each observation term.
     noise: Vec<Random>,
-    /// The step of the episode at which each event happens next, of those that do so at intervals.
+    /// Episode step at which each event is due next; unused for events without an interval.
     events: Vec<u64>,
 }
 
@@ -62,36 +63,38 @@ impl std::fmt::Debug for Env {
     }
 }
 
-/// Reading.
+/// Accessors.
 impl Env {
     /// The simulation.
     pub fn sim(&self) -> &SimulationManager {
         &self.present.sim
     }
 
-    /// The simulation, to serve, record or change it between steps. A state that is written is seen in the next step. Where it is
-    /// reset, as viewers may do too, the episode ends with the next step ([`EndReason::Reset`]) and another one begins:
-    /// [`reset`](Self::reset) begins one at once.
+    /// The simulation, to serve, record or change it between steps.
+    ///
+    /// The next step sees a state that is written here. If the simulation is reset here or by a viewer, the episode
+    /// ends with the next step ([`EndReason::Reset`]) and another one begins. [`reset`](Self::reset) begins an episode
+    /// at once.
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
         &mut self.present.sim
     }
 
-    /// The simulation, as the last step left it.
+    /// Returns the simulation in the state after the last step.
     pub fn into_sim(self) -> SimulationManager {
         let (mut sim, (_, id)) = (self.present.sim, self.watch);
-        // It may be another simulation than at first: then there is nothing to take away.
+        // The caller may have swapped the simulation through `sim_mut`. Then it lacks this observer.
         if sim.observers().contains(id) {
             let _ = sim.observers_mut().remove(id);
         }
         sim
     }
 
-    /// What terms see at present.
+    /// Returns the context that terms see at present.
     pub fn now(&self) -> Now<'_> {
         self.present.now()
     }
 
-    /// How it is stepped.
+    /// Lengths of steps and episodes.
     pub fn cfg(&self) -> &EnvCfg {
         &self.cfg
     }
@@ -101,35 +104,36 @@ impl Env {
         self.rows.len()
     }
 
-    /// Length of a step \[s\].
+    /// Duration of a step of the task \[s\].
     pub fn step_dt(&self) -> f64 {
         f64::from(self.cfg.decimation) * self.present.sim.cfg().physics_dt
     }
 
-    /// Columns of the observations, `term/column`. The noise of a term without a clip has no bound.
+    /// Columns of the observations, named `term/column`. A term with noise and without a clip is unbounded.
     pub fn observation_space(&self) -> &Space {
         &self.observation_space
     }
 
-    /// Columns of the actions, `term/column`.
+    /// Columns of the actions, named `term/column`.
     pub fn action_space(&self) -> &Space {
         &self.action_space
     }
 
-    /// Names of the reward terms.
+    /// Names of the reward terms, in the order in which they were added.
     pub fn reward_names(&self) -> Vec<&str> {
         self.terms.rewards.iter().map(|term| term.name.as_str()).collect()
     }
 
-    /// What was seen last, shape (N, columns of [`observation_space`](Self::observation_space)); 0 before the first reset.
+    /// The latest observations, shape (N, columns of [`observation_space`](Self::observation_space)); zeros before the
+    /// first reset.
     pub fn observations(&self) -> ArrayView2<'_, f64> {
         self.observations.view()
     }
 }
 
-/// Running.
+/// Resets and steps.
 impl Env {
-    /// An environment of checked terms, whose spaces are those of observations and actions.
+    /// Creates the environments from checked terms. `spaces` are those of the observations and of the actions.
     pub(crate) fn new(mut sim: SimulationManager, cfg: EnvCfg, terms: Terms, spaces: [Space; 2]) -> Result<Self> {
         let [observation_space, action_space] = spaces;
         let (n, seed, first) = (sim.num_envs(), sim.cfg().seed, sim.cfg().first_env());
@@ -158,16 +162,20 @@ impl Env {
         Ok(env)
     }
 
-    /// Begins new episodes where `mask` is true (everywhere where it is `None`), and gives what is seen in all environments,
-    /// shape (N, columns of [`observation_space`](Self::observation_space)). Episodes elsewhere go on as if nothing had happened.
+    /// Begins new episodes where `mask` is true (everywhere if it is `None`), and returns the observations of all
+    /// environments, shape (N, columns of [`observation_space`](Self::observation_space)).
     ///
-    /// With a seed, random numbers of these environments start again: the same seed gives the same episodes. Without one they go
-    /// on, as they do when episodes end by themselves; at first the seed is the simulation's. (Noise of sensors and of
-    /// [`randomize`](kinetoscope_sim::EnvPropertiesMut::randomize) goes by the simulation's seed alone.) Properties, such as masses and gains, stay
-    /// as events have left them: an event that changes them at a reset sets them, instead of scaling what it finds.
+    /// Other environments continue their episodes unchanged. With a `seed`, the random numbers of the reset
+    /// environments restart: the same seed gives the same episodes. Without a seed they continue, as at the automatic
+    /// resets. The initial seed is the simulation's. The noise of sensors and of
+    /// [`randomize`](kinetoscope_sim::EnvPropertiesMut::randomize) depends on the simulation's seed only.
+    ///
+    /// Properties such as masses and gains keep the values that events gave them. An event that changes a property at a
+    /// reset should therefore set it, and not scale the value that it finds.
     ///
     /// # Errors
-    /// A mask of another length, or a term that fails; then the environments have no episode until they are reset.
+    /// The mask has another length than N, or a term fails. After a failed term these environments have no episode
+    /// until they are reset.
     pub fn reset(&mut self, mask: Option<&[bool]>, seed: Option<u64>) -> Result<Array2<f64>> {
         let n = self.num_envs();
         if let Some(mask) = mask.filter(|mask| mask.len() != n) {
@@ -189,15 +197,18 @@ impl Env {
         Ok(self.observations.clone())
     }
 
-    /// Does one step in all environments. `actions` has a row for each environment and the columns of
-    /// [`action_space`](Self::action_space); what is beyond the bounds becomes the bound.
+    /// Does one step in all environments.
     ///
-    /// An environment in which a step cannot be done ends as terminated, with [`EndReason::Diverged`]: what is observed last and
-    /// rewarded is of its last good state. The others do not notice.
+    /// `actions` has shape (N, columns of [`action_space`](Self::action_space)). Actions beyond their bounds are
+    /// clamped.
+    ///
+    /// If the physics of an environment diverges, its episode terminates with [`EndReason::Diverged`]. Its final
+    /// observation and reward are those of its last good state. Other environments are not affected.
     ///
     /// # Errors
-    /// Actions of another shape or that are not finite, or an environment without an episode: then nothing was done. A term that
-    /// fails, or gives what is of another shape or not finite: then the step is broken off, and every environment has to be reset.
+    /// - The actions have another shape or are not finite, or an environment has no episode. Nothing was done then.
+    /// - A term fails, or returns an array of another shape or with a number that is not finite. The step is then
+    ///   incomplete and every environment has to be reset.
     pub fn step<'a>(&mut self, actions: impl AsArray<'a, f64, Ix2>) -> Result<Step> {
         let actions = self.within_bounds(actions.into())?;
         if let Some(env) = self.rows.iter().position(|row| !row.runs) {
@@ -235,7 +246,7 @@ impl Env {
         let (terminated, truncated, reasons) = self.ends()?;
         let reward_terms = self.rewards()?;
         self.reward_sums += &reward_terms;
-        // In the order of the terms.
+        // Sums in the order of the terms.
         let rewards = reward_terms.map_axis(Axis(1), |terms| terms.iter().fold(0.0, |sum, reward| sum + reward));
         let result =
             StepResult { rewards: rewards.clone(), terminated: terminated.clone(), truncated: truncated.clone() };
@@ -296,7 +307,7 @@ impl Env {
         Ok(())
     }
 
-    /// Which episodes end, and the first reason of each.
+    /// Finds the episodes that end: terminated, truncated, and the first reason of each.
     #[expect(clippy::type_complexity, reason = "three columns of a step")]
     fn ends(&self) -> Result<(Array1<bool>, Array1<bool>, Vec<Option<EndReason>>)> {
         let n = self.num_envs();
@@ -329,7 +340,7 @@ impl Env {
         Ok((terminated, truncated, reasons))
     }
 
-    /// The weighted rewards of each term.
+    /// Computes the weighted reward terms, shape (N, reward terms).
     fn rewards(&self) -> Result<Array2<f64>> {
         let mut table = Array2::zeros((self.num_envs(), self.terms.rewards.len()));
         for (mut column, term) in table.columns_mut().into_iter().zip(&self.terms.rewards) {
@@ -338,7 +349,7 @@ impl Env {
         Ok(table)
     }
 
-    /// What was seen last, with `envs` looked at again.
+    /// Returns the latest observations, computed anew in `envs`.
     fn observe(&mut self, envs: &[usize]) -> Result<Array2<f64>> {
         let mut seen = self.observations.clone();
         let mut first = 0;
@@ -388,12 +399,12 @@ impl Env {
             self.reward_sums.row_mut(env).fill(0.0);
         }
         self.happen(envs, |when| when == When::Reset, |event| format!("event/{event}"))?;
-        // These were this task's own.
+        // The monitor also saw the resets of this function, which do not end an episode.
         envs.iter().for_each(|&env| self.watch.0.clear(env));
         Ok(())
     }
 
-    /// Lets those events happen in `envs` that are `due`, with dice that are called as `named` says.
+    /// Runs the events that are `due` in `envs`, each with random numbers keyed by `named(event)`.
     fn happen(&mut self, envs: &[usize], due: impl Fn(When) -> bool, named: impl Fn(&str) -> String) -> Result<()> {
         for event in self.terms.events.iter().filter(|event| due(event.when)) {
             let what = named(&event.name);
@@ -404,7 +415,7 @@ impl Env {
         Ok(())
     }
 
-    /// Lets events happen where their time has come.
+    /// Runs the interval events that are due at the present step of the episodes in `envs`.
     fn happen_at_intervals(&mut self, envs: &[usize]) -> Result<()> {
         for (k, event) in self.terms.events.iter().enumerate() {
             let When::Interval { steps } = event.when else { continue };
@@ -425,7 +436,7 @@ impl Env {
     }
 }
 
-/// Steps from step `now` until an event happens again.
+/// Number of steps from step `now` until an interval event is due again, uniform in `low..=high`.
 fn wait(key: Key, env: usize, event: &str, now: u64, [low, high]: [u64; 2]) -> u64 {
     let share = key.dice(env, &format!("interval/{event}/{now}")).uniform();
     // Rounding may make the product of a share below 1 the whole width.

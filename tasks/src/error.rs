@@ -1,11 +1,11 @@
-//! What can be wrong with a task and with what it is told.
+//! Errors of tasks and their terms.
 
 use std::fmt;
 
 /// Result of this crate.
 pub type Result<T, E = EnvError> = std::result::Result<T, E>;
 
-/// What the function of a term fails with: anything.
+/// Error of a term's function: any error type.
 pub type TermError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Result of the function of a term.
@@ -30,7 +30,7 @@ pub enum TermKind {
 }
 
 impl TermKind {
-    /// What errors call what the function of a term gives.
+    /// Label of the result of a term's function, for error messages.
     pub(crate) fn gives(self, name: &str) -> String {
         format!("what the {self} term {name:?} gives")
     }
@@ -49,11 +49,11 @@ impl fmt::Display for TermKind {
     }
 }
 
-/// Why a task cannot be built, reset or stepped.
+/// Error of building, resetting or stepping a task.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EnvError {
-    /// The simulation refused something.
+    /// The simulation returned an error.
     #[error(transparent)]
     Sim(#[from] kinetoscope_sim::Error),
     /// A number of the configuration or of a term is out of range.
@@ -63,16 +63,16 @@ pub enum EnvError {
         field: String,
         /// The value given.
         value: String,
-        /// What would be right.
+        /// Accepted values.
         expected: &'static str,
     },
-    /// A task without terms that it cannot be without.
+    /// A task has no column of a kind that it needs.
     #[error("there is no {kind} term; a task needs at least one")]
     NoTerm {
-        /// What is missing.
+        /// The missing kind of term.
         kind: TermKind,
     },
-    /// A name that cannot be a part of others.
+    /// The name of a term is empty or contains a slash, the separator of keys and column names.
     #[error("{kind} term {name:?}: a name must not be empty, and without a slash")]
     TermName {
         /// The kind of the term.
@@ -111,14 +111,14 @@ pub enum EnvError {
         kind: TermKind,
         /// Its name.
         name: String,
-        /// What it says.
+        /// Error of the function.
         #[source]
         error: TermError,
     },
     /// There is no such name.
     #[error("there is no {what} {name:?}; there are: {}", .candidates.join(", "))]
     UnknownName {
-        /// What was looked for.
+        /// Kind of name.
         what: &'static str,
         /// The name given.
         name: String,
@@ -132,9 +132,9 @@ pub enum EnvError {
         what: String,
         /// Shape given.
         found: Vec<usize>,
-        /// Shape that would be right.
+        /// Expected shape.
         expected: Vec<usize>,
-        /// What the axes are.
+        /// Meaning of the axes.
         meaning: &'static str,
     },
     /// A number is NaN or infinite.
@@ -149,7 +149,7 @@ pub enum EnvError {
         /// The value.
         value: f64,
     },
-    /// An environment was stepped that was never reset, or not since a step broke off.
+    /// An environment without an episode was stepped: it was never reset, or not since a step failed.
     #[error(
         "environment {env} has no episode: call `reset(None, ..)` before the first step, and after a step that failed"
     )]
@@ -160,12 +160,12 @@ pub enum EnvError {
 }
 
 impl EnvError {
-    /// The function of a term failed.
+    /// Creates [`Term`](Self::Term).
     pub(crate) fn term(kind: TermKind, name: &str, error: TermError) -> Self {
         Self::Term { kind, name: name.into(), error }
     }
 
-    /// There is no such name.
+    /// Creates [`UnknownName`](Self::UnknownName) with the candidates nearest to `name`.
     pub(crate) fn unknown<'n>(what: &'static str, name: &str, names: impl IntoIterator<Item = &'n str>) -> Self {
         let candidates = kinetoscope_scene::pattern::closest(name, names).into_iter().map(str::to_string).collect();
         Self::UnknownName { what, name: name.into(), candidates }

@@ -1,4 +1,4 @@
-//! What happens to environments beside what agents do: starts at random places, other masses, pushes.
+//! Event terms: random initial states, property changes, pushes.
 
 use crate::dice::Dice;
 use crate::error::{EnvError, Result, TermResult};
@@ -7,7 +7,7 @@ use std::fmt;
 
 type Act = Box<dyn Fn(&mut SimulationManager, &mut [Dice]) -> TermResult + Send>;
 
-/// When an event happens.
+/// Time at which an event happens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum When {
@@ -15,19 +15,20 @@ pub enum When {
     Startup,
     /// When an episode begins, after the simulation went back to the initial state there.
     Reset,
-    /// Again and again in an episode, after steps; from one time to the next there are as many steps as were drawn.
+    /// Repeatedly during an episode, after steps. The number of steps in between is drawn anew each time.
     Interval {
-        /// Fewest and most steps, at least 1.
+        /// Minimum and maximum number of steps, at least 1.
         steps: [u64; 2],
     },
 }
 
-/// Something that happens to environments.
+/// A change of the simulation besides the actions, such as a random initial state or a push.
 ///
-/// Its random numbers are those of the dice, one for each environment that is concerned; draws from these repeat with the seed
-/// that [`Env::reset`](crate::Env::reset) is given. To set properties by them, use
-/// [`randomize_with`](kinetoscope_sim::EnvPropertiesMut::randomize_with): [`randomize`](kinetoscope_sim::EnvPropertiesMut::randomize) draws by the seed of the
-/// manager, and goes on drawing where it is.
+/// Its random numbers come from one generator for each affected environment. They repeat with the seed that is given to
+/// [`Env::reset`](crate::Env::reset). To randomize properties with them, use
+/// [`randomize_with`](kinetoscope_sim::EnvPropertiesMut::randomize_with).
+/// [`randomize`](kinetoscope_sim::EnvPropertiesMut::randomize) instead continues the manager's own random numbers,
+/// which a reset does not restart.
 pub struct EventTerm {
     pub(crate) name: String,
     pub(crate) when: When,
@@ -35,7 +36,7 @@ pub struct EventTerm {
 }
 
 impl EventTerm {
-    /// Something that happens at a time: `act` gets one die for each environment in which it happens.
+    /// Creates an event. `act` gets one random number generator for each environment in which the event happens.
     pub fn new(
         name: impl Into<String>,
         when: When,
@@ -44,7 +45,7 @@ impl EventTerm {
         Self { name: name.into(), when, act: Box::new(act) }
     }
 
-    /// Something that happens when an episode begins.
+    /// Creates an event that happens when an episode begins.
     pub fn on_reset(
         name: impl Into<String>,
         act: impl Fn(&mut SimulationManager, &mut [Dice]) -> TermResult + Send + 'static,

@@ -1,19 +1,32 @@
-//! Tasks for agents: a batch of environments that is observed, acted on, rewarded, and begun again.
+//! Reinforcement-learning tasks: a batch of environments with observations, actions, rewards, terminations and resets.
 //!
 //! ```text
 //! actions -> ActionTerm -> SimulationManager -> TerminationTerm, RewardTerm -> EventTerm -> ObservationTerm -> Step
 //! ```
 //!
-//! [`VectorEnv`] is what Gymnasium calls so: spaces, `reset`, `step`. An [`Env`] is one that is made of terms as tasks of Isaac Lab
-//! are: each term is a plain value with a name and a function of the simulation ([`Now`]). Environments whose episode ends begin the next one in the same
-//! step ([`Env::step`] says what can be relied on). Random numbers of a task are keyed by its seed, the global index of
-//! the environment, the number of the episode and the name of the term: bits depend neither on the number of environments, of
-//! threads and of processes, nor on what other environments do.
+//! A task is built from terms, as in Isaac Lab. A term is a plain value: a name and a function of the simulation.
+//!
+//! | item | role |
+//! |---|---|
+//! | [`VectorEnv`] | interface for learning code: spaces, `reset`, `step`, as in Gymnasium |
+//! | [`Env`], [`EnvBuilder`], [`EnvCfg`] | the implementation of [`VectorEnv`] with a simulation and terms |
+//! | [`ActionTerm`], [`CommandTerm`], [`EventTerm`] | write to the simulation: actions, goals, resets, pushes |
+//! | [`ObservationTerm`], [`RewardTerm`], [`TerminationTerm`] | read from the simulation, through [`Now`] |
+//! | [`mod@terms`] | ready-made terms for robots |
+//! | [`Space`], [`Step`] | named columns with bounds; the result of a step |
+//! | [`Dice`] | random numbers of one environment, episode and term |
+//! | [`fn@check`] | tests an implementation of [`VectorEnv`] |
+//!
+//! An environment whose episode ends begins the next one in the same step; [`Env`] documents the order of a step.
+//!
+//! The random numbers of a task are keyed by its seed, the global index of the environment, the number of the episode
+//! and the name of the term. The same keys give the same bits for any number of environments, threads and processes.
 //!
 //! ```
-//! use kinetoscope_tasks::{ActionTerm, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, Space, TerminationTerm};
-//! use ndarray::{Array2, array};
 //! use kinetoscope_sim::{DriveCfg, DriveType, JointIndex, MjcfFile, RobotCfg, SimulationManager, SimulationManagerCfg};
+//! use kinetoscope_tasks::{ActionTerm, EnvBuilder, EnvCfg, EventTerm, ObservationTerm, RewardTerm, Space};
+//! use kinetoscope_tasks::TerminationTerm;
+//! use ndarray::{Array2, array};
 //!
 //! let cart = r#"<mujoco><worldbody><body name="rail"><geom size="0.01"/><body name="cart">
 //!     <joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1" mass="2"/></body></body></worldbody></mujoco>"#;

@@ -1,24 +1,24 @@
-//! What terms see.
+//! The context that is passed to terms.
 
 use crate::error::{EnvError, Result, TermKind, TermResult};
 use kinetoscope_sim::SimulationManager;
 use ndarray::{Array1, Array2, ArrayView2};
 
-/// The present of all environments: what functions of terms look at.
+/// Read access to the simulation and the task state of all environments, for the functions of terms.
 #[derive(Clone, Copy, Debug)]
 pub struct Now<'e> {
     present: &'e Present,
 }
 
-/// The simulation, and what a task knows beside it.
+/// The simulation and the state of a task outside it.
 #[derive(Debug)]
 pub(crate) struct Present {
     pub(crate) sim: SimulationManager,
     /// The last actions, within their bounds, shape (N, action columns).
     pub(crate) actions: Array2<f64>,
-    /// Those before.
+    /// Actions of the step before the last one, shape (N, action columns).
     pub(crate) previous: Array2<f64>,
-    /// Steps of each episode so far.
+    /// Number of steps of each episode so far.
     pub(crate) steps: Vec<u64>,
     /// Name and values of each command term.
     pub(crate) commands: Vec<(String, Array2<f64>)>,
@@ -41,26 +41,27 @@ impl<'e> Now<'e> {
         self.present.sim.num_envs()
     }
 
-    /// Actions of the last step, within their bounds, shape (N, columns of [`Env::action_space`](crate::Env::action_space));
-    /// 0 at the start of an episode.
+    /// Actions of the last step, clamped to their bounds, shape (N, columns of
+    /// [`Env::action_space`](crate::Env::action_space)); 0 at the start of an episode.
     pub fn actions(&self) -> ArrayView2<'e, f64> {
         self.present.actions.view()
     }
 
-    /// Actions of the step before the last one, shaped as [`actions`](Self::actions); 0 where there was none.
+    /// Actions of the step before the last one, shaped as [`actions`](Self::actions); 0 if the episode had no such
+    /// step.
     pub fn previous_actions(&self) -> ArrayView2<'e, f64> {
         self.present.previous.view()
     }
 
-    /// Steps of the environment's episode so far, the present one included, shape (N,).
+    /// Number of steps of each environment's episode so far, including the present one, shape (N,).
     pub fn episode_steps(&self) -> &'e [u64] {
         &self.present.steps
     }
 
-    /// What the command term called `name` wants of each environment, shape (N, columns of the term).
+    /// Values of the command term called `name`, shape (N, columns of the term).
     ///
     /// # Errors
-    /// There is no such term; the error lists those there are.
+    /// There is no command term of this name; the error lists the existing ones, the nearest first.
     pub fn command(&self, name: &str) -> Result<ArrayView2<'e, f64>> {
         let commands = &self.present.commands;
         let found = commands.iter().find(|(of, _)| of == name);
@@ -69,7 +70,7 @@ impl<'e> Now<'e> {
             .ok_or_else(|| EnvError::unknown("command", name, commands.iter().map(|(of, _)| of.as_str())))
     }
 
-    /// What the function of a term gave, which is a number for each environment.
+    /// Checks the result of a term's function, which must have shape (N,).
     pub(crate) fn for_each_env<T>(
         &self,
         kind: TermKind,

@@ -1,4 +1,4 @@
-//! What agents see of environments.
+//! Observation terms.
 
 use crate::error::{EnvError, Result, TermKind, TermResult};
 use crate::now::Now;
@@ -9,20 +9,20 @@ use std::fmt;
 
 type Observe = Box<dyn Fn(&Now<'_>) -> TermResult<Array2<f64>> + Send>;
 
-/// Noise that is added to every number of an observation.
+/// Noise that is added to every value of an observation term.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Noise {
-    /// Normal, with mean 0.
+    /// Normal distribution with mean 0.
     Normal {
         /// Standard deviation, in the unit of the columns.
         std: f64,
     },
-    /// Uniform.
+    /// Uniform distribution.
     Uniform {
-        /// Smallest, in the unit of the columns.
+        /// Lower bound, in the unit of the columns.
         low: f64,
-        /// Largest.
+        /// Upper bound, in the unit of the columns.
         high: f64,
     },
 }
@@ -43,7 +43,7 @@ impl Noise {
     }
 }
 
-/// Columns of the observations. What the function gives gets its noise, is clipped, and scaled, in this order.
+/// A group of observation columns. Noise is added to the values first, then they are clipped, then scaled.
 pub struct ObservationTerm {
     pub(crate) name: String,
     pub(crate) columns: Vec<String>,
@@ -54,8 +54,10 @@ pub struct ObservationTerm {
 }
 
 impl ObservationTerm {
-    /// A term with named columns. `observe` gives rows for all environments, shape (N, columns). It may be called again in
-    /// the same step, for environments that begin a new episode: what it gives must depend on what it is shown alone.
+    /// Creates a term with named columns. `observe` returns the rows of all environments, shape (N, columns).
+    ///
+    /// It may be called twice in a step, because environments that begin a new episode are observed again. Its result
+    /// must therefore depend on its argument only.
     pub fn new<N: Into<String>>(
         name: impl Into<String>,
         columns: impl IntoIterator<Item = N>,
@@ -66,25 +68,26 @@ impl ObservationTerm {
         Self { name: name.into(), columns, noise: None, clip, scale: 1.0, observe: Box::new(observe) }
     }
 
-    /// With noise.
+    /// Adds noise to the values.
     #[must_use]
     pub fn with_noise(self, noise: Noise) -> Self {
         Self { noise: Some(noise), ..self }
     }
 
-    /// Held between two numbers, in the unit of the columns. What is infinite, such as the depth of a miss, becomes one of them.
+    /// Clips the values to \[low, high\], in the unit of the columns. An infinite value, such as the depth of a miss,
+    /// becomes a bound.
     #[must_use]
     pub fn clipped(self, clip: [f64; 2]) -> Self {
         Self { clip, ..self }
     }
 
-    /// Multiplied.
+    /// Multiplies the clipped values by `scale`.
     #[must_use]
     pub fn scaled(self, scale: f64) -> Self {
         Self { scale, ..self }
     }
 
-    /// Checks noise, clip and scale; what the columns can be.
+    /// Checks noise, clip and scale, and returns the columns with the bounds after scaling.
     pub(crate) fn space(&self) -> Result<Space> {
         let wrong = |field: &str, value: String, expected| {
             let field = format!("{field} of the observation term {:?}", self.name);
@@ -100,14 +103,14 @@ impl ObservationTerm {
         if !(self.scale.is_finite() && self.scale != 0.0) {
             return wrong("scale", self.scale.to_string(), "it must be finite and not 0");
         }
-        // What the user wrote, before what becomes of it.
+        // Checks the clip as given, so that an error shows the user's numbers and not the scaled ones.
         Space::uniform(self.columns.iter().map(String::as_str), self.clip)?;
         let ends = self.clip.map(|end| self.scale * end);
         let bounds = if self.scale > 0.0 { ends } else { [ends[1], ends[0]] };
         Space::uniform(self.columns.iter().map(String::as_str), bounds)
     }
 
-    /// The rows of all environments as the function gives them.
+    /// Computes the raw values of all environments, shape (N, columns).
     pub(crate) fn rows(&self, now: &Now<'_>) -> Result<Array2<f64>> {
         let rows = (self.observe)(now).map_err(|e| EnvError::term(TermKind::Observation, &self.name, e))?;
         let expected = vec![now.num_envs(), self.columns.len()];
@@ -118,7 +121,7 @@ impl ObservationTerm {
         Err(EnvError::Shape { what, found, expected, meaning: "environments, columns of the term" })
     }
 
-    /// What agents see of a number.
+    /// Applies noise, clip and scale to a raw value.
     pub(crate) fn seen(&self, value: f64, random: &mut Random) -> f64 {
         let noisy = self.noise.map_or(value, |noise| value + noise.draw(random));
         self.scale * noisy.clamp(self.clip[0], self.clip[1])

@@ -1,4 +1,4 @@
-//! What agents get for what they do.
+//! Reward terms.
 
 use crate::error::{EnvError, Result, TermKind, TermResult};
 use crate::now::Now;
@@ -7,8 +7,10 @@ use std::fmt;
 
 type Reward = Box<dyn Fn(&Now<'_>) -> TermResult<Array1<f64>> + Send>;
 
-/// A part of the reward of a step: a number for each environment, times a weight. (In Isaac Lab weights are of rates, and the
-/// products are multiplied by the length of a step: multiply weights by it to take them over.)
+/// A term of the reward of a step: one number for each environment, times a weight.
+///
+/// Isaac Lab multiplies its weights by the duration of a step. To port a weight from there, multiply it by
+/// [`Env::step_dt`](crate::Env::step_dt).
 pub struct RewardTerm {
     pub(crate) name: String,
     pub(crate) weight: f64,
@@ -16,7 +18,7 @@ pub struct RewardTerm {
 }
 
 impl RewardTerm {
-    /// `weight` times what `reward` gives for each environment, shape (N,).
+    /// Creates the term `weight * reward`; `reward` returns one number for each environment, shape (N,).
     pub fn new(
         name: impl Into<String>,
         weight: f64,
@@ -33,7 +35,7 @@ impl RewardTerm {
         Err(EnvError::Config { field, value: self.weight.to_string(), expected: "it must be finite" })
     }
 
-    /// The weighted rewards of all environments.
+    /// Computes the weighted rewards of all environments, shape (N,).
     pub(crate) fn rewards(&self, now: &Now<'_>) -> Result<Array1<f64>> {
         let mut rewards = now.for_each_env(TermKind::Reward, &self.name, (self.reward)(now))?;
         rewards.mapv_inplace(|value| self.weight * value);

@@ -1,4 +1,4 @@
-//! Boxes of numbers that observations and actions are in.
+//! Spaces of observations and actions.
 
 use crate::error::{EnvError, Result};
 use ndarray::ArrayView1;
@@ -12,10 +12,10 @@ pub struct Space {
 }
 
 impl Space {
-    /// Columns with their bounds, lower and upper; infinite for none.
+    /// Creates a space from columns and their bounds \[low, high\]; use infinities for no bound.
     ///
     /// # Errors
-    /// Bounds that hold no number, or two columns of one name.
+    /// The bounds of a column contain no finite number, or two columns have the same name.
     pub fn new<N: Into<String>>(columns: impl IntoIterator<Item = (N, [f64; 2])>) -> Result<Self> {
         let mut space = Self { names: Vec::new(), low: Vec::new(), high: Vec::new() };
         for (name, [low, high]) in columns {
@@ -34,10 +34,10 @@ impl Space {
         Ok(space)
     }
 
-    /// Columns with the same bounds.
+    /// Creates a space whose columns all have the same bounds.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// The same as [`new`](Self::new).
     pub fn uniform<N: Into<String>>(names: impl IntoIterator<Item = N>, bounds: [f64; 2]) -> Result<Self> {
         Self::new(names.into_iter().map(|name| (name, bounds)))
     }
@@ -47,7 +47,7 @@ impl Space {
         self.names.len()
     }
 
-    /// Whether there is no column.
+    /// True if there is no column.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()
     }
@@ -67,27 +67,27 @@ impl Space {
         &self.high
     }
 
-    /// Place of the column called `name`.
+    /// Index of the column called `name`.
     ///
     /// # Errors
-    /// There is none; the error lists the nearest names.
+    /// There is no such column; the error lists the nearest names.
     pub fn column(&self, name: &str) -> Result<usize> {
         let place = self.names.iter().position(|of| of == name);
         place.ok_or_else(|| EnvError::unknown("column", name, self.names.iter().map(String::as_str)))
     }
 
-    /// Whether a row of numbers is in the space.
+    /// True if a row has as many numbers as there are columns, and each is within its bounds.
     pub fn contains(&self, row: ArrayView1<'_, f64>) -> bool {
         let mut bounds = self.low.iter().zip(&self.high);
         row.len() == self.len() && row.iter().all(|x| bounds.next().is_some_and(|(low, high)| low <= x && x <= high))
     }
 
-    /// The number of a column that is nearest to `value`.
+    /// Clamps `value` to the bounds of a column.
     pub(crate) fn clamp(&self, column: usize, value: f64) -> f64 {
         value.clamp(self.low[column], self.high[column])
     }
 
-    /// Columns of several terms side by side, `term/column`.
+    /// Concatenates the columns of several terms, named `term/column`.
     pub(crate) fn joined<'s>(parts: impl Iterator<Item = (&'s str, &'s Self)>) -> Self {
         let mut all = Self { names: Vec::new(), low: Vec::new(), high: Vec::new() };
         for (term, part) in parts {

@@ -1,70 +1,73 @@
-//! What comes of a step.
+//! The result of a step.
 
 use kinetoscope_sim::EnvId;
 use ndarray::{Array1, Array2};
 use std::fmt;
 
-/// What comes of a step of all environments of a [`VectorEnv`](crate::VectorEnv).
+/// Result of a step of all environments of a [`VectorEnv`](crate::VectorEnv).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step<I = Info> {
-    /// What is seen now, shape (N, columns of [`observation_space`](crate::VectorEnv::observation_space)): where an episode
-    /// ended, the first observation of the next one.
+    /// Present observations, shape (N, columns of [`observation_space`](crate::VectorEnv::observation_space)). In an
+    /// environment whose episode ended, the first observation of the next episode.
     pub observations: Array2<f64>,
-    /// What the actions led to, shaped as the observations: where an episode ended, its last observation, elsewhere the same
-    /// numbers as there.
+    /// Observations that the actions led to, same shape. In an environment whose episode ended, its last observation;
+    /// elsewhere equal to `observations`.
     pub final_observations: Array2<f64>,
     /// Rewards, shape (N,).
     pub rewards: Array1<f64>,
-    /// Whether the episode ended by itself, shape (N,): after that nothing more could be earned. Of an [`Env`](crate::Env), by a
-    /// termination term or a step that could not be done.
+    /// True if the episode reached its end, shape (N,): no further reward is possible. In an [`Env`](crate::Env), by a
+    /// termination term or a diverged simulation.
     pub terminated: Array1<bool>,
-    /// Whether the episode was broken off, shape (N,). Of an [`Env`](crate::Env), by the limit of steps, a term that truncates, or
-    /// a reset behind its back.
+    /// True if the episode was cut off, shape (N,). In an [`Env`](crate::Env), by the limit of steps, a truncating
+    /// term, or a reset from outside the task.
     pub truncated: Array1<bool>,
-    /// What else the environments tell.
+    /// Additional results of the implementation.
     pub info: I,
 }
 
-/// What a step of an [`Env`](crate::Env) tells besides.
+/// Additional results of a step of an [`Env`](crate::Env).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Info {
-    /// Weighted rewards of each term, shape (N, [`Env::reward_names`](crate::Env::reward_names)); their sums are the rewards.
+    /// Weighted rewards of each term, shape (N, [`Env::reward_names`](crate::Env::reward_names)). Their sums are the
+    /// rewards.
     pub reward_terms: Array2<f64>,
-    /// The episodes that ended, by environment.
+    /// The episodes that ended, in the order of environments.
     pub ended: Vec<Ended>,
 }
 
 /// An episode that ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ended {
-    /// Where.
+    /// The environment.
     pub env: EnvId,
-    /// Why.
+    /// The reason.
     pub reason: EndReason,
-    /// Steps it had.
+    /// Number of steps of the episode.
     pub steps: u64,
-    /// Sum of its weighted rewards by term, in the order of [`Env::reward_names`](crate::Env::reward_names).
+    /// Sum of the weighted rewards of each term, in the order of [`Env::reward_names`](crate::Env::reward_names).
     pub reward_sums: Vec<f64>,
 }
 
 impl Ended {
-    /// Sum of all its rewards.
+    /// Sum of all rewards of the episode.
     pub fn total(&self) -> f64 {
         self.reward_sums.iter().sum()
     }
 }
 
-/// Why an episode ended. Where there are several reasons, the first of this list, and of the terms the one that was added
-/// first.
+/// Reason for the end of an episode.
+///
+/// If there are several, a divergence comes first, then a reset, then the terms in the order in which they were added,
+/// then the time limit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EndReason {
-    /// A step could not be done: the environment stood in its last good state, and was revived.
+    /// The simulation diverged: the environment stayed in its last good state until its reset.
     Diverged(String),
-    /// Somebody else reset the environment: a viewer, or the program by [`Env::sim_mut`](crate::Env::sim_mut). What is rewarded and
-    /// observed last is of the state after that.
+    /// The environment was reset from outside the task: by a viewer, or by the program through
+    /// [`Env::sim_mut`](crate::Env::sim_mut). The final observation and reward are those of the state after that reset.
     Reset,
-    /// A termination term, by name.
+    /// A termination term, by its name.
     Term(String),
     /// The limit of [`EnvCfg::episode_steps`](crate::EnvCfg::episode_steps).
     TimeLimit,

@@ -1,6 +1,6 @@
-//! Terms that most tasks of robots have; what else a task needs is a function away.
+//! Ready-made terms for robots. Any other term is a function of the simulation.
 
-// Those that have a file of their own.
+// Terms with a file of their own.
 macro_rules! terms {
     ($($file:ident: $($name:ident),+;)*) => {$(
         mod $file;
@@ -31,7 +31,7 @@ use crate::space::Space;
 use kinetoscope_sim::{JointIndex, Robot, RobotId, SimulationManager};
 use ndarray::{Array1, Array2, Axis};
 
-/// Names and columns of the joints of a robot that match `patterns`.
+/// Finds the joints of a robot that match `patterns`, with their names.
 fn joints(sim: &SimulationManager, robot: RobotId, patterns: &[&str]) -> Result<(Vec<String>, Vec<JointIndex>)> {
     let robot = sim.robot(robot);
     let joints = robot.find_joints(patterns)?;
@@ -42,13 +42,14 @@ fn columns(of: &Array2<f64>, joints: &[JointIndex]) -> Array2<f64> {
     of.select(Axis(1), &joints.iter().map(|joint| joint.0).collect::<Vec<_>>())
 }
 
-/// Positions of joints from their start \[rad or m\]; one column for each joint that matches `patterns` (whole names).
+/// Joint positions relative to the initial ones \[rad or m\]; one column for each joint that matches one of `patterns`
+/// (whole names).
 ///
 /// # Errors
-/// A pattern that matches nothing.
+/// A pattern matches no joint.
 ///
 /// # Panics
-/// The robot is of another manager.
+/// The robot belongs to another manager.
 pub fn joint_positions(
     sim: &SimulationManager,
     name: &str,
@@ -58,13 +59,13 @@ pub fn joint_positions(
     seen_of_joints(sim, name, robot, patterns, |robot| robot.qpos() - robot.default_qpos())
 }
 
-/// Velocities of joints \[rad/s or m/s\], as [`joint_positions`].
+/// Joint velocities \[rad/s or m/s\]; columns as in [`joint_positions`].
 ///
 /// # Errors
-/// A pattern that matches nothing.
+/// A pattern matches no joint.
 ///
 /// # Panics
-/// The robot is of another manager.
+/// The robot belongs to another manager.
 pub fn joint_velocities(
     sim: &SimulationManager,
     name: &str,
@@ -74,7 +75,7 @@ pub fn joint_velocities(
     seen_of_joints(sim, name, robot, patterns, |robot| robot.qvel())
 }
 
-/// What `read` gives of the joints of a robot that match `patterns`.
+/// A term with the columns that `read` returns for the joints that match `patterns`.
 fn seen_of_joints(
     sim: &SimulationManager,
     name: &str,
@@ -86,12 +87,12 @@ fn seen_of_joints(
     Ok(ObservationTerm::new(name, names, move |now| Ok(columns(&read(&now.sim().robot(robot)), &joints))))
 }
 
-/// The last actions, one column for each of `names`, the columns of the action space.
+/// The last actions; `names` are the names of all columns of the action space.
 pub fn last_actions<N: Into<String>>(name: &str, names: impl IntoIterator<Item = N>) -> ObservationTerm {
     ObservationTerm::new(name, names, |now| Ok(now.actions().to_owned()))
 }
 
-/// The numbers of a command, one column for each of `names`.
+/// Values of a command; `names` are the names of its columns.
 pub fn commanded<N: Into<String>>(
     name: &str,
     command: impl Into<String>,
@@ -101,13 +102,14 @@ pub fn commanded<N: Into<String>>(
     ObservationTerm::new(name, names, move |now| Ok(now.command(&command)?.to_owned()))
 }
 
-/// Efforts of joints \[N m or N\], from minus `bound` to `bound`, as [`set_qf_target`](kinetoscope_sim::RobotMut::set_qf_target) takes them.
+/// Joint efforts \[N m or N\], from `-bound` to `bound`, applied with
+/// [`set_qf_target`](kinetoscope_sim::RobotMut::set_qf_target).
 ///
 /// # Errors
-/// A pattern that matches nothing, or a bound that is negative or not a number.
+/// A pattern matches no joint, or `bound` is negative or NaN.
 ///
 /// # Panics
-/// The robot is of another manager.
+/// The robot belongs to another manager.
 pub fn joint_efforts(
     sim: &SimulationManager,
     name: &str,
@@ -121,14 +123,14 @@ pub fn joint_efforts(
     }))
 }
 
-/// Changes of the position targets of joints: actions are from -1 to 1, and `step` is what 1 changes a target by in a step of the
-/// task \[rad or m\]. Targets stay within the limits of the joints.
+/// Changes of joint position targets: actions are from -1 to 1, and an action of 1 adds `step` \[rad or m\] to a target
+/// in a step of the task. Targets stay within the limits of the joints.
 ///
 /// # Errors
-/// A pattern that matches nothing.
+/// A pattern matches no joint.
 ///
 /// # Panics
-/// The robot is of another manager.
+/// The robot belongs to another manager.
 pub fn target_changes(
     sim: &SimulationManager,
     name: &str,
@@ -143,12 +145,12 @@ pub fn target_changes(
     }))
 }
 
-/// 1 in every step: for being there still.
+/// A reward of 1 in every step.
 pub fn alive(name: &str, weight: f64) -> RewardTerm {
     RewardTerm::new(name, weight, |now| Ok(Array1::ones(now.num_envs())))
 }
 
-/// Sum of the squares of what the actions have changed by since the step before.
+/// Sum of the squared changes of the actions since the previous step.
 pub fn action_rate(name: &str, weight: f64) -> RewardTerm {
     RewardTerm::new(name, weight, |now: &Now<'_>| -> TermResult<Array1<f64>> {
         let change = &now.actions() - &now.previous_actions();

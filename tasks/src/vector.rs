@@ -1,4 +1,4 @@
-//! What learning code asks of a batch of environments, however it is made.
+//! The interface between learning code and batches of environments: [`VectorEnv`].
 
 use crate::environment::Env;
 use crate::error::EnvError;
@@ -6,10 +6,10 @@ use crate::space::Space;
 use crate::step::{Info, Step};
 use ndarray::{Array2, ArrayView2};
 
-/// A batch of environments that learn side by side: Gymnasium's `VectorEnv`.
+/// A batch of environments for learning code: Gymnasium's `VectorEnv`.
 ///
-/// [`Env`] is one, of a simulation and terms. Implement it for what is made otherwise (a closed form, another simulator, a layer
-/// around an `Env` that filters observations), and write what learns for any of them:
+/// [`Env`] implements it with a simulation and terms. Implement it for other batches: a closed-form system, another
+/// simulator, or a wrapper of an `Env` that filters observations. Write learning code for any implementation:
 ///
 /// ```
 /// use kinetoscope_tasks::VectorEnv;
@@ -29,21 +29,22 @@ use ndarray::{Array2, ArrayView2};
 /// }
 /// ```
 ///
-/// What an implementation promises:
+/// An implementation keeps this contract, which [`check`](fn@crate::check) tests:
 ///
-/// - spaces and the number of environments, N, never change;
-/// - [`reset`](Self::reset) comes before the first [`step`](Self::step);
-/// - an environment whose episode ends begins the next one in the same step (Gymnasium's `AutoresetMode.SAME_STEP`), with the last
-///   observation of the old one in [`Step::final_observations`]; one that somebody else has reset is truncated, and that
-///   observation is of the state after the reset ([`EndReason::Reset`](crate::EndReason::Reset) where there are reasons);
-/// - what is observed is finite; actions beyond their bounds become the bounds;
-/// - environments do not know of each other, and the same seed and actions give the same bits.
+/// - The spaces and the number of environments, N, never change.
+/// - The caller resets all environments before the first [`step`](Self::step).
+/// - An environment whose episode ends begins the next one in the same step (Gymnasium's `AutoresetMode.SAME_STEP`).
+///   The last observation of the old episode is in [`Step::final_observations`].
+/// - An episode that is reset from outside is truncated. Its final observation is that of the state after the reset
+///   ([`EndReason::Reset`](crate::EndReason::Reset) if the implementation reports reasons).
+/// - Observations are finite. Actions beyond their bounds are clamped.
+/// - Environments do not influence each other. The same seed and actions give the same bits.
 ///
-/// `Box<dyn VectorEnv<Error = E, Info = I>>` is possible: where kinds of environments are only known when the program runs.
+/// The trait is dyn-compatible: `Box<dyn VectorEnv<Error = E, Info = I>>` holds an implementation chosen at run time.
 pub trait VectorEnv {
-    /// What can go wrong.
+    /// Error type of resets and steps.
     type Error: std::error::Error + Send + Sync + 'static;
-    /// What a step tells besides: `()` for nothing.
+    /// Additional results of a step; `()` for an implementation without any.
     type Info;
 
     /// Number of environments, N.
@@ -55,19 +56,18 @@ pub trait VectorEnv {
     /// Columns of the actions.
     fn action_space(&self) -> &Space;
 
-    /// Begins new episodes where `mask` is true (everywhere where it is `None`), elsewhere nothing happens; with a seed, random
-    /// numbers start again there. Gives what is seen in all environments, shape (N, columns of
-    /// [`observation_space`](Self::observation_space)).
+    /// Begins new episodes where `mask` is true (everywhere if it is `None`), and returns the observations of all
+    /// environments, shape (N, columns of [`observation_space`](Self::observation_space)). With a `seed`, the random
+    /// numbers of these environments restart. Other environments are unchanged.
     ///
     /// # Errors
-    /// A mask that has not one value for each environment, or what else the implementation cannot do.
+    /// The mask has another length than N, or the implementation fails.
     fn reset(&mut self, mask: Option<&[bool]>, seed: Option<u64>) -> Result<Array2<f64>, Self::Error>;
 
     /// Does one step in all environments. `actions` has shape (N, columns of [`action_space`](Self::action_space)).
     ///
     /// # Errors
-    /// Actions of another shape or that are not finite, an environment that was never reset, or what else the implementation
-    /// cannot do.
+    /// The actions have another shape or are not finite, an environment was never reset, or the implementation fails.
     fn step(&mut self, actions: ArrayView2<'_, f64>) -> Result<Step<Self::Info>, Self::Error>;
 }
 

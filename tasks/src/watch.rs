@@ -1,27 +1,27 @@
-//! The observer of a task. It notes resets that the task has not asked for, by viewers and by programs, and says that the
-//! results of steps are published.
+//! The observer of a task. It records resets that the task did not request, such as those by viewers, and declares that
+//! the task publishes [`StepResult`].
 
 use kinetoscope_sim::{Moment, Observer, SimulationManager, StepResult};
 use std::any::TypeId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Notes which environments were reset.
+/// Records which environments were reset.
 #[derive(Clone, Debug)]
 pub(crate) struct Watch(Arc<[AtomicBool]>);
 
 impl Watch {
-    /// Of so many environments.
+    /// Creates the monitor of `num_envs` environments.
     pub(crate) fn new(num_envs: usize) -> Self {
         Self((0..num_envs).map(|_| AtomicBool::new(false)).collect())
     }
 
-    /// Whether an environment was reset since this was cleared.
+    /// True if the environment was reset since the last call of [`clear`](Self::clear).
     pub(crate) fn was_reset(&self, env: usize) -> bool {
         self.0[env].load(Ordering::Relaxed)
     }
 
-    /// Forgets the resets of an environment.
+    /// Clears the reset flag of an environment.
     pub(crate) fn clear(&self, env: usize) {
         self.0[env].store(false, Ordering::Relaxed);
     }

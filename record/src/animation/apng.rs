@@ -1,4 +1,4 @@
-//! Animated PNG: the frames are chunks of PNG files, as the third edition of the PNG specification, section 4.9, has them.
+//! Animated PNG: frames are chunks of PNG files, as in the third edition of the PNG specification, section 4.9.
 
 use super::{Encoder, Out, duration, sides};
 use crate::picture::Png;
@@ -10,14 +10,14 @@ struct Apng {
     size: [u32; 2],
     frames: u32,
     sequence: u32,
-    /// Where the count of frames is in the file.
+    /// File offset of the frame count.
     count_at: u64,
     data: Vec<u8>,
 }
 
 const SIGNATURE: &[u8; 8] = b"\x89PNG\r\n\x1a\n";
 
-/// The longest side of a PNG file.
+/// Largest side of a PNG file \[pixels\].
 const MOST: usize = (1 << 31) - 1;
 
 pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
@@ -40,7 +40,7 @@ fn chunk(to: &mut impl Write, kind: &[u8; 4], data: &[&[u8]]) -> Written {
     Ok(to.write_all(&crc.finalize().to_be_bytes())?)
 }
 
-/// The data of the chunks of one kind in a PNG file.
+/// Data of the chunks of one type in a PNG file.
 fn chunks<'f>(file: &'f [u8], kind: &'static [u8; 4]) -> impl Iterator<Item = &'f [u8]> {
     let mut rest = file.get(SIGNATURE.len()..).unwrap_or(&[]);
     std::iter::from_fn(move || {
@@ -56,7 +56,7 @@ fn chunks<'f>(file: &'f [u8], kind: &'static [u8; 4]) -> impl Iterator<Item = &'
 
 impl Apng {
     fn write_count(out: &mut Out, frames: u32) -> Written {
-        // Played for ever.
+        // Endless loop.
         chunk(out, b"acTL", &[&frames.to_be_bytes(), &[0; 4]])
     }
 }
@@ -82,7 +82,7 @@ impl Encoder for Apng {
         }
         control.extend_from_slice(&milliseconds.to_be_bytes());
         control.extend_from_slice(&1000_u16.to_be_bytes());
-        // The frame replaces the one before.
+        // The frame replaces the previous one.
         control.extend_from_slice(&[0, 0]);
         chunk(out, b"fcTL", &[&control])?;
         self.sequence += 1;

@@ -1,4 +1,4 @@
-//! Animated GIF: 256 colours in a frame, the best ones where there are more, and times in hundredths of a second.
+//! Animated GIF: a palette of 256 colors per frame, quantized if necessary, and times in 1/100 s.
 
 use super::{Encoder, Out, duration, rgb_of, sides};
 use crate::writer::Written;
@@ -7,13 +7,13 @@ use std::io::{self, Write};
 
 struct Gif {
     size: [u16; 2],
-    /// Writes into memory, which goes to the file after every frame.
+    /// Writes into memory, which is copied to the file after every frame.
     encoder: Option<gif::Encoder<Vec<u8>>>,
     rgb: Vec<u8>,
 }
 
-/// How coarsely the best colours are looked for where there are more than 256: 1 looks at all pixels, 30 at few. Faster than this
-/// is hardly faster, and shows.
+/// Sampling step of color quantization: 1 uses all pixels, 30 uses few. Larger values are hardly faster and visibly
+/// worse.
 const COARSENESS: i32 = 10;
 
 pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
@@ -56,7 +56,7 @@ mod tests {
         let mut file = tempfile::tempfile().unwrap();
         let mut out: Out = BufWriter::new(Box::new(file.try_clone().unwrap()));
         let mut encoder = begin([64, 64]).unwrap();
-        // 4096 reds and greens, and nothing of what a palette for everything has room for beside them.
+        // 4096 combinations of red and green, which a fixed palette of all colors represents poorly.
         let rgba: Vec<u8> =
             (0..64 * 64_u32).flat_map(|k| [(4 * (k % 64)) as u8, (4 * (k / 64)) as u8, 40, 255]).collect();
         encoder.frame(&mut out, &rgba, [0.0, 0.25]).unwrap();

@@ -1,26 +1,28 @@
-//! Pictures as an H.264 stream (ITU-T H.264, constrained baseline), without loss but for the colour space: what has changed is
-//! sent as it is, what has not is not sent.
+//! H.264 encoder (ITU-T H.264, constrained baseline), lossless except for the color conversion: changed macroblocks are
+//! sent uncompressed, unchanged ones are skipped.
 //!
-//! A picture is made of squares of 16 x 16 pixels, each of them in one of three ways: as in the picture before (clause 7.3.4,
-//! skipped), as the last row above it or the last column beside it goes on (8.3.3, Intra_16x16 without a residual), or number by
-//! number (I_PCM). What a simulation shows mostly stands still, so that few are of the third kind.
+//! A frame consists of macroblocks of 16 x 16 pixels. Each is coded in one of three ways: as in the previous frame
+//! (clause 7.3.4, skipped), as the continuation of the last row above or the last column to the left (8.3.3,
+//! Intra_16x16 without a residual), or sample by sample (I_PCM). Images of a simulation are mostly static, so that few
+//! macroblocks are of the third kind.
 
 use super::level::{HIGHEST, Level, SIDE};
 
-/// Pictures from one that stands alone to the next: where a player can begin.
+/// Number of frames from one IDR frame to the next. A player can begin at an IDR frame.
 const GROUP: u32 = 120;
 
-/// Units of the stream (7.3.1), as MP4 files have them: without start codes. What level it has is known at its end.
+/// Parameter set NAL units (7.3.1), as in MP4 files: without start codes. The level is known only at the end of the
+/// stream.
 pub(super) struct Headers {
     pub(super) sequence: Vec<u8>,
     pub(super) picture: Vec<u8>,
 }
 
-/// One picture of the stream.
+/// A coded frame.
 pub(super) struct Coded<'c> {
-    /// The unit.
+    /// NAL unit.
     pub(super) unit: &'c [u8],
-    /// Whether it can be decoded without those before.
+    /// True for an IDR frame, which does not refer to other frames.
     pub(super) alone: bool,
 }
 
@@ -28,30 +30,30 @@ pub(super) struct Stream {
     size: [usize; 2],
     now: Planes,
     before: Planes,
-    /// Pictures since the last one that stands alone.
+    /// Number of frames since the last IDR frame.
     since: u32,
-    /// How many stand alone.
+    /// Number of IDR frames.
     groups: u32,
     bits: Bits,
     unit: Vec<u8>,
-    /// For the row of squares above and the one to the left: whether their numbers were sent one by one.
+    /// True for each macroblock of the row above that was coded as I_PCM.
     above: Vec<bool>,
 }
 
-/// A picture in Y'CbCr of BT.709 with limited range, the colours at half the resolution in the middle of four pixels.
+/// A frame in Y'CbCr (BT.709, limited range) with 4:2:0 chroma, sited in the center of four pixels.
 #[derive(Clone)]
 struct Planes {
-    /// Squares per row and rows of squares.
+    /// Macroblocks per row and rows of macroblocks.
     squares: [usize; 2],
-    /// Luma, then both kinds of chroma.
+    /// Luma, then both chroma planes.
     planes: [Vec<u8>; 3],
 }
 
 impl Stream {
-    /// For pictures of a width and height; what fits, where they do not.
+    /// Creates an encoder for frames of a width and height; the error describes the supported sizes.
     pub(super) fn new(size: [usize; 2]) -> Result<Self, String> {
         let squares = size.map(|side| side.div_ceil(SIDE));
-        // Four pixels share a colour.
+        // Four pixels share a chroma sample.
         let even = size.iter().all(|side| *side > 0 && side % 2 == 0);
         if !even || !HIGHEST.has(squares) {
             let [most, all] = HIGHEST.largest();
@@ -70,14 +72,14 @@ impl Stream {
         })
     }
 
-    /// The headers of the stream, when all of it is known: for how long each picture is shown, in units of which a second has
-    /// `per_second`, and its bytes.
+    /// Parameter sets of the complete stream. `frames` are duration (in units of 1 / `per_second` s) and size (in
+    /// bytes) of each frame.
     pub(super) fn headers(&self, per_second: u32, frames: impl Iterator<Item = [u32; 2]> + Clone) -> Headers {
         let level = Level::of(self.now.squares, per_second, frames);
         Headers { sequence: sequence(self.size, level.code), picture: picture() }
     }
 
-    /// The next picture, of red, green, blue and opacity, which is left out.
+    /// Encodes the next frame from RGBA pixels, without their alpha channel.
     pub(super) fn code(&mut self, rgba: &[u8]) -> Coded<'_> {
         std::mem::swap(&mut self.now, &mut self.before);
         self.now.fill(rgba, self.size);
@@ -95,7 +97,7 @@ impl Stream {
         bits.ue(0); // pic_parameter_set_id
         bits.put(self.since % 16, 4); // frame_num
         if alone {
-            bits.ue(self.groups % 2); // idr_pic_id: not that of the one before
+            bits.ue(self.groups % 2); // idr_pic_id: differs from that of the previous IDR frame
             self.groups += 1;
             bits.put(0, 2); // no_output_of_prior_pics_flag, long_term_reference_flag
         } else {
@@ -104,8 +106,8 @@ impl Stream {
             bits.put(0, 1); // adaptive_ref_pic_marking_mode_flag
         }
         bits.se(0); // slice_qp_delta
-        bits.ue(1); // disable_deblocking_filter_idc: what is sent is what is shown
-        // In P slices the types of intra squares come after five others (table 7-13).
+        bits.ue(1); // disable_deblocking_filter_idc: the decoder shows the sent samples
+        // In P slices, intra macroblock types follow five others (table 7-13).
         let first_type = if alone { 0 } else { 5 };
         let mut skipped = 0;
         let [columns, rows] = now.squares;
@@ -125,7 +127,7 @@ impl Stream {
                 }
                 let goes_on = [Way::Down, Way::Across].into_iter().find(|way| now.goes_on(*way, place));
                 if let Some(way) = goes_on {
-                    // Intra_16x16 without coefficients (table 7-11): the mode, then that of chroma (table 7-16).
+                    // Intra_16x16 without coefficients (table 7-11): luma mode, then chroma mode (table 7-16).
                     let (luma, chroma) = match way {
                         Way::Down => (0, 2),
                         Way::Across => (1, 1),
@@ -133,7 +135,8 @@ impl Stream {
                     bits.ue(first_type + 1 + luma);
                     bits.ue(chroma);
                     bits.se(0); // mb_qp_delta
-                    // No coefficient, in the code that the neighbours call for (9.2.1): those of I_PCM count as 16.
+                    // coeff_token of no coefficient, in the table for the neighbors' counts (9.2.1); I_PCM counts as
+                    // 16.
                     let known = [(column > 0).then_some(left), (row > 0).then_some(above[column])];
                     let count = |sent: bool| if sent { 16 } else { 0 };
                     let context = match known {
@@ -142,7 +145,7 @@ impl Stream {
                     };
                     match context {
                         0 => bits.put(1, 1),
-                        // Of eight and more, six bits.
+                        // The table for eight and more has codes of six bits.
                         _ => bits.put(0b000011, 6),
                     }
                 } else {
@@ -158,18 +161,18 @@ impl Stream {
         }
         bits.end();
         self.unit.clear();
-        // nal_ref_idc 3; a picture that stands alone, or one that does not.
+        // nal_ref_idc 3; nal_unit_type 5 (IDR) or 1.
         self.unit.push(if alone { 0x65 } else { 0x61 });
         escape(&self.bits.bytes, &mut self.unit);
     }
 }
 
-/// From where a square is continued.
+/// Direction in which a macroblock is predicted.
 #[derive(Clone, Copy)]
 enum Way {
-    /// From the row above.
+    /// Down, from the row above.
     Down,
-    /// From the column to the left.
+    /// To the right, from the column to the left.
     Across,
 }
 
@@ -179,13 +182,13 @@ impl Planes {
         Self { squares, planes: [vec![0; luma], vec![0; luma / 4], vec![0; luma / 4]] }
     }
 
-    /// Side of a square in a plane, and length of its rows.
+    /// Side of a macroblock in a plane, and length of the plane's rows \[samples\].
     fn shape(&self, plane: usize) -> (usize, usize) {
         let side = if plane == 0 { SIDE } else { SIDE / 2 };
         (side, side * self.squares[0])
     }
 
-    /// Takes a picture; beyond its edges, which nobody sees, its last pixels go on.
+    /// Converts a frame. Padding beyond its edges, which is cropped, repeats the last pixels.
     fn fill(&mut self, rgba: &[u8], [width, height]: [usize; 2]) {
         let pixels = rgba.as_chunks::<4>().0;
         let [columns, rows] = self.squares.map(|count| count * SIDE / 2);
@@ -207,7 +210,7 @@ impl Planes {
         }
     }
 
-    /// The rows of a square in a plane.
+    /// Rows of a macroblock in a plane.
     fn rows(&self, plane: usize, [column, row]: [usize; 2]) -> impl Iterator<Item = &[u8]> {
         let (side, stride) = self.shape(plane);
         (0..side).map(move |k| &self.planes[plane][(row * side + k) * stride + column * side..][..side])
@@ -217,7 +220,7 @@ impl Planes {
         (0..3).all(|plane| self.rows(plane, place).eq(other.rows(plane, place)))
     }
 
-    /// Whether a square is what its neighbour's edge continues to, in all planes.
+    /// True if a macroblock equals the prediction from its neighbor's edge, in all planes.
     fn goes_on(&self, way: Way, [column, row]: [usize; 2]) -> bool {
         let place = [column, row];
         (0..3).all(|plane| {
@@ -247,12 +250,12 @@ impl Planes {
     }
 }
 
-/// BT.709 (0.2126 R + 0.7152 G + 0.0722 B) from 16 to 235, in 65536ths.
+/// Luma of BT.709 (0.2126 R + 0.7152 G + 0.0722 B) from 16 to 235, in fixed point with 16 bits.
 fn luma([red, green, blue]: [i32; 3]) -> u8 {
     ((11_966 * red + 40_254 * green + 4_064 * blue + (16 << 16) + (1 << 15)) >> 16) as u8
 }
 
-/// The differences of blue and red to luma from 16 to 240, of sums of four pixels.
+/// Chroma (Cb, Cr) of BT.709 from 16 to 240, from sums of four pixels.
 fn chroma([red, green, blue]: [i32; 3]) -> [u8; 2] {
     let middle = (128 << 18) + (1 << 17);
     let cb = -6_596 * red - 22_189 * green + 28_785 * blue + middle;
@@ -260,16 +263,16 @@ fn chroma([red, green, blue]: [i32; 3]) -> [u8; 2] {
     [(cb >> 18) as u8, (cr >> 18) as u8]
 }
 
-/// The sequence parameter set (7.3.2.1.1).
+/// Sequence parameter set (7.3.2.1.1).
 fn sequence([width, height]: [usize; 2], level: u8) -> Vec<u8> {
     let squares = [width, height].map(|side| side.div_ceil(SIDE) as u32);
     let mut bits = Bits::default();
     bits.put(66, 8); // profile_idc: baseline
-    bits.put(0b1100_0000, 8); // constrained: also main
+    bits.put(0b1100_0000, 8); // constrained: also decodable as main profile
     bits.put(level.into(), 8);
     bits.ue(0); // seq_parameter_set_id
     bits.ue(0); // log2_max_frame_num_minus4
-    bits.ue(2); // pic_order_cnt_type: shown in the order of the stream
+    bits.ue(2); // pic_order_cnt_type: display order is decoding order
     bits.ue(1); // max_num_ref_frames
     bits.put(0, 1); // gaps_in_frame_num_value_allowed_flag
     squares.iter().for_each(|count| bits.ue(count - 1));
@@ -284,24 +287,24 @@ fn sequence([width, height]: [usize; 2], level: u8) -> Vec<u8> {
     bits.put(1, 1); // vui_parameters_present_flag (annex E)
     bits.put(0, 2); // aspect_ratio_info_present_flag, overscan_info_present_flag
     bits.put(1, 1); // video_signal_type_present_flag
-    bits.put(5, 3); // video_format: not specified
+    bits.put(5, 3); // video_format: unspecified
     bits.put(0, 1); // video_full_range_flag
     bits.put(1, 1); // colour_description_present_flag
-    // Primaries and matrix of BT.709; the curve of sRGB.
+    // Primaries and matrix of BT.709; transfer function of sRGB.
     [1, 13, 1].into_iter().for_each(|code| bits.put(code, 8));
     bits.put(1, 1); // chroma_loc_info_present_flag
-    bits.ue(1); // in the middle of four pixels
+    bits.ue(1); // chroma sample in the center of four pixels
     bits.ue(1);
-    bits.put(0, 4); // timing_info, nal_hrd, vcl_hrd, pic_struct: not there
+    bits.put(0, 4); // no timing_info, nal_hrd, vcl_hrd, pic_struct
     bits.put(1, 1); // bitstream_restriction_flag
     bits.put(1, 1); // motion_vectors_over_pic_boundaries_flag
-    // No limits of bytes and bits; vectors of 0; nothing is shown later than it comes; one picture is kept.
+    // No limits of bytes and bits, zero motion vectors, no reordering, one reference frame.
     [0, 0, 0, 0, 0, 1].into_iter().for_each(|number| bits.ue(number));
     bits.end();
     unit(0x67, &bits)
 }
 
-/// The picture parameter set (7.3.2.2).
+/// Picture parameter set (7.3.2.2).
 fn picture() -> Vec<u8> {
     let mut bits = Bits::default();
     bits.ue(0); // pic_parameter_set_id
@@ -310,7 +313,7 @@ fn picture() -> Vec<u8> {
     [0, 0, 0].into_iter().for_each(|number| bits.ue(number)); // slice groups, reference indices
     bits.put(0, 3); // weighted_pred_flag, weighted_bipred_idc
     (0..3).for_each(|_| bits.se(0)); // quantizers
-    bits.put(0b100, 3); // deblocking_filter_control_present_flag; constrained_intra_pred, redundant_pic_cnt: not
+    bits.put(0b100, 3); // deblocking_filter_control_present_flag; no constrained_intra_pred, no redundant_pic_cnt
     bits.end();
     unit(0x68, &bits)
 }
@@ -321,7 +324,7 @@ fn unit(head: u8, bits: &Bits) -> Vec<u8> {
     unit
 }
 
-/// Puts a 3 into what would look like the beginning of a unit (7.4.1).
+/// Inserts emulation prevention bytes (7.4.1).
 fn escape(bytes: &[u8], to: &mut Vec<u8>) {
     let mut zeros = 0;
     for &byte in bytes {
@@ -334,11 +337,11 @@ fn escape(bytes: &[u8], to: &mut Vec<u8>) {
     }
 }
 
-/// Bits, the highest of a byte first.
+/// Bit writer, most significant bit first.
 #[derive(Default)]
 struct Bits {
     bytes: Vec<u8>,
-    /// How many bits of the last byte are free.
+    /// Number of free bits in the last byte.
     free: u32,
 }
 
@@ -348,7 +351,7 @@ impl Bits {
         self.free = 0;
     }
 
-    /// The lowest `count` bits of a number.
+    /// Writes the lowest `count` bits of a number.
     fn put(&mut self, number: u32, count: u32) {
         for k in (0..count).rev() {
             if self.free == 0 {
@@ -362,25 +365,25 @@ impl Bits {
         }
     }
 
-    /// A number as an Exp-Golomb code (9.1): as many zeros as it has bits behind its first, when one is added.
+    /// Writes an unsigned Exp-Golomb code (9.1): n zeros, then the n + 1 bits of `number + 1`.
     fn ue(&mut self, number: u32) {
         let length = 32 - (number + 1).leading_zeros();
         self.put(0, length - 1);
         self.put(number + 1, length);
     }
 
-    /// The same with a sign (9.1.1).
+    /// Writes a signed Exp-Golomb code (9.1.1).
     fn se(&mut self, number: i32) {
         let twice = 2 * number.unsigned_abs();
         self.ue(if number > 0 { twice - 1 } else { twice });
     }
 
-    /// Zeros up to the next byte.
+    /// Pads with zeros to the next byte.
     fn align(&mut self) {
         self.free = 0;
     }
 
-    /// A one, then zeros up to the next byte.
+    /// Writes the stop bit, then pads with zeros to the next byte.
     fn end(&mut self) {
         self.put(1, 1);
         self.align();
@@ -416,7 +419,7 @@ mod tests {
             assert_eq!(chroma([4 * grey; 3]), [128, 128], "{grey}");
         }
         assert_eq!([luma([0; 3]), luma([255; 3])], [16, 235]);
-        // Pure blue and pure red are the ends of their differences.
+        // Pure blue and pure red are the extreme values of Cb and Cr.
         assert_eq!([chroma([0, 0, 1020])[0], chroma([1020, 0, 0])[1]], [240, 240]);
         assert_eq!([chroma([1020, 1020, 0])[0], chroma([0, 1020, 1020])[1]], [16, 16]);
     }
@@ -433,7 +436,7 @@ mod tests {
         let again = stream.code(&noise(0));
         assert!(!again.alone && again.unit.len() < 16, "{}", again.unit.len());
         assert!(stream.code(&noise(1)).unit.len() > 64 * 48 * 3 / 2);
-        // A flat picture needs one square.
+        // A uniform frame needs one I_PCM macroblock.
         let mut flat = Stream::new(size).unwrap_or_else(|fits| panic!("{fits}"));
         let flat = flat.code(&[90; 4 * 64 * 48]).unit.len();
         assert!((384..500).contains(&flat), "{flat}");

@@ -1,21 +1,21 @@
-//! Levels of H.264: what a player has to be able to do (ITU-T H.264, table A-1, and what clause A.3.1 asks of a stream).
+//! Levels of H.264: requirements on a decoder (ITU-T H.264, table A-1 and clause A.3.1).
 
-/// Side of a square \[pixels\]: of a macroblock.
+/// Side of a macroblock \[pixels\].
 pub(super) const SIDE: usize = 16;
 
-/// A row of the table. Level 1b, which other bits tell, is left out: 1.1 does.
+/// A row of table A-1. Level 1b is omitted because other bits signal it; level 1.1 replaces it.
 pub(super) struct Level {
-    /// Ten times the level.
+    /// Ten times the level number.
     pub(super) code: u8,
-    /// Squares in a second (MaxMBPS).
+    /// Macroblocks per second (MaxMBPS).
     per_second: u64,
-    /// Squares of a picture (MaxFS).
+    /// Macroblocks per frame (MaxFS).
     squares: usize,
-    /// Bits in a second, in thousands (MaxBR).
+    /// Bit rate \[kbit/s\] (MaxBR).
     rate: u64,
-    /// Bits that wait to be decoded, in thousands (MaxCPB).
+    /// Size of the coded picture buffer \[kbit\] (MaxCPB).
     waiting: u64,
-    /// How many times fewer bytes come in than go out while squares are decoded as fast as may be (MinCR).
+    /// Minimum compression ratio of frames that are decoded at the maximum rate (MinCR).
     fewer: u64,
 }
 
@@ -45,23 +45,24 @@ const LEVELS: [Level; 19] = [
     level(62, 16_711_680, 139_264, 800_000, 800_000, 2),
 ];
 
-/// The last one: what is too much for it too is said to be of it.
+/// The highest level. It is also signaled for a stream that exceeds it.
 pub(super) const HIGHEST: &Level = &LEVELS[LEVELS.len() - 1];
 
 impl Level {
-    /// Whether it has pictures of so many squares per row, and so many rows of them: eight times as long as wide at most.
+    /// True if the level supports frames of this many macroblocks per row and rows. The side limit is the square root
+    /// of 8 MaxFS.
     pub(super) fn has(&self, [width, height]: [usize; 2]) -> bool {
         let side = (8 * self.squares).isqrt();
         width.max(height) <= side && width * height <= self.squares
     }
 
-    /// The largest pictures \[pixels\]: their sides, and how many in all.
+    /// Largest frames: side length and area \[pixels\].
     pub(super) fn largest(&self) -> [usize; 2] {
         [(8 * self.squares).isqrt() * SIDE, self.squares * SIDE * SIDE]
     }
 
-    /// The first one that has pictures of so many squares, one after the other: how long each is shown, in units of which a second
-    /// has `per_second`, and its bytes.
+    /// The lowest level for a stream. `frames` are duration (in units of 1 / `per_second` s) and size (in bytes) of
+    /// each frame.
     pub(super) fn of(
         squares: [usize; 2],
         per_second: u32,
@@ -69,7 +70,7 @@ impl Level {
     ) -> &'static Self {
         let [second, all] = [u64::from(per_second), (squares[0] * squares[1]) as u64];
         let bits = |bytes: u32| 8 * u64::from(bytes);
-        // What comes in within a second: the frames that begin in it.
+        // Largest number of bits within a second: of the frames that begin in it.
         let (mut most, mut largest, mut inside, mut since) = (0, 0, 0_u64, 0_u64);
         let mut first = frames.clone();
         for [shown, bytes] in frames.clone() {
@@ -84,7 +85,7 @@ impl Level {
             }
         }
         let fits = |level: &&Self| {
-            // A picture is decoded while the one before is shown, and its bytes come in meanwhile.
+            // A frame is decoded during the display of the previous one; its bytes arrive in that time.
             let mut pairs = frames.clone().zip(frames.clone().skip(1));
             let in_time = pairs.all(|([shown, _], [_, bytes])| {
                 let shown = u64::from(shown);
@@ -101,13 +102,13 @@ impl Level {
 mod tests {
     use super::*;
 
-    /// Pictures of these sides \[pixels\], so many in a second, each of so many bytes.
+    /// Level of frames of these sides \[pixels\], at this rate \[Hz\], each of this many bytes.
     fn of(sides: [usize; 2], rate: u32, bytes: u32) -> u8 {
         let shown = 90_000 / rate;
         Level::of(sides.map(|side| side.div_ceil(SIDE)), 90_000, (0..3 * rate).map(|_| [shown, bytes])).code
     }
 
-    /// The judge: frame sizes and the rates that they reach at most, as table A-6 of the standard lists them for levels.
+    /// Reference: frame sizes and their maximum rates by level, as listed in table A-6 of the standard.
     #[test]
     fn frame_sizes() {
         for (sides, rate, code) in [
@@ -136,14 +137,14 @@ mod tests {
 
     #[test]
     fn bit_rates() {
-        // 64 000 bits in a second are 800 bytes ten times: level 1; one byte more is level 1.1.
+        // 64 000 bits per second are ten times 800 bytes: level 1. One byte more requires level 1.1.
         assert_eq!([800, 801].map(|bytes| of([128, 96], 10, bytes)), [10, 11]);
-        // One picture alone, of as many bits as come in in a second of levels 1 and 1.1, and a byte more.
+        // A single frame with the bits per second of levels 1 and 1.1, and one byte more.
         let alone = |bytes| Level::of([8, 6], 90_000, [[90_000, bytes]].into_iter()).code;
         assert_eq!([8_000, 8_001, 24_000, 24_001].map(alone), [10, 11, 11, 12]);
-        // 1280 x 720 at 30 in a second, all squares as they are (384 bytes each): 332 Mbit/s.
+        // 1280 x 720 at 30 Hz with uncompressed macroblocks of 384 bytes: 332 Mbit/s.
         assert_eq!(of([1280, 720], 30, 3600 * 384), 61);
-        // More than any level has.
+        // More than any level supports.
         assert_eq!(of([1920, 1088], 60, 8160 * 384), 62);
     }
 }

@@ -1,5 +1,5 @@
-//! Animations: the pictures of one camera in one environment as a file that is played. A format is one file here, and one line in
-//! the list of [`Format`].
+//! Animations: the images of one camera in one environment as a video file. Each format has one file here, and one
+//! entry in the list of [`Format`].
 
 mod apng;
 mod gif;
@@ -17,20 +17,19 @@ use crate::writer::{Fault, Sink, Written};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// What frames are written to.
+/// Output of encoders.
 type Out = BufWriter<Box<dyn Storage>>;
 
-/// Writes frames as a format has them.
+/// Encoder of a format.
 trait Encoder: Send {
-    /// The next frame: its pixels, red, green, blue and opacity, and since when until when it is shown \[s\], from the first frame
-    /// on.
+    /// Encodes the next frame: RGBA pixels, and begin and end of its display \[s\], relative to the first frame.
     fn frame(&mut self, out: &mut Out, rgba: &[u8], shown: [f64; 2]) -> Written;
 
-    /// What follows the last frame, and what of the beginning is known only then.
+    /// Writes the end of the file, and the parts of its beginning that are known only now.
     fn finish(&mut self, out: &mut Out) -> Written;
 }
 
-/// How a format begins: pictures of some width and height; or what they would have to be.
+/// Creates an encoder for frames of this width and height; the error describes the supported sizes.
 type Begin = fn([usize; 2]) -> std::result::Result<Box<dyn Encoder>, String>;
 
 fn encoder(format: Format) -> Option<Begin> {
@@ -43,29 +42,29 @@ fn encoder(format: Format) -> Option<Begin> {
     }
 }
 
-/// How long a frame is shown that is the only one \[s\].
+/// Duration of a frame that is the only one \[s\].
 const ALONE: f64 = 0.04;
 
-/// An animation on its way.
+/// Writer of an animation.
 pub(crate) struct Animation {
     part: PartFile,
     file: Option<Out>,
     encoder: Box<dyn Encoder>,
-    /// The frame that waits to know how long it is shown, and its time \[s\].
+    /// The last frame, whose duration is not known yet, and its time \[s\].
     waiting: Option<(Vec<u8>, f64)>,
-    /// The time of the first frame \[s\].
+    /// Time of the first frame \[s\].
     first: Option<f64>,
-    /// How long the frame before was shown \[s\].
+    /// Duration of the previous frame \[s\].
     last: f64,
 }
 
-/// Checks that a format has pictures of this width and height.
+/// Checks that a format supports frames of this width and height.
 pub(crate) fn check(path: &Path, format: Format, size: [usize; 2]) -> Result<()> {
     begin(path, format, size).map(|_| ())
 }
 
 fn begin(path: &Path, format: Format, size: [usize; 2]) -> Result<Box<dyn Encoder>> {
-    // Nobody asks for an animation of another format.
+    // Callers use animation formats only.
     let begin = encoder(format).ok_or_else(|| RecordError::Nothing { path: path.into(), format })?;
     let [width, height] = size;
     begin(size).map_err(|fits| RecordError::Size { path: path.into(), format, width, height, fits })
@@ -78,8 +77,8 @@ impl Animation {
         Ok(Self { part, file, encoder, waiting: None, first: None, last: ALONE })
     }
 
-    /// Writes the frame that waits, which is shown until `next` \[s\]; where there is no next one, as long as the one before.
-    /// Gives its memory.
+    /// Encodes the pending frame, which ends at `next` \[s\]. Without a next frame, it has the duration of the previous
+    /// one. Returns the pixel buffer for reuse.
     fn show(&mut self, next: Option<f64>) -> Written<Vec<u8>> {
         let (Some((rgba, time)), Some(out)) = (self.waiting.take(), &mut self.file) else { return Ok(Vec::new()) };
         self.last = next.map_or(self.last, |next| next - time);
@@ -92,7 +91,7 @@ impl Animation {
 impl Sink for Animation {
     fn write(&mut self, _streams: &[Stream], packet: &Packet) -> Written {
         let Some(block) = packet.blocks.iter().find(|block| block.used) else { return Ok(()) };
-        // On the clock of the recording, which goes on over resets.
+        // The time is on the clock of the recording, which continues over resets.
         let time = block.stamps.first().copied().unwrap_or(0.0);
         let mut rgba = self.show(Some(time))?;
         rgba.clear();
@@ -102,7 +101,7 @@ impl Sink for Animation {
     }
 
     fn flush(&mut self) -> Written {
-        // Nobody can read it before the end.
+        // An animation is not readable before its end.
         Ok(())
     }
 
@@ -121,17 +120,17 @@ impl Sink for Animation {
     }
 }
 
-/// A moment as a whole number of units, of which a second has `per_second`. What is shown from one moment to the next is the
-/// difference of two of them, so that nothing adds up.
+/// Converts a time to a whole number of units. Durations are differences of these numbers, so that rounding errors do
+/// not accumulate.
 fn units(time: f64, per_second: f64) -> u64 {
-    // Negative ones become 0: there is none before the first frame.
+    // Negative times become 0: none precedes the first frame.
     (time * per_second).round() as u64
 }
 
-/// How long a frame is shown, in such units: at least one, and `most` at most.
+/// Duration of a frame in units, at least one and at most `most`.
 ///
 /// # Errors
-/// It was shown for longer than the format can say.
+/// The frame is longer than the format supports.
 fn duration<N: TryFrom<u64>>([from, until]: [f64; 2], per_second: f64, most: u64) -> Written<N> {
     let found = units(until, per_second).saturating_sub(units(from, per_second)).max(1);
     let fits = N::try_from(found).ok().filter(|_| found <= most);
@@ -141,7 +140,7 @@ fn duration<N: TryFrom<u64>>([from, until]: [f64; 2], per_second: f64, most: u64
     })
 }
 
-/// Pixels without their opacity.
+/// Copies pixels without their alpha channel.
 fn rgb_of(rgba: &[u8], rgb: &mut Vec<u8>) {
     rgb.clear();
     for pixel in rgba.as_chunks::<4>().0 {
@@ -149,7 +148,7 @@ fn rgb_of(rgba: &[u8], rgb: &mut Vec<u8>) {
     }
 }
 
-/// Width and height, where both are from 1 to `most`.
+/// Width and height, if both are from 1 to `most`.
 fn sides<N: TryFrom<usize>>(size: [usize; 2], most: usize) -> std::result::Result<[N; 2], String> {
     let side = |side: usize| N::try_from(side).ok().filter(|_| (1..=most).contains(&side));
     match size.map(side) {
@@ -164,7 +163,7 @@ mod tests {
 
     #[test]
     fn durations() {
-        // 30 frames a second in hundredths of a second: 3, 4, 3, 3, 4, ...
+        // 30 frames per second in units of 10 ms: 3, 4, 3, 3, 4, ...
         let shown = |k: u32| [f64::from(k) / 30.0, f64::from(k + 1) / 30.0];
         let all: Vec<u64> = (0..30).map(|k| duration(shown(k), 100.0, 9).unwrap()).collect();
         assert_eq!((all[..3].to_vec(), all.iter().sum::<u64>()), (vec![3, 4, 3], 100));

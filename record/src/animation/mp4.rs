@@ -1,21 +1,21 @@
-//! MP4 (ISO/IEC 14496-12, its video as in 14496-15): the pictures one after the other, then where each of them is and how long it
-//! is shown. Without that nobody can read it: it comes at the end.
+//! MP4 files (ISO/IEC 14496-12, video as in 14496-15): the frames in sequence, then the table of their offsets and
+//! durations. The file is not readable without the table, which is written at the end.
 
 use super::h264::{Headers, Stream};
 use super::{Encoder, Out, duration};
 use crate::writer::{Fault, Written};
 use std::io::{Seek, SeekFrom, Write};
 
-/// Units of time in a second: whole ones for a frame at 24, 25, 30, 50, 60, 100 per second.
+/// Units of time per second: integers for a frame at 24, 25, 30, 50, 60 and 100 Hz.
 const PER_SECOND: u32 = 90_000;
 
 struct Mp4 {
     size: [usize; 2],
     stream: Stream,
     frames: Vec<Sample>,
-    /// Where the length of the data is to be written.
+    /// File offset of the data length, which is written at the end.
     length_at: u64,
-    /// Where the next picture comes.
+    /// File offset of the next frame.
     at: u64,
 }
 
@@ -31,10 +31,10 @@ pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
     Ok(Box::new(Mp4 { size, stream, frames: Vec::new(), length_at: 0, at: 0 }))
 }
 
-/// What every box begins with: its length, with itself, and its kind.
+/// A box: its length, including the header, its type and its content.
 fn boxed(kind: &[u8; 4], parts: &[&[u8]]) -> Vec<u8> {
     let length = 8 + parts.iter().map(|part| part.len()).sum::<usize>();
-    // The largest one has some bytes for each frame.
+    // The largest box has some bytes for each frame.
     let mut all = u32::try_from(length).unwrap_or(u32::MAX).to_be_bytes().to_vec();
     all.extend_from_slice(kind);
     parts.iter().for_each(|part| all.extend_from_slice(part));
@@ -48,7 +48,7 @@ fn full(kind: &[u8; 4], version: u8, flags: u32, parts: &[&[u8]]) -> Vec<u8> {
     boxed(kind, &[&[&head[..]], parts].concat())
 }
 
-/// Numbers one after the other, highest byte first.
+/// Concatenates big-endian numbers.
 fn words<const B: usize>(numbers: impl IntoIterator<Item = [u8; B]>) -> Vec<u8> {
     numbers.into_iter().flatten().collect()
 }
@@ -57,24 +57,24 @@ fn u32s(numbers: &[u32]) -> Vec<u8> {
     words(numbers.iter().map(|number| number.to_be_bytes()))
 }
 
-/// No rotation, no scale, in fixed point.
+/// The identity matrix in fixed point: no rotation, no scale.
 const UPRIGHT: [u32; 9] = [1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30];
 
 impl Mp4 {
-    /// Everything about the pictures (8.2).
+    /// Movie metadata (8.2).
     fn about(&self) -> Vec<u8> {
         let length: u64 = self.frames.iter().map(|frame| u64::from(frame.duration)).sum();
         let length = length.to_be_bytes();
-        // Made and changed at no time that is told: the same recording is the same file.
+        // Without times of creation and modification, equal recordings give equal files.
         let never = [0; 16];
         let scale = PER_SECOND.to_be_bytes();
         let [upright, next] = [u32s(&UPRIGHT), u32s(&[2])];
         let loudness = u32s(&[1 << 16, 1 << 24, 0, 0]);
         let header = full(b"mvhd", 1, 0, &[&never, &scale, &length, &loudness, &upright, &[0; 24], &next]);
         let sides = u32s(&self.size.map(|side| (side as u32) << 16));
-        // Enabled, in the film, in its preview; the first track.
+        // Enabled, in the movie, in its preview; track 1.
         let track = full(b"tkhd", 1, 7, &[&never, &u32s(&[1, 0]), &length, &[0; 16], &upright, &sides]);
-        // The language is undetermined: `und` in five bits each.
+        // Language `und` (undetermined), five bits per letter.
         let media = full(b"mdhd", 1, 0, &[&never, &scale, &length, &[0x55, 0xc4, 0, 0]]);
         let handler = full(b"hdlr", 0, 0, &[&[0; 4], b"vide", &[0; 12], b"video\0"]);
         let here = full(b"dref", 0, 0, &[&u32s(&[1]), &full(b"url ", 0, 1, &[])]);
@@ -84,7 +84,7 @@ impl Mp4 {
         boxed(b"moov", &[&header, &track])
     }
 
-    /// The table of samples (8.5).
+    /// Sample table (8.5).
     fn table(&self) -> Vec<u8> {
         let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX).to_be_bytes();
         let mut shown: Vec<[u32; 2]> = Vec::new();
@@ -98,7 +98,7 @@ impl Mp4 {
         let times = full(b"stts", 0, 0, &[&count(shown.len()), &times]);
         let alone: Vec<u32> = (1..).zip(&self.frames).filter(|(_, frame)| frame.alone).map(|(k, _)| k).collect();
         let alone = full(b"stss", 0, 0, &[&count(alone.len()), &u32s(&alone)]);
-        // Each picture is a chunk of its own.
+        // Each frame is a chunk.
         let chunks = full(b"stsc", 0, 0, &[&u32s(&[1, 1, 1, 1])]);
         let sizes = words(self.frames.iter().map(|frame| frame.bytes.to_be_bytes()));
         let sizes = full(b"stsz", 0, 0, &[&[0; 4], &count(self.frames.len()), &sizes]);
@@ -108,16 +108,16 @@ impl Mp4 {
         boxed(b"stbl", &[&kinds, &times, &alone, &chunks, &sizes, &places])
     }
 
-    /// What the pictures are.
+    /// Sample description.
     fn kind(&self) -> Vec<u8> {
         let frames = self.frames.iter().map(|frame| [frame.duration, frame.bytes]);
         let Headers { sequence, picture } = &self.stream.headers(PER_SECOND, frames);
         let length = |unit: &[u8]| (unit.len() as u16).to_be_bytes();
-        // Lengths of units have four bytes; one unit of each kind. Profile and level are as the first says.
+        // Lengths of units have four bytes; one parameter set of each kind. Profile and level are those of the first.
         let profile = sequence.get(1..4).unwrap_or_default();
         let avc = [&[1], profile, &[0xff, 0xe1], &length(sequence), sequence, &[1], &length(picture), picture];
         let avc = boxed(b"avcC", &avc);
-        // Primaries, curve and matrix as in the stream, limited range.
+        // Primaries, transfer function and matrix as in the stream, limited range.
         let color = boxed(b"colr", &[b"nclx", &[0, 1, 0, 13, 0, 1, 0]]);
         let sides = words(self.size.map(|side| (side as u16).to_be_bytes()));
         let inch = u32s(&[72 << 16, 72 << 16, 0]);
@@ -131,7 +131,7 @@ impl Encoder for Mp4 {
         if self.frames.is_empty() {
             let brands = boxed(b"ftyp", &[b"isom", &u32s(&[0x200]), b"isomiso2avc1mp41"]);
             out.write_all(&brands)?;
-            // With a length of eight bytes, which is not known yet.
+            // The length has eight bytes and is not known yet.
             out.write_all(&u32s(&[1]))?;
             out.write_all(b"mdat\0\0\0\0\0\0\0\0")?;
             self.length_at = brands.len() as u64 + 8;
@@ -152,7 +152,7 @@ impl Encoder for Mp4 {
     fn finish(&mut self, out: &mut Out) -> Written {
         out.write_all(&self.about())?;
         out.seek(SeekFrom::Start(self.length_at))?;
-        // With its head of sixteen bytes.
+        // The length includes the header of sixteen bytes.
         Ok(out.write_all(&(self.at - self.length_at + 8).to_be_bytes())?)
     }
 }

@@ -1,5 +1,5 @@
-//! Animated WebP, without loss: each frame is the stream of a still picture in a chunk of the container that RFC 9649, section
-//! 2.7, describes.
+//! Animated WebP, lossless: each frame is the bitstream of a still image, in a chunk of the container of RFC 9649,
+//! section 2.7.
 
 use super::{Encoder, Out, duration, rgb_of, sides};
 use crate::writer::{Fault, Written};
@@ -8,22 +8,22 @@ use std::io::{self, Seek, SeekFrom, Write};
 
 struct Webp {
     size: [u32; 2],
-    /// What is in the file behind the length at its beginning \[bytes\].
+    /// Size of the file after its length field \[bytes\].
     length: u64,
     rgb: Vec<u8>,
     still: Vec<u8>,
 }
 
-/// The longest side of a stream without loss.
+/// Largest side of a lossless bitstream \[pixels\].
 const MOST: usize = 1 << 14;
 
-/// The largest length of a file (section 2.4) \[bytes\].
+/// Largest value of the length field (section 2.4) \[bytes\].
 const LONGEST: u64 = (1 << 32) - 10;
 
-/// Where the pictures begin in the file of a still one: behind `RIFF`, a length, and `WEBP`.
+/// Offset of the chunks in the file of a still image: after `RIFF`, a length, and `WEBP`.
 const CHUNKS: usize = 12;
 
-/// The frame is not blended with the one before.
+/// Blending method: the frame replaces the previous one.
 const REPLACES: u8 = 0b10;
 
 const ANIMATED: u8 = 0b10;
@@ -42,7 +42,7 @@ impl Webp {
     /// Writes a chunk, if the file has room for it.
     fn chunk(&mut self, out: &mut Out, kind: &[u8; 4], parts: &[&[u8]]) -> Written {
         let length: usize = parts.iter().map(|part| part.len()).sum();
-        // The next one begins at an even place.
+        // Chunks begin at even offsets.
         let after = self.length + 8 + (length + length % 2) as u64;
         let known = u32::try_from(length).ok().filter(|_| after <= LONGEST);
         let known =
@@ -64,7 +64,7 @@ impl Encoder for Webp {
             out.write_all(b"RIFF\0\0\0\0WEBP")?;
             self.length = 4;
             self.chunk(out, b"VP8X", &[&[ANIMATED, 0, 0, 0], &width, &height])?;
-            // No background, played for ever.
+            // No background, endless loop.
             self.chunk(out, b"ANIM", &[&[0; 4], &[0; 2]])?;
         }
         rgb_of(rgba, &mut self.rgb);
@@ -81,7 +81,7 @@ impl Encoder for Webp {
     }
 
     fn finish(&mut self, out: &mut Out) -> Written {
-        // Every chunk has seen to it that it fits.
+        // Each chunk has checked that it fits.
         let length = u32::try_from(self.length).unwrap_or(u32::MAX);
         out.seek(SeekFrom::Start(4))?;
         Ok(out.write_all(&length.to_le_bytes())?)
@@ -94,11 +94,11 @@ mod tests {
     use super::*;
     use std::io::BufWriter;
 
-    /// Root cause: the length of a file was looked at when its last frame had been written, hours later.
+    /// Root cause: the length of a file was checked after its last frame, after hours of recording.
     #[test]
     fn length_limit() {
         let rgba = [7; 4 * 16 * 16];
-        // One frame alone, and what it takes.
+        // Size of a single frame.
         let frame_at = |length: u64| {
             let file = tempfile::tempfile().unwrap();
             let mut out: Out = BufWriter::new(Box::new(file.try_clone().unwrap()));
@@ -110,7 +110,7 @@ mod tests {
         let (result, after, size) = frame_at(4);
         result.unwrap();
         assert_eq!(after - 4, size, "a chunk is counted as it is written");
-        // The last one that fits, and the first that does not: nothing of it is written.
+        // The last frame that fits, and the first that does not: it is not written at all.
         let (result, last, _) = frame_at(LONGEST - size);
         result.unwrap();
         assert_eq!(last, LONGEST);

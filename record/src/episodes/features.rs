@@ -1,4 +1,4 @@
-//! What the streams of a recording are in frames: features, whose names are the dataset's.
+//! Features of frames: values of streams, with the names of a dataset format.
 
 use crate::error::{RecordError, Result};
 use crate::format::Format;
@@ -6,64 +6,64 @@ use crate::stream::{Kind, Stream};
 use std::ops::Range;
 use std::path::Path;
 
-/// Everything that a frame has, in the order of its columns.
+/// Content of frames, in the order of the columns.
 pub(crate) struct Features {
     pub(crate) numbers: Vec<Feature>,
     pub(crate) pictures: Vec<Seen>,
-    /// The stream whose rows are frames.
+    /// Stream whose rows are frames.
     pub(crate) base: usize,
-    /// The stream that tells what came of steps of a task.
+    /// Stream with the results of task steps.
     pub(crate) outcome: Option<usize>,
 }
 
-/// Some numbers of the rows of a stream.
+/// A range of values in the rows of a stream.
 #[derive(Clone, Debug, PartialEq)]
 struct StreamPart {
     stream: usize,
     range: Range<usize>,
 }
 
-/// Numbers of a frame.
+/// A feature of numbers.
 pub(crate) struct Feature {
     pub(crate) role: Role,
-    /// What it is called in the dataset.
+    /// Name in the dataset.
     pub(crate) name: String,
-    /// What each of the numbers is.
+    /// Name of each number.
     pub(crate) names: Vec<String>,
     /// Sources of the numbers.
     parts: Vec<StreamPart>,
 }
 
-/// Pictures of frames.
+/// A feature of images.
 pub(crate) struct Seen {
     pub(crate) stream: usize,
-    /// What they are called in the dataset.
+    /// Name in the dataset.
     pub(crate) name: String,
-    /// Width and height.
+    /// Width and height \[pixels\].
     pub(crate) size: [usize; 2],
 }
 
-/// What a feature is of.
+/// Meaning of a feature.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
-    /// Positions of joints.
+    /// Joint positions.
     Positions,
     Velocities,
     Efforts,
-    /// What joints are told: positions, or controls.
+    /// Joint position targets, or controls.
     Action,
     TargetVelocities,
     TargetEfforts,
-    /// Poses of objects.
+    /// Object poses.
     Objects,
-    /// Time, positions and velocities as MuJoCo has them.
+    /// Time, positions and velocities in MuJoCo's order.
     EngineState,
-    /// A channel of a sensor.
+    /// Channel of a sensor.
     Sensor {
         stream: String,
         channel: String,
     },
-    /// Colour of a camera.
+    /// Color image of a camera.
     Picture(String),
 }
 
@@ -72,19 +72,19 @@ const TARGETS: [Role; 3] = [Role::Action, Role::TargetVelocities, Role::TargetEf
 const CONTROLS: [Role; 3] = [Role::Positions, Role::Velocities, Role::Action];
 
 impl Role {
-    /// Whether that of a frame comes with the row after it.
+    /// True if the value of a frame comes with the next row.
     pub(crate) fn is_action(&self) -> bool {
         matches!(self, Self::Action | Self::TargetVelocities | Self::TargetEfforts)
     }
 
-    /// Of formats that tell more than one row of a frame: whether it is observed. Then what it is when the action was done is told too.
+    /// True if the feature is an observation, which robomimic also stores as `next_obs`.
     #[cfg(feature = "hdf5")]
     pub(crate) fn is_observed(&self) -> bool {
         !self.is_action() && *self != Self::EngineState
     }
 }
 
-/// Whether a dataset has a place for a stream.
+/// True if datasets support a stream.
 pub(crate) fn holds(stream: &Stream) -> bool {
     match &stream.kind {
         Kind::Joints { .. } | Kind::Imu | Kind::Numbers { .. } | Kind::Outcome => true,
@@ -94,7 +94,7 @@ pub(crate) fn holds(stream: &Stream) -> bool {
     }
 }
 
-/// Links have several poses, and follow from joints.
+/// True for poses of objects. Poses of links follow from joints and are not supported.
 fn is_object(stream: &Stream) -> bool {
     matches!(&stream.kind, Kind::Poses { frames } if stream.name == format!("{}/pose", frames.join("/")))
 }
@@ -105,10 +105,10 @@ fn is_mjcf(stream: &Stream) -> bool {
 }
 
 impl Features {
-    /// `name` gives the names of roles in the dataset.
+    /// Collects the features of streams. `name` returns the name of a role in the dataset.
     ///
     /// # Errors
-    /// There is nothing whose rows could be frames, or two things have the same name.
+    /// No stream has rows that can be frames, or two features have the same name.
     pub(crate) fn of(path: &Path, format: Format, streams: &[Stream], name: fn(&Role) -> String) -> Result<Self> {
         let mut all = Self { numbers: Vec::new(), pictures: Vec::new(), base: 0, outcome: None };
         let mut base = None;
@@ -167,7 +167,7 @@ impl Features {
         Ok(all)
     }
 
-    /// Joints of several robots are one feature.
+    /// Adds values to the feature of a role. The joints of several robots are one feature.
     fn append(&mut self, role: Role, name: fn(&Role) -> String, names: Vec<String>, part: StreamPart) {
         let joins = !matches!(role, Role::Sensor { .. });
         match self.numbers.iter_mut().find(|feature| joins && feature.role == role) {
@@ -183,14 +183,14 @@ impl Features {
         self.numbers.iter().map(|feature| &*feature.name).chain(self.pictures.iter().map(|picture| &*picture.name))
     }
 
-    /// Width and height of the pictures of a stream, if it has any.
+    /// Width and height of the images of a stream, if it has images.
     pub(crate) fn size_of(&self, stream: usize) -> Option<[usize; 2]> {
         self.pictures.iter().find(|picture| picture.stream == stream).map(|picture| picture.size)
     }
 }
 
 impl Feature {
-    /// Its numbers among the rows of all streams, if they are all there.
+    /// Values of the feature in the present rows of all streams, if all of them exist.
     pub(crate) fn values(&self, rows: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
         let mut values = Vec::with_capacity(self.names.len());
         for StreamPart { stream, range } in &self.parts {

@@ -1,11 +1,12 @@
-//! What happened, as episodes of frames: what datasets to learn from are made of, whatever their files are.
+//! Episodes and frames of learning datasets, independent of their file formats.
 //!
-//! An episode is what an environment does from one reset to the next. Its frames have one rate, that of the rows of the recording; a
-//! frame holds what was last measured, and the action that came next: the targets of the step that followed. So the last row of an
-//! episode, which no action followed, is no frame.
+//! An episode lasts from one reset of an environment to the next. Its frames have one rate, that of the rows of the
+//! recording. A frame contains the last measurements and the action that follows: the targets of the next step. The
+//! last row of an episode, which no action follows, is therefore no frame.
 //!
-//! What a task tells after the step ([`Kind::Outcome`](crate::stream::Kind::Outcome)) is of the action of the frame before: a frame waits
-//! for it until the row after its next one. Where a frame is longer than a step of the task, rewards are added up.
+//! The result of a task step ([`Kind::Outcome`](crate::stream::Kind::Outcome)) belongs to the action of the previous
+//! frame. A frame therefore waits for results until the second row after it. If a frame lasts longer than a step of the
+//! task, its rewards are summed.
 
 mod features;
 
@@ -18,71 +19,72 @@ use std::sync::Arc;
 
 pub(crate) use features::{Features, Role, holds};
 
-/// What is wrong where no frame came of a recording.
+/// Explanation of a recording without any frame.
 pub(crate) const NO_FRAME: &str = "every one needs all that is measured, and the action after it";
 
-/// A dataset on its way. Its environments have numbers: their places in [`environments`].
+/// Writer of a dataset. Its environments are numbered by their index in [`environments`].
 pub(crate) trait Dataset: Send {
-    /// A picture, as the dataset keeps it.
+    /// An encoded image.
     type Picture: Send + Sync;
 
-    /// What is kept of a picture of red, green, blue and opacity, which is left out; width and height.
+    /// Encodes RGBA pixels without their alpha channel; `size` is width and height.
     fn picture(&mut self, rgba: &[u8], size: [usize; 2]) -> Written<Self::Picture>;
 
-    /// An episode begins in an environment, if none goes on: a frame of it comes. Episodes have the order in which they begin.
+    /// Begins an episode in an environment, unless one is in progress. A frame follows. Episodes are numbered in the
+    /// order in which they begin.
     fn begin(&mut self, env: usize);
 
-    /// Adds a frame to the episode of an environment, which has begun. `next` is what was measured when the
-    /// action had been done; its actions are older ones.
+    /// Adds a frame to the present episode of an environment. `next` contains the observations after the action; its
+    /// own actions are outdated.
     fn add(&mut self, env: usize, frame: &Frame<Self::Picture>, next: &Frame<Self::Picture>) -> Written;
 
-    /// Ends the episode of an environment, if there is one.
+    /// Ends the present episode of an environment, if there is one.
     fn end(&mut self, env: usize) -> Written;
 
-    /// Makes the dataset whole and gives it its name, when all episodes have ended; returns its size \[bytes\].
+    /// Completes the dataset after the last episode and gives it its name; returns its size \[bytes\].
     fn finish(&mut self) -> Written<u64>;
 
-    /// After an error: where what was written can be read.
+    /// Path of the partial dataset after an error, if it can be read.
     fn kept(&self) -> Option<PathBuf>;
 }
 
-/// What a frame has.
+/// Content of a frame.
 pub(crate) struct Frame<P> {
-    /// Those of each feature.
+    /// Values of each feature.
     pub(crate) numbers: Vec<Vec<f64>>,
     pub(crate) pictures: Vec<Arc<P>>,
-    /// What its action earned, as far as a task has told it.
+    /// Sum of the rewards of its action so far; 0 without a task.
     pub(crate) reward: f64,
-    /// Whether the episode ended with its action, as a task has told it.
+    /// True if the episode ended with its action, according to the task.
     pub(crate) done: bool,
 }
 
-/// Makes frames and episodes of packets.
+/// Splits packets into frames and episodes.
 pub(crate) struct Episodes<D: Dataset> {
     dataset: D,
     features: Arc<Features>,
-    /// Steps from one row to the next.
+    /// Steps between two rows.
     every: u64,
     envs: Vec<Env<D::Picture>>,
 }
 
 struct Env<P> {
     env: usize,
-    /// What was measured last, for each stream.
+    /// Last measured values of each stream.
     numbers: Vec<Option<Vec<f64>>>,
     pictures: Vec<Option<Arc<P>>>,
     /// The frame that waits for its action.
     pending: Option<Frame<P>>,
-    /// The step of its row.
+    /// Step of its row.
     pending_at: u64,
-    /// The frame before it, which waits for what came of its action.
+    /// The frame before it, which waits for the result of its action.
     complete: Option<Frame<P>>,
 }
 
-/// The environments of a dataset, in which every stream is.
+/// Environments of a dataset. Each must have all streams.
 ///
 /// # Errors
-/// One of them is not there.
+/// A stream is missing in one of them.
 pub(crate) fn environments(path: &Path, streams: &[Stream]) -> Result<Vec<usize>> {
     let mut envs: Vec<usize> = streams.iter().flat_map(|stream| stream.env_ids.iter().copied()).collect();
     envs.sort_unstable();
@@ -96,7 +98,7 @@ pub(crate) fn environments(path: &Path, streams: &[Stream]) -> Result<Vec<usize>
 }
 
 impl<D: Dataset> Episodes<D> {
-    /// Of the environments `envs`; a row every so many steps.
+    /// Creates the splitter for environments `envs`, with `every` steps between two rows.
     pub(crate) fn new(dataset: D, features: Arc<Features>, every: u64, envs: &[usize], streams: &[Stream]) -> Self {
         let count = streams.len();
         let none = |env: &usize| Env {
@@ -110,12 +112,12 @@ impl<D: Dataset> Episodes<D> {
         Self { dataset, features, every, envs: envs.iter().map(none).collect() }
     }
 
-    /// Whether the rows of a step are frames, whatever happened there.
+    /// True if the row of a step is a frame, regardless of events.
     fn is_due(&self, step: u64) -> bool {
         step.is_multiple_of(self.every)
     }
 
-    /// Takes what is new of an environment.
+    /// Stores the new values of an environment.
     fn take(&mut self, k: usize, streams: &[Stream], packet: &Packet) -> Written {
         let Env { env, numbers, pictures, .. } = &mut self.envs[k];
         let outcome = self.features.outcome;
@@ -139,7 +141,7 @@ impl<D: Dataset> Episodes<D> {
         Ok(())
     }
 
-    /// What there is now, if there is something of everything; actions are filled in later.
+    /// Frame of the present values, if all streams have a value; actions are filled in later.
     fn now(&self, k: usize) -> Option<Frame<D::Picture>> {
         let Env { numbers, pictures, .. } = &self.envs[k];
         let numbers = self.features.numbers.iter().map(|feature| feature.values(numbers));
@@ -148,13 +150,13 @@ impl<D: Dataset> Episodes<D> {
         Some(Frame { numbers, pictures, reward: 0.0, done: false })
     }
 
-    /// The frame of a row, which waits for its action.
+    /// Creates the frame of a row, which waits for its action.
     fn wait(&mut self, k: usize, step: u64) {
         self.envs[k].pending = self.now(k);
         self.envs[k].pending_at = step;
     }
 
-    /// Adds the frame that waits for what came of its action: nothing more will.
+    /// Adds the frame that waits for results, because no further ones follow.
     fn settle(&mut self, k: usize) -> Written {
         let Env { pending, complete, .. } = &mut self.envs[k];
         match (complete.take(), pending) {
@@ -163,11 +165,11 @@ impl<D: Dataset> Episodes<D> {
         }
     }
 
-    /// A task tells what came of a step.
+    /// Adds the result of a task step.
     fn judged(&mut self, k: usize, values: &[f64], step: u64) {
         let [reward, terminated, truncated] = *values else { return };
         let Env { pending, pending_at, complete, .. } = &mut self.envs[k];
-        // Of the step that led to the row that waits: its action is that of the frame before, if there is one.
+        // A result at the step of the pending row belongs to the action of the frame before it, if there is one.
         let frame = if step == *pending_at { complete } else { pending };
         if let Some(frame) = frame {
             frame.reward += reward;
@@ -175,9 +177,9 @@ impl<D: Dataset> Episodes<D> {
         }
     }
 
-    /// The episode of an environment has ended.
+    /// Ends the episode of an environment.
     fn ended(&mut self, k: usize) -> Written {
-        // What was told after the last frame counts to it: the row after it is none.
+        // Results after the last frame are added to it, because the row after it is no frame.
         let Env { pending, complete, .. } = &mut self.envs[k];
         if let (Some(last), Some(rest)) = (complete, pending) {
             last.reward += rest.reward;
@@ -188,10 +190,10 @@ impl<D: Dataset> Episodes<D> {
         self.dataset.end(k)
     }
 
-    /// A row is due.
+    /// Handles a regular row.
     fn due(&mut self, k: usize, step: u64, fresh: bool) -> Written {
         if !fresh {
-            // It stands still: it has diverged.
+            // A diverged environment has no new values.
             return self.ended(k);
         }
         self.settle(k)?;
@@ -234,13 +236,13 @@ impl<D: Dataset> Sink for Episodes<D> {
             let fresh = row.is_some_and(|row| block.fresh[row]);
             match (&packet.event, happened) {
                 (None, _) => self.due(k, packet.step, fresh)?,
-                // What somebody has written is where the next action begins, where a row was due at all.
+                // A write at a regular row replaces the state in which the next action begins.
                 (_, Some(EventKind::Written)) if self.envs[k].pending.is_some() && self.is_due(packet.step) => {
                     self.settle(k)?;
                     self.wait(k, packet.step);
                 }
                 (_, Some(EventKind::Reset)) if self.is_due(packet.step) => self.wait(k, packet.step),
-                // Something happened to others before this row was taken.
+                // The event concerned other environments, before this regular row.
                 (_, None) if fresh => self.due(k, packet.step, true)?,
                 _ => {}
             }
@@ -249,7 +251,7 @@ impl<D: Dataset> Sink for Episodes<D> {
     }
 
     fn flush(&mut self) -> Written {
-        // Nobody can read it before the end.
+        // A dataset is not readable before its end.
         Ok(())
     }
 

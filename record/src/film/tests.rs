@@ -5,7 +5,8 @@ use kinetoscope_testkit::worlds::{object, sr5};
 
 const STEPS: usize = 30;
 
-/// An arm that moves, one with a free base, a cube that falls, a box that is moved by hand, a part with a ball and a slide.
+/// A moving arm, an arm with a free base, a falling cube, a kinematic box, and an MJCF part with a ball and a slide
+/// joint.
 fn busy() -> SimulationManager {
     let mut sim = simulation(2);
     sim.add_robot(sr5("arm")).unwrap();
@@ -22,7 +23,7 @@ fn busy() -> SimulationManager {
     sim
 }
 
-/// Poses of all bodies that are called so in both, in both environments.
+/// Poses of the bodies of the recorded scene, in both environments.
 fn poses(sim: &SimulationManager) -> Vec<(String, Array2<f64>)> {
     let mut poses = Vec::new();
     for (uid, robot) in sim.entities().robot_ids() {
@@ -49,7 +50,7 @@ fn recorded(path: &Path, scene: bool) -> Vec<Vec<(String, Array2<f64>)>> {
         sim.robot_mut(arm).set_qpos_target(&targets, None, None).unwrap();
         let row = ndarray::array![[1.0, 1.0 + 0.01 * step as f64, 0.8, 0.6, 0.0, 0.8, 0.0]];
         sim.rigid_object_mut(hand).write_pose(&row, Some(&[EnvId(step % 2)])).unwrap();
-        // What was written is recorded at the time of the step before: it is what is shown there.
+        // A write is recorded at the time of the previous step, and is shown at that time.
         all.push(poses(&sim));
         sim.update(1);
     }
@@ -58,7 +59,7 @@ fn recorded(path: &Path, scene: bool) -> Vec<Vec<(String, Array2<f64>)>> {
     all
 }
 
-/// Largest distance of what a film shows from what was, of positions and quaternions, and of which body at which step.
+/// Largest difference of displayed and original positions and quaternions, with the body and the step.
 fn largest_difference(
     film: &mut Film,
     sim: &mut SimulationManager,
@@ -66,7 +67,7 @@ fn largest_difference(
 ) -> (f64, String) {
     let mut largest = (0.0, String::new());
     for (step, expected) in all.iter().enumerate() {
-        // The state after a step is the last that was recorded at its time; a recording that began at step 3 begins at 0.03 s.
+        // The state after a step is the last one recorded at its time. The recording begins at step 3, at 0.03 s.
         let frame = film.frame_at(0.01 * (step + 3) as f64);
         film.show(sim, frame).unwrap();
         let part = sim.mjcf_part(film.part);
@@ -90,7 +91,7 @@ fn largest_difference(
     largest
 }
 
-/// A recording alone shows where everything was.
+/// A recording alone contains the poses of all bodies.
 #[test]
 fn poses_of_a_recording() {
     let folder = tempfile::tempdir().unwrap();
@@ -101,22 +102,23 @@ fn poses_of_a_recording() {
         assert_eq!(sim.num_envs(), 2);
         assert!(film.unmoved().is_empty(), "{:?}", film.unmoved());
         assert_eq!(film.times().len(), STEPS + 1, "{name}: {:?}", film.times());
-        // The same joints in the same chain, computed by the same engine of a model that was written with all digits.
+        // The same joints and the same engine, with a model that was written with all digits.
         let largest = largest_difference(&mut film, &mut sim, &all);
         assert!(largest.0 < 1e-9, "{name}: {largest:?}");
-        // To and fro.
+        // Seeks forward and backward.
         film.show(&mut sim, STEPS).unwrap();
         let end = sim.mjcf_part(film.part).qpos();
         film.show(&mut sim, 0).unwrap();
         assert_ne!(sim.mjcf_part(film.part).qpos(), end);
         film.show(&mut sim, usize::MAX).unwrap();
         assert_eq!(sim.mjcf_part(film.part).qpos(), end);
-        // The control: what was recorded a step later is elsewhere.
+        // Control: states of the next step differ.
         assert!(largest_difference(&mut film, &mut sim, &all[1..]).0 > 1e-4);
     }
 }
 
-/// From step 15 on nothing is known of environment 1, as of one that diverged: it stays there, whichever frame was shown before.
+/// From step 15 on, environment 1 has no finite values, as after a divergence. It stays in its state of step 15,
+/// whichever frame was shown before.
 #[test]
 fn divergence() {
     const LOST: usize = 15;
@@ -141,7 +143,7 @@ fn divergence() {
             let seen = at(&mut film, STEPS);
             assert_eq!(seen.0.row(1), last.0.row(1), "{name}: from {from}");
             assert_eq!(seen.1.row(1), last.1.row(1), "{name}: from {from}");
-            // The control: the other environment goes on.
+            // Control: the other environment continues.
             assert_eq!(seen.0.row(0), whole.0.row(0), "{name}");
             assert_ne!(seen.0.row(0), last.0.row(0), "{name}");
         }
@@ -163,7 +165,7 @@ fn without_a_scene() {
     assert!(error.contains("nothing that moves"), "{error}");
 }
 
-/// Joints that were not recorded are named.
+/// Joints without recorded values are listed.
 #[test]
 fn unrecorded_joints() {
     let (_folder, path) = scratch("run.mcap");
@@ -196,7 +198,7 @@ fn damaged_scenes() {
         let error = scene_file::unpack(&packed[..end], path).unwrap_err().to_string();
         assert!(error.contains("damaged"), "{error}");
     }
-    // A file that would be written elsewhere.
+    // Names that lead out of the folder.
     for name in ["../away.xml", "/away.xml", "a/../../away.xml"] {
         let mut archive = crate::zip::Archive::new(std::io::Cursor::new(Vec::new()));
         archive.add(name, b"", &mut &b"x"[..]).unwrap();

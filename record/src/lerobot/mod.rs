@@ -1,4 +1,4 @@
-//! LeRobot datasets, version 3.0: a folder with one Parquet file for each episode and what is known of all of them.
+//! LeRobot datasets, version 3.0: a folder with a Parquet file for each episode, and metadata.
 
 mod parquet;
 mod statistics;
@@ -20,19 +20,19 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The file that says that a folder is a dataset; the last one that is written.
+/// The metadata file that makes a folder a dataset. It is written last.
 const INFO: &str = "meta/info.json";
-/// The file that says that a recorder of ours wrote it, so that it may be replaced. It is locked as long as there is one.
+/// The file that marks a folder as that of a recorder, which may be replaced. It is locked while the recorder exists.
 const MARKER: &str = "meta/.kinetoscope";
 
-/// Files of a folder.
+/// Number of files in a folder.
 const CHUNK: u64 = 1000;
 
-/// Rows are written when there are so many, or so many bytes of them.
+/// Rows are written at this number of rows or bytes.
 const ROWS: usize = 256;
 const BYTES: usize = 1 << 20;
 
-/// Columns that every dataset has behind its features.
+/// Columns of every dataset, after its features.
 const COMMON: [(&str, &str); 5] = [
     ("timestamp", "float32"),
     ("frame_index", "int64"),
@@ -41,34 +41,34 @@ const COMMON: [(&str, &str); 5] = [
     ("task_index", "int64"),
 ];
 
-/// What came of the action of a frame, where a task told it.
+/// Results of the action of a frame, with a task only.
 const REWARD: &str = "next.reward";
 const DONE: &str = "next.done";
 
-/// A dataset on its way.
+/// Writer of a LeRobot dataset.
 struct LeRobot {
     folder: PartFolder,
     disk: Disk,
-    /// The marker, locked.
+    /// The marker file, locked.
     _lock: File,
     fps: u64,
     task: String,
     features: Arc<Features>,
-    /// The episode that goes on in each environment.
+    /// Present episode of each environment.
     running: Vec<Option<Running>>,
-    /// Frames of each episode that was begun, and where its file has the numbers of its frames in the dataset.
+    /// Length of each episode, and the positions of its `index` column.
     episodes: Vec<Episode>,
     statistics: Vec<Statistics>,
     png: Png,
 }
 
-/// A picture that was measured.
+/// An encoded image, with its statistics.
 struct Picture {
     file: Vec<u8>,
     about: OfPicture,
 }
 
-/// An episode that goes on.
+/// An episode in progress.
 struct Running {
     episode: usize,
     table: Table,
@@ -82,18 +82,18 @@ struct Running {
 struct Episode {
     frames: u64,
     file: PathBuf,
-    /// Places and numbers of rows, as the table says.
+    /// File offset and number of rows of each part of the `index` column.
     index: Vec<(u64, u64)>,
 }
 
-/// Frames in a second, which are a whole number.
+/// Frames per second, which must be a whole number.
 ///
 /// # Errors
-/// The rows of the recording have another rate.
+/// The rate of the recording is not a whole number.
 fn rate(path: &Path, dt: f64, every: u64) -> Result<u64> {
     let found = 1.0 / (dt * every as f64);
     let whole = found.round();
-    // A thousandth of a frame in an hour of them.
+    // The tolerance is a thousandth of a frame per hour.
     if whole >= 1.0 && (found - whole).abs() < 1e-8 * whole {
         return Ok(whole as u64);
     }
@@ -107,7 +107,7 @@ fn rate(path: &Path, dt: f64, every: u64) -> Result<u64> {
     Err(RecordError::Rate { path: path.into(), every, found, near })
 }
 
-/// What a role is called in a dataset. Names of features have no strokes.
+/// Name of a role in a dataset. Feature names must not contain slashes.
 fn name_of(role: &Role) -> String {
     let dotted = |name: &str| name.replace('/', ".");
     match role {
@@ -124,14 +124,14 @@ fn name_of(role: &Role) -> String {
     }
 }
 
-/// Begins a dataset; `dt` is the time of a step \[s\].
+/// Creates a dataset; `dt` is the physics time step \[s\].
 pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64, disk: &Disk) -> Result<Box<dyn Sink>> {
     let RecorderCfg { path, every, overwrite, task, .. } = cfg;
     let fps = rate(path, dt, *every)?;
     let features = Arc::new(Features::of(path, Format::LeRobot, streams, name_of)?);
     let statistics = features.numbers.iter().map(|feature| Statistics::new(feature.names.len()));
     let statistics = statistics.chain(features.pictures.iter().map(|_| Statistics::new(3)));
-    // Of rewards and ends.
+    // Statistics of rewards and ends.
     let of_outcome = features.outcome.iter().flat_map(|_| [1, 1].map(Statistics::new));
     let statistics = statistics.chain(of_outcome).collect();
     let envs = episodes::environments(path, streams)?;
@@ -151,7 +151,7 @@ pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64, disk: &Disk
     Ok(Box::new(Episodes::new(dataset, features, *every, &envs, streams)))
 }
 
-/// What a frame has, as columns.
+/// Columns of a frame.
 fn columns(features: &Features) -> Vec<(String, Kind)> {
     let numbers = features.numbers.iter().map(|feature| (feature.name.clone(), Kind::Float32(feature.names.len())));
     let pictures = features.pictures.iter().map(|picture| (picture.name.clone(), Kind::Picture));
@@ -164,7 +164,7 @@ fn columns(features: &Features) -> Vec<(String, Kind)> {
     numbers.chain(pictures).chain(outcome).chain(common).collect()
 }
 
-/// The same, as `meta/info.json` has it.
+/// Features, as described in `meta/info.json`.
 fn described(features: &Features) -> Map<String, Value> {
     let numbers = features.numbers.iter().map(|feature| {
         let names = &feature.names;
@@ -217,7 +217,7 @@ impl Dataset for LeRobot {
             ends.push(u8::from(*done));
         }
         let time = (running.frames as f64 / self.fps as f64) as f32;
-        // The place in the dataset is known at the end.
+        // The index in the dataset is known at the end only.
         let whole = [running.frames, running.episode as u64, 0, 0];
         if let Some(to) = leaves.next() {
             to.extend_from_slice(&time.to_le_bytes());
@@ -240,7 +240,7 @@ impl Dataset for LeRobot {
         Ok(())
     }
 
-    /// The file of the episode is whole.
+    /// Completes the file of the episode.
     fn end(&mut self, env: usize) -> Written {
         let Some(mut running) = self.running[env].take() else { return Ok(()) };
         running.write(&self.disk)?;
@@ -265,7 +265,7 @@ impl Dataset for LeRobot {
         let of_all = names.zip(&self.statistics).map(|(name, one)| (name.to_string(), one.told()));
         out.write_all(format!("{:#}\n", Value::Object(of_all.collect())).as_bytes())?;
         out.into_inner().map_err(io::IntoInnerError::into_error)?.sync()?;
-        // The last one: a folder with it is a dataset.
+        // Written last, because it makes the folder a dataset.
         let info = format!("{:#}\n", self.info());
         let mut out = self.file(INFO)?;
         out.write_all(info.as_bytes())?;
@@ -287,7 +287,7 @@ impl LeRobot {
         Ok(BufWriter::new(self.disk.storage(File::create(path)?)))
     }
 
-    /// The only task, which is the index of its table, as pandas has it.
+    /// Writes the only task, which is the index of its table in pandas.
     fn write_tasks(&self) -> Written {
         let index = "__index_level_0__";
         let column = |name: Option<&str>, field, pandas, numpy| json!({ "name": name, "field_name": field, "pandas_type": pandas, "numpy_type": numpy, "metadata": null });
@@ -365,7 +365,7 @@ impl LeRobot {
         })
     }
 
-    /// Numbers the frames of all episodes: how many there are before is known only now.
+    /// Writes the indices of all frames in the dataset, which are known only now.
     fn number_frames(&self) -> io::Result<()> {
         let mut next = 0_u64;
         for episode in &self.episodes {
@@ -387,7 +387,7 @@ fn data_file(episode: u64) -> String {
 }
 
 impl Running {
-    /// Files are open only while they are written: there may be thousands.
+    /// Opens the file for appending. Files are open only during writes, because there may be thousands.
     fn open(&self, disk: &Disk) -> io::Result<Box<dyn Storage>> {
         self.file.parent().map_or(Ok(()), fs::create_dir_all)?;
         Ok(disk.storage(OpenOptions::new().create(true).append(true).open(&self.file)?))
@@ -405,7 +405,7 @@ impl Running {
     }
 }
 
-/// All files of a folder \[bytes\].
+/// Size of all files of a folder \[bytes\].
 fn size_of(folder: &Path) -> io::Result<u64> {
     let mut bytes = 0;
     for entry in fs::read_dir(folder)? {

@@ -1,40 +1,41 @@
-//! Parquet files, as far as LeRobot datasets need them: flat columns, lists of one length, pictures; no compression, no missing
-//! values. The layout is that of the Apache Parquet format, its descriptions are in Thrift's compact protocol.
+//! Parquet files with the features that LeRobot datasets need: flat columns, lists of equal length and images, without
+//! compression and missing values. The layout follows the Apache Parquet format; metadata are in Thrift's compact
+//! protocol.
 
 use crate::writer::{Fault, Written};
 use std::io::Write;
 
-/// What a column holds in each row.
+/// Type of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Whole numbers.
+    /// 64-bit integer.
     Int64,
-    /// Yes or no: a byte each, 1 or 0, which are packed when they are written.
+    /// Boolean, passed as one byte, 1 or 0, and packed when written.
     Bool,
-    /// As many numbers; one alone is no list.
+    /// This number of floats; one alone is no list.
     Float32(usize),
-    /// A text.
+    /// A string.
     Text,
-    /// A list of one text.
+    /// A list of one string.
     Texts,
-    /// A file in a format for pictures, and its name.
+    /// An image file and its name.
     Picture,
 }
 
-/// A column that holds values: those of pictures have two.
+/// A physical column. Images have two.
 struct Leaf {
     path: Vec<String>,
-    /// The physical type: 0 BOOLEAN, 2 INT64, 4 FLOAT, 6 BYTE_ARRAY.
+    /// Physical type: 0 BOOLEAN, 2 INT64, 4 FLOAT, 6 BYTE_ARRAY.
     physical: i64,
-    /// Values in each row, where they are a list.
+    /// Length of the lists, for a column of lists.
     list: Option<usize>,
 }
 
-/// A file on its way: row groups one after the other, then what is where.
+/// Writer of a file: row groups in sequence, then the metadata.
 pub(crate) struct Table {
     columns: Vec<(String, Kind)>,
     leaves: Vec<Leaf>,
-    /// Bytes until now.
+    /// Bytes written so far.
     at: u64,
     rows: u64,
     groups: Vec<Group>,
@@ -42,7 +43,7 @@ pub(crate) struct Table {
 
 struct Group {
     rows: u64,
-    /// For each leaf: where its page begins, how long it is, where its values begin.
+    /// For each leaf: offset of its page, size of the page, offset of the values.
     pages: Vec<(u64, u64, u64)>,
 }
 
@@ -71,13 +72,13 @@ impl Table {
         Self { columns, leaves, at: 0, rows: 0, groups: Vec::new() }
     }
 
-    /// How many columns with values there are.
+    /// Number of physical columns.
     pub(crate) fn width(&self) -> usize {
         self.leaves.len()
     }
 
-    /// Writes some rows: the values of each leaf, one after the other, lowest byte first, texts and files behind their lengths
-    /// ([`put_bytes`]).
+    /// Writes a row group: the little-endian values of each leaf, concatenated. Strings and files are prefixed by their
+    /// lengths ([`put_bytes`]).
     pub(crate) fn write(&mut self, out: &mut impl Write, rows: usize, values: &[Vec<u8>]) -> Written {
         if self.at == 0 {
             out.write_all(MAGIC)?;
@@ -85,7 +86,7 @@ impl Table {
         }
         let mut pages = Vec::new();
         for (leaf, values) in self.leaves.iter().zip(values) {
-            // Eight in a byte, the first in its lowest bit.
+            // Eight per byte, the first in the lowest bit.
             let bits = |eight: &[u8]| eight.iter().enumerate().fold(0, |byte, (k, one)| byte | (one & 1) << k);
             let packed: Vec<u8> =
                 if leaf.physical == BOOLEAN { values.chunks(8).map(bits).collect() } else { Vec::new() };
@@ -104,14 +105,14 @@ impl Table {
         Ok(())
     }
 
-    /// Where the values of a column of whole numbers are: the place in the file and the number of rows of each group.
+    /// File offset of the values and number of rows of each row group, for an integer column.
     pub(crate) fn places(&self, name: &str) -> Vec<(u64, u64)> {
         let leaf = self.leaves.iter().position(|leaf| leaf.path == [name]);
         let place = |group: &Group| leaf.and_then(|leaf| group.pages.get(leaf)).map(|page| (page.2, group.rows));
         self.groups.iter().filter_map(place).collect()
     }
 
-    /// Writes what is where, which ends the file. `about` is told to readers that know the keys.
+    /// Writes the metadata, which ends the file. `about` are key-value pairs for readers.
     pub(crate) fn finish(&mut self, out: &mut impl Write, about: &[(&str, &str)]) -> Written {
         if self.at == 0 {
             out.write_all(MAGIC)?;
@@ -133,7 +134,7 @@ impl Table {
                 [0, 3].into_iter().for_each(|encoding| file.zigzag(encoding));
                 file.list(3, 8, leaf.path.len());
                 leaf.path.iter().for_each(|part| file.binary(part.as_bytes()));
-                file.int(4, 5, 0); // not compressed
+                file.int(4, 5, 0); // uncompressed
                 file.int(5, 6, number(group.rows * leaf.list.unwrap_or(1) as u64)?);
                 file.int(6, 6, number(*bytes)?);
                 file.int(7, 6, number(*bytes)?);
@@ -157,13 +158,13 @@ impl Table {
         file.text(6, "kinetoscope");
         file.close();
         out.write_all(&file.bytes)?;
-        // Readers take it for a number with a sign.
+        // Readers treat the length as signed.
         out.write_all(&number::<i32>(file.bytes.len() as u64)?.to_le_bytes())?;
         Ok(out.write_all(MAGIC)?)
     }
 
     fn schema(&self, file: &mut Thrift) {
-        // Elements in depth first order: the type, repetition (0 required, 2 repeated), name, children, converted type.
+        // Elements in depth-first order: type, repetition (0 required, 2 repeated), name, children, converted type.
         type Element<'e> = (Option<i64>, Option<i64>, &'e str, Option<usize>, Option<i64>);
         let mut elements: Vec<Element<'_>> = vec![(None, None, "schema", Some(self.columns.len()), None)];
         const UTF8: Option<i64> = Some(0);
@@ -202,25 +203,25 @@ impl Table {
     }
 }
 
-/// A text or a file as a value.
+/// Appends a string or a file as a value.
 pub(crate) fn put_bytes(bytes: &[u8], to: &mut Vec<u8>) -> Written {
     to.extend_from_slice(&number::<i32>(bytes.len() as u64)?.to_le_bytes());
     to.extend_from_slice(bytes);
     Ok(())
 }
 
-/// A size or a count as the format has it: numbers with signs, of 32 bits in pages, of 64 elsewhere.
+/// Converts a size or a count to the signed type of the format: 32 bits in pages, 64 bits elsewhere.
 fn number<N: TryFrom<u64>>(number: u64) -> Written<N> {
     let too_large = "bytes or rows are more than a page or a table of a Parquet file may have";
     let error = |_| Fault::limit(format!("{number} {too_large}; make pictures smaller, or episodes shorter"));
     N::try_from(number).map_err(error)
 }
 
-/// What a page begins with: of so many bytes, its levels counted, and so many values.
+/// Page header for `size` bytes, including the levels, and `count` values.
 fn page_head(size: usize, count: usize) -> Written<Vec<u8>> {
     let (size, count) = (number::<i32>(size as u64)?, number::<i32>(count as u64)?);
     let mut page = Thrift::default();
-    page.int(1, 5, 0); // a page of data
+    page.int(1, 5, 0); // data page
     page.int(2, 5, size.into());
     page.int(3, 5, size.into());
     page.open(5);
@@ -233,7 +234,7 @@ fn page_head(size: usize, count: usize) -> Written<Vec<u8>> {
     Ok(page.bytes)
 }
 
-/// Levels of lists that all have one length: where rows begin, and that nothing is missing; runs of one value each.
+/// Repetition and definition levels of lists of equal length without missing values, as run-length encoding.
 fn levels(rows: usize, width: usize) -> Vec<u8> {
     let run = |count: usize, value: u8, to: &mut Vec<u8>| {
         varint((count as u64) << 1, to);
@@ -259,10 +260,10 @@ fn varint(mut number: u64, to: &mut Vec<u8>) {
     to.push(number as u8);
 }
 
-/// Thrift's compact protocol, inside a first structure.
+/// Writer of Thrift's compact protocol, within a top-level structure.
 struct Thrift {
     bytes: Vec<u8>,
-    /// The last field of each structure that is open.
+    /// The last field id of each open structure.
     last: Vec<u8>,
 }
 
@@ -273,7 +274,7 @@ impl Default for Thrift {
 }
 
 impl Thrift {
-    /// Fields come in the order of their numbers, with gaps below 16.
+    /// Begins a field. Fields have ascending ids with differences below 16.
     fn field(&mut self, field: u8, kind: u8) {
         if let Some(last) = self.last.last_mut() {
             self.bytes.push((field - *last) << 4 | kind);
@@ -285,7 +286,7 @@ impl Thrift {
         varint((number << 1 ^ number >> 63) as u64, &mut self.bytes);
     }
 
-    /// A whole number; `kind` is 5 for 32 bits and 6 for 64.
+    /// Writes an integer; `kind` is 5 for 32 bits and 6 for 64.
     fn int(&mut self, field: u8, kind: u8, number: i64) {
         self.field(field, kind);
         self.zigzag(number);
@@ -301,7 +302,7 @@ impl Thrift {
         self.binary(text.as_bytes());
     }
 
-    /// The beginning of a list, whose elements follow.
+    /// Begins a list, whose elements follow.
     fn list(&mut self, field: u8, kind: u8, count: usize) {
         self.field(field, 9);
         if count < 15 {
@@ -312,12 +313,12 @@ impl Thrift {
         }
     }
 
-    /// The beginning of a structure in a list.
+    /// Begins a structure in a list.
     fn begin(&mut self) {
         self.last.push(0);
     }
 
-    /// The beginning of a structure in a field.
+    /// Begins a structure in a field.
     fn open(&mut self, field: u8) {
         self.field(field, 12);
         self.begin();
@@ -334,11 +335,11 @@ impl Thrift {
 mod tests {
     use super::*;
 
-    /// Root cause: sizes were made numbers of 64 bits, and written where readers take 32.
+    /// Root cause: sizes were converted to 64 bits, and written where readers expect 32.
     #[test]
     fn large_pages() {
         let most = i32::MAX as usize;
-        // Field 2 of 32 bits, zigzag: twice the size, seven bits in a byte, behind field 1, which is 0.
+        // Field 2 of 32 bits, zigzag: twice the size, seven bits per byte, after field 1, which is 0.
         assert_eq!(page_head(most, 1).unwrap()[2..8], [0x15, 0xfe, 0xff, 0xff, 0xff, 0x0f]);
         for (size, count) in [(most + 1, 1), (1, most + 1)] {
             let error = page_head(size, count).unwrap_err();
@@ -348,7 +349,7 @@ mod tests {
 
     #[test]
     fn thrift_numbers() {
-        // Of the compact protocol's description: 50 399 is 0xdf 0x89 0x03; -1 becomes 1, 1 becomes 2.
+        // From the description of the compact protocol: 50 399 is 0xdf 0x89 0x03; -1 becomes 1, 1 becomes 2.
         let mut bytes = Vec::new();
         varint(50_399, &mut bytes);
         assert_eq!(bytes, [0xdf, 0x89, 0x03]);

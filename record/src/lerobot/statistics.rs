@@ -1,19 +1,19 @@
-//! Least, largest, mean and deviation of what is in a dataset: learning scales by them.
+//! Minimum, maximum, mean and standard deviation of the features of a dataset, for normalization.
 //!
-//! They are those of numbers that are finite: one that is not would make them useless for all the others. Where none is, they are
-//! `null`, which JSON has instead of NaN. The frames keep what was measured.
+//! Numbers that are not finite are excluded, because they would invalidate the statistics of all others. A statistic
+//! without any finite number is `null`, since JSON has no NaN. The frames keep the measured values.
 
 use serde_json::{Value, json};
 
-/// Of a feature, for each of its numbers, over all frames.
+/// Statistics of a feature: of each of its numbers over all frames.
 pub(super) struct Statistics {
     of: Vec<Moments>,
     frames: u64,
     picture: bool,
 }
 
-/// Of numbers that come in groups: how many, their mean and the sum of squares about it, as Chan, Golub and LeVeque (1983) join
-/// them; and the ends.
+/// Moments of a set of numbers: count, mean, sum of squared deviations, minimum and maximum. Sets are merged as in
+/// Chan, Golub and LeVeque (1983).
 #[derive(Clone, Copy)]
 pub(super) struct Moments {
     count: f64,
@@ -22,7 +22,7 @@ pub(super) struct Moments {
     ends: [f64; 2],
 }
 
-/// Of one picture, for red, green and blue, each from 0 to 1.
+/// Statistics of one image: of red, green and blue, each from 0 to 1.
 pub(super) struct OfPicture([Moments; 3]);
 
 impl Moments {
@@ -49,7 +49,7 @@ impl OfPicture {
         for (channel, moments) in all.iter_mut().enumerate() {
             let values = || rgba.as_chunks::<4>().0.iter().map(|pixel| u64::from(pixel[channel]));
             let count = values().count() as f64;
-            // Whole numbers: nothing is rounded.
+            // Integer sums are exact.
             let (sum, squares) = values().fold((0, 0), |(sum, squares), x| (sum + x, squares + x * x));
             if let (Some(least), Some(largest)) = (values().min(), values().max()) {
                 let mean = sum as f64 / count;
@@ -79,7 +79,7 @@ impl Statistics {
         self.of.iter_mut().zip(&of.0).for_each(|(all, moments)| all.join(moments));
     }
 
-    /// As `meta/stats.json` has it; pictures have shape (3, 1, 1).
+    /// Converts to the form in `meta/stats.json`. Statistics of images have shape (3, 1, 1).
     pub(super) fn told(&self) -> Value {
         let of = |one: fn(&Moments) -> f64| -> Value {
             let values = self.of.iter().map(|moments| if moments.count > 0.0 { one(moments) } else { f64::NAN });
@@ -106,14 +106,14 @@ mod tests {
         for row in [[1.0, f32::NAN, 5.0], [f32::INFINITY, f32::NAN, 7.0], [3.0, f32::NEG_INFINITY, 9.0]] {
             all.add(&row);
         }
-        // By hand: of 1 and 3; of nothing; of 5, 7 and 9, whose variance is 8 / 3.
+        // By hand: of 1 and 3; of no number; of 5, 7 and 9, whose variance is 8 / 3.
         let told = all.told();
         assert_eq!(told["min"], json!([1.0, null, 5.0]));
         assert_eq!(told["max"], json!([3.0, null, 9.0]));
         assert_eq!(told["mean"], json!([2.0, null, 7.0]));
         assert_eq!(told["count"], json!([3]));
         let deviation = |k: usize| told["std"][k].as_f64().unwrap_or(f64::NAN);
-        // A few roundings of numbers below 10.
+        // A few rounding errors of numbers below 10.
         assert!((deviation(0) - 1.0).abs() < 1e-14 && (deviation(2) - (8.0_f64 / 3.0).sqrt()).abs() < 1e-14, "{told}");
         assert!(told["std"][1].is_null(), "{told}");
     }

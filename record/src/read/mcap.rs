@@ -1,4 +1,4 @@
-//! MCAP files of ROS 2 messages, read from the beginning to the end, a chunk at a time.
+//! MCAP files of ROS 2 messages, read sequentially by chunks.
 
 use super::{RecordedTopic, Samples, Wanted};
 use crate::error::{RecordError, Result};
@@ -12,23 +12,23 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Chunks are smaller by far, before they are compressed \[bytes\].
+/// Upper limit of the uncompressed size of a chunk \[bytes\].
 const LARGEST: usize = 1 << 30;
 
-/// A channel, and how its messages are read; `None` where nobody here knows.
+/// A channel with its message type; `None` for types that cannot be read.
 pub(super) struct Channel {
     pub(super) topic: String,
     kind: String,
     pub(super) reads: Option<Arc<MessageType>>,
 }
 
-/// What is told of a file.
+/// Record of a file that is passed to the visitor.
 pub(super) enum Told<'r> {
     Message { channel: &'r Channel, time: u64, data: &'r [u8] },
     Attachment(Attachment<'r>),
 }
 
-/// Reads a whole file, and tells what is in it.
+/// Reads a whole file and calls `tell` with its messages and attachments.
 pub(super) fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) -> Result<()> {
     let failed = |error: std::io::Error| RecordError::file(path, error);
     let file = File::open(path).map_err(failed)?;
@@ -52,7 +52,7 @@ pub(super) fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) ->
             Ok(LinearReadEvent::Record { opcode, data }) => {
                 match mcap::parse_record(opcode, data).map_err(|error| malformed(error.to_string()))? {
                     Record::Schema { header, data } => {
-                        // What things look like are no numbers over time.
+                        // Scene messages have no numbers over time.
                         let numbers = header.encoding == "ros2msg" && header.name != SCENE_UPDATE;
                         let text = numbers.then(|| std::str::from_utf8(&data).ok()).flatten();
                         let reads = text.and_then(MessageType::parse).map(Arc::new);
@@ -87,18 +87,18 @@ pub(super) fn walk(path: &Path, mut tell: impl FnMut(Told<'_>) -> Result<()>) ->
     Ok(())
 }
 
-/// What there is, and what of it cannot be read.
+/// Lists the topics, and warnings about unreadable messages.
 pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
-    /// A topic on its way; fields are kept in the order in which they were seen.
+    /// A topic while its messages are read; fields are in the order of their first appearance.
     #[derive(Default)]
     struct Found {
         kind: String,
         count: u64,
         fields: Vec<String>,
         known: BTreeSet<String>,
-        /// Whether fields of the messages to come are to be looked for.
+        /// True if later messages may have new fields.
         looks: bool,
-        /// How many of its messages cannot be read, and which is the first.
+        /// Number of unreadable messages, and index of the first.
         unread: u64,
         first_unread: u64,
     }
@@ -112,7 +112,7 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
         found.count += 1;
         let Some(reads) = &channel.reads else { return Ok(()) };
         let Some(value) = reads.read(data) else {
-            // The others can be read all the same.
+            // Other messages of the topic may be readable.
             if found.unread == 0 {
                 found.first_unread = found.count;
             }
@@ -144,7 +144,7 @@ pub(super) fn topics(path: &Path) -> Result<(Vec<RecordedTopic>, Vec<String>)> {
     Ok((topics, warnings))
 }
 
-/// The numbers that are wanted.
+/// Reads the selected numbers.
 pub(super) fn samples(path: &Path, wanted: &[Wanted]) -> Result<Vec<Samples>> {
     let mut by_topic: BTreeMap<&str, Vec<(usize, Vec<Step>)>> = BTreeMap::new();
     for (place, Wanted { topic, field }) in wanted.iter().enumerate() {
@@ -156,7 +156,7 @@ pub(super) fn samples(path: &Path, wanted: &[Wanted]) -> Result<Vec<Samples>> {
         let (Some(of_topic), Some(reads)) = (by_topic.get(channel.topic.as_str()), &channel.reads) else {
             return Ok(());
         };
-        // `topics` has told of those that cannot be read.
+        // `topics` has reported unreadable messages.
         let Some(value) = reads.read(data) else { return Ok(()) };
         for (place, steps) in of_topic {
             if let Some(number) = value.number(steps) {
@@ -169,7 +169,7 @@ pub(super) fn samples(path: &Path, wanted: &[Wanted]) -> Result<Vec<Samples>> {
     Ok(samples)
 }
 
-/// A file that is in the recording.
+/// Reads an attachment.
 pub(super) fn attachment(path: &Path, name: &str) -> Result<Option<Vec<u8>>> {
     let mut found = None;
     walk(path, |told| {

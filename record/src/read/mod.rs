@@ -1,4 +1,4 @@
-//! Recordings read again: what is in them, and the numbers of it over time.
+//! Reading of recordings: their topics, and numbers over time.
 //!
 //! ```no_run
 //! use kinetoscope_record::{Recording, Wanted};
@@ -22,7 +22,7 @@ use crate::format::Format;
 use kinetoscope_scene::pattern::closest;
 use std::path::{Path, PathBuf};
 
-/// A recording that was opened: an MCAP file of ROS 2 messages, of this program or another, or a NumPy archive of a recorder.
+/// An open recording: an MCAP file of ROS 2 messages from any program, or a NumPy archive of a recorder.
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
@@ -33,35 +33,35 @@ pub struct Recording {
 
 #[derive(Debug)]
 enum Content {
-    /// Read from the file whenever something is wanted.
+    /// Read from the file on each request.
     Mcap,
     Npz(Box<Archive>),
 }
 
-/// Something that was recorded of one environment.
+/// A recorded topic of one environment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordedTopic {
-    /// Such as `/env_0/arm/joint_states`; of archives too.
+    /// Name, such as `/env_0/arm/joint_states`, for archives too.
     pub name: String,
-    /// What it is: the type of its messages, or the array of an archive.
+    /// Message type, or `numbers` or `pictures` for an archive.
     pub kind: String,
-    /// How many messages or rows there are.
+    /// Number of messages or rows.
     pub count: u64,
-    /// Names of its numbers, such as `position[J1]`; none for pictures and texts.
+    /// Names of its numbers, such as `position[J1]`; empty for images and texts.
     pub fields: Vec<String>,
 }
 
-/// A number that is wanted of every message of a topic.
+/// Selection of a number in every message of a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wanted {
-    /// The topic, in full.
+    /// Full name of the topic.
     pub topic: String,
-    /// The number.
+    /// Name of the number.
     pub field: String,
 }
 
 impl Wanted {
-    /// A number of a topic.
+    /// Selects a number of a topic.
     pub fn new(topic: impl Into<String>, field: impl Into<String>) -> Self {
         Self { topic: topic.into(), field: field.into() }
     }
@@ -70,17 +70,18 @@ impl Wanted {
 /// A number over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
-    /// When it was captured, on the clock of the recording, which goes on over resets \[s\].
+    /// Times of capture \[s\], on the clock of the recording, which continues over resets.
     pub times: Vec<f64>,
-    /// What it was, as often.
+    /// Values at these times.
     pub values: Vec<f64>,
 }
 
 impl Recording {
-    /// Opens a recording, and reads what is in it.
+    /// Opens a recording and reads its list of topics.
     ///
     /// # Errors
-    /// There is no such file; it is neither an MCAP file of ROS 2 messages nor a NumPy archive of a recorder, or is not whole.
+    /// There is no such file, it is neither an MCAP file of ROS 2 messages nor a NumPy archive of a recorder, or it is
+    /// incomplete.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let malformed = |what: &str| RecordError::Malformed { path: path.into(), what: what.into() };
@@ -101,27 +102,27 @@ impl Recording {
         Ok(Self { path: path.into(), topics, warnings, content })
     }
 
-    /// The file.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What was recorded, in the order of its names.
+    /// Topics, sorted by name.
     pub fn topics(&self) -> &[RecordedTopic] {
         &self.topics
     }
 
-    /// What of it cannot be read, and why: messages that are not what their type says. Their topics lack them; those that have no
-    /// others have no numbers.
+    /// Warnings about messages that cannot be read because they do not match their type. Their topics lack these
+    /// messages. A topic without any readable message has no fields.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// The topic of a name, or of the end of one: `arm/joint_states` and `/joint_states` are `/env_0/arm/joint_states` where there
-    /// is one arm. Without `env` it is that of the first environment.
+    /// Finds a topic by its full name or the end of it. `arm/joint_states` and `/joint_states` find
+    /// `/env_0/arm/joint_states` if there is one arm. Without `env`, the first environment is used.
     ///
     /// # Errors
-    /// No topic ends so, or more than one; the error names the nearest, or those.
+    /// No topic or more than one matches. The error lists the nearest or the matching names.
     pub fn topic(&self, name: &str, env: Option<usize>) -> Result<&RecordedTopic> {
         if let Some(topic) = self.topics.iter().find(|topic| topic.name == name) {
             return Ok(topic);
@@ -153,7 +154,7 @@ impl Recording {
         }
     }
 
-    /// The environments that something was recorded of, in order.
+    /// Recorded environments, in ascending order.
     pub fn env_ids(&self) -> Vec<usize> {
         let mut envs: Vec<usize> = self.topics.iter().filter_map(|topic| env_of(&topic.name)).collect();
         envs.sort_unstable();
@@ -161,11 +162,13 @@ impl Recording {
         envs
     }
 
-    /// Numbers over time, one series for each that is wanted, in the order of the file. A message without that number, such as one
-    /// of transforms of other frames, has no sample, nor has one that cannot be read ([`warnings`](Self::warnings)).
+    /// Reads numbers over time: one series for each of `wanted`, in the order of the file.
+    ///
+    /// A message without the number, such as a transform message of other frames, has no sample, nor has an unreadable
+    /// message ([`warnings`](Self::warnings)).
     ///
     /// # Errors
-    /// A topic or a field that is not known, with the nearest ones; a file that is not what it was when it was opened.
+    /// A topic or a field is unknown (the error lists the nearest ones), or the file has changed since it was opened.
     pub fn samples(&self, wanted: &[Wanted]) -> Result<Vec<Samples>> {
         for Wanted { topic, field } in wanted {
             let topic = match self.topics.iter().find(|known| known.name == *topic) {
@@ -184,7 +187,7 @@ impl Recording {
         }
     }
 
-    /// A file that the recording holds beside the numbers, by its name, such as the scene.
+    /// Content of an attached file, such as the scene; `None` if there is no such file.
     pub(crate) fn attachment(&self, name: &str) -> Result<Option<Vec<u8>>> {
         match &self.content {
             Content::Mcap => mcap::attachment(&self.path, name),
@@ -192,13 +195,13 @@ impl Recording {
         }
     }
 
-    /// Whether it is an archive.
+    /// True for a NumPy archive.
     pub(crate) fn is_archive(&self) -> bool {
         matches!(self.content, Content::Npz(_))
     }
 }
 
-/// The environment of a topic.
+/// Environment of a topic.
 fn env_of(topic: &str) -> Option<usize> {
     topic.strip_prefix("/env_")?.split('/').next()?.parse().ok()
 }

@@ -1,23 +1,23 @@
-//! NumPy archives of a recorder, by environment.
+//! Topics and numbers of NumPy archives, by environment.
 
 use super::{RecordedTopic, Samples, Wanted};
 use crate::archive::Archive;
 use crate::error::Result;
 use serde_json::Value;
 
-/// The numbers of a pose.
+/// Names of the numbers of a pose.
 const POSE: [&str; 7] = ["x", "y", "z", "qw", "qx", "qy", "qz"];
 
-/// A quantity of a stream.
+/// A field of a stream.
 struct Part<'a> {
-    /// The array.
+    /// Name of the array.
     array: &'a str,
     /// Names of its numbers in an environment, in order.
     fields: Vec<String>,
     of_forces: bool,
 }
 
-/// A stream, as `recording.json` describes it.
+/// A stream, as described in `recording.json`.
 struct Stream<'a> {
     name: &'a str,
     env_ids: Vec<usize>,
@@ -32,9 +32,9 @@ fn streams(archive: &Archive) -> Vec<Stream<'_>> {
         let columns: Vec<String> = columns.map(|of| of.as_str().unwrap_or_default().to_string()).collect();
         let envs = stream["env_ids"].as_array().into_iter().flatten().filter_map(Value::as_u64);
         let parts = stream["arrays"].as_array().into_iter().flatten().filter_map(|part| {
-            // Pictures are none of the arrays that were read.
+            // Arrays of images were not listed in the archive.
             let array = part["name"].as_str().filter(|array| archive.shape(array).is_some())?;
-            // What the array has, not what is said of it.
+            // Uses the shape of the array, not the declared one.
             let shape = archive.shape(array)?.get(2..)?;
             let own = array.strip_prefix(name).unwrap_or(array).trim_start_matches('/');
             let of_forces = part["of_forces"].as_bool().unwrap_or(false);
@@ -46,7 +46,7 @@ fn streams(archive: &Archive) -> Vec<Stream<'_>> {
     .collect()
 }
 
-/// Names of the numbers of a quantity: those of joints as in messages, poses by their frames, others by their places.
+/// Names of the numbers of a field: joints as in messages, poses by frame, others by index.
 fn fields(own: &str, columns: &[String], shape: &[usize]) -> Vec<String> {
     let named = match own {
         "positions" => "position",
@@ -64,7 +64,7 @@ fn fields(own: &str, columns: &[String], shape: &[usize]) -> Vec<String> {
     }
 }
 
-/// What there is.
+/// Lists the topics of an archive.
 pub(super) fn topics(archive: &Archive) -> Result<Vec<RecordedTopic>> {
     let mut topics = Vec::new();
     for stream in streams(archive) {
@@ -81,7 +81,8 @@ pub(super) fn topics(archive: &Archive) -> Result<Vec<RecordedTopic>> {
     Ok(topics)
 }
 
-/// The numbers that are wanted; rows in which an environment has nothing new, its time being that of the row before, are left out.
+/// Reads the selected numbers. Skips rows in which an environment repeats its last time, because they have no new
+/// value.
 pub(super) fn samples(archive: &Archive, wanted: &[Wanted]) -> Result<Vec<Samples>> {
     let streams = streams(archive);
     let mut samples = Vec::with_capacity(wanted.len());
@@ -105,7 +106,8 @@ pub(super) fn samples(archive: &Archive, wanted: &[Wanted]) -> Result<Vec<Sample
     Ok(samples)
 }
 
-/// Times of the rows of a stream in an environment, on a clock that goes on over resets \[s\]; `None` where a row holds nothing new.
+/// Recorded times of the rows of a stream in an environment \[s\], continuing over resets; `None` for a row without a
+/// new value.
 fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) -> Result<Vec<Option<f64>>> {
     let forces = format!("{}/force_time", stream.name);
     let array = if of_forces && archive.shape(&forces).is_some() { forces } else { format!("{}/time", stream.name) };
@@ -118,7 +120,7 @@ fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) ->
     };
     let captured = column(&array)?;
     let Some((first, step)) = captured.first().zip(steps.first()) else { return Ok(Vec::new()) };
-    // What states begin with is exact; a sensor that is late begins so much later.
+    // State rows begin at step 0, with an exact time. The first row of a sensor comes at a later step.
     let start = if *step == 0.0 { *first } else { first - step * dt };
     let events = archive.happened(env)?;
     let (mut offset, mut next, mut last) = (0.0, 0, None);
@@ -126,7 +128,7 @@ fn times(archive: &Archive, stream: &Stream<'_>, row: usize, of_forces: bool) ->
     for (&time, &step) in captured.iter().zip(steps) {
         let now = start + step * dt;
         while let Some((at, after)) = events.get(next) {
-            // At its own step, the row before an event has the time before it.
+            // A row of the same step may precede the event and then has the time before it.
             let renewed = start + at * dt - after;
             let jumps = (after + offset - (start + at * dt)).abs() > 0.5 * dt;
             if *at > step || (*at == step && jumps && (time + offset - now).abs() <= 0.5 * dt) {

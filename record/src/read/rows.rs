@@ -1,4 +1,4 @@
-//! Rows of an MCAP file of a recorder, as a NumPy archive would have them: what is needed to do recorded actions again.
+//! Rows of a recorder's MCAP file as arrays of a NumPy archive, for replay.
 
 use super::mcap::{Told, walk};
 use crate::error::{RecordError, Result};
@@ -9,17 +9,17 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Arrays by name: shapes and numbers.
+/// Arrays by name: shape and values.
 pub(crate) type Arrays = BTreeMap<String, (Vec<usize>, Vec<f64>)>;
 
-/// What a file holds: what its streams are, the state at the beginning, the numbers.
+/// Content of a file: description of its streams, initial state, arrays.
 pub(crate) struct Rows {
     pub(crate) about: Value,
     pub(crate) start: Vec<u8>,
     pub(crate) arrays: Arrays,
 }
 
-/// A stream on its way.
+/// A stream while its messages are read.
 struct Stream {
     name: String,
     envs: Vec<usize>,
@@ -27,17 +27,17 @@ struct Stream {
     parts: Vec<(String, Vec<usize>, usize)>,
     /// Frames of poses.
     frames: Vec<String>,
-    /// Steps of the rows that are whole.
+    /// Steps of the complete rows.
     steps: Vec<f64>,
-    /// The rows of each part.
+    /// Rows of each array.
     rows: Vec<Vec<f64>>,
-    /// The row that is read now, of each part and environment, and its step; what nobody has told is as in the row before.
+    /// Values of the present row, of each array and environment. Values without a message are those of the row before.
     now: Vec<Vec<f64>>,
     told: Vec<bool>,
     step: f64,
 }
 
-/// Ends of the names of streams: poses, which are transforms, and joints, which are messages of their own.
+/// Name endings of streams of poses, which are transform messages, and of joints, which have messages of their own.
 const POSES: [&str; 3] = ["/link_poses", "/body_poses", "/pose"];
 const JOINTS: [&str; 2] = ["/joint_states", "/targets"];
 
@@ -58,14 +58,14 @@ impl Stream {
             Some((part["name"].as_str()?.to_string(), shape, width))
         };
         let parts: Vec<_> = stream["arrays"].as_array()?.iter().map(part).collect::<Option<_>>()?;
-        // No more memory is asked for than numbers come: rows are as wide as the messages turn out to be.
+        // Rows have the width of their messages, so that a declared width cannot request memory.
         let (now, rows) = (vec![Vec::new(); parts.len() * envs.len()], vec![Vec::new(); parts.len()]);
         let told = vec![false; parts.len() * envs.len()];
         let (name, frames) = (stream["name"].as_str()?.to_string(), texts(&stream["columns"]));
         Some(Self { name, envs, parts, frames, steps: Vec::new(), rows, now, told, step: 0.0 })
     }
 
-    /// A part of an environment at a step; `None` where it has another width than is said.
+    /// Adds the values of an array in an environment at a step; `None` if they do not have the declared width.
     fn put(&mut self, part: usize, env: usize, step: f64, numbers: Vec<f64>) -> Option<()> {
         let row = self.envs.iter().position(|of| *of == env)?;
         if self.parts.get(part)?.2 != numbers.len() {
@@ -81,7 +81,7 @@ impl Stream {
         Some(())
     }
 
-    /// The row is whole; `None` where an environment has none yet.
+    /// Completes the present row; `None` if an environment has no values yet.
     fn end_row(&mut self) -> Option<()> {
         if !self.told.contains(&true) {
             return Some(());
@@ -101,7 +101,7 @@ impl Stream {
     }
 }
 
-/// The numbers of a list of a message.
+/// Values of a list of numbers in a message.
 fn numbers(message: &Message, field: &str) -> Vec<f64> {
     match message.field(field) {
         Some(Message::Numbers(numbers)) => numbers.clone(),
@@ -109,7 +109,7 @@ fn numbers(message: &Message, field: &str) -> Vec<f64> {
     }
 }
 
-/// Frames and poses of a message of transforms, `[x, y, z, qw, qx, qy, qz]` each.
+/// Frames and poses of a transform message, `[x, y, z, qw, qx, qy, qz]` each.
 fn transforms(message: &Message) -> Vec<(String, [f64; 7])> {
     let Some(Message::List(all)) = message.field("transforms") else { return Vec::new() };
     let one = |one: &Message| {
@@ -125,13 +125,13 @@ fn transforms(message: &Message) -> Vec<(String, [f64; 7])> {
     all.iter().filter_map(one).collect()
 }
 
-/// The environment of a topic or a name, and the rest: `/env_2/arm/targets`.
+/// Splits a topic or a frame such as `/env_2/arm/targets` into the environment and the rest.
 fn of_env(name: &str) -> Option<(usize, &str)> {
     let (env, rest) = name.trim_start_matches('/').strip_prefix("env_")?.split_once('/')?;
     Some((env.parse().ok()?, rest))
 }
 
-/// What happened, of the text of a log: kind and step.
+/// Parses the text of an event message: kind and step.
 fn happened(text: &str) -> Option<(EventKind, f64)> {
     let (kind, rest) = text.split_once(" at step ")?;
     let kinds = [EventKind::Reset, EventKind::Written, EventKind::Diverged, EventKind::Note];
@@ -139,10 +139,10 @@ fn happened(text: &str) -> Option<(EventKind, f64)> {
     Some((kind, rest.split(',').next()?.parse().ok()?))
 }
 
-/// Reads a file.
+/// Reads the rows of a file.
 ///
 /// # Errors
-/// It is no MCAP file of a recorder, or not whole.
+/// It is not an MCAP file of a recorder, or is incomplete.
 pub(crate) fn rows(path: &Path) -> Result<Rows> {
     let malformed = |what: String| RecordError::Malformed { path: path.into(), what };
     let (mut about, mut start) = (None, None);
@@ -166,7 +166,7 @@ pub(crate) fn rows(path: &Path) -> Result<Rows> {
             }
             Told::Message { channel, time, data } => (channel, time, data),
         };
-        // What comes before is said: places of environments, which are no rows.
+        // Messages before the description are origins of environments, which are no rows.
         let Some(reads) = channel.reads.as_ref().filter(|_| dt > 0.0) else { return Ok(()) };
         if channel.topic == "/events" {
             let message = reads.read(data);

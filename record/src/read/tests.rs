@@ -28,8 +28,9 @@ fn recorded(path: &Path, reset_at: Option<u32>) {
     });
 }
 
-/// What MuJoCo's Euler steps of length h make of a spring, exactly: v' = v - h w² x and x' = x + h v' give
-/// x'' - 2 x' + x = -(h w)² x', whose solution from rest at `start` is start (cos(k a) - tan(a/2) sin(k a)) with 2 cos(a) = 2 - (h w)².
+/// Exact solution of MuJoCo's Euler steps of length h for a spring: v' = v - h w² x and x' = x + h v' give x'' - 2 x' +
+/// x = -(h w)² x', whose solution from rest at `start` is start (cos(k a) - tan(a/2) sin(k a)) with 2 cos(a) = 2 - (h
+/// w)².
 fn swing(start: f64, step: u32) -> f64 {
     let (h, w2) = (0.01_f64, 40.0);
     let a = (1.0 - 0.5 * h * h * w2).acos();
@@ -59,7 +60,7 @@ fn spring() {
                 assert!((x - swing(start, step)).abs() < 1e-12, "{name}: {x} at step {step}");
             }
         }
-        // The control: a spring that is a thousandth stiffer is told apart.
+        // Control: the comparison detects a spring that is 0.1 % stiffer.
         let off = (0..=STEPS).map(|k| (swing(0.3, k) - 0.3 * (0.01 * f64::from(k) * 40.04_f64.sqrt()).cos()).abs());
         assert!(off.fold(0.0, f64::max) > 1e-3);
         all.push(samples.into_iter().map(|samples| samples.values).collect::<Vec<_>>());
@@ -83,13 +84,13 @@ fn reset() {
         assert!(a.times.iter().zip(&b.times).all(|(a, b)| (a - b).abs() < 1e-9), "{:?}\n{:?}", a.times, b.times);
         assert!(a.times.is_sorted() && (a.times[a.times.len() - 1] - 3.0).abs() < 1e-6);
     }
-    // The reset has a row of its own in its environment, at the time that it has: twice there at 1 s.
+    // The reset has a row of its own in its environment, with the time of the reset: two rows at 1 s.
     assert_eq!((npz[0].times.len(), npz[1].times.len()), (301, 302));
     assert!((npz[1].times[100] - 1.0).abs() < 1e-6 && (npz[1].times[101] - 1.0).abs() < 1e-6);
     assert_eq!(npz[1].values[101], 0.0, "a reset is to the initial state");
 }
 
-/// Errors name the candidates.
+/// Errors list the candidates.
 #[test]
 fn unknown_names() {
     for name in ["run.mcap", "run.npz"] {
@@ -126,7 +127,7 @@ fn damaged_recordings() {
         let middle = whole.len() / 2;
         damaged[middle..middle + 16].iter_mut().for_each(|byte| *byte ^= 0x5a);
         std::fs::write(&path, &damaged).unwrap();
-        // Of an archive no more is read than is asked for: whoever asks for what is damaged is told.
+        // Archives are read on demand, so that damage is found when the damaged array is read.
         let all = |recording: Recording| {
             let fields =
                 recording.topics().iter().flat_map(|of| of.fields.iter().map(|field| Wanted::new(&of.name, field)));
@@ -136,7 +137,7 @@ fn damaged_recordings() {
         };
         assert_eq!(Recording::open(&path).is_err(), name == "run.mcap");
         assert!(matches!(Recording::open(&path).and_then(all), Err(RecordError::Malformed { .. })), "{name}");
-        // The control.
+        // Control: the undamaged file.
         std::fs::write(&path, &whole).unwrap();
         let all_of_it = Recording::open(&path).and_then(all);
         assert!(all_of_it.is_ok() || name == "run.mcap", "{all_of_it:?}");
@@ -146,14 +147,15 @@ fn damaged_recordings() {
     }
 }
 
-/// Root cause: of topics with the same fields in all messages only the first was read at opening, so that a later damaged one
-/// made all reading fail.
+/// Root cause: for topics with the same fields in all messages, only the first message was read at opening. A later
+/// damaged message made all reading fail.
 #[test]
 fn unreadable_messages() {
     let folder = tempfile::tempdir().unwrap();
     let (path, other) = (folder.path().join("run.mcap"), folder.path().join("other.mcap"));
     recorded(&path, None);
-    // As somebody else might write it: two topics whose second and fourth messages are cut, and one that has no others.
+    // A file of another program: two topics whose second and fourth messages are truncated, and one with only truncated
+    // messages.
     let bytes = std::fs::read(&path).unwrap();
     let mut writer = ::mcap::Writer::new(std::fs::File::create(&other).unwrap()).unwrap();
     let mut seen = std::collections::BTreeMap::new();

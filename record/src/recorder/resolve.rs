@@ -1,4 +1,4 @@
-//! What a configuration means in a simulation: what is recorded, and into which file.
+//! Resolution of a configuration in a simulation: the recorded streams and the file writer.
 
 use crate::animation::{self, Animation};
 use crate::cfg::RecorderCfg;
@@ -16,7 +16,7 @@ use crate::topic::Topic;
 use crate::writer::Sink;
 use kinetoscope_sim::{SimulationManager, StepResult};
 
-/// What the topics of a configuration mean in a simulation, and the sensors that were left out.
+/// Resolves the topics of a configuration in a simulation. Also returns what was left out.
 pub(super) fn resolve(
     sim: &mut SimulationManager,
     cfg: &RecorderCfg,
@@ -68,7 +68,7 @@ pub(super) fn resolve(
         for source in held {
             match sources.iter().find(|known| known.stream.name == source.stream.name) {
                 None => sources.push(source),
-                // Asked for twice.
+                // The same stream was requested twice.
                 Some(known) if known.is(&source) => {}
                 Some(_) => return Err(RecordError::SameName { path: cfg.path.clone(), name: source.stream.name }),
             }
@@ -109,9 +109,9 @@ pub(super) fn resolve(
     Ok((sources, left_out))
 }
 
-/// Says of everything how many steps are between its rows.
+/// Sets the number of steps between two rows of each stream.
 fn set_rates(sources: &mut [Source], cfg: &RecorderCfg, format: Format) -> Result<()> {
-    // What is drawn of the stage has its own, and what comes of steps of a task comes when it does.
+    // The overview has its own rate; results of task steps are recorded when they are published.
     let at_steps = |source: &&mut Source| source.sensor.is_none() && !source.is_stage() && !source.is_outcome();
     for source in sources.iter_mut().filter(at_steps) {
         source.every = Some(cfg.every);
@@ -141,7 +141,7 @@ fn set_rates(sources: &mut [Source], cfg: &RecorderCfg, format: Format) -> Resul
     Ok(())
 }
 
-/// Everything that there is and the format has a place for.
+/// All streams of the simulation that the format supports.
 fn everything(
     sim: &mut SimulationManager,
     cfg: &RecorderCfg,
@@ -179,18 +179,18 @@ fn everything(
     }
     sources.retain(|source| format.holds(&source.stream) && source.stream.width() > 0);
     if sources.is_empty() && (format.is_animation() || format == Format::Pictures) {
-        // Without a camera there is the stage to show.
+        // Without a camera, the overview image is recorded.
         sources.push(Source::stage(sim, &cfg.stage, envs)?);
     }
     if format.is_animation() {
-        // The first camera, in the first environment that it looks into.
+        // An animation shows the first camera, in its first environment.
         sources.truncate(1);
         sources.iter_mut().for_each(Source::keep_first);
     }
     Ok(sources)
 }
 
-/// The scene, and what of it is left out: a scene that cannot be written is no reason not to record.
+/// Packs the scene, and lists what was left out of it. A scene that cannot be packed does not prevent the recording.
 pub(super) fn packed_scene(sim: &SimulationManager) -> (Option<Vec<u8>>, Vec<String>) {
     match scene_file::pack(sim) {
         Ok((scene, left_out)) => (Some(scene), left_out.iter().map(|what| format!("of the scene: {what}")).collect()),
@@ -198,7 +198,7 @@ pub(super) fn packed_scene(sim: &SimulationManager) -> (Option<Vec<u8>>, Vec<Str
     }
 }
 
-/// The file of a format.
+/// Creates the writer of a format.
 pub(super) fn open(
     sim: &SimulationManager,
     cfg: &RecorderCfg,
@@ -247,7 +247,7 @@ pub(super) fn open(
         }
         _ => {
             let size = streams.iter().find_map(picture_size);
-            // `resolve` has seen to it that there is a picture.
+            // `resolve` ensures that there is an image.
             let size = size.ok_or_else(|| RecordError::Nothing { path: cfg.path.clone(), format })?;
             Ok(Box::new(Animation::create(part, storage, format, size)?))
         }
@@ -255,7 +255,7 @@ pub(super) fn open(
     sink
 }
 
-/// Width and height of a stream of pictures.
+/// Width and height of an image stream \[pixels\].
 fn picture_size(stream: &Stream) -> Option<[usize; 2]> {
     match stream.kind {
         Kind::Picture { height, width, .. } => Some([width, height]),

@@ -48,7 +48,7 @@ impl<F: FnMut(&Packet) + Send> Sink for Calls<F> {
     }
 }
 
-/// Begins to record the ball to a function, with room for this number of packets.
+/// Records the ball with a function as the writer, and with this number of packets.
 fn record_to(
     sim: &mut SimulationManager,
     packets: usize,
@@ -61,7 +61,7 @@ fn record_to(
     sim.observers_mut().add(recorder)
 }
 
-/// A simulation waits for a slow disk, reports it, and loses nothing.
+/// A simulation waits for a slow disk, reports the waits, and loses no data.
 #[test]
 fn slow_disk() {
     let (steps, pause) = (20, Duration::from_millis(3));
@@ -85,13 +85,13 @@ fn slow_disk() {
     // Steps of one ball take microseconds: 21 rows with 2 packets wait 19 times, less where this thread was held up.
     assert!(slow.waits >= 10 && slow.waited >= pause * 10, "{slow}");
     assert!(slow.to_string().contains("the simulation waited for it"), "{slow}");
-    // Control: with room for all packets there is no wait, and the same is written.
+    // Control: with a packet for every row there is no wait, and the same data is written.
     let (roomy, same) = recorded(32);
     assert_eq!((roomy.waits, roomy.waited, &same), (0, Duration::ZERO, &heights));
 }
 
 fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) -> Result<Recorded> {
-    // Without the scene, which would fill the disk alone.
+    // Records no scene, which alone would fill the disk.
     let cfg = RecorderCfg { scene: false, ..RecorderCfg::new(path) };
     let recorder = Recorder::start(sim, cfg, &Disk::full_after(left))?;
     let recorder = sim.observers_mut().add(recorder);
@@ -99,7 +99,7 @@ fn record_to_a_full_disk(sim: &mut SimulationManager, path: &Path, left: usize) 
     sim.finish_recording(recorder)
 }
 
-/// Asserts that a disk with this room is too small for a recording, and that what remains is kept as `part`, if anything.
+/// Asserts that a disk with this room is too small for a recording. `part` is the expected partial file, if any.
 #[track_caller]
 fn assert_too_small(sim: &mut SimulationManager, path: &Path, left: usize, part: Option<&Path>) {
     let error = record_to_a_full_disk(sim, path, left).unwrap_err();
@@ -108,7 +108,7 @@ fn assert_too_small(sim: &mut SimulationManager, path: &Path, left: usize, part:
     assert_eq!((kept.as_deref(), path.exists()), (part, false), "{left}");
 }
 
-/// A folder of images on a full disk holds whole images, under another name.
+/// On a full disk, the partial folder of images contains complete images only.
 #[test]
 fn full_disk_images() {
     let folder = tempfile::tempdir().unwrap();
@@ -124,7 +124,7 @@ fn full_disk_images() {
     let bytes = record_to_a_full_disk(&mut simulation(), &whole, usize::MAX).unwrap().bytes;
     assert!(images(&whole).len() > 20 && bytes > 5000, "{bytes} bytes in {}", images(&whole).len());
     for left in [0, 10] {
-        // Not even the head of the list finds room: it is not begun.
+        // There is no room for the header of the list, so that recording does not begin.
         let path = folder.path().join(format!("left_{left}"));
         let error = record_to_a_full_disk(&mut simulation(), &path, left).unwrap_err();
         assert!(error.to_string().contains("no space left") && !path.exists(), "{left}: {error}");
@@ -143,7 +143,7 @@ fn full_disk_images() {
     }
 }
 
-/// A dataset on a full disk has neither its name nor the file that makes it a dataset.
+/// On a full disk, a dataset has neither its final name nor the file that makes it a dataset.
 #[test]
 fn full_disk_dataset() {
     let folder = tempfile::tempdir().unwrap();
@@ -157,7 +157,7 @@ fn full_disk_dataset() {
     let whole = folder.path().join("whole.lerobot");
     let bytes = record_to_a_full_disk(&mut actuated(), &whole, usize::MAX).unwrap().bytes as usize;
     assert!(whole.join("meta/info.json").is_file() && bytes > 10_000, "{bytes}");
-    // Nothing; in the rows; in the tables at the end; in the last file. Places of frames are written twice.
+    // No room; full in the rows; in the tables at the end; in the last file. Offsets of frames are written twice.
     for left in [0, 1000, bytes / 2, bytes - 100] {
         let path = folder.path().join(format!("left_{left}.lerobot"));
         let part = part_of(&path);
@@ -166,12 +166,12 @@ fn full_disk_dataset() {
     }
 }
 
-/// Of files, only messages remain, under another name.
+/// On a full disk, MCAP is the only file format that leaves a partial file.
 #[test]
 fn full_disk_files() {
     let camera = CameraCfg { width: 64, height: 64, update_period: 0.05, ..CameraCfg::default() };
     let animations = Format::all().filter(|(format, _)| format.is_animation());
-    // What is buffered is written at the end at the latest.
+    // Buffered data is written at the end at the latest.
     let animations = animations.flat_map(|(_, end)| [0, 100, 900].map(|left| (format!("run.{end}"), left, true)));
     let files = [("run.mcap", 3000), ("run.npz", 3000), ("run.npz", 0)].map(|(name, left)| (name.into(), left, false));
     for (name, left, is_animation) in animations.chain(files) {
@@ -262,8 +262,8 @@ fn panic_of_the_thread() {
     kinetoscope_testkit::refusal::assert_error(sim.finish_recording(recorder), "", &["panicked"]);
 }
 
-/// Root cause: arrivals were counted, and the shown values were copied. They differ where the state is written while
-/// measurements are on their way: cameras were recorded as after the write, and rows of ray casters were lost.
+/// Root cause: arrivals were counted, but the shown values were copied. They differ if the state is written while
+/// measurements are pending. Cameras were recorded as after the write, and rows of ray casters were lost.
 #[test]
 fn late_sensors() {
     const LATENCY: u32 = 4;
@@ -294,7 +294,7 @@ fn late_sensors() {
     sim.update(6);
     put(&mut sim, [0.3, 0.1, 1.1], Some(&[EnvId(0)]));
     sim.update(2);
-    // Again, while measurements of the time in between are on their way, and in the other environment too.
+    // A second write, while earlier measurements are pending, and in the other environment too.
     put(&mut sim, [-0.2, 0.1, 1.1], Some(&[EnvId(0)]));
     put(&mut sim, [0.2, 0.1, 1.1], Some(&[EnvId(1)]));
     sim.update(1);
@@ -312,7 +312,7 @@ fn late_sensors() {
         ("imu", &["time", "pos_w", "lin_vel_b"]),
     ];
     for (sensor, array) in arrays.into_iter().flat_map(|(sensor, all)| all.iter().map(move |array| (sensor, array))) {
-        // The judge is a sensor that is not late: every row of the late one is one of its rows, once and in order.
+        // Reference: a sensor without latency. Every row of the late sensor is one of its rows, once and in order.
         let of = |name| rows(&path, &format!("{name}_{sensor}/{array}"));
         let ((_, late, of_late), (_, prompt, of_prompt)) = (of("late"), of("prompt"));
         assert_eq!((prompt, late), (STEPS, STEPS - LATENCY as usize), "{sensor}/{array}");
@@ -362,7 +362,7 @@ fn arrays_of_one_name() {
     }
 }
 
-/// Where the chunks of an MCAP file are: records are a byte of their kind, eight of their length, and their data.
+/// Byte ranges of the chunks of an MCAP file. A record has one byte for its type, eight for its length, and its data.
 fn chunks(file: &[u8]) -> Vec<std::ops::Range<usize>> {
     let (mut at, mut chunks) = (mcap::MAGIC.len(), Vec::new());
     while let Some((kind, rest)) = file[at..].split_first().filter(|(_, rest)| rest.len() >= 8) {
@@ -390,12 +390,12 @@ fn damage() {
     let whole = std::fs::read(&part).unwrap();
     let chunks = chunks(&whole);
     assert!(chunks.len() > 2, "{chunks:?}");
-    // The end is torn in the last chunk: no damage.
+    // A truncated last chunk is no damage.
     std::fs::write(&part, &whole[..chunks[chunks.len() - 1].end - 100]).unwrap();
     let torn = recover(&path).unwrap();
     assert!(torn.damage.is_none() && torn.messages > 0 && !part.exists(), "{torn:?}");
     std::fs::remove_file(&path).unwrap();
-    // The second chunk is damaged: what is before is read, the file stays.
+    // The second chunk is damaged: the messages before it are recovered, and the partial file is kept.
     let mut damaged = whole.clone();
     let middle = chunks[1].start.midpoint(chunks[1].end);
     damaged[middle..middle + 64].iter_mut().for_each(|byte| *byte ^= 0x55);
@@ -405,14 +405,15 @@ fn damage() {
     assert!(recovered.messages < torn.messages, "{recovered:?} {torn:?}");
     assert_eq!(std::fs::read(&part).unwrap(), damaged);
     std::fs::remove_file(&path).unwrap();
-    // Not one whole message.
+    // No complete message.
     std::fs::write(&part, &whole[..200]).unwrap();
     let error = recover(&path).unwrap_err().to_string();
     assert!(error.contains("nothing of it can be read"), "{error}");
     assert_eq!(names(&folder), ["run.mcap.part"]);
 }
 
-/// Resets the first environment at some steps; added before a recorder, it is told of every step first.
+/// Resets the first environment at some steps. It is added before a recorder, so that it is notified of every step
+/// first.
 #[derive(Debug)]
 struct Resets(&'static [u64]);
 
@@ -428,8 +429,8 @@ impl Observer for Resets {
     }
 }
 
-/// Root cause: measurements were counted again in all environments when one was reset, so that a measurement that the recorder
-/// had not seen yet was lost in the others.
+/// Root cause: the measurement counts of all environments were updated when one was reset. A measurement that was not
+/// recorded yet was lost in the other environments.
 #[test]
 fn resets_of_another_environment() {
     const STEPS: u32 = 20;
@@ -439,7 +440,7 @@ fn resets_of_another_environment() {
         sim.observers_mut().add(Resets(resets));
         sim.add_sensor("imu", ImuCfg::on("ball/ball")).unwrap();
         record(&mut sim, RecorderCfg::new(&path), |sim| sim.update(STEPS));
-        // Rows of two environments: those of the second, each once.
+        // Rows of two environments: selects those of the second, each once.
         let mut heights: Vec<f64> = numbers_of(&path, "imu/pos_w").chunks(6).map(|row| row[5]).collect();
         heights.dedup();
         heights

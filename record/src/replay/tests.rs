@@ -17,7 +17,7 @@ fn arms() -> SimulationManager {
     sim
 }
 
-/// Targets that change at every step, otherwise in each environment; a reset on the way.
+/// Applies different targets at every step and in each environment, with a reset in between.
 fn drive(sim: &mut SimulationManager, mut at_step: impl FnMut(&mut SimulationManager, u32)) {
     let (arm, pusher) = (sim.entities().robot_id("arm").unwrap(), sim.entities().mjcf_id("pusher").unwrap());
     for step in 0..STEPS {
@@ -36,7 +36,7 @@ fn drive(sim: &mut SimulationManager, mut at_step: impl FnMut(&mut SimulationMan
 
 fn recording(path: &Path, at_step: impl FnMut(&mut SimulationManager, u32)) {
     let mut sim = arms();
-    // Somewhere, not at the initial state.
+    // Not in the initial state.
     sim.update(7);
     let recorder = sim.record(RecorderCfg::new(path)).unwrap();
     drive(&mut sim, at_step);
@@ -53,7 +53,8 @@ fn same_bits() {
         assert_eq!(num_envs(&path).unwrap(), 2);
         let verdict = verify(&mut sim, &path).unwrap();
         assert!(verdict.is_same(), "{name}: {verdict}");
-        // Each step, the beginning and the reset: positions, velocities, efforts, poses of links, and the pusher's three.
+        // Each step, the beginning and the reset: positions, velocities, efforts, poses of links, and the pusher's
+        // three.
         let arm = sim.robot(sim.entities().robot_id("arm").unwrap());
         let row = 2 * (3 * arm.dof() + 7 * arm.link_names().len() + 3) as u64;
         assert_eq!((verdict.steps, verdict.numbers), (u64::from(STEPS), row * (u64::from(STEPS) + 2)), "{name}");
@@ -72,7 +73,7 @@ fn recovered_recording() {
     crate::recover::recover(&path).unwrap();
     let verdict = verify(&mut arms(), &path).unwrap();
     assert!(verdict.is_same() && verdict.steps == u64::from(STEPS), "{verdict}");
-    // The control: without what it begins with.
+    // Control: the file without its attachments.
     let whole = std::fs::read(&path).unwrap();
     let other = folder.path().join("other.mcap");
     let mut writer = mcap::Writer::new(File::create(&other).unwrap()).unwrap();
@@ -104,7 +105,7 @@ fn other_actions() {
         let difference = verdict.difference.unwrap();
         assert_eq!((difference.step, difference.env, difference.written), (13, 1, false), "{difference:?}");
 
-        // A joint that somebody moved by hand before step 20.
+        // A joint that was written before step 20.
         let path = folder.path().join(format!("written.{end}"));
         recording(&path, |sim, step| {
             if step == 20 {
@@ -119,7 +120,7 @@ fn other_actions() {
     }
 }
 
-/// The same archive with other data of some arrays.
+/// Copies an archive with changed data of some arrays.
 fn changed(path: &Path, to: &Path, change: impl Fn(&str, &mut Vec<u8>)) {
     let mut archive = zip::Archive::new(File::create(to).unwrap());
     for (name, mut data) in zip::parse(&std::fs::read(path).unwrap()).unwrap() {
@@ -129,7 +130,7 @@ fn changed(path: &Path, to: &Path, change: impl Fn(&str, &mut Vec<u8>)) {
     archive.finish().unwrap();
 }
 
-/// Changes a number, counted in an array.
+/// Changes the number with this index in an array.
 fn change(data: &mut [u8], place: usize, to: impl Fn(f64) -> f64) {
     let at = data.len() - npy::parse(data).unwrap().2.len() + 8 * place;
     let old = f64::from_le_bytes(*data[at..].first_chunk().unwrap());
@@ -148,7 +149,7 @@ fn changed_target() {
         }
     });
     let difference = verify(&mut arms(), &other).unwrap().difference.unwrap();
-    // The target of row 17 acted in step 17.
+    // The target of row 17 was applied in step 17.
     assert_eq!((difference.step, difference.env), (17, 0), "{difference:?}");
     assert!(difference.array.starts_with("arm/joint_states/"), "{difference:?}");
 }

@@ -1,24 +1,24 @@
-//! Pieces of bytes in a file without a name, found again by their places.
+//! A buffer file of byte blocks.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Where a piece is.
+/// Position of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     at: u64,
     bytes: u64,
 }
 
-/// The file. It is written until something is read.
+/// The buffer file. Blocks may be written and read in any order.
 pub(super) struct Heap {
     file: BufWriter<File>,
     at: u64,
 }
 
 impl Place {
-    /// What a place takes itself.
+    /// Size of a serialized position.
     pub(super) const BYTES: usize = 16;
 
     pub(super) fn to_bytes(self) -> [u8; Self::BYTES] {
@@ -28,7 +28,7 @@ impl Place {
         bytes
     }
 
-    /// Of as many bytes; others are 0.
+    /// Deserializes a position; missing bytes are 0.
     pub(super) fn from_bytes(bytes: &[u8]) -> Self {
         let (words, _) = bytes.as_chunks::<8>();
         let word = |k: usize| words.get(k).map_or(0, |word| u64::from_le_bytes(*word));
@@ -41,7 +41,7 @@ impl Heap {
         Ok(Self { file: BufWriter::with_capacity(1 << 16, tempfile::tempfile_in(folder)?), at: 0 })
     }
 
-    /// Adds a piece.
+    /// Appends a block.
     pub(super) fn put(&mut self, piece: &[u8]) -> io::Result<Place> {
         self.file.write_all(piece)?;
         let place = Place { at: self.at, bytes: piece.len() as u64 };
@@ -49,14 +49,14 @@ impl Heap {
         Ok(place)
     }
 
-    /// Reads a piece again, which replaces what is in `to`.
+    /// Reads a block into `to`, replacing its content.
     pub(super) fn take(&mut self, place: Place, to: &mut Vec<u8>) -> io::Result<()> {
         self.file.flush()?;
         let file = self.file.get_mut();
         file.seek(SeekFrom::Start(place.at))?;
         to.clear();
         file.take(place.bytes).read_to_end(to)?;
-        // Where the next piece would be written.
+        // Returns to the position of the next write.
         file.seek(SeekFrom::Start(self.at))?;
         if to.len() as u64 == place.bytes { Ok(()) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
     }

@@ -1,23 +1,25 @@
-//! Datasets as robomimic reads them: one HDF5 file.
+//! HDF5 datasets for robomimic.
 //!
-//! | what | shape | |
+//! | content | shape | |
 //! |---|---|---|
 //! | `data`, attribute `total` | | frames of all episodes |
-//! | `data`, attribute `env_args` | | JSON: `env_name`, `env_type`, `type` (the same), `env_kwargs` with `task`, `physics_dt`, `every`, `columns` |
+//! | `data`, attribute `env_args` | | JSON: `env_name`, `env_type`, `type` (the same), `env_kwargs` (see below) |
 //! | `data/demo_0`, attributes `num_samples`, `env_id` | | frames of the episode, and its environment |
-//! | `actions` | (T, A) | what joints were told: positions, or controls of MJCF files; f64, as all numbers |
-//! | `action_dict/joint_vel`, `action_dict/joint_effort` | (T, A) | the same of velocities and efforts |
-//! | `states` | (T, 1 + nq + nv) | time, positions and velocities of all joints of the scene, as MuJoCo has them |
-//! | `rewards` | (T,) | what the action earned, where a task told it |
-//! | `dones` | (T,) | 1 where a task said that the episode ended with the action; without a task, in the last frame; i64 |
+//! | `actions` | (T, A) | joint position targets, or controls of MJCF parts; f64, as all numbers |
+//! | `action_dict/joint_vel`, `action_dict/joint_effort` | (T, A) | joint velocity and effort targets |
+//! | `states` | (T, 1 + nq + nv) | time, positions and velocities of all joints of the scene, in MuJoCo's order |
+//! | `rewards` | (T,) | reward of the action, with a task only |
+//! | `dones` | (T,) | 1 if the task ended the episode with the action; without a task, in the last frame; i64 |
 //! | `obs/joint_pos`, `obs/joint_vel`, `obs/joint_effort` | (T, J) | joints of all robots |
 //! | `obs/object` | (T, 7 K) | poses of objects in the environment, x, y, z, qw, qx, qy, qz |
-//! | `obs/SENSOR_CHANNEL` | (T, W) | numbers of other sensors |
-//! | `obs/CAMERA_image` | (T, H, W, 3) | colour, u8, a chunk for each picture, packed by deflate |
-//! | `next_obs/...` | | the same when the action had been done |
+//! | `obs/SENSOR_CHANNEL` | (T, W) | values of other sensors |
+//! | `obs/CAMERA_image` | (T, H, W, 3) | color, u8, one chunk for each image, compressed by deflate |
+//! | `next_obs/...` | | the same observations after the action |
 //!
-//! Until the end, rows and packed pictures are in two files without a name in the same folder: how many episodes there are and how
-//! long each is, is known only then, and a killed process leaves nothing.
+//! `env_kwargs` has `task`, `physics_dt`, `every` and `columns`.
+//!
+//! Until the end, rows and compressed images are in two unnamed files in the same folder, because the number and the
+//! lengths of episodes are not known before. A killed process leaves nothing.
 
 mod heap;
 
@@ -38,21 +40,21 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Rows of an episode are written when they have so many bytes.
+/// Size at which the buffered rows of an episode are written \[bytes\].
 const BYTES: usize = 1 << 16;
 
-/// The type of environments that come from Gymnasium: of those that robomimic knows, the one that says least.
+/// robomimic's environment type for Gymnasium, the most general one.
 const GYM: i64 = 2;
 
-/// A dataset on its way.
+/// Writer of a robomimic dataset.
 struct Robomimic {
     part: PartFile,
     features: Arc<Features>,
     columns: Vec<Column>,
-    /// What `env_args` says.
+    /// Value of the attribute `env_args`.
     about: Value,
     envs: Vec<usize>,
-    /// The episode that goes on in each environment.
+    /// Present episode of each environment.
     running: Vec<Option<Running>>,
     episodes: Vec<Episode>,
     rows: Heap,
@@ -62,25 +64,25 @@ struct Robomimic {
 
 /// A dataset of each episode.
 struct Column {
-    /// Its name below the episode.
+    /// Path below the episode.
     path: String,
-    /// Where it stands in the record of a frame \[bytes\].
+    /// Offset in the record of a frame \[bytes\].
     at: usize,
     kind: Kind,
 }
 
 enum Kind {
-    /// So many f64.
+    /// This number of f64.
     Numbers(usize),
-    /// One f64, which is no list.
+    /// One f64 as a scalar.
     Number,
-    /// A whole number.
+    /// One i64 as a scalar.
     Whole,
-    /// The place of a picture of this width and height.
+    /// Position of an image of this width and height.
     Picture([usize; 2]),
 }
 
-/// An episode that goes on: records of frames that are not written yet.
+/// An episode in progress, with the records of frames that are not written yet.
 struct Running {
     episode: usize,
     rows: Vec<u8>,
@@ -89,11 +91,11 @@ struct Running {
 struct Episode {
     env: usize,
     frames: usize,
-    /// Where its records are.
+    /// Positions of its records.
     blocks: Vec<Place>,
 }
 
-/// What a role is called below an episode, for what was measured below `obs` and `next_obs`.
+/// Name of a role below an episode; for observations, below `obs` and `next_obs`.
 fn name_of(role: &Role) -> String {
     let flat = |name: &str| name.replace('/', "_");
     match role {
@@ -110,7 +112,7 @@ fn name_of(role: &Role) -> String {
     }
 }
 
-/// The datasets of an episode, and what the record of a frame takes \[bytes\].
+/// Datasets of an episode, and size of the record of a frame \[bytes\].
 fn columns(features: &Features) -> (Vec<Column>, usize) {
     let (mut columns, mut at) = (Vec::new(), 0);
     let mut add = |path: String, kind: Kind| {
@@ -138,7 +140,7 @@ fn columns(features: &Features) -> (Vec<Column>, usize) {
     (columns, at)
 }
 
-/// Begins a dataset; `dt` is the time of a step \[s\].
+/// Creates a dataset; `dt` is the physics time step \[s\].
 pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64) -> Result<Box<dyn Sink>> {
     let RecorderCfg { path, every, overwrite, task, .. } = cfg;
     let features = Arc::new(Features::of(path, Format::Hdf5, streams, name_of)?);
@@ -146,7 +148,7 @@ pub(crate) fn create(cfg: &RecorderCfg, streams: &[Stream], dt: f64) -> Result<B
         let topic = "a run that nobody acts in: record targets of joints, or states with controls".into();
         return Err(RecordError::NoPlace { path: path.clone(), format: Format::Hdf5, topic });
     }
-    // A picture is a chunk.
+    // Each image is one chunk of the file.
     let too_large = |[width, height]: [usize; 2]| 3 * width as u128 * height as u128 > u128::from(u32::MAX);
     if let Some([width, height]) = features.pictures.iter().map(|picture| picture.size).find(|size| too_large(*size)) {
         let fits = "three bytes for each pixel must be less than 4 GiB".into();
@@ -202,7 +204,7 @@ impl Dataset for Robomimic {
 
     fn add(&mut self, env: usize, frame: &Frame<Place>, next: &Frame<Place>) -> Written {
         let Some(Running { episode, rows }) = &mut self.running[env] else { return Ok(()) };
-        // In the order of the columns.
+        // The order is that of the columns.
         for (of, actions) in [(frame, true), (next, false)] {
             let features = self.features.numbers.iter().zip(&of.numbers);
             for (_, numbers) in features.filter(|(feature, _)| actions || feature.role.is_observed()) {
@@ -234,10 +236,10 @@ impl Dataset for Robomimic {
         if self.episodes.is_empty() {
             return Err(Fault::NoFrame(episodes::NO_FRAME));
         }
-        // The part is locked already, by this process.
+        // This process has locked the partial file already.
         let file = H5FileOptions::new().no_locking().create(self.part.part()).map_err(fault)?;
         self.write_all(&file)?;
-        // The part is brought to the disk before it gets its name.
+        // `commit` flushes the file to the disk before it renames it.
         file.close_no_sync().map_err(fault)?;
         Ok(self.part.commit()?)
     }
@@ -287,7 +289,7 @@ fn write(demo: &H5Group, episode: &Episode, columns: &[Column], rows: &mut Heap,
         };
         datasets.push(dataset.map_err(fault)?);
     }
-    // Where no task says where episodes end.
+    // Without a task, the last frame is done.
     let ends = !columns.iter().any(|column| column.path == "dones");
     let dones = ends.then(|| demo.new_dataset::<i64>().shape([frames]).create("dones").map_err(fault)).transpose()?;
     let record = columns.iter().map(Column::end).max().unwrap_or(0);
@@ -316,7 +318,7 @@ fn write(demo: &H5Group, episode: &Episode, columns: &[Column], rows: &mut Heap,
                 Kind::Picture(_) => {
                     for (frame, cell) in (first..).zip(cells()) {
                         pictures.take(Place::from_bytes(cell), &mut picture)?;
-                        // It is packed already.
+                        // The image is compressed already.
                         dataset.write_chunk_raw(frame, &picture, 0).map_err(fault)?;
                     }
                 }
@@ -332,14 +334,14 @@ fn write(demo: &H5Group, episode: &Episode, columns: &[Column], rows: &mut Heap,
 }
 
 impl Column {
-    /// Where it ends in a record.
+    /// End offset in the record \[bytes\].
     fn end(&self) -> usize {
         self.at + self.kind.bytes()
     }
 }
 
 impl Kind {
-    /// What it takes in the record of a frame \[bytes\].
+    /// Size in the record of a frame \[bytes\].
     fn bytes(&self) -> usize {
         match self {
             Self::Numbers(width) => 8 * width,

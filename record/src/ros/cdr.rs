@@ -1,20 +1,21 @@
-//! Bytes of messages: the Common Data Representation of the OMG (formal/02-06-51, chapter 15), little-endian, as ROS 2 uses it.
+//! Encoding of messages: the Common Data Representation of the OMG (formal/02-06-51, chapter 15), little-endian, as ROS
+//! 2 uses it.
 
-/// What stands before every message: little-endian, no options.
+/// Header of every message: little-endian, no options.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
-/// A message in the making. Every number stands at a multiple of its size, counted from behind the header.
+/// Writer of a message. Every number is aligned to a multiple of its size, counted from the end of the header.
 #[derive(Debug, Default)]
 pub(crate) struct Cdr(Vec<u8>);
 
 impl Cdr {
-    /// Begins a message, in the memory of the one before.
+    /// Begins a message, reusing the memory of the previous one.
     pub(crate) fn begin(&mut self) {
         self.0.clear();
         self.0.extend_from_slice(&HEADER);
     }
 
-    /// The message.
+    /// Bytes of the message.
     pub(crate) fn bytes(&self) -> &[u8] {
         &self.0
     }
@@ -43,37 +44,37 @@ impl Cdr {
         self.0.extend_from_slice(&number.to_le_bytes());
     }
 
-    /// Numbers of a fixed count.
+    /// Writes an array of fixed length.
     pub(crate) fn f64s(&mut self, numbers: &[f64]) {
         numbers.iter().for_each(|number| self.f64(*number));
     }
 
-    /// The count of what follows.
+    /// Writes a length.
     pub(crate) fn count(&mut self, count: usize) {
-        // No message of a recording is longer than 4 GiB: pictures and states are far below.
+        // No message of a recording exceeds 4 GiB: images and states are far below.
         self.u32(u32::try_from(count).unwrap_or(u32::MAX));
     }
 
-    /// A text, with the zero that ends it.
+    /// Writes a string, with its terminating zero.
     pub(crate) fn text(&mut self, text: &str) {
         self.count(text.len() + 1);
         self.0.extend_from_slice(text.as_bytes());
         self.0.push(0);
     }
 
-    /// A list of numbers.
+    /// Writes a sequence of numbers.
     pub(crate) fn list(&mut self, numbers: &[f64]) {
         self.count(numbers.len());
         self.f64s(numbers);
     }
 
-    /// A list of bytes.
+    /// Writes a sequence of bytes.
     pub(crate) fn blob(&mut self, bytes: &[u8]) {
         self.count(bytes.len());
         self.0.extend_from_slice(bytes);
     }
 
-    /// A list of bytes that `put` appends.
+    /// Writes a sequence of `count` bytes, which `put` appends.
     pub(crate) fn blob_of(&mut self, count: usize, put: impl FnOnce(&mut Vec<u8>)) {
         self.count(count);
         put(&mut self.0);

@@ -1,23 +1,23 @@
-//! The messages, field by field.
+//! Writing of messages, field by field.
 
 use super::cdr::Cdr;
 use crate::stream::Distortion;
 use kinetoscope_sensors::camera::CameraInfo;
 
-/// When and where something was measured.
+/// Time and frame of a message.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stamp<'a> {
     /// Time \[ns\].
     pub(crate) nanos: u64,
-    /// The frame in which it is told.
+    /// The reference frame.
     pub(crate) frame: &'a str,
 }
 
 const NANOS: u64 = 1_000_000_000;
-/// The levels of a log's information and warnings.
+/// Log levels of information and warnings.
 const INFO: u8 = 20;
 const WARN: u8 = 30;
-/// Types of the numbers of a point.
+/// Data types of point fields.
 const FLOAT32: u8 = 7;
 const INT32: u8 = 5;
 
@@ -31,24 +31,24 @@ fn header(to: &mut Cdr, stamp: Stamp<'_>) {
     to.text(stamp.frame);
 }
 
-/// `[w, x, y, z]` in the order of ROS.
+/// Writes a quaternion `[w, x, y, z]` in ROS's order.
 fn quaternion(to: &mut Cdr, wxyz: &[f64]) {
     if let [w, x, y, z] = wxyz {
         to.f64s(&[*x, *y, *z, *w]);
     }
 }
 
-/// `sensor_msgs/msg/JointState`: `rows` are positions, velocities and efforts, one after the other.
+/// `sensor_msgs/msg/JointState`: `rows` are positions, velocities and efforts, concatenated.
 pub(crate) fn joint_state(to: &mut Cdr, stamp: Stamp<'_>, names: &[String], rows: &[f64]) {
     header(to, stamp);
     to.count(names.len());
     names.iter().for_each(|name| to.text(name));
-    // Three lists, also of nothing.
+    // Three lists, even without joints.
     let count = names.len();
     (0..3).for_each(|k| to.list(rows.get(k * count..(k + 1) * count).unwrap_or(&[])));
 }
 
-/// `tf2_msgs/msg/TFMessage`: poses `[x, y, z, qw, qx, qy, qz]` of `frames`, whose names get `prefix`.
+/// `tf2_msgs/msg/TFMessage`: poses `[x, y, z, qw, qx, qy, qz]` of `frames`, with `prefix` added to their names.
 pub(crate) fn transforms(to: &mut Cdr, stamp: Stamp<'_>, prefix: &str, frames: &[String], poses: &[f64]) {
     to.count(frames.len());
     for (frame, pose) in frames.iter().zip(poses.chunks_exact(7)) {
@@ -66,7 +66,7 @@ pub(crate) fn compressed_image(to: &mut Cdr, stamp: Stamp<'_>, png: &[u8]) {
     to.blob(png);
 }
 
-/// `sensor_msgs/msg/Image` of `row_bytes` bytes per row that `put` appends.
+/// `sensor_msgs/msg/Image` with `row_bytes` bytes per row, which `put` appends.
 pub(crate) fn image(
     to: &mut Cdr,
     stamp: Stamp<'_>,
@@ -85,9 +85,11 @@ pub(crate) fn image(
     to.blob_of(height * row_bytes, put);
 }
 
-/// `sensor_msgs/msg/CameraInfo`; `k` are the nine numbers of the camera's matrix, `r` and `p` the nine and twelve of what rectifies an eye
-/// of a pair, row by row, nothing of a camera alone: R is the identity then, and P is K. ROS counts pixels from the centre of the
-/// first one, not from its corner.
+/// `sensor_msgs/msg/CameraInfo`.
+///
+/// `k` is the 3 x 3 camera matrix, row-major. `r` (3 x 3) and `p` (3 x 4) are the rectification of a camera of a stereo
+/// pair. They are empty for a single camera; then R is the identity and P is K. ROS measures pixel coordinates from the
+/// center of the first pixel, not from its corner.
 pub(crate) fn camera_info(
     to: &mut Cdr,
     stamp: Stamp<'_>,
@@ -101,7 +103,7 @@ pub(crate) fn camera_info(
     to.count(width);
     to.text(&distortion.model);
     to.list(&distortion.coefficients);
-    // The first two rows of both K and P have the principal point in their third column.
+    // The principal point is in the third column of the first two rows of K and P.
     let counted = |matrix: &[f64], columns: usize| -> Vec<f64> {
         let at = |(i, x): (usize, &f64)| if i == 2 || i == columns + 2 { x - CameraInfo::FIRST_CENTRE } else { *x };
         matrix.iter().enumerate().map(at).collect()
@@ -112,14 +114,14 @@ pub(crate) fn camera_info(
     let (r, p) = if p.is_empty() { (&IDENTITY[..], &alone[..]) } else { (r, p) };
     to.f64s(r);
     to.f64s(&counted(p, 4));
-    // Neither binned nor a part of a larger picture.
+    // No binning, no region of interest.
     (0..6).for_each(|_| to.u32(0));
     to.u8(0);
 }
 
 /// `sensor_msgs/msg/Imu`: orientation w x y z, angular velocity and acceleration in its own axes.
 pub(crate) fn imu(to: &mut Cdr, stamp: Stamp<'_>, wxyz: &[f64], angular: &[f64], acceleration: &[f64]) {
-    // All zero: not known.
+    // All zeros: unknown.
     const COVARIANCE: [f64; 9] = [0.0; 9];
     header(to, stamp);
     quaternion(to, wxyz);
@@ -130,15 +132,15 @@ pub(crate) fn imu(to: &mut Cdr, stamp: Stamp<'_>, wxyz: &[f64], angular: &[f64],
     to.f64s(&COVARIANCE);
 }
 
-/// `geometry_msgs/msg/TwistStamped` and `geometry_msgs/msg/AccelStamped`, which have the same fields: along the axes, then around
-/// them.
+/// `geometry_msgs/msg/TwistStamped` or `geometry_msgs/msg/AccelStamped`, which have the same fields: linear, then
+/// angular.
 pub(crate) fn motion(to: &mut Cdr, stamp: Stamp<'_>, linear: &[f64], angular: &[f64]) {
     header(to, stamp);
     to.f64s(linear);
     to.f64s(angular);
 }
 
-/// What rays hit: of each ray three numbers of its point, the distance, three of the normal, and the mask id.
+/// Hits of rays: for each ray three coordinates of the point, the distance, three of the normal, and the mask id.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hits<'a> {
     pub(crate) points: &'a [f64],
@@ -147,7 +149,7 @@ pub(crate) struct Hits<'a> {
     pub(crate) ids: &'a [f64],
 }
 
-/// The numbers of a point, each of four bytes.
+/// Fields of a point, four bytes each.
 const FIELDS: [(&str, u8); 8] = [
     ("x", FLOAT32),
     ("y", FLOAT32),
@@ -159,7 +161,7 @@ const FIELDS: [(&str, u8); 8] = [
     ("id", INT32),
 ];
 
-/// `sensor_msgs/msg/PointCloud2` of the rays that hit something.
+/// `sensor_msgs/msg/PointCloud2` of the rays that hit a surface.
 pub(crate) fn points(to: &mut Cdr, stamp: Stamp<'_>, hits: Hits<'_>) {
     let Hits { points, distances, normals, ids } = hits;
     let rays = points.chunks_exact(3).zip(distances).zip(normals.chunks_exact(3).zip(ids));
@@ -200,7 +202,7 @@ pub(crate) fn numbers(to: &mut Cdr, label: &str, shape: &[usize], values: &[f64]
     to.list(values);
 }
 
-/// `rcl_interfaces/msg/Log`; `bad`: as a warning.
+/// `rcl_interfaces/msg/Log`, as a warning if `bad`.
 pub(crate) fn log(to: &mut Cdr, nanos: u64, bad: bool, name: &str, message: &str) {
     time(to, nanos);
     to.u8(if bad { WARN } else { INFO });
@@ -215,8 +217,8 @@ pub(crate) fn log(to: &mut Cdr, nanos: u64, bad: bool, name: &str, message: &str
 mod tests {
     use super::*;
 
-    /// Root cause: lists were written as often as there were rows of as many numbers as joints, which is never without joints; the
-    /// message ended before its lists.
+    /// Root cause: lists were written as often as there were rows of as many numbers as joints. Without joints there
+    /// were none, and the message ended before its lists.
     #[test]
     fn no_joints() {
         let of = |names: &[String], rows: &[f64]| {
@@ -225,10 +227,10 @@ mod tests {
             joint_state(&mut cdr, Stamp { nanos: 0, frame: "" }, names, rows);
             cdr.bytes().to_vec()
         };
-        // Of the encoding: four bytes before it, eight of the time, a text of nothing with its zero, filled up to a multiple of
-        // four, and four counts.
+        // The encoding has four bytes, the time eight, the empty text with its zero and padding to a multiple of four
+        // eight, and four counts follow.
         assert_eq!(of(&[], &[]), [&[0, 1, 0, 0][..], &[0; 8], &[1, 0, 0, 0, 0, 0, 0, 0], &[0; 16]].concat());
-        // The control: of one joint, three numbers.
+        // Control: three numbers for one joint.
         let one = of(&["j".into()], &[1.0, 2.0, 3.0]);
         assert!(one.ends_with(&3.0_f64.to_le_bytes()));
     }

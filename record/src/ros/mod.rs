@@ -1,7 +1,7 @@
-//! ROS 2 messages: what they are called and made of, and their bytes.
+//! ROS 2 messages: their types, writing and reading.
 //!
-//! The names and the order of the fields are those of the ROS packages `builtin_interfaces`, `foxglove_msgs`, `geometry_msgs`, `rcl_interfaces`,
-//! `sensor_msgs`, `std_msgs` and `tf2_msgs`; the bytes are little-endian CDR.
+//! The names and the order of the fields are those of the ROS packages `builtin_interfaces`, `foxglove_msgs`,
+//! `geometry_msgs`, `rcl_interfaces`, `sensor_msgs`, `std_msgs` and `tf2_msgs`. The bytes are little-endian CDR.
 
 mod cdr;
 mod message;

@@ -1,15 +1,15 @@
-//! Messages read again, of any type that a file describes: the numbers in them, by name.
+//! Reading of messages of any type that a file describes: their numbers, by name.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Types in types, at most: deeper is a circle.
+/// Largest depth of nested types. A deeper nesting is a cycle.
 const DEEPEST: usize = 12;
 
-/// What a message is made of.
+/// A message type.
 #[derive(Clone, Debug)]
 pub(crate) struct MessageType {
-    /// Fields by the name of the type; that of the message itself is empty.
+    /// Fields by type name. The name of the message type itself is empty.
     types: BTreeMap<String, Vec<Field>>,
 }
 
@@ -27,7 +27,7 @@ enum Kind {
     Other(String),
 }
 
-/// A type of numbers.
+/// Primitive number types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Number {
     Bool,
@@ -43,7 +43,7 @@ enum Number {
     F64,
 }
 
-/// How many there are of a field.
+/// Multiplicity of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Many {
     One,
@@ -51,14 +51,14 @@ enum Many {
     List,
 }
 
-/// What stands in a message.
+/// A value in a message.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
     Number(f64),
     Numbers(Vec<f64>),
     Text(String),
     Texts(Vec<String>),
-    /// Bytes, which are pictures or points: they are no numbers of their own.
+    /// Bytes of images or point clouds, which are not read as numbers.
     Bytes,
     Struct(Vec<(Arc<str>, Value)>),
     List(Vec<Value>),
@@ -93,8 +93,8 @@ impl Number {
 }
 
 impl MessageType {
-    /// Reads a description in the words of ROS (`ros2msg`): fields, then those of the types in them behind a line of `=`. `None`
-    /// for one that is no such description.
+    /// Parses a ROS message definition (`ros2msg`): fields, then those of nested types after a line of `=`. `None` for
+    /// an invalid definition.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let mut types = BTreeMap::new();
         let mut name = String::new();
@@ -111,9 +111,9 @@ impl MessageType {
         Some(Self { types })
     }
 
-    /// Reads a message in little-endian CDR; `None` for one that is not as the description says.
+    /// Reads a message in little-endian CDR; `None` if it does not match the type.
     pub(crate) fn read(&self, message: &[u8]) -> Option<Value> {
-        // The kind of encoding, then options: as written by every ROS 2 on machines of today.
+        // Encoding and options, as every ROS 2 writes them on present machines.
         let ([0, 1, _, _], rest) = message.split_first_chunk::<4>()? else { return None };
         let mut bytes = Bytes { all: rest, at: 0 };
         self.structure(&mut bytes, self.types.get("")?, 0)
@@ -136,8 +136,8 @@ impl MessageType {
             Many::Fixed(count) => Some(count),
             Many::List => Some(bytes.count()?),
         };
-        // Each takes a byte at least, which is checked below where it is not plain: no message makes anybody ask for more memory
-        // than it has itself.
+        // Each element takes at least one byte, which is checked below for nested types. Thus no message can request
+        // more memory than its own size.
         if count.is_some_and(|count| count > bytes.left()) {
             return None;
         }
@@ -154,7 +154,7 @@ impl MessageType {
                 match count {
                     None => self.structure(bytes, fields, depth + 1),
                     Some(count) => {
-                        // A type without fields takes nothing: there may be as many of it as anybody says.
+                        // Rejects a type without fields, which could have any count.
                         let each = (0..count).map(|_| {
                             let begin = bytes.at;
                             self.structure(bytes, fields, depth + 1).filter(|_| bytes.at > begin)
@@ -166,7 +166,7 @@ impl MessageType {
         }
     }
 
-    /// The fields of a type, which may be called without its package.
+    /// Fields of a type, whose name may lack its package.
     fn fields_of(&self, name: &str) -> Option<&[Field]> {
         let name = short(name);
         let own = self.types.get(&name).or_else(|| {
@@ -177,12 +177,12 @@ impl MessageType {
     }
 }
 
-/// `package/msg/Type` is `package/Type`.
+/// Shortens `package/msg/Type` to `package/Type`.
 fn short(name: &str) -> String {
     name.replace("/msg/", "/")
 }
 
-/// Constants are no fields: `uint8 FLOAT32=7`.
+/// True for a constant such as `uint8 FLOAT32=7`, which is no field.
 fn is_constant(line: &str) -> bool {
     line.split_once(char::is_whitespace)
         .is_some_and(|(_, rest)| rest.split(['"', '\'']).next().is_some_and(|rest| rest.contains('=')))
@@ -200,7 +200,7 @@ impl Field {
                 (kind, if bounded { Many::List } else { Many::Fixed(count.parse().ok()?) })
             }
         };
-        // A text may have a largest length.
+        // A string may have a maximum length.
         let word = kind.split("<=").next()?;
         let kind = match Number::of(word) {
             Some(number) => Kind::Number(number),
@@ -211,7 +211,7 @@ impl Field {
     }
 }
 
-/// Bytes behind the header, and how far they were read.
+/// The bytes after the header, and the reading position.
 struct Bytes<'b> {
     all: &'b [u8],
     at: usize,
@@ -227,7 +227,7 @@ impl Bytes<'_> {
         Some(())
     }
 
-    /// Numbers stand at multiples of their size.
+    /// Reads bytes at the next multiple of their count.
     fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
         let at = self.at.checked_next_multiple_of(N)?;
         let array = *self.all.get(at..)?.first_chunk::<N>()?;
@@ -254,7 +254,7 @@ impl Bytes<'_> {
         usize::try_from(u32::from_le_bytes(self.array()?)).ok()
     }
 
-    /// A text, whose zero at the end is counted.
+    /// Reads a string. Its count includes the terminating zero.
     fn text(&mut self) -> Option<String> {
         let count = self.count()?;
         let bytes = self.all.get(self.at..self.at.checked_add(count)?)?;
@@ -269,7 +269,7 @@ impl Value {
         fields.iter().find(|(known, _)| **known == *name).map(|(_, value)| value)
     }
 
-    /// What tells elements of a list apart: names beside a list of numbers, `child_frame_id` or `name` in a list of structures.
+    /// Name of an element in a list of structures: its `child_frame_id` or `name`.
     fn own_name(&self) -> Option<&str> {
         let named = self.field("child_frame_id").or_else(|| self.field("name"))?;
         if let Self::Text(name) = named { Some(name) } else { None }
@@ -282,7 +282,7 @@ impl Value {
         }
     }
 
-    /// Names of all numbers in it, such as `position[J1]` or `orientation.w`.
+    /// Appends the names of all numbers, such as `position[J1]` or `orientation.w`.
     pub(crate) fn fields(&self, before: &str, out: &mut Vec<String>) {
         let Self::Struct(fields) = self else { return };
         for (name, value) in fields {
@@ -305,13 +305,13 @@ impl Value {
         }
     }
 
-    /// Whether other messages of the same type may have other fields.
+    /// True if other messages of the same type may have other fields.
     pub(crate) fn varies(&self) -> bool {
         let Self::Struct(fields) = self else { return false };
         fields.iter().any(|(_, value)| matches!(value, Self::List(_)) || value.varies())
     }
 
-    /// The number that [`fields`](Self::fields) calls so, in parts; `None` where there is none in this message.
+    /// The number at a path of [`fields`](Self::fields); `None` if this message does not contain it.
     pub(crate) fn number(&self, path: &[Step]) -> Option<f64> {
         let (first, rest) = path.split_first()?;
         let value = self.field(&first.name)?;
@@ -341,16 +341,16 @@ impl Value {
     }
 }
 
-/// A part of the name of a field.
+/// Component of a field path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Step {
     name: String,
-    /// What stands in brackets behind it.
+    /// Content of the brackets after the name.
     key: Option<String>,
 }
 
 impl Step {
-    /// `transforms[env_0/arm/link].transform.translation.x` in its parts; what is in brackets may hold dots.
+    /// Splits a path such as `transforms[env_0/arm/link].transform.translation.x`. Brackets may contain dots.
     pub(crate) fn of(field: &str) -> Vec<Self> {
         let (mut steps, mut depth, mut from) = (Vec::new(), 0_usize, 0);
         let mut push = |text: &str| {
@@ -433,7 +433,7 @@ mod tests {
         let value = read(Schema::Float64MultiArray, |cdr| numbers(cdr, "forces", &[2, 2], &[1.0, 2.0, 3.0, 4.0]));
         assert_eq!(number(&value, "data[3]"), Some(4.0));
         assert_eq!(number(&value, "layout.dim[1].size"), Some(2.0));
-        // Of two rays one hit something.
+        // One of two rays hit a surface.
         let hits = Hits {
             points: &[1.0, 2.0, 3.0, f64::INFINITY, f64::INFINITY, f64::INFINITY],
             distances: &[4.0, f64::INFINITY],
@@ -455,14 +455,14 @@ mod tests {
         for end in 0..whole.len() {
             assert_eq!(kind.read(&whole[..end]), None, "{end}");
         }
-        // A count of four thousand million.
+        // A count of 2^32 - 1.
         let mut absurd = whole.clone();
         absurd[24..28].fill(0xff);
         assert_eq!(kind.read(&absurd), None);
-        // A type that holds itself.
+        // A type that contains itself.
         let circle = MessageType::parse("A a\n====\nMSG: p/A\np/A a\n").unwrap();
         assert_eq!(circle.read(&whole), None);
-        // A million times a million of a type that takes no byte.
+        // 10^12 elements of a type that takes no byte.
         let schema = "B[1000000] b\n====\nMSG: p/B\nC[1000000] c\n====\nMSG: p/C\n";
         assert_eq!(MessageType::parse(schema).unwrap().read(&vec![0; 1 << 21]), None);
         assert!(MessageType::parse("float64").is_none());

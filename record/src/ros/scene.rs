@@ -1,5 +1,5 @@
-//! `foxglove_msgs/msg/SceneUpdate`: what an environment looks like. The names and the order of the fields are those of the ROS
-//! package `foxglove_msgs`.
+//! `foxglove_msgs/msg/SceneUpdate`: the appearance of an environment. The names and the order of the fields are those
+//! of the ROS package `foxglove_msgs`.
 
 use super::cdr::Cdr;
 use super::message::{Stamp, time};
@@ -7,10 +7,10 @@ use crate::scene_update::{Drawn, Entity, Form, SceneUpdate};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 
-/// Whatever a viewer has of the topic goes away.
+/// Deletes all entities of the topic in a viewer.
 const ALL: u8 = 1;
 
-/// `at.frame` is the frame of the environment, with which the names of all others begin.
+/// Writes an update. `at.frame` is the frame of the environment, which prefixes all other frames.
 pub(crate) fn scene_update(to: &mut Cdr, at: Stamp<'_>, update: &SceneUpdate) {
     to.count(1);
     time(to, at.nanos);
@@ -29,7 +29,7 @@ fn one(to: &mut Cdr, at: Stamp<'_>, entity: &Entity, Drawn { form, rgba }: &Draw
         None => to.text(at.frame),
     }
     to.text(&format!("{}#{}", entity.name, entity.instance));
-    // It stays until it is replaced, and goes where its frame goes.
+    // It stays until it is replaced, and moves with its frame.
     to.i32(0);
     to.u32(0);
     to.u8(1);
@@ -52,7 +52,7 @@ fn one(to: &mut Cdr, at: Stamp<'_>, entity: &Entity, Drawn { form, rgba }: &Draw
                 to.count(1);
                 pose(to, &entity.pose);
                 to.f64s(size);
-                // As wide at both ends.
+                // Equal radii at both ends.
                 to.f64s(&[1.0, 1.0]);
                 to.f64s(rgba);
             }

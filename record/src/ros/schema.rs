@@ -1,6 +1,6 @@
-//! What messages are made of, as ROS 2 describes them.
+//! Message definitions, in ROS 2's `ros2msg` format.
 
-/// The types of messages that are recorded.
+/// Types of recorded messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Schema {
     AccelStamped,
@@ -20,7 +20,7 @@ pub(crate) enum Schema {
 const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
 const HEADER: (&str, &str) = ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
 const VECTOR: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
-/// What moves along an axis and around it.
+/// Fields of `Twist` and `Accel`.
 const TWO: &str = "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n";
 const QUATERNION: (&str, &str) = ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n");
 const TRANSFORM: (&str, &str) =
@@ -38,9 +38,9 @@ const POINT_FIELD: (&str, &str) =
 const LAYOUT: (&str, &str) = ("std_msgs/MultiArrayLayout", "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n");
 const DIMENSION: (&str, &str) = ("std_msgs/MultiArrayDimension", "string label\nuint32 size\nuint32 stride\n");
 
-/// The type of what an environment looks like: no numbers over time.
+/// Type of scene messages, which have no numbers over time.
 pub(crate) const SCENE_UPDATE: &str = "foxglove_msgs/msg/SceneUpdate";
-/// The types in it.
+/// Nested types of `SceneUpdate`.
 const SCENE_TYPES: [(&str, &str); 18] = [
     TIME,
     VECTOR,
@@ -102,7 +102,7 @@ const SCENE_TYPES: [(&str, &str); 18] = [
 ];
 
 impl Schema {
-    /// Its name.
+    /// Name of the type.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::AccelStamped => "geometry_msgs/msg/AccelStamped",
@@ -120,7 +120,7 @@ impl Schema {
         }
     }
 
-    /// Its fields, then those of the types in it.
+    /// Definition: its fields, then those of the nested types.
     pub(crate) fn text(self) -> String {
         let (own, others): (&str, &[(&str, &str)]) = match self {
             Self::AccelStamped => (

@@ -1,4 +1,4 @@
-//! Cameras as they are recorded: their channels, their eyes, their lenses.
+//! Camera sensors as sources: channels, stereo pairs, intrinsics and distortion.
 
 use super::{Number, Source, What, sim_error};
 use crate::error::Result;
@@ -14,21 +14,21 @@ use kinetoscope_sim::SimulationManager;
 use ndarray::{Array2, Array3, Axis};
 use std::any::Any;
 
-/// The channel that both eyes of a pair tell together.
+/// Name of the channel that both cameras of a stereo pair provide together.
 pub(super) const DISPARITY: &str = "disparity";
 
-/// Which camera of a sensor.
+/// A camera of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Eye {
-    /// The sensor is one.
+    /// The sensor itself.
     Only,
-    /// Those of a pair.
+    /// Left camera of a stereo pair.
     Left,
     Right,
 }
 
 impl Eye {
-    /// The cameras that a sensor has.
+    /// The cameras of a sensor.
     pub(super) fn of(sensor: &dyn Any) -> &'static [Self] {
         if sensor.is::<StereoCamera>() {
             &[Self::Left, Self::Right]
@@ -39,7 +39,7 @@ impl Eye {
         }
     }
 
-    /// What the camera is called that belongs to the sensor `uid`.
+    /// Name of the camera, for the sensor `uid`.
     pub(super) fn name(self, uid: &str) -> String {
         match self {
             Self::Only => uid.into(),
@@ -48,14 +48,14 @@ impl Eye {
         }
     }
 
-    /// The eye that the name of a channel begins with, and the channel: `left/depth`.
+    /// Splits a channel name such as `left/depth` into the camera and the channel.
     pub(super) fn in_front_of(channel: &str) -> (Self, &str) {
         let of = |prefix| channel.strip_prefix(prefix);
         let left = of("left/").map(|rest| (Self::Left, rest));
         left.or_else(|| of("right/").map(|rest| (Self::Right, rest))).unwrap_or((Self::Only, channel))
     }
 
-    /// The camera.
+    /// The camera, if the sensor has it.
     pub(super) fn camera(self, sensor: &dyn Any) -> Option<&Camera> {
         let pair = sensor.downcast_ref::<StereoCamera>();
         match self {
@@ -65,7 +65,7 @@ impl Eye {
         }
     }
 
-    /// The pictures that it draws.
+    /// Image channels of the camera: name, element type, components per pixel.
     pub(super) fn channels(self, sensor: &dyn Any) -> Vec<(&'static str, Element, usize)> {
         match self.camera(sensor) {
             Some(camera) => {
@@ -77,28 +77,28 @@ impl Eye {
         }
     }
 
-    /// Rows and pixels per row.
+    /// Height and width of the images \[pixels\].
     pub(super) fn image_shape(self, sensor: &dyn Any) -> (usize, usize) {
         let camera = self.camera(sensor).map(Camera::image_shape);
         camera.or_else(|| sensor.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::image_shape)).unwrap_or((0, 0))
     }
 
-    /// What its lens does to its pictures, which is the same in all environments.
+    /// Lens distortion, which is the same in all environments.
     pub(super) fn distortion(self, sensor: &dyn Any) -> Option<Distortion> {
         let Some(camera) = self.camera(sensor) else {
-            // Ray casters that draw pictures are pinholes.
+            // Ray-caster cameras are pinhole cameras.
             return Some(Distortion { model: DistortionModel::PlumbBob.name().into(), coefficients: vec![0.0; 5] });
         };
         let info = camera.camera_info("", *camera.env_ids().first()?).ok()?;
         Some(Distortion { model: info.distortion_model.name().into(), coefficients: info.distortion_coefficients })
     }
 
-    /// R and P of an eye of a pair, as [`Rectification`] has them, of the pictures that arrived last: 9 and 12 numbers of each row.
-    /// `None` for cameras alone and for eyes that cannot be rectified.
+    /// Rectification matrices R (3 x 3) and P (3 x 4) of the last arrived images, row-major, 21 numbers per row; see
+    /// [`Rectification`]. `None` for single cameras and for pairs that cannot be rectified.
     pub(super) fn rectified(self, sensor: &dyn Any) -> Option<Array2<f64>> {
         let eye = usize::from(self == Self::Right);
         let rows = rectifications(sensor)?.ok()?.into_iter().map(|Rectification { rotations, projections }| {
-            // Row by row.
+            // `iter` of the transposed matrix is row-major.
             let (r, p) = (rotations[eye].transpose(), projections[eye].transpose());
             let mut numbers = [0.0; 21];
             numbers.iter_mut().zip(r.iter().chain(p.iter())).for_each(|(to, from)| *to = *from);
@@ -107,7 +107,7 @@ impl Eye {
         Some(Array2::from(rows.collect::<Vec<_>>()))
     }
 
-    /// Intrinsic matrices and poses, in the axes of ROS, of the pictures that arrived last.
+    /// Intrinsic matrices and poses, with ROS camera axes, of the last arrived images.
     pub(super) fn lenses(self, sensor: &dyn Any) -> Option<(Array3<f64>, Array2<f64>)> {
         if let Some(camera) = self.camera(sensor) {
             return Some((camera.arrived_intrinsic_matrices(), camera.arrived_pose_w(CameraConvention::Ros)));
@@ -117,7 +117,7 @@ impl Eye {
     }
 }
 
-/// How the pictures of a pair that arrived last are rectified, row by row; `None` for other sensors.
+/// Rectification of the last arrived images of a stereo camera, row by row; `None` for other sensors.
 fn rectifications(sensor: &dyn Any) -> Option<std::result::Result<Vec<Rectification>, CameraError>> {
     let pair = sensor.downcast_ref::<StereoCamera>()?;
     let matrices = [pair.left(), pair.right()].map(Camera::arrived_intrinsic_matrices);
@@ -134,12 +134,12 @@ fn rectifications(sensor: &dyn Any) -> Option<std::result::Result<Vec<Rectificat
     Some(rows.map(of).collect())
 }
 
-/// The camera that tells when a sensor of cameras has taken pictures, and of which environments: both eyes of a pair do together.
+/// The camera whose timing applies to a camera sensor. Both cameras of a stereo pair capture together.
 pub(super) fn timed(sensor: &dyn Any) -> Option<&Camera> {
     Eye::of(sensor).first().and_then(|eye| eye.camera(sensor))
 }
 
-/// Channels of a camera: their names, types and numbers per pixel, and how their pictures are copied.
+/// Generates the list of the camera's channels (name, type, components per pixel) and the function that copies them.
 macro_rules! cameras {
     ($($(#[$doc:meta])* $field:ident :: $Channel:ident,)*) => {
         const CAMERA: &[(&str, Element, usize)] = &[$(
@@ -164,7 +164,7 @@ macro_rules! cameras {
 
 kinetoscope_render::with_channels!(cameras);
 
-/// The same of ray casters that draw pictures.
+/// Channels of ray-caster cameras: name, type, components per pixel.
 const RAY_CAMERA: [(&str, Element, usize); 4] = [
     (Depth::NAME, Element::F32, 1),
     (Distance::NAME, Element::F32, 1),
@@ -173,7 +173,7 @@ const RAY_CAMERA: [(&str, Element, usize); 4] = [
 ];
 
 impl Source {
-    /// What ROS's message of a camera does not say of this one, and why.
+    /// Describes what ROS's `CameraInfo` message cannot express for this camera, and the reason.
     pub(crate) fn unspoken(&self, sim: &SimulationManager) -> Option<String> {
         let (Kind::Lens { camera, distortion, .. }, What::Lens(uid, _)) = (&self.stream.kind, &self.what) else {
             return None;
@@ -213,7 +213,7 @@ mod tests {
     use super::*;
     use kinetoscope_render::frame::Channels;
 
-    /// Root cause: the list was written by hand beside that of the cameras, and lacked two of its channels.
+    /// Root cause: a second, handwritten list of the channels lacked two of them.
     #[test]
     fn channels() {
         let recorded: Vec<&str> = CAMERA.iter().map(|(name, ..)| *name).collect();

@@ -1,4 +1,4 @@
-//! A ball that falls, and NumPy archives read back.
+//! A falling ball, and reading of NumPy archives.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Content of recordings, held against what was read from the simulation meanwhile.
+//! Content of recordings, compared with values that were read from the simulation meanwhile.
 
 use super::*;
 
@@ -115,7 +115,7 @@ fn no_side_effect() {
     assert_eq!(recorded, alone);
 }
 
-/// Time goes on over a reset, and the state after it has a message of its own in its environment.
+/// Recorded time continues over a reset. The state after the reset has a message of its own in its environment.
 #[test]
 fn reset() {
     let at_each: &[u64] = &[0, 1, 2, 3, 4, 5, 6, 6, 7, 8, 9, 10];
@@ -137,7 +137,7 @@ fn reset() {
     }
 }
 
-/// Topics, environments and rates that a configuration chooses.
+/// A configuration selects topics, environments and rates.
 #[test]
 fn choice() {
     let (_folder, path) = scratch("run.mcap");

@@ -1,4 +1,4 @@
-//! Frames and episodes that a run should have in datasets.
+//! Expected frames and episodes of datasets.
 
 use super::*;
 
@@ -8,10 +8,10 @@ pub(crate) struct Row {
     pub(crate) positions: Vec<f64>,
     pub(crate) velocities: Vec<f64>,
     pub(crate) efforts: Vec<f64>,
-    /// Of positions, velocities and efforts.
+    /// Targets of positions, velocities and efforts.
     pub(crate) targets: [Vec<f64>; 3],
     pub(crate) cube: Vec<f64>,
-    /// Measured last since the environment was reset; red, green and blue as hexadecimal numbers.
+    /// Last image since the reset of the environment: red, green and blue as hexadecimal numbers.
     pub(crate) image: Option<String>,
     pub(crate) acceleration: Option<Vec<f64>>,
     joints: bool,
@@ -96,7 +96,8 @@ impl Expected {
         }
     }
 
-    /// The environment of each episode and its frames, each with the row that follows, which has its action. The last row is no frame.
+    /// Environment and frames of each episode. Each frame is paired with the next row, which has its action. The last
+    /// row is no frame.
     pub(crate) fn episodes(&self) -> Vec<(usize, Vec<[&Row; 2]>)> {
         let of = |(env, rows): &'_ (usize, Vec<Row>)| -> (usize, Vec<[usize; 2]>) {
             let whole = (1..rows.len()).filter(|next| rows[next - 1].is_whole()).map(|next| [next - 1, next]);

@@ -1,4 +1,4 @@
-//! HDF5 files as robomimic reads them, read by h5py; robomimic itself brings PyTorch, some gigabytes.
+//! HDF5 files for robomimic, read by h5py. robomimic itself requires PyTorch, some gigabytes.
 
 use super::episodes::{Expected, Row};
 use super::*;
@@ -42,14 +42,14 @@ fn frames() {
         assert_eq!(table("dones"), json!(dones));
         // Without a task there are no rewards.
         assert!(episode["numbers"].get("rewards").is_none());
-        // An arm with a fixed base and a cube: angles and the pose of a free joint, which MuJoCo has in this order.
+        // An arm with a fixed base and a cube: joint angles and the pose of a free joint, in MuJoCo's order.
         for (state, [row, _]) in list(&table("states")).iter().zip(&frames) {
             let state = numbers(state);
             let (joints, dof) = (row.positions.len(), row.velocities.len());
             assert_eq!(state.len(), 1 + joints + 7 + dof + 6);
             assert_eq!(state[1..=joints], row.positions);
             assert_eq!(state[1 + joints..4 + joints], row.cube[..3]);
-            // The engine makes its quaternions of length 1 once more: a rounding of each number.
+            // The engine normalizes its quaternions once more: one rounding of each number.
             let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 2.0 * f64::EPSILON;
             assert!(state[4 + joints..8 + joints].iter().zip(&row.cube[3..]).all(near), "{state:?} {row:?}");
             assert_eq!(state[8 + joints..8 + joints + dof], row.velocities);
@@ -62,7 +62,7 @@ fn frames() {
     assert_eq!(about["columns"]["joint_pos"], json!(joints));
 }
 
-/// Many episodes, which are many groups, and long ones, which are many blocks.
+/// Many episodes are many groups, and long episodes are many blocks.
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
 fn many_episodes() {
@@ -74,7 +74,7 @@ fn many_episodes() {
         <geom size="0.1" mass="1"/></body></worldbody><actuator><motor joint="x"/></actuator></mujoco>"#;
     let mut sim = simulation(ENVS);
     let cart = sim.add_mjcf(MjcfCfg::text("cart", cart)).unwrap();
-    // Three steps from one reset of all environments to the next, then none.
+    // All environments are reset every three steps, then no longer.
     let mut positions: Vec<Vec<Vec<f64>>> = Vec::new();
     record(&mut sim, RecorderCfg::new(&path), |sim| {
         for step in 0..3 * RESETS + STEPS {
@@ -134,7 +134,7 @@ fn refusals() {
 /// Set in child processes only: the file to record to.
 const FILE: &str = "KINETOSCOPE_TEST_HDF5_TO";
 
-/// Records where the system limits the size of files, which is like a full disk.
+/// Records with a limited file size, which acts as a full disk.
 #[test]
 #[ignore = "runs in a process of its own"]
 fn scenario_full_disk() {
@@ -152,7 +152,7 @@ fn scenario_full_disk() {
 #[test]
 #[cfg_attr(not(feature = "hdf5"), ignore = "needs the feature hdf5")]
 fn full_disk() {
-    // A limit in blocks of 512 bytes, whose signal is ignored, so that writing is an error.
+    // The limit is in blocks of 512 bytes. Its signal is ignored, so that writing returns an error.
     let said = |blocks: u64| {
         let (folder, path) = scratch("run.hdf5");
         let child = kinetoscope_testkit::process::command(module_path!(), "scenario_full_disk");
@@ -172,7 +172,7 @@ fn full_disk() {
     assert_eq!(left, ["run.hdf5"], "{text}");
     let whole = text.split("whole ").nth(1).and_then(|rest| rest.split_whitespace().next()).unwrap();
     let whole: u64 = whole.parse().unwrap();
-    // While rows and images are buffered, in the file itself, and in what comes last.
+    // Full while rows and images are buffered, in the file itself, and at its end.
     for blocks in [1, whole / 512 / 4, whole / 512 / 2, whole / 512 - 1] {
         let (text, left) = said(blocks);
         let parts = ["refused", "run.hdf5", "too large"];

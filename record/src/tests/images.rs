@@ -1,4 +1,4 @@
-//! Folders of images, animations, and images of the stage.
+//! Folders of images, animations and overview images.
 
 use super::*;
 
@@ -20,7 +20,7 @@ fn recorded(cfg: RecorderCfg) -> (Recorded, Vec<Vec<u8>>, Vec<Vec<f32>>) {
     (world.sim.finish_recording(recorder).unwrap(), colors, depths)
 }
 
-/// A folder has every image to the last bit, and depth to the millimetre.
+/// A folder has every color image bit by bit, and depth to the millimeter.
 #[test]
 fn folder() {
     let (_folder, path) = scratch("images");
@@ -34,7 +34,7 @@ fn folder() {
         assert_eq!(image("color", k).to_rgb8().as_raw(), color);
         for (found, depth) in image("depth", k).as_luma16().unwrap().iter().zip(depth) {
             let metres = f32::from(*found) / 1000.0;
-            // Half a millimetre of rounding, and that of f32 at some metres.
+            // Half a millimeter of rounding, and the rounding of f32 at some meters.
             let same = if depth.is_finite() { (metres - depth).abs() < 0.000_501 } else { *found == 0 };
             assert!(same, "{found} mm for {depth} m");
             seen += u32::from(depth.is_finite());
@@ -54,7 +54,7 @@ fn folder_by_pillow() {
         let step = u64::from(IMAGE_EVERY) * (k as u64 + 1);
         let of = |channel: &str| &found[format!("camera/{channel}/env_1/{k:06}.png")];
         assert_eq!(*of("color"), json!(["RGB", [32, 24], weighed(color, |byte| u64::from(*byte)), step]));
-        // A miss is 0; half a millimetre rounds away from it.
+        // A miss is 0; half a millimeter rounds away from zero.
         let mm = |depth: &f32| if depth.is_finite() { (depth * 1000.0).round() as u64 } else { 0 };
         let [mode, size, sum, at] = &list(of("depth"))[..] else { panic!("{}", of("depth")) };
         assert!(["I;16", "I"].contains(&mode.as_str().unwrap()), "{mode}");
@@ -62,13 +62,13 @@ fn folder_by_pillow() {
     }
 }
 
-/// A folder has its name when it is whole, and nothing of the folder that it replaces.
+/// A folder gets its name when it is complete, and keeps nothing of the folder that it replaces.
 #[test]
 fn overwritten_folder() {
     let (folder, path) = scratch("images");
     let part = folder.path().join("images.part");
     let (was, ..) = recorded(RecorderCfg::new(&path));
-    // Masks are asked for with the rest of the camera, and have no place.
+    // The topic includes masks, which the format does not support.
     let mut world = World::new(2, 1);
     let cfg = RecorderCfg::new(&path).with_topics([Topic::Sensor("camera".into())]);
     let error = world.sim.record(cfg.clone()).unwrap_err();
@@ -110,7 +110,7 @@ fn check_frame(end: &str, frame: &Value, color: &[u8]) {
             assert_eq!(bytes("rgb"), color, "so many are a palette");
         }
         "mp4" => {
-            // ITU-R BT.709, 8 bits, limited range: half of rounding, and the error of constants in 65536ths.
+            // ITU-R BT.709, 8 bits, limited range: half of rounding, and the error of constants with 16 bits.
             let close = |found: u8, wanted: f64| assert!((f64::from(found) - wanted).abs() < 0.52, "{found} {wanted}");
             let luma = |[r, g, b]: [f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
             let scaled = |p: &[u8; 3]| [p[0], p[1], p[2]].map(|x| f64::from(x) / 255.0);
@@ -161,7 +161,7 @@ fn animation_streams() {
         let error = world.sim.record(cfg).unwrap_err();
         assert!(matches!(&error, RecordError::TooMany { .. }), "{error}");
         assert!(error.to_string().contains("camera/color in 2 environments"), "{error}");
-        // Without a topic, the first of each is taken.
+        // Without a topic, the first camera and the first environment are used.
         let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
         let streams: Vec<_> = world
             .sim
@@ -172,7 +172,7 @@ fn animation_streams() {
             .map(|s| (s.name.clone(), s.env_ids.clone()))
             .collect();
         assert_eq!(streams, [("camera/color".to_string(), vec![0])]);
-        // A recording without a frame is no file.
+        // A recording without a frame leaves no file.
         let error = world.sim.finish_recording(recorder).unwrap_err().to_string();
         assert!(error.contains("no frame"), "{}: {error}", format.name());
         assert!(names(&folder).is_empty());
@@ -194,7 +194,7 @@ fn odd_size() {
 
 const STAGE: [usize; 2] = [96, 64];
 
-/// Records the stage for 0.3 s, at 20 images per second.
+/// Records the overview for 0.3 s, at 20 images per second.
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
 fn stage_animations() {
@@ -217,7 +217,7 @@ fn stage_animations() {
     }
 }
 
-/// The judge is the rasterizer of cameras at the viewpoint of the stage: of one environment, both see the same.
+/// Reference: the rasterizer of a camera at the viewpoint of the overview. With one environment, both images are equal.
 #[test]
 fn stage_by_camera() {
     let (_folder, path) = scratch("images");
@@ -241,13 +241,13 @@ fn stage_by_camera() {
     record_steps(&mut world, RecorderCfg { stage, topics, ..RecorderCfg::new(&path) }, 20);
     let image = |of: &str, k: usize| std::fs::read(path.join(format!("{of}/color/env_0/{k:06}.png"))).unwrap();
     for k in 0..4 {
-        // The stage is drawn at the beginning too.
+        // The overview also has an image at the beginning.
         assert!(image("stage", k + 1) == image("judge", k), "image {k}");
     }
     assert!(image("stage", 1) != image("stage", 4), "control: it moves");
 }
 
-/// Without a camera, the stage is what there is to see.
+/// Without a camera, the overview image is recorded.
 #[test]
 fn stage_alone() {
     let folder = tempfile::tempdir().unwrap();

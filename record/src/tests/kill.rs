@@ -1,5 +1,5 @@
-//! Processes that are killed while they record: everything recorded more than a second before can be read, where the file
-//! is written while it is recorded.
+//! Processes that are killed while they record. Everything recorded more than a second before the kill can be read, if
+//! the format is written during the recording.
 
 use super::*;
 use std::io::{BufRead, BufReader, Write};
@@ -10,18 +10,18 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Set in child processes only: the file to record to.
 const FILE: &str = "KINETOSCOPE_TEST_RECORD_TO";
-/// Number of processes that are killed: 50 in CI, else few.
+/// Number of killed processes: 50 in CI, else few.
 const KILLS: &str = "KINETOSCOPE_TEST_KILLS";
-/// Number of processes at a time: they mostly sleep.
+/// Number of simultaneous processes, which mostly sleep.
 const AT_A_TIME: u32 = 8;
 
-/// Records until it is killed, and prints which steps it has done.
+/// Records until it is killed, and prints its completed steps.
 #[test]
 #[ignore = "runs in a process of its own"]
 fn scenario_endless() {
     let Some(path) = std::env::var_os(FILE) else { return };
     let mut world = World::new(2, 1);
-    // Its life begins before there is a file.
+    // The process may be killed before there is a file.
     writeln!(std::io::stdout(), "\ndone 0").unwrap();
     world.sim.record(RecorderCfg::new(path)).unwrap();
     for step in 0.. {
@@ -33,8 +33,8 @@ fn scenario_endless() {
     }
 }
 
-/// Kills a process `life` after its first step (`begun`), or after a time before there is a file. Returns the steps that it had
-/// done one second before.
+/// Kills a process `life` after its first step (`begun`), or from a time before there is a file. Returns the number of
+/// steps that were done one second before the kill.
 fn kill_after(path: &Path, life: Duration, begun: bool) -> u64 {
     let mut child = kinetoscope_testkit::process::command(module_path!(), "scenario_endless")
         .env(FILE, path)
@@ -54,7 +54,7 @@ fn kill_after(path: &Path, life: Duration, begun: bool) -> u64 {
     while begun && done.iter().all(|(_, steps)| *steps == 0) {
         done.push(heard.recv().unwrap());
     }
-    // The end may come at any point, also within its first line or the first bytes of its file.
+    // The kill may come at any point, including the first line or the first bytes of the file.
     std::thread::sleep(life);
     let end = Instant::now();
     // SIGKILL, on Unix.
@@ -81,16 +81,16 @@ fn readable_rows() {
             kill_once(folder.path(), kill);
         }
     };
-    // A thread that panics is noticed at the end.
+    // A panic of a thread is noticed at the end.
     std::thread::scope(|scope| (0..AT_A_TIME.min(kills)).for_each(|_| drop(scope.spawn(work))));
     assert_eq!(next.load(Ordering::Relaxed), kills + AT_A_TIME.min(kills), "each of them was killed");
 }
 
 fn kill_once(folder: &Path, kill: u32) {
     let path = folder.join(format!("{kill}.mcap"));
-    // Another time at every run, anywhere between two flushes.
+    // A different time in every run, anywhere between two flushes.
     let chance = u64::from(SystemTime::now().duration_since(UNIX_EPOCH).unwrap().subsec_micros());
-    // A third of them from the first moments on: while the file is begun, and before anything of it is a second old.
+    // A third of the processes are killed early: while the file is created, and before anything is a second old.
     let short = kill.is_multiple_of(3);
     let life = Duration::from_millis(if short { chance % 1200 } else { 1200 + chance % 1000 });
     let old = kill_after(&path, life, !short);
@@ -100,7 +100,8 @@ fn kill_once(folder: &Path, kill: u32) {
     let recovered = match recover(&path) {
         Ok(recovered) => recovered,
         Err(error) => {
-            // Nothing was a second old, and nothing was whole yet: the part stays, and no file gets the name.
+            // No data was a second old, and no message was complete: the partial file remains, and no file gets the
+            // name.
             let said = error.to_string();
             let begun = ["there is no whole message", "this is no MCAP file", "entity not found"];
             assert!(old == 0 && begun.iter().any(|what| said.contains(what)), "step {old}: {said}");

@@ -3,7 +3,7 @@
 use super::episodes::Expected;
 use super::*;
 
-/// Frames of a dataset; each action is the one that followed.
+/// Frames of a dataset; each has the action that follows.
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
 fn frames() {
@@ -41,20 +41,20 @@ fn frames() {
     }
 }
 
-/// A dataset has its name when it is whole.
+/// A dataset has its name only when it is complete.
 #[test]
 fn unfinished() {
     let (folder, path) = scratch("run.lerobot");
     let part = folder.path().join("run.lerobot.part");
     let mut world = World::new(1, 1);
     let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
-    // Nothing was measured: there is no frame.
+    // Without a measurement, there is no frame.
     let error = world.sim.finish_recording(recorder).unwrap_err();
     let RecordError::BrokenOff { error, kept, .. } = error else { panic!("{error}") };
     assert!(matches!(&*error, RecordError::NoFrame { path: of, .. } if *of == path), "{error}");
     assert_eq!(kept.as_deref(), Some(&*part));
     assert!(!path.exists() && part.exists());
-    // The rest is neither taken for whole nor thrown away.
+    // The partial dataset is neither accepted as complete nor deleted.
     let error = world.sim.record(RecorderCfg::new(&path)).unwrap_err();
     assert!(matches!(error, RecordError::Unfinished { recoverable: false, .. }), "{error}");
     let cfg = overwriting(RecorderCfg::new(&path));

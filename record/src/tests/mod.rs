@@ -1,5 +1,5 @@
-//! Recordings: their content, held against the simulation and read by independent readers; and shared parts of the tests
-//! of this crate.
+//! Tests of recordings: their content is compared with the simulation and read by independent readers. Shared functions
+//! of the tests of this crate.
 
 mod archives;
 mod contents;
@@ -79,7 +79,7 @@ pub(crate) fn record_steps(world: &mut World, cfg: RecorderCfg, steps: u32) -> R
     world.sim.finish_recording(recorder).unwrap()
 }
 
-/// The same configuration, which may replace files.
+/// Allows a configuration to replace files.
 pub(crate) fn overwriting(cfg: RecorderCfg) -> RecorderCfg {
     RecorderCfg { overwrite: true, ..cfg }
 }
@@ -98,7 +98,7 @@ pub(crate) struct Message {
 }
 
 impl Message {
-    /// The number of the step at its time, of steps of 10 ms.
+    /// Number of the step at its time, for steps of 10 ms.
     pub(crate) fn step(&self) -> u64 {
         (self.time as f64 / 1e7).round() as u64
     }
@@ -128,7 +128,7 @@ pub(crate) fn of<'m>(messages: &'m [Message], topic: &str) -> Vec<&'m Message> {
     messages.iter().filter(|message| message.topic == topic).collect()
 }
 
-/// The numbers of the steps at which a topic has messages.
+/// Steps at which a topic has messages.
 pub(crate) fn steps_of(messages: &[Message], topic: &str) -> Vec<u64> {
     of(messages, topic).iter().map(|message| message.step()).collect()
 }
@@ -139,7 +139,7 @@ pub(crate) fn logs(path: &Path) -> Vec<String> {
     of(&messages(path), "/events").iter().map(text).collect()
 }
 
-/// The bytes of numbers in messages.
+/// Little-endian bytes of numbers, as in messages.
 pub(crate) fn bytes(numbers: impl IntoIterator<Item: Borrow<f64>>) -> Vec<u8> {
     numbers.into_iter().flat_map(|x| x.borrow().to_le_bytes()).collect()
 }
@@ -149,7 +149,7 @@ pub(crate) fn said(script: &str, file: &Path) -> Value {
     read_json(&python_readers(), &Path::new(env!("CARGO_MANIFEST_DIR")).join("src/tests").join(script), file)
 }
 
-/// Numbers with a fraction as texts of their bits, as the scripts give them: nothing is lost between the programs.
+/// Replaces floating-point numbers by strings of their bits, as the scripts do, so that no precision is lost.
 pub(crate) fn bits(value: Value) -> Value {
     match value {
         Value::Number(number) if number.is_f64() => number.as_f64().unwrap().to_bits().to_string().into(),
@@ -159,12 +159,12 @@ pub(crate) fn bits(value: Value) -> Value {
     }
 }
 
-/// A number from the text of its bits.
+/// Converts a string of bits to a number.
 pub(crate) fn number(text: &Value) -> f64 {
     f64::from_bits(text.as_str().unwrap().parse().unwrap())
 }
 
-/// Numbers from texts of their bits.
+/// Converts strings of bits to numbers.
 pub(crate) fn numbers(values: &Value) -> Vec<f64> {
     list(values).iter().map(number).collect()
 }
@@ -174,12 +174,12 @@ pub(crate) fn list(value: &Value) -> &Vec<Value> {
     value.as_array().unwrap()
 }
 
-/// The sum of numbers, each by its place, so that no number may stand for another.
+/// The sum of numbers weighted by their positions, so that exchanged numbers change it.
 pub(crate) fn weighed<T>(numbers: impl IntoIterator<Item = T>, number: impl Fn(T) -> u64) -> u64 {
     numbers.into_iter().zip(1..).map(|(x, k)| number(x) * k).sum()
 }
 
-/// Red, green and blue of an image with opacity.
+/// Red, green and blue of an image with an alpha channel.
 pub(crate) fn rgb(color: &ndarray::Array3<u8>) -> Vec<u8> {
     color.rows().into_iter().flat_map(|p| [p[0], p[1], p[2]]).collect()
 }

@@ -14,7 +14,7 @@ const DECIMATION: u32 = 2;
 const EPISODE: u64 = 7;
 const STEPS: usize = 25;
 
-/// A cart on a rail that is pushed. Its reward is its position; an episode ends when the cart is too far away.
+/// A cart on a rail, moved by forces. Its reward is its position; an episode ends when the cart is too far away.
 fn task() -> Env {
     let cart = r#"<mujoco><worldbody><body name="rail"><geom size="0.01"/><body name="cart">
         <joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1" mass="2"/></body></body></worldbody></mujoco>"#;
@@ -41,7 +41,7 @@ fn task() -> Env {
         .unwrap()
 }
 
-/// An episode as the task reports it: the reward of each step, and if it has ended.
+/// An episode as reported by the task: the reward of each step, and true if it has ended.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Told {
     env: usize,
@@ -62,7 +62,7 @@ fn run(recordings: &[(&Path, u64)]) -> Vec<Told> {
     let mut all: Vec<Told> = (0..ENVS).map(|env| Told { env, ..Told::default() }).collect();
     let mut now: Vec<usize> = (0..ENVS).collect();
     for step in 0..STEPS {
-        // Other actions in each environment: the last is pushed so hard that its episode ends early.
+        // Each environment has other actions. The last cart is pushed so hard that its episode ends early.
         let actions = Array2::from_shape_fn((ENVS, 1), |(env, _)| 1e4 * env as f64 * (1.0 + 0.1 * step as f64));
         let done = env.step(&actions).unwrap();
         for k in 0..ENVS {
@@ -94,20 +94,20 @@ fn robomimic() {
     for (path, every) in &files {
         let found = said("read_hdf5.py", path);
         let episodes = list(&found["episodes"]);
-        // The rows of an episode are at multiples of `every`, and each but the last is a frame.
+        // The rows of an episode are at multiples of `every`. Each but the last is a frame.
         let rows_of = |episode: &Told| -> Vec<u64> {
             let end = episode.begin + u64::from(DECIMATION) * episode.rewards.len() as u64;
             (episode.begin.next_multiple_of(*every)..=end).step_by(*every as usize).collect()
         };
         let mut told: Vec<&Told> = told.iter().filter(|episode| rows_of(episode).len() > 1).collect();
-        // In the order of their first whole frames, those of a row in the order of environments.
+        // Sorted by their first complete frames, then by environment.
         told.sort_by_key(|episode| (rows_of(episode)[1], episode.env));
         assert_eq!(episodes.len(), told.len(), "every {every}");
         for (episode, told) in episodes.iter().zip(told) {
             let rows = rows_of(told);
             let frames = rows.len() - 1;
             assert_eq!((&episode["frames"], &episode["env"]), (&json!(frames), &json!(told.env)), "every {every}");
-            // A frame has the rewards until the row after it; the last one those until the end.
+            // A frame has the rewards until the next row. The last frame also has those until the end of the episode.
             let mut wanted = vec![0.0; frames];
             for (k, reward) in told.rewards.iter().enumerate() {
                 let at = told.begin + u64::from(DECIMATION) * (k as u64 + 1);
@@ -149,7 +149,7 @@ fn lerobot() {
     }
 }
 
-/// Archives and messages have outcomes at the time of the step.
+/// Archives and messages have task results at the time of the step.
 #[test]
 fn archive_and_messages() {
     let folder = tempfile::tempdir().unwrap();
@@ -174,7 +174,7 @@ fn archive_and_messages() {
     }
 }
 
-/// The observer of a program with a task of its own.
+/// The observer of a program with its own task.
 struct OwnTask;
 
 impl Observer for OwnTask {
@@ -189,7 +189,7 @@ impl Observer for OwnTask {
     }
 }
 
-/// A program with a task of its own publishes the outcomes itself; a recording without a task has no outcomes.
+/// A program with its own task publishes the results itself. A recording without a task has no results.
 #[test]
 fn own_task() {
     let (_folder, path) = scratch("run.npz");
@@ -212,7 +212,7 @@ fn own_task() {
         for step in 0..4 {
             sim.update(2);
             outcome(f64::from(step), ENVS).publish(sim).unwrap();
-            // One number too few is refused, and is not in the recording.
+            // An array with one number too few is refused and not recorded.
             let error = outcome(100.0, ENVS - 1).publish(sim).unwrap_err().to_string();
             assert!(error.contains("rewards"), "{error}");
         }

@@ -72,7 +72,7 @@ impl Sampled for Skin {
 /// Stamps and values of a channel in environment 1, step by step.
 type Measured = (Vec<f64>, Vec<Vec<f64>>);
 
-/// Records a skin; gives pressures and temperatures as the sensor has them.
+/// Records a skin sensor; returns its pressures and temperatures.
 fn record_skin(path: &Path) -> [Measured; 2] {
     let mut sim = falling(2);
     let skin = sim.add_sensor("skin", SkinCfg).unwrap();
@@ -88,7 +88,7 @@ fn record_skin(path: &Path) -> [Measured; 2] {
             }
         }
     });
-    // Forces are of the beginning of the step.
+    // Forces are those of the beginning of the step.
     assert!(measured[0].0.iter().zip(&measured[1].0).all(|(force, state)| force < state));
     measured
 }

@@ -1,4 +1,4 @@
-//! Independent readers: NumPy, the `mcap` package with its decoder of ROS 2 messages, Pillow, PyAV with FFmpeg.
+//! Independent readers: NumPy, the `mcap` package with its ROS 2 decoder, Pillow, PyAV with FFmpeg.
 
 use super::*;
 use kinetoscope_render::lens::Lens;
@@ -6,7 +6,8 @@ use kinetoscope_render::lens::{OpenCvFisheye, Panorama};
 
 const STEPS: u32 = 4 * IMAGE_EVERY;
 
-/// The matrix of a camera in environment 1 for ROS, which counts pixels from the centre of the first one.
+/// Intrinsic matrix of a camera in environment 1 for ROS, which measures pixel coordinates from the center of the first
+/// pixel.
 fn ros_matrix(camera: &Camera) -> Vec<f64> {
     let mut matrix = camera.intrinsic_matrices().index_axis(Axis(0), 1).to_owned();
     matrix[(0, 2)] -= 0.5;
@@ -14,7 +15,7 @@ fn ros_matrix(camera: &Camera) -> Vec<f64> {
     matrix.into_iter().collect()
 }
 
-/// Records, and returns the expected last row. Messages of ROS have the matrix of ROS, arrays that of the camera.
+/// Records, and returns the expected last row. ROS messages have ROS's matrix, arrays that of the camera.
 fn recorded(path: &Path, finish: bool) -> Value {
     let mut world = World::new(2, 2);
     let recorder = world.sim.record(RecorderCfg::new(path)).unwrap();
@@ -69,7 +70,7 @@ fn files() {
     }
 }
 
-/// Recovery of an unfinished recording gives a whole file, with its index and the same messages.
+/// Recovery of an unfinished recording gives a complete file, with its index and the same messages.
 #[test]
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
 fn recovered_file() {
@@ -80,19 +81,19 @@ fn recovered_file() {
     let recovered = recover_to(&path, &out).unwrap();
     assert!(recovered.damage.is_none() && recovered.messages > 0, "{recovered:?}");
     assert_eq!(said("read_mcap.py", &out), expected);
-    // The part is gone now, and there is nothing more to recover.
+    // The partial file is deleted, and there is nothing left to recover.
     let again = recover_to(&path, folder.path().join("other.mcap")).unwrap_err();
     assert!(again.to_string().contains("run.mcap.part"), "{again}");
 }
 
-/// A cube that stands, rays from above, cameras: the expected content of messages of points, forces and normals.
+/// Expected messages of points, forces and normals: a standing cube, rays from above, cameras.
 fn sensed(path: &Path) -> Value {
     let mut sim = simulation(2);
     sim.add_rigid_object(kinetoscope_testkit::worlds::cube("cube", 0.4, 2.0, [0.1, 0.05, 0.2])).unwrap();
     let touch = sim.add_sensor("touch", ContactSensorCfg::of("cube")).unwrap();
     let pattern = Grid { resolution: 0.2, size: [0.6, 0.4], ..Grid::default() };
     let offset = Pose::translation(0.03, 0.0, 2.0);
-    // Some rays end before the ground: misses, which are no points.
+    // Some rays end before the ground. These misses are no points.
     let scanner = RayCasterCfg { offset, max_distance: 1.8, pattern: pattern.into(), ..RayCasterCfg::default() };
     let scanner = sim.add_sensor("scanner", scanner).unwrap();
     let eye = CameraCfg {
@@ -108,7 +109,7 @@ fn sensed(path: &Path) -> Value {
     let pair = sim.add_sensor("pair", pair).unwrap();
     let imu = sim.add_sensor("imu", ImuCfg::on("cube")).unwrap();
     let eye = sim.add_sensor("eye", eye).unwrap();
-    // A lens that ROS has a model for, and one that it has none for.
+    // A lens with a distortion model of ROS, and a lens without one.
     let bent = OpenCvFisheye { k1: 0.02, k2: -0.003, k3: 0.0005, k4: -0.0001, max_angle: None };
     let lenses: [(&str, Lens); 2] = [("fish", bent.into()), ("round", Panorama {}.into())];
     let [fish, _] = lenses.map(|(uid, lens)| {
@@ -127,7 +128,7 @@ fn sensed(path: &Path) -> Value {
     };
     let points = of_hits(scanner.hits().index_axis(Axis(0), 1));
     let forces: Vec<f64> = sim.sensor(touch).unwrap().net_forces_w().index_axis(Axis(0), 1).iter().copied().collect();
-    // The contact force is its weight, to the rest of its settling.
+    // The contact force equals the weight, up to the remaining motion.
     assert!((forces[2] - 2.0 * 9.81).abs() < 0.01, "{forces:?}");
     let (eye, pair) = (sim.sensor(eye).unwrap(), sim.sensor(pair).unwrap());
     let normal = eye.normal().unwrap().index_axis(Axis(0), 1).to_owned();
@@ -139,7 +140,7 @@ fn sensed(path: &Path) -> Value {
     let right = pair.right().color().unwrap().index_axis(Axis(0), 1).to_owned();
     let imu = sim.sensor(imu).unwrap();
     let moves = [imu.lin_vel_b(), imu.ang_vel_b(), imu.lin_acc_b(), imu.ang_acc_b()];
-    // P of ROS: of the right eye it brings points of the left one, 6 cm beside it, into the image.
+    // ROS's P of the right camera projects points of the left camera's frame, 6 cm beside it, into the right image.
     let projections = [0.0, 0.06].map(|baseline| {
         let k = pair.left().intrinsic_matrices();
         let [fx, cx, fy, cy] = [k[(1, 0, 0)], k[(1, 0, 2)] - 0.5, k[(1, 1, 1)], k[(1, 1, 2)] - 0.5];

@@ -4,13 +4,13 @@ use super::*;
 use kinetoscope_testkit::refusal::assert_error;
 use std::fs;
 
-/// A name for each format that is a file.
+/// A file name for each format that is a file.
 fn files() -> impl Iterator<Item = String> {
     let is_file = |format: &Format| format.is_built() && ![Format::Pictures, Format::LeRobot].contains(format);
     Format::all().filter(move |(format, _)| is_file(format)).map(|(_, end)| format!("run.{end}"))
 }
 
-/// Files stay, and are replaced at the end if they may be; a folder of another origin is never replaced.
+/// Existing files are kept, or replaced at the end with `overwrite`. A folder of another program is never replaced.
 #[test]
 fn taken_names() {
     let folder = tempfile::tempdir().unwrap();
@@ -26,7 +26,8 @@ fn taken_names() {
         world.sim.finish_recording(recorder).unwrap();
         assert_ne!(fs::read(&path).unwrap(), b"precious");
     }
-    // Found by reading: every dataset has `meta/info.json`, so a dataset of another program was taken for a recorder's and replaced.
+    // Found by review: every dataset has `meta/info.json`, so that datasets of other programs were taken for a
+    // recorder's and replaced.
     for file in ["images/one", "run.lerobot/one", "other.lerobot/meta/info.json"] {
         let file = folder.path().join(file);
         fs::create_dir_all(file.parent().unwrap()).unwrap();
@@ -37,26 +38,26 @@ fn taken_names() {
         }
         assert_eq!(fs::read_to_string(&file).unwrap(), "precious");
     }
-    // A recording that was killed can be recovered, and is not overwritten.
+    // The recording of a killed process can be recovered, and is not overwritten.
     let part = folder.path().join("killed.mcap.part");
     fs::write(&part, "precious").unwrap();
     assert_error(world.sim.record(RecorderCfg::new(folder.path().join("killed.mcap"))), "Unfinished", &["recover"]);
     assert_eq!(fs::read_to_string(part).unwrap(), "precious");
 }
 
-/// Places where nothing can be written.
+/// Paths that cannot be written.
 #[test]
 fn places() {
     let folder = tempfile::tempdir().unwrap();
     let mut world = World::new(1, 1);
-    // Not even an administrator writes below a file.
+    // Not even an administrator can write below a file.
     let file = folder.path().join("file");
     fs::write(&file, "").unwrap();
     for name in files().chain(["images".into(), "run.lerobot".into()]) {
         assert_error(world.sim.record(RecorderCfg::new(file.join(&name))), "File", &[&name]);
     }
     for name in files() {
-        // Folders of images are made; files need their folder.
+        // Folders of images are created; files need an existing folder.
         let missing = folder.path().join("missing").join(&name);
         assert_error(world.sim.record(RecorderCfg::new(missing)), "File", &[&name]);
         // Root cause: the check that a file may not replace a folder was made when the recording ended.
@@ -68,7 +69,7 @@ fn places() {
     assert_eq!(names(&folder), ["file"], "nothing was left");
 }
 
-/// Wrong names and numbers; the message has what would be right.
+/// Errors of wrong names and numbers contain the valid ones.
 #[test]
 fn configurations() {
     let (folder, path) = scratch("run.mcap");
@@ -109,7 +110,7 @@ fn configurations() {
     record_steps(&mut world, new("run.npz"), 0);
 }
 
-/// The unreadable rest of a killed archive is replaced; two recorders do not write one file.
+/// The unreadable remainder of a killed archive is replaced. Two recorders cannot write one file.
 #[test]
 fn busy_archive() {
     let (folder, path) = scratch("run.npz");
@@ -122,7 +123,7 @@ fn busy_archive() {
     assert!(path.exists());
 }
 
-/// Recorded entities must not change while they are recorded. Messages remain, under another name, and nothing waits for ever.
+/// Recorded entities must not change during a recording. Messages remain in a partial file, and no call blocks forever.
 #[test]
 fn changed_scene() {
     for (name, keeps) in [("run.npz", false), ("run.mcap", true)] {
@@ -130,11 +131,11 @@ fn changed_scene() {
         let mut world = World::new(1, 1);
         let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
         world.step(0);
-        // Another object changes nothing that is recorded.
+        // Another object does not change recorded streams.
         kinetoscope_testkit::worlds::add_ball(&mut world.sim, "ball", [0.0; 3]);
         world.step(1);
         assert!(!world.sim.observers().get(recorder).unwrap().has_failed());
-        // A second robot has joints, which the sensor of all joints now measures.
+        // A second robot adds joints, which the sensor of all joints now measures.
         world.sim.add_robot(kinetoscope_testkit::worlds::sr5("other")).unwrap();
         world.step(2);
         let observer = world.sim.observers_mut().get(recorder).unwrap();

@@ -1,4 +1,4 @@
-//! Scenes for viewers in recordings, read by the package `mcap` and held against MuJoCo's geoms.
+//! Scene messages for viewers, read by the package `mcap` and compared with MuJoCo's geoms.
 
 use super::*;
 use kinetoscope_scene::PoseF32;
@@ -8,7 +8,7 @@ use kinetoscope_testkit::worlds::{fixed, object};
 
 const STEPS: u32 = 30;
 
-/// All kinds of MuJoCo's geoms, on bodies that move.
+/// All types of MuJoCo's geoms, on moving bodies.
 const TOYS: &str = r#"<mujoco><worldbody><geom name="post" type="capsule" size="0.05 0.2" pos="-1 0.4 0.3" euler="20 0 40"/>
     <body name="mobile" pos="-1 0 1" euler="0 30 0"><joint name="swing" type="ball"/>
       <geom type="box" size="0.1 0.2 0.05" pos="0.3 0 0" euler="10 20 30" rgba="0.1 0.2 0.3 1"/>
@@ -17,8 +17,8 @@ const TOYS: &str = r#"<mujoco><worldbody><geom name="post" type="capsule" size="
         <geom type="cylinder" size="0.04 0.12" pos="0 0 0.2" euler="70 0 0"/>
         <geom type="box" size="0.01 0.01 0.01" group="3"/></body></body></worldbody></mujoco>"#;
 
-/// The kind of a shape in a recording, points of it in its own frame (vertices, or the middles of the sides of the box around it), and
-/// its number of corners.
+/// Kind of a shape in a recording, points in its own frame, and its number of corners. The points are vertices, or the
+/// centers of the sides of the bounding box.
 fn outline(shape: &Shape) -> (&'static str, Vec<[f32; 3]>, usize) {
     let sides = |half: [f32; 3]| {
         let side = |sign: f32| (0..3).map(move |k| std::array::from_fn(|i| if i == k { sign * half[k] } else { 0.0 }));
@@ -37,7 +37,7 @@ fn outline(shape: &Shape) -> (&'static str, Vec<[f32; 3]>, usize) {
     }
 }
 
-/// The largest distance of points of entities from where MuJoCo has them in an environment \[m\].
+/// Largest distance between points of entities and their positions in MuJoCo, in an environment \[m\].
 fn farthest(world: &mut World, env: usize, entities: &Value) -> f64 {
     let scene = world.sim.scene_mut().scene_of(EnvId(env)).unwrap();
     let mut look = Look::default();
@@ -68,8 +68,8 @@ fn entities(update: &Value) -> impl Iterator<Item = &Value> {
     update["entities"].as_object().unwrap().values()
 }
 
-/// Poses of geoms and their vertices are in single precision, some metres from the origin: 2.4e-7 m each below 4 m, in three axes, and
-/// in every one three products of as many.
+/// Poses and vertices of geoms are in single precision, some meters from the origin. Each has an error of 2.4e-7 m
+/// below 4 m, in three axes, and each axis has three products.
 const NEAR: f64 = 3e-6;
 
 #[test]
@@ -80,7 +80,7 @@ fn entity_poses() {
     world.sim.add_mjcf(MjcfCfg::text("toys", TOYS)).unwrap();
     let recorder = world.sim.record(RecorderCfg::new(&path)).unwrap();
     (0..STEPS).for_each(|step| world.step(step));
-    // Another color from now on, in one environment.
+    // Changes a color in one environment.
     let rgba = [0.25, 0.5, 0.75, 1.0];
     world
         .sim
@@ -94,14 +94,15 @@ fn entity_poses() {
     let recorded = world.sim.finish_recording(recorder).unwrap();
     assert_eq!(recorded.left_out, [""; 0], "{recorded}");
     let found = said("read_scenes.py", &path);
-    // At the beginning, when the color was set, when the table came; in the other environment without the second.
+    // At the beginning, at the change of the color, and at the addition of the table. The other environment has no
+    // second update.
     assert_eq!(found["counts"], json!({ "/env_0/scene": 2, "/env_1/scene": 3 }));
     let updates = list(&found["updates"]);
     let steps: Vec<f64> = updates.iter().map(|update| update["time"].as_f64().unwrap() / 1e7).collect();
     assert_eq!(steps, [0.0, f64::from(STEPS), f64::from(STEPS + 1)]);
     let far = farthest(&mut world, 1, &updates[2]["entities"]);
     assert!(far < NEAR, "{far}");
-    // Controls: the poses of the other environment, and a geom of a group that cameras do not draw.
+    // Controls: the poses of environment 0, and a geom of a group that is not drawn.
     assert!(farthest(&mut world, 0, &updates[2]["entities"]) > 100.0 * NEAR);
     let frames: Vec<&str> = entities(&updates[2]).map(|entity| entity["frame"].as_str().unwrap()).collect();
     for frame in ["env_1", "env_1/cube", "env_1/toys/mobile", "env_1/toys/tip", "env_1/arm/link6"] {
@@ -124,7 +125,7 @@ fn missing_poses() {
     let found = said("read_scenes.py", &path);
     let names: Vec<&str> = entities(&found["updates"][0]).map(|entity| entity["name"].as_str().unwrap()).collect();
     assert!(names.contains(&"cube") && names.contains(&"ground"), "{names:?}");
-    // The link that is welded to the world stands where it is.
+    // The link that is welded to the world has a fixed pose.
     assert!(names.iter().all(|name| !name.starts_with("arm/") || *name == "arm/base_link"), "{names:?}");
     // Control: a recording without the scene.
     let path = folder.path().join("without.mcap");

@@ -1,9 +1,9 @@
-//! Standing upright, as a reward.
+//! Reward for an upright root link.
 
 use crate::reward::RewardTerm;
 use kinetoscope_sim::RobotId;
 
-/// The square of the sine of the angle between the upward axis of the root link and the world's: 0 where it stands upright.
+/// Squared sine of the angle between the z axes of the root link and of the world: 0 where the robot stands upright.
 pub fn flat_orientation(name: &str, weight: f64, robot: RobotId) -> RewardTerm {
     RewardTerm::new(name, weight, move |now| {
         let gravity = now.sim().robot(robot).projected_gravity_b();

@@ -1,11 +1,11 @@
-//! Bodies that must not touch anything.
+//! Termination by contact forces.
 
 use crate::termination::TerminationTerm;
 use ndarray::{Array1, Axis};
 use kinetoscope_sensors::ContactSensor;
 use kinetoscope_sim::SensorId;
 
-/// Ends where the normal forces on one of a sensor's bodies sum up to more than a force \[N\].
+/// Terminates where the net normal contact force on one of the sensor's bodies exceeds `force` \[N\].
 pub fn illegal_contact(name: &str, sensor: SensorId<ContactSensor>, force: f64) -> TerminationTerm {
     TerminationTerm::new(name, move |now| {
         let sensor = now.sim().sensor(sensor)?;

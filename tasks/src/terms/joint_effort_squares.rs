@@ -1,4 +1,4 @@
-//! What drives give, as a reward.
+//! Reward of joint efforts.
 
 use super::{columns, joints};
 use crate::error::Result;
@@ -6,14 +6,14 @@ use crate::reward::RewardTerm;
 use ndarray::Axis;
 use kinetoscope_sim::{RobotId, SimulationManager};
 
-/// Sum of the squares of the efforts of the drives of joints that match one of `patterns` (whole names) in the last physics step
-/// \[N² m² or N²\].
+/// Sum of the squared drive efforts in the last physics step \[N² m² or N²\], over the joints that match one of
+/// `patterns` (whole names).
 ///
 /// # Errors
-/// A pattern that matches nothing.
+/// A pattern matches no joint.
 ///
 /// # Panics
-/// The robot is of another manager.
+/// The robot belongs to another manager.
 pub fn joint_effort_squares(
     sim: &SimulationManager,
     name: &str,

@@ -1,4 +1,4 @@
-//! Joints that leave their range.
+//! Termination by joint limits.
 
 use super::joints;
 use crate::error::Result;
@@ -6,14 +6,14 @@ use crate::termination::TerminationTerm;
 use ndarray::{Array1, Axis};
 use kinetoscope_sim::{RobotId, SimulationManager};
 
-/// Ends where a joint that matches one of `patterns` (whole names) is beyond its [soft limits](kinetoscope_sim::Robot::soft_qpos_limits); joints
-/// without limits never are.
+/// Terminates where a joint that matches one of `patterns` (whole names) is beyond its limits
+/// ([`soft_qpos_limits`](kinetoscope_sim::Robot::soft_qpos_limits)). Joints without limits never terminate an episode.
 ///
 /// # Errors
-/// A pattern that matches nothing.
+/// A pattern matches no joint.
 ///
 /// # Panics
-/// The robot is of another manager.
+/// The robot belongs to another manager.
 pub fn joint_out_of_limits(
     sim: &SimulationManager,
     name: &str,

@@ -1,4 +1,4 @@
-//! Joints that begin somewhere.
+//! Random initial joint states.
 
 use super::joints;
 use crate::error::Result;
@@ -6,14 +6,15 @@ use crate::event::EventTerm;
 use ndarray::Array2;
 use kinetoscope_sim::{RobotId, SimulationManager};
 
-/// Puts joints that match one of `patterns` (whole names) beside their start when an episode begins: the start and a number drawn
-/// uniformly from `positions` \[rad or m\], within their limits, with a velocity drawn from `velocities` \[rad/s or m/s\].
+/// Randomizes the initial state of the joints that match one of `patterns` (whole names) when an episode begins. An
+/// offset from `positions` \[rad or m\] is added to the default position, within the joint limits. The velocity is from
+/// `velocities` \[rad/s or m/s\]. Both are uniformly distributed.
 ///
 /// # Errors
-/// A pattern that matches nothing.
+/// A pattern matches no joint.
 ///
 /// # Panics
-/// The robot is of another manager.
+/// The robot belongs to another manager.
 pub fn reset_joints_by_offset(
     sim: &SimulationManager,
     name: &str,

@@ -1,4 +1,4 @@
-//! Robots that begin somewhere.
+//! Random initial root states.
 
 use crate::dice::Dice;
 use crate::event::EventTerm;
@@ -6,20 +6,20 @@ use ndarray::Array2;
 use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
 use kinetoscope_sim::RobotId;
 
-/// By how much roots begin beside their start: each number is drawn uniformly between two bounds.
+/// Ranges \[low, high\] of uniformly distributed offsets from the default root pose, and of root velocities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RootRanges {
-    /// x, y, z in the environment \[m\].
+    /// x, y, z in the frame of the environment \[m\].
     pub position: [[f64; 2]; 3],
-    /// Roll, pitch, yaw about the axes of the root where it starts \[rad\].
+    /// Roll, pitch, yaw about the axes of the default root pose \[rad\].
     pub rpy: [[f64; 2]; 3],
-    /// Velocity in world axes \[m/s\].
+    /// Linear velocity in world axes \[m/s\].
     pub linear: [[f64; 2]; 3],
     /// Angular velocity in world axes \[rad/s\].
     pub angular: [[f64; 2]; 3],
 }
 
-/// Puts the root link of a robot without a fixed base beside its start when an episode begins, with a velocity.
+/// Randomizes the pose and the velocity of the root link when an episode begins. The robot must not have a fixed base.
 pub fn reset_root_uniform(name: &str, robot: RobotId, ranges: RootRanges) -> EventTerm {
     let drawn = |die: &mut Dice, ranges: [[f64; 2]; 3]| ranges.map(|[low, high]| die.between(low, high));
     EventTerm::on_reset(name, move |sim, dice| {

@@ -1,10 +1,12 @@
-//! Going as fast as wanted, as a reward.
+//! Reward for tracking a velocity command.
 
 use crate::reward::RewardTerm;
 use kinetoscope_sim::RobotId;
 
-/// exp(-d² / std²), where d is how far the velocity of the root link, x and y in its own axes, is from the first two columns of a
-/// command \[m/s\]: 1 where it is what was wanted.
+/// Reward exp(-d² / std²) for tracking a velocity command.
+///
+/// d is the distance between the x and y velocity of the root link, in its own frame, and the first two columns of the
+/// command \[m/s\]. The term is `weight` where both are equal.
 pub fn track_lin_vel(name: &str, weight: f64, robot: RobotId, command: impl Into<String>, std: f64) -> RewardTerm {
     let command = command.into();
     RewardTerm::new(name, weight, move |now| {

@@ -10,7 +10,7 @@ fn notes(path: &Path) -> Vec<serde_json::Value> {
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-/// Whole numbers of an array of events.
+/// Integers of an array of events.
 fn whole(path: &Path, name: &str) -> Vec<i32> {
     let (descr, _, data) = rows(path, &format!("events/{name}"));
     match descr.as_str() {
@@ -64,7 +64,7 @@ fn divergence() {
     let recorder = sim.record(RecorderCfg::new(&path)).unwrap();
     let ball = sim.entities().mjcf_id("ball").unwrap();
     let blow_up = |sim: &mut SimulationManager| {
-        // MuJoCo warns of speeds above its mjMAXVAL, 1e10, and the step is not done.
+        // MuJoCo warns of speeds above its mjMAXVAL, 1e10, and does not do the step.
         let fast = ndarray::array![[0.0, 0.0, 1e12, 0.0, 0.0, 0.0]];
         sim.mjcf_part_mut(ball).write_qvel(&fast, Some(&[EnvId(1)])).unwrap();
     };
@@ -103,14 +103,14 @@ fn rates() {
     };
     recorded(&[("ball", 8), ("imu", 5)], &path).unwrap();
     assert_eq!(numbers_of(&path, "ball/state/step"), [0.0, 8.0, 16.0]);
-    // It measures at even steps; at every fifth step, what it measured last.
+    // The sensor measures at even steps. Every fifth step records its last measurement.
     assert_eq!(numbers_of(&path, "imu/step"), [5.0, 10.0, 15.0, 20.0]);
     assert_eq!(numbers_of(&path, "second/step").len(), 20, "the other one as ever");
     let dt = falling(1).cfg().physics_dt;
     let captured: Vec<u64> = numbers_of(&path, "imu/time").iter().map(|time| (time / dt).round() as u64).collect();
-    // Steps 4, 10, 14, 20; accelerations are of the beginning of a step.
+    // Steps 4, 10, 14, 20; accelerations are those of the beginning of a step.
     assert_eq!(captured, [3, 9, 13, 19]);
-    // The control: without, as often as `every` says and whenever it measures.
+    // Control: without `rates`, `every` applies to states, and sensors are recorded at each measurement.
     recorded(&[], &path).unwrap();
     assert_eq!(numbers_of(&path, "ball/state/step"), [0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0]);
     assert_eq!(numbers_of(&path, "imu/step").len(), 10);
@@ -157,7 +157,7 @@ fn early_failure() {
         assert!(begun.elapsed() < Duration::from_secs(20), "nothing is said");
     };
     assert!(why.contains("run.mcap") && why.contains("no space left on this disk"), "{why}");
-    // It is what is said at the end, too.
+    // The final error is the same.
     let error = sim.finish_recording(recorder).unwrap_err().to_string();
     assert!(error.contains("no space left on this disk"), "{error}");
 }

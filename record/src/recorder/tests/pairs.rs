@@ -1,11 +1,11 @@
-//! What recordings say of pairs of eyes.
+//! Recorded calibration of stereo cameras.
 
 use super::*;
 use crate::{Recording, Wanted};
 use kinetoscope_sensors::camera::StereoCameraCfg;
 use kinetoscope_sensors::camera::{CameraPlacement, StereoCamera};
 
-/// A pair of small eyes, the right one turned and askew.
+/// A stereo pair of small cameras, the right one toed in and rotated.
 fn toed_in(left_to_right_pos: [f64; 3]) -> StereoCameraCfg {
     let camera = CameraCfg {
         width: 16,
@@ -18,7 +18,7 @@ fn toed_in(left_to_right_pos: [f64; 3]) -> StereoCameraCfg {
     StereoCameraCfg { camera, left_to_right_pos, left_to_right_rot, ..StereoCameraCfg::default() }
 }
 
-/// Root cause: R and P were made of the baseline alone, which was taken for zero of a pair that is not parallel.
+/// Root cause: R and P were computed from the baseline alone, which was zero for pairs that are not parallel.
 #[test]
 fn calibrations() {
     let folder = tempfile::tempdir().unwrap();
@@ -27,7 +27,7 @@ fn calibrations() {
     let id: SensorId<StereoCamera> = sim.add_sensor("eyes", toed_in([0.1, 0.01, -0.02])).unwrap();
     let recorders = [&archive, &messages].map(|path| sim.record(RecorderCfg::new(path)).unwrap());
     sim.update(1);
-    // Another lens, from then on: in this environment only.
+    // Changes the intrinsics in this environment only.
     let wide = [Intrinsics::Pixels { fx: 15.0, fy: 14.0, cx: 7.0, cy: 6.0 }];
     sim.sensor_mut(id).unwrap().set_intrinsics(&wide, Some(&[1])).unwrap();
     sim.update(1);
@@ -48,7 +48,7 @@ fn calibrations() {
             };
             assert_eq!((read("r", 9), read("p", 12)), (r.as_slice().to_vec(), p.as_slice().to_vec()), "{topic}");
         }
-        // Archives count pixels as cameras do.
+        // Archives use the pixel coordinates of cameras.
         let [r, p] =
             ["rectification", "projection"].map(|part| numbers_of(&archive, &format!("eyes/{eye}/lens/{part}")));
         let (last_r, last_p) = (&r[r.len() - 9..], &p[p.len() - 12..]);
@@ -56,13 +56,13 @@ fn calibrations() {
         assert_eq!(last_r, found.rotations[k].transpose().as_slice());
         assert_eq!(last_p, found.projections[k].transpose().as_slice());
     }
-    // The control: the baseline is there, and so is the turn.
+    // Control: baseline and rotation are in the matrices.
     assert!(
         expected[1][1].projection_matrix[(0, 3)] < -1.0 && expected[1][1].rectification_matrix[(0, 2)].abs() > 0.01
     );
 }
 
-/// A pair that cannot be rectified is recorded as cameras alone.
+/// A pair that cannot be rectified is recorded as two single cameras.
 #[test]
 fn no_rectification() {
     let (_folder, path) = scratch("run.mcap");
