@@ -48,7 +48,8 @@ pub(super) fn count(sim: &SimulationManager) -> usize {
 }
 
 impl CameraId {
-    /// Returns the view in each environment, or `None` where the camera is inactive or has no measurement yet.
+    /// Returns the view in each environment, or `None` where the camera does not observe the environment or has not
+    /// measured yet.
     pub(super) fn views(self, sim: &SimulationManager) -> Vec<Option<CameraView>> {
         let envs = sim.num_envs();
         match self {
