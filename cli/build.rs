@@ -1,6 +1,6 @@
-//! Binaries that are linked to the MuJoCo of `MUJOCO_DIR` find it there when they start.
+//! Build script that adds the library folder of `MUJOCO_DIR` to the run path of the binary.
 //!
-//! Cargo sets the library path of `cargo run` and `cargo test` alone, and passes no linker arguments of `mujoco-sys` on.
+//! Cargo sets the library path only for `cargo run` and `cargo test`, and ignores the linker arguments of `mujoco-sys`.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -8,7 +8,7 @@ use std::{env, fs};
 fn main() {
     println!("cargo::rerun-if-env-changed=MUJOCO_DIR");
     println!("cargo::rerun-if-changed=build.rs");
-    // Without the variable the library is where the linker of the system looks; a wrong one is an error of mujoco-sys.
+    // Without the variable, the system linker finds the library. An invalid folder is reported by `mujoco-sys`.
     let Some(folder) = env::var_os("MUJOCO_DIR").map(PathBuf::from).and_then(|folder| fs::canonicalize(folder).ok())
     else {
         return;
@@ -19,7 +19,7 @@ fn main() {
     }
 }
 
-/// True if MuJoCo's library is in a folder.
+/// True if a folder contains the MuJoCo library.
 fn has_library(folder: &Path) -> bool {
     let Ok(entries) = fs::read_dir(folder) else { return false };
     entries.flatten().any(|entry| entry.file_name().to_string_lossy().starts_with("libmujoco.so"))
