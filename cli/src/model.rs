@@ -149,8 +149,8 @@ impl Model {
 impl ModelArgs {
     /// Returns the files by kind.
     ///
+    /// # Errors
     /// A file of another kind, an MJCF or scene file together with other files, or flags of another kind of file.
-    /// A file of another kind, an MJCF or scene file that is not alone, or flags of another kind of file.
     pub(crate) fn files(&self) -> Result<Files> {
         let files: Vec<PathBuf> = self.files.iter().map(|file| user_or_asset(file)).collect();
         let kinds: Vec<FileKind> = files.iter().map(|file| FileKind::of(file)).collect();

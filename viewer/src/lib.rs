@@ -30,7 +30,6 @@
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//! snapshot, on their own threads, and send commands. [`Screenshot`] is a picture in one call; [`plot`] draws numbers over time.
 #![forbid(unsafe_code)]
 
 mod control;

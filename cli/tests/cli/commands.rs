@@ -14,7 +14,7 @@ fn check() {
     assert!(out.contains("total mass 2 kg") && out.contains("hinge"), "{out}");
     let json = std::fs::read_to_string(shell.path("arm.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
-    // The torque that holds 2 kg half a metre along the rod, 0.5 rad from upright, against gravity.
+    // Torque that holds 2 kg, half a meter along the rod and 0.5 rad from upright, against gravity.
     let torque = report["gravity_torque"][0].as_f64().unwrap();
     assert!((torque - 2.0 * 9.81 * 0.5 * 0.5f64.sin()).abs() < 1e-9, "{torque}");
 

@@ -11,9 +11,9 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 pub struct ImageWindowCfg {
     /// Text of the title bar.
     pub title: String,
-    /// Pixels per row and rows of the window when it opens.
+    /// Initial size: pixels per row, rows.
     pub size: [usize; 2],
-    /// X display, for example `:0`; `None` takes the variable `DISPLAY`.
+    /// X display, such as `:0`. `None` uses the environment variable `DISPLAY`.
     pub display: Option<String>,
 }
 
