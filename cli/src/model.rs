@@ -188,9 +188,9 @@ impl ModelArgs {
         Ok(if kinds[at] == FileKind::Scene { Files::Scene(path) } else { Files::Mjcf(path) })
     }
 
-    /// Builds the simulation. URDF files are a robot, and so is an MJCF file with a single articulated body tree. Other
-    /// MJCF files (several bodies, ball joints, no hinge or slide joints) are scenes with their own world geoms and no
-    /// additional ground.
+    /// Builds the simulation. URDF files form one robot. An MJCF file is a robot if possible; otherwise (several root
+    /// bodies, ball joints, or no hinge or slide joint) it is a scene with its own world geoms and no additional
+    /// ground.
     ///
     /// # Errors
     /// Errors of the files, or flags that do not apply to a scene.

@@ -33,7 +33,7 @@ const DISTANCES: [f64; 2] = [0.02, 1e4];
 
 impl Eye {
     /// Creates a camera at `eye` that looks at `target` \[m\], or `None` if the points coincide or are not finite. The
-    /// distance is limited to 0.02 m to 10 km and the elevation to ±1.55 rad, which moves the camera off `eye`.
+    /// distance is clamped to 0.02 m to 10 km and the elevation to ±1.55 rad; the position then differs from `eye`.
     pub fn looking(eye: [f64; 3], target: [f64; 3]) -> Option<Self> {
         let way = Vector3::from(target) - Vector3::from(eye);
         let distance = way.norm();

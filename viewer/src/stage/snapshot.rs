@@ -112,7 +112,7 @@ pub struct JointName {
     pub name: String,
     /// True if the joint accepts targets: it has a drive and mimics no other joint.
     pub driven: bool,
-    /// True for a prismatic joint, false for a revolute joint.
+    /// True for a prismatic joint, whose positions are in meters.
     pub slides: bool,
 }
 
