@@ -108,8 +108,8 @@ pub trait Screenshot {
     /// `cfg`.
     ///
     /// # Errors
-    /// The file name does not end in `.png`, the folder is missing or not writable, the disk is full, or the size or
-    /// the environment is invalid. An existing file is unchanged after an error.
+    /// An invalid file name extension, size or environment, a missing or read-only folder, or a full disk. An existing
+    /// file is unchanged after an error.
     fn screenshot_with(&mut self, path: impl AsRef<Path>, cfg: &ScreenshotCfg) -> Result<(), ScreenshotError>;
 
     /// Returns a camera from which all environments fill an image of `size` pixels, in their current state.

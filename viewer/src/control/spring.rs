@@ -26,8 +26,8 @@ pub(super) struct Spring {
 
 impl Spring {
     /// Returns the attachment point \[m\] and the force there \[N\], both in the environment frame. The force is that
-    /// of a critically damped oscillator, `F = m (w² (target - point) - 2 w v)`, with the mass of the body and of all
-    /// bodies attached to it.
+    /// of a critically damped oscillator: `F = m (w² (target - point) - 2 w v)`. The mass m includes all bodies
+    /// attached to the body.
     pub(super) fn force(&self, motion: &BodyMotion) -> ([f64; 3], [f64; 3]) {
         let point = (motion.pose * Point3::from(self.hold)).coords;
         let arm = point - motion.pose.translation.vector;

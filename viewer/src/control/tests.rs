@@ -184,8 +184,8 @@ fn refusals() {
 }
 
 /// With steps of 10 ms, step s ends (s - s0) 10 ms after the step s0 at which the speed was set; lost time is caught up
-/// or dropped. So 40 steps after s0 end 40 step times after the request, less the block without a check (one step in
-/// real time, three at four times real time). A busy machine may take longer.
+/// or dropped. So 40 steps after s0 end 40 step times after the request, less the block without a check. That block is
+/// one step in real time, and three steps at four times real time. A busy machine may take longer.
 #[test]
 fn real_time() {
     let mut sim = sample(1).sim;

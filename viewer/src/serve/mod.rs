@@ -133,8 +133,8 @@ impl Serve for SimulationManager {
         let token = if address.ip().is_loopback() { None } else { Some(Token::random()?) };
         let secret = token.as_ref().map_or_else(String::new, |token| format!("?token={}", token.as_str()));
         let url = format!("http://{}/{secret}", address::reachable(address));
-        // Requests two snapshots per second, so that a new viewer starts with a state at most half a second old, even
-        // if the program does not step at that time.
+        // Requests two snapshots per second. A new viewer thus starts with a state at most half a second old, even if
+        // the program does not step then.
         let usher = self.viewer(Wants { rate: 2.0, ..Wants::default() });
         let theatre = Arc::new(Theatre::new(usher, cfg));
         let server = Server::start(listener, Door::new(address, token), theatre, max_viewers)?;

@@ -326,8 +326,8 @@ impl Drop for Screened {
     }
 }
 
-/// Returns the number of window pixels per image pixel, along each side, such that the image has at most about
-/// [`MOST_PIXELS`] pixels and its sides are supported by the renderer.
+/// Returns the number of window pixels per image pixel, along each side, for an image of at most about [`MOST_PIXELS`]
+/// pixels with sides that the renderer supports.
 fn coarseness(size: [usize; 2]) -> usize {
     let fits = |k: &usize| {
         let [width, height] = size.map(|n| n.div_ceil(*k));
