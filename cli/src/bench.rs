@@ -1,4 +1,4 @@
-//! `kinetoscope bench`: how fast a model runs and is drawn on this machine.
+//! `kinetoscope bench`: simulation and rendering throughput of a model.
 
 use crate::ending::{Ending, Result};
 use crate::model::{Model, ModelArgs, Setup, SpawnArgs};
@@ -8,9 +8,9 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::Still;
 use std::time::Instant;
 
-/// Steps per second and pictures per second of a robot on this machine, on every core
+/// Steps per second and images per second of a robot on this machine, on every core
 ///
-/// Rates of one program on one machine: to compare with other simulators in one run, see `cargo xtask bench` in the
+/// These rates are of this program alone. To compare with other simulators in one run, see `cargo xtask bench` in the
 /// source tree.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
@@ -19,13 +19,13 @@ pub(crate) struct Args {
     model: ModelArgs,
     #[command(flatten)]
     spawn: SpawnArgs,
-    /// Environments [default: those of a scene file, else 64]
+    /// Number of environments [default: that of a scene file, else 64]
     #[arg(long, alias = "num_envs")]
     num_envs: Option<usize>,
-    /// Threads that step [default: every core]
+    /// Number of stepping threads [default: every core]
     #[arg(long)]
     threads: Option<usize>,
-    /// How long each rate is measured, in seconds
+    /// Duration of each measurement, in seconds
     #[arg(long, default_value_t = 2.0)]
     seconds: f64,
     #[command(flatten)]
@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     };
     let share = || Some(start.elapsed().as_secs_f64() / args.seconds);
     let elapsed = progress::during("steps", share, step);
-    // An environment that diverged stands still: its later steps are not counted.
+    // A diverged environment no longer steps, so its later steps are not counted.
     let diverged = model.sim.diverged();
     let stopped = diverged.len();
     if let Some(first) = diverged.first().filter(|_| stopped == num_envs) {
@@ -96,7 +96,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     Ok(if warned || !diverged.is_empty() { Ending::Warned } else { Ending::Done })
 }
 
-/// Reads the state, as a program that trains does after each step.
+/// Reads the state, as a training program does after each step.
 fn read_state(model: &Model) {
     match model.robot {
         Some(robot) => drop(model.sim.robot(robot).qpos()),

@@ -1,4 +1,4 @@
-//! `kinetoscope check`: what is in a robot's files, and everything odd in them.
+//! `kinetoscope check`: report on the contents of robot files, with warnings.
 
 use crate::ending::{Ending, Result};
 use crate::model::{Files, ModelArgs, Setup, is_scene};
@@ -9,16 +9,16 @@ use kinetoscope::sim::inspect::{InspectCfg, InspectError, inspect};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Tree, joints, masses, dynamics and warnings of a robot, with the lines that they are about
+/// Tree, joints, masses, dynamics and warnings of a robot, with the file lines of the warnings
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
-    /// Joint positions [rad or m], 0 where not given
+    /// Joint positions [rad or m]; joints without a value are at 0
     #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', value_parser = position, allow_hyphen_values = true)]
     qpos: Vec<(String, f64)>,
-    /// Write the report to a file as JSON
+    /// Write the report to a JSON file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -48,12 +48,12 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     };
     args.write_json(|| serde_json::to_string_pretty(&report))?;
     print(&report.without_warnings());
-    // MuJoCo has a say too: it compiles what the report describes.
+    // MuJoCo compiles the model as well, and its warnings are included.
     let warned = args.model.build(&Setup::STILL)?.print_warnings();
     Ok(if warned || !report.warnings.is_empty() { Ending::Warned } else { Ending::Done })
 }
 
-/// Checks an MJCF file that is a scene.
+/// Checks an MJCF file that describes a scene.
 fn mjcf_scene(args: &Args) -> Result<Ending> {
     args.refuse_positions()?;
     let model = args.model.build(&Setup::STILL)?;
@@ -64,10 +64,10 @@ fn mjcf_scene(args: &Args) -> Result<Ending> {
     Ok(if model.print_warnings() { Ending::Warned } else { Ending::Done })
 }
 
-/// Checks a scene file: each robot in it, and what else there is.
+/// Checks a scene file: reports each robot, and lists the other entities.
 fn scene(args: &Args, path: &Path) -> Result<Ending> {
     args.refuse_positions()?;
-    // The whole scene is built first: its errors name the lines of the scene file.
+    // The whole scene is built first, because its errors name the lines of the scene file.
     let model = args.model.build(&Setup::STILL)?;
     let report = SceneReport::of(&args.model.names(), &SceneCfg::from_file(path)?)?;
     let json = report.json()?;
@@ -93,7 +93,7 @@ impl Args {
 
 fn print(report: &dyn std::fmt::Display) {
     let mut out = std::io::stdout().lock();
-    // A closed pipe, as behind `| head`, is no error of ours.
+    // A closed pipe, as with `| head`, is not an error.
     let _ = write!(out, "{report}");
     let _ = out.flush();
 }

@@ -1,20 +1,20 @@
-//! `kinetoscope convert`: a robot as MJCF, for both lines of MuJoCo, with its meshes.
+//! `kinetoscope convert`: exports a robot as MJCF with its meshes, for both supported MuJoCo versions.
 
 use crate::ending::{Ending, Result};
 use crate::excerpt;
 use crate::model::{ModelArgs, Setup};
 use std::path::{Path, PathBuf};
 
-/// The robot as MJCF that plain MuJoCo loads, one file for 2.2.2 and one for 4.x, with meshes and textures beside them
+/// Convert a robot to MJCF for plain MuJoCo: one file for 2.2.2 and one for 4.x, with meshes and textures beside them
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
-    /// Folder to write to; made where it is missing
+    /// Output folder; created if missing
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
-    /// Write into a folder that holds something already
+    /// Write to a folder that is not empty
     #[arg(long)]
     force: bool,
 }
@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     Ok(if warned.contains(&true) { Ending::Warned } else { Ending::Done })
 }
 
-/// Whether a folder holds nothing, or is not there.
+/// True if a folder is empty or does not exist.
 fn is_empty(folder: &Path) -> Result<bool> {
     match std::fs::read_dir(folder) {
         Ok(mut entries) => Ok(entries.next().is_none()),
@@ -48,7 +48,7 @@ fn is_empty(folder: &Path) -> Result<bool> {
     }
 }
 
-/// All files of a folder, in order.
+/// Returns all files of a folder and its subfolders, sorted by path.
 fn written(folder: &Path) -> Result<Vec<PathBuf>> {
     let (mut files, mut folders) = (Vec::new(), vec![folder.to_path_buf()]);
     while let Some(folder) = folders.pop() {

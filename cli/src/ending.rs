@@ -1,12 +1,12 @@
-//! The results of commands.
+//! Results of commands.
 
-/// How a command ended that did its work.
+/// Outcome of a command that completed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ending {
     Done,
-    /// Something of the input was repaired, ignored or missing.
+    /// A part of the input was repaired, ignored or missing.
     Warned,
 }
 
-/// Errors are sentences for the user; those about a file begin with its name and line.
+/// Result of a command. Errors are sentences for the user; an error about a file begins with its path and line.
 pub(crate) type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;

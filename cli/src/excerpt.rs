@@ -1,6 +1,6 @@
-//! Errors and warnings with the line of the user's file that they are about.
+//! Errors and warnings with an excerpt of the source line.
 //!
-//! A message that has a place begins with it, `arm.urdf:12: ...`: a rule of all errors and diagnostics of the library.
+//! All errors and diagnostics of the library that refer to a file begin with its location: `arm.urdf:12: ...`.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use kinetoscope::robot::diagnostic::Diagnostic;
@@ -8,7 +8,7 @@ use std::io::{IsTerminal, Write};
 use std::ops::Range;
 use std::path::Path;
 
-/// Larger files are not read for the sake of a line.
+/// Maximum size of a file that is read for an excerpt \[bytes\].
 const LARGEST: u64 = 64 << 20;
 
 /// Prints an error.
@@ -16,7 +16,7 @@ pub(crate) fn print_error(message: &str) {
     print(&render(Level::ERROR, message, None, colored()));
 }
 
-/// Prints diagnostics as warnings; whether there were any.
+/// Prints diagnostics as warnings. Returns true if there were any.
 pub(crate) fn print_warnings(diagnostics: &[Diagnostic]) -> bool {
     let mut any = false;
     for diagnostic in diagnostics {
@@ -29,7 +29,7 @@ pub(crate) fn print_warnings(diagnostics: &[Diagnostic]) -> bool {
 }
 
 fn print(text: &str) {
-    // Nobody to read it is no error of ours.
+    // A closed standard error stream is not an error.
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
@@ -37,7 +37,7 @@ fn colored() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
-/// A message, and the line it is about where there is one that can be read.
+/// Renders a message with an excerpt of its source line, if the line can be read.
 fn render(level: Level<'_>, message: &str, kind: Option<&'static str>, colored: bool) -> String {
     let place = place(message);
     let said = place.as_ref().map_or(message, |place| &message[place.length..]);
@@ -52,19 +52,19 @@ fn render(level: Level<'_>, message: &str, kind: Option<&'static str>, colored: 
     renderer.render(&[title.element(snippet)])
 }
 
-/// A place that a message begins with.
+/// Source location at the beginning of a message.
 struct Place<'m> {
     path: &'m str,
     line: usize,
     /// The line itself.
     text: String,
-    /// Of the beginning of the message that says it \[bytes\].
+    /// Length of the location prefix in the message \[bytes\].
     length: usize,
 }
 
-/// The place that a message begins with: `FILE:LINE: `, where the file is there and has such a line.
+/// Parses the location prefix `FILE:LINE: ` of a message. Returns `None` if the file or the line does not exist.
 fn place(message: &str) -> Option<Place<'_>> {
-    // A path may have colons of its own.
+    // A path may contain colons.
     let ends = message.match_indices(": ").map(|(at, _)| at);
     ends.take(8).find_map(|end| {
         let (path, line) = message[..end].rsplit_once(':')?;
@@ -78,9 +78,9 @@ fn place(message: &str) -> Option<Place<'_>> {
     })
 }
 
-/// What of a line is meant: the first thing that the message quotes and that stands there, else all that is written. MuJoCo
-/// quotes with single marks. Where it stands there more than once, as the value of an attribute that the message names, else as
-/// a whole value, else first.
+/// Returns the range of a line to underline: the first quoted text of the message that occurs in the line, else the
+/// whole line without indentation. MuJoCo quotes with single quotation marks. Several occurrences are ranked: the value
+/// of an attribute named by the message, then a whole value, then the first occurrence.
 fn marked(text: &str, message: &str) -> Range<usize> {
     let of = |mark: char| message.split(mark).skip(1).step_by(2).filter(|quoted| !quoted.trim().is_empty());
     let mut quoted = of('"').chain(of('\''));
@@ -93,7 +93,7 @@ fn marked(text: &str, message: &str) -> Range<usize> {
         (named, whole)
     };
     let found = quoted.find_map(|quoted| {
-        // Of equals the last is the largest: from behind, that is the first.
+        // `max_by_key` returns the last maximum, so reverse iteration gives the first occurrence.
         let places = text.rmatch_indices(quoted).map(|(at, _)| at);
         places.max_by_key(|&at| likely(quoted, at)).map(|at| at..at + quoted.len())
     });
@@ -105,7 +105,7 @@ fn marked(text: &str, message: &str) -> Range<usize> {
 mod tests {
     use super::*;
 
-    /// The line is shown, and the part of it that the message quotes is underlined, or else all of it.
+    /// The line is shown, and the part that the message quotes is underlined, or else the whole line.
     #[test]
     fn excerpts() {
         let folder = tempfile::tempdir().unwrap();
@@ -127,13 +127,13 @@ mod tests {
             assert_eq!(lines[at + 1].find('^'), lines[at].find(under), "{text}");
             assert_eq!(text.matches('^').count(), under.len(), "{text}");
         }
-        // A place that is not there stays in the message.
+        // A location that does not exist stays in the message.
         for message in
             [format!("{path}:9: too far"), "gone.urdf:1: gone".into(), "no place: 1: 2".into(), String::new()]
         {
             assert_eq!(render(Level::ERROR, &message, None, false).trim_end(), format!("error: {message}").trim_end());
         }
-        // Lines of any bytes are shown.
+        // Lines with arbitrary bytes are shown.
         let path = file("x.urdf", b"\xff\xfe \"\xc3\xa4\"\r\n\n");
         for line in [1, 2, 3] {
             let message = format!("{path}:{line}: \"\u{e4}\" is wrong");
@@ -141,7 +141,7 @@ mod tests {
         }
     }
 
-    /// Of equal words the one that is meant is underlined.
+    /// Of several equal words, the relevant one is underlined.
     #[test]
     fn underlined_word() {
         let (arms, zeros) = ("<joint name=\"arm\" parent=\"arm\"/>", "<box size=\"0.5 0 0.25\" rgba=\"0\"/>");

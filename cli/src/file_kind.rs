@@ -1,23 +1,23 @@
-//! Kinds of files, by the end of their names and by how they begin.
+//! Detection of file kinds by extension and content.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Kinds of files that commands tell apart.
+/// Kinds of input files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FileKind {
-    /// A URDF, or a file that only its reader can tell.
+    /// A URDF file, or a file of unknown kind that the URDF reader rejects.
     Urdf,
     /// A MuJoCo model in XML.
     Mjcf,
     /// A scene file: TOML, YAML or JSON.
     Scene,
-    /// Another kind: its name with an article, and the way to use such a file.
+    /// Another kind: its name with an article, and a hint on how to use it.
     Other(&'static str, &'static str),
 }
 
-/// Ends of names of files that hold no model, with the kind of file and the way to use it.
+/// Extensions of files without a model, with the kind of file and a hint on how to use it.
 const OTHERS: [(&[&str], &str, &str); 7] = [
     (&["png", "jpg", "jpeg", "gif", "apng", "webp", "bmp", "tga", "tif", "tiff", "ppm"], "an image", ""),
     (&["mp4", "avi", "mov", "mkv", "webm"], "a video", ""),
@@ -28,7 +28,7 @@ const OTHERS: [(&[&str], &str, &str); 7] = [
     (&["usd", "usda", "usdc", "usdz"], "a USD file", ""),
 ];
 
-/// Beginnings of binary files, with the kind of file.
+/// Signatures of binary files, with the kind of file.
 const BEGINNINGS: [(&[u8], &str); 6] = [
     (b"\x89PNG", "an image"),
     (b"\xff\xd8\xff", "an image"),
@@ -39,7 +39,8 @@ const BEGINNINGS: [(&[u8], &str); 6] = [
 ];
 
 impl FileKind {
-    /// The kind of a file. A file that cannot be read is of the kind that its name says: its reader reports the error.
+    /// Returns the kind of a file. For an unreadable file, the kind follows from its name, and its reader reports the
+    /// error.
     pub(crate) fn of(path: &Path) -> Self {
         if path.is_dir() {
             return Self::Other("a folder", "");
@@ -57,7 +58,7 @@ impl FileKind {
                 other.map_or(Self::Urdf, |(_, what, hint)| Self::Other(what, hint))
             }
         };
-        // The root element says more than the name.
+        // The root element takes precedence over the extension.
         match (by_name, root_element(&String::from_utf8_lossy(&begins))) {
             (Self::Urdf | Self::Mjcf, Some("robot")) => Self::Urdf,
             (Self::Urdf | Self::Mjcf, Some("mujoco")) => Self::Mjcf,
@@ -70,17 +71,17 @@ impl FileKind {
     }
 }
 
-/// The first bytes of a file.
+/// Returns the first bytes of a file.
 fn beginning(path: &Path) -> Vec<u8> {
     let mut bytes = Vec::new();
     if let Ok(file) = File::open(path) {
-        // Of a file that cannot be read, its reader reports the error.
+        // Errors are ignored: the reader of the file reports them.
         let _ = file.take(1 << 16).read_to_end(&mut bytes);
     }
     bytes
 }
 
-/// The name of the first element of an XML text, if it is one.
+/// Returns the name of the root element of an XML text, or `None` if the text does not start with an element.
 fn root_element(text: &str) -> Option<&str> {
     let mut rest = text.trim_start_matches('\u{feff}').trim_start();
     loop {

@@ -1,14 +1,14 @@
-//! Ctrl+C as a good end.
+//! Clean shutdown on Ctrl+C.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Raised by Ctrl+C, which also does `act`; a second Ctrl+C ends the program at once.
+/// Returns a flag that Ctrl+C sets. Ctrl+C also calls `act`; a second Ctrl+C exits the program at once.
 pub(crate) fn on_ctrl_c(act: impl Fn() + Send + 'static) -> Arc<AtomicBool> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    // Some programs send the signal to a process and to its group: that is one Ctrl+C.
+    // Some programs send the signal to the process and to its group; both count as one Ctrl+C.
     let mut first: Option<Instant> = None;
     let handler = ctrlc::set_handler(move || {
         flag.store(true, Ordering::SeqCst);

@@ -1,4 +1,5 @@
-//! `kinetoscope`: what one wants to know of a robot's files, and to make of them, without writing a program.
+//! `kinetoscope`: command line tool that checks, converts, renders, simulates, benchmarks and replays robots and
+//! scenes.
 
 mod bench;
 mod check;
@@ -22,7 +23,7 @@ use clap::{Parser, Subcommand};
 use ending::Ending;
 use std::process::ExitCode;
 
-/// Robots from URDF and MJCF: what is in the files, how they look, how fast they run. No GPU, no OpenGL.
+/// Tools for robots and scenes from URDF and MJCF: check, convert, render, view, benchmark, replay. No GPU, no OpenGL
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope", version, after_help = HELP)]
 struct Args {
@@ -47,7 +48,7 @@ Exit codes: 0 done; 1 done, with warnings (something was repaired, ignored or mi
 FILE: URDF files, an MJCF file, or a scene file (TOML, YAML, JSON). One that is relative and does not exist is looked for
 among the bundled assets (sr5/SR5.urdf, ...).";
 
-/// One line per command; what it does is in the file of its name.
+/// Subcommands; each is implemented in the module of its name.
 #[derive(Debug, Subcommand)]
 enum Command {
     Check(check::Args),
@@ -64,7 +65,7 @@ fn main() -> ExitCode {
     let args = match Args::try_parse() {
         Ok(args) => args,
         Err(error) => {
-            // A closed pipe, as behind `| head`, is no error of ours.
+            // A closed pipe, as with `| head`, is not an error.
             let _ = error.print();
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
@@ -83,7 +84,7 @@ fn main() -> ExitCode {
         Ok(Ending::Done) => ExitCode::SUCCESS,
         Ok(Ending::Warned) => ExitCode::from(1),
         Err(error) => {
-            // Fields of a configuration are flags here.
+            // Settings of the library are flags here.
             excerpt::print_error(&error.to_string().replace("UrdfCfg::packages", "--package NAME=DIR"));
             ExitCode::from(2)
         }

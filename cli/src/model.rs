@@ -1,4 +1,4 @@
-//! Models that commands take: URDF files, an MJCF file, or a scene file.
+//! Model arguments of commands: URDF files, an MJCF file, or a scene file.
 
 use crate::ending::Result;
 use crate::excerpt;
@@ -10,40 +10,40 @@ use kinetoscope::robot::urdf::Strictness;
 use kinetoscope::sim::{Error, MjcfId, RobotFileError};
 use std::path::{Path, PathBuf};
 
-/// The files of a model.
+/// Files and loading options of a model.
 #[derive(Debug, clap::Args)]
 pub(crate) struct ModelArgs {
-    /// URDF files, of which each further one hangs from the tip of the one before; or one MJCF file; or one scene file (TOML,
-    /// YAML, JSON)
+    /// URDF files, each attached to the tip of the previous one; or one MJCF file; or one scene file (TOML, YAML, JSON)
     #[arg(required = true, value_name = "FILE.urdf|FILE.xml|SCENE.toml")]
     files: Vec<PathBuf>,
     /// Let the root of a robot move freely
     #[arg(long, alias = "floating_base")]
     pub(crate) floating_base: bool,
-    /// Folder of a package of package:// addresses; may be repeated
+    /// Folder of a ROS package for package:// URIs; may be repeated
     #[arg(long, value_name = "NAME=DIR", value_parser = package)]
     package: Vec<(String, PathBuf)>,
-    /// Folder in which meshes and packages are searched that are not found from the URDF, as Isaac Gym's asset root
+    /// Additional search folder for meshes and packages that are not found relative to the URDF, like Isaac Gym's asset
+    /// root
     #[arg(long, value_name = "DIR", value_parser = folder)]
     asset_root: Option<PathBuf>,
-    /// Refuse URDF files with departures from the format that are otherwise warnings
+    /// Treat deviations from the URDF format as errors instead of warnings
     #[arg(long)]
     strict: bool,
 }
 
-/// Start of a robot: its height and the ground.
+/// Initial height of a robot, and the ground.
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct SpawnArgs {
-    /// Height of the lowest collision point of the robot above the ground at the start [default: 0 with --floating-base; else
-    /// the root link starts at height 0]
+    /// Initial height of the robot's lowest collision point above the ground [default: 0 with --floating-base; else the
+    /// root link starts at height 0]
     #[arg(long, alias = "spawn_height", value_name = "METRES", allow_negative_numbers = true)]
     pub(crate) spawn_height: Option<f64>,
-    /// Leave out the ground
+    /// Omit the ground
     #[arg(long, alias = "no_ground")]
     pub(crate) no_ground: bool,
 }
 
-/// Files by their kind.
+/// Input files by kind.
 #[derive(Clone, Debug)]
 pub(crate) enum Files {
     Urdf(UrdfCfg),
@@ -51,24 +51,24 @@ pub(crate) enum Files {
     Scene(PathBuf),
 }
 
-/// The simulation that a command wants.
+/// Settings of the simulation of a command.
 #[derive(Clone, Debug)]
 pub(crate) struct Setup {
-    /// Environments; where `None`, those of a scene file, else `default_envs`.
+    /// Number of environments; `None` uses that of a scene file, else `default_envs`.
     pub(crate) num_envs: Option<usize>,
     pub(crate) default_envs: usize,
-    /// Distance of environments \[m\]; where `None`, that of a scene file, else the default of the command.
+    /// Distance between environments \[m\]; `None` uses that of a scene file, else `default_arena_space`.
     pub(crate) arena_space: Option<f64>,
     pub(crate) default_arena_space: f64,
-    /// Threads that step; where `None`, those of a scene file, else every core.
+    /// Number of stepping threads; `None` uses that of a scene file, else every core.
     pub(crate) threads: Option<usize>,
-    /// True if there is a ground under a robot.
+    /// True to add a ground plane below a robot.
     pub(crate) ground: bool,
     pub(crate) spawn_height: Option<f64>,
 }
 
 impl Setup {
-    /// One environment without a ground: a model to look at.
+    /// One environment without a ground, for commands that do not step.
     pub(crate) const STILL: Self = Self {
         num_envs: Some(1),
         default_envs: 1,
@@ -79,13 +79,13 @@ impl Setup {
         spawn_height: None,
     };
 
-    /// A model that moves, as flags of the command say.
+    /// Settings of commands that step.
     pub(crate) fn moving(num_envs: Option<usize>, threads: Option<usize>, spawn: &SpawnArgs) -> Self {
         let SpawnArgs { spawn_height, no_ground } = *spawn;
         Self { num_envs, threads, ground: !no_ground, spawn_height, ..Self::STILL }
     }
 
-    /// The configuration of a simulation of one robot.
+    /// Returns the configuration of a simulation with one robot.
     fn cfg(&self) -> SimulationManagerCfg {
         let defaults = SimulationManagerCfg::default();
         SimulationManagerCfg {
@@ -98,13 +98,13 @@ impl Setup {
     }
 }
 
-/// A model in a simulation.
+/// A simulation with the loaded model.
 #[derive(Debug)]
 pub(crate) struct Model {
     pub(crate) sim: SimulationManager,
-    /// The robot that the files are; `None` where they are a scene.
+    /// Robot of the input files; `None` for a scene.
     pub(crate) robot: Option<RobotId>,
-    /// The MJCF file that is a scene.
+    /// MJCF file that is a scene; `None` for other input.
     pub(crate) part: Option<MjcfId>,
     /// Warnings of the command itself.
     warnings: Vec<String>,
@@ -115,15 +115,15 @@ impl Model {
         Self { sim, robot: None, part: None, warnings: Vec::new() }
     }
 
-    /// Prints all warnings; returns whether there were any.
+    /// Prints all warnings. Returns true if there were any.
     pub(crate) fn print_warnings(&self) -> bool {
         self.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
         excerpt::print_warnings(self.sim.diagnostics()) || !self.warnings.is_empty()
     }
 
-    /// A warning about a robot on a fixed base that reaches into the ground.
+    /// Adds a warning if a robot on a fixed base starts partly below the ground.
     fn warn_if_in_ground(&mut self, id: RobotId) -> Result<()> {
-        /// Less is rounding of the files' numbers \[m\].
+        /// Tolerance for rounded numbers in files \[m\].
         const SLACK: f64 = 1e-3;
         let robot = self.sim.robot(id);
         let (names, heights) = (robot.link_names(), robot.link_lowest_heights());
@@ -147,10 +147,10 @@ impl Model {
 }
 
 impl ModelArgs {
-    /// The files by their kind.
+    /// Returns the files by kind.
     ///
     /// # Errors
-    /// A file of another kind, an MJCF or scene file that is not alone, or flags of another kind of file.
+    /// A file of another kind, an MJCF or scene file together with other files, or flags of another kind of file.
     pub(crate) fn files(&self) -> Result<Files> {
         let files: Vec<PathBuf> = self.files.iter().map(|file| user_or_asset(file)).collect();
         let kinds: Vec<FileKind> = files.iter().map(|file| FileKind::of(file)).collect();
@@ -188,11 +188,12 @@ impl ModelArgs {
         Ok(if kinds[at] == FileKind::Scene { Files::Scene(path) } else { Files::Mjcf(path) })
     }
 
-    /// The model in a simulation. URDF files are a robot, and so is an MJCF file that can be one; another MJCF file (several
-    /// bodies, balls, nothing that turns or slides) is a scene with what stands in its world, and no ground beside its own.
+    /// Builds the simulation. URDF files form one robot. An MJCF file is a robot if possible; otherwise (several root
+    /// bodies, ball joints, or no hinge or slide joint) it is a scene with its own world geoms and no additional
+    /// ground.
     ///
     /// # Errors
-    /// Whatever is wrong in the files; flags that a scene has no use for.
+    /// Errors of the files, or flags that do not apply to a scene.
     pub(crate) fn build(&self, setup: &Setup) -> Result<Model> {
         if let Some(height) = setup.spawn_height.filter(|height| !height.is_finite()) {
             return Err(format!("--spawn-height {height}: give a height in metres, such as 0.1").into());
@@ -207,7 +208,7 @@ impl ModelArgs {
         }
     }
 
-    /// A robot, with its lowest collision point at `clearance` above the ground.
+    /// Builds a robot with its lowest collision point at `clearance` above the ground; `None` keeps the initial pose.
     fn robot(&self, setup: &Setup, robot: RobotCfg, clearance: Option<f64>) -> Result<Model> {
         let mut model = Model::of(SimulationManager::new(setup.cfg())?);
         let (uid, fix_base) = ("robot".into(), !self.floating_base);
@@ -219,9 +220,9 @@ impl ModelArgs {
         Ok(model)
     }
 
-    /// A robot, or a scene. A robot on a free base starts where the file puts it, but never in the ground.
+    /// Builds a robot, or a scene. A robot on a free base starts at the pose of the file, but never below the ground.
     fn mjcf(&self, setup: &Setup, path: &Path) -> Result<Model> {
-        /// Less is rounding \[m\].
+        /// Tolerance for rounding \[m\].
         const SLACK: f64 = 1e-6;
         let robot = || RobotCfg { mjcf: Some(MjcfFile::new(path)), ..Default::default() };
         let refused = match self.robot(setup, robot(), setup.spawn_height) {
@@ -246,7 +247,7 @@ impl ModelArgs {
         Ok(model)
     }
 
-    /// Builds the scene that a scene file declares.
+    /// Builds the scene of a scene file.
     fn scene(&self, setup: &Setup, path: &Path) -> Result<Model> {
         self.refuse_robot_flags(setup, path)?;
         let mut cfg = SceneCfg::from_file(path)?;
@@ -257,7 +258,7 @@ impl ModelArgs {
         Ok(Model::of(InteractiveScene::new(cfg)?.into_sim()))
     }
 
-    /// An error where flags of a robot are given for a scene.
+    /// Returns an error if robot flags are given for a scene.
     fn refuse_robot_flags(&self, setup: &Setup, path: &Path) -> Result<()> {
         let flags = [("--floating-base", self.floating_base), ("--spawn-height", setup.spawn_height.is_some())];
         match flags.iter().find(|(_, given)| *given) {
@@ -272,14 +273,14 @@ impl ModelArgs {
         }
     }
 
-    /// The files as they were given.
+    /// Returns the file paths as given on the command line.
     pub(crate) fn names(&self) -> String {
         let names: Vec<String> = self.files.iter().map(|file| file.display().to_string()).collect();
         names.join(" ")
     }
 }
 
-/// True if an MJCF file that is no robot may be a scene.
+/// True if an MJCF file that was rejected as a robot may be a scene.
 pub(crate) fn is_scene(error: &RobotFileError) -> bool {
     use RobotFileError::{Actuator, BallJoint, MocapBody, NeedsWorld, NoBody, NoJoint, SeveralRoots};
     matches!(
@@ -294,7 +295,8 @@ pub(crate) fn is_scene(error: &RobotFileError) -> bool {
     )
 }
 
-/// A file of the user, else an asset, else the path as it is: the loader says that there is none.
+/// Resolves a path: an existing file, else a bundled asset, else the path unchanged, so that the loader reports the
+/// missing file.
 fn user_or_asset(file: &Path) -> PathBuf {
     if file.exists() { file.to_path_buf() } else { assets::path(file).unwrap_or_else(|_| file.to_path_buf()) }
 }

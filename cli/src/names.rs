@@ -1,6 +1,6 @@
-//! Names of recorded fields: patterns, and short lists.
+//! Patterns and compact lists of recorded field names.
 
-/// Names that differ in their brackets only are one: `position[J1, J2]`, `data[0..11]`.
+/// Merges names that differ only in their brackets: `position[J1, J2]`, `data[0..11]`.
 pub(crate) fn grouped(fields: &[String]) -> Vec<String> {
     let mut groups: Vec<((&str, &str), Vec<&str>)> = Vec::new();
     for field in fields {
@@ -25,7 +25,7 @@ pub(crate) fn grouped(fields: &[String]) -> Vec<String> {
     groups.into_iter().map(text).collect()
 }
 
-/// True if a name matches a pattern, in which `*` stands for any letters.
+/// True if a name matches a pattern, in which `*` stands for any characters.
 pub(crate) fn fits(pattern: &str, name: &str) -> bool {
     let mut parts = pattern.split('*');
     let Some(mut rest) = parts.next().and_then(|first| name.strip_prefix(first)) else { return false };

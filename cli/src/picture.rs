@@ -1,4 +1,4 @@
-//! A channel of a picture as a PNG.
+//! Image channels as PNG files.
 
 use crate::ending::Result;
 use image::{Rgb, RgbImage};
@@ -6,23 +6,23 @@ use kinetoscope::render::frame::Frame;
 use kinetoscope::sensors::camera::colormap::{depth_color, mask_color, normal_color};
 use std::path::Path;
 
-/// What a picture shows.
+/// Image channel to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Channel {
-    /// What an eye would see
+    /// Rendered color
     Color,
-    /// How far things are: near is warm
+    /// Distance from the camera; near is warm
     Depth,
-    /// Which thing is where: one colour each
+    /// Instance segmentation: one color per object
     Mask,
-    /// Where surfaces face
+    /// Surface normals
     Normal,
 }
 
-/// Writes a channel of a frame that has it.
+/// Writes a channel of a frame as a PNG file. A channel that the frame does not have is black.
 ///
 /// # Errors
-/// The file cannot be written; its name does not end in `.png`.
+/// The file cannot be written, or its name does not end in `.png`.
 pub(crate) fn write(frame: &Frame, channel: Channel, [width, height]: [usize; 2], path: &Path) -> Result<()> {
     if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
         return Err(format!("{}: pictures are written as PNG; give a name that ends in .png", path.display()).into());

@@ -1,4 +1,4 @@
-//! `kinetoscope plot`: numbers of a recording over time, as a picture.
+//! `kinetoscope plot`: plots recorded values over time.
 
 use crate::ending::{Ending, Result};
 use crate::names::{fits, grouped};
@@ -7,35 +7,36 @@ use kinetoscope::viewer::plot::{self, Plot, Series};
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Numbers of a recording over time, as SVG or PNG; without --topic a list of what there is
+/// Plot recorded values over time as SVG or PNG; without --topic, list the topics
 ///
-/// A topic may be named by its end: joint_states is /env_0/arm/joint_states where there is one arm. Each --field is plotted of
-/// each --topic, so that two topics with the same names of joints lie over each other: what was wanted, and what came.
+/// A topic may be given by the end of its name: joint_states stands for /env_0/arm/joint_states if it is unambiguous.
+/// Each --field is plotted for each --topic, so that two topics with the same joint names are overlaid, such as targets
+/// and measured positions.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
-    /// A recording, .mcap or .npz
+    /// Recording, .mcap or .npz
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// A topic, or the end of its name; may be repeated
+    /// Topic, or the end of its name; may be repeated
     #[arg(long, value_name = "NAME")]
     topic: Vec<String>,
-    /// A number of these topics, such as `position[JOINT1]`; * stands for anything; may be repeated
+    /// Field of these topics, such as `position[JOINT1]`; * matches any characters; may be repeated
     #[arg(long, value_name = "NAME")]
     field: Vec<String>,
-    /// The environment, where the topic does not say it [default: the first that was recorded]
+    /// Environment, if the topic name does not contain it [default: the first recorded one]
     #[arg(long)]
     env: Option<usize>,
-    /// The plot
+    /// Output file
     #[arg(short, long, value_name = "FILE.svg|FILE.png")]
     out: Option<PathBuf>,
-    /// What stands above it [default: the topics]
+    /// Title of the plot [default: the topics]
     #[arg(long)]
     title: Option<String>,
-    /// Pixels per row
+    /// Width of the plot, in pixels
     #[arg(long, default_value_t = 960)]
     width: usize,
-    /// Rows
+    /// Height of the plot, in pixels
     #[arg(long, default_value_t = 540)]
     height: usize,
 }
@@ -81,7 +82,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
                 topic.fields.iter().filter(|known| fits(field, known)).map(|known| Wanted::new(&topic.name, known)),
             );
             if wanted.len() == before {
-                // The recording says what there is.
+                // An unknown field is passed on: the error of the recording lists the fields.
                 wanted.push(Wanted::new(&topic.name, field));
             }
         }
@@ -112,10 +113,10 @@ fn points(plot: &Plot) -> usize {
     plot.series.iter().map(|series| series.points.len()).sum()
 }
 
-/// Says what is in a recording.
+/// Prints the topics of a recording with their fields.
 fn list(recording: &Recording, topics: &[&RecordedTopic]) {
     let mut out = std::io::stdout().lock();
-    // A closed pipe, as behind `| head`, is no error of ours.
+    // A closed pipe, as with `| head`, is not an error.
     let _ = writeln!(out, "{}", recording.path().display());
     for &RecordedTopic { name, kind, count, fields } in topics {
         let _ = writeln!(out, "{name}   {kind}, {count} times");
@@ -125,7 +126,7 @@ fn list(recording: &Recording, topics: &[&RecordedTopic]) {
     }
 }
 
-/// What a field is without saying of what.
+/// Returns a field name without its brackets.
 fn stem(field: &str) -> &str {
     field.split('[').next().unwrap_or(field)
 }

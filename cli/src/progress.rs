@@ -1,16 +1,16 @@
-//! How far long work is: a bar on a terminal, a plain line every ten seconds elsewhere. Both are written to standard error.
+//! Progress of long tasks on standard error: a bar on a terminal, otherwise a line every ten seconds.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Between two looks.
+/// Interval between two updates.
 const LOOK: Duration = Duration::from_millis(100);
-/// Between two lines.
+/// Interval between two lines.
 const LINE: Duration = Duration::from_secs(10);
 
-/// Does some work, and says meanwhile how much of it is done, from 0 to 1, where that is known.
+/// Runs `work` and reports its progress. `done` returns the completed fraction, 0 to 1, or `None` if unknown.
 pub(crate) fn during<T>(what: &str, done: impl Fn() -> Option<f64> + Send, work: impl FnOnce() -> T) -> T {
     let (ended, until_ended) = channel::<()>();
     std::thread::scope(|scope| {
@@ -24,7 +24,7 @@ pub(crate) fn during<T>(what: &str, done: impl Fn() -> Option<f64> + Send, work:
             while until_ended.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
                 let share = done();
                 if terminal {
-                    // What ends at once has no bar.
+                    // A task that ends before the first update shows no bar.
                     share.into_iter().for_each(|share| bar.set_position((1000.0 * share) as u64));
                 } else if lines.is_due(Instant::now()) {
                     eprintln!("{}", line(what, share, start.elapsed()));
@@ -38,7 +38,7 @@ pub(crate) fn during<T>(what: &str, done: impl Fn() -> Option<f64> + Send, work:
     })
 }
 
-/// When lines are due.
+/// Schedule of the progress lines.
 #[derive(Debug)]
 struct Lines {
     last: Instant,

@@ -1,17 +1,17 @@
-//! `kinetoscope recover`: a whole file of what a killed recording has left.
+//! `kinetoscope recover`: completes the file of an interrupted recording.
 
 use crate::ending::{Ending, Result};
 use kinetoscope::record::recover_to;
 use std::path::PathBuf;
 
-/// Makes a whole, indexed MCAP file of what a recording has left that was killed
+/// Make a complete, indexed MCAP file from an interrupted recording
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
-    /// The recording, by the name that it was to have (run.mcap) or by that of what was left (run.mcap.part)
+    /// Recording, by its final name (run.mcap) or its partial file (run.mcap.part)
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// What to call the whole file, instead of the name that it was to have
+    /// Name of the complete file, instead of the final name of the recording
     #[arg(short, long, value_name = "OUT")]
     out: Option<PathBuf>,
 }

@@ -1,4 +1,4 @@
-//! `kinetoscope render`: a picture of a model at its initial state.
+//! `kinetoscope render`: renders an image of a model in its initial state.
 
 use crate::ending::{Ending, Result};
 use crate::model::{Files, ModelArgs, Setup};
@@ -16,44 +16,44 @@ use kinetoscope::sim::{Error, Still};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// A picture of a model as it starts
+/// Render an image of a model in its initial state
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
     #[command(flatten)]
     model: ModelArgs,
-    /// The picture, as PNG
+    /// Output file, as PNG
     #[arg(short, long, value_name = "FILE.png")]
     out: PathBuf,
-    /// What the picture shows
+    /// Image channel to write
     #[arg(long, value_enum, default_value_t = Channel::Color)]
     channel: Channel,
     #[command(flatten)]
     look: Look,
 }
 
-/// From where and how a model is drawn.
+/// Camera and renderer settings.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Look {
-    /// A camera of an MJCF file
+    /// Camera of an MJCF file
     #[arg(long, conflicts_with_all = ["eye", "target"])]
     camera: Option<String>,
-    /// Where the camera is, in metres
+    /// Camera position, in meters
     #[arg(long, value_name = "X,Y,Z", requires = "target", value_parser = point, allow_hyphen_values = true)]
     eye: Option<Point>,
-    /// Where it looks, in metres
+    /// Point that the camera looks at, in meters
     #[arg(long, value_name = "X,Y,Z", requires = "eye", value_parser = point, allow_hyphen_values = true)]
     target: Option<Point>,
-    /// Vertical field of view in degrees [default: the camera's, or 45]
+    /// Vertical field of view in degrees [default: that of the camera, or 45]
     #[arg(long)]
     fovy: Option<f64>,
-    /// Pixels per row
+    /// Image width, in pixels
     #[arg(long, default_value_t = 1280)]
     width: usize,
-    /// Rows
+    /// Image height, in pixels
     #[arg(long, default_value_t = 720)]
     height: usize,
-    /// How it is drawn
+    /// Rendering method
     #[arg(long, value_enum, default_value_t = Method::Raster)]
     renderer: Method,
     /// Paths per pixel, with --renderer rt [default: 64]
@@ -61,14 +61,14 @@ pub(crate) struct Look {
     samples: Option<u32>,
 }
 
-/// How a picture is drawn.
+/// Rendering method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Method {
     /// Rasterizer
     Raster,
-    /// Rasterizer with shadows by rays
+    /// Rasterizer with ray-traced shadows
     Hybrid,
-    /// What is seen by rays, light and shadows as the rasterizer has them
+    /// Ray-traced visibility; light and shadows as with raster
     FastRt,
     /// Path tracing
     Rt,
@@ -119,8 +119,8 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     Ok(if warned { Ending::Warned } else { Ending::Done })
 }
 
-/// The model of an MJCF file; an error has the line of the file that MuJoCo names. Of a file that includes others it does not
-/// say whose line that is.
+/// Loads a model from an MJCF file. Errors of the compiler get the file and the line that MuJoCo reports. With included
+/// files the line is omitted, because MuJoCo does not report to which file it belongs.
 fn of_mjcf(path: &Path) -> Result<Still> {
     Still::of_mjcf(path, None).map_err(|error| {
         let line = if let Error::Compile(refused) = &error { refused.line } else { None };
@@ -133,10 +133,10 @@ fn of_mjcf(path: &Path) -> Result<Still> {
 }
 
 impl Look {
-    /// What the picture shows of a model.
+    /// Returns the camera view of a model.
     ///
     /// # Errors
-    /// The file has no such camera; sizes or angles that cannot be.
+    /// The file has no such camera, or a size or angle is invalid.
     pub(crate) fn view(&self, still: &Still) -> Result<View> {
         let free = still.first_view([self.width, self.height]);
         let (pose, fovy) = match (&self.camera, self.eye, self.target) {
@@ -157,10 +157,10 @@ impl Look {
         Ok(view)
     }
 
-    /// What draws it, on every core.
+    /// Creates the renderer, with a thread per core.
     ///
     /// # Errors
-    /// A number of paths that is not possible, or any without path tracing.
+    /// An invalid number of paths, or any number of paths without path tracing.
     pub(crate) fn rasterizer(&self) -> Result<ParallelRasterizer> {
         if let Some(samples) = self.samples.filter(|_| self.renderer != Method::Rt) {
             return Err(format!("--samples {samples}: paths are of --renderer rt").into());
@@ -182,10 +182,10 @@ impl Look {
     }
 }
 
-/// Draws a shot again and again for some seconds; gives pictures per second.
+/// Renders the same image repeatedly for some seconds. Returns images per second.
 ///
 /// # Errors
-/// The shot cannot be drawn.
+/// Rendering failed.
 pub(crate) fn rate(rasterizer: &mut ParallelRasterizer, shot: Shot<'_>, seconds: f64) -> Result<f64> {
     let channels = Channels { color: true, depth: true, mask: true, normal: true, ..Channels::default() };
     let mut frame = Frame::new(shot.view.width, shot.view.height, channels);

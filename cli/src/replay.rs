@@ -1,4 +1,4 @@
-//! `kinetoscope replay`: a recording shown again, drawn, or run again.
+//! `kinetoscope replay`: shows a recording, renders images of it, or verifies it by running its actions again.
 
 use crate::ending::{Ending, Result};
 use crate::{excerpt, interrupt};
@@ -11,38 +11,38 @@ use kinetoscope::viewer::{Play, Speed};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-/// Shows a recording in a window or a browser with a time line, draws pictures of it, or runs its actions again
+/// Show a recording in a window or a browser with a timeline, render images of it, or run its actions again
 ///
-/// A recording holds its scene, so that the file is enough to show it. To run its actions again, the scene has to be built as it
-/// was, drives and all: give the scene file with --scene.
+/// A recording contains its scene, so the file is sufficient to show it. Running its actions again requires the
+/// original scene, including drives: give the scene file with --scene.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
-    /// A recording, .mcap or .npz
+    /// Recording, .mcap or .npz
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// The scene file that was recorded, where the recording does not hold its scene, or for --verify
+    /// Recorded scene file, if the recording does not contain its scene, or for --verify
     #[arg(long, value_name = "SCENE.toml|yaml")]
     scene: Option<PathBuf>,
-    /// Show it in browsers at this address instead of a window
+    /// Show the recording in browsers at this address instead of a window
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
     serve: Option<String>,
-    /// Write pictures to this folder instead of opening a window
+    /// Write images to this folder instead of opening a window
     #[arg(long, value_name = "DIR", conflicts_with = "serve", requires = "at")]
     out: Option<PathBuf>,
-    /// Times of these pictures, in seconds on the clock of the recording
+    /// Times of the images, in seconds of recording time
     #[arg(long, value_name = "SECONDS,...", value_delimiter = ',', requires = "out", allow_hyphen_values = true)]
     at: Vec<f64>,
-    /// Pixels per row of pictures
+    /// Width of the images, in pixels
     #[arg(long, default_value_t = 960)]
     width: usize,
-    /// Rows of pictures
+    /// Height of the images, in pixels
     #[arg(long, default_value_t = 540)]
     height: usize,
     /// Run the recorded actions again and compare every number, bit for bit
     #[arg(long, requires = "scene", conflicts_with_all = ["serve", "out"])]
     verify: bool,
-    /// End after so many seconds instead of when the window is closed
+    /// End after this number of seconds instead of when the window is closed
     #[arg(long, value_name = "SECONDS", conflicts_with_all = ["out", "verify"])]
     seconds: Option<f64>,
 }
@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     Ok(if warned { Ending::Warned } else { Ending::Done })
 }
 
-/// The scene of a file, in as many environments as were recorded, and whether there were warnings.
+/// Builds the scene of a file with the recorded number of environments. Also returns true if there were warnings.
 fn built(file: &Path, num_envs: usize) -> Result<(InteractiveScene, bool)> {
     let mut cfg = SceneCfg::from_file(file)?;
     cfg.simulation.num_envs = num_envs;
@@ -104,7 +104,7 @@ fn draw(args: &Args, mut film: Film, mut sim: SimulationManager, folder: &Path) 
         return Err(format!("--at {time}: the recording is from {first} s to {last} s").into());
     }
     std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    // From the same place in all of them, with what moves in the image at all of these times.
+    // All images have the same camera, which frames everything that is visible at any of these times.
     let mut stills = Vec::new();
     for time in &args.at {
         film.show(&mut sim, film.frame_at(*time))?;
@@ -123,10 +123,10 @@ fn draw(args: &Args, mut film: Film, mut sim: SimulationManager, folder: &Path) 
 
 fn show(args: &Args, mut film: Film, mut sim: SimulationManager) -> Result<()> {
     let begun = std::time::Instant::now();
-    // Whoever opens it sees the beginning at once, not the scene as it was built.
+    // A new viewer sees the first frame at once, not the initial state of the scene.
     film.show(&mut sim, 0)?;
     let mut film = RecordedFilm(film);
-    // Nothing is held: it is asked many times a second whether to go on.
+    // Ctrl+C needs no action of its own, because `goes_on` is called many times a second.
     let interrupted = interrupt::on_ctrl_c(|| ());
     let goes_on = || {
         let in_time = args.seconds.is_none_or(|seconds| begun.elapsed().as_secs_f64() < seconds);

@@ -1,4 +1,4 @@
-//! Reports of `check` about scenes: MJCF files that are no robot, and scene files.
+//! Reports of `check` on scenes: MJCF files that are not robots, and scene files.
 
 use crate::ending::Result;
 use kinetoscope::mujoco as mj;
@@ -8,7 +8,7 @@ use kinetoscope::sim::inspect::{InspectCfg, Report, inspect};
 use serde_json::{Value, json};
 use std::fmt;
 
-/// An MJCF file that is a scene: its bodies, joints and actuators.
+/// Report on an MJCF file that is a scene: its bodies, joints and actuators.
 pub(crate) struct MjcfReport {
     file: String,
     total_mass: f64,
@@ -23,7 +23,7 @@ struct Body {
     parent: String,
     depth: usize,
     mass: f64,
-    /// Name and kind of each joint that moves it.
+    /// Name and kind of each joint of the body.
     joints: Vec<(String, &'static str)>,
     mocap: bool,
 }
@@ -118,16 +118,18 @@ impl fmt::Display for MjcfReport {
     }
 }
 
-/// A scene file: a report of each robot and articulation, and the kinds of the other entities.
+/// Report on a scene file: a report per robot and articulation, and the kinds of the other entities.
 pub(crate) struct SceneReport {
     file: String,
     num_envs: usize,
     dt: f64,
     robots: Vec<(String, Report)>,
-    /// Name and kind.
+    /// Name and kind of each entity that is neither a robot nor an articulation.
     others: Vec<(String, &'static str)>,
 }
 
+/// Inspects the robots of a scene.
+///
 impl SceneReport {
     /// # Errors
     /// A robot cannot be inspected.
@@ -155,6 +157,8 @@ impl SceneReport {
         self.robots.iter().any(|(_, report)| !report.warnings.is_empty())
     }
 
+    /// Returns the report as JSON.
+    ///
     /// # Errors
     /// A report cannot be written as JSON.
     pub(crate) fn json(&self) -> Result<Value> {
@@ -192,7 +196,7 @@ impl fmt::Display for SceneReport {
     }
 }
 
-/// The kind of an entity.
+/// Returns the kind of an entity.
 fn kind_of(entity: &EntityCfg) -> &'static str {
     match entity {
         EntityCfg::Robot(_) => "robot",

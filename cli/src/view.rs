@@ -1,4 +1,4 @@
-//! `kinetoscope view`: a model as it moves, in a window or in a browser.
+//! `kinetoscope view`: simulates a model in a window or a browser.
 
 use crate::ending::{Ending, Result};
 use crate::interrupt;
@@ -13,10 +13,10 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A model as it moves: in a window, or in a browser with --serve
+/// Simulate a model in a window, or in a browser with --serve
 ///
-/// Its drives hold it where it starts; sliders and the mouse move it. It goes on until the window is closed, all --steps are
-/// done, or Ctrl+C; each of them is a good end. H in the window shows its keys.
+/// Drives hold the initial joint positions; sliders and the mouse move the model. The simulation ends when the window
+/// is closed, all --steps are done, or on Ctrl+C; each of these is a regular end. H in the window shows its keys.
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Args {
@@ -24,27 +24,28 @@ pub(crate) struct Args {
     model: ModelArgs,
     #[command(flatten)]
     spawn: SpawnArgs,
-    /// Show it in browsers and open no window; at 127.0.0.1:8080 where no address is given. An address that other machines
-    /// reach (0.0.0.0:8080) needs the token that is printed
+    /// Show the simulation in browsers and open no window; the default address is 127.0.0.1:8080. An address that other
+    /// machines can reach (0.0.0.0:8080) requires the printed token
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
     serve: Option<String>,
-    /// Environments, side by side [default: those of a scene file, else 1]
+    /// Number of environments, side by side [default: that of a scene file, else 1]
     #[arg(long, alias = "num_envs")]
     num_envs: Option<usize>,
-    /// Distance of environments, in metres [default: that of a scene file, else 2]
+    /// Distance between environments, in meters [default: that of a scene file, else 2]
     #[arg(long, alias = "arena_space")]
     arena_space: Option<f64>,
-    /// Threads that step [default: every core]
+    /// Number of stepping threads [default: every core]
     #[arg(long)]
     threads: Option<usize>,
-    /// End after so many steps
+    /// End after this number of steps
     #[arg(long)]
     steps: Option<u64>,
-    /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset; .mp4,
-    /// .gif, .webp or .apng for the first camera; a folder for PNG files of all cameras. Without it the record button begins a recording.mcap
+    /// Record everything from the start: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset;
+    /// .mp4, .gif, .webp or .apng for the first camera; a folder for PNG files of all cameras. Without this flag, the
+    /// record button starts a recording.mcap
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Replace the file of --record, and what a recording that was killed has left
+    /// Replace the file of --record and the partial file of an interrupted recording
     #[arg(long, requires = "record")]
     overwrite: bool,
     /// Simulated seconds per second, until a viewer sets another speed
@@ -73,7 +74,7 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
     let model = args.model.build(&setup)?;
     let warned = model.print_warnings();
     let mut sim = model.sim;
-    // First of all: a Ctrl+C while the recording begins or the page opens also ends it well.
+    // Ctrl+C is handled from here on, so that it also ends the start of the recording or of the page cleanly.
     let interrupted = on_ctrl_c(&mut sim);
     let files = Arc::new(Mutex::new(args.recording()));
     if args.record.is_some() {
@@ -105,16 +106,16 @@ pub(crate) fn run(args: &Args) -> Result<Ending> {
 }
 
 impl Args {
-    /// What the record button does.
+    /// Returns the implementation of the record button.
     fn recording(&self) -> FileRecording {
         let path = self.record.clone().unwrap_or_else(|| "recording.mcap".into());
         FileRecording::new(RecorderCfg { overwrite: self.overwrite, ..RecorderCfg::new(path) })
     }
 
-    /// Shows the simulation; gives the window, where it is one.
+    /// Shows the simulation. Returns the window, or `None` for a browser view.
     ///
     /// # Errors
-    /// There is no display, or nothing can listen at the address.
+    /// No display is available, or the server cannot listen at the address.
     fn show(&self, sim: &mut SimulationManager, button: RecordButton) -> Result<Option<Window>> {
         let (speed, recording) = (Some(Speed::Times(self.speed)), Some(button));
         let names = self.model.names();
@@ -132,7 +133,7 @@ impl Args {
     }
 }
 
-/// What to do where there is no window.
+/// Returns the error message for a window that cannot be opened, with alternatives.
 fn no_window(error: &WindowError, names: &str) -> String {
     match error {
         WindowError::NoDisplay { reason, display, wayland } => {
@@ -149,7 +150,7 @@ fn no_window(error: &WindowError, names: &str) -> String {
     }
 }
 
-/// Raised by Ctrl+C, which also lets the simulation go on where a viewer holds it.
+/// Returns a flag that Ctrl+C sets. Ctrl+C also resumes a paused simulation and sets it to free speed.
 fn on_ctrl_c(sim: &mut SimulationManager) -> Arc<AtomicBool> {
     let wants = Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
     let key: Viewer = sim.viewer(wants);

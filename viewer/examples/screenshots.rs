@@ -1,4 +1,4 @@
-//! Images of the window for the documentation, as a window draws them:
+//! Renders the window images of the documentation:
 //!
 //! ```sh
 //! cargo run --release -p kinetoscope-viewer --example screenshots docs/pictures
@@ -18,7 +18,7 @@ use std::time::Instant;
 
 const SIZE: [usize; 2] = [960, 540];
 
-/// Sixteen arms that have lifted themselves, each beside a cube.
+/// Sixteen arms in a raised pose, each beside a cube.
 fn arms() -> SimulationManager {
     let cfg = SimulationManagerCfg { num_envs: 16, physics_dt: 0.01, arena_space: 2.0, ..Default::default() };
     let mut sim = SimulationManager::new(cfg).unwrap();
@@ -76,7 +76,7 @@ fn main() {
         std::fs::write(folder.join(name), canvas.to_png().unwrap()).unwrap();
     };
     let draw = |name: &str, keys: &[Key], eye: Option<Eye>| draw_with(name, keys, eye, None);
-    // Down and up again: the first environment, alone.
+    // Page down and page up select the first environment alone.
     let one = [Key::PageDown, Key::PageUp];
     let with = |more: &[Key]| [&one[..], more].concat();
     draw("window_grid.png", &[], None);

@@ -1,14 +1,35 @@
-//! Seeing a simulation that runs, and acting on it: what every window and browser view is made of, and the window.
+//! Live views of a running simulation: native windows, browser views, screenshots and plots.
 //!
 //! ```text
-//! simulation's thread                              a viewer's own thread
+//! simulation thread                                viewer thread
 //! SimulationManager -> Conductor -> Snapshot  ==>  Viewer -> Painter -> Canvas
 //!                      Conductor <- Command   <==  Viewer
 //! ```
 //!
-//! The [`Conductor`] is an observer of the simulation. At most as often as somebody wants to see something it copies where
-//! everything is to a [`Snapshot`]; it waits for no viewer, and draws nothing. Viewers draw what they like of the newest
-//! snapshot, on their own threads, and send commands. [`Screenshot`] is a picture in one call; [`plot`] draws numbers over time.
+//! The [`Conductor`] is an observer of the simulation. It copies the scene state into a [`Snapshot`] at the highest
+//! rate that any viewer requests. It renders nothing and never waits for a viewer. Each viewer renders the newest
+//! snapshot on its own thread and sends commands back.
+//!
+//! | Module | Contents |
+//! |---|---|
+//! | `control` | [`Conductor`], [`Viewer`] handles, commands, recording playback |
+//! | `stage` | snapshots, camera model, rendering, overlays, picking |
+//! | [`window`] | native X11 windows |
+//! | `serve` | HTTP and WebSocket server of the browser view |
+//! | `screenshot` | [`Screenshot`]: one image in one call |
+//! | [`plot`] | plots of numbers over time, as SVG or PNG |
+//!
+//! ```no_run
+//! use kinetoscope_sim::{SimulationManager, SimulationManagerCfg};
+//! use kinetoscope_viewer::OpenWindow;
+//!
+//! let mut sim = SimulationManager::new(SimulationManagerCfg::default())?;
+//! let window = sim.open_window()?;
+//! while window.is_open() {
+//!     sim.update(1);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![forbid(unsafe_code)]
 
 mod control;

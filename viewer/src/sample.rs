@@ -1,4 +1,5 @@
-//! A small simulation for tests: an arm with one joint, a cube on the ground, a camera over it; and a thread that steps one.
+//! Test fixtures: a small simulation (an arm with one joint, a cube on the ground, a camera above it) and a stepping
+//! thread.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 use crate::stage::Canvas;
@@ -14,12 +15,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 
-/// Half the length of the cube's edges \[m\].
+/// Half the edge length of the cube \[m\].
 pub(crate) const HALF: f64 = 0.1;
 /// Mass of the cube \[kg\].
 pub(crate) const MASS: f64 = 2.0;
 
-/// A plate that turns about the vertical, 1 m beside the cube.
+/// URDF of a plate that turns about a vertical axis, 1 m beside the cube.
 const ARM: &str = r#"<robot name="arm"><link name="base"/>
   <joint name="turn" type="revolute"><parent link="base"/><child link="plate"/><origin xyz="1 0 0.5"/><axis xyz="0 0 1"/>
     <limit lower="-2" upper="2" effort="50" velocity="5"/></joint>
@@ -35,7 +36,7 @@ pub(crate) struct Sample {
     pub(crate) camera: SensorId<Camera>,
 }
 
-/// `num_envs` environments with steps of 10 ms.
+/// Builds the sample simulation with `num_envs` environments and a time step of 10 ms.
 pub(crate) fn sample(num_envs: usize) -> Sample {
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         num_envs,
@@ -74,12 +75,12 @@ pub(crate) fn sample(num_envs: usize) -> Sample {
     Sample { sim, robot, camera }
 }
 
-/// Number of pixels that differ.
+/// Counts the pixels that differ between two canvases.
 pub(crate) fn unlike(one: &Canvas, other: &Canvas) -> usize {
     one.bytes().chunks(4).zip(other.bytes().chunks(4)).filter(|(a, b)| a != b).count()
 }
 
-/// A simulation that a thread steps until it is stopped.
+/// A simulation stepped by its own thread until [`end`](Self::end).
 pub(crate) struct Running {
     steps: Arc<AtomicU64>,
     stop: Arc<AtomicBool>,
@@ -100,18 +101,18 @@ impl Running {
         Self { steps, stop, thread }
     }
 
-    /// Steps that are done.
+    /// Returns the number of completed steps.
     pub(crate) fn steps(&self) -> u64 {
         self.steps.load(Ordering::SeqCst)
     }
 
-    /// Waits until it has done more than `steps` steps.
+    /// Waits until the thread has completed more than `steps` steps.
     #[track_caller]
     pub(crate) fn goes_on_beyond(&self, steps: u64) {
         kinetoscope_testkit::wait::until("it goes on", || self.steps() > steps);
     }
 
-    /// The simulation, stopped; nothing may hold it any more.
+    /// Stops the thread and returns the simulation. No viewer may hold it paused any more.
     pub(crate) fn end(self) -> SimulationManager {
         self.stop.store(true, Ordering::SeqCst);
         self.thread.join().unwrap()

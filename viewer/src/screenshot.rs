@@ -1,4 +1,4 @@
-//! A picture of the stage in one call, without a window or a screen.
+//! Screenshots: an image of the scene in one call, without a window or a display.
 
 use crate::control::Wants;
 use crate::file_extension;
@@ -9,18 +9,18 @@ use kinetoscope_sim::SimulationManager;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What a picture of the stage shows.
+/// Settings of a screenshot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScreenshotCfg {
-    /// Pixels per row, rows.
+    /// Image size: pixels per row, rows.
     pub size: [usize; 2],
-    /// From where; so that everything is in the picture, as windows begin, where `None`.
+    /// Camera. `None` frames the shown environments, like the initial view of a window.
     pub eye: Option<Eye>,
-    /// Which environments.
+    /// Environments in the image.
     pub shown: Shown,
-    /// What is drawn over it.
+    /// Overlays drawn on the scene.
     pub overlays: Overlays,
-    /// Threads that draw; all of the machine where `None`. The picture is the same for any number.
+    /// Number of rendering threads. `None` uses every core. The image does not depend on this number.
     pub threads: Option<usize>,
 }
 
@@ -30,61 +30,63 @@ impl Default for ScreenshotCfg {
     }
 }
 
-/// There is no picture.
+/// An error of [`Screenshot`].
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScreenshotError {
-    /// The end of the name is of no format.
+    /// The file name extension is not `.png`.
     #[error("{path}: pictures of the stage are not written as .{end}; give a name that ends in .png")]
     Extension {
-        /// The file.
+        /// Path of the image file.
         path: PathBuf,
-        /// The end of its name.
+        /// File name extension, in lower case and without its dot.
         end: String,
     },
-    /// There is no such folder.
+    /// The folder of the file does not exist.
     #[error("{path}: there is no folder {folder} to write it to; make it first")]
     NoFolder {
-        /// The file.
+        /// Path of the image file.
         path: PathBuf,
-        /// The folder.
+        /// The missing folder.
         folder: PathBuf,
     },
-    /// The file cannot be written: the disk is full, the folder is read-only.
+    /// The file cannot be written, for example because the disk is full or the folder is read-only.
     #[error("{path}: {error}")]
     File {
-        /// The file.
+        /// Path of the image file.
         path: PathBuf,
-        /// Why.
+        /// Error of the operating system or of the PNG encoder.
         error: Arc<std::io::Error>,
     },
-    /// A size that no picture has.
+    /// A side of the image is zero or too long.
     #[error("a picture of {width} x {height} pixels: 1 to {most} would do for both")]
     Size {
         /// Pixels per row.
         width: usize,
-        /// Rows.
+        /// Number of rows.
         height: usize,
-        /// The largest side.
+        /// Longest supported side \[pixels\].
         most: usize,
     },
-    /// There is no such environment.
+    /// The environment does not exist.
     #[error("there is no environment {env}; there are {count}, from 0")]
     Environment {
-        /// The one that was asked for.
+        /// Index of the requested environment.
         env: usize,
-        /// How many there are.
+        /// Number of environments.
         count: usize,
     },
-    /// It cannot be drawn.
+    /// The renderer returned an error.
     #[error("the stage cannot be drawn: {0}")]
     Draw(RenderError),
 }
 
-/// Simulations of which pictures can be taken.
+/// Screenshots of a simulation.
 pub trait Screenshot {
-    /// Writes a picture of the stage as it is now to a PNG file: all environments in their grid, from where a window looks when it
-    /// opens, 960 by 540 pixels. A file of that name is replaced, when the new one is whole. Nothing of the simulation changes.
+    /// Writes an image of the current state to a PNG file: all environments in their grid, 960 by 540 pixels, seen from
+    /// the initial camera of a window.
+    ///
+    /// An existing file is replaced once the new file is complete. The simulation does not change.
     ///
     /// ```no_run
     /// use kinetoscope_sim::{SimulationManager, SimulationManagerCfg};
@@ -97,25 +99,26 @@ pub trait Screenshot {
     /// ```
     ///
     /// # Errors
-    /// As [`screenshot_with`](Self::screenshot_with).
+    /// The errors of [`screenshot_with`](Self::screenshot_with).
     fn screenshot(&mut self, path: impl AsRef<Path>) -> Result<(), ScreenshotError> {
         self.screenshot_with(path, &ScreenshotCfg::default())
     }
 
-    /// As [`screenshot`](Self::screenshot), with more to choose.
+    /// Writes an image of the current state to a PNG file, like [`screenshot`](Self::screenshot), with the settings
+    /// `cfg`.
     ///
     /// # Errors
-    /// A name that does not end in `.png`, a folder that is missing or cannot be written to, a full disk; sizes and environments
-    /// that do not exist. What was there before is there then.
+    /// An invalid file name extension, size or environment, a missing or read-only folder, or a full disk. An existing
+    /// file is unchanged after an error.
     fn screenshot_with(&mut self, path: impl AsRef<Path>, cfg: &ScreenshotCfg) -> Result<(), ScreenshotError>;
 
-    /// From where all environments fill an image of `size` pixels, as they are now.
+    /// Returns a camera from which all environments fill an image of `size` pixels, in their current state.
     fn overview_eye(&mut self, size: [usize; 2]) -> Eye;
 
-    /// The picture itself, four bytes per pixel.
+    /// Renders the image and returns it as a canvas with four bytes per pixel.
     ///
     /// # Errors
-    /// Sizes and environments that do not exist.
+    /// The size or the environment is invalid, or the renderer returned an error.
     fn picture_of_stage(&mut self, cfg: &ScreenshotCfg) -> Result<Canvas, ScreenshotError>;
 }
 
@@ -155,7 +158,7 @@ impl Screenshot for SimulationManager {
         let wants = Wants { contacts, markers: cfg.overlays.sensors, ..Wants::default() };
         let run = Run { steps: self.observers().steps(), ..Run::default() };
         let mut canvas = Canvas::default();
-        // A pool of one has one to give.
+        // A new pool of size one always has a free snapshot.
         let Some(snapshot) = Pool::default().take(self, 1, &wants, run) else { return Ok(canvas) };
         let view = cfg.eye.unwrap_or_else(|| everything(&snapshot, cfg.shown, cfg.size)).view(width, height);
         let look = Look { shown: cfg.shown, overlays: cfg.overlays, ..Look::default() };
@@ -166,7 +169,7 @@ impl Screenshot for SimulationManager {
     }
 }
 
-/// From where all that is shown fills the image.
+/// Returns a camera from which the shown environments fill the image.
 fn everything(snapshot: &Snapshot, shown: Shown, size: [usize; 2]) -> Eye {
     match shown {
         Shown::All => Eye::overview(snapshot, size),
@@ -182,7 +185,7 @@ mod tests {
     use crate::sample::sample;
     use ndarray::array;
 
-    /// The file is the stage as a window first shows it, and nothing of the simulation changes.
+    /// The file shows the initial view of a window, and the simulation does not change.
     #[test]
     fn file() {
         let folder = tempfile::tempdir().unwrap();
@@ -207,7 +210,7 @@ mod tests {
         Painter::new(1).draw(&snapshot, &eye.view(960, 540), &Look::default(), &mut canvas).unwrap();
         assert_eq!((image.dimensions(), image.as_raw().as_slice()), ((960, 540), canvas.bytes()));
         assert!(red(&image) > 100, "the cubes are red: {}", red(&image));
-        // The control: without cubes another image replaces the file.
+        // Control: without cubes, a different image replaces the file.
         let cube = sim.entities().rigid_object_id("cube").unwrap();
         sim.rigid_object_mut(cube).write_pose(&array![[0.0, 0.0, -50.0, 1.0, 0.0, 0.0, 0.0]], None).unwrap();
         assert_eq!(red(&written(&mut sim)), 0);
@@ -233,11 +236,11 @@ mod tests {
         }
     }
 
-    /// A file that cannot be written is refused, and nothing is left.
+    /// A file that cannot be written is refused, and no temporary file remains.
     #[test]
     fn refusals() {
         let folder = tempfile::tempdir().unwrap();
-        // A folder has the name: the image is written beside it, and cannot take its place.
+        // A folder has this name: the image is written to a temporary file, which cannot replace the folder.
         std::fs::create_dir(folder.path().join("taken.png")).unwrap();
         std::fs::write(folder.path().join("taken.png/something"), "").unwrap();
         let mut sim = sample(1).sim;

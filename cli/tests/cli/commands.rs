@@ -1,4 +1,4 @@
-//! `check`, `convert`, `render`, `bench` and the help: what they print and write, and their exit codes.
+//! Output and exit codes of `check`, `convert`, `render`, `bench` and the help.
 
 use super::support::{ARM, Shell};
 use super::view::SCENE;
@@ -14,7 +14,7 @@ fn check() {
     assert!(out.contains("total mass 2 kg") && out.contains("hinge"), "{out}");
     let json = std::fs::read_to_string(shell.path("arm.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
-    // The torque that holds 2 kg half a metre along the rod, 0.5 rad from upright, against gravity.
+    // Torque that holds 2 kg, half a meter along the rod and 0.5 rad from upright, against gravity.
     let torque = report["gravity_torque"][0].as_f64().unwrap();
     assert!((torque - 2.0 * 9.81 * 0.5 * 0.5f64.sin()).abs() < 1e-9, "{torque}");
 
@@ -29,12 +29,12 @@ fn check() {
     assert_eq!(numbers, [0.05, 0.08, 0.12], "{row}");
 }
 
-/// Ignored settings are warnings, and the exit code is 1.
+/// Ignored settings are warnings, with exit code 1.
 #[test]
 fn check_warnings() {
     let shell = Shell::with(&[
         ("unlimited.urdf", &ARM.replace("effort=\"50\"", "effort=\"0\"")),
-        // Its time step is not that of a scene.
+        // The file has a time step, which does not apply to a robot.
         ("pendulum.xml", PENDULUM),
     ]);
     for (file, listed, warned) in [
@@ -47,7 +47,7 @@ fn check_warnings() {
     }
 }
 
-/// Departures from URDF are warnings with their lines, and errors with --strict; flags are called by their names.
+/// Deviations from URDF are warnings with their lines, and errors with --strict; messages name the flags.
 #[test]
 fn strict_and_packages() {
     let twice = "<material name=\"\"/><material name=\"\"/></visual>";
@@ -77,13 +77,13 @@ fn strict_and_packages() {
     }
 }
 
-/// An error of a file is shown with its line, by every command that reads one.
+/// Every command that reads a file shows the line of an error in it.
 #[test]
 fn line_of_error() {
     let hinge = "type=\"hinge\" axis=\"0 1 0\" range=\"-90 90\" limited=\"true\"";
     let shell = Shell::with(&[
         ("unknown.xml", &PENDULUM.replace("size=", "sise=")),
-        // A mass that the compiler refuses.
+        // A mass that the MuJoCo compiler rejects.
         ("mass.xml", &PENDULUM.replace("mass=\"1\"", "mass=\"-1\"")),
         // An attribute that ball joints do not have.
         ("ball.xml", &PENDULUM.replace(hinge, "type=\"ball\" no_such=\"1\"")),
@@ -108,7 +108,7 @@ fn convert() {
     let shell = Shell::with_arm();
     let out = shell.ok("convert arm.urdf -o out");
     assert!(out.lines().all(|file| shell.path(file).is_file()), "{out}");
-    // MuJoCo reads what was written.
+    // MuJoCo loads the written file.
     let version = if kinetoscope::mujoco::TARGET == kinetoscope::mujoco::Target::V2 { "2" } else { "4" };
     let mjcf = format!("out/robot.mjcf{version}.xml");
     assert!(out.contains(&mjcf), "{out}");
@@ -131,7 +131,7 @@ fn render_channels() {
         assert_ne!(image.get_pixel(60, 40), image.get_pixel(5, 40), "{channel}: the rod is not in the middle");
         image
     });
-    // 0.1 m at 2.95 m from the eye, 80 pixels for 45 degrees: 3.3 pixels, so 3 or 4 columns of the middle row.
+    // 0.1 m at 2.95 m from the camera, with 80 pixels for 45 degrees, are 3.3 pixels: 3 or 4 columns of the middle row.
     let ground = images[2].get_pixel(5, 40);
     let across = (0..120).filter(|&x| images[2].get_pixel(x, 40) != ground).count();
     assert!((3..=4).contains(&across), "{across}");
@@ -145,7 +145,7 @@ fn bench() {
         let line = out.lines().find(|line| line.contains(words)).unwrap_or_else(|| panic!("{words}: {out}"));
         line.split_whitespace().next().unwrap().parse().unwrap()
     };
-    // Both are rounded to whole numbers.
+    // Both rates are rounded to integers.
     let (all, each) = (rate("environment steps per second"), rate("steps of all environments"));
     assert!((all - 3.0 * each).abs() <= 2.0 && each > 0.0, "{out}");
     assert!(rate("per second") > 0.0);
@@ -195,7 +195,7 @@ fn refusals() {
     ]);
 }
 
-/// Every command, future ones included, has examples of its own and says what exit codes mean.
+/// Every command, including future ones, has examples of its own and explains its exit codes.
 #[test]
 fn help() {
     let shell = Shell::with(&[]);
@@ -214,7 +214,7 @@ fn help() {
     }
 }
 
-/// A box of 1 kg with its origin in the middle, and a leg below.
+/// A box of 1 kg with its origin at the center, and a leg below.
 const BOX: &str = r#"<robot name="box"><link name="body">
   <inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
   <visual><geometry><box size="0.4 0.4 0.2"/></geometry></visual>
@@ -224,9 +224,9 @@ const BOX: &str = r#"<robot name="box"><link name="body">
   <joint name="hip" type="revolute"><parent link="body"/><child link="leg"/><axis xyz="0 1 0"/>
     <limit lower="-1" upper="1" effort="50" velocity="1"/></joint></robot>"#;
 
-/// A robot on a free base starts on the ground; one that is bolted in the ground is reported with depth and flags.
+/// A robot on a free base starts on the ground; a robot fixed below the ground is reported with its depth and flags.
 ///
-/// Cause: the root link was put at height 0 whatever hung below it, so that robots on legs started inside of the ground.
+/// Cause: the root link was placed at height 0 regardless of lower links, so legged robots started inside the ground.
 #[test]
 fn starts_on_the_ground() {
     let shell = Shell::with(&[("box.urdf", BOX)]);
@@ -239,7 +239,7 @@ fn starts_on_the_ground() {
         let scene = kinetoscope::record::Recording::open(shell.path("a.mcap")).unwrap();
         let (mut film, mut sim) = kinetoscope::record::Film::of(&scene, None).unwrap();
         film.show(&mut sim, 0).unwrap();
-        // A recorded scene is one part.
+        // A recorded scene is a single MJCF entity.
         let part = sim.mjcf_part(sim.entities().mjcf_id("scene").unwrap());
         part.body_pose("robot/body").unwrap()[(0, 2)]
     };
@@ -260,12 +260,12 @@ fn starts_on_the_ground() {
     }
 }
 
-/// A simulation that diverges has no rate.
+/// A simulation that diverges in all environments reports no rate.
 ///
-/// Cause: steps were counted whether environments did them or stood still after they diverged.
+/// Cause: steps were counted even for environments that had diverged and no longer stepped.
 #[test]
 fn bench_of_a_diverged_simulation() {
-    // 1e-9 kg m² under 1e8 N m: MuJoCo calls it unstable in the first steps.
+    // 1e-9 kg m² under 1e8 N m: MuJoCo reports instability in the first steps.
     let wild = r#"<mujoco><worldbody><body name="a" pos="0 0 1"><joint name="j" axis="0 1 0" stiffness="-1e15"/>
       <geom size="0.01" pos="0.1 0 0" mass="0.001"/></body></worldbody></mujoco>"#;
     let shell = Shell::with(&[("wild.xml", wild)]);
@@ -275,9 +275,9 @@ fn bench_of_a_diverged_simulation() {
     assert!(!err.contains("environment steps per second"), "{err}");
 }
 
-/// Scene files, and MJCF files that are no robot, are taken by every command.
+/// Every command accepts scene files, and MJCF files that are not robots.
 ///
-/// Cause: only `view` and `render` took MJCF files that are no robot, and no command took scene files.
+/// Cause: only `view` and `render` accepted MJCF files that are not robots, and no command accepted scene files.
 #[test]
 fn scenes() {
     let toml = "[simulation]\nnum_envs = 3\n[entities.arm]\ntype = \"robot\"\nurdf = \"arm.urdf\"\n\
@@ -320,10 +320,11 @@ fn scenes() {
     }
 }
 
-/// MuJoCo 2.2.2 says of a newer file what it needs, with the line, also of an included file; MuJoCo 4 takes the file.
+/// For a newer file, MuJoCo 2.2.2 reports the required version with the line, even for an included file; MuJoCo 4 loads
+/// the file.
 ///
-/// Cause: its words alone ("Schema violation") do not tell an old program from a wrong file, and for defaults and included
-/// files it names line 0 or a line of a file that it does not name.
+/// Cause: its own message ("Schema violation") does not distinguish an old MuJoCo from an invalid file. For defaults
+/// and included files, it reports line 0, or a line of an unnamed file.
 #[test]
 fn newer_mjcf() {
     let with = |joint: &str| PENDULUM.replace("<joint ", &format!("<joint {joint} "));
@@ -347,7 +348,7 @@ fn newer_mjcf() {
             shell.ok(&format!("render {file} -o a.png --width 64"));
         }
     }
-    // The control: a word that no known version has.
+    // Control: a keyword that no supported MuJoCo version has.
     let err = shell.refused("render wrong.xml -o a.png");
     assert!(err.contains("wrong.xml:2") && err.contains("If it is no mistake") == is_old, "{err}");
 }

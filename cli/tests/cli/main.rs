@@ -1,4 +1,4 @@
-//! The command `kinetoscope`, and its views as users and browsers meet them.
+//! Integration tests of the command `kinetoscope` and its views.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod browser;
@@ -11,7 +11,7 @@ mod support;
 mod tutorials;
 mod view;
 
-// Modules of the command with unit tests of their own: they run here, so that the command needs no second test binary.
+// Modules of the command with unit tests. They run in this binary, so the command needs no second test binary.
 #[allow(dead_code, reason = "only its tests are run")]
 #[path = "../../src/excerpt.rs"]
 mod excerpt;

@@ -1,4 +1,4 @@
-//! `kinetoscope plot`, against a motion in closed form.
+//! `kinetoscope plot`, compared with a motion in closed form.
 
 use super::support::Shell;
 use kinetoscope::ndarray::array;
@@ -8,11 +8,11 @@ use kinetoscope_testkit::svg::curves;
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use std::path::Path;
 
-/// A mass of 1 kg that slides on a spring of 40 N/m, without friction.
+/// A mass of 1 kg on a spring of 40 N/m, sliding without friction.
 const SPRING: &str = r#"<mujoco><worldbody><body name="cart" pos="0 0 1">
     <joint name="x" type="slide" axis="1 0 0" stiffness="40"/><geom type="sphere" size="0.1" mass="1"/></body></worldbody></mujoco>"#;
 const STEPS: u32 = 300;
-/// Initial positions \[m\], in each environment.
+/// Initial position of each environment \[m\].
 const STARTS: [f64; 2] = [0.3, 0.1];
 
 fn record(path: &Path) {
@@ -24,7 +24,7 @@ fn record(path: &Path) {
     sim.finish_recording(recorder).unwrap();
 }
 
-/// Euler steps of length h of a spring, exactly: x'' - 2 x' + x = -(h w)² x', from rest.
+/// Exact solution of semi-implicit Euler steps of length h on a spring: x'' - 2 x' + x = -(h w)² x', from rest.
 fn swing(start: f64, time: f64) -> f64 {
     let a = (1.0 - 0.5 * 0.01 * 0.01 * 40.0_f64).acos();
     let k = time / 0.01;
@@ -42,14 +42,14 @@ fn closed_form() {
             assert!(said.contains("1 curves, 301 points"), "{said}");
             let curves = curves(&std::fs::read_to_string(shell.path("plot.svg")).unwrap());
             assert_eq!((curves.len(), curves[0].len()), (1, 301));
-            // Two decimals of a pixel, in the curve and in the labels: 3 s on more than 600 pixels, 2 starts on more than
-            // 400; and between two times the swing moves by 6.4 starts a second at most.
+            // Curves and labels are rounded to hundredths of a pixel: 3 s on more than 600 pixels, 2 starts on more
+            // than 400. Between two times, the position changes by at most 6.4 starts per second.
             let (time, place) = (0.02 * 3.2 / 600.0, 0.02 * 2.2 * start / 400.0);
             for (k, [t, x]) in (0..).zip(&curves[0]) {
                 assert!((t - 0.01 * f64::from(k)).abs() < time, "{name}: {t}");
                 assert!((x - swing(start, 0.01 * f64::from(k))).abs() < place, "{name}: {x} at {t} s");
             }
-            // The control: the swing of the other environment is another one.
+            // Control: the motion of the other environment differs.
             let other = STARTS[0] + STARTS[1] - start;
             assert!((curves[0][0][1] - other).abs() > 100.0 * place);
         }

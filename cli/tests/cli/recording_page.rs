@@ -1,4 +1,4 @@
-//! Commands and programs of docs/recording.md, run as they stand there.
+//! Runs the commands and programs of docs/recording.md as they are written there.
 
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Format, RecorderCfg};
@@ -8,13 +8,13 @@ use std::process::{Command, Output};
 
 const PAGE: &str = include_str!("../../../docs/recording.md");
 
-/// The blocks of a language.
+/// Returns the code blocks of a language.
 fn blocks(language: &str) -> Vec<String> {
     let fence = format!("```{language}\n");
     PAGE.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap().to_string()).collect()
 }
 
-/// Recordings with the names of the page, long enough for its times.
+/// Writes recordings with the names of the page, long enough for its times.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut world = RecordedWorld::new(1, 2);
@@ -34,7 +34,7 @@ fn printed(output: &Output) -> String {
 
 #[test]
 fn commands() {
-    /// Lines that ask for a display, or for a file that the page does not make: other tests run these.
+    /// Commands that need a display, or a file that the page does not create; other tests run them.
     const ELSEWHERE: [&str; 4] = [
         "kinetoscope recover run.mcap",
         "kinetoscope replay arm.mcap",
@@ -52,7 +52,7 @@ fn commands() {
     for line in blocks("sh").iter().flat_map(|block| block.lines()) {
         let line = line.split(" #").next().unwrap().trim();
         if let Some(rest) = line.strip_prefix("cargo run --release ") {
-            // The table of examples runs these; here, the example exists.
+            // The table of examples is tested elsewhere; this test checks that the example exists.
             let name = rest.split_whitespace().skip_while(|word| *word != "--example").nth(1).unwrap();
             assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../examples/{name}.rs")).is_file(), "{line}");
         } else if ELSEWHERE.contains(&line) {
@@ -76,7 +76,7 @@ fn commands() {
 fn programs() {
     let python = kinetoscope_testkit::needs::python_readers();
     let folder = folder();
-    // LeRobot brings some gigabytes: read_lerobot.py asks it where it is installed.
+    // LeRobot needs some gigabytes: read_lerobot.py reads the data set where LeRobot is installed.
     let absent =
         |block: &str| block.contains("arm.hdf5") && !Format::Hdf5.is_built() || block.contains("import LeRobotDataset");
     let blocks: Vec<_> = blocks("python").into_iter().filter(|block| !absent(block)).collect();

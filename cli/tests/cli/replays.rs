@@ -1,4 +1,4 @@
-//! `kinetoscope replay`: what it draws, what it serves, and how it verifies.
+//! Images, views and verification of `kinetoscope replay`.
 
 use super::support::{Running, Shell, colors, red, window_of};
 use kinetoscope::ndarray::{Array3, array};
@@ -22,7 +22,7 @@ mjcf.text = '''<mujoco><option timestep="0.01"/><worldbody><body name="cart" pos
   <geom type="sphere" size="0.2" mass="1" rgba="0.9 0 0 1"/></body></worldbody></mujoco>'''
 "#;
 
-/// A folder with `cart.toml`: a cart on a spring.
+/// Creates a folder with `cart.toml`: a cart on a spring.
 fn shell() -> Shell {
     Shell::with(&[("cart.toml", SCENE)])
 }
@@ -40,7 +40,7 @@ fn record(shell: &Shell, start: f64, cfgs: &[RecorderCfg], run: impl FnOnce(&mut
     recorders.into_iter().for_each(|recorder| drop(sim.finish_recording(recorder).unwrap()));
 }
 
-/// Images of a recording show what the simulation showed at that time.
+/// Images of a recording match the simulation at that time.
 #[test]
 fn images() {
     let shell = shell();
@@ -69,18 +69,18 @@ fn images() {
             assert!(said.contains(file), "{said}");
             shell.image(&format!("{out}/{file}"))
         });
-        // Cause: the checker of the ground, about 8 of 255 lighter and darker, was not in a recorded scene.
+        // Cause: the checkerboard of the ground, about 8 of 255 lighter and darker, was missing in a recorded scene.
         for (found, expected) in found.iter().zip(&expected) {
             let off = found.iter().zip(expected.iter()).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>();
             assert!(off / (3.0 * 320.0 * 200.0) < 1.0, "{} levels off", off / (3.0 * 320.0 * 200.0));
         }
         let (found, expected) = (found.map(|image| red(&image)), expected.iter().map(red).collect::<Vec<_>>());
         for ((count, place), (pixels, expected)) in found.iter().zip(&expected) {
-            // The same ball at the same place; edges may be shaded otherwise.
+            // The ball is at the same place; the shading of edges may differ.
             assert!(*pixels > 150 && count.abs_diff(*pixels) <= pixels / 20, "{count} instead of {pixels}");
             assert!((0..2).all(|k| (place[k] - expected[k]).abs() < 0.5), "{name}: {place:?} instead of {expected:?}");
         }
-        // The control: half a swing later it is elsewhere.
+        // Control: half a period later, the ball is elsewhere.
         assert!((found[0].1[0] - found[1].1[0]).abs() > 20.0, "{found:?}");
     }
 }
@@ -136,12 +136,12 @@ fn pages_and_refusals() {
     assert_eq!(running.ended().code(), Some(0));
 }
 
-/// A topic that is left out is a warning, and the exit code is 1.
+/// A skipped topic is a warning, with exit code 1.
 #[test]
 fn torn_topic() {
     let shell = shell();
     record(&shell, 0.0, &[RecorderCfg::new(shell.path("run.mcap"))], |sim, _| sim.update(20));
-    // As another program might write it, with a topic whose messages are cut.
+    // A file as another program may write it, with a topic of truncated messages.
     let bytes = std::fs::read(shell.path("run.mcap")).unwrap();
     let mut writer = mcap::Writer::new(std::fs::File::create(shell.path("torn.mcap")).unwrap()).unwrap();
     for message in mcap::MessageStream::new(&bytes).unwrap() {
@@ -169,7 +169,7 @@ fn torn_topic() {
 
 const SIZE: [usize; 2] = [960, 540];
 
-/// The mark of the time line: the middle column of what is bright yellow in the lowest rows of the window.
+/// Center column of the timeline mark: bright yellow columns in the lowest rows of the window.
 fn mark(image: &[[u8; 3]]) -> Option<f64> {
     let [width, height] = SIZE;
     let bright = |column: &usize| (height - 14..height - 2).all(|row| image[row * width + column] == [255, 210, 60]);
@@ -192,7 +192,7 @@ fn window() {
         (running, window)
     };
     let (mut running, window) = start();
-    // It holds at the end, where the mark is at the right end of the line: 70 pixels from the side.
+    // Playback pauses at the end, with the mark at the right end of the timeline, 70 pixels from the side.
     wait::until("the end", || mark(&shown()).is_some_and(|mark| (mark - (SIZE[0] as f64 - 70.0)).abs() < 2.0));
     if let Some(folder) = std::env::var_os("KINETOSCOPE_SCREENSHOTS") {
         let image = image::RgbImage::from_raw(SIZE[0] as u32, SIZE[1] as u32, shown().concat()).unwrap();
@@ -204,7 +204,7 @@ fn window() {
     let (mut running, _) = start();
     running.interrupt();
     assert_eq!(running.ended().code(), Some(0));
-    // A lost display ends it, with an error.
+    // A lost display ends the command with an error.
     let (mut running, _) = start();
     display.server.kill().unwrap();
     assert_eq!(running.ended().code(), Some(2));

@@ -1,4 +1,4 @@
-//! The examples of EmbodiChain's tutorials: their lines and poses, their windows, and how they end.
+//! Examples after EmbodiChain's tutorials: output and poses, windows, and how they end.
 
 use super::support::{Running, Shell, window_of};
 use kinetoscope_testkit::wait;
@@ -8,10 +8,10 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// The title of the tutorial's window of images.
+/// Title of the tutorial's image window.
 const IMAGES: &str = "Sensor Views (Color / Depth / Mask / Normals)";
 
-/// An example, which `cargo test` builds with the tests of the workspace, in a folder of its own.
+/// Returns the command of an example, which `cargo test` builds with the workspace, in its own folder.
 fn example(name: &str, folder: &Path) -> Command {
     let tests = std::env::current_exe().unwrap();
     let file = tests.parent().unwrap().with_file_name("examples").join(name);
@@ -21,7 +21,7 @@ fn example(name: &str, folder: &Path) -> Command {
     command
 }
 
-/// Poses, lines and their order are those of the tutorial's script; a hand closes at its lower limits.
+/// Poses and the order of the output match the tutorial's script; a hand closes at its lower limits.
 #[test]
 #[ignore = "needs the examples: cargo xtask test"]
 fn create_robot() {
@@ -54,7 +54,7 @@ fn create_robot() {
         |k: usize| phases[k]["target"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect::<Vec<_>>();
     assert_eq!(target(0), [0.0, -0.5, 0.5, -1.0, 0.5, 0.0]);
     assert_eq!(target(1), [0.5, 0.0, -0.5, 0.5, -0.5, 0.5]);
-    // Lower limits, then upper ones, which are straight fingers.
+    // Lower limits, then upper limits, which are straight fingers.
     assert!(
         target(2).iter().all(|q| *q < -1.0) && target(3).iter().all(|q| *q == 0.0),
         "{:?} {:?}",
@@ -68,7 +68,7 @@ fn create_robot() {
 fn closed_window() {
     let (display, shell) = (Display::start("1280x800"), Shell::with(&[]));
     let connection = display.connect();
-    // Without the window's end it would run for hours.
+    // Without the end of the window, it would run for hours.
     let args = ["--steps", "10000000", "--report", "report.json"];
     let mut running =
         Running(example("create_robot", shell.folder()).args(args).env("DISPLAY", &display.name).spawn().unwrap());
@@ -89,7 +89,8 @@ fn sensor_window() {
         (running, wait::some("the window of images", || window_of(&connection, IMAGES)))
     };
     let files = |shell: &Shell| std::fs::read_dir(shell.folder()).unwrap().count();
-    // The normals of the ground, which fill the middle of the fourth image: (0, 0, 1) towards the camera is (128, 128, 255).
+    // Normals of the ground, at the center of the fourth image: (0, 0, 1) towards the camera is encoded as (128, 128,
+    // 255).
     let normals = || screenshot(&connection, [970, 900], [1, 1])[0];
     let shell = Shell::with(&[]);
     let (mut running, window) = start(&shell, &[]);
@@ -101,7 +102,7 @@ fn sensor_window() {
     let (mut running, _) = start(&shell, &["--save", "--steps", "1"]);
     assert_eq!(running.ended().code(), Some(0));
     assert!(shell.path("sensor_views_0.png").is_file());
-    // Ctrl+C while an image is traced that takes minutes.
+    // Ctrl+C during path tracing of an image that takes minutes.
     let (mut running, window) = start(&shell, &["--enable_rt", "--rt-samples", "1000", "--mask", "instance"]);
     wait::until("the progress is shown", || {
         screenshot(&connection, [10, 30], [200, 24]).iter().any(|p| p[0] > 200 && p[2] < 100)
@@ -109,7 +110,7 @@ fn sensor_window() {
     let begun = Instant::now();
     running.interrupt();
     assert_eq!(running.ended().code(), Some(0));
-    // A second on a calm machine.
+    // A second on an idle machine.
     assert!(begun.elapsed() < Duration::from_secs(5), "{:?}", begun.elapsed());
     assert_ne!(window, 0);
     assert_eq!(files(&shell), 1, "an image that was cancelled is no file");

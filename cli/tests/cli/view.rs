@@ -1,4 +1,4 @@
-//! `kinetoscope view`: a window on an X server without a screen, a page for browsers, and how it ends.
+//! `kinetoscope view`: a window on Xvfb, a page for browsers, and how the command ends.
 
 use super::serve::visitor::say;
 use super::support::{Running, Shell, colors, window_of};
@@ -6,7 +6,7 @@ use kinetoscope_testkit::wait;
 use kinetoscope_testkit::x_server::{Display, close, screenshot};
 use std::time::Instant;
 
-/// Two bodies in the world, one of them on a ball joint: no robot.
+/// Two bodies in the world, one of them on a ball joint: not a robot.
 pub(crate) const SCENE: &str = r#"<mujoco><option timestep="0.01"/><worldbody><geom type="plane" size="2 2 0.1"/>
   <body pos="0 0 1"><joint type="ball"/><geom type="capsule" size="0.05" fromto="0 0 0 0.3 0 0" mass="1"/></body>
   <body pos="1 0 1"><freejoint/><geom size="0.1" mass="1"/></body></worldbody></mujoco>"#;
@@ -28,8 +28,8 @@ fn real_time() {
         assert_eq!(code, 0, "{out}{err}");
         start.elapsed().as_secs_f64()
     };
-    // 200 steps of 10 ms, less the block of one step that is not waited for at either end. A machine that needs 1.9 s to
-    // start a program is too busy for this test.
+    // 200 steps of 10 ms, less a block of one unthrottled step at both ends. A machine that needs 1.9 s to start a
+    // program is too busy for this test.
     let (real, fast) = (took("1"), took("1000"));
     assert!(real > 1.97 && fast < real, "{real} s and {fast} s");
 }
@@ -48,11 +48,11 @@ fn page_and_ctrl_c() {
     assert_eq!(running.ended().code(), Some(0));
 }
 
-/// A recording is whole at every good end.
+/// A recording is complete at every regular end.
 #[test]
 fn recording() {
     let shell = Shell::with_arm();
-    // All steps are done: one row for each, and one for the beginning.
+    // After all steps: one row per step, and one for the initial state.
     let line = "view arm.urdf --serve 127.0.0.1:0 --speed 100 --steps 30 --record steps.npz";
     let (out, err, code) = shell.run(line);
     assert_eq!(code, 0, "{out}{err}");
@@ -71,14 +71,14 @@ fn recording() {
     assert!(std::fs::read(file).unwrap().ends_with(b"\x89MCAP0\r\n"), "the end of a whole MCAP file");
 }
 
-/// An MJCF file that is no robot is shown as a scene.
+/// An MJCF file that is not a robot is shown as a scene.
 #[test]
 fn mjcf_scene() {
     let broken = SCENE.replace("size=\"0.1\"", "size=\"0.1\" no_such=\"1\"");
     let shell = Shell::with(&[("scene.xml", SCENE), ("broken.xml", &broken)]);
     let (out, err, code) = shell.run("view scene.xml --serve 127.0.0.1:0 --steps 20 --speed 100");
     assert_eq!(code, 0, "{out}{err}");
-    // The controls: a file that MuJoCo refuses is no scene either, and flags of a robot have no meaning.
+    // Controls: a file that MuJoCo rejects is not a scene either, and robot flags are refused.
     for (line, words) in [
         ("view scene.xml --floating-base --serve 127.0.0.1:0 --steps 1", "is a scene, not one robot"),
         ("view broken.xml --serve 127.0.0.1:0 --steps 1", "no_such"),
@@ -105,7 +105,7 @@ fn window() {
     wait::until("the model is drawn", || shown() > 50);
     close(&connection, window);
     assert_eq!(running.ended().code(), Some(0));
-    // A lost display ends it, with an error.
+    // A lost display ends the command with an error.
     let (mut running, ..) = start("view arm.urdf");
     display.server.kill().unwrap();
     assert_eq!(running.ended().code(), Some(2));

@@ -1,4 +1,4 @@
-//! The observer that shows a simulation to its viewers and does what they ask for.
+//! The observer that publishes snapshots to viewers and runs their commands.
 
 mod playback;
 mod refusals;
@@ -18,40 +18,40 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How long is waited before it is looked again whether anybody is still there.
+/// Longest wait between two checks for commands and dropped viewers.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// Shows a simulation to all its viewers, and does what they ask for, between its steps. See
+/// Publishes snapshots of a simulation to all its viewers and runs their commands between steps. See
 /// [`Viewing`](super::Viewing).
 ///
-/// While it is paused it holds the thread that called `update`, in [`Observer::observe`]; it lets go when the last viewer
-/// is gone.
+/// A paused simulation blocks inside [`Observer::observe`], on the thread that called `update`. It continues when the
+/// last viewer is dropped.
 #[derive(Debug)]
 pub struct Conductor {
     hub: Arc<Hub>,
     pool: Pool,
-    /// Made with the first viewer, when the length of a step is known.
+    /// Created at the first step with viewers, from the time step of the simulation.
     pace: Option<Pace>,
     wants: Wants,
-    /// The step at which it holds; `None` while it runs.
+    /// Step at which the simulation is paused; `None` while running.
     hold_at: Option<u64>,
-    /// Who wants it held; it runs again when the last of them is gone.
+    /// Viewers that paused the simulation. It resumes when the last of them is dropped.
     held_by: BTreeSet<u64>,
-    /// How fast each viewer wanted it, the last wish last: that one counts, for as long as its viewer is there.
+    /// Speeds set by viewers, oldest first. The last entry applies; entries of dropped viewers are removed.
     speeds: Vec<(u64, Speed)>,
-    /// The step at which it looks again.
+    /// Step of the next check for commands.
     look_at: u64,
-    /// When the last snapshot was taken.
+    /// Time of the last snapshot.
     shown: Option<Instant>,
-    /// Something changed that no snapshot shows.
+    /// True if the state changed since the last published snapshot.
     dirty: bool,
     springs: BTreeMap<u64, Spring>,
-    /// Bodies that springs pulled at last.
+    /// Bodies with a spring force in the last step.
     pulled: Vec<HeldBody>,
     button: Option<RecordButton>,
-    /// How the recording stood when that was asked last.
+    /// Last known state of the recording.
     recording: Option<RecordingState>,
-    /// Who began what is recorded; `None` where the program did.
+    /// Viewer that started the recording; `None` if the program started it.
     recorded_by: Option<u64>,
     refusals: Refusals,
 }
@@ -78,7 +78,7 @@ impl Conductor {
         }
     }
 
-    /// A new viewer.
+    /// Adds a viewer.
     pub(super) fn admit(&mut self, wants: Wants) -> Viewer {
         let viewer = self.hub.admit(wants);
         self.wants = self.wants.union(wants);
@@ -86,7 +86,7 @@ impl Conductor {
         viewer
     }
 
-    /// Another record button.
+    /// Replaces the record button and stops the recording of the previous button.
     pub(super) fn set_button(&mut self, sim: &mut SimulationManager, button: RecordButton) {
         if self.button.as_ref() == Some(&button) {
             return;
@@ -100,7 +100,7 @@ impl Conductor {
         }
     }
 
-    /// Begins to record for a viewer, or ends it.
+    /// Starts or stops the recording on behalf of a viewer.
     fn record(&mut self, sim: &mut SimulationManager, viewer: u64, on: bool) -> Result<(), String> {
         let button = self.button.as_ref().ok_or("there is no record button here: the program has given none")?;
         let was = button.state(sim).is_some_and(|state| state.on);
@@ -116,7 +116,7 @@ impl Conductor {
         Ok(())
     }
 
-    /// What a viewer has begun to record ends with the viewer.
+    /// Stops a recording whose viewer was dropped.
     fn end_recording_of_gone(&mut self, sim: &mut SimulationManager, viewers: &[u64]) {
         if let Some(viewer) = self.recorded_by.filter(|viewer| !viewers.contains(viewer)) {
             self.dirty = true;
@@ -125,7 +125,7 @@ impl Conductor {
         }
     }
 
-    /// Shows the simulation as it is.
+    /// Publishes a snapshot of the current state.
     pub(super) fn publish(&mut self, sim: &mut SimulationManager) {
         if let Some(button) = &self.button {
             self.recording = button.state(sim).or(self.recording.take());
@@ -141,18 +141,18 @@ impl Conductor {
             timeline: None,
         };
         self.shown = Some(Instant::now());
-        // Where every snapshot is in somebody's hands, or the newest is just being taken, the next one will do.
+        // If viewers hold every snapshot, or are reading the newest one right now, the next attempt publishes.
         let taken = self.pool.take(sim, self.hub.viewers() + 2, &self.wants, run);
         self.dirty = !taken.is_some_and(|snapshot| self.hub.show(snapshot));
     }
 
-    /// How long no snapshot is due.
+    /// Returns the time until the next snapshot is due.
     fn rest(&self) -> Duration {
         let period = Duration::from_secs_f64(1.0 / self.wants.rate.clamp(0.1, 1000.0));
         self.shown.map_or(Duration::ZERO, |shown| period.saturating_sub(shown.elapsed()))
     }
 
-    /// Does what viewers asked for. Says whether there are any.
+    /// Runs the queued commands. Returns `false` if no viewer is left.
     fn obey(&mut self, sim: &mut SimulationManager) -> bool {
         let Mail { commands, viewers, wants } = self.hub.collect();
         self.dirty |= wants != self.wants;
@@ -171,7 +171,7 @@ impl Conductor {
         !viewers.is_empty()
     }
 
-    /// What viewers did to time ends with them, whoever else still watches.
+    /// Undoes the pause and speed of dropped viewers; settings of other viewers remain.
     fn forget_gone(&mut self, steps: u64, viewers: &[u64]) {
         self.held_by.retain(|viewer| viewers.contains(viewer));
         if self.held_by.is_empty() && self.hold_at.is_some() {
@@ -209,7 +209,7 @@ impl Conductor {
             Command::Step(count) => {
                 let from = self.hold_at.map_or(steps, |step| step.max(steps));
                 self.hold_at = Some(from.saturating_add(u64::from(count)));
-                // Steps in a pause are of those who paused.
+                // During a pause, a step command does not make its viewer a holder of the pause.
                 if self.held_by.is_empty() {
                     self.held_by.insert(viewer);
                 }
@@ -259,7 +259,7 @@ impl Conductor {
         }
     }
 
-    /// Springs pull for the next step; those of several viewers at one body, together.
+    /// Applies the spring forces to the next step. Springs of several viewers on one body are added.
     fn pull(&mut self, sim: &mut SimulationManager) {
         let Self { springs, refusals, pulled, .. } = self;
         let mut forces: Vec<(HeldBody, Vec<_>)> = Vec::new();
@@ -295,7 +295,7 @@ impl Conductor {
         self.pace.iter_mut().for_each(|pace| pace.restart(steps, Instant::now()));
     }
 
-    /// Nobody watches: the simulation is on its own again.
+    /// Undoes all viewer settings after the last viewer was dropped.
     fn let_go(&mut self, sim: &mut SimulationManager) {
         self.springs.clear();
         self.pull(sim);
@@ -305,7 +305,7 @@ impl Conductor {
         self.speeds.clear();
     }
 
-    /// Steps were done: obeys, shows, waits.
+    /// Handles completed steps: runs commands, publishes a snapshot, and waits while paused or ahead of schedule.
     fn conduct(&mut self, sim: &mut SimulationManager) {
         let steps = sim.observers().steps();
         let dt = sim.cfg().physics_dt;
@@ -351,7 +351,7 @@ impl Observer for Conductor {
             Moment::Stepped => self.conduct(sim),
             Moment::Compiled => {
                 self.pool.forget_names();
-                // Bodies have other numbers now; whoever drags will drag again.
+                // Body indices have changed, so active drags end. The mouse creates them again.
                 self.springs.clear();
                 self.pulled.clear();
                 if self.hub.viewers() > 0 {

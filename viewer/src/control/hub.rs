@@ -1,4 +1,4 @@
-//! What the simulation's thread and its viewers share.
+//! State shared by the simulation's thread and its viewers.
 
 use super::{Command, Wants};
 use crate::stage::Snapshot;
@@ -7,21 +7,22 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Commands that wait, at most: a viewer that sends more is told.
+/// Maximum number of queued commands. [`Viewer::send`] returns `false` beyond it.
 const WAITING: usize = 4096;
-/// Why a command that was [sent](Viewer::send) is not done.
+/// Reason for a command that could not be [sent](Viewer::send).
 pub(crate) const TAKES_NONE: &str = "the simulation takes no commands: the program does not step it";
 
-/// The place where they meet. Locks are held to move a pointer or a command, never to draw or to step.
+/// Shared command queue and newest snapshot. Locks are held only to move a pointer or a command, never to render or to
+/// step.
 #[derive(Debug, Default)]
 pub(super) struct Hub {
     inbox: Mutex<Inbox>,
-    /// Something came into the inbox, or a viewer went.
+    /// Signals a new command, changed requests or a dropped viewer.
     news: Condvar,
     newest: Mutex<Option<Arc<Snapshot>>>,
-    /// There is a newer snapshot, or no more will come.
+    /// Signals a newer snapshot or the end of the simulation.
     fresh: Condvar,
-    /// Viewers there are, for those who do not want to lock.
+    /// Number of viewers, readable without a lock.
     viewers: AtomicUsize,
     over: AtomicBool,
 }
@@ -33,7 +34,7 @@ struct Inbox {
     next: u64,
 }
 
-/// What came in.
+/// Commands, viewers and combined requests since the last [`Hub::collect`].
 #[derive(Debug)]
 pub(super) struct Mail {
     pub(super) commands: VecDeque<(u64, Command)>,
@@ -41,7 +42,7 @@ pub(super) struct Mail {
     pub(super) wants: Wants,
 }
 
-/// Nothing panics while it holds one of ours.
+/// Locks a mutex. No code panics while holding one of these locks, so poisoning is ignored.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -60,7 +61,7 @@ impl Hub {
         self.viewers.load(Ordering::Acquire)
     }
 
-    /// Takes what came in.
+    /// Takes the queued commands. Also returns the current viewers and their combined requests.
     pub(super) fn collect(&self) -> Mail {
         let mut inbox = lock(&self.inbox);
         let wants = inbox.viewers.values().fold(Wants::NOTHING, |all, one| all.union(*one));
@@ -68,16 +69,17 @@ impl Hub {
         Mail { commands: std::mem::take(&mut inbox.commands), viewers, wants }
     }
 
-    /// Waits until something comes in, or a viewer goes, or `timeout` is over.
+    /// Waits for a command, a changed request, a dropped viewer, or `timeout`.
     pub(super) fn wait_for_news(&self, timeout: Duration) {
         let inbox = lock(&self.inbox);
         if inbox.commands.is_empty() {
-            // Woken for nothing, the caller looks and comes again.
+            // Spurious wakeups are harmless: the caller checks its conditions and waits again.
             drop(self.news.wait_timeout(inbox, timeout));
         }
     }
 
-    /// Shows a snapshot, unless somebody is just taking the one before: then this one is left out.
+    /// Publishes a snapshot. Returns `false` and drops the snapshot if a viewer is reading the current one at this
+    /// moment.
     pub(super) fn show(&self, snapshot: Arc<Snapshot>) -> bool {
         let Ok(mut newest) = self.newest.try_lock() else { return false };
         *newest = Some(snapshot);
@@ -85,17 +87,17 @@ impl Hub {
         true
     }
 
-    /// There will be no more snapshots.
+    /// Marks the end of the simulation: no more snapshots will follow.
     pub(super) fn end(&self) {
         self.over.store(true, Ordering::Release);
-        // With the lock held nobody is between looking and waiting.
+        // Holding the lock guarantees that no viewer is between its check and its wait.
         let _newest = lock(&self.newest);
         self.fresh.notify_all();
     }
 }
 
-/// A viewer's end: gives snapshots, takes commands. It may be sent to another thread; dropping it ends what it did to the
-/// simulation.
+/// Handle of a viewer: receives snapshots and sends commands. It can move to another thread. Dropping it undoes its
+/// pause, speed and spring.
 #[derive(Debug)]
 pub struct Viewer {
     hub: Arc<Hub>,
@@ -103,19 +105,21 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    /// Of a simulation that is over.
+    /// Creates a viewer of a simulation that has already ended.
     pub(super) fn of_nothing() -> Self {
         let hub = Arc::new(Hub::default());
         hub.end();
         hub.admit(Wants::default())
     }
 
-    /// The newest snapshot; `None` before the first. Snapshots come from a pool: hold one at a time, or fewer come.
+    /// Returns the newest snapshot, or `None` before the first. Snapshots come from a pool: holding more than one
+    /// reduces the snapshot rate.
     pub fn newest(&self) -> Option<Arc<Snapshot>> {
         lock(&self.hub.newest).clone()
     }
 
-    /// The first snapshot with a number above `after`, waiting up to `timeout` for it.
+    /// Waits up to `timeout` for a snapshot with a number above `after` and returns it. Returns `None` after the
+    /// timeout or the end of the simulation.
     pub fn wait(&self, after: u64, timeout: Duration) -> Option<Arc<Snapshot>> {
         let end = Instant::now() + timeout;
         let mut newest = lock(&self.hub.newest);
@@ -131,8 +135,8 @@ impl Viewer {
         }
     }
 
-    /// Asks the simulation to do something. `false` where it cannot come to it: it is over, or thousands of commands wait
-    /// because nobody calls `update`.
+    /// Sends a command to the simulation. Returns `false` if the simulation has ended, or if 4096 commands are already
+    /// queued because `update` is not called.
     pub fn send(&self, command: Command) -> bool {
         let mut inbox = lock(&self.hub.inbox);
         let last = inbox.commands.back_mut().filter(|(from, last)| *from == self.number && command.replaces(last));
@@ -147,18 +151,18 @@ impl Viewer {
         !self.is_over()
     }
 
-    /// Changes what it wants to find in snapshots.
+    /// Replaces the snapshot contents that this viewer requests.
     pub fn set_wants(&self, wants: Wants) {
         lock(&self.hub.inbox).viewers.insert(self.number, wants);
         self.hub.news.notify_all();
     }
 
-    /// Another viewer of the same simulation.
+    /// Adds another viewer of the same simulation.
     pub fn another(&self, wants: Wants) -> Self {
         self.hub.admit(wants)
     }
 
-    /// Whether the simulation was dropped: there will be no more snapshots.
+    /// True if the simulation was dropped: no more snapshots will follow.
     pub fn is_over(&self) -> bool {
         self.hub.over.load(Ordering::Acquire)
     }

@@ -1,4 +1,4 @@
-//! Between a running simulation and those who watch it: what they may do, and who does it.
+//! Connection between a running simulation and its viewers: commands, snapshot delivery and recording playback.
 
 mod conductor;
 mod hub;
@@ -16,58 +16,60 @@ pub use recording::{RecordButton, Recording, RecordingState};
 use crate::stage::Shown;
 use kinetoscope_sim::{EnvId, JointIndex, RobotId, SimulationManager};
 
-/// What a viewer asks a simulation to do. It is done between two steps, on the simulation's thread.
+/// A request of a viewer to the simulation. Commands run between two steps, on the simulation's thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Command {
-    /// Hold the simulation where it is: `update` does not return until it goes on. It goes on when somebody says so, or when
-    /// all who paused it are gone.
+    /// Pauses the simulation: `update` blocks until any viewer resumes it, or until all viewers that paused it are
+    /// dropped.
     Pause,
-    /// Go on.
+    /// Resumes the simulation.
     Resume,
-    /// Hold a simulation that runs, let go on one that is held.
+    /// Pauses a running simulation and resumes a paused one.
     TogglePause,
-    /// Do this many steps, then hold again. They are steps that the program asked for: `update(n)` still does n.
+    /// Runs this many steps and pauses again. The program has to request these steps: `update(n)` still does n steps in
+    /// total.
     Step(u32),
-    /// How fast simulated time passes from now on, until a viewer sets another speed or this one goes: then it is what the
-    /// others set last.
+    /// Sets the speed of simulated time. The latest setting counts; when its viewer is dropped, the previous setting of
+    /// another viewer applies again.
     SetSpeed(Speed),
-    /// Put environments back to their initial state, all of them where `None`.
+    /// Resets one environment to its initial state; `None` resets all environments.
     Reset(Option<EnvId>),
-    /// Give a joint's drive a target \[rad or m\], in all environments where `env` is `None`. The program may set another
-    /// one with its next step.
+    /// Sets the drive target of a joint in one environment; `None` sets it in all environments. The program may
+    /// overwrite the target before the next step.
     SetTarget {
         /// The robot.
         robot: RobotId,
         /// The joint.
         joint: JointIndex,
-        /// The environment.
+        /// The environment; `None` for all.
         env: Option<EnvId>,
-        /// The target \[rad or m\].
+        /// Drive target \[rad or m\].
         value: f64,
     },
-    /// Pull at a body with a spring, until [`Release`](Self::Release), another drag by the same viewer, or its end. The
-    /// spring is as strong as the body is heavy: a free body follows as a critically damped oscillator.
+    /// Pulls a body with a spring until [`Release`](Self::Release), the next drag of the same viewer, or the drop of
+    /// that viewer. The stiffness scales with the mass: a free body follows as a critically damped oscillator.
     Drag {
         /// The environment.
         env: EnvId,
-        /// The body, as [`Names::bodies`](crate::stage::Names::bodies) numbers them.
+        /// Index of the body in [`Names::bodies`](crate::stage::Names::bodies).
         body: usize,
-        /// Where the spring holds it, in the body's frame \[m\].
+        /// Attachment point of the spring, in the body frame \[m\].
         hold: [f64; 3],
-        /// Where the spring's other end is, in the environment \[m\].
+        /// Target position of the spring's other end, in the environment frame \[m\].
         target: [f64; 3],
     },
-    /// End this viewer's drag.
+    /// Ends the drag of this viewer.
     Release,
-    /// Begin to record, or end it, as the simulation's [`RecordButton`] says.
+    /// Starts (`true`) or stops (`false`) the recording through the simulation's [`RecordButton`].
     Record(bool),
-    /// Go to a time of what was recorded \[s\], the nearest that there is: only where a film is [played](Play).
+    /// Seeks to a time of a recording \[s\], limited to its first and last time. The last frame at or before that time
+    /// is shown. Supported only while a recording [plays](Play).
     Seek(f64),
 }
 
 impl Command {
-    /// Whether the earlier of two commands that wait has no effect where this one follows.
+    /// True if this command makes an `earlier` queued command of the same viewer redundant.
     fn replaces(&self, earlier: &Self) -> bool {
         match (self, earlier) {
             (Self::SetTarget { robot, joint, env, .. }, Self::SetTarget { robot: r, joint: j, env: e, .. }) => {
@@ -81,23 +83,24 @@ impl Command {
     }
 }
 
-/// How fast simulated time passes.
+/// Speed of simulated time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Speed {
-    /// As fast as the machine can.
+    /// As fast as the machine can step.
     #[default]
     Free,
-    /// This many simulated seconds in a second, or fewer where the machine cannot: 1 is real time, 0.1 slow motion.
+    /// Simulated seconds per wall-clock second, or fewer if the machine is too slow: 1 is real time, 0.1 is slow
+    /// motion.
     Times(f64),
 }
 
 impl Speed {
     /// Real time.
     pub const REAL: Self = Self::Times(1.0);
-    /// The slowest and the fastest factor.
+    /// Smallest and largest factor of [`Speed::Times`].
     pub const RANGE: [f64; 2] = [1e-3, 1e3];
 
-    /// Whether it is one that can be had.
+    /// True if the factor is inside [`Self::RANGE`].
     fn is_valid(self) -> bool {
         match self {
             Self::Free => true,
@@ -106,18 +109,18 @@ impl Speed {
     }
 }
 
-/// What a viewer wants to find in snapshots, besides where everything is that can be seen.
+/// Optional snapshot contents that a viewer requests, in addition to poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wants {
-    /// Snapshots per second of wall time, at most.
+    /// Maximum number of snapshots per second of wall-clock time.
     pub rate: f64,
-    /// Whose contacts, with forces. They are solved for the purpose: as much work as a step.
+    /// Environments whose contacts and contact forces are included. Computing them costs as much as a simulation step.
     pub contacts: Option<Shown>,
-    /// What sensors show of their measurements: see `debug_vis` in their configurations.
+    /// Debug markers of sensors: see `debug_vis` in their configurations.
     pub markers: bool,
-    /// Positions and targets of joints.
+    /// Joint positions, targets and efforts.
     pub joints: bool,
-    /// What camera sensors look at.
+    /// Views of camera sensors.
     pub cameras: bool,
 }
 
@@ -128,10 +131,10 @@ impl Default for Wants {
 }
 
 impl Wants {
-    /// Nothing.
+    /// Requests nothing.
     pub(crate) const NOTHING: Self = Self { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false };
 
-    /// What two viewers want together.
+    /// Combines the requests of two viewers.
     fn union(self, other: Self) -> Self {
         Self {
             rate: self.rate.max(other.rate),
@@ -146,16 +149,16 @@ impl Wants {
     }
 }
 
-/// What viewers need of a simulation.
+/// Access of viewers to a simulation.
 pub trait Viewing {
-    /// A new viewer of this simulation. The first snapshot is there at once; the next ones come with the steps. All viewers
-    /// of a simulation have one [`Conductor`] between them, which the first brings along.
+    /// Adds a viewer. Its first snapshot is available at once; further snapshots follow with the steps. All viewers of
+    /// a simulation share one [`Conductor`], which the first viewer adds.
     ///
-    /// What a viewer told the simulation ends with the viewer: its pause, its speed, its spring. So a simulation goes on, as
-    /// fast as it can, when all are gone.
+    /// The pause, speed and spring of a viewer end when the viewer is dropped. After the last viewer is dropped, the
+    /// simulation runs freely and as fast as it can.
     fn viewer(&mut self, wants: Wants) -> Viewer;
 
-    /// Gives all viewers a record button, in place of the one they had; what that one was recording ends.
+    /// Sets the record button that all viewers show. A recording that the previous button was running is stopped.
     fn record_button(&mut self, button: RecordButton);
 }
 
@@ -174,14 +177,14 @@ impl Viewing for SimulationManager {
     }
 }
 
-/// Does something with the conductor of a simulation, which is made where there is none.
+/// Calls `act` with the conductor of the simulation, which is added if missing.
 fn with_conductor<T>(
     sim: &mut SimulationManager,
     act: impl FnOnce(&mut Conductor, &mut SimulationManager) -> T,
 ) -> Option<T> {
     let known = sim.observers().ids::<Conductor>().first().copied();
     let id = known.unwrap_or_else(|| sim.observers_mut().add(Conductor::new()));
-    // Taken out and put back: it reads the whole simulation. Nobody else takes it.
+    // The conductor is removed and added again, because `act` needs the whole simulation. No other code removes it.
     let mut conductor = sim.observers_mut().remove(id).ok()?;
     let done = act(&mut conductor, sim);
     sim.observers_mut().add(conductor);

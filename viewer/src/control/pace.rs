@@ -1,28 +1,28 @@
-//! How fast simulated time passes, measured and held.
+//! Real-time clock: measures the speed of simulated time and throttles it to the requested speed.
 
 use super::Speed;
 use std::time::{Duration, Instant};
 
-/// Farther behind than this the lost time is given up: a simulation that was held does not rush to catch up.
+/// Lag beyond which lost time is dropped. A simulation that was paused does not rush to catch up.
 const GIVE_UP: Duration = Duration::from_millis(200);
-/// Over how long the speed is measured.
+/// Duration of one speed measurement.
 const WINDOW: Duration = Duration::from_millis(500);
-/// How long steps may go on without a look at commands, about.
+/// Approximate longest time between two checks for commands.
 const LOOK: Duration = Duration::from_millis(8);
 
-/// The clock of a simulation that somebody watches.
+/// Clock of a simulation that has viewers.
 #[derive(Debug)]
 pub(super) struct Pace {
     speed: Speed,
     dt: f64,
-    /// A moment and the step that was due then.
+    /// A time and the step that was due at that time.
     anchor: (Instant, u64),
-    /// When the measurement began, and with which step.
+    /// Start of the speed measurement: time and step.
     window: (Instant, u64),
     measured: Option<f64>,
-    /// A step takes about this long when nothing is waited for.
+    /// Approximate wall-clock duration of one step, without throttling.
     step_time: Duration,
-    /// When the last wait ended, and with which step.
+    /// End of the last wait: time and step.
     resumed: (Instant, u64),
 }
 
@@ -42,17 +42,17 @@ impl Pace {
         self.restart(steps, now);
     }
 
-    /// Counts from now: after a pause, a reset, another speed.
+    /// Restarts the schedule and the measurement, after a pause, a reset or a speed change.
     pub(super) fn restart(&mut self, steps: u64, now: Instant) {
         (self.anchor, self.window, self.resumed, self.measured) = ((now, steps), (now, steps), (now, steps), None);
     }
 
-    /// Simulated seconds per second over the last half second; `None` at first.
+    /// Returns simulated seconds per second over the last half second, or `None` before the first measurement.
     pub(super) fn measured(&self) -> Option<f64> {
         self.measured
     }
 
-    /// Steps were done.
+    /// Updates the measurements after steps were done.
     pub(super) fn note(&mut self, steps: u64, now: Instant) {
         let (since, first) = self.resumed;
         let done = steps.saturating_sub(first);
@@ -69,7 +69,7 @@ impl Pace {
         }
     }
 
-    /// How long to wait before the next step; none where the machine is behind.
+    /// Returns the time to wait before the next step; zero if the simulation lags behind.
     pub(super) fn ahead(&mut self, steps: u64, now: Instant) -> Duration {
         let Speed::Times(factor) = self.speed else { return Duration::ZERO };
         let (began, first) = self.anchor;
@@ -80,12 +80,12 @@ impl Pace {
         due.saturating_duration_since(now)
     }
 
-    /// The waiting is over.
+    /// Marks the end of a wait.
     pub(super) fn waited(&mut self, steps: u64, now: Instant) {
         self.resumed = (now, steps);
     }
 
-    /// Steps until it is looked again.
+    /// Returns the number of steps until the next check for commands.
     pub(super) fn block(&self) -> u64 {
         let by_work = LOOK.as_secs_f64() / self.step_time.as_secs_f64().max(1e-9);
         let by_pace = match self.speed {
@@ -111,7 +111,7 @@ mod tests {
         for (what, speed, steps, passed, expected) in [
             ("ten steps are 100 ms, 30 ms are gone", Speed::REAL, [5, 15].as_slice(), 30, 70),
             ("slow motion", Speed::Times(0.1), &[5, 15], 0, 1000),
-            // A second behind: no wait, and from here on it counts anew.
+            // One second behind: no wait, and the schedule restarts here.
             ("lost time is given up", Speed::REAL, &[0, 1, 2], 1000, 10),
         ] {
             pace.set_speed(speed, steps[0], start);
@@ -122,7 +122,7 @@ mod tests {
         }
     }
 
-    /// The speed is measured over half a second; looks at commands are some milliseconds apart.
+    /// The speed is measured over half a second, and checks for commands are some milliseconds apart.
     #[test]
     fn measured_speed() {
         let start = Instant::now();
@@ -133,7 +133,7 @@ mod tests {
         assert!(pace.measured().is_some_and(|speed| (speed - 2.0).abs() < 1e-9), "{:?}", pace.measured());
 
         let mut pace = Pace::new(0.001, 0, start);
-        // Steps of 20 µs, again and again.
+        // Repeated steps of 20 µs.
         for k in 1..40u32 {
             pace.note(u64::from(k) * 100, start + Duration::from_millis(2) * k);
         }

@@ -1,54 +1,54 @@
-//! The record button: views show it, and what it does is the program's.
+//! The record button: viewers display it, and the program implements it.
 
 use kinetoscope_sim::SimulationManager;
 use std::fmt;
 use std::sync::{Arc, Mutex};
 
-/// What happens when somebody presses the record button.
+/// Implementation of a record button.
 ///
-/// It is called on the thread that steps, between two steps, so it may read everything and add observers, such as a recorder.
-/// It must not call `update`.
+/// The methods run on the simulation's thread, between two steps. They may read the whole simulation and add observers
+/// such as a recorder. They must not call `update`.
 pub trait Recording: Send {
-    /// Begins to record, or ends it; where that is so already, nothing is to be done.
+    /// Starts (`on`) or stops the recording. Does nothing if the recording is already in that state.
     ///
     /// # Errors
-    /// Why not, in words that viewers are shown.
+    /// Returns the reason of a failure, as a text that viewers display.
     fn set(&mut self, sim: &mut SimulationManager, on: bool) -> Result<(), String>;
 
-    /// How it stands; asked whenever viewers are shown something new.
+    /// Returns the current state. Called whenever a snapshot is published.
     fn state(&self, sim: &SimulationManager) -> RecordingState;
 }
 
-/// How a recording stands.
+/// State of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordingState {
-    /// Whether it records.
+    /// True while recording.
     pub on: bool,
-    /// What viewers are told beside the button, such as the name of the file; may be empty.
+    /// Text that viewers display beside the button, such as the file name; may be empty.
     pub text: String,
 }
 
 /// A record button for [`WindowCfg`](crate::WindowCfg), [`ServeCfg`](crate::ServeCfg) or
-/// [`Viewing::record_button`](super::Viewing::record_button). Its clones are the same button.
+/// [`Viewing::record_button`](super::Viewing::record_button). Clones refer to the same button.
 ///
-/// A simulation has one, which all its windows and browsers show; another one that is given later takes its place. What a
-/// viewer has begun to record ends with that viewer; what the program has begun does not.
+/// A simulation has one button, which all its windows and browser views show. A button that is set later replaces it. A
+/// recording started by a viewer stops when that viewer is dropped; a recording started by the program continues.
 #[derive(Clone)]
 pub struct RecordButton(Arc<Mutex<dyn Recording>>);
 
 impl RecordButton {
-    /// A button that does this.
+    /// Creates a button from its implementation.
     pub fn new(recording: impl Recording + 'static) -> Self {
         Self::shared(Arc::new(Mutex::new(recording)))
     }
 
-    /// A button that does what somebody else has a hand on, too. Who holds the lock when it is pressed holds nobody up: the
-    /// button is refused then, so it is to be held for moments.
+    /// Creates a button whose implementation is shared with other code. If that code holds the lock when the button is
+    /// pressed, the press is refused instead of blocking the simulation; hold the lock only briefly.
     pub fn shared<R: Recording + 'static>(recording: Arc<Mutex<R>>) -> Self {
         Self(recording)
     }
 
-    /// Presses it.
+    /// Starts or stops the recording. Refused with a reason while the lock is held elsewhere.
     pub(super) fn set(&self, sim: &mut SimulationManager, on: bool) -> Result<(), String> {
         match self.0.try_lock() {
             Ok(mut recording) => recording.set(sim, on),
@@ -56,7 +56,7 @@ impl RecordButton {
         }
     }
 
-    /// How it stands; `None` while somebody holds its lock.
+    /// Returns the state of the recording, or `None` while the lock is held elsewhere.
     pub(super) fn state(&self, sim: &SimulationManager) -> Option<RecordingState> {
         self.0.try_lock().ok().map(|recording| recording.state(sim))
     }
@@ -68,7 +68,7 @@ impl fmt::Debug for RecordButton {
     }
 }
 
-/// Whether they are the same button.
+/// Two buttons are equal if they share the same implementation.
 impl PartialEq for RecordButton {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)

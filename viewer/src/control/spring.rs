@@ -1,12 +1,12 @@
-//! The spring by which a viewer drags a body.
+//! Virtual spring with which a viewer drags a body.
 
 use kinetoscope_sim::{BodyMotion, EnvId, SimulationManager};
 use nalgebra::{Point3, Vector3};
 
-/// Angular frequency of a free body on the spring \[rad/s\]: it comes within 2 % of where it is pulled in 0.7 s.
+/// Angular frequency of a free body on the spring \[rad/s\]. The body comes within 2 % of the target in 0.7 s.
 const FREQUENCY: f64 = 8.0;
 
-/// A body in an environment.
+/// A body in one environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct HeldBody {
     pub(super) env: EnvId,
@@ -18,15 +18,16 @@ pub(super) struct HeldBody {
 pub(super) struct Spring {
     pub(super) env: EnvId,
     pub(super) body: usize,
-    /// In the body's frame \[m\].
+    /// Attachment point in the body frame \[m\].
     pub(super) hold: [f64; 3],
-    /// In the environment \[m\].
+    /// Target point in the environment frame \[m\].
     pub(super) target: [f64; 3],
 }
 
 impl Spring {
-    /// Where it holds the body, and the force there \[N\]: of a critically damped oscillator,
-    /// `F = m (w² (target - point) - 2 w v)`, with the mass of the body and all that hangs on it.
+    /// Returns the attachment point \[m\] and the force there \[N\], both in the environment frame. The force is that
+    /// of a critically damped oscillator: `F = m (w² (target - point) - 2 w v)`. The mass m includes all bodies
+    /// attached to the body.
     pub(super) fn force(&self, motion: &BodyMotion) -> ([f64; 3], [f64; 3]) {
         let point = (motion.pose * Point3::from(self.hold)).coords;
         let arm = point - motion.pose.translation.vector;
@@ -35,32 +36,32 @@ impl Spring {
         (point.into(), (motion.carried_mass * pull).into())
     }
 
-    /// What it holds.
+    /// Returns the body on the spring.
     pub(super) fn held(&self) -> HeldBody {
         HeldBody { env: self.env, body: self.body }
     }
 
-    /// Where it pulls with which force now; nowhere at what cannot move.
+    /// Returns the current attachment point and force, or `None` if the body cannot move.
     ///
     /// # Errors
-    /// There is no such environment or body.
+    /// The environment or body does not exist.
     pub(super) fn force_now(&self, sim: &SimulationManager) -> kinetoscope_sim::Result<Option<([f64; 3], [f64; 3])>> {
         let motion = sim.scene().body_motion(self.env, self.body)?;
         Ok((!motion.is_fixed).then(|| self.force(&motion)))
     }
 
-    /// Pulls for the next step, alone.
+    /// Applies the force of this spring alone to the next step.
     ///
     /// # Errors
-    /// There is nothing to pull at, or a number is not finite.
+    /// The environment or body does not exist, or if a number is not finite.
     pub(super) fn apply(&self, sim: &mut SimulationManager) -> kinetoscope_sim::Result<()> {
         let force = self.force_now(sim)?;
         sim.scene_mut().pull(self.env, self.body, force.as_slice())
     }
 }
 
-/// Lets go of a body.
+/// Removes the spring force from a body.
 pub(super) fn release(sim: &mut SimulationManager, HeldBody { env, body }: HeldBody) {
-    // Of a body that is gone nothing has to be let go.
+    // An error means that the body no longer exists; no force is left to remove.
     let _ = sim.scene_mut().pull(env, body, &[]);
 }

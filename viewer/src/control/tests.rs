@@ -10,7 +10,7 @@ use kinetoscope_testkit::wait::PATIENCE;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// The first snapshot from now on that is as it should be.
+/// Waits for a snapshot that satisfies `is` and returns it.
 #[track_caller]
 fn wait_for(viewer: &Viewer, is: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
     let (start, mut after) = (Instant::now(), 0);
@@ -25,7 +25,7 @@ fn wait_for(viewer: &Viewer, is: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
     panic!("no such snapshot; the newest is {:?}", run(viewer));
 }
 
-/// Steps until something is so. Commands are obeyed some milliseconds later, after any number of steps.
+/// Steps until the condition holds. Commands run some milliseconds later, after any number of steps.
 #[track_caller]
 fn step_until(sim: &mut SimulationManager, is: impl Fn(&SimulationManager) -> bool) {
     let start = Instant::now();
@@ -46,7 +46,7 @@ fn pause_and_steps() {
     let running = Running::start(sim);
     assert!(viewer.send(Command::Pause));
     let held = wait_for(&viewer, |s| s.run.paused).run.steps;
-    // It is inside of update: the step that it holds at was done, and update has not returned.
+    // The pause is inside `update`: the step it holds at is done, and `update` has not returned.
     let done = running.steps();
     assert!(done == held || done + 1 == held, "{done} {held}");
     std::thread::sleep(Duration::from_millis(200));
@@ -54,7 +54,7 @@ fn pause_and_steps() {
     assert!(viewer.send(Command::Step(7)));
     let after = wait_for(&viewer, |s| s.run.paused && s.run.steps > held);
     assert_eq!(after.run.steps, held + 7);
-    // The cube's time says so too: steps of 10 ms.
+    // The simulated time agrees: steps of 10 ms.
     assert!((after.envs[1].look.time - (held + 7) as f64 * 0.01).abs() < 1e-9);
     assert!(viewer.send(Command::Resume));
     running.goes_on_beyond(held + 100);
@@ -62,7 +62,7 @@ fn pause_and_steps() {
     running.end();
 }
 
-/// The simulation goes on when all viewers that paused it are gone.
+/// The simulation resumes when all viewers that paused it are dropped.
 #[test]
 fn pause_ends_with_viewer() {
     let mut sim = sample(1).sim;
@@ -73,23 +73,23 @@ fn pause_ends_with_viewer() {
     viewer.send(Command::Pause);
     wait_for(&other, |s| s.run.paused && s.run.speed == Speed::Times(0.5));
     other.send(Command::Pause);
-    // A viewer that asks for a step holds nothing by that.
+    // A viewer that requests a step does not hold the pause.
     let stepper = other.another(Wants::default());
     let held = run(&other).steps;
     stepper.send(Command::Step(1));
     let held = wait_for(&other, |s| s.run.paused && s.run.steps == held + 1).run.steps;
     drop(viewer);
-    // The other one paused it as well: it stays held. The speed went with the viewer that had set it.
+    // The other viewer paused it as well, so the pause stays. The speed ended with the viewer that set it.
     wait_for(&other, |s| s.run.paused && s.run.speed == Speed::Free);
     std::thread::sleep(Duration::from_millis(250));
     assert!(running.steps() <= held);
-    // A viewer that only watches does not keep it held.
+    // A viewer that only watches does not hold the pause.
     drop(other);
     wait_for(&stepper, |s| !s.run.paused && s.run.steps > held);
     drop(stepper);
     running.goes_on_beyond(held + 200);
     let mut sim = running.end();
-    // A new viewer finds it running, at free speed, with snapshots.
+    // A new viewer finds a running simulation, at free speed, with snapshots.
     let viewer = sim.viewer(Wants::default());
     assert!(!run(&viewer).paused && run(&viewer).speed == Speed::Free);
     drop(sim);
@@ -111,7 +111,7 @@ fn speed_ends_with_viewer() {
     set(&above, Speed::REAL);
     drop(above);
     wait_for(&below, |s| s.run.speed == Speed::Times(20.0));
-    // The viewer that sets it last has the last word, and the other leaves nothing behind.
+    // The latest speed applies, and a dropped viewer leaves no setting behind.
     let above = below.another(Wants::default());
     set(&above, Speed::REAL);
     set(&below, Speed::Times(30.0));
@@ -133,8 +133,8 @@ fn target_and_reset() {
     viewer.send(Command::SetTarget { robot, joint, env: Some(EnvId(1)), value: 0.8 });
     sim.update(300);
     let q = sim.robot(robot).qpos();
-    // The drive has no load about the vertical: it ends in its target. Critically damped or slower poles of 10 s⁻¹ and
-    // more leave e^-20 of the way after 3 s.
+    // The drive carries no load about the vertical, so it settles at its target. Critically damped or slower poles of
+    // 10 s⁻¹ and more leave e^-20 of the distance after 3 s.
     assert!((q[(1, 0)] - 0.8).abs() < 1e-6, "{q}");
     assert_eq!(q[(0, 0)], 0.0, "the other environment was not asked");
     viewer.send(Command::Reset(Some(EnvId(1))));
@@ -143,7 +143,7 @@ fn target_and_reset() {
     assert!(sim.robot(robot).qpos()[(1, 0)].abs() < 1e-9);
 }
 
-/// Refusals are reported and counted; each is shown until the next action.
+/// Refusals are reported and counted; each is shown until the next successful command.
 #[test]
 fn refusals() {
     let Sample { mut sim, robot, .. } = sample(1);
@@ -163,7 +163,7 @@ fn refusals() {
         drag(9, 0, 0.0),
         drag(0, 99, 0.0),
         drag(0, 2, f64::INFINITY),
-        // There is no record button; the same is refused again.
+        // No record button exists; the same command is refused twice.
         Command::Record(true),
         Command::Record(true),
     ];
@@ -173,7 +173,7 @@ fn refusals() {
         assert!(run(&viewer).refused.is_some_and(|why| count < 11 || why.contains("record button")), "{command:?}");
     }
     assert!(sim.diverged().is_empty());
-    // A spring says nothing about it, and a command that is done does.
+    // A successful spring command does not clear the refusal; another successful command does.
     viewer.send(drag(0, 0, 0.0));
     viewer.send(Command::Release);
     sim.update(100);
@@ -183,14 +183,14 @@ fn refusals() {
     assert_eq!(run(&viewer).refusals, nonsense.len() as u64);
 }
 
-/// Steps of 10 ms: at step s it is waited until (s - s0) 10 ms after the step s0 that the speed was set at, and what was
-/// lost is caught up with or given up. So 40 steps after s0 end 40 steps' time after it was asked for, less the block that
-/// is not looked into (one step in real time, three at four times that). A busy machine may take longer.
+/// With steps of 10 ms, step s ends (s - s0) 10 ms after the step s0 at which the speed was set; lost time is caught up
+/// or dropped. So 40 steps after s0 end 40 step times after the request, less the block without a check. That block is
+/// one step in real time, and three steps at four times real time. A busy machine may take longer.
 #[test]
 fn real_time() {
     let mut sim = sample(1).sim;
     let viewer = sim.viewer(Wants::default());
-    // From before it is asked for: afterwards it may already be late, and would catch up.
+    // The time starts before the request: afterwards the simulation may already be late and would catch up.
     let mut took = |speed: Option<Speed>, steps| {
         let start = Instant::now();
         if let Some(speed) = speed {
@@ -200,8 +200,8 @@ fn real_time() {
         sim.update(steps);
         start.elapsed()
     };
-    // The control: without a speed nothing is waited for. (40 steps of one box take some milliseconds; the best of some, on a
-    // busy machine.)
+    // Control: without a speed the simulation does not wait. (40 steps of one box take some milliseconds; the best of
+    // several runs counts, because the machine may be busy.)
     let free = (0..20).map(|_| took(None, 40)).min().unwrap();
     let (real, fast) = (took(Some(Speed::REAL), 40), took(Some(Speed::Times(4.0)), 200));
     assert!(real >= Duration::from_millis(380), "{real:?}");
@@ -209,7 +209,7 @@ fn real_time() {
     assert!(free < real, "{free:?} {real:?}");
 }
 
-/// The force of a spring points to its end and slows what moves.
+/// The spring force points to the target and damps the motion.
 #[test]
 fn spring_force() {
     let pose = Pose::translation(1.0, 2.0, 3.0);
@@ -219,12 +219,12 @@ fn spring_force() {
     // 2 kg (8 rad/s)² 0.5 m = 64 N, straight up.
     assert!((0..3).all(|k| (point[k] - [1.1, 2.0, 3.0][k]).abs() < 1e-12));
     assert!((0..3).all(|k| (force[k] - [0.0, 0.0, 64.0][k]).abs() < 1e-9), "{force:?}");
-    // Turning about z with 1 rad/s, the point moves along y with 0.1 m/s: 2 kg 2 (8 rad/s) 0.1 m/s against it.
+    // Turning about z at 1 rad/s, the point moves along y at 0.1 m/s: the damping force is 2 kg 2 (8 rad/s) 0.1 m/s.
     let (_, force) = spring.force(&BodyMotion { angular: [0.0, 0.0, 1.0], ..motion });
     assert!((force[1] + 3.2).abs() < 1e-9, "{force:?}");
 }
 
-/// A free cube without gravity, edges of 0.2 m, steps of 1 ms.
+/// A free cube without gravity, with edges of 0.2 m and steps of 1 ms.
 fn floating_cube() -> (SimulationManager, ObjectId) {
     let cfg = SimulationManagerCfg { gravity: [0.0; 3].into(), physics_dt: 1e-3, ground: None, ..Default::default() };
     let mut sim = SimulationManager::new(cfg).unwrap();
@@ -237,21 +237,21 @@ fn drag(hold: [f64; 3], target: [f64; 3]) -> Command {
     Command::Drag { env: EnvId(0), body: 0, hold, target }
 }
 
-/// A free body in its centre of mass on the spring is a critically damped oscillator: x(t) = 1 - (1 + w t) e^-wt.
+/// A free body pulled at its center of mass is a critically damped oscillator: x(t) = 1 - (1 + w t) e^-wt.
 #[test]
 fn spring_in_closed_form() {
     let (mut sim, id) = floating_cube();
     let viewer = sim.viewer(Wants::default());
     viewer.send(drag([0.0; 3], [1.0, 0.0, 0.0]));
-    // The command is obeyed after the first step.
+    // The command runs after the first step.
     sim.update(1);
     for k in 1..=5 {
         sim.update(100);
         let wt = 8.0 * 0.1 * f64::from(k);
         let expected = 1.0 - (1.0 + wt) * (-wt).exp();
         let x = sim.rigid_object(id).pose()[(0, 0)];
-        // Semi-implicit Euler with the force of the beginning of the step moves the poles by w² h / 2 relative to w: the
-        // curve is late or early by less than w h = 0.8 %, of a way of 1 m.
+        // Semi-implicit Euler with the force from the beginning of the step shifts the poles by w² h / 2 relative to w.
+        // The curve is late or early by less than w h = 0.8 % of a distance of 1 m.
         assert!((x - expected).abs() < 0.008, "after {wt}: {x}, not {expected}");
     }
     let speed = |sim: &SimulationManager| sim.rigid_object(id).velocity()[(0, 0)];
@@ -260,30 +260,31 @@ fn spring_in_closed_form() {
     let v = speed(&sim);
     sim.update(100);
     assert_eq!(v, speed(&sim), "let go, it flies on as it was");
-    // A viewer that goes lets go as well.
+    // A dropped viewer releases its spring too.
     viewer.send(drag([0.0; 3], [9.0, 0.0, 0.0]));
     step_until(&mut sim, |sim| speed(sim) > v);
     drop(viewer);
-    // While it is pulled, every step looks for commands.
+    // While a body is dragged, every step checks for commands.
     sim.update(2);
     let v = speed(&sim);
     sim.update(50);
     assert_eq!(v, speed(&sim));
 }
 
-/// Two springs at one body act together. At its centre, to x and to y: `x'' = w² (1 - 2 x) - 4 w x'`, so it comes to rest half
-/// way to either. At points of its own, to either side: a couple.
+/// Two springs on one body add up. At its center, toward x and y: `x'' = w² (1 - 2 x) - 4 w x'`, so it comes to rest
+/// halfway between the targets. At opposite points, toward opposite sides: a couple.
 #[test]
 fn two_springs() {
     let (mut sim, id) = floating_cube();
     let (first, second) = (sim.viewer(Wants::default()), sim.viewer(Wants::default()));
     first.send(drag([0.0; 3], [1.0, 0.0, 0.0]));
     second.send(drag([0.0; 3], [0.0, 1.0, 0.0]));
-    // The slower pole is (2 - √2) w = 4.7 s⁻¹: e^-14 of the way is left after 3 s.
+    // The slower pole is (2 - √2) w = 4.7 s⁻¹: e^-14 of the distance is left after 3 s.
     sim.update(3000);
     let pose = sim.rigid_object(id).pose();
     assert!((pose[(0, 0)] - 0.5).abs() < 1e-5 && (pose[(0, 1)] - 0.5).abs() < 1e-5, "{pose}");
-    // One lets go: the other has it alone. Its pole is w = 8 s⁻¹, twice: (1 + 24) e^-24 is left.
+    // After one release, the other spring acts alone. Its double pole is w = 8 s⁻¹: (1 + 24) e^-24 of the distance is
+    // left.
     first.send(Command::Release);
     sim.update(3000);
     let pose = sim.rigid_object(id).pose();
@@ -293,16 +294,16 @@ fn two_springs() {
     let (first, second) = (sim.viewer(Wants::default()), sim.viewer(Wants::default()));
     first.send(drag([0.0, 0.1, 0.0], [1.0, 0.1, 0.0]));
     second.send(drag([0.0, -0.1, 0.0], [-1.0, -0.1, 0.0]));
-    // Obeyed after the first step; the second is the first that is pulled.
+    // The command runs after the first step; the second step is the first with a force.
     sim.update(2);
     let v = sim.rigid_object(id).velocity();
-    // 2 kg (8 rad/s)² 1 m = 128 N, each 0.1 m beside the centre, against m a² / 6, for a millisecond.
+    // 2 kg (8 rad/s)² 1 m = 128 N, each 0.1 m from the center, on the inertia m a² / 6, for one millisecond.
     let spin = -2.0 * 0.1 * 128.0 / (MASS * 0.04 / 6.0) * 1e-3;
     assert!((v[(0, 5)] - spin).abs() < 1e-6 * spin.abs(), "{v} instead of {spin}");
     assert!((0..3).all(|k| v[(0, k)].abs() < 1e-9), "the forces cancel: {v}");
 }
 
-/// Watching everything changes no bit, even if the viewers never let a snapshot go.
+/// Watching changes no bit, even if the viewers never release a snapshot.
 #[test]
 fn watching_changes_nothing() {
     let bits = |watch: bool| {
@@ -312,7 +313,7 @@ fn watching_changes_nothing() {
         let viewers: Vec<Viewer> = (0..3).filter(|_| watch).map(|_| sim.viewer(wants)).collect();
         for k in 0..50 {
             sim.update(4);
-            // They keep every snapshot they get: more than there are.
+            // The viewers keep every snapshot, more than the pool has.
             held.extend(viewers.iter().filter_map(Viewer::newest));
             if k == 20 {
                 sim.reset(Some(&[EnvId(1)])).unwrap();
@@ -346,7 +347,7 @@ fn later_objects() {
     assert_eq!(after.envs[0].look.bodies.len(), after.names.bodies.len());
 }
 
-/// A recording that counts how often it was begun and ended.
+/// A recording that counts its starts and stops.
 #[derive(Debug, Default)]
 struct Counter {
     on: bool,
@@ -367,7 +368,7 @@ impl Recording for Counter {
     }
 }
 
-/// A button, and its counts.
+/// Returns a button and its counts.
 fn counter() -> (Arc<Mutex<Counter>>, RecordButton, impl Fn() -> (bool, u32, u32)) {
     let counter = Arc::new(Mutex::new(Counter::default()));
     let counted = Arc::clone(&counter);
@@ -378,7 +379,7 @@ fn counter() -> (Arc<Mutex<Counter>>, RecordButton, impl Fn() -> (bool, u32, u32
     (Arc::clone(&counter), RecordButton::shared(counter), counts)
 }
 
-/// The record button is pressed between steps, and its state is that of the step that is shown.
+/// The record button is pressed between steps, and its state belongs to the published step.
 #[test]
 fn record_button() {
     let mut sim = sample(1).sim;
@@ -393,18 +394,18 @@ fn record_button() {
         let run = run(&viewer);
         run.recording.is_some_and(|recording| recording.on && recording.text == format!("step {}", run.steps))
     });
-    // A later viewer may end it.
+    // Another viewer may stop the recording.
     let other = viewer.another(Wants::default());
     other.send(Command::Record(false));
     step_until(&mut sim, |_| counted() == (false, 1, 1));
-    // While its lock is held it is refused, and nothing waits.
+    // While its lock is held, the button refuses, and the simulation does not wait.
     let held = counter.lock().unwrap();
     viewer.send(Command::Record(true));
     step_until(&mut sim, |_| run(&viewer).refused.is_some_and(|reason| reason.contains("busy")));
     assert!(run(&viewer).recording.is_some(), "its last known state stays");
     drop(held);
     assert_eq!(counted(), (false, 1, 1));
-    // Paused, it is pressed too.
+    // The button also works while paused.
     viewer.send(Command::Pause);
     viewer.send(Command::Record(true));
     let running = Running::start(sim);
@@ -416,7 +417,7 @@ fn record_button() {
     running.end();
 }
 
-/// A recording ends with the viewer that began it, and with no other.
+/// A recording stops with the viewer that started it, and with no other viewer.
 #[test]
 fn recording_ends_with_viewer() {
     let mut sim = sample(1).sim;
@@ -425,7 +426,7 @@ fn recording_ends_with_viewer() {
     sim.record_button(button.clone());
     first.send(Command::Record(true));
     step_until(&mut sim, |_| counted() == (true, 1, 0));
-    // Pressed again, it stays that of the first.
+    // Pressed again by the second viewer, it still belongs to the first.
     second.send(Command::Record(true));
     sim.update(200);
     drop(second);
@@ -433,7 +434,7 @@ fn recording_ends_with_viewer() {
     assert_eq!(counted(), (true, 1, 0));
     drop(first);
     step_until(&mut sim, |_| counted() == (false, 1, 1));
-    // A recording that the program began is the program's.
+    // A recording that the program started belongs to the program.
     counter.lock().unwrap().set(&mut sim, true).unwrap();
     let viewer = sim.viewer(Wants::default());
     viewer.send(Command::Record(true));
@@ -441,7 +442,7 @@ fn recording_ends_with_viewer() {
     drop(viewer);
     sim.update(200);
     assert_eq!(counted(), (true, 2, 1));
-    // The same button once more changes nothing; another one ends what the first was doing.
+    // Setting the same button again changes nothing; another button stops the recording of the first.
     sim.record_button(button);
     assert_eq!(counted(), (true, 2, 1));
     sim.record_button(RecordButton::new(Counter::default()));

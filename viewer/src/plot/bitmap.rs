@@ -1,4 +1,4 @@
-//! A plot as pixels.
+//! Rasterization of plots.
 
 use crate::stage::Canvas;
 use embedded_graphics::mono_font::MonoTextStyle;
@@ -13,7 +13,7 @@ const BLACK: [u8; 3] = [0; 3];
 /// Half the width of a curve \[pixels\].
 const CURVE: f64 = 0.75;
 
-/// The picture.
+/// Rasterizes a plot.
 pub(super) fn picture(drawing: &Drawing) -> Canvas {
     let Drawing { size: [width, height], frame: [left, top, right, bottom], grid, labels, curves, keys } = drawing;
     let mut canvas = Canvas::new(*width, *height);
@@ -64,20 +64,21 @@ fn write(canvas: &mut Canvas, Label { text, at, anchor }: &Label) {
         .draw(canvas);
 }
 
-/// Draws soft lines. What the lines of one curve cover is collected first: where they meet, nothing is darker.
+/// Draws antialiased lines. The coverage of all lines of one curve is collected first, so that crossings are not
+/// darker.
 struct Pen {
-    /// How much of each pixel is covered, of 255.
+    /// Coverage of each pixel, 0 to 255.
     cover: Vec<u8>,
     touched: Vec<usize>,
     size: [usize; 2],
 }
 
 impl Pen {
-    /// A line of twice the width `half` \[pixels\]; pixels are covered as far as their centres are inside, within a pixel.
+    /// Adds a line of width 2 `half` \[pixels\]. Coverage falls off linearly over one pixel at the edges.
     fn stroke(&mut self, from: [f64; 2], to: [f64; 2], half: f64) {
         let way = [to[0] - from[0], to[1] - from[1]];
         let length = way[0].hypot(way[1]);
-        // Points of a plot are in its frame, so that a line is as long as a picture at most.
+        // Points of a plot are inside its frame, so a line is at most as long as the image.
         let steps = length.ceil().clamp(1.0, 1e5) as u32;
         let reach = (half + 1.0).ceil() as i64;
         let mut last = None;
@@ -116,7 +117,7 @@ impl Pen {
         self.cover[at] = self.cover[at].max(covered);
     }
 
-    /// Puts what was collected on the canvas.
+    /// Blends the collected coverage onto the canvas and clears it.
     fn ink(&mut self, canvas: &mut Canvas, color: [u8; 3]) {
         let (pixels, _) = canvas.bytes_mut().as_chunks_mut::<4>();
         for at in self.touched.drain(..) {

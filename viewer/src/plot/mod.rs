@@ -1,4 +1,4 @@
-//! Plots of numbers over time: joints that follow their targets, forces, values of sensors.
+//! Plots of numbers over time, such as joint positions and targets, forces, and sensor values.
 //!
 //! ```no_run
 //! use kinetoscope_viewer::plot::{self, Plot, Series};
@@ -10,8 +10,8 @@
 //! # Ok::<(), kinetoscope_viewer::plot::PlotError>(())
 //! ```
 //!
-//! Both files show the same lines at the same places. Letters are drawn from a table in the program or named by their family:
-//! no font is looked for, and a plot is the same on every machine.
+//! Both files show the same lines at the same coordinates. The PNG file uses a built-in bitmap font, and the SVG file
+//! names a font family. No system font is loaded, so a plot is the same on every machine.
 
 mod bitmap;
 
@@ -22,27 +22,27 @@ use kinetoscope_scene::AtomicFile;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A plot cannot be drawn or written.
+/// An error of plotting.
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
-    /// The end of the name is of no format.
+    /// The file name extension is neither `.svg` nor `.png`.
     #[error("{path}: plots are not written as .{end}; give a name that ends in .svg or .png")]
     Extension {
-        /// The file.
+        /// Path of the plot file.
         path: PathBuf,
-        /// The end of its name.
+        /// File name extension, in lower case and without its dot.
         end: String,
     },
-    /// A size that is too small to read or too large to draw.
+    /// The plot is too small to read or too large to draw.
     #[error(transparent)]
     Size(#[from] SizeError),
     /// The file cannot be written.
     #[error("{path}: {error}")]
     File {
-        /// The file.
+        /// Path of the plot file.
         path: PathBuf,
-        /// Cause.
+        /// Error of the operating system or of the PNG encoder.
         error: Arc<std::io::Error>,
     },
 }
@@ -55,8 +55,8 @@ pub fn canvas(plot: &Plot) -> Result<Canvas, PlotError> {
     Ok(bitmap::picture(&plot.drawing()?))
 }
 
-/// Writes a plot to a file, as the end of its name says: `.svg` or `.png`. A file of that name is replaced, when the new one is
-/// whole.
+/// Writes a plot to a file in the format of its extension, `.svg` or `.png`. An existing file is replaced once the new
+/// file is complete.
 ///
 /// # Errors
 /// [`PlotError::Extension`], [`PlotError::Size`], [`PlotError::File`].

@@ -18,11 +18,12 @@ fn ink() {
     };
     for point in &drawing.curves[0].pieces[0] {
         assert!(blue(point[0], point[1]), "{point:?}");
-        // The control: ten pixels beside it there is none, but where the line is steep.
+        // Control: twelve pixels above or below, the image has no line, except where the line is steep.
         let flat = (point[1] - drawing.curves[0].pieces[0][15][1]).abs() < 20.0;
         assert!(flat || !blue(point[0], point[1] + 12.0) || !blue(point[0], point[1] - 12.0), "{point:?}");
     }
-    // All ink of the curve is near it: a line of 1.5 pixels and half a pixel of edge to both sides.
+    // All colored pixels of the curve are near it: the line is 1.5 pixels wide, plus half a pixel of edge on both
+    // sides.
     let [left, top, right, bottom] = drawing.frame.map(|x| x as usize);
     let piece = &drawing.curves[0].pieces[0];
     for y in top + 2..bottom - 2 {

@@ -1,16 +1,16 @@
-//! Where the browser view listens.
+//! Address parsing and listening of the browser view.
 
 use super::error::ServeError;
 use std::io::ErrorKind;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 
-/// Where an address without a port listens.
+/// Default port.
 const PORT: u16 = 8080;
-/// Ports that are tried as candidates where one is taken.
+/// Number of following ports that are tried as alternatives to a port in use.
 const NEXT: u16 = 64;
 
-/// What the user wrote, as an address: `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080`, `127.0.0.1` and `8080` are known;
-/// names of other machines are not looked up.
+/// Parses an address such as `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080`, `127.0.0.1` or `8080`. Host names other
+/// than `localhost` are not resolved.
 pub(super) fn parse(given: &str) -> Result<SocketAddr, ServeError> {
     let text = given.trim();
     let local = |port| SocketAddr::from((Ipv4Addr::LOCALHOST, port));
@@ -37,7 +37,7 @@ pub(super) fn parse(given: &str) -> Result<SocketAddr, ServeError> {
     Err(ServeError::Address { given: given.into(), reason, candidates })
 }
 
-/// Listens there; the next free port is a candidate where this one is taken.
+/// Listens at an address. If the port is in use, the error suggests the next free port.
 pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
     let error = match TcpListener::bind(address) {
         Ok(listener) => return Ok(listener),
@@ -65,19 +65,20 @@ pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
     }
 }
 
-/// The next port that nobody listens on.
+/// Returns the next free port.
 fn next_free(address: SocketAddr) -> Option<SocketAddr> {
     let ports = (1..=NEXT).filter_map(|k| address.port().checked_add(k));
     ports.map(|port| SocketAddr::new(address.ip(), port)).find(|address| TcpListener::bind(address).is_ok())
 }
 
-/// How others reach what listens there: where it listens on every address, the one that packets leave from.
+/// Returns the address under which other machines reach the server. For an unspecified address, this is the address of
+/// the default network interface.
 pub(super) fn reachable(address: SocketAddr) -> SocketAddr {
     if !address.ip().is_unspecified() {
         return address;
     }
-    // Connecting a UDP socket sends nothing: it only asks which interface would be used. The other end is an address of
-    // documentations (RFC 5737), which nobody has.
+    // Connecting a UDP socket sends no packet; it only selects the network interface. The destination is a reserved
+    // documentation address (RFC 5737).
     let outgoing = || {
         let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).ok()?;
         socket.connect((Ipv4Addr::new(192, 0, 2, 1), 9)).ok()?;
@@ -124,7 +125,7 @@ mod tests {
 
     #[test]
     fn refused_by_the_system() {
-        // An address of documentations (RFC 5737), of no machine.
+        // A reserved documentation address (RFC 5737), which no machine has.
         let error = listen("192.0.2.1:0".parse().unwrap()).unwrap_err();
         assert!(matches!(&error, ServeError::Address { .. }), "{error}");
         assert!(error.to_string().contains("not an address of this machine"), "{error}");

@@ -1,16 +1,16 @@
-//! Answers of HTTP. Every connection is closed after one.
+//! HTTP responses. The connection is closed after each response.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 
-/// How long the other end may take to read an answer.
+/// Timeout of writing a response.
 const WRITE_TIME: Duration = Duration::from_secs(5);
-/// How much of what is still on its way is read before closing, and for how long: closing with something unread would
-/// destroy the answer before it is read.
+/// Number of bytes and time for which remaining request data is read before closing. Closing a socket with unread data
+/// would reset the connection and lose the response.
 const LINGER: (usize, Duration) = (256 << 10, Duration::from_millis(300));
 
-/// Why something was refused.
+/// Reason of a refused request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Status {
     BadRequest,
@@ -57,7 +57,7 @@ impl Status {
     }
 }
 
-/// Sends a page.
+/// Sends the page with status 200.
 pub(super) fn page(stream: &mut TcpStream, html: &str, nonce: &str, with_body: bool) {
     let policy = format!(
         "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; connect-src 'self'; img-src blob: \
@@ -67,7 +67,7 @@ pub(super) fn page(stream: &mut TcpStream, html: &str, nonce: &str, with_body: b
     send(stream, "200 OK", &more, html, with_body);
 }
 
-/// Refuses.
+/// Sends a status and an explanation.
 pub(super) fn refuse(stream: &mut TcpStream, status: Status) {
     let more: &[(&str, &str)] = match status {
         Status::WrongMethod => &[("Allow", "GET, HEAD")],
@@ -93,7 +93,7 @@ fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &str, w
     }
 }
 
-/// Reads what is still coming, up to a bound.
+/// Reads the remaining request data, within limits.
 pub(super) fn linger(stream: &mut TcpStream) {
     let (most, time) = LINGER;
     let start = Instant::now();

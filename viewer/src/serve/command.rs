@@ -1,79 +1,79 @@
-//! What a page may ask for.
+//! Commands from the page.
 
 use serde::Deserialize;
 
-/// A command of one viewer, as JSON: `{"do": "orbit", "dx": 0.1, "dy": 0}`.
+/// A command from one browser, as JSON: `{"do": "orbit", "dx": 0.1, "dy": 0}`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum Command {
-    /// A picture or a state has arrived: the next may come.
+    /// Acknowledges an image or a state, so that the next one can be sent.
     Seen { what: Seen },
-    /// Pictures are to be so large \[pixels\].
+    /// Sets the image size \[pixels\].
     Size { width: usize, height: usize },
-    /// Turns the view, in heights of the picture.
+    /// Orbits the camera by fractions of the image height.
     Orbit { dx: f64, dy: f64 },
-    /// Moves the view, in heights of the picture.
+    /// Pans the camera by fractions of the image height.
     Pan { dx: f64, dy: f64 },
-    /// Comes nearer, in notches of a wheel.
+    /// Zooms in by steps of a mouse wheel; negative steps zoom out.
     Zoom { by: f64 },
-    /// Looks from where it began.
+    /// Returns the camera to its initial pose.
     Home,
-    /// Looks at one environment, or at all.
+    /// Shows one environment, or all for `None`.
     Environment { env: Option<usize> },
-    /// Shows what a camera sensor sees, or none.
+    /// Shows the images of a camera sensor, or none for `None`.
     Camera { name: Option<String> },
-    /// Shows or hides something.
+    /// Enables or disables an overlay.
     Overlay { name: String, on: bool },
-    /// Holds the simulation.
+    /// Pauses the simulation.
     Pause,
-    /// Goes on.
+    /// Resumes the simulation.
     Play,
-    /// Does one step, and holds then.
+    /// Runs one step, then pauses.
     Step,
-    /// Resets the environment that is looked at, or all.
+    /// Resets the shown environment, or all.
     Reset,
-    /// Goes to a time of what was recorded \[s\].
+    /// Seeks to a time of a recording \[s\].
     Seek { time: f64 },
-    /// Simulated seconds per second; without bound where there is none.
+    /// Sets the speed in simulated seconds per second; `None` is as fast as the machine can step.
     Speed { factor: Option<f64> },
-    /// Selects what is seen at a point of the picture; nothing where that is the sky. Points are in parts of the picture's
-    /// width and height, from its upper left.
+    /// Selects the object at an image point, or nothing for the sky. Points are fractions of the image width and
+    /// height, from the upper left corner.
     Select { x: f64, y: f64 },
-    /// Selects nothing.
+    /// Clears the selection.
     Unselect,
-    /// Takes hold of the body at a point of the picture, and selects it.
+    /// Grabs the body at an image point with a mouse spring, and selects it.
     Grab { x: f64, y: f64 },
-    /// Pulls what is held to a point of the picture, or beside it, with a spring.
+    /// Pulls the grabbed body toward an image point, which may be outside the image.
     Pull { x: f64, y: f64 },
-    /// Lets go of it.
+    /// Releases the grabbed body.
     Release,
-    /// Begins to record, or ends it.
+    /// Starts or stops the recording.
     Record { on: bool },
-    /// Moves a joint's target \[rad or m\] in the environment that is looked at, or in all.
+    /// Sets the target of a joint \[rad or m\] in the shown environment, or in all.
     Target { robot: String, joint: String, value: f64 },
 }
 
-/// What has arrived.
+/// Kind of an acknowledged message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Seen {
-    /// A picture.
+    /// An image.
     Picture,
-    /// Contents or a state.
+    /// Scene contents or a state.
     State,
 }
 
 impl Command {
-    /// Reads a command; what is wrong with it is said in words.
+    /// Parses and validates a command. Returns the reason of a failure as a text.
     pub(super) fn parse(text: &str) -> Result<Self, String> {
         let command: Self = serde_json::from_str(text).map_err(|error| format!("not understood: {error}"))?;
         command.check()?;
         Ok(command)
     }
 
-    /// Numbers that mean something.
+    /// Checks that the numbers are in a sensible range.
     fn check(&self) -> Result<(), String> {
-        // A hand does not move further between two pictures.
+        // A larger mouse motion between two images is implausible.
         const FAR: f64 = 100.0;
         let within = |value: f64, what: &str| {
             if value.abs() <= FAR { Ok(()) } else { Err(format!("{what} is {value}: -{FAR} to {FAR} would do")) }

@@ -1,29 +1,29 @@
-//! Who may come in: not the pages of other sites, and not those without the token.
+//! Access control: refuses requests from other websites and requests without the token.
 
 use super::answer::Status;
 use super::head::Head;
 use super::token::Token;
 use std::net::{IpAddr, SocketAddr};
 
-/// The rules of one view.
+/// Access policy of one view.
 #[derive(Clone, Debug)]
 pub(super) struct Door {
-    /// Only this machine can reach it.
+    /// True if the server listens on loopback only.
     local: bool,
     token: Option<Token>,
 }
 
 impl Door {
-    /// A door at the address, with a token where other machines can reach it.
+    /// Creates the policy of an address, with a token if other machines can reach it.
     pub(super) fn new(address: SocketAddr, token: Option<Token>) -> Self {
         Self { local: address.ip().is_loopback(), token }
     }
 
-    /// Lets a request in or says why not.
+    /// Accepts a request, or returns the status of the refusal.
     ///
-    /// Where only this machine can reach the view, a browser on it still can be told by any page to ask us. The page's own
-    /// origin gives it away, or, where its name was made to point to this machine (DNS rebinding), the host it asks for: on
-    /// a local view that has to be this machine's. The port may differ, because of tunnels.
+    /// Even on a loopback address, any website can make a local browser send requests to this server. The `Origin`
+    /// header reveals such requests. With DNS rebinding the origin matches, but the `Host` header names the website, so
+    /// a loopback view accepts only host names of this machine. The port may differ, because of tunnels.
     pub(super) fn check(&self, head: &Head) -> Result<(), Status> {
         let host = head.header("host")?.ok_or(Status::BadRequest)?;
         if self.local && !is_local(host) {
@@ -33,7 +33,7 @@ impl Door {
             let at = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
             at.is_some_and(|at| at.eq_ignore_ascii_case(host))
         };
-        // Programs that are no browsers send none: nobody can make them come here against their will.
+        // Non-browser clients send no `Origin` header and are not exposed to cross-site requests.
         if head.header("origin")?.is_some_and(|origin| !same(origin)) {
             return Err(Status::Forbidden);
         }
@@ -45,11 +45,11 @@ impl Door {
     }
 }
 
-/// Whether a `Host` header names this machine.
+/// True if a `Host` header names this machine.
 fn is_local(host: &str) -> bool {
     let name = match host.rsplit_once(':') {
         Some((name, port)) if !port.is_empty() && port.bytes().all(|b| b.is_ascii_digit()) => name,
-        // An IPv6 address without a port ends with its bracket.
+        // An IPv6 address without a port ends with a bracket.
         Some(_) if !host.ends_with(']') => return false,
         _ => host,
     };

@@ -1,46 +1,46 @@
-//! What can go wrong before the browser view listens.
+//! Errors of starting a browser view.
 
 use std::net::SocketAddr;
 
-/// Why there is no browser view.
+/// An error of starting a browser view.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ServeError {
-    /// It is not an address that can be listened on.
+    /// The address is invalid or not available.
     #[error("cannot serve at {given:?}: {reason}{}", hint(candidates))]
     Address {
-        /// What was asked for.
+        /// The requested address.
         given: String,
-        /// What is wrong with it.
+        /// Reason of the refusal.
         reason: String,
-        /// Addresses that would do.
+        /// Alternative addresses.
         candidates: Vec<String>,
     },
-    /// Another program, or another simulation, listens there.
+    /// Another program or another simulation listens at the address.
     #[error(
         "cannot serve at {address}: port {} is in use{}",
         address.port(),
         hint(&next.iter().map(ToString::to_string).collect::<Vec<_>>())
     )]
     PortInUse {
-        /// What was asked for.
+        /// The requested address.
         address: SocketAddr,
-        /// The next port that is free.
+        /// The next free port, if one was found.
         next: Option<SocketAddr>,
     },
-    /// The system refused for another reason.
+    /// The operating system refused to listen for another reason.
     #[error("cannot serve at {address}: {error}")]
     Listen {
-        /// What was asked for.
+        /// The requested address.
         address: SocketAddr,
-        /// What the system says.
+        /// Error of the operating system.
         #[source]
         error: std::io::Error,
     },
-    /// The system gives no random numbers, or no thread.
+    /// The operating system provides no random numbers or no thread.
     #[error("cannot serve: {0}")]
     System(String),
-    /// The simulation cannot be looked at.
+    /// The simulation returned an error.
     #[error("cannot serve: {0}")]
     Simulation(#[from] kinetoscope_sim::Error),
 }

@@ -1,4 +1,4 @@
-//! The eyes of a viewer in a browser: which environment they look at, from where, and what is drawn over it.
+//! Rendering and control for each browser: shown environment, camera, overlays, and commands.
 
 use super::ServeCfg;
 use super::command::Command;
@@ -17,28 +17,29 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Sides of a picture \[pixels\].
+/// Smallest and largest side of an image \[pixels\].
 const SIDES: [usize; 2] = [16, 2048];
-/// Pixels of a picture, at most: of a larger page the picture is coarser than its screen.
+/// Maximum number of pixels of an image. Larger pages get an image of lower resolution.
 const MOST_PIXELS: usize = 1920 * 1080;
-/// Between two pictures of a camera.
+/// Minimum interval between two images of a camera sensor.
 const PANEL_EVERY: Duration = Duration::from_millis(100);
-/// Width of each of the four pictures of a camera, at most \[pixels\].
+/// Maximum width of each of the four images of a camera sensor \[pixels\].
 const PANEL_WIDTH: usize = 320;
 
-/// Gives viewers their eyes.
+/// View backend of a simulation: creates the sessions of browsers.
 pub(super) struct Theatre {
-    /// Keeps the speed that was asked for with the server.
+    /// Viewer that keeps the initial speed set with the server.
     usher: Viewer,
     shared: Arc<Shared>,
 }
 
-/// What all viewers of a server share.
+/// State shared by all sessions of a server.
 struct Shared {
     cfg: ServeCfg,
-    /// Pauses and speeds of all browsers: whoever is in one may leave and come again, and they stay.
+    /// Viewer that owns the pause and speed of all browsers. These settings stay when a single browser leaves and
+    /// returns.
     hands: Mutex<Viewer>,
-    /// Who holds it draws: so viewers together take one core from the simulation.
+    /// Held while rendering, so that all sessions together take at most one core from the simulation.
     brush: Mutex<()>,
     seated: AtomicUsize,
 }
@@ -61,7 +62,7 @@ impl Show for Theatre {
     }
 
     fn deserted(&self) {
-        // What the old hands did ends with them; what was done in a window stays.
+        // Dropping the old viewer undoes the settings of browsers; the settings of windows stay.
         *self.shared.hands() = self.usher.another(Wants::NOTHING);
     }
 }
@@ -77,7 +78,7 @@ struct OwnEyes {
     wants: Wants,
     shared: Arc<Shared>,
     eye: Option<Eye>,
-    /// Number of the program's point of view that was taken over.
+    /// Value of `Viewpoint::changes` that was last applied.
     view_changes: u64,
     shown: Shown,
     overlays: Overlays,
@@ -89,12 +90,13 @@ struct OwnEyes {
     painter: Painter,
     panel: Panel,
     canvas: Canvas,
-    /// Raised by what changes the picture without the simulation.
+    /// Incremented by each change of the image that does not come from the simulation.
     looks: u64,
-    /// Snapshot and look of the last picture.
+    /// Snapshot number and `looks` of the last image.
     drawn: (u64, u64),
-    /// The same of the last picture of a camera, and when that was.
+    /// Snapshot number and `looks` of the last camera sensor image.
     panel_drawn: (u64, u64),
+    /// Time of the last camera sensor image.
     panel_at: Option<Instant>,
     told_names: Option<(Arc<Names>, usize)>,
     told: Option<Value>,
@@ -133,7 +135,7 @@ impl OwnEyes {
         }
     }
 
-    /// Looks at the newest snapshot for as long as something is made of it: held longer, fewer would come.
+    /// Calls `make` with the newest snapshot and releases it afterward: a held snapshot would reduce the snapshot rate.
     fn with_newest<T>(&mut self, make: impl FnOnce(&mut Self, &Snapshot) -> T) -> Option<T> {
         let snapshot = self.viewer.newest()?;
         Some(make(self, &snapshot))
@@ -199,7 +201,7 @@ impl OwnEyes {
         Ok(())
     }
 
-    /// Asks for what is drawn, and no more: contacts are solved for the purpose.
+    /// Requests the snapshot contents that are drawn, and no others, because contacts are expensive to compute.
     fn want(&mut self) {
         let contacts = contacts_wanted(self.shown, &self.overlays, self.picked.as_ref());
         let wants = Wants { contacts, ..self.wants };
@@ -214,7 +216,7 @@ impl OwnEyes {
         if ![width, height].iter().all(|side| (least..=4 * most).contains(side)) {
             return Err(format!("{width} x {height}: pictures have sides of {least} to {} pixels", 4 * most));
         }
-        // Larger ones are drawn smaller, in the same shape.
+        // Larger images are rendered at lower resolution with the same aspect ratio.
         let by_pixels = (MOST_PIXELS as f64 / (width * height) as f64).sqrt();
         let scale = by_pixels.min(most as f64 / width.max(height) as f64).min(1.0);
         self.size = [width, height].map(|side| ((side as f64 * scale) as usize).max(1));
@@ -229,7 +231,7 @@ impl OwnEyes {
         self.send(control::Command::SetTarget { robot, joint, env: self.env(), value })
     }
 
-    /// The view of the stage, and what is drawn in it, to find out what is seen at a point: in parts of width and height.
+    /// Calls `find` with the current view at an image point, given as fractions of width and height.
     fn with_seen<T>(
         &mut self,
         [x, y]: [f64; 2],
@@ -239,7 +241,7 @@ impl OwnEyes {
         let eye = self.eye.unwrap_or_else(|| self.home(&snapshot));
         let [width, height] = self.size;
         let view = eye.view(width, height);
-        // The last pixel is at 1.
+        // A coordinate of 1 selects the last pixel.
         let pixel = [(x, width), (y, height)].map(|(part, side)| (part * side as f64).min(side as f64 - 0.5));
         let look = Look { shown: self.shown, overlays: self.overlays, ..Look::default() };
         let shared = Arc::clone(&self.shared);
@@ -257,7 +259,7 @@ impl OwnEyes {
     fn grab(&mut self, at: [f64; 2]) -> Result<(), String> {
         self.pull = self.with_seen(at, Pull::at);
         let Some(pull) = &self.pull else {
-            // What was held before is let go.
+            // The previously grabbed body is released.
             self.send_own(control::Command::Release)?;
             return Err("there is nothing here that can be pulled at".into());
         };
@@ -267,7 +269,7 @@ impl OwnEyes {
     }
 
     fn pull_to(&mut self, at: [f64; 2]) -> Result<(), String> {
-        // Who grabbed nothing was told so.
+        // Without a grabbed body, the failed grab was already reported.
         let Some(mut pull) = self.pull.take() else { return Ok(()) };
         self.pull = self.with_seen([0.0; 2], move |_, snapshot, view, _, _| {
             pull.to(snapshot, view, [at[0] * view.width as f64, at[1] * view.height as f64]);
@@ -277,7 +279,7 @@ impl OwnEyes {
         self.send_pull()
     }
 
-    /// The spring is this viewer's own: it ends with it.
+    /// The spring belongs to the viewer of this session and ends with the session.
     fn send_pull(&self) -> Result<(), String> {
         self.pull.as_ref().and_then(Pull::command).map_or(Ok(()), |pull| self.send_own(pull))
     }
@@ -295,7 +297,7 @@ impl OwnEyes {
         if snapshot.number != self.drawn.0 {
             self.picked.iter_mut().for_each(|picked| picked.renumber(&snapshot.names));
             self.pull.iter_mut().for_each(|pull| pull.renumber(&snapshot.names));
-            // Where that fails it is over.
+            // Sending fails only after the simulation has ended.
             let _ = self.send_pull();
         }
         self.drawn = key;
@@ -335,7 +337,7 @@ impl OwnEyes {
         Some(Picture { about, file: drawn.then(|| self.jpeg()).flatten()? })
     }
 
-    /// What is on the canvas, as a file.
+    /// Encodes the canvas as a JPEG file.
     fn jpeg(&self) -> Option<Vec<u8>> {
         let [width, height] = self.canvas.dimensions().map(|side| u32::try_from(side).unwrap_or(u32::MAX));
         let rgb: Vec<u8> = self.canvas.bytes().as_chunks::<4>().0.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();

@@ -1,33 +1,32 @@
-//! The head of an HTTP request, with bounds on its size and on the time it may take.
+//! Parser of HTTP request heads, with limits on size and duration.
 
 use super::answer::Status;
 use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Bytes of a request line with its headers, at most. Browsers send less than 2 kB; cookies of other pages on this machine
-/// come along.
+/// Maximum size of a request head \[bytes\]. Browsers send less than 2 kB, plus cookies of other pages on this machine.
 const MAX_BYTES: usize = 16 << 10;
-/// Headers, at most.
+/// Maximum number of headers.
 const MAX_HEADERS: usize = 96;
-/// How long a head may take, all of it: one byte a second is no request.
+/// Timeout of a complete request head. Clients that send a byte per second are refused.
 const MAX_TIME: Duration = Duration::from_secs(5);
 
-/// What was asked.
+/// A parsed HTTP request head.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Head {
     pub(super) method: String,
-    /// Without the query.
+    /// Path without the query.
     pub(super) path: String,
-    /// What stands behind the question mark.
+    /// Query without the question mark.
     pub(super) query: String,
     headers: Vec<(String, String)>,
-    /// Bytes that came after the head.
+    /// Bytes received after the head.
     pub(super) rest: Vec<u8>,
 }
 
 impl Head {
-    /// Reads a head; `None` where the other end said nothing at all.
+    /// Reads a request head. Returns `None` if the client sent nothing, or if the connection failed.
     pub(super) fn read(stream: &mut TcpStream) -> Result<Option<Self>, Status> {
         let start = Instant::now();
         let mut bytes = Vec::new();
@@ -56,7 +55,7 @@ impl Head {
         }
     }
 
-    /// A whole head, or `None` where more has to come.
+    /// Parses a complete head, or returns `None` if more bytes are needed.
     fn parse(bytes: &[u8]) -> Result<Option<Self>, Status> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
@@ -81,7 +80,7 @@ impl Head {
         }))
     }
 
-    /// The value of a header, `name` in small letters. One that came twice says nothing that can be relied on: an error.
+    /// Returns the value of a header, by lower-case name. Duplicate headers are ambiguous and give an error.
     pub(super) fn header(&self, name: &str) -> Result<Option<&str>, Status> {
         let mut values = self.headers.iter().filter(|(n, _)| n == name).map(|(_, value)| value.as_str());
         match (values.next(), values.next()) {
@@ -90,13 +89,13 @@ impl Head {
         }
     }
 
-    /// Whether a header that lists words has this one.
+    /// True if a comma-separated header contains a word.
     pub(super) fn lists(&self, name: &str, word: &str) -> bool {
         let values = self.headers.iter().filter(|(n, _)| n == name);
         values.flat_map(|(_, value)| value.split(',')).any(|item| item.trim().eq_ignore_ascii_case(word))
     }
 
-    /// A value of the query.
+    /// Returns a value of the query.
     pub(super) fn query(&self, key: &str) -> Option<&str> {
         self.query.split('&').filter_map(|pair| pair.split_once('=')).find(|(k, _)| *k == key).map(|(_, value)| value)
     }
@@ -121,7 +120,7 @@ mod tests {
         assert_eq!(head.header("origin"), Ok(None));
         assert!(head.lists("connection", "upgrade") && !head.lists("connection", "close"));
         assert_eq!(head.rest, b"more");
-        // A request in pieces waits for the rest.
+        // An incomplete request waits for more bytes.
         for end in 1..text.len() - "more".len() {
             assert_eq!(parsed(&text[..end]), Ok(None), "{:?}", &text[..end]);
         }

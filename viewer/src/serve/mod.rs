@@ -1,4 +1,4 @@
-//! The simulation in a browser: one page, with pictures drawn here, sliders, plots and buttons.
+//! Browser view: a web page with live images, joint sliders, plots and controls of the simulation.
 //!
 //! ```no_run
 //! use kinetoscope_sim::{SimulationManager, SimulationManagerCfg};
@@ -14,12 +14,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Everybody on this machine may look and act, and nobody else. At an address that other machines reach, a token is needed,
-//! which is in [`Served::url`]. Nothing is encrypted: where the network between is not to be trusted, listen on loopback and
-//! come through a tunnel (`ssh -L 8080:localhost:8080 robot`).
+//! On a loopback address, every program and user of this machine can watch and control the simulation. On an address
+//! that other machines can reach, a token is required, which is part of [`Served::url`]. The connection is not
+//! encrypted: over an untrusted network, listen on loopback and use a tunnel (`ssh -L 8080:localhost:8080 robot`).
 //!
-//! Each viewer has a thread that draws its pictures of the newest [`Snapshot`](crate::Snapshot), one at a time among all
-//! viewers of a server: together they use one core at most. The simulation waits for none of them.
+//! Each viewer has its own thread, which renders images of the newest [`Snapshot`](crate::Snapshot). Only one viewer of
+//! a server renders at a time, so all viewers together use at most one core. The simulation waits for none of them.
 
 mod address;
 mod answer;
@@ -46,19 +46,19 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Weak};
 use token::Token;
 
-/// How a simulation is served.
+/// Settings of the browser view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ServeCfg {
-    /// Viewers at a time, at most. A further one is told to come later.
+    /// Maximum number of simultaneous viewers. Further viewers are refused with status 503 (Service Unavailable).
     pub max_viewers: usize,
-    /// Pictures per second for each viewer, at most.
+    /// Maximum number of images per second for each viewer.
     pub rate: f64,
-    /// Quality of the pictures, 1 to 100: how much of what JPEG leaves out is kept.
+    /// JPEG quality of the images, 1 to 100.
     pub quality: u8,
-    /// How fast simulated time passes until some viewer says otherwise, and again when the last one has gone; `None` leaves it as
-    /// it is: what a window set, else as fast as can be.
+    /// Speed of simulated time until a viewer changes it, and again after the last viewer has left. `None` keeps the
+    /// current speed: that set by a window, otherwise as fast as the machine can step.
     pub speed: Option<Speed>,
-    /// The simulation's record button; where `None`, the one that another view has brought, if any.
+    /// Record button of the simulation. `None` keeps the button that another view has set, if any.
     pub recording: Option<RecordButton>,
 }
 
@@ -68,7 +68,8 @@ impl Default for ServeCfg {
     }
 }
 
-/// A view that is being served. It is served until it is [closed](Self::close) or the simulation is dropped.
+/// Handle of a browser view. Dropping the handle has no effect: the view ends when it is [closed](Self::close) or the
+/// simulation is dropped.
 #[derive(Debug)]
 pub struct Served {
     url: String,
@@ -78,48 +79,48 @@ pub struct Served {
 }
 
 impl Served {
-    /// What to open in a browser, with the token where one is needed.
+    /// Address to open in a browser, with the token if one is required.
     pub fn url(&self) -> &str {
         &self.url
     }
 
-    /// Where it listens.
+    /// Address and port that the server listens on.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// How many look at it now.
+    /// Number of connected viewers.
     pub fn viewers(&self) -> usize {
         self.house.upgrade().map_or(0, |house| house.viewers())
     }
 
-    /// Sends all viewers away and listens no more.
+    /// Disconnects all viewers and stops listening.
     ///
     /// # Errors
-    /// It was closed before.
+    /// The view was already closed.
     ///
     /// # Panics
-    /// It is served by another simulation.
+    /// The view belongs to another simulation.
     pub fn close(&self, sim: &mut SimulationManager) -> kinetoscope_sim::Result<()> {
         sim.observers_mut().remove(self.host).map(drop)
     }
 }
 
-/// Simulations that can be seen in a browser.
+/// Browser views of a simulation.
 pub trait Serve {
-    /// Shows the simulation in browsers at `address`: `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080`, `8080`; port 0 takes
-    /// any that is free. It is seen and can be acted on while the program steps it.
+    /// Serves the simulation to browsers at `address`: `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080` or `8080`; port
+    /// 0 selects a free port. Viewers can watch and control the simulation while the program steps it.
     ///
     /// # Errors
-    /// The address is none, is not of this machine, or is in use; the error says what would do.
+    /// The address is invalid, does not belong to this machine, or is in use; the error suggests alternatives.
     fn serve(&mut self, address: &str) -> Result<Served, ServeError> {
         self.serve_with(address, ServeCfg::default())
     }
 
-    /// As [`serve`](Self::serve), with more to choose.
+    /// Serves the simulation to browsers, like [`serve`](Self::serve), with the settings `cfg`.
     ///
     /// # Errors
-    /// As there.
+    /// The errors of [`serve`](Self::serve).
     fn serve_with(&mut self, address: &str, cfg: ServeCfg) -> Result<Served, ServeError>;
 }
 
@@ -132,7 +133,8 @@ impl Serve for SimulationManager {
         let token = if address.ip().is_loopback() { None } else { Some(Token::random()?) };
         let secret = token.as_ref().map_or_else(String::new, |token| format!("?token={}", token.as_str()));
         let url = format!("http://{}/{secret}", address::reachable(address));
-        // Who comes in later finds how things were half a second ago, also where the program does not step just then.
+        // Requests two snapshots per second. A new viewer thus starts with a state at most half a second old, even if
+        // the program does not step then.
         let usher = self.viewer(Wants { rate: 2.0, ..Wants::default() });
         let theatre = Arc::new(Theatre::new(usher, cfg));
         let server = Server::start(listener, Door::new(address, token), theatre, max_viewers)?;
@@ -143,7 +145,7 @@ impl Serve for SimulationManager {
     }
 }
 
-/// Keeps a server for as long as there is its simulation.
+/// Observer that owns the server, which thus ends with its simulation.
 struct Host(Server);
 
 impl std::fmt::Debug for Host {
@@ -167,7 +169,7 @@ mod tests {
     use crate::control::Command;
     use crate::sample::sample;
 
-    /// Serving leaves the speed that a window set, unless it sets one.
+    /// Serving keeps the speed that a window set, unless the settings have a speed.
     #[test]
     fn speed() {
         let mut sim = sample(1).sim;
@@ -181,7 +183,7 @@ mod tests {
         };
         until(&mut sim, Speed::REAL);
         let _served = sim.serve("127.0.0.1:0").unwrap();
-        // Commands are obeyed within some milliseconds, steps are 10 ms long.
+        // Commands run within some milliseconds; steps take 10 ms.
         sim.update(10);
         assert_eq!(window.newest().unwrap().run.speed, Speed::REAL);
         let cfg = ServeCfg { speed: Some(Speed::Times(2.0)), ..ServeCfg::default() };

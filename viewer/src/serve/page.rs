@@ -1,6 +1,6 @@
-//! The page: one HTML file with its style and its program inside, so that it needs nothing else.
+//! The web page: a single HTML file with embedded styles and scripts.
 
-/// The page as it is sent. `nonce` marks its own style and program, the only ones that its browser will accept.
+/// Returns the page. Its styles and scripts carry `nonce`, and the browser accepts no others.
 pub(super) fn html(nonce: &str) -> String {
     const PAGE: &str = include_str!("page/index.html");
     const STYLE: &str = include_str!("page/page.css");
@@ -18,13 +18,13 @@ pub(super) fn html(nonce: &str) -> String {
 mod tests {
     use super::*;
 
-    /// The page is whole and asks no other server.
+    /// The page is complete and requests nothing from other servers.
     #[test]
     fn page() {
         let page = html("0123abcd");
         assert!(page.starts_with("<!doctype html>") && page.trim_end().ends_with("</html>"));
         let absent = ["/*STYLE*/", "/*PROGRAM*/", "NONCE", "http://", "https://", "//cdn", "@import", "url("];
-        // One more end would end the program in the middle of the page.
+        // Another closing tag would end the script in the middle of the page.
         let counts = [("nonce=\"0123abcd\"", 2), ("</script>", 1), ("</style>", 1)];
         for (text, count) in counts.into_iter().chain(absent.map(|text| (text, 0))) {
             assert_eq!(page.matches(text).count(), count, "{text}");

@@ -1,4 +1,4 @@
-//! Listens, and gives each connection a thread of its own, within bounds.
+//! HTTP server with one thread per connection, and limits on the number of connections.
 
 use super::answer::{self, Status};
 use super::door::Door;
@@ -15,24 +15,24 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tungstenite::handshake::derive_accept_key;
 
-/// Connections besides viewers: pages that are being loaded, and those who say nothing until their time is up.
+/// Number of connections in addition to viewers: page loads, and silent connections until their timeout.
 const SPARE_CONNECTIONS: usize = 32;
-/// How often somebody new is looked for.
+/// Interval between two checks for new connections.
 const ACCEPT_EVERY: Duration = Duration::from_millis(15);
-/// How long nobody may be there until what the last one did to the simulation is undone: who only lost the connection, or
-/// loads the page again, is back by then.
+/// Time without viewers after which the settings of the last viewer are undone. A viewer that lost its connection or
+/// reloads the page returns earlier.
 const DESERTED_AFTER: Duration = Duration::from_secs(10);
-/// The path of the WebSocket.
+/// Path of the WebSocket endpoint.
 const LIVE: &str = "/live";
 
-/// What all connections share.
+/// State shared by all connections.
 pub(super) struct House {
     door: Door,
     show: Arc<dyn Show>,
     max_viewers: usize,
     viewers: AtomicUsize,
     stop: AtomicBool,
-    /// The other ends, to wake their threads.
+    /// Open sockets, which are shut down to wake their threads.
     connections: Mutex<Connections>,
 }
 
@@ -44,12 +44,12 @@ struct Connections {
 }
 
 impl House {
-    /// Whether everybody has to leave.
+    /// True if the server is shutting down and all connections have to end.
     pub(super) fn closes(&self) -> bool {
         self.stop.load(Ordering::Acquire)
     }
 
-    /// How many look at it now.
+    /// Number of connected viewers.
     pub(super) fn viewers(&self) -> usize {
         self.viewers.load(Ordering::Acquire)
     }
@@ -59,14 +59,14 @@ impl House {
     }
 }
 
-/// A server; dropped, it closes every connection and waits for its threads.
+/// A running server. Dropping the server closes every connection and joins all threads.
 pub(super) struct Server {
     house: Arc<House>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Server {
-    /// Lets people in from now on.
+    /// Starts to accept connections.
     pub(super) fn start(
         listener: TcpListener,
         door: Door,
@@ -89,12 +89,12 @@ impl Server {
         Ok(Self { house, thread: Some(thread) })
     }
 
-    /// How many look at it now.
+    /// Number of connected viewers.
     pub(super) fn viewers(&self) -> usize {
         self.house.viewers()
     }
 
-    /// What its connections share.
+    /// Returns the state shared by all connections.
     pub(super) fn house(&self) -> Weak<House> {
         Arc::downgrade(&self.house)
     }
@@ -105,13 +105,13 @@ impl Drop for Server {
         self.house.stop.store(true, Ordering::Release);
         if let Some(thread) = self.thread.take() {
             thread.thread().unpark();
-            // One that panicked has ended as well.
+            // A thread that panicked has ended as well.
             let _ = thread.join();
         }
         let threads = {
             let mut connections = self.house.connections();
             for stream in connections.open.values() {
-                // Gone already where it fails.
+                // An error means that the connection is already closed.
                 let _ = stream.shutdown(Shutdown::Both);
             }
             std::mem::take(&mut connections.threads)
@@ -123,10 +123,10 @@ impl Drop for Server {
 }
 
 fn listen(listener: &TcpListener, house: &Arc<House>) {
-    // When the last viewer was seen; `None` while nobody has to be waited for.
+    // Time at which a viewer was last connected; `None` if no settings have to be undone.
     let mut seen: Option<Instant> = None;
     while !house.closes() {
-        // An error is of the one who wanted to come in, or there are too many files open, which passes.
+        // An error comes from the connecting client or from a temporary lack of file descriptors.
         match listener.accept() {
             Ok((stream, _)) => welcome(stream, house),
             Err(_) => std::thread::park_timeout(ACCEPT_EVERY),
@@ -141,9 +141,9 @@ fn listen(listener: &TcpListener, house: &Arc<House>) {
     }
 }
 
-/// Gives a connection its thread.
+/// Starts the thread of a connection.
 fn welcome(mut stream: TcpStream, house: &Arc<House>) {
-    // Accepted sockets block, whatever the listener does: on Linux that is so, elsewhere it has to be said.
+    // Accepted sockets may inherit the non-blocking mode of the listener on some systems (not on Linux).
     if stream.set_nonblocking(false).is_err() || stream.set_nodelay(true).is_err() {
         return;
     }
@@ -152,7 +152,8 @@ fn welcome(mut stream: TcpStream, house: &Arc<House>) {
         let mut connections = house.connections();
         if connections.open.len() >= house.max_viewers + SPARE_CONNECTIONS {
             drop(connections);
-            // Not a word that could block: whoever comes in such numbers is no browser.
+            // The connection is closed without a response, which could block. So many connections do not come from
+            // browsers.
             return;
         }
         connections.next += 1;
@@ -164,17 +165,17 @@ fn welcome(mut stream: TcpStream, house: &Arc<House>) {
     let thread = std::thread::Builder::new().name("view-talk".into());
     let talk = move || {
         talk(&mut stream, &entry.house);
-        // Ends it for the other side too, although the waker still holds it.
+        // Closes the connection for the client too, although `waker` still holds the socket.
         let _ = stream.shutdown(Shutdown::Both);
         drop(entry);
     };
-    // Without a thread the entry is dropped here.
+    // If no thread can be started, the entry is dropped here.
     if let Ok(thread) = thread.spawn(talk) {
         house.connections().threads.push(thread);
     }
 }
 
-/// A connection's place in the list, free when it is dropped: also when its thread panics.
+/// Entry of a connection in the list of open sockets. Dropping it removes the entry, even if the thread panics.
 struct Entry {
     house: Arc<House>,
     number: u64,
@@ -186,7 +187,7 @@ impl Drop for Entry {
     }
 }
 
-/// A viewer's place, free when it is dropped.
+/// Reserved place of a viewer, released on drop.
 struct Seat<'a>(&'a House);
 
 impl<'a> Seat<'a> {
@@ -223,11 +224,11 @@ fn talk(stream: &mut TcpStream, house: &House) {
     }
 }
 
-/// Turns the connection into a WebSocket (RFC 6455, section 4.2).
+/// Upgrades the connection to a WebSocket (RFC 6455, section 4.2).
 fn live(stream: &mut TcpStream, house: &House, head: Head) {
     let asks = head.lists("connection", "upgrade") && head.lists("upgrade", "websocket");
     let version = head.header("sec-websocket-version").ok().flatten();
-    // Sixteen bytes in base 64.
+    // Sixteen bytes in base64.
     let key = head.header("sec-websocket-key").ok().flatten().filter(|key| key.len() == 24);
     let Some(key) = key.filter(|_| asks && version == Some("13")) else {
         return answer::refuse(stream, Status::UpgradeRequired);

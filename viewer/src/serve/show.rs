@@ -1,42 +1,43 @@
-//! What a server shows, without saying how it is drawn: transport and simulation meet here.
+//! Interface between the server (transport) and the view (simulation and rendering).
 
 use super::command::Command;
 use serde_json::Value;
 
-/// Something that can be looked at by many.
+/// A view that serves several clients.
 pub(super) trait Show: Send + Sync {
-    /// The eyes of one more viewer.
+    /// Creates the session of a new client.
     fn eyes(&self) -> Box<dyn Eyes>;
 
-    /// All viewers have been gone for a while.
+    /// Called after all clients have been gone for a while.
     fn deserted(&self);
 }
 
-/// What one viewer sees and does. Nothing in here waits for the simulation.
+/// Session of one client. Its methods never wait for the simulation.
 pub(super) trait Eyes: Send {
-    /// What there is: robots and their joints, cameras, environments. `None` where that is as it was told last.
+    /// Returns the scene contents: robots and their joints, cameras, environments. `None` if unchanged since the last
+    /// call.
     fn contents(&mut self) -> Option<Value>;
 
-    /// How everything stands now. `None` where that is as it was told last.
+    /// Returns the state. `None` if unchanged since the last call.
     fn state(&mut self) -> Option<Value>;
 
-    /// Does what the viewer asks, or says why not.
+    /// Runs a command, or returns the reason of its refusal.
     fn obey(&mut self, command: Command) -> Result<(), String>;
 
-    /// The pictures that are due: none where nothing has changed.
+    /// Renders the images that are due; empty if nothing has changed.
     fn pictures(&mut self) -> Vec<Picture>;
 }
 
-/// A picture on its way.
+/// An encoded image with its description.
 pub(super) struct Picture {
-    /// What it shows, for the page.
+    /// Description of the image for the page.
     pub(super) about: Value,
-    /// A file of pictures: JPEG or PNG.
+    /// Image file, JPEG or PNG.
     pub(super) file: Vec<u8>,
 }
 
 impl Picture {
-    /// As it travels: the length of `about` as four bytes, the lowest first, `about` as JSON, the file.
+    /// Encodes the message: length of `about` as four bytes (little endian), `about` as JSON, image file.
     pub(super) fn message(&self) -> Vec<u8> {
         let about = self.about.to_string().into_bytes();
         let length = u32::try_from(about.len()).unwrap_or(u32::MAX).to_le_bytes();

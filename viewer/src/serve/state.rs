@@ -1,13 +1,13 @@
-//! What the page is told, as JSON.
+//! JSON messages to the page: scene contents and state.
 
 use crate::control::Speed;
 use crate::stage::{JointName, Names, Overlays, Picked, Shown, Snapshot, describe, slider_range};
 use serde_json::{Value, json};
 
-/// Name, words for people, and the switch of what can be drawn over the scene.
+/// Name, label, and accessor of an overlay.
 type Overlay = (&'static str, &'static str, fn(&mut Overlays) -> &mut bool);
 
-/// All that can be drawn over the scene.
+/// All overlays.
 pub(super) const OVERLAYS: [Overlay; 9] = [
     ("visuals", "visuals", |o| &mut o.visuals),
     ("collisions", "collision shapes", |o| &mut o.collisions),
@@ -20,14 +20,14 @@ pub(super) const OVERLAYS: [Overlay; 9] = [
     ("sensors", "sensors", |o| &mut o.sensors),
 ];
 
-/// What there is.
+/// Returns the scene contents: environments, robots with their joints, cameras, and overlays.
 pub(super) fn contents(snapshot: &Snapshot, overlays: &Overlays) -> Value {
     let mut overlays = *overlays;
     let overlays: Vec<Value> = OVERLAYS
         .iter()
         .map(|(name, title, of)| json!({"name": name, "title": title, "on": *of(&mut overlays)}))
         .collect();
-    // Limits of the first environment: a slider has one range.
+    // Limits come from the first environment, since a slider has a single range.
     let limits = snapshot.envs.first().map(|env| env.joints.as_slice()).unwrap_or_default();
     let joint = |index: usize, name: &JointName| {
         let [.., lower, upper] = limits.get(index).copied().unwrap_or([f64::NAN; 4]);
@@ -54,7 +54,7 @@ pub(super) fn contents(snapshot: &Snapshot, overlays: &Overlays) -> Value {
     })
 }
 
-/// How everything stands, with the joints of the environment that is shown, or of the first.
+/// Returns the state, with the joints of the shown environment, or of the first.
 pub(super) fn state(snapshot: &Snapshot, shown: Shown, picked: Option<&Picked>, viewers: usize) -> Value {
     let (index, environment) = match shown {
         Shown::All => (0, None),
@@ -94,7 +94,7 @@ pub(super) fn state(snapshot: &Snapshot, shown: Shown, picked: Option<&Picked>, 
     })
 }
 
-/// What was clicked on: where it is, and the contact forces on it, in the axes of its environment; null what is not known.
+/// Returns the selection: pose and contact forces in the environment frame. Unknown values are null.
 fn selected(picked: &Picked, snapshot: &Snapshot) -> Value {
     let pose = picked.pose(snapshot);
     let position = pose.map_or(picked.point, |pose| pose.translation.vector.into());
@@ -112,7 +112,7 @@ fn selected(picked: &Picked, snapshot: &Snapshot) -> Value {
     })
 }
 
-/// The joint that the page calls by the names of its robot and its own.
+/// Finds a driven joint by the names of its robot and its own.
 pub(super) fn find_joint<'a>(names: &'a Names, robot: &str, joint: &str) -> Result<&'a JointName, String> {
     let of_robot: Vec<&JointName> = names.joints.iter().filter(|name| parts(name).0 == robot).collect();
     if of_robot.is_empty() {
@@ -127,7 +127,7 @@ pub(super) fn find_joint<'a>(names: &'a Names, robot: &str, joint: &str) -> Resu
     if found.driven { Ok(found) } else { Err(format!("joint {joint:?} has no drive of its own")) }
 }
 
-/// Robots with the number of their first joint.
+/// Returns the joints of each robot, with the index of its first joint.
 fn by_robot(names: &Names) -> impl Iterator<Item = (usize, &[JointName])> {
     let mut first = 0;
     names.joints.chunk_by(|a, b| a.robot == b.robot).map(move |joints| {
@@ -137,12 +137,12 @@ fn by_robot(names: &Names) -> impl Iterator<Item = (usize, &[JointName])> {
     })
 }
 
-/// Robot and joint of `uid/joint`.
+/// Splits `uid/joint` into robot and joint.
 fn parts(name: &JointName) -> (&str, &str) {
     name.name.split_once('/').unwrap_or(("", &name.name))
 }
 
-/// A number, or null where JSON has none.
+/// Returns a number, or null for a non-finite value, which JSON cannot represent.
 fn finite(value: f64) -> Value {
     if value.is_finite() { json!(value) } else { Value::Null }
 }

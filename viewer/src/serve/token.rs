@@ -1,13 +1,13 @@
-//! The secret of a view that other machines can reach.
+//! Access token of views that other machines can reach.
 
 use super::error::ServeError;
 use std::fmt;
 use std::hint::black_box;
 
-/// Bytes of a token: too many to be guessed.
+/// Number of random bytes of a token: 128 bits cannot be guessed.
 const BYTES: usize = 16;
 
-/// A random secret: who knows it may look and act.
+/// A random secret that grants access to a view.
 #[derive(Clone, PartialEq, Eq)]
 pub(super) struct Token(String);
 
@@ -18,26 +18,27 @@ impl fmt::Debug for Token {
 }
 
 impl Token {
-    /// A new one.
+    /// Creates a random token.
     pub(super) fn random() -> Result<Self, ServeError> {
         Ok(Self(random_hex()?))
     }
 
-    /// As it stands in the address of the page.
+    /// Returns the token as used in the URL.
     pub(super) fn as_str(&self) -> &str {
         &self.0
     }
 
-    /// Whether `given` is this one; the time that takes tells nothing of how much of it is right.
+    /// True if `given` equals the token. The comparison takes constant time, so its duration reveals nothing about the
+    /// token.
     pub(super) fn is(&self, given: &str) -> bool {
         let (own, given) = (self.0.as_bytes(), given.as_bytes());
-        // Its length is no secret.
+        // The length is not secret.
         own.len() == given.len()
             && black_box(own.iter().zip(given).fold(0, |apart, (a, b)| black_box(apart | (a ^ b)))) == 0
     }
 }
 
-/// 32 random hexadecimal digits.
+/// Returns 32 random hexadecimal digits.
 pub(super) fn random_hex() -> Result<String, ServeError> {
     let mut bytes = [0; BYTES];
     getrandom::fill(&mut bytes).map_err(|error| ServeError::System(format!("no random numbers: {error}")))?;
@@ -49,7 +50,7 @@ pub(super) fn random_hex() -> Result<String, ServeError> {
 mod tests {
     use super::*;
 
-    /// A token is equal to itself only, and is not printed.
+    /// A token equals only itself, and is not printed by `Debug`.
     #[test]
     fn equality() {
         let [token, second] = [(); 2].map(|()| Token::random().unwrap());

@@ -1,7 +1,7 @@
-//! One viewer: its pictures and its commands.
+//! WebSocket session of one browser: images, states and commands.
 //!
-//! What is sent is made when it can be sent: there is no queue that could grow. The page says when it has a picture or a
-//! state, and not more than a few are on their way at a time; so a slow viewer gets fewer, and always the newest.
+//! Messages are created when they can be sent, so no queue can grow. The page acknowledges images and states, and only
+//! a few may be unacknowledged at a time. A slow viewer therefore gets fewer images, and always the newest.
 
 use super::answer;
 use super::command::{Command, Seen};
@@ -16,24 +16,24 @@ use tungstenite::protocol::frame::coding::CloseCode;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Bytes, Error, Message, WebSocket};
 
-/// How long a viewer may not take what is sent.
+/// Write timeout, after which a viewer is disconnected.
 pub(super) const WRITE_TIME: Duration = Duration::from_secs(5);
-/// Who was silent for so long is gone; pages answer a ping.
+/// Time without messages after which a viewer is disconnected. Pages answer pings.
 const SILENT_TIME: Duration = Duration::from_secs(15);
 const PING_EVERY: Duration = Duration::from_secs(4);
-/// Commands are short.
+/// Maximum size of a command \[bytes\].
 const MAX_MESSAGE: usize = 16 << 10;
-/// Letters of a reason, at most: some repeat what was asked.
+/// Maximum number of characters of a refusal, since some refusals quote the command.
 const MAX_REASON: usize = 500;
-/// No more pictures, or states, are made while so many are on their way.
+/// Maximum number of unacknowledged images and states.
 const MAX_PICTURES: u32 = 2;
 const MAX_STATES: u32 = 3;
-/// Between two states.
+/// Minimum interval between two states.
 const STATE_EVERY: Duration = Duration::from_millis(40);
-/// Between two looks at whether a picture is due.
+/// Minimum interval between two checks for new images.
 const LOOK_EVERY: Duration = Duration::from_millis(25);
 
-/// The reading of one viewer's socket and what is due to it.
+/// WebSocket session of one browser.
 struct Viewer<'a, S> {
     socket: WebSocket<S>,
     house: &'a House,
@@ -46,10 +46,10 @@ struct Viewer<'a, S> {
     told: Instant,
 }
 
-/// Why a conversation ended.
+/// End of a session.
 struct Over;
 
-/// Talks until one of both goes.
+/// Runs a session until the browser or the server ends it.
 pub(super) fn look(stream: &mut TcpStream, rest: Vec<u8>, house: &House, eyes: Box<dyn Eyes>) {
     let config = WebSocketConfig::default()
         .read_buffer_size(8 << 10)
@@ -71,7 +71,7 @@ pub(super) fn look(stream: &mut TcpStream, rest: Vec<u8>, house: &House, eyes: B
     };
     while viewer.turn(stream).is_ok() {}
     drop(viewer);
-    // Why it was closed is read before the end.
+    // The browser reads the close reason before the connection ends.
     answer::linger(stream);
 }
 
@@ -89,13 +89,13 @@ impl<S: Read + Write> Viewer<'_, S> {
         }
         self.tell()?;
         self.show()?;
-        // At least a millisecond: zero would wait for ever.
+        // At least one millisecond: a timeout of zero would block forever.
         let due = STATE_EVERY.saturating_sub(self.told.elapsed()).min(LOOK_EVERY.saturating_sub(self.looked.elapsed()));
         stream.set_read_timeout(Some(due.max(Duration::from_millis(1)))).map_err(|_| Over)?;
         self.hear()
     }
 
-    /// What there is, and how it stands.
+    /// Sends contents and state if they changed.
     fn tell(&mut self) -> Result<(), Over> {
         if self.told.elapsed() < STATE_EVERY {
             return Ok(());
@@ -130,7 +130,7 @@ impl<S: Read + Write> Viewer<'_, S> {
         Ok(())
     }
 
-    /// A command, if one comes in time.
+    /// Reads and runs a command, if one arrives before the timeout.
     fn hear(&mut self) -> Result<(), Over> {
         let message = match self.socket.read() {
             Ok(message) => message,
@@ -145,11 +145,11 @@ impl<S: Read + Write> Viewer<'_, S> {
             Message::Text(text) => self.obey(&text),
             Message::Binary(_) => self.close(CloseCode::Unsupported, "commands are text"),
             Message::Close(_) => {
-                // The answer is ready and only has to be sent.
+                // The close response is already queued and only has to be sent.
                 let _ = self.socket.flush();
                 Err(Over)
             }
-            // tungstenite answers pings.
+            // tungstenite answers pings itself.
             Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => Ok(()),
         }
     }
@@ -176,13 +176,13 @@ impl<S: Read + Write> Viewer<'_, S> {
         }
     }
 
-    /// One that does not take it in time is gone.
+    /// Sends a message. A write timeout ends the session.
     fn send(&mut self, message: Message) -> Result<(), Over> {
         self.socket.send(message).map_err(|_| Over)
     }
 
     fn close(&mut self, code: CloseCode, reason: &'static str) -> Result<(), Over> {
-        // It is over, whether that is heard or not.
+        // The session ends regardless of errors.
         let _ = self.socket.close(Some(CloseFrame { code, reason: reason.into() }));
         let _ = self.socket.flush();
         Err(Over)

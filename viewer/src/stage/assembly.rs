@@ -1,24 +1,24 @@
-//! Environments side by side with markers among them, as one scene.
+//! Merges the environments and markers into one render scene.
 
 use super::snapshot::{EnvStage, Shown, Snapshot};
 use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 use std::sync::Arc;
 
-/// The geom group of markers: MuJoCo's are 0 to 5.
+/// Geom group of markers. MuJoCo uses the groups 0 to 5.
 pub(super) const MARKERS: u8 = 31;
 
-/// What is drawn, and whose it is.
+/// The merged render scene, with the origin of each instance.
 #[derive(Debug, Default)]
 pub(super) struct Assembly {
-    /// Its instances have their number in `parts` and one as mask id; markers have [`Marker::MASK_ID`].
+    /// Render scene. The mask id of an instance is its index in `parts` plus one; markers have [`Marker::MASK_ID`].
     pub(super) scene: Option<RenderScene>,
     pub(super) poses: Vec<PoseF32>,
-    /// Environment and instance in it of each instance, without the markers, which come last.
+    /// Environment and instance index of each instance; markers come last and have no entry.
     pub(super) parts: Vec<(usize, usize)>,
-    /// Whether each of these is the ground, which stays where it is.
+    /// True for each instance of `parts` that is the ground. The ground is not moved to the origin of its environment.
     is_ground: Vec<bool>,
     instances: Vec<Instance>,
-    /// What the instances were made of: made anew only where this changes.
+    /// Sources of `instances`, which are rebuilt only when this key changes.
     key: Option<Key>,
 }
 
@@ -36,13 +36,14 @@ impl Key {
     }
 }
 
-/// The environments that are shown, with their numbers.
+/// Returns the shown environments with their indices.
 pub(super) fn chosen(snapshot: &Snapshot, shown: Shown) -> impl Iterator<Item = (usize, &EnvStage)> {
     snapshot.envs.iter().enumerate().filter(move |(env, _)| shown.has(*env))
 }
 
 impl Assembly {
-    /// Puts the environments of a snapshot side by side; the ground is there once. `markers` are in their environments.
+    /// Updates the merged scene from a snapshot. The ground is included once. `markers` are in the frames of their
+    /// environments.
     pub(super) fn set(&mut self, snapshot: &Snapshot, shown: Shown, markers: &[(usize, Marker)]) {
         let scenes: Vec<Arc<RenderScene>> =
             chosen(snapshot, shown).filter_map(|(_, env)| snapshot.scene_of(env)).collect();
@@ -65,7 +66,7 @@ impl Assembly {
             }
         }
         let lit = scenes.first().cloned().unwrap_or_else(|| Arc::new(RenderScene::empty()));
-        // Every instance was drawable where it came from; there may be too many triangles together.
+        // Each instance was renderable in its own scene, but the triangle count of all instances may exceed the limit.
         self.scene = lit.with_instances(instances).ok();
     }
 
@@ -87,7 +88,7 @@ impl Assembly {
         }
     }
 
-    /// Moves the instances to where they are now.
+    /// Updates the poses of the instances.
     fn place(&mut self, snapshot: &Snapshot) {
         let Self { poses, parts, is_ground, .. } = self;
         poses.clear();

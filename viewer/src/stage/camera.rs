@@ -1,4 +1,4 @@
-//! The camera sensors of a simulation, of every kind, and what they look at.
+//! Camera sensors of every kind and their views.
 
 use kinetoscope_render::View;
 use kinetoscope_render::lens::Lens;
@@ -8,18 +8,18 @@ use kinetoscope_sensors::camera::{Camera, CameraConvention, StereoCamera};
 use kinetoscope_sensors::ray::RayCasterCamera;
 use kinetoscope_sim::{EnvId, SensorId, SimulationManager};
 
-/// What a camera looks at in an environment.
+/// View of a camera sensor in one environment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraView {
-    /// From where, and its picture as a pinhole has it.
+    /// Pose and pinhole intrinsics of the camera, in the environment frame.
     pub view: View,
-    /// What bends its rays: a pinhole bends none.
+    /// Lens model that bends the rays; a pinhole by default.
     pub lens: Lens,
-    /// What other sensors show in its colours; nothing where its configuration says so.
+    /// Markers of other sensors that are drawn into the color image; empty if the camera configuration disables them.
     pub markers: Vec<Marker>,
 }
 
-/// A camera sensor, or one of a pair.
+/// Handle of a camera sensor, or of one camera of a stereo pair.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum CameraId {
     Camera(SensorId<Camera>),
@@ -28,10 +28,10 @@ pub(super) enum CameraId {
     Rays(SensorId<RayCasterCamera>),
 }
 
-/// Nearest and farthest that is drawn of what rays measure \[m\].
+/// Clip range of images from ray-caster cameras \[m\].
 const RAYS_SEE: [f32; 2] = [0.01, 1000.0];
 
-/// All cameras with their names; the eyes of a pair are `NAME/left` and `NAME/right`.
+/// Returns all cameras with their names. The cameras of a stereo pair are named `NAME/left` and `NAME/right`.
 pub(super) fn cameras(sim: &SimulationManager) -> Vec<(String, CameraId)> {
     let cameras = sim.entities().sensor_ids::<Camera>().into_iter().map(|(name, id)| (name, CameraId::Camera(id)));
     let eyes = sim.entities().sensor_ids::<StereoCamera>().into_iter().flat_map(|(name, id)| {
@@ -41,14 +41,15 @@ pub(super) fn cameras(sim: &SimulationManager) -> Vec<(String, CameraId)> {
     cameras.chain(eyes).chain(rays).collect()
 }
 
-/// How many cameras there are.
+/// Returns the number of cameras.
 pub(super) fn count(sim: &SimulationManager) -> usize {
     let pairs = sim.entities().sensor_ids::<StereoCamera>().len();
     sim.entities().sensor_ids::<Camera>().len() + 2 * pairs + sim.entities().sensor_ids::<RayCasterCamera>().len()
 }
 
 impl CameraId {
-    /// What it looks at in each environment; `None` where it does not look, or has not measured yet.
+    /// Returns the view in each environment, or `None` where the camera does not observe the environment or has not
+    /// measured yet.
     pub(super) fn views(self, sim: &SimulationManager) -> Vec<Option<CameraView>> {
         let envs = sim.num_envs();
         match self {

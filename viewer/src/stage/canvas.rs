@@ -1,4 +1,4 @@
-//! A picture that is drawn on: what the renderer drew, and lines and letters over it.
+//! RGBA image with line and text drawing.
 
 use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::Rgb888;
@@ -6,7 +6,7 @@ use embedded_graphics::prelude::*;
 use embedded_graphics::text::{Baseline, Text};
 use std::convert::Infallible;
 
-/// Four bytes per pixel: red, green, blue, and 255; row by row from the top left.
+/// An image with four bytes per pixel (red, green, blue, 255), row by row from the top left.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Canvas {
     size: [usize; 2],
@@ -14,15 +14,15 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// A black picture of `width` by `height` pixels.
+    /// Creates a black image of `width` by `height` pixels.
     pub fn new(width: usize, height: usize) -> Self {
         let mut canvas = Self::default();
         canvas.resize(width, height);
         canvas
     }
 
-    /// An image of `width` by `height` pixels from its bytes: red, green, blue and opacity (ignored) of each pixel, row by row from
-    /// the top left, such as one environment of a camera's color. `None` if there are not 4 * width * height bytes.
+    /// Creates an image from RGBA bytes, row by row from the top left, such as one environment of a camera's color. The
+    /// opacity is ignored. Returns `None` unless there are 4 * width * height bytes.
     pub fn from_rgba(width: usize, height: usize, rgba: &[u8]) -> Option<Self> {
         let mut canvas = Self::new(width, height);
         if rgba.len() != canvas.bytes.len() {
@@ -34,7 +34,7 @@ impl Canvas {
         Some(canvas)
     }
 
-    /// Another size; what is on it is lost where that changes anything.
+    /// Changes the size. If the size differs, the content becomes black.
     pub fn resize(&mut self, width: usize, height: usize) {
         if self.size != [width, height] {
             self.size = [width, height];
@@ -43,34 +43,34 @@ impl Canvas {
         }
     }
 
-    /// Pixels per row, rows.
+    /// Size of the image: pixels per row, rows.
     pub fn dimensions(&self) -> [usize; 2] {
         self.size
     }
 
-    /// The bytes.
+    /// Bytes of the image.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// The bytes, to draw on.
+    /// Bytes of the image, writable. The fourth byte of each pixel stays 255.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         &mut self.bytes
     }
 
-    /// Colour of a pixel; `None` outside.
+    /// Returns the color of a pixel, or `None` outside the image.
     pub fn pixel(&self, x: usize, y: usize) -> Option<[u8; 3]> {
         let [width, height] = self.size;
         let at = (x < width && y < height).then_some(4 * (y * width + x))?;
         self.bytes.get(at..at + 3).map(|rgb| [rgb[0], rgb[1], rgb[2]])
     }
 
-    /// Colours a pixel, if there is one.
+    /// Sets the color of a pixel; ignored outside the image.
     pub fn set(&mut self, x: i32, y: i32, color: [u8; 3]) {
         self.blend(x, y, color, 255);
     }
 
-    /// Mixes a colour into a pixel, with an opacity of 0 to 255.
+    /// Blends a color into a pixel with an opacity of 0 to 255.
     fn blend(&mut self, x: i32, y: i32, color: [u8; 3], opacity: u8) {
         let [width, height] = self.size;
         let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
@@ -83,7 +83,7 @@ impl Canvas {
         }
     }
 
-    /// A filled rectangle, with an opacity of 0 to 255.
+    /// Fills a rectangle, with an opacity of 0 to 255, clipped to the image.
     pub fn fill(&mut self, [x, y]: [i32; 2], [width, height]: [i32; 2], color: [u8; 3], opacity: u8) {
         let [w, h] = self.size.map(|n| i32::try_from(n).unwrap_or(i32::MAX));
         for row in y.max(0)..y.saturating_add(height).min(h) {
@@ -93,7 +93,7 @@ impl Canvas {
         }
     }
 
-    /// A line from pixel to pixel, one pixel wide. Of ends far outside, what is inside is drawn.
+    /// Draws a line from pixel to pixel, one pixel wide, clipped to the image.
     pub fn line(&mut self, from: [f32; 2], to: [f32; 2], color: [u8; 3]) {
         let Some([from, to]) = clipped(from, to, self.size.map(|n| n as f32)) else { return };
         let delta = [to[0] - from[0], to[1] - from[1]];
@@ -104,7 +104,7 @@ impl Canvas {
         }
     }
 
-    /// Letters with their top left corner at a pixel, on a shade that makes them readable on everything.
+    /// Draws text with its top left corner at a pixel, on a dark background for contrast.
     pub fn text(&mut self, text: &str, [x, y]: [i32; 2], font: &MonoFont<'_>, color: [u8; 3]) {
         let cell = font.character_size;
         let (columns, lines) = text.lines().fold((0, 0), |(w, n), line| (w.max(line.chars().count()), n + 1));
@@ -115,7 +115,7 @@ impl Canvas {
         let Ok(_) = Text::with_baseline(text, Point::new(x, y), style, Baseline::Top).draw(self);
     }
 
-    /// Copies `picture` to a place; what does not fit is left out.
+    /// Copies `picture` with its top left corner to a pixel, clipped to this image.
     pub fn paste(&mut self, picture: &Self, [x, y]: [usize; 2]) {
         let [width, height] = self.size;
         let [w, h] = picture.size;
@@ -127,7 +127,7 @@ impl Canvas {
     }
 }
 
-/// The part of a line inside of a picture, a pixel around it included; `None` where there is none (Liang and Barsky 1984).
+/// Clips a line to the image plus a margin of one pixel; `None` if the line is outside (Liang and Barsky 1984).
 fn clipped(from: [f32; 2], to: [f32; 2], size: [f32; 2]) -> Option<[[f32; 2]; 2]> {
     if from.iter().chain(&to).any(|x| !x.is_finite()) {
         return None;
@@ -179,7 +179,7 @@ mod tests {
         canvas.line([1.5, 2.5], [7.5, 5.5], [255, 0, 0]);
         assert_eq!([canvas.pixel(1, 2), canvas.pixel(7, 5)], [Some([255, 0, 0]); 2]);
         assert_eq!(canvas.pixel(7, 2), Some([0, 0, 0]));
-        // Through the whole image, from far outside; and past it.
+        // Through the whole image, from far outside; and outside the image.
         canvas.line([-1e6, 3.5], [1e6, 3.5], [0, 255, 0]);
         assert!((0..10).all(|x| canvas.pixel(x, 3) == Some([0, 255, 0])));
         let before = canvas.clone();

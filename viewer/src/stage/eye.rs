@@ -1,21 +1,20 @@
-//! Where a viewer looks from.
+//! Orbit camera of viewers.
 
 use super::snapshot::Snapshot;
 use kinetoscope_render::View;
 use kinetoscope_scene::framing::{FILL, Framing, Placed, REACH};
 use nalgebra::Vector3;
 
-/// A viewer's camera: it turns about a point, moves with its picture, comes nearer, and flies. Up in the picture is up in the
-/// world.
+/// An orbit camera that turns about a target point, pans, zooms and flies. The image's up direction is the world's +z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
-    /// The point it turns about, in the middle of the picture \[m\].
+    /// Target point in the center of the image, in the frame of the overview \[m\].
     pub target: [f64; 3],
-    /// How far that is \[m\].
+    /// Distance from the camera to the target \[m\].
     pub distance: f64,
-    /// Direction of the way it looks, in the horizontal plane \[rad\]: 0 is along x, a quarter turn along y.
+    /// Heading of the viewing direction in the horizontal plane \[rad\]: 0 is along +x, π/2 along +y.
     pub azimuth: f64,
-    /// How far up it looks \[rad\]; negative is down.
+    /// Angle of the viewing direction above the horizontal plane \[rad\]; negative looks down.
     pub elevation: f64,
     /// Vertical field of view \[rad\].
     pub fovy: f64,
@@ -27,13 +26,14 @@ impl Default for Eye {
     }
 }
 
-/// It never looks quite straight up or down \[rad\]: there right and left would be lost.
+/// Largest elevation angle \[rad\]. Straight up or down, the right direction would be undefined.
 const STEEPEST: f64 = 1.55;
-/// Nearest and farthest distance of the point it turns about \[m\].
+/// Smallest and largest distance to the target \[m\].
 const DISTANCES: [f64; 2] = [0.02, 1e4];
 
 impl Eye {
-    /// From `eye` to `target` \[m\]; `None` where they are the same or not finite.
+    /// Creates a camera at `eye` that looks at `target` \[m\], or `None` if the points coincide or are not finite. The
+    /// distance is clamped to 0.02 m to 10 km and the elevation to ±1.55 rad; the position then differs from `eye`.
     pub fn looking(eye: [f64; 3], target: [f64; 3]) -> Option<Self> {
         let way = Vector3::from(target) - Vector3::from(eye);
         let distance = way.norm();
@@ -51,9 +51,9 @@ impl Eye {
         })
     }
 
-    /// The point of view that the program set ([`kinetoscope_sim::SceneViewMut::set_camera_view`](kinetoscope_sim::SceneViewMut::set_camera_view)),
-    /// else one from which everything of a snapshot but the ground fills an image of `size` pixels, seen from the front, the
-    /// side and above.
+    /// Returns the camera set by the program ([`set_camera_view`](kinetoscope_sim::SceneViewMut::set_camera_view)), if
+    /// any. Otherwise returns a camera from which all environments, without the ground, fill an image of `size` pixels,
+    /// seen obliquely from above.
     pub fn overview(snapshot: &Snapshot, [width, height]: [usize; 2]) -> Self {
         if let Some(eye) = snapshot.viewpoint.and_then(|view| Self::looking(view.eye, view.target)) {
             return eye;
@@ -70,8 +70,8 @@ impl Eye {
         Self::framing(&placed, [width, height])
     }
 
-    /// So that everything that is drawn of some scenes but the ground fills an image of `size` pixels, seen from the front, the
-    /// side and above. The scenes may be one scene at several moments.
+    /// Returns a camera from which the scenes, without the ground, fill an image of `size` pixels, seen obliquely from
+    /// above. `placed` may contain one scene at several times.
     pub fn framing(placed: &[Placed<'_>], [width, height]: [usize; 2]) -> Self {
         let eye = Self::default();
         let (forward, aspect) = (eye.forward(), width.max(1) as f64 / height.max(1) as f64);
@@ -81,19 +81,19 @@ impl Eye {
         Self { target: placement.target, distance: distance.clamp(DISTANCES[0], DISTANCES[1]), ..eye }
     }
 
-    /// The way it looks.
+    /// Viewing direction, a unit vector.
     pub fn forward(&self) -> [f64; 3] {
         let (sin, cos) = self.elevation.sin_cos();
         [cos * self.azimuth.cos(), cos * self.azimuth.sin(), sin]
     }
 
-    /// Where it is \[m\].
+    /// Position of the camera \[m\].
     pub fn position(&self) -> [f64; 3] {
         let forward = self.forward();
         [0, 1, 2].map(|k| self.target[k] - self.distance * forward[k])
     }
 
-    /// To the right in the picture, and up in it.
+    /// Directions to the right and up in the image.
     fn axes(&self) -> [Vector3<f64>; 2] {
         let forward = Vector3::from(self.forward());
         let right = Vector3::new(self.azimuth.sin(), -self.azimuth.cos(), 0.0);
@@ -104,59 +104,60 @@ impl Eye {
         self.target = (Vector3::from(self.target) + by).into();
     }
 
-    /// Turns about the target, as if the scene were dragged by pixels of a picture of `height` rows.
+    /// Orbits about the target, for a mouse drag by pixels of an image of `height` rows.
     pub fn orbit(&mut self, [dx, dy]: [f64; 2], height: usize) {
         let scale = std::f64::consts::PI / height.max(1) as f64;
         self.azimuth = (self.azimuth - dx * scale).rem_euclid(std::f64::consts::TAU);
         self.elevation = (self.elevation - dy * scale).clamp(-STEEPEST, STEEPEST);
     }
 
-    /// Turns where it stands, as if the scene were dragged: the target moves.
+    /// Turns the camera in place, for a mouse drag by pixels of an image of `height` rows. The target moves.
     pub fn turn(&mut self, [dx, dy]: [f64; 2], height: usize) {
         let eye = Vector3::from(self.position());
         self.orbit([-dx, -dy], height);
         self.target = (eye + self.distance * Vector3::from(self.forward())).into();
     }
 
-    /// Moves so that what is at the target's distance follows the mouse, by pixels of a picture of `height` rows.
+    /// Pans such that points at the target's distance follow the mouse, for a drag by pixels of an image of `height`
+    /// rows.
     pub fn pan(&mut self, [dx, dy]: [f64; 2], height: usize) {
         let [right, up] = self.axes();
         let scale = 2.0 * self.distance * (0.5 * self.fovy).tan() / height.max(1) as f64;
         self.shift((up * dy - right * dx) * scale);
     }
 
-    /// Comes nearer by steps of a wheel; negative ones go away.
+    /// Zooms in by steps of a mouse wheel; negative steps zoom out.
     pub fn zoom(&mut self, steps: f64) {
         self.distance = (self.distance * 0.85f64.powf(steps)).clamp(DISTANCES[0], DISTANCES[1]);
     }
 
-    /// Flies by distances ahead, to the right and up \[m\].
+    /// Moves by distances ahead, to the right, and up along +z \[m\].
     pub fn fly(&mut self, [ahead, right, up]: [f64; 3]) {
         let [to_right, _] = self.axes();
         self.shift(Vector3::from(self.forward()) * ahead + to_right * right + Vector3::z() * up);
     }
 
-    /// The camera for a picture of `width` by `height` pixels.
+    /// Returns the pinhole view of an image of `width` by `height` pixels.
     pub fn view(&self, width: usize, height: usize) -> View {
         let [eye, target] = [self.position(), self.target].map(|p| p.map(|x| x as f32));
         let near = (0.01 * self.distance).clamp(0.005, 0.05) as f32;
         let far = (20.0 * self.distance).max(500.0) as f32;
         let size = [width, height].map(|n| n.clamp(1, View::MAX_SIDE));
         let view = View::look_at(size, self.fovy as f32, eye, target, [0.0, 0.0, 1.0]);
-        // Far from the origin single precision may lose the target.
+        // Far from the origin, the target may be lost in single precision.
         let fallback = || View::look_at(size, self.fovy as f32, [-1.0, 0.0, 0.0], [0.0; 3], [0.0, 0.0, 1.0]);
         view.or_else(|_| fallback()).map_or_else(|_| plain(size), |view| View { near, far, ..view })
     }
 }
 
-/// A camera in the origin.
+/// Returns a camera at the origin.
 fn plain([width, height]: [usize; 2]) -> View {
     let [cx, cy] = [0.5 * width as f32, 0.5 * height as f32];
     let world_from_camera = kinetoscope_scene::PoseF32::IDENTITY;
     View { width, height, fx: cy.max(1.0), fy: cy.max(1.0), cx, cy, near: 0.01, far: 100.0, world_from_camera }
 }
 
-/// Pixel of a point of the world; `None` behind the camera.
+/// Projects a world point to pixel coordinates; `None` if it is nearer than the near plane or behind the camera.
 pub(super) fn project(view: &View, point: [f64; 3]) -> Option<[f32; 2]> {
     let [x, y, z] = view.world_from_camera.apply_inverse(point.map(|p| p as f32));
     (z > view.near).then(|| [view.fx * x / z + view.cx, view.fy * y / z + view.cy])
@@ -170,8 +171,8 @@ mod tests {
         (0..3).all(|k| (a[k] - b[k]).abs() < 1e-9)
     }
 
-    /// True if a point is seen at this pixel of 960 by 540, to a hundredth: coordinates of some metres in single precision, at
-    /// 650 pixels a radian, have 1e-3 pixels.
+    /// True if a point projects to this pixel of 960 by 540, to 0.01 pixels. Coordinates of a few meters in single
+    /// precision, at 650 pixels per radian, have an error of 1e-3 pixels.
     fn seen_at(eye: &Eye, point: [f64; 3], pixel: [f32; 2]) -> bool {
         project(&eye.view(960, 540), point).is_some_and(|at| (0..2).all(|k| (at[k] - pixel[k]).abs() < 0.01))
     }
@@ -187,7 +188,7 @@ mod tests {
         }
     }
 
-    /// An orbit keeps the target in the middle, a turn keeps the place, and panning moves the plane of the target with the
+    /// An orbit keeps the target in the center, a turn keeps the position, and panning moves the target plane with the
     /// mouse, pixel by pixel.
     #[test]
     fn drags() {
@@ -197,7 +198,7 @@ mod tests {
         let place = eye.position();
         eye.turn([33.0, 12.0], 540);
         assert!(close(place, eye.position()));
-        // Dragging down the whole height, again and again, ends nearly over it.
+        // Repeated drags down over the whole height end almost above the target.
         (0..9).for_each(|_| eye.orbit([0.0, 540.0], 540));
         assert!((eye.elevation + STEEPEST).abs() < 1e-12);
         assert!(eye.view(960, 540).validate().is_ok());
@@ -220,7 +221,7 @@ mod tests {
         let mut eye = Eye { azimuth: 0.0, elevation: 0.0, ..Eye::default() };
         let place = eye.position();
         eye.fly([1.0, 2.0, 3.0]);
-        // Looking along x, right is -y.
+        // Looking along +x, the right direction is -y.
         assert!(close(eye.position(), [place[0] + 1.0, place[1] - 2.0, place[2] + 3.0]));
     }
 }

@@ -1,4 +1,4 @@
-//! What a viewer sees: snapshots of the whole stage, and everything that is drawn of them.
+//! Snapshots of the simulation, and everything that is drawn from them: cameras, images, overlays, picking.
 
 mod assembly;
 mod camera;

@@ -1,6 +1,7 @@
-//! What is drawn over the scene to explain it: contact forces, frames, axes, centres of mass, names.
+//! Overlays that annotate the scene: contact forces, frames, joint axes, centers of mass, names.
 //!
-//! Frames, axes and centres of mass are inside of what they belong to: they are drawn over it too, as lines and dots.
+//! Frames, axes and centers of mass are usually inside of bodies, so they are also drawn on top of the image as lines
+//! and dots.
 
 use super::assembly::chosen;
 use super::canvas::Canvas;
@@ -14,24 +15,24 @@ use kinetoscope_scene::Marker;
 use kinetoscope_sim::JointAxis;
 use nalgebra::Vector3;
 
-/// What is drawn over the scene, and which of its shapes are.
+/// Overlays and geom groups that are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overlays {
-    /// What sensors show of their measurements.
+    /// Debug markers of sensors.
     pub sensors: bool,
-    /// Contact forces, as arrows in the points of contact; the length grows with the logarithm of the force.
+    /// Contact forces, as arrows at the contact points. The arrow length grows with the logarithm of the force.
     pub contacts: bool,
     /// Frames of links and objects.
     pub frames: bool,
-    /// Axes of joints.
+    /// Joint axes.
     pub joints: bool,
-    /// Centres of mass, as dots of four quarters.
+    /// Centers of mass, as discs with four quarters.
     pub masses: bool,
     /// Names of links and objects.
     pub names: bool,
-    /// Where bodies were.
+    /// Trails of past positions of bodies.
     pub trails: bool,
-    /// What is there to be looked at: geom groups 0 to 2.
+    /// Visual shapes: geom groups 0 to 2.
     pub visuals: bool,
     /// Collision shapes: geom groups 3 to 5.
     pub collisions: bool,
@@ -53,19 +54,19 @@ impl Default for Overlays {
     }
 }
 
-/// Length of the axes of frames \[m\].
+/// Length of frame axes \[m\].
 const FRAME: f32 = 0.08;
-/// Length of the axes of joints \[m\].
+/// Length of joint axes \[m\].
 const AXIS: f64 = 0.16;
 
 impl Overlays {
-    /// Geom groups that are drawn: bit k is group k.
+    /// Bit mask of the drawn geom groups: bit k is group k.
     pub fn groups(&self) -> u32 {
         let (visuals, collisions) = (if self.visuals { 0b111 } else { 0 }, if self.collisions { 0b11_1000 } else { 0 });
         visuals | collisions
     }
 
-    /// The markers of the environments that are shown.
+    /// Returns the markers of the shown environments, with the index of their environment.
     pub(super) fn markers(&self, snapshot: &Snapshot, shown: Shown) -> Vec<(usize, Marker)> {
         let mut markers = Vec::new();
         for (k, env) in chosen(snapshot, shown) {
@@ -89,7 +90,7 @@ impl Overlays {
         markers
     }
 
-    /// What is inside of things, seen through them, and names.
+    /// Draws frames, joint axes, centers of mass and names on top of the image.
     pub(super) fn draw_over(&self, snapshot: &Snapshot, shown: Shown, view: &View, canvas: &mut Canvas) {
         for (_, env) in chosen(snapshot, shown) {
             let mut line = |from: Vector3<f64>, way: Vector3<f64>, rgba: [f32; 4]| {
@@ -122,7 +123,7 @@ impl Overlays {
         self.write_names(snapshot, shown, view, canvas);
     }
 
-    /// Names of links and objects, where they are in the picture.
+    /// Draws the names of links and objects at their projected positions.
     fn write_names(&self, snapshot: &Snapshot, shown: Shown, view: &View, canvas: &mut Canvas) {
         if !self.names {
             return;
@@ -141,13 +142,13 @@ impl Overlays {
     }
 }
 
-/// A point of an environment in the overview.
+/// Transforms a point from its environment to the overview.
 pub(super) fn in_overview(env: &EnvStage, point: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| point[k] + env.origin[k])
 }
 
-/// The force on the second body, from the point of contact. Its length is `0.05 m log2(1 + F / 1 N)`: 5 cm for 1 N, a third
-/// of a metre for 100 N, half a metre for 1000 N.
+/// Arrow of the force on the second body, starting at the contact point. Its length is `0.05 m log2(1 + F / 1 N)`: 5 cm
+/// for 1 N, a third of a meter for 100 N, half a meter for 1000 N.
 fn force_arrow(contact: &Contact) -> Option<Marker> {
     let force = Vector3::from(contact.force);
     let size = force.norm();
@@ -155,7 +156,7 @@ fn force_arrow(contact: &Contact) -> Option<Marker> {
     Marker::arrow(contact.point, (force / size.max(1e-9) * length).into(), color::FORCE).filter(|_| length > 1e-4)
 }
 
-/// Where the arrow of an axis begins, and where it goes \[m\]: the joint is in its middle.
+/// Returns the start and the vector of a joint axis arrow \[m\]; the joint is at its center.
 fn axis_of(joint: &JointAxis) -> (Vector3<f64>, Vector3<f64>) {
     let axis = Vector3::from(joint.axis);
     (Vector3::from(joint.anchor) - axis * (0.5 * AXIS), axis * AXIS)
@@ -165,8 +166,8 @@ fn color_of(joint: &JointAxis) -> [f32; 4] {
     if joint.slides { color::SLIDE } else { color::HINGE }
 }
 
-/// The sign of a centre of mass: a disc whose quarters are dark and bright. It is as large as a ball of 2 cm there, but never
-/// so small that it is not seen, nor large.
+/// Draws the center-of-mass symbol, a disc with dark and bright quarters. Its radius is that of a ball of 2 cm at that
+/// distance, limited to 1.5 to 7 pixels.
 fn dot(at: [f64; 3], view: &View, canvas: &mut Canvas) {
     let Some([x, y]) = project(view, at) else { return };
     let z = view.world_from_camera.apply_inverse(at.map(|p| p as f32))[2];
@@ -197,7 +198,7 @@ mod tests {
             let (point, normal) = ([1.0, 2.0, 0.0], [0.0, 0.0, 1.0]);
             Contact { bodies: [None, Some(0)], point, normal, distance: 0.0, force, normal_force: force[2] }
         };
-        // It starts in the contact and points along the force.
+        // The arrow starts at the contact point and points along the force.
         let marker = force_arrow(&contact([0.0, 0.0, 3.0]));
         let Some(Marker { kind: MarkerKind::Arrow { length, .. }, pose, .. }) = marker else { panic!("{marker:?}") };
         // log2(4) = 2.
@@ -207,7 +208,7 @@ mod tests {
         assert_eq!([[0.0; 3], [f64::NAN; 3]].map(|force| force_arrow(&contact(force))), [None, None]);
     }
 
-    /// A point two metres ahead is in the middle of the image; the disc there has `pi r^2` pixels, half of them bright.
+    /// A point two meters ahead is at the image center; its disc has `pi r^2` pixels, half of them bright.
     #[test]
     fn centre_of_mass() {
         let view = Eye::looking([-2.0, 0.0, 0.0], [0.0; 3]).unwrap().view(201, 201);
@@ -221,7 +222,7 @@ mod tests {
         let [bright, dark] = disc([0.0; 3]);
         let radius = (view.fx * 0.02 / 2.0).clamp(1.5, 7.0);
         let area = std::f32::consts::PI * radius * radius;
-        // The rim is of pixels that are in it by their middle: off by less than its length.
+        // Pixels count by their centers, so the area is off by less than twice the circumference.
         let off = (bright.len() + dark.len()) as f32 - area;
         assert!(off.abs() < 2.0 * std::f32::consts::PI * radius && bright.len() > 1, "{off} of {area}");
         let middle = [0, 1].map(|k| bright.iter().map(|at| at[k] as f32).sum::<f32>() / bright.len() as f32);
@@ -230,12 +231,12 @@ mod tests {
         assert!(disc([f64::NAN; 3])[0].is_empty());
     }
 
-    /// From the end of each axis of a frame back to its origin lies its color, and from end to end of a joint's axis its own.
+    /// Each axis of a frame, from its end to its origin, has its own color; so does a joint axis from end to end.
     #[test]
     fn axes() {
         let mut sample = crate::sample::sample(2);
         let snapshot = sample.sim.viewer(Wants::default()).newest().unwrap();
-        // From near by, where axes that begin in one point have parted after a third of their length.
+        // From nearby, so that axes from one origin are apart after a third of their length.
         let target = in_overview(&snapshot.envs[1], [0.5, 0.0, 0.3]);
         let eye = [target[0] + 0.7, target[1] + 1.3, target[2] + 0.9];
         let view = Eye::looking(eye, target).unwrap().view(1600, 1200);
@@ -243,7 +244,7 @@ mod tests {
             let mut canvas = Canvas::new(1600, 1200);
             overlays.draw_over(&snapshot, Shown::One(1), &view, &mut canvas);
             let at = |part: f64| project(&view, in_overview(&snapshot.envs[1], (from + (to - from) * part).into()));
-            // Within a pixel: lines are rounded to whole ones.
+            // To one pixel: lines are rounded to whole pixels.
             (4..10).all(|k| {
                 let Some([x, y]) = at(f64::from(k) / 10.0) else { return false };
                 (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy))).any(|(dx, dy)| {

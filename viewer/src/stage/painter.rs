@@ -1,4 +1,4 @@
-//! Draws a snapshot, on the thread of whoever looks.
+//! Renders snapshots on the thread of the viewer.
 
 use super::assembly::{Assembly, MARKERS, chosen};
 use super::canvas::Canvas;
@@ -12,10 +12,10 @@ use kinetoscope_render::{ParallelRasterizer, RasterCfg, Shot};
 use kinetoscope_render::{RenderError, View};
 use kinetoscope_scene::Marker;
 
-/// Radius of the ball where something was clicked on \[pixels\].
+/// Radius of the marker at a selected point \[pixels\].
 const BALL: f32 = 4.0;
 
-/// Draws pictures of snapshots. It keeps its memory: use one for all pictures of a window.
+/// Renders images of snapshots. It reuses its buffers, so one instance should serve all images of a window.
 #[derive(Debug)]
 pub struct Painter {
     rasterizer: ParallelRasterizer,
@@ -23,48 +23,48 @@ pub struct Painter {
     assembly: Assembly,
 }
 
-/// What a picture shows besides the scene.
+/// Contents of an image besides the scene.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Look<'a> {
-    /// Which environments.
+    /// Environments in the image.
     pub shown: Shown,
-    /// What is drawn over it.
+    /// Overlays.
     pub overlays: Overlays,
-    /// What was clicked on.
+    /// Selected point.
     pub picked: Option<&'a Picked>,
-    /// Where bodies were.
+    /// Trails of bodies.
     pub trails: Option<&'a Trails>,
-    /// A spring that is pulled, from where to where in its environment \[m\].
+    /// Mouse spring: its environment and its two ends in the environment frame \[m\].
     pub spring: Option<(usize, [[f64; 3]; 2])>,
 }
 
 impl Painter {
-    /// Draws on `threads` threads, with four samples per pixel.
+    /// Creates a renderer with `threads` threads and four samples per pixel.
     pub fn new(threads: usize) -> Self {
         let cfg = RasterCfg::default();
         Self { rasterizer: ParallelRasterizer::new(cfg, threads), cfg, assembly: Assembly::default() }
     }
 
-    /// Draws with no more than so many of its threads from now on.
+    /// Limits the number of threads for the next images.
     pub fn use_threads(&mut self, most: usize) {
         self.rasterizer.use_threads(most);
     }
 
-    /// Samples per pixel of its pictures.
+    /// Number of samples per pixel.
     pub(crate) fn samples(&self) -> u8 {
         self.cfg.samples
     }
 
-    /// Samples per pixel, 1 or 4.
+    /// Sets the number of samples per pixel, 1 or 4.
     pub fn set_samples(&mut self, samples: u8) {
         self.cfg.samples = samples;
     }
 
-    /// Draws a snapshot as `view` sees it: `view` looks at the overview, or at the one environment that is shown, which then is
-    /// where the overview has it. The canvas gets the size of the view.
+    /// Renders a snapshot through `view`, whose pose is in the frame of the overview. A single environment stays at its
+    /// place in the overview. The canvas is resized to the view.
     ///
     /// # Errors
-    /// The view is no good.
+    /// The view is invalid, or the renderer failed.
     pub fn draw(
         &mut self,
         snapshot: &Snapshot,
@@ -78,7 +78,7 @@ impl Painter {
             markers.push((picked.env, Marker::axes(pose, 0.12)));
         }
         if let Some((picked, env)) = look.picked.and_then(|picked| Some((picked, snapshot.envs.get(picked.env)?))) {
-            // A ball on it, also where its frame is inside of it.
+            // The marker is visible even if the frame of the body is inside of the body.
             let point = picked.point_now(snapshot);
             let [.., depth] = view.world_from_camera.apply_inverse(in_overview(env, point).map(|x| x as f32));
             let ball = Marker::sphere(point, BALL * depth / view.fx, color::CHOSEN);
@@ -104,16 +104,16 @@ impl Painter {
         Ok(())
     }
 
-    /// What is seen at a pixel of a picture; `None` for the sky. Markers are not in the way.
+    /// Returns the object at a pixel, or `None` for the sky. Markers are ignored.
     pub fn pick(&mut self, snapshot: &Snapshot, view: &View, look: &Look<'_>, [x, y]: [f64; 2]) -> Option<Picked> {
         self.assembly.set(snapshot, look.shown, &[]);
         let scene = self.assembly.scene.as_ref()?;
-        // One pixel of the picture, with the same rays.
+        // A view of this single pixel, with the same rays.
         let (column, row) = (x.floor() as f32, y.floor() as f32);
         let pixel = View { width: 1, height: 1, cx: view.cx - column, cy: view.cy - row, ..*view };
         let (mut mask, mut position) = ([0], [0.0; 3]);
         let frame = FrameMut { mask: Some(&mut mask), position: Some(&mut position), ..FrameMut::default() };
-        // Details count here, and cost nothing.
+        // A single pixel costs nothing, so full detail is used.
         self.rasterizer.set_cfg(RasterCfg { groups: look.overlays.groups(), lod: false, ..self.cfg });
         let shot = Shot { scene, poses: &self.assembly.poses, view: &pixel, lights: None, lens: None, before: None };
         self.rasterizer.render(&mut [(shot, frame)]).ok()?;

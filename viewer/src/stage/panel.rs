@@ -1,4 +1,4 @@
-//! What a camera sensor sees, live: colour, depth, mask and normals in a grid of 2 x 2.
+//! Live images of a camera sensor: color, depth, mask and normals in a 2 x 2 grid.
 
 use super::assembly::MARKERS;
 use super::canvas::Canvas;
@@ -11,32 +11,32 @@ use kinetoscope_render::{ParallelRasterizer, PixelIntrinsics, RasterCfg, Rendere
 use kinetoscope_scene::{Instance, Marker, PoseF32, RenderScene};
 use kinetoscope_sensors::camera::colormap::{depth_color, mask_color, normal_color};
 
-/// Draws what camera sensors see from snapshots, without asking the sensors for anything: with the pose and the lens of the
-/// camera at its last measurement, and everything else where it is now. Behind a lens that bends them, rays are followed; what
-/// other sensors show is in the colours of cameras that draw it.
+/// Renders the images of camera sensors from snapshots, without triggering the sensors. The pose and lens are those of
+/// the last measurement; everything else is current. With a bending lens, images are ray traced. Markers of other
+/// sensors appear in the color image of cameras that draw them.
 #[derive(Debug)]
 pub(crate) struct Panel {
     rasterizer: ParallelRasterizer,
     frame: Frame,
     size: [usize; 2],
-    /// The lens of the last picture that had one.
+    /// Rays of the most recently used lens.
     rays: Option<LensRays>,
 }
 
-/// What the panel draws with.
+/// Rasterizer settings of the panel.
 fn cfg() -> RasterCfg {
     RasterCfg { samples: 1, ..RasterCfg::default() }
 }
 
 impl Panel {
-    /// Draws on `threads` threads.
+    /// Creates a panel with `threads` rendering threads.
     pub(crate) fn new(threads: usize) -> Self {
         let rasterizer = ParallelRasterizer::new(cfg(), threads);
         Self { rasterizer, frame: Frame::default(), size: [0; 2], rays: None }
     }
 
-    /// Draws camera `camera` of environment `env` in a grid, each picture at most `width` pixels wide. `false`, and nothing is
-    /// drawn, where that camera does not look at that environment.
+    /// Renders camera `camera` in environment `env` as a grid of images, each at most `width` pixels wide. Returns
+    /// `false` and leaves the canvas unchanged if the camera has no view of the environment, or if rendering fails.
     pub(crate) fn draw(
         &mut self,
         snapshot: &Snapshot,
@@ -81,8 +81,8 @@ impl Panel {
         true
     }
 
-    /// Makes the rays of a lens in front of these pixels, unless they are those of the last picture. `false` where a lens sees
-    /// nothing through so few pixels.
+    /// Computes the rays of a lens for these pixels, unless they are cached. Returns `false` if the lens or its rays
+    /// are invalid at this resolution.
     fn has_rays(&mut self, lens: Lens, view: &View) -> bool {
         let [fx, fy, cx, cy] = [view.fx, view.fy, view.cx, view.cy].map(f64::from);
         let Ok(optics) = Optics::new(lens, PixelIntrinsics { fx, fy, cx, cy }) else { return false };
@@ -121,7 +121,7 @@ impl Panel {
     }
 }
 
-/// A scene with markers among its instances, and where all of them are; `None` where there is nothing to add.
+/// Adds markers to the instances and poses of a scene; `None` if there are no markers or too many triangles.
 fn with_markers(scene: &RenderScene, poses: &[PoseF32], markers: &[Marker]) -> Option<(RenderScene, Vec<PoseF32>)> {
     let (added, places): (Vec<Instance>, Vec<PoseF32>) = markers.iter().flat_map(Marker::instances).unzip();
     if added.is_empty() {
@@ -129,15 +129,15 @@ fn with_markers(scene: &RenderScene, poses: &[PoseF32], markers: &[Marker]) -> O
     }
     let added = added.into_iter().map(|instance| Instance { group: MARKERS, ..instance });
     let instances = scene.instances().iter().cloned().chain(added).collect();
-    // There may be too many triangles together.
+    // The triangle count of all instances may exceed the limit.
     let scene = scene.with_instances(instances).ok()?;
     Some((scene, poses.iter().copied().chain(places).collect()))
 }
 
-/// The colour of a pixel, by its number.
+/// Color of a pixel, by its index.
 type PixelColor<'a> = &'a dyn Fn(usize) -> [u8; 3];
 
-/// The same view with fewer pixels, at most `width` in a row.
+/// Scales a view down to at most `width` pixels per row.
 fn shrunk(view: &View, width: usize) -> View {
     let scale = (width.max(1) as f32 / view.width as f32).min(1.0);
     let side = |n: usize| ((n as f32 * scale).round() as usize).max(1);

@@ -1,47 +1,47 @@
-//! What was clicked on.
+//! Selected points of objects.
 
 use super::overlay::Overlays;
 use super::snapshot::{Names, Shown, Snapshot};
 use kinetoscope_scene::Pose;
 use nalgebra::{Point3, Vector3};
 
-/// A point of something that was clicked on.
+/// A selected point on an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picked {
-    /// The environment.
+    /// Environment index.
     pub env: usize,
-    /// `uid/link`, the uid of an object, the name of a geom of the world.
+    /// `uid/link`, uid of an object, or name of a world geom.
     pub name: String,
-    /// The body, as [`Names::bodies`](super::Names::bodies) numbers them; `None` for the world.
+    /// Index of the body in [`Names::bodies`](super::Names::bodies); `None` for the world.
     pub body: Option<usize>,
-    /// The mask id.
+    /// Mask id.
     pub mask_id: i32,
-    /// Where, in the environment \[m\].
+    /// Selected point in the environment frame \[m\], at the time of selection.
     pub point: [f64; 3],
-    /// Where, in the body's frame \[m\]; in the environment for the world.
+    /// Selected point in the body frame \[m\]; in the environment frame for the world.
     pub hold: [f64; 3],
 }
 
 impl Picked {
-    /// An instance of an environment that was hit in a point of the overview.
+    /// Creates the selection from an instance of an environment and a hit point in the overview.
     pub(super) fn new(snapshot: &Snapshot, env: usize, instance: usize, position: [f32; 3]) -> Option<Self> {
         let stage = snapshot.envs.get(env)?;
         let scene = snapshot.scene_of(stage)?;
         let hit = scene.instances().get(instance)?;
         let body = hit.body.and_then(|body| usize::try_from(body).ok());
-        // The ground is one for all, and nobody's in particular.
+        // The ground is shared by all environments, so the point is relative to the environment of its instance.
         let point = [0, 1, 2].map(|k| f64::from(position[k]) - stage.origin[k]);
         let pose = body.and_then(|body| stage.look.bodies.get(body));
         let hold = pose.map_or(point, |pose| pose.inverse_transform_point(&Point3::from(point)).into());
         Some(Self { env, name: hit.name.to_string(), body, mask_id: hit.mask_id, point, hold })
     }
 
-    /// Where the body is now; `None` for the world, and for what is gone.
+    /// Returns the current pose of the body, or `None` for the world and for bodies that no longer exist.
     pub fn pose(&self, snapshot: &Snapshot) -> Option<Pose> {
         snapshot.envs.get(self.env)?.look.bodies.get(self.body?).copied()
     }
 
-    /// Numbers of bodies are other ones when something was added to the simulation.
+    /// Updates the body index after entities were added to the simulation.
     pub(crate) fn renumber(&mut self, names: &Names) {
         let is = |body: usize| names.bodies.get(body) == Some(&self.name);
         if self.body.is_some_and(|body| !is(body)) {
@@ -49,15 +49,15 @@ impl Picked {
         }
     }
 
-    /// How many contacts the body has, and the sum of their forces on it \[N\], in the axes of its environment. `None` for the
-    /// world, and where the snapshot has no contacts of its environment.
+    /// Returns the number of contacts of the body and their total force on it \[N\], in the axes of the environment.
+    /// Returns `None` for the world and if the snapshot has no contacts of the environment.
     pub fn contact_force(&self, snapshot: &Snapshot) -> Option<(usize, [f64; 3])> {
         let body = self.body?;
         let env = snapshot.envs.get(self.env).filter(|_| snapshot.contacts_of.is_some_and(|of| of.has(self.env)))?;
         let of = |contact: &Option<u32>| contact.is_some_and(|contact| contact as usize == body);
         let (mut count, mut sum) = (0, Vector3::zeros());
         for contact in &env.contacts {
-            // The force is on the second body; the first has its negative.
+            // The contact force acts on the second body; the first body has the opposite force.
             for (_, sign) in contact.bodies.iter().zip([-1.0, 1.0]).filter(|(body, _)| of(body)) {
                 count += 1;
                 sum += Vector3::from(contact.force) * sign;
@@ -66,13 +66,13 @@ impl Picked {
         Some((count, sum.into()))
     }
 
-    /// Where the point is now, in its environment \[m\].
+    /// Returns the current position of the point in the environment frame \[m\].
     pub fn point_now(&self, snapshot: &Snapshot) -> [f64; 3] {
         self.pose(snapshot).map_or(self.point, |pose| (pose * Point3::from(self.hold)).into())
     }
 }
 
-/// What there is to say of something that was clicked on: name, pose, the contact forces on it.
+/// Returns the text lines about a selection: name, pose, and contact force.
 pub(crate) fn describe(picked: &Picked, snapshot: &Snapshot) -> Vec<String> {
     let mut lines = vec![format!("{}  (environment {}, mask id {})", picked.name, picked.env, picked.mask_id)];
     let Some(pose) = picked.pose(snapshot) else {
@@ -81,7 +81,7 @@ pub(crate) fn describe(picked: &Picked, snapshot: &Snapshot) -> Vec<String> {
         return lines;
     };
     let (t, q) = (pose.translation.vector, pose.rotation);
-    // No zero has a sign that means nothing.
+    // Values that round to zero are shown without a sign.
     let tidy = |number: f64, least: f64| if number.abs() < least { 0.0 } else { number };
     let [x, y, z] = [t.x, t.y, t.z].map(|x| tidy(x, 5e-4));
     lines.push(format!("position  {x:+.3} {y:+.3} {z:+.3} m"));
@@ -98,7 +98,7 @@ pub(crate) fn describe(picked: &Picked, snapshot: &Snapshot) -> Vec<String> {
     lines
 }
 
-/// Whose contacts are needed to draw them where that is wanted, and to say which forces are on what was clicked on.
+/// Returns the environments whose contacts are needed, for the force overlay and for the selected body.
 pub(crate) fn contacts_wanted(shown: Shown, overlays: &Overlays, picked: Option<&Picked>) -> Option<Shown> {
     let of_picked = picked.filter(|picked| picked.body.is_some()).map(|picked| Shown::One(picked.env));
     match (overlays.contacts.then_some(shown), of_picked) {

@@ -1,4 +1,4 @@
-//! Pictures as PNG files.
+//! PNG encoding.
 
 use super::canvas::Canvas;
 use image::codecs::png::PngEncoder;
@@ -6,10 +6,10 @@ use image::{ExtendedColorType, ImageEncoder};
 use std::io;
 
 impl Canvas {
-    /// The picture as a PNG file, red, green, blue and 255 in each pixel.
+    /// Encodes the image as a PNG file in RGBA.
     ///
     /// # Errors
-    /// A picture without pixels.
+    /// The image has no pixels.
     pub fn to_png(&self) -> io::Result<Vec<u8>> {
         let [width, height] = self.dimensions().map(|side| u32::try_from(side).unwrap_or(u32::MAX));
         let mut file = Vec::new();

@@ -1,11 +1,11 @@
-//! Memory of snapshots, used again and again.
+//! Reusable snapshot buffers.
 
 use super::snapshot::{Names, Run, Snapshot};
 use crate::control::Wants;
 use kinetoscope_sim::SimulationManager;
 use std::sync::Arc;
 
-/// A fixed number of snapshots, of which those that nobody holds are filled again.
+/// A limited number of snapshots. Snapshots that no viewer holds are filled again.
 #[derive(Debug, Default)]
 pub(crate) struct Pool {
     snapshots: Vec<Arc<Snapshot>>,
@@ -14,7 +14,7 @@ pub(crate) struct Pool {
 }
 
 impl Pool {
-    /// A snapshot of now; `None` where all `size` of them are in somebody's hands.
+    /// Fills a snapshot of the current state and returns it, or `None` if all `size` snapshots are held by viewers.
     pub(crate) fn take(
         &mut self,
         sim: &mut SimulationManager,
@@ -27,7 +27,7 @@ impl Pool {
         }
         let names = Arc::clone(self.names.as_ref()?);
         if self.snapshots.len() > size {
-            // Of viewers that went.
+            // Fewer viewers need fewer snapshots.
             self.snapshots.retain(|snapshot| Arc::strong_count(snapshot) > 1);
         }
         let free = self.snapshots.iter().position(|snapshot| Arc::strong_count(snapshot) == 1);
@@ -45,7 +45,7 @@ impl Pool {
         Some(Arc::clone(&self.snapshots[place]))
     }
 
-    /// Something was added to the simulation.
+    /// Invalidates the names after entities were added to the simulation.
     pub(crate) fn forget_names(&mut self) {
         self.names = None;
     }

@@ -1,4 +1,4 @@
-//! A body that the mouse pulls at.
+//! Mouse spring on a body.
 
 use super::painter::{Look, Painter};
 use super::pick::Picked;
@@ -7,19 +7,18 @@ use crate::control::Command;
 use kinetoscope_render::View;
 use kinetoscope_sim::EnvId;
 
-/// A body that is held in a point of it, and where it is pulled to: in the plane through that point that is parallel to the
-/// picture.
+/// A mouse spring: a held point of a body, and a target in the plane through that point parallel to the image.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Pull {
     picked: Picked,
-    /// Distance of that plane along the optical axis \[m\].
+    /// Distance of that plane from the camera along the optical axis \[m\].
     depth: f64,
-    /// In the environment \[m\].
+    /// Target point in the environment frame \[m\].
     target: [f64; 3],
 }
 
 impl Pull {
-    /// Takes hold of what is seen at a pixel; `None` where that is no body.
+    /// Grabs the body at a pixel; `None` if the pixel shows no body.
     pub(crate) fn at(
         painter: &mut Painter,
         snapshot: &Snapshot,
@@ -36,12 +35,12 @@ impl Pull {
         Some(Self { picked, depth, target })
     }
 
-    /// What is held.
+    /// The held point.
     pub(crate) fn picked(&self) -> &Picked {
         &self.picked
     }
 
-    /// Pulls to a pixel.
+    /// Moves the target to a pixel.
     pub(crate) fn to(&mut self, snapshot: &Snapshot, view: &View, [x, y]: [f64; 2]) {
         let origin = snapshot.envs.get(self.picked.env).map_or([0.0; 3], |env| env.origin);
         let ray = [(x as f32 - view.cx) / view.fx, (y as f32 - view.cy) / view.fy, 1.0];
@@ -49,18 +48,18 @@ impl Pull {
         self.target = [0, 1, 2].map(|k| f64::from(place[k]) - origin[k]);
     }
 
-    /// Something was added to the simulation.
+    /// Updates the body index after entities were added to the simulation.
     pub(crate) fn renumber(&mut self, names: &Names) {
         self.picked.renumber(names);
     }
 
-    /// What asks the simulation for it; `None` where the body is gone.
+    /// Returns the drag command, or `None` if the body no longer exists.
     pub(crate) fn command(&self) -> Option<Command> {
         let Picked { env, body, hold, .. } = self.picked;
         Some(Command::Drag { env: EnvId(env), body: body?, hold, target: self.target })
     }
 
-    /// The spring as it is drawn: its environment and its ends there \[m\].
+    /// Returns the drawn spring: its environment and its two ends in the environment frame \[m\].
     pub(crate) fn spring(&self, snapshot: &Snapshot) -> (usize, [[f64; 3]; 2]) {
         (self.picked.env, [self.picked.point_now(snapshot), self.target])
     }

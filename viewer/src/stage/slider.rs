@@ -1,9 +1,10 @@
-//! From where to where a slider of a joint goes: the same in windows and browsers.
+//! Range of joint sliders, shared by windows and browser views.
 
 use std::f64::consts::PI;
 
-/// The ends of a joint's slider \[rad or m\]: its limits. Where it has none on a side, it goes half a turn to that side, or a metre
-/// where it slides; from a limit that is beyond, as far from there. Limits that leave no way between them are none.
+/// Returns the range of a joint's slider \[rad or m\]: its limits. A missing limit is replaced by half a turn, or by 1
+/// m for a prismatic joint. If the other limit lies beyond that, the range extends by the same amount from it. An empty
+/// range counts as unlimited.
 pub(crate) fn slider_range([low, high]: [f64; 2], slides: bool) -> [f64; 2] {
     let reach = if slides { 1.0 } else { PI };
     match (low.is_finite(), high.is_finite()) {
@@ -18,7 +19,7 @@ pub(crate) fn slider_range([low, high]: [f64; 2], slides: bool) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// A slider ends at the limits, and a reach away where one is missing.
+    /// A slider ends at the limits, and at a default distance where a limit is missing.
     #[test]
     fn ranges() {
         let none = f64::INFINITY;
@@ -26,7 +27,7 @@ mod tests {
             ([-0.5, 2.0], [-0.5, 2.0], [-0.5, 2.0]),
             ([-none, none], [-PI, PI], [-1.0, 1.0]),
             ([f64::NAN, f64::NAN], [-PI, PI], [-1.0, 1.0]),
-            // One limit: before the middle, in it, beyond the reach.
+            // One limit: on the near side of zero, at zero, beyond the default distance.
             ([-0.5, none], [-0.5, PI], [-0.5, 1.0]),
             ([0.0, none], [0.0, PI], [0.0, 1.0]),
             ([5.0, none], [5.0, 5.0 + PI], [5.0, 6.0]),

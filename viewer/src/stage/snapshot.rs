@@ -1,4 +1,4 @@
-//! The whole stage at one moment.
+//! Snapshots of all environments.
 
 use super::camera::{self, CameraId, CameraView};
 use crate::control::{RecordingState, Speed, Wants};
@@ -8,23 +8,23 @@ use kinetoscope_scene::{Marker, RenderScene};
 use kinetoscope_sim::{EnvId, JointIndex, Look, MaskId, RobotId, SimulationManager, Viewpoint};
 use std::sync::Arc;
 
-/// Which environments.
+/// Selection of environments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shown {
-    /// All of them, in their grid.
+    /// All environments, in their grid.
     #[default]
     All,
-    /// One.
+    /// One environment, by index.
     One(usize),
 }
 
 impl Shown {
-    /// Whether an environment is among them.
+    /// True if an environment is selected.
     pub fn has(self, env: usize) -> bool {
         self == Self::All || self == Self::One(env)
     }
 
-    /// The one; `None` where it is all.
+    /// Returns the single environment, or `None` for all.
     pub(crate) fn env(self) -> Option<EnvId> {
         match self {
             Self::All => None,
@@ -33,104 +33,107 @@ impl Shown {
     }
 }
 
-/// All environments at one moment. It never changes; everything in it is in the frame of its environment.
+/// The state of all environments at one time. Snapshots are immutable. Quantities are in the frame of their
+/// environment.
 #[derive(Clone, Debug, Default)]
 pub struct Snapshot {
-    /// Later snapshots have higher numbers, from 1.
+    /// Sequence number, from 1, increasing.
     pub number: u64,
-    /// How the simulation runs.
+    /// Run state of the simulation.
     pub run: Run,
-    /// What can be seen in every environment, without the poses.
+    /// Render scene shared by all environments, without poses.
     pub scene: Option<Arc<RenderScene>>,
-    /// What each mask id is.
+    /// Object of each mask id.
     pub ids: Arc<[MaskId]>,
-    /// What things are called.
+    /// Names of bodies, joints and cameras.
     pub names: Arc<Names>,
-    /// Point of view that the program set; `None` where it set none.
+    /// Camera set by the program, if any.
     pub viewpoint: Option<Viewpoint>,
-    /// The environments.
+    /// State of each environment.
     pub envs: Vec<EnvStage>,
-    /// Which of them have their contacts in it.
+    /// Environments whose contacts are included.
     pub contacts_of: Option<Shown>,
 }
 
-/// How a simulation runs.
+/// Run state of a simulation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Run {
-    /// Physics steps since the simulation was made.
+    /// Physics steps since the simulation was created. During playback: index of the frame.
     pub steps: u64,
-    /// Whether it is held.
+    /// True while paused.
     pub paused: bool,
-    /// How fast it should be.
+    /// Requested speed.
     pub speed: Speed,
-    /// How many simulated seconds pass in a second, over the last half second; `None` where that is not known yet.
+    /// Simulated seconds per wall-clock second, over the last half second; `None` before the first measurement.
     pub measured_speed: Option<f64>,
-    /// Why the last command was refused; `None` once another one was done.
+    /// Reason of the last refused command; `None` after a later command succeeded.
     pub refused: Option<String>,
-    /// How many commands were refused so far: who sees the same reason again sees whether it was refused again.
+    /// Number of refused commands so far. It distinguishes a repeated refusal with the same reason.
     pub refusals: u64,
-    /// How the recording stands; `None` where there is no record button.
+    /// State of the recording; `None` without a record button.
     pub recording: Option<RecordingState>,
-    /// Where in a recording this is; `None` for a simulation that runs.
+    /// Playback position; `None` for a running simulation.
     pub timeline: Option<Timeline>,
 }
 
-/// A moment of a recording, and the ends of it \[s\].
+/// Playback time in a recording, with the first and last time \[s\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timeline {
-    /// The moment.
+    /// Time of the shown frame.
     pub now: f64,
-    /// The first one.
+    /// Time of the first frame.
     pub start: f64,
-    /// The last one.
+    /// Time of the last frame.
     pub end: f64,
 }
 
-/// What things are called; the same until something is added to the simulation.
+/// Names of bodies, joints and cameras. They stay the same until an entity is added to the simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
-    /// Links (`uid/link`), objects, bodies of MJCF files.
+    /// Links (`uid/link`), objects, and bodies of MJCF files.
     pub bodies: Arc<[String]>,
-    /// Joints of robots, one after the other.
+    /// Joints of all robots, robot by robot.
     pub joints: Vec<JointName>,
-    /// Camera sensors of every kind; the eyes of a pair are `NAME/left` and `NAME/right`.
+    /// Camera sensors of every kind. The cameras of a stereo pair are named `NAME/left` and `NAME/right`.
     pub cameras: Vec<String>,
-    /// Which mask id the ground has: it is there once for all environments.
+    /// Mask id of the ground, which is drawn once for all environments.
     pub(crate) ground: Option<i32>,
     camera_ids: Vec<CameraId>,
 }
 
-/// A joint of a robot.
+/// Name and properties of a robot joint.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JointName {
     /// The robot.
     pub robot: RobotId,
-    /// The joint.
+    /// Index of the joint in the robot.
     pub joint: JointIndex,
     /// `uid/joint`.
     pub name: String,
-    /// Whether it can be given a target: it has a drive, and follows no other joint.
+    /// True if the joint accepts targets: it has a drive and mimics no other joint.
     pub driven: bool,
-    /// Whether it slides instead of turning.
+    /// True for a prismatic joint, whose positions are in meters.
     pub slides: bool,
 }
 
-/// An environment at one moment.
+/// State of one environment.
 #[derive(Clone, Debug, Default)]
 pub struct EnvStage {
-    /// Where it is in the overview \[m\].
+    /// Position of the environment's origin in the overview \[m\].
     pub origin: [f64; 3],
-    /// Where everything is.
+    /// Poses and other visible state.
     pub look: Look,
-    /// Contacts with their forces, where some viewer wants them; bodies are those of [`Names::bodies`].
+    /// Contacts with their forces, if a viewer requested them. Bodies are indices into [`Names::bodies`].
     pub contacts: Vec<Contact>,
-    /// What sensors show of their measurements.
+    /// Debug markers of sensors.
     pub markers: Vec<Marker>,
-    /// Position, target and the ends of the range of each joint of [`Names::joints`] \[rad or m\].
+    /// Position, target, lower and upper limit of each joint of [`Names::joints`] \[rad or m\], shape (num_joints, 4).
+    /// Empty unless requested.
     pub joints: Vec<[f64; 4]>,
-    /// Effort of the drive of each joint in the last step \[N m or N\]; 0 without a drive.
+    /// Drive effort of each joint in the last step \[N m or N\]; 0 without a drive. Empty unless requested.
     pub efforts: Vec<f64>,
-    /// What each camera of [`Names::cameras`] looks at; `None` where it does not look at this environment.
+    /// View of each camera of [`Names::cameras`]; `None` where a camera does not observe this environment. Empty unless
+    /// requested.
     pub views: Vec<Option<CameraView>>,
 }
 
@@ -155,14 +158,14 @@ impl Names {
         Self { bodies: sim.entities().body_names(), joints, cameras, ground, camera_ids }
     }
 
-    /// Whether they are still those of `sim`: sensors are added without a word.
+    /// True if the names still apply to `sim`. Added sensors are detected by the number of cameras.
     pub(super) fn fit(&self, sim: &SimulationManager) -> bool {
         camera::count(sim) == self.cameras.len()
     }
 }
 
 impl Snapshot {
-    /// Copies everything that `wants` asks for.
+    /// Copies the current state, with the contents that `wants` requests.
     pub(super) fn fill(&mut self, sim: &mut SimulationManager, names: &Arc<Names>, wants: &Wants, run: Run) {
         self.run = run;
         self.scene = Some(Arc::clone(sim.scene_mut().visible().scene()));
@@ -173,7 +176,7 @@ impl Snapshot {
         let origins = sim.cfg().env_origins();
         for (k, env) in self.envs.iter_mut().enumerate() {
             env.origin = [0, 1, 2].map(|axis| origins[(k, axis)]);
-            // There is such an environment.
+            // The environment index is valid, so the result is never an error.
             let _ = sim.scene_mut().look(EnvId(k), &mut env.look);
             if let Some(timeline) = self.run.timeline {
                 env.look.time = timeline.now;
@@ -218,12 +221,12 @@ impl Snapshot {
         }
     }
 
-    /// The same moment with one environment alone; with none where there is no such environment.
+    /// Returns a copy with a single environment, or with no environment if the index is invalid.
     pub(crate) fn only(&self, env: usize) -> Self {
         Self { viewpoint: None, envs: self.envs.get(env).into_iter().cloned().collect(), ..self.clone() }
     }
 
-    /// What an environment looks like: its own scene, or that of all.
+    /// Returns the render scene of an environment: its own scene, or the shared one.
     pub(crate) fn scene_of(&self, env: &EnvStage) -> Option<Arc<RenderScene>> {
         env.look.own_scene.0.as_ref().or(self.scene.as_ref()).map(Arc::clone)
     }

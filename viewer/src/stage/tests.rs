@@ -14,7 +14,7 @@ use nalgebra::{Point3, Vector3};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// A snapshot with everything, after the cube has come to rest.
+/// Steps until the cube rests, then takes a snapshot with all contents.
 fn stage(num_envs: usize) -> (Sample, Arc<Snapshot>) {
     let mut sample = sample(num_envs);
     sample.sim.update(100);
@@ -24,7 +24,7 @@ fn stage(num_envs: usize) -> (Sample, Arc<Snapshot>) {
 }
 
 impl Sample {
-    /// The newest snapshot.
+    /// Returns the newest snapshot.
     fn snapshot(&mut self) -> Arc<Snapshot> {
         self.sim.viewer(Wants::default()).newest().unwrap()
     }
@@ -54,26 +54,26 @@ fn picking() {
             Eye::looking((target + Vector3::new(0.3, 0.2, 1.5)).into(), target.into()).unwrap().view(201, 101)
         };
         let mut pick = |view: &View| painter.pick(&snapshot, view, &Look::default(), [100.5, 50.5]);
-        // The middle of the cube's upper face, and of the plate's, in the middle of the image.
+        // The center of the upper face of the cube, and of the plate, at the image center.
         for (name, at) in [("cube", [0.0, 0.0, 2.0 * HALF]), ("arm/plate", [1.0, 0.0, 0.525])] {
             let picked = pick(&above(at)).unwrap();
             assert!(picked.name == name && picked.env == env, "{picked:?}");
             assert_eq!(snapshot.names.bodies[picked.body.unwrap()], name);
-            // Half a pixel at 1.5 m is 6 mm; the face is flat, so its height is exact to single precision.
+            // Half a pixel at 1.5 m is 6 mm. The face is flat, so its height is exact to single precision.
             let away = (Vector3::from(picked.point) - Vector3::from(at)).norm();
             assert!(away < 0.01 && (picked.point[2] - at[2]).abs() < 1e-3, "{picked:?}");
             let back = picked.pose(&snapshot).unwrap() * Point3::from(picked.hold);
             assert!((back.coords - Vector3::from(picked.point)).norm() < 1e-9);
         }
-        // Beside both there is the ground, and above the horizon nothing.
+        // Beside both is the ground; above the horizon is the sky.
         let picked = pick(&above([0.0, -0.5, 0.0])).unwrap();
         assert!(picked.name == "ground" && picked.body.is_none(), "{picked:?}");
         assert_eq!(pick(&Eye::looking([0.0, 0.0, 1.0], [1.0, 0.0, 3.0]).unwrap().view(201, 101)), None);
     }
 }
 
-/// The contact forces on a resting cube add up to its weight, m g, upward: a law. The place that was clicked on has a ball, as
-/// large from near as from far, which is no obstacle to the next click.
+/// The contact forces on a resting cube add up to its weight, m g, upward. The selected point has a marker of the same
+/// image size at any distance, which does not block the next click.
 #[test]
 fn selected_cube() {
     let (_, snapshot) = stage(1);
@@ -88,20 +88,21 @@ fn selected_cube() {
             assert!(contact.bodies.contains(&Some(cube)), "only the cube touches anything: {contact:?}");
             sum += if contact.bodies[1] == Some(cube) { 1.0 } else { -1.0 } * Vector3::from(contact.force);
         }
-        // At rest to 1e-3 m/s² after a second.
+        // At rest to 1e-3 m/s² after one second.
         assert!((sum - Vector3::new(0.0, 0.0, MASS * 9.81)).norm() < 0.01, "{sum}");
         let text = describe(&picked, &snapshot).join("\n");
         assert!(text.starts_with("cube  (environment 0") && text.contains("+19.6"), "{text}");
         let look = Look { picked: Some(&picked), ..Look::default() };
         let with = painted(&mut painter, &snapshot, &view, &look);
-        // A disc of radius 4 has 50 pixels; half of the ball or more is above the face, and so is the tip of no axis.
+        // A disc of radius 4 has 50 pixels. At least half of the marker is above the face; the tips of the axes add
+        // some pixels.
         let marked = unlike(&with, &painted(&mut painter, &snapshot, &view, &Look::default()));
         assert!((25..90).contains(&marked), "{marked} pixels from {distance} m");
         assert_eq!(painter.pick(&snapshot, &view, &look, [100.5, 50.5]), Some(picked));
     }
 }
 
-/// All environments stand in their grid, or one is shown.
+/// All environments are drawn in their grid, or only one of them.
 #[test]
 fn environments() {
     let (_, snapshot) = stage(4);
@@ -115,7 +116,7 @@ fn environments() {
     // Four red cubes, or one of them.
     let (all_red, one_red) = (red(&all), red(&one));
     assert!(one_red > 0 && all_red > 2 * one_red && all_red < 8 * one_red, "{all_red} {one_red}");
-    // Drawn again, and by another painter on one thread, the bits are the same.
+    // Rendering again, also with one thread, gives the same bits.
     for painter in [&mut painter, &mut Painter::new(1)] {
         assert!(painted(painter, &snapshot, &view, &Look::default()) == all);
     }
@@ -127,7 +128,7 @@ fn environments() {
     }
 }
 
-/// Every overlay changes the image, and goes again.
+/// Every overlay changes the image, and disabling it restores the image.
 #[test]
 fn overlays() {
     let (mut sample, snapshot) = stage(2);
@@ -153,11 +154,11 @@ fn overlays() {
         assert!(unlike(&draw(&snapshot, base, None), &draw(&snapshot, with, None)) > 5, "{with:?}");
     }
     assert_eq!(draw(&snapshot, none, None), plain, "and without them it is as before");
-    // Markers of sensors, once these show them.
+    // Markers of sensors, once they are enabled.
     sample.sim.scene_mut().set_debug_vis(sample.camera, true).unwrap();
     let shown = sample.snapshot();
     assert!(unlike(&draw(&shown, none, None), &draw(&shown, Overlays::default(), None)) > 5);
-    // A trail of something that moves.
+    // A trail of a moving body.
     let mut trails = Trails::default();
     trails.add(&shown, Shown::All);
     sample.sim.robot_mut(sample.robot).set_qpos_target(&ndarray::arr2(&[[1.5]]), None, None).unwrap();
@@ -172,14 +173,14 @@ fn overlays() {
     assert!(unlike(&draw(&moved, trail, Some(&trails)), &draw(&moved, none, None)) > 5);
 }
 
-/// This many environments, which are those of a snapshot again and again.
+/// Repeats the environments of a snapshot up to this number.
 fn many(snapshot: &Snapshot, envs: usize) -> Snapshot {
     let envs = snapshot.envs.iter().cycle().take(envs).map(|env| EnvStage { origin: [0.0; 3], ..env.clone() });
     Snapshot { envs: envs.collect(), ..snapshot.clone() }
 }
 
-/// With more bodies than trails, the image says so. An environment that is shown alone has trails, also far behind
-/// the first 1024 bodies, and keeps them where all have some.
+/// With more bodies than trails, the image says so. A single shown environment has trails, even beyond the first 1024
+/// bodies, and keeps them when it already has some.
 #[test]
 fn limit_of_trails() {
     let (mut sample, first) = stage(2);
@@ -218,7 +219,7 @@ fn limit_of_trails() {
     assert_eq!(drawn(far + 1, Shown::All, Shown::One(far)), 0, "it had none: they begin now");
 }
 
-/// The panel draws what the sensor itself measures, pixel by pixel, where nothing moved since.
+/// Without motion since the measurement, the panel draws the pixels that the sensor measures.
 #[test]
 fn panel() {
     let (sample, snapshot) = stage(2);
@@ -234,7 +235,7 @@ fn panel() {
     let (mut seen, mut colors) = (BTreeSet::new(), BTreeSet::new());
     // Below the titles.
     for (v, u) in (15..48usize).flat_map(|v| (0..64usize).map(move |u| (v, u))) {
-        // The color of a pixel with several objects, or with lit and shaded parts, is the mean of four samples.
+        // The color of a pixel at an edge or a shading boundary is the mean of four samples.
         let rgb = |v: usize, u: usize| [0, 1, 2].map(|k| color[(1, v, u, k)]);
         let around = [(v - 1, u), (v + 1, u), (v, u.saturating_sub(1)), (v, (u + 1).min(63)), (v, u)];
         let flat = around.iter().all(|&(near, beside)| {
@@ -279,7 +280,8 @@ fn like_eye(channels: Channels) -> CameraCfg {
     }
 }
 
-/// Cameras of every kind are in the panel, each as it sees: a stereo camera, one ray for each pixel, a lens that bends the rays.
+/// The panel shows cameras of every kind as they are: a stereo camera, a ray-caster camera, and a camera with a fisheye
+/// lens.
 #[test]
 fn panel_of_every_camera() {
     let mut sample = sample(1);
@@ -309,22 +311,23 @@ fn panel_of_every_camera() {
     assert!(fisheye == own(sim.sensor(fish).unwrap().mask().unwrap()));
     assert!(left == own(sim.sensor(pair).unwrap().left().mask().unwrap()));
     assert!(right == own(sim.sensor(pair).unwrap().right().mask().unwrap()));
-    // Rays and rasterizer may differ where an edge goes through the middle of a pixel.
+    // Ray caster and rasterizer may differ where an edge passes through a pixel center.
     let differ = own(sim.sensor(rays).unwrap().mask()).iter().zip(&cast).filter(|(a, b)| a != b).count();
     assert!(differ < 20, "{differ} of {} pixels", cast.len());
-    // The controls: each of them sees something else.
+    // Controls: the cameras have different images.
     assert!(left != right && fisheye != left);
     let colors: BTreeSet<_> = fisheye.iter().collect();
     assert!(colors.len() >= 2, "{colors:?}");
 }
 
-/// Markers of other sensors are in the colors of a camera that draws them, there and in the panel, and in nothing else.
+/// Markers of other sensors are in the color image of a camera that draws them, in the sensor and in the panel, and in
+/// no other channel.
 #[test]
 fn panel_with_markers() {
     let mut sample = sample(1);
     let marked = CameraCfg { draw_markers: true, ..like_eye(Channels { color: true, ..Channels::NONE }) };
     sample.sim.add_sensor("marked", marked).unwrap();
-    // Another camera above the cube shows its frame.
+    // Another camera above the cube shows its frame as a marker.
     let placement = Placement::LookAt { eye: [0.2, 0.1, 0.4], target: [0.0; 3], up: [0.0, 0.0, 1.0] };
     let other = CameraCfg { extrinsics: Extrinsics { placement, ..Default::default() }, ..CameraCfg::default() };
     let other = sample.sim.add_sensor("other", other).unwrap();

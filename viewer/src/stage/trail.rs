@@ -1,4 +1,4 @@
-//! Where bodies were.
+//! Trails of past body positions.
 
 use super::canvas::Canvas;
 use super::color;
@@ -9,32 +9,32 @@ use embedded_graphics::mono_font::ascii::FONT_6X10;
 use kinetoscope_render::View;
 use std::collections::VecDeque;
 
-/// Places that are kept of each body.
+/// Positions per trail.
 const LENGTH: usize = 120;
-/// Bodies whose trails are kept, at most.
+/// Maximum number of bodies with trails.
 const BODIES: usize = 1024;
-/// A new place is kept where the body is this far from the last one \[m\].
+/// Distance between two positions of a trail \[m\].
 const APART: f64 = 0.01;
 
-/// Trails of bodies, kept by the viewer who draws them: of the environments that are shown, and of 1024 bodies at most,
-/// environment by environment. Where there are more, that is written into the picture.
+/// Trails of the bodies of the shown environments, environment by environment, for at most 1024 bodies. The image notes
+/// if there are more bodies.
 #[derive(Debug, Default)]
 pub struct Trails {
-    /// One for each body, from those of environment `first_env` on.
+    /// Positions of each body, from the bodies of environment `first_env` on, in the environment frame \[m\].
     places: Vec<VecDeque<[f64; 3]>>,
     first_env: usize,
-    /// Bodies of an environment.
+    /// Number of bodies per environment.
     bodies: usize,
 }
 
 impl Trails {
-    /// Takes over where bodies are now. A simulation of other bodies, an environment that was put back, and one that was not
-    /// among those with trails begin anew.
+    /// Appends the current positions. Trails restart when the bodies change, when an environment is reset, and for
+    /// environments that had no trails.
     pub fn add(&mut self, snapshot: &Snapshot, shown: Shown) {
         let bodies = snapshot.names.bodies.len();
         let (first_env, wanted) = match shown {
             Shown::All => (0, bodies * snapshot.envs.len()),
-            // One of those that have trails anyway: all of them keep theirs.
+            // The environment already has trails, so all trails are kept.
             Shown::One(env) if self.bodies == bodies && self.has_all_of(env) => (self.first_env, self.places.len()),
             Shown::One(env) => (env, if env < snapshot.envs.len() { bodies } else { 0 }),
         };
@@ -46,7 +46,7 @@ impl Trails {
         for (trail, pose) in self.places.iter_mut().zip(all) {
             let now: [f64; 3] = pose.translation.vector.into();
             let distance = trail.back().map(|last| (0..3).map(|k| (now[k] - last[k]).powi(2)).sum::<f64>().sqrt());
-            // Nothing flies a metre between two pictures: it was put somewhere else.
+            // A jump of more than one meter between two images is a teleport, not a motion.
             if distance.is_some_and(|distance| distance.is_nan() || distance > 1.0) {
                 trail.clear();
             }
@@ -59,17 +59,17 @@ impl Trails {
         }
     }
 
-    /// Whether every body of this environment has a trail.
+    /// True if every body of this environment has a trail.
     fn has_all_of(&self, env: usize) -> bool {
         env >= self.first_env && (env - self.first_env + 1) * self.bodies <= self.places.len()
     }
 
-    /// Forgets them.
+    /// Removes all trails.
     pub fn clear(&mut self) {
         self.places.clear();
     }
 
-    /// Draws those of the environments that are shown, older places darker.
+    /// Draws the trails of the shown environments; older positions are darker.
     pub(super) fn draw(&self, snapshot: &Snapshot, shown: Shown, view: &View, canvas: &mut Canvas) {
         for (index, trail) in self.places.iter().enumerate() {
             let env = self.first_env + index / self.bodies.max(1);
@@ -92,7 +92,7 @@ impl Trails {
         if there_are > BODIES {
             let text = format!("trails of the first {BODIES} of {there_are} bodies");
             let [width, height] = canvas.dimensions().map(|n| i32::try_from(n).unwrap_or(i32::MAX));
-            // In the middle below: the corners have other words.
+            // At the bottom center, because the corners show other text.
             let left = (width - 6 * text.len() as i32) / 2;
             canvas.text(&text, [left.max(2), height - 14], &FONT_6X10, color::TRAIL);
         }

@@ -1,4 +1,4 @@
-//! What a window does with mouse and keys, and what it draws: everything but the window.
+//! State of a simulation window: handles mouse and keyboard input and renders the image, independent of X11.
 
 use super::desks::Desks;
 use super::fineness::Fineness;
@@ -16,87 +16,87 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What happens to a window.
+/// An input event of a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input {
     /// A key was pressed.
     Press(Key),
-    /// A key is held, and repeats.
+    /// A held key repeats.
     Repeat(Key),
-    /// A key was let go.
+    /// A key was released.
     Release(Key),
-    /// A button of the mouse was pressed at a pixel: 1 is the left one, 2 the middle one, 3 the right one.
+    /// A mouse button was pressed at a pixel: 1 is left, 2 is middle, 3 is right.
     ButtonPress(u8, [f64; 2], Modifiers),
-    /// A button was let go.
+    /// A mouse button was released at a pixel.
     ButtonRelease(u8, [f64; 2]),
-    /// The mouse is at a pixel.
+    /// The mouse moved to a pixel.
     Move([f64; 2]),
-    /// The wheel was turned by steps, away from the user, at a pixel.
+    /// The wheel was turned by steps at a pixel; positive is away from the user.
     Wheel(f64, [f64; 2]),
-    /// The window has this many pixels.
+    /// The image of the window was resized: pixels per row, rows.
     Resize([usize; 2]),
-    /// The keyboard is somebody else's now.
+    /// The window lost the keyboard focus.
     FocusLost,
 }
 
-/// Keys that are held while a button is pressed.
+/// Modifier keys held during a button press.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Modifiers {
-    /// Shift.
+    /// The Shift key.
     pub shift: bool,
-    /// Control.
+    /// The Control key.
     pub ctrl: bool,
 }
 
-/// What the mouse is doing.
+/// Effect of the current mouse drag.
 #[derive(Clone, Debug, PartialEq)]
 enum Grip {
     Orbit,
     Pan,
     Turn,
-    /// The time line of a recording.
+    /// Seeks on the timeline of a recording.
     Timeline,
-    /// A slider of a joint.
+    /// Moves the slider of a joint, by joint index.
     Slider(usize),
-    /// A body.
+    /// Pulls a body with a spring.
     Spring(Pull),
 }
 
-/// What the mouse is doing since a button was pressed, until that button is let go.
+/// A mouse drag, from the press of a button to its release.
 #[derive(Clone, Debug, PartialEq)]
 struct Held {
     button: u8,
     grip: Grip,
-    /// Where it was pressed, and where the mouse was last.
+    /// Position of the press, and last position of the mouse \[pixels\].
     start: [f64; 2],
     last: [f64; 2],
 }
 
-/// Pictures per second, at most: what most screens show.
+/// Maximum frame rate \[Hz\], the refresh rate of most screens.
 const RATE: f64 = 60.0;
-/// A mouse that moved less than this between press and release clicked \[pixels\].
+/// Largest mouse motion of a click \[pixels\].
 const CLICK: f64 = 3.0;
-/// Width of each of the panel's four pictures \[pixels\].
+/// Width of each image of the camera panel \[pixels\].
 const PANEL: usize = 160;
 
-/// The state of a window.
+/// State of a simulation window.
 pub struct App {
     painter: Painter,
     panel: Panel,
-    /// The panel's pictures.
+    /// Image of the camera panel.
     small: Canvas,
     trails: Trails,
     snapshot: Option<Arc<Snapshot>>,
     size: [usize; 2],
     eye: Option<Eye>,
-    /// Number of the program's point of view that was taken over.
+    /// Value of `Viewpoint::changes` that was last applied.
     view_changes: u64,
     shown: Shown,
-    /// The environment that panels and sliders are of.
+    /// Environment of the camera panel and the sliders.
     env: usize,
-    /// The camera sensor that is looked through.
+    /// Camera sensor whose view fills the window.
     through: Option<usize>,
-    /// The camera sensor of the panel.
+    /// Camera sensor of the panel.
     panel_of: Option<usize>,
     overlays: Overlays,
     picked: Option<Picked>,
@@ -106,20 +106,20 @@ pub struct App {
     sliders: Option<usize>,
     help: bool,
     commands: Vec<Command>,
-    /// The last command came to nobody.
+    /// True if the last command could not be sent.
     unheard: bool,
     drawn: Vec<Instant>,
     flown: Instant,
     desks: Desks,
-    /// Where pictures may have fewer samples to keep pace.
+    /// Adaptive sample count; `None` always uses four samples per pixel.
     fineness: Option<Fineness>,
-    /// How long it took to hand the last picture to the display.
+    /// Duration of sending the last image to the display.
     handing: Duration,
-    /// What the last picture showed: which snapshot, from where.
+    /// Number of the last rendered snapshot, and its view.
     showed: Option<(u64, View)>,
 }
 
-/// Short: snapshots and pictures are long.
+/// Omits snapshots and images, which are long.
 impl fmt::Debug for App {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("App")
@@ -136,8 +136,9 @@ impl fmt::Debug for App {
 }
 
 impl App {
-    /// A window of `size` pixels, drawn on `threads` threads at most, and on half of them where physics takes all the time that
-    /// it can get: as fast as can be, and for some seconds after it fell behind the speed that it should have.
+    /// Creates the state of a window of `size` pixels with at most `threads` rendering threads. Half of the threads
+    /// render while physics needs all available time: at free speed, and for 5 s after physics fell behind the
+    /// requested speed.
     pub fn new(size: [usize; 2], threads: usize) -> Self {
         Self {
             painter: Painter::new(threads),
@@ -170,7 +171,7 @@ impl App {
         }
     }
 
-    /// A newer snapshot.
+    /// Sets the snapshot to render.
     pub fn show(&mut self, snapshot: Arc<Snapshot>) {
         self.env = self.env.min(snapshot.envs.len().saturating_sub(1));
         let changes = snapshot.viewpoint.map_or(0, |view| view.changes);
@@ -193,69 +194,70 @@ impl App {
         self.pull();
     }
 
-    /// Whether the simulation could be told what the user wants: if not, the picture says so.
+    /// Records the result of sending the last command. The image shows a message after a failure.
     pub fn was_heard(&mut self, heard: bool) {
         self.unheard = !heard;
     }
 
-    /// How long it took to hand the last picture to the display: that, too, is time in which nothing is drawn.
+    /// Records the duration of sending the last image to the display. The adaptive sample count includes it.
     pub fn handed_over(&mut self, took: Duration) {
         self.handing = took;
     }
 
-    /// Looks from somewhere else.
+    /// Sets the free camera.
     pub fn look_from(&mut self, eye: Eye) {
         self.eye = Some(eye);
     }
 
-    /// Where it looks from, where it looks freely.
+    /// Returns the free camera.
     pub fn eye(&self) -> Eye {
         self.eye.unwrap_or_default()
     }
 
-    /// What is drawn beside what is there.
+    /// Returns the enabled overlays.
     pub fn overlays(&self) -> Overlays {
         self.overlays
     }
 
-    /// What was clicked on last.
+    /// Returns the selected point.
     pub fn picked(&self) -> Option<&Picked> {
         self.picked.as_ref()
     }
 
-    /// What it wants to find in snapshots.
+    /// Returns the snapshot contents that the window needs.
     pub fn wants(&self) -> Wants {
         let contacts = contacts_wanted(self.shown_now(), &self.overlays, self.picked.as_ref());
         Wants { rate: RATE, contacts, markers: self.overlays.sensors, ..Wants::default() }
     }
 
-    /// What it asks the simulation for, since this was called last.
+    /// Takes the commands for the simulation since the last call.
     pub fn take_commands(&mut self) -> Vec<Command> {
         std::mem::take(&mut self.commands)
     }
 
-    /// From now on what moves is drawn with one sample per pixel instead of four where those would make fewer than 30 pictures
-    /// per second. What rests for a quarter of a second has four.
+    /// Enables adaptive sampling. If four samples per pixel would give fewer than 30 frames per second, moving images
+    /// use one sample. Images at rest for a quarter of a second use four samples.
     pub fn keep_pace(&mut self) {
         self.fineness = Some(Fineness::default());
     }
 
-    /// Whether there is a picture to draw even where nothing happens: keys to fly are held, or what rests was drawn coarsely.
+    /// True if a new image is needed without an event: flight keys are held, or a resting image has only one sample per
+    /// pixel.
     pub fn moves(&self, now: Instant) -> bool {
         !self.held.is_empty() || self.fineness.is_some_and(|fineness| fineness.wants_better(now))
     }
 
-    /// Which environments are in the picture: where somebody looks through a camera, that of the camera.
+    /// Returns the environments in the image. A camera sensor shows its environment alone.
     fn shown_now(&self) -> Shown {
         if self.looks_through() { Shown::One(self.env) } else { self.shown }
     }
 
-    /// Whether the picture is a camera sensor's: one is chosen, and it looks at the environment.
+    /// True if the window shows a camera sensor: one is chosen, and it observes the environment.
     fn looks_through(&self) -> bool {
         self.through_view(1, 1).is_some()
     }
 
-    /// Something happened.
+    /// Handles an input event.
     pub fn handle(&mut self, input: Input) {
         match input {
             Input::Press(key) => self.press(key),
@@ -332,7 +334,7 @@ impl App {
         }
     }
 
-    /// Shows one environment; the eye goes along.
+    /// Shows a single environment and moves the camera along.
     fn show_env(&mut self, env: usize) {
         let Some(snapshot) = &self.snapshot else { return };
         let from = self.shown.env().and_then(|EnvId(k)| snapshot.envs.get(k)).map(|env| env.origin);
@@ -346,7 +348,7 @@ impl App {
         (self.env, self.shown) = (env, Shown::One(env));
     }
 
-    /// The camera of the picture.
+    /// Returns the view of the image.
     fn view(&self) -> View {
         let [width, height] = self.size.map(|n| n.clamp(1, View::MAX_SIDE));
         if let Some(view) = self.through_view(width, height) {
@@ -355,14 +357,14 @@ impl App {
         self.eye.unwrap_or_default().view(width, height)
     }
 
-    /// What a camera sensor looks at, its picture as large as fits.
+    /// Returns the view of the chosen camera sensor, scaled to fit the window; `None` without such a view.
     fn through_view(&self, width: usize, height: usize) -> Option<View> {
         let env = self.snapshot.as_ref()?.envs.get(self.env)?;
         let view = env.views.get(self.through?)?.as_ref()?.view;
         let scale = (width as f32 / view.width as f32).min(height as f32 / view.height as f32);
         let mut pose = view.world_from_camera;
         (0..3).for_each(|k| pose.translation[k] += env.origin[k] as f32);
-        // The principal point keeps its place in the sensor's picture, which is in the middle of the window.
+        // The principal point keeps its position relative to the sensor image, which is centered in the window.
         let [left, top] = [width as f32 - scale * view.width as f32, height as f32 - scale * view.height as f32];
         let (cx, cy) = (view.cx * scale + 0.5 * left, view.cy * scale + 0.5 * top);
         Some(View { width, height, fx: view.fx * scale, fy: view.fy * scale, cx, cy, world_from_camera: pose, ..view })
@@ -371,9 +373,9 @@ impl App {
     fn grip(&mut self, button: u8, at: [f64; 2], modifiers: Modifiers) {
         let Some(snapshot) = self.snapshot.clone() else { return };
         match &self.grip {
-            // One thing at a time.
+            // Only one drag at a time.
             Some(held) if held.button != button => return,
-            // That it was let go was not heard.
+            // The release of the same button was lost, so it is made up for.
             Some(_) => self.release(button, at),
             None => {}
         }
@@ -404,7 +406,7 @@ impl App {
         self.grip = grip.map(|grip| Held { button, grip, start: at, last: at });
     }
 
-    /// A body to be pulled.
+    /// Grabs the body at a pixel with a mouse spring.
     fn spring(&mut self, snapshot: &Snapshot, at: [f64; 2]) -> Option<Grip> {
         let view = self.view();
         let look = Look { shown: self.shown_now(), overlays: self.overlays, ..Look::default() };
@@ -442,7 +444,7 @@ impl App {
         self.pull();
     }
 
-    /// Sends the spring as it is.
+    /// Queues a drag command with the current spring, in place of older ones.
     fn pull(&mut self) {
         if let Some(Held { grip: Grip::Spring(pull), .. }) = &self.grip
             && let Some(drag) = pull.command()
@@ -492,7 +494,7 @@ impl App {
         self.commands.push(Command::SetTarget { robot, joint, env, value });
     }
 
-    /// Flies on while keys are held.
+    /// Moves the free camera according to the held flight keys.
     fn fly(&mut self, now: Instant) {
         let seconds = now.saturating_duration_since(self.flown).as_secs_f64().min(0.1);
         self.flown = now;
@@ -506,11 +508,11 @@ impl App {
                 way += Vector3::from(direction.map(f64::from));
             }
         }
-        // As fast as what is looked at is far.
+        // The speed per second is the distance to the target.
         eye.fly((way * eye.distance * seconds).into());
     }
 
-    /// Draws the window's picture; black before the first snapshot.
+    /// Renders the image of the window, including overlays and panels; black before the first snapshot.
     pub fn draw(&mut self, canvas: &mut Canvas, now: Instant) {
         let [width, height] = self.size.map(|n| n.clamp(1, View::MAX_SIDE));
         canvas.resize(width, height);
@@ -526,17 +528,17 @@ impl App {
         let (shown, overlays, picked) = (self.shown_now(), self.overlays, self.picked.as_ref());
         let look = Look { shown, overlays, picked, trails: Some(&self.trails), spring };
         self.painter.use_threads(self.desks.now(&snapshot.run, now));
-        // Held by a pause, a simulation shows another snapshot where somebody moved something, and only there.
+        // The snapshot number of a paused simulation changes only if a user changed something.
         let shows = (snapshot.number, view);
         let changed = self.showed.replace(shows) != Some(shows);
         if let Some(fineness) = &mut self.fineness {
             self.painter.set_samples(fineness.samples(changed, now));
         }
         let start = Instant::now();
-        // Views of windows are good ones; one that is not leaves the last picture.
+        // The view of a window is always valid. If rendering fails, the canvas keeps its content.
         let _ = self.painter.draw(&snapshot, &view, &look, canvas);
         if let Some(fineness) = &mut self.fineness {
-            // This picture is not handed over yet: that will take as long as the last one took.
+            // The current image is not sent yet, so the duration of sending the last image serves as an estimate.
             fineness.drew(self.painter.samples(), start.elapsed() + self.handing);
         }
         let name = self.caption(&snapshot);
@@ -545,7 +547,7 @@ impl App {
         if let Some(picked) = &self.picked {
             let mut lines = describe(picked, &snapshot);
             lines.extend(self.follow.map(|_| "followed".into()));
-            // The time line is below.
+            // An empty line leaves space for the timeline below.
             lines.extend(snapshot.run.timeline.map(|_| String::new()));
             hud::note(canvas, &lines);
         }
@@ -562,7 +564,7 @@ impl App {
         }
     }
 
-    /// What it is looked through.
+    /// Returns the description of the view: free camera or camera sensor.
     fn caption(&self, snapshot: &Snapshot) -> String {
         let Some(name) = self.through.and_then(|camera| snapshot.names.cameras.get(camera)) else {
             return "free view".into();
@@ -571,7 +573,7 @@ impl App {
         let looks = snapshot.envs.get(env).and_then(|env| env.views.get(self.through?)?.as_ref());
         match looks {
             Some(looks) if looks.lens.is_pinhole() => format!("camera {name}, environment {env}"),
-            // The rasterizer draws straight lines; the panel follows the rays.
+            // The window image is rasterized without the lens; the panel traces the rays of the lens.
             Some(looks) => {
                 format!("camera {name} without its {} lens (I: with it), environment {env}", looks.lens.name())
             }
@@ -579,12 +581,12 @@ impl App {
         }
     }
 
-    /// How much of the right side the sliders take \[pixels\].
+    /// Returns the width of the slider panel, or 0 if it is closed \[pixels\].
     fn aside(&self) -> usize {
         if self.sliders.is_some() { hud::SLIDERS as usize } else { 0 }
     }
 
-    /// The camera panel in the lower right corner, beside the sliders.
+    /// Draws the camera panel in the lower right corner, to the left of the sliders.
     fn draw_panel(&mut self, snapshot: &Snapshot, canvas: &mut Canvas) {
         let Some(camera) = self.panel_of else { return };
         if self.panel.draw(snapshot, camera, self.env, PANEL, &mut self.small) {
@@ -600,7 +602,7 @@ impl App {
     }
 }
 
-/// Whether what is shown is being recorded.
+/// True while a recording is running.
 fn records(snapshot: &Snapshot) -> bool {
     snapshot.run.recording.as_ref().is_some_and(|recording| recording.on)
 }

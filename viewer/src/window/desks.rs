@@ -1,37 +1,39 @@
-//! How many threads draw a window, so that physics has its time.
+//! Number of rendering threads of a window, limited in favor of physics.
 
 use crate::control::Speed;
 use crate::stage::Run;
 use std::time::{Duration, Instant};
 
-/// Slower than this part of the speed that it should have, physics is held up.
+/// Share of the requested speed below which physics is late.
 const KEPT: f64 = 0.97;
-/// How long it is left alone after that.
+/// Duration for which a late simulation keeps half of the threads.
 const RESPECT: Duration = Duration::from_secs(5);
 
-/// Late measurements in a row before physics is taken to be held up: one of half a second may be late for another reason.
+/// Consecutive late measurements after which physics counts as held up. One measurement of half a second may be late
+/// for other reasons.
 const LATE: u32 = 2;
 
-/// The threads of a window.
+/// Thread budget of a window.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Desks {
     most: usize,
-    /// The last measurement of the speed. That another one came is seen by its value, which is a quotient of nanoseconds.
+    /// Last measurement of the speed. A different value marks a new measurement, since the value is a quotient of
+    /// nanoseconds.
     measured: Option<f64>,
-    /// Late measurements in a row.
+    /// Number of consecutive late measurements.
     late: u32,
-    /// When physics was seen to fall behind last.
+    /// Time at which physics was last seen to be late.
     behind: Option<Instant>,
 }
 
 impl Desks {
-    /// At most so many threads, and at least one.
+    /// Creates a budget of at most `threads` threads, and at least one.
     pub(super) fn new(threads: usize) -> Self {
         Self { most: threads.max(1), measured: None, late: 0, behind: None }
     }
 
-    /// How many threads draw the next picture. Physics that keeps its pace rests between steps: what is left of the machine's time
-    /// is the picture's.
+    /// Returns the number of threads for the next image. Physics that keeps up with real time sleeps between steps, so
+    /// the image may use the remaining time of all cores.
     pub(super) fn now(&mut self, run: &Run, now: Instant) -> usize {
         let rests = run.paused || run.timeline.is_some();
         let measured = run.measured_speed.filter(|_| !rests);
@@ -64,10 +66,11 @@ mod tests {
             assert_eq!(at(&Run::default(), &mut desks, 0.0), half, "as fast as can be");
             assert_eq!(at(&real(None), &mut desks, 0.0), most, "nothing is known yet");
             assert_eq!(at(&real(Some(0.99)), &mut desks, 0.5), most);
-            // Late once, however many pictures show it, and then not again.
+            // A single late measurement has no effect, however many images show it.
             assert_eq!([1.0, 1.1, 1.2].map(|s| at(&real(Some(0.8)), &mut desks, s)), [most; 3]);
             assert_eq!(at(&real(Some(1.0)), &mut desks, 1.5), most);
-            // It fell behind, and is left alone, also when it has caught up; not where it is held, or a recording.
+            // A late simulation keeps half of the threads even after it caught up, but not while paused or during
+            // playback.
             assert_eq!(at(&real(Some(0.91)), &mut desks, 1.9), most);
             assert_eq!(at(&real(Some(0.9)), &mut desks, 2.0), half);
             assert_eq!(at(&real(Some(1.0)), &mut desks, 6.9), half);
@@ -75,7 +78,7 @@ mod tests {
             let timeline = Some(Timeline { now: 0.0, start: 0.0, end: 1.0 });
             assert_eq!(at(&Run { timeline, ..real(Some(1.0)) }, &mut desks, 6.9), most);
             assert_eq!(at(&real(Some(1.0)), &mut desks, 7.1), most);
-            // Slow motion is a pace, too.
+            // Slow motion is also a requested speed.
             let slow = |measured| Run { speed: Speed::Times(0.1), measured_speed: Some(measured), ..Run::default() };
             assert_eq!([at(&slow(0.1), &mut desks, 8.0), at(&slow(0.091), &mut desks, 8.5)], [most; 2]);
             assert_eq!(at(&slow(0.09), &mut desks, 9.0), half);

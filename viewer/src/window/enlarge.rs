@@ -1,4 +1,4 @@
-//! Pictures that the X server enlarges: for a huge window a coarse picture is sent, by the extension RENDER.
+//! Upscaling by the X server: a huge window is sent a coarse image, which the RENDER extension enlarges.
 
 use super::x11::Failure;
 use x11rb::connection::{Connection, RequestConnection as _};
@@ -8,27 +8,27 @@ use x11rb::protocol::render::{
 use x11rb::protocol::xproto::{ConnectionExt as _, Pixmap, Visualid, Window};
 use x11rb::rust_connection::RustConnection;
 
-/// 1 in numbers of 16 bits before the point and 16 behind it.
+/// The number 1 in 16.16 fixed point.
 const ONE: i32 = 1 << 16;
 
-/// A picture on the server that a window shows enlarged.
+/// A server-side image that is shown enlarged in a window.
 #[derive(Debug)]
 pub(super) struct Enlarged {
     pixmap: Pixmap,
     source: Picture,
     target: Picture,
-    /// Of the picture \[pixels\].
+    /// Size of the server-side image \[pixels\].
     pub(super) size: [usize; 2],
-    /// Pixels of the window for each, along each side.
+    /// Window pixels per image pixel, along each side.
     pub(super) factor: usize,
 }
 
-/// How the server calls the pixels of a visual; `None` where it enlarges nothing.
+/// Returns the RENDER format of a visual, or `None` if the server cannot scale images of it.
 pub(super) fn format(connection: &RustConnection, visual: Visualid) -> Result<Option<Pictformat>, Failure> {
     if connection.extension_information(X11_EXTENSION_NAME)?.is_none() {
         return Ok(None);
     }
-    // Transforms came with 0.6.
+    // RENDER supports transforms since version 0.6.
     let version = connection.render_query_version(0, 11)?.reply()?;
     if (version.major_version, version.minor_version) < (0, 6) {
         return Ok(None);
@@ -39,7 +39,7 @@ pub(super) fn format(connection: &RustConnection, visual: Visualid) -> Result<Op
 }
 
 impl Enlarged {
-    /// A picture of `size` for a window with pixels of this depth and format.
+    /// Creates an image of `size` pixels on the server, for a window of this depth and format.
     pub(super) fn new(
         connection: &RustConnection,
         window: Window,
@@ -52,11 +52,11 @@ impl Enlarged {
         let [pixmap, source, target] =
             [connection.generate_id()?, connection.generate_id()?, connection.generate_id()?];
         connection.create_pixmap(depth, pixmap, window, width, height)?;
-        // Beyond its edge its last pixels are seen, where the window is not a multiple of it.
+        // Padding repeats the last pixels where the window size is no multiple of the factor.
         let repeat = CreatePictureAux::new().repeat(Repeat::PAD);
         connection.render_create_picture(source, pixmap, format, &repeat)?;
         connection.render_create_picture(target, window, format, &CreatePictureAux::new())?;
-        // From pixels of the window to those of the picture.
+        // Maps window pixels to image pixels.
         let scale = ONE / i32::try_from(factor.max(1)).unwrap_or(i32::MAX);
         let transform = Transform { matrix11: scale, matrix22: scale, matrix33: ONE, ..Transform::default() };
         connection.render_set_picture_transform(source, transform)?;
@@ -64,12 +64,12 @@ impl Enlarged {
         Ok(Self { pixmap, source, target, size, factor })
     }
 
-    /// Where the picture is drawn.
+    /// Returns the pixmap that the image is sent to.
     pub(super) fn pixmap(&self) -> Pixmap {
         self.pixmap
     }
 
-    /// Shows it over the whole window.
+    /// Shows the image enlarged over the whole window.
     pub(super) fn show(&self, connection: &RustConnection, window: [usize; 2]) -> Result<(), Failure> {
         let [width, height] = window.map(|n| u16::try_from(n).unwrap_or(u16::MAX));
         let (op, mask) = (PictOp::SRC, x11rb::NONE);
@@ -77,7 +77,7 @@ impl Enlarged {
         Ok(())
     }
 
-    /// Gives the server's memory back.
+    /// Frees the resources on the server.
     pub(super) fn free(self, connection: &RustConnection) -> Result<(), Failure> {
         connection.render_free_picture(self.source)?;
         connection.render_free_picture(self.target)?;

@@ -1,34 +1,35 @@
-//! How many samples a pixel of a window gets, so that what moves is seen to move.
+//! Adaptive number of samples per pixel, which keeps the frame rate of moving images.
 
 use std::time::{Duration, Instant};
 
-/// Samples per pixel of what rests, and of what moves where those take too long.
+/// Samples per pixel of images at rest, and of slow images in motion.
 const FINE: u8 = 4;
 const COARSE: u8 = 1;
-/// Drawing a picture and handing it to the display take no longer than this where they can: 30 in a second.
+/// Target for the time of rendering and sending an image: 30 frames per second.
 const BUDGET: Duration = Duration::from_millis(33);
-/// Slow pictures in a row before fewer samples are taken: one may be slow for another reason.
+/// Consecutive slow images after which the sample count drops. A single image may be slow for other reasons.
 const SLOW: u32 = 3;
-/// After so long what moves is tried with all samples again.
+/// Interval after which moving images are tried again with all samples.
 const RETRY: Duration = Duration::from_secs(5);
-/// What has not changed for so long rests.
+/// Time without changes after which an image counts as at rest.
 const REST: Duration = Duration::from_millis(250);
 
-/// What was found out about the pictures of a window.
+/// Adaptive sampling state of a window.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Fineness {
-    /// When what is shown changed last.
+    /// Time of the last change of the image.
     moved: Option<Instant>,
-    /// Fine pictures in a row that took too long.
+    /// Number of consecutive slow images with all samples.
     slow: u32,
-    /// When a fine picture was drawn last.
+    /// Time of the last image with all samples.
     fine: Option<Instant>,
-    /// Samples of the last picture.
+    /// Samples per pixel of the last image.
     last: Option<u8>,
 }
 
 impl Fineness {
-    /// Samples per pixel of the next picture; `changed`: it shows something else than the last one.
+    /// Returns the number of samples per pixel of the next image. `changed` is true if the image differs from the last
+    /// one.
     pub(super) fn samples(&mut self, changed: bool, now: Instant) -> u8 {
         if changed {
             self.moved = Some(now);
@@ -42,7 +43,7 @@ impl Fineness {
         samples
     }
 
-    /// A picture was drawn, and handed to the display.
+    /// Records the duration of rendering and sending an image.
     pub(super) fn drew(&mut self, samples: u8, took: Duration) {
         self.last = Some(samples);
         if samples == FINE {
@@ -50,7 +51,7 @@ impl Fineness {
         }
     }
 
-    /// Whether what rests is still shown coarsely.
+    /// True if an image at rest has only one sample per pixel.
     pub(super) fn wants_better(&self, now: Instant) -> bool {
         let rests = self.moved.is_none_or(|then| now.saturating_duration_since(then) >= REST);
         self.last == Some(COARSE) && rests
@@ -64,7 +65,8 @@ mod tests {
     const LATE: Duration = Duration::from_millis(50);
     const QUICK: Duration = Duration::from_millis(20);
 
-    /// Samples of each image of something that moves, 50 ms apart; with all samples an image takes as long as given.
+    /// Returns the samples per pixel of each image of a moving scene, 50 ms apart. `fine` has the durations of images
+    /// with all samples.
     fn samples(fineness: &mut Fineness, start: Instant, fine: &[Duration]) -> Vec<u8> {
         let one = |(k, &took): (u32, &Duration)| {
             let samples = fineness.samples(true, start + k * Duration::from_millis(50));
@@ -78,29 +80,29 @@ mod tests {
     #[test]
     fn moving_and_resting() {
         let start = Instant::now();
-        // Fast enough, but for two in a row: fine all the time.
+        // Fast, except for two in a row: fine all the time.
         let quick = [vec![QUICK; 5], vec![LATE; 2], vec![QUICK; 5]].concat();
         assert_eq!(samples(&mut Fineness::default(), start, &quick), [4; 12]);
         let mut late = Fineness::default();
         assert_eq!(samples(&mut late, start, &[LATE; 6]), [4, 4, 4, 1, 1, 1]);
-        // It stops at 300 ms; a quarter of a second later it is drawn again, once.
+        // The motion stops at 300 ms. A quarter of a second later, the image is rendered again, once.
         let at = |milliseconds| start + Duration::from_millis(milliseconds);
         assert!(!late.wants_better(at(540)) && late.wants_better(at(550)));
         assert_eq!(late.samples(false, at(550)), 4);
         late.drew(4, LATE);
         assert!(!late.wants_better(at(700)));
-        // It moves again: how long fine images take is known.
+        // The motion continues: the duration of fine images is already known.
         assert_eq!(late.samples(true, at(800)), 1);
     }
 
     #[test]
     fn retries() {
         let (start, mut fineness) = (Instant::now(), Fineness::default());
-        // The third is at 150 ms, so that one at 5150 ms is tried, and the next one after as long.
+        // The third image is at 150 ms, so the image at 5150 ms is tried, and the next one after the same interval.
         let found = samples(&mut fineness, start, &[LATE; 210]);
         let fine: Vec<usize> = (1..).zip(found).filter(|(_, samples)| *samples == FINE).map(|(k, _)| k).collect();
         assert_eq!(fine, [1, 2, 3, 103, 203]);
-        // It has become faster: the next try is the last.
+        // Rendering has become faster: the next try succeeds, and fine images stay.
         let found = samples(&mut fineness, start + Duration::from_millis(50 * 210), &[QUICK; 100]);
         assert_eq!((found[91], found[92], found[99]), (1, 4, 4));
     }

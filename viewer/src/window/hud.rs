@@ -1,4 +1,4 @@
-//! What is written over the picture of a window: status, help, joint sliders. Functions of what they show, on a canvas.
+//! Text and controls on top of the window image: status, help, joint sliders. Pure drawing functions on a canvas.
 
 use super::keys;
 use crate::control::{RecordingState, Speed};
@@ -15,20 +15,20 @@ const BLUE: [u8; 3] = [80, 150, 240];
 const DARK: [u8; 3] = [20, 22, 26];
 const RED: [u8; 3] = [235, 60, 50];
 
-/// Width of the panel of sliders \[pixels\].
+/// Width of the slider panel \[pixels\].
 pub(super) const SLIDERS: i32 = 210;
 /// Size of the record button \[pixels\].
 const RECORD: [i32; 2] = [96, 19];
 /// Height of a slider with its name \[pixels\].
 const ROW: i32 = 26;
-/// Where the first slider is, from the top of the panel \[pixels\].
+/// Distance of the first slider from the top of the panel \[pixels\].
 const TOP: i32 = 22;
 
 fn int(n: usize) -> i32 {
     i32::try_from(n).unwrap_or(i32::MAX)
 }
 
-/// Time, speed, what is shown, and why the last command was refused, in the upper left corner.
+/// Draws time, speed, the shown environments, and the last refusal in the upper left corner.
 pub(super) fn status(
     canvas: &mut Canvas,
     snapshot: &Snapshot,
@@ -70,18 +70,19 @@ pub(super) fn status(
     }
 }
 
-/// Where the record button is, on a canvas of this width whose right side is taken by something `aside` pixels wide.
+/// Returns the top left corner of the record button, on a canvas of this width. `aside` is the width of a panel on the
+/// right side \[pixels\].
 fn record_corner(width: usize, aside: usize) -> [i32; 2] {
     [int(width.saturating_sub(aside)) - RECORD[0] - 6, 6]
 }
 
-/// Whether a pixel is on the record button.
+/// True if a pixel is on the record button.
 pub(super) fn on_record_button(width: usize, aside: usize, at: [f64; 2]) -> bool {
     let corner = record_corner(width, aside);
     (0..2).all(|k| (f64::from(corner[k])..f64::from(corner[k] + RECORD[k])).contains(&at[k]))
 }
 
-/// The record button, and how the recording stands.
+/// Draws the record button and the state of the recording.
 pub(super) fn record_button(canvas: &mut Canvas, aside: usize, recording: &RecordingState) {
     let width = canvas.dimensions()[0];
     let [x, y] = record_corner(width, aside);
@@ -96,13 +97,13 @@ pub(super) fn record_button(canvas: &mut Canvas, aside: usize, recording: &Recor
     }
 }
 
-/// Lines in the lower left corner.
+/// Draws text lines in the lower left corner.
 pub(super) fn note(canvas: &mut Canvas, lines: &[String]) {
     let height = int(canvas.dimensions()[1]);
     canvas.text(&lines.join("\n"), [8, height - 13 * int(lines.len()) - 6], FONT, WHITE);
 }
 
-/// What something is, at a corner.
+/// Draws a caption with its top left corner at a pixel.
 pub(super) fn caption(canvas: &mut Canvas, text: &str, [x, y]: [usize; 2]) {
     canvas.text(text, [int(x), int(y)], SMALL, WHITE);
 }
@@ -110,7 +111,7 @@ pub(super) fn caption(canvas: &mut Canvas, text: &str, [x, y]: [usize; 2]) {
 /// Width of a column of the help \[pixels\].
 const COLUMN: i32 = 315;
 
-/// All keys, in the middle: in two columns where there is room for them, else in one.
+/// Draws the help in the center, in two columns if the canvas is wide enough, otherwise in one.
 pub(super) fn help(canvas: &mut Canvas) {
     let lines = keys::help();
     let [width, height] = canvas.dimensions().map(int);
@@ -128,23 +129,23 @@ pub(super) fn help(canvas: &mut Canvas) {
     }
 }
 
-/// Which joints have sliders: their places among the names of joints.
+/// Returns the joints with sliders, as indices into the joint names.
 pub(super) fn driven(snapshot: &Snapshot) -> Vec<usize> {
     snapshot.names.joints.iter().enumerate().filter(|(_, joint)| joint.driven).map(|(k, _)| k).collect()
 }
 
-/// The ends of the slider of a joint.
+/// Returns the range of the slider of a joint.
 fn ends(snapshot: &Snapshot, joint: usize, values: &[f64; 4]) -> [f64; 2] {
     let slides = snapshot.names.joints.get(joint).is_some_and(|name| name.slides);
     slider_range([values[2], values[3]], slides)
 }
 
-/// How many sliders there is room for.
+/// Returns the number of sliders that fit into a panel of this height \[pixels\].
 fn rows(height: i32) -> usize {
     usize::try_from((height - TOP) / ROW).unwrap_or(0)
 }
 
-/// Sliders of the joints of environment `env`, along the right side, from number `first` on.
+/// Draws the sliders of environment `env` along the right side, starting with slider number `first`.
 pub(super) fn sliders(canvas: &mut Canvas, snapshot: &Snapshot, env: usize, first: usize) {
     let [width, height] = canvas.dimensions().map(int);
     let left = width - SLIDERS;
@@ -156,7 +157,7 @@ pub(super) fn sliders(canvas: &mut Canvas, snapshot: &Snapshot, env: usize, firs
         let Some((name, values)) = snapshot.names.joints.get(joint).zip(stage.joints.get(joint)) else { return };
         let [position, target, ..] = *values;
         let short = name.name.rsplit('/').next().unwrap_or(&name.name);
-        // No zero has a sign that means nothing.
+        // A value that rounds to zero is shown as +0.
         let shown = if position.abs() < 5e-4 { 0.0 } else { position };
         canvas.text(&format!("{short:<20.20} {shown:+.3}"), [left + 8, top], SMALL, WHITE);
         let [low, high] = ends(snapshot, joint, values);
@@ -170,7 +171,7 @@ pub(super) fn sliders(canvas: &mut Canvas, snapshot: &Snapshot, env: usize, firs
     }
 }
 
-/// The slider at a pixel of a canvas of this size: number of the joint, and the target there.
+/// Returns the slider at a pixel of a canvas of this size: joint index, and the target at that pixel.
 pub(super) fn slider_at(
     snapshot: &Snapshot,
     env: usize,
@@ -187,7 +188,7 @@ pub(super) fn slider_at(
     Some((joint, slider_value(snapshot, env, joint, width, x)?))
 }
 
-/// The target that a slider has where the mouse is, beside it too.
+/// Returns the target of a slider for a horizontal pixel position, limited to the range of the slider.
 pub(super) fn slider_value(snapshot: &Snapshot, env: usize, joint: usize, width: usize, x: f64) -> Option<f64> {
     let [low, high] = ends(snapshot, joint, snapshot.envs.get(env)?.joints.get(joint)?);
     let left = f64::from(int(width) - SLIDERS) + 8.0;

@@ -1,4 +1,4 @@
-//! A window for images that a program makes, such as the channels of a camera.
+//! A window for images that a program computes, such as the channels of a camera.
 
 use super::x11::{Failure, Happened, Screened};
 use super::{Closed, LOOK, Shared, Window, WindowError, on_thread};
@@ -11,9 +11,9 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 pub struct ImageWindowCfg {
     /// Text of the title bar.
     pub title: String,
-    /// Pixels per row and rows of the window when it opens.
+    /// Initial size: pixels per row, rows.
     pub size: [usize; 2],
-    /// X display, for example `:0`; `None` takes the variable `DISPLAY`.
+    /// X display, such as `:0`. `None` uses the environment variable `DISPLAY`.
     pub display: Option<String>,
 }
 
@@ -23,17 +23,17 @@ impl Default for ImageWindowCfg {
     }
 }
 
-/// A window that shows the newest image it was given, as `imshow` of OpenCV does.
+/// A window that shows the most recent image, like `imshow` of OpenCV.
 ///
-/// A thread of its own answers the display, so a program that computes for minutes still has a window that moves and closes.
-/// Dropping the value closes the window.
+/// The window has its own thread, so it stays responsive while the program computes for minutes. Dropping the value
+/// closes the window.
 #[derive(Debug)]
 pub struct ImageWindow {
     window: Window,
     latest: Arc<Latest>,
 }
 
-/// The newest image.
+/// The most recent image, shared with the window's thread.
 #[derive(Debug, Default)]
 struct Latest {
     image: Mutex<(u64, Arc<Canvas>)>,
@@ -44,7 +44,7 @@ impl ImageWindow {
     /// Opens an empty (black) window.
     ///
     /// # Errors
-    /// [`WindowError::NoDisplay`] if there is no display.
+    /// [`WindowError::NoDisplay`] if no display is available, [`WindowError::Thread`] if no thread can be started.
     pub fn open(cfg: ImageWindowCfg) -> Result<Self, WindowError> {
         let latest = Arc::new(Latest::default());
         let own = Arc::clone(&latest);
@@ -61,7 +61,7 @@ impl ImageWindow {
         self.latest.changed.notify_all();
     }
 
-    /// The handle of the window: it tells whether the window is open, closes it, and counts its images.
+    /// Handle of the window: reports if the window is open, closes it, and counts its frames.
     pub fn window(&self) -> &Window {
         &self.window
     }
@@ -74,7 +74,7 @@ impl Drop for ImageWindow {
 }
 
 impl Latest {
-    /// The newest image and its number, as soon as it is newer than `last`, or after [`LOOK`].
+    /// Waits up to [`LOOK`] for an image newer than number `last`. Returns the newest image and its number.
     fn newer_than(&self, last: u64) -> (u64, Arc<Canvas>) {
         let latest = self.image.lock().unwrap_or_else(PoisonError::into_inner);
         let waited = self.changed.wait_timeout_while(latest, LOOK, |(number, _)| *number == last);
@@ -107,14 +107,14 @@ fn show(mut screen: Screened, latest: &Latest, shared: &Shared) -> Result<Closed
     }
 }
 
-/// The image scaled to fit into `size` (pixels per row, rows), by the nearest pixel, in the middle of black.
+/// Scales the image to fit into `size` (pixels per row, rows), by nearest neighbor, centered on black.
 fn letterboxed(image: &Canvas, size: [usize; 2]) -> Canvas {
     let [columns, rows] = image.dimensions();
     let mut out = Canvas::new(size[0], size[1]);
     if columns == 0 || rows == 0 {
         return out;
     }
-    // The side that limits the scale is filled; integers keep an image of the window's own size as it is.
+    // The side that limits the scale is filled. Integer arithmetic keeps an image of the window's size unchanged.
     let fitted = if size[0] * rows <= size[1] * columns {
         [size[0], (size[0] * rows / columns).max(1)]
     } else {
@@ -136,7 +136,7 @@ fn letterboxed(image: &Canvas, size: [usize; 2]) -> Canvas {
 mod tests {
     use super::*;
 
-    /// An image whose pixel (x, y) has the colour (x, y, 7).
+    /// An image whose pixel (x, y) has the color (x, y, 7).
     fn numbered(width: usize, height: usize) -> Canvas {
         let mut image = Canvas::new(width, height);
         (0..height).for_each(|y| (0..width).for_each(|x| image.set(x as i32, y as i32, [x as u8, y as u8, 7])));

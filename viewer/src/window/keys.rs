@@ -1,10 +1,10 @@
-//! Keys of the window: one table, from which the keys are obeyed and the help is written.
+//! Key bindings of the window: one table that defines both the actions and the help text.
 
-/// A key, by what is printed on it.
+/// A key, identified by its label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Key {
-    /// A letter, in lower case, a digit or a sign.
+    /// A letter in lower case, a digit, or a punctuation character.
     Char(char),
     /// Escape.
     Escape,
@@ -14,15 +14,15 @@ pub enum Key {
     Backspace,
     /// Home.
     Home,
-    /// The first of the function keys.
+    /// The function key F1.
     F1,
-    /// Arrow.
+    /// The left arrow key.
     Left,
-    /// Arrow.
+    /// The right arrow key.
     Right,
-    /// Arrow.
+    /// The up arrow key.
     Up,
-    /// Arrow.
+    /// The down arrow key.
     Down,
     /// Page up.
     PageUp,
@@ -30,7 +30,7 @@ pub enum Key {
     PageDown,
 }
 
-/// What a key does.
+/// The effect of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Action {
     Pause,
@@ -65,18 +65,18 @@ pub(crate) enum Action {
 }
 
 impl Action {
-    /// Whether a key that is held does it again and again: what goes a step further does, what turns to and fro does not.
+    /// True if a held key repeats the action. Steps repeat; toggles do not.
     pub(crate) fn repeats(self) -> bool {
         matches!(self, Self::Steps(_) | Self::NextEnv | Self::PreviousEnv | Self::Slower | Self::Faster)
     }
 }
 
-/// A key and what it does.
+/// A key with its action and help text.
 #[derive(Debug)]
 pub(crate) struct Binding {
     pub(crate) key: Key,
     pub(crate) action: Action,
-    /// What the help says; empty where the binding before says it too.
+    /// Help text; keys with the same action share one line of the help.
     pub(crate) help: &'static str,
 }
 
@@ -84,7 +84,7 @@ const fn key(key: Key, action: Action, help: &'static str) -> Binding {
     Binding { key, action, help }
 }
 
-/// All keys.
+/// All key bindings.
 pub(crate) const TABLE: &[Binding] = &[
     key(Key::F1, Action::Help, "this help"),
     key(Key::Char('h'), Action::Help, "this help"),
@@ -129,7 +129,7 @@ pub(crate) const TABLE: &[Binding] = &[
     key(Key::Escape, Action::Unselect, "select nothing, close the help"),
 ];
 
-/// What the mouse does.
+/// Mouse actions of the help: gesture and effect.
 pub(crate) const MOUSE: &[[&str; 2]] = &[
     ["drag", "turn about the middle"],
     ["right drag", "move"],
@@ -139,12 +139,12 @@ pub(crate) const MOUSE: &[[&str; 2]] = &[
     ["Ctrl + drag", "pull a body with a spring"],
 ];
 
-/// What a key does.
+/// Returns the action of a key.
 pub(crate) fn action(key: Key) -> Option<Action> {
     TABLE.iter().find(|binding| binding.key == key).map(|binding| binding.action)
 }
 
-/// What is printed on a key.
+/// Returns the label of a key.
 pub(crate) fn label(key: Key) -> String {
     match key {
         Key::Char(' ') => "Space".into(),
@@ -155,7 +155,7 @@ pub(crate) fn label(key: Key) -> String {
     }
 }
 
-/// The lines of the help: keys that do the same are on one line.
+/// Returns the lines of the help. Keys with the same action share a line.
 pub(crate) fn help() -> Vec<[String; 2]> {
     let mut lines: Vec<(Action, [String; 2])> = Vec::new();
     for binding in TABLE {
@@ -172,7 +172,7 @@ pub(crate) fn help() -> Vec<[String; 2]> {
 mod tests {
     use super::*;
 
-    /// Every key does one thing, and the help names it.
+    /// Every key has one action, and the help names it.
     #[test]
     fn table() {
         let keys: std::collections::HashSet<Key> = TABLE.iter().map(|binding| binding.key).collect();
@@ -184,7 +184,7 @@ mod tests {
             assert!(help.iter().any(said), "{binding:?} is not in the help");
         }
         assert_eq!([' ', '~'].map(|key| action(Key::Char(key))), [Some(Action::Pause), None]);
-        // Letters are 6 pixels wide; columns have 84 and 229.
+        // Letters are 6 pixels wide; the columns have 84 and 229 pixels.
         let long = |[keys, text]: &[String; 2]| keys.len() > 13 || text.len() > 37;
         assert!(!help.iter().any(long), "a line does not fit into the help");
     }

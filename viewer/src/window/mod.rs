@@ -1,4 +1,4 @@
-//! A native window onto a simulation that runs.
+//! Native X11 windows: a live view of a simulation, and a window for images.
 
 mod app;
 mod desks;
@@ -25,21 +25,21 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 use x11::{Failure, Happened, Screened};
 
-/// A window.
+/// Settings of a simulation window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WindowCfg {
-    /// What is written over it.
+    /// Text of the title bar.
     pub title: String,
-    /// Pixels per row, rows.
+    /// Initial size: pixels per row, rows.
     pub size: [usize; 2],
-    /// The X display, such as `:0`; that of the variable `DISPLAY` where `None`.
+    /// X display, such as `:0`. `None` uses the environment variable `DISPLAY`.
     pub display: Option<String>,
-    /// How fast simulated time passes once it is open; `None` leaves it as it is.
+    /// Speed of simulated time after the window opens. `None` keeps the current speed.
     pub speed: Option<Speed>,
-    /// Threads that draw, at most; as many as the machine has where `None`. Half of them, and at least one, draw where physics
-    /// takes all the time that it can get ([`App::new`]).
+    /// Maximum number of rendering threads. `None` uses every core. Half of them, but at least one, render while
+    /// physics needs all available time ([`App::new`]).
     pub threads: Option<usize>,
-    /// The simulation's record button; where `None`, the one that another view has brought, if any.
+    /// Record button of the simulation. `None` keeps the button that another view has set, if any.
     pub recording: Option<RecordButton>,
 }
 
@@ -50,11 +50,11 @@ impl Default for WindowCfg {
     }
 }
 
-/// Why there is no window.
+/// An error of opening a window.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WindowError {
-    /// There is no display, or it cannot be reached.
+    /// No X display is set, or the connection to it failed.
     #[error(
         "no window can be opened: {reason} (DISPLAY is {}, WAYLAND_DISPLAY is {}). Set DISPLAY to an X server, which Wayland \
          desktops have too (XWayland), or run without a window: the examples with --headless, or with --serve for a \
@@ -62,14 +62,14 @@ pub enum WindowError {
         shown(.display), shown(.wayland)
     )]
     NoDisplay {
-        /// What was tried and what came of it.
+        /// Attempted connection and its error.
         reason: String,
-        /// The variable `DISPLAY`.
+        /// Value of the environment variable `DISPLAY`.
         display: Option<String>,
-        /// The variable `WAYLAND_DISPLAY`.
+        /// Value of the environment variable `WAYLAND_DISPLAY`.
         wayland: Option<String>,
     },
-    /// The operating system gives no thread.
+    /// The operating system could not start a thread, or the thread ended early.
     #[error("no window can be opened: no thread for it: {0}")]
     Thread(String),
 }
@@ -78,21 +78,22 @@ fn shown(variable: &Option<String>) -> String {
     variable.as_ref().map_or_else(|| "not set".into(), |value| format!("{value:?}"))
 }
 
-/// How a window ended.
+/// Reason for the end of a window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Closed {
-    /// The user closed it, or [`Window::close`] did.
+    /// Closed by the user or by [`Window::close`].
     ByUser,
-    /// The simulation was dropped.
+    /// Closed because the simulation was dropped.
     WithSimulation,
-    /// The display was lost; the simulation went on.
+    /// The connection to the display was lost, with the reason. The simulation continued.
     DisplayLost(String),
-    /// A mistake of ours ended its thread; what it was stands in the program's error output. The simulation went on.
+    /// A panic (a bug of this crate) ended the window's thread; the program's standard error has the message. The
+    /// simulation continued.
     Crashed,
 }
 
 impl Closed {
-    /// What went wrong, where it was not meant to end.
+    /// Returns the description of an unexpected end, or `None` for a regular end.
     pub fn fault(&self) -> Option<&str> {
         match self {
             Self::ByUser | Self::WithSimulation => None,
@@ -104,8 +105,8 @@ impl Closed {
     }
 }
 
-/// A handle of an open window. Dropping it closes nothing: the window stays until the user closes it, the simulation is
-/// dropped, or [`close`](Self::close).
+/// Handle of an open window. Dropping the handle does not close the window. It stays open until the user closes it, the
+/// simulation is dropped, or [`close`](Self::close) is called.
 #[derive(Clone, Debug)]
 pub struct Window {
     shared: Arc<Shared>,
@@ -121,32 +122,32 @@ struct Shared {
 }
 
 impl Window {
-    /// Whether it is open.
+    /// True while the window is open.
     pub fn is_open(&self) -> bool {
         self.closed().is_none()
     }
 
-    /// How it ended; `None` while it is open.
+    /// Returns the reason for the end of the window, or `None` while it is open.
     pub fn closed(&self) -> Option<Closed> {
         self.shared.closed.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The window's number on its X display, for programs that take pictures of windows.
+    /// Returns the X11 window id, for tools that capture windows.
     pub fn number(&self) -> u32 {
         self.shared.number.load(Ordering::Acquire)
     }
 
-    /// How many pictures it has handed to its display so far.
+    /// Returns the number of frames that were sent to the display.
     pub fn pictures(&self) -> u64 {
         self.shared.pictures.load(Ordering::Acquire)
     }
 
-    /// Asks it to close, and does not wait.
+    /// Requests the window to close, without waiting.
     pub fn close(&self) {
         self.shared.close.store(true, Ordering::Release);
     }
 
-    /// Waits until it is closed, up to `timeout`: how it ended, `None` where it is still open.
+    /// Waits up to `timeout` until the window is closed. Returns the reason, or `None` if the window is still open.
     pub fn wait(&self, timeout: Duration) -> Option<Closed> {
         let closed = self.shared.closed.lock().unwrap_or_else(PoisonError::into_inner);
         let open = |closed: &mut Option<Closed>| closed.is_none();
@@ -155,7 +156,7 @@ impl Window {
     }
 }
 
-/// The end of a window's thread: whatever it comes from, whoever waits hears of it.
+/// Reports the end of a window's thread to waiting callers. When dropped without a report, it reports a crash.
 struct Ending(Arc<Shared>);
 
 impl Ending {
@@ -171,23 +172,25 @@ impl Drop for Ending {
     }
 }
 
-/// Opens windows onto a simulation.
+/// Windows of a simulation.
 pub trait OpenWindow {
-    /// Opens a window of 960 by 540 pixels in which time passes as it does outside; see
+    /// Opens a window of 960 by 540 pixels that runs the simulation in real time. See
     /// [`open_window_with`](Self::open_window_with).
     ///
     /// # Errors
-    /// As [`open_window_with`](Self::open_window_with).
+    /// The errors of [`open_window_with`](Self::open_window_with).
     fn open_window(&mut self) -> Result<Window, WindowError> {
         self.open_window_with(WindowCfg::default())
     }
 
-    /// Opens a window, on a thread of its own: it is drawn while `update` steps, and `update` waits where the user pauses.
-    /// When it is closed, or its display is lost or does not answer for 15 s, the simulation goes on, as fast as it can. There
-    /// may be several, one after the other or at the same time.
+    /// Opens a window on its own thread. The window renders while `update` steps, and `update` blocks while the user
+    /// pauses.
+    ///
+    /// After the window is closed, its display is lost, or the display does not respond for 15 s, the simulation
+    /// continues as fast as it can. Several windows may be open at the same time.
     ///
     /// # Errors
-    /// [`WindowError::NoDisplay`] where there is none.
+    /// [`WindowError::NoDisplay`] if no display is available, [`WindowError::Thread`] if no thread can be started.
     fn open_window_with(&mut self, cfg: WindowCfg) -> Result<Window, WindowError>;
 }
 
@@ -209,11 +212,12 @@ impl OpenWindow for SimulationManager {
     }
 }
 
-/// Opens a window and calls `run` with it and with `state` on a thread of its own; `begin` is called before the window's handle
-/// is returned. `state` is dropped before the end of the window is seen through the handle.
+/// Opens a window and calls `run` with the window and `state` on a new thread. `begin` is called before the handle is
+/// returned. `state` is dropped before the handle reports the end of the window.
 ///
 /// # Errors
-/// [`WindowError::NoDisplay`] if there is no display or it does not answer.
+/// [`WindowError::NoDisplay`] if no display is available or it does not respond; [`WindowError::Thread`] if no thread
+/// can be started.
 fn on_thread<T: Send + 'static>(
     title: String,
     size: [usize; 2],
@@ -227,7 +231,7 @@ fn on_thread<T: Send + 'static>(
     let window = Window { shared: Arc::clone(&shared) };
     let thread_main = move || {
         let ending = Ending(Arc::clone(&shared));
-        // Declared after the ending, so dropped before it when the thread panics.
+        // Declared after `ending`, so `state` is dropped first if the thread panics.
         let state = state;
         let screen = match Screened::open(&title, size, display.as_deref()) {
             Ok(screen) => screen,
@@ -235,7 +239,7 @@ fn on_thread<T: Send + 'static>(
         };
         shared.number.store(screen.number(), Ordering::Release);
         begin(&state);
-        // The caller has given up if the display took too long.
+        // The send fails if the caller stopped waiting because the display took too long.
         if opened.send(Ok(())).is_err() {
             return;
         }
@@ -260,10 +264,10 @@ fn no_display(failure: &Failure) -> WindowError {
     WindowError::NoDisplay { reason: failure.to_string(), display, wayland }
 }
 
-/// Longest time between two looks at what the user does.
+/// Longest time between two checks for user input.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Shows snapshots until something ends it.
+/// Shows snapshots until the window closes.
 fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared) -> Result<Closed, Failure> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let mut app = App::new(screen.picture_size(), cfg.threads.unwrap_or(cores));
@@ -271,7 +275,7 @@ fn show(mut screen: Screened, viewer: &Viewer, cfg: &WindowCfg, shared: &Shared)
     let mut canvas = Canvas::default();
     let (mut last, mut wants) = (0, Wants::default());
     let mut outdated = true;
-    // Before the first key, which would do nothing where nothing is shown.
+    // The first snapshot is shown before the first key, because keys have no effect without a snapshot.
     if let Some(snapshot) = viewer.newest() {
         last = snapshot.number;
         app.show(snapshot);

@@ -1,5 +1,5 @@
-//! The window without a display: effects of keys and the mouse, and the drawn image. With a display: on an X server without a
-//! screen.
+//! The window without a display: effects of keys and the mouse, and the rendered image. With a display: on Xvfb, an X
+//! server without a screen.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod display;
@@ -16,14 +16,14 @@ use kinetoscope_sim::EnvId;
 use nalgebra::Vector3;
 
 const SIZE: [usize; 2] = [640, 360];
-/// The middle of the image.
+/// Center of the image.
 const MIDDLE: [f64; 2] = [SIZE[0] as f64 / 2.0, SIZE[1] as f64 / 2.0];
 const PLAIN: Modifiers = Modifiers { shift: false, ctrl: false };
 const CTRL: Modifiers = Modifiers { shift: false, ctrl: true };
-/// The mark of the target of a slider, and the letters of notes.
+/// Color of a slider's target mark, and of notes.
 const YELLOW: Option<[u8; 3]> = Some([255, 210, 60]);
 
-/// A window's state that shows a sample.
+/// A window state with a sample simulation.
 struct Shows {
     sample: Sample,
     viewer: Viewer,
@@ -46,33 +46,33 @@ impl Shows {
         canvas
     }
 
-    /// Commands of a click.
+    /// Clicks at a pixel and returns the resulting commands.
     fn click(&mut self, at: [f64; 2]) -> Vec<Command> {
         self.app.handle(Input::ButtonPress(1, at, PLAIN));
         self.app.handle(Input::ButtonRelease(1, at));
         self.app.take_commands()
     }
 
-    /// Commands of a key.
+    /// Presses and releases a key and returns the resulting commands.
     fn press(&mut self, key: Key) -> Vec<Command> {
         self.app.handle(Input::Press(key));
         self.app.handle(Input::Release(key));
         self.app.take_commands()
     }
 
-    /// Commands of keys with letters.
+    /// Presses letter keys and returns the resulting commands.
     fn type_in(&mut self, letters: &str) -> Vec<Command> {
         letters.chars().flat_map(|letter| self.press(Key::Char(letter))).collect()
     }
 
-    /// Looks from above the cube: the middle of the image is on its upper face.
+    /// Looks down at the cube: the image center is on its upper face.
     fn over_the_cube(&mut self, env: usize) {
         let origin = self.sample.sim.cfg().env_origins();
         let at = |p: [f64; 3]| [0, 1, 2].map(|k| origin[(env, k)] + p[k]);
         self.app.look_from(Eye::looking(at([0.02, 0.01, 1.5]), at([0.0, 0.0, 2.0 * HALF])).unwrap());
     }
 
-    /// Puts the cube of each environment somewhere, and shows it.
+    /// Moves the cube of each environment and shows the result.
     fn move_cube(&mut self, place: impl Fn(usize) -> [f64; 3]) -> Arc<Snapshot> {
         let (sim, envs) = (&mut self.sample.sim, self.viewer.newest().unwrap().envs.len());
         let row = |env| [&place(env)[..], &[1.0, 0.0, 0.0, 0.0]].concat();
@@ -84,7 +84,7 @@ impl Shows {
         self.viewer.newest().unwrap()
     }
 
-    /// A changed snapshot, to show.
+    /// Returns a modified snapshot.
     fn changed(&self, change: impl FnOnce(&mut Snapshot)) -> Snapshot {
         let mut snapshot = Snapshot::clone(&self.viewer.newest().unwrap());
         change(&mut snapshot);
@@ -92,7 +92,7 @@ impl Shows {
     }
 }
 
-/// A state in which each key changes something: a cube is selected, and one environment is seen through its camera.
+/// A state in which each key has an effect: a cube is selected, and one environment is seen through its camera.
 fn busy() -> Shows {
     let mut shows = shows(3);
     shows.over_the_cube(0);
@@ -103,7 +103,7 @@ fn busy() -> Shows {
     shows
 }
 
-/// Every key does something; held, it repeats steps and nothing else: a held key pauses once, and begins one recording.
+/// Every key has an effect. A held key repeats steps only: it pauses once, and starts one recording.
 #[test]
 fn keys_and_repeats() {
     for binding in TABLE {
@@ -123,7 +123,7 @@ fn keys_and_repeats() {
     }
 }
 
-/// Each key of an overlay turns that one, and no other, and back again.
+/// Each overlay key toggles its own overlay and no other.
 #[test]
 fn overlay_keys() {
     type Overlay = fn(&mut Overlays) -> &mut bool;
@@ -151,7 +151,7 @@ fn overlay_keys() {
 fn command_keys() {
     let mut shows = shows(3);
     assert_eq!(shows.type_in(" .1"), [Command::TogglePause, Command::Step(1), Command::SetSpeed(Speed::REAL)]);
-    // The reset is of the environment that is shown, or of all; before the first comes the last.
+    // The reset applies to the shown environment, or to all. The environment before the first is the last.
     for (keys, expected) in [
         (&[][..], None),
         (&[Key::PageDown], Some(EnvId(1))),
@@ -169,10 +169,10 @@ fn command_keys() {
         (Speed::REAL, Some(0.9), "=", 2.0),
         (Speed::REAL, Some(0.9), "+", 2.0),
         (times(0.25), Some(0.9), "-", 0.125),
-        // The ends of the range.
+        // At the limits of the range.
         (times(1.5e-3), Some(0.9), "-", 1e-3),
         (times(700.0), Some(0.9), "+", 1e3),
-        // As fast as can be: half and twice of the measured speed.
+        // At free speed: half and twice the measured speed.
         (Speed::Free, Some(8.0), "-", 4.0),
         (Speed::Free, None, "=", 2.0),
     ] {
@@ -182,7 +182,8 @@ fn command_keys() {
     }
 }
 
-/// The panel of keys I and page down: in its corner are the four images that a panel of that camera and environment draws.
+/// The panel of the keys I and page down: its corner shows the four images that a panel of that camera and environment
+/// draws.
 #[test]
 fn panel_of_environment() {
     let mut shows = shows(3);
@@ -204,13 +205,14 @@ fn panel_of_environment() {
     assert!(shows.drawn().pixel(width - 10, height - 10) != expected.pixel(w - 4, h - 4), "it goes again");
 }
 
-/// Commands wait while nothing steps the simulation; when thousands wait no more are taken, and the image says so.
+/// Commands are queued while the simulation does not step. When the queue is full, commands are rejected, and the image
+/// says so.
 #[test]
 fn full_inbox() {
     let mut shows = shows(1);
     let sent = (0..100_000).take_while(|_| shows.viewer.send(Command::TogglePause)).count();
     assert!(sent < 100_000, "it is taken for ever");
-    // Below the lines of the status, where refusals stand.
+    // Below the status lines, where refusals are shown.
     let mut shining = |heard: Option<bool>| {
         heard.into_iter().for_each(|heard| shows.app.was_heard(heard));
         let canvas = shows.drawn();
@@ -222,7 +224,7 @@ fn full_inbox() {
     assert_eq!(shining(Some(true)), plain);
 }
 
-/// A waiting program hears of the end of a window, even if its thread panics.
+/// Waiting callers see the end of a window, even if its thread panics.
 #[test]
 fn crash() {
     let shared = Arc::new(Shared::default());
@@ -236,10 +238,10 @@ fn crash() {
     assert!(Closed::Crashed.fault().is_some() && Closed::ByUser.fault().is_none());
 }
 
-/// A way to move an eye.
+/// A camera motion by a mouse drag.
 type Way = fn(&mut Eye, [f64; 2], usize);
 
-/// Drags and the wheel move the eye; how that moves the image is tested with the eye.
+/// Drags and the wheel move the camera. The effect on the image is tested with the camera.
 #[test]
 fn drags_and_wheel() {
     let Shows { sample: _sample, viewer: _viewer, mut app } = shows(1);
@@ -248,7 +250,7 @@ fn drags_and_wheel() {
         [(1, false, Eye::orbit), (1, true, Eye::pan), (2, false, Eye::turn), (3, false, Eye::pan)];
     for (button, shift, way) in ways {
         let (before, mut expected) = (app.eye(), app.eye());
-        // In two parts, as a mouse moves.
+        // In two parts, as with a real mouse.
         way(&mut expected, [by[0], 0.0], SIZE[1]);
         way(&mut expected, [0.0, by[1]], SIZE[1]);
         app.handle(Input::ButtonPress(button, [100.0, 100.0], Modifiers { shift, ctrl: false }));
@@ -256,7 +258,7 @@ fn drags_and_wheel() {
         app.handle(Input::Move([100.0 + by[0], 100.0 + by[1]]));
         app.handle(Input::ButtonRelease(button, [100.0 + by[0], 100.0 + by[1]]));
         assert!(app.eye() == expected && expected != before, "button {button}: {:?}", app.eye());
-        // Let go, it moves no more.
+        // After the release, the camera stays.
         app.handle(Input::Move([10.0, 10.0]));
         assert_eq!(app.eye(), expected);
     }
@@ -264,7 +266,7 @@ fn drags_and_wheel() {
     expected.zoom(2.0);
     app.handle(Input::Wheel(2.0, MIDDLE));
     assert_eq!(app.eye(), expected);
-    // Through a camera nothing moves.
+    // Through a camera sensor, the view is fixed.
     for input in [
         Input::Press(Key::Char('v')),
         Input::ButtonPress(1, MIDDLE, PLAIN),
@@ -277,7 +279,7 @@ fn drags_and_wheel() {
     assert_eq!(app.eye(), expected);
 }
 
-/// A second button changes nothing of what the first one holds, nor does letting it go.
+/// A second button, pressed and released, has no effect on the drag of the first.
 #[test]
 fn second_button() {
     let mut shows = shows(1);
@@ -295,7 +297,7 @@ fn second_button() {
     let (held, eye) = commands(&[Input::ButtonRelease(3, MIDDLE)]);
     assert!(!held.contains(&Command::Release) && eye == before, "the spring is of the first button");
     assert_eq!(commands(&[Input::ButtonRelease(1, MIDDLE)]).0.last(), Some(&Command::Release));
-    // A release that was not heard is made up for when the button is pressed again.
+    // A lost release is made up for when the button is pressed again.
     commands(&[Input::ButtonPress(1, MIDDLE, CTRL)]);
     assert_eq!(commands(&[Input::ButtonPress(1, MIDDLE, PLAIN)]).0, [Command::Release]);
 }
@@ -315,8 +317,8 @@ fn selection_and_spring() {
     shows.app.handle(Input::Move([x + 90.0, y]));
     let [Command::Drag { env, body, target, .. }] = shows.app.take_commands()[..] else { panic!("one drag") };
     assert_eq!((env, Some(body)), (EnvId(3), picked.body));
-    // In the plane of the image, at the depth of the face: 1.3 m away from the eye a pixel is 1.3 m / f, with
-    // f = 180 / tan(22.5°) pixels. It was selected where the button was let go: in the middle of the pixel one to the right.
+    // The motion is in the plane through the face parallel to the image: at a distance of 1.3 m, a pixel is 1.3 m / f,
+    // with f = 180 / tan(22.5°) pixels. The selection was at the center of the pixel one to the right.
     let moved = (Vector3::from(target) - Vector3::from(picked.point)).norm();
     let expected = 88.5 * 1.3 / (180.0 / 22.5f64.to_radians().tan());
     assert!((moved - expected).abs() < 0.01 * expected, "{moved} {expected}");
@@ -324,7 +326,7 @@ fn selection_and_spring() {
     assert!(shows.app.take_commands().contains(&Command::Release));
     shows.press(Key::Escape);
     assert!(shows.app.picked().is_none());
-    // Followed, it stays in the middle of the image.
+    // While followed, the body stays at the image center.
     shows.click(MIDDLE);
     shows.type_in("x");
     shows.move_cube(|_| [0.0, -0.8, HALF]);
@@ -332,8 +334,8 @@ fn selection_and_spring() {
     assert!(shows.app.picked().is_some_and(|picked| picked.name == "cube"), "{:?}", shows.app.picked());
 }
 
-/// The panel of sliders is 210 pixels wide, its first row is from 22 to 48, and its one slider goes from 8 pixels beside its
-/// edge to 8 before the end, from -2 to 2 rad.
+/// The slider panel is 210 pixels wide. Its first row is from 22 to 48. Its only slider goes from 8 pixels right of the
+/// panel's edge to 8 pixels before its end, from -2 to 2 rad.
 #[test]
 fn sliders() {
     let mut shows = shows(1);
@@ -352,18 +354,18 @@ fn sliders() {
         assert!((value - expected).abs() < 1e-9, "{what}: {value}");
     }
     shows.app.handle(Input::ButtonRelease(1, MIDDLE));
-    // A window with too few rows for a slider has no slider to move.
+    // A window without space for a slider has no slider to drag.
     for (height, is_there) in [(47, false), (48, true), (360, true)] {
         shows.app.handle(Input::Resize([SIZE[0], height]));
         let canvas = shows.drawn();
-        // The letters above are of the same yellow.
+        // The title above has the same yellow.
         let mut places = (30..height.min(48)).flat_map(|y| (SIZE[0] - 202..SIZE[0] - 8).map(move |x| (x, y)));
         assert_eq!(places.any(|(x, y)| canvas.pixel(x, y) == YELLOW), is_there, "{height}");
         assert_eq!(shows.click([SIZE[0] as f64 - 100.0, 35.0]).len(), usize::from(is_there), "{height}");
     }
 }
 
-/// Through a camera sensor, a click on each pixel finds the link of its mask.
+/// Through a camera sensor, a click on each pixel finds the object of its mask.
 #[test]
 fn sensor_view() {
     let mut shows = shows(2);
@@ -371,7 +373,7 @@ fn sensor_view() {
     shows.type_in("v");
     let mask = shows.sample.sim.sensor(shows.sample.camera).unwrap().mask().unwrap().to_owned();
     let cube = shows.sample.sim.scene().mask_ids().iter().find(|id| id.object == "cube").unwrap().id;
-    // The sensor's 64 x 48 pixels are 7.5 pixels of the window each, in the middle of it.
+    // The sensor's 64 x 48 pixels cover 7.5 window pixels each, centered in the window.
     let mut tried = 0;
     for (v, u) in (2usize..46).step_by(4).flat_map(|v| (2usize..62).step_by(4).map(move |u| (v, u))) {
         let id = mask[(1, v, u)];
@@ -386,8 +388,8 @@ fn sensor_view() {
     assert!(tried > 3, "the cube was looked at {tried} times");
 }
 
-/// Through a camera only its environment is seen, so only that is clicked on, reset, and asked for contacts; also if all
-/// environments are shown otherwise, and another one stands between.
+/// Through a camera, only its environment is shown, selected, reset, and queried for contacts, even if all environments
+/// are shown otherwise and another one stands in between.
 #[test]
 fn sensor_view_of_one_environment() {
     let mut shows = shows(2);
@@ -408,7 +410,7 @@ fn sensor_view_of_one_environment() {
         cubes += usize::from(picked.name == "cube");
     }
     assert!(cubes > 3, "{cubes}");
-    // The control: from the same place, freely, the other one is in the way.
+    // Control: from the same pose without the camera, the other environment blocks the view.
     let mut painter = Painter::new(1);
     let mut pose = through.world_from_camera;
     (0..3).for_each(|k| pose.translation[k] += [x, y, z][k] as f32);
@@ -425,7 +427,7 @@ fn help_at_every_width() {
         hud::help(&mut canvas);
         let rows = lines.div_ceil(columns);
         let [left, top] = [width - 315 * columns - 10, 15 * (lines - rows)].map(|free| free / 2);
-        // Of each line, both parts have letters.
+        // Both parts of each line have letters.
         for line in 0..lines {
             let [x, y] = [left + 12 + line / rows * 315, top + 28 + line % rows * 15];
             for (part, wide, color) in [(0, 84, [240; 3]), (84, 222, [170; 3])] {
@@ -445,14 +447,14 @@ fn every_size() {
         shows.app.handle(Input::Resize(size));
         assert_eq!(shows.drawn().dimensions(), size);
     }
-    // The help is one of the parts that are drawn, of 640 pixels in a row.
+    // The help is part of the image, of 640 pixels in a row.
     let with = shows.drawn();
     shows.press(Key::F1);
     assert!(unlike(&with, &shows.drawn()) > 50_000, "{}", unlike(&with, &shows.drawn()));
 }
 
-/// A held key of flight goes where it says, and nowhere else: ahead along the view, right of it, and up in the world, by the
-/// distance of the target each second; without the focus it is let go.
+/// A held flight key moves along its own direction only: forward along the view, right of it, and up in the world. The
+/// speed per second is the distance to the target. Losing the focus releases the key.
 #[test]
 fn flight() {
     for (key, [ahead, right, up]) in [
@@ -478,7 +480,7 @@ fn flight() {
         let to_right = forward.cross(&Vector3::z()).normalize();
         let wanted = forward * ahead + to_right * right + Vector3::z() * up;
         assert!((way.normalize() - wanted).norm() < 1e-9, "{key:?}: {way}, not along {wanted}");
-        // For 30 ms to 100 ms.
+        // Between 30 ms and 100 ms.
         let share = way.norm() / before.distance;
         assert!((0.029..0.101).contains(&share), "{key:?}: {share}");
         shows.app.handle(Input::FocusLost);
@@ -486,7 +488,7 @@ fn flight() {
     }
 }
 
-/// A recording that is what it is set to.
+/// A recording with a directly settable state.
 #[derive(Debug, Default)]
 struct Switch(bool);
 
@@ -507,7 +509,7 @@ fn record_button() {
     let on_button = [SIZE[0] as f64 - 96.0, 11.0];
     // The whole mark, of 9 by 9 pixels.
     let red = |canvas: &Canvas| (0..9).all(|k| canvas.pixel(SIZE[0] - 96 + k, 11 + k) == Some([235, 60, 50]));
-    // Without a recorder the image has no button, and the simulation refuses the key.
+    // Without a record button, the image shows none, and the simulation refuses the key.
     let bare = shows.drawn();
     assert!(shows.click(on_button).is_empty() && !red(&bare));
     assert_eq!(shows.type_in("r"), [Command::Record(true)]);
@@ -519,18 +521,19 @@ fn record_button() {
         assert!(shows.click([on_button[0], 40.0]).is_empty(), "below it");
         assert_eq!(red(&shows.drawn()), on);
     }
-    // Its text is below it.
+    // The text is below the button.
     let with = shows.drawn();
     let text = (30..42).flat_map(|y| (SIZE[0] - 110..SIZE[0] - 8).map(move |x| (x, y)));
     assert!(text.filter(|&(x, y)| bare.pixel(x, y) != with.pixel(x, y)).count() > 200);
-    // Beside the sliders, where they are open.
+    // To the left of the sliders while they are open.
     shows.press(Key::Tab);
     assert!(!matches!(shows.click(on_button)[..], [Command::Record(_)]));
     assert_eq!(shows.click([on_button[0] - 210.0, 11.0]), [Command::Record(false)]);
 }
 
-/// Images of a held simulation, each at a time [ms] and of a snapshot with a number: true for those that differ from `fine`
-/// below the status, which counts images. The display takes `handing` for each.
+/// Renders images of a paused simulation, each at a time \[ms\] and of a snapshot number. Returns true for each image
+/// that differs from `fine` below the status, which shows the frame rate. `handing` is the duration of sending an
+/// image.
 fn coarse(app: &mut App, held: &Snapshot, fine: &Canvas, images: &[(u64, u64)], handing: Duration) -> Vec<bool> {
     let (start, below) = (Instant::now(), 4 * 70 * fine.dimensions()[0]);
     let one = |&(number, milliseconds): &(u64, u64)| {
@@ -543,8 +546,8 @@ fn coarse(app: &mut App, held: &Snapshot, fine: &Canvas, images: &[(u64, u64)], 
     images.iter().map(one).collect()
 }
 
-/// While time is held and four samples of each pixel take too long, a moving view has one, until it rests; also if it is the
-/// display that takes too long.
+/// In a paused simulation, if four samples per pixel take too long, a moving view has one sample until it rests. The
+/// time of sending the image counts too.
 #[test]
 fn coarse_while_moving() {
     let Shows { sample: _sample, viewer, .. } = shows(1);
@@ -558,21 +561,22 @@ fn coarse_while_moving() {
         app.keep_pace();
         (app, fine)
     };
-    // Six million pixels on one thread take longer than a thirtieth of a second, which three images find out.
+    // Six million pixels on one thread take longer than a thirtieth of a second, which three images detect.
     let (mut large, fine) = app([3000, 2000]);
     let moving: Vec<_> = (0..8).map(|k| (10 + k, 100 * k)).collect();
     let images = [&moving[..], &[(17, 800), (17, 900), (17, 1000)]].concat();
     let [f, t] = [false, true];
-    // A quarter of a second after it was moved it rests.
+    // The view rests a quarter of a second after the last motion.
     assert_eq!(coarse(&mut large, &held, &fine, &images, Duration::ZERO), [f, f, f, t, t, t, t, t, t, t, f]);
-    // A small image is drawn at once. The first one does not know yet how long the display takes, and three tell.
+    // A small image is rendered quickly. The first image does not know the duration of sending yet; three slow images
+    // are needed.
     for (handing, expected) in [(Duration::from_millis(500), [f, f, f, f, t, t, t, t]), (Duration::ZERO, [f; 8])] {
         let (mut small, fine) = app([320, 200]);
         assert_eq!(coarse(&mut small, &held, &fine, &moving, handing), expected, "{handing:?}");
     }
 }
 
-/// The program's point of view is that of open windows and of screenshots; the user moves on from there.
+/// The camera set by the program applies to open windows and screenshots; users can move on from there.
 #[test]
 fn viewpoint() {
     let mut shows = shows(2);

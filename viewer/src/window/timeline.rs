@@ -1,4 +1,4 @@
-//! The time line of what was recorded, along the lower edge of a window.
+//! Timeline of a recording, along the lower edge of a window.
 
 use crate::stage::{Canvas, Snapshot, Timeline};
 use embedded_graphics::mono_font::ascii::FONT_6X10;
@@ -7,18 +7,18 @@ const DARK: [u8; 3] = [20, 22, 26];
 const GREY: [u8; 3] = [170; 3];
 const YELLOW: [u8; 3] = [255, 210, 60];
 
-/// From the sides of the window to the line \[pixels\].
+/// Distance from the sides of the window to the timeline \[pixels\].
 const SIDE: f64 = 70.0;
-/// Height of the strip at the lower edge in which it can be grasped \[pixels\].
+/// Height of the clickable strip at the lower edge \[pixels\].
 const HEIGHT: f64 = 16.0;
 
-/// Where the line begins and ends \[pixels\].
+/// Returns the left and right end of the timeline \[pixels\].
 fn ends(width: usize) -> [f64; 2] {
     let width = width as f64;
     [SIDE.min(width / 2.0), (width - SIDE).max(width / 2.0)]
 }
 
-/// Draws it, where there is one.
+/// Draws the timeline if the snapshot belongs to a recording.
 pub(super) fn draw(canvas: &mut Canvas, snapshot: &Snapshot) {
     let Some(Timeline { now, start, end }) = snapshot.run.timeline else { return };
     let [width, height] = canvas.dimensions();
@@ -34,13 +34,13 @@ pub(super) fn draw(canvas: &mut Canvas, snapshot: &Snapshot) {
     canvas.text(&format!("{end:.2} s"), [right + 8, top + 3], &FONT_6X10, GREY);
 }
 
-/// The time at a pixel, where that is on the line.
+/// Returns the recording time at a pixel, or `None` outside the timeline strip.
 pub(super) fn time_at(snapshot: &Snapshot, size: [usize; 2], [x, y]: [f64; 2]) -> Option<f64> {
     snapshot.run.timeline?;
     (y >= size[1] as f64 - HEIGHT).then(|| time_beside(snapshot, size[0], x))?
 }
 
-/// The time that the line has where the mouse is, above and beside it too.
+/// Returns the recording time at a horizontal pixel position, also outside of the timeline.
 pub(super) fn time_beside(snapshot: &Snapshot, width: usize, x: f64) -> Option<f64> {
     let Timeline { start, end, .. } = snapshot.run.timeline?;
     let [left, right] = ends(width);
@@ -62,7 +62,8 @@ mod tests {
         Snapshot { run: Run { timeline, ..Run::default() }, ..Snapshot::default() }
     }
 
-    /// The mark is where a click goes to; without a recording and in the smallest windows nothing is wrong.
+    /// The mark is at the pixel that seeks to its time. Without a recording and in the smallest windows, drawing is
+    /// harmless.
     #[test]
     fn mark() {
         let size = [400, 300];
@@ -87,12 +88,12 @@ mod tests {
         }
     }
 
-    /// A window seeks where its line is pressed and dragged.
+    /// Pressing and dragging on the timeline seeks.
     #[test]
     fn seek() {
         let mut app = App::new([400, 300], 1);
         for (what, snapshot, y, expected) in [
-            // The middle of 2 s to 6 s, at any height of the mouse.
+            // From the start at 2 s to the middle of 2 s to 6 s, at any height of the mouse.
             ("on the line", at(3.0), 290.0, &[Command::Seek(2.0), Command::Seek(4.0)][..]),
             ("above the line", at(3.0), 200.0, &[]),
             ("no line", Snapshot::default(), 290.0, &[]),

@@ -1,4 +1,5 @@
-//! Ends the connection to a display that does not answer: whoever waits for it would wait for ever.
+//! Watchdog of an X11 connection: closes the connection to a display that does not respond, so that no thread blocks
+//! forever.
 
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
@@ -7,12 +8,13 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long a display may take for one request, or to let somebody in: a picture takes seconds where the way to it is slow.
+/// Maximum duration of a request or of opening a window. An image takes seconds over a slow network.
 pub(super) const PATIENCE: Duration = Duration::from_secs(15);
-/// Between two looks. They are counted, not timed: a program that was stopped and goes on has not waited.
+/// Interval between two checks. Checks are counted instead of measuring time, so that a suspended program does not time
+/// out.
 const LOOK: Duration = Duration::from_secs(1);
 
-/// Watches the requests of one connection, on a thread of its own, until it is dropped.
+/// Watches the requests of one connection on its own thread, until it is dropped.
 #[derive(Debug)]
 pub(super) struct Watch {
     shared: Arc<Shared>,
@@ -21,7 +23,7 @@ pub(super) struct Watch {
 
 #[derive(Debug, Default)]
 struct Shared {
-    /// Begun and ended requests: an odd number while one is on its way.
+    /// Number of started plus finished requests: odd while a request is in progress.
     requests: AtomicU64,
     frozen: AtomicBool,
     over: Mutex<bool>,
@@ -29,21 +31,21 @@ struct Shared {
 }
 
 impl Watch {
-    /// Watches a connection, whose socket this is.
+    /// Starts to watch a connection with this socket.
     ///
     /// # Errors
-    /// The operating system gives no thread.
+    /// The operating system cannot start a thread.
     pub(super) fn start(socket: OwnedFd) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let own = Arc::clone(&shared);
-        // Any kind of socket is shut down alike.
+        // `shutdown` works for any kind of socket.
         let socket = UnixStream::from(socket);
         let thread = std::thread::Builder::new().name("kinetoscope-watch".into());
         let thread = thread.spawn(move || own.watch(&socket))?;
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Does something that may wait for the display.
+    /// Runs a request that may block on the display.
     pub(super) fn request<T>(&self, request: impl FnOnce() -> T) -> T {
         self.shared.requests.fetch_add(1, Ordering::AcqRel);
         let result = request();
@@ -51,7 +53,7 @@ impl Watch {
         result
     }
 
-    /// Whether the connection was ended because the display did not answer.
+    /// True if the connection was closed because the display did not respond.
     pub(super) fn is_frozen(&self) -> bool {
         self.shared.frozen.load(Ordering::Acquire)
     }
@@ -71,7 +73,7 @@ impl Shared {
             last = requests;
             if LOOK * looks >= PATIENCE {
                 self.frozen.store(true, Ordering::Release);
-                // Whoever waits is woken by it; where that fails the connection is gone already.
+                // The shutdown wakes the blocked thread. If it fails, the connection is already closed.
                 let _ = socket.shutdown(std::net::Shutdown::Both);
                 return;
             }
@@ -84,7 +86,7 @@ impl Drop for Watch {
         *self.shared.over.lock().unwrap_or_else(PoisonError::into_inner) = true;
         self.shared.ends.notify_all();
         if let Some(thread) = self.thread.take() {
-            // One that panicked has ended as well.
+            // A thread that panicked has ended as well.
             let _ = thread.join();
         }
     }
@@ -97,7 +99,8 @@ mod tests {
     use std::io::Read;
     use std::time::Instant;
 
-    /// A request without an answer ends with its connection, not before its time; idle requests end nothing.
+    /// An unanswered request ends with its connection, but not before the timeout. Idle requests do not close the
+    /// connection.
     #[test]
     fn unanswered_request() {
         let (own, other) = UnixStream::pair().unwrap();

@@ -1,4 +1,5 @@
-//! A window of an X server, by the protocol itself: no C library, so nothing but an error comes of a lost connection.
+//! A window on an X server, through the X11 protocol without C libraries. A lost connection is an error and nothing
+//! else.
 
 use super::app::{Input, Modifiers};
 use super::enlarge::{self, Enlarged};
@@ -27,7 +28,7 @@ x11rb::atom_manager! {
     }
 }
 
-/// A window, its size and its keys.
+/// An open window, with its keyboard mapping and its frame buffers.
 #[derive(Debug)]
 pub(super) struct Screened {
     watch: Watch,
@@ -36,32 +37,32 @@ pub(super) struct Screened {
     gc: u32,
     atoms: Atoms,
     depth: u8,
-    /// Where red, green and blue are in a pixel \[bits\].
+    /// Bit position of red, green and blue in a pixel.
     shifts: [u32; 3],
     most_significant_first: bool,
     size: [usize; 2],
     keys: Keys,
-    /// A key that was let go, unless the next event says that it repeats.
+    /// Last key release, held back until the next event shows if the key repeats.
     released: Option<KeyReleaseEvent>,
-    /// Pixels as the server has them.
+    /// Pixels in the server's format.
     pixels: Vec<u8>,
-    /// How the server calls them, where it can enlarge pictures.
+    /// RENDER format of the window; `None` if the server cannot scale images.
     format: Option<Pictformat>,
-    /// The picture that it enlarges, while the window is huge.
+    /// Server-side image that is shown enlarged, while the window is huge.
     enlarged: Option<Enlarged>,
 }
 
-/// What happened.
+/// An event of the window.
 #[derive(Debug)]
 pub(super) enum Happened {
     Input(Input),
-    /// Something lay over the window.
+    /// A part of the window was uncovered and needs a redraw.
     Exposed,
-    /// The user wants it closed.
+    /// The user closed the window.
     Close,
 }
 
-/// The connection was lost, or the server refused something.
+/// An error of the connection, or a refused request.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Failure {
     #[error("{0}")]
@@ -80,12 +81,12 @@ pub(super) enum Failure {
     Colors,
 }
 
-/// Larger pictures are drawn coarser, and enlarged by the server where it can: more than this takes longer than a thirtieth
-/// of a second \[pixels\].
+/// Maximum number of rendered pixels. Larger windows are rendered at lower resolution and enlarged, because rendering
+/// more pixels takes longer than a thirtieth of a second.
 const MOST_PIXELS: usize = 1920 * 1200;
 
 impl Screened {
-    /// Opens a window of about `size` pixels on a display, that of the variable `DISPLAY` where `None`.
+    /// Opens a window of about `size` pixels on a display; `None` uses the environment variable `DISPLAY`.
     pub(super) fn open(title: &str, size: [usize; 2], display: Option<&str>) -> Result<Self, Failure> {
         let (connection, number) = x11rb::connect(display)?;
         let watch = Watch::start(connection.stream().as_fd().try_clone_to_owned()?)?;
@@ -151,28 +152,28 @@ impl Screened {
         })
     }
 
-    /// How many pixels of the window a pixel of the picture covers, along each side.
+    /// Returns the number of window pixels per image pixel, along each side.
     fn coarseness(&self) -> usize {
         coarseness(self.size)
     }
 
-    /// Size of the picture that is to be drawn.
+    /// Returns the size of the image to render.
     pub(super) fn picture_size(&self) -> [usize; 2] {
         let k = self.coarseness();
         self.size.map(|n| n.div_ceil(k).max(1))
     }
 
-    /// The number of the window on its display.
+    /// Returns the X11 window id.
     pub(super) fn number(&self) -> u32 {
         self.window
     }
 
-    /// What happened since this was asked last.
+    /// Returns the events since the last call.
     pub(super) fn poll(&mut self) -> Result<Vec<Happened>, Failure> {
         self.events().map_err(|failure| self.cause(failure))
     }
 
-    /// Where the display did not answer, that is why the connection was lost.
+    /// Replaces the error by [`Failure::Frozen`] if the connection was closed because the display did not respond.
     fn cause(&self, failure: Failure) -> Failure {
         if self.watch.is_frozen() { Failure::Frozen } else { failure }
     }
@@ -180,7 +181,7 @@ impl Screened {
     fn events(&mut self) -> Result<Vec<Happened>, Failure> {
         let mut happened: Vec<Happened> = Vec::new();
         let mut released = self.released.take();
-        // Whether its successor may still be on its way.
+        // True if the next event may still arrive.
         let mut is_new = false;
         while let Some(event) = self.watch.request(|| self.connection.poll_for_event())? {
             let repeats = matches!((&released, &event), (Some(key), Event::KeyPress(next)) if repeats(key, next));
@@ -195,7 +196,7 @@ impl Screened {
                 Some(Happened::Input(Input::Press(key))) if repeats => Some(Happened::Input(Input::Repeat(key))),
                 next => next,
             };
-            // Of many places of the mouse the last one counts.
+            // Of several consecutive mouse moves only the last counts.
             if let (Some(Happened::Input(Input::Move(to))), Some(Happened::Input(Input::Move(last)))) =
                 (&next, happened.last_mut())
             {
@@ -251,12 +252,12 @@ impl Screened {
         })
     }
 
-    /// The key of a code, with what else is held.
+    /// Returns the key of a key code, with the modifiers in `state`.
     fn key(&self, code: u8, state: KeyButMask) -> Option<Key> {
         self.keys.get(code, state.contains(KeyButMask::SHIFT))
     }
 
-    /// Shows a picture.
+    /// Shows an image.
     pub(super) fn present(&mut self, canvas: &Canvas) -> Result<(), Failure> {
         self.send(canvas).map_err(|failure| self.cause(failure))
     }
@@ -284,11 +285,11 @@ impl Screened {
         Ok(())
     }
 
-    /// Sends a picture, each pixel `k` times along each side, to something of `size` pixels.
+    /// Sends an image to a drawable of `size` pixels, with each pixel repeated `k` times along each side.
     fn put(&mut self, canvas: &Canvas, k: usize, to: Drawable, [width, height]: [usize; 2]) -> Result<(), Failure> {
         let [columns, rows] = canvas.dimensions();
         let line = 4 * width;
-        // What one request may hold, without its head.
+        // Maximum payload of one request, without its header.
         let most = self.connection.maximum_request_bytes().saturating_sub(64);
         let band = (most / line).clamp(1, height);
         for top in (0..height).step_by(band) {
@@ -317,7 +318,7 @@ impl Screened {
 
 impl Drop for Screened {
     fn drop(&mut self) {
-        // Where the connection is lost the window is gone anyway.
+        // Errors are ignored: if the connection is lost, the window is gone anyway.
         self.watch.request(|| {
             let _ = self.connection.destroy_window(self.window);
             let _ = self.connection.flush();
@@ -325,8 +326,8 @@ impl Drop for Screened {
     }
 }
 
-/// How many pixels of a window of this size a pixel of its picture covers, along each side: few enough pixels, in rows and
-/// columns that can be drawn.
+/// Returns the number of window pixels per image pixel, along each side, for an image of at most about [`MOST_PIXELS`]
+/// pixels with sides that the renderer supports.
 fn coarseness(size: [usize; 2]) -> usize {
     let fits = |k: &usize| {
         let [width, height] = size.map(|n| n.div_ceil(*k));
@@ -335,12 +336,12 @@ fn coarseness(size: [usize; 2]) -> usize {
     (1..).find(fits).unwrap_or(1)
 }
 
-/// Whether a key was not let go and pressed again but is held: the server then says both, of the same moment.
+/// True if a release and a press come from a held key: the X server sends both with the same time stamp.
 fn repeats(released: &KeyReleaseEvent, next: &KeyPressEvent) -> bool {
     (released.detail, released.time) == (next.detail, next.time)
 }
 
-/// Depth of the screen, and where the colours are in its pixels.
+/// Returns the depth of the screen and the bit positions of red, green and blue.
 fn colors(connection: &RustConnection, screen: &Screen) -> Result<(u8, [u32; 3]), Failure> {
     let depth = screen.root_depth;
     let formats = &connection.setup().pixmap_formats;
@@ -352,7 +353,7 @@ fn colors(connection: &RustConnection, screen: &Screen) -> Result<(u8, [u32; 3])
     if masks.into_iter().all(byte) { Ok((depth, masks.map(u32::trailing_zeros))) } else { Err(Failure::Colors) }
 }
 
-/// What is printed on keys.
+/// Keyboard mapping: the keysyms of each key code.
 #[derive(Debug)]
 struct Keys {
     first: u8,
@@ -368,8 +369,9 @@ impl Keys {
         Ok(Self { first, each: usize::from(mapping.keysyms_per_keycode), signs: mapping.keysyms })
     }
 
-    /// The key of a code; with shift the upper sign, where there is one. What the first of two alphabets says counts, and that of
-    /// the second where nothing is bound to the first, such as a Cyrillic letter: each has two signs of a key.
+    /// Returns the key of a key code, with the upper keysym if Shift is held. With several keyboard layouts, the second
+    /// one is used for keys without a binding in the first, such as Cyrillic letters. Each layout has two keysyms per
+    /// key.
     fn get(&self, code: u8, shift: bool) -> Option<Key> {
         let at = usize::from(code.checked_sub(self.first)?) * self.each;
         let signs = self.signs.get(at..at + self.each)?;
@@ -380,7 +382,7 @@ impl Keys {
     }
 }
 
-/// The key of a sign. Source: the X protocol's `keysymdef.h`, whose first 256 signs are Latin-1.
+/// Returns the key of a keysym. Source: the X protocol's `keysymdef.h`, whose first 256 keysyms are Latin-1.
 fn key_of(sign: u32) -> Option<Key> {
     Some(match sign {
         0x20..=0x7e => Key::Char(char::from_u32(sign)?.to_ascii_lowercase()),
@@ -415,13 +417,14 @@ mod tests {
             (0xffbe, Some(Key::F1)),
             (0xff1b, Some(Key::Escape)),
             (0xffab, Some(Key::Char('+'))),
-            // Shift alone.
+            // The Shift key alone.
             (0xffe1, None),
         ] {
             assert_eq!(key_of(sign), key, "{sign:x}");
         }
         let american = Keys { first: 8, each: 2, signs: vec![0x3d, 0x2b, 0x61, 0] };
-        // A Russian alphabet before an American one: the key between Tab and W is "short i" in the first, Q in the second.
+        // A Russian layout before an American one: the key between Tab and W is "short i" in the first, Q in the
+        // second.
         let two = Keys { first: 8, each: 4, signs: vec![0x6ca, 0x6ea, 0x71, 0x51, 0x20, 0x20, 0x6ca, 0x6ca] };
         let russian = Keys { first: 8, each: 2, signs: vec![0x6ca, 0x6ea] };
         for (keys, code, shift, expected) in [
@@ -439,7 +442,8 @@ mod tests {
         }
     }
 
-    /// A window may be up to 65 535 pixels wide, an image 8192: its last column was repeated.
+    /// A window may be up to 65 535 pixels wide, but an image at most 8192: without a coarser image, its last column
+    /// was repeated.
     #[test]
     fn coarse_images() {
         for (size, k) in [([1, 1], 1), ([960, 540], 1), ([1920, 1200], 1), ([3840, 2160], 2), ([8192, 50], 1)] {

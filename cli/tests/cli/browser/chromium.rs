@@ -1,4 +1,4 @@
-//! Chromium without a screen, driven over its DevTools protocol: one WebSocket, and JSON.
+//! Headless Chromium, driven by its DevTools protocol: JSON over one WebSocket.
 
 use kinetoscope_testkit::wait;
 use serde_json::{Value, json};
@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tungstenite::{Message, WebSocket};
 
-/// The longest wait on a busy machine.
+/// Longest wait on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(90);
 
-/// A browser with an empty profile; it ends when it is dropped.
+/// A browser with an empty profile. Dropping the value ends the browser.
 pub(crate) struct Chromium {
     process: Child,
     wire: Mutex<Wire>,
@@ -21,13 +21,13 @@ pub(crate) struct Chromium {
     _alone: MutexGuard<'static, ()>,
 }
 
-/// One at a time: a machine of two cores draws, steps and shows in each test already.
+/// Serializes the browser tests: a machine with two cores already renders, steps and displays in each test.
 static ONE: Mutex<()> = Mutex::new(());
 
 struct Wire {
     socket: WebSocket<TcpStream>,
     next: u64,
-    /// Events that came while answers were waited for.
+    /// Events received while waiting for responses.
     events: Vec<Value>,
 }
 
@@ -35,7 +35,7 @@ impl Chromium {
     pub(crate) fn start(program: &Path) -> Self {
         let alone = ONE.lock().unwrap_or_else(PoisonError::into_inner);
         let profile = tempfile::tempdir().unwrap();
-        // Its sandbox does not work for root, nor in most containers; the only page it opens is our own.
+        // The sandbox does not work for root, nor in most containers. The only opened page is our own.
         let process = Command::new(program)
             .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"])
             .args(["--disable-background-networking", "--disable-extensions", "--mute-audio", "--hide-scrollbars"])
@@ -47,7 +47,7 @@ impl Chromium {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        // It writes where it listens: the port, and the path of its WebSocket.
+        // Chromium writes its port and the path of its WebSocket to this file.
         let file = profile.path().join("DevToolsActivePort");
         let (port, path) = wait::some("Chromium", || {
             let text = std::fs::read_to_string(&file).unwrap_or_default();
@@ -64,7 +64,7 @@ impl Chromium {
         self.wire.lock().unwrap()
     }
 
-    /// Opens a page, with the functions of [`super::TOOLS`].
+    /// Opens a page and defines the functions of [`super::TOOLS`] in it.
     pub(crate) fn open(&self, url: &str) -> Tab<'_> {
         let target = self.wire().ask(None, "Target.createTarget", json!({"url": "about:blank"}));
         let attach = json!({"targetId": target["targetId"], "flatten": true});
@@ -82,7 +82,7 @@ impl Chromium {
 
 impl Drop for Chromium {
     fn drop(&mut self) {
-        // Asked, it ends its helpers too.
+        // The close request also ends the helper processes.
         if let Ok(mut wire) = self.wire.lock() {
             let _ = wire.socket.send(Message::text(json!({"id": 0, "method": "Browser.close"}).to_string()));
         }
@@ -99,7 +99,7 @@ impl Drop for Chromium {
 }
 
 impl Wire {
-    /// Asks, and waits for the answer.
+    /// Sends a request and waits for the response.
     fn ask(&mut self, session: Option<&str>, method: &str, params: Value) -> Value {
         self.next += 1;
         let mut message = json!({"id": self.next, "method": method, "params": params});
@@ -119,7 +119,7 @@ impl Wire {
     }
 }
 
-/// A page.
+/// A page of the browser.
 pub(crate) struct Tab<'a> {
     browser: &'a Chromium,
     session: String,
@@ -130,7 +130,7 @@ impl Tab<'_> {
         self.browser.wire().ask(Some(&self.session), method, params)
     }
 
-    /// The value of an expression in the page.
+    /// Evaluates an expression in the page.
     pub(crate) fn evaluate(&mut self, expression: &str) -> Value {
         let params = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
         let answer = self.ask("Runtime.evaluate", params);
@@ -138,7 +138,7 @@ impl Tab<'_> {
         answer["result"]["value"].clone()
     }
 
-    /// The value of an expression that is a number.
+    /// Evaluates an expression that is a number.
     pub(crate) fn number(&mut self, expression: &str) -> f64 {
         self.evaluate(expression).as_f64().unwrap()
     }
@@ -147,7 +147,7 @@ impl Tab<'_> {
     #[track_caller]
     pub(crate) fn wait_until(&mut self, what: &str, expression: &str) {
         let start = Instant::now();
-        // While the page is being loaded there is nothing to ask.
+        // While the page loads, elements may not exist yet.
         let wanted = format!("(() => {{ try {{ return {expression}; }} catch {{ return false; }} }})()");
         while self.evaluate(&wanted) != true {
             assert!(start.elapsed() < PATIENCE, "waited for {what}: {:?}", self.complaints());
@@ -155,7 +155,7 @@ impl Tab<'_> {
         }
     }
 
-    /// Left edge, vertical middle, width and height of an element \[CSS pixels\]. It is scrolled into view.
+    /// Scrolls an element into view. Returns its left edge, vertical center, width and height \[CSS pixels\].
     pub(crate) fn rectangle(&mut self, element: &str) -> [f64; 4] {
         let rectangle = self.evaluate(&format!(
             "(() => {{ const e = {element}; e.scrollIntoView({{ block: 'center', behavior: 'instant' }}); \
@@ -171,19 +171,19 @@ impl Tab<'_> {
         self.ask("Input.dispatchMouseEvent", params);
     }
 
-    /// Clicks on the middle of an element.
+    /// Clicks on the center of an element.
     pub(crate) fn click(&mut self, element: &str) {
         let [x, y, width, _] = self.rectangle(element);
         self.drag([x + 0.5 * width, y], [x + 0.5 * width, y]);
     }
 
-    /// Drags with the mouse.
+    /// Drags with the left mouse button.
     pub(crate) fn drag(&mut self, from: [f64; 2], to: [f64; 2]) {
         self.hold(from, to, false);
         self.let_go(to);
     }
 
-    /// Drags, with Ctrl pressed or not, and does not let go.
+    /// Drags without releasing the button, with or without Ctrl.
     pub(crate) fn hold(&mut self, from: [f64; 2], to: [f64; 2], ctrl: bool) {
         self.mouse("mouseMoved", from, false, ctrl);
         self.mouse("mousePressed", from, true, ctrl);
@@ -197,12 +197,12 @@ impl Tab<'_> {
         self.mouse("mouseReleased", at, false, false);
     }
 
-    /// Chooses in a list.
+    /// Selects an option of a list.
     pub(crate) fn choose(&mut self, id: &str, value: &str) {
         self.evaluate(&format!("$('{id}').value = '{value}'; $('{id}').dispatchEvent(new Event('change'))"));
     }
 
-    /// Light or dark, in a window of another size \[CSS pixels\].
+    /// Sets the color scheme and the window size \[CSS pixels\].
     pub(crate) fn show_as(&mut self, scheme: &str, [width, height]: [u32; 2]) {
         let feature = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
         self.ask("Emulation.setEmulatedMedia", feature);
@@ -210,15 +210,15 @@ impl Tab<'_> {
         self.ask("Emulation.setDeviceMetricsOverride", size);
     }
 
-    /// The visible part of the page, as PNG.
+    /// Returns the visible part of the page as PNG.
     pub(crate) fn screenshot(&mut self) -> Vec<u8> {
         let answer = self.ask("Page.captureScreenshot", json!({"format": "png"}));
         decode_base64(answer["data"].as_str().unwrap())
     }
 
-    /// Errors of the page's program, and what its browser did not let it do.
+    /// Returns errors of the page's scripts, and actions that the browser blocked.
     pub(crate) fn complaints(&mut self) -> Vec<String> {
-        // Events before this answer come before it.
+        // Earlier events arrive before this response.
         self.ask("Runtime.evaluate", json!({"expression": "0"}));
         let wire = self.browser.wire();
         let own = wire.events.iter().filter(|event| event["sessionId"] == self.session.as_str());
@@ -231,7 +231,7 @@ impl Tab<'_> {
     }
 }
 
-/// RFC 4648, section 4.
+/// Decodes base64 (RFC 4648, section 4).
 fn decode_base64(text: &str) -> Vec<u8> {
     let value = |c: u8| match c {
         b'A'..=b'Z' => u32::from(c - b'A'),

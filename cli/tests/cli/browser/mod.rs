@@ -1,4 +1,4 @@
-//! The page of the browser view in Chromium: it shows the simulation and acts on it.
+//! The page of the browser view in Chromium: it shows the simulation and controls it.
 
 mod chromium;
 
@@ -13,21 +13,21 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// Names the folder to which screenshots of the page are written, for the documentation.
+/// Environment variable with the folder for screenshots of the page, for the documentation.
 const SCREENSHOTS: &str = "KINETOSCOPE_SCREENSHOTS";
 
 fn browser() -> Chromium {
     Chromium::start(&kinetoscope_testkit::needs::chromium())
 }
 
-/// The page at an address, when it is connected.
+/// Opens the page at an address and waits for the connection.
 fn page<'a>(browser: &'a Chromium, url: &str) -> Tab<'a> {
     let mut tab = browser.open(url);
     tab.wait_until("connected", "$('link').dataset.state === 'connected'");
     tab
 }
 
-/// The page of a simulation, when its first image has come.
+/// Opens the page of a simulation and waits for its first image.
 fn page_of<'a>(browser: &'a Chromium, running: &Running) -> Tab<'a> {
     let mut tab = page(browser, &running.url);
     tab.wait_until("an image", "$('cover').hidden");
@@ -40,16 +40,17 @@ fn screenshot(tab: &mut Tab<'_>, name: &str) {
     }
 }
 
-/// The page refused nothing and reported no error.
+/// Asserts that the page refused no command and reported no error.
 #[track_caller]
 fn assert_content(tab: &mut Tab<'_>) {
     assert_eq!(tab.evaluate("$('note').hidden"), true, "nothing was refused");
     assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 
-/// Functions of the tests, defined in every page: `$` finds an element, `pixels` the bytes of a canvas and its size, `look`
-/// the number of colors and the share of pixels that are red as the cube is, with their middle in parts of the canvas, `hash`
-/// is another number for another image, `columns` and `count` measure what has nearly the color of a plot's blue line.
+/// Test functions that are defined in every page. `$` finds an element. `pixels` returns the bytes of a canvas and its
+/// size. `look` returns the number of colors, the share of pixels that are as red as the cube, and their center in
+/// fractions of the canvas. `hash` differs for different images. `columns` and `count` measure pixels with nearly the
+/// color of a plot's blue line.
 const TOOLS: &str = "
 window.$ = (id) => document.getElementById(id);
 window.pixels = (id) => {
@@ -93,18 +94,18 @@ fn simulation() {
     let mut tab = page_of(&browser, &running);
     tab.wait_until("its title", "document.title === 'arm – Kinetoscope'");
 
-    // An image arrives, as large as it is shown, with the cube in it.
+    // An image arrives in its displayed size and shows the cube.
     let fits = "(({ width, height, clientWidth, clientHeight }) => width === clientWidth && height === clientHeight)";
     tab.wait_until("an image of the canvas' size", &format!("{fits}($('stage'))"));
     let look = tab.evaluate("look()");
     assert!(look["colors"].as_u64() > Some(100) && look["red"].as_f64() > Some(0.001), "{look}");
     assert!(look["width"].as_u64() > Some(400), "{look}");
 
-    // So does the camera's.
+    // The image of the camera sensor arrives too.
     tab.wait_until("the camera", "!$('panel').hidden");
     assert_eq!(tab.evaluate("[$('panel').width, $('panel').height]"), json!([128, 96]));
 
-    // A slider that is dragged by the mouse moves its joint, in the simulation.
+    // A slider dragged with the mouse moves its joint in the simulation.
     let sliders =
         tab.evaluate("[...document.querySelectorAll('#joints input[type=range]')].map((s) => s.dataset.joint)");
     assert_eq!(sliders, json!(["JOINT1", "JOINT2", "JOINT3", "JOINT4", "JOINT5", "JOINT6"]));
@@ -113,14 +114,14 @@ fn simulation() {
     let [lower, upper] = ["min", "max"].map(|end| tab.number(&format!("Number({slider}.{end})")));
     tab.drag([x + 0.5 * width, y], [x + 0.6 * width, y]);
     let target = tab.number(&format!("{slider}.valueAsNumber"));
-    // A tenth of the way is a tenth of the range, but for the width of the thumb (16 of some 300 pixels).
+    // A tenth of the slider is a tenth of the range, except for the width of the thumb (16 of about 300 pixels).
     let expected = 0.5 * (lower + upper) + 0.1 * (upper - lower);
     assert!((target - expected).abs() < 0.02 * (upper - lower), "{target} for {expected}");
     running.wait_until("the joint comes to where the slider is", |now| {
         now.steps > 0 && (now.positions[(0, 0)] - target).abs() < 0.02
     });
 
-    // Pause pauses, by a click, and the button says what it does next.
+    // A click on the pause button pauses, and the button then shows its next action.
     tab.click("$('pause')");
     tab.wait_until("paused", "$('pause').textContent === 'Play'");
     let held = running.now().steps;
@@ -131,8 +132,8 @@ fn simulation() {
     tab.click("$('step')");
     tab.wait_until("a step", &format!("$('time').textContent !== {before}"));
 
-    // Position and effort of the first joint are plotted, unless its mark is taken away. (Without the other joints, which
-    // would be drawn over it.)
+    // Position and effort of the first joint are plotted unless its box is unchecked. (The other joints are hidden,
+    // because they would be drawn on top.)
     let marks = "[...document.querySelectorAll('#joints .mark')]";
     tab.evaluate(&format!("{marks}.slice(1).filter((mark) => mark.checked).forEach((mark) => mark.click())"));
     let mark = "document.querySelector('#joints .mark')";
@@ -145,8 +146,8 @@ fn simulation() {
         tab.wait_until("the line again", &format!("{pixels} > 30"));
     }
 
-    // Overlays and the shown environments make another image, and then the same again. From where both environments are seen
-    // as a whole now, which is not quite where the first image was taken from.
+    // Overlays and the shown environments change the image, and undoing the change restores it. The reference is the
+    // view that frames both environments now, which differs slightly from the first image.
     tab.choose("environment", "1");
     tab.choose("environment", "all");
     std::thread::sleep(Duration::from_millis(500));
@@ -160,7 +161,7 @@ fn simulation() {
     }
     let of_two = tab.number("look().red");
     tab.choose("environment", "1");
-    // One alone is looked at from nearer: one cube of two, each larger by a fifth at least.
+    // A single environment is seen from closer: one cube instead of two, each larger by at least a fifth.
     tab.wait_until("one environment", &format!("hash() !== {all} && look().red > 0.5 * 1.2 * {of_two}"));
     tab.choose("environment", "all");
     tab.wait_until("both", &format!("hash() === {all}"));
@@ -170,7 +171,7 @@ fn simulation() {
     tab.click("$('pause')");
     running.wait_until("it goes on", |now| now.steps > held + 50);
 
-    // One environment of the two, another speed, another view: nothing is refused.
+    // One of the two environments, another speed, another view: no command is refused.
     tab.choose("environment", "1");
     tab.choose("speed", "1");
     tab.wait_until("real time", "$('speed').value === '1'");
@@ -182,11 +183,11 @@ fn simulation() {
     assert_content(&mut tab);
 }
 
-/// A click selects the cube, whose force is plotted, and a drag with Ctrl pulls it.
+/// A click selects the cube and plots its contact force, and a drag with Ctrl pulls it.
 #[test]
 #[ignore = "needs Chromium: cargo xtask test"]
 fn selection() {
-    /// Numbers behind a word in the text on the selection.
+    /// Returns the numbers after a word in the text about the selection.
     fn said(tab: &mut Tab<'_>, word: &str) -> Vec<f64> {
         let text = tab.evaluate("$('selected').textContent");
         let line = text.as_str().unwrap().lines().find_map(|line| line.split_once(word)).map_or("", |(_, rest)| rest);
@@ -197,7 +198,7 @@ fn selection() {
     let mut tab = page(&browser, &running.url);
     assert_eq!(tab.evaluate("$('selected-card').hidden"), true);
     tab.wait_until("a hint", "$('forces-title').textContent.includes('click on a body')");
-    // The cube has come to rest by then: 1.5 s of simulation.
+    // The cube rests after 1.5 s of simulation.
     tab.wait_until("1.5 s", "parseFloat($('time').textContent) > 1.5");
     tab.wait_until("the cube is seen", "look().middle !== null");
     let [u, v] = [0, 1].map(|k| tab.number(&format!("look().middle[{k}]")));
@@ -209,13 +210,13 @@ fn selection() {
     // The contacts carry the weight of 1 kg; the text is rounded to hundredths of a newton.
     let force = said(&mut tab, "force on it");
     assert!(force.len() == 3 && (force[2] - 9.81).abs() < 0.011 && force[0].abs() < 0.011, "{force:?}");
-    // And are plotted: the line of z has its color, over most of a second's width of the plot at least.
+    // The force is plotted: the line of z has its color, over at least most of a second's width of the plot.
     assert_eq!(tab.evaluate("$('forces-title').textContent"), "Contact force on cube, environment 0xyz");
     tab.wait_until("a line", "blue('forces', 60).columns > 1 / 12");
     let rest = said(&mut tab, "position")[2];
     assert!((rest - 0.2).abs() < 2e-3, "{rest}");
     screenshot(&mut tab, "serve_selected.png");
-    // Pulled up by a part of the image's height it leaves the ground; let go, it comes back.
+    // Pulled up by a fraction of the image height, the cube leaves the ground; released, it falls back.
     let up = [place[0], place[1] - 0.3 * height];
     tab.hold(place, up, true);
     tab.wait_until("nothing touches it", "/no contact/.test($('selected').textContent)");
@@ -242,22 +243,22 @@ fn time_line() {
         tab.wait_until("the cube is seen", "look().middle !== null");
         let [x, y, width, _] = tab.rectangle("$('timeline')");
         let mut last = x + width - 8.0;
-        // The middle of the thumb, 16 pixels wide, goes from end to end of the line.
+        // The center of the thumb, 16 pixels wide, moves from end to end of the slider.
         let heights = [0.0, 0.5, 0.8].map(|share| {
             let to = x + 8.0 + share * (width - 16.0);
             tab.drag([last, y], [to, y]);
             last = to;
-            // Steps are 5 ms apart, a pixel is about one; where the mouse takes the thumb is two pixels off at most.
+            // Steps are 5 ms apart, about one pixel. The dragged thumb is off by at most two pixels.
             for time in
                 [&format!("parseFloat({text})"), "$('timeline').valueAsNumber", "parseFloat($('time').textContent)"]
             {
                 tab.wait_until(time, &format!("Math.abs({time} - {}) < 0.006 + 2 * 0.5 / {width}", 0.5 * share));
             }
-            // The first view fits the moment that is shown: from here on the whole fall is in it.
+            // The first view frames only the shown state. From here on, the view frames the whole fall.
             if share == 0.0 {
                 tab.click("$('home')");
             }
-            // Images come a moment later: two equal ones are of one time.
+            // Images arrive with a delay: two equal images belong to the same time.
             let mut height = f64::NAN;
             loop {
                 std::thread::sleep(Duration::from_millis(300));
@@ -272,16 +273,16 @@ fn time_line() {
             }
             height
         });
-        // It falls by g t² / 2: 0, 0.31 and 0.78 m. In the image the second way is longer than the first, both are seen.
+        // It falls by g t² / 2: 0, 0.31 and 0.78 m. In the image, the second interval is longer than the first.
         let fallen = [heights[1] - heights[0], heights[2] - heights[1]];
         assert!(fallen[0] > 0.01 && fallen[1] > 1.1 * fallen[0], "{heights:?}");
-        // From there it is played to the end.
+        // From there, playback runs to the end.
         tab.click("$('pause')");
         tab.wait_until("the end again", &format!("{text} === '0.50 of 0.50 s'"));
         tab.wait_until("it holds", "$('pause').textContent === 'Play'");
         assert_content(&mut tab);
     });
-    // The control: a simulation that runs has no time line, and without a recorder no button.
+    // Control: a running simulation has no timeline, and without a record button the page shows none.
     let running = Running::start(1);
     let mut tab = page_of(&browser, &running);
     assert_eq!(tab.evaluate("[$('timeline-row').hidden, $('record').hidden]"), json!([true, true]));
@@ -309,7 +310,7 @@ fn record_button() {
     assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 
-/// A lost connection is shown and found again.
+/// A lost connection is reported and restored.
 #[test]
 #[ignore = "needs Chromium: cargo xtask test"]
 fn reconnection() {
@@ -320,21 +321,21 @@ fn reconnection() {
     drop(running);
     tab.wait_until("lost", "$('link').dataset.state !== 'connected'");
     tab.wait_until("nothing can be pressed", "$('pause').disabled");
-    // The port is free again once the system has forgotten the old connections.
+    // The port becomes free again once the system has closed the old connections.
     let again = Running::start_at(1, &address, ServeCfg::default());
     tab.wait_until("found again", "$('link').dataset.state === 'connected'");
     tab.wait_until("it can be pressed", "!$('pause').disabled");
     wait::until("one viewer", || again.viewers() == 1);
 }
 
-/// The page is readable in the light and the dark, in a narrow window, and without eyes.
+/// The page is readable in light and dark mode, in a narrow window, and with a screen reader.
 #[test]
 #[ignore = "needs Chromium: cargo xtask test"]
 fn readability() {
     let browser = browser();
     let running = Running::start(1);
     let mut tab = page_of(&browser, &running);
-    // Every control has a name.
+    // Every control has an accessible name.
     let unnamed = tab.evaluate(
         "[...document.querySelectorAll('button, input, select, canvas')]
             .filter((e) => !(e.labels?.length || e.getAttribute('aria-label') || e.getAttribute('aria-labelledby')
@@ -346,7 +347,7 @@ fn readability() {
         [("light", 1400, "serve_light.png"), ("dark", 1400, "serve_dark.png"), ("light", 420, "serve_narrow.png")]
     {
         tab.show_as(scheme, [width, 900]);
-        // Contrast of text on its ground, after WCAG 2: 4.5 is asked for.
+        // Contrast of text on its background by WCAG 2, which requires 4.5.
         let contrast = tab.evaluate(
             "(() => {
                 const parse = (c) => c.match(/[\\d.]+/g).slice(0, 3).map(Number);

@@ -1,4 +1,4 @@
-//! Access: hosts, origins, tokens, and what is answered.
+//! Access control: hosts, origins, tokens, and response statuses.
 
 use super::running::{Running, scene};
 use super::visitor::{connect, say, status, status_of};
@@ -7,7 +7,7 @@ use kinetoscope::viewer::{ServeCfg, ServeError};
 use std::io::{Read, Write};
 use std::net::TcpListener;
 
-/// Headers with which a browser opens a WebSocket.
+/// Headers that a browser sends to open a WebSocket.
 const UPGRADE: [&str; 4] = [
     "Connection: keep-alive, Upgrade",
     "Upgrade: websocket",
@@ -15,7 +15,7 @@ const UPGRADE: [&str; 4] = [
     "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
 ];
 
-/// The page comes whole and loads nothing from elsewhere; nothing else is answered.
+/// The page is complete and loads nothing from elsewhere; other paths are refused.
 #[test]
 fn page() {
     let running = Running::start(1);
@@ -34,7 +34,7 @@ fn page() {
         ("/etc/passwd", &[host][..], 404),
         ("/../../etc/passwd", &[host], 404),
         ("/live", &[host], 426),
-        // HTTP 1.1 has a host, and only one.
+        // HTTP 1.1 requires exactly one host.
         ("/", &[], 400),
         ("/", &[host, host], 400),
     ] {
@@ -49,13 +49,13 @@ fn other_sites() {
     let running = Running::start(1);
     let port = running.address.port();
     for (host, expected) in [
-        // The name of a site that was made to point here (DNS rebinding).
+        // A website whose name resolves to this machine (DNS rebinding).
         ("evil.example".into(), 403),
         (format!("evil.example:{port}"), 403),
         ("127.0.0.1.evil.example".into(), 403),
         ("10.1.2.3".into(), 403),
         (format!("127.0.0.1:{port}"), 200),
-        // A tunnel has another port.
+        // A tunnel has a different port.
         ("localhost:1234".into(), 200),
         ("[::1]:80".into(), 200),
     ] {
@@ -67,18 +67,18 @@ fn other_sites() {
         let headers = [&UPGRADE[..], &[&host, &origin]].concat();
         assert_eq!(status(running.address, "/live", &headers), 403, "{origin}");
     }
-    // The control. An open WebSocket does not end: only the first answer is read.
+    // Control. An open WebSocket does not end, so only the first response is read.
     let mut stream = connect(running.address);
     let headers = UPGRADE.join("\r\n");
     write!(stream, "GET /live HTTP/1.1\r\n{headers}\r\n{host}\r\nOrigin: http://127.0.0.1:{port}\r\n\r\n").unwrap();
     let mut answer = [0; 256];
     let n = stream.read(&mut answer).unwrap();
     let answer = String::from_utf8_lossy(&answer[..n]);
-    // The answer to this key in RFC 6455, section 1.3.
+    // The response to this key in RFC 6455, section 1.3.
     assert!(status_of(&answer) == 101 && answer.contains("s3pPLMBiTxaQ9kYGzzhZRbK+xOo="), "{answer}");
 }
 
-/// An address of the network needs the token, and nothing else opens it.
+/// An address of the network requires the token, and nothing else grants access.
 #[test]
 fn token() {
     let running = Running::start_at(1, "0.0.0.0:0", ServeCfg::default());
@@ -110,6 +110,6 @@ fn address_errors() {
     assert!(error.to_string().contains(&format!("port {} is in use; try {next}", address.port())), "{error}");
     let error = sim.serve("127.0.0.1:http").unwrap_err();
     assert!(matches!(error, ServeError::Address { .. }) && error.to_string().contains("127.0.0.1:8080"), "{error}");
-    // The candidate is right, and a view that could not be had leaves nothing behind.
+    // The suggested port works, and a failed view leaves nothing behind.
     sim.serve(&next.to_string()).unwrap();
 }

@@ -1,4 +1,4 @@
-//! Clients with bad manners: no panic, no memory, no thread and no file is left, and the next one is served.
+//! Hostile clients: they cause no panic and leak no memory, thread or file, and the next client is served.
 
 use super::running::Running;
 use super::visitor::{Visitor, say, status, status_of};
@@ -14,7 +14,7 @@ use tungstenite::Message;
 #[test]
 fn garbage() {
     let running = Running::start(1);
-    // A pseudo-random sequence of every byte, a TLS greeting, and malformed requests.
+    // Pseudo-random bytes of all values, a TLS handshake, and malformed requests.
     let noise: Vec<u8> = (0..4096_u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
     let tls = [&b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03"[..], &noise].concat();
     for bytes in [
@@ -35,7 +35,7 @@ fn garbage() {
     assert_eq!(status(running.address, "/", &["Host: localhost"]), 200);
 }
 
-/// A frame as a browser sends it, masked with zeros.
+/// Encodes a frame as a browser sends it, masked with zeros.
 fn frame(first: u8, payload: &[u8]) -> Vec<u8> {
     let mut bytes = vec![first];
     match payload.len() {
@@ -50,10 +50,10 @@ fn frame(first: u8, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Sends bytes on an open WebSocket; returns the code with which it is closed.
+/// Sends bytes on an open WebSocket. Returns the code of the close frame.
 fn closed_with(running: &Running, bytes: &[u8]) -> Option<u16> {
     let mut visitor = Visitor::enter(running.address);
-    // Refused early, the rest cannot be written.
+    // After an early refusal, the rest cannot be written.
     let _ = visitor.socket.get_mut().write_all(bytes);
     loop {
         match visitor.socket.read() {
@@ -67,7 +67,7 @@ fn closed_with(running: &Running, bytes: &[u8]) -> Option<u16> {
 #[test]
 fn malformed_frames() {
     let running = Running::start(1);
-    // Announces 2^62 bytes.
+    // A header that announces 2^62 bytes.
     let huge = [&[0x81, 0xff][..], &(1_u64 << 62).to_be_bytes(), &[0; 4], b"{"].concat();
     let fragments = [0x01, 0x00, 0x00].map(|first| frame(first, &[b' '; 8000])).concat();
     for (what, bytes, code) in [
@@ -92,11 +92,11 @@ fn huge_heads() {
     process::assert_passes(module_path!(), "huge_heads_scenario", &[]);
 }
 
-/// In a process of its own: it measures memory.
+/// Runs in its own process, because it measures memory.
 #[test]
 #[ignore = "runs in a process of its own"]
 fn huge_heads_scenario() {
-    /// Memory of this process \[bytes\].
+    /// Returns the resident memory of this process \[bytes\].
     fn resident() -> usize {
         let status = std::fs::read_to_string("/proc/self/status").unwrap();
         let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
@@ -117,7 +117,7 @@ fn huge_heads_scenario() {
         assert_eq!(status_of(&say(running.address, head.as_bytes())), 431, "{what}");
     }
     drop(long);
-    // The texts of 64 MB are freed; the server may keep nothing of them.
+    // The texts of 64 MB are freed; the server must not keep copies of them.
     let grown = resident().saturating_sub(before);
     assert!(grown < 100 << 20, "{} MB", grown >> 20);
     assert_eq!(status(running.address, "/", &["Host: localhost"]), 200);
@@ -128,7 +128,7 @@ fn leaks() {
     process::assert_passes(module_path!(), "leaks_scenario", &[]);
 }
 
-/// Viewers that vanish leave nothing behind, nor does the end of the simulation. In a process of its own: it counts threads
+/// Vanishing viewers and the end of the simulation leak nothing. It runs in its own process, because it counts threads
 /// and files.
 #[test]
 #[ignore = "runs in a process of its own"]
@@ -148,19 +148,19 @@ fn leaks_scenario() {
         let mut visitor = Visitor::enter(served.address());
         visitor.socket.send(Message::text(r#"{"do":"size","width":320,"height":180}"#)).unwrap();
         sim.update(5);
-        // Some vanish at once, some in the middle of an image.
+        // Some vanish at once, some while an image is sent.
         for _ in 0..k % 4 {
             let _ = visitor.socket.read();
         }
         assert!(k != 7 || more_than(before), "a viewer has a thread and a socket");
-        // No goodbye: unread messages make the system reset the connection.
+        // Without a close frame: unread messages make the system reset the connection.
         drop(visitor);
     }
     wait::until("viewers are gone", || served.viewers() == 0);
     wait::until("as before the viewers", || threads_and_files() == before);
     sim.update(10);
 
-    // A viewer that is there when the simulation ends is sent away.
+    // A viewer that is connected when the simulation ends is disconnected.
     let mut visitor = Visitor::enter(served.address());
     wait::until("it is there", || served.viewers() == 1);
     drop(sim);

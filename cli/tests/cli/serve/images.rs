@@ -1,4 +1,4 @@
-//! Images that viewers see.
+//! Images of the browser view.
 
 use super::running::Running;
 use super::visitor::{Came, Visitor};
@@ -8,7 +8,7 @@ use kinetoscope_testkit::wait::PATIENCE;
 use serde_json::json;
 use std::time::Duration;
 
-/// Share of red pixels.
+/// Returns the share of red pixels.
 fn share(image: &RgbImage) -> f64 {
     red(image).0 as f64 / f64::from(image.width() * image.height())
 }
@@ -17,7 +17,7 @@ fn shades(image: &RgbImage) -> usize {
     colors(image.pixels().map(|p| p.0))
 }
 
-/// Images come in the size that was asked for, and show the scene; those of a camera show its four channels.
+/// Images have the requested size and show the scene; those of a camera sensor show its four channels.
 #[test]
 fn sizes_and_channels() {
     let running = Running::start(2);
@@ -31,7 +31,7 @@ fn sizes_and_channels() {
     }
     visitor.ask(json!({"do": "camera", "name": "eye"}));
     let image = visitor.wait_image("camera", |about, _| about["camera"] == "eye");
-    // Four of 64 x 48 in a grid: color, depth, mask and normals.
+    // Four images of 64 x 48 in a grid: color, depth, mask and normals.
     assert_eq!(image.dimensions(), (128, 96));
     let parts = [[0, 0], [64, 0], [0, 48], [64, 48]];
     let parts = parts.map(|[x, y]| image::imageops::crop_imm(&image, x, y, 64, 48).to_image());
@@ -45,7 +45,7 @@ fn view_commands() {
     let running = Running::start(1);
     let mut visitor = Visitor::enter(running.address);
     visitor.ask(json!({"do": "size", "width": 320, "height": 180}));
-    // Held, so that nothing but the view changes.
+    // Paused, so that only the view changes.
     visitor.pause();
     let mut after = |commands: &[serde_json::Value]| {
         commands.iter().for_each(|command| visitor.ask(command.clone()));
@@ -56,17 +56,17 @@ fn view_commands() {
     assert!(share(&far) < 0.7 * share(&home), "from farther away everything is smaller: {}", share(&far));
     assert!(after(&[json!({"do": "home"})]) == home, "the same view of the same scene is the same image");
     let panned = after(&[json!({"do": "pan", "dx": -0.2, "dy": 0.0})]);
-    // 0.2 heights of 180 pixels, at the distance of the target; the cube is a little nearer or farther.
+    // 0.2 heights of 180 pixels, at the target's distance; the cube is slightly nearer or farther.
     let moved = red(&home).1[0] - red(&panned).1[0];
     assert!((18.0..60.0).contains(&moved), "{moved} pixels");
     let turned = after(&[json!({"do": "home"}), json!({"do": "orbit", "dx": 0.3, "dy": 0.1})]);
     assert!(turned != home, "from another side it is another image");
 }
 
-/// The last image of the view that was asked for last.
+/// Waits for the last image of the most recently requested view.
 fn settled(visitor: &mut Visitor) -> RgbImage {
     let mut last = visitor.wait_image("stage", |_, _| true);
-    // Commands and images take turns on one connection: a refusal after a command was read after it.
+    // Commands and images take turns on one connection: a refusal follows the commands before it.
     visitor.ask(json!({"do": "environment", "env": 999}));
     visitor.wait("the answer", |came| match came {
         Came::Image { about, image } if about["shows"] == "stage" => {
@@ -76,7 +76,7 @@ fn settled(visitor: &mut Visitor) -> RgbImage {
         Came::Refused(_) => Some(()),
         _ => None,
     });
-    // One that was drawn after that, if the view changed: at most one is still to come.
+    // An image rendered after that, if the view changed: at most one is still to come.
     let stream = visitor.socket.get_ref().try_clone().unwrap();
     stream.set_read_timeout(Some(Duration::from_millis(700))).unwrap();
     while let Some(came) = visitor.next_or_silence() {

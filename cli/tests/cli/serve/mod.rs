@@ -1,4 +1,4 @@
-//! The browser view without a browser: access, images, commands, several viewers, and clients with bad manners.
+//! The browser view without a browser: access, images, commands, several viewers, and hostile clients.
 
 mod access;
 mod hostile;

@@ -1,4 +1,4 @@
-//! A simulation that steps on a thread of its own while it is served, and a recording that is played.
+//! A served simulation that steps on its own thread, and playback of a recording.
 
 use kinetoscope::RecordedFilm;
 use kinetoscope::ndarray::{Array2, array};
@@ -14,28 +14,28 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// The state of the simulation, as the program that steps it has it.
+/// State of the simulation, as seen by the stepping program.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Now {
     pub(crate) steps: u64,
     pub(crate) positions: Array2<f64>,
-    /// The longest time that one step took \[s\].
+    /// Longest duration of a step \[s\].
     pub(crate) longest_step: f64,
 }
 
-/// A simulation that is served, and stops when it is dropped.
+/// A served simulation. Dropping the value stops it.
 pub(crate) struct Running {
     pub(crate) url: String,
     pub(crate) address: SocketAddr,
     served: Served,
     now: Arc<Mutex<Now>>,
     stop: Arc<AtomicBool>,
-    /// A viewer beside the browsers.
+    /// A viewer in addition to the browsers.
     pub(crate) key: Viewer,
     thread: Option<JoinHandle<()>>,
 }
 
-/// The bundled arm of six driven joints beside a red cube of 0.4 m and 1 kg, with a camera that looks at both.
+/// Builds the bundled arm with six driven joints beside a red cube of 0.4 m and 1 kg, with a camera that observes both.
 pub(crate) fn scene(num_envs: usize) -> SimulationManager {
     let cfg = SimulationManagerCfg { physics_dt: 0.005, arena_space: 3.0, ..cfg(num_envs, 1) };
     let mut sim = SimulationManager::new(cfg).unwrap();
@@ -73,7 +73,7 @@ impl Running {
                 now.positions = sim.robot(robot).qpos();
                 now.longest_step = now.longest_step.max(took);
                 drop(now);
-                // As a program with work of its own; both cores are for the tests too.
+                // Like a program with work of its own; both cores are needed by the tests too.
                 std::thread::sleep(Duration::from_millis(1));
             }
         });
@@ -84,23 +84,23 @@ impl Running {
         self.now.lock().unwrap().clone()
     }
 
-    /// Begins to measure the longest step anew.
+    /// Restarts the measurement of the longest step.
     pub(crate) fn forget_longest_step(&self) {
         self.now.lock().unwrap().longest_step = 0.0;
     }
 
-    /// Number of viewers.
+    /// Returns the number of viewers.
     pub(crate) fn viewers(&self) -> usize {
         self.served.viewers()
     }
 
-    /// Waits until something holds.
+    /// Waits until a condition holds.
     #[track_caller]
     pub(crate) fn wait_until(&self, what: &str, holds: impl Fn(&Now) -> bool) {
         wait::until(what, || holds(&self.now()));
     }
 
-    /// Waits for some steps more.
+    /// Waits for `more` further steps.
     #[track_caller]
     pub(crate) fn wait_for_steps(&self, more: u64) {
         let before = self.now().steps;
@@ -117,7 +117,7 @@ impl Drop for Running {
     }
 }
 
-/// Plays a recording of half a second, in which the cube of [`scene`] falls from `height`, for as long as `watch` takes.
+/// Plays a recording of half a second, in which the cube of [`scene`] falls from `height`, while `watch` runs.
 pub(crate) fn play_fall(height: f64, watch: impl FnOnce(SocketAddr, &str) + Send) {
     struct Ends<'a>(&'a AtomicBool);
     impl Drop for Ends<'_> {

@@ -1,4 +1,4 @@
-//! Several viewers at once, slow ones among them.
+//! Several simultaneous viewers, including slow ones.
 
 use super::running::Running;
 use super::visitor::{Visitor, connect, say, status_of};
@@ -9,8 +9,8 @@ use std::io::{Read, Write};
 use std::time::{Duration, Instant};
 use tungstenite::Message;
 
-/// A step of this scene takes less than a millisecond; a viewer that does not read is given up after five seconds. A
-/// simulation that waited for it, even once, would take longer for a step than this.
+/// A step of this scene takes less than a millisecond, and a viewer that does not read is disconnected after five
+/// seconds. A simulation that waited for it even once would exceed this duration of a step.
 const LONGEST_STEP: f64 = 2.0;
 
 #[test]
@@ -53,7 +53,7 @@ fn slow_viewers() {
     alive.wait_state("three", |state| state["viewers"] == 3);
     running.forget_longest_step();
     let before = running.now().steps;
-    // This one talks without end and reads no answer, which fills the buffers of both sides.
+    // This viewer sends endlessly and reads no response, which fills the buffers of both sides.
     let talk = std::thread::spawn(move || {
         let mut said = 0_u32;
         while greedy.socket.send(Message::text(r#"{"do":"nothing"}"#)).is_ok() {
@@ -61,7 +61,7 @@ fn slow_viewers() {
         }
         said
     });
-    // Both are given up when they were silent, or have not read, for seconds; the third reads on.
+    // Both are disconnected after seconds without sending or reading; the third viewer keeps reading.
     let start = Instant::now();
     while running.viewers() > 1 {
         assert!(start.elapsed() < Duration::from_secs(90), "{} viewers", running.viewers());
@@ -77,7 +77,7 @@ fn slow_viewers() {
     drop(dead);
 }
 
-/// A viewer that pauses and leaves does not hold the simulation for ever; one that comes back at once finds it held.
+/// The pause of a viewer that leaves ends after a while; a viewer that returns at once finds the simulation paused.
 #[test]
 fn pause_of_browser() {
     let running = Running::start(1);
@@ -92,7 +92,7 @@ fn pause_of_browser() {
     running.wait_for_steps(20);
 }
 
-/// A pause of the program, as a window makes it, stays when the browsers leave; their own settings do not.
+/// A pause by the program, such as by a window, stays when the browsers leave; their own settings do not.
 #[test]
 fn pause_of_program() {
     let cfg = ServeCfg { speed: Some(Speed::Times(3.0)), ..ServeCfg::default() };
@@ -113,7 +113,7 @@ fn pause_of_program() {
     running.wait_for_steps(20);
 }
 
-/// More connections than the server takes at a time leave room for viewers; silent ones are closed.
+/// More connections than the server accepts at a time leave room for viewers; silent connections are closed.
 #[test]
 fn silent_connections() {
     let running = Running::start(1);
@@ -129,7 +129,7 @@ fn silent_connections() {
     drop(silent);
     let get = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
     wait::until("there is room again", || status_of(&say(running.address, get)) == 200);
-    // Nothing is said to those who leave at once.
+    // Clients that disconnect at once get no response.
     for _ in 0..20 {
         connect(running.address).shutdown(std::net::Shutdown::Both).unwrap();
     }

@@ -1,4 +1,4 @@
-//! Commands of viewers: targets, pause, speed, selection, the spring, and recordings.
+//! Commands of viewers: targets, pause, speed, selection, mouse spring, and recordings.
 
 use super::running::Running;
 use super::visitor::{Came, Visitor};
@@ -28,7 +28,7 @@ fn contents() {
     assert!(joints.iter().all(|j| j["lower"].as_f64().unwrap() < j["upper"].as_f64().unwrap()), "{joints:?}");
 }
 
-/// A slider moves its joint in the chosen environments, and no other; the state says so.
+/// A slider moves its joint in the chosen environments and no other, and the state reports the target.
 #[test]
 fn targets() {
     let running = Running::start(2);
@@ -36,10 +36,11 @@ fn targets() {
     visitor.ask(json!({"do": "environment", "env": 1}));
     visitor.wait_state("environment 1", |state| state["environment"] == 1);
     visitor.ask(json!({"do": "target", "robot": "arm", "joint": "JOINT1", "value": 0.8}));
-    // Gains of 1e4 / 1e3 hold a joint with a vertical axis to less than a milliradian once it is there; 0.02 is a part of
-    // the way of 0.8.
+    // Gains of 1e4 / 1e3 hold a joint with a vertical axis to less than a milliradian at its target; 0.02 is a fraction
+    // of the distance of 0.8.
     running.wait_until("its target", |now| now.steps > 0 && (now.positions[(1, 0)] - 0.8).abs() < 0.02);
-    // In the other environment, at its start; the arm's own weight bends other joints by their gains only.
+    // In the other environment, the joint stays at its start; other joints sag under the arm's weight according to
+    // their gains.
     let now = running.now();
     assert!(now.positions[(0, 0)].abs() < 0.02, "{:?}", now.positions);
     assert!(now.positions.row(1).iter().skip(1).all(|q| q.abs() < 0.05), "{:?}", now.positions);
@@ -55,11 +56,11 @@ fn targets() {
     visitor.ask(json!({"do": "target", "robot": "arm", "joint": "JOINT1", "value": -0.5}));
     running.wait_until("both targets", |now| now.positions.column(0).iter().all(|q| (q + 0.5).abs() < 0.02));
 
-    // Efforts hold the arm up: leaned forward, the second joint carries everything above it.
+    // Efforts hold the arm up: leaning forward, the second joint carries everything above it.
     visitor.ask(json!({"do": "environment", "env": 0}));
     visitor.ask(json!({"do": "target", "robot": "arm", "joint": "JOINT2", "value": 0.9}));
     visitor.wait_state("the arm leans", |state| near(state, 1, 0.9));
-    // The drive's law at rest: effort = kp (target - position), kp = 1e4 N m/rad.
+    // Drive law at rest: effort = kp (target - position), kp = 1e4 N m/rad.
     let state = visitor.wait_state("it is at rest", |state| {
         let row = &state["robots"][0];
         let sag = row["targets"][1].as_f64().unwrap() - row["positions"][1].as_f64().unwrap();
@@ -87,18 +88,18 @@ fn refusals() {
         (json!({"do": "grab", "x": 2.0, "y": 0.5}), "0 to 1"),
         (json!({"do": "select", "x": 0.5}), "missing field `y`"),
     ]);
-    // What the simulation refuses is in its state.
+    // A refusal by the simulation is part of its state.
     visitor.ask(json!({"do": "record", "on": true}));
     visitor.wait_state("a refusal", |state| state["refused"].as_str().is_some_and(|why| why.contains("record button")));
     running.wait_for_steps(10);
 }
 
-/// A visitor who sees environment `env`, whose cube is at rest, and the place of the cube in the image, in parts of it.
+/// Connects a viewer to environment `env`, whose cube is at rest. Returns the cube's center in fractions of the image.
 fn at_rest(running: &Running, env: usize) -> (Visitor, [f64; 2]) {
     let mut visitor = Visitor::enter(running.address);
     visitor.ask(json!({"do": "size", "width": 640, "height": 360}));
     visitor.ask(json!({"do": "environment", "env": env}));
-    // It starts where it stands, and sinks in by the softness of the contact.
+    // The cube starts on the ground and sinks in by the compliance of the contact.
     let rests = |state: &Value| state["environment"] == env && state["time"].as_f64() > Some(1.5);
     visitor.wait_state("the cube is at rest", rests);
     let image = visitor.wait_image("stage", |_, image| image.dimensions() == (640, 360) && red(image).0 > 50);
@@ -118,19 +119,19 @@ fn selection() {
     let state = select(y, "forces of the selection", &|selected| selected["force"].is_array());
     let selected = &state["selected"];
     assert_eq!((&selected["name"], &selected["environment"]), (&json!("cube"), &json!(1)));
-    // It was put at (0.7, 0, 0.2) and stands; contacts give way by less than a millimetre.
+    // It was placed at (0.7, 0, 0.2) and rests there; contacts yield by less than a millimeter.
     let position = numbers(&selected["position"]);
     assert!((0..3).all(|k| (position[k] - [0.7, 0.0, 0.2][k]).abs() < 1e-3), "{position:?}");
     assert!((numbers(&selected["quaternion"])[0] - 1.0).abs() < 1e-6, "{selected}");
-    // At rest the contacts carry the weight and nothing else; what is left of the settling decays with the contacts' time
-    // constant of 0.02 s, from which 1.5 s are far away.
+    // At rest, the contacts carry exactly the weight. Settling decays with the contacts' time constant of 0.02 s, much
+    // less than 1.5 s.
     let force = numbers(&selected["force"]);
     assert!((force[2] - WEIGHT).abs() < 1e-3 * WEIGHT, "{force:?}");
     assert!(force[0].hypot(force[1]) < 1e-3 * WEIGHT, "{force:?}");
     assert!(selected["contacts"].as_u64() >= Some(3), "{selected}");
     let says = selected["says"].as_array().unwrap();
     assert!(says.iter().any(|line| line.as_str().unwrap().contains("+9.81 N")), "{says:?}");
-    // The control: above it in the image there is the arm, the ground or the sky.
+    // Control: above it in the image is the arm, the ground or the sky.
     select(0.02, "something else", &|selected| selected["name"] != "cube");
     select(y, "the cube", &|selected| selected["name"] == "cube");
     visitor.ask(json!({"do": "unselect"}));

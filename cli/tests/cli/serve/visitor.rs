@@ -1,4 +1,4 @@
-//! A viewer without a browser.
+//! A test client of the browser view, without a browser.
 
 use image::RgbImage;
 use kinetoscope_testkit::wait::PATIENCE;
@@ -8,7 +8,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::time::Instant;
 use tungstenite::{Message, WebSocket};
 
-/// A message of the server.
+/// A message from the server.
 #[derive(Debug)]
 pub(crate) enum Came {
     Contents(Value),
@@ -17,7 +17,7 @@ pub(crate) enum Came {
     Image { about: Value, image: RgbImage },
 }
 
-/// A viewer that behaves as the page does.
+/// A client that behaves like the page.
 pub(crate) struct Visitor {
     pub(crate) socket: WebSocket<TcpStream>,
 }
@@ -34,7 +34,7 @@ impl Visitor {
         self.socket.send(Message::text(command.to_string())).unwrap();
     }
 
-    /// The next message; confirms it, as the page does. `None` if nothing came for as long as the socket waits.
+    /// Returns the next message and acknowledges it, like the page. Returns `None` if the read timeout expires.
     pub(crate) fn next_or_silence(&mut self) -> Option<Came> {
         loop {
             match self.socket.read() {
@@ -64,7 +64,7 @@ impl Visitor {
         }
     }
 
-    /// Waits for a message.
+    /// Waits for a message that satisfies `wanted`.
     #[track_caller]
     pub(crate) fn wait<T>(&mut self, what: &str, mut wanted: impl FnMut(Came) -> Option<T>) -> T {
         let start = Instant::now();
@@ -76,7 +76,7 @@ impl Visitor {
         }
     }
 
-    /// Waits for a state with a property.
+    /// Waits for a state that satisfies `holds`.
     #[track_caller]
     pub(crate) fn wait_state(&mut self, what: &str, mut holds: impl FnMut(&Value) -> bool) -> Value {
         self.wait(what, |came| match came {
@@ -85,7 +85,7 @@ impl Visitor {
         })
     }
 
-    /// Waits for an image of the stage or of a camera.
+    /// Waits for an image of the scene or of a camera sensor.
     #[track_caller]
     pub(crate) fn wait_image(&mut self, shows: &str, mut good: impl FnMut(&Value, &RgbImage) -> bool) -> RgbImage {
         self.wait(shows, |came| match came {
@@ -94,7 +94,7 @@ impl Visitor {
         })
     }
 
-    /// Commands that are refused, each with these words.
+    /// Asserts that each command is refused with a reason that contains these words.
     #[track_caller]
     pub(crate) fn assert_refused<const N: usize>(&mut self, rows: [(Value, &str); N]) {
         for (command, words) in rows {
@@ -107,14 +107,14 @@ impl Visitor {
         }
     }
 
-    /// Pauses the simulation; the state in which it is held.
+    /// Pauses the simulation and returns the paused state.
     pub(crate) fn pause(&mut self) -> Value {
         self.ask(json!({"do": "pause"}));
         self.wait_state("paused", |state| state["paused"] == true)
     }
 }
 
-/// A connection that waits no longer than is sensible.
+/// Connects with the timeouts of the tests.
 pub(crate) fn connect(address: SocketAddr) -> TcpStream {
     let stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -122,23 +122,23 @@ pub(crate) fn connect(address: SocketAddr) -> TcpStream {
     stream
 }
 
-/// Sends bytes and returns the answer, up to the end of the connection.
+/// Sends bytes and returns the response, up to the end of the connection.
 pub(crate) fn say(address: SocketAddr, bytes: &[u8]) -> String {
     let mut stream = connect(address);
-    // Refused early, the rest cannot be written.
+    // After an early refusal, the rest cannot be written.
     let _ = stream.write_all(bytes);
     let mut answer = Vec::new();
     let _ = stream.read_to_end(&mut answer);
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-/// The status of a GET with these headers.
+/// Returns the status of a GET request with these headers.
 pub(crate) fn status(address: SocketAddr, path: &str, headers: &[&str]) -> u16 {
     let headers: String = headers.iter().map(|header| format!("{header}\r\n")).collect();
     status_of(&say(address, format!("GET {path} HTTP/1.1\r\n{headers}\r\n").as_bytes()))
 }
 
-/// The status of an answer; 0 without an answer.
+/// Returns the status of a response; 0 without a response.
 pub(crate) fn status_of(answer: &str) -> u16 {
     answer.strip_prefix("HTTP/1.1 ").and_then(|rest| rest.get(..3)).and_then(|code| code.parse().ok()).unwrap_or(0)
 }

@@ -1,4 +1,4 @@
-//! The command in a shell of its own folder, and images that it makes.
+//! The command in a folder of its own, and helpers for its images.
 
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::wait;
@@ -22,18 +22,18 @@ pub(crate) const ARM: &str = r#"<robot name="arm">
 </robot>
 "#;
 
-/// A folder that command lines run in: names of files in them are relative to it.
+/// A folder in which command lines run. File names in them are relative to the folder.
 pub(crate) struct Shell(Files);
 
 impl Shell {
-    /// A folder with these files.
+    /// Creates a folder with these files.
     pub(crate) fn with(files: &[(&str, &str)]) -> Self {
         let shell = Self(Files::default());
         files.iter().for_each(|(name, content)| drop(shell.0.write(name, content)));
         shell
     }
 
-    /// A folder with `arm.urdf`.
+    /// Creates a folder with `arm.urdf`.
     pub(crate) fn with_arm() -> Self {
         Self::with(&[("arm.urdf", ARM)])
     }
@@ -54,7 +54,7 @@ impl Shell {
         image::open(self.path(name)).unwrap().to_rgb8()
     }
 
-    /// `kinetoscope` with these arguments, without a terminal and without a display.
+    /// Returns the command `kinetoscope` with these arguments, without a terminal and without a display.
     pub(crate) fn command(&self, line: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_kinetoscope"));
         command.args(line.split_whitespace()).current_dir(self.0.folder()).stdin(Stdio::null());
@@ -62,14 +62,14 @@ impl Shell {
         command
     }
 
-    /// Its output, its errors, and its exit code.
+    /// Runs a command line. Returns its output, its errors, and its exit code.
     pub(crate) fn run(&self, line: &str) -> (String, String, i32) {
         let Output { stdout, stderr, status } = self.command(line).output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
         (text(stdout), text(stderr), status.code().unwrap())
     }
 
-    /// The output of a line that ends well and has nothing to complain of.
+    /// Runs a command line that succeeds without warnings, and returns its output.
     #[track_caller]
     pub(crate) fn ok(&self, line: &str) -> String {
         let (out, err, code) = self.run(line);
@@ -77,7 +77,7 @@ impl Shell {
         out
     }
 
-    /// The errors of a line that is refused: nothing else is printed.
+    /// Runs a command line that is refused and prints only errors, and returns the errors.
     #[track_caller]
     pub(crate) fn refused(&self, line: &str) -> String {
         let (out, err, code) = self.run(line);
@@ -85,7 +85,7 @@ impl Shell {
         err
     }
 
-    /// Lines that are refused, each with these words; no file is written.
+    /// Asserts that each command line is refused with these words and writes no file.
     #[track_caller]
     pub(crate) fn assert_refused(&self, rows: &[(&str, &str)]) {
         let files = || std::fs::read_dir(self.0.folder()).unwrap().count();
@@ -98,7 +98,7 @@ impl Shell {
     }
 }
 
-/// The command while it runs; it is killed with the value.
+/// A running command. Dropping the value kills the process.
 pub(crate) struct Running(pub(crate) Child);
 
 impl Running {
@@ -106,21 +106,21 @@ impl Running {
         Self(command.stdout(Stdio::piped()).spawn().unwrap())
     }
 
-    /// The first line that it prints.
+    /// Reads the first line of its output.
     pub(crate) fn line(&mut self) -> String {
         let mut line = String::new();
         BufReader::new(self.0.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
         line
     }
 
-    /// Everything that it prints from here on.
+    /// Reads the remaining output.
     pub(crate) fn rest(&mut self) -> String {
         let mut rest = String::new();
         self.0.stdout.as_mut().unwrap().read_to_string(&mut rest).unwrap();
         rest
     }
 
-    /// Ctrl+C in a terminal.
+    /// Sends Ctrl+C as a terminal does.
     pub(crate) fn interrupt(&self) {
         assert!(Command::new("kill").args(["-INT", &self.0.id().to_string()]).status().unwrap().success());
     }
@@ -137,7 +137,7 @@ impl Drop for Running {
     }
 }
 
-/// Number and middle of the red pixels: those of the red body of a scene, of which nothing else is red.
+/// Counts the red pixels and returns their center. Only the red body of a scene is red.
 pub(crate) fn red(image: &image::RgbImage) -> (usize, [f64; 2]) {
     let red = image.enumerate_pixels().filter(|(.., p)| p[0] > 60 && f64::from(p[0]) > 2.5 * f64::from(p[1].max(p[2])));
     let sum = |(n, [sx, sy]): (usize, [f64; 2]), (x, y, _)| (n + 1, [sx + f64::from(x) + 0.5, sy + f64::from(y) + 0.5]);
@@ -145,12 +145,12 @@ pub(crate) fn red(image: &image::RgbImage) -> (usize, [f64; 2]) {
     (count, sum.map(|s| s / count.max(1) as f64))
 }
 
-/// Number of different colors.
+/// Counts the different colors.
 pub(crate) fn colors(pixels: impl IntoIterator<Item = [u8; 3]>) -> usize {
     pixels.into_iter().collect::<std::collections::BTreeSet<_>>().len()
 }
 
-/// The window whose title contains this.
+/// Returns the window whose title contains `title`.
 pub(crate) fn window_of(connection: &RustConnection, title: &str) -> Option<u32> {
     let children = connection.query_tree(connection.setup().roots[0].root).unwrap().reply().unwrap().children;
     children.into_iter().find(|window| {

@@ -1,4 +1,4 @@
-//! What was recorded, shown to viewers as a simulation is: they pause it, step, and go to and fro.
+//! Playback of recordings to viewers, with pause, single frames, speed and seek.
 
 use super::{Conductor, Kind, PATIENCE};
 use crate::control::hub::Mail;
@@ -7,42 +7,44 @@ use crate::stage::{Run, Timeline};
 use kinetoscope_sim::SimulationManager;
 use std::time::{Duration, Instant};
 
-/// Something that is known at each of some times, such as a recording.
+/// A sequence of simulation states with time stamps, such as a recording.
 pub trait Film {
-    /// The times \[s\], in ascending order.
+    /// Time stamps of the frames \[s\], in ascending order.
     fn times(&self) -> &[f64];
 
-    /// Puts the simulation where it was at one of them.
+    /// Writes the state of one frame to the simulation.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
+    /// Returns the reason as a text if the frame cannot be shown.
     fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<(), String>;
 }
 
-/// Why a film is not shown, or not to its end.
+/// An error of [`Play::play`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlayError {
-    /// There is no time at which anything is known.
+    /// The recording has no frames.
     #[error("there is nothing to show: not a single moment was recorded")]
     Empty,
-    /// Times that cannot be put on a line.
+    /// The time stamps are not finite or not in ascending order.
     #[error("there is nothing to show: the times of a film must be finite and in ascending order")]
     Times,
-    /// A moment of it cannot be shown.
+    /// A frame cannot be shown.
     #[error("{0}")]
     Frame(String),
 }
 
-/// Simulations that something recorded can be shown in.
+/// Playback of a recording in a simulation.
 pub trait Play {
-    /// Shows a film to the viewers that the simulation has, windows and browsers, instead of stepping, as long as `go_on` says so;
-    /// it is asked many times a second. It begins at the beginning and holds at the end. Viewers pause it, do single frames, change
-    /// its speed, and seek ([`Command::Seek`]); a reset goes to the beginning. Nothing is interpolated: at each time the last moment
-    /// before is shown.
+    /// Shows a recording to the viewers of this simulation (windows and browsers) instead of stepping, for as long as
+    /// `go_on` returns true. `go_on` is called many times a second.
+    ///
+    /// Playback starts at the first frame and pauses at the last. Viewers can pause, show single frames, change the
+    /// speed, and seek ([`Command::Seek`]); a reset returns to the first frame. Frames are not interpolated: the last
+    /// frame at or before the current time is shown.
     ///
     /// # Errors
-    /// There is nothing to show, or a moment cannot be shown.
+    /// The recording is empty, its times are invalid, or a frame cannot be shown.
     fn play(&mut self, film: &mut dyn Film, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError>;
 }
 
@@ -50,7 +52,7 @@ impl Play for SimulationManager {
     fn play(&mut self, film: &mut dyn Film, go_on: &mut dyn FnMut() -> bool) -> Result<(), PlayError> {
         let mut head = Playhead::new(film.times())?;
         let known = self.observers().ids::<Conductor>().first().copied();
-        // Taken out, so that it hears of nothing that the film writes.
+        // The conductor is removed meanwhile, so that writes of the recording do not notify it.
         let taken = known.and_then(|id| self.observers_mut().remove(id).ok());
         let mut conductor = taken.unwrap_or_else(Conductor::new);
         let result = conductor.play(self, film, &mut head, go_on);
@@ -59,16 +61,16 @@ impl Play for SimulationManager {
     }
 }
 
-/// Where in a film somebody is.
+/// Playback position in a recording.
 #[derive(Clone, Debug)]
 struct Playhead {
     times: Vec<f64>,
-    /// The time that is shown \[s\].
+    /// Current playback time \[s\].
     now: f64,
     frame: usize,
     plays: bool,
     speed: Speed,
-    /// When `now` was right.
+    /// Wall-clock time of the last update of `now`.
     at: Instant,
 }
 
@@ -85,7 +87,7 @@ impl Playhead {
         [self.times[0], self.times[self.times.len() - 1]]
     }
 
-    /// Goes to a time; the frame is the last one that is not later.
+    /// Moves to a time; the frame becomes the last one at or before it.
     fn seek(&mut self, time: f64) {
         let [start, end] = self.ends();
         self.now = time.clamp(start, end);
@@ -97,7 +99,7 @@ impl Playhead {
         self.now = self.times[self.frame];
     }
 
-    /// Time has passed outside.
+    /// Advances the playback time by the elapsed wall-clock time.
     fn advance(&mut self, now: Instant) {
         let passed = now.saturating_duration_since(self.at).as_secs_f64();
         self.at = now;
@@ -111,14 +113,14 @@ impl Playhead {
         self.plays &= self.frame + 1 < self.times.len();
     }
 
-    /// A picture was shown: as fast as can be, each of them is another frame.
+    /// Advances by one frame after a snapshot was published at free speed.
     fn was_shown(&mut self) {
         if self.plays && self.speed == Speed::Free {
             self.go_to_frame(self.frame + 1);
         }
     }
 
-    /// How long nothing changes.
+    /// Returns the time until the next frame.
     fn rest(&self) -> Duration {
         match (self.plays, self.speed) {
             (false, _) => PATIENCE,
@@ -157,7 +159,7 @@ impl Playhead {
         Ok(())
     }
 
-    /// Goes on; from the end it begins again.
+    /// Resumes playback; at the last frame it restarts from the first.
     fn resume(&mut self) {
         if self.frame + 1 >= self.times.len() {
             self.go_to_frame(0);
@@ -194,7 +196,7 @@ impl Conductor {
                     head.was_shown();
                 }
             }
-            // Where the newest picture is just being taken, the next attempt comes soon.
+            // If a viewer is just reading the newest snapshot, the next attempt comes soon.
             let wait =
                 if self.dirty { self.rest().max(Duration::from_millis(2)) } else { head.rest().max(self.rest()) };
             self.hub.wait_for_news(wait.clamp(Duration::from_millis(1), PATIENCE));
@@ -202,7 +204,7 @@ impl Conductor {
         Ok(())
     }
 
-    /// Shows the simulation as it is, which is as it was.
+    /// Publishes a snapshot of the current frame.
     fn present(&mut self, sim: &mut SimulationManager, head: &Playhead) {
         let [start, end] = head.ends();
         let run = Run {
@@ -231,7 +233,7 @@ mod tests {
     use ndarray::array;
     use std::sync::atomic::{AtomicBool, Ordering};
 
-    /// A cube that rises by a metre each second, seen ten times a second.
+    /// A cube that rises by a meter each second, recorded ten times a second.
     struct Rising(Vec<f64>);
 
     impl Film for Rising {
@@ -251,7 +253,7 @@ mod tests {
         snapshot.envs[0].look.bodies[cube].translation.z
     }
 
-    /// The snapshot after commands, when the film rests: a copy, because a viewer that keeps snapshots gets no more.
+    /// Returns the snapshot after commands, once playback rests. Returns a copy, because held snapshots block the pool.
     fn watched(viewer: &Viewer, commands: &[Command]) -> Snapshot {
         let before = viewer.newest().unwrap().number;
         commands.iter().for_each(|command| assert!(viewer.send(*command)));
@@ -263,7 +265,7 @@ mod tests {
     }
 
     fn playing(act: impl FnOnce(&Viewer) + Send) {
-        /// Ends the film in every case.
+        /// Stops the playback in every case, including a panic.
         struct Ends<'a>(&'a AtomicBool);
         impl Drop for Ends<'_> {
             fn drop(&mut self) {
@@ -273,7 +275,7 @@ mod tests {
         let mut sim = sample(1).sim;
         let steps = sim.observers().steps();
         let viewer = sim.viewer(Wants { rate: 200.0, ..Wants::default() });
-        // Times that do not begin at 0, as those of a recording that was begun late.
+        // The times do not begin at 0, like a recording that was started late.
         let mut film = Rising((0..=40).map(|k| 3.0 + 0.1 * f64::from(k)).collect());
         let over = AtomicBool::new(false);
         std::thread::scope(|scope| {
@@ -284,7 +286,7 @@ mod tests {
             sim.play(&mut film, &mut || !over.load(Ordering::Acquire)).unwrap();
         });
         assert_eq!(sim.observers().steps(), steps, "nothing was stepped");
-        // The conductor is there again: the simulation goes on as it would have.
+        // The conductor is back: the simulation steps as before.
         drop(viewer);
         sim.update(1);
         assert_eq!(sim.observers().steps(), steps + 1);
@@ -296,7 +298,7 @@ mod tests {
             let seen = watched(viewer, &[Command::Pause, Command::Seek(5.05)]);
             let timeline = seen.run.timeline.unwrap();
             assert_eq!([timeline.start, timeline.end], [3.0, 7.0]);
-            // The last frame that is not later than the time of the seek.
+            // The last frame at or before the requested time.
             assert!((timeline.now - 5.0).abs() < 1e-9 && (height(&seen) - 5.0).abs() < 1e-9, "{timeline:?}");
             assert!(seen.run.paused && (seen.envs[0].look.time - 5.0).abs() < 1e-9);
             let seen = watched(viewer, &[Command::Step(3)]);
@@ -305,9 +307,9 @@ mod tests {
                 (&[Command::Seek(-1e9)][..], 3.0),
                 (&[Command::Seek(1e9)], 7.0),
                 (&[Command::Seek(3.0)], 3.0),
-                // Ten times as fast as time: at the end after less than half a second, where it holds.
+                // Ten times real time: reaches the end in less than half a second and pauses there.
                 (&[Command::SetSpeed(Speed::Times(10.0)), Command::Resume], 7.0),
-                // From there it begins again.
+                // From the end, playback restarts.
                 (&[Command::SetSpeed(Speed::Free), Command::TogglePause], 7.0),
                 (&[Command::Reset(None)], 3.0),
             ] {
@@ -328,7 +330,7 @@ mod tests {
             std::thread::sleep(Duration::from_millis(1000));
             let seen = watched(viewer, &[Command::Pause]);
             let passed = start.elapsed().as_secs_f64();
-            // A frame is 0.1 s long; commands are obeyed within PATIENCE; `watched` waited 0.4 s at least.
+            // A frame lasts 0.1 s; commands run within PATIENCE; `watched` waits at least 0.4 s.
             let moved = height(&seen) - 3.0;
             assert!(moved > 0.75 && moved < passed + 0.01, "{moved} m in {passed} s");
         });
@@ -355,7 +357,7 @@ mod tests {
         }
         let mut sim = sample(1).sim;
         assert_eq!(sim.play(&mut Rising(Vec::new()), &mut || true), Err(PlayError::Empty));
-        // The control: a simulation that runs has no time line.
+        // Control: a running simulation has no timeline.
         let viewer = sim.viewer(Wants::default());
         viewer.send(Command::Seek(1.0));
         sim.update(1);

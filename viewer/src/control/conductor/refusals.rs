@@ -1,8 +1,8 @@
-//! What viewers are told of commands that were refused.
+//! Refused commands, as reported to viewers.
 
 use crate::control::Command;
 
-/// What a command is about: a spring that is pulled asks many times a second, and says nothing of other commands.
+/// Group of a command. A mouse spring sends many commands per second, and their success must not clear other refusals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Spring,
@@ -15,7 +15,7 @@ impl Kind {
     }
 }
 
-/// The last refusal, until something else is done, and how many there were.
+/// The last refusal, kept until a later success clears it, and the total count.
 #[derive(Debug, Default)]
 pub(super) struct Refusals {
     last: Option<(Kind, String)>,
@@ -23,7 +23,7 @@ pub(super) struct Refusals {
 }
 
 impl Refusals {
-    /// A command was done, or refused.
+    /// Records the result of a command. A success clears the last refusal of the same kind; other commands clear any.
     pub(super) fn answer(&mut self, kind: Kind, done: Result<(), String>) {
         match done {
             Ok(()) => {
@@ -33,7 +33,7 @@ impl Refusals {
         }
     }
 
-    /// Something was refused, if there is a reason.
+    /// Records a refusal if there is a reason.
     pub(super) fn note(&mut self, kind: Kind, reason: Option<String>) {
         if let Some(reason) = reason {
             self.count += 1;
@@ -41,7 +41,7 @@ impl Refusals {
         }
     }
 
-    /// Nobody is there any more who was told.
+    /// Clears the last refusal, after the last viewer was dropped.
     pub(super) fn forget(&mut self) {
         self.last = None;
     }

@@ -3,7 +3,7 @@
 const PLOTTED_AT_FIRST = 6;
 
 class Joints {
-  /** `send` takes a command; `changed` is called when other joints are to be plotted. */
+  /** `send` sends a command; `changed` is called when the set of plotted joints changes. */
   constructor(box, send, changed) {
     this.box = box;
     this.send = send;
@@ -11,7 +11,7 @@ class Joints {
     this.rows = [];
   }
 
-  /** Makes the sliders anew. */
+  /** Rebuilds the sliders. */
   build(robots) {
     this.rows = [];
     this.box.replaceChildren();
@@ -73,7 +73,7 @@ class Joints {
       row.held = performance.now();
       this.send({ do: "target", robot: robot.name, joint: joint.name, value: slider.valueAsNumber });
     });
-    // Arrow keys on a slider without steps move by a hundredth of its way.
+    // Arrow keys on a slider without steps move by a hundredth of its range.
     slider.addEventListener("keydown", (event) => {
       const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
       if (by === undefined) return;
@@ -90,7 +90,7 @@ class Joints {
     return Object.assign(row, { slider, now });
   }
 
-  /** Moves the sliders to where targets and joints are. */
+  /** Shows joint positions and targets on the sliders. */
   show(robots) {
     for (const row of this.rows) {
       const robot = robots[row.r];
@@ -99,7 +99,7 @@ class Joints {
       const unit = row.joint.unit;
       row.value.textContent = q === null || q === undefined ? "–" : `${(Math.abs(q) < 5e-4 ? 0 : q).toFixed(3)} ${unit}`;
       if (!row.slider) continue;
-      // A slider that is being dragged belongs to the hand.
+      // A slider that was just dragged ignores the reported target.
       if (performance.now() - row.held > 400 && Number.isFinite(target)) row.slider.valueAsNumber = target;
       const at = (q - row.lower) / (row.upper - row.lower);
       row.now.style.left = `${(Math.min(1, Math.max(0, at)) * 100).toFixed(2)}%`;
@@ -108,7 +108,7 @@ class Joints {
     }
   }
 
-  /** What is plotted. */
+  /** Returns the plotted columns with their colors. */
   lines() {
     return this.rows.filter((row) => row.mark.checked).map(({ column, color }) => ({ column, color }));
   }

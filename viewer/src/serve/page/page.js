@@ -1,4 +1,4 @@
-// The connection, and what it brings to the page.
+// Connection to the server, and updates of the page.
 
 const $ = (id) => document.getElementById(id);
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5];
@@ -7,13 +7,13 @@ let socket = null;
 let patience = 250; // milliseconds until the next attempt to connect
 let contents = null;
 let state = null;
-let refusals = null; // how many commands were refused when that was told last
-let unseen = 0; // pictures that came while the page was hidden
+let refusals = null; // last reported number of refused commands
+let unseen = 0; // images received while the page was hidden
 let noteTimer = 0;
 let arrivals = [];
 const history = { positions: new History(), efforts: new History(), forces: new History() };
 const AXES = ["x", "y", "z"].map((name, column) => ({ name, column, color: ["#e4572e", "#2e9e5b", "#2f7ed8"][column] }));
-let plotted = null; // whose contact force is in the plot
+let plotted = null; // name of the body whose contact force is plotted
 
 function send(command) {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(command));
@@ -36,7 +36,7 @@ function connect() {
   link("connecting", "connecting");
   const url = new URL("/live", location.href);
   url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
-  url.search = location.search; // the token, where there is one
+  url.search = location.search; // the token, if there is one
   const own = new WebSocket(url);
   own.binaryType = "arraybuffer";
   socket = own;
@@ -60,7 +60,7 @@ function connect() {
   });
 }
 
-/** What this page was looking at before the connection was lost. */
+/** Restores the selections from before the connection was lost. */
 function wishes() {
   const chosen = $("environment").value;
   if (chosen) send({ do: "environment", env: chosen === "all" ? null : Number(chosen) });
@@ -92,7 +92,7 @@ function note(text) {
   noteTimer = setTimeout(() => { box.hidden = true; }, 8000);
 }
 
-/** A picture: the length of its description, the description, the file. */
+/** Shows an image message: length of the description, description, image file. */
 async function show(buffer) {
   try {
     const length = new DataView(buffer).getUint32(0, true);
@@ -110,7 +110,7 @@ async function show(buffer) {
   } catch (error) {
     console.error("a picture could not be shown", error);
   } finally {
-    // In a tab that nobody sees, no more are drawn until somebody does.
+    // A hidden tab acknowledges no images, so the server renders none until the tab is visible.
     if (document.hidden) unseen += 1; else send({ do: "seen", what: "picture" });
   }
 }
@@ -126,7 +126,7 @@ function options(select, entries) {
   if (entries.some(([value]) => value === before)) select.value = before;
 }
 
-/** Makes what depends on the simulation's contents. */
+/** Builds the controls that depend on the scene contents. */
 function build() {
   const envs = Array.from({ length: contents.environments }, (_, k) => [String(k), `${k}`]);
   options($("environment"), envs.length > 1 ? [["all", `all ${envs.length}`], ...envs] : envs);
@@ -157,7 +157,7 @@ function build() {
   document.title = contents.robots.length ? `${contents.robots.map((r) => r.name).join(", ")} – Kinetoscope` : "Kinetoscope";
 }
 
-/** Shows how everything stands. */
+/** Shows the current state. */
 function refresh() {
   $("time").textContent = `${state.time.toFixed(3)} s`;
   $("rate").textContent = state.paused ? "paused" : state.rate === null ? "–" : `${state.rate.toFixed(2)} ×`;
@@ -191,7 +191,7 @@ function refresh() {
   history.efforts.add(state.time, state.robots.flatMap((robot) => robot.efforts));
 }
 
-/** What was clicked on, and the contact force on it. */
+/** Shows the selection and its contact force. */
 function select(selected) {
   $("selected-card").hidden = selected === null;
   $("selected").textContent = selected === null ? "" : selected.says.join("\n");

@@ -1,7 +1,7 @@
-// Lines over time, on a canvas.
+// Line plots over time, on a canvas.
 
 const COLORS = ["#2f7ed8", "#e4572e", "#2e9e5b", "#a35bd6", "#c7961a", "#17a2b8", "#d6438f", "#7a8b2d"];
-const SPAN = 10; // seconds of simulation that are shown
+const SPAN = 10; // displayed time span, in seconds of simulation
 const MOST_SAMPLES = 2000;
 
 class History {
@@ -9,7 +9,7 @@ class History {
 
   clear() { this.times = []; this.rows = []; }
 
-  /** A sample: time [s] and one number for each joint. Time that goes back (a reset) starts anew. */
+  /** Adds a sample: time [s] and one number per column. If time goes back (a reset), the history restarts. */
   add(time, row) {
     const last = this.times[this.times.length - 1];
     if (last !== undefined && time < last) this.clear();
@@ -22,7 +22,7 @@ class History {
   }
 }
 
-/** Steps of 1, 2 or 5 times a power of ten, about `count` of them. */
+/** Returns a step of 1, 2 or 5 times a power of ten, such that about `count` steps cover `range`. */
 function niceStep(range, count) {
   const raw = range / count;
   const power = 10 ** Math.floor(Math.log10(raw));

@@ -1,6 +1,6 @@
-// The picture of the stage, and the hand that turns it, selects and pulls.
+// The image of the scene, with pointer and keyboard input: orbit, pan, zoom, select, pull.
 
-const CLICK = 4; // a hand that moved less than this clicked, in CSS pixels
+const CLICK = 4; // largest pointer motion of a click, in CSS pixels
 
 class Stage {
   constructor(canvas, send) {
@@ -8,9 +8,9 @@ class Stage {
     this.send = send;
     this.moved = null;
     this.hands = new Map();
-    this.pressed = null; // where the one hand came down that may be clicking
-    this.pulling = null; // the hand that pulls at a body
-    this.pulled = null; // where to, until that is sent
+    this.pressed = null; // position of a press that may become a click
+    this.pulling = null; // id of the pointer that pulls a body
+    this.pulled = null; // target of the pull, until it is sent
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
@@ -48,7 +48,7 @@ class Stage {
     new ResizeObserver(() => this.size()).observe(canvas);
   }
 
-  /** Where in the picture: parts of its width and height; a hand that pulls may leave it. */
+  /** Position in fractions of the image's width and height, clamped to the image if `inside` is true. */
   place(event, inside = true) {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     const part = (at, from, side) => (at - from) / Math.max(side, 1);
@@ -77,7 +77,7 @@ class Stage {
     const before = this.hands.get(event.pointerId);
     if (!before) return;
     const [dx, dy] = [event.clientX - before[0], event.clientY - before[1]];
-    // Two fingers: what changes their distance zooms, the rest moves.
+    // Two fingers: a change of their distance zooms, and their motion pans.
     if (this.hands.size === 2) {
       const other = [...this.hands].find(([id]) => id !== event.pointerId)[1];
       const apart = (p) => Math.hypot(p[0] - other[0], p[1] - other[1]);
@@ -103,7 +103,7 @@ class Stage {
     event.preventDefault();
   }
 
-  /** Gathers what the hand does until the next frame: mice report more often than pictures come. */
+  /** Accumulates pointer motion and sends it every 16 ms, because mice report more often than images arrive. */
   move(what, dx, dy) {
     const first = this.moved === null;
     this.moved ??= { orbit: [0, 0], pan: [0, 0], zoom: [0, 0] };
@@ -113,7 +113,7 @@ class Stage {
     setTimeout(() => {
       const moved = this.moved;
       this.moved = null;
-      // Parts of the picture's height, so that a hand's way means the same on every screen.
+      // Fractions of the image height, so that a motion has the same effect on every screen.
       const height = Math.max(this.canvas.clientHeight, 1);
       for (const kind of ["orbit", "pan"]) {
         const [x, y] = moved[kind];
@@ -123,7 +123,7 @@ class Stage {
     }, 16);
   }
 
-  /** Asks for pictures as large as they are shown. */
+  /** Requests images in their displayed size. */
   size() {
     const scale = Math.min(window.devicePixelRatio || 1, 2);
     const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map((n) => Math.round(n * scale));
@@ -131,7 +131,7 @@ class Stage {
   }
 }
 
-/** Draws a file of pictures onto a canvas of its size. */
+/** Draws an image file onto a canvas and resizes the canvas to the image. */
 async function paint(canvas, file) {
   const picture = await createImageBitmap(file);
   if (canvas.width !== picture.width || canvas.height !== picture.height) {

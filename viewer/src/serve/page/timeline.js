@@ -1,7 +1,7 @@
-// The time line of what was recorded: there only where a recording is shown.
+// Timeline of a recording, shown only during playback.
 
 class Timeline {
-  /** Puts itself before `bar`; `send` sends a command. */
+  /** Inserts the timeline before `bar`; `send` sends a command. */
   constructor(bar, send) {
     this.label = document.createElement("label");
     this.label.id = "timeline-row";
@@ -23,7 +23,7 @@ class Timeline {
     this.slider.addEventListener("input", () => send({ do: "seek", time: Number(this.slider.value) }));
   }
 
-  /** Shows where the recording is; `timeline` is null where there is none. */
+  /** Shows the playback time; `timeline` is null for a running simulation. */
   show(timeline) {
     this.label.hidden = timeline === null;
     if (timeline === null) return;

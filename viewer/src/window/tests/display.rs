@@ -1,4 +1,4 @@
-//! Events that a program sends to a window on an X server.
+//! Input events that a test sends to a window on an X server.
 
 use crate::window::WindowCfg;
 use kinetoscope_scene::Pose;
@@ -12,12 +12,12 @@ use x11rb::rust_connection::RustConnection;
 
 pub(super) const SIZE: [usize; 2] = [480, 270];
 
-/// A small window on a display.
+/// Settings of a small window on a display.
 pub(super) fn cfg_on(display: &str) -> WindowCfg {
     WindowCfg { size: SIZE, display: Some(display.into()), threads: Some(1), ..WindowCfg::default() }
 }
 
-/// Two environments with a red cube.
+/// Builds two environments with a red cube.
 pub(super) fn simulation() -> SimulationManager {
     let cfg = SimulationManagerCfg { num_envs: 2, physics_dt: 0.01, threads: Some(1), ..Default::default() };
     let mut sim = SimulationManager::new(cfg).unwrap();
@@ -32,7 +32,7 @@ pub(super) fn simulation() -> SimulationManager {
     sim
 }
 
-/// A window, as another program sees it.
+/// A window, as seen by another X client.
 pub(super) struct Target<'a> {
     pub(super) connection: &'a RustConnection,
     pub(super) window: u32,
@@ -43,7 +43,7 @@ impl<'a> Target<'a> {
         Self { connection, window }
     }
 
-    /// Sends an event of a key or of the mouse: its kind, the key or button, when \[ms\], where.
+    /// Sends a key or mouse event: kind, key code or button, time stamp \[ms\], position.
     pub(super) fn send(&self, kind: u8, detail: u8, time: u32, [x, y]: [i16; 2]) {
         let mask = match kind {
             KEY_PRESS_EVENT => EventMask::KEY_PRESS,
@@ -52,7 +52,7 @@ impl<'a> Target<'a> {
             BUTTON_RELEASE_EVENT => EventMask::BUTTON_RELEASE,
             _ => EventMask::POINTER_MOTION,
         };
-        // Events of keys, buttons and the mouse have the same fields.
+        // Key, button and motion events have the same fields.
         let event = KeyPressEvent {
             response_type: kind,
             detail,
@@ -72,7 +72,7 @@ impl<'a> Target<'a> {
         self.connection.flush().unwrap();
     }
 
-    /// The code of a key by its sign.
+    /// Returns the key code of a keysym.
     fn code(&self, sign: u8) -> u8 {
         let (first, last) = (self.connection.setup().min_keycode, self.connection.setup().max_keycode);
         let mapping = self.connection.get_keyboard_mapping(first, last - first + 1).unwrap().reply().unwrap();
@@ -80,12 +80,12 @@ impl<'a> Target<'a> {
         first + mapping.keysyms.chunks(each).position(|signs| signs[0] == u32::from(sign)).unwrap() as u8
     }
 
-    /// Presses keys.
+    /// Presses keys without releasing them.
     pub(super) fn press(&self, signs: &[u8]) {
         signs.iter().for_each(|sign| self.send(KEY_PRESS_EVENT, self.code(*sign), 0, [0, 0]));
     }
 
-    /// Holds a key down for some repeats, of which an X server sends a release and a press at one moment.
+    /// Holds a key down for some repeats. For each, an X server sends a release and a press with the same time stamp.
     pub(super) fn hold(&self, sign: u8, repeats: u32) {
         let key = self.code(sign);
         self.send(KEY_PRESS_EVENT, key, 1000, [0, 0]);
@@ -96,7 +96,7 @@ impl<'a> Target<'a> {
         self.send(KEY_RELEASE_EVENT, key, 2000 + 40 * repeats, [0, 0]);
     }
 
-    /// Changes the size of the window.
+    /// Resizes the window.
     pub(super) fn resize(&self, [width, height]: [u32; 2]) {
         let aux = ConfigureWindowAux::new().width(width).height(height);
         self.connection.configure_window(self.window, &aux).unwrap();

@@ -1,5 +1,5 @@
-//! The window on an X server without a screen (Xvfb): the display shows the drawn image, windows are opened and closed again and
-//! again, and the loss of the display ends the window, not the program.
+//! The window on Xvfb, an X server without a screen: the display shows the rendered image, windows are opened and
+//! closed repeatedly, and the loss of the display ends the window, not the program.
 
 use super::display::{SIZE, Target, cfg_on, is_red, simulation};
 use crate::sample::Running;
@@ -21,14 +21,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use x11rb::protocol::xproto::{BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, MOTION_NOTIFY_EVENT};
 
-/// Below the status, which counts images per second \[pixels\].
+/// First pixel below the status, which shows the frame rate.
 const BELOW_STATUS: usize = 70 * SIZE[0];
 
 fn pixels(canvas: &Canvas) -> Vec<[u8; 3]> {
     canvas.bytes().chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect()
 }
 
-/// The image of a window without a display.
+/// Renders the image of a window without a display.
 fn drawn(app: &mut App) -> Vec<[u8; 3]> {
     let mut canvas = Canvas::default();
     app.draw(&mut canvas, Instant::now());
@@ -67,14 +67,14 @@ fn image_and_mouse() {
     assert!(expect("the display shows what was drawn", eye)[BELOW_STATUS..] == first[BELOW_STATUS..]);
     let red = first[BELOW_STATUS..].iter().filter(|p| is_red(p)).count();
     assert!(red > 200, "cubes are in the image: {red}");
-    // The mouse: dragged by 60 and 20 pixels with the left button, with the right one, and notches of the wheel.
+    // Mouse drags by 60 and 20 pixels with the left and right button, and steps of the wheel.
     let at = [200i16, 150];
     for (button, way) in [(1, Eye::orbit as fn(&mut Eye, [f64; 2], usize)), (3, Eye::pan)] {
         target.send(BUTTON_PRESS_EVENT, button, 0, at);
         target.send(MOTION_NOTIFY_EVENT, 0, 0, [at[0] + 60, at[1] + 20]);
         target.send(BUTTON_RELEASE_EVENT, button, 0, [at[0] + 60, at[1] + 20]);
         way(&mut eye, [60.0, 20.0], SIZE[1]);
-        // The control: another view is another image.
+        // Control: a different view is a different image.
         assert!(expect("it is turned and moved", eye)[BELOW_STATUS..] != first[BELOW_STATUS..]);
     }
     for (button, steps) in [(4, 1.0), (5, -1.0), (5, -1.0)] {
@@ -84,7 +84,7 @@ fn image_and_mouse() {
         expect("it comes nearer and goes away", eye);
     }
 
-    // Extreme sizes: the window stays, and shows something down to its last pixel, where a new size leaves black.
+    // Extreme sizes: the window survives and fills its last pixel, where a resize leaves black.
     const SCREEN: [usize; 2] = [1280, 800];
     for size in [[1u32, 1], [9000, 7000], [480, 270]] {
         target.resize(size);
@@ -95,7 +95,7 @@ fn image_and_mouse() {
     }
     close(&connection, window.number());
     assert_eq!(ended(&window), Closed::ByUser);
-    // The simulation ends the window.
+    // Dropping the simulation closes the window.
     let window = sim.open_window_with(cfg_on(&display.name)).unwrap();
     drop(sim);
     assert_eq!(ended(&window), Closed::WithSimulation);
@@ -111,12 +111,13 @@ fn keys() {
     let target = Target::on(&connection, window.number());
     let viewer = sim.viewer(Wants::default());
     let run = Running::start(sim);
-    // The space bar pauses, and lets go on; 0 is as fast as can be.
+    // The space bar pauses and resumes; 0 is free speed.
     for (keys, paused, speed) in [(&b" "[..], true, None), (b" ", false, None), (b"0", false, Some(Speed::Free))] {
         target.press(keys);
         wait_for(&viewer, paused, speed);
     }
-    // Held, it pauses once and does not flicker: an odd number of repeats would let it go on. The key after it says when.
+    // While held, the space bar pauses once: an odd number of repeats would resume. The following key marks the end of
+    // the repeats.
     target.hold(b' ', 5);
     target.press(b"1");
     wait_for(&viewer, true, Some(Speed::REAL));
@@ -158,14 +159,14 @@ fn images() {
         images.show(image.clone());
         wait::until("the image is on the screen", || shown() == pixels(&image));
     }
-    // A larger window shows the image larger.
+    // A larger window scales the image up.
     Target::on(&connection, images.window().number()).resize([80, 60]);
     wait::until("the image is scaled", || screenshot(&connection, [6, 4], [2, 2]) == [[250, 251, 252]; 4]);
     close(&connection, images.window().number());
     assert_eq!(ended(images.window()), Closed::ByUser);
-    // The program goes on: an image for a closed window is dropped.
+    // The program continues: an image for a closed window is dropped.
     images.show(filled([1, 2, 3]));
-    // The end of the value ends the window.
+    // Dropping the value closes the window.
     let images = open("dropped");
     let window = images.window().clone();
     drop(images);
@@ -179,11 +180,11 @@ fn images() {
     assert!(matches!(images.window().closed(), Some(Closed::DisplayLost(_))), "{:?}", images.window().closed());
 }
 
-/// A simulation that a window on `display` has paused, and that a thread steps.
+/// Opens a window on `display`, pauses the simulation with it, and steps on a thread.
 fn paused(display: &Display, mut sim: SimulationManager) -> (Window, Viewer, Running) {
     let window = sim.open_window_with(cfg_on(&display.name)).unwrap();
     let viewer = sim.viewer(Wants::default());
-    // It stays until the key is obeyed: a server drops what a client has sent that is gone.
+    // The connection stays open until the command has run: a server drops the events of clients that have disconnected.
     let connection = display.connect();
     Target::on(&connection, window.number()).press(b" ");
     let run = Running::start(sim);
@@ -195,7 +196,8 @@ fn paused(display: &Display, mut sim: SimulationManager) -> (Window, Viewer, Run
 #[ignore = "needs Xvfb: cargo xtask test"]
 fn lost_display() {
     let mut display = Display::start("1280x800");
-    // The display stands still while the window is open and has paused the simulation: that goes on. No other is opened.
+    // The display freezes while the window holds the simulation paused: the simulation continues. A second window
+    // cannot open.
     let (window, viewer, run) = paused(&display, simulation());
     let held = run.steps();
     std::thread::sleep(Duration::from_millis(300));
@@ -203,7 +205,7 @@ fn lost_display() {
     display.signal("STOP");
     let cfg = cfg_on(&display.name);
     let other = std::thread::spawn(move || simulation().open_window_with(cfg).unwrap_err());
-    // Snapshots of a paused simulation come when a viewer wants something else: then an image is due.
+    // Snapshots of a paused simulation are published when a viewer changes its requests; then an image is due.
     while window.is_open() {
         viewer.set_wants(Wants { markers: run.steps().is_multiple_of(2), ..Wants::default() });
         viewer.send(Command::SetSpeed(Speed::REAL));
@@ -217,7 +219,7 @@ fn lost_display() {
     display.signal("CONT");
     drop(viewer);
 
-    // The display is lost while the window has paused the simulation: that goes on.
+    // The display is lost while the window holds the simulation paused: the simulation continues.
     let (window, viewer, run) = paused(&display, run.end());
     drop(viewer);
     display.server.kill().unwrap();
@@ -225,7 +227,7 @@ fn lost_display() {
     run.goes_on_beyond(run.steps() + 10);
     let mut sim = run.end();
 
-    // And there is no display any more.
+    // No display is available any more.
     let error = sim.open_window_with(cfg_on(&display.name)).unwrap_err();
     assert!(matches!(error, WindowError::NoDisplay { .. }));
     let text = error.to_string();
@@ -240,7 +242,7 @@ fn leaks() {
     process::assert_passes(module_path!(), "leaks_scenario", &[("DISPLAY", &display.name)]);
 }
 
-/// Windows are opened and closed again: no thread stays, and no file. In a process of its own: it counts them.
+/// Repeated opening and closing leaks no thread and no file. It runs in its own process, because it counts them.
 #[test]
 #[ignore = "runs in a process of its own"]
 fn leaks_scenario() {
@@ -256,7 +258,7 @@ fn leaks_scenario() {
         assert_eq!(ended(&window), Closed::ByUser);
         open
     };
-    // The first one starts threads that the simulation keeps.
+    // The first window starts threads that the simulation keeps.
     open_and_close();
     std::thread::sleep(Duration::from_secs(1));
     let before = threads_and_files();
@@ -269,9 +271,10 @@ fn leaks_scenario() {
     wait::until("threads and files of windows end", || !more());
 }
 
-/// An address before that of an X server, which passes everything on and counts what programs send.
+/// Starts a proxy in front of an X server that counts the bytes sent by programs. Returns its display name and the
+/// count.
 fn counting_wire(display: &Display) -> (String, Arc<AtomicUsize>) {
-    /// Until one end is closed; the other is closed when its last half is dropped.
+    /// Copies until one end is closed. The other end is closed when its last half is dropped.
     fn pass_on(mut from: impl Read, mut to: impl Write, count: &AtomicUsize) {
         let mut chunk = vec![0; 1 << 16];
         while let Ok(n) = from.read(&mut chunk) {
@@ -299,14 +302,14 @@ fn counting_wire(display: &Display) -> (String, Arc<AtomicUsize>) {
     (format!("127.0.0.1:{number}"), sent)
 }
 
-/// Of a window that is larger than any screen a coarse image is sent to the X server, which enlarges it.
+/// For a window larger than any screen, a coarse image is sent to the X server, which enlarges it.
 #[test]
 #[ignore = "needs Xvfb: cargo xtask test"]
 fn huge() {
-    // Larger than the middle of the window.
+    // Larger than the center of the window.
     let display = Display::start("5400x4200");
     let (name, sent) = counting_wire(&display);
-    // Bytes that were sent, when no more come.
+    // Returns the number of sent bytes, once it stops growing.
     let settled = || {
         let (mut last, mut since) = (sent.load(Ordering::SeqCst), Instant::now());
         while since.elapsed() < Duration::from_millis(700) {
@@ -323,8 +326,8 @@ fn huge() {
     let connection = display.connect();
     let target = Target::on(&connection, window.number());
     let is_drawn = |[x, y]: [usize; 2]| screenshot(&connection, [x - 1, y - 1], [1, 1]) != [[0; 3]];
-    // Nothing steps: an image is sent when a key asks for another one, and only then. Four bytes for each pixel, and some for
-    // the request.
+    // The simulation does not step, so an image is sent only after a key press. It has four bytes per pixel, plus the
+    // request header.
     let assert_sent = |[width, height]: [usize; 2], request: usize| {
         let (before, own) = (settled(), 4 * width * height);
         target.press(b"h");
@@ -339,10 +342,10 @@ fn huge() {
     assert_sent(SIZE, 4096);
     target.resize([9000, 7000]);
     wait::until("it is drawn at its new size", || is_drawn([5400, 4200]));
-    // 1920 x 1200 pixels are the most that are drawn: of 9000 x 7000 every sixth, along each side.
+    // At most 1920 x 1200 pixels are rendered: of 9000 x 7000, every sixth pixel along each side.
     let coarse = [1500, 1167];
     assert_sent(coarse, 8192);
-    // The display shows that image, each pixel 6 by 6 times: around the cube that is most to the left.
+    // The display shows that image with each pixel repeated 6 by 6 times, around the leftmost cube.
     let mut app = App::new(coarse, 2);
     let snapshot = sim.viewer(Wants::default()).newest().unwrap();
     // The view is that of the window's first size.
@@ -359,7 +362,7 @@ fn huge() {
     wait::until("the display shows it", || screenshot(&connection, corner, size) == enlarged);
     let red = enlarged.iter().filter(|p| is_red(p)).count();
     assert!(red > 36 * 200, "cubes are in it: {red}");
-    // The control: a pixel beside it the image is another one.
+    // Control: one pixel beside, the image differs.
     assert!(screenshot(&connection, [corner[0] + 1, corner[1]], size) != enlarged);
     window.close();
     ended(&window);
