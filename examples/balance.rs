@@ -9,7 +9,7 @@
 //! ```
 //!
 //! The controller uses a gyroscope and an accelerometer, both with noise and bias, the wheel contacts with the floor,
-//! and its own motor commands. It reads no pose, no velocity and no joint state; these only judge the result.
+//! and its own motor commands. It reads no pose, no velocity and no joint state; these only evaluate the result.
 //!
 //! The exit code is 0 if at least 15 of 16 robots stand at the end and their bodies have never touched the floor. It is
 //! 1 for fewer robots, as with the second command, whose wheels stand still, and 2 for an error.

@@ -3,7 +3,7 @@
 //!
 //! Mask and depth of each image give the position of the cube relative to the camera. Joint encoders and the
 //! calibration of the camera give the position of the camera relative to the robot. The true position of the cube is
-//! only read at the end, to judge the result.
+//! only read at the end, to evaluate the result.
 //!
 //! ```text
 //! cargo run --release --example visual_servo -- --headless --out images

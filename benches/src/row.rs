@@ -13,7 +13,7 @@ pub(crate) struct Row {
     pub(crate) case: String,
     /// Unit of `ours` and `rival`.
     pub(crate) unit: String,
-    /// Our number.
+    /// Kinetoscope's number.
     pub(crate) ours: f64,
     /// The baseline's number; `None` if the baseline is not on the machine.
     pub(crate) rival: Option<f64>,

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Runs `work`, a path tracing job, and meanwhile shows its progress on the terminal. After `limit` the job is
-/// cancelled. `look` is called every tenth of a second from another thread and may also cancel the job.
+/// canceled. `look` is called every tenth of a second from another thread and may also cancel the job.
 pub(crate) fn draw<T>(
     progress: &RenderProgress,
     limit: Option<Duration>,

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 /// Characters of a bar.
 const BAR: usize = 20;
 
-/// The parts of some work.
+/// Progress over a number of parts.
 #[derive(Debug)]
 pub(crate) struct Progress {
     parts: usize,

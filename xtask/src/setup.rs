@@ -327,10 +327,10 @@ fn install(machine: &Machine, needs: &[Need]) -> Outcome {
     }
 }
 
-/// True if a user is asked before packages are installed.
+/// True if a prompt precedes the installation of packages.
 static ASK: AtomicBool = AtomicBool::new(false);
 
-/// From now on, a user at a terminal is asked before packages are installed; CI installs them without asking.
+/// Enables a prompt before packages are installed. Only a terminal outside CI gets the prompt.
 pub(crate) fn ask_before_installing() {
     ASK.store(true, Ordering::Relaxed);
 }

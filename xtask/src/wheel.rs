@@ -122,7 +122,7 @@ fn unpack(wheel: &Path, unpacked: &Path) -> Outcome {
             remove_dir(unpacked)?;
         }
         match fs::rename(&scratch, unpacked) {
-            // Another process was faster.
+            // Another process has completed the folder in the meantime.
             Err(_) if is_complete(unpacked) => Ok(()),
             result => result.map_err(|e| Failure::new(format!("{}: {e}", unpacked.display()))),
         }

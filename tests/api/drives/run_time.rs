@@ -1,8 +1,8 @@
 //! Changes of drives at run time: gains, types and limits, per joint and per environment.
 //!
 //! The laws are those of `law.rs`, with their tolerance of 1e-9: a joint of constant inertia M without other loads has
-//! v' = (M v + h kp (q* - q)) / (M + h kd + h² kp). Control: an environment that is not named does the same as before,
-//! to the last bit.
+//! v' = (M v + h kp (q* - q)) / (M + h kd + h² kp). Control: the motion of an environment that is not named stays
+//! bit-identical.
 
 use crate::drives::law::EXACT;
 use crate::drives::worlds::*;

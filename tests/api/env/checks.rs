@@ -18,7 +18,7 @@ fn good_tasks() {
     assert!(said[0].contains("a column too many") && said[1].contains("no number"), "{said:?}");
 }
 
-/// The fault of an environment.
+/// Faults of an environment that the check must detect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Fault {
     None,

@@ -42,7 +42,7 @@ fn check(name: &str, cfg: RobotCfg, link: &str, at_limits: bool) {
     }
     println!("{name}: {solved} of {targets} solved");
     assert!(solved >= targets * 99 / 100, "{name}: {solved} of {targets}");
-    // Control: the default position itself is no solution.
+    // Control: the default position itself is not a solution.
     let first = placed(&mut sim, id, &reachable.select(Axis(0), &[0]), link);
     let (far, _) = apart(&placed(&mut sim, id, &start, link), &first);
     assert!(far > 0.01, "{name}: {far}");

@@ -96,7 +96,7 @@ fn spherical_wrist_turn() {
                 assert!(found.success[0] && found.seed[0] == 0, "{what}");
                 let slack = (found.rotation_error[0] / length).min(1.0).asin() + 1e-3;
                 assert!(largest(found.qpos.view(), &q) <= most + slack, "at most {most}: {what}");
-                // The start is no solution.
+                // The start is not a solution.
                 assert!(found.iterations[0] > 0, "{what}");
             }
         }

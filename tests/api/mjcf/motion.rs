@@ -109,7 +109,7 @@ fn numbers() {
     assert!(!tail(&[file.qpos0()[0] + 1e-9], &[file.qpos0()[0]]), "a control: this comparison sees 1e-9");
 }
 
-/// A file with one of everything moves in a scene as it does alone.
+/// A file with an element of every type moves in a scene as in plain MuJoCo.
 #[test]
 fn whole_machine() {
     let (mut sim, part) = with(1, MACHINE);
@@ -178,8 +178,8 @@ fn far_arm() -> RobotCfg {
     RobotCfg { init_pose: Pose::translation(5.0, 0.0, 0.0), ..sr5("robot") }
 }
 
-/// A robot with implicit drives moves beside parts as it does alone: its rows are located among the part's equalities
-/// and friction.
+/// The motion of a robot with implicit drives is independent of parts in the scene: its rows are located among the
+/// part's equalities and friction.
 #[test]
 fn drives_beside_parts() {
     let run = |with_parts: bool| {
