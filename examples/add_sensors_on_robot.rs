@@ -1,7 +1,7 @@
 //! A quadruped with a camera, a height scanner and contact sensors on its feet, as in Orbit's tutorial.
 //!
 //! ```text
-//! cargo run --release --example add_sensors_on_robot -- --headless --num-envs 2 --steps 1000 --out pictures
+//! cargo run --release --example add_sensors_on_robot -- --headless --num-envs 2 --steps 1000 --out images
 //! cargo run --release --example add_sensors_on_robot -- --headless --steps 12000 --reset-every 0 --payload 5
 //! cargo run --release --example add_sensors_on_robot -- --headless --robot quadruped/quadruped.xml --spawn-height 0
 //! ```
@@ -28,7 +28,8 @@ use std::process::ExitCode;
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// URDF or MJCF (.xml) of a quadruped with ANYmal's joint names, instead of the bundled one; an MJCF file says how high it starts
+    /// URDF or MJCF (.xml) of a quadruped with ANYmal's joint names, instead of the bundled one; an MJCF file sets its
+    /// own start height
     #[arg(long)]
     robot: Option<PathBuf>,
     #[command(flatten)]
@@ -54,7 +55,7 @@ fn main() -> ExitCode {
     launcher::run("add_sensors_on_robot", || run(&Args::parse()))
 }
 
-/// Steps in a second.
+/// Steps per second.
 const SECOND: u64 = 200;
 
 fn run(args: &Args) -> launcher::Result {
@@ -79,7 +80,7 @@ fn run(args: &Args) -> launcher::Result {
     let mut step = 0;
     while !progress.stop(step) {
         if args.reset_every > 0 && step % args.reset_every == 0 {
-            // Poses are in the environments: origins are not added.
+            // Poses are in the environment frame: environment origins are not added.
             let mut robot = scene.robot_mut("robot")?;
             let (root, standing) = (robot.read().default_root_state(), robot.read().default_qpos());
             robot.write_root_state(&root, None)?;
@@ -87,7 +88,7 @@ fn run(args: &Args) -> launcher::Result {
             let still = robot.read().default_qvel();
             robot.write_joint_state(&start, &still, None, None)?;
             robot.set_qpos_target(&standing, None, None)?;
-            // The written state stays: this clears the buffers of sensors.
+            // The reset keeps the written state and clears the buffers of the sensors.
             scene.reset(None)?;
             totals.seen = [0; 3];
             progress.say("[INFO]: Resetting robot state...");
@@ -117,7 +118,7 @@ fn run(args: &Args) -> launcher::Result {
     Ok(())
 }
 
-/// The bundled scene, with what the flags say.
+/// The bundled scene with the flags applied.
 fn scene_cfg(args: &Args) -> launcher::Result<SceneCfg> {
     let mut cfg = SceneCfg::from_file(assets::path("scenes/quadruped.toml")?)?;
     let from_flags = args.launcher.simulation()?;
@@ -132,14 +133,15 @@ fn scene_cfg(args: &Args) -> launcher::Result<SceneCfg> {
         if let EntityCfg::Sensor(sensor) = entity {
             let sensor: &mut dyn Any = &mut **sensor;
             if let Some(scanner) = sensor.downcast_mut::<RayCasterCfg>().filter(|_| args.spawn.no_ground) {
-                // A pattern that names nothing is refused; of what stands still there is nothing, and all rays miss.
+                // A target pattern without a match is an error. Without a ground the scene has no static geometry, so
+                // with StaticOnly all rays miss.
                 scanner.targets = HitTargets::StaticOnly;
             }
         }
         let EntityCfg::Robot(robot) = entity else { continue };
         if let Some(file) = &args.robot {
             let file = launcher::user_or_asset(file)?;
-            // An MJCF file says how high its robot stands.
+            // An MJCF file sets the start height of its robot.
             if file.extension().is_some_and(|extension| extension == "xml") {
                 (robot.mjcf, robot.urdf, robot.init_pose) =
                     (Some(MjcfFile::new(file)), UrdfCfg::default(), Pose::identity());
@@ -154,12 +156,12 @@ fn scene_cfg(args: &Args) -> launcher::Result<SceneCfg> {
     Ok(cfg)
 }
 
-/// The three sensors.
+/// The camera, the height scanner and the contact sensor.
 fn sensors(scene: &InteractiveScene) -> launcher::Result<(&Camera, &RayCaster, &ContactSensor)> {
     Ok((scene.sensor("camera")?, scene.sensor("height_scanner")?, scene.sensor("contact_forces")?))
 }
 
-/// Text that the tutorial prints after every step.
+/// The text that the tutorial prints after every step.
 fn summary(scene: &InteractiveScene) -> launcher::Result<String> {
     const LINE: &str = "-------------------------------";
     let (camera, scanner, contacts) = sensors(scene)?;
@@ -178,19 +180,19 @@ fn summary(scene: &InteractiveScene) -> launcher::Result<String> {
     ))
 }
 
-/// The largest z of all hits; `None` where no ray hits.
+/// The largest z of all hits \[m\]; `None` if no ray hits.
 fn max_height(scanner: &RayCaster) -> Option<f64> {
     let hits = scanner.hits();
     let heights = hits.index_axis(Axis(2), 2);
     heights.iter().copied().filter(|z| z.is_finite()).reduce(f64::max)
 }
 
-/// The largest component of all forces, as the tutorial has it.
+/// The largest component of all forces \[N\], defined as in the tutorial.
 fn largest(forces: ArrayView3<'_, f64>) -> f64 {
     forces.iter().copied().fold(0.0, f64::max)
 }
 
-/// Measurements over the whole run; a reset starts a sensor's own count again.
+/// Statistics of the whole run; a reset restarts the counters of the sensors.
 #[derive(Default)]
 struct Totals {
     seen: [u64; 3],
@@ -257,7 +259,7 @@ fn report(
     }))
 }
 
-/// What the camera of each robot sees, and the stage with all robots and what their sensors show.
+/// Writes the camera image of each robot, and the stage with all robots and their sensor markers.
 fn write_pictures(scene: &mut InteractiveScene, out: &Path) -> launcher::Result {
     let front = scene.sensor::<Camera>("camera")?;
     let (color, [width, height]) = (front.color()?, [640, 480]);

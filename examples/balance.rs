@@ -1,16 +1,18 @@
-//! Robots on two wheels stay upright by what an IMU and contact sensors say, in 16 environments: dropped from 3 cm, then
-//! pushed four times, at other times and with other forces in each; once so far up that they lose the floor.
+//! Two-wheeled robots balance on an IMU and contact sensors in 16 environments.
+//!
+//! Each robot is dropped from 3 cm and pushed four times, at its own times and with its own forces. The third push also
+//! lifts the robot off the floor.
 //!
 //! ```text
-//! cargo run --release --example balance -- --headless --out pictures
+//! cargo run --release --example balance -- --headless --out images
 //! cargo run --release --example balance -- --headless --no-feedback
 //! ```
 //!
-//! What the controller knows: a gyroscope and an accelerometer, both with noise and bias, whether wheels are on the floor, and
-//! what it asked of its own motors. No pose, no velocity and no joint is read; those are looked at to judge in the end.
+//! The controller uses a gyroscope and an accelerometer, both with noise and bias, the wheel contacts with the floor,
+//! and its own motor commands. It reads no pose, no velocity and no joint state; these only evaluate the result.
 //!
-//! The exit code is 0 where at least 15 of 16 robots stand in the end and their bodies have never touched the floor, 1 where
-//! fewer do (the second command, whose wheels stand still), 2 where something is wrong.
+//! The exit code is 0 if at least 15 of 16 robots stand at the end and their bodies have never touched the floor. It is
+//! 1 for fewer robots, as with the second command, whose wheels stand still, and 2 for an error.
 
 mod launcher;
 
@@ -29,44 +31,45 @@ use nalgebra::{Matrix4, RowVector4, Vector3, Vector4};
 use serde_json::json;
 use std::process::ExitCode;
 
-/// Balances robots that are pushed, and counts.
+/// Balances pushed robots and counts the successes.
 #[derive(Debug, Parser)]
 #[command(name = "balance")]
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// The controller does nothing: wheels stand still
+    /// Turn the controller off: the wheels stand still
     #[arg(long, alias = "no_feedback")]
     no_feedback: bool,
-    /// Pushes are as many times as strong
+    /// Scale factor of the pushes
     #[arg(long, default_value_t = 1.0)]
     push: f64,
 }
 
 const DT: f64 = 0.002;
-/// How long it goes on \[s\].
+/// Duration of the run \[s\].
 const DURATION: f64 = 14.0;
 
 const G: f64 = 9.81;
-/// How far above the floor they are dropped \[m\].
+/// Drop height of the robots above the floor \[m\].
 const DROP: f64 = 0.03;
 
-/// Most acceleration that is asked for \[m/s²\]: tyres with friction 1 slip at 9.8.
+/// Limit of the commanded acceleration \[m/s²\]: tires with friction 1 slip at 9.8.
 const MOST: f64 = 6.0;
-/// Time in which the accelerometer corrects what the gyroscope says \[s\].
+/// Time constant with which the accelerometer corrects the gyroscope's tilt estimate \[s\].
 const CORRECTION: f64 = 0.5;
-/// Stiffness of the wheels' speed controllers \[N m s/rad\].
+/// Gain of the wheels' speed controllers \[N m s/rad\].
 const GRIP: f64 = 20.0;
 
-/// Pushes: when they may begin \[s\], how long they last \[s\], how strong they are \[N\], fore or aft, in the centre of mass of
-/// the body.
+/// Pushes at the center of mass of the body: range of start times \[s\], duration \[s\], range of forces \[N\], fore or
+/// aft.
 const PUSHES: [[f64; 2]; 4] = [[2.0, 2.5], [4.5, 5.0], [7.0, 7.5], [10.0, 10.5]];
 const LENGTH: f64 = 0.15;
 const FORCES: [f64; 2] = [20.0, 35.0];
-/// The third one also lifts \[N\]: the robot weighs 94 N, and leaves the floor for about a quarter of a second.
+/// Upward force of the third push \[N\]: the robot weighs 94 N, and leaves the floor for about a quarter of a second.
 const LIFT: f64 = 120.0;
 
-/// In the end they stand: tilted by no more than this \[rad\], no faster than this \[m/s\], no farther from their start \[m\].
+/// Success at the end of the run: tilt at most this \[rad\], speed at most this \[m/s\], distance from the start at
+/// most this \[m\].
 const UPRIGHT: f64 = 0.05;
 const SLOW: f64 = 0.1;
 const AT_HOME: f64 = 0.5;
@@ -94,7 +97,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         urdf,
         fix_base: false,
         init_pose: Pose::translation(0.0, 0.0, plant.radius + DROP),
-        // Speed controllers.
+        // Speed controllers: no stiffness, only damping.
         drive: DriveCfg { stiffness: 0.0.into(), damping: GRIP.into(), ..Default::default() },
         ..Default::default()
     })?;
@@ -106,7 +109,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
         eprintln!("warning: {diagnostic}");
     }
     args.launcher.write_dump(&sim)?;
-    // They start a little tilted.
+    // The robots start slightly tilted.
     let tilts = grip::scatter::<1>(&sim, "tilt");
     let start: Vec<Pose> =
         tilts.iter().map(|[tilt]| from_xyz_rpy([0.0, 0.0, plant.radius + DROP], [0.0, 0.05 * tilt, 0.0])).collect();
@@ -125,7 +128,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let steps = (DURATION / DT).round() as u64;
     let progress = Progress::new(&args.launcher, steps);
     let gains = plant.gains();
-    // When pictures are taken: before all pushes, after the first, in the air, landed, in the end.
+    // Times of the images: before all pushes, after the first, in the air, landed, at the end.
     let end_of = |push: usize| pushes[0].list[push].time[1];
     let moments = [1.0, end_of(0) + 0.1, end_of(2) + 0.04, end_of(2) + 0.4, DURATION];
     progress.say(&format!("Gains on distance, speed, tilt and its rate: {:.3?}", gains.as_slice()));
@@ -144,7 +147,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
             };
             let speed = if args.no_feedback { 0.0 } else { controller.wheels(&felt, &gains, plant.radius) };
             speeds.row_mut(env).fill(speed);
-            // To judge: the controller does not know.
+            // For the result only: the controller does not use it.
             record.airborne += u64::from(!felt.grounded && time > 1.0);
             let touching = (0..3).map(|k| forces[(env, watched[2], k)].powi(2)).sum::<f64>().sqrt();
             record.fell |= touching > 1.0;
@@ -207,7 +210,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     trial::conclude(&args.launcher, &mut sim, count)
 }
 
-/// On the axle, where tilting does not accelerate it: what a cheap one measures.
+/// A low-cost IMU on the axle, where tilting does not accelerate it.
 fn imu_cfg() -> ImuCfg {
     let noise = [
         ("ang_vel_b".to_string(), NoiseCfg { bias_std: 0.01, ..NoiseCfg::white(0.005) }),
@@ -216,28 +219,28 @@ fn imu_cfg() -> ImuCfg {
     ImuCfg { sampling: SamplingCfg { noise: noise.into(), ..Default::default() }, ..ImuCfg::on("balancer/body") }
 }
 
-/// A robot, as its controller thinks of it: what its file says.
+/// The controller's model of a robot, taken from its URDF.
 #[derive(Clone, Copy, Debug)]
 struct Plant {
-    /// Of the wheels \[m\].
+    /// Radius of the wheels \[m\].
     radius: f64,
     /// Mass of the body, and of both wheels \[kg\].
     body: f64,
     wheels: f64,
-    /// Of the body's centre of mass above the axle \[m\].
+    /// Height of the body's center of mass above the axle \[m\].
     height: f64,
-    /// Of the body about its centre of mass, and of both wheels about the axle \[kg m²\].
+    /// Inertia of the body about its center of mass, and of both wheels about the axle \[kg m²\].
     body_inertia: f64,
     wheel_inertia: f64,
 }
 
 impl Plant {
-    /// From the links `body`, whose frame is in the middle of the axle, and the two tyres.
+    /// Takes the model from the links `body`, whose frame is at the middle of the axle, and the two tires.
     fn of(robot: &RobotDescription) -> launcher::Result<Self> {
         let link = |name: &str| robot.links.iter().find(|link| link.name == name).ok_or(format!("no link {name}"));
         let inertial = |name: &str| {
             let inertial = link(name)?.inertial.as_ref().ok_or(format!("the link {name} has no mass"))?;
-            // About y, the axle, in the axes of the link.
+            // Inertia about the axle (y), in the axes of the link.
             let turn = inertial.link_from_com.rotation.to_rotation_matrix();
             let about_y = (turn.matrix() * inertial.inertia * turn.matrix().transpose())[(1, 1)];
             Ok::<_, String>((inertial.mass, inertial.link_from_com.translation.z, about_y))
@@ -252,11 +255,11 @@ impl Plant {
         Ok(Self { radius: *radius, body, wheels, height, body_inertia, wheel_inertia })
     }
 
-    /// Gains on distance, speed, tilt and rate of tilt, of the acceleration that is asked for.
+    /// Feedback gains on distance, speed, tilt and tilt rate; their weighted sum gives the commanded acceleration.
     ///
-    /// With the axle accelerated by a, the body (mass m, its centre h above the axle, inertia I about that) tilts by θ. The wheels
-    /// (mass M, inertia J, radius r) are driven by a torque T, which acts on the body the other way. For small angles, with H the
-    /// force of the axle on the body and F that of the floor on the wheels:
+    /// The axle accelerates by a. The body (mass m, center of mass h above the axle, inertia I about it) tilts by θ.
+    /// The wheels (mass M, inertia J, radius r) are driven by a torque T, with the reaction on the body. H is the force
+    /// of the axle on the body, F the force of the floor on the wheels. For small angles:
     ///
     /// ```text
     /// body, along:  m (a + h θ") = H             wheels, along:  M a = F - H
@@ -264,9 +267,9 @@ impl Plant {
     /// so            (I + m h² + m h r) θ" = m g h θ - (m h + (M + m) r + J / r) a
     /// ```
     ///
-    /// The gains are those of the linear-quadratic regulator of x' = v, v' = a, θ' = ω, ω' = A θ - B a in steps of dt, with costs
-    /// by Bryson's rule: one over the square of what is thought large. Its Riccati equation is solved by going back in time
-    /// until nothing changes any more.
+    /// The gains are those of the linear-quadratic regulator of x' = v, v' = a, θ' = ω, ω' = A θ - B a in steps of dt.
+    /// The costs follow Bryson's rule: each is the inverse square of the largest acceptable value. The Riccati equation
+    /// is iterated backward in time until the gains converge.
     fn gains(&self) -> RowVector4<f64> {
         let Self { radius, body, wheels, height, body_inertia, wheel_inertia } = *self;
         let inertia = body_inertia + body * height * height + body * height * radius;
@@ -282,7 +285,7 @@ impl Plant {
             0.0, 0.0, a * DT, 1.0,
         );
         let input = Vector4::new(0.0, DT, 0.0, -b * DT);
-        // 0.5 m, 1 m/s, 0.2 rad, 1 rad/s, and 3 m/s².
+        // Acceptable values: 0.5 m, 1 m/s, 0.2 rad, 1 rad/s, and 3 m/s².
         let cost = Matrix4::from_diagonal(&Vector4::new(4.0, 1.0, 25.0, 1.0));
         let effort = 1.0 / 9.0;
         let mut value = cost;
@@ -300,47 +303,49 @@ impl Plant {
     }
 }
 
-/// What a robot feels.
+/// Sensor readings of a robot.
 struct Felt {
-    /// Angular velocity in its axes \[rad/s\].
+    /// Angular velocity in the axes of the body \[rad/s\].
     spin: Vector3<f64>,
-    /// Acceleration and weight in its axes \[m/s²\].
+    /// Specific force (acceleration minus gravity) in the axes of the body \[m/s²\].
     acceleration: Vector3<f64>,
-    /// Both wheels are on the floor.
+    /// True if both wheels touch the floor.
     grounded: bool,
 }
 
-/// What a controller remembers: what it thinks and what it has asked for.
+/// State of a controller: its estimates and its last commands.
 #[derive(Clone, Debug, Default)]
 struct Controller {
-    /// How far the body is tilted forwards, as it thinks \[rad\].
+    /// Estimated forward tilt of the body \[rad\].
     tilt: f64,
-    /// Acceleration, speed and distance that it has asked for, or felt in the air \[m/s², m/s, m\].
+    /// Acceleration, speed and distance, from the commands on the floor and from the accelerometer in the air \[m/s²,
+    /// m/s, m\].
     acceleration: f64,
     speed: f64,
     distance: f64,
 }
 
 impl Controller {
-    /// Speed of both wheels of this radius \[m\] relative to the body \[rad/s\].
+    /// Speed of both wheels, of this radius \[m\], relative to the body \[rad/s\].
     fn wheels(&mut self, felt: &Felt, gains: &RowVector4<f64>, radius: f64) -> f64 {
         self.tilt += DT * felt.spin.y;
         let (sin, cos) = self.tilt.sin_cos();
         self.acceleration = if felt.grounded {
-            // At a tilt of θ, with the axle accelerated by a, what is felt is along (a cos θ - g sin θ, a sin θ + g cos θ), at an angle
-            // of θ - atan(a / g).
+            // At a tilt of θ, with the axle accelerated by a, the accelerometer reads a vector along (a cos θ - g sin
+            // θ, a sin θ + g cos θ), at an angle of θ - atan(a / g).
             let leans = (-felt.acceleration.x).atan2(felt.acceleration.z) + self.acceleration.atan2(G);
             self.tilt += DT / CORRECTION * (leans - self.tilt);
             let state = Vector4::new(self.distance, self.speed, self.tilt, felt.spin.y);
             -(gains * state)[0].clamp(-MOST, MOST)
         } else {
-            // In the air there is no weight to tell where down is, and no floor to push against. What is felt along the floor is what
-            // pushes: wheels turn as fast as the floor will come.
+            // In the air the accelerometer gives no vertical reference, and the wheels have no floor to push against.
+            // The measured acceleration along the floor is that of the push: the wheels match the speed of the floor
+            // before they land.
             felt.acceleration.x * cos + felt.acceleration.z * sin
         };
         self.speed += DT * self.acceleration;
         self.distance += DT * self.speed;
-        // A wheel that stands still on the floor turns backwards in a body that tilts forwards.
+        // A wheel at rest on the floor turns backward relative to a body that tilts forward.
         self.speed / radius - felt.spin.y
     }
 }
@@ -348,9 +353,9 @@ impl Controller {
 /// A push.
 #[derive(Clone, Copy, Debug)]
 struct Push {
-    /// When it begins and ends \[s\].
+    /// Start and end time \[s\].
     time: [f64; 2],
-    /// Forwards and up \[N\].
+    /// Forward and upward force \[N\].
     force: [f64; 2],
 }
 
@@ -373,21 +378,21 @@ impl Pushes {
         Self { list: PUSHES.into_iter().enumerate().map(&mut push).collect() }
     }
 
-    /// The force at a time, in world axes \[N\].
+    /// Force at a time, in world axes \[N\].
     fn force(&self, time: f64) -> [f64; 3] {
         let now = self.list.iter().find(|push| (push.time[0]..push.time[1]).contains(&time));
         now.map_or([0.0; 3], |push| [push.force[0], 0.0, push.force[1]])
     }
 }
 
-/// What happened to a robot.
+/// Statistics of a robot.
 #[derive(Clone, Debug, Default)]
 struct Record {
     /// The largest tilt \[rad\].
     tilt: f64,
-    /// Steps without both wheels on the floor, once it has landed.
+    /// Steps without contact of both wheels, once the robot has landed.
     airborne: u64,
-    /// The body has touched the floor.
+    /// True if the body has touched the floor.
     fell: bool,
 }
 

@@ -1,4 +1,5 @@
-//! An arm and a hand from two URDF files, or from one URDF or MJCF file, driven through a cycle of four phases in N environments.
+//! An arm and a hand from two URDF files, or from one URDF or MJCF file, that repeat a cycle of four phases in N
+//! environments.
 //!
 //! ```text
 //! cargo run --release --example create_robot -- --headless --num-envs 4 --steps 4000
@@ -22,14 +23,14 @@ struct Args {
     launcher: Launcher,
     #[command(flatten)]
     robot: ArmWithHand,
-    /// Close the hand by its upper limits and open it by the lower ones, for hands that bend that way
+    /// Close the hand at its upper joint limits and open it at the lower ones, for hands that bend that way
     #[arg(long, alias = "swap_hand")]
     swap_hand: bool,
 }
 
 /// Steps of one phase.
 const PHASE: u64 = 1000;
-/// Environment steps between looks at Ctrl+C and the progress bar: a tenth of a second or so.
+/// Environment steps between two checks of Ctrl+C and the progress bar: about a tenth of a second.
 const BLOCK: u64 = 4096;
 
 fn main() -> ExitCode {
@@ -109,7 +110,7 @@ fn run(args: &Args) -> launcher::Result {
     Ok(())
 }
 
-/// One quarter of the cycle: which joints go where.
+/// One quarter of the cycle: joints and their targets.
 struct Phase {
     name: &'static str,
     message: &'static str,
@@ -120,7 +121,7 @@ struct Phase {
 fn phases(sim: &SimulationManager, robot: RobotId, swap_hand: bool) -> launcher::Result<Vec<Phase>> {
     let view = sim.robot(robot);
     let (arm, hand) = (view.joint_ids("arm")?, view.joint_ids("hand")?);
-    // The tutorial's positions are for six joints; a longer arm keeps its others at zero.
+    // The tutorial gives positions of six joints; the other joints of a longer arm stay at zero.
     let arm_target =
         |first: &[f64]| arm.iter().enumerate().map(|(i, _)| first.get(i).copied().unwrap_or(0.0)).collect();
     let limits = view.qpos_limits();

@@ -1,9 +1,9 @@
 //! A camera that looks at an arm, a hand and a falling cube: color, depth, mask and normals of N environments.
 //!
 //! ```text
-//! cargo run --release --example create_sensor -- --headless --num-envs 4 --steps 2004 --out pictures
-//! cargo run --release --example create_sensor -- --headless --steps 1 --attach-sensor --out pictures
-//! cargo run --release --example create_sensor -- --headless --steps 1 --renderer rt --out pictures
+//! cargo run --release --example create_sensor -- --headless --num-envs 4 --steps 2004 --out images
+//! cargo run --release --example create_sensor -- --headless --steps 1 --attach-sensor --out images
+//! cargo run --release --example create_sensor -- --headless --steps 1 --renderer rt --out images
 //! ```
 
 mod launcher;
@@ -24,7 +24,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Moves an arm between two poses and takes pictures of it.
+/// Moves an arm between two poses and records images of it.
 #[derive(Debug, Parser)]
 #[command(name = "create_sensor")]
 struct Args {
@@ -32,22 +32,22 @@ struct Args {
     launcher: Launcher,
     #[command(flatten)]
     robot: ArmWithHand,
-    /// Hang the camera on a link of the robot instead of placing it above the cube
+    /// Attach the camera to a link of the robot instead of placing it above the cube
     #[arg(long, alias = "attach_sensor")]
     attach_sensor: bool,
-    /// The link that the camera hangs on; the tip of the arm by default
+    /// Parent link of the camera; the tip of the arm by default
     #[arg(long, alias = "attach_link", requires = "attach_sensor")]
     attach_link: Option<String>,
-    /// Pixels per row
+    /// Width of the images, in pixels
     #[arg(long, default_value_t = 640)]
     width: usize,
-    /// Rows
+    /// Height of the images, in pixels
     #[arg(long, default_value_t = 480)]
     height: usize,
-    /// Unit with a color of its own in the mask's image: every link, or every robot and object
+    /// Segmentation level of the mask image: every link, or every robot and object
     #[arg(long, value_enum, default_value_t = MaskLevel::Link)]
     mask: MaskLevel,
-    /// Write images also when they are shown in a window; without a window they are always written
+    /// Write images even if a window shows them; without a window they are always written
     #[arg(long)]
     save: bool,
     /// Also write depth, mask and normals as .npy, shape (N, H, W, ...)
@@ -60,7 +60,7 @@ struct Args {
     paths: PathFlags,
 }
 
-/// Unit with an id of its own in the mask's image.
+/// Unit with its own id in the mask image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum MaskLevel {
     /// Each link
@@ -69,7 +69,7 @@ enum MaskLevel {
     Instance,
 }
 
-/// The tutorial sets targets at multiples of these steps.
+/// The tutorial sets its two targets at multiples of these steps.
 const POSITION_1_EVERY: u64 = 1001;
 const POSITION_2_EVERY: u64 = 2003;
 
@@ -116,7 +116,7 @@ fn run(args: &Args) -> launcher::Result {
     println!("Press Ctrl+C to stop");
     let arm = sim.robot(robot).joint_ids("arm")?;
     let position = |wrist: f64| {
-        // The tutorial's positions are for six joints; a longer arm keeps its others at zero.
+        // The tutorial gives positions of six joints; the other joints of a longer arm stay at zero.
         let mut target = vec![0.0; arm.len()];
         for (to, from) in target.iter_mut().zip([0.0, 0.5, -1.5, wrist, -0.5, 0.0]) {
             *to = from;
@@ -211,11 +211,11 @@ fn camera_cfg(args: &Args, sim: &SimulationManager, robot: RobotId) -> CameraCfg
         Extrinsics {
             parent: Some(args.attach_link.clone().unwrap_or_else(tip)),
             placement: Placement::Pose { pos: [0.09, 0.05, 0.04], rotation: tutorial_rotation() },
-            // Its numbers are used as OpenGL's axes by the tutorial's simulator where a camera has a parent.
+            // The tutorial's simulator reads these numbers in OpenGL's axes for a camera with a parent.
             convention: CameraConvention::OpenGl,
         }
     } else {
-        // Half a turn about y: the optical axis points down.
+        // Half a turn about y points the optical axis down.
         let rotation = from_wxyz([0.0, 0.0, 1.0, 0.0]);
         Extrinsics {
             parent: None,
@@ -235,21 +235,22 @@ fn camera_cfg(args: &Args, sim: &SimulationManager, robot: RobotId) -> CameraCfg
     }
 }
 
-/// Euler angles xyz (-35, 135, 0) degrees about fixed axes, read as SciPy does.
+/// Rotation of the Euler angles xyz (-35, 135, 0) degrees about fixed axes, in SciPy's convention.
 ///
-/// The tutorial writes the quaternion of these angles as x, y, z, w into a field that is read as w, x, y, z. Read that way
-/// the camera looks along (-0.58, -0.41, 0.71) of the link; in the order it was meant, along (-0.58, -0.57, 0.58). Both see
-/// the workspace in front of the hand; this is the second, which is what the angles say.
+/// The tutorial writes the quaternion of these angles as x, y, z, w into a field that is read as w, x, y, z. With the
+/// field's order the camera looks along (-0.58, -0.41, 0.71) of the link; with the intended order, along (-0.58, -0.57,
+/// 0.58). Both directions show the workspace in front of the hand. This function returns the intended one, which
+/// matches the angles.
 fn tutorial_rotation() -> UnitQuaternion<f64> {
     from_xyz_rpy([0.0; 3], [(-35f64).to_radians(), 135f64.to_radians(), 0.0]).rotation
 }
 
-/// Images that were taken, where they go, and how long they took.
+/// Recorded images, their destination and their rendering times.
 struct Album {
-    /// Folder of the files; `None` where images are only shown.
+    /// Folder of the files; `None` if images are only shown.
     out: Option<PathBuf>,
     raw: bool,
-    /// Turns mask ids of links into those of instances, where `--mask instance` asks for it.
+    /// Maps link ids of the mask to instance ids, for `--mask instance`.
     instances: Option<Segmentation>,
     window: Option<SensorWindow>,
     end: End,
@@ -259,9 +260,10 @@ struct Album {
 }
 
 impl Album {
-    /// Draws what the camera sees now, shows it and writes it to files. False if the user ended the example meanwhile.
+    /// Renders the current camera image, shows it and writes it to files. Returns false if the user ended the example
+    /// meanwhile.
     fn add(&mut self, camera: &Camera, step: u64) -> launcher::Result<bool> {
-        // Two targets at step 0 are one image.
+        // Two targets at step 0 share one image.
         if self.files.iter().any(|f| f["step"] == step) {
             return Ok(true);
         }

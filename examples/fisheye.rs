@@ -1,9 +1,9 @@
-//! One scene through many lenses: pinholes with distortion, fisheyes, a panorama, or the twin of a real, calibrated camera.
+//! One scene through many lenses: pinholes with distortion, fisheyes, a panorama, or the calibration of a real camera.
 //!
 //! ```text
-//! cargo run --release --example fisheye -- --headless --out pictures
-//! cargo run --release --example fisheye -- --headless --lens panorama --width 1024 --height 512 --out pictures
-//! cargo run --release --example fisheye -- --headless --camera-info ost.yaml --renderer rt --out pictures
+//! cargo run --release --example fisheye -- --headless --out images
+//! cargo run --release --example fisheye -- --headless --lens panorama --width 1024 --height 512 --out images
+//! cargo run --release --example fisheye -- --headless --camera-info ost.yaml --renderer rt --out images
 //! ```
 
 mod launcher;
@@ -23,29 +23,29 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Draws an arm, a hand and a few objects through lenses.
+/// Renders an arm, a hand and a few objects through lenses.
 #[derive(Debug, Parser)]
 #[command(name = "fisheye")]
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Draw through this lens only; may be given several times [default: all of them]
+    /// Render through this lens only; may be given several times [default: all of them]
     #[arg(long = "lens", value_name = "NAME", conflicts_with = "camera_info")]
     lenses: Vec<String>,
-    /// Draw through the lens of a ROS camera_info file, with its size and intrinsics
+    /// Render through the lens of a ROS camera_info file, with its size and intrinsics
     #[arg(long, alias = "camera_info", value_name = "FILE", conflicts_with_all = ["width", "height"])]
     camera_info: Option<PathBuf>,
-    /// Pixels per row
+    /// Width of the images, in pixels
     #[arg(long, default_value_t = 320)]
     width: usize,
-    /// Rows
+    /// Height of the images, in pixels
     #[arg(long, default_value_t = 240)]
     height: usize,
     #[command(flatten)]
     paths: PathFlags,
 }
 
-/// Where the cameras are, and what they look at \[m\].
+/// Position and target of the cameras \[m\].
 const EYE: [f64; 3] = [0.75, -0.55, 0.75];
 const TARGET: [f64; 3] = [0.25, 0.0, 0.45];
 
@@ -55,7 +55,7 @@ fn main() -> ExitCode {
 
 fn run(args: &Args) -> launcher::Result {
     let renderer = match args.launcher.renderer {
-        // The rasterizer draws straight lines.
+        // The rasterizer supports only lenses that keep straight lines straight.
         Renderer::Auto => Renderer::FastRt,
         other => other,
     };
@@ -80,7 +80,7 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    // Pictures are what it is for: it ends with them, unless somebody watches.
+    // Without a viewer, the images are the only output, and few steps are enough.
     let mut launcher = args.launcher.clone();
     launcher.steps = launcher.steps.or((launcher.headless && launcher.serve_address().is_none()).then_some(100));
     let progress = Progress::new(&launcher, 100);
@@ -115,7 +115,7 @@ fn run(args: &Args) -> launcher::Result {
     }))
 }
 
-/// Balls all around, so that there is something to see everywhere.
+/// Balls all around the camera, so that every direction shows objects.
 fn add_objects(sim: &mut SimulationManager) -> launcher::Result {
     for k in 0..12 {
         let (angle, radius) = (f64::from(k) * std::f64::consts::TAU / 12.0, 0.12);
@@ -133,7 +133,7 @@ fn add_objects(sim: &mut SimulationManager) -> launcher::Result {
     Ok(())
 }
 
-/// The cameras to draw with, and their names.
+/// The cameras to render with, and their names.
 fn views(args: &Args) -> launcher::Result<Vec<(String, CameraCfg)>> {
     let placement = Placement::LookAt { eye: EYE, target: TARGET, up: [0.0, 0.0, 1.0] };
     let base = CameraCfg {
@@ -162,12 +162,12 @@ fn views(args: &Args) -> launcher::Result<Vec<(String, CameraCfg)>> {
     examples().into_iter().filter(wanted).map(of).collect()
 }
 
-/// Whether a name or an alias means a lens of this kind.
+/// True if a name or an alias denotes a lens of this kind.
 fn is_called(name: &str, lens: &Lens) -> bool {
     Lens::from_name(name).is_ok_and(|known| known.name() == lens.name())
 }
 
-/// A lens of each kind, with numbers of real ones.
+/// One lens of each kind, with realistic parameters.
 fn examples() -> Vec<Lens> {
     vec![
         Lens::default(),
@@ -182,7 +182,8 @@ fn examples() -> Vec<Lens> {
     ]
 }
 
-/// Intrinsics with which the image circle of a lens fits into the picture; 75 degrees from top to bottom without one.
+/// Intrinsics that fit the image circle of a lens into the image; a vertical field of view of 75 degrees for lenses
+/// without an image circle.
 fn fitting(lens: &Lens, width: usize, height: usize) -> launcher::Result<Intrinsics> {
     let Domain { radius, .. } = lens.domain()?;
     let (w, h) = (width as f64, height as f64);
@@ -196,7 +197,7 @@ fn fitting(lens: &Lens, width: usize, height: usize) -> launcher::Result<Intrins
     })
 }
 
-/// The report of a lens as a line of text.
+/// One line of text about the report of a lens.
 fn line(report: &Value) -> String {
     let number = |name: &str| report[name].as_f64().unwrap_or(f64::NAN);
     let files: Vec<&str> = report["files"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
@@ -216,7 +217,8 @@ fn line(report: &Value) -> String {
     )
 }
 
-/// Writes what a camera sees, and its calibration where ROS has a model for it; what there is to say about it.
+/// Writes the images of a camera, and its calibration if ROS has a distortion model for the lens. Returns the color
+/// image and its report.
 fn show(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(image::RgbImage, Value)> {
     let start = Instant::now();
     let (height, width) = camera.image_shape();
@@ -254,7 +256,7 @@ fn show(camera: &Camera, name: &str, out: &Path) -> launcher::Result<(image::Rgb
     Ok((picture, report))
 }
 
-/// How far the points are from the pixels that they were made of, seen again through the lens \[pixels\].
+/// The largest reprojection error of the point map through the lens \[pixels\].
 fn round_trip(camera: &Camera) -> launcher::Result<f64> {
     let (map, optics) = (camera.point_map(0, PointFrame::Camera)?, camera.optics(0)?);
     let mut worst = 0.0f64;

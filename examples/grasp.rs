@@ -1,19 +1,22 @@
-//! An arm finds a cube, closes its hand on it, lifts it, holds it and puts it down on a shelf, in 16 environments with
-//! cubes of other masses at other places. Nothing but contact friction holds the cube; nothing is written into the state
-//! after the start. Every way is planned with inverse kinematics and played through the drives.
+//! An arm grasps a cube, lifts it, holds it and puts it down on a shelf, in 16 environments with cubes of random masses
+//! and places.
+//!
+//! Only contact friction holds the cube, and nothing is written into the state after the start. Every motion is planned
+//! with inverse kinematics and played through the drives.
 //!
 //! ```text
-//! cargo run --release --example grasp -- --headless --out pictures
+//! cargo run --release --example grasp -- --headless --out images
 //! cargo run --release --example grasp -- --headless --friction 0.02
 //! ```
 //!
-//! The exit code is 0 where at least 15 of 16 environments succeed, 1 where fewer do (the second command, whose cubes
-//! slip), 2 where something is wrong.
+//! The exit code is 0 if at least 15 of 16 environments succeed. It is 1 for fewer, as with the second command, whose
+//! cubes slip, and 2 for an error.
 //!
-//! The second command shows that it is friction that holds the cubes: two fingers push with 9.5 N each, and the thumb against
-//! them with their sum. Both sides together rub with at most 2 x 19 N x 0.02 = 0.76 N, and the lightest cube, of 0.1 kg,
-//! weighs 0.98 N. The heaviest, of 0.4 kg, needs 3.92 N / 38 N = 0.10. Hands go where they do in the first command up to the
-//! lift, which the report says; where cubes are left decides whether there is a way on from there.
+//! The second command shows that friction holds the cubes. Two fingers push with 9.5 N each, and the thumb pushes
+//! against them with the sum. Both sides together hold at most 2 x 19 N x 0.02 = 0.76 N by friction; the lightest cube,
+//! of 0.1 kg, weighs 0.98 N. The heaviest, of 0.4 kg, needs a friction coefficient of 3.92 N / 38 N = 0.10. Up to the
+//! lift, the hands follow the same paths as in the first command, as the report shows. After the lift, the position of
+//! the cube decides whether a path exists.
 
 mod launcher;
 
@@ -30,52 +33,52 @@ use serde_json::json;
 use std::f64::consts::FRAC_PI_2;
 use std::process::ExitCode;
 
-/// Grasps cubes, lifts them by 0.2 m, holds them for 2 s, puts them on a shelf, and counts.
+/// Grasps cubes, lifts them by 0.2 m, holds them for 2 s, puts them on a shelf, and counts the successes.
 #[derive(Debug, Parser)]
 #[command(name = "grasp")]
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Sliding friction of hand and cube; of cube and furniture it stays 1
+    /// Sliding friction between hand and cube; between cube and furniture it stays 1
     #[arg(long, default_value_t = 1.0)]
     friction: f64,
 }
 
 /// Edge of the cube \[m\].
 const EDGE: f64 = 0.06;
-/// Masses are drawn from here \[kg\].
+/// Range of the random masses \[kg\].
 const MASSES: [f64; 2] = [0.1, 0.4];
-/// Where the cube is at the start: middle of the table's top, and how far from it at most, along x and y \[m\].
+/// Start position of the cube: middle of the tabletop, and largest offset from it along x and y \[m\].
 const TABLE: [f64; 3] = [0.6, -0.15, 0.06];
 const SCATTER: f64 = 0.05;
-/// The cube is turned by at most this \[rad\].
+/// Largest start rotation of the cube \[rad\].
 const TURN: f64 = 0.6;
-/// Middle of the shelf's top \[m\], which is turned to the arm.
+/// Middle of the shelf's top \[m\]; the shelf faces the arm.
 const SHELF: [f64; 3] = [0.42, 0.42, 0.15];
 const SHELF_SIDE: f64 = 0.3;
 
-/// How far the cube has to rise \[m\]; the hand goes a little further, because the cube may slip.
+/// Required lift of the cube \[m\]. The hand moves slightly further, because the cube may slip.
 const LIFT: f64 = 0.2;
 const LIFT_COMMAND: f64 = 0.22;
-/// For how long it has to stay up there \[s\].
+/// Required holding time \[s\].
 const HOLD: f64 = 2.0;
-/// A cube stands on the shelf when its middle is as high as it should be, this much more or less \[m\], ...
+/// Tolerance of the cube's height when it stands on the shelf \[m\].
 const AT_REST_HEIGHT: f64 = 3e-3;
-/// ... and it moves no faster than this \[m/s, rad/s\].
+/// Speed limit of a cube at rest \[m/s, rad/s\].
 const AT_REST_SPEED: f64 = 0.01;
-/// The hand has let go when the cube's middle is farther from the palm's frame than this \[m\]: it is 0.114 away in the hand,
-/// and 0.22 once the hand has risen from it.
+/// Distance of the cube's middle from the palm's frame above which the hand has released the cube \[m\]. It is 0.114 in
+/// the hand, and 0.22 once the hand has risen from the cube.
 const LET_GO: f64 = 0.17;
 
-/// The middle of the cube in the hand, ahead of the palm's frame, to the side of the thumb, below \[m\]. The fingers that
-/// close are 0.01 and 0.03 to the side, the thumb 0.02; the table is 5 mm below their tips.
+/// Middle of the grasped cube relative to the palm's frame \[m\]: forward, toward the thumb's side, down. The closing
+/// fingers are 0.01 and 0.03 to the side, the thumb 0.02; the table is 5 mm below their tips.
 const GRIP: [f64; 3] = [0.0707, -0.02, -0.087];
-/// Fingers close until they meet the cube, with this effort each \[N m\]: 9.5 N at the tip, 0.105 m of joint and follower
-/// away. The thumb holds its place against both with up to 2 N m.
+/// Effort limit of each finger \[N m\]. The fingers close until they meet the cube, with 9.5 N at the tip, which is
+/// 0.105 m of joint and follower away. The thumb holds its position against both with up to 2 N m.
 const FINGER_EFFORT: f64 = 1.0;
-/// Hand open, thumb up.
+/// Open hand, thumb up.
 const OPEN: [(&str, f64); 3] = [("LEFT_HAND_THUMB1", 0.0), ("LEFT_HAND_INDEX", -0.35), ("LEFT_HAND_MIDDLE", -0.35)];
-/// The thumb at the cube, the fingers as far as they get.
+/// Closed hand: the thumb at the cube, the fingers closing until they are blocked.
 const CLOSED: [(&str, f64); 3] = [("LEFT_HAND_THUMB1", -0.18), ("LEFT_HAND_INDEX", -1.2), ("LEFT_HAND_MIDDLE", -1.2)];
 
 fn main() -> ExitCode {
@@ -136,7 +139,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     })?;
     album.add(motion.sim)?;
     progress.say("To the shelf...");
-    // The cube lies in the hand a little otherwise than planned: the plan goes on from where it is.
+    // The cube has shifted in the hand, so the plan continues from its measured pose.
     let lifted = above(&grips, LIFT_COMMAND);
     let from_cube = |(cube, grip): (&Pose, &Pose)| shelf_place() * upright(cube).inv_mul(grip);
     let down: Vec<Pose> = places(motion.sim).iter().zip(&lifted).map(from_cube).collect();
@@ -193,7 +196,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     trial::conclude(&args.launcher, &mut sim, count)
 }
 
-/// How to hold a cube: from that of its four sides that looks most to the arm.
+/// Grip frame of a cube, on the side face that points most toward the arm.
 fn grip_of(cube: &Pose) -> Pose {
     let away = cube.translation.y.atan2(cube.translation.x);
     let yaw = upright(cube).rotation.euler_angles().2;
@@ -201,7 +204,7 @@ fn grip_of(cube: &Pose) -> Pose {
     from_xyz_rpy(cube.translation.vector.into(), [0.0, 0.0, yaw + quarter])
 }
 
-/// The pose without what tilts it.
+/// The pose with its tilt removed; only the yaw remains.
 fn upright(pose: &Pose) -> Pose {
     let ahead = pose.rotation * Vector3::x();
     from_xyz_rpy(pose.translation.vector.into(), [0.0, 0.0, ahead.y.atan2(ahead.x)])
@@ -211,19 +214,19 @@ fn shelf_pose() -> Pose {
     from_xyz_rpy(SHELF, [0.0, 0.0, SHELF[1].atan2(SHELF[0])])
 }
 
-/// The cube on the shelf, a hair above it.
+/// Pose of the cube on the shelf, 1 mm above it.
 fn shelf_place() -> Pose {
     shelf_pose() * Pose::translation(0.0, 0.0, EDGE / 2.0 + 0.001)
 }
 
-/// The cube, a table and a shelf of boards.
+/// Adds the cube, a table and a shelf of boards.
 fn add_things(sim: &mut SimulationManager) -> launcher::Result<ObjectId> {
     let mut board = |uid: &str, size: [f64; 3], pose: Pose| {
         sim.add_rigid_object(RigidObjectCfg {
             uid: uid.into(),
             shape: ObjectShape::Box { size },
             body_type: BodyType::Static,
-            // MuJoCo takes the larger of two surfaces.
+            // MuJoCo uses the larger friction of the two surfaces.
             friction: Some(SimulationManagerCfg::default().friction),
             init_pose: pose,
             rgba: [0.72, 0.58, 0.42, 1.0],
@@ -250,7 +253,7 @@ fn add_things(sim: &mut SimulationManager) -> launcher::Result<ObjectId> {
     })?)
 }
 
-/// Puts each cube elsewhere on its table; where they are then.
+/// Moves each cube to a random place on its table. Returns the poses.
 fn scatter(sim: &mut SimulationManager, cube: ObjectId) -> launcher::Result<Vec<Pose>> {
     let place = |[x, y, turn]: [f64; 3]| {
         let place = [TABLE[0] + SCATTER * x, TABLE[1] + SCATTER * y, TABLE[2] + EDGE / 2.0];

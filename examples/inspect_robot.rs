@@ -1,9 +1,4 @@
-//! What a robot is, before MuJoCo sees it: tree, joints, masses, dynamics, and everything odd in its files.
-//!
-//! ```text
-//! cargo run --release --example inspect_robot -- sr5/SR5.urdf revo1_left/revo1_left.urdf --qpos JOINT2=0.5
-//! cargo run --release --example inspect_robot -- quadruped/quadruped.xml --floating-base
-//! ```
+//! A report on a robot before MuJoCo loads it: tree, joints, masses, dynamics, and every diagnostic of its files.
 
 mod launcher;
 
@@ -18,11 +13,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Prints tree, joints, masses, dynamics and warnings of a robot, as its files describe it, with mass properties that they lack from the shapes.
+/// Prints tree, joints, masses, dynamics and warnings of a robot as its files describe it; missing mass properties come
+/// from the shapes.
 #[derive(Debug, Parser)]
 #[command(name = "inspect_robot", after_help = HELP)]
 struct Args {
-    /// URDF files, each further one hangs from the tip of the one before; or one MJCF file (.xml)
+    /// URDF files, each attached to the tip of the one before; or one MJCF file (.xml)
     #[arg(required = true, value_name = "FILE.urdf|FILE.xml")]
     files: Vec<PathBuf>,
     /// Let the root move freely: six more rows of the dynamics, ahead of the joints
@@ -31,19 +27,19 @@ struct Args {
     /// Folder of a package of package:// addresses; may be repeated
     #[arg(long, value_name = "NAME=DIR", value_parser = package)]
     package: Vec<(String, PathBuf)>,
-    /// Folder in which meshes and packages are searched that are not found from the URDF, as Isaac Gym's asset root
+    /// Folder for meshes and packages that are not found relative to the URDF, as Isaac Gym's asset root
     #[arg(long, value_name = "DIR", value_parser = folder)]
     asset_root: Option<PathBuf>,
-    /// Refuse URDF files with departures from the format that are otherwise warnings
+    /// Refuse URDF files that deviate from the format; otherwise deviations are warnings
     #[arg(long)]
     strict: bool,
-    /// Joint positions [rad or m], where not given 0 or an MJCF file's own; mimic joints follow their driver
+    /// Joint positions [rad or m], by default 0 or the MJCF file's own; mimic joints follow their driver
     #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', value_parser = position)]
     qpos: Vec<(String, f64)>,
     /// Write the report to a file as JSON; `-` writes JSON to the terminal instead of the tables
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Folder for a picture of the robot, robot.png
+    /// Folder for an image of the robot, robot.png
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -73,9 +69,9 @@ fn main() -> ExitCode {
     ExitCode::from(run(std::env::args_os(), &mut std::io::stdout().lock(), &mut std::io::stderr().lock()))
 }
 
-/// The program with its arguments, what it prints, and its exit code.
+/// Runs the program with its arguments and output streams; returns the exit code.
 pub(crate) fn run(args: impl IntoIterator<Item = OsString>, out: &mut dyn Write, err: &mut dyn Write) -> u8 {
-    // A closed pipe, as behind `| head`, is no error of ours: what cannot be written is left out.
+    // Write errors are ignored: a closed pipe, as behind `| head`, is not an error of the program.
     let args = match Args::try_parse_from(args) {
         Ok(args) => args,
         Err(error) => {
@@ -112,7 +108,7 @@ fn print(report: &Report, json: Option<&Path>, out: &mut dyn Write) -> Result<()
     Ok(())
 }
 
-/// Draws the robot, and shows it as it moves, where flags ask for it.
+/// Renders the robot, and shows it in motion, if the flags request it.
 fn show(args: &Args, cfg: InspectCfg) -> launcher::Result {
     if args.out.is_none() && !args.live.wants_motion() {
         return Ok(());
@@ -168,7 +164,7 @@ fn is_mjcf(file: &Path) -> bool {
     file.extension().is_some_and(|extension| extension == "xml")
 }
 
-/// A file of the user, else an asset, else the path as it is: the loader says that there is none.
+/// The path of an existing file, otherwise an asset, otherwise the path unchanged: the loader reports the missing file.
 fn user_or_asset(file: &Path) -> PathBuf {
     if file.exists() { file.to_path_buf() } else { assets::path(file).unwrap_or_else(|_| file.to_path_buf()) }
 }

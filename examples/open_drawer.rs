@@ -1,14 +1,16 @@
-//! An arm finds a cabinet, lays its fingers behind the handle of the drawer and pulls it open, in 16 environments with
-//! cabinets at other places. The drawer is passive: damping and dry friction are all that its slide has, and fingers are
-//! all that moves it. Cabinets stand free on the floor; nothing is written into the state after the start.
+//! An arm hooks its fingers behind the handle of a drawer and pulls it open, in 16 environments with randomly placed
+//! cabinets.
+//!
+//! The drawer is passive: its slide has only damping and dry friction, and only the fingers move it. Cabinets stand
+//! free on the floor; nothing is written into the state after the start.
 //!
 //! ```text
-//! cargo run --release --example open_drawer -- --headless --out pictures
+//! cargo run --release --example open_drawer -- --headless --out images
 //! cargo run --release --example open_drawer -- --headless --slide-friction 500
 //! ```
 //!
-//! The exit code is 0 where at least 15 of 16 drawers are open, 1 where fewer are (the second command, whose drawers are
-//! stuck), 2 where something is wrong.
+//! The exit code is 0 if at least 15 of 16 drawers are open. It is 1 for fewer, as with the second command, whose
+//! drawers are stuck, and 2 for an error.
 
 mod launcher;
 
@@ -26,7 +28,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Opens drawers by 0.15 m and counts.
+/// Opens drawers by 0.15 m and counts the successes.
 #[derive(Debug, Parser)]
 #[command(name = "open_drawer")]
 struct Args {
@@ -37,27 +39,27 @@ struct Args {
     slide_friction: f64,
 }
 
-/// Where the cabinet stands, its front towards the arm: middle of where it may be, and how far from there at most \[m\].
+/// Position of the cabinet, its front facing the arm: middle of the random range, and largest offset from it \[m\].
 const PLACE: [f64; 2] = [0.98, 0.0];
 const SCATTER: [f64; 2] = [0.03, 0.08];
-/// It is turned by at most this \[rad\].
+/// Largest rotation of the cabinet \[rad\].
 const TURN: f64 = 0.2;
-/// The handle in the frame of the drawer \[m\].
+/// Handle in the frame of the drawer \[m\].
 const HANDLE: [f64; 3] = [0.073, 0.0, 0.0];
 
-/// How far drawers have to be open in the end \[m\]; the hand goes further, because the handle has some play in it.
+/// Required opening of the drawers \[m\]. The hand moves further, because the handle has some play in it.
 const OPEN_BY: f64 = 0.15;
 const PULL: f64 = 0.2;
-/// They are at rest then \[m/s\], ...
+/// Speed limit of a drawer at rest \[m/s\].
 const AT_REST: f64 = 0.01;
-/// ... and the cabinet is where it was \[m\].
+/// Largest accepted displacement of the cabinet \[m\].
 const CABINET_STAYS: f64 = 0.02;
 
-/// The handle in the hand, ahead of the palm's frame and below \[m\]: bent fingers are 12 mm behind it.
+/// Handle in the hand, forward of the palm's frame and below it \[m\]: the bent fingers are 12 mm behind the handle.
 const GRIP: [f64; 3] = [0.09, 0.0, -0.08];
-/// The largest effort of fingers \[N m\]: 19 N at each tip.
+/// Effort limit of the fingers \[N m\]: 19 N at each tip.
 const FINGER_EFFORT: f64 = 2.0;
-/// Fingers bent, so that they fit between handle and drawer.
+/// Bent fingers that fit between handle and drawer.
 const BENT: [(&str, f64); 5] = [
     ("LEFT_HAND_THUMB1", 0.0),
     ("LEFT_HAND_INDEX", -0.6),
@@ -114,7 +116,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let tip = Tip::of_part("arm").at(grip::PALM).with_tcp(grip::palm_from_grip(GRIP));
     let handles: Vec<Pose> = trial::poses(&sim.articulation(cabinet).link_pose("drawer")?)
         .iter()
-        // The hand looks into the drawer, which looks at the hand.
+        // The grip frame faces the drawer, so it is turned by half a turn from the frame of the handle.
         .map(|drawer| drawer * from_xyz_rpy(HANDLE, [0.0, 0.0, PI]))
         .collect();
     let above = |poses: &[Pose], height: f64| trial::moved(poses, |_| [0.0, 0.0, height]);
@@ -172,7 +174,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     trial::conclude(&args.launcher, &mut sim, count)
 }
 
-/// Puts each cabinet elsewhere on the floor; where they are then.
+/// Moves each cabinet to a random place on the floor. Returns the poses.
 fn scatter(sim: &mut SimulationManager, cabinet: ArticulationId) -> launcher::Result<Vec<Pose>> {
     let place = |[x, y, turn]: [f64; 3]| {
         let place = [PLACE[0] + SCATTER[0] * x, PLACE[1] + SCATTER[1] * y, 0.0];

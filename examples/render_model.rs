@@ -1,7 +1,7 @@
-//! One image of any MJCF or URDF, in four channels.
+//! One image of any MJCF or URDF file, in four channels.
 //!
 //! ```text
-//! cargo run --release --example render_model -- /usr/share/mujoco/model/humanoid.xml --out pictures
+//! cargo run --release --example render_model -- /usr/share/mujoco/model/humanoid.xml --out images
 //! ```
 
 mod launcher;
@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Draws color, depth, mask and normals of a model at its initial state.
+/// Renders color, depth, mask and normals of a model at its initial state.
 #[derive(Debug, Parser)]
 #[command(name = "render_model")]
 struct Args {
@@ -33,31 +33,31 @@ struct Args {
     /// Positions of all joints in MuJoCo's order (MJCF) or in the order of the URDF, separated by commas
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
     qpos: Option<Vec<f64>>,
-    /// A camera of the file
+    /// Name of a camera in the file
     #[arg(long, conflicts_with_all = ["eye", "target"])]
     camera: Option<String>,
-    /// Where the camera is, x,y,z in metres
+    /// Position of the camera, x,y,z in meters
     #[arg(long, requires = "target", value_parser = point, allow_hyphen_values = true)]
     eye: Option<Point>,
-    /// Where it looks, x,y,z in metres
+    /// Target of the camera, x,y,z in meters
     #[arg(long, requires = "eye", value_parser = point, allow_hyphen_values = true)]
     target: Option<Point>,
-    /// Vertical field of view in degrees; 45 where neither the flag nor a camera of the file says otherwise
+    /// Vertical field of view in degrees; by default that of the file's camera, otherwise 45
     #[arg(long)]
     fovy: Option<f64>,
-    /// Pixels per row
+    /// Width of the image, in pixels
     #[arg(long, default_value_t = 640)]
     width: usize,
-    /// Rows
+    /// Height of the image, in pixels
     #[arg(long, default_value_t = 480)]
     height: usize,
-    /// Whether lamps cast shadows
+    /// Shadows of the lights
     #[arg(long, value_enum, default_value_t = Switch::On)]
     shadows: Switch,
     /// Samples per pixel of the color: 1 or 4
     #[arg(long, default_value_t = 4)]
     msaa: u8,
-    /// How the image is drawn
+    /// Renderer of the image
     #[arg(long, value_enum, default_value_t = Renderer::Auto)]
     renderer: Renderer,
     #[command(flatten)]
@@ -65,19 +65,19 @@ struct Args {
     /// Rays for ambient occlusion, with --renderer hybrid
     #[arg(long, default_value_t = 0)]
     ao_rays: u16,
-    /// Give up after so many seconds, with an error; of path tracing only
+    /// Time limit of path tracing, after which the example ends with an error
     #[arg(long, value_name = "SECONDS")]
     time_limit: Option<f64>,
-    /// Geom groups that are drawn, as in MuJoCo's viewers
+    /// Rendered geom groups, as in MuJoCo's viewers
     #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2])]
     groups: Vec<u8>,
-    /// Threads that draw; every core by default
+    /// Rendering threads; every core by default
     #[arg(long)]
     threads: Option<usize>,
-    /// Draw again and again for so many seconds and report images per second
+    /// Render repeatedly for this many seconds and report images per second
     #[arg(long)]
     bench: Option<f64>,
-    /// Also draw the color with the rasterizer, and write both side by side: raster-and-rt.png, or whatever --renderer is
+    /// Also render the color with the rasterizer, and write both side by side: raster-and-rt.png, for any --renderer
     #[arg(long)]
     compare: bool,
     /// Folder for color.png, depth.png, mask.png, normal.png and meta.json
@@ -211,7 +211,7 @@ fn is_urdf(args: &Args) -> bool {
     args.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf"))
 }
 
-/// The model in a simulation.
+/// A simulation of the model.
 fn simulation(args: &Args) -> launcher::Result<SimulationManager> {
     let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() })?;
     let row = args.qpos.as_ref().map(|qpos| Array2::from_shape_vec((1, qpos.len()), qpos.clone())).transpose()?;
@@ -226,7 +226,7 @@ fn simulation(args: &Args) -> launcher::Result<SimulationManager> {
     Ok(sim)
 }
 
-/// A URDF goes through the whole pipeline, anything else is for MuJoCo to read.
+/// Loads the model for rendering. A URDF goes through the whole pipeline; MuJoCo reads any other file.
 fn load(args: &Args) -> launcher::Result<Still> {
     if !is_urdf(args) {
         return Ok(Still::of_mjcf(&args.file, args.qpos.as_deref())?);
@@ -239,7 +239,7 @@ fn load(args: &Args) -> launcher::Result<Still> {
     Ok(still)
 }
 
-/// The view, the pose of its optical frame, and its vertical field of view \[rad\].
+/// The render view, the pose of its optical frame, and its vertical field of view \[rad\].
 fn view(args: &Args, still: &Still) -> launcher::Result<(View, Pose, f64)> {
     let free = still.first_view([args.width, args.height]);
     let (pose, own_fovy) = match (&args.camera, args.eye, args.target) {

@@ -1,8 +1,8 @@
-//! Cameras that look at objects of several kinds: color, depth, normals, which object and which kind every pixel shows, and
-//! the points in space.
+//! Cameras that look at objects of several kinds: color, depth, normals, instance and class of every pixel, and the
+//! point cloud.
 //!
 //! ```text
-//! cargo run --release --example run_camera -- --headless --num-envs 2 --steps 200 --save --draw --out pictures
+//! cargo run --release --example run_camera -- --headless --num-envs 2 --steps 200 --save --draw --out images
 //! ```
 
 mod launcher;
@@ -21,7 +21,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Drops objects of random shapes and takes pictures of them.
+/// Drops objects of random shapes and records images of them.
 #[derive(Debug, Parser)]
 #[command(name = "run_camera", mut_arg("num_envs", |arg| arg.default_value("2")))]
 struct Args {
@@ -30,26 +30,26 @@ struct Args {
     /// Number of objects in each environment
     #[arg(long, default_value_t = 8)]
     objects: usize,
-    /// The environment whose camera is drawn and saved
+    /// The environment whose camera images are shown and saved
     #[arg(long, alias = "camera_id", default_value_t = 0)]
     camera_id: usize,
-    /// Show the points that the camera sees as balls, in the colours of objects, in a picture of all environments
+    /// Show the points that the camera sees as balls, in the colors of the objects, in an image of all environments
     #[arg(long)]
     draw: bool,
     /// Write every channel as PNG, depth and mask as .npy, the points as .ply
     #[arg(long)]
     save: bool,
-    /// Pixels per row
+    /// Width of the images, in pixels
     #[arg(long, default_value_t = 640)]
     width: usize,
-    /// Rows
+    /// Height of the images, in pixels
     #[arg(long, default_value_t = 480)]
     height: usize,
 }
 
-/// Steps from one picture to the next.
+/// Steps between two images.
 const PICTURE_EVERY: u64 = 50;
-/// Balls that `--draw` shows at most.
+/// Maximum number of balls that `--draw` shows.
 const MOST_BALLS: usize = 4000;
 
 fn main() -> ExitCode {
@@ -139,7 +139,7 @@ fn run(args: &Args) -> launcher::Result {
     }))
 }
 
-/// Objects of random shapes, sizes and colours, of 5 kg; the class says which shape.
+/// Objects of random shapes, sizes and colors, of 5 kg; the semantic class is the shape.
 fn add_objects(sim: &mut SimulationManager, args: &Args) -> launcher::Result<Vec<ObjectId>> {
     let mut random = Random::keyed(args.launcher.seed, 0, "objects");
     let mut objects = Vec::new();
@@ -164,14 +164,15 @@ fn add_objects(sim: &mut SimulationManager, args: &Args) -> launcher::Result<Vec
     Ok(objects)
 }
 
-/// Puts the objects above each other, at places and turned as each environment's random numbers say.
+/// Stacks the objects above each other, with a random offset and rotation in each environment.
 fn scatter(sim: &mut SimulationManager, objects: &[ObjectId], seed: u64) -> launcher::Result {
     let mut random: Vec<Random> = (0..sim.num_envs()).map(|env| Random::keyed(seed, env as u64, "scatter")).collect();
     for (k, &object) in objects.iter().enumerate() {
         let mut poses = Array2::zeros((sim.num_envs(), 7));
         for (env, random) in random.iter_mut().enumerate() {
             let place = [2.0 * random.uniform() - 1.0, 2.0 * random.uniform() - 1.0, 0.5 + 0.4 * k as f64];
-            // Four normal numbers are a rotation, each as likely; writing makes the quaternion one of length 1.
+            // Four independent normal numbers have a uniformly distributed direction, thus a uniform rotation; the
+            // write normalizes the quaternion.
             let rotation: [f64; 4] = std::array::from_fn(|_| random.normal());
             for (to, from) in poses.row_mut(env).iter_mut().zip(place.into_iter().chain(rotation)) {
                 *to = from;
@@ -194,7 +195,7 @@ fn camera_cfg(args: &Args) -> CameraCfg {
     }
 }
 
-/// Shapes of the channels, as the tutorial prints them.
+/// Shapes of the channels, in the tutorial's format.
 fn shapes(camera: &Camera, step: u64) -> launcher::Result<String> {
     Ok(format!(
         "step {step}: rgb {:?}, depth {:?}, normals {:?}, instances {:?}",
@@ -205,7 +206,7 @@ fn shapes(camera: &Camera, step: u64) -> launcher::Result<String> {
     ))
 }
 
-/// The class of each mask id, and a number for each class, in the order of the ids.
+/// The class of each mask id, and a number for each class in the order of the ids.
 fn classes(sim: &SimulationManager) -> (BTreeMap<i32, String>, BTreeMap<String, i32>) {
     let of_id = sim.scene().mask_ids().iter().map(|id| (id.id, id.class.clone())).collect();
     let mut numbers = BTreeMap::new();
@@ -256,7 +257,7 @@ fn save(
     Ok(files)
 }
 
-/// How many pixels show each class.
+/// Number of pixels of each class.
 fn pixels_by_class(
     sim: &SimulationManager,
     camera: SensorId<Camera>,
@@ -271,7 +272,7 @@ fn pixels_by_class(
     Ok(counts)
 }
 
-/// Points that the camera sees \[m\], in their colours.
+/// World positions of the visible points \[m\] with their RGB colors.
 fn colored_points(
     sim: &SimulationManager,
     camera: SensorId<Camera>,
@@ -287,7 +288,7 @@ fn colored_points(
         .collect())
 }
 
-/// Some of the points as balls, each in the colour that the mask picture gives to its object.
+/// A subset of the points as balls, each in the color of its object in the mask image.
 fn balls(camera: &Camera, env: usize) -> launcher::Result<Vec<(EnvId, Marker)>> {
     let (map, mask) = (camera.point_map(env, PointFrame::World)?, camera.mask()?);
     let mask = mask.index_axis(Axis(0), env);
@@ -301,7 +302,7 @@ fn balls(camera: &Camera, env: usize) -> launcher::Result<Vec<(EnvId, Marker)>> 
     Ok(markers.collect())
 }
 
-/// How far the points are from the pixels that they were made of, seen again \[pixels\].
+/// The largest reprojection error of the point map \[pixels\].
 fn round_trip(camera: &Camera, env: usize) -> launcher::Result<f64> {
     let (map, k) = (camera.point_map(env, PointFrame::World)?, camera.intrinsic_matrices());
     let pose: [f64; 7] = std::array::from_fn(|i| camera.pose_w(CameraConvention::Ros)[(env, i)]);

@@ -1,7 +1,7 @@
-//! Where the links of a quadruped are, seen from its base, and a frame of our own on a shank.
+//! Poses of a quadruped's links relative to its base, and of a user-defined frame on a shank.
 //!
 //! ```text
-//! cargo run --release --example run_frame_transformer -- --headless --steps 500 --out pictures
+//! cargo run --release --example run_frame_transformer -- --headless --steps 500 --out images
 //! ```
 
 mod launcher;
@@ -18,7 +18,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Follows the frames of a robot, one after the other.
+/// Shows the frames of a robot, one after the other.
 #[derive(Debug, Parser)]
 #[command(name = "run_frame_transformer")]
 struct Args {
@@ -29,17 +29,17 @@ struct Args {
     robot: PathBuf,
     #[command(flatten)]
     spawn: SpawnFlags,
-    /// The link of the source frame
+    /// Link of the source frame
     #[arg(long, default_value = "base")]
     source: String,
-    /// The links of the target frames, a pattern that matches whole names
+    /// Links of the target frames, a pattern that matches whole names
     #[arg(long, default_value = ".*")]
     targets: String,
 }
 
-/// Steps for which a frame is shown, as in the tutorial.
+/// Steps for which each frame is shown, as in the tutorial.
 const FRAME_EVERY: u64 = 50;
-/// Where the foot is on the shank \[m\]: the fixed joint of the URDF.
+/// Position of the foot on the shank \[m\]: the fixed joint of the URDF.
 const FOOT: [f64; 3] = [0.08795, 0.01305, -0.33797];
 
 fn main() -> ExitCode {
@@ -112,14 +112,14 @@ fn run(args: &Args) -> launcher::Result {
     }))
 }
 
-/// A robot with ANYmal's start and drives.
+/// A robot with ANYmal's start posture and drives.
 fn robot_cfg(args: &Args) -> launcher::Result<RobotCfg> {
     let urdf = UrdfCfg::single(launcher::user_or_asset(&args.robot)?);
     Ok(RobotCfg { uid: "robot".into(), urdf, ..assets::quadruped()? })
 }
 
-/// All links; the tutorial's frame on the left front shank, a quarter turn about z against its foot; and the foot itself, as
-/// the URDF has it, which must be where LF_FOOT is.
+/// All links, the tutorial's frame on the left front shank, and the foot as in the URDF. The tutorial's frame is a
+/// quarter turn about z from its foot. The foot frame must coincide with the link LF_FOOT.
 fn frames_cfg(args: &Args) -> FrameTransformerCfg {
     let quarter = from_xyz_rpy([0.0; 3], [0.0, 0.0, -FRAC_PI_2]);
     let foot = Pose::translation(FOOT[0], FOOT[1], FOOT[2]);
@@ -133,7 +133,7 @@ fn frames_cfg(args: &Args) -> FrameTransformerCfg {
     FrameTransformerCfg { debug_vis: true, ..FrameTransformerCfg::from(&args.source, targets) }
 }
 
-/// One frame of environment 0.
+/// The pose of one frame in environment 0, as text.
 fn line(sim: &SimulationManager, frames: SensorId<FrameTransformer>, target: usize) -> launcher::Result<String> {
     let (frames, time) = (sim.sensor(frames)?, sim.time().first().copied().unwrap_or(0.0));
     let (p, q) = (frames.target_pos_source(), frames.target_quat_source());
@@ -143,7 +143,7 @@ fn line(sim: &SimulationManager, frames: SensorId<FrameTransformer>, target: usi
     Ok(format!("t = {time:5.2} s: {name:<34} at ({p}) m, turned by ({q}), seen from the source"))
 }
 
-/// Every frame of environment 0.
+/// The poses of every frame in environment 0.
 fn table(sim: &SimulationManager, frames: SensorId<FrameTransformer>) -> launcher::Result<Vec<Value>> {
     let frames = sim.sensor(frames)?;
     let numbers =
@@ -162,7 +162,7 @@ fn table(sim: &SimulationManager, frames: SensorId<FrameTransformer>) -> launche
         .collect())
 }
 
-/// The largest distance, over environments, of a frame from the link LF_FOOT \[m\].
+/// The largest distance, over environments, between a frame and the link LF_FOOT \[m\].
 fn apart(sim: &SimulationManager, frames: SensorId<FrameTransformer>, name: &str) -> launcher::Result<f64> {
     let robot = sim.robot(sim.entities().robot_id("robot")?);
     let (foot, frames) = (robot.link_pose("LF_FOOT")?, sim.sensor(frames)?);

@@ -1,7 +1,7 @@
 //! A height scanner on balls that roll over rough terrain.
 //!
 //! ```text
-//! cargo run --release --example run_ray_caster -- --headless --num-envs 4 --steps 1000 --out pictures
+//! cargo run --release --example run_ray_caster -- --headless --num-envs 4 --steps 1000 --out images
 //! ```
 
 mod launcher;
@@ -25,40 +25,40 @@ use std::time::{Duration, Instant};
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Steps between resets with other places and velocities; 0 for none
+    /// Steps between resets with new places and velocities; 0 for none
     #[arg(long, alias = "reset_every", default_value_t = 250)]
     reset_every: u64,
-    /// Distance of neighbouring rays, in metres
+    /// Distance between neighboring rays, in meters
     #[arg(long, default_value_t = 0.1)]
     resolution: f64,
-    /// Distance of neighbouring points of the terrain, in metres
+    /// Distance between neighboring points of the terrain, in meters
     #[arg(long, default_value_t = 0.2)]
     cell: f64,
-    /// Height of the highest points of the terrain, in metres
+    /// Height of the highest points of the terrain, in meters
     #[arg(long, default_value_t = 0.12)]
     roughness: f64,
 }
 
 /// Side of the terrain \[m\].
 const SIDE: f64 = 8.0;
-/// Steps from one line to the next.
+/// Steps between two lines of output.
 const REPORT_EVERY: u64 = 50;
 
 fn main() -> ExitCode {
     launcher::run("run_ray_caster", || run(&Args::parse()))
 }
 
-/// The ball, what it lies on and what it measures.
+/// The ball, its terrain and its scanner.
 struct Scene {
     ball: ObjectId,
     terrain: TerrainId,
     scanner: SensorId<RayCaster>,
 }
 
-/// What was measured in the whole run.
+/// Statistics of the whole run.
 #[derive(Debug, Default)]
 struct Totals {
-    /// How long each step took without the scanner, and with it.
+    /// Durations of the steps without the scanner, and with it.
     stepping: [Vec<Duration>; 2],
     hits: u64,
     misses: u64,
@@ -84,7 +84,7 @@ fn run(args: &Args) -> launcher::Result {
     })?;
     let mut noise: Vec<Random> =
         (0..sim.num_envs()).map(|env| Random::keyed(args.launcher.seed, env as u64, "reset")).collect();
-    // The same steps without the scanner tell what it costs.
+    // The same steps without the scanner show its cost.
     throw(&mut sim, ball, &mut noise.clone())?;
     let mut totals = Totals::default();
     let bare_steps = args.launcher.steps.unwrap_or(250).min(250);
@@ -166,8 +166,8 @@ fn terrain_cfg(args: &Args) -> launcher::Result<TerrainCfg> {
         seed: args.launcher.seed,
     };
     let mut heights = rough.heights()?;
-    // Environments stand side by side: where their terrains meet, both have the lowest height. Otherwise the walls of the
-    // higher one show as a dark seam.
+    // Environments stand side by side, so both terrains get the lowest height along their common edge. Otherwise the
+    // wall of the higher terrain shows as a dark seam.
     for axis in [Axis(0), Axis(1)] {
         for edge in [0, heights.len_of(axis) - 1] {
             heights.index_axis_mut(axis, edge).fill(rough.range[0]);
@@ -176,7 +176,7 @@ fn terrain_cfg(args: &Args) -> launcher::Result<TerrainCfg> {
     Ok(TerrainCfg { heights, size: rough.size, ..Default::default() })
 }
 
-/// Isaac's: a square of 2 m around the ball, of which only the heading turns it.
+/// Isaac Lab's height scanner: a square of 2 m around the ball that turns with the heading only.
 fn scanner_cfg(args: &Args) -> RayCasterCfg {
     RayCasterCfg {
         parent: Some("ball".into()),
@@ -188,7 +188,7 @@ fn scanner_cfg(args: &Args) -> RayCasterCfg {
     }
 }
 
-/// Puts every ball somewhere above the middle, with a velocity along the ground.
+/// Puts every ball at a random place above the middle, with a random horizontal velocity.
 fn throw(sim: &mut SimulationManager, ball: ObjectId, noise: &mut [Random]) -> launcher::Result {
     sim.reset(None)?;
     let mut between = |env: usize, most: f64| most * (2.0 * noise[env].uniform() - 1.0);
@@ -206,7 +206,7 @@ fn throw(sim: &mut SimulationManager, ball: ObjectId, noise: &mut [Random]) -> l
 }
 
 impl Totals {
-    /// Holds every hit against the terrain's own height there.
+    /// Compares every hit with the height of the terrain at that place.
     fn count(&mut self, sim: &SimulationManager, scene: &Scene) -> launcher::Result {
         let (scanner, terrain) = (sim.sensor(scene.scanner)?, sim.entities().terrain(scene.terrain));
         for hit in scanner.hits().rows() {
@@ -215,7 +215,7 @@ impl Totals {
                 continue;
             }
             self.hits += 1;
-            // The terrain stands in the middle of its environment, not turned.
+            // The terrain stands in the middle of its environment, without rotation.
             if let Some(height) = terrain.height_at([hit[0], hit[1]]) {
                 self.worst = self.worst.max((height - hit[2]).abs());
             }
@@ -224,13 +224,13 @@ impl Totals {
     }
 }
 
-/// Half of the steps are faster \[ms\]: other programs on the machine do not count.
+/// The median duration \[ms\], which other programs on the machine disturb little.
 fn median_ms(mut times: Vec<Duration>) -> f64 {
     times.sort_unstable();
     times.get(times.len() / 2).map_or(0.0, Duration::as_secs_f64) * 1e3
 }
 
-/// Where the ball of environment 0 is and what it sees below itself.
+/// Position of the ball of environment 0, and the terrain heights below it.
 fn summary(sim: &SimulationManager, scene: &Scene) -> launcher::Result<(String, Value)> {
     let (scanner, pose) = (sim.sensor(scene.scanner)?, sim.rigid_object(scene.ball).pose());
     let of_first = scanner.hits().index_axis_move(Axis(0), 0);

@@ -1,7 +1,7 @@
-//! Cameras made of rays that look at rough terrain: depth, distance, normals and points, one exact ray through every pixel.
+//! Ray-caster cameras that look at rough terrain: depth, distance, normals and points, with one exact ray per pixel.
 //!
 //! ```text
-//! cargo run --release --example run_ray_caster_camera -- --headless --num-envs 2 --steps 200 --save --out pictures
+//! cargo run --release --example run_ray_caster_camera -- --headless --num-envs 2 --steps 200 --save --out images
 //! ```
 
 mod launcher;
@@ -18,29 +18,29 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Looks at rough terrain with a camera of rays in every environment.
+/// Looks at rough terrain with a ray-caster camera in every environment.
 #[derive(Debug, Parser)]
 #[command(name = "run_ray_caster_camera", mut_arg("num_envs", |arg| arg.default_value("2")))]
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// The environment whose camera is saved
+    /// The environment whose camera images are saved
     #[arg(long, alias = "camera_id", default_value_t = 0)]
     camera_id: usize,
     /// Write depth, distance and normals as PNG, depth as .npy, the points as .ply
     #[arg(long)]
     save: bool,
-    /// Pixels per row
+    /// Width of the images, in pixels
     #[arg(long, default_value_t = 640)]
     width: usize,
-    /// Rows
+    /// Height of the images, in pixels
     #[arg(long, default_value_t = 480)]
     height: usize,
 }
 
 /// Side of the terrain \[m\].
 const SIDE: f64 = 8.0;
-/// Time between pictures \[s\].
+/// Time between images \[s\].
 const PERIOD: f64 = 0.5;
 
 fn main() -> ExitCode {
@@ -96,7 +96,7 @@ fn run(args: &Args) -> launcher::Result {
     let points: Vec<[f32; 3]> =
         map.rows().into_iter().filter(|p| p[0].is_finite()).map(|p| [p[0], p[1], p[2]]).collect();
     let error = cloud::round_trip(&map, lens(of, args.camera_id), &pose(of, args.camera_id));
-    // The terrain stands in the middle of its environment, not turned.
+    // The terrain stands in the middle of its environment, without rotation.
     if points.is_empty() {
         return Err("the camera sees nothing of the terrain".into());
     }
@@ -104,7 +104,7 @@ fn run(args: &Args) -> launcher::Result {
         let height = sim.entities().terrain(terrain).height_at([f64::from(p[0]), f64::from(p[1])]);
         height.map_or(f64::INFINITY, |height| (height - f64::from(p[2])).abs())
     });
-    // On the rim, rounding puts a point beside the terrain.
+    // At the rim of the terrain, rounding can put a point just outside of it.
     let (beside, on): (Vec<f64>, Vec<f64>) = off.partition(|off| off.is_infinite());
     let worst = on.into_iter().fold(0.0, f64::max);
     println!("\n{} points; they lie on the terrain to {worst:.1e} m, {} beside it", points.len(), beside.len());
@@ -141,7 +141,7 @@ fn run(args: &Args) -> launcher::Result {
     }))
 }
 
-/// Isaac's lens (24 mm before 20.955 mm), which sees nothing but the terrain.
+/// Isaac Lab's default lens (focal length 24 mm, aperture 20.955 mm), with the terrain as the only target.
 fn camera_cfg(args: &Args) -> RayCasterCameraCfg {
     RayCasterCameraCfg {
         width: args.width,
@@ -158,12 +158,12 @@ fn lens(camera: &RayCasterCamera, env: usize) -> [f64; 4] {
     [k[(env, 0, 0)], k[(env, 1, 1)], k[(env, 0, 2)], k[(env, 1, 2)]]
 }
 
-/// Where the camera of one environment was.
+/// Pose of one environment's camera in the ROS convention.
 fn pose(camera: &RayCasterCamera, env: usize) -> [f64; 7] {
     std::array::from_fn(|i| camera.pose_w(CameraConvention::Ros)[(env, i)])
 }
 
-/// Low is dark.
+/// Gray level of a height: low is dark.
 fn grey(height: f32, [low, high]: [f32; 2]) -> [u8; 3] {
     [(55.0 + 200.0 * (height - low) / (high - low).max(1e-6)) as u8; 3]
 }

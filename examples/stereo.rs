@@ -1,8 +1,8 @@
-//! A pair of eyes that looks at an arm and things on the ground: left, right and disparity pictures, and a coloured point
-//! cloud that was computed of the disparity as one would with a real pair.
+//! A stereo camera that looks at an arm and objects on the ground: left, right and disparity images, and a colored
+//! point cloud. The point cloud is computed from the disparity, as with a real stereo camera.
 //!
 //! ```text
-//! cargo run --release --example stereo -- --headless --steps 100 --out pictures
+//! cargo run --release --example stereo -- --headless --steps 100 --out images
 //! ```
 
 mod launcher;
@@ -19,25 +19,25 @@ use nalgebra::Point3;
 use serde_json::json;
 use std::process::ExitCode;
 
-/// Looks at an arm and things on the ground with two eyes.
+/// Looks at an arm and objects on the ground with a stereo camera.
 #[derive(Debug, Parser)]
 #[command(name = "stereo")]
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// The environment whose pictures are written
+    /// The environment whose images are written
     #[arg(long, alias = "camera_id", default_value_t = 0)]
     camera_id: usize,
-    /// Pixels per row
+    /// Width of the images, in pixels
     #[arg(long, default_value_t = 640)]
     width: usize,
-    /// Rows
+    /// Height of the images, in pixels
     #[arg(long, default_value_t = 480)]
     height: usize,
-    /// Distance of the eyes, in metres
+    /// Distance between the two cameras, in meters
     #[arg(long, default_value_t = 0.12)]
     baseline: f64,
-    /// How far the right eye is turned to the left one, in degrees; eyes that are not parallel have no disparity
+    /// Rotation of the right camera toward the left one, in degrees; cameras that are not parallel have no disparity
     #[arg(long, alias = "toe_in_deg", default_value_t = 0.0)]
     toe_in_deg: f64,
     #[command(flatten)]
@@ -133,7 +133,7 @@ fn run(args: &Args) -> launcher::Result {
     }))
 }
 
-/// Eyes in front of the robot, above the things.
+/// A stereo camera in front of the robot, above the objects.
 fn stereo_cfg(args: &Args, renderer: kinetoscope::render::Renderer) -> StereoCameraCfg {
     let f = 500.0 * args.width as f64 / 640.0;
     let placement = Placement::LookAt { eye: [1.9, 0.25, 0.95], target: [0.35, 0.0, 0.25], up: [0.0, 0.0, 1.0] };
@@ -158,16 +158,16 @@ fn stereo_cfg(args: &Args, renderer: kinetoscope::render::Renderer) -> StereoCam
     }
 }
 
-/// What the eyes of one environment saw, and all that a stereo matcher knows of them.
+/// Images of one environment's stereo camera, with the calibration that a stereo matcher needs.
 struct Pair {
     left: Vec<u8>,
     right: Vec<u8>,
     disparity: Vec<f32>,
-    /// fx, fy, cx, cy of the left eye \[pixels\].
+    /// fx, fy, cx, cy of the left camera \[pixels\].
     lens: [f64; 4],
     baseline: f64,
     world_from_left: Pose,
-    /// What the right eye measured itself \[m\].
+    /// Depth measured by the right camera itself \[m\].
     right_depth: Vec<f32>,
     left_mask: Vec<i32>,
     right_mask: Vec<i32>,
@@ -196,7 +196,7 @@ impl Pair {
         })
     }
 
-    /// Points in the environment \[m\] with the colours of the left eye, of the disparity alone: z = fx b / d.
+    /// Points in the environment \[m\] with the colors of the left camera, from the disparity alone: z = fx b / d.
     fn points(&self, width: usize) -> Vec<([f32; 3], [u8; 3])> {
         let [fx, fy, cx, cy] = self.lens;
         let point = |(k, &d): (usize, &f32)| {
@@ -207,11 +207,12 @@ impl Pair {
         self.disparity.iter().enumerate().filter(|(_, d)| **d > 0.0).map(point).collect()
     }
 
-    /// How many points the right eye sees on the same thing where the disparity d says, at (u - d, v), and the disparity of
-    /// the right eye's own depth there against d \[pixels\]: 9 of 10 points differ by no more.
+    /// Number of compared points, and the 90th percentile of the disparity error \[pixels\].
     ///
-    /// Depth is measured at the centres of pixels, so it is taken between two of them: 1 / z is linear in the picture of a
-    /// plane. One of ten is left out for edges within a thing, what is hidden by the thing itself, and silhouettes.
+    /// A left pixel with disparity d corresponds to (u - d, v) in the right image. The right camera's own depth there
+    /// gives a second disparity, which is compared with d. Depth is measured at pixel centers and interpolated between
+    /// two of them: 1 / z is linear in the image of a plane. One point of ten is ignored, for edges within an object,
+    /// self-occlusion and silhouettes.
     fn disagreement(&self, width: usize) -> (usize, f64) {
         let scale = self.lens[0] * self.baseline;
         let mut off: Vec<f64> = Vec::new();
@@ -228,11 +229,11 @@ impl Pair {
             off.push((a + share * (b - a) - f64::from(d)).abs());
         }
         off.sort_unstable_by(f64::total_cmp);
-        // Nothing to compare agrees with nothing.
+        // Without compared points the error counts as infinite.
         (off.len(), off.get(off.len() * 9 / 10).copied().unwrap_or(f64::MAX))
     }
 
-    /// Near (a large disparity) is red, far blue, nothing black.
+    /// Disparity image: near (large disparity) is red, far blue, no disparity black.
     fn disparity_picture(&self, [width, height]: [usize; 2]) -> RgbImage {
         let seen = self.disparity.iter().copied().filter(|d| *d > 0.0);
         let range = picture::finite_range(seen).unwrap_or([0.0, 1.0]);

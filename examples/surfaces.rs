@@ -1,7 +1,8 @@
-//! What surfaces and lamps can be: glass, water, metals from polished to matt, paint, a thing that glows, under a spot with a size.
+//! Materials and lights: glass, water, metals from polished to matte, paint and an emissive object, under a spotlight
+//! with a size.
 //!
 //! ```text
-//! cargo run --release --example surfaces -- --headless --renderer rt --rt-samples 256 --out pictures
+//! cargo run --release --example surfaces -- --headless --renderer rt --rt-samples 256 --out images
 //! ```
 
 mod launcher;
@@ -14,19 +15,19 @@ use launcher::{Launcher, PathFlags, Progress, picture};
 use serde_json::json;
 use std::process::ExitCode;
 
-/// Draws balls of many surfaces.
+/// Renders balls of many materials.
 #[derive(Debug, Parser)]
 #[command(name = "surfaces")]
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Pixels per row
+    /// Width of the image, in pixels
     #[arg(long, default_value_t = 640)]
     width: usize,
-    /// Rows
+    /// Height of the image, in pixels
     #[arg(long, default_value_t = 360)]
     height: usize,
-    /// Radius of the lamp, in metres: shadows are as soft as it is large
+    /// Radius of the light, in meters: a larger light has softer shadows
     #[arg(long, alias = "lamp_radius", default_value_t = 0.2)]
     lamp_radius: f64,
     #[command(flatten)]
@@ -37,7 +38,7 @@ fn main() -> ExitCode {
     launcher::run("surfaces", || run(&Args::parse()))
 }
 
-/// The surfaces: name, colour and what else there is to say of it.
+/// The materials: name, color and further properties.
 fn surfaces() -> [(&'static str, [f64; 4], SurfaceCfg); 8] {
     let white = [1.0; 4];
     let gold = [1.0, 0.77, 0.34, 1.0];
@@ -101,7 +102,7 @@ fn run(args: &Args) -> launcher::Result {
     args.launcher.serve(&mut sim)?;
     args.launcher.open_window(&mut sim);
     let recording = args.launcher.start_recording(&mut sim)?;
-    // The picture is what it is for: it ends with it, unless somebody watches.
+    // Without a viewer, the image is the only output, and one step is enough.
     let mut launcher = args.launcher.clone();
     launcher.steps = launcher.steps.or((launcher.headless && launcher.serve_address().is_none()).then_some(1));
     let progress = Progress::new(&launcher, 1);

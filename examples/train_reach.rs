@@ -1,19 +1,19 @@
 //! An arm learns to reach: a linear policy, found by augmented random search in 256 environments at once.
 //!
 //! ```text
-//! cargo run --release --example train_reach -- --headless --out pictures
+//! cargo run --release --example train_reach -- --headless --out images
 //! cargo run --release --example train_reach -- --headless --no-signal
 //! ```
 //!
-//! Each iteration tries the policy with random changes of its weights, each change with both signs, on the same eight
-//! targets, and moves the weights along those changes that earned more (Mania, Guy and Recht: *Simple random search of static
-//! linear policies is competitive for reinforcement learning*, 2018; version V1 without the choice of the best directions).
-//! Everything that is random is keyed by `--seed`: curve and policy are the same for any number of threads.
+//! Each iteration tests random perturbations of the policy's weights, each with both signs, on the same eight targets.
+//! It moves the weights along the perturbations with the higher returns (Mania, Guy and Recht: *Simple random search of
+//! static linear policies is competitive for reinforcement learning*, 2018; version V1 without the selection of the
+//! best directions). All random numbers are keyed by `--seed`: curve and policy are the same for any number of threads.
 //!
-//! What learns knows of the arm only what a [`VectorEnv`] tells; a few lines around it count who reaches the targets.
+//! The learning code accesses the arm only through a [`VectorEnv`]; a few lines around it count the reached targets.
 //!
-//! The exit code is 0 where the arm has learned it, 1 where it has not (the second command, in which policies are told what others
-//! have earned), 2 where something is wrong.
+//! The exit code is 0 if the arm has learned the task. It is 1 if it has not, as with the second command, which
+//! shuffles the returns between policies, and 2 for an error.
 
 mod launcher;
 
@@ -31,44 +31,44 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Learns to reach random targets and counts before and after.
+/// Learns to reach random targets, and counts the reached ones before and after.
 #[derive(Debug, Parser)]
 #[command(name = "train_reach", mut_arg("num_envs", |arg| arg.default_value("256")))]
 pub(crate) struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Changes of the policy
+    /// Policy updates
     #[arg(long, default_value_t = 32)]
     iterations: usize,
-    /// Size of the changes that are tried
+    /// Standard deviation of the perturbations
     #[arg(long, default_value_t = 0.15)]
     noise: f64,
-    /// How far the weights move in an iteration
+    /// Learning rate of the weights
     #[arg(long, alias = "step_size", default_value_t = 0.15)]
     step_size: f64,
-    /// Policies are told what others have earned, at random: nothing is to be learned from it
+    /// Shuffle the returns between policies, so that they carry no learning signal
     #[arg(long, alias = "no_signal")]
     no_signal: bool,
 }
 
-/// Targets that every change is tried on.
+/// Number of targets that every perturbation is tested on.
 pub(crate) const TARGETS: usize = 8;
-/// The box of targets: its middle and half of its sides \[m\]. The tip starts at (0.54, 0.14, 0.37).
+/// The box of targets: its center and half of its sides \[m\]. The tip starts at (0.54, 0.14, 0.37).
 const MIDDLE: [f64; 3] = [0.5, 0.1, 0.45];
 const HALF: [f64; 3] = [0.12, 0.3, 0.15];
 /// Steps of an episode: 3 s.
 const EPISODE: u64 = 60;
-/// Physics steps of 10 ms in a step: decisions at 20 Hz.
+/// Physics steps of 10 ms per environment step: decisions at 20 Hz.
 const DECIMATION: u32 = 5;
-/// Most that a joint's target changes by in a step \[rad\]: 2 rad/s.
+/// Largest change of a joint's target per step \[rad\]: 2 rad/s.
 const TURN: f64 = 0.1;
-/// Observed distances are multiplied by this \[1/m\], so that they are about as large as joint angles.
+/// Scale of the observed distances \[1/m\], which makes them about as large as joint angles.
 const SCALE: f64 = 10.0;
 
-/// A target is reached when the tip is as near to it at the end of an episode \[m\]. The ball of this radius is 0.26 % of the
-/// box: as many targets would be reached by ending anywhere in it.
+/// Largest distance of the tip from a reached target at the end of an episode \[m\]. A ball of this radius is 0.26 % of
+/// the box: a policy that ends anywhere in the box reaches that share of the targets.
 const NEAR: f64 = 0.03;
-/// Share of targets that has to be reached in the end.
+/// Share of targets that has to be reached at the end.
 const LEARNED: f64 = 0.9;
 
 fn main() -> ExitCode {
@@ -89,7 +89,8 @@ fn run(args: &Args) -> launcher::Result<bool> {
             return Err(format!("{flag} {value}: it must be above 0").into());
         }
     }
-    // How many targets there are: few while learning, so that changes are compared on the same ones, then one for each.
+    // Number of distinct targets: few while learning, so that perturbations are compared on the same ones; later one
+    // per environment.
     let targets = Arc::new(AtomicUsize::new(num_envs));
     let mut env = task(args, Arc::clone(&targets))?;
     args.launcher.write_dump(env.sim())?;
@@ -100,7 +101,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     let mut run = Run { env: &mut env, progress: &progress, step: 0 };
 
     let mut policy = Policy::idle(run.env);
-    // Targets of their own, which are not learned on.
+    // Test targets that are not used for learning.
     let unseen = args.launcher.seed.wrapping_add(1);
     let before = run.reached(&policy, unseen)?;
     if let Some(before) = before {
@@ -160,7 +161,7 @@ fn run(args: &Args) -> launcher::Result<bool> {
     Ok(after.is_some_and(|after| after >= LEARNED))
 }
 
-/// The arm, what it is to do, what it sees and is rewarded for.
+/// Builds the environment: arm, actions, commands, observations and rewards.
 pub(crate) fn task(args: &Args, targets: Arc<AtomicUsize>) -> launcher::Result<Env> {
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         arena_space: args.launcher.arena_space.unwrap_or(1.6),
@@ -178,7 +179,7 @@ pub(crate) fn task(args: &Args, targets: Arc<AtomicUsize>) -> launcher::Result<E
     }
     let turns = terms::target_changes(&sim, "turn", arm, &["JOINT[1-6]"], TURN)?;
     let angles = terms::joint_positions(&sim, "angle", arm, &["JOINT[1-6]"])?;
-    // From the tip to the target [m].
+    // Vector from the tip to the target \[m\].
     let apart = move |now: &Now<'_>| -> TermResult<Array2<f64>> {
         let tip = now.sim().robot(arm).link_pose("ee_link")?;
         Ok(Array2::from_shape_fn((now.num_envs(), 3), |(env, k)| -tip[(env, k)]) + now.command("target")?)
@@ -189,7 +190,7 @@ pub(crate) fn task(args: &Args, targets: Arc<AtomicUsize>) -> launcher::Result<E
     Ok(EnvBuilder::new(sim, EnvCfg { decimation: DECIMATION, episode_steps: Some(EPISODE) })
         .action(turns)
         .command(CommandTerm::new("target", ["x", "y", "z"], move |dice| {
-            // The same for all who are compared, another in every episode.
+            // The target is the same for all compared policies, and changes with every episode.
             let target = (dice.global_env() % targets.load(Ordering::Relaxed)) as u64;
             let mut random = Random::keyed(dice.seed(), target, &format!("target {}", dice.episode()));
             std::array::from_fn(|k| MIDDLE[k] + HALF[k] * (2.0 * random.uniform() - 1.0))
@@ -202,20 +203,22 @@ pub(crate) fn task(args: &Args, targets: Arc<AtomicUsize>) -> launcher::Result<E
         .build()?)
 }
 
-/// What is observed, and 1, times weights: shape (observations + 1, actions).
+/// A linear policy: weights of the observations and of a constant 1, shape (observations + 1, actions).
 #[derive(Clone, Debug)]
 struct Policy {
     weights: Array2<f64>,
 }
 
 impl Policy {
-    /// Does nothing.
+    /// The zero policy: no action.
     fn idle(env: &impl VectorEnv) -> Self {
         Self { weights: Array2::zeros((env.observation_space().len() + 1, env.action_space().len())) }
     }
 
-    /// Moves along the changes that earned more: by the step size, times the mean of the changes, each times the difference of
-    /// what it earned with both signs, over the standard deviation of all that was earned.
+    /// Moves the weights along the perturbations with the higher returns.
+    ///
+    /// The step is the step size times the mean over perturbations, each weighted by its return difference between both
+    /// signs, divided by the standard deviation of all returns.
     fn learn(&mut self, tried: &Tried, returns: &Array1<f64>, step_size: f64) {
         let earned = |policy: usize| (0..TARGETS).map(|t| returns[policy * TARGETS + t]).sum::<f64>() / TARGETS as f64;
         let all: Vec<f64> = (0..tried.policies.len()).map(earned).collect();
@@ -228,7 +231,7 @@ impl Policy {
     }
 }
 
-/// Policies that are tried: with each change of the weights, and with its opposite.
+/// Tested policies: each perturbation of the weights, added and subtracted.
 struct Tried {
     changes: Vec<Array2<f64>>,
     policies: Vec<Array2<f64>>,
@@ -247,11 +250,11 @@ impl Tried {
     }
 }
 
-/// What was earned, in another order.
+/// The returns in random order.
 fn shuffled(returns: &Array1<f64>, seed: u64, iteration: usize) -> Array1<f64> {
     let mut random = Random::keyed(seed, iteration as u64, "no signal");
     let mut told = returns.clone();
-    // Fisher and Yates: each order is as probable as any other.
+    // Fisher-Yates shuffle: all orders are equally probable.
     for k in (1..told.len()).rev() {
         let other = (random.uniform() * (k + 1) as f64) as usize;
         told.swap(k, other.min(k));
@@ -259,7 +262,7 @@ fn shuffled(returns: &Array1<f64>, seed: u64, iteration: usize) -> Array1<f64> {
     told
 }
 
-/// Episodes of all environments, one after the other.
+/// Runs episodes in all environments, one after the other.
 struct Run<'r, E> {
     env: &'r mut E,
     progress: &'r Progress,
@@ -268,8 +271,9 @@ struct Run<'r, E> {
 }
 
 impl<E: VectorEnv> Run<'_, E> {
-    /// One episode in all environments, from what is `seen` there: what was earned, and how far the tip was from the target in the
-    /// end \[m\]. The next episode has begun then. `None` where somebody has stopped it.
+    /// Runs one episode in all environments, starting from the observations `seen`. Returns the returns, and the
+    /// distances of the tip from the target at the end \[m\]. Afterwards the next episode has begun. `None` if the user
+    /// has stopped the run.
     fn episode<'p>(
         &mut self,
         seen: &mut Array2<f64>,
@@ -296,8 +300,8 @@ impl<E: VectorEnv> Run<'_, E> {
         Ok(None)
     }
 
-    /// In which part of the environments the policy reaches the target, in one episode with the seed; `None` where somebody has
-    /// stopped it.
+    /// Share of the environments in which the policy reaches the target in one episode with the seed; `None` if the
+    /// user has stopped the run.
     fn reached(&mut self, policy: &Policy, seed: u64) -> launcher::Result<Option<f64>> {
         let mut seen = self.env.reset(None, Some(seed))?;
         let done = self.episode(&mut seen, |_| policy.weights.view())?;
@@ -305,7 +309,7 @@ impl<E: VectorEnv> Run<'_, E> {
     }
 }
 
-/// What the policy of each environment does about what is `seen` there.
+/// Computes the actions of each environment's policy from the observations `seen`.
 fn act<'p>(seen: &Array2<f64>, policy: impl Fn(usize) -> ArrayView2<'p, f64>, actions: &mut Array2<f64>) {
     for ((env, mut action), row) in actions.rows_mut().into_iter().enumerate().zip(seen.rows()) {
         let weights = policy(env);
@@ -314,7 +318,7 @@ fn act<'p>(seen: &Array2<f64>, policy: impl Fn(usize) -> ArrayView2<'p, f64>, ac
     }
 }
 
-/// Draws all environments with their targets, a step before the end of an episode.
+/// Renders all environments with their targets, one step before the end of an episode.
 fn draw_reaching(env: &mut Env, policy: &Policy, seed: u64, file: &Path) -> launcher::Result {
     let mut seen = env.reset(None, Some(seed))?;
     let mut actions = Array2::zeros((env.num_envs(), env.action_space().len()));
@@ -329,12 +333,12 @@ fn draw_reaching(env: &mut Env, policy: &Policy, seed: u64, file: &Path) -> laun
     stage::write(env.sim_mut(), &balls, [far + 2.0, -far - 1.6, 2.2], [far - 1.0, 1.0 - far, 0.0], file)
 }
 
-/// How many of these distances from a target are near \[m\].
+/// Number of distances \[m\] that count as reached.
 fn count(distances: &Array1<f64>) -> usize {
     distances.iter().filter(|distance| **distance < NEAR).count()
 }
 
-/// The learning curve, as numbers and drawn.
+/// Writes the learning curve as numbers and as a plot.
 fn write_curve(rows: &[[f64; 3]], out: &Path) -> launcher::Result {
     launcher::make_folder(out)?;
     let mut text = String::from("iteration,return,distance_m,reached\n");

@@ -1,16 +1,18 @@
-//! A camera on the hand finds a cube, and the arm moves the hand over it by what the camera sees, in 16 environments with
-//! cubes at other places. Mask and depth of each picture say where the cube is from the camera; joint encoders and the
-//! calibration of the camera say where the camera is from the robot. Where the cube really is, is looked at to judge in the end,
-//! and never before.
+//! Image-based control: a hand-mounted camera finds a cube, and the arm moves the hand above it, in 16 environments
+//! with randomly placed cubes.
+//!
+//! Mask and depth of each image give the position of the cube relative to the camera. Joint encoders and the
+//! calibration of the camera give the position of the camera relative to the robot. The true position of the cube is
+//! only read at the end, to evaluate the result.
 //!
 //! ```text
-//! cargo run --release --example visual_servo -- --headless --out pictures
+//! cargo run --release --example visual_servo -- --headless --out images
 //! cargo run --release --example visual_servo -- --headless --miscalibrated 0.02
 //! cargo run --release --example visual_servo -- --headless --blind
 //! ```
 //!
-//! The exit code is 0 where at least 15 of 16 hands are above their cubes in the end, 1 where fewer are (the second command,
-//! whose cameras are not where they are thought to be, and the third, whose pictures have no mask), 2 where something is wrong.
+//! The exit code is 0 if at least 15 of 16 hands are above their cubes at the end, 1 for fewer, and 2 for an error. It
+//! is 1 for the second command, whose cameras are miscalibrated, and for the third, whose masks are empty.
 
 mod launcher;
 
@@ -31,16 +33,16 @@ use serde_json::json;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::process::ExitCode;
 
-/// Moves hands over cubes by images, and counts.
+/// Moves hands over cubes by camera images, and counts the successes.
 #[derive(Debug, Parser)]
 #[command(name = "visual_servo")]
 struct Args {
     #[command(flatten)]
     launcher: Launcher,
-    /// Cameras are as far from where they are thought to be \[m\], along x and y of the picture
+    /// Calibration error of the cameras [m], along x and y of the image
     #[arg(long, default_value_t = 0.0)]
     miscalibrated: f64,
-    /// Masks are empty
+    /// Empty masks
     #[arg(long)]
     blind: bool,
 }
@@ -48,34 +50,34 @@ struct Args {
 /// Edge of the cube, and height of the table \[m\].
 const EDGE: f64 = 0.06;
 const TABLE: f64 = 0.06;
-/// Middle of where cubes lie, and how far from there at most \[m\]; they are turned by at most 45°.
+/// Center of the cubes' random positions, and largest offset from it \[m\]; cubes are rotated by at most 45°.
 const PLACE: [f64; 2] = [0.48, 0.1];
 const SCATTER: [f64; 2] = [0.1, 0.17];
 
-/// Pixels of the camera, and its field of view.
+/// Width and height of the camera image \[pixels\], and its field of view \[rad\].
 const PIXELS: usize = 160;
 const FOVY: f64 = 60.0 * PI / 180.0;
-/// Where the camera is on the flange \[m\], and what it looks at there: past the back of the straight hand, whose tips are at
-/// z = 0.21.
+/// Position of the camera on the flange, and its target there \[m\]: past the back of the straight hand, whose tips are
+/// at z = 0.21.
 const EYE: [f64; 3] = [0.0, 0.12, 0.0];
 const LOOKS_AT: [f64; 3] = [0.0, 0.0, 0.4];
-/// Standard deviation of each depth \[m\].
+/// Standard deviation of the depth noise \[m\].
 const DEPTH_NOISE: f64 = 0.002;
 
-/// Height of the flange above the table while it looks for cubes, and above the top of a cube in the end \[m\]: then the tips are
-/// 0.1 m above it.
+/// Height of the flange above the table during the search, and above the top of a cube at the end \[m\]: the tips are
+/// then 0.1 m above the cube.
 const LOOK_HEIGHT: f64 = 0.6;
 const END_HEIGHT: f64 = 0.31;
-/// Looks, and part of what is missing that the hand moves by after each.
+/// Number of control steps, and the share of the position error that the hand corrects in each.
 const LOOKS: usize = 12;
 const GAIN: f64 = 0.6;
-/// Pixels of the cube that are needed to say where it is.
+/// Minimum number of cube pixels for a position estimate.
 const FEW: usize = 20;
 
-/// The hand is above the cube when the axis of the flange passes the middle of the cube's top as near as this \[m\]: what a
-/// pixel sees there, 0.33 m away, with a focal length of 80 / tan 30° = 139 pixels, ...
+/// Success: largest distance between the axis of the flange and the middle of the cube's top \[m\]. It is the size of a
+/// pixel there, 0.33 m away, with a focal length of 80 / tan 30° = 139 pixels.
 const NEAR: f64 = 0.0024;
-/// ... and is as high as it should be, this much more or less \[m\].
+/// Success: largest error of the height \[m\].
 const HEIGHT_ERROR: f64 = DEPTH_NOISE;
 
 fn main() -> ExitCode {
@@ -132,7 +134,8 @@ fn run(args: &Args) -> launcher::Result<bool> {
         for (env, (command, flange)) in commands.iter_mut().zip(&flanges).enumerate() {
             let Some(top) = eyes.top_of_cube(motion.sim, env, flange)? else { continue };
             found[env] = true;
-            // What is missing is added to what was asked for, not to where the hand is: that corrects what gravity pulls it down by.
+            // The error is added to the command, not to the measured pose of the hand: this also corrects the sag under
+            // gravity.
             let wanted = top + Vector3::new(0.0, 0.0, END_HEIGHT);
             let error = wanted.coords - flange.translation.vector;
             command.translation.vector += GAIN * error;
@@ -153,13 +156,13 @@ fn run(args: &Args) -> launcher::Result<bool> {
 
     let (steps, planned) = (motion.step(), motion.planned().to_vec());
     let rate = progress.env_steps_per_second(steps, sim.num_envs());
-    // To judge: nothing was moved by these.
+    // For the result only: no command depends on these poses.
     let cubes = trial::poses(&sim.rigid_object(cube).pose());
     let (flanges, diverged) = (trial::poses(&sim.robot(robot).link_pose("ee_link")?), trial::diverged(&sim));
     let mut table = Vec::new();
     for env in 0..sim.num_envs() {
         let top = cubes[env] * Pose::translation(0.0, 0.0, EDGE / 2.0);
-        // The middle of the cube's top in the frame of the flange, whose axis is z.
+        // Middle of the cube's top in the frame of the flange, whose axis is z.
         let place = flanges[env].inverse_transform_point(&Point3::from(top.translation.vector));
         let (beside, height) = (place.x.hypot(place.y), place.z);
         let is_above = beside < NEAR && (height - END_HEIGHT).abs() < HEIGHT_ERROR;
@@ -190,19 +193,19 @@ fn run(args: &Args) -> launcher::Result<bool> {
     trial::conclude(&args.launcher, &mut sim, count)
 }
 
-/// The flange at a place, pointing down; the camera on it is on the far side of the hand.
+/// Flange pose at a place, pointing down; its camera is on the far side of the hand.
 fn above(place: [f64; 3]) -> Pose {
     from_xyz_rpy(place, [PI, 0.0, FRAC_PI_2])
 }
 
-/// What the encoders of the arm say \[rad\].
+/// Encoder readings of the arm joints \[rad\].
 fn positions(sim: &SimulationManager, robot: RobotId) -> launcher::Result<kinetoscope::ndarray::Array2<f64>> {
     let robot = sim.robot(robot);
     let columns: Vec<usize> = robot.joint_ids("arm")?.iter().map(|joint| joint.0).collect();
     Ok(robot.qpos().select(kinetoscope::ndarray::Axis(1), &columns))
 }
 
-/// What mask pictures say of the thing called `name`.
+/// Mask id of the object called `name`.
 fn mask_id(sim: &SimulationManager, name: &str) -> launcher::Result<i32> {
     let id = sim
         .scene()
@@ -229,22 +232,22 @@ fn camera_cfg() -> CameraCfg {
     }
 }
 
-/// A camera, and what is thought to be known of it.
+/// A camera with its assumed calibration.
 struct Eyes {
     camera: SensorId<Camera>,
-    /// What masks say of the cube.
+    /// Mask id of the cube.
     cube: i32,
     intrinsics: PixelIntrinsics,
-    /// The calibration: where the optical frame is on the flange.
+    /// Calibration: pose of the optical frame on the flange.
     flange_from_camera: Pose,
 }
 
 impl Eyes {
-    /// Middle of the top of the cube in the frame of the environment \[m\], with the flange where it is thought to be; `None` where
-    /// too little of a cube is seen.
+    /// Estimated middle of the cube's top in the frame of the environment \[m\], given the assumed pose of the flange.
+    /// `None` if too few pixels show the cube.
     ///
-    /// Points of the cube are those of its mask, as far away as the depth says. Those of its top are the highest: a cube has
-    /// no others within four deviations of the depth below them but on its sides, of which few are seen from above.
+    /// The points of the cube are those of its mask, at the measured depth. The points within four standard deviations
+    /// of the depth noise below the highest ones belong to the top. A view from above shows few points of the sides.
     fn top_of_cube(&self, sim: &SimulationManager, env: usize, flange: &Pose) -> launcher::Result<Option<Point3<f64>>> {
         let camera = sim.sensor(self.camera)?;
         let (mask, depth) = (camera.mask()?, camera.depth()?);
@@ -261,7 +264,7 @@ impl Eyes {
         if points.len() < FEW {
             return Ok(None);
         }
-        // Noise makes single points high: the height that a tenth of them is above.
+        // Noise raises single points, so the reference height is the 90th percentile.
         let mut heights: Vec<f64> = points.iter().map(|point| point.z).collect();
         heights.sort_by(|a, b| b.total_cmp(a));
         let high = heights[heights.len() / 10];
@@ -270,7 +273,7 @@ impl Eyes {
         Ok(Some(Point3::from(sum / top.len() as f64)))
     }
 
-    /// What the camera of the first environment sees.
+    /// Writes the camera image of the first environment.
     fn write_picture(
         &self,
         sim: &SimulationManager,
@@ -283,7 +286,7 @@ impl Eyes {
     }
 }
 
-/// A cube on a table.
+/// Adds a cube on a table.
 fn add_things(sim: &mut SimulationManager) -> launcher::Result<ObjectId> {
     let [x, y] = PLACE;
     sim.add_rigid_object(RigidObjectCfg {
@@ -305,7 +308,7 @@ fn add_things(sim: &mut SimulationManager) -> launcher::Result<ObjectId> {
     })?)
 }
 
-/// Puts each cube elsewhere on its table.
+/// Moves each cube to a random place on its table.
 fn scatter(sim: &mut SimulationManager, cube: ObjectId) -> launcher::Result {
     let place = |[x, y, turn]: [f64; 3]| {
         let place = [PLACE[0] + SCATTER[0] * x, PLACE[1] + SCATTER[1] * y, TABLE + EDGE / 2.0];

@@ -1,5 +1,6 @@
-//! What a contact sensor costs: quadrupeds that stand, with a sensor on their feet that measures in every step and keeps six
-//! measurements, against the same quadrupeds without. The sides are created in both orders, half the time each.
+//! Cost of a contact sensor: standing quadrupeds with a sensor on their feet, compared with the same quadrupeds
+//! without. The sensor measures in every step and keeps six measurements. The sides are created in both orders, half
+//! the time each.
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::row::Row;
@@ -9,11 +10,11 @@ use kinetoscope::sensors::ContactSensor;
 use std::time::{Duration, Instant};
 
 const ENVS: usize = 64;
-/// A sensor may take 3 % of a step.
+/// Target: the sensor takes at most 3 % of a step.
 const WANTED: f64 = 1.0 / 1.03;
-/// They stand: there is no need to start again.
+/// The robots stand still, so restarts are not needed.
 const STEPS: u32 = 1_000_000;
-/// Steps until they stand.
+/// Steps until the robots have settled.
 const SETTLING: u32 = 400;
 
 struct Quadrupeds {

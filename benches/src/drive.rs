@@ -1,6 +1,6 @@
-//! What drives cost: the arm and hand on their way between two poses, against the same model stepped from the same states
-//! without the drives' writes. The sides are created in both orders, half the time each: the ratio is the geometric mean
-//! of the two, times are those of mean rates.
+//! Cost of drives: arm and hand between two poses, compared with the same model stepped from the same states without
+//! drives. The sides are created in both orders, half the time each: the ratio is the geometric mean of the two, times
+//! are those of mean rates.
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{State, drive_sr5, sr5};
@@ -16,16 +16,16 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 const ENVS: usize = 64;
-/// A driven step may cost 1.3 times one without drives.
+/// Target: a step with drives takes at most 1.3 times a step without.
 const WANTED: f64 = 1.0 / 1.3;
-/// Steps between restarts: the undriven arm has fallen little.
+/// Steps between restarts, few enough that the undriven arm has hardly fallen.
 const STEPS: u32 = 16;
 /// Steps between changes of the targets.
 const PHASE: u32 = 200;
 
 type States = Rc<RefCell<Vec<State>>>;
 
-/// With drives; goes on where it is, and says where that is.
+/// The side with drives. It continues from its state and shares that state with the other side.
 struct Driven {
     sim: SimulationManager,
     robot: RobotId,
@@ -60,7 +60,7 @@ impl Side for Driven {
     }
 }
 
-/// Without the writes; starts where the driven side stands.
+/// The side without drives. It restarts from the state of the driven side.
 struct Undriven {
     batch: Batch,
     states: States,

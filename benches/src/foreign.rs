@@ -1,12 +1,12 @@
-//! How much processor time other programs take while we measure.
+//! Processor time of other programs during a measurement.
 
 use std::fs;
 
 /// Unit of times below /proc \[s\]: Linux shows them in hundredths of a second on every architecture.
 const TICK: f64 = 0.01;
 
-/// Processor time \[s\] that neither this process nor the processes `ours` have used since the machine started; `None`
-/// where there is no /proc.
+/// Processor time \[s\] used since boot by processes other than this one and the processes `ours`; `None` without
+/// /proc.
 pub(crate) fn seconds(ours: &[u32]) -> Option<f64> {
     let busy = busy_ticks(&fs::read_to_string("/proc/stat").ok()?)?;
     let mut own = process_ticks(&fs::read_to_string("/proc/self/stat").ok()?)?;
@@ -16,14 +16,14 @@ pub(crate) fn seconds(ours: &[u32]) -> Option<f64> {
     Some((busy as f64 - own as f64) * TICK)
 }
 
-/// All but `idle` and `iowait` in the first line of /proc/stat; `guest` times are part of `user` already.
+/// All fields but `idle` and `iowait` in the first line of /proc/stat; `guest` times are already part of `user`.
 fn busy_ticks(stat: &str) -> Option<u64> {
     let line = stat.lines().next()?.strip_prefix("cpu ")?;
     let ticks: Vec<u64> = line.split_whitespace().map(str::parse).collect::<Result<_, _>>().ok()?;
     Some(ticks.iter().take(8).enumerate().filter(|(i, _)| *i != 3 && *i != 4).map(|(_, t)| t).sum())
 }
 
-/// `utime + stime` of a line such as `12 (a name) S 1 ...`, threads that have ended included.
+/// `utime + stime` of a line such as `12 (a name) S 1 ...`; this includes threads that have ended.
 fn process_ticks(stat: &str) -> Option<u64> {
     let mut fields = stat.get(stat.rfind(')')? + 1..)?.split_whitespace().skip(11);
     Some(fields.next()?.parse::<u64>().ok()? + fields.next()?.parse::<u64>().ok()?)
@@ -51,7 +51,7 @@ mod tests {
             x = std::hint::black_box(x.wrapping_mul(3));
         }
         let all = seconds(&[]).unwrap_or(f64::NAN) - before;
-        // Others may work at the same time: at most all other cores.
+        // Other programs may run at the same time, on at most all other cores.
         let others = (std::thread::available_parallelism().map_or(1, usize::from) - 1) as f64;
         assert!(all < 0.3 * others + 0.15, "{all}");
     }

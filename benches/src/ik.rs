@@ -1,7 +1,9 @@
-//! Inverse kinematics: poses of arms at random joint positions, one after the other on one core, from the default
-//! positions. The rival is what one writes on bare MuJoCo: damped least squares on `mj_jac` with a constant damping,
-//! positions cut at the limits, and the same number of starts. What either says it solved is asked of MuJoCo. The same
-//! again with a pose for each of 64 environments in one call.
+//! Inverse kinematics: arm poses at random joint positions, solved one after the other on one core from the default
+//! positions.
+//!
+//! The baseline is a solver on bare MuJoCo: damped least squares on `mj_jac` with constant damping, positions clamped
+//! at the limits, and the same number of restarts. MuJoCo verifies the solutions of both. A second comparison solves
+//! one pose for each of 64 environments in one call.
 
 use crate::interleave::{Plan, Side, measure, median};
 use crate::row::Row;
@@ -17,14 +19,14 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 const TARGETS: usize = 1000;
-/// Environments whose poses are solved in one call.
+/// Environments solved in one call.
 const ENVS: usize = 64;
-/// Solves of a pose out of reach.
+/// Number of solves of an unreachable pose.
 const FAR: usize = 21;
-/// Square of the rival's damping.
+/// Square of the baseline's damping factor.
 const DAMPING: f64 = 1e-3;
 
-/// Name, file, and the link that its last joint moves.
+/// Name, file, and link moved by the last joint.
 fn arms() -> Outcome<[(&'static str, PathBuf, &'static str); 3]> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/arms");
     Ok([
@@ -34,7 +36,7 @@ fn arms() -> Outcome<[(&'static str, PathBuf, &'static str); 3]> {
     ])
 }
 
-/// The poses of a frame that are to be reached.
+/// Target poses of a frame.
 struct Task {
     link: &'static str,
     limits: Vec<[f64; 2]>,
@@ -43,7 +45,7 @@ struct Task {
     cfg: IkCfg,
 }
 
-/// Ours.
+/// Our solver.
 struct Ours<'t> {
     task: &'t Task,
     sim: SimulationManager,
@@ -59,20 +61,20 @@ impl Ours<'_> {
     }
 }
 
-/// Ours, a pose for each environment in one call.
+/// Our solver, with one pose per environment in each call.
 struct Batched<'t> {
     task: &'t Task,
     sim: SimulationManager,
     robot: RobotId,
-    /// The poses of the calls, one after the other.
+    /// The poses of the successive calls.
     targets: Vec<Vec<Pose>>,
     next: usize,
 }
 
-/// A bare MuJoCo loop.
+/// The baseline: a loop on bare MuJoCo.
 struct Bare<'t> {
     task: &'t Task,
-    /// Poses in one step.
+    /// Poses per step.
     each: usize,
     data: Data,
     body: usize,
@@ -102,7 +104,7 @@ impl<'t> Bare<'t> {
         })
     }
 
-    /// Where MuJoCo puts the link.
+    /// Forward kinematics of the link in MuJoCo.
     fn place(&mut self, positions: &[f64]) -> Outcome<Pose> {
         for (&address, &q) in self.qpos.iter().zip(positions) {
             self.data.qpos_mut()[address] = q;
@@ -112,7 +114,7 @@ impl<'t> Bare<'t> {
         Ok(from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]))
     }
 
-    /// Way from a pose to the target.
+    /// Twist from a pose to the target, its translation \[m\] and its angle \[rad\].
     fn error(pose: &Pose, target: &Pose) -> (Vector6<f64>, f64, f64) {
         let way = target.translation.vector - pose.translation.vector;
         let turn = (target.rotation * pose.rotation.inverse()).scaled_axis();
@@ -273,7 +275,7 @@ fn one_arm(settings: &Settings, name: &str, urdf: PathBuf, link: &'static str) -
     let plan = Plan { seconds: settings.seconds, restart_after: 1 << 20 };
     let times = measure(plan, &mut [&mut ours, &mut bare])?;
     let (many, its_robot) = simulation(ENVS, &urdf)?;
-    // All of them; the last round is filled up with the first ones.
+    // All targets; the last call is padded with the first targets.
     let rounds = task.targets.len().div_ceil(ENVS);
     let filled: Vec<Pose> = task.targets.iter().copied().cycle().take(rounds * ENVS).collect();
     let targets = filled.chunks_exact(ENVS).map(<[Pose]>::to_vec).collect();

@@ -1,54 +1,54 @@
-//! Fair timing on a machine that others use too: sides take turns in short blocks, and ratios are taken turn by turn.
+//! Fair timing on a shared machine: the sides take turns in short blocks, and ratios are computed per turn.
 //!
-//! A round runs one block of every side, then one more of every side in reverse order: a load that grows or fades during
-//! a round meets all sides alike. Results are medians over rounds; a round in which other programs kept the processor
-//! busy does not count.
+//! A round runs one block of every side, then another block of every side in reverse order, so that a changing load
+//! affects all sides alike. Results are medians over rounds; rounds in which other programs kept the processor busy are
+//! discarded.
 //!
-//! Which side is created first matters too: at 1024 environments the side whose memory was allocated first was up to 1.3
-//! times as fast as the other, whichever it was (it gets the larger pages). Comparisons of many environments are
-//! therefore done [in both orders](in_both_orders).
+//! The order of creation matters too. At 1024 environments the side whose memory was allocated first was up to 1.3
+//! times as fast as the other, because it gets the larger pages. Comparisons of many environments are therefore done
+//! [in both orders](in_both_orders).
 
 use crate::foreign;
 use crate::settings::Outcome;
 use kinetoscope::mujoco::release_freed;
 use std::time::{Duration, Instant};
 
-/// One program that takes part. All sides do the same work.
+/// One program of a comparison. All sides do the same work.
 pub(crate) trait Side {
-    /// Goes to where the work starts, not timed.
+    /// Returns to the start of the work; not timed.
     fn restart(&mut self) -> Outcome<()>;
 
     /// Does `steps` steps in every environment; returns the time they took.
     fn block(&mut self, steps: u32) -> Outcome<Duration>;
 
-    /// The process that does the work, where it is another one.
+    /// The id of the process that does the work, if it is another process.
     fn process(&self) -> Option<u32> {
         None
     }
 
-    /// Positions after the last block, where they must be those of every other side.
+    /// Positions after the last block, for benchmarks in which all sides must have the same positions.
     fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
         Ok(None)
     }
 }
 
-/// Share of one core that other programs may take in a round that counts.
+/// Largest share of one core that other programs may take in a valid round.
 const FOREIGN: f64 = 0.05;
-/// On a machine that is always busy we stop waiting for quiet rounds after this many times the length planned.
+/// On a machine that is always busy, the search for quiet rounds ends after this multiple of the planned length.
 const PATIENCE: f64 = 4.0;
 
-/// How to measure.
+/// Parameters of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plan {
     /// Length of the measurement \[s\].
     pub(crate) seconds: f64,
-    /// Work starts again when a side has done this many steps.
+    /// The work restarts once a side has done this many steps.
     pub(crate) restart_after: u32,
 }
 
-/// A shorter block would count the start of threads.
+/// Minimum length of a block: a shorter one would be dominated by the start of threads.
 const SHORTEST_BLOCK: Duration = Duration::from_millis(50);
-/// A median of fewer rounds is not one.
+/// Minimum number of rounds for a median.
 const FEWEST_ROUNDS: usize = 5;
 
 /// Time per step \[s\] of every round: `times[side][round]`.
@@ -68,23 +68,23 @@ impl Times {
         median((0..rounds).map(|round| number(&of_round(round))).collect())
     }
 
-    /// How many times faster `ours` is than `rival`.
+    /// Speed of side `ours` relative to side `rival`: the median ratio of their times.
     pub(crate) fn ratio(&self, ours: usize, rival: usize) -> f64 {
         self.median_of(|t| t[rival] / t[ours])
     }
 }
 
-/// Which side of a pair is created first.
+/// Creation order of a pair of sides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Order {
-    /// Ours.
+    /// Our side first.
     OursFirst,
-    /// The rival.
+    /// The baseline first.
     RivalFirst,
 }
 
 impl Order {
-    /// Calls both in this order.
+    /// Creates both sides in this order.
     pub(crate) fn create<A, B>(
         self,
         ours: impl FnOnce() -> Outcome<A>,
@@ -107,12 +107,12 @@ impl Order {
 #[derive(Debug)]
 pub(crate) struct BothOrders([Times; 2]);
 
-/// Calls `measurement`, which is to create its sides in the order given and to take half the time, once for each order;
-/// what it has created is gone in between.
+/// Runs `measurement` once for each order. `measurement` must create its sides in the given order, and take half of the
+/// time. The sides are dropped in between.
 pub(crate) fn in_both_orders(mut measurement: impl FnMut(Order) -> Outcome<Times>) -> Outcome<BothOrders> {
     let mut one = |order| {
         let times = measurement(order);
-        // The second order finds memory as the first did.
+        // Returns freed memory to the system, so that both orders start with the same memory.
         release_freed();
         times
     };
@@ -120,27 +120,27 @@ pub(crate) fn in_both_orders(mut measurement: impl FnMut(Order) -> Outcome<Times
 }
 
 impl BothOrders {
-    /// Mean rate of one side, which does `count` things in a step \[1/s\].
+    /// Mean rate of one side with `count` items per step \[1/s\].
     pub(crate) fn rate(&self, side: usize, count: usize) -> f64 {
         self.0.iter().map(|times| count as f64 / times.per_step(side)).sum::<f64>() / 2.0
     }
 
-    /// How many times faster `ours` is than `rival`: the geometric mean.
+    /// Speed of `ours` relative to `rival`: the geometric mean over both orders.
     pub(crate) fn ratio(&self, ours: usize, rival: usize) -> f64 {
         self.mean_of(|t| t[rival] / t[ours])
     }
 
-    /// Geometric mean of what [`Times::median_of`] gives in each order; for ratios.
+    /// Geometric mean of [`Times::median_of`] over both orders, for ratios.
     pub(crate) fn mean_of(&self, number: impl Fn(&[f64]) -> f64) -> f64 {
         self.0.iter().map(|times| times.median_of(&number)).product::<f64>().sqrt()
     }
 }
 
-/// Measures all sides; after every round, not timed, their states must agree.
+/// Measures all sides. After every round, outside of the timed part, their states must agree.
 pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times> {
     let mut times = vec![Vec::new(); sides.len()];
     restart_all(sides)?;
-    // The first round warms up and tells how many steps make a block.
+    // The first round warms up and determines the number of steps per block.
     let mut steps = 1_u32;
     loop {
         let mut shortest = Duration::MAX;
@@ -199,8 +199,8 @@ pub(crate) fn measure(plan: Plan, sides: &mut [&mut dyn Side]) -> Outcome<Times>
     Ok(Times(times))
 }
 
-/// One step that is not timed brings data and threads where the side wants them: the sides before it have filled the
-/// caches with theirs.
+/// Runs a block after one untimed step. The step reloads the caches and wakes the threads, because the previous sides
+/// have filled the caches with their data.
 fn warm_block(side: &mut dyn Side, steps: u32) -> Outcome<Duration> {
     side.block(1)?;
     side.block(steps)
@@ -210,7 +210,7 @@ fn restart_all(sides: &mut [&mut dyn Side]) -> Outcome<()> {
     sides.iter_mut().try_for_each(|side| side.restart())
 }
 
-/// All sides have done the same steps from the same starts: they must be in the same state, bit by bit.
+/// Checks that all sides are in the same state, bit by bit: they have done the same steps from the same starts.
 fn same_physics(sides: &mut [&mut dyn Side]) -> Outcome<()> {
     let mut states = Vec::new();
     for side in sides.iter_mut() {
@@ -222,7 +222,7 @@ fn same_physics(sides: &mut [&mut dyn Side]) -> Outcome<()> {
     Err("ours and a rival are in different states: they did not do the same work".into())
 }
 
-/// Median; NaN of nothing.
+/// Median; NaN for an empty list.
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     match values.len() {

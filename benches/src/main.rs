@@ -1,6 +1,7 @@
-//! Ours and the rivals, one after the other in one run: `kinetoscope-benches [NAME]... [--json FILE] [--seconds S]`.
+//! Benchmarks of Kinetoscope and its baselines in one run: `kinetoscope-benches [NAME]... [--json FILE] [--seconds S]`.
 //!
-//! `cargo xtask bench` runs this on both lines of MuJoCo. A table goes to standard error, the rows as JSON to a file.
+//! `cargo xtask bench` runs them on both supported MuJoCo versions. A table goes to standard error, the rows as JSON to
+//! a file.
 
 mod camera;
 mod contacts;
@@ -28,7 +29,7 @@ use settings::{Outcome, Settings};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// The list of benchmarks: name and function, in the order in which they run.
+/// The benchmarks in the order in which they run: name and function.
 const BENCHES: &[(&str, Bench)] = &[
     ("step", step::run),
     ("drive", drive::run),
@@ -47,11 +48,12 @@ const BENCHES: &[(&str, Bench)] = &[
 
 type Bench = fn(&Settings) -> Outcome<Vec<Row>>;
 
-/// Ours and the rivals in one run.
+/// Benchmarks of Kinetoscope and its baselines in one run.
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, view, trace, contacts, ik, randomize, startup, memory
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, view, trace, contacts, ik, randomize,
+    /// startup, memory
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

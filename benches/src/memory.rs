@@ -1,5 +1,5 @@
-//! Memory per extra environment, against one `mjData`: what resident memory grows by from 64 to 1024 of them, each count
-//! in a process of its own, after a few steps (memory that was never touched takes no room).
+//! Memory per additional environment, relative to one `mjData`: the growth of resident memory from 64 to 1024
+//! environments. Each count runs in a separate process and takes a few steps, because untouched memory is not resident.
 
 use crate::models::{Case, drive_sr5, sr5};
 use crate::row::Row;
@@ -9,7 +9,7 @@ use std::process::Command;
 
 const FEW: usize = 64;
 const MANY: usize = 1024;
-/// An environment may take 1.1 times one `mjData`.
+/// Target: an environment takes at most 1.1 times one `mjData`.
 const WANTED: f64 = 1.0 / 1.1;
 const STEPS: u32 = 20;
 const HUMANOID: &str = "humanoid";
@@ -29,7 +29,7 @@ pub(crate) fn run(_: &Settings) -> Outcome<Vec<Row>> {
     Ok(rows)
 }
 
-/// Memory per extra environment \[KiB\].
+/// Memory per additional environment \[KiB\].
 fn growth(side: &str, case: &str) -> Outcome<f64> {
     let resident = |envs: usize| -> Outcome<f64> {
         let output =
@@ -43,7 +43,7 @@ fn growth(side: &str, case: &str) -> Outcome<f64> {
     Ok((resident(MANY)? - resident(FEW)?) / (MANY - FEW) as f64 / 1024.0)
 }
 
-/// The other process: makes environments, steps them, prints the resident memory \[bytes\].
+/// The measured process: creates environments, steps them, prints the resident memory \[bytes\].
 pub(crate) fn child(args: &[String]) -> Outcome<()> {
     let [side, case, envs] = args else { return Err("side, case and number of environments".into()) };
     let envs: usize = envs.parse()?;
@@ -74,7 +74,7 @@ pub(crate) fn child(args: &[String]) -> Outcome<()> {
     }
 }
 
-/// Called while everything that counts is alive.
+/// Prints the resident memory; the measured objects must still be alive.
 fn print_resident() -> Outcome<()> {
     let status = std::fs::read_to_string("/proc/self/status")?;
     let kib = status

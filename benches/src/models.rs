@@ -1,4 +1,4 @@
-//! What is stepped: Debian's humanoid and the bundled arm with its hand, from many different states.
+//! Stepped models: Debian's humanoid and the bundled arm with its hand, from many different states.
 
 use crate::settings::Outcome;
 use kinetoscope::exec::ThreadPool;
@@ -13,34 +13,34 @@ use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 use std::sync::Arc;
 
-/// MuJoCo's humanoid as Debian's package libmujoco-samples installs it.
+/// MuJoCo's humanoid, as installed by Debian's package libmujoco-samples.
 pub(crate) const HUMANOID: &str = "/usr/share/mujoco/model/humanoid/humanoid.xml";
 
-/// What a bare loop does in one step.
+/// MuJoCo calls of a bare loop in one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Loop {
     /// `mj_step`.
     Step,
-    /// `mj_step2`, then `mj_step1`, as our own loop.
+    /// `mj_step2`, then `mj_step1`, as in our own loop.
     Step21,
 }
 
-/// A model, and states to start from.
+/// A model with start states.
 #[derive(Clone, Debug)]
 pub(crate) struct Case {
     /// Name in the results.
     pub(crate) name: &'static str,
-    /// The model with room for every contact that occurs.
+    /// The model, with buffers large enough for every contact that occurs.
     pub(crate) model: Model,
-    /// What the bare loop calls.
+    /// The calls of the bare loop.
     pub(crate) bare: Loop,
-    /// The MJCF, where the model is not a file.
+    /// The MJCF, unless the model is a file.
     pub(crate) mjcf: Option<String>,
-    /// States on one trajectory; environment `i` starts from one of them.
+    /// States on one trajectory, assigned to the environments in turn.
     states: Vec<State>,
 }
 
-/// A state to start from.
+/// A start state.
 #[derive(Clone, Debug)]
 pub(crate) struct State {
     pub(crate) qpos: Vec<f64>,
@@ -54,7 +54,7 @@ impl State {
         Self { qpos: data.qpos().to_vec(), qvel: data.qvel().to_vec(), warmstart: data.qacc_warmstart().to_vec() }
     }
 
-    /// Puts the state into `data`.
+    /// Copies the state to `data`.
     pub(crate) fn write(&self, data: &mut Data) {
         data.qpos_mut().copy_from_slice(&self.qpos);
         data.qvel_mut().copy_from_slice(&self.qvel);
@@ -62,13 +62,13 @@ impl State {
     }
 }
 
-/// Number of different starts.
+/// Number of different start states.
 const STARTS: usize = 128;
-/// Steps from a start to the next restart.
+/// Steps between two restarts.
 pub(crate) const STEPS: u32 = 96;
 
 impl Case {
-    /// Debian's humanoid, falling with small constant torques; `None`, with a message, where it is not installed.
+    /// Debian's humanoid, falling with small constant torques; `None` with a message if it is not installed.
     pub(crate) fn humanoid() -> Outcome<Option<Self>> {
         if !Path::new(HUMANOID).exists() {
             eprintln!("skipped: {HUMANOID} is not there (Debian's package libmujoco-samples)");
@@ -79,7 +79,7 @@ impl Case {
         Self::new("humanoid", compiled.into_model(), None, Loop::Step).map(Some)
     }
 
-    /// The bundled arm and hand, limp: the model that drives are written to, without the writes.
+    /// The bundled arm and hand without active drives: the same model as with drives, but no drive writes.
     pub(crate) fn sr5() -> Outcome<Self> {
         let (sim, _) = sr5(1, 1)?;
         Self::new("SR5 + hand", sim.batch().model().clone(), Some(sim.scene().mjcf().into()), Loop::Step21)
@@ -102,38 +102,38 @@ impl Case {
         Ok(case)
     }
 
-    /// Environments at their starts, without drives.
+    /// Environments at their start states, without drives.
     pub(crate) fn batch(&self, envs: usize, threads: usize) -> Outcome<Batch> {
         let mut batch = Batch::new(&self.model, &Arc::new(DriveTable::default()), envs, threads, ThreadPool::new())?;
         self.restart(&mut batch);
         Ok(batch)
     }
 
-    /// Puts all environments to their starts.
+    /// Resets all environments to their start states.
     pub(crate) fn restart(&self, batch: &mut Batch) {
         let case = self.clone();
         batch.run(|i, env| env.reset(|data, _| case.write(i, data)));
     }
 
-    /// The start of environment `index`.
+    /// The start state of environment `index`.
     pub(crate) fn state(&self, index: usize) -> &State {
         &self.states[index * 37 % STARTS]
     }
 
-    /// Controls of environment `index`, constant.
+    /// Constant controls of environment `index`.
     pub(crate) fn controls(&self, index: usize) -> Vec<f64> {
         let phase = 0.7 * (index % STARTS) as f64;
         (0..self.model.nu()).map(|k| 0.2 * (1.3 * k as f64 + phase).sin()).collect()
     }
 
-    /// Writes start and controls of environment `index`.
+    /// Writes start state and controls of environment `index`.
     pub(crate) fn write(&self, index: usize, data: &mut Data) {
         self.state(index).write(data);
         data.ctrl_mut().copy_from_slice(&self.controls(index));
     }
 }
 
-/// Every second state of one environment from the initial state on.
+/// Every second state of one environment, beginning at the initial state.
 fn trajectory(model: &Model) -> Outcome<Vec<State>> {
     let mut batch = Batch::new(model, &Arc::new(DriveTable::default()), 1, 1, ThreadPool::new())?;
     let mut states = Vec::new();
@@ -179,7 +179,7 @@ pub(crate) fn arm_with_hand(
     Ok((sim, robot))
 }
 
-/// Sends arm and hand to one of two poses.
+/// Sets the targets of arm and hand to one of two poses.
 pub(crate) fn drive_sr5(sim: &mut SimulationManager, robot: RobotId, closed: bool) -> Outcome<()> {
     let arm = sim.robot(robot).joint_ids("arm")?;
     let hand = sim.robot(robot).joint_ids("hand")?;

@@ -1,5 +1,5 @@
-//! Batched stepping against `mujoco.batch` from Python: the same model, states and threads, in turns. The two processes
-//! are started in both orders, half the time each: ratios are geometric means of the two, rates are means.
+//! Batched stepping, compared with `mujoco.batch` from Python: the same model, states and threads, in turns. The two
+//! processes are started in both orders, half the time each: ratios are geometric means of the two, rates are means.
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{Case, STEPS};
@@ -40,7 +40,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     Ok(rows)
 }
 
-/// A Python process that holds a `mujoco.batch.Batch`.
+/// A Python process with a `mujoco.batch.Batch`.
 struct Rival(Process);
 
 impl Rival {
@@ -48,13 +48,13 @@ impl Rival {
         let folder = tempfile::tempdir()?;
         let job = job(case, envs, threads, folder.path())?;
         let mut rival = Self(Process::start(python, "mujoco_batch.py", &job, folder)?);
-        // When it answers, its memory is allocated.
+        // The baseline answers once its memory is allocated.
         rival.restart()?;
         Ok(rival)
     }
 }
 
-/// What the script is told: the model as ours is after compiling, and the starts.
+/// The job of the script: our compiled model, and the start states.
 fn job(case: &Case, envs: usize, threads: usize, folder: &Path) -> Outcome<serde_json::Value> {
     let m = &case.model;
     let file = match &case.mjcf {
@@ -73,7 +73,7 @@ fn job(case: &Case, envs: usize, threads: usize, folder: &Path) -> Outcome<serde
         "actuator_biasprm": m.actuator_biasprm(),
     });
     if case.mjcf.is_some() {
-        // Controls of drives hold targets and are not clamped.
+        // Drive controls hold targets and are not clamped.
         arrays["actuator_ctrllimited"] = json!(vec![0; m.nu()]);
         arrays["dof_damping"] = json!(m.dof_damping());
     }

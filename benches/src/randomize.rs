@@ -1,7 +1,8 @@
-//! Properties of single environments: masses of all links and friction of all shapes, drawn for every environment. The rival
-//! is what one does with bare MuJoCo: a whole model for each environment (`mj_copyModel`), to which the values are written,
-//! then `mj_setConst` (in a small `mjData`, which is made with the copy). Ours finds names and checks values as well; neither
-//! side does a forward pass, which ours does when somebody reads or steps.
+//! Randomization of properties per environment: masses of all links and friction of all shapes.
+//!
+//! The baseline is the usual way with bare MuJoCo: a whole model for each environment (`mj_copyModel`), to which the
+//! values are written, then `mj_setConst` (in a small `mjData`, created with the copy). Our side also resolves names
+//! and checks values. Neither side runs a forward pass; ours runs it at the next read or step.
 
 use crate::interleave::{Plan, Side, measure};
 use crate::models::sr5;
@@ -59,7 +60,7 @@ fn editors(model: &Model) -> Outcome<Vec<Editor>> {
     Ok((0..ENVS).map(|_| Editor::new(model)).collect::<Result<_, _>>()?)
 }
 
-/// The draws of the rival: as many numbers as ours.
+/// The random writes of the baseline: as many numbers as ours.
 fn write(editor: &mut Editor, model: &Model, random: &mut Random) -> Outcome<()> {
     let mut factor = |low: f64, high: f64| random.between(low, high);
     for body in 1..model.nbody() {
@@ -75,7 +76,7 @@ fn write(editor: &mut Editor, model: &Model, random: &mut Random) -> Outcome<()>
     Ok(editor.set_constants()?)
 }
 
-/// Draws for environments that were drawn for before.
+/// Randomizes environments that were randomized before.
 struct Ours(SimulationManager);
 
 impl Side for Ours {
@@ -92,7 +93,7 @@ impl Side for Ours {
     }
 }
 
-/// A whole model for each environment.
+/// The baseline: a whole model for each environment.
 struct Whole {
     editors: Vec<Editor>,
     masses: Vec<f64>,
@@ -114,7 +115,7 @@ impl Side for Whole {
             self.draws += 1;
         }
         let time = start.elapsed();
-        // It did the work.
+        // Checks that the work was done.
         if self.editors.iter_mut().any(|editor| editor.body_mass_mut() == self.masses) {
             return Err("the rival changed no mass".into());
         }
@@ -122,7 +123,7 @@ impl Side for Whole {
     }
 }
 
-/// Draws in a new simulation.
+/// Randomizes a new simulation.
 struct First;
 
 impl Side for First {
@@ -142,7 +143,7 @@ impl Side for First {
     }
 }
 
-/// Copies the model for each environment.
+/// The baseline's first randomization: copies the model for each environment.
 struct FirstWhole {
     masses: Vec<f64>,
     model: Model,

@@ -1,14 +1,15 @@
-//! Height scans: our ray caster against MuJoCo's, on the same rough terrain of 100 000 triangles, as a mesh and as a height
-//! field. One thread on both sides. That both measure the same distances is checked before.
+//! Height scans: our ray caster compared with MuJoCo's, on the same rough terrain of 100 000 triangles, as a mesh and
+//! as a height field. Both sides use one thread, and a check before the benchmark ensures that they measure the same
+//! distances.
 //!
-//! Ours is the whole sensor, as a simulation updates it: frames, 187 rays in each of 64 environments, distances, points,
-//! normals and ids. Three comparisons, of which MuJoCo measures distances only:
+//! Our side is the whole sensor as a simulation updates it: frames, 187 rays in each of 64 environments, distances,
+//! points, normals and ids. MuJoCo measures distances only. There are three comparisons:
 //!
-//! - vertical rays from 20 m above, against `mj_ray`, one ray at a time;
-//! - the same, against `mj_multiRay`. That casts all of its rays from one point, so it is of no use for parallel ones; what it
-//!   is given is its best case of the same task: one call for each environment, from the middle of the scanner to the very
-//!   points that the parallel rays hit. (2.2.2 has no `mj_multiRay`.)
-//! - a fan of rays from that point, to a level grid of the scanner's size: the same rays on both sides.
+//! - Vertical rays from 20 m above, against `mj_ray`, one ray at a time.
+//! - The same rays against `mj_multiRay`. That function casts all of its rays from one point and cannot cast parallel
+//!   rays. It gets its best case of the same task: one call for each environment, from the middle of the scanner to the
+//!   points hit by the parallel rays. (2.2.2 has no `mj_multiRay`.)
+//! - A fan of rays from that point to a level grid of the scanner's size: the same rays on both sides.
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::row::Row;
@@ -26,17 +27,17 @@ use kinetoscope::sim::Visible;
 use std::time::{Duration, Instant};
 
 const ENVS: usize = 64;
-/// Points along a side: 224 squared cells of two triangles.
+/// Points along a side: 224 x 224 cells of two triangles.
 const SIDE: usize = 225;
-/// Half a side \[m\]: cells of 0.1 m.
+/// Half of a side \[m\]: cells of 0.1 m.
 const HALF: f64 = 11.2;
 const HEIGHT: f64 = 1.0;
 const FLOOR: f64 = 0.5;
-/// The sensor is this far above its body \[m\].
+/// Height of the sensor above its body \[m\].
 const ABOVE: f64 = 20.0;
-/// Times of the ratio that was set as the aim.
+/// Target of the speed ratio.
 const WANTED: f64 = 5.0;
-/// How far distances may differ \[m\]: those of a mesh are of single precision on both sides, rounded in other frames.
+/// Tolerance of distances \[m\]: mesh coordinates are in single precision on both sides, rounded in different frames.
 const SAME: f64 = 1e-4;
 
 /// Terrain as a mesh, or as a height field.
@@ -54,7 +55,7 @@ impl Terrain {
         }
     }
 
-    /// Rays that the rival casts in a step: 2.2.2 tests every triangle of a mesh.
+    /// Number of baseline rays per step; 2.2.2 tests every triangle of a mesh.
     fn rival_rays(self) -> usize {
         if self == Self::Mesh && TARGET == Target::V2 { 16 } else { 4096 }
     }
@@ -65,7 +66,7 @@ impl Terrain {
             Self::Mesh => {
                 let field = HeightField::new([HALF, HALF, HEIGHT, FLOOR], SIDE, SIDE, &elevation);
                 let field = field.ok_or("terrain without points")?;
-                // The surface alone: the long triangles of the floor make MuJoCo thirty times as slow.
+                // The surface alone: the long triangles of the floor make MuJoCo thirty times slower.
                 let mut mesh = field.mesh().to_tri_mesh();
                 let is_surface = |t: &[u32; 3]| t.iter().all(|&i| mesh.positions[i as usize][2] >= 0.0);
                 mesh.triangles.retain(is_surface);
@@ -74,7 +75,7 @@ impl Terrain {
                 }
                 let mut bytes = Vec::new();
                 write_binary_stl(&mesh, &mut bytes)?;
-                // It has no volume; 2.2.2 does not ask.
+                // The surface has no volume; only MuJoCo 4 checks this.
                 let inertia = if TARGET == Target::V4 { "inertia='shell'" } else { "" };
                 (format!("<mesh name='t' file='t.stl' {inertia}/>"), "type='mesh' mesh='t'", ("t.stl", bytes))
             }
@@ -96,7 +97,8 @@ impl Terrain {
     }
 }
 
-/// Hills with noise on them, between 0 and 1; MuJoCo stretches them to exactly that.
+/// Hills with noise between 0 and 1. The first two samples are 0 and 1, because MuJoCo normalizes the field to that
+/// range.
 fn rough(i: usize, j: usize) -> f64 {
     let mut hash = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (j as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
     hash = (hash ^ (hash >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -108,7 +110,7 @@ fn rough(i: usize, j: usize) -> f64 {
     }
 }
 
-/// Ours: the sensor, and the state that it reads.
+/// Our side: the sensor, and the state that it reads.
 struct Ours {
     caster: RayCaster,
     state: SceneState,
@@ -157,7 +159,7 @@ impl Ours {
         ENVS * self.caster.num_rays()
     }
 
-    /// Where the rays begin and where they go.
+    /// Origins and directions of the rays.
     fn lines(&self) -> Vec<([f64; 3], [f64; 3])> {
         let (starts, directions) = (self.caster.ray_starts(), self.caster.ray_directions());
         let row = |a: &Array3<f64>, env, k| [0, 1, 2].map(|axis| a[(env, k, axis)]);
@@ -166,7 +168,7 @@ impl Ours {
     }
 }
 
-/// From one point to where vertical rays of the usual grid are at the height of the middle of the terrain.
+/// A pattern of rays from one point to the usual grid at half the height of the terrain.
 fn fan() -> Outcome<RayPattern> {
     let down = 1.5 + ABOVE - 0.5 * HEIGHT;
     let directions: Vec<_> =
@@ -189,7 +191,7 @@ impl Side for Ours {
     }
 }
 
-/// The rival: one ray after the other, a part of all of them in every step.
+/// The `mj_ray` baseline: one ray after the other, a part of all rays in every step.
 struct Bare<'d> {
     data: &'d Data,
     rays: Vec<([f64; 3], [f64; 3])>,
@@ -214,7 +216,7 @@ impl<'d> Bare<'d> {
         Ok(())
     }
 
-    /// Every so many rays, so that the slowest rival is done within seconds.
+    /// Checks that distances agree. Slow baselines check only every 37th ray, to finish within seconds.
     fn must_agree(&mut self, ours: &Ours) -> Outcome<()> {
         let (every, rays) = (if self.per_step < 1000 { 37 } else { 1 }, ours.caster.num_rays());
         for k in (0..self.rays.len()).step_by(every) {
@@ -244,7 +246,7 @@ impl Side for Bare<'_> {
     }
 }
 
-/// The other rival: one call for each environment, with all of its rays.
+/// The `mj_multiRay` baseline: one call for each environment, with all of its rays.
 struct Together {
     data: Data,
     points: Vec<[f64; 3]>,
@@ -253,7 +255,7 @@ struct Together {
 }
 
 impl Together {
-    /// Rays from the middle of each scanner to everything that ours hit.
+    /// Rays from the middle of each scanner to all points that our rays hit.
     fn new(data: &Data, ours: &Ours) -> Outcome<Self> {
         let mut data = Data::new(data.model())?;
         data.step1()?;
@@ -283,7 +285,7 @@ impl Together {
         Ok(())
     }
 
-    /// Both hit the same points, or, where something is in the way of the rays from the middle, one before.
+    /// Checks that both hit the same points, or that the terrain blocks the ray from the middle earlier.
     fn must_agree(&mut self, ours: &Ours) -> Outcome<()> {
         self.cast()?;
         let rays = ours.caster.num_rays();
@@ -356,7 +358,7 @@ fn one_by_one(plan: Plan, data: &Data, terrain: Terrain, name: &str) -> Outcome<
     Ok(Row::new("rays", name, "rays/s", 1, rate(0)).against("mj_ray", rate(1), ratio).wanted(WANTED))
 }
 
-/// Rays of a pattern against `mj_multiRay`; ours alone where there is none.
+/// Rays of a pattern against `mj_multiRay`; only our side on versions without that function.
 fn together(plan: Plan, data: &Data, name: &str, pattern: &RayPattern) -> Outcome<Row> {
     let has_rival = TARGET == Target::V4;
     let times = in_both_orders(|_| {

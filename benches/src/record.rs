@@ -1,8 +1,9 @@
-//! What recording costs: a simulation with a camera whose pictures somebody reads, with and without a recorder.
+//! Cost of recording: a simulation with a camera whose images are read, with and without a recorder.
 //!
-//! Both sides step the same arms and read the same pictures; ours writes them to an MCAP file too, colour as PNG, depth as
-//! it is, with the states of every picture. A block counts until everything is given to the file. Two speeds: in real time,
-//! where the recorder has what the simulation leaves of the machine, and as fast as can be, where each takes from the other.
+//! Both sides step the same arms and read the same images. Our side also writes them to an MCAP file: color as PNG,
+//! depth uncompressed, and the states of every image. A block ends when all data are passed to the file. There are two
+//! speeds: real time, where the recorder uses the idle part of the machine, and maximum speed, where simulation and
+//! recorder compete.
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::row::Row;
@@ -14,12 +15,12 @@ use std::time::{Duration, Instant};
 
 const ENVS: usize = 16;
 const SIDE: usize = 128;
-/// Steps per second, and between two pictures: 30 Hz.
+/// Steps per second, and steps between two images: 30 Hz.
 const RATE: u32 = 240;
 const PICTURE_EVERY: u32 = 8;
-/// Less than 5 % slower.
+/// Target: less than 5 % slower.
 const WANTED: f64 = 0.95;
-/// A recording of this many steps is begun anew: some hundred megabytes.
+/// A recording restarts after this many steps, at some hundred megabytes.
 const RESTART: u32 = 4000;
 
 struct Arms {
@@ -93,11 +94,11 @@ impl Side for Arms {
     }
 }
 
-/// Simulated seconds per second in real time: each step begins when its time has come, or as soon as it can.
+/// Simulated seconds per second in real time: each step begins on schedule, or as soon as possible.
 fn kept(recorded: bool, seconds: f64) -> Outcome<f64> {
     let mut arms = Arms::new(recorded)?;
     arms.restart()?;
-    // The first picture, and the first chunk of the file, take memory.
+    // The first image and the first chunk of the file allocate memory.
     arms.block(2 * PICTURE_EVERY)?;
     let steps = (seconds * f64::from(RATE)) as u32;
     let start = Instant::now();

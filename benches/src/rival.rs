@@ -1,4 +1,4 @@
-//! A rival in Python: a process that is told what to do over pipes (see `rivals/*.py`), one line each way.
+//! A baseline in Python: a process that receives commands over pipes (see `rivals/*.py`), one line each way.
 
 use crate::settings::Outcome;
 use kinetoscope::mujoco::{TARGET, Target};
@@ -8,11 +8,11 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
-/// Names a python that can import mujoco 4; `cargo xtask bench` sets it.
+/// Environment variable with a python that can import mujoco 4; set by `cargo xtask bench`.
 const PYTHON: &str = "KINETOSCOPE_PYTHON4";
 
-/// The python that runs rivals; `None`, with a message, where there is none or where this build is for another MuJoCo than
-/// theirs.
+/// The python of the baselines; `None` with a message if there is no such python, or if this build is for another
+/// MuJoCo version.
 pub(crate) fn python(rivals: &str) -> Option<OsString> {
     if TARGET != Target::V4 {
         eprintln!("  without {rivals}: the rivals have MuJoCo 4, and this build is for 2.2.2");
@@ -25,7 +25,7 @@ pub(crate) fn python(rivals: &str) -> Option<OsString> {
     python
 }
 
-/// Whether `python` runs this line.
+/// True if `python` runs this line without an error.
 pub(crate) fn can_run(python: &OsString, line: &str) -> bool {
     let mut command = Command::new(python);
     command.args(["-c", line]).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
@@ -37,7 +37,7 @@ pub(crate) fn can_run(python: &OsString, line: &str) -> bool {
 pub(crate) struct Process {
     script: &'static str,
     process: Child,
-    /// Open until the process is to end.
+    /// Standard input of the script; closing it ends the process.
     commands: Option<ChildStdin>,
     answers: BufReader<ChildStdout>,
     _job: tempfile::TempDir,
@@ -71,19 +71,19 @@ impl Process {
         if line.is_empty() { Err(format!("{} ended early", self.script).into()) } else { Ok(line.trim().into()) }
     }
 
-    /// The command `block`: the time that these steps took.
+    /// Sends the command `block`; returns the time of these steps.
     pub(crate) fn block(&mut self, steps: u32) -> Outcome<Duration> {
         Ok(Duration::from_secs_f64(self.ask(&format!("block {steps}"))?.parse()?))
     }
 
-    /// A command that is answered with bytes.
+    /// Sends a command with an answer in hexadecimal bytes.
     pub(crate) fn bytes(&mut self, command: &str) -> Outcome<Vec<u8>> {
         let hex = self.ask(command)?;
         let byte = |i: usize| u8::from_str_radix(hex.get(i..i + 2).unwrap_or(""), 16);
         Ok((0..hex.len()).step_by(2).map(byte).collect::<Result<_, _>>()?)
     }
 
-    /// Number of the process.
+    /// Process id.
     pub(crate) fn id(&self) -> u32 {
         self.process.id()
     }
@@ -91,7 +91,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // The end of its input ends the process.
+        // Closing its standard input ends the process.
         self.commands = None;
         let _ = self.process.wait();
     }

@@ -1,37 +1,37 @@
-//! One comparison: what is written as JSON and shown as a table.
+//! One comparison, for the JSON file and the table.
 
 use kinetoscope::mujoco as mj;
 use serde::Serialize;
 use std::fmt::Write as _;
 
-/// Ours against one rival.
+/// Our result compared with one baseline.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Row {
     /// Name of the benchmark.
     pub(crate) bench: String,
-    /// What was measured.
+    /// Name of the measured case.
     pub(crate) case: String,
     /// Unit of `ours` and `rival`.
     pub(crate) unit: String,
-    /// Our number.
+    /// Kinetoscope's number.
     pub(crate) ours: f64,
-    /// The rival's number; `None` where it is not on the machine.
+    /// The baseline's number; `None` if the baseline is not on the machine.
     pub(crate) rival: Option<f64>,
-    /// Who the rival is.
+    /// Name of the baseline.
     pub(crate) rival_name: String,
-    /// Above 1 ours is better.
+    /// Speed ratio; above 1 our side is better.
     pub(crate) ratio: Option<f64>,
-    /// Threads of both.
+    /// Number of threads of both sides.
     pub(crate) threads: usize,
     /// Version of MuJoCo.
     pub(crate) mujoco: String,
-    /// The ratio we want at least; not part of the results.
+    /// The target of the ratio; not part of the results.
     #[serde(skip)]
     pub(crate) wanted: Option<f64>,
 }
 
 impl Row {
-    /// A row of this build, without a rival.
+    /// A row of this build without a baseline.
     pub(crate) fn new(bench: &str, case: impl Into<String>, unit: &str, threads: usize, ours: f64) -> Self {
         Self {
             bench: bench.into(),
@@ -47,7 +47,7 @@ impl Row {
         }
     }
 
-    /// The same row with its rival.
+    /// Adds the baseline.
     pub(crate) fn against(mut self, rival_name: &str, rival: f64, ratio: f64) -> Self {
         self.rival_name = rival_name.into();
         self.rival = Some(rival);
@@ -55,13 +55,13 @@ impl Row {
         self
     }
 
-    /// The same row, for a rival that is not on the machine.
+    /// Adds the name of a baseline that is not on the machine.
     pub(crate) fn without(mut self, rival_name: &str) -> Self {
         self.rival_name = rival_name.into();
         self
     }
 
-    /// The same row with the ratio we want at least.
+    /// Adds the target of the ratio.
     pub(crate) fn wanted(mut self, ratio: f64) -> Self {
         self.wanted = Some(ratio);
         self
@@ -72,7 +72,7 @@ impl Row {
     }
 }
 
-/// All rows as text; a ratio below the one wanted is marked.
+/// All rows as text; ratios below their target are marked.
 pub(crate) fn table(rows: &[Row]) -> String {
     let mut out = format!(
         "{:<13} {:<44} {:>7} {:>7} {:>12} {:>12} {:<11} {:<22} {:>6}\n",

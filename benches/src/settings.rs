@@ -1,11 +1,11 @@
-//! The time of a measurement, and its result.
+//! Length and result type of a measurement.
 
-/// Rows, or the reason why a benchmark has no result.
+/// The result of a benchmark, or the reason for its failure.
 pub(crate) type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// How long to measure.
+/// Length of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// Time for one comparison \[s\], setting up not counted.
+    /// Time for one comparison \[s\], without the setup.
     pub(crate) seconds: f64,
 }

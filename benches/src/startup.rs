@@ -1,5 +1,6 @@
-//! From process start to the end of the first step: the example `create_robot` with the bundled robot, and with the
-//! vendors' meshes, whose hulls the first start computes and the second finds in a cache.
+//! Time from process start to the end of the first step, for the example `create_robot`. It runs with the bundled
+//! robot, and with the vendors' meshes: the first start computes their convex hulls, the second reads them from a
+//! cache.
 
 use crate::interleave::median;
 use crate::row::Row;
@@ -10,7 +11,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 const RUNS: usize = 9;
-/// The limits \[s\].
+/// Targets \[s\].
 const BUNDLED: f64 = 0.3;
 const FIRST: f64 = 1.5;
 const SECOND: f64 = 0.5;
@@ -38,7 +39,7 @@ fn row(case: &str, limit: f64, times: &[f64]) -> Row {
     Row::new("startup", case, "s", 1, time).against(&format!("limit {limit} s"), limit, limit / time).wanted(1.0)
 }
 
-/// Times of whole processes \[s\], which do one step: an upper bound of the time to it.
+/// Durations of whole processes with one step \[s\]: an upper bound of the time to the first step.
 fn times(example: &Path, args: &[OsString], runs: usize, cache: Option<&Path>) -> Outcome<Vec<f64>> {
     let mut times = Vec::new();
     for _ in 0..runs {
@@ -58,7 +59,7 @@ fn times(example: &Path, args: &[OsString], runs: usize, cache: Option<&Path>) -
     Ok(times)
 }
 
-/// The release build of the example for the same MuJoCo as this program.
+/// The release build of the example, for the same MuJoCo version as this program.
 fn build_example() -> Outcome<PathBuf> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(cargo)

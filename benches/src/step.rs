@@ -1,6 +1,7 @@
-//! Batched stepping with all positions and velocities read back, against bare loops of MuJoCo calls on as many threads.
+//! Batched stepping with all positions and velocities read back, compared with bare loops of MuJoCo calls on as many
+//! threads.
 //!
-//! Both sides start from the same states and do the same physics; that is checked, bit by bit, after every round. They
+//! Both sides start from the same states and do the same physics; this is checked bit by bit after every round. They
 //! are created in both orders, half the time each: ratios are geometric means of the two, rates are means.
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
@@ -14,7 +15,7 @@ use std::time::{Duration, Instant};
 const ENVS: [usize; 2] = [64, 1024];
 const WANTED: f64 = 0.97;
 
-/// Ours: a batch, and where its state is copied to after every step.
+/// Our side: a batch, and copies of its state after every step.
 pub(crate) struct Ours<'c> {
     case: &'c Case,
     batch: Batch,
@@ -49,7 +50,7 @@ impl Side for Ours<'_> {
     }
 }
 
-/// The rival: every thread steps its share of `mjData` again and again; nobody waits and nothing is read.
+/// The baseline: every thread steps its share of `mjData` repeatedly, without synchronization and without reads.
 struct Bare<'c> {
     case: &'c Case,
     shares: Vec<Vec<Data>>,
@@ -93,7 +94,7 @@ impl Side for Bare<'_> {
         let run = move |share: &mut Vec<Data>| (0..steps).all(|_| share.iter_mut().all(|data| bare_step(data, what)));
         let good = match &mut *self.shares {
             [share] => run(share),
-            // This thread takes part, as it does in ours.
+            // This thread takes part, as in our side.
             [share, others @ ..] => std::thread::scope(|scope| {
                 let others: Vec<_> = others.iter_mut().map(|share| scope.spawn(move || run(share))).collect();
                 let mine = run(share);
@@ -108,8 +109,8 @@ impl Side for Bare<'_> {
     fn qpos(&mut self) -> Outcome<Option<Vec<f64>>> {
         let mut qpos = Vec::new();
         for data in self.shares.iter_mut().flatten() {
-            // 2.2.2 normalizes quaternions in place when a step begins, and ours has begun the next one. Normalizing twice
-            // would change the last bit, so this is undone.
+            // 2.2.2 normalizes quaternions in place at the start of a step, and our side has begun the next step.
+            // Normalizing twice would change the last bit, so this is undone.
             let before = data.qpos().to_vec();
             if self.case.bare == Loop::Step {
                 data.step1()?;
@@ -127,7 +128,8 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
         for envs in ENVS {
             let name = format!("{}, {envs} envs", case.name);
             eprintln!("  {name}");
-            // Half the time in each comparison with one and with two threads, and half of that in each order.
+            // All four sides run in one measurement: half of the time for each thread count, and half of that for each
+            // order.
             let plan = Plan { seconds: settings.seconds, restart_after: STEPS };
             let times = in_both_orders(|order| {
                 let pair =

@@ -1,9 +1,11 @@
-//! Ray tracing on one thread: what is seen of the vendor's SR5 (the bundled one where it is not there) where it covers 40 % of a
-//! picture, paths in a closed lit box around it, and how long its trees take to build. Against what we want; whole pictures by rays
-//! also against MuJoCo Warp's ray caster, where it is on the machine. Collision shapes are neither seen nor built.
+//! Ray tracing on one thread, on the vendor's SR5 (or the bundled one without the vendor's files).
 //!
-//! Rows in percent say where the time goes, found by leaving work out: the same picture without the robot, the same paths
-//! without shadow rays, the same paths that end at the first surface. All of them take turns with the whole.
+//! There are three measurements: primary rays with the robot covering 40 % of an image, paths in a closed lit box
+//! around the robot, and the build time of its BVHs. Each is compared with a target; whole ray-cast images also with
+//! MuJoCo Warp's ray caster, if it is on the machine. Collision shapes are neither rendered nor built.
+//!
+//! Rows in percent split the time by leaving work out: the same image without the robot, the same paths without shadow
+//! rays, the same paths that end at the first surface. All variants take turns with the full work.
 
 use crate::camera::{Scene, by_rays};
 use crate::interleave::{Plan, Side, Times, measure};
@@ -20,15 +22,15 @@ use kinetoscope::scene::{Instance, Light, LightKind, Material, PoseF32, RenderSc
 use std::time::{Duration, Instant};
 
 const SIZE: [usize; 2] = [640, 480];
-/// The part of the picture that the robot covers.
+/// Share of the image that the robot covers.
 const COVERED: f64 = 0.4;
-/// Half the side of the box \[m\].
+/// Half of the box's side \[m\].
 const WALL: f32 = 1.5;
-/// What we want: rays per second, paths per second, nanoseconds per triangle.
+/// Targets: rays per second, paths per second, nanoseconds per triangle.
 const RAYS: f64 = 8e6;
 const PATHS: f64 = 0.3e6;
 const BUILD: f64 = 60.0;
-/// Work begins anew after this many steps: never.
+/// Steps until a restart: never reached.
 const ALWAYS: u32 = 1_000_000;
 
 pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
@@ -52,7 +54,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     let mut rows = vec![
         at_least(row("what is seen, 640x480", "rays/s", per_second), RAYS, per_second / RAYS),
         row("what is seen, 640x480, covered by it", "%", covered),
-        // Those that pass by cost little.
+        // Rays that miss the robot cost little.
         row("what is seen, 640x480, rays that meet it", "rays/s", hits / rays.per_step(0)),
         row("what is seen, 640x480, time without it", "%", percent(&rays, 1)),
         by_rays(settings, &scene)?,
@@ -83,7 +85,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     let [warm, cold] = [0, 1].map(|side| 1e9 * trees.per_step(side) / triangles);
     rows.extend([
         at_least(row("trees", "ns/triangle", warm), BUILD, BUILD / warm),
-        // Pages that the system gives for the first time are cleared by it.
+        // The system clears pages on first use.
         row("trees in memory that is new", "ns/triangle", cold),
     ]);
     Ok(rows)
@@ -97,7 +99,7 @@ fn shot<'a>(scene: &'a RenderScene, poses: &'a [PoseF32], view: &'a View) -> Sho
     Shot { scene, poses, view, lights: None, lens: None, before: None }
 }
 
-/// The same picture again and again.
+/// Renders the same image repeatedly.
 struct Pictures<'a> {
     rasterizer: ParallelRasterizer,
     frame: Frame,
@@ -126,11 +128,10 @@ impl Side for Pictures<'_> {
     }
 }
 
-/// The trees of a scene, built again and again: boxes, order, nodes and the triangles in their order; giving them back is not
-/// counted.
+/// Builds the BVHs of a scene repeatedly: bounds, order, nodes and reordered triangles. Dropping them is not counted.
 struct Trees<'a> {
     of: &'a RenderScene,
-    /// Whether the process gives memory back before.
+    /// True to release memory to the system before each build.
     cold: bool,
 }
 
@@ -154,14 +155,14 @@ impl Side for Trees<'_> {
     }
 }
 
-/// The robot in a room of six walls, with a lamp under the ceiling.
+/// The robot in a box of six walls, with a light under the ceiling.
 fn boxed(robot: &RenderScene, poses: &[PoseF32]) -> Outcome<(RenderScene, Vec<PoseF32>)> {
     let mut instances = robot.instances().to_vec();
     let mut poses = poses.to_vec();
     let material = Material { specular: 0.0, ..Material::from_rgba([0.8, 0.8, 0.8, 1.0]) };
     for axis in 0..3 {
         for sign in [-1.0f32, 1.0] {
-            // Columns are the axes of a wall: its normal looks inward.
+            // Columns are the axes of a wall; its normal points inward.
             let mut normal = [0.0; 3];
             normal[axis] = -sign;
             let mut along = [0.0; 3];

@@ -1,8 +1,8 @@
-//! What a window shows while physics runs: pictures per second, how well real time is kept, and whether whoever draws slowly
-//! holds physics up.
+//! Window rendering during physics: images per second, the real-time factor, and the effect of a slow viewer on the
+//! physics rate.
 //!
-//! Sixteen of the vendor's arms with the bundled hand move all the time; of 960 x 540 pixels each picture shows them all, in a
-//! window of an X server without a screen (Xvfb), which takes its share of the machine.
+//! Sixteen of the vendor's arms with the bundled hand move all the time. Each image of 960 x 540 pixels shows all of
+//! them. The window is in a headless X server (Xvfb), which takes its share of the machine.
 
 use crate::interleave::{Plan, Side, in_both_orders, measure};
 use crate::models::{arm_with_hand, drive_sr5};
@@ -21,21 +21,21 @@ use std::time::{Duration, Instant};
 
 const ENVS: usize = 16;
 const SIZE: [usize; 2] = [960, 540];
-/// Pictures per second that are wanted at least.
+/// Target of the images per second.
 const PICTURES: f64 = 30.0;
-/// Simulated seconds per second that are wanted, of real time.
+/// Target of the real-time factor.
 const REAL: f64 = 0.98;
-/// What is left of the speed of physics where somebody takes very long to draw.
+/// Target of the physics speed with a very slow viewer, relative to no viewer.
 const UNHINDERED: f64 = 0.9;
-/// How long that is.
+/// Rendering time of the slow viewer.
 const SLOW: Duration = Duration::from_millis(250);
-/// Pictures that are drawn before it counts, and how long is waited for them.
+/// Number of warm-up images, and the time limit for them.
 const FIRST: u64 = 10;
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Steps between two changes of the arms' targets.
 const SWING: u32 = 100;
 
-/// The arm that is shown.
+/// The arm of the benchmark.
 struct Arm {
     name: &'static str,
     file: PathBuf,
@@ -63,7 +63,7 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get)
 }
 
-/// A thread that works until it is dropped.
+/// A thread that repeats its work until it is dropped.
 struct Worker {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -85,19 +85,19 @@ impl Worker {
 impl Drop for Worker {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        // One that panicked has ended, too.
+        // A panic in the thread is ignored: it has ended too.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
-/// An X server without a screen, until it is dropped.
+/// A headless X server that runs until it is dropped.
 struct Display {
     server: Child,
     name: String,
 }
 
 impl Display {
-    /// `None` where there is no Xvfb.
+    /// Starts the server; `None` without Xvfb.
     fn start() -> Option<Self> {
         let arguments = ["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset"];
         let mut command = std::process::Command::new("Xvfb");
@@ -112,18 +112,18 @@ impl Display {
 
 impl Drop for Display {
     fn drop(&mut self) {
-        // It has ended either way.
+        // Errors are ignored: the server has ended either way.
         let _ = self.server.kill();
         let _ = self.server.wait();
     }
 }
 
-/// Pictures per second of a window, and simulated seconds per second, in real time.
+/// Images per second of a window, and simulated seconds per second, in real time.
 fn shown(arm: &Arm, display: &Display, seconds: f64) -> Outcome<[f64; 2]> {
     let (mut sim, robot) = arm.simulation()?;
     let cfg = WindowCfg { size: SIZE, display: Some(display.name.clone()), ..WindowCfg::default() };
     let window = sim.open_window_with(cfg)?;
-    // The first picture makes coarser meshes for what is far away, and finds no memory.
+    // The first images allocate memory and build levels of detail for distant objects.
     let start = Instant::now();
     while window.pictures() < FIRST && start.elapsed() < PATIENCE {
         swing(&mut sim, robot, &window, 0.1)?;
@@ -146,7 +146,7 @@ fn swing(sim: &mut SimulationManager, robot: RobotId, window: &Window, seconds: 
     Ok([pictures / elapsed, (sim.observers().steps() - first) as f64 * sim.cfg().physics_dt / elapsed])
 }
 
-/// Arms at free speed, watched by somebody who takes a quarter of a second for each picture, or by nobody.
+/// Arms at free speed, with a viewer that takes a quarter of a second per image, or without a viewer.
 struct Arms {
     sim: SimulationManager,
     robot: RobotId,
@@ -163,7 +163,7 @@ impl Arms {
             Worker::start(move || {
                 let snapshot = viewer.wait(last, SLOW);
                 last = snapshot.as_ref().map_or(last, |snapshot| snapshot.number);
-                // Asleep: what is measured is who waits for whom, not who takes which core.
+                // The viewer sleeps, so that the benchmark measures waiting and not the use of cores.
                 std::thread::sleep(SLOW);
                 drop(snapshot);
             })

@@ -8,7 +8,7 @@ use kinetoscope::sim::Robot;
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 
-/// Which arm and which hand.
+/// Files and joints of an arm with a hand.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ArmWithHand {
     /// One URDF or MJCF (.xml) file with both, instead of --arm-urdf and --hand-urdf
@@ -29,10 +29,11 @@ pub(crate) struct ArmWithHand {
 }
 
 impl ArmWithHand {
-    /// The two merged, the hand turned and moved onto the flange, or the one file; with the tutorial's gains.
+    /// The configuration of the robot with the tutorial's gains: arm and hand merged, the hand turned and moved onto
+    /// the flange, or the single file of `--robot`.
     ///
     /// # Errors
-    /// A file is neither there nor an asset.
+    /// A file neither exists nor is a bundled asset.
     pub(crate) fn cfg(&self) -> Result<RobotCfg> {
         if let Some(file) = &self.robot {
             let file = user_or_asset(file)?;
@@ -56,7 +57,7 @@ fn merged(arm_urdf: &Path, hand_urdf: &Path, arm_joints: &str, hand_joints: &str
     Ok(RobotCfg { urdf: UrdfCfg { components, ..Default::default() }, ..driven(arm_joints, hand_joints) })
 }
 
-/// The parts `arm` and `hand` with the tutorial's gains.
+/// A robot with the control parts `arm` and `hand` and the tutorial's gains.
 fn driven(arm_joints: &str, hand_joints: &str) -> RobotCfg {
     RobotCfg {
         uid: "sr5_with_brainco".into(),
@@ -70,7 +71,7 @@ fn driven(arm_joints: &str, hand_joints: &str) -> RobotCfg {
     }
 }
 
-/// The link that the hand hangs on, as `uid/link`.
+/// The link that carries the hand, as `uid/link`.
 pub(crate) fn tip(robot: Robot<'_>) -> String {
     let description = robot.description();
     let joins = |parent: &str, child: &str| parent == "arm" && child == "hand";

@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Writes points \[m\] with their colours, binary, little-endian.
+/// Writes points \[m\] with their RGB colors as binary little-endian PLY.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -34,9 +34,11 @@ pub(crate) fn write_ply(path: &Path, points: &[([f32; 3], [u8; 3])]) -> Result {
     write().map_err(|e| format!("{}: {e}", path.display()).into())
 }
 
-/// How far from its pixel's centre a point of a camera's cloud is, seen again through the camera's matrices: the largest
-/// distance in pixels. `map` has shape (H, W, 3), world frame \[m\]; `intrinsics` is (fx, fy, cx, cy) \[pixels\]; `pose` is
-/// the camera's row in the ROS convention.
+/// The largest reprojection error of a camera's point cloud: the distance of a point's projection from the center of
+/// its pixel \[pixels\].
+///
+/// `map` has shape (H, W, 3), world frame \[m\]; `intrinsics` is (fx, fy, cx, cy) \[pixels\]; `pose` is the camera's
+/// pose row in the ROS convention.
 pub(crate) fn round_trip(map: &Array3<f32>, [fx, fy, cx, cy]: [f64; 4], pose: &[f64; 7]) -> f64 {
     let camera_from_world = from_row(pose).inverse();
     let mut worst = 0.0_f64;

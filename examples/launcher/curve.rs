@@ -1,4 +1,4 @@
-//! A curve of shares as a picture.
+//! A line plot of shares between 0 and 1 as an image.
 
 use super::panel::Canvas;
 use embedded_graphics::mono_font::MonoTextStyle;
@@ -9,11 +9,11 @@ use embedded_graphics::primitives::{Line, PrimitiveStyle};
 use embedded_graphics::text::Text;
 use image::{Rgb, RgbImage};
 
-/// Pixels of the picture, and of the margins around the curve: left, top, right, bottom.
+/// Image size (width, height) \[pixels\], and the margins around the plot area: left, top, right, bottom \[pixels\].
 const SIZE: [u32; 2] = [640, 360];
 const MARGIN: [i32; 4] = [56, 36, 20, 36];
 
-/// Draws numbers from 0 to 1 in their order.
+/// Plots numbers from 0 to 1 in their order.
 pub(crate) fn draw(title: &str, values: &[f64]) -> RgbImage {
     let mut canvas = Canvas(RgbImage::from_pixel(SIZE[0], SIZE[1], Rgb([250, 250, 250])));
     let [left, top, right, bottom] = MARGIN;

@@ -1,4 +1,4 @@
-//! The bundled hand as a gripper: fingers down, closing on what is between their tips and the thumb's.
+//! The bundled hand as a gripper: fingers pointing down, closing on an object between their tips and the thumb.
 
 use super::Result;
 use kinetoscope::prelude::*;
@@ -6,17 +6,18 @@ use kinetoscope::scene::Random;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
-/// The hand is tilted by this \[rad\], fingers down: then the thumb's tip and the fingers' tips, closed on a thing of 6 cm,
-/// are at the same height, 0.103 m below the palm's frame.
+/// Tilt of the hand \[rad\], fingers down. With this tilt the tips of thumb and fingers, closed on a 6 cm object, are
+/// level, 0.103 m below the frame of the palm.
 const TILT: f64 = 20f64.to_radians();
 
-/// The palm's frame.
+/// Name of the palm's link.
 pub(crate) const PALM: &str = "left_hand_base";
 
-/// The frame of a grip in the frame of the palm: x ahead to where straight fingers point, but level; y to the side of the
-/// fingers without thumb; z up. `place` is its origin, from the palm's, in those axes \[m\].
+/// The grip frame in the frame of the palm: x is level, in the direction of the straight fingers; y points to the
+/// fingers' side away from the thumb; z is up. `place` is the origin of the grip frame relative to the palm, in the
+/// axes of the grip frame \[m\].
 pub(crate) fn palm_from_grip(place: [f64; 3]) -> Pose {
-    // In the palm's frame fingers are along y, and the palm looks along z.
+    // In the palm's frame the fingers point along y and the palm faces z.
     let (sin, cos) = TILT.sin_cos();
     let (ahead, side, up) = (Vector3::new(0.0, cos, -sin), Vector3::x(), Vector3::new(0.0, -sin, -cos));
     let axes = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[ahead, side, up]));
@@ -24,11 +25,12 @@ pub(crate) fn palm_from_grip(place: [f64; 3]) -> Pose {
     Pose::from_parts((rotation * Vector3::from(place)).into(), rotation)
 }
 
-/// The bundled arm and hand, bent so that the hand can be level in front of it, the thumb opposite the fingers; `hand` are
-/// more start positions, `finger_effort` is the largest of each joint at the root of a finger \[N m\].
+/// The bundled arm and hand in a start posture with the hand level in front of the arm and the thumb opposite the
+/// fingers. `hand` lists further start positions \[rad\]; `finger_effort` is the effort limit of the joint at the root
+/// of each finger \[N m\].
 pub(crate) fn robot_cfg(hand: &[(&str, f64)], finger_effort: f64) -> Result<RobotCfg> {
     let cfg = assets::sr5_with_hand()?;
-    // Away from where the axes of JOINT4 and JOINT6 are the same.
+    // This posture keeps away from the singularity where the axes of JOINT4 and JOINT6 align.
     let elbow = [("JOINT2", 0.3), ("JOINT3", -2.2), ("JOINT5", 0.6), ("JOINT6", FRAC_PI_2)];
     let thumb = [("LEFT_HAND_THUMB2", -FRAC_PI_2)];
     let init_qpos = elbow.iter().chain(&thumb).chain(hand).map(|&(joint, q)| (joint.to_string(), q)).collect();
@@ -36,7 +38,8 @@ pub(crate) fn robot_cfg(hand: &[(&str, f64)], finger_effort: f64) -> Result<Robo
     Ok(RobotCfg { init_qpos, drive: DriveCfg { max_effort, ..cfg.drive }, ..cfg })
 }
 
-/// For each environment numbers in -1..1, the same for any number of environments and processes.
+/// Returns uniform random numbers in -1..1 for each environment, keyed by its global index: the numbers do not depend
+/// on the number of environments or processes.
 pub(crate) fn scatter<const K: usize>(sim: &SimulationManager, what: &str) -> Vec<[f64; K]> {
     let (seed, first) = (sim.cfg().seed, sim.cfg().first_env());
     let of = |env: usize| {

@@ -1,4 +1,4 @@
-//! What every example shares: flags, Ctrl+C, the progress bar, the report, pictures.
+//! Code shared by the examples: flags, Ctrl+C, the progress bar, the report, images.
 #![allow(dead_code, reason = "each example uses its part")]
 
 pub(crate) mod arm;
@@ -43,55 +43,58 @@ pub(crate) struct Launcher {
     /// Run without a window
     #[arg(long)]
     pub(crate) headless: bool,
-    /// Show the simulation in browsers, in real time until a viewer says otherwise; at 127.0.0.1:8080 where no address is
-    /// given. An address that other machines reach (0.0.0.0:8080) needs the token that is printed
+    /// Show the simulation in browsers, at real-time speed until a viewer changes it; the address defaults to
+    /// 127.0.0.1:8080. An address that other machines reach (0.0.0.0:8080) needs the token that is printed
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = SERVE)]
     pub(crate) serve: Option<String>,
-    /// Device of the physics: cpu (cuda and cuda:N are named in the answer, and refused)
+    /// Device of the physics: cpu; cuda and cuda:N are refused with an explanation
     #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
     pub(crate) device: Device,
     #[command(flatten)]
     elsewhere: FlagsFromElsewhere,
-    /// How images are drawn
+    /// Renderer of the images
     #[arg(long, value_enum, default_value_t = Renderer::Auto)]
     pub(crate) renderer: Renderer,
-    /// Distance of environments in the overview, in metres
+    /// Distance between environments in the overview, in meters
     #[arg(long, alias = "arena_space")]
     pub(crate) arena_space: Option<f64>,
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
-    /// Threads that step; every core by default
+    /// Threads that step the environments; every core by default
     #[arg(long)]
     pub(crate) threads: Option<usize>,
-    /// Folder for pictures
+    /// Folder for images
     #[arg(long)]
     pub(crate) out: Option<PathBuf>,
-    /// Folder for every stage of the pipeline: merged URDF, description, MJCF for both MuJoCo lines, meshes
+    /// Folder for every stage of the pipeline: merged URDF, description, MJCF for both supported MuJoCo versions,
+    /// meshes
     #[arg(long)]
     pub(crate) dump: Option<PathBuf>,
     /// File for the report, as JSON
     #[arg(long)]
     pub(crate) report: Option<PathBuf>,
-    /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset, .hdf5 for
-    /// robomimic (build with --features hdf5); .mp4, .gif, .webp or .apng for the first camera, or the stage where there is none; a
-    /// folder for PNG files of all cameras; from the start, where without it the record button of window and browser begins a recording.mcap
+    /// File to record everything to: .mcap for Foxglove and Rerun, .npz for NumPy, .lerobot for a LeRobot dataset,
+    /// .hdf5 for robomimic (build with --features hdf5); .mp4, .gif, .webp or .apng for the first camera, or for the
+    /// stage if the scene has no camera; a folder for PNG files of all cameras. Recording starts at once; without the
+    /// flag the record button of window and browser starts a recording.mcap
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
-    /// What a film of --record shows: `stage` for all environments side by side, or the name of a camera (of environment 0). Other
-    /// files have every camera, and the stage too where it is named
+    /// Image source of an animation of --record: `stage` for all environments side by side, or the name of a camera (of
+    /// environment 0). Other formats record every camera, and also the stage if it is named here
     #[arg(long, alias = "record_view", value_name = "NAME", requires = "record")]
     pub(crate) record_view: Option<String>,
-    /// Replace the file of --record, and what a recording that was killed has left
+    /// Replace the file of --record, including the remains of a recording that was killed
     #[arg(long, requires = "record")]
     pub(crate) overwrite: bool,
     /// Physics steps from one recorded row of states to the next
     #[arg(long, value_name = "STEPS", default_value_t = 1)]
     pub(crate) record_every: u64,
-    /// The same for what has a rate of its own: NAME=STEPS, where NAME is as in the file, such as arm/link_poses=10 or camera=30
+    /// Recording period of single streams: NAME=STEPS, where NAME is as in the file, such as arm/link_poses=10 or
+    /// camera=30
     #[arg(long, value_name = "NAME=STEPS,...", value_delimiter = ',', value_parser = rate)]
     pub(crate) record_rate: Vec<(String, u64)>,
-    /// What records: made when somebody first asks.
+    /// The recording shared by `--record` and the record buttons, created on first use.
     #[cfg(all(feature = "record", feature = "viewer"))]
     #[arg(skip)]
     files: std::sync::OnceLock<Arc<std::sync::Mutex<kinetoscope::FileRecording>>>,
@@ -106,12 +109,12 @@ fn rate(text: &str) -> std::result::Result<(String, u64), String> {
     Ok((name.trim().to_owned(), steps))
 }
 
-/// Where physics runs.
+/// Device of the physics.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Device {
-    /// This machine's processor.
+    /// The CPU.
     Cpu,
-    /// A graphics card, by the name that was given (not supported).
+    /// A CUDA device by its given name (not supported).
     Cuda(String),
 }
 
@@ -125,10 +128,10 @@ fn device(text: &str) -> std::result::Result<Device, String> {
     }
 }
 
-/// Flags of EmbodiChain's and Isaac Lab's launchers, so that their command lines run here.
+/// Flags of EmbodiChain's and Isaac Lab's launchers, accepted so that their command lines run here.
 #[derive(Clone, Debug, Args)]
 struct FlagsFromElsewhere {
-    /// Number of a graphics card; without effect here
+    /// GPU number; without effect here
     #[arg(long = "gpu-id", alias = "gpu_id", value_name = "N", hide = true)]
     gpu_id: Option<u32>,
     /// Isaac Lab's streaming: 1 and 2 are --serve here, 0 turns it off
@@ -143,7 +146,7 @@ struct FlagsFromElsewhere {
 }
 
 impl FlagsFromElsewhere {
-    /// One line for each flag that was given and has no effect here, with the reason.
+    /// One line for each given flag without effect here, with the reason.
     fn notes(&self) -> Vec<String> {
         let cameras = "cameras draw on the CPU, with or without a window";
         let flags = [
@@ -156,17 +159,17 @@ impl FlagsFromElsewhere {
     }
 }
 
-/// How images are drawn; examples without a camera accept the names so that scripts run, and those whose cameras draw in one way
-/// only refuse the others ([`Launcher::simulation`]).
+/// Renderer of the images. Examples without a camera accept every name so that scripts run; examples with a fixed
+/// renderer refuse the others ([`Launcher::simulation`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Renderer {
     /// The default
     Auto,
     /// Rasterizer
     Raster,
-    /// Rasterizer with shadows by rays
+    /// Rasterizer with ray-traced shadows
     Hybrid,
-    /// What is seen by rays, light and shadows as the rasterizer has them
+    /// Ray-traced visibility, with the lighting and shadows of the rasterizer
     FastRt,
     /// Path tracing
     Rt,
@@ -178,24 +181,24 @@ pub(crate) struct PathFlags {
     /// Path tracing: paths per pixel [default: 64]
     #[arg(long, alias = "rt_samples", value_name = "PATHS")]
     pub(crate) rt_samples: Option<u32>,
-    /// Path tracing: surfaces that light goes over after the one that is seen, at most [default: 4]
+    /// Path tracing: maximum number of bounces after the first hit [default: 4]
     #[arg(long, alias = "rt_bounces", value_name = "BOUNCES")]
     pub(crate) rt_bounces: Option<u32>,
-    /// Path tracing: leave the noise as it is
+    /// Path tracing: leave out the denoiser
     #[arg(long, alias = "rt_noisy")]
     pub(crate) rt_noisy: bool,
 }
 
 impl Renderer {
-    /// What the flag calls it.
+    /// The name of the flag's value.
     pub(crate) fn name(self) -> String {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
 
-    /// What cameras call it.
+    /// The renderer of the cameras.
     ///
     /// # Errors
-    /// Numbers of paths or bounces that are not possible, or any without path tracing.
+    /// The number of paths or bounces is out of range, or the path tracing flags are given for another renderer.
     pub(crate) fn of_cameras(self, flags: PathFlags) -> Result<kinetoscope::render::Renderer> {
         use kinetoscope::render::Renderer as Known;
         let PathFlags { rt_samples, rt_bounces, rt_noisy } = flags;
@@ -224,16 +227,16 @@ impl Renderer {
 const SERVE: &str = "127.0.0.1:8080";
 
 impl Launcher {
-    /// Address at which browsers see the simulation, where `--serve` or `--livestream` asks for it.
+    /// The address of the browser view, if `--serve` or `--livestream` is given.
     pub(crate) fn serve_address(&self) -> Option<&str> {
         let streamed = self.elsewhere.livestream.is_some_and(|mode| mode > 0).then_some(SERVE);
         self.serve.as_deref().or(streamed)
     }
 
-    /// The simulation these flags ask for, of an example that draws with the rasterizer or not with a camera.
+    /// The simulation of these flags, for an example that renders with the rasterizer or has no camera.
     ///
     /// # Errors
-    /// The device is not supported, or another renderer is asked for.
+    /// The device is not supported, or another renderer is requested.
     pub(crate) fn simulation(&self) -> Result<SimulationManagerCfg> {
         if !matches!(self.renderer, Renderer::Auto | Renderer::Raster) {
             let name = self.renderer.name();
@@ -246,7 +249,7 @@ impl Launcher {
         self.simulation_drawn_anyhow()
     }
 
-    /// The simulation these flags ask for, of an example that draws as they say or accepts them all.
+    /// The simulation of these flags, for an example that supports every renderer or accepts every name.
     ///
     /// # Errors
     /// The device is not supported.
@@ -267,7 +270,7 @@ impl Launcher {
         })
     }
 
-    /// Writes every stage of the pipeline to the folder of `--dump`; what is left out is a warning each.
+    /// Writes every stage of the pipeline to the folder of `--dump`; prints a warning for each item that is left out.
     ///
     /// # Errors
     /// A file cannot be written.
@@ -280,10 +283,10 @@ impl Launcher {
         Ok(())
     }
 
-    /// The folder of `--out`, else the one that the example runs in; made where it is `wanted`.
+    /// The folder of `--out`, otherwise the working directory. Creates the folder if `wanted`.
     ///
     /// # Errors
-    /// It cannot be made.
+    /// The folder cannot be created.
     pub(crate) fn out_folder(&self, wanted: bool) -> Result<PathBuf> {
         let out = self.out.clone().unwrap_or_else(|| ".".into());
         if wanted {
@@ -305,26 +308,26 @@ impl Launcher {
     }
 }
 
-/// A file of the user as it is, else an asset of that name.
+/// The path of an existing file, otherwise the bundled asset of that name.
 ///
 /// # Errors
-/// It is neither.
+/// The path is neither a file nor an asset.
 pub(crate) fn user_or_asset(path: &Path) -> Result<PathBuf> {
     if path.exists() { Ok(path.to_path_buf()) } else { Ok(assets::path(path)?) }
 }
 
-/// Makes the folder of `--out`.
+/// Creates the folder of `--out`.
 ///
 /// # Errors
-/// It cannot be made.
+/// The folder cannot be created.
 pub(crate) fn make_folder(out: &Path) -> Result {
     std::fs::create_dir_all(out).map_err(|e| format!("--out {}: {e}", out.display()).into())
 }
 
-/// Checks that there is the environment of `--camera-id`.
+/// Checks the environment number of `--camera-id`.
 ///
 /// # Errors
-/// There is none of that number.
+/// The number is not below the number of environments.
 pub(crate) fn check_camera_id(camera_id: usize, sim: &SimulationManager) -> Result {
     let n = sim.num_envs();
     if camera_id < n {
@@ -334,12 +337,12 @@ pub(crate) fn check_camera_id(camera_id: usize, sim: &SimulationManager) -> Resu
     }
 }
 
-/// Where the tutorial's cameras stand \[m\]: at two places, in turns.
+/// Positions of the tutorial's cameras \[m\]: two places in alternation.
 pub(crate) fn two_views(num_envs: usize) -> Vec<[f64; 3]> {
     (0..num_envs).map(|env| if env % 2 == 0 { [2.5, 2.5, 2.5] } else { [-2.5, -2.5, 2.5] }).collect()
 }
 
-/// Runs an example: an error is printed and gives exit code 2.
+/// Runs an example. An error is printed and gives exit code 2.
 pub(crate) fn run(name: &str, example: impl FnOnce() -> Result) -> ExitCode {
     match example() {
         Ok(()) => ExitCode::SUCCESS,
@@ -350,7 +353,7 @@ pub(crate) fn run(name: &str, example: impl FnOnce() -> Result) -> ExitCode {
     }
 }
 
-/// The end of an example by its user: Ctrl+C, or the window closed.
+/// Stop request of the user: Ctrl+C, or the window closed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct End {
     interrupted: Arc<AtomicBool>,
@@ -358,33 +361,33 @@ pub(crate) struct End {
 }
 
 impl End {
-    /// True when Ctrl+C was pressed or the window was closed.
+    /// True if Ctrl+C was pressed or the window was closed.
     pub(crate) fn has_come(&self) -> bool {
         self.interrupted.load(Ordering::SeqCst) || self.window.is_closed()
     }
 }
 
-/// The loop's clock: progress bar, Ctrl+C and the window's end, number of steps.
+/// Control of the main loop: progress bar, step limit, Ctrl+C and the closing of the window.
 #[derive(Debug)]
 pub(crate) struct Progress {
     bar: ProgressBar,
     steps: Option<u64>,
     end: End,
     start: Instant,
-    /// When it was said last how far it is, where there is no terminal.
+    /// Time of the last progress line, for runs without a terminal.
     said: Cell<Instant>,
 }
 
-/// Between two lines that say how far it is, where there is no terminal.
+/// Interval of progress lines without a terminal.
 pub(crate) const LINE: Duration = Duration::from_secs(10);
 
 impl Progress {
-    /// Starts the clock; `cycle` is the length of the bar where the number of steps is open.
+    /// Starts the clock. `cycle` is the length of the bar if the number of steps is open.
     pub(crate) fn new(launcher: &Launcher, cycle: u64) -> Self {
         let interrupted = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&interrupted);
-        // A second Ctrl+C ends the program at once, should the report hang on a slow disk. Some programs that send the
-        // signal send it twice, to the process and to its group: that is one Ctrl+C.
+        // A second Ctrl+C ends the program at once, in case the report hangs on a slow disk. Some programs send the
+        // signal twice, to the process and to its group: a repetition within a second counts as the same Ctrl+C.
         let mut first: Option<Instant> = None;
         let handler = ctrlc::set_handler(move || {
             flag.store(true, Ordering::SeqCst);
@@ -405,17 +408,17 @@ impl Progress {
         Self { bar, steps: launcher.steps, end, start, said: Cell::new(start) }
     }
 
-    /// True when Ctrl+C was pressed, the window was closed or all steps are done.
+    /// True if Ctrl+C was pressed, the window was closed or all steps are done.
     pub(crate) fn stop(&self, step: u64) -> bool {
         self.end.has_come() || self.steps.is_some_and(|steps| step >= steps)
     }
 
-    /// The user's end of the example, for other threads.
+    /// The stop request, for other threads.
     pub(crate) fn end(&self) -> End {
         self.end.clone()
     }
 
-    /// Where a block of at most `length` steps ends.
+    /// The last step of a block of at most `length` steps.
     pub(crate) fn end_of_block(&self, step: u64, length: u64) -> u64 {
         (step + length).min(self.steps.unwrap_or(u64::MAX))
     }
@@ -426,7 +429,7 @@ impl Progress {
         if std::io::stderr().is_terminal() { self.bar.suspend(|| println!("{message}")) } else { println!("{message}") }
     }
 
-    /// Moves the bar; where there is no terminal, a line every ten seconds says how far it is.
+    /// Moves the bar. Without a terminal, prints a progress line every ten seconds.
     pub(crate) fn advance(&self, step: u64) {
         if self.bar.is_hidden() && self.said.get().elapsed() >= LINE {
             self.said.set(Instant::now());
@@ -439,7 +442,7 @@ impl Progress {
         self.bar.set_position(step);
     }
 
-    /// Steps of all environments per second since the start; ends the bar.
+    /// Finishes the bar; returns the environment steps per second since the start.
     pub(crate) fn env_steps_per_second(&self, steps: u64, num_envs: usize) -> f64 {
         let seconds = self.start.elapsed().as_secs_f64();
         self.bar.finish_and_clear();

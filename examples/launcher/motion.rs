@@ -5,13 +5,12 @@ use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
 use kinetoscope::robot::kinematics::{IkCfg, Tip};
 
-/// Distance of points on a straight line that inverse kinematics are solved for \[m\].
+/// Distance between the inverse-kinematics waypoints of a straight line \[m\].
 const SPACING: f64 = 0.02;
-/// Joints that turn further than this between two points of a line do not follow it \[rad\].
+/// Largest joint change between two waypoints of a line \[rad\]. A larger one means that the joints leave the line.
 const LEAP: f64 = 0.5;
 
-/// Moves one robot in all environments at once. Whatever moves does so through its drives: nothing is written into the
-/// state.
+/// Moves one robot in all environments at once, through its drives only: nothing is written into the state.
 #[derive(Debug)]
 pub(crate) struct Motion<'a> {
     pub(crate) sim: &'a mut SimulationManager,
@@ -24,10 +23,10 @@ pub(crate) struct Motion<'a> {
 }
 
 impl<'a> Motion<'a> {
-    /// Movements of the frame `tip`, by the joints of the control part `arm`.
+    /// Creates a motion player of the frame `tip`, moved by the joints of the control part `arm`.
     ///
     /// # Errors
-    /// There is no such part.
+    /// The robot has no such control part.
     pub(crate) fn new(
         sim: &'a mut SimulationManager,
         robot: RobotId,
@@ -44,19 +43,19 @@ impl<'a> Motion<'a> {
         self.step
     }
 
-    /// For each environment, whether every pose so far could be reached by the plan.
+    /// True for each environment in which every pose so far was reachable.
     pub(crate) fn planned(&self) -> &[bool] {
         &self.planned
     }
 
-    /// Goes to one pose per environment, on whatever way that the joints take.
+    /// Moves to one pose per environment along a joint-space interpolation.
     pub(crate) fn reach(&mut self, poses: &[Pose], seconds: f64) -> Result {
         let start = self.targets(&self.arm);
         let end = self.solve(poses, &start, f64::INFINITY)?;
         self.play(&self.arm.clone(), &[start, end], seconds, |_| ())
     }
 
-    /// Goes to one pose per environment on a straight line from where the targets put the frame now.
+    /// Moves to one pose per environment on a straight line, starting at the frame of the current targets.
     pub(crate) fn line(&mut self, poses: &[Pose], seconds: f64) -> Result {
         let start = self.targets(&self.arm);
         let from = trial::poses(&self.sim.robot(self.robot).compute_fk(&start, self.tip, None)?);
@@ -81,7 +80,7 @@ impl<'a> Motion<'a> {
         self.play(&joints, &[start, end], seconds, |_| ())
     }
 
-    /// Stays; `watch` looks at every step.
+    /// Holds the targets and calls `watch` after every step.
     pub(crate) fn wait(&mut self, seconds: f64, watch: impl FnMut(&SimulationManager)) -> Result {
         self.play(&[], &[], seconds, watch)
     }
@@ -91,7 +90,8 @@ impl<'a> Motion<'a> {
         self.sim.robot(self.robot).qpos_target().select(Axis(1), &columns)
     }
 
-    /// Joint positions for poses, from positions near them; an environment without a solution stays where it is.
+    /// Inverse-kinematics solutions for poses, started from the joint positions `near`. An environment without a
+    /// solution keeps these positions.
     fn solve(&mut self, poses: &[Pose], near: &Array2<f64>, leap: f64) -> Result<Array2<f64>> {
         let found =
             self.sim.robot(self.robot).compute_ik(poses, self.tip, &IkCfg::default(), Some(near.view()), None)?;
@@ -106,7 +106,7 @@ impl<'a> Motion<'a> {
         Ok(positions)
     }
 
-    /// Plays points of a way in even times, starting and ending gently.
+    /// Plays waypoints at equal intervals with a smooth start and end.
     fn play(
         &mut self,
         joints: &[JointIndex],

@@ -1,15 +1,15 @@
-//! Arrays for NumPy: version 1.0 of its `.npy` format, as `numpy.lib.format` describes it. `record::npy` writes the same, which
-//! builds without recordings do not have.
+//! NumPy's `.npy` format, version 1.0, after the documentation of `numpy.lib.format`. `record::npy` writes the same
+//! format, but is missing in builds without recordings.
 
 use kinetoscope::ndarray::{ArrayBase, Data, Dimension};
 use std::io::{self, Write};
 
 /// A number that an array file can hold.
 pub(crate) trait Element: Copy {
-    /// How NumPy names the type in a file: byte order, kind and bytes.
+    /// NumPy's name of the type: byte order, kind and number of bytes.
     const DESCR: &'static str;
 
-    /// Appends the bytes, lowest first.
+    /// Appends the bytes in little-endian order.
     fn put(self, bytes: &mut Vec<u8>);
 }
 
@@ -27,7 +27,7 @@ macro_rules! element {
 
 element!(u8: "|u1", i32: "<i4", f32: "<f4", f64: "<f8");
 
-/// The numbers of `array` in C order, whatever order it has in memory.
+/// Writes the elements of `array` in C order, independent of its memory layout.
 pub(crate) fn write<S, D>(to: &mut impl Write, array: &ArrayBase<S, D>) -> io::Result<()>
 where
     S: Data,
@@ -42,7 +42,7 @@ where
     shape.truncate(shape.len() - if array.ndim() == 1 { 1 } else { 2.min(shape.len()) });
     let mut header =
         format!("{{'descr': '{}', 'fortran_order': False, 'shape': ({shape}), }}", <S::Elem as Element>::DESCR);
-    // One byte is for the line's end.
+    // One byte is the final line break.
     let padding = (FIXED + header.len() + 1).next_multiple_of(ALIGN) - (FIXED + header.len() + 1);
     header.extend(std::iter::repeat_n(' ', padding));
     header.push('\n');

@@ -14,31 +14,31 @@ use std::convert::Infallible;
 
 /// Height of a title \[pixels\].
 const TITLE: u32 = 28;
-/// Space around pictures \[pixels\].
+/// Space around images \[pixels\].
 const GAP: u32 = 8;
 /// Height of the depth scale \[pixels\].
 const SCALE: u32 = 24;
 
-/// The channels of one environment.
+/// The channels of one environment's camera.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Views<'a> {
-    /// Pixels per row, rows.
+    /// Width and height \[pixels\].
     pub(crate) size: [usize; 2],
-    /// Four bytes per pixel.
+    /// RGBA, four bytes per pixel.
     pub(crate) color: &'a [u8],
-    /// Metres.
+    /// Depth \[m\].
     pub(crate) depth: &'a [f32],
-    /// Ids.
+    /// Mask ids.
     pub(crate) mask: &'a [i32],
-    /// Three numbers per pixel.
+    /// Normals, three numbers per pixel.
     pub(crate) normal: &'a [f32],
 }
 
 impl<'a> Views<'a> {
-    /// What a camera sees in its environment number `row`.
+    /// The images of a camera in its environment number `row`.
     ///
     /// # Errors
-    /// One of the four channels is not enabled, or cannot be drawn.
+    /// One of the four channels is not enabled, or cannot be rendered.
     pub(crate) fn of(camera: &'a Camera, row: usize) -> super::Result<Self> {
         let (height, width) = camera.image_shape();
         Ok(Self {
@@ -51,12 +51,12 @@ impl<'a> Views<'a> {
     }
 }
 
-/// One environment of a channel.
+/// The data of one environment in a channel.
 fn slice<T, D: RemoveAxis>(channel: ArrayView<'_, T, D>, row: usize) -> super::Result<&[T]> {
     channel.index_axis_move(Axis(0), row).to_slice().ok_or_else(|| "pictures are not in C order".into())
 }
 
-/// Color, Depth, Mask, Normals in a grid of 2 x 2.
+/// A 2 x 2 grid of color, depth, mask and normals with titles.
 pub(crate) fn grid(views: &Views<'_>) -> RgbImage {
     let size = views.size;
     let range = picture::finite_range(views.depth.iter().copied()).unwrap_or([0.0, 1.0]);
@@ -80,14 +80,14 @@ pub(crate) fn grid(views: &Views<'_>) -> RgbImage {
     out.0
 }
 
-/// Size of the tiled [`grid`]s of `num_envs` environments, of channels of `size` (pixels per row, rows).
+/// Size of the tiled [`grid`]s of `num_envs` environments, of channels of `size` (width, height) \[pixels\].
 pub(crate) fn tiled_size(size: [usize; 2], num_envs: usize) -> [usize; 2] {
     let (gap, title) = (2 * GAP as usize, (TITLE + SCALE) as usize);
     let columns = (1..).find(|c| c * c >= num_envs).unwrap_or(1);
     [2 * columns * (size[0] + gap), 2 * num_envs.div_ceil(columns) * (size[1] + title)]
 }
 
-/// Pictures of the same size in a grid as square as can be, row by row.
+/// Tiles images of equal size row by row in a grid that is as square as possible.
 pub(crate) fn tile(pictures: &[RgbImage]) -> RgbImage {
     let Some(first) = pictures.first() else { return RgbImage::default() };
     let columns = (1..).find(|c| c * c >= pictures.len()).unwrap_or(1);
@@ -110,7 +110,7 @@ impl Canvas {
         let Ok(_) = Text::with_text_style(text, Point::new(x as i32, y as i32), style, place).draw(self);
     }
 
-    /// A bar of the colours between the ends of `range` \[m\], with both written beside it.
+    /// Draws a bar of the depth colors with both ends of `range` \[m\] as labels.
     fn depth_scale(&mut self, [x, y]: [u32; 2], width: u32, range: [f32; 2]) {
         let [near, far] = range.map(|d| format!("{d:.2} m"));
         let style = MonoTextStyle::new(&FONT_8X13, Rgb888::new(30, 30, 30));

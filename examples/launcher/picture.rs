@@ -1,4 +1,4 @@
-//! Channels of cameras as files.
+//! Camera channels as image and array files.
 
 use super::{Result, npy};
 use image::{Rgb, RgbImage};
@@ -8,10 +8,10 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Space between two pictures \[pixels\].
+/// Space between two images \[pixels\].
 const GAP: u32 = 8;
 
-/// Writes an array for NumPy.
+/// Writes an array as `.npy`.
 pub(crate) fn write_npy<S, D>(path: &Path, array: &ArrayBase<S, D>) -> Result
 where
     S: Data,
@@ -26,17 +26,17 @@ where
     write().map_err(|e: std::io::Error| format!("{}: {e}", path.display()).into())
 }
 
-/// Writes a picture as PNG.
+/// Writes an image as PNG.
 pub(crate) fn write_png(path: &Path, picture: &RgbImage) -> Result {
     picture.save(path).map_err(|e| format!("{}: {e}", path.display()).into())
 }
 
-/// Colours without their opacity.
+/// RGB image of RGBA bytes; the alpha channel is dropped.
 pub(crate) fn color_picture(size: [usize; 2], color: &[u8]) -> RgbImage {
     picture(size, |k| [color[4 * k], color[4 * k + 1], color[4 * k + 2]])
 }
 
-/// Two pictures of the same size, beside each other.
+/// Two images of the same size, side by side.
 pub(crate) fn side_by_side(size: [usize; 2], colors: [&[u8]; 2]) -> RgbImage {
     let [left, right] = colors.map(|color| color_picture(size, color));
     let second = left.width() + GAP;
@@ -46,17 +46,17 @@ pub(crate) fn side_by_side(size: [usize; 2], colors: [&[u8]; 2]) -> RgbImage {
     both
 }
 
-/// Depths by colour between the ends of `range`.
+/// Depth image, colored over `range` \[m\].
 pub(crate) fn depth_picture(size: [usize; 2], depth: &[f32], range: [f32; 2]) -> RgbImage {
     picture(size, |k| depth_color(depth[k], range))
 }
 
-/// Mask ids, each in its own colour.
+/// Mask image with one color per id.
 pub(crate) fn mask_picture(size: [usize; 2], mask: &[i32]) -> RgbImage {
     picture(size, |k| mask_color(mask[k]))
 }
 
-/// Normals as colours.
+/// Normals as colors.
 pub(crate) fn normal_picture(size: [usize; 2], normal: &[f32]) -> RgbImage {
     picture(size, |k| normal_color([normal[3 * k], normal[3 * k + 1], normal[3 * k + 2]]))
 }
@@ -65,7 +65,7 @@ fn picture([width, height]: [usize; 2], color: impl Fn(usize) -> [u8; 3]) -> Rgb
     RgbImage::from_fn(width as u32, height as u32, |x, y| Rgb(color(y as usize * width + x as usize)))
 }
 
-/// Smallest and largest finite value; `None` where there is none.
+/// The smallest and largest finite value; `None` without finite values.
 pub(crate) fn finite_range(depth: impl IntoIterator<Item = f32>) -> Option<[f32; 2]> {
     depth
         .into_iter()

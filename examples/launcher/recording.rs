@@ -1,4 +1,4 @@
-//! What an example records, where the build can: the feature `record`.
+//! Recording flags of the examples, for builds with the features `record` and `viewer`.
 
 use super::{Launcher, Result};
 #[cfg(all(feature = "record", feature = "viewer"))]
@@ -16,8 +16,8 @@ mod recorded {
     use std::time::{Duration, Instant};
 
     impl Launcher {
-        /// What `--record` and the record button of window and browser do: they record to the file of `--record`, or, where the
-        /// button is pressed without it, to `recording.mcap` in the folder of `--out`.
+        /// The recording of `--record` and of the record button. It goes to the file of `--record`, or without the flag
+        /// to `recording.mcap` in the folder of `--out`.
         pub(in super::super) fn files(&self) -> &Arc<Mutex<FileRecording>> {
             self.files.get_or_init(|| {
                 let folder = || self.out.clone().unwrap_or_default().join("recording.mcap");
@@ -32,7 +32,7 @@ mod recorded {
         /// Begins to record to the file of `--record`.
         ///
         /// # Errors
-        /// The file cannot be written, or has no place for anything of this example.
+        /// The file cannot be written, or its format cannot hold any stream of this example.
         pub(crate) fn start_recording(&self, sim: &mut SimulationManager) -> Result<Recording> {
             let files = self.files();
             if self.record.is_some() {
@@ -44,13 +44,13 @@ mod recorded {
         }
     }
 
-    /// The same, of what `--record-view` names.
+    /// `cfg` with the topics that `--record-view` selects.
     fn showing(cfg: RecorderCfg, view: &str) -> RecorderCfg {
         let film = Format::of_path(&cfg.path).is_ok_and(Format::is_animation);
         match (view, film) {
             ("stage", true) => cfg.with_topics([Topic::Stage]),
             ("stage", false) => cfg.with_topics([Topic::Everything, Topic::Stage]),
-            // A camera that there is not is an error, which names those there are.
+            // An unknown camera is an error that lists the cameras of the scene.
             (camera, true) => {
                 RecorderCfg { envs: Some(vec![EnvId(0)]), ..cfg }.with_topics([Topic::channel(camera, "color")])
             }
@@ -58,7 +58,7 @@ mod recorded {
         }
     }
 
-    /// Says at once, not only at the end, that a recording has stopped.
+    /// Reports a failed recording at once, not only at the end.
     struct Watch {
         files: Arc<Mutex<FileRecording>>,
         looked: Instant,
@@ -75,7 +75,7 @@ mod recorded {
                 return;
             }
             self.looked = Instant::now();
-            // Whoever holds it is asking for the same.
+            // A holder of the lock, such as the record button, reports the same failure itself.
             let failure = self.files.try_lock().ok().and_then(|files| files.failure(sim));
             if let Some(why) = &failure {
                 eprintln!("--record {why}; nothing is recorded any more");
@@ -84,20 +84,20 @@ mod recorded {
         }
     }
 
-    /// Steps from one look at the clock to the next.
+    /// Steps between two looks at the clock.
     const LOOK_EVERY: u64 = 10;
 
-    /// What `--record` or the record button has begun, if anything.
+    /// The recording that `--record` or the record button has begun, if any.
     #[derive(Debug)]
     pub(crate) struct Recording {
         files: Arc<Mutex<FileRecording>>,
     }
 
     impl Recording {
-        /// Ends the recording: the file is whole.
+        /// Ends the recording and completes the file.
         ///
         /// # Errors
-        /// It could not be written.
+        /// The file could not be written.
         pub(crate) fn finish(&self, sim: &mut SimulationManager) -> Result {
             let ended = self.files.lock().unwrap_or_else(PoisonError::into_inner).end(sim);
             for recorded in ended.map_err(|error| format!("--record {error}"))? {
@@ -108,17 +108,17 @@ mod recorded {
     }
 }
 
-/// Nothing: this build does not record.
+/// Placeholder for builds without recordings.
 #[cfg(not(all(feature = "record", feature = "viewer")))]
 #[derive(Debug)]
 pub(crate) struct Recording;
 
 #[cfg(not(all(feature = "record", feature = "viewer")))]
 impl Launcher {
-    /// This build records nothing.
+    /// Returns a placeholder: this build does not record.
     ///
     /// # Errors
-    /// `--record` asks for it.
+    /// `--record` is given.
     pub(crate) fn start_recording(&self, _: &mut SimulationManager) -> Result<Recording> {
         match self.record {
             Some(_) => {
@@ -132,10 +132,10 @@ impl Launcher {
 
 #[cfg(not(all(feature = "record", feature = "viewer")))]
 impl Recording {
-    /// There is nothing to end.
+    /// Does nothing.
     ///
     /// # Errors
-    /// None.
+    /// Never fails.
     pub(crate) fn finish(&self, _: &mut SimulationManager) -> Result {
         Ok(())
     }

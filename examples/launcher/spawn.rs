@@ -1,13 +1,13 @@
-//! Flags for the start of a robot that stands on the ground, as those of `kinetoscope view`.
+//! Flags for the start height of a robot on the ground, the same as those of `kinetoscope view`.
 
 use clap::Args;
 use kinetoscope::prelude::*;
 
-/// Height of the robot at the start, and the ground.
+/// Start height of the robot, and the ground.
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct SpawnFlags {
-    /// Height of the lowest collision point of the robot above the ground at the start, in metres; without it the robot starts
-    /// where its pose in the example, or its MJCF file, puts it
+    /// Height of the lowest collision point of the robot above the ground at the start, in meters. The default is the
+    /// pose of the example or of the MJCF file
     #[arg(long, alias = "spawn_height", value_name = "METRES", allow_negative_numbers = true)]
     spawn_height: Option<f64>,
     /// Leave out the ground: the robot falls
@@ -16,7 +16,7 @@ pub(crate) struct SpawnFlags {
 }
 
 impl SpawnFlags {
-    /// Sets the ground of a simulation and the height of its robot.
+    /// Sets the ground of a simulation and the start height of its robot.
     ///
     /// # Errors
     /// The height is not finite.

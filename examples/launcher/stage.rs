@@ -1,4 +1,4 @@
-//! All environments in one picture, with what sensors show of their measurements.
+//! All environments in one image, with the debug markers of the sensors.
 
 use super::{Result, picture};
 use kinetoscope::prelude::*;
@@ -10,10 +10,10 @@ use kinetoscope::sensors::camera::look_at_pose;
 use kinetoscope::sim::Still;
 use std::path::Path;
 
-/// Draws environments side by side, seen from `eye`, and writes them as PNG.
+/// Renders all environments side by side, seen from `eye` toward `target` \[m\], and writes a PNG.
 ///
 /// # Errors
-/// There is too much to draw, or the file cannot be written.
+/// The scene is too large to render, or the file cannot be written.
 pub(crate) fn write(
     sim: &mut SimulationManager,
     markers: &[(EnvId, Marker)],

@@ -1,28 +1,28 @@
-//! Examples that look at a model: what they do where somebody wants to watch it move.
+//! Live view and recording for the examples that inspect a model.
 
 use super::{Launcher, Progress, Result};
 use clap::Parser as _;
 use kinetoscope::prelude::*;
 use std::path::PathBuf;
 
-/// `--serve`, `--record` and `--headless` of examples that look at a model and step nothing by themselves.
+/// `--serve`, `--record`, `--steps` and `--headless` of examples that inspect a model and take no steps by themselves.
 #[derive(Clone, Debug, clap::Args)]
 pub(crate) struct StillFlags {
-    /// Then show the model in browsers, in real time, until Ctrl+C; at 127.0.0.1:8080 where no address is given
+    /// Show the moving model in browsers, in real time, until Ctrl+C; the address defaults to 127.0.0.1:8080
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
     serve: Option<String>,
-    /// Then record the model as it moves, until Ctrl+C; the format is that of the name, as in every example
+    /// Record the moving model until Ctrl+C; the file name selects the format, as in every example
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Physics steps that are shown or recorded, in the place of Ctrl+C
+    /// Number of physics steps to show or record, instead of running until Ctrl+C
     #[arg(long)]
     steps: Option<u64>,
-    /// As every example has it; this one never opens a window
+    /// Accepted as in every example; this one never opens a window
     #[arg(long, hide_short_help = true)]
     headless: bool,
 }
 
-/// The flags of every example, with nobody who typed them.
+/// The default values of every example's flags.
 #[derive(Debug, clap::Parser)]
 struct Untyped {
     #[command(flatten)]
@@ -30,15 +30,15 @@ struct Untyped {
 }
 
 impl StillFlags {
-    /// Whether the model is to move at all.
+    /// True if the flags make the model move.
     pub(crate) fn wants_motion(&self) -> bool {
         self.serve.is_some() || self.record.is_some()
     }
 
-    /// Steps a model, shown and recorded as the flags say.
+    /// Steps a model while it is shown and recorded.
     ///
     /// # Errors
-    /// The address is none, or in use; the file cannot be written.
+    /// The address is invalid or in use, or the file cannot be written.
     pub(crate) fn show(&self, sim: &mut SimulationManager) -> Result {
         let Untyped { launcher } = Untyped::try_parse_from(["model", "--headless"])?;
         let (serve, record) = (self.serve.clone(), self.record.clone());

@@ -1,4 +1,4 @@
-//! Examples that try something in many environments and count: 16 of them, and what counts as enough.
+//! Examples that run a task in 16 environments and count the successes.
 
 use super::{Launcher, Result, picture, stage};
 use clap::Parser;
@@ -10,18 +10,19 @@ use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// The flags, with 16 environments where nobody says how many.
+/// Parses the flags, with 16 environments by default.
 pub(crate) fn parse<A: Parser>() -> A {
     let command = A::command().mut_arg("num_envs", |flag| flag.default_value("16"));
     A::from_arg_matches(&command.get_matches()).unwrap_or_else(|error| error.exit())
 }
 
-/// How many of the environments have to succeed: all but one in 16.
+/// Number of environments that have to succeed: all but one in 16.
 pub(crate) fn needed(num_envs: usize) -> usize {
     num_envs - num_envs / 16
 }
 
-/// Runs an example that says whether enough succeeded: exit code 0, 1 where fewer did, 2 for an error.
+/// Runs an example that returns true for enough successes. The exit code is 0, or 1 for too few successes, or 2 for an
+/// error.
 pub(crate) fn run(name: &str, example: impl FnOnce() -> Result<bool>) -> ExitCode {
     let mut enough = false;
     let code = super::run(name, || {
@@ -31,8 +32,8 @@ pub(crate) fn run(name: &str, example: impl FnOnce() -> Result<bool>) -> ExitCod
     if enough || code != ExitCode::SUCCESS { code } else { ExitCode::FAILURE }
 }
 
-/// For each environment, why it could not be stepped on; `None` where all went well. What it shows is its last good state,
-/// which is no result.
+/// The reason for the divergence of each environment, or `None`. A diverged environment shows its last good state,
+/// which is not a result.
 pub(crate) fn diverged(sim: &SimulationManager) -> Vec<Option<String>> {
     let mut reasons = vec![None; sim.num_envs()];
     for diverged in sim.diverged() {
@@ -42,23 +43,23 @@ pub(crate) fn diverged(sim: &SimulationManager) -> Vec<Option<String>> {
     reasons
 }
 
-/// What an example counted.
+/// Results of an example.
 #[derive(Debug)]
 pub(crate) struct Count<'a> {
-    /// What a success is, behind their number and "of 16".
+    /// Description of a success, printed after "N of 16".
     pub(crate) what: &'a str,
-    /// The setting that decides the run, as its report calls it, in its unit.
+    /// The deciding setting: its key in the report, and its value in the unit of the key.
     pub(crate) setting: (&'a str, f64),
-    /// A row for each environment, with `success`.
+    /// One row for each environment, with the key `success`.
     pub(crate) table: Vec<Value>,
     pub(crate) steps: u64,
     /// Environment steps per second.
     pub(crate) rate: f64,
-    /// The picture of all environments: its name, from where and to where it is seen.
+    /// The overview image of all environments: file name, camera position and camera target \[m\].
     pub(crate) overview: (&'a str, [f64; 3], [f64; 3]),
 }
 
-/// Prints what was counted, draws all environments and writes the report; gives whether enough succeeded.
+/// Prints the results, renders all environments and writes the report. Returns true for enough successes.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -92,22 +93,22 @@ pub(crate) fn word(yes: bool) -> &'static str {
     if yes { "yes" } else { "no" }
 }
 
-/// Rows `[x, y, z, qw, qx, qy, qz]` as poses.
+/// Converts rows `[x, y, z, qw, qx, qy, qz]` to poses.
 pub(crate) fn poses(rows: &Array2<f64>) -> Vec<Pose> {
     rows.rows().into_iter().map(|row| from_row(&std::array::from_fn(|k| row[k]))).collect()
 }
 
-/// Poses as rows `[x, y, z, qw, qx, qy, qz]`.
+/// Converts poses to rows `[x, y, z, qw, qx, qy, qz]`.
 pub(crate) fn rows(poses: &[Pose]) -> Array2<f64> {
     Array2::from_shape_fn((poses.len(), 7), |(env, k)| to_row(&poses[env])[k])
 }
 
-/// Poses at another place, by a vector in the axes of the environment \[m\].
+/// Poses translated by a vector in the axes of the environment \[m\].
 pub(crate) fn moved(poses: &[Pose], by: impl Fn(&Pose) -> [f64; 3]) -> Vec<Pose> {
     poses.iter().map(|pose| Pose::translation(by(pose)[0], by(pose)[1], by(pose)[2]) * pose).collect()
 }
 
-/// Pictures of the first environment, `NAME_1.png` and so on.
+/// Images of the first environment, `NAME_1.png` and so on.
 #[derive(Debug)]
 pub(crate) struct Album {
     out: Option<PathBuf>,
@@ -117,10 +118,10 @@ pub(crate) struct Album {
 }
 
 impl Album {
-    /// A camera that looks from `eye` to `target`; pictures go to the folder `out`, if there is one.
+    /// Adds a camera that looks from `eye` to `target` \[m\]. Images go to the folder `out`, if given.
     ///
     /// # Errors
-    /// The folder cannot be made.
+    /// The folder cannot be created.
     pub(crate) fn new(
         sim: &mut SimulationManager,
         name: &'static str,
@@ -144,7 +145,7 @@ impl Album {
         Ok(Self { out, name, camera, taken: 0 })
     }
 
-    /// Takes the next picture.
+    /// Writes the next image.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -1,4 +1,4 @@
-//! The window and the browser view of an example, where the build has them: the feature `view`.
+//! The window and the browser view of an example, for builds with the feature `viewer`.
 
 use super::{Launcher, Result};
 use kinetoscope::prelude::*;
@@ -16,29 +16,29 @@ mod shown {
     use kinetoscope::viewer::{Canvas, Command, Speed, Viewer, Viewing, Wants};
     use std::sync::{Arc, OnceLock};
 
-    /// The window of an example, once it is open.
+    /// The window of an example once it is open.
     #[derive(Clone, Debug, Default)]
     pub(crate) struct Shown(Arc<OnceLock<Window>>);
 
     impl Shown {
-        /// True when there was a window and it is closed, by the user or by a lost display.
+        /// True if a window was opened and then closed, by the user or by a lost display.
         pub(crate) fn is_closed(&self) -> bool {
             self.0.get().is_some_and(|window| !window.is_open())
         }
     }
 
-    /// Lets a simulation go on that somebody paused.
+    /// Viewer handle that resumes a paused simulation.
     static KEY: OnceLock<Viewer> = OnceLock::new();
 
-    /// Ctrl+C ends an example also while somebody holds it, in a window or in a browser.
+    /// Makes Ctrl+C end an example even if a window or a browser has paused the simulation.
     fn keep_key(sim: &mut SimulationManager) {
-        // One is enough for both.
+        // One handle serves window and browser.
         KEY.get_or_init(|| {
             sim.viewer(Wants { rate: 0.0, contacts: None, markers: false, joints: false, cameras: false })
         });
     }
 
-    /// A viewer that holds the simulation does not hold the program.
+    /// Resumes a paused simulation so that the program can end.
     pub(crate) fn let_go() {
         if let Some(key) = KEY.get() {
             key.send(Command::Resume);
@@ -46,7 +46,7 @@ mod shown {
         }
     }
 
-    /// A window that shows what a sensor measured.
+    /// A window with the images of a sensor.
     #[derive(Debug)]
     pub(crate) struct SensorWindow {
         cfg: ImageWindowCfg,
@@ -62,7 +62,7 @@ mod shown {
             for (to, from) in self.last.bytes_mut().chunks_exact_mut(4).zip(image.as_raw().chunks_exact(3)) {
                 to[..3].copy_from_slice(from);
             }
-            // As with `imshow`, the next image opens a window again that the user has closed.
+            // As with `imshow`, the next image reopens a window that the user has closed.
             if !self.window.window().is_open()
                 && let Ok(window) = ImageWindow::open(self.cfg.clone())
             {
@@ -71,7 +71,7 @@ mod shown {
             self.window.show(self.last.clone());
         }
 
-        /// Shows a line of text over the last image, until the next one.
+        /// Shows a line of text over the last image until the next one.
         pub(crate) fn announce(&self, text: &str) {
             let mut image = self.last.clone();
             image.text(text, [12, 34], &FONT_10X20, [255, 210, 60]);
@@ -80,8 +80,8 @@ mod shown {
     }
 
     impl Launcher {
-        /// Opens a window for the images of a sensor, of `size` (pixels per row, rows), at most 1600 by 1200; `None` where there
-        /// is no window of the simulation either.
+        /// Opens a window for sensor images of `size` (width, height), scaled to at most 1600 by 1200 \[pixels\].
+        /// `None` if the simulation itself has no window.
         pub(crate) fn open_sensor_window(&self, title: &str, size: [usize; 2]) -> Option<SensorWindow> {
             self.window.0.get()?;
             let scale = [1600.0, 1200.0].iter().zip(size).fold(1.0_f64, |scale, (most, n)| scale.min(most / n as f64));
@@ -99,10 +99,10 @@ mod shown {
             }
         }
 
-        /// Shows the simulation in browsers where `--serve` asks for it.
+        /// Serves the browser view, if `--serve` is given.
         ///
         /// # Errors
-        /// The address is none, or in use.
+        /// The address is invalid or in use.
         pub(crate) fn serve(&self, sim: &mut SimulationManager) -> Result {
             let Some(address) = self.serve_address() else { return Ok(()) };
             let cfg = ServeCfg { speed: Some(Speed::REAL), recording: self.record_button(), ..ServeCfg::default() };
@@ -112,7 +112,7 @@ mod shown {
             Ok(())
         }
 
-        /// Draws the stage as a window first shows it, to a PNG in the folder of `--out`, where that is given.
+        /// Renders the stage as in a newly opened window to a PNG in the folder of `--out`, if given.
         ///
         /// # Errors
         /// The file cannot be written.
@@ -125,8 +125,8 @@ mod shown {
             Ok(())
         }
 
-        /// Opens a window onto the simulation, unless `--headless` says otherwise. Closing it ends the example as Ctrl+C does.
-        /// Without a display, a message says so and the example runs without a window.
+        /// Opens a window onto the simulation, except with `--headless`. Closing it ends the example as Ctrl+C does.
+        /// Without a display, the example prints a message and runs without a window.
         pub(crate) fn open_window(&self, sim: &mut SimulationManager) {
             if self.headless {
                 return;
@@ -141,7 +141,7 @@ mod shown {
             }
         }
 
-        /// The record button of window and browser, where the build records.
+        /// The record button of window and browser, in builds that record.
         fn record_button(&self) -> Option<RecordButton> {
             #[cfg(feature = "record")]
             return Some(RecordButton::shared(std::sync::Arc::clone(self.files())));
@@ -151,7 +151,7 @@ mod shown {
     }
 }
 
-/// Without the feature `view`, there is no window of a sensor.
+/// Placeholder for builds without the feature `viewer`: no such value exists.
 #[cfg(not(feature = "viewer"))]
 #[derive(Debug)]
 pub(crate) enum SensorWindow {}
@@ -169,18 +169,18 @@ impl SensorWindow {
     }
 }
 
-/// Without the feature `view`, no viewer holds a simulation.
+/// Does nothing: without the feature `viewer`, a simulation cannot be paused.
 #[cfg(not(feature = "viewer"))]
 pub(crate) fn let_go() {}
 
-/// Without the feature `view`, there is no window to close.
+/// Placeholder for builds without the feature `viewer`.
 #[cfg(not(feature = "viewer"))]
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shown;
 
 #[cfg(not(feature = "viewer"))]
 impl Shown {
-    /// Always false: there is no window.
+    /// Always false: this build has no window.
     pub(crate) fn is_closed(&self) -> bool {
         false
     }
@@ -188,10 +188,10 @@ impl Shown {
 
 #[cfg(not(feature = "viewer"))]
 impl Launcher {
-    /// This build serves nothing.
+    /// Serves nothing: this build has no browser view.
     ///
     /// # Errors
-    /// `--serve` asks for it.
+    /// `--serve` is given.
     pub(crate) fn serve(&self, _: &mut SimulationManager) -> Result {
         match self.serve_address() {
             Some(_) => {
@@ -201,10 +201,10 @@ impl Launcher {
         }
     }
 
-    /// This build draws no stage.
+    /// Renders nothing: this build has no stage view.
     ///
     /// # Errors
-    /// `--out` asks for it.
+    /// `--out` is given.
     pub(crate) fn screenshot(&self, _: &mut SimulationManager, _: &str) -> Result {
         match self.out {
             Some(_) => {
@@ -214,12 +214,12 @@ impl Launcher {
         }
     }
 
-    /// This build has no window.
+    /// Always `None`: this build has no window.
     pub(crate) fn open_sensor_window(&self, _: &str, _: [usize; 2]) -> Option<SensorWindow> {
         None
     }
 
-    /// Says that this build opens no window, unless `--headless` wants none.
+    /// Prints that this build opens no window, except with `--headless`.
     pub(crate) fn open_window(&self, _: &mut SimulationManager) {
         if !self.headless {
             println!("This build has no window (its feature `view` is off).\nGoing on without, as with --headless.");

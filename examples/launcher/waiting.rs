@@ -1,4 +1,4 @@
-//! How far a long picture is, for who waits for it at a terminal.
+//! Progress of a long rendering, shown at the terminal.
 
 use super::LINE;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -6,11 +6,11 @@ use kinetoscope::render::RenderProgress;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Between two looks.
+/// Interval between two progress updates.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Does `work`, which draws by paths, and meanwhile shows the progress on the terminal. After `limit` the work is cancelled.
-/// `look` is called every tenth of a second from another thread; it may cancel, too.
+/// Runs `work`, a path tracing job, and meanwhile shows its progress on the terminal. After `limit` the job is
+/// canceled. `look` is called every tenth of a second from another thread and may also cancel the job.
 pub(crate) fn draw<T>(
     progress: &RenderProgress,
     limit: Option<Duration>,
@@ -25,7 +25,7 @@ pub(crate) fn draw<T>(
             let style = ProgressStyle::with_template("{percent:>3} % {wide_bar} {msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             let mut said = start;
-            // Ended, or nobody waits any more.
+            // Ends when the work is done, or when its thread has dropped the sender.
             while until_done.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
                 if limit.is_some_and(|limit| start.elapsed() > limit) {
                     progress.cancel();
@@ -51,7 +51,7 @@ pub(crate) fn draw<T>(
     })
 }
 
-/// Speed, and how long it takes yet.
+/// Rates, and the remaining time.
 fn message(progress: &RenderProgress) -> String {
     let seconds = progress.elapsed().map_or(0.0, |time| time.as_secs_f64());
     let rate = |count: u64| if seconds > 0.0 { count as f64 / seconds / 1e6 } else { 0.0 };

@@ -1,4 +1,5 @@
-//! The public API: robots, objects, drives, tasks and sensors, each against closed forms, MuJoCo or another way to the same answer.
+//! Tests of the public API: robots, objects, drives, tasks and sensors, each compared with closed forms, with MuJoCo or
+//! with another method.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod articulations;

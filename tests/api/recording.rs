@@ -1,4 +1,4 @@
-//! The record button of views writes files, as the recorder does.
+//! The record button of viewers writes the same files as the recorder.
 
 use kinetoscope::FileRecording;
 use kinetoscope::record::{RecordError, Recorded, RecorderCfg, Recording, Wanted};
@@ -8,13 +8,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard};
 
-/// A world with a button, and a viewer that presses it.
+/// A world with a record button, and a viewer that presses the button.
 struct Watched {
     world: RecordedWorld,
     files: Arc<Mutex<FileRecording>>,
     viewer: Viewer,
     step: u32,
-    /// Joint positions at each time \[ns\].
+    /// Joint positions by time \[ns\].
     positions: BTreeMap<u64, Vec<f64>>,
 }
 
@@ -42,18 +42,18 @@ impl Watched {
         self.positions.insert(nanos(self.world.sim.time()[0]), positions);
     }
 
-    /// State of the recording in the views: running or not, and its text.
+    /// Returns the state of the recording in viewers: true while it runs, and its text.
     fn seen(&self) -> (bool, String) {
         let state = self.viewer.newest().unwrap().run.recording.clone().unwrap();
         (state.on, state.text)
     }
 
-    /// The reason why a command was refused.
+    /// Returns the error message of the rejected command.
     fn refused(&self) -> Option<String> {
         self.viewer.newest().unwrap().run.refused.clone()
     }
 
-    /// Steps until this holds.
+    /// Steps until the condition is true.
     fn step_until(&mut self, what: &str, is: impl Fn(&Self) -> bool) {
         for _ in 0..20_000 {
             if is(self) {
@@ -69,7 +69,7 @@ impl Watched {
         self.step_until("the button is obeyed", |own| own.seen().0 == on);
     }
 
-    /// Ends the recording in the program.
+    /// Ends the recording from the program.
     fn end(&mut self) -> Vec<Recorded> {
         let mut files = self.files.lock().unwrap();
         let recorded = files.end(&mut self.world.sim).unwrap();
@@ -77,7 +77,7 @@ impl Watched {
         recorded
     }
 
-    /// Every row of a file is the state of the simulation at its time, and no row is missing.
+    /// Checks that every row of a file is the state of the simulation at its time, and that no row is missing.
     fn check(&self, path: &Path, recorded: &Recorded) {
         let recording = Recording::open(path).unwrap();
         let topic = recording.topic("/env_0/arm/joint_states", None).unwrap();
@@ -91,7 +91,7 @@ impl Watched {
             assert!(times.windows(2).all(|pair| pair[1] - pair[0] == 10_000_000), "{times:?}");
             let expected: Vec<f64> = times.iter().map(|time| self.positions[time][joint]).collect();
             assert_eq!(samples.values, expected, "joint {joint}");
-            // Control: another time has other positions.
+            // Control: positions differ between times.
             assert_ne!(expected[0], expected[5], "joint {joint}");
         }
     }
@@ -128,7 +128,7 @@ fn viewer_that_leaves() {
     let mut watched = Watched::new(&path);
     watched.press(true);
     (0..20).for_each(|_| watched.step());
-    // Another viewer stays, and sees the recording end.
+    // Another viewer stays and receives the end of the recording.
     let gone = std::mem::replace(&mut watched.viewer, watched.world.sim.viewer(Wants::default()));
     drop(gone);
     watched.step_until("it ends", |own| !own.seen().0);
@@ -136,7 +136,7 @@ fn viewer_that_leaves() {
     watched.check(&path, &recorded[0]);
 }
 
-/// The button takes the next free name; the program gets an error.
+/// The button takes the next free name; a call from the program returns an error.
 #[test]
 fn taken_names() {
     let folder = tempfile::tempdir().unwrap();
@@ -151,15 +151,15 @@ fn taken_names() {
     watched.press(false);
     assert!(folder.path().join("run-3.mcap").is_file());
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "precious");
-    // A folder that is missing is reported to the viewer.
+    // A missing folder is reported to the viewer.
     let mut watched = Watched::new(&folder.path().join("missing/run.mcap"));
     watched.viewer.send(Command::Record(true));
     watched.step_until("it is refused", |own| own.refused().is_some());
     assert!(watched.refused().unwrap().contains("missing") && !watched.seen().0);
 }
 
-/// Root cause: an error of a recording that the button had ended was reported to the viewer only, and a program that asked at
-/// its end got no error.
+/// Regression: the error of a recording that was ended by the button was reported to the viewer only. The program's
+/// `end` did not return the error.
 #[test]
 fn broken_recording() {
     let folder = tempfile::tempdir().unwrap();
@@ -167,11 +167,12 @@ fn broken_recording() {
     let mut files = FileRecording::new(RecorderCfg::new(folder.path().join("run.npz")));
     files.set(&mut world.sim, true).unwrap();
     world.step(0);
-    // A second robot has joints, which the sensor of all joints now measures.
+    // A second robot adds joints, which the sensor of all joints now measures: the columns of the recording no longer
+    // fit.
     world.sim.add_robot(sr5("other")).unwrap();
     world.step(1);
     let said = files.set(&mut world.sim, false).unwrap_err();
-    // Another recording, which is well.
+    // A second recording, which succeeds.
     files.set(&mut world.sim, true).unwrap();
     world.step(2);
     let error = files.end(&mut world.sim).unwrap_err();

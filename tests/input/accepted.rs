@@ -1,4 +1,4 @@
-//! Strange and still robots: they are simulated, or reported as diverged; never a panic, never NaN in what is read.
+//! Unusual robots: they are simulated, or reported as diverged; no panic, and no NaN in the state that is read.
 
 use super::support::{INERTIAL, LIMIT, exported, hinge_with, robot, sim};
 use kinetoscope::ndarray::Array2;
@@ -60,7 +60,7 @@ fn rows() -> Vec<(String, String)> {
         rows.push(("mimic", chain(&[("revolute", LIMIT.into()), ("revolute", mimic)])));
     }
     for free in ["planar", "floating"] {
-        // In the middle, at the root, at the end, three in a row.
+        // In the middle, at the root, at the end, and three in a row.
         let kinds = [
             ["revolute", free, "revolute"],
             [free, "revolute", "prismatic"],
@@ -116,7 +116,7 @@ fn use_it(robot: RobotCfg, what: &str) -> Result<(), String> {
     if limits.iter().any(|x| x.is_nan()) || limits.rows().into_iter().any(|r| r[0] > r[1]) {
         return Err(format!("limits {limits}"));
     }
-    // Plain MuJoCo has no quarantine: its compiler takes a step, which must succeed.
+    // MuJoCo without Kinetoscope has no quarantine: its compiler takes a step, which must succeed.
     if is(&["1e300", "far"]) {
         return Ok(());
     }

@@ -1,4 +1,4 @@
-//! Bundled files: the folders that are searched.
+//! Search folders of the bundled files.
 
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
@@ -22,14 +22,15 @@ fn scenario_elsewhere() {
     }
 }
 
-/// EmbodiChain's tutorial closes a hand at its lower limits and opens it at the upper ones; our hand bent the other way.
+/// Compatibility with EmbodiChain's tutorial, which closes a hand at its lower limits and opens it at the upper ones.
+/// Regression: the bundled hand bent the other way.
 #[test]
 fn hand_closes_at_its_lower_limits() {
     let mut sim = SimulationManager::new(SimulationManagerCfg::default()).unwrap();
     let id = sim.add_robot(urdf_robot("hand", assets::path("revo1_left/revo1_left.urdf").unwrap())).unwrap();
     let robot = sim.robot(id);
     let limits = robot.qpos_limits();
-    // Frames of the outer segments in the palm's frame [m]: fingers along +y, the palm faces +z.
+    // Positions of the outer segments in the palm's frame [m]: fingers along +y, the palm faces +z.
     let place = |link: &str, end: usize| {
         let qpos: Array2<f64> = limits.index_axis(Axis(2), end).to_owned();
         let pose = robot.compute_fk(&qpos, link, None).unwrap();
@@ -42,10 +43,10 @@ fn hand_closes_at_its_lower_limits() {
     }
 }
 
-/// Boxes of the bundled hand end where the round edge beside them is as high: on the axis of the cylinder.
+/// The boxes of the bundled hand end at the height of the adjacent cylinders, on the axis of the cylinder.
 ///
-/// Root cause once: the palm's box was 0.8 mm wider on each side, so that its side stood 23 um above the cylinder, a dotted line
-/// in images.
+/// Regression: the palm's box was 0.8 mm wider on each side, so that its side stood 23 um above the cylinder, visible
+/// as a dotted line in images.
 #[test]
 fn round_edges_of_the_hand() {
     let file = std::fs::read_to_string(assets::path("revo1_left/revo1_left.urdf").unwrap()).unwrap();
@@ -54,7 +55,7 @@ fn round_edges_of_the_hand() {
     for link in document.descendants().filter(|n| n.has_tag_name("link")) {
         let visuals: Vec<_> = link.children().filter(|n| n.has_tag_name("visual")).collect();
         let numbers = |text: &str| text.split_whitespace().map(|x| x.parse().unwrap()).collect::<Vec<f64>>();
-        // Origin and sizes of the visuals of a kind.
+        // Origins and sizes of the visuals of a kind.
         let of = |kind: &str, size: &str| -> Vec<(Vec<f64>, Vec<f64>)> {
             let found = visuals.iter().filter_map(|visual| {
                 let shape = visual.descendants().find(|n| n.has_tag_name(kind))?;

@@ -1,4 +1,4 @@
-//! `SimulationManager::new`.
+//! Validation of the configuration by `SimulationManager::new`.
 
 use super::support::{ball, cfg, hinge, robot};
 use kinetoscope::prelude::*;
@@ -7,7 +7,7 @@ use kinetoscope_testkit::refusal::assert_refused;
 
 type Change = fn(&mut SimulationManagerCfg);
 
-/// A change of the default configuration, and what the message says.
+/// A change of the default configuration, and parts of the error message.
 const REFUSED: &[(Change, &[&str])] = &[
     (|c| c.num_envs = 0, &["num_envs is 0", "at least 1"]),
     (|c| c.num_envs = 1 << 40, &["num_envs is 1099511627776", "at most"]),
@@ -51,7 +51,7 @@ fn out_of_range() {
     assert_refused(REFUSED.iter().map(|(change, parts)| (parts[0], made(change), "", parts)));
 }
 
-/// Extreme and still numbers: they work, and what diverges is reported.
+/// Extreme but valid numbers: the simulation works, and diverged environments are reported.
 const ACCEPTED: &[Change] = &[
     |c| c.physics_dt = 1.0,
     |c| (c.physics_dt, c.substeps) = (1e-5, 10_000),

@@ -1,5 +1,6 @@
-//! Every writer of robots, objects and MJCF parts, with every kind of mistake that its arrays and indices can have: a typed
-//! error that names it, and nothing is written. Each is called rightly, too, and then something changes.
+//! Every writer of robots, objects and MJCF parts, with every kind of invalid array and index: each gives a typed error
+//! that names the mistake, and leaves the state unchanged. Each writer is also called with valid input, which must
+//! change the state.
 
 use super::support::{LIMIT, bits, chain, robot};
 use kinetoscope::ndarray::{Array2, Axis};
@@ -37,7 +38,7 @@ fn world() -> (SimulationManager, Ids) {
     (sim, ids)
 }
 
-/// Everything that a writer here may change.
+/// All state that these writers can change, as text.
 fn told(sim: &SimulationManager, ids: Ids) -> String {
     let view = sim.robot(ids.robot);
     let drives = [view.stiffness(), view.damping(), view.qf_limits(), view.qvel_limits()];
@@ -63,7 +64,7 @@ type Values<'a> = &'a Array2<f64>;
 type Envs<'a> = Option<&'a [EnvId]>;
 type Joints<'a> = Option<&'a [JointIndex]>;
 
-/// A writer of numbers of joints: its name, whether infinity is a number for it, and its call.
+/// A writer of joint values: its name, true if infinity is valid, and its call.
 type OfJoints = (&'static str, bool, fn(&mut RobotMut<'_>, Values<'_>, Joints<'_>, Envs<'_>) -> Result<()>);
 
 const OF_JOINTS: &[OfJoints] = &[
@@ -83,7 +84,7 @@ const OF_JOINTS: &[OfJoints] = &[
     ("set_qvel_limits", true, |r, v, j, e| r.set_qvel_limits(v, j, e)),
 ];
 
-/// A writer of rows: its name, a good row, and its call.
+/// A writer of rows: its name, a valid row, and its call.
 type OfRows = (&'static str, &'static [f64], fn(&mut SimulationManager, Ids, Values<'_>, Envs<'_>) -> Result<()>);
 
 const OF_ROWS: &[OfRows] = &[
@@ -107,7 +108,7 @@ const OF_ROWS: &[OfRows] = &[
     ("write_mocap_pose", POSE, |s, i, v, e| s.mjcf_part_mut(i.part).write_mocap_pose("hand", v, e)),
 ];
 
-/// The error that a mistake must give.
+/// The expected error of a mistake.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Shape,
@@ -129,7 +130,7 @@ fn assert_refused(result: Result<()>, name: &str, kind: Kind) {
     assert!(right, "{name}: {kind:?} gave {error:?}");
 }
 
-/// Tables of `rows` rows like the good one.
+/// A table of `rows` rows equal to `good`.
 fn table(good: &[f64], rows: usize) -> Array2<f64> {
     Array2::from_shape_fn((rows, good.len()), |(_, k)| good[k])
 }
@@ -140,7 +141,7 @@ fn with_last(mut values: Array2<f64>, value: f64) -> Array2<f64> {
     values
 }
 
-/// Tables and environments that are wrong for any writer of such rows.
+/// Tables and environment ids that are invalid for every writer of such rows.
 fn mistakes(good: &[f64], infinity_is_fine: bool) -> Vec<(Array2<f64>, Option<Vec<EnvId>>, Kind)> {
     let some = |ids: &[usize]| Some(ids.iter().map(|&id| EnvId(id)).collect());
     let mut mistakes = vec![
@@ -191,7 +192,7 @@ fn of_joints() {
             assert_refused(call(&mut sim.robot_mut(ids.robot), &values, Some(joints), None), name, kind);
             assert_eq!(told(&sim, ids), before, "{name}: {kind:?}");
         }
-        // No environment and no joint are no mistake.
+        // Empty lists of environments or joints are valid.
         let mut robot = sim.robot_mut(ids.robot);
         call(&mut robot, &table(good, 0), None, Some(&[])).unwrap();
         call(&mut robot, &Array2::zeros((ENVS, 0)), Some(&[]), None).unwrap();
@@ -216,7 +217,7 @@ fn of_rows() {
         call(&mut sim, ids, &table(good, 1), Some(&[EnvId(2)])).unwrap();
         assert_ne!(told(&sim, ids), before, "{name}: the control");
     }
-    // A quaternion of length zero has no direction.
+    // A quaternion of length zero is not a rotation.
     let nowhere = table(&[0.0; 7], 1);
     for (name, _, call) in OF_ROWS.iter().filter(|(name, ..)| name.ends_with("pose")) {
         let before = told(&sim, ids);

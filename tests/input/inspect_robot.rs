@@ -1,4 +1,4 @@
-//! The example `inspect_robot`: what it reports agrees with closed forms and with MuJoCo, and its exit codes.
+//! The example `inspect_robot`: its reports agree with closed forms and with MuJoCo; its exit codes.
 
 use super::support::TETRAHEDRON;
 use kinetoscope::mujoco::{Data, ObjectKind, compile};
@@ -49,7 +49,7 @@ impl Folder {
         self.0.write(name, content).to_str().unwrap().to_owned()
     }
 
-    /// A robot with these elements; the first is in line 2.
+    /// Writes a robot with these elements, the first of them in line 2.
     fn urdf(&self, elements: &[&str]) -> String {
         self.write("robot.urdf", urdf::robot("r", &elements.join("\n")))
     }
@@ -71,12 +71,12 @@ fn joint(name: &str, kind: &str, parent: &str, child: &str, more: &str) -> Strin
 }
 
 const LIMIT: &str = "<limit lower=\"-1\" upper=\"2\" effort=\"5\" velocity=\"3\"/>";
-/// Mass, distance, moment and angle of a pendulum.
+/// Mass \[kg\], distance \[m\], moment of inertia \[kg m²\] and angle \[rad\] of a pendulum.
 const M: f64 = 2.0;
 const L: f64 = 0.5;
 const I: f64 = 0.1;
 const Q: f64 = 0.7;
-/// Of numbers of size 1; ten times as much for torques of 10 N m.
+/// For numbers of size 1; multiplied by ten for torques of 10 N m.
 const ROUNDING: Tolerance = Tolerance::absolute(1e-15, "rounding of a handful of operations on numbers of size 1");
 const MUJOCO: Tolerance =
     Tolerance::absolute(1e-12, "the same sums in MuJoCo's order, a thousand times their rounding");
@@ -89,7 +89,7 @@ fn names(value: &Value) -> Vec<&str> {
     value.as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect()
 }
 
-/// `file:line: kind` of every warning, the file without its folder.
+/// `file:line: kind` of every warning, with the file name without its folder.
 fn warnings(report: &Value) -> Vec<String> {
     let name = |file: &Value| Path::new(file.as_str().unwrap()).file_name().unwrap().to_str().unwrap().to_owned();
     let of = |w: &Value| format!("{}:{}: {}", name(&w["file"]), w["line"], w["kind"].as_str().unwrap());
@@ -100,12 +100,12 @@ const SR5: &str = "sr5/SR5.urdf";
 const HAND: &str = "revo1_left/revo1_left.urdf";
 const ANYMAL: &str = "anymal_c_simple_description/urdf/anymal.urdf";
 
-/// A point mass m at distance l from a horizontal axis, at angle q below the horizontal after a turn by q about +y:
+/// A point mass m at distance l from a horizontal axis, at angle q below the horizontal after a rotation by q about +y:
 /// M = I + m l², g = -m 9.81 l cos q (the height of the mass is -l sin q).
 #[test]
 fn pendulum() {
     let folder = Folder::new();
-    // A fixed link without mass: its origin is 1 m from the axis.
+    // A fixed massless link, whose origin is 1 m from the axis.
     let weld = urdf::joint("weld", "fixed", ["arm", "tool"], [1.0, 0.0, 0.0], "0 1 0", "");
     let file = folder.pendulum(&["<link name=\"tool\"/>", &weld]);
     let (code, json) = report(&[&file, "--qpos", &format!("swing={Q}")]);
@@ -129,7 +129,7 @@ fn pendulum() {
     assert_ne!(still["gravity_torque"], json["gravity_torque"], "the position matters");
 }
 
-/// The report of the library, with and without the section of warnings.
+/// The report of the library, with and without its warnings section.
 #[test]
 fn library() {
     let folder = Folder::new();
@@ -178,7 +178,7 @@ fn joints() {
     assert!(warnings(&other).contains(&"robot.urdf:6: mimic-position-ignored".to_owned()), "{:?}", warnings(&other));
 }
 
-/// Each file hangs from the one before it.
+/// Each file is attached to the tip of the one before it.
 #[test]
 fn several_files() {
     let folder = Folder::new();
@@ -193,12 +193,13 @@ fn several_files() {
     assert_eq!(parents, [&Value::Null, &"x_a".into(), &"x_b".into(), &"y_a".into(), &"y_b".into(), &"z_a".into()]);
 }
 
-/// Mass matrix and gravity torque of the report against those that MuJoCo computes from our MJCF, at the same position.
-/// Entries are compared in units of the two coordinates they couple; the MJCF is written with all digits.
+/// Compares mass matrix and gravity torque of the report with MuJoCo's, computed from the exported MJCF at the same
+/// position. Entries are compared in units of the two coordinates that they couple; the MJCF is written with all
+/// digits.
 fn compare_with_mujoco(files: &[&str], urdf: UrdfCfg, floating: bool) {
     let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() }).unwrap();
     let robot = sim.add_robot(RobotCfg { urdf, fix_base: !floating, ..Default::default() }).unwrap();
-    // Inside of all limits, each joint at a place of its own; mimic joints follow.
+    // A different position for each joint, inside of all limits; mimic joints follow their drivers.
     let view = sim.robot(robot);
     let (limits, drivers) = (view.qpos_limits(), view.mimic_drivers());
     let own: Vec<f64> = (0..view.dof())
@@ -259,7 +260,7 @@ fn dynamics() {
     compare_with_mujoco(&[HAND], components(&[HAND]), true);
 }
 
-/// Its broken inertias are sound once the links are fused.
+/// The invalid inertias of ANYmal become valid once its links are fused.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn dynamics_of_anymal() {
@@ -399,7 +400,8 @@ fn text() {
     assert_eq!(written["robot"], "SR5_revo1_left");
 }
 
-/// Two joints in one body, a spring-less pendulum that starts at 30 degrees, a follower by a line and one by a curve.
+/// Two joints in one body, a pendulum without spring that starts at 30 degrees, one follower by a linear and one by a
+/// quadratic polynomial.
 const MJCF: &str = r#"<mujoco><compiler angle="degree" autolimits="true"/><worldbody><body name="base"><geom size="0.1" mass="2"/>
   <body name="bar" pos="0 0 1"><joint name="turn" axis="0 0 1" armature="0.02"/>
     <joint name="swing" axis="0 1 0" ref="30" range="-90 90" armature="0.3"/>
@@ -409,7 +411,8 @@ const MJCF: &str = r#"<mujoco><compiler angle="degree" autolimits="true"/><world
   </body></worldbody><equality><joint joint1="line" joint2="turn" polycoef="0.1 2 0 0 0"/>
   <joint joint1="curve" joint2="turn" polycoef="0.1 0 3 0 0"/></equality></mujoco>"#;
 
-/// Judged by MuJoCo with the file alone: the matrix of `mj_fullM`, which holds rotor inertias too, and `qfrc_bias` at rest.
+/// Reference: MuJoCo with the file alone, its matrix of `mj_fullM`, which includes rotor inertias, and `qfrc_bias` at
+/// rest.
 #[test]
 fn mjcf_file() {
     let folder = Folder::new();
@@ -429,13 +432,13 @@ fn mjcf_file() {
     }
     assert_close("gravity torque", numbers(&json["gravity_torque"]), data.qfrc_bias(), MUJOCO);
     assert!(data.qfrc_bias()[1].abs() > 10.0 && json["total_mass"].as_f64().unwrap() == 6.0);
-    // The control: the rotor of the swing is about as heavy as what it swings, 0.02 + 3 · 0.5².
+    // Control: the rotor of the joint "swing" is about as heavy as its load, 0.02 + 3 · 0.5².
     assert!((matrix[5] - (0.3 + 0.02 + 0.75)).abs() < 1e-12, "{matrix:?}");
-    // Followers cannot be put elsewhere.
+    // Positions of followers cannot be set.
     let (_, json) = report(&[&file, "--qpos", "turn=0.4,curve=0.2"]);
     assert_close("positions", numbers(&json["qpos"]), qpos, MUJOCO);
     assert!(warnings(&json).iter().any(|w| w.ends_with("mimic-position-ignored")), "{:?}", warnings(&json));
-    // The bundled quadruped, floating, and what cannot be.
+    // The bundled quadruped with a floating base, and invalid arguments.
     let (_, json) = report(&["quadruped/quadruped.xml", "--floating-base"]);
     assert!((json["total_mass"].as_f64().unwrap() - 52.135).abs() < 1e-3);
     assert_eq!(json["columns"].as_array().unwrap().len(), 6 + 12);

@@ -1,4 +1,4 @@
-//! A refusal of a model by MuJoCo names the place in the user's file that caused the line of the MJCF.
+//! An error of MuJoCo's compiler names the place in the user's file that produced the line of the MJCF.
 
 use super::support::{INERTIAL, TETRAHEDRON, hinge_with, robot, sim};
 use kinetoscope::mujoco::{LoadError, TARGET, compile};
@@ -11,7 +11,7 @@ use kinetoscope::sim::mjcf::document::{
 use kinetoscope::sim::mjcf::write::write;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// A body with a hinge and a sphere; each element has a line of its own.
+/// A body with a hinge and a sphere; each element has its own source line.
 fn document() -> Mjcf {
     let at = |line| Some(Source::new("robot.urdf", line));
     let option = PhysicsOption {
@@ -89,13 +89,13 @@ fn elements() {
         let Err(LoadError::Compile(error)) = compile(&text.xml, &[]) else { panic!("{what}: accepted") };
         let message = text.locate(error).to_string();
         let expected = format!("robot.urdf:{line}: MuJoCo refuses the model: ");
-        // The mass properties of a body are read with the body or with the element, depending on the version.
+        // Depending on its version, MuJoCo reads the mass properties with the body or with the inertial element.
         let near = *line == 20 && message.starts_with("robot.urdf:21: ");
         assert!(near || message.starts_with(&expected), "{what}: {message}");
     }
 }
 
-/// Robots that pass our checks may be refused by MuJoCo: the message names the file and the line.
+/// MuJoCo may refuse robots that pass our checks: the message names the file and the line.
 #[test]
 fn whole_robots() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Input of users, good and bad: it works, or it is refused with a message that helps; nothing is half done, and nothing
-//! ends the process.
+//! User input, valid and invalid: it works, or it is refused with a helpful message. A refused call changes nothing,
+//! and no input ends the process.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accepted;

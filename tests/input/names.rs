@@ -1,4 +1,4 @@
-//! Names of any kind go through the URDF, the MJCF and back.
+//! Names with any characters survive the way through the URDF and the MJCF and back.
 
 use super::support::{INERTIAL, LIMIT, TETRAHEDRON, cfg, exported, robot, sim};
 use kinetoscope::mujoco::ObjectKind;
@@ -12,7 +12,7 @@ fn escaped(name: &str) -> String {
     name.replace('"', "&quot;").replace('\'', "&apos;").replace('\n', "&#10;")
 }
 
-/// A root and two links that collide by a mesh of this size, with joints of the same names.
+/// A root and two links with mesh collision shapes of this size; joints have the names of their links.
 fn two_links(dir: &Path, uid: &str, names: [&str; 2], size: &str) -> RobotCfg {
     std::fs::write(dir.join("t.stl"), TETRAHEDRON.replace("0.1", size)).unwrap();
     let links = names.map(|name| {
@@ -71,7 +71,8 @@ fn links_and_joints() {
     }
 }
 
-/// `x.x` is the name in the document of the first degree of freedom of a planar joint `x`.
+/// The document names the first degree of freedom of a planar joint `x` `x.x`, which may collide with a joint of that
+/// name.
 #[test]
 fn generated_names() {
     let dir = tempfile::tempdir().unwrap();
@@ -95,7 +96,7 @@ fn generated_names() {
 
 #[test]
 fn uids() {
-    // Names that differ in case only have meshes of their own.
+    // Names that differ only in case have separate meshes.
     let dirs = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
     let mut sim = sim(1);
     for (uid, dir, size) in [("arm", &dirs[0], "0.1"), ("ARM", &dirs[1], "0.7")] {
@@ -112,7 +113,7 @@ fn uids() {
         let id = sim.add_robot(two_links(dir, uid, ["l", "m"], "0.1")).unwrap_or_else(|e| panic!("{uid:?}: {e}"));
         assert_eq!(sim.entities().robot_id(uid).unwrap(), id);
     }
-    // Names become parts of paths, of files too.
+    // Names become parts of paths, including file paths.
     for uid in [".", "..", "a/b", "a\\b", "a\nb", ""] {
         let error = sim.add_robot(two_links(dir, uid, ["l", "m"], "0.1")).unwrap_err();
         assert!(matches!(error, Error::InvalidUid(_)), "{uid:?}: {error}");

@@ -1,4 +1,4 @@
-//! `add_robot` names the mistake, and the simulation goes on as if it had not been asked.
+//! `add_robot` reports mistakes and leaves the simulation unchanged.
 
 use super::support::{INERTIAL, TETRAHEDRON, ball, bits, cfg, chain, hinge, hinge_with, robot, sim};
 use kinetoscope::ndarray::array;
@@ -9,7 +9,7 @@ use std::path::Path;
 
 type Make = Box<dyn Fn(&Path) -> RobotCfg>;
 
-/// A mistake, a robot that has it, and parts of the message.
+/// A mistake, a robot with it, and parts of the message.
 type Row = (&'static str, Make, &'static [&'static str]);
 
 fn change(change: fn(&mut RobotCfg)) -> Make {
@@ -50,13 +50,13 @@ fn text(urdf: String) -> Make {
     Box::new(move |dir| robot(dir, "new", &urdf))
 }
 
-/// A link that collides as this geometry, in line 3.
+/// A link with this collision geometry, in line 3.
 fn collides(geometry: &str) -> Make {
     let link = format!("{INERTIAL}<collision><geometry>{geometry}</geometry></collision>");
     text(hinge_with(&link, "<limit effort=\"1\" velocity=\"1\"/>"))
 }
 
-/// A link that collides by a mesh of this content.
+/// A link with a collision mesh of this content.
 fn mesh(file: &'static str, content: impl Into<Vec<u8>>) -> Make {
     let (content, made) = (content.into(), collides(&format!("<mesh filename=\"{file}\"/>")));
     Box::new(move |dir| {
@@ -220,7 +220,7 @@ fn deepest_chain() {
     sim.update(2);
     assert_eq!(sim.robot(id).dof(), MAX_BODY_DEPTH - 1);
     assert!(sim.diverged().is_empty(), "{:?}", sim.diverged());
-    // Fixed links count nothing.
+    // Fixed links do not count.
     sim.add_robot(robot(dir.path(), "rigid", &chain(3000, "fixed", ""))).unwrap();
     sim.update(1);
 }

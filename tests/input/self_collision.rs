@@ -6,7 +6,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope_testkit::urdf::collision;
 
-/// A star of arms around a hub, with spheres of 0.05 m at 0.1 m from it; only neighbours overlap.
+/// A star of arms around a hub, with spheres of 0.05 m at 0.1 m from the hub; only near arms overlap.
 fn star(arms: usize, spheres: usize) -> String {
     let sphere = |i: usize| collision("<sphere radius=\"0.05\"/>", [0.1 + 0.001 * i as f64, 0.0, 0.0]);
     let shapes: String = (0..spheres).map(sphere).collect();
@@ -38,24 +38,24 @@ fn drift(sim: &SimulationManager, id: RobotId) -> f64 {
 fn overlapping_links() {
     let (mut sim, id) = world(true, &star(5, 1));
     let listed = overlaps(&sim);
-    // Neighbours are 2 * 0.1 * sin(0.15) = 0.03 apart, the next ones 0.059, the next 0.087, and the next 0.113.
+    // Neighbors are 2 * 0.1 * sin(0.15) = 0.03 m apart, the next arms 0.059, 0.087 and 0.113 m.
     assert_eq!(listed.len(), 4 + 3 + 2, "{listed:#?}");
     assert!(listed[0].contains("\"star/a0\"") && listed[0].contains("\"star/a1\""), "{listed:#?}");
     assert!(sim.scene().mjcf().contains("<exclude body1=\"star/a0\" body2=\"star/a1\"/>"));
     sim.update(50);
     assert!(drift(&sim, id) < 1e-9, "they push each other away: {}", drift(&sim, id));
-    // The two that are apart still collide.
+    // Arms that do not overlap still collide.
     sim.robot_mut(id).set_qpos_target(&array![[1.2, 0.0, 0.0, 0.0, 0.0]], None, None).unwrap();
     sim.update(200);
     assert!(sim.robot(id).qpos()[(0, 4)] > 0.01, "arm 4 is pushed: {}", sim.robot(id).qpos());
-    // Without self-collision nothing is excluded.
+    // Without self-collision, no pair is excluded.
     let (mut sim, _) = world(false, &star(5, 1));
     assert!(overlaps(&sim).is_empty() && !sim.scene().mjcf().contains("<exclude"));
     sim.update(1);
     assert!(sim.batch().read(0, |env| env.data().contact().is_empty()));
 }
 
-/// Up to 144 contacts for each pair of neighbours: more than the contact buffer of an export file holds.
+/// Up to 144 contacts for each pair of neighbors: more than the contact buffer of an exported file holds.
 #[test]
 fn overlaps_beyond_the_contact_buffer() {
     let (mut sim, id) = world(true, &star(6, 12));
@@ -65,7 +65,7 @@ fn overlaps_beyond_the_contact_buffer() {
     assert!(drift(&sim, id) < 1e-9, "{}", drift(&sim, id));
 }
 
-/// A finding in one robot is listed once, however many robots follow.
+/// A diagnostic of one robot is listed once, independent of the number of robots added later.
 #[test]
 fn diagnostics_once() {
     let (dir, mut sim) = (tempfile::tempdir().unwrap(), sim(1));

@@ -1,4 +1,4 @@
-//! Robots of these tests.
+//! Robots of the input tests.
 
 use kinetoscope::mujoco::{Model, TARGET, Target, compile_file};
 use kinetoscope::prelude::*;
@@ -43,13 +43,13 @@ pub(crate) fn hinge() -> String {
     hinge_with(INERTIAL, LIMIT)
 }
 
-/// One link that collides as a sphere of 0.1 m.
+/// One link with a collision sphere of 0.1 m.
 pub(crate) fn ball() -> String {
     let collision = urdf::collision("<sphere radius=\"0.1\"/>", [0.0; 3]);
     urdf::robot("ball", &format!("<link name=\"ball\">{INERTIAL}{collision}</link>"))
 }
 
-/// Links `l0`, `l1`, ..., one in each line, with joints `j1`, `j2`, ... about y of this kind and content.
+/// Links `l0`, `l1`, ..., one per line, with joints `j1`, `j2`, ... about y of this kind and content.
 pub(crate) fn chain(links: usize, kind: &str, more: &str) -> String {
     let mut elements = format!("<link name=\"l0\">{INERTIAL}</link>\n");
     for i in 1..links {

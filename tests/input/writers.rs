@@ -1,5 +1,5 @@
-//! Messages of `set_qpos_target`, `write_qpos`, `reset` and look-ups by name; layouts of arrays. All writers and their kinds of
-//! errors are in `every_writer`.
+//! Error messages of `set_qpos_target`, `write_qpos`, `reset` and look-ups by name; memory layouts of arrays. The
+//! module `every_writer` covers all writers and kinds of errors.
 
 use super::support::{LIMIT, bits, chain, robot, sim};
 use kinetoscope::ndarray::{Array2, array};
@@ -50,7 +50,7 @@ fn messages() {
             assert_eq!(bits(&sim), before, "row {i}, {name}");
         }
     }
-    // A reset that names an environment that does not exist resets none.
+    // A reset with an unknown environment resets no environment.
     for bad in [4, usize::MAX] {
         let message = sim.reset(Some(&[EnvId(0), EnvId(bad)])).unwrap_err().to_string();
         assert!(message.contains(&format!("environment {bad} does not exist")), "{message}");
@@ -86,7 +86,7 @@ fn layouts() {
     let q = sim.robot(id).qpos();
     assert_eq!([q[(2, 2)], q[(2, 0)], q[(0, 2)], q[(0, 0)]], [0.7, 0.6, 0.5, 0.4]);
     assert_eq!([q[(2, 1)], q[(1, 0)]], [rows[(2, 1)], rows[(1, 0)]]);
-    // Outside of the limits: clamped.
+    // Positions outside of the limits are clamped.
     sim.robot_mut(id).write_qpos(&array![[5.0, -5.0, f64::MAX]], None, None).unwrap();
     assert_eq!(sim.robot(id).qpos().row(1), array![1.0, -1.0, 1.0]);
     sim.robot_mut(id).set_qpos_target(&array![[f64::MIN, 5.0, 0.0]], None, None).unwrap();

@@ -1,25 +1,25 @@
-//! A contact with restitution as steps see it, written without MuJoCo: where its tolerances come from.
+//! Explicit steps of a contact with restitution, written without MuJoCo: the source of the tolerances of bounces.
 //!
-//! `RigidObjectCfg::restitution` is a spring k and a damper b between the surfaces: while they overlap by x < 0 and push,
-//! `x'' = -b x' - k x`, with `k = ω²`, ω = π/(10 h) and `b = 2 ζ ω`. The integrator takes the acceleration before the step,
-//! then the velocity, then the place (semi-implicit Euler). Ten steps are few: where in a step the surfaces meet changes
-//! what comes out. [`apex`] is what comes out of a fall from a height, by the recursion of these steps; [`off`] and
-//! [`apex_off`] are the worst over all such places.
+//! `RigidObjectCfg::restitution` is a spring k and a damper b between the surfaces. While they overlap by x < 0 and
+//! push, `x'' = -b x' - k x`, with `k = ω²`, ω = π/(10 h) and `b = 2 ζ ω`. The integrator is semi-implicit Euler:
+//! acceleration before the step, then velocity, then position. Ten steps are few, so the result depends on the fraction
+//! of a step at which the surfaces meet. [`apex`] gives the height after a fall by the recursion of these steps;
+//! [`off`] and [`apex_off`] give the largest errors over all such fractions.
 
 use std::f64::consts::PI;
 
-/// Steps of an undamped contact, as `RigidObjectCfg::restitution` says.
+/// Steps of an undamped contact, as documented at `RigidObjectCfg::restitution`.
 const STEPS: f64 = 10.0;
 
-/// Places in a step where the surfaces are made to meet.
+/// Number of tested fractions of a step at which the surfaces meet.
 const PLACES: usize = 200;
 
-/// What MuJoCo leaves of a constraint: its largest impedance d is 0.9999, so 1e-4 of the velocity before and after; the rows
-/// of a pyramidal cone with a friction of 1 yield once as much.
+/// MuJoCo's constraint error: its largest impedance d is 0.9999, which loses 1e-4 of the velocity before and after. The
+/// rows of a pyramidal cone with a friction of 1 yield the same again.
 const IMPEDANCE: f64 = 4e-4;
 
-/// Damping ratio ζ whose spring and damper, never pulling, give the restitution e: exp(-ζ/w atan2(2 ζ w, ζ² - w²)) = e with
-/// w² = 1 - ζ² (Schwager, Pöschel, Granular Matter 9, 2007, equation 21).
+/// Damping ratio ζ of the spring and damper, without pulling forces, for the restitution e: exp(-ζ/w atan2(2 ζ w, ζ² -
+/// w²)) = e with w² = 1 - ζ² (Schwager, Pöschel, Granular Matter 9, 2007, equation 21).
 fn damping_ratio(e: f64) -> f64 {
     if e >= 1.0 {
         return 0.0;
@@ -33,8 +33,8 @@ fn damping_ratio(e: f64) -> f64 {
     (low + high) / 2.0
 }
 
-/// Steps of length 1 from the distance `x` and the velocity `v`, until `done` says so of distance and velocity. `g` pulls the
-/// surfaces together; the contact sets the acceleration as a whole, and only where that pushes.
+/// Steps of length 1 from the distance `x` and the velocity `v` until `done(x, v)`. `g` pulls the surfaces together; a
+/// contact that pushes replaces the acceleration.
 fn steps(e: f64, g: f64, mut x: f64, mut v: f64, done: impl Fn(f64, f64) -> bool) -> [f64; 2] {
     let omega = PI / STEPS;
     let (k, b) = (omega * omega, 2.0 * damping_ratio(e) * omega);
@@ -46,7 +46,7 @@ fn steps(e: f64, g: f64, mut x: f64, mut v: f64, done: impl Fn(f64, f64) -> bool
     [x, v]
 }
 
-/// The furthest that a bounce of restitution `e`, without gravity, may come out from it.
+/// Largest error of the restitution `e` in a bounce without gravity.
 pub(crate) fn off(e: f64) -> f64 {
     let worst = (0..PLACES).map(|place| {
         let sunk = (place as f64 + 0.5) / PLACES as f64;
@@ -56,9 +56,9 @@ pub(crate) fn off(e: f64) -> f64 {
     worst.fold(0.0, f64::max) + IMPEDANCE
 }
 
-/// The height \[m\] that is reached after a fall from `height` \[m\], in steps of `h` \[s\] under `g` \[m/s²\].
+/// The height \[m\] reached after a fall from `height` \[m\], in steps of `h` \[s\] under `g` \[m/s²\].
 pub(crate) fn apex(e: f64, height: f64, h: f64, g: f64) -> f64 {
-    // In steps: velocities are in metres per step.
+    // In units of steps: velocities are in meters per step.
     let g = g * h * h;
     let [x, v] = steps(e, g, height, 0.0, |x, v| x < 0.0 && v < 0.0);
     let [x, v] = steps(e, g, x, v, |x, v| x >= 0.0 && v > 0.0);
@@ -66,12 +66,12 @@ pub(crate) fn apex(e: f64, height: f64, h: f64, g: f64) -> f64 {
     top
 }
 
-/// What [`apex`] may be off by, for the impedance that MuJoCo gives a contact.
+/// The error of [`apex`] due to MuJoCo's contact impedance \[m\].
 pub(crate) fn apex_rest(e: f64, height: f64) -> f64 {
     2.0 * e * e * IMPEDANCE * height
 }
 
-/// The furthest that the height \[m\] after a fall may come out from e² `height`, wherever in a step the surfaces meet.
+/// Largest error of the height \[m\] after a fall against e² `height`, over all fractions of a step.
 pub(crate) fn apex_off(e: f64, height: f64, h: f64, g: f64) -> f64 {
     let way = (2.0 * g * height).sqrt() * h;
     let worst = (0..PLACES).map(|place| {
@@ -83,10 +83,10 @@ pub(crate) fn apex_off(e: f64, height: f64, h: f64, g: f64) -> f64 {
 
 #[test]
 fn restitution() {
-    // Without damping the steps keep v² + ω² x² - ω² h x v; the surfaces sink in by a part p of a step and leave by q of
-    // one, which is 1/4 ω² h² = 2.5 % of v² between the two at most: 1.2 % of v.
+    // Undamped steps conserve v² + ω² x² - ω² h x v. The surfaces enter at a fraction p of a step and leave at q, which
+    // changes v² by at most 1/4 ω² h² = 2.5 %, that is 1.2 % of v.
     assert!(off(1.0) < 0.0124 + IMPEDANCE);
-    // What the documentation of the restitution promises.
+    // The values in the documentation of the restitution.
     for (e, promised) in [(1.0, 0.003), (0.8, 0.03), (0.5, 0.06), (0.3, 0.08), (0.14, 0.08)] {
         let found = off(e);
         assert!((0.5 * promised..promised).contains(&found), "{e}: {found}");

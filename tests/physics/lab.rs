@@ -1,5 +1,5 @@
-//! A place to measure in: a simulation with robots from URDF text and rigid objects, and their states as vectors. A law finds
-//! everything that it needs here.
+//! Test bench of the laws: a simulation with robots from URDF text and rigid objects, and their states as vectors. A
+//! law needs no other module.
 
 pub(crate) use crate::law::{law, worse};
 pub(crate) use crate::urdf::{Joint, Link, POINT, base, urdf};
@@ -8,7 +8,7 @@ pub(crate) use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::{from_row, to_row};
 use kinetoscope::sim::{self, Cone, DriveModel, Integrator, ObjectId, WrenchFrame};
 use kinetoscope_testkit::urdf::Files;
-/// The default drive, evaluated at the end of the step, and none: joints move freely.
+/// The default drive, evaluated at the end of the step, and the passive drive, with which joints move freely.
 pub(crate) use kinetoscope_testkit::worlds::{gains as implicit, no_drive as passive};
 use nalgebra::UnitQuaternion;
 pub(crate) use nalgebra::Vector3;
@@ -16,7 +16,7 @@ pub(crate) use nalgebra::Vector3;
 /// Gravity on earth \[m/s²\].
 pub(crate) const G: f64 = 9.81;
 
-/// Steps of a millisecond on one thread, gravity, no ground, no light.
+/// Time step of a millisecond, one thread, gravity, no ground, no light.
 pub(crate) fn earth() -> SimulationManagerCfg {
     SimulationManagerCfg {
         physics_dt: 1e-3,
@@ -32,11 +32,11 @@ pub(crate) fn weightless() -> SimulationManagerCfg {
     SimulationManagerCfg { gravity: Vector3::zeros(), ..earth() }
 }
 
-/// How much harder than to sink in it is to creep on a [`slope`].
+/// Ratio of frictional to normal constraint impedance on a [`slope`].
 pub(crate) const IMPRATIO: f64 = 100.0;
 
-/// As [`earth`], on a ground plane that gravity is tilted against: a slope of `angle` \[rad\] down along x. Elliptic cones,
-/// and friction that creeps a hundred times less than MuJoCo's default.
+/// As [`earth`], with a ground plane and tilted gravity: a slope of `angle` \[rad\] down along x. Friction has elliptic
+/// cones, and creeps a hundred times less than MuJoCo's default.
 pub(crate) fn slope(angle: f64, friction: f64) -> SimulationManagerCfg {
     SimulationManagerCfg {
         gravity: G * Vector3::new(angle.sin(), 0.0, -angle.cos()),
@@ -52,7 +52,7 @@ pub(crate) fn with_dt(dt: f64, cfg: SimulationManagerCfg) -> SimulationManagerCf
     SimulationManagerCfg { physics_dt: dt, ..cfg }
 }
 
-/// Runge-Kutta of order 4: for passive robots, and those of [`explicit`] drives.
+/// Runge-Kutta of order 4, for passive robots and robots with [`explicit`] drives.
 pub(crate) fn rk4(cfg: SimulationManagerCfg) -> SimulationManagerCfg {
     SimulationManagerCfg { integrator: Integrator::Rk4, ..cfg }
 }
@@ -74,23 +74,23 @@ impl Lab {
         Self { sim: SimulationManager::new(cfg).unwrap(), files: Files::default() }
     }
 
-    /// A file in this lab's folder.
+    /// Writes a file into the folder of this lab.
     pub(crate) fn file(&self, name: &str, text: &str) -> std::path::PathBuf {
         self.files.write(name, text)
     }
 
-    /// A robot of this text; `cfg` says everything but the file.
+    /// Adds a robot from URDF text; `cfg` gives everything but the file.
     pub(crate) fn robot(&mut self, text: &str, cfg: RobotCfg) -> RobotId {
         let path = self.file(&format!("{}.urdf", cfg.uid), text);
         self.sim.add_robot(RobotCfg { urdf: UrdfCfg::single(path), ..cfg }).unwrap()
     }
 
-    /// A passive robot with a fixed base at the origin.
+    /// Adds a passive robot with a fixed base at the origin.
     pub(crate) fn mechanism(&mut self, text: &str) -> RobotId {
         self.robot(text, RobotCfg { drive: passive(), ..RobotCfg::default() })
     }
 
-    /// A passive robot that nothing holds.
+    /// Adds a passive robot with a floating base.
     pub(crate) fn free(&mut self, text: &str, at: [f64; 3]) -> RobotId {
         let init_pose = Pose::translation(at[0], at[1], at[2]);
         self.robot(text, RobotCfg { drive: passive(), fix_base: false, init_pose, ..RobotCfg::default() })
@@ -104,7 +104,7 @@ impl Lab {
         self.sim.cfg().physics_dt
     }
 
-    /// Steps for `seconds`, which must be a whole number of steps.
+    /// Runs for `seconds`, which must be a whole number of steps.
     #[track_caller]
     pub(crate) fn run(&mut self, seconds: f64) {
         let steps = seconds / self.dt();
@@ -113,7 +113,7 @@ impl Lab {
         assert_well(&self.sim);
     }
 
-    /// Steps `steps` times and looks after each, `t` being the time \[s\] since the call.
+    /// Takes `steps` steps and calls `look` after each with the time \[s\] since the call.
     pub(crate) fn watch(&mut self, steps: u32, mut look: impl FnMut(f64, &SimulationManager)) {
         for step in 1..=steps {
             self.sim.update(1);
@@ -122,8 +122,8 @@ impl Lab {
         assert_well(&self.sim);
     }
 
-    /// Period \[s\] in which the only joint of a robot swings through 0, from where it stands to five passages, two in a
-    /// period, within `steps` steps. Passages are read off straight lines between steps.
+    /// Period \[s\] of the only joint of a robot, from its zero crossings: five crossings, two per period, within
+    /// `steps` steps. Crossings are linearly interpolated between steps.
     pub(crate) fn period(&mut self, robot: RobotId, steps: u32) -> f64 {
         let (mut before, mut times) = ([0.0, self.q(robot)[0]], Vec::new());
         self.watch(steps, |t, sim| {
@@ -136,14 +136,14 @@ impl Lab {
         (times[4] - times[0]) / 2.0
     }
 
-    /// Positions and velocities of all joints, in their order.
+    /// Writes positions and velocities of all joints, in their order.
     pub(crate) fn write_joints(&mut self, robot: RobotId, q: &[f64], v: &[f64]) {
         let mut robot = self.sim.robot_mut(robot);
         robot.write_qpos(&row(q), None, None).unwrap();
         robot.write_qvel(&row(v), None, None).unwrap();
     }
 
-    /// Velocity of the root link's frame and its angular velocity, in world axes.
+    /// Writes the velocity of the root link's frame and its angular velocity, in world axes.
     pub(crate) fn write_root_velocity(&mut self, robot: RobotId, linear: [f64; 3], angular: [f64; 3]) {
         let v = [linear, angular].concat();
         self.sim.robot_mut(robot).write_root_velocity(&row(&v), None).unwrap();
@@ -154,12 +154,12 @@ impl Lab {
         self.sim.rigid_object_mut(object).write_velocity(&row(&v), None).unwrap();
     }
 
-    /// Efforts of all joints, from the next step on.
+    /// Sets the efforts of all joints from the next step on.
     pub(crate) fn push_joints(&mut self, robot: RobotId, efforts: &[f64]) {
         self.sim.robot_mut(robot).set_qf_target(&row(efforts), None, None).unwrap();
     }
 
-    /// A force in the centre of mass of a link and a torque, in world axes, from the next step on.
+    /// Sets a force at the center of mass of a link and a torque, in world axes, from the next step on.
     pub(crate) fn push_link(&mut self, robot: RobotId, link: &str, force: Vector3<f64>, torque: Vector3<f64>) {
         let link = self.sim.robot(robot).link_id(link).unwrap();
         let [force, torque] = [force, torque].map(|v| Array3::from_shape_fn((1, 1, 3), |(_, _, k)| v[k]));
@@ -167,7 +167,7 @@ impl Lab {
         robot.set_external_wrench(&force, &torque, WrenchFrame::World, Some(&[link]), None).unwrap();
     }
 
-    /// As [`push_link`](Self::push_link), of an object.
+    /// As [`push_link`](Self::push_link), for an object.
     pub(crate) fn push(&mut self, object: ObjectId, force: Vector3<f64>, torque: Vector3<f64>) {
         let (force, torque) = (row(force.as_slice()), row(torque.as_slice()));
         self.sim.rigid_object_mut(object).set_external_wrench(&force, &torque, WrenchFrame::World, None).unwrap();
@@ -195,7 +195,7 @@ impl Lab {
     }
 }
 
-/// Asserts that no environment diverged, and that MuJoCo warned of nothing.
+/// Asserts that no environment diverged, and that MuJoCo gave no warning.
 #[track_caller]
 pub(crate) fn assert_well(sim: &SimulationManager) {
     assert!(sim.diverged().is_empty(), "{:?}", sim.diverged());
@@ -203,7 +203,7 @@ pub(crate) fn assert_well(sim: &SimulationManager) {
     assert!(!counts.keys().any(|name| name.starts_with("mujoco")), "{counts:?}");
 }
 
-/// Where a body is and how it moves, in the world; velocity is that of its frame.
+/// Pose and velocity of a body in the world; the velocity is that of its frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Body {
     pub(crate) position: Vector3<f64>,
@@ -236,7 +236,7 @@ pub(crate) fn row(values: &[f64]) -> Array2<f64> {
     Array2::from_shape_vec((1, values.len()), values.to_vec()).unwrap()
 }
 
-/// A pose as the row that is written.
+/// A pose as a row of shape (1, 7).
 pub(crate) fn pose_row(pose: &Pose) -> Array2<f64> {
     row(&to_row(pose))
 }

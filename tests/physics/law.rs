@@ -1,9 +1,9 @@
-//! What a law is: rows of expected and measured numbers, and controls that show that the rows can fail.
+//! Laws: rows of expected and measured numbers, and controls that show that the rows can fail.
 
 use crate::rows;
 use serde::Serialize;
 
-/// The larger of two numbers, NaN if either is: `f64::max` would drop what went wrong.
+/// The larger of two numbers, or NaN if either is NaN; `f64::max` would drop the NaN.
 pub(crate) fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
@@ -11,27 +11,27 @@ pub(crate) fn worse(a: f64, b: f64) -> f64 {
 /// One number that a law predicts.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Row {
-    /// What it is, unique within the law.
+    /// Name of the quantity, unique within the law.
     pub(crate) quantity: String,
-    /// Its unit; empty for a plain number.
+    /// Unit; empty for a plain number.
     pub(crate) unit: String,
     pub(crate) expected: f64,
     pub(crate) measured: f64,
     /// Largest error, in the unit of the quantity.
     pub(crate) tolerance: f64,
-    /// Where the tolerance comes from.
+    /// Source of the tolerance.
     pub(crate) why: String,
     pub(crate) pass: bool,
-    /// Why the two lines of MuJoCo differ in this row, where they do.
+    /// Reason for a difference between the supported MuJoCo versions in this row, if any.
     pub(crate) lines_differ: Option<String>,
 }
 
-/// The same number where the effect was taken away: it must miss.
+/// The same quantity measured without the effect: it must miss the expected number.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Control {
-    /// The row that it is a control of.
+    /// The row of the control.
     pub(crate) quantity: String,
-    /// What was taken away.
+    /// The removed effect.
     pub(crate) without: String,
     pub(crate) measured: f64,
     pub(crate) misses: bool,
@@ -44,30 +44,31 @@ pub(crate) struct Series {
     pub(crate) points: Vec<[f64; 2]>,
 }
 
-/// A picture of the law.
+/// A plot of the law.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Plot {
     pub(crate) title: String,
     /// Labels of the axes, with units.
     pub(crate) x: String,
     pub(crate) y: String,
-    /// Whether both axes are logarithmic.
+    /// True if both axes are logarithmic.
     pub(crate) log: bool,
     pub(crate) series: Vec<Series>,
 }
 
-/// What a law measures.
+/// Measurements of a law.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(crate) struct Measured {
     rows: Vec<Row>,
     controls: Vec<Control>,
     plots: Vec<Plot>,
-    /// Why the two lines of MuJoCo give different numbers, where any of them may.
+    /// Reason for differences between the supported MuJoCo versions in any row, if any.
     lines_differ: Option<String>,
 }
 
 impl Measured {
-    /// `measured` is `expected` within `tolerance`, all in `unit`; `why` says where the tolerance comes from.
+    /// Adds a row: `measured` must equal `expected` within `tolerance`, all in `unit`; `why` is the source of the
+    /// tolerance.
     pub(crate) fn row(
         &mut self,
         quantity: &str,
@@ -78,34 +79,35 @@ impl Measured {
     ) {
         assert!(self.rows.iter().all(|row| row.quantity != quantity), "two rows are called {quantity:?}");
         assert!(tolerance.is_finite() && tolerance >= 0.0 && expected.is_finite(), "{quantity}: no such tolerance");
-        // Not `error > tolerance`: a measured NaN fails.
+        // Not `error > tolerance`, so that a measured NaN fails.
         let pass = (measured - expected).abs() <= tolerance;
         let [quantity, unit, why] = [quantity, unit, why].map(str::to_string);
         self.rows.push(Row { quantity, unit, expected, measured, tolerance, why, pass, lines_differ: None });
     }
 
-    /// Every row needs at least one: the row called `quantity`, measured again in a world `without` the effect, must miss by more than its tolerance.
+    /// Adds a control: the row called `quantity`, measured `without` the effect, must miss by more than its tolerance.
+    /// Every row needs at least one.
     #[track_caller]
     pub(crate) fn control(&mut self, quantity: &str, without: &str, measured: f64) {
         let row = self.rows.iter().find(|row| row.quantity == quantity).expect("a control of a row that exists");
-        // A world that came out as NaN would not show that the row can tell two worlds apart.
+        // A NaN would not show that the row can distinguish the two cases.
         let misses = measured.is_finite() && (measured - row.expected).abs() > row.tolerance;
         self.controls.push(Control { quantity: quantity.into(), without: without.into(), measured, misses });
     }
 
-    /// Why 2.2.2 and 4.x give numbers that differ by more than a tenth of a tolerance. A law that does not say so promises
-    /// that they do not.
+    /// Gives the reason why 2.2.2 and 4.x differ by more than a tenth of a tolerance. Without a reason, the law
+    /// guarantees that they do not.
     pub(crate) fn lines_differ(&mut self, why: &str) {
         self.lines_differ = Some(why.into());
     }
 
-    /// As [`lines_differ`](Self::lines_differ), of one row only.
+    /// As [`lines_differ`](Self::lines_differ), for one row only.
     pub(crate) fn lines_differ_in(&mut self, quantity: &str, why: &str) {
         let row = self.rows.iter_mut().find(|row| row.quantity == quantity).expect("a row that exists");
         row.lines_differ = Some(why.into());
     }
 
-    /// A picture for the page of numbers: series of (x, y).
+    /// Adds a plot to the physics page: series of (x, y).
     pub(crate) fn plot(&mut self, title: &str, [x, y]: [&str; 2], log: bool, series: &[(&str, Vec<[f64; 2]>)]) {
         let series = series.iter().map(|(name, points)| Series { name: (*name).into(), points: points.clone() });
         let [title, x, y] = [title, x, y].map(str::to_string);
@@ -137,9 +139,9 @@ impl Measured {
     }
 }
 
-/// Measures a law, writes its rows where they are wanted, and fails unless every row holds and every control misses.
+/// Measures a law, writes its rows if requested, and fails unless every row holds and every control misses.
 ///
-/// `path` is `module_path!()`, from which the law has its name; `statement` is the law as a formula.
+/// `path` is `module_path!()`, the source of the law's name; `statement` is the law as a formula.
 #[track_caller]
 pub(crate) fn law(path: &str, statement: &str, measure: impl FnOnce(&mut Measured)) {
     let mut words = path.rsplit("::");

@@ -1,10 +1,11 @@
-//! Laws of physics, each against its closed form or a conservation law, through URDF files, manager, robots and objects.
+//! Laws of physics, each compared with its closed form or a conservation law, through URDF files, manager, robots and
+//! objects.
 //!
-//! One file is one law; its name is the law's, its head has the derivation. To add one, write the file and name it in the
-//! `mod.rs` of its group. `cargo test --test physics free_fall` runs one of them.
+//! One file is one law: the file name is the law's name, and the module comment has the derivation. To add a law, write
+//! the file and list it in the `mod.rs` of its group. `cargo test --test physics free_fall` runs one law.
 //!
-//! With `KINETOSCOPE_PHYSICS_ROWS` naming a folder, each law also writes what it measured there: `cargo xtask
-//! physics-report` makes `docs/physics.md` of it.
+//! If `KINETOSCOPE_PHYSICS_ROWS` names a folder, each law also writes its results there; `cargo xtask physics-report`
+//! converts them to `docs/physics.md`.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod bounce;

@@ -1,14 +1,14 @@
-//! What laws measured, as files for the page of numbers.
+//! Results of the laws as files for the physics page.
 
 use crate::law::Measured;
 use kinetoscope::mujoco as mj;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// The folder for the rows, one file per law.
+/// Environment variable with the folder for the results, one file per law.
 const VARIABLE: &str = "KINETOSCOPE_PHYSICS_ROWS";
 
-/// Writes `group.name.json` into the folder that the environment names, if it names one.
+/// Writes `group.name.json` into the folder of the environment variable, if set.
 pub(crate) fn write(group: &str, name: &str, statement: &str, measured: &Measured) {
     let Some(folder) = std::env::var_os(VARIABLE).map(PathBuf::from) else { return };
     std::fs::create_dir_all(&folder).unwrap();

@@ -7,41 +7,41 @@ use std::fmt::Write as _;
 #[derive(Clone, Debug)]
 pub(crate) struct Link {
     pub(crate) name: String,
-    /// \[kg\].
+    /// Mass \[kg\].
     pub(crate) mass: f64,
-    /// Centre of mass in the link \[m\], and the turn of the axes of `inertia` \[rad\].
+    /// Center of mass in the link frame \[m\], and rotation of the axes of `inertia` (roll, pitch, yaw) \[rad\].
     pub(crate) com: [f64; 3],
     pub(crate) rpy: [f64; 3],
-    /// About the centre of mass \[kg m²\].
+    /// Inertia about the center of mass \[kg m²\].
     pub(crate) inertia: Matrix3<f64>,
-    /// Content of `<geometry>` of what collides; nothing collides where it is empty.
+    /// Content of the collision's `<geometry>`; empty for no collisions.
     pub(crate) shape: String,
 }
 
 impl Link {
-    /// A body with these moments about its origin and nothing that collides.
+    /// A body with these moments about its origin and no collision shape.
     pub(crate) fn new(name: &str, mass: f64, moments: [f64; 3]) -> Self {
         let inertia = Matrix3::from_diagonal(&moments.into());
         Self { name: name.into(), mass, com: [0.0; 3], rpy: [0.0; 3], inertia, shape: String::new() }
     }
 
-    /// A brick that is filled evenly, its edges `size` long: m (b² + c²)/12.
+    /// A solid box of the edge lengths a, b and c: m (b² + c²)/12.
     pub(crate) fn brick(name: &str, mass: f64, [a, b, c]: [f64; 3]) -> Self {
         let moments = [b * b + c * c, a * a + c * c, a * a + b * b].map(|s| mass * s / 12.0);
         Self { shape: format!("<box size=\"{a} {b} {c}\"/>"), ..Self::new(name, mass, moments) }
     }
 
-    /// A ball that is filled evenly: 2/5 m r².
+    /// A solid ball: 2/5 m r².
     pub(crate) fn ball(name: &str, mass: f64, radius: f64) -> Self {
         Self::sphere(name, mass, radius, 0.4 * mass * radius * radius)
     }
 
-    /// A ball with this moment about its centre: 2/3 m r² for a shell.
+    /// A ball with this moment about its center: 2/3 m r² for a shell.
     pub(crate) fn sphere(name: &str, mass: f64, radius: f64, moment: f64) -> Self {
         Self { shape: format!("<sphere radius=\"{radius}\"/>"), ..Self::new(name, mass, [moment; 3]) }
     }
 
-    /// A cylinder about z that is filled evenly: m r²/2, and m (3 r² + l²)/12 across.
+    /// A solid cylinder about z: m r²/2, and m (3 r² + l²)/12 across.
     pub(crate) fn cylinder(name: &str, mass: f64, radius: f64, length: f64) -> Self {
         let across = mass * (3.0 * radius * radius + length * length) / 12.0;
         let moments = [across, across, mass * radius * radius / 2.0];
@@ -49,7 +49,7 @@ impl Link {
         Self { shape, ..Self::new(name, mass, moments) }
     }
 
-    /// A mass whose moments are too small to be felt, `com` away from the origin.
+    /// A point mass at `com`, with negligible moments.
     pub(crate) fn point(name: &str, mass: f64, com: [f64; 3]) -> Self {
         Self { com, ..Self::new(name, mass, [POINT; 3]) }
     }
@@ -58,16 +58,17 @@ impl Link {
         Self { com, ..self }
     }
 
-    /// As it is, but nothing collides with it.
+    /// The same link without a collision shape.
     pub(crate) fn ghost(self) -> Self {
         Self { shape: String::new(), ..self }
     }
 }
 
-/// The moment of a "point" \[kg m²\]: MuJoCo wants some. What it changes is part of the laws that use it.
+/// The moment of a point mass \[kg m²\], because MuJoCo requires a positive one. Its effect is part of the laws that
+/// use it.
 pub(crate) const POINT: f64 = 1e-9;
 
-/// A joint; without more said it is at the parent's origin and its axes are the parent's.
+/// A joint; by default at the parent's origin with the parent's axes.
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
     pub(crate) name: String,
@@ -95,7 +96,7 @@ impl Joint {
         Self::new("continuous", name, parent_and_child, axis)
     }
 
-    /// A slide whose ends are far away.
+    /// A slide with distant limits.
     pub(crate) fn slide(name: &str, parent_and_child: [&str; 2], axis: [f64; 3]) -> Self {
         Self::new("prismatic", name, parent_and_child, axis).limit(-1e3, 1e3, 1e9)
     }
@@ -129,12 +130,12 @@ impl Joint {
     }
 }
 
-/// A link without mass: what a chain hangs from.
+/// A massless link, the base of a chain.
 pub(crate) fn base() -> Link {
     Link::new("base", 0.0, [0.0; 3])
 }
 
-/// The file; links without mass have no `<inertial>`.
+/// The URDF text; massless links have no `<inertial>`.
 pub(crate) fn urdf(links: &[Link], joints: &[Joint]) -> String {
     let v = |x: [f64; 3]| format!("{} {} {}", x[0], x[1], x[2]);
     let mut out = String::from("<robot name=\"law\">\n");

@@ -1,15 +1,15 @@
-//! Whether two runs of an example saw the same: depth and mask in the arrays that they wrote.
+//! Comparison of two example runs: depth and mask arrays of different renderers must agree.
 
 use std::fs;
 use std::path::Path;
 
-/// Part of its depth \[m/m\] that a pixel may differ by: rounding of rays in single precision, at the slants of the examples.
+/// Relative tolerance of depths \[m/m\]: single-precision rounding of rays, at the slants of the examples.
 const DEPTH: f32 = 1e-4;
-/// Neighbours are of one surface where their depths differ by no more than this part.
+/// Largest relative depth difference of neighboring pixels on one surface.
 const SURFACE: f32 = 0.1;
 
-/// Checks that two folders have the same `depth*.npy` and `mask*.npy` off silhouettes, and, where `lit` is whether their renderers
-/// have light of their own each, other pictures.
+/// Checks that two folders have the same `depth*.npy` and `mask*.npy` off silhouettes. If `lit` is true, the renderers
+/// have different lighting, and the color images must differ.
 pub(crate) fn check(ours: &Path, other: &Path, lit: bool) -> Result<(), String> {
     let names = |folder: &Path| -> Result<Vec<String>, String> {
         let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
@@ -46,10 +46,10 @@ pub(crate) fn check(ours: &Path, other: &Path, lit: bool) -> Result<(), String> 
     Ok(())
 }
 
-/// An array of numbers of four bytes: its shape, and the bits.
+/// An array of four-byte numbers: its shape, and their bits.
 type Array = (Vec<usize>, Vec<u32>);
 
-/// Reads an array that an example has written, version 1.0 of NumPy's format.
+/// Reads an array written by an example, in version 1.0 of NumPy's format.
 fn array(path: &Path) -> Result<Array, String> {
     let wrong = |what: &str| format!("{}: {what}", path.display());
     let bytes = fs::read(path).map_err(|e| wrong(&e.to_string()))?;
@@ -70,8 +70,8 @@ fn array(path: &Path) -> Result<Array, String> {
     Ok((shape, numbers))
 }
 
-/// How many pixels off silhouettes were compared, and how many differ: where a pixel and its eight neighbours are of one thing
-/// and one surface in both.
+/// Numbers of compared and of differing pixels. Compared pixels are off silhouettes: in both images, the pixel and its
+/// eight neighbors show one object and one surface.
 fn compare(ours: &(Array, Array), other: &(Array, Array)) -> Result<(usize, usize), String> {
     let ((shape, _), _) = ours;
     if [&ours.1.0, &other.0.0, &other.1.0].into_iter().any(|other| other != shape) {
@@ -105,7 +105,7 @@ fn compare(ours: &(Array, Array), other: &(Array, Array)) -> Result<(usize, usiz
 mod tests {
     use super::*;
 
-    /// A folder with one picture of 5 x 4 pixels: things 7 and 8 side by side, at 2 and 3 m.
+    /// A folder with an image of 6 x 4 pixels: objects 7 and 8 side by side, at 2 and 3 m.
     fn folder(shift: f32, id: i32, color: &str) -> tempfile::TempDir {
         let dir = tempfile::tempdir().expect("a scratch folder");
         let write = |name: &str, descr: &str, numbers: Vec<[u8; 4]>| {
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn same_things_in_other_colors() {
         let ours = folder(0.0, 8, "ours");
-        // Two columns of each half are whole in two rows.
+        // In two rows, two columns of pixels are off silhouettes.
         let seen = |dir: &tempfile::TempDir| {
             let read = |name: &str| array(&dir.path().join(name)).expect("an array");
             (read("depth_0.npy"), read("mask_0.npy"))

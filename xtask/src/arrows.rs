@@ -1,4 +1,4 @@
-//! Compares the dependencies between the workspace's packages with the arrows written in ARCHITECTURE.md.
+//! Compares the dependencies between the workspace's packages with the list in ARCHITECTURE.md.
 
 use crate::run::{Failure, Outcome, Repo, no_findings};
 use crate::source_check::workspace_dependencies;
@@ -43,7 +43,7 @@ fn written_arrows(page: &str) -> Result<BTreeSet<Arrow>, String> {
     Ok(arrows)
 }
 
-/// Edges between members with the kind that makes them. Dev-dependencies are left out: tests may use any crate.
+/// Dependencies between workspace members with their kind. Dev-dependencies are left out: tests may use any crate.
 fn used_arrows(metadata: &Value) -> BTreeMap<Arrow, String> {
     let members: BTreeSet<&str> = packages(metadata).filter_map(|package| package["name"].as_str()).collect();
     let mut arrows = BTreeMap::new();
@@ -80,8 +80,8 @@ fn differences(written: &BTreeSet<Arrow>, used: &BTreeMap<Arrow, String>) -> Vec
     unwritten.chain(unused).collect()
 }
 
-/// Arrows point down only: repeatedly take away arrows that nothing leads to or that lead on to nothing; what stays goes
-/// in a circle.
+/// A dependency cycle, if any. Dependencies without a predecessor or without a successor are removed repeatedly; the
+/// rest forms cycles.
 fn cycle(arrows: &BTreeSet<Arrow>) -> Option<String> {
     let mut left = arrows.clone();
     loop {
@@ -96,7 +96,7 @@ fn cycle(arrows: &BTreeSet<Arrow>) -> Option<String> {
     (!names.is_empty()).then(|| format!("arrows must point down only, these lead into a circle: {}", names.join(", ")))
 }
 
-/// Dependencies from a registry that bypass the table in the root's Cargo.toml, where the reasons stand.
+/// Dependencies from a registry that bypass the table in the root's Cargo.toml, which gives the reasons.
 fn unlisted_dependencies(metadata: &Value, cargo_toml: &str) -> Vec<String> {
     let listed = workspace_dependencies(cargo_toml);
     let is_listed =
@@ -109,7 +109,7 @@ fn unlisted_dependencies(metadata: &Value, cargo_toml: &str) -> Vec<String> {
         .collect()
 }
 
-/// Inline code that looks like a path of the tree: has a `/` or is the name of a file with a known ending.
+/// Inline code that looks like a path of the tree: it contains `/` or is a file name with a known extension.
 fn named_paths(page: &str) -> Vec<String> {
     let mut in_block = false;
     let mut paths = Vec::new();
@@ -117,7 +117,7 @@ fn named_paths(page: &str) -> Vec<String> {
         if line.trim_start().starts_with("```") {
             in_block = !in_block;
         } else if !in_block {
-            // Every second piece between backquotes is code.
+            // Every second part between backquotes is code.
             paths.extend(line.split('`').skip(1).step_by(2).filter(|code| is_path(code)).map(str::to_string));
         }
     }
@@ -157,7 +157,7 @@ mod tests {
         differences(&written_arrows(&page(arrows)).expect("a block"), &used_arrows(&metadata()))
     }
 
-    /// Arrows that are missing on either side are named.
+    /// Dependencies missing on either side are reported.
     #[test]
     fn both_sides() {
         for (arrows, named) in [

@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: ours and the rivals on both lines of MuJoCo, and the page with the results.
+//! `cargo xtask bench`: Kinetoscope and its baselines on both supported MuJoCo versions, and the page with the results.
 
 use crate::progress::Progress;
 use crate::python::{self, Module};
@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use std::{fs, thread};
 
 const RESULTS: &str = "benches/RESULTS.md";
-/// What is measured against rivals of the cameras.
+/// Benchmarks with baselines for cameras.
 const OF_CAMERAS: [&str; 2] = ["camera", "trace"];
-/// Rivals of the cameras. No other versions were tried.
+/// Python packages of the camera baselines. Other versions are untested.
 const CAMERAS: &[Module] = &[
     python::OPENGL,
     Module { name: "mujoco_warp", packages: &["mujoco-warp==4.0.0", "warp-lang==1.19.0"] },
@@ -39,7 +39,7 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
     let heading = heading(&machine());
     let old = if args.update {
         let old = fs::read_to_string(&path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
-        // Before the benchmarks run for nothing.
+        // Checked before the benchmarks run.
         replaced(&old, &heading, "")?;
         Some(old)
     } else {
@@ -96,8 +96,8 @@ pub(crate) fn run(repo: &Repo, args: &BenchArgs) -> Outcome {
     Ok(())
 }
 
-/// A page whose tables are replaced by those of the same name; new ones come last. Not for a page of another machine: what
-/// stays must have been measured on the same one.
+/// A page with the tables of the same name replaced; new tables come last. The page must be of the same machine,
+/// because the remaining tables must be comparable.
 fn replaced(page: &str, heading: &str, tables: &str) -> Outcome<String> {
     let split = |text: &str| -> Vec<String> {
         let parts = text.split("\n## ").filter(|part| !part.trim().is_empty());
@@ -131,7 +131,7 @@ fn read_rows(file: &Path) -> Outcome<Vec<Value>> {
     }
 }
 
-/// One table per benchmark, in the order the rows came.
+/// One table per benchmark, in the order of the rows.
 fn tables(rows: &[Value]) -> Outcome<String> {
     let mut benches: Vec<&str> = Vec::new();
     for row in rows {
@@ -169,7 +169,7 @@ fn text<'a>(row: &'a Value, key: &str) -> Outcome<&'a str> {
     row[key].as_str().ok_or_else(|| Failure::new(format!("a row without the text `{key}`: {row}")))
 }
 
-/// Three digits that count; `-` where there is no number.
+/// Three significant digits; `-` without a number.
 fn number(value: &Value) -> String {
     match value.as_f64() {
         None => "-".to_string(),

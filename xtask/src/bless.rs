@@ -1,9 +1,9 @@
-//! `cargo xtask bless`: rewrites the goldens from what the code gives now.
+//! `cargo xtask bless`: rewrites the golden files with the current output.
 
 use crate::run::{Cmd, Outcome, Repo};
 use crate::setup::{self, Line, Wanted};
 
-/// Tests that compare with a golden rewrite it instead when this is set.
+/// Environment variable that makes golden tests rewrite their files.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_BLESS";
 
 #[derive(Debug, clap::Args)]
@@ -14,7 +14,7 @@ pub(crate) struct BlessArgs {
 }
 
 pub(crate) fn run(repo: &Repo, args: &BlessArgs) -> Outcome {
-    // Some goldens belong to one line of MuJoCo.
+    // Some golden files belong to one supported MuJoCo version.
     for line in [Line::Debian, Line::Wheel] {
         let ready = setup::prepare(repo, Wanted { line: Some(line), extras: &[] })?;
         ready.cargo().env(VARIABLE, "1").args(["test", "--workspace", &args.filter]).run()?;

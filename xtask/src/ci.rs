@@ -1,4 +1,4 @@
-//! `cargo xtask ci`: everything a change has to pass, stage by stage, on both lines of MuJoCo.
+//! `cargo xtask ci`: all checks of a change, stage by stage, on both supported MuJoCo versions.
 
 use crate::docs_check::TEST_COMMAND;
 use crate::examples::Rows;
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct CiArgs {
-    /// Only what takes a minute: formatting, rules of the tree, clippy, unit tests
+    /// Only fast checks: formatting, rules of the tree, clippy, unit tests
     #[arg(long)]
     quick: bool,
     /// Only this stage
@@ -22,7 +22,7 @@ pub(crate) struct CiArgs {
     only: Option<String>,
 }
 
-/// One line of the table that is printed at the end.
+/// One stage of the run.
 #[derive(Debug)]
 struct Stage {
     name: &'static str,
@@ -45,7 +45,7 @@ enum When {
 #[derive(Debug)]
 struct Context<'a> {
     repo: &'a Repo,
-    /// What git saw as changed before the first stage; None where there is no git.
+    /// Lines of `git status` before the first stage; `None` outside of a git repository.
     changed_before: Option<BTreeSet<String>>,
 }
 
@@ -106,13 +106,13 @@ struct Took {
     /// "passed", "failed" or "skipped".
     result: &'static str,
     wall: Duration,
-    /// Processor time of all programs that the stage started, user and system; zero where the kernel does not tell.
+    /// User and system processor time of all programs that the stage started; zero if the kernel does not report it.
     cpu: Duration,
 }
 
 pub(crate) fn run(repo: &Repo, args: &CiArgs) -> Outcome {
     let context = Context { repo, changed_before: changed_files(repo) };
-    // Rows of an earlier run are of earlier code.
+    // Rows of an earlier run belong to earlier code.
     physics_report::forget_rows(repo)?;
     let chosen = chosen(args);
     let start = Instant::now();
@@ -232,11 +232,12 @@ fn demo(context: &Context<'_>) -> Outcome {
     docs_check::parse(command).map_err(|e| Failure::new(e.to_string()))?.run(context.repo)
 }
 
-/// The very line of the README, so that what newcomers type is what is tested.
+/// Parses the command line of the README, so that CI runs exactly the documented command.
 fn readme_test(context: &Context<'_>) -> Outcome {
     let cli = docs_check::parse(TEST_COMMAND).map_err(|e| Failure::new(e.to_string()))?;
     let args = cli.test_args().ok_or_else(|| Failure::new(format!("`{TEST_COMMAND}` is no test command")))?;
-    // The second half of CI is the other line: here a MUJOCO_DIR of the caller's must not count.
+    // Without a version in the command, CI tests 2.2.2 here and ignores a MUJOCO_DIR of the caller: another stage tests
+    // the other version.
     test::run(context.repo, &TestArgs { mujoco: Some(args.mujoco.unwrap_or(Line::Debian)), ..args.clone() })
         .map_err(|failure| Failure { again: Some(TEST_COMMAND.to_string()), ..failure })
 }
@@ -246,7 +247,8 @@ fn wheel_test(context: &Context<'_>) -> Outcome {
         .map_err(|failure| Failure { again: Some(format!("{TEST_COMMAND} --mujoco 4")), ..failure })
 }
 
-/// The tests of both lines wrote what they measured; where they did not run before this stage, they run now.
+/// Checks the physics page against the rows that the tests of both versions wrote. If they have not run before this
+/// stage, they run now.
 fn physics(context: &Context<'_>) -> Outcome {
     if physics_report::has_rows(context.repo) {
         return physics_report::check_rows(context.repo);
@@ -254,7 +256,7 @@ fn physics(context: &Context<'_>) -> Outcome {
     physics_report::run(context.repo, &PhysicsReportArgs { check: true })
 }
 
-/// MuJoCo's log file, and files that tests or examples wrote into the tree.
+/// Reports MuJoCo's log file, and files that tests or examples wrote into the tree.
 fn leftovers(context: &Context<'_>) -> Outcome {
     let mut findings: Vec<String> =
         files_below(&context.repo.root).into_iter().filter(|path| path.ends_with("MUJOCO_LOG.TXT")).collect();
@@ -265,7 +267,7 @@ fn leftovers(context: &Context<'_>) -> Outcome {
     no_findings("these files were left behind or changed while CI ran", &findings)
 }
 
-/// Lines of `git status`: everything that is not as committed and not ignored.
+/// Lines of `git status`: all changes and all untracked files that are not ignored.
 fn changed_files(repo: &Repo) -> Option<BTreeSet<String>> {
     let status = Cmd::new("git")
         .args(["status", "--porcelain", "--untracked-files=all"])
@@ -316,7 +318,7 @@ mod tests {
         assert_eq!(words, expected.map(|line| line.split(' ').collect::<Vec<_>>()));
     }
 
-    /// A new file is found, and the log of MuJoCo although git ignores it.
+    /// A new file is reported, and so is MuJoCo's log although git ignores it.
     #[test]
     fn files_left_behind() {
         let dir = tempfile::tempdir().expect("a scratch folder");

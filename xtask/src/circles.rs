@@ -1,13 +1,13 @@
-//! Circles of files: files of a crate that use each other, directly or by way of others.
+//! Import cycles: files of a crate that use each other, directly or through other files.
 //!
-//! An arrow goes from a file to the file that defines what a path of it names (`use crate::..`, `super::..`, or a path in
-//! code); re-exports are followed to the definition, and make no arrow of their own. Tests do not count.
+//! An edge leads from a file to the file that defines an item named by one of its paths (`use crate::..`, `super::..`,
+//! or a path in code). Re-exports are followed to the definition, and are not edges themselves. Tests are ignored.
 
 use crate::run::{Outcome, Repo, no_findings};
 use crate::source_check::{TextFile, code_only, text_files};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Files of the largest circle that is allowed.
+/// Number of files in the largest allowed cycle.
 const LARGEST: usize = 5;
 
 type Path = Vec<String>;
@@ -21,7 +21,7 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
     no_findings("circles of more than 5 files; move what both sides need into a file of its own", &findings)
 }
 
-/// All circles, the largest first.
+/// All cycles, the largest first.
 fn circles(files: &[TextFile]) -> Vec<Vec<String>> {
     let mut crates: BTreeMap<&str, Vec<&TextFile>> = BTreeMap::new();
     for file in files.iter().filter(|file| file.path.ends_with(".rs") && !is_test(&file.path)) {
@@ -66,7 +66,7 @@ impl Crate {
         this
     }
 
-    /// The module and item that a written path names, from the root of the crate; `None` for other crates.
+    /// The module and item of a written path, from the root of the crate; `None` for other crates.
     fn resolve(&self, module: &Path, written: &[String]) -> Option<Path> {
         let mut base = module.clone();
         let mut rest = written;
@@ -90,7 +90,7 @@ impl Crate {
         Some(base)
     }
 
-    /// The path with re-exports replaced by what they name.
+    /// The path with re-exports replaced by their targets.
     fn defined(&self, path: Path, depth: usize) -> Path {
         for split in 0..path.len() {
             let (module, name) = (path[..split].to_vec(), &path[split]);
@@ -120,7 +120,7 @@ impl Crate {
             });
             arrows.entry(file).or_default().extend(targets);
         }
-        // Files that reach each other.
+        // Files that reach each other form a cycle.
         let reach: BTreeMap<&String, BTreeSet<&String>> =
             arrows.keys().map(|file| (*file, reached(file, &arrows))).collect();
         let mut found: BTreeSet<Vec<String>> = BTreeSet::new();
@@ -135,7 +135,7 @@ impl Crate {
     }
 }
 
-/// All files that a file uses, directly or not.
+/// All files that a file uses, directly or indirectly.
 fn reached<'a>(from: &'a String, arrows: &BTreeMap<&'a String, BTreeSet<&'a String>>) -> BTreeSet<&'a String> {
     let (mut seen, mut next) = (BTreeSet::new(), vec![from]);
     while let Some(file) = next.pop() {
@@ -158,7 +158,7 @@ fn module_of(path: &str) -> Path {
     parts
 }
 
-/// The code before the module of unit tests.
+/// The code without its modules of unit tests.
 fn without_tests(code: &str) -> String {
     let mut from = 0;
     while let Some(at) = code[from..].find("#[cfg(test)]").map(|at| from + at) {
@@ -202,7 +202,7 @@ fn scan(code: &str) -> (Vec<Use>, Vec<Path>) {
     (uses, paths)
 }
 
-/// Reads a `use` tree from `at`; returns where it ends.
+/// Reads a `use` tree from `at`; returns its end.
 fn tree(tokens: &[&str], mut at: usize, prefix: &[String], public: bool, uses: &mut Vec<Use>) -> usize {
     let mut path = prefix.to_vec();
     loop {
@@ -241,7 +241,7 @@ fn is_name(token: &str) -> bool {
     token.starts_with(|c: char| c.is_alphabetic() || c == '_') && token != "as"
 }
 
-/// Names, `::` and single signs.
+/// Names, `::` and single characters.
 fn tokens(code: &str) -> Vec<&str> {
     let (mut out, mut rest) = (Vec::new(), code);
     while let Some(first) = rest.chars().next() {
@@ -268,7 +268,7 @@ mod tests {
         texts.iter().map(|(path, text)| TextFile { path: (*path).into(), text: (*text).into() }).collect()
     }
 
-    /// A circle by way of a re-export and of a path in code; tests, comments and other crates make none.
+    /// A cycle through a re-export and a path in code. Tests, comments and other crates add no edges.
     #[test]
     fn circles_of_files() {
         let tree = files(&[
@@ -281,7 +281,7 @@ mod tests {
             ("b/src/lib.rs", "use a::x::X;"),
         ]);
         assert_eq!(circles(&tree), [["a/src/x.rs", "a/src/y/inner.rs", "a/src/y/mod.rs"]]);
-        // The control: without the path of y no circle is found.
+        // Control: without the path in `y` there is no cycle.
         let mut open = tree;
         open[2].text = "mod inner;".into();
         assert!(circles(&open).is_empty());

@@ -1,9 +1,9 @@
-//! `cargo xtask demo`: the first example, from nothing installed to a running robot.
+//! `cargo xtask demo`: the first example, on a machine with nothing installed.
 
 use crate::run::{Outcome, Repo};
 use crate::setup::{self, Wanted};
 
-/// What runs when nothing else is asked for; a flag of the user's replaces the one here.
+/// Default flags; the user's flags replace them.
 const DEFAULTS: &[(&str, Option<&str>)] = &[("--headless", None), ("--num-envs", Some("4")), ("--steps", Some("2004"))];
 
 #[derive(Debug, clap::Args)]
@@ -26,7 +26,7 @@ pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> Outcome {
     defaults.push(("--out", Some(&pictures)));
     ready
         .cargo()
-        // Paths among the arguments are relative to where the user is, not to the repository.
+        // Paths in the arguments are relative to the user's working directory, not to the repository.
         .current_dir(".")
         .args(["run", "--manifest-path"])
         .arg(repo.root.join("Cargo.toml"))
@@ -38,7 +38,8 @@ pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> Outcome {
         .run()
 }
 
-/// What a newcomer waits for is the build: recordings and the browser view are compiled where a flag asks for them.
+/// Feature flags of cargo. The build dominates the time of the first run, so recordings and the browser view are
+/// compiled only if a flag needs them.
 fn rooms(user: &[String]) -> &'static [&'static str] {
     let asked = |arg: &String| flag_name(arg).is_some_and(|name| ["record", "serve"].contains(&name.as_str()));
     if user.iter().any(asked) { &[] } else { &["--no-default-features"] }
@@ -57,7 +58,7 @@ fn merged(defaults: &[(&str, Option<&str>)], user: &[String]) -> Vec<String> {
     merged
 }
 
-/// `--num_envs=8` and `--num-envs` are the same flag `num-envs`.
+/// The normalized name of a flag: `--num_envs=8` and `--num-envs` are both `num-envs`.
 fn flag_name(arg: &str) -> Option<String> {
     let name = arg.strip_prefix("--")?;
     Some(name.split('=').next().unwrap_or(name).replace('_', "-"))

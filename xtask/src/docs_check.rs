@@ -1,4 +1,4 @@
-//! What the pages promise: their commands parse, their links lead somewhere.
+//! Checks of the documentation pages: their commands parse, and their links have targets.
 
 use crate::Cli;
 use crate::run::{Outcome, Repo, no_findings};
@@ -6,7 +6,7 @@ use crate::source_check::files_below;
 use clap::Parser;
 
 const README: &str = "README.md";
-/// The two commands a newcomer types; CI runs the second one literally.
+/// The two commands for new users; CI runs the second one literally.
 pub(crate) const PROMISED: [&str; 2] = ["cargo xtask demo", TEST_COMMAND];
 pub(crate) const TEST_COMMAND: &str = "cargo xtask test";
 const NEEDED: [&str; 3] = [README, "ARCHITECTURE.md", "CONTRIBUTING.md"];
@@ -36,7 +36,7 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
     no_findings("the documentation is not true", &findings)
 }
 
-/// Pages of the project's own: those in the root and in docs/, not the ones that came with somebody's robot.
+/// True for pages of the project: those in the root and in docs/. Pages of bundled robots are excluded.
 fn is_page(path: &str) -> bool {
     path.ends_with(".md") && (!path.contains('/') || path.starts_with("docs/"))
 }
@@ -58,7 +58,7 @@ fn commands_that_do_not_parse(page: &str) -> Vec<String> {
         .collect()
 }
 
-/// A line of a code block as the command it is: without a prompt and without a comment.
+/// The command in a line of a code block, without prompt and comment.
 fn command(line: &str) -> Option<&str> {
     let line = line.trim();
     let line = line.strip_prefix("$ ").unwrap_or(line);
@@ -68,7 +68,7 @@ fn command(line: &str) -> Option<&str> {
 
 /// The parsed form of a line `cargo xtask ...`.
 pub(crate) fn parse(line: &str) -> Result<Cli, clap::Error> {
-    // `cargo xtask` is one word to clap: the name of the program.
+    // For clap, `cargo xtask` is one word: the name of the program.
     let words = line.trim_start_matches("cargo xtask").split_whitespace();
     Cli::try_parse_from(std::iter::once("cargo xtask").chain(words))
 }
@@ -83,7 +83,7 @@ fn code_lines(page: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Targets of `[text](target)` outside of code, without anchors, titles and addresses of the web.
+/// Targets of `[text](target)` outside of code, without anchors, titles and web addresses.
 fn relative_links(page: &str) -> Vec<String> {
     let mut in_block = false;
     let mut links = Vec::new();

@@ -1,4 +1,4 @@
-//! The table of how CI runs every example, and the check that every example stands in it.
+//! The table of example runs in CI, and the check that every example is in the table.
 
 use crate::alike;
 use crate::progress::Progress;
@@ -10,12 +10,12 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-/// Vendor robots beside the repository; where they are absent, the rows that need them are left out, in CI an error.
+/// Vendor robots next to the repository. Without them, the rows that need them are skipped; in CI that is an error.
 const ROBOTS: &str = "../shared/robots";
-/// No example runs that long with the arguments of the table; one that does hangs.
+/// Time limit of an example; a run that exceeds it hangs.
 const TIME_LIMIT: Duration = Duration::from_secs(600);
-/// Examples of feedback are there to be run and watched: each run of theirs ends within a minute, learning included.
-/// Their time is what it would be without other programs on the machine.
+/// Feedback-control examples, which users run and watch: each run ends within a minute, including learning. The limit
+/// applies to the time without the load of other programs.
 const QUICK: [&str; 3] = ["balance", "train_reach", "visual_servo"];
 const QUICK_LIMIT: Duration = Duration::from_secs(60);
 
@@ -25,13 +25,13 @@ struct Run {
     example: &'static str,
     args: &'static str,
     exits: &'static [i32],
-    /// What its report has to say.
+    /// Check of the report's content.
     report: Requirement,
-    /// True where the report must say something of its own.
+    /// True if the report has a check of its own.
     judged: bool,
 }
 
-/// Says what is wrong with a report.
+/// Returns the error of a report.
 type Requirement = fn(&Value) -> Result<(), String>;
 
 const fn run_of(example: &'static str, exits: &'static [i32], args: &'static str) -> Run {
@@ -42,7 +42,8 @@ const fn trial_of(example: &'static str, exits: &'static [i32], args: &'static s
     Run { example, args, exits, report, judged: true }
 }
 
-/// A new example needs at least one row here: what it does on good input, and its exit code on bad input.
+/// The runs of all examples. A new example needs at least one row with valid input, and one with invalid input and its
+/// exit code.
 const TABLE: &[Run] = &[
     run_of("create_robot", &[0], "--headless --num-envs 4 --steps 400 --report {out}/create_robot.json"),
     run_of(
@@ -70,9 +71,9 @@ const TABLE: &[Run] = &[
     run_of("create_robot", &[2], "--headless --steps 1 --record {out}/none.npz --record-every 0"),
     run_of("create_robot", &[0], "--headless --num-envs 2 --steps 50 --out {out}/create_robot"),
     run_of("create_robot", &[2], "--headless --steps 1 --record {out}/create_robot.avi"),
-    // As the tests, examples are built with the feature that writes it.
+    // Examples are built with the feature `hdf5`, as the tests are.
     run_of("create_robot", &[0], "--headless --steps 20 --record {out}/create_robot.hdf5"),
-    // Without a camera, and with one that does not exist: the stage, and an error.
+    // Recordings of an example without a camera: the stage works, and a camera that does not exist is an error.
     run_of("create_robot", &[0], "--headless --num-envs 2 --steps 50 --record {out}/create_robot.apng"),
     run_of("create_robot", &[2], "--headless --steps 1 --record {out}/none.mp4 --record-view nobody"),
     run_of("create_robot", &[2], "--headless --steps 1 --record-view stage"),
@@ -196,7 +197,7 @@ const TABLE: &[Run] = &[
     run_of("stereo", &[2], "--headless --steps 1 --baseline 0 --out {out}/none"),
     run_of("stereo", &[2], "--headless --steps 1 --toe-in-deg 3 --out {out}/none"),
     run_of("stereo", &[2], "--headless --steps 1 --camera-id 1 --out {out}/none"),
-    // The control of the run after it: other renderers draw glass as a white ball.
+    // Control of the next run: other renderers draw glass as an opaque white ball.
     trial_of(
         "surfaces",
         &[0],
@@ -211,9 +212,9 @@ const TABLE: &[Run] = &[
     ),
     run_of("surfaces", &[2], "--headless --lamp-radius=-1 --out {out}/none"),
     trial_of("grasp", &[0], "--headless --out {out}/grasp --report {out}/grasp.json", enough_succeeded),
-    // Two cubes that are taken from another side than their first, and arrive turned.
+    // Two cubes are grasped on another side than the first, and end up rotated.
     trial_of("grasp", &[0], "--headless --seed 5 --report {out}/grasp_turned.json", enough_succeeded),
-    // Hands that slip: the control of the runs above.
+    // Control of the runs above: the cubes slip.
     trial_of("grasp", &[1], "--headless --friction 0.02 --report {out}/grasp_slips.json", none_lifted),
     run_of("grasp", &[2], "--headless --friction=-1"),
     trial_of(
@@ -222,11 +223,11 @@ const TABLE: &[Run] = &[
         "--headless --out {out}/open_drawer --report {out}/open_drawer.json",
         enough_succeeded,
     ),
-    // Drawers that are stuck: the control of the run above.
+    // Control of the run above: the drawers are stuck.
     trial_of("open_drawer", &[1], "--headless --slide-friction 500 --report {out}/open_drawer_stuck.json", none_opened),
     run_of("open_drawer", &[2], "--headless --slide-friction=-1"),
     trial_of("balance", &[0], "--headless --out {out}/balance --report {out}/balance.json", balanced),
-    // Wheels that stand still: the control of the run above.
+    // Control of the run above: the wheels stand still.
     trial_of("balance", &[1], "--headless --no-feedback --report {out}/balance_falls.json", all_fell),
     run_of("balance", &[2], "--headless --push=-1"),
     trial_of(
@@ -235,7 +236,7 @@ const TABLE: &[Run] = &[
         "--headless --out {out}/visual_servo --report {out}/visual_servo.json",
         enough_succeeded,
     ),
-    // Cameras that are not where they are thought to be, and masks that are empty: the controls of the run above.
+    // Controls of the run above: miscalibrated cameras, and empty masks.
     trial_of(
         "visual_servo",
         &[1],
@@ -245,7 +246,7 @@ const TABLE: &[Run] = &[
     trial_of("visual_servo", &[1], "--headless --blind --report {out}/visual_servo_blind.json", none_found),
     run_of("visual_servo", &[2], "--headless --miscalibrated inf"),
     trial_of("train_reach", &[0], "--headless --out {out}/train_reach --report {out}/train_reach.json", learned),
-    // As much is tried, and nothing is told of what came of it: the control of the run above.
+    // Control of the run above: the same learning with shuffled returns.
     trial_of("train_reach", &[1], "--headless --no-signal --report {out}/train_reach_no_signal.json", not_learned),
     run_of("train_reach", &[2], "--headless --num-envs 100"),
     run_of("train_reach", &[2], "--headless --noise 0"),
@@ -326,8 +327,8 @@ const TABLE: &[Run] = &[
     run_of("inspect_robot", &[2], "{out}/there_is_no_such_file.urdf"),
 ];
 
-/// Folders of the rows above that show the same things from the same places, by two renderers, and whether those have light of
-/// their own each: `fast-rt` has the rasterizer's, and may draw the same picture to the bit.
+/// Pairs of folders with the same scenes by two renderers. The flag is true for renderers with different lighting:
+/// `fast-rt` has the rasterizer's lighting, and may render identical images.
 const ALIKE: [(&str, [&str; 2], bool); 6] = [
     ("create_sensor", ["sensor/raster", "sensor/rt"], true),
     ("create_sensor", ["sensor/raster", "sensor/hybrid"], true),
@@ -337,12 +338,12 @@ const ALIKE: [(&str, [&str; 2], bool); 6] = [
     ("render_model", ["model/raster", "model/fast-rt"], false),
 ];
 
-/// Rows of the table that are run.
+/// Selection of table rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rows {
     All,
-    /// The first good row of each example, and every row whose report is judged: what depends on MuJoCo's version. Flags, formats and
-    /// refusals do not.
+    /// The rows that depend on the MuJoCo version: the first valid row of each example, and every row with a report
+    /// check. Flags, formats and refusals do not depend on it.
     OfPhysics,
 }
 
@@ -362,10 +363,10 @@ impl Rows {
     }
 }
 
-/// Builds the examples with cargo's choice of packages, and runs rows of the table.
+/// Builds the examples of these packages and runs rows of the table.
 pub(crate) fn run(repo: &Repo, ready: &Ready, packages: &[&str], rows: Rows) -> Outcome {
     no_findings("examples and their table in xtask/src/examples.rs disagree", &table_gaps(&examples(&repo.root)))?;
-    // As the tests are built, so that nothing is compiled twice.
+    // Built with the features of the tests, so that nothing is compiled twice.
     ready.cargo().args(["build", "--examples"]).args(packages).args(test::features(packages)).run()?;
     let out = repo.target.join("examples-out");
     if out.exists() {
@@ -413,7 +414,7 @@ fn run_row(ready: &Ready, row: &Run, out: &Path) -> Outcome {
         let expected = expected.join(" or ");
         return Err(failure(format!("`{} {}` ended with {code}, expected {expected}", row.example, args.join(" "))));
     }
-    // Bad input ends before there is anything to report.
+    // A run with invalid input ends before it can write a report.
     if let (0 | 1, Some(report)) = (code, flag_value(&args, "--report")) {
         check_report(Path::new(report), row.report)
             .map_err(|reason| failure(format!("the report {report}: {reason}")))?;
@@ -429,7 +430,7 @@ fn flag_value<'a>(args: &'a [String], flag: &str) -> Option<&'a str> {
     args.iter().position(|arg| arg == flag).and_then(|at| args.get(at + 1)).map(String::as_str)
 }
 
-/// A report is a JSON object that says something, and what the run requires.
+/// Checks that a report is a non-empty JSON object that meets the requirement.
 fn check_report(path: &Path, required: Requirement) -> Result<(), String> {
     let text = fs::read_to_string(path).map_err(|e| e.to_string())?;
     match serde_json::from_str::<Value>(&text) {
@@ -443,8 +444,8 @@ fn anything(_: &Value) -> Result<(), String> {
     Ok(())
 }
 
-/// Where the disparity says, the right eye measured the depth that the disparity means, on at least a tenth of all pixels: to
-/// a tenth of a pixel, which is what curved things leave between two pixels.
+/// Checks the disparity against the right camera's own depth, on at least a tenth of all pixels. The tolerance is a
+/// tenth of a pixel, for curved surfaces between two pixel centers.
 fn disparity_leads_to_the_points(report: &Value) -> Result<(), String> {
     let pixels = number(report, "width")? * number(report, "height")?;
     let (points, error) = (number(report, "points")?, number(report, "disagreement_pixels")?);
@@ -461,8 +462,8 @@ fn disparity_leads_to_the_points(report: &Value) -> Result<(), String> {
     Ok(())
 }
 
-/// Through each of the nine lenses something is seen, and every point is seen again at the pixel that it was made of: points
-/// have single precision, which moves them by 6e-8 of their distance, a hundredth of a pixel being 3e-5 of it or more.
+/// Checks that each of the nine lenses shows objects, and that points project back to their pixels. Points are in
+/// single precision, which moves them by 6e-8 of their distance; a hundredth of a pixel is 3e-5 of it or more.
 fn lenses_lead_back(report: &Value) -> Result<(), String> {
     let lenses = report["lenses"].as_array().filter(|lenses| lenses.len() == 9).ok_or("there are nine lenses")?;
     for lens in lenses {
@@ -474,13 +475,13 @@ fn lenses_lead_back(report: &Value) -> Result<(), String> {
     Ok(())
 }
 
-/// The glass ball shows the ground behind it, which is darker than the clay in the lamp's light.
+/// Checks that the glass ball shows the ground behind it, which is darker than the clay in the direct light.
 fn light_goes_through_glass(report: &Value) -> Result<(), String> {
     let [glass, clay] = glass_and_clay(report)?;
     if glass < 0.8 * clay { Ok(()) } else { Err(format!("glass has a mean red of {glass}, clay of {clay}")) }
 }
 
-/// White glass that is drawn as a surface is brighter than clay in the same light.
+/// Checks that opaque white glass is brighter than clay in the same light.
 fn glass_is_brighter_than_clay(report: &Value) -> Result<(), String> {
     let [glass, clay] = glass_and_clay(report)?;
     if glass > clay { Ok(()) } else { Err(format!("glass has a mean red of {glass}, clay of {clay}")) }
@@ -493,10 +494,10 @@ fn glass_and_clay(report: &Value) -> Result<[f64; 2], String> {
     Ok([red("glass")?, red("clay")?])
 }
 
-/// How many environments the examples that count have where nobody says how many.
+/// Default number of environments in the examples that count successes.
 const TRIALS: u64 = 16;
 
-/// Of 16 environments as many succeeded as are needed, and those that did have not diverged.
+/// Checks that enough of the 16 environments succeeded, and that these have not diverged.
 fn enough_succeeded(report: &Value) -> Result<(), String> {
     let succeeded = trials(report)?.iter().filter(|row| row["success"] == true && row["diverged"].is_null()).count();
     let (successes, needed) = (number(report, "successes")?, number(report, "needed")?);
@@ -509,25 +510,26 @@ fn enough_succeeded(report: &Value) -> Result<(), String> {
     Ok(())
 }
 
-/// No environment succeeded, because no cube was lifted, though hands went there and up again. Where they go afterwards
-/// depends on where cubes are left.
+/// Checks that no environment succeeded because no cube was lifted, although the hands moved there and up again. Later
+/// motions are not checked, because they depend on the final positions of the cubes.
 fn none_lifted(report: &Value) -> Result<(), String> {
     none(report, |row| Ok(row["planned_to_lift"] != true || row["lifted"] != false))
 }
 
-/// No environment succeeded, though hands went everywhere, because no drawer opened as far as it should.
+/// Checks that no environment succeeded because no drawer opened far enough, although every hand motion was possible.
 fn none_opened(report: &Value) -> Result<(), String> {
     none(report, |row| Ok(row["planned"] != true || number(row, "open")? >= 0.15))
 }
 
-/// As [`enough_succeeded`], and pushes were pushes: all robots lost the floor, and tilted.
+/// As [`enough_succeeded`]; also checks that the pushes were strong: every robot left the floor and tilted.
 ///
-/// The third push lifts 9.6 kg by 120 N for 0.15 s: (120 - 9.6 x 9.81) / 9.6 = 2.69 m/s², so 0.40 m/s and 3 cm then, and the floor
-/// again after (0.40 + sqrt(0.40² + 2 x 9.81 x 0.03)) / 9.81 = 0.13 s: 0.28 s in all, of which half is asked for.
+/// The third push lifts 9.6 kg by 120 N for 0.15 s. The acceleration is (120 - 9.6 x 9.81) / 9.6 = 2.69 m/s², which
+/// gives 0.40 m/s and 3 cm at its end. The robot lands after (0.40 + sqrt(0.40² + 2 x 9.81 x 0.03)) / 9.81 = 0.13 s
+/// more: 0.28 s in total, of which half is required.
 ///
-/// The weakest push is 20 N for 0.15 s, at 0.45 m from the floor, on an inertia of 1.43 kg m² (that of the example's `gains`): it
-/// leaves 0.94 rad/s at 0.07 rad, and wheels that accelerate at most by 6 m/s² take 0.06 s, 0.03 rad, to stop that. Of four pushes,
-/// the strongest tilts a robot by no less than these 0.1 rad.
+/// The weakest push is 20 N for 0.15 s, at 0.45 m from the floor, on an inertia of 1.43 kg m² (see the example's
+/// `gains`). It leaves 0.94 rad/s at 0.07 rad. Wheels that accelerate by at most 6 m/s² take 0.06 s, 0.03 rad, to stop
+/// that. The strongest of four pushes tilts a robot by at least these 0.1 rad.
 fn balanced(report: &Value) -> Result<(), String> {
     enough_succeeded(report)?;
     for row in trials(report)? {
@@ -538,13 +540,14 @@ fn balanced(report: &Value) -> Result<(), String> {
     Ok(())
 }
 
-/// No environment succeeded, because every body touched the floor.
+/// Checks that no environment succeeded because every body touched the floor.
 fn all_fell(report: &Value) -> Result<(), String> {
     none(report, |row| Ok(row["body_touched_floor"] != true))
 }
 
-/// No environment succeeded, though cubes were found and hands went there: as far beside them as cameras were from where they
-/// were thought to be. That is 2 cm along both axes of the picture, one of which is tilted by atan(0.12 / 0.4): 27.7 mm.
+/// Checks that no environment succeeded, although the cubes were found and the hands moved there. The distance from the
+/// cube must equal the calibration error: 2 cm along both axes of the image, one of which is tilted by atan(0.12 /
+/// 0.4), that is 27.7 mm.
 fn all_beside(report: &Value) -> Result<(), String> {
     none(report, |row| {
         let beside = number(row, "beside")?;
@@ -552,13 +555,14 @@ fn all_beside(report: &Value) -> Result<(), String> {
     })
 }
 
-/// No environment succeeded, because no cube was found.
+/// Checks that no environment succeeded because no cube was found.
 fn none_found(report: &Value) -> Result<(), String> {
-    // And it is not over a cube that it does not look for: a pixel is 2.4 mm there.
+    // The hand must also not be above the cube by chance: a pixel is 2.4 mm there.
     none(report, |row| Ok(row["found"] != false || number(row, "beside")? < 0.0024))
 }
 
-/// Of many targets few were reached before, and enough after. Ending anywhere in the box of targets reaches 0.26 % of them.
+/// Checks that few of many targets were reached before learning, and enough after. A policy that ends anywhere in the
+/// box reaches 0.26 % of the targets.
 fn learned(report: &Value) -> Result<(), String> {
     let (before, after) = (number(report, "reached_before")?, number(report, "reached_after")?);
     let (needed, envs) = (number(report, "needed")?, number(report, "num_envs")?);
@@ -571,8 +575,9 @@ fn learned(report: &Value) -> Result<(), String> {
     Ok(())
 }
 
-/// As much was tried as where it is learned, without a word of what came of it, and few targets were reached before and after:
-/// ending anywhere in the box of targets reaches 0.26 % of them, so that 5 % of 128 or more come about by chance once in 1e6 runs.
+/// Checks a learning run without a signal: as many iterations as with one, but few targets reached before and after. A
+/// policy that ends anywhere in the box reaches 0.26 % of the targets, so that 5 % of 128 or more occur by chance once
+/// in 1e6 runs.
 fn not_learned(report: &Value) -> Result<(), String> {
     let (before, after) = (number(report, "reached_before")?, number(report, "reached_after")?);
     if report["signal"] != false || number(report, "iterations")? < 32.0 || number(report, "num_envs")? < 128.0 {
@@ -581,7 +586,7 @@ fn not_learned(report: &Value) -> Result<(), String> {
     if before.max(after) <= 0.05 { Ok(()) } else { Err(format!("{before} were reached before, {after} after")) }
 }
 
-/// No environment succeeded, and in none is true what should not be; all of them ran to the end.
+/// Checks that no environment succeeded or diverged, and that `wrong` is false for every environment.
 fn none(report: &Value, wrong: impl Fn(&Value) -> Result<bool, String>) -> Result<(), String> {
     let successes = number(report, "successes")?;
     if successes != 0.0 {
@@ -595,7 +600,7 @@ fn none(report: &Value, wrong: impl Fn(&Value) -> Result<bool, String>) -> Resul
     Ok(())
 }
 
-/// The environments of a report, of which there are 16.
+/// The rows of a report's 16 environments.
 fn trials(report: &Value) -> Result<&[Value], String> {
     let rows = report["environments"].as_array().map(Vec::as_slice).unwrap_or_default();
     match (number(report, "num_envs")?, rows.len() as u64) {

@@ -1,7 +1,17 @@
 //! The project's commands: `cargo xtask demo | test | ci | bench | physics-report | mutate | bless`.
 //!
-//! Every command first installs what is missing on the machine (`setup.rs`). This crate depends on no room of the
-//! project, so that it builds before MuJoCo is there.
+//! Every command first installs missing software on the machine (`setup.rs`). This crate depends on no crate with
+//! MuJoCo, so that it builds before MuJoCo is installed.
+//!
+//! | module | content |
+//! |---|---|
+//! | `demo`, `test`, `ci`, `bench`, `physics_report`, `mutate`, `bless` | the commands |
+//! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
+//! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
+//! | `arrows`, `circles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
+//! | `examples`, `alike` | the table of example runs, and the comparison of their images |
+//! | `physics_page`, `svg` | the page of the laws of physics, and its plots |
+//! | `mutations` | the lists of code mutations |
 #![forbid(unsafe_code)]
 
 mod alike;
@@ -42,19 +52,19 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Task {
-    /// Install what is missing and run the first example, without a window
+    /// Install missing software and run the first example, without a window
     Demo(demo::DemoArgs),
-    /// Install what is missing and run all tests
+    /// Install missing software and run all tests
     Test(test::TestArgs),
-    /// Everything a change has to pass, in one command
+    /// Run all checks of a change
     Ci(ci::CiArgs),
-    /// Ours and the rivals side by side; without a name also writes benches/RESULTS.md
+    /// Compare with the baselines; without a name also writes benches/RESULTS.md
     Bench(bench::BenchArgs),
-    /// The laws of physics on both lines of MuJoCo; writes docs/physics.md
+    /// Check the laws of physics on both supported MuJoCo versions; writes docs/physics.md
     PhysicsReport(physics_report::PhysicsReportArgs),
-    /// Break the code in many ways, one at a time, and see which test notices
+    /// Mutate the code in many places, one at a time, and report the tests that fail
     Mutate(mutate::MutateArgs),
-    /// Rewrite the expected outputs (goldens) of the tests from what the code gives now
+    /// Rewrite the golden files of the tests with the current output
     Bless(bless::BlessArgs),
 }
 

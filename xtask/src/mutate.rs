@@ -1,6 +1,6 @@
-//! `cargo xtask mutate`: breaks the code in one place, runs the tests that should notice, and so for every mutation of the
-//! lists (`mutations/`). All are done in a copy of the tree below the target folder. What was tried is written to
-//! `docs/mutations.md`; rows of other mutations stay.
+//! `cargo xtask mutate`: mutates the code in one place and runs the tests that should fail, for every mutation of the
+//! lists (`mutations/`). Mutations are made in a copy of the tree below the target folder. The results are written to
+//! `docs/mutations.md`; rows of other mutations are kept.
 
 use crate::mutations::{self, Mutation};
 use crate::progress::Progress;
@@ -13,17 +13,17 @@ use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct MutateArgs {
-    /// Only mutations whose name contains this, or whose tests are in the binary of this name
+    /// Only mutations with this in their name, or with tests in the binary of this name
     filter: Option<String>,
 }
 
-/// What the tests said of a mutation.
+/// Test result of a mutation.
 #[derive(Debug, PartialEq, Eq)]
 enum Verdict {
-    /// Names of the tests that failed, and words of the mutation that no failed test has in its name.
+    /// Names of the failed tests, and expected name parts without a failed test.
     Caught(Vec<String>, Vec<String>),
     Survived,
-    /// The changed code is no code, or no test ran.
+    /// The mutated code does not compile, or no test ran.
     NotTried(String),
 }
 
@@ -41,7 +41,7 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
         let cargo = ready.cargo().current_dir(&tree).env("CARGO_TARGET_DIR", folder.join("target"));
         cargo.arg("test").args(target(binary)).arg("--").arg("--include-ignored").args(words).success_and_output()
     };
-    // A test that fails on the code as it is would seem to catch everything.
+    // A test that fails on the unchanged code would seem to catch every mutation.
     for (binary, words) in binaries(&chosen) {
         let (passed, said) = test(binary, &words)?;
         if verdict(passed, &said, &words) != Verdict::Survived {
@@ -76,7 +76,7 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
         let by: &[String] = if let Verdict::Caught(by, _) = &verdict { by } else { &[] };
         let path = repo.root.join(PAGE);
         write(&path, &page(&read(&path)?, &row(mutation, by)))?;
-        // A law that is said to notice must.
+        // Every named test of a mutation must fail.
         if !matches!(&verdict, Verdict::Caught(_, not_by) if not_by.is_empty()) {
             findings.push(line);
         }
@@ -92,7 +92,7 @@ pub(crate) fn run(repo: &Repo, args: &MutateArgs) -> Outcome {
 /// The page of the results.
 const PAGE: &str = "docs/mutations.md";
 
-/// The page with a new row; those of other mutations are taken from the page as it was.
+/// The page with a new row; rows of other mutations are taken from the old page.
 fn page(old: &str, new: &str) -> String {
     let row_of = |mutation: &Mutation| {
         let beginning = beginning(mutation);
@@ -108,7 +108,7 @@ fn page(old: &str, new: &str) -> String {
     head + &rows.concat()
 }
 
-/// How the row of a mutation begins.
+/// The beginning of a mutation's row.
 fn beginning(mutation: &Mutation) -> String {
     format!("| {} | [{}]", mutation.name, mutation.file)
 }
@@ -119,7 +119,7 @@ fn row(mutation: &Mutation, caught_by: &[String]) -> String {
     format!("{}(../{}) | {} |\n", beginning(mutation), mutation.file, by)
 }
 
-/// Every mutation still finds its place: the search text stands in the file exactly once.
+/// Checks that the search text of every mutation occurs in its file exactly once.
 fn fits(root: &Path) -> Outcome {
     let mut findings = Vec::new();
     for Mutation { name, file, search, replacement, .. } in mutations::all() {
@@ -131,7 +131,7 @@ fn fits(root: &Path) -> Outcome {
     no_findings("mutations that do not fit the code (xtask/src/mutations)", &findings)
 }
 
-/// Every mutation finds its place, and the page is of this list.
+/// Checks that every mutation applies, and that the page matches the list.
 pub(crate) fn check(root: &Path) -> Outcome {
     fits(root)?;
     let page = read(&root.join(PAGE))?;
@@ -145,7 +145,7 @@ pub(crate) fn check(root: &Path) -> Outcome {
     no_findings("docs/mutations.md is of another list: cargo xtask mutate", &findings)
 }
 
-/// Cargo's words for the tests that a mutation names.
+/// Cargo arguments that select the tests of a mutation.
 fn target(binary: &str) -> Vec<&str> {
     match binary.split_once('/') {
         Some((package, test)) => vec!["--package", package, "--test", test],
@@ -154,7 +154,7 @@ fn target(binary: &str) -> Vec<&str> {
     }
 }
 
-/// The test binaries of some mutations, each with the words of all of them.
+/// The test binaries of some mutations, each with all of their test name parts.
 fn binaries(mutations: &[&Mutation]) -> BTreeMap<&'static str, Vec<&'static str>> {
     let mut found: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     for (binary, words) in mutations.iter().map(|mutation| mutation.tests) {
@@ -169,7 +169,7 @@ fn binaries(mutations: &[&Mutation]) -> BTreeMap<&'static str, Vec<&'static str>
 fn verdict(passed: bool, said: &str, words: &[&str]) -> Verdict {
     let failed = |line: &str| Some(line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?.to_string());
     let caught: Vec<String> = said.lines().filter_map(failed).collect();
-    // A test binary that dies says no more than which test it was in.
+    // An aborted test binary reports only the test that was running.
     if !caught.is_empty() {
         let misses = |word: &&&str| !caught.iter().any(|name| name.contains(**word));
         let missing = words.iter().filter(misses).map(|word| (*word).to_string()).collect();
@@ -185,8 +185,8 @@ fn verdict(passed: bool, said: &str, words: &[&str]) -> Verdict {
     }
 }
 
-/// Brings `to` up to date with the files below `from`; files that are the same keep their time, so that cargo builds only
-/// what changed.
+/// Updates `to` with the files below `from`. Unchanged files keep their time stamps, so that cargo builds only changed
+/// code.
 fn copy(from: &Path, to: &Path) -> Outcome {
     let wanted = files_below(from);
     for file in &wanted {

@@ -1,19 +1,20 @@
-//! How long a program would have run alone: what other programs took of the machine meanwhile is not its own.
+//! Run time of a program without the load of other programs on the machine.
 
 use std::fs;
 use std::time::{Duration, Instant};
 
-/// A second in the kernel's counts of processor time: `USER_HZ`, which is 100 on every architecture that Linux runs on here.
+/// Ticks per second of the kernel's processor times: `USER_HZ`, which is 100 on every architecture supported here.
 const TICKS: f64 = 100.0;
 
-/// Watches a process from its beginning.
+/// Watches a process from its start.
 #[derive(Debug)]
 pub(crate) struct OwnTime {
     begun: Instant,
     pid: u32,
-    /// Processor time of the machine when it began \[s\], and the number of its cores; `None` where the kernel does not tell.
+    /// Processor time of the machine at the start \[s\], and the number of its cores; `None` if the kernel does not
+    /// report it.
     machine: Option<(f64, f64)>,
-    /// Processor time of the process until it was looked at last \[s\].
+    /// Processor time of the process at the last look \[s\].
     own: f64,
 }
 
@@ -23,7 +24,8 @@ impl OwnTime {
         Self { begun: Instant::now(), pid, machine, own: 0.0 }
     }
 
-    /// Looks at the process, while it runs: afterwards nobody knows any more how much it took.
+    /// Updates the processor time of the process. Call it while the process runs: the kernel discards the counters
+    /// afterwards.
     pub(crate) fn look(&mut self) {
         let stat = fs::read_to_string(format!("/proc/{}/stat", self.pid)).ok();
         if let Some(own) = stat.and_then(|text| process(&text)) {
@@ -31,7 +33,7 @@ impl OwnTime {
         }
     }
 
-    /// Its time until now: that of the clock, without what others took of each core on average.
+    /// Wall time since the start, minus the average time per core used by other programs.
     pub(crate) fn elapsed(&self) -> Duration {
         let clock = self.begun.elapsed();
         let now = fs::read_to_string("/proc/stat").ok().and_then(|text| machine(&text));
@@ -44,18 +46,18 @@ impl OwnTime {
     }
 }
 
-/// Seconds that a program would have run alone that ran for `clock` seconds, while the machine's cores worked for `busy` seconds, of
-/// which `own` were its own.
+/// Estimated run time \[s\] of a program alone on the machine. The program ran for `clock` seconds, while the machine's
+/// cores worked for `busy` seconds in total, `own` of them for the program.
 fn alone(clock: f64, busy: f64, own: f64, cores: f64) -> f64 {
-    // It ran no less than its own work on all cores takes.
+    // Lower bound: the program's work spread over all cores.
     (clock - (busy - own).max(0.0) / cores).max(own / cores)
 }
 
-/// Processor time of all processes \[s\] and the number of cores, of `/proc/stat` as proc(5) describes it.
+/// Processor time of all processes \[s\] and the number of cores, from `/proc/stat` (see proc(5)).
 fn machine(text: &str) -> Option<(f64, f64)> {
     let numbers: Vec<f64> =
         text.lines().next()?.strip_prefix("cpu ")?.split_whitespace().map_while(|x| x.parse().ok()).collect();
-    // User, nice, system; then idle and waiting for disks; interrupts, and what a host took.
+    // User, nice and system; skipping idle and I/O wait; then interrupts and steal time.
     let busy = |k: &usize| numbers.get(*k).copied().unwrap_or(0.0);
     let all: f64 = [0, 1, 2, 5, 6, 7].iter().map(busy).sum();
     let is_core =
@@ -64,24 +66,24 @@ fn machine(text: &str) -> Option<(f64, f64)> {
     (cores > 0).then_some((all / TICKS, cores as f64))
 }
 
-/// Processor time, user and system, of all programs that this process started and that have ended, theirs included; zero
-/// where the kernel does not tell.
+/// User and system processor time of all ended child processes, including their children; zero if the kernel does not
+/// report it.
 pub(crate) fn of_children() -> Duration {
     let text = fs::read_to_string("/proc/self/stat").unwrap_or_default();
     Duration::from_secs_f64(children(&text).unwrap_or(0.0))
 }
 
-/// Processor time of the ended children of a process \[s\], of its `stat`: fields 16 and 17 of proc(5).
+/// Processor time of the ended children of a process \[s\], from its `stat`: fields 16 and 17 of proc(5).
 fn children(text: &str) -> Option<f64> {
     let numbers: Vec<&str> = text.rsplit_once(") ")?.1.split_whitespace().collect();
     let number = |field: usize| numbers.get(field - 3)?.parse::<f64>().ok();
     Some((number(16)? + number(17)?) / TICKS)
 }
 
-/// Processor time of a process \[s\], of its `stat`: the name in brackets may hold anything.
+/// Processor time of a process \[s\], from its `stat`. The name in parentheses may contain any characters.
 fn process(text: &str) -> Option<f64> {
     let numbers: Vec<&str> = text.rsplit_once(") ")?.1.split_whitespace().collect();
-    // Fields 14 and 15; the first behind the name is field 3.
+    // Fields 14 and 15; the first field after the name is field 3.
     let ticks = |field: usize| numbers.get(field - 3)?.parse::<f64>().ok();
     Some((ticks(14)? + ticks(15)?) / TICKS)
 }
@@ -94,9 +96,9 @@ mod tests {
     fn foreign_time() {
         // Alone, on one core of two and on both.
         assert_eq!([alone(10.0, 10.0, 10.0, 2.0), alone(10.0, 20.0, 20.0, 2.0)], [10.0, 10.0]);
-        // It waited for others as long as it worked.
+        // The program waited for others as long as it worked.
         assert_eq!(alone(20.0, 40.0, 20.0, 2.0), 10.0);
-        // Counts are taken at other moments than the clock.
+        // Processor times and wall time are sampled at slightly different times.
         assert_eq!(alone(10.0, 19.0, 20.0, 2.0), 10.0);
     }
 

@@ -1,4 +1,4 @@
-//! The page of numbers: what the laws of physics measured, as tables, and whether a page still says the truth.
+//! The physics page: tables of the measured laws, and the check of an existing page.
 
 use crate::run::{Failure, Outcome};
 use kinetoscope_plot::{Plot, Series};
@@ -14,12 +14,13 @@ const GROUPS: [(&str, &str); 5] = [
     ("contacts", "Contacts and sensors"),
     ("numerical", "Numerical promises"),
 ];
-/// The part of its tolerance by which a number may differ between two machines, or two lines of MuJoCo, without a reason.
+/// Share of its tolerance by which a number may differ, without a reason, between two machines or two supported MuJoCo
+/// versions.
 const SAME: f64 = 0.1;
-/// Digits behind the first of the numbers on the page.
+/// Digits after the first digit of the numbers on the page.
 const DIGITS: usize = 8;
 
-/// One number of a law on one MuJoCo.
+/// One number of a law on one MuJoCo version.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Row {
     pub(crate) group: String,
@@ -32,18 +33,18 @@ pub(crate) struct Row {
     pub(crate) tolerance: f64,
     pub(crate) mujoco: String,
     pub(crate) pass: bool,
-    /// Why the lines of MuJoCo differ, where the law says so.
+    /// The law's reason for a difference between MuJoCo versions, if given.
     pub(crate) lines_differ: Option<String>,
-    /// Whether it says so of this row alone: then they do.
+    /// True if the reason is for this row alone: the versions must then differ.
     pub(crate) must_differ: bool,
 }
 
-/// What one run measured.
+/// Results of one run.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Measured {
     pub(crate) rows: Vec<Row>,
     pub(crate) controls: usize,
-    /// Those of them that do not miss: the law, the quantity and what was taken away.
+    /// The controls that do not miss: law, quantity and removed effect.
     pub(crate) idle_controls: Vec<String>,
     /// Names of the laws, their plots and the version.
     pub(crate) plots: Vec<(String, Plot, String)>,
@@ -76,7 +77,7 @@ pub(crate) fn read(folder: &Path) -> Outcome<Measured> {
 
 fn add(to: &mut Measured, law: &Value) -> Option<()> {
     let text = |value: &Value| value.as_str().map(str::to_string);
-    // JSON has no NaN: null is one.
+    // JSON has no NaN, which is written as null.
     let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
     let (name, mujoco, measured) = (text(&law["name"])?, text(&law["mujoco"])?, &law["measured"]);
     for row in measured["rows"].as_array()? {
@@ -110,7 +111,7 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
         }
         let axes = [text(&plot["x"])?, text(&plot["y"])?];
         let log = plot["log"].as_bool()?;
-        // Few points are measurements, not samples of a curve.
+        // A series with few points holds measurements, not samples of a curve.
         let marks = series.iter().all(|series: &Series| series.points.len() <= 12);
         let plot = Plot { title: text(&plot["title"])?, axes, log, marks, series, ..Plot::default() };
         to.plots.push((name.clone(), plot, mujoco.clone()));
@@ -118,8 +119,8 @@ fn add(to: &mut Measured, law: &Value) -> Option<()> {
     Some(())
 }
 
-/// The plots of all runs by the name of their file, which is that of the law; curves that differ between lines of MuJoCo are
-/// drawn for each.
+/// The plots of all runs, named after their files, which have the names of the laws. Curves that differ between MuJoCo
+/// versions are drawn for each version.
 pub(crate) fn plots(runs: &[Measured]) -> Vec<(String, Plot)> {
     let mut found: Vec<(String, Plot, &str)> = Vec::new();
     for (law, plot, mujoco) in runs.iter().flat_map(|run| &run.plots) {
@@ -150,17 +151,17 @@ pub(crate) fn plots(runs: &[Measured]) -> Vec<(String, Plot)> {
 fn looks_as(a: &Series, b: &Series) -> bool {
     let near = |x: f64, y: f64| (x - y).abs() <= 0.02 * x.abs().max(y.abs());
     let pairs = || a.points.iter().zip(&b.points);
-    // Numbers that are rounding differ by anything.
+    // Rounding errors may differ by any amount.
     let rounding = |y: f64| y.abs() < 1e-12;
     a.name == b.name
         && a.points.len() == b.points.len()
         && pairs().all(|(p, q)| near(p[0], q[0]) && (near(p[1], q[1]) || rounding(p[1]) && rounding(q[1])))
 }
 
-/// The page.
+/// Writes the page.
 ///
 /// # Errors
-/// The lines of MuJoCo differ and no law says why.
+/// The MuJoCo versions differ and no law gives a reason.
 pub(crate) fn page(runs: &[Measured]) -> Outcome<String> {
     let rows: Vec<&Row> = runs.iter().flat_map(|run| &run.rows).collect();
     let mut laws: Vec<(&str, &str)> = rows.iter().map(|row| (row.group.as_str(), row.law.as_str())).collect();
@@ -201,7 +202,7 @@ pub(crate) fn page(runs: &[Measured]) -> Outcome<String> {
             "\n## {heading}\n\n| test | law | quantity | expected | measured | error | tolerance | MuJoCo | |\n\
              |---|---|---|--:|--:|--:|--:|---|---|\n"
         );
-        // Lines of MuJoCo next to each other: rows in the order of the first run, then what only another has.
+        // Versions next to each other: rows in the order of the first run, then rows of other runs only.
         let mut done: Vec<(&str, &str)> = Vec::new();
         for row in rows.iter().filter(|row| row.group == group) {
             if done.contains(&(row.law.as_str(), row.quantity.as_str())) {
@@ -245,7 +246,7 @@ fn table_row(row: &Row) -> String {
     format!("| {} |", cells.map(|cell| cell.replace('|', "\\|")).join(" | "))
 }
 
-/// A number that reads well, with nine digits.
+/// A number in a readable notation with nine digits.
 fn number(x: f64) -> String {
     let plain = x == 0.0 || (1e-4..1e7).contains(&x.abs());
     if !plain {
@@ -257,7 +258,7 @@ fn number(x: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
 }
 
-/// The table of what the lines of MuJoCo do not have in common.
+/// The table of the differences between the MuJoCo versions.
 fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
     let [first, second] = versions else { return Ok(String::new()) };
     let mut out = format!(
@@ -315,15 +316,15 @@ fn differences(rows: &[&Row], versions: &[&str]) -> Outcome<String> {
     Ok(if some { out } else { String::new() })
 }
 
-/// What a page says that was not measured: numbers that changed by more than a tenth of their tolerance, rows that are
-/// missing or too many, and what the text around the tables says.
+/// Statements of a page that were not measured: numbers that changed by more than a tenth of their tolerance, missing
+/// or superfluous rows, and differences in the text around the tables.
 pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
     let mut findings = Vec::new();
     let now = match self::page(runs) {
         Ok(now) => now,
         Err(failure) => return vec![failure.message],
     };
-    // Lines that are no rows of numbers: counts, versions, whether all hold, headings, pictures.
+    // Lines outside of the number tables: counts, versions, overall result, headings, images.
     let is_text = |line: &&str| !line.starts_with("| ");
     let (was, is): (Vec<&str>, Vec<&str>) =
         (page.lines().filter(is_text).collect(), now.lines().filter(is_text).collect());
@@ -333,7 +334,7 @@ pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
     let mut said: Vec<Vec<String>> = page.lines().filter_map(cells).filter(|cells| cells.len() == 9).collect();
     said.retain(|cells| cells[0].starts_with('['));
     for row in runs.iter().flat_map(|run| &run.rows) {
-        // As it would be written: what is the same text is the same row.
+        // The row as it would be written now; rows with equal text in the key columns correspond.
         let new = cells(&table_row(row)).unwrap_or_default();
         let name = format!("{} ({}, MuJoCo {})", row.law, row.quantity, row.mujoco);
         let key = |cells: &[String]| [0, 2, 7].map(|k| cells[k].clone());
@@ -348,7 +349,7 @@ pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
             // An error is written with two digits.
             let digits = if k == 5 { 1 } else { DIGITS as i32 };
             let most = SAME * row.tolerance + 10.0_f64.powi(1 - digits) * is.abs();
-            // Not `>`: a NaN is no number to agree with.
+            // Not `>`, so that NaN counts as a difference.
             let agrees = (was - is).abs() <= most;
             if !agrees {
                 findings.push(format!("{name}: {what} {} on the page, {} now", old[k], new[k]));
@@ -364,7 +365,7 @@ pub(crate) fn untrue(page: &str, runs: &[Measured]) -> Vec<String> {
     findings
 }
 
-/// What the table of differences between the lines of MuJoCo says that was not measured.
+/// Statements in the table of version differences that were not measured.
 fn untrue_differences(page: &str, now: &str, runs: &[Measured]) -> Vec<String> {
     let table = |text: &str| -> Vec<Vec<String>> {
         text.lines().filter_map(cells).filter(|cells| cells.len() == 5 && cells[0] != "test").collect()
@@ -443,7 +444,7 @@ mod tests {
         assert_eq!(untrue(&page, &[run("2.2.2", 1.095 + 5e-8)]), Vec::<String>::new());
         let found = untrue(&page, &[run("2.2.2", 1.095 + 3e-7)]);
         assert!(found.len() == 1 && found[0].contains("1.0950003 now"), "{found:?}");
-        // The row, the row that is no more, and the version in the text, which is old and new.
+        // The changed row, the removed row, and the version in the text, old and new.
         assert_eq!(untrue(&page, &[run("4.0.0", 1.095)]).len(), 4);
         let mut failed = run("2.2.2", 1.095);
         failed.rows[0].pass = false;

@@ -1,4 +1,5 @@
-//! `cargo xtask physics-report`: the laws of physics on both lines of MuJoCo, and the page with what they measured.
+//! `cargo xtask physics-report`: measures the laws of physics on both supported MuJoCo versions and writes the page of
+//! results.
 
 use crate::physics_page::{self, Measured};
 use crate::progress::Progress;
@@ -10,12 +11,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 const PAGE: &str = "docs/physics.md";
-/// The plots, one file per law.
+/// Folder of the plots, one file per law.
 const PLOTS: &str = "docs/physics";
-/// Names a folder to the tests, into which each law writes what it measured.
+/// Environment variable with the folder for the results of the laws.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_PHYSICS_ROWS";
 const LINES: [Line; 2] = [Line::Debian, Line::Wheel];
-/// How far a curve may move before a picture is no longer that of these numbers \[pixels\].
+/// Largest accepted shift of a curve in an existing plot \[pixels\].
 const PIXELS: f64 = 1.0;
 
 #[derive(Debug, clap::Args)]
@@ -25,7 +26,7 @@ pub(crate) struct PhysicsReportArgs {
     pub(crate) check: bool,
 }
 
-/// Where the laws' rows of a line are, below the target folder.
+/// The folder of a version's rows, below the target folder.
 fn folder(repo: &Repo, line: Line) -> PathBuf {
     let name = match line {
         Line::Debian => "2",
@@ -34,7 +35,7 @@ fn folder(repo: &Repo, line: Line) -> PathBuf {
     repo.target.join("physics-rows").join(name)
 }
 
-/// An empty folder for the rows of a line, so that none of an earlier run counts.
+/// An empty folder for the rows of a version, without rows of earlier runs.
 pub(crate) fn fresh_folder(repo: &Repo, line: Line) -> Outcome<PathBuf> {
     let folder = folder(repo, line);
     let fail = |e: std::io::Error| Failure::new(format!("{}: {e}", folder.display()));
@@ -58,7 +59,7 @@ pub(crate) fn run(repo: &Repo, args: &PhysicsReportArgs) -> Outcome {
         let ready = setup::prepare(repo, Wanted { line: Some(line), extras: &[] })?;
         let rows = fresh_folder(repo, line)?;
         let tests = ready.cargo().env(VARIABLE, rows).args(["test", "--package", "kinetoscope", "--test", "physics"]);
-        // What a law that fails measured is on the page, too.
+        // The page also shows the results of failing laws.
         failed = failed.and(tests.run());
     }
     progress.end();
@@ -72,12 +73,12 @@ pub(crate) fn run(repo: &Repo, args: &PhysicsReportArgs) -> Outcome {
     failed
 }
 
-/// Compares the page with the rows that the tests of both lines wrote while they ran ([`fresh_folder`]).
+/// Compares the page with the rows that the tests of both versions have written ([`fresh_folder`]).
 pub(crate) fn check_rows(repo: &Repo) -> Outcome {
     compare(repo, &measured(repo)?)
 }
 
-/// Whether both lines have written rows.
+/// True if both versions have written rows.
 pub(crate) fn has_rows(repo: &Repo) -> bool {
     LINES.iter().all(|&line| fs::read_dir(folder(repo, line)).is_ok_and(|mut files| files.next().is_some()))
 }
@@ -109,14 +110,14 @@ fn write(repo: &Repo, runs: &[Measured]) -> Outcome {
 }
 
 fn compare(repo: &Repo, runs: &[Measured]) -> Outcome {
-    // Fails where the lines differ without a reason.
+    // Fails if the versions differ without a reason.
     physics_page::page(runs)?;
     let mut findings = physics_page::untrue(&repo.read(PAGE)?, runs);
     findings.extend(untrue_pictures(&repo.root.join(PLOTS), &pictures(runs)?)?);
     no_findings(&format!("{PAGE} is no longer true; `cargo xtask physics-report` writes it again"), &findings)
 }
 
-/// What is in the folder of the plots that the report would not write, and the other way round.
+/// Differences between the folder of the plots and the plots of the report: missing, outdated and superfluous files.
 fn untrue_pictures(folder: &Path, pictures: &[(String, String)]) -> Outcome<Vec<String>> {
     let mut findings = Vec::new();
     for (name, text) in pictures {
@@ -156,7 +157,7 @@ mod tests {
             fs::write(folder.path().join(name), text).expect("writable");
         }
         assert_eq!(look(&pictures), Vec::<String>::new());
-        // What was measured now is twice as large: the curve is in the same place.
+        // The measured values are twice as large, so the curve has the same shape but other axis labels.
         let found = look(&[of("top", 2.0), of("bounce", 2.0)]);
         assert!(found.len() == 1 && found[0].contains("top.svg shows other curves"), "{found:?}");
         let found = look(&pictures[..1]);

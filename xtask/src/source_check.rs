@@ -1,11 +1,11 @@
-//! Rules on the text of the tree: where `unsafe` may stand, how long a file may be, what may not be left behind.
+//! Rules for the text of the tree: places of `unsafe`, length of files, forbidden leftovers.
 
 use crate::run::{Outcome, Repo, no_findings};
 use std::path::Path;
 
-/// The unsafe walls: generated bindings, the crate that calls them, and the thread pool.
+/// The only places with unsafe code: generated bindings, the crate that calls them, and the thread pool.
 const UNSAFE_MAY_STAND_IN: [&str; 3] = ["mujoco-sys/src/lib.rs", "mujoco/src/", "exec/src/workers.rs"];
-/// Crates that forbid unsafe code as a whole.
+/// Crates that forbid unsafe code.
 const FORBID_UNSAFE: [&str; 7] = [
     "scene/src/lib.rs",
     "robot/src/lib.rs",
@@ -21,7 +21,7 @@ const FOREIGN_FOLDERS: [&str; 3] = ["home", "root", "work"];
 /// Larger files are data.
 const MAX_TEXT_BYTES: u64 = 1 << 20;
 
-/// A text file of the tree, its path relative to the root with `/`.
+/// A text file of the tree; its path is relative to the root, with `/`.
 #[derive(Debug)]
 pub(crate) struct TextFile {
     pub(crate) path: String,
@@ -45,7 +45,7 @@ pub(crate) fn run(repo: &Repo) -> Outcome {
     no_findings("rules of the tree are broken", &findings)
 }
 
-/// All files below `root` in order of their path, without version control and without cargo's target folders.
+/// All files below `root`, sorted by path, without version control and cargo's target folders.
 pub(crate) fn files_below(root: &Path) -> Vec<String> {
     let mut found = Vec::new();
     let mut folders = vec![root.to_path_buf()];
@@ -149,8 +149,8 @@ fn stubs(files: &[TextFile]) -> Vec<String> {
     findings
 }
 
-/// True if the `ignore` at `at` says `= "needs ..."` (a test that `cargo xtask test` runs once the need is installed) or
-/// `= "runs in a process of its own"`.
+/// True if the `ignore` at `at` has an accepted reason: `= "needs ..."` (a test that `cargo xtask test` runs once the
+/// requirement is installed) or `= "runs in a process of its own"`.
 fn has_reason(text: &str, code: &str, at: usize) -> bool {
     let line = |text: &str| text.lines().nth(line_of(code, at) - 1).unwrap_or_default().to_string();
     ["ignore = \"needs ", "ignore = \"runs in a process of its own\""].iter().any(|reason| line(text).contains(reason))
@@ -163,7 +163,8 @@ fn foreign_paths(files: &[TextFile]) -> Vec<String> {
             for folder in FOREIGN_FOLDERS {
                 let needle = format!("/{folder}/");
                 let is_start = |at: usize| {
-                    // In the middle of a path or address the folder means something else; behind `file://` it does not.
+                    // Inside a longer path or an address the folder name is harmless; after `file://` it is an absolute
+                    // path.
                     line[..at].chars().next_back().is_none_or(|c| !c.is_alphanumeric() && !"._-})$*".contains(c))
                 };
                 if line.match_indices(&needle).any(|(at, _)| is_start(at)) {
@@ -217,7 +218,7 @@ fn line_of(text: &str, at: usize) -> usize {
     text[..at].matches('\n').count() + 1
 }
 
-/// Identifiers and keywords with their byte offset.
+/// Identifiers and keywords with their byte offsets.
 fn words(code: &str) -> impl Iterator<Item = (usize, &str)> {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     code.split(move |c| !is_word(c))
@@ -225,7 +226,7 @@ fn words(code: &str) -> impl Iterator<Item = (usize, &str)> {
         .map(|word| (word.as_ptr() as usize - code.as_ptr() as usize, word))
 }
 
-/// Rust text with comments and literals blanked out; line breaks stay where they are.
+/// Rust text with comments and literals replaced by spaces; line breaks are kept.
 pub(crate) fn code_only(text: &str) -> String {
     let chars: Vec<char> = text.chars().collect();
     let mut out = String::with_capacity(text.len());
@@ -245,7 +246,7 @@ pub(crate) fn code_only(text: &str) -> String {
     out
 }
 
-/// Where the comment or literal that starts at `at` ends.
+/// The end of the comment or literal that starts at `at`, if any.
 fn opaque_end(chars: &[char], at: usize) -> Option<usize> {
     let next = |offset: usize| chars.get(at + offset).copied();
     let find = |from: usize, pattern: &[char]| {
@@ -319,7 +320,7 @@ mod tests {
         assert_eq!(code_only("b'\\'' x br\"y\" z").split_whitespace().collect::<Vec<_>>(), ["b", "x", "z"]);
     }
 
-    /// Unsafe code may stand in the crates of MuJoCo, in comments and in other files.
+    /// Unsafe code is allowed in the crates of MuJoCo, in comments and in other files.
     #[test]
     fn unsafe_code() {
         let text = "unsafe fn f() {}";

@@ -1,12 +1,12 @@
-//! Comparison of plots in SVG.
+//! Comparison of SVG plots.
 
-/// Attributes that say where something is in the picture.
+/// Attributes with coordinates.
 const PLACES: [&str; 6] = ["x", "y", "cx", "cy", "d", "points"];
 
-/// True if two pictures are the same but for places that differ by at most `most` pixels. Text in them is the same
-/// to the letter: the numbers at the ticks say what the places mean.
+/// True if two plots are equal except for coordinates that differ by at most `most` pixels. Their texts must be equal,
+/// because the tick labels give the scale of the coordinates.
 pub(crate) fn agree(a: &str, b: &str, most: f64) -> bool {
-    // Outside and inside of quotation marks in turn.
+    // Parts outside and inside of quotation marks alternate.
     let (a, b): (Vec<&str>, Vec<&str>) = (a.split('"').collect(), b.split('"').collect());
     let is_place = |k: usize| {
         let before = a[k - 1].strip_suffix('=').unwrap_or_default();
@@ -15,7 +15,7 @@ pub(crate) fn agree(a: &str, b: &str, most: f64) -> bool {
     a.len() == b.len() && (0..a.len()).all(|k| a[k] == b[k] || k % 2 == 1 && is_place(k) && are_near(a[k], b[k], most))
 }
 
-/// True if two texts are the same but for numbers that differ by at most `most`.
+/// True if two texts are equal except for numbers that differ by at most `most`.
 fn are_near(a: &str, b: &str, most: f64) -> bool {
     let split = |text: &str| -> (String, Vec<f64>) {
         let (mut rest, mut numbers, mut number) = (String::new(), Vec::new(), String::new());
@@ -64,12 +64,12 @@ mod tests {
         let points = [[0.0, 1.0], [1.0, 3.0], [2.0, 2.0]];
         let text = svg(false, &points);
         assert!(agree(&text, &text, 0.0));
-        // 448 pixels high and 2 J with their margins: 0.004 J are 0.9 pixels.
+        // The plot is 448 pixels high for 2 J with margins: 0.004 J are 0.9 pixels.
         let noise = svg(false, &[[0.0, 1.0], [1.0, 3.0], [2.0, 2.004]]);
         assert!(text != noise && agree(&text, &noise, 1.0) && !agree(&text, &noise, 0.1));
         let moved = svg(false, &[[0.0, 1.0], [1.0, 3.0], [2.0, 2.02]]);
         assert!(!agree(&text, &moved, 1.0));
-        // The same curve at other numbers: in the same places, with other ticks. On axes of any kind.
+        // The same curve with other values: the same coordinates with other tick labels, for all kinds of axes.
         for (log, by) in [(false, 10.0), (false, 0.1), (true, 10.0)] {
             let [one, other] = [1.0, by].map(|by| svg(log, &points.map(|[x, y]| [x + 1.0, by * y])));
             assert!(!agree(&one, &other, 1.0), "{one} and {other}");

@@ -1,4 +1,5 @@
-//! `cargo xtask test`: every test of the workspace, those included that need something installed, against one MuJoCo.
+//! `cargo xtask test`: all tests of the workspace against one MuJoCo version, including tests that need installed
+//! software.
 
 use crate::robots::{self, Robots};
 use crate::run::{Failure, Outcome, Repo};
@@ -20,7 +21,7 @@ pub(crate) struct TestArgs {
     pub(crate) test_args: Vec<String>,
 }
 
-/// A reason for which tests are left out, and the part of their names.
+/// A reason for skipped tests, and the part of their names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct LeftOut {
     name: &'static str,
@@ -32,7 +33,8 @@ const OF_MUJOCO_2: LeftOut = LeftOut { name: "batch::sample_models", why: "MuJoC
 const OF_VENDORS: LeftOut =
     LeftOut { name: "vendor", why: "these tests need robots that PyPI does not have; KINETOSCOPE_ROBOTS names others" };
 
-/// Packages with code that depends on MuJoCo's version, and the tests of the whole: what is tested on the second version.
+/// Packages for the tests on the second MuJoCo version: packages with version-dependent code, and the integration
+/// tests.
 pub(crate) fn of_mujoco() -> [&'static str; 8] {
     [
         "--package",
@@ -56,18 +58,18 @@ pub(crate) fn run(repo: &Repo, args: &TestArgs) -> Outcome {
 pub(crate) fn run_packages(repo: &Repo, args: &TestArgs, packages: &[&str]) -> Outcome {
     const NEEDS: [Need; 7] =
         [Need::Xvfb, Need::Chromium, Need::Models, Need::Readelf, Need::Pip, Need::Venv, Need::OsMesa];
-    // MuJoCo's own renderer is compared with where both have the same MuJoCo.
+    // Images are compared with MuJoCo's own renderer only if both use the same MuJoCo version.
     let with_renderer = args.mujoco == Some(Line::Wheel);
     let needs = if with_renderer { &NEEDS[..] } else { &NEEDS[..6] };
     let ready = setup::prepare(repo, Wanted { line: args.mujoco, extras: needs })?;
     let mut left_out = vec![if with_renderer { OF_MUJOCO_2 } else { OF_MUJOCO_4 }];
-    // A variable left over from a bless must not turn the tests into a rewrite of what they compare with.
+    // A variable left over from a bless must not turn the tests into a rewrite of the golden files.
     let mut cargo = ready.cargo().env_remove(crate::bless::VARIABLE);
     if let Robots::FromPyPi(folder) = robots::obtain(repo)? {
         cargo = cargo.env(robots::VARIABLE, folder);
         left_out.push(OF_VENDORS);
     }
-    // The laws of physics write what they measure, for the page of numbers to be compared with.
+    // The laws of physics write their results for the comparison with the physics page.
     let everything = args.package.is_none() && args.filter.is_none() && args.test_args.is_empty();
     if let Some(line) = args.mujoco.filter(|_| everything) {
         cargo = cargo.env(physics_report::VARIABLE, physics_report::fresh_folder(repo, line)?);
@@ -89,17 +91,17 @@ fn cargo_args(args: &TestArgs, packages: &[&str], left_out: &[LeftOut]) -> Vec<S
     words.extend(packages.iter().map(|word| (*word).to_string()));
     words.extend(features(packages));
     words.extend(args.filter.clone());
-    // Needs are installed: tests that wait for one are run.
+    // The requirements are installed, so ignored tests run too.
     words.extend(["--", "--include-ignored"].map(String::from));
     words.extend(left_out.iter().flat_map(|left| ["--skip", left.name]).map(String::from));
     words.extend(args.test_args.iter().cloned());
     words
 }
 
-/// Crates that have the feature of recordings as HDF5, which is off by default.
+/// Crates with the feature `hdf5`, which is off by default.
 const WITH_HDF5: [&str; 3] = ["kinetoscope", "kinetoscope-cli", "kinetoscope-record"];
 
-/// The features to check beside the default ones, for cargo's choice of packages.
+/// The features to test besides the default ones, for these packages.
 pub(crate) fn features(packages: &[&str]) -> Vec<String> {
     let feature = match packages {
         ["--workspace"] => "kinetoscope-cli/hdf5".to_string(),

@@ -1,4 +1,4 @@
-//! MuJoCo 4 from the PyPI wheel `mujoco-core`, which carries the headers and the library.
+//! MuJoCo 4 from the PyPI wheel `mujoco-core`, which contains the headers and the library.
 
 use crate::run::{Cmd, Failure, Outcome, Repo};
 use std::path::{Path, PathBuf};
@@ -6,13 +6,13 @@ use std::{env, fs};
 
 pub(crate) const VERSION: &str = "4.0.1";
 
-/// The release of the Python package `mujoco` that is compared with: it may be older than the library.
+/// The compared release of the Python package `mujoco`; it may be older than the library.
 pub(crate) const PYTHON_VERSION: &str = "4.0.0";
 
-/// The folder with `include/mujoco` and `libmujoco.so.*`, downloaded and unpacked at the first call.
+/// The folder with `include/mujoco` and `libmujoco.so.*`, downloaded and unpacked by the first call.
 ///
 /// # Errors
-/// If pip is missing, the download fails, or the wheel does not hold what is expected of it.
+/// Pip is missing, the download fails, or the wheel lacks expected files.
 pub(crate) fn obtain(repo: &Repo) -> Outcome<PathBuf> {
     let unpacked = unpacked_dir(repo);
     if is_complete(&unpacked) {
@@ -33,12 +33,12 @@ pub(crate) fn obtain(repo: &Repo) -> Outcome<PathBuf> {
     Ok(unpacked.join("mujoco"))
 }
 
-/// True if `obtain` can be expected to work: it did already, or there is a pip to download with.
+/// True if `obtain` is likely to work: the wheel is already unpacked, or pip is installed.
 pub(crate) fn is_available(repo: &Repo) -> bool {
     is_complete(&unpacked_dir(repo)) || pip().is_some()
 }
 
-/// The words that start pip, if there is one.
+/// The command that starts pip, if pip is installed.
 pub(crate) fn pip() -> Option<Vec<&'static str>> {
     [vec!["python3", "-m", "pip"], vec!["pip"], vec!["pip3"]]
         .into_iter()
@@ -69,7 +69,7 @@ fn find_wheel(dir: &Path) -> Option<PathBuf> {
     found.into_iter().next()
 }
 
-/// Downloads into a folder of this process and moves the finished file: `wheels` never holds half a file.
+/// Downloads into a folder of this process and moves the complete file: `wheels` never holds a partial file.
 fn download(wheels: &Path) -> Outcome<PathBuf> {
     let pip = pip().ok_or_else(|| {
         Failure::new(format!(
@@ -106,7 +106,7 @@ fn download(wheels: &Path) -> Outcome<PathBuf> {
     moved
 }
 
-/// Unpacks beside the target folder and renames: a folder of that name is always a whole one.
+/// Unpacks next to the destination and renames: a folder of that name is always complete.
 fn unpack(wheel: &Path, unpacked: &Path) -> Outcome {
     let scratch = scratch_beside(unpacked)?;
     let python = Cmd::new("python3").args(["-m", "zipfile", "-e"]).args([wheel, &scratch]);
@@ -122,7 +122,7 @@ fn unpack(wheel: &Path, unpacked: &Path) -> Outcome {
             remove_dir(unpacked)?;
         }
         match fs::rename(&scratch, unpacked) {
-            // Another process was faster.
+            // Another process has completed the folder in the meantime.
             Err(_) if is_complete(unpacked) => Ok(()),
             result => result.map_err(|e| Failure::new(format!("{}: {e}", unpacked.display()))),
         }
@@ -155,7 +155,7 @@ fn remove_file(file: &Path) -> Outcome {
 pub(crate) mod tests {
     use super::*;
 
-    /// Writes a file, with its folders.
+    /// Writes a file and creates its folders.
     pub(crate) fn write(path: &Path, text: &str) {
         fs::create_dir_all(path.parent().expect("has a parent")).expect("writable");
         fs::write(path, text).expect("writable");

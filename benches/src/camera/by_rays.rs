@@ -1,4 +1,4 @@
-//! Pictures whose every pixel is a ray, ours and MuJoCo Warp's: one core each, the same robot from the same place.
+//! Images with one ray per pixel, ours and MuJoCo Warp's: one core each, the same robot from the same viewpoint.
 
 use super::scene::Scene;
 use super::sides::{Look, Renderer, Work};
@@ -7,12 +7,12 @@ use crate::row::Row;
 use crate::settings::{Outcome, Settings};
 use kinetoscope::render::Renderer as OurRenderer;
 
-/// Pictures in a step.
+/// Images per step.
 const ENVS: usize = 4;
-/// Times of the ratio that was set as the aim.
+/// Target of the speed ratio.
 const WANTED: f64 = 2.0;
 
-/// Colour, depth and mask (ours also normals) of a scene.
+/// Benchmarks color, depth and mask of a scene (our renderer also fills normals).
 pub(crate) fn by_rays(settings: &Settings, scene: &Scene) -> Outcome<Row> {
     let [width, height] = VGA;
     let work = Work { size: VGA, envs: ENVS, physics: 0, look: Look::Plain, shadow_size: None };

@@ -1,11 +1,11 @@
-//! What this machine can do at most: loops that only copy, and loops that only compute.
+//! Hardware limits of this machine: loops that only copy memory, and loops that only compute.
 
 use crate::interleave::Side;
 use crate::settings::Outcome;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-/// Copies more than caches hold, on some threads.
+/// Copies a buffer larger than the caches, on several threads.
 pub(super) struct Copying(Vec<(Vec<u64>, Vec<u64>)>);
 
 impl Copying {
@@ -34,7 +34,7 @@ impl Side for Copying {
     }
 }
 
-/// Computes in registers, a fixed amount of work shared by some threads.
+/// Computes in registers: a fixed amount of work shared by several threads.
 pub(super) struct Compute(u64);
 
 impl Compute {

@@ -1,15 +1,19 @@
-//! Cameras on the CPU: our rasterizer against MuJoCo's own renderer on OSMesa, PyBullet's TinyRenderer and MuJoCo Warp's ray
-//! caster, all drawing the same geoms from the same camera. That is checked: every rival's depth image must be ours.
+//! CPU rendering of cameras, compared with MuJoCo's own renderer on OSMesa, PyBullet's TinyRenderer and MuJoCo Warp's
+//! ray caster.
 //!
-//! Ours fills colour, depth, mask and normals; rivals fill colour, depth and segmentation (none has normals). Rivals that
-//! draw one image after the other draw a few environments per turn, in turn: rates are images per second of each side.
-//! OSMesa uses all cores, and is compared with ours on two threads; the others use one, and are compared with one thread.
+//! All renderers draw the same geoms from the same camera. This is checked: every baseline's depth image must agree
+//! with ours.
 //!
-//! `plain` is without shadows and with one sample per pixel, `full` with shadows and four samples; mirrors are off on both sides. "MuJoCo on OSMesa" is
-//! `mujoco.Renderer` at its best settings (see `rivals/mujoco_osmesa.py`); "OSMesa by hand" is what its library can do when
-//! it is called with two passes instead of three, which that class does not offer. Shadow maps are as large as each side
-//! makes them by default, 4096 texels wide in MuJoCo and at most 1024 in ours, so there is also a row with MuJoCo's made as
-//! small as ours.
+//! Our renderer fills color, depth, mask and normals; the baselines fill color, depth and segmentation (none of them
+//! has normals). Baselines that render one image after the other render only a few environments per turn: rates are
+//! images per second of each side. OSMesa uses all cores and is compared with two of our threads; the other baselines
+//! use one core and are compared with one thread.
+//!
+//! `plain` is without shadows and with one sample per pixel, `full` with shadows and four samples; reflections are off
+//! on both sides. "MuJoCo on OSMesa" is `mujoco.Renderer` at its best settings (see `rivals/mujoco_osmesa.py`). "OSMesa
+//! by hand" calls the library with two passes instead of three, which that class does not offer. Shadow maps have the
+//! default size of each side, 4096 texels in MuJoCo and at most 1024 in ours. Another row reduces MuJoCo's shadow maps
+//! to the size of ours.
 
 mod by_rays;
 mod limit;
@@ -31,10 +35,10 @@ use std::ffi::OsString;
 
 /// Steps between restarts: the scenes hardly move.
 const STEPS: u32 = 1_000_000;
-/// Environments of the batches, and of pictures that are large.
+/// Number of environments in the batches, and for large images.
 const BATCH: usize = 64;
 const FEW: usize = 8;
-/// Physics steps per image, where there are any: a camera with 50 Hz and steps of 5 ms.
+/// Physics steps per image, for cases with physics: a camera with 50 Hz and steps of 5 ms.
 const PHYSICS: u32 = 4;
 const VGA: [usize; 2] = [640, 480];
 
@@ -42,7 +46,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     let rivals = Rivals::new();
     let scenes = Scenes::new()?;
     let mut rows = Vec::new();
-    // All of this takes minutes: show results as they come.
+    // The benchmark takes minutes, so results are shown as they are measured.
     let mut add = |new: Vec<Row>| {
         for row in &new {
             let ratio = row.ratio.map_or_else(String::new, |ratio| format!(", {ratio:.1} x {}", row.rival_name));
@@ -66,7 +70,7 @@ pub(crate) fn run(settings: &Settings) -> Outcome<Vec<Row>> {
     Ok(rows)
 }
 
-/// The rivals on this machine.
+/// The baselines installed on this machine.
 struct Rivals {
     python: Option<OsString>,
     missing: Vec<Renderer>,
@@ -93,7 +97,7 @@ impl Rivals {
     }
 }
 
-/// Sides that take turns, and how many images each draws in a step.
+/// Sides that take turns, and the number of images that each renders per step.
 #[derive(Default)]
 struct Contest<'s> {
     sides: Vec<(f64, Box<dyn Side + 's>)>,
@@ -110,12 +114,12 @@ impl<'s> Contest<'s> {
         Ok(self.sides.len() - 1)
     }
 
-    /// The rival, where it is on the machine; it must see what our rasterizer sees.
+    /// Adds a baseline if it is installed; its depth image must agree with our rasterizer's.
     fn rival(&mut self, rivals: &Rivals, renderer: Renderer, scene: &'s Scene, work: &Work) -> Outcome<Option<usize>> {
         self.rival_of(rivals, renderer, scene, work, OurRenderer::Raster)
     }
 
-    /// The same of one of our renderers.
+    /// Adds a baseline that is compared with one of our renderers.
     fn rival_of(
         &mut self,
         rivals: &Rivals,
@@ -145,7 +149,7 @@ impl<'s> Contest<'s> {
     }
 }
 
-/// Results of a contest.
+/// Times of a comparison, with the number of images per step of each side.
 struct Rates {
     times: Times,
     images: Vec<f64>,
@@ -169,7 +173,7 @@ impl Rates {
     }
 }
 
-/// Large pictures: both looks, on two threads against OSMesa, on one against the others.
+/// Large images in both quality settings: two threads against OSMesa, one thread against the other baselines.
 fn large(settings: &Settings, rivals: &Rivals, scene: &Scene, wanted: [f64; 2]) -> Outcome<Vec<Row>> {
     let [width, height] = VGA;
     let name = |look: &str| format!("{}, {width}x{height}, {look}", scene.name);
@@ -197,7 +201,7 @@ fn large(settings: &Settings, rivals: &Rivals, scene: &Scene, wanted: [f64; 2]) 
         against("full, shadow maps of 1024", ours_full, (Renderer::OsMesaByHand, by_hand_small)),
     ];
     for (look, side) in [("plain", ours), ("full", ours_full)] {
-        // Colour, depth and mask have 4 bytes each, a normal 12.
+        // Color, depth and mask take 4 bytes per pixel each, a normal 12.
         let seconds = (width * height * 24) as f64 * rates.times.per_step(copying) / Copying::BYTES as f64;
         let distance = rates.times.median_of(|t| t[side] / rates.images[side]) / seconds;
         rows.push(Row::new("camera", name(look), "x of bandwidth limit", 2, distance).against(
@@ -210,7 +214,7 @@ fn large(settings: &Settings, rivals: &Rivals, scene: &Scene, wanted: [f64; 2]) 
     Ok(rows)
 }
 
-/// Environments that are stepped and drawn, with the whole machine.
+/// Stepping and rendering of environments on the whole machine.
 fn stepping(settings: &Settings, rivals: &Rivals, scene: &Scene) -> Outcome<Vec<Row>> {
     let mut rows = Vec::new();
     for side in [64, 128, 256] {
@@ -240,7 +244,7 @@ fn stepping(settings: &Settings, rivals: &Rivals, scene: &Scene) -> Outcome<Vec<
     Ok(rows)
 }
 
-/// One thread against the rivals that have one.
+/// One thread against the single-threaded baselines.
 fn per_core(settings: &Settings, rivals: &Rivals, scene: &Scene, size: [usize; 2], envs: usize) -> Outcome<Vec<Row>> {
     let mut rows = Vec::new();
     for look in [Look::Plain, Look::Full] {
@@ -250,12 +254,12 @@ fn per_core(settings: &Settings, rivals: &Rivals, scene: &Scene, size: [usize; 2
         let mut contest = Contest::default();
         let ours = contest.ours(scene, &work, 1)?;
         let warp = contest.rival(rivals, Renderer::Warp, scene, &work)?;
-        // It has no multisampling.
+        // TinyRenderer has no multisampling.
         let has_tiny = look == Look::Plain;
         let tiny = if has_tiny { contest.rival(rivals, Renderer::Tiny, scene, &work)? } else { None };
         let rates = contest.run(settings.seconds)?;
         let row = rates.row(name.clone(), 1, ours, (Renderer::Warp, warp));
-        // What we want to reach is about batches of small pictures.
+        // The target applies to batches of small images.
         rows.push(if has_tiny && envs == BATCH { row.wanted(5.0) } else { row });
         if has_tiny {
             rows.push(rates.row(name, 1, ours, (Renderer::Tiny, tiny)));
@@ -264,7 +268,7 @@ fn per_core(settings: &Settings, rivals: &Rivals, scene: &Scene, size: [usize; 2
     Ok(rows)
 }
 
-/// Two threads against one, and how a loop that only computes does on this machine.
+/// Speed-up of two threads over one, compared with that of a compute loop on this machine.
 fn scaling(settings: &Settings, scene: &Scene) -> Outcome<Vec<Row>> {
     let mut rows = Vec::new();
     for (size, envs) in [(VGA, FEW), ([128, 128], BATCH)] {
@@ -280,7 +284,7 @@ fn scaling(settings: &Settings, scene: &Scene) -> Outcome<Vec<Row>> {
             let name = format!("{}, {envs} x {}x{}, {}", scene.name, size[0], size[1], look.name());
             let [ours, bare] = [times.median_of(|t| t[0] / t[1]), times.median_of(|t| t[2] / t[3])];
             let ratio = times.median_of(|t| (t[0] / t[1]) / (t[2] / t[3]));
-            // 1.8 times as fast where computing alone is 1.9 times as fast.
+            // A speed-up of 1.8 where the compute loop has 1.9.
             rows.push(
                 Row::new("camera", name, "speed-up", 2, ours).against("compute loop", bare, ratio).wanted(1.8 / 1.9),
             );

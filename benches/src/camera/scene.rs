@@ -1,5 +1,5 @@
-//! What is drawn: MuJoCo's humanoid, the vendor's arm with its 160 000 triangles, and the bundled arm, each as an MJCF file
-//! that ours and the rivals compile.
+//! Benchmark scenes: MuJoCo's humanoid, the vendor's arm with its 160 000 triangles, and the bundled arm. Each is an
+//! MJCF file that our renderer and the baselines compile.
 
 use crate::models::{Case, HUMANOID, arm_with_hand, sr5};
 use crate::settings::Outcome;
@@ -15,14 +15,14 @@ use kinetoscope::scene::{Instance, PoseF32, RenderScene};
 use kinetoscope::sim::Visible;
 use std::path::{Path, PathBuf};
 
-/// Geom groups that are drawn: not those of collision shapes.
+/// Rendered geom groups: all but those of collision shapes.
 pub(super) const GROUPS: [u8; 3] = [0, 1, 2];
 /// Vertical field of view \[deg\].
 const FOVY: f32 = 45.0;
-/// States to draw that differ from each other.
+/// Number of different states to render.
 const STATES: usize = 64;
 
-/// A model, what can be seen of it, and a camera.
+/// A model, its visual scene, and a camera.
 pub(crate) struct Scene {
     /// Name in the results.
     pub(crate) name: &'static str,
@@ -30,17 +30,17 @@ pub(crate) struct Scene {
     pub(super) file: PathBuf,
     pub(super) model: Model,
     pub(super) visible: Visible,
-    /// Joint positions to draw; environment `i` has one of them.
+    /// Joint positions to render, assigned to the environments in turn.
     states: Vec<Vec<f64>>,
     eye: [f32; 3],
     target: [f32; 3],
     /// The MJCF without the camera.
     mjcf: String,
-    /// Where the file is.
+    /// The temporary folder of the file.
     _folder: tempfile::TempDir,
 }
 
-/// Those that the machine has files for.
+/// The scenes with files on this machine.
 pub(super) struct Scenes {
     pub(super) humanoid: Option<Scene>,
     pub(super) vendor: Option<Scene>,
@@ -68,13 +68,13 @@ impl Scenes {
     }
 }
 
-/// The vendor's SR5, where it is on the machine.
+/// The vendor's SR5, if it is on the machine.
 fn vendor_arm() -> Option<PathBuf> {
     robots().map(|dir| dir.join("rokae_description/urdf/SR5.urdf")).filter(|file| file.exists())
 }
 
 impl Scene {
-    /// The vendor's SR5 and nothing else, the bundled one where there is none.
+    /// The vendor's SR5 alone, or the bundled one without the vendor's files.
     pub(crate) fn arm_alone() -> Outcome<Self> {
         let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() })?;
         let (name, file) = match vendor_arm() {
@@ -104,7 +104,7 @@ impl Scene {
         Ok(Self { name, file, model, visible, states, eye, target, mjcf: mjcf.into(), _folder: folder })
     }
 
-    /// A robot as it is exported for other programs, its arm bent, a little differently in every state.
+    /// A robot as exported for other programs, with a bent arm that differs slightly in every state.
     fn exported(name: &'static str, sim: &SimulationManager) -> Outcome<Self> {
         let folder = tempfile::tempdir()?;
         sim.dump(folder.path())?;
@@ -121,7 +121,7 @@ impl Scene {
         Self::new(name, &mjcf, folder, (0..STATES).map(state).collect(), [1.5, -1.1, 1.1], [0.1, 0.0, 0.5])
     }
 
-    /// The same seen from so near, or so far, that things cover this part of a picture.
+    /// The scene seen from the distance at which the robot covers this share of an image.
     pub(crate) fn covering(mut self, share: f64) -> Outcome<Self> {
         let size = [320, 240];
         let (drawn, poses) = self.drawn(0)?;
@@ -146,7 +146,7 @@ impl Scene {
         Ok(self)
     }
 
-    /// What is drawn, without what belongs to other geom groups, and where it is in environment `index`.
+    /// The rendered scene without other geom groups, and its poses in environment `index`.
     pub(crate) fn drawn(&self, index: usize) -> Outcome<(RenderScene, Vec<PoseF32>)> {
         let mut data = Data::new(&self.model)?;
         data.qpos_mut().copy_from_slice(self.state(index));
@@ -164,12 +164,12 @@ impl Scene {
         &self.states[index % self.states.len()]
     }
 
-    /// The camera with pictures of this size.
+    /// The camera's view with images of this size.
     pub(crate) fn view(&self, size: [usize; 2]) -> Outcome<View> {
         Ok(View::look_at(size, FOVY.to_radians(), self.eye, self.target, [0.0, 0.0, 1.0])?)
     }
 
-    /// Triangles of the meshes that are drawn.
+    /// Number of triangles of the rendered meshes.
     pub(super) fn triangles(&self) -> usize {
         let drawn = self.visible.scene().instances().iter().filter(|instance| is_drawn(instance));
         drawn
@@ -188,7 +188,7 @@ fn compile(file: &Path) -> Outcome<Model> {
     Ok(compiled.into_model())
 }
 
-/// The MJCF with the camera in its world.
+/// The MJCF with the camera in its world body.
 fn with_camera(mjcf: &str, view: &View) -> Outcome<String> {
     let end = mjcf.rfind("</worldbody>").ok_or("an MJCF without a world")?;
     let pose = &view.world_from_camera;

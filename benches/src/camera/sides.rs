@@ -1,4 +1,4 @@
-//! Those that draw: our rasterizer in this process, rivals in others.
+//! The compared renderers: our rasterizer in this process, baselines in other processes.
 
 use super::scene::{GROUPS, Scene};
 use crate::interleave::Side;
@@ -16,14 +16,14 @@ use std::ffi::OsString;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How things look.
+/// Rendering quality.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Look {
     /// No shadows, one sample per pixel.
     Plain,
     /// Shadows, four samples per pixel.
     Full,
-    /// As the rival draws when nobody tells it how; as `Full` in ours.
+    /// The baseline's default settings; as `Full` in ours.
     Defaults,
 }
 
@@ -37,7 +37,7 @@ impl Look {
     }
 }
 
-/// What every side does in a step.
+/// The work of every side in a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Work {
     pub(super) size: [usize; 2],
@@ -45,11 +45,11 @@ pub(super) struct Work {
     /// Physics steps before an image.
     pub(super) physics: u32,
     pub(super) look: Look,
-    /// Side of the rival's shadow maps \[texels\]; `None` is its own choice.
+    /// Width of the baseline's shadow maps \[texels\]; `None` for its default.
     pub(super) shadow_size: Option<u32>,
 }
 
-/// Ours: environments, and a frame for each.
+/// Our renderer: environments, and a frame for each.
 pub(super) struct Ours<'s> {
     scene: &'s Scene,
     batch: Batch,
@@ -144,12 +144,12 @@ impl Side for Ours<'_> {
     }
 }
 
-/// Who else draws.
+/// Renderers of the baselines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Renderer {
-    /// `mujoco.Renderer`, MuJoCo's renderer as users have it.
+    /// `mujoco.Renderer`, MuJoCo's renderer with its public API.
     OsMesa,
-    /// The same library, called by hand with as few passes as there can be.
+    /// The same library, called directly with the minimum number of passes.
     OsMesaByHand,
     Tiny,
     Warp,
@@ -173,7 +173,7 @@ impl Renderer {
         }
     }
 
-    /// What python must be able to run.
+    /// Python code that fails if the baseline is not installed.
     pub(super) fn probe(self) -> &'static str {
         match self {
             Self::OsMesa | Self::OsMesaByHand => {
@@ -184,7 +184,7 @@ impl Renderer {
         }
     }
 
-    /// Images that it draws in a step: a whole batch, or as many as take a fraction of a second.
+    /// Number of images per step: a whole batch, or as many as take a fraction of a second.
     pub(super) fn images(self, work: &Work) -> usize {
         match self {
             Self::Warp => work.envs,
@@ -195,7 +195,7 @@ impl Renderer {
     }
 }
 
-/// A rival's process.
+/// A baseline's process.
 pub(super) struct Rival {
     name: &'static str,
     process: Process,
@@ -220,12 +220,12 @@ impl Rival {
         Ok(Self { name: renderer.name(), process })
     }
 
-    /// Triangles of the meshes that it draws.
+    /// Number of triangles of the baseline's meshes.
     pub(super) fn triangles(&mut self) -> Outcome<usize> {
         Ok(self.process.ask("triangles")?.parse()?)
     }
 
-    /// Its depth image must be this one: the same camera, the same things in the same places.
+    /// Checks that the baseline's depth image agrees with ours, so that camera, objects and poses are the same.
     pub(super) fn must_see(&mut self, ours: &[f32], size: [usize; 2]) -> Outcome<()> {
         let bytes = self.process.bytes("depth")?;
         let theirs: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|chunk| f32::from_le_bytes(*chunk)).collect();
@@ -237,15 +237,15 @@ impl Rival {
     }
 }
 
-/// Share of the pixels that must agree.
+/// Required share of agreeing pixels.
 const SAME: f64 = 0.97;
-/// What is farther is background, whatever a renderer calls that \[m\].
+/// Farther depths count as background, which renderers encode differently \[m\].
 const FAR: f32 = 20.0;
 
-/// Share of pixels whose depth is, within 2 %, between the depths around that pixel in the other picture: where pixels
-/// have their centres is not the same everywhere.
+/// Share of pixels with a depth within 2 % of the range of depths around that pixel in the other image: renderers place
+/// pixel centers differently.
 fn agreement(ours: &[f32], theirs: &[f32], [width, height]: [usize; 2]) -> f64 {
-    // Ray casters have 0 where rays hit nothing.
+    // Ray casters report 0 for rays without a hit.
     let far = |x: f32| if x > 0.0 && x < FAR { x } else { FAR };
     let around = |k: usize, n: usize| k.saturating_sub(1)..(k + 2).min(n);
     let agrees = |(index, &depth): (usize, &f32)| {

@@ -1,4 +1,4 @@
-//! Poses, names and contacts of articulations, scene files, exports, and mistakes, which leave the simulation as it was.
+//! Poses, names and contacts of articulations, scene files and exports; mistakes, which leave the simulation unchanged.
 
 use super::*;
 use kinetoscope::ndarray::{Array2, array};
@@ -17,7 +17,7 @@ fn free_base() {
     sim.update(500);
     let drawers = sim.articulation(id).link_pose("drawer").unwrap();
     for (env, place) in places.iter().enumerate() {
-        // 22 kg on four soft contacts sink in by micrometers.
+        // A mass of 22 kg on four soft contacts sinks in by micrometers.
         let (off, angle) = errors(&pose_in(&drawers, env), &(place * Pose::translation(0.2, 0.0, 0.2)));
         assert!(off < 5e-4 && angle < 1e-3, "{off} {angle}");
     }
@@ -111,7 +111,7 @@ fn scene_file() {
     assert_error(scene.robot("cabinet").map(drop), "", &["cabinet", "articulation", "robot"]);
 }
 
-/// The export holds the joint of the file, for MuJoCo alone.
+/// The export contains the joint of the file, for plain MuJoCo.
 #[test]
 fn export() {
     let (sim, _) = with(1, cabinet());
@@ -170,7 +170,7 @@ fn handle_of_another_manager() {
     other.articulation(id);
 }
 
-/// MuJoCo has 31 contact bits; one is the world's.
+/// MuJoCo has 31 contact bits; the world uses one.
 #[test]
 fn too_many() {
     let (files, mut sim) = (Files::default(), sim(1));

@@ -5,7 +5,7 @@ use kinetoscope::ndarray::array;
 use kinetoscope::sim::EntityTypes;
 use kinetoscope_testkit::refusal::assert_error;
 
-/// [`door`] as MJCF, with an actuator that says how it could be driven; its limits are in radians.
+/// [`door`] as MJCF, with limits in radians and an actuator that defines a drive.
 const LEAF: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="frame">
     <body name="leaf"><joint name="hinge" axis="0 0 1" range="0 1.6"/>
       <inertial pos="0.4 0 1" mass="20" diaginertia="7 8 1.1"/><site name="knob" pos="0.8 0 1"/></body></body></worldbody>
@@ -15,7 +15,8 @@ fn leaf(text: &str) -> ArticulationCfg {
     ArticulationCfg { uid: "door".into(), mjcf: Some(MjcfFile::text(text)), ..Default::default() }
 }
 
-/// The judge is the same door from a URDF, whose motions are held against closed forms; the same numbers, up to rounding.
+/// Compares the motion with that of the same door from a URDF, which other tests check against closed forms: equal up
+/// to rounding.
 #[test]
 fn swinging_door() {
     let files = Files::default();
@@ -28,10 +29,10 @@ fn swinging_door() {
         sim.articulation(id).qpos()
     });
     assert!((&mine - &other).iter().all(|d| d.abs() < 1e-12), "{mine} {other}");
-    // I = 1.1 + 20 · 0.4² = 4.3 about the hinge: 0.3 t + 1/2 (2 / 4.3) t² at t = 0.4 s, with Euler's half step more.
+    // I = 1.1 + 20 · 0.4² = 4.3 about the hinge: 0.3 t + 1/2 (2 / 4.3) t² at t = 0.4 s, plus Euler's half step.
     let expected = 0.3 * 0.4 + 0.5 * 2.0 / 4.3 * 0.4 * (0.4 + DT);
     assert!((mine[(0, 0)] - expected).abs() < 1e-9, "{} is not {expected}", mine[(0, 0)]);
-    // Controls: with a drive the actuator's numbers hold, and it stays.
+    // Controls: a drive uses the actuator's gains and holds the door.
     let (mut sim, id) = with(1, ArticulationCfg { drive: Some(DriveCfg::default()), ..leaf(LEAF) });
     assert_eq!(sim.articulation(id).stiffness(), array![[300.0]]);
     assert_eq!(sim.articulation(id).link_names(), ["frame", "leaf", "knob"]);
@@ -39,7 +40,7 @@ fn swinging_door() {
     assert!(sim.articulation(id).qpos()[(0, 0)].abs() < 1e-9);
 }
 
-/// Numbers of the file hold unless the configuration has others.
+/// Values of the file apply unless the configuration overrides them.
 #[test]
 fn friction_and_start() {
     let text = LEAF.replace(r#"range="0 1.6""#, r#"range="0 1.6" ref="0.5" frictionloss="3" armature="0.7""#);
@@ -63,7 +64,7 @@ fn mistakes() {
     assert_error(sim.add_articulation(missing), "", &["nowhere/door.xml"]);
 }
 
-/// Scene files name the file, relative to themselves, and keep it when they are written again.
+/// Scene files refer to the MJCF file by a path relative to themselves, and keep it when they are written again.
 #[test]
 fn scene_file() {
     let files = Files::default();

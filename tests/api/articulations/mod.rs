@@ -1,4 +1,4 @@
-//! Articulations that are no robots: they move as their files say, and as what touches them makes them.
+//! Passive articulations: they move as their joints and contacts allow.
 
 mod entities;
 mod mjcf;
@@ -9,14 +9,14 @@ use kinetoscope::sim::ArticulationId;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::text_robot;
 
-/// Short steps: closed forms in continuous time are compared with them.
+/// Short time step, because results are compared with closed forms in continuous time \[s\].
 const DT: f64 = 1e-3;
 
 fn cabinet_urdf() -> UrdfCfg {
     UrdfCfg::single(assets::path("cabinet/cabinet.urdf").unwrap())
 }
 
-/// The bundled cabinet, its front towards +x.
+/// The bundled cabinet, with its front facing +x.
 fn cabinet() -> ArticulationCfg {
     ArticulationCfg { uid: "cabinet".into(), urdf: cabinet_urdf(), ..Default::default() }
 }

@@ -1,6 +1,6 @@
-//! Joints that nothing drives. The cabinet's drawer has the mass m = 2 kg, the damping b = 8 N s/m and the dry friction
-//! f = 2 N of its file, so that m v' = F - b v - f sign v has closed forms. Euler's steps of 1 ms are off by about
-//! h b / 2m = 0.2 % of a distance, and MuJoCo's dry friction gives way a little before it slips: 1 % of tolerance.
+//! Motion of undriven joints. The cabinet's drawer has the mass m = 2 kg, the damping b = 8 N s/m and the dry friction
+//! f = 2 N of its file, so that m v' = F - b v - f sign v has closed forms. Euler's steps of 1 ms are off by about h b
+//! / 2m = 0.2 % of a distance, and MuJoCo's dry friction yields slightly before it slips: 1 % of tolerance.
 
 use super::*;
 use kinetoscope::ndarray::array;
@@ -15,14 +15,14 @@ const SOFT: Tolerance = Tolerance::relative(
     "Euler's h b / 2m = 0.2 % of a distance, and dry friction that gives way before it slips",
 );
 
-/// The way of a mass from a speed until it stands.
+/// Stopping distance of a mass with an initial speed.
 fn slides(mass: f64, speed: f64, friction: f64) -> f64 {
     let rest = friction / DAMPING;
     mass / DAMPING * speed - rest * mass / DAMPING * (1.0 + speed / rest).ln()
 }
 
-/// Of its file; with friction and rotor inertia of its own, without a drive and with one whose numbers they replace; and with
-/// a robot's drive, which holds it at its target.
+/// The drawer with the values of its file; with its own friction and rotor inertia, without a drive and with a drive
+/// whose values they override; and with a robot's drive, which holds it at its target.
 #[test]
 fn sliding_drawer() {
     let (mut sim, id) = with(2, cabinet());
@@ -33,7 +33,7 @@ fn sliding_drawer() {
     assert_number("way", open[(1, 0)], slides(MASS, 0.3, FRICTION), SOFT);
     assert!(speed.iter().all(|v| v.abs() < 1e-6), "{speed}");
     assert_eq!(sim.articulation(id).qf(), array![[0.0], [0.0]], "no drive gives anything");
-    // Controls: with other numbers it would be elsewhere.
+    // Controls: other values give clearly different positions.
     let (friction, rotor) = (3.0, 2.0);
     assert!((open[(0, 0)] / slides(MASS, 0.5, 1.5 * FRICTION) - 1.0).abs() > 0.1);
     assert!((open[(0, 0)] / slides(MASS + rotor, 0.5, friction) - 1.0).abs() > 0.1);
@@ -55,7 +55,7 @@ fn sliding_drawer() {
     assert!(sim.articulation(id).qpos()[(0, 0)].abs() < 1e-3, "held at its target");
 }
 
-/// A push opens it where it exceeds the friction, also that of its own environment.
+/// A force opens the drawer if it exceeds the friction, including a friction randomized per environment.
 #[test]
 fn pushed_drawer() {
     let (mut sim, id) = with(2, cabinet());
@@ -65,7 +65,7 @@ fn pushed_drawer() {
     // v' = (F - f)/m - b/m v from rest.
     let (speed, time) = ((6.0 - FRICTION) / DAMPING, MASS / DAMPING);
     assert_number("way", open[(0, 0)], speed * (0.5 - time * (1.0 - (-0.5 / time).exp())), SOFT);
-    // Dry friction is a soft constraint: below it there is a creep of less than a millimeter per second.
+    // Dry friction is a soft constraint: below it the joint creeps by less than a millimeter per second.
     assert!(open[(1, 0)].abs() < 1e-3, "{open}");
     sim.update(1500);
     let open = sim.articulation(id).qpos();
@@ -81,7 +81,7 @@ fn pushed_drawer() {
     assert_number("way", open[(1, 0)], slides(MASS, 0.5, 6.0), SOFT);
 }
 
-/// Targets do nothing without a drive, and states are as written.
+/// Without a drive targets have no effect, and states are as written.
 #[test]
 fn targets_and_states() {
     let (mut sim, id) = with(2, ArticulationCfg { init_qpos: vec![("drawer_.*".into(), 0.1)], ..cabinet() });
@@ -96,7 +96,7 @@ fn targets_and_states() {
     assert_eq!(sim.articulation(id).qpos(), array![[0.1], [0.1]]);
 }
 
-/// A spring closes a door, against 2.5 N m by all but 0.5 rad.
+/// A spring closes a door, up to 0.5 rad against a torque of 2.5 N m.
 #[test]
 fn sprung_door() {
     let files = Files::default();

@@ -1,5 +1,5 @@
-//! The same bits for any number of threads and environments, and for one update or many; the same motion for dense and
-//! sparse Jacobians; efforts that contacts do not change.
+//! Determinism: the same bits for any number of threads and environments, and for one update or many. The motion is the
+//! same for dense and sparse Jacobians, and contacts do not change the efforts of other joints.
 
 use super::support::{add_ball, add_walker, all_bits, cfg, most_contacts, row, sim};
 use kinetoscope::mujoco::{Data, compile};
@@ -8,14 +8,14 @@ use kinetoscope::prelude::*;
 use kinetoscope_testkit::urdf::{Files, joint, limit, link, robot};
 use kinetoscope_testkit::worlds::{arm_and_hand, text_robot};
 
-/// The arm reaches into the ground, the walker falls on it and kicks, each environment with targets of its own.
+/// The arm reaches into the ground, the walker falls on it and kicks; each environment has its own targets.
 fn scene(num_envs: usize, threads: usize) -> SimulationManager {
     let mut sim = sim(cfg(num_envs, threads));
     let arm = sim.add_robot(arm_and_hand("sr5")).unwrap();
     let legs = add_walker(&mut sim, "walker", 0.5);
     for (robot, reach) in [(arm, 1.6), (legs, -0.8)] {
         let dof = sim.robot(robot).dof();
-        // By the index of the environment, not by their number.
+        // The target depends on the index of the environment, not on the number of environments.
         let target = |(env, joint)| {
             if joint == 1 { reach + 0.01 * env as f64 } else { 0.3 + 0.003 * env as f64 }
         };
@@ -49,7 +49,7 @@ fn environments() {
     }
 }
 
-/// More steps than the block in which they are handed to the workers.
+/// More steps than one block of steps given to the workers.
 #[test]
 fn updates() {
     let mut one_by_one = scene(3, 2);
@@ -69,8 +69,8 @@ fn managers_in_threads() {
     });
 }
 
-/// Efforts are those that the solver found in the step, whatever comes into contact at its end: those of a loaded hinge in
-/// every step, beside balls that fall one after the other.
+/// Efforts are those solved in the step, even if new contacts arise at its end. The efforts of a loaded hinge are
+/// compared in every step while balls fall next to it.
 #[test]
 fn efforts_beside_contacts() {
     let [alone, beside] = [0, 6].map(|balls| {
@@ -92,7 +92,7 @@ fn efforts_beside_contacts() {
         };
         (0..80).map(step).collect::<Vec<f64>>()
     });
-    // Hanging by its stiffness, the lever asks for m g l cos(q).
+    // The lever hangs on its stiffness, so its effort is m g l cos(q).
     let held = alone.last().unwrap().abs();
     assert!((held - 2.0 * 9.81 * 0.5 * 0.4_f64.cos()).abs() < 0.1, "{held}");
     for (step, (a, b)) in alone.iter().zip(&beside).enumerate() {
@@ -100,7 +100,8 @@ fn efforts_beside_contacts() {
     }
 }
 
-/// Twelve free bars (72 degrees of freedom) that fall onto a plane and onto each other, 60 steps of 2 ms from the first touch.
+/// Final state of twelve free bars (72 degrees of freedom) that fall onto a plane and onto each other, 60 steps of 2 ms
+/// from the first contact.
 fn fall(jacobian: &str, friction: f64) -> Vec<f64> {
     let bar = |i: u32| {
         let (x, y, z) = (0.04 * f64::from(i % 3), 0.03 * f64::from(i % 2), 0.06 + 0.11 * f64::from(i / 3));
@@ -128,9 +129,9 @@ fn fall(jacobian: &str, friction: f64) -> Vec<f64> {
     data.qpos().to_vec()
 }
 
-/// Dense and sparse constraint Jacobians lead to the same motion: MuJoCo 4.0.0's Newton solver is known to factor a wrong
-/// Hessian in some sparse cases. Both solve the same problem to the solver's tolerance of 1e-8; over 60 steps contact may
-/// amplify that a hundredfold: 1e-6 m. Control: with a friction that is 1 % smaller they part by more than that.
+/// Dense and sparse constraint Jacobians lead to the same motion: MuJoCo 4.0.0's Newton solver is known to factor a
+/// wrong Hessian in some sparse cases. Both solve the same problem to the solver's tolerance of 1e-8; over 60 steps
+/// contact may amplify that a hundredfold: 1e-6 m. Control: 1 % less friction changes the motion by more than that.
 #[test]
 fn sparse_jacobians() {
     let dense = fall("dense", 1.0);

@@ -1,14 +1,14 @@
-//! Buffers that were too small never show: the step is done again with larger ones, to the same bits.
+//! Growth of buffers: a step with too small buffers is repeated with larger ones, with the same bits.
 
 use super::support::{add_ball, add_plate, all_bits, assert_quiet, bits_of, cfg, copy_of, most_contacts, row, sim};
 use kinetoscope::mujoco::{Buffers, Data, Model, TARGET, Target};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::env::Env;
 
-/// Room for everything in these tests.
+/// Buffers that are large enough for all tests of this file.
 const HUGE: Buffers = Buffers { contacts: 1000, constraints: 3000, arena_bytes: 64 << 20 };
 
-/// Runs `sim` from its start and the same environment with huge buffers, and compares after every 10 steps.
+/// Runs `sim` and a copy of its environment with large buffers, and compares them after every 10 steps.
 fn compare_with_huge_buffers(sim: &mut SimulationManager, steps: u32, contacts: usize) {
     let huge = sim.batch().model().with_buffers(HUGE);
     let mut reference = sim.batch().read(0, |env| copy_of(&huge, env));
@@ -36,7 +36,7 @@ fn many_contacts() {
     assert!(sim.warnings().buffer_growths() > 0);
 }
 
-/// A little tilted: contacts come one after the other, and the buffers grow several times in the middle of the motion.
+/// A slightly tilted plate: contacts arise one after the other, and the buffers grow several times during the motion.
 #[test]
 fn drives_at_work() {
     let mut sim = sim(cfg(2, 1));
@@ -61,7 +61,7 @@ fn pile_of_robots() {
     assert!(sim.warnings().buffer_growths() > 0 || TARGET != Target::V2);
 }
 
-/// The model, and an environment of it in the state in which its contacts are many.
+/// The model, and an environment with many contacts.
 fn resting_plate() -> (Model, Env) {
     let mut sim = sim(cfg(1, 1));
     add_plate(&mut sim, [9, 3], [0.0, 0.0, 0.03], [0.0; 3]);
@@ -73,7 +73,7 @@ fn resting_plate() -> (Model, Env) {
     (model, start)
 }
 
-/// The half of the step that first finds no room.
+/// The half of the step (1 or 2) in which an allocation first fails.
 fn first_failure(model: &Model, start: &Env) -> Option<u8> {
     let Ok(mut data) = Data::new(model) else { return Some(1) };
     data.qpos_mut().copy_from_slice(start.data().qpos());
@@ -89,7 +89,7 @@ fn first_failure(model: &Model, start: &Env) -> Option<u8> {
     None
 }
 
-/// The place in a step where the buffers are found too small depends on their size: every place is to be gone through.
+/// The place of the failed allocation within a step depends on the size of the buffers; the test covers every place.
 #[test]
 fn every_place_in_a_step() {
     let (model, start) = resting_plate();
@@ -114,7 +114,7 @@ fn every_place_in_a_step() {
         assert_eq!(bits_of(&env), expected, "{buffers:?}, grown {} times", env.growths());
         assert_eq!(*env.warnings(), Default::default(), "{buffers:?}");
     }
-    // On 2.2.2 the stack is made to fit the rows; on 4.x both share the arena.
+    // On 2.2.2 the stack is sized to fit the rows; on 4.x both share the arena.
     assert!(in_step1 > 0 && (in_step2 > 0 || TARGET == Target::V2), "{in_step1} {in_step2}");
     let expected = reference(5);
     for nothing in [0, 1] {

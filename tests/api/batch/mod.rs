@@ -1,5 +1,5 @@
-//! Batches of environments: the same bits however they are run, buffers that grow, environments that diverge, errors of
-//! the engine, recompilation, and everything freed at the end.
+//! Batches of environments: determinism, growing buffers, diverged environments, errors of the engine, recompilation,
+//! and freed resources.
 
 mod determinism;
 mod growth;

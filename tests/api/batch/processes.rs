@@ -1,5 +1,5 @@
-//! `mju_error` inside a step is a value, in any thread, and never the end of the process; no log is written, and dropping a
-//! manager frees its memory and ends its threads: in processes of their own.
+//! `mju_error` inside a step is returned as an error in any thread and never ends the process. No log is written, and
+//! dropping a manager frees its memory and ends its threads. The tests run in separate processes.
 
 use super::support::{add_plate, add_walker, bits_of, cfg, sim, wheel};
 use kinetoscope::mujoco::{Asset, Data, Model, TARGET, Target, compile, compile_file};
@@ -13,13 +13,14 @@ use kinetoscope_testkit::worlds::arm_and_hand;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Boxes in a heap, with next to no memory for the solver: MuJoCo stops in the middle of a step, with `mju_error`.
+/// A pile of boxes with too little memory for the solver: MuJoCo stops in the middle of a step with `mju_error`.
 fn starved() -> Model {
-    // In the air at first: the compiler takes a step as well.
+    // The boxes start in the air, because the compiler takes a step as well.
     let boxes: String = [0.15, 0.4, 0.65, 0.9]
         .map(|z| format!(r#"<body pos="0.01 0 {z}"><freejoint/><geom type="box" size=".1 .1 .1"/></body>"#))
         .concat();
-    // Too little for a step and enough for the compiler differs between versions: searched for.
+    // The size that is too small for a step but large enough for the compiler differs between versions, so it is
+    // searched for.
     for i in 0..200 {
         let size = match TARGET {
             Target::V2 => format!(r#"<size njmax="500" nconmax="100" nstack="{}"/>"#, 1000 + 200 * i),
@@ -42,7 +43,7 @@ fn provoke(model: &Model) {
     let error = (0..100).find_map(|_| data.step().err()).map(|error| error.to_string());
     let error = error.unwrap_or_else(|| panic!("MuJoCo found the memory enough: {:?}", data.take_warnings()));
     assert!(error.starts_with("MuJoCo stopped: "), "{error}");
-    // After a reset the data is as new.
+    // A reset makes the data usable again.
     data.reset();
     assert!(data.time() == 0.0);
 }
@@ -66,7 +67,7 @@ fn engine_errors_in_threads() {
     });
 }
 
-/// An environment with this little memory never ends the process, and never shows half a step.
+/// An environment with this little memory never ends the process, and never shows a partial step.
 #[test]
 fn engine_errors_in_an_environment() {
     let (model, table) = (starved(), Arc::new(DriveTable::default()));
@@ -81,7 +82,7 @@ fn engine_errors_in_an_environment() {
     assert_eq!(bits_of(&env), bits_of(&reference));
 }
 
-/// The output of a scenario that succeeds, with an empty folder left.
+/// Runs a scenario that must succeed and leave an empty folder; returns its output.
 fn scenario(name: &str, done: &str) -> String {
     let dir = tempfile::tempdir().unwrap();
     let output = run(module_path!(), name, dir.path(), &[]);
@@ -149,7 +150,7 @@ fn leaks() {
     scenario("scenario_200_managers", "200 managers");
 }
 
-/// Memory and threads while a manager is in use.
+/// Resident memory and number of threads while a manager is in use.
 fn use_one() -> (usize, usize) {
     let mut sim = sim(cfg(16, 4));
     sim.add_robot(arm_and_hand("sr5")).unwrap();
@@ -165,11 +166,11 @@ fn scenario_200_managers() {
         return;
     }
     let (empty, before) = (resident(), threads());
-    // The allocator keeps some of what was freed: the first twenty show how much.
+    // The allocator keeps some of the freed memory: the first twenty managers show how much.
     let first = (0..20).fold((0, 0), |_, _| use_one());
     assert_eq!(first.1, before + 3, "three workers and the caller");
     let one = first.0.saturating_sub(empty);
-    // The memory that the allocator keeps varies: the least of ten measurements is compared.
+    // The memory kept by the allocator varies, so the smallest of ten measurements is compared.
     let least = || {
         let used = (0..10).map(|_| {
             (0..10).for_each(|_| _ = use_one());
@@ -179,10 +180,10 @@ fn scenario_200_managers() {
     };
     let warm = least();
     let grown = least().saturating_sub(warm);
-    // A leak of one environment in each manager would be 100 sixteenths of what one manager takes; what the allocator keeps
-    // was seen to differ by 1.1.
+    // A leak of one environment per manager would be 100 sixteenths of a manager's memory; the allocator's variation
+    // was measured as 1.1 times that memory.
     assert!(grown < 2 * one, "{grown} bytes more; one manager takes {one}");
-    // A joined thread leaves /proc when the kernel has finished with it, shortly after.
+    // A joined thread leaves /proc shortly after, when the kernel has finished with it.
     for _ in 0..200 {
         if threads() == before {
             break;

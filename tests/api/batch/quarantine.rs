@@ -1,4 +1,4 @@
-//! A diverged environment is taken out, reported and revived; the others do not notice.
+//! Quarantine: a diverged environment is stopped, reported and revived by a reset; the others are unaffected.
 
 use super::support::{add_walker, all_bits, bits_of, cfg, sim, wheel};
 use kinetoscope::exec::ThreadPool;
@@ -22,7 +22,7 @@ const BLOW_UPS: [BlowUp; 6] = [
     ("force NaN", |d| d.xfrc_applied_mut()[8] = f64::NAN, Warning::BadAcceleration),
 ];
 
-/// One of 64 environments below the manager blows up, in its initial state after 50 steps.
+/// One of 64 environments diverges, with no manager on top of the batch; after 50 steps it holds its initial state.
 #[test]
 fn one_of_64() {
     let mut sim = sim(cfg(1, 2));
@@ -89,7 +89,7 @@ fn report_and_revival() {
         assert_eq!(sim.warnings().counts()["mujoco-bad-position"], 1);
         let (before, undisturbed) = (all_bits(&sim), all_bits(&calm));
         assert!((0..64).all(|k| k == 40 || before[k] == undisturbed[k]), "the others");
-        // Only a reset revives, and only the one that is named.
+        // Only a reset revives an environment, and only the named one.
         sim.reset(Some(&[EnvId(40)])).unwrap();
         assert!(sim.diverged().is_empty());
         let (mut fresh, _) = wheels(1);
@@ -101,7 +101,7 @@ fn report_and_revival() {
     }
 }
 
-/// A position below MuJoCo's largest number, to which an unlimited drive answers with an acceleration above it: undone.
+/// A position below MuJoCo's limit, with an unlimited drive that produces an acceleration above it: the step is undone.
 #[test]
 fn divergence_in_a_step() {
     let (mut sim, robot) = wheels(4);
@@ -119,7 +119,7 @@ fn divergence_in_a_step() {
     assert_eq!(sim.robot(robot).qpos()[(2, 0)], 0.7);
 }
 
-/// Writing to it and adding a robot revive nothing.
+/// Writing to a diverged environment and adding a robot do not revive it.
 #[test]
 fn no_revival() {
     let (mut sim, robot) = wheels(3);

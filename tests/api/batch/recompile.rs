@@ -1,4 +1,4 @@
-//! What exists goes on as if nothing was added.
+//! Recompilation: existing entities continue as if nothing had been added.
 
 use super::support::{add_plate, add_walker, assert_quiet, cfg, sim, wheel};
 use kinetoscope::mujoco::ObjectKind;
@@ -9,7 +9,8 @@ use kinetoscope::sim::env::Env;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{arm_and_hand, fixed, gains, no_drive, object};
 
-/// Bits of the time and of position, velocity, warm start of all joints whose name starts with `prefix`, in order.
+/// Bits of the time and of position, velocity and warm start of all joints with names that start with `prefix`, in
+/// order.
 fn bits_of_robot(env: &Env, prefix: &str) -> Vec<u64> {
     let (data, model) = (env.data(), env.data().model());
     let mut bits = vec![data.time().to_bits()];
@@ -73,23 +74,23 @@ fn robot_far_away() {
         sim.update(100);
         sim.robot(arm).qpos()
     });
-    // The solver stops when all rows together are good enough: equal to what it leaves, not bit for bit.
+    // The solver stops when all rows together have converged, so results agree to its tolerance but not bit for bit.
     let difference = (with - without).iter().fold(0.0_f64, |most, d| most.max(d.abs()));
     assert!(difference < 1e-6, "{difference:e}");
 }
 
-/// An addition between two steps of a scene without rows of constraints.
+/// An addition between two steps of a scene without constraint rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Added {
     Nothing,
-    /// A pendulum and a body beside, which meet nothing.
+    /// A pendulum and a body without contact to the existing ones.
     Beside,
-    /// A board under the body that falls.
+    /// A board under the falling body.
     InTheWay,
 }
 
-/// Positions, velocities, poses over one second after `added`, of a body that tumbles and falls, a passive pendulum and a wheel
-/// with an explicit drive.
+/// Positions, velocities and poses over one second after the addition, for a tumbling falling body, a passive pendulum
+/// and a wheel with an explicit drive.
 fn second_without_rows(added: Added) -> Vec<f64> {
     let (files, mut sim) = (Files::default(), sim(SimulationManagerCfg { ground: None, ..cfg(2, 1) }));
     let wheel_at = |uid: &str, x: f64, drive| RobotCfg {
@@ -134,10 +135,10 @@ fn second_without_rows(added: Added) -> Vec<f64> {
     states
 }
 
-/// Without rows of constraints nothing is solved together: MuJoCo's inertia matrix has a block for each tree, whose
-/// factor and acceleration are computed from that tree alone. What may differ is the order of sums, by rounding: 1e-16 of
-/// numbers up to 20, 100 steps, and a pendulum, the only thing here that makes differences grow, by less than
-/// exp(1 s * sqrt(m g l / I)) = exp(7): 2e-10. Control: a board that the body falls on.
+/// Without constraint rows, trees are independent: MuJoCo's inertia matrix has a block for each tree, whose factor and
+/// acceleration depend on that tree alone. Only the order of sums may differ, by rounding: 1e-16 of numbers up to 20,
+/// over 100 steps. The pendulum, the only part that amplifies differences, does so by less than exp(1 s * sqrt(m g l /
+/// I)) = exp(7): 2e-10. Control: a board under the falling body.
 #[test]
 fn scene_without_rows() {
     let alone = second_without_rows(Added::Nothing);

@@ -1,4 +1,4 @@
-//! MuJoCo's own sample models, of the library's package.
+//! MuJoCo's own sample models, from the package of the library.
 
 use kinetoscope::mujoco::compile_file;
 use kinetoscope::sim::drive::table::DriveTable;
@@ -22,7 +22,7 @@ fn compile_and_step() {
                 assert!(env.data().qpos().iter().all(|q| q.is_finite()));
                 stepped += 1;
             }
-            // Parts that other files include are no models.
+            // Files that are only included by others are not models.
             Err(error) => refused.push(format!("{}: {error}", file.display())),
         }
     }

@@ -1,4 +1,4 @@
-//! Robots of these tests, and copies of environments.
+//! Robots of the batch tests, and copies of environments.
 
 use kinetoscope::mujoco::Model;
 use kinetoscope::prelude::*;
@@ -8,7 +8,7 @@ use kinetoscope::sim::env::Env;
 use kinetoscope_testkit::urdf::{Files, collision, joint, limit, link, robot};
 pub(crate) use kinetoscope_testkit::worlds::{all_bits, bits_of, cfg, row, sim};
 
-/// Adds a robot of URDF elements, with a base that moves.
+/// Adds a robot of URDF elements with a floating base.
 pub(crate) fn add_free(sim: &mut SimulationManager, uid: &str, elements: &str, at: [f64; 3], rpy: [f64; 3]) -> RobotId {
     let (files, init_pose) = (Files::default(), from_xyz_rpy(at, rpy));
     let cfg = kinetoscope_testkit::worlds::text_robot(&files, uid, &robot(uid, elements));
@@ -76,14 +76,14 @@ pub(crate) fn most_contacts(batch: &Batch) -> usize {
     most
 }
 
-/// No warning of MuJoCo, and nothing diverged.
+/// Asserts that MuJoCo gave no warning and no environment diverged.
 #[track_caller]
 pub(crate) fn assert_quiet(sim: &SimulationManager) {
     let mujoco: Vec<_> = sim.warnings().counts().into_keys().filter(|name| name.starts_with("mujoco")).collect();
     assert!(mujoco.is_empty() && sim.diverged().is_empty(), "{mujoco:?} {:?}", sim.diverged());
 }
 
-/// An environment of `model` in the state and with the targets of `other`.
+/// An environment of `model` with the state and the targets of `other`.
 pub(crate) fn copy_of(model: &Model, other: &Env) -> Env {
     let mut env = Env::new(model, other.drives.table()).unwrap();
     env.reset(|data, drives| {

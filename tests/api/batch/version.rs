@@ -1,18 +1,19 @@
-//! A library of another version than the headers is a clear error: tried with a library that is nothing but a version.
+//! A MuJoCo library of another version than the headers gives a clear error, tested with a stub library that only
+//! reports a version.
 
 use kinetoscope::prelude::*;
 use kinetoscope_testkit::process::{is_child, run, text};
 use std::path::Path;
 use std::process::Command;
 
-/// Output of a program that must be there and succeed.
+/// Output of a program that must be installed and succeed.
 fn tool(program: &str, args: &[&str]) -> String {
     let output = Command::new(program).args(args).output().unwrap_or_else(|e| panic!("{program}: {e}"));
     assert!(output.status.success(), "{program} {args:?}: {}", text(&output.stderr));
     text(&output.stdout)
 }
 
-/// Builds a library that has all that this binary imports of MuJoCo: functions that abort, and this version.
+/// Builds a library with all symbols that this binary imports from MuJoCo: functions that abort, and this version.
 fn build_stub(dir: &Path, version: i32) {
     let exe = std::env::current_exe().unwrap().to_string_lossy().into_owned();
     let dynamic = tool("readelf", &["-d", &exe]);
@@ -27,7 +28,7 @@ fn build_stub(dir: &Path, version: i32) {
         let size = size.parse().ok().filter(|&size: &usize| size > 0).unwrap_or(8);
         let definition = match (name, kind, section) {
             _ if !name.starts_with("mj") => continue,
-            // Copied into the executable: it has the size there.
+            // Copied into the executable, where the size is known.
             (_, "OBJECT", _) => format!("char {name}[{size}];"),
             ("mj_version", _, "UND") => format!("int mj_version(void) {{ return {version}; }}"),
             ("mju_user_error" | "mju_user_warning", _, "UND") => format!("void (*{name})(const char*);"),
@@ -48,7 +49,7 @@ fn build_stub(dir: &Path, version: i32) {
 #[ignore = "needs readelf and cc: cargo xtask test"]
 fn another_version() {
     let headers = kinetoscope::mujoco::version_string();
-    // Written as 2.x and 3.x write it, and as 4.x does.
+    // Version numbers in the format of 2.x and 3.x, and of 4.x.
     for (version, name) in [(210, "2.1.0"), (3_005_001, "3.5.1"), (4_001_000, "4.1.0")] {
         let dir = tempfile::tempdir().unwrap();
         build_stub(dir.path(), version);
@@ -70,7 +71,7 @@ fn scenario_start() {
     if !is_child() {
         return;
     }
-    // Twice: the answer does not change.
+    // Twice, because the error must not change.
     for _ in 0..2 {
         println!("manager: {}", SimulationManager::new(SimulationManagerCfg::default()).unwrap_err());
         println!("compile: {}", kinetoscope::mujoco::compile("<mujoco/>", &[]).unwrap_err());

@@ -1,9 +1,9 @@
-//! Explicit actuator models: the law of each, step by step, what all of them do with a step of the target, and other gains,
-//! types and limits while they run.
+//! Explicit actuator models: the law of each, step by step; their response to a step of the target; and changes of
+//! gains, types and limits at run time.
 //!
-//! For a joint of constant inertia M without other loads MuJoCo's Euler step is v' = v + h tau / M, q' = q + h v', with tau
-//! the model's effort at the start of the step. Tolerance 1e-9 over some 200 steps, as in `law.rs`: rounding of 1e-16 a step,
-//! which stable gains do not let grow.
+//! For a joint of constant inertia M without other loads MuJoCo's Euler step is v' = v + h tau / M, q' = q + h v',
+//! where tau is the model's effort at the start of the step. Tolerance 1e-9 over some 200 steps, as in `law.rs`:
+//! rounding of 1e-16 per step, which stable gains do not amplify.
 
 use crate::drives::law::{EXACT, LAW, Law};
 use crate::drives::worlds::*;
@@ -40,7 +40,7 @@ fn law(kp: f64, kd: f64) -> Law {
     Law { m: M, kp, kd, explicit: true, ..LAW }
 }
 
-/// All models, and the delay of each \[steps\].
+/// All models, with the delay of each \[steps\].
 fn models(delay: u32) -> impl Iterator<Item = (ActuatorModel, u32)> {
     let late = DelayedPd { delay, max_delay: delay }.into();
     ActuatorModel::examples()
@@ -65,7 +65,7 @@ fn ideal_pd() {
                 let (tau, bound) = law.step_to(aim);
                 saturated += u32::from(bound);
                 if integrator == Integrator::Rk4 {
-                    // RK4 holds the effort, too: exact for a constant force.
+                    // RK4 also holds the effort constant, and is exact for a constant force.
                     law.q += H * 0.5 * (before - law.v);
                 }
                 world.step(1);
@@ -78,7 +78,7 @@ fn ideal_pd() {
     }
 }
 
-/// Stall 120 N m, continuous 80 N m, 7.5 rad/s without load: the corners and lines of the four quadrants.
+/// Stall 120 N m, continuous 80 N m, 7.5 rad/s without load: corners and lines of the four quadrants.
 #[test]
 fn dc_motor_quadrants() {
     let world = world(&[wheel().effort(80.0)], motor(120.0), weightless());
@@ -90,7 +90,7 @@ fn dc_motor_quadrants() {
         (3.75, 10.0, 10.0),
         (3.75, -500.0, -80.0),
         (7.5, 500.0, 0.0),
-        // Faster than without load it brakes, whatever the command.
+        // Above the no-load speed it brakes for any command.
         (9.0, 500.0, -24.0),
         (9.0, 0.0, -24.0),
         (12.5, 500.0, -80.0),
@@ -109,7 +109,7 @@ fn dc_motor_quadrants() {
             assert_number(&what, env.data().qvel()[0], sign * (speed + H * given / M), EXACT);
         }
     }
-    // Below the lines it is the ideal controller, with its gains.
+    // Inside the torque-speed lines it is the ideal controller with its gains.
     let drive = with(DcMotor { saturation_effort: 120.0 }, 40.0, 5.0);
     let mut env = self::world(&[wheel().effort(80.0)], drive, weightless()).env();
     push(&mut env, &[0.1], &[1.0]);
@@ -118,7 +118,7 @@ fn dc_motor_quadrants() {
     assert_number("inside of the lines", env.drives.effort[0], 40.0 * 0.4 + 5.0 * 1.0, EXACT);
 }
 
-/// The speed without load is per environment: at v a motor gives at most s (1 - v / v_max).
+/// The no-load speed is set per environment: at v a motor gives at most s (1 - v / v_max).
 #[test]
 fn dc_motor_limits() {
     let mut world = world(&[wheel().effort(100.0)], motor(6.0), weightless_envs(2));
@@ -136,7 +136,7 @@ fn dc_motor_limits() {
         let result = world.robot().set_qvel_limits(&array![[bad]], None, None);
         assert_error(result, "OutOfRange { argument: \"set_qvel_limits\"", &["dc_motor"]);
     }
-    // A motor without a continuous limit would brake without end.
+    // A motor without a continuous limit would brake without bound.
     let error = world.robot().set_qf_limits(&array![[f64::INFINITY]], None, None).unwrap_err();
     assert!(matches!(error, Error::OutOfRange { argument: "set_qf_limits", row: 0, column: 0, .. }), "{error}");
     assert!(error.to_string().contains("dc_motor") && error.to_string().contains("joint \"j\""), "{error}");
@@ -147,9 +147,9 @@ fn dc_motor_limits() {
     assert_eq!(world.view().qf(), array![[2.0], [2.0]], "below the lines, 4.8 and 3 N m");
 }
 
-/// With full throttle from rest tau = s (1 - v / v_max) in every step: with r = 1 - h s / (M v_max),
-/// v_n = v_max (1 - r^n) and q_n = h (v_1 + ... + v_n) = h v_max (n - r (1 - r^n) / (1 - r)). That settles while |r| < 1;
-/// beyond, the motor overshoots until its limit holds it, and `add_robot` has warned.
+/// At full throttle from rest, tau = s (1 - v / v_max) in every step: with r = 1 - h s / (M v_max), v_n = v_max (1 -
+/// r^n) and q_n = h (v_1 + ... + v_n) = h v_max (n - r (1 - r^n) / (1 - r)). This settles for |r| < 1; beyond, the
+/// motor overshoots until its limit holds it, and `add_robot` warns.
 #[test]
 fn dc_motor_from_rest() {
     let stall = 6.0;
@@ -175,13 +175,13 @@ fn dc_motor_from_rest() {
     }
 }
 
-/// All three targets of step n, wobbling.
+/// Oscillating targets of position, velocity and effort in step n.
 fn wobble(n: i32) -> [f64; 3] {
     let n = f64::from(n);
     [0.5 * (0.31 * n).sin(), 0.2 * (0.7 * n).cos(), 0.3 * (1.1 * n).sin()]
 }
 
-/// The targets that act in step n: before, those of the start.
+/// The targets that act in step n; before the delay has passed, those of the start.
 fn delayed(n: i32, delay: i32) -> [f64; 3] {
     if n < delay { [0.0; 3] } else { wobble(n - delay) }
 }
@@ -191,7 +191,7 @@ fn assert_at(found: [f64; 2], law: &Law, what: &str) {
     assert_number(&format!("velocity, {what}"), found[1], law.v, EXACT);
 }
 
-/// Targets act in each environment its own number of steps later.
+/// Targets act in each environment after its own number of steps.
 #[test]
 fn delay_per_environment() {
     let delays = [0, 1, 3, 6];
@@ -215,17 +215,17 @@ fn delay_per_environment() {
             apart = apart.max((laws[0].q - laws[3].q).abs());
         }
         assert!(apart > 0.05, "the control: a delay shows: {apart}");
-        // A reset forgets the delayed targets, and keeps the delays.
+        // A reset clears the delayed targets, and keeps the delays.
         world.sim.reset(None).unwrap();
         assert_eq!(world.view().delay().column(0).to_vec(), [0, 1, 3, 6]);
     }
 }
 
-/// In step n the targets of step n - d(n) act: the last ones again where the delay grows, some never where it falls.
+/// In step n the targets of step n - d(n) act: an increasing delay repeats targets, a decreasing one skips some.
 #[test]
 fn delay_that_changes() {
     let mut world = world(&[wheel()], with(DelayedPd { delay: 2, max_delay: 7 }, 25.0, 1.0), weightless());
-    // First step and delay from there on; the first one is longer than any before.
+    // First step of each delay, and the delay; the first delay is longer than any before.
     let changes = [(1, 7), (20, 2), (50, 5), (100, 1), (110, 0), (120, 7), (150, 0)];
     let (mut delay, mut law, mut acted) = (2, law(25.0, 1.0), Vec::new());
     for n in 0..180 {
@@ -239,13 +239,13 @@ fn delay_that_changes() {
         law.step_to(delayed(n, delay));
         assert_at([world.q()[0], world.v()[0]], &law, &format!("step {n}"));
     }
-    // As documented: from 2 to 5 steps three targets act again, from 5 to 1 four never do.
+    // As documented: from 2 to 5 steps three targets act again, from 5 to 1 four are skipped.
     assert_eq!(acted[48..55], [46, 47, 45, 46, 47, 48, 49]);
     assert_eq!(acted[98..102], [93, 94, 99, 100]);
 }
 
-/// A target that was set in a wide range and acts in a tight one acts at the end of the tight one, and one that waits until
-/// the range is wide again as it was set.
+/// A delayed target is clamped to the range at the time it acts. A target that acts while the range is tight is
+/// clamped; a target that was set earlier and acts after the range is wide again is unchanged.
 #[test]
 fn delay_across_limits() {
     let delay = 5;
@@ -265,7 +265,7 @@ fn delay_across_limits() {
         let acts = set.len().checked_sub(1 + delay as usize).map_or([0.0; 3], |k| set[k]);
         let aim = clamp(range, acts[0]);
         cut += u32::from(aim != acts[0]);
-        // Set before the range was tight, it acts after.
+        // Set before the range became tight, and acting after.
         spared += u32::from(n % 40 >= 23 && n % 40 < 25 && clamp(tight, aim) != aim);
         law.step_to([aim, acts[1], acts[2]]);
         assert_at([world.q()[0], world.v()[0]], &law, &format!("step {n}"));
@@ -273,7 +273,7 @@ fn delay_across_limits() {
     assert!(cut > 3 && spared > 3, "the control: {cut} were clamped when they acted, {spared} were not");
 }
 
-/// A step that is done again, because its buffers were too small, is one step of the delay line.
+/// A step that is repeated with larger buffers counts as one step of the delay line.
 #[test]
 fn delay_in_a_repeated_step() {
     let joints = ["a", "b", "c"].map(|name| Joint::wheel(name, M).range(-0.02, 0.02));
@@ -284,7 +284,7 @@ fn delay_in_a_repeated_step() {
         env.drives = drives;
         env
     };
-    // One size for each version of MuJoCo: rows of constraints on 2.2.2, one arena on 4.x.
+    // One size for each MuJoCo version: constraint rows on 2.2.2, one arena on 4.x.
     let huge = Buffers { contacts: 100, constraints: 100, arena_bytes: 1 << 20 };
     let mut in_motion = 0;
     for i in 0..40 {
@@ -294,7 +294,7 @@ fn delay_in_a_repeated_step() {
         for n in 0..60 {
             for env in [&mut small, &mut large] {
                 for drive in 0..3 {
-                    // The stops are hit one after the other: each needs a row more.
+                    // The stops are hit one after the other, and each adds a row.
                     env.drives.feedforward[drive] = 20.0 * (0.3 * f64::from(n) - drive as f64).sin();
                 }
                 step(env);
@@ -308,10 +308,10 @@ fn delay_in_a_repeated_step() {
     assert!(in_motion > 0, "some step was done again");
 }
 
-/// Underdamped second order: M q'' = kp (q* - q) - kd q' from rest,
-/// q = q* (1 - exp(-z w t) (cos(d t) + z w / d sin(d t))), w² = kp / M, z = kd / (2 M w), d = w sqrt(1 - z²); later by the
-/// delay. Euler's method is of first order: the error is about h times the acceleration's scale, and half of it with half
-/// the step. The bound 5 h w q* holds for z = 0.5; the control is the ratio of the errors.
+/// Underdamped second order: M q'' = kp (q* - q) - kd q' from rest, q = q* (1 - exp(-z w t) (cos(d t) + z w / d sin(d
+/// t))), w² = kp / M, z = kd / (2 M w), d = w sqrt(1 - z²), shifted by the delay. Euler's method is of first order: the
+/// error is about h times the scale of the acceleration, and half of it with half the step. The bound 5 h w q* holds
+/// for z = 0.5; the control is the ratio of the errors.
 #[test]
 fn second_order() {
     let (m, w, z, aim) = (0.1_f64, 10.0_f64, 0.5_f64, 0.05);
@@ -338,7 +338,7 @@ fn second_order() {
     }
 }
 
-/// Models are chosen by joint; others are driven as the robot is. Gains change at run time as those of other drives do.
+/// Models are selected by joint; the other joints use the robot's drive. Gains change at run time as for other drives.
 #[test]
 fn models_beside_rows() {
     let (kp, kd) = (60.0, 4.0);
@@ -363,8 +363,8 @@ fn models_beside_rows() {
     world.assert_well();
 }
 
-/// h² kp + 2 h kd = 4 I with the inertia I of a wheel and, times the square of its ratio, of the one that follows it; gains
-/// that are not stable at this time step are a warning, as for MuJoCo's actuators.
+/// h² kp + 2 h kd = 4 I, where I is the inertia of a wheel plus the squared ratio times that of its follower. Gains
+/// that are unstable at this time step give a warning, as for MuJoCo's actuators.
 #[test]
 fn largest_stable_step() {
     // kp = (0.8 - 0.02) / 1e-4 = 7800.
@@ -376,7 +376,7 @@ fn largest_stable_step() {
     let world = world(&joints, gains(kp, kd), weightless());
     let description = world.view().description();
     let (plans, _) = plan(description, &gains(kp, kd), &BTreeMap::new(), &[], false).unwrap();
-    // The two do not feel each other but through the coupling, which is not in the mass matrix.
+    // The two joints interact only through the coupling, which is not in the mass matrix.
     let felt = effective_inertias(description, &plans, false).unwrap();
     let limit = Tolerance::mixed(1e-12, "rounding of a mass matrix of two joints and its inverse");
     assert_number("inertia of a", felt[0], leader, limit);
@@ -384,7 +384,7 @@ fn largest_stable_step() {
     let of = |inertia: f64| ((kd * kd + 4.0 * inertia * kp).sqrt() - kd) / kp;
     let (expected, alone) = (of(leader + ratio * ratio * follower), of(leader));
     let found = stable_timestep_of(Scheme::Explicit, description, &plans, false).unwrap();
-    // Bisected to 1e-9 of it.
+    // Bisected to a relative accuracy of 1e-9.
     assert_number("largest step", found / expected, 1.0, Tolerance::mixed(2e-9, "bisected to 1e-9 of it"));
     assert!((found / alone - 1.0).abs() > 0.1, "the control: the follower matters");
     assert!(warn_if_unstable(description, &plans, false, 0.99 * expected).is_none());
@@ -414,7 +414,7 @@ fn refused_models() {
         assert!(matches!(**plan, PlanError::ActuatorModel { .. } | PlanError::Drive(_)), "{error}");
         assert!(parts.iter().all(|part| error.to_string().contains(part)), "{error} lacks {parts:?}, of {what}");
     }
-    // A velocity limit in the file is enough; a passive joint needs none.
+    // A velocity limit in the file is sufficient; a passive joint needs none.
     try_world(&[wheel().effort(5.0)], plain(), weightless()).unwrap();
     try_world(&[wheel()], DriveCfg { drive_type: DriveType::None, ..plain() }, weightless()).unwrap();
 }
@@ -443,7 +443,7 @@ fn refused_delays() {
 }
 
 const ENVS: usize = 3;
-/// Two wheels with the model, and one without.
+/// Inertias of two wheels with the model, and of one without.
 const MOMENTS: [f64; 3] = [0.2, 0.5, 0.3];
 const LIMIT: f64 = 0.9;
 
@@ -459,7 +459,7 @@ fn first_settings() -> Settings {
     ([3.0, 0.4, LIMIT].map(|value| Array2::from_elem((ENVS, 3), value)), Array2::default((ENVS, 3)))
 }
 
-/// Changes of step n, of single joints in single environments.
+/// Changes of step n, for single joints in single environments.
 fn change(world: &mut World, settings: &mut Settings, n: i32) {
     const A: Option<&[JointIndex]> = Some(&[JointIndex(0)]);
     const B: Option<&[JointIndex]> = Some(&[JointIndex(1)]);
@@ -483,7 +483,7 @@ fn change(world: &mut World, settings: &mut Settings, n: i32) {
             (kind[(1, 0)], kind[(2, 1)]) = (DriveType::Acceleration, DriveType::None);
         }
         160 => {
-            // A number that is set while it does not act, acts when it does.
+            // A gain that is set while the type is `None` acts when the type changes.
             robot.set_stiffness(&array![[5.0]], B, TWO).unwrap();
             robot.set_drive_type(DriveType::Force, None, None).unwrap();
             stiffness[(2, 1)] = 5.0;
@@ -506,11 +506,11 @@ fn three_wheels(model: ActuatorModel) -> World {
     world(&joints, drive, weightless_envs(ENVS))
 }
 
-/// Below its stall effort and far from its speed without load a motor gives the clamped sum, as the others do. Gains of type
-/// `acceleration` are multiplied by M, type `none` has none.
+/// Below its stall effort and far below its no-load speed, a DC motor gives the clamped sum, like the other models.
+/// Gains of the type `Acceleration` are multiplied by M; the type `None` has no gains.
 #[test]
 fn changes_at_run_time() {
-    // All three targets of step n, wide enough to reach the limit.
+    // Targets of step n, with an amplitude that reaches the limit.
     let wobble = |n: i32, joint: usize| {
         let (n, phase) = (f64::from(n), joint as f64);
         [0.6 * (0.13 * n + phase).sin(), 0.2 * (0.7 * n + phase).cos(), 0.1 * (1.1 * n - phase).sin()]
@@ -520,7 +520,7 @@ fn changes_at_run_time() {
         let [mut world, mut unchanged] = [(); 2].map(|()| three_wheels(model));
         let mut settings = first_settings();
         assert_eq!(settings_of(&world), settings, "{name}");
-        // In the second round every change before the reset holds from the start.
+        // In the second round every change before the reset applies from the start.
         for round in 0..2 {
             let mut laws = Array2::from_elem((ENVS, 2), law(0.0, 0.0));
             let (mut saturated, mut free, mut apart) = (0, 0, 0.0_f64);
@@ -540,7 +540,7 @@ fn changes_at_run_time() {
                     let unit = match kind[at] {
                         DriveType::Force => 1.0,
                         DriveType::Acceleration => m,
-                        // Nothing but `None` is left of what is set here.
+                        // For the types set here, only `None` remains.
                         _ => 0.0,
                     };
                     let (kp, kd) = (unit * stiffness[at], unit * damping[at]);
@@ -572,7 +572,7 @@ fn changes_at_run_time() {
     }
 }
 
-/// A motor's own demands hold for random numbers as for those that are set: an effort limit must be finite.
+/// A motor requires a finite effort limit, for randomized values as for values that are set.
 #[test]
 fn randomized_limits() {
     for model in ActuatorModel::examples() {
@@ -591,7 +591,7 @@ fn randomized_limits() {
                 &["environment 2", "max_effort", "\"robot/b\"", "dc_motor", "finite"],
             );
             assert_eq!(settings_of(&world), first_settings(), "nothing is set");
-            // The wheel without a model may have no limit.
+            // The wheel without a model may be unlimited.
             unlimited(&mut world.sim, "robot/c", None).unwrap();
         } else {
             result.unwrap();

@@ -1,9 +1,9 @@
-//! Exports: plain MuJoCo, without our drives, is stable on them as far as the comment in the file says.
+//! Exported models: plain MuJoCo, without our drives, is stable up to the time step named in the comment of the file.
 //!
-//! From the keyframe `start` with the targets there, and with targets 0.5 rad away (so that drives saturate). Stable: no
-//! MuJoCo warning and, where the targets are those of the start, at rest after 1 s (1 mrad/s); where the named step is too
-//! small to wait for that, no joint is faster than the law makes it (5 rad/s for 0.5 rad at kp / kd = 10 / s, times 2).
-//! Control: steps far above the one that is named diverge.
+//! Each run starts from the keyframe `start`, with its targets and with targets 0.5 rad away (so that drives saturate).
+//! Stable means: no MuJoCo warning and, with the targets of the start, at rest after 1 s (1 mrad/s). If the named step
+//! is too small to wait for that, no joint may be faster than the law allows (5 rad/s for 0.5 rad at kp / kd = 10 / s,
+//! times 2). Control: steps far above the named one diverge.
 
 use crate::drives::worlds::*;
 use kinetoscope::mujoco as mj;
@@ -16,7 +16,7 @@ struct Export {
     xml: String,
     start: Vec<f64>,
     targets: Vec<f64>,
-    /// The step that the comment names, if it names one.
+    /// The largest step named in the comment, if any.
     bound: Option<f64>,
 }
 
@@ -41,7 +41,7 @@ fn export(cfg: RobotCfg) -> Export {
 }
 
 impl Export {
-    /// Largest speed at the end, or `None` where MuJoCo warned.
+    /// Largest speed at the end, or `None` if MuJoCo warned.
     fn run(&self, h: f64, steps: usize, offset: f64) -> Option<f64> {
         let old = between(&self.xml, "timestep=\"", "\"");
         let xml = self.xml.replacen(&format!("timestep=\"{old}\""), &format!("timestep=\"{h:e}\""), 1);
@@ -62,8 +62,8 @@ impl Export {
     }
 }
 
-/// Cause: couplings are solved before implicit damping slows the drivers, so exports were explicit, at time steps of 1e-7 s and
-/// less for fingers of some grams.
+/// Regression: couplings are solved before implicit damping slows the drivers, so exports were explicit, at time steps
+/// of 1e-7 s and less for fingers of some grams.
 #[test]
 fn with_followers() {
     let init_qpos = vec![("JOINT2".into(), 0.4), ("LEFT_HAND_INDEX".into(), 0.3)];
@@ -75,13 +75,14 @@ fn with_followers() {
     assert!(export.xml.contains("accelerates more slowly"), "what was given up is said");
     for h in [step, 0.5 * step, 0.1 * step] {
         let [hold, reach] = [0.0, 0.5].map(|offset| export.run(h, (2.0 / h) as usize, offset).unwrap());
-        // Without a limit in the way a drive closes in at kp e / kd: 10 / s x 0.5 rad, a follower 1.05 times as fast.
+        // Without a limit a drive approaches its target at kp e / kd: 10 / s x 0.5 rad; a follower is 1.05 times as
+        // fast.
         assert!(hold < 1e-3 && reach < 10.0, "{h}: {hold} {reach}");
     }
     assert!(export.run(1e4 * bound, 400, 0.5).is_none(), "the control: a step far above it diverges");
 }
 
-/// Followers of an export are where their drivers put them, while these move.
+/// Followers of an export stay at the positions given by their moving drivers.
 #[test]
 fn followers_track() {
     let export = export(RobotCfg {
@@ -111,7 +112,7 @@ fn followers_track() {
             moved = moved.max(at(*driver).abs());
         }
     }
-    // The control: drivers move by far more than followers are off.
+    // Control: drivers move much farther than the error of the followers.
     assert!(far < 5e-3 && moved > 0.3, "{far} rad off, {moved} rad moved");
 }
 
@@ -123,7 +124,7 @@ fn without_followers() {
     let bound = export.bound.expect("drives have limits: both lines name a step");
     for h in [1e-3, 0.01, 0.05] {
         assert!(export.run(h, 1000, 0.0).unwrap() < 1e-3, "{h}");
-        // On 2.2.2, velocity-implicit: up to the named step, whether drives saturate or not.
+        // On 2.2.2, velocity-implicit: stable up to the named step, with and without saturation.
         assert!(mj::TARGET != mj::Target::V2 || export.run(h, 3000, 0.5).unwrap() < 1e-3, "{h}");
     }
     match mj::TARGET {
@@ -136,8 +137,8 @@ fn without_followers() {
     }
 }
 
-/// Implicit integrators take the damping of an actuator to the end of the step, its stiffness not: with little damping
-/// the bound is `h = (kd + sqrt(kd² + 4 M kp)) / kp`, and no drive needs to saturate for it.
+/// Implicit integrators evaluate the damping of an actuator at the end of the step, but not its stiffness: with little
+/// damping the bound is `h = (kd + sqrt(kd² + 4 M kp)) / kp`, also without saturation.
 #[test]
 fn little_damping() {
     let (m, kp, kd) = (1e-5, 1e4, 0.1_f64);
@@ -146,7 +147,7 @@ fn little_damping() {
     let export = export(RobotCfg { drive: gains(kp, kd), ..robot });
     let (bound, expected) = (export.bound.unwrap(), (kd + (kd * kd + 4.0 * m * kp).sqrt()) / kp);
     assert!((bound / expected - 1.0).abs() < 1e-3, "{bound} {expected}");
-    // From 1 mrad beside the target. Below the bound the slowest mode decays by the root of det = M / (M + h kd), 4 % a
+    // From 1 mrad off the target. Below the bound the slowest mode decays by the root of det = M / (M + h kd), 4 % a
     // step; above it, it grows.
     let below = export.run(0.9 * bound, 4000, 1e-3).unwrap();
     assert!(below < 1e-3, "{below}");

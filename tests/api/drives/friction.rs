@@ -1,16 +1,16 @@
-//! Dry friction f of a joint (Coulomb: -f sign(v) in motion, up to ±f at rest), alone and with a drive; and how far a drive
-//! gives way under a load.
+//! Dry friction f of a joint (Coulomb: -f sign(v) in motion, up to ±f at rest), alone and with a drive; and the
+//! compliance of a drive under a load.
 //!
 //! In motion friction is exact: M (v' - v) = h (tau(q', v') - f sign v'), tolerance 1e-9 as in `law.rs`. Friction is a
-//! constraint row of MuJoCo's, which is a stiff damper below its limit: at rest under a load tau < f it creeps with
-//! v = tau R / b, R = (1 - d) / d / M, b = 1 / h, d = 0.9999 (MuJoCo's largest): 1e-4 h tau / M. Where a test holds still,
-//! twice that is its tolerance. Control: MuJoCo's default d = 0.9 and b = 105 / s creep out of the band within a second.
+//! constraint row of MuJoCo, which is a stiff damper below its limit. At rest under a load tau < f it creeps with v =
+//! tau R / b, R = (1 - d) / d / M, b = 1 / h, d = 0.9999 (MuJoCo's largest): 1e-4 h tau / M. Tests of joints at rest
+//! allow twice that. Control: MuJoCo's default d = 0.9 and b = 105 / s creep out of the band within a second.
 //!
-//! A soft drive (kp 40, kd 5) under gravity sags by exactly tau_g / kp: at rest the law reads kp (q* - q) = tau_g(q), with
-//! tau_g from `kinetoscope_robot::dynamics`, which has no drives. The slowest mode decays with kd / kp = 0.125 s: after 10 s, exp(-80) of
-//! it is left. Tolerance 1e-9 rad: rounding of positions through kp. A 1 % change of kp would move the joints by 2 mrad.
-//! Control: the same row with MuJoCo's own stiffness (only its reference acceleration rewritten) is a rigid drive that hangs
-//! less than a tenth as low.
+//! A soft drive (kp 40, kd 5) under gravity sags by exactly tau_g / kp. At rest the law is kp (q* - q) = tau_g(q), with
+//! tau_g from `kinetoscope_robot::dynamics`, which has no drives. The slowest mode decays with kd / kp = 0.125 s: after
+//! 10 s, exp(-80) of it is left. Tolerance 1e-9 rad: rounding of positions through kp. A 1 % change of kp would move
+//! the joints by 2 mrad. Control: the same row with MuJoCo's own stiffness (only its reference acceleration rewritten)
+//! is a rigid drive that sags by less than a tenth.
 
 use crate::drives::law::EXACT;
 use crate::drives::worlds::*;
@@ -28,7 +28,7 @@ fn rough(name: &str) -> Joint {
     Joint::wheel(name, M).rough(F)
 }
 
-/// q* within ±f / kp of q moves nothing; from farther away the joint stops f / kp before its target.
+/// A target within ±f / kp of q causes no motion; from farther away the joint stops f / kp before its target.
 #[test]
 fn band() {
     // Overdamped, so that it does not overshoot: kd² > 4 M kp. 3 s are 15 time constants.
@@ -67,7 +67,7 @@ fn one_step() {
     }
 }
 
-/// A lever that gravity loads with less than f stays where it is, driven or not; with more it moves. At q = 0 the load is
+/// A lever with a gravity load below f stays in place, driven or not; with a larger load it moves. At q = 0 the load is
 /// 0.5 kg x 9.81 x 0.2 m = 0.981 N m. MuJoCo's default friction creeps.
 #[test]
 fn holds_a_load() {
@@ -101,13 +101,13 @@ fn arm_in_its_band() {
     for (i, f) in [3.0, 1.0].into_iter().enumerate() {
         let left = 400.0 * (aim[i] - world.q()[i]) - load[i];
         assert!(left.abs() <= f * (1.0 + 1e-3) && left.abs() > 0.5 * f, "joint {i}: {left}");
-        // creep() with what joint b feels, 1 / (M^-1)_bb = 8e-3 kg m².
+        // The formula of `creep` with the effective inertia of joint b, 1 / (M^-1)_bb = 8e-3 kg m².
         assert!(world.v()[i].abs() < 3e-4, "joint {i}: {}", world.v()[i]);
     }
 }
 
-/// Drives, their friction, friction of undriven joints and of a second robot are rows of one list: each drive's effort is
-/// its own law at the new state, and each undriven wheel decelerates by its own friction.
+/// Drives, their friction, the friction of undriven joints and a second robot share one list of rows. Each drive's
+/// effort is its own law at the new state, and each undriven wheel decelerates by its own friction.
 #[test]
 fn rows_of_one_list() {
     let (kp, kd) = (100.0, 10.0);
@@ -159,7 +159,7 @@ fn sag() {
         let limit = Tolerance::mixed(40e-9, "1e-9 rad times kp = 40 N m/rad");
         assert_number("the drive carries the load", world.effort()[i], load[i], limit);
     }
-    // The control.
+    // Control.
     let row = format!("frictionloss=\"30\" solreffriction=\"{} 1\" solimpfriction=\".999 .999 .001\"", 2.0 * H);
     let mut data = plain(&hinge_mjcf("", &row, [1.0, 0.2, 0.01]));
     for _ in 0..1000 {

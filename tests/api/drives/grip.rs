@@ -1,13 +1,14 @@
-//! A finger that presses on a fixed block pushes with the force that its limit implies, instead of walking through it.
+//! A finger that presses on a fixed block pushes with the force that follows from its effort limit, and does not
+//! penetrate the block.
 //!
-//! A finger of 45 g turns about x; its round tip, 90 mm from the axis, meets a block whose face is normal to the tip's
-//! path at 0.3 rad; the drive (1e3 / 1e2) aims at 0.8 rad with a limit of 2 N m. At rest the limit is in balance with the
-//! contact: F = 2 N m / 0.09 m = 22.2 N. Tolerance 5 %: the tip rests a little inside the face, and the four edges of
-//! the friction pyramid tilt the force. The finger rests (1 mrad/s), the center of its tip in front of the face: its depth
-//! is that of MuJoCo's default contact, 2.5 mm of the tip's radius of 8 mm.
+//! A finger of 45 g turns about x. Its round tip, 90 mm from the axis, meets a block whose face is normal to the tip's
+//! path at 0.3 rad. The drive (1e3 / 1e2) has the target 0.8 rad and a limit of 2 N m. At rest the limit balances the
+//! contact: F = 2 N m / 0.09 m = 22.2 N. Tolerance 5 %: the tip rests slightly inside the face, and the four edges of
+//! the friction pyramid tilt the force. The finger is at rest (1 mrad/s) with the center of its tip in front of the
+//! face: its depth is that of MuJoCo's default contact, 2.5 mm of the tip's radius of 8 mm.
 //!
-//! Control: the same drive as a torque computed beforehand (the implicit law without the contact in it, clamped, applied
-//! from outside) holds with less than half of that.
+//! Control: the same drive as a precomputed torque (the implicit law without the contact, clamped and applied
+//! externally) holds with less than half of that force.
 
 use crate::drives::worlds::*;
 use kinetoscope::mujoco as mj;
@@ -22,7 +23,7 @@ const LIMIT: f64 = 2.0;
 const LEVER: f64 = 0.09;
 const AIM: f64 = 0.8;
 const FACE: f64 = 0.3;
-/// Moment of inertia about the joint.
+/// Moment of inertia about the joint \[kg m²\].
 const MOMENT: f64 = 3e-5 + 0.045 * 0.045 * 0.045;
 
 fn scene(drive: DriveCfg, cone: Cone) -> World {

@@ -1,23 +1,24 @@
-//! The law of one drive, and of several on one chain.
+//! The law of one drive, and of several drives on one chain.
 //!
-//! A row drive gives tau = clamp(kp (q* - q') + kd (v* - v') + tau_ff, ±limit) at the end of the step, with q' = q + h v'.
-//! For a joint of constant inertia M and viscous damping B without other loads, M (v' - v) = h (tau - B v') gives, unsaturated,
+//! A drive as constraint row gives tau = clamp(kp (q* - q') + kd (v* - v') + tau_ff, ±limit) at the end of the step,
+//! with q' = q + h v'. For a joint of constant inertia M and viscous damping B without other loads, M (v' - v) = h
+//! (tau - B v') gives, unsaturated,
 //!
 //! ```text
 //! v' = (M v + h (kp (q* - q) + kd v* + tau_ff)) / (M + h B + h kd + h² kp)
 //! ```
 //!
-//! and saturated v' = (M v ± h limit) / (M + h B). `DriveModel::Actuator` and explicit models give the law at the start of
-//! the step: (M + h B) (v' - v) = h (tau - B v). Gains of type `Acceleration` are multiplied by I = 1 / (M⁻¹)_ii at the
-//! start, type `None` has none. For a chain with mass matrix M(q) and bias c(q, v) (both taken at the start of the step by
-//! MuJoCo's Euler integrator), with the set S of saturated joints known, (M + h B + h Kd + h² Kp) v' = M v + h (Kp (q* - q) +
-//! Kd v* + tau_ff - c), rows in S with their gains zero and ±limit.
+//! and saturated v' = (M v ± h limit) / (M + h B). `DriveModel::Actuator` and explicit models evaluate the law at the
+//! start of the step: (M + h B) (v' - v) = h (tau - B v). Gains of type `Acceleration` are multiplied by I = 1 /
+//! (M⁻¹)_ii at the start; type `None` has no gains. For a chain with mass matrix M(q) and bias c(q, v) (both evaluated
+//! at the start of the step by MuJoCo's Euler integrator), with the known set S of saturated joints, (M + h B + h Kd +
+//! h² Kp) v' = M v + h (Kp (q* - q) + Kd v* + tau_ff - c); rows in S have zero gains and ±limit.
 //!
 //! Tolerance 1e-9, relative above 1: the solver's problem is quadratic between its corners, so Newton's method is exact
-//! there up to rounding, which is 1e-16 times the ratio of the largest to the smallest of M and h kd + h² kp (up to 1e6
-//! here); over 200 steps stable gains do not let it grow. Controls: the explicit law misses by more than 1e-3; MuJoCo's own
-//! damping beside a row scales the solver's acceleration by M / (M + h B) after the solve: a light link moves more than ten
-//! times more slowly.
+//! there up to rounding. Rounding is 1e-16 times the ratio of the largest to the smallest of M and h kd + h² kp (up to
+//! 1e6 here); over 200 steps stable gains do not amplify it. Controls: the explicit law misses by more than 1e-3;
+//! MuJoCo's own damping beside a row scales the solver's acceleration by M / (M + h B) after the solve: a light link
+//! moves more than ten times more slowly.
 
 use crate::drives::worlds::*;
 use kinetoscope::mujoco as mj;
@@ -29,7 +30,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 pub(crate) const EXACT: Tolerance =
     Tolerance::mixed(1e-9, "Newton's method: rounding of 1e-16 times a ratio of up to 1e6 of inertias and gains");
 
-/// A joint of inertia `m` with viscous damping `b`, and what drives it.
+/// A joint of inertia `m` with viscous damping `b`, and its drive.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Law {
     pub(crate) h: f64,
@@ -59,7 +60,7 @@ pub(crate) const LAW: Law = Law {
 };
 
 impl Law {
-    /// Goes a step further and returns the effort.
+    /// Takes a step and returns the effort.
     pub(crate) fn step(&mut self) -> f64 {
         let Law { h, m, b, kp, kd, limit, q, v, aim: [aim, v_aim, ff], .. } = *self;
         let now = kp * (aim - q) + kd * v_aim + ff;
@@ -71,7 +72,7 @@ impl Law {
         tau
     }
 
-    /// The same with targets that change; true if the limit binds.
+    /// Takes a step with new targets; returns the effort, and true if the limit binds.
     pub(crate) fn step_to(&mut self, aim: [f64; 3]) -> (f64, bool) {
         self.aim = aim;
         let unlimited = Law { limit: f64::INFINITY, ..*self }.step();
@@ -84,7 +85,7 @@ impl Law {
         if self.limit.is_finite() { joint.effort(self.limit) } else { joint }
     }
 
-    /// Steps a joint with this drive, and returns the number of steps at its limit.
+    /// Steps a joint with this drive; returns the number of steps at its limit.
     fn check(mut self, what: &str, joint: &Joint, drive: DriveCfg, steps: usize) -> usize {
         let world = world(std::slice::from_ref(joint), drive, at_dt(self.h, weightless()));
         assert!(!world.warned_unstable(), "{what}");
@@ -102,7 +103,7 @@ impl Law {
             assert_number(&format!("position of {what}"), env.data().qpos()[0], self.q, EXACT);
             let found = env.drives.effort.first().copied().unwrap_or(0.0);
             assert_number(&format!("effort of {what}"), found, tau, EXACT);
-            // The limit is held to the last bit, and by nothing that it does not bind.
+            // A saturated effort equals the limit bit for bit, and an unsaturated effort does not.
             assert_eq!(found.abs() == self.limit, bound, "{what}");
             saturated += usize::from(bound);
         }
@@ -134,7 +135,7 @@ fn one_step() {
         let distinct = case.kp > 0.0 || case.kd > 0.0;
         assert!(!distinct || (explicit.v - implicit.v).abs() > 1e-3 * implicit.v.abs(), "the control: {case:?}");
     }
-    // Rotor inertia adds to the joint's own.
+    // Rotor inertia adds to the joint's own inertia.
     let rotor = Law { m: 0.4, kp: 200.0, kd: 10.0, aim: [0.5, 0.0, 0.0], ..LAW };
     let drive = DriveCfg { armature: [("j", 0.3)].into(), ..gains(200.0, 10.0) };
     rotor.check("a rotor", &Joint::wheel("j", 0.1), drive, 1);
@@ -161,7 +162,7 @@ fn recurrences() {
         for law in [Law { v: 3.0, ..light }, Law { b: 0.5, v: 3.0, ..LAW }] {
             law.check("an undriven joint", &law.joint(), DriveCfg { model, ..no_drive() }, 50);
         }
-        // Gains that are accelerations move light and heavy joints alike.
+        // Gains of acceleration drives move light and heavy joints alike.
         let (drive_type, explicit) = (DriveType::Acceleration, model == DriveModel::Actuator);
         for m in [0.05, 5.0] {
             let law = Law { m, kp: 90.0 * m, kd: 15.0 * m, aim: [0.4, 0.0, 0.0], explicit, ..LAW };
@@ -170,7 +171,7 @@ fn recurrences() {
     }
 }
 
-/// The control: a row as it is, with the damping left to MuJoCo.
+/// Control: an unmodified row, with the damping left to MuJoCo.
 #[test]
 fn mujocos_damping_beside_a_row() {
     let (m, b, kp, kd, aim) = (1e-5, 0.1, 10.0, 0.5, 0.5);
@@ -203,16 +204,16 @@ fn substeps() {
     assert_number("velocity after five substeps", world.v()[0], law.v, EXACT);
 }
 
-/// Saturated, the effort is the limit to the last bit and the motion is that of the limit; a demand of 99.9 % of the
-/// limit is not clamped, one of 100.1 % is. The clamp is on the whole sum: a feed-forward cannot lift the drive over its
-/// limit, and works against the rest.
+/// Saturated, the effort is the limit to the last bit and the motion is that of the limit. A demand of 99.9 % of the
+/// limit is not clamped, one of 100.1 % is. The clamp applies to the whole sum: a feed-forward cannot exceed the limit,
+/// and can cancel the other terms.
 #[test]
 fn effort_limit() {
     let law = Law { m: 0.02, kp: 1e3, kd: 1e2, limit: 2.0, ..LAW };
     let (drive, joint) = (gains(law.kp, law.kd), law.joint());
     for sign in [1.0, -1.0] {
         for v in [0.0, 0.7, -3.0] {
-            // The aim at which the unclamped law asks for `share` of the limit.
+            // The target for which the unclamped law gives `share` of the limit.
             for share in [0.5, 0.999, 1.001, 50.0] {
                 let end = v + H / law.m * sign * law.limit * share;
                 let aim = [(sign * share * law.limit + (law.kd + H * law.kp) * end) / law.kp, 0.0, 0.0];
@@ -222,7 +223,7 @@ fn effort_limit() {
             }
         }
     }
-    // kp e = 30 and tau_ff = -29: neither fits into the limit, their sum does.
+    // kp e = 30 and tau_ff = -29: each exceeds the limit, but their sum does not.
     for (kp, kd, aim, binds) in
         [(100.0, 1.0, [0.0, 0.0, 5.0], 1), (0.0, 0.0, [0.0, 0.0, 5.0], 1), (100.0, 1.0, [0.3, 0.0, -29.0], 0)]
     {
@@ -231,7 +232,8 @@ fn effort_limit() {
     }
 }
 
-/// An effort limit of 0 or none at all in the file is no limit, with a warning; the configuration goes before the file.
+/// An effort limit of 0, or a missing one, in the file means no limit, with a warning; the configuration overrides the
+/// file.
 #[test]
 fn effort_limit_of_the_file() {
     for joint in [Joint::wheel("j", 0.1), Joint::wheel("j", 0.1).effort(0.0)] {
@@ -257,8 +259,8 @@ fn effort_limit_of_the_file() {
     }
 }
 
-/// Three joints that move each other, in motion under gravity, with none to three of them saturated; and damped, the second
-/// without gains.
+/// Three coupled joints in motion under gravity, with none to three of them saturated; then with damping, and the
+/// second joint without gains.
 #[test]
 fn chain() {
     let a = Joint::lever("a", 3.0, 0.2, 0.02);
@@ -284,7 +286,7 @@ fn chain() {
         env.drives.position.copy_from_slice(&aim);
         step(&mut env);
         let (tau, (mass, bias)) = (env.drives.effort.clone(), world.dynamics(&q, &v, &EARTH));
-        // Gains of the joints that are not at their limit; the others contribute ±limit.
+        // Gains of the joints below their limit; the saturated joints contribute ±limit.
         let saturated: Vec<bool> = (0..3).map(|i| tau[i].abs() == limits[i]).collect();
         let gain = |k: [f64; 3]| DVector::from_fn(3, |i, _| if saturated[i] { 0.0 } else { k[i] });
         let (kps, kds) = (gain(kp), gain(kd));
@@ -295,7 +297,7 @@ fn chain() {
         for i in 0..3 {
             assert_number(&format!("joint {i}, limits {limits:?}"), env.data().qvel()[i], expected[i], EXACT);
             assert!(tau[i].abs() <= limits[i]);
-            // A joint at its limit is one whose law asks for more.
+            // The law of a saturated joint demands at least its limit.
             let asked = kp[i] * (aim[i] - env.data().qpos()[i]) - kd[i] * env.data().qvel()[i];
             assert!(!saturated[i] || asked * tau[i].signum() >= limits[i], "joint {i}: {asked} {limits:?}");
         }
@@ -303,7 +305,8 @@ fn chain() {
     }
 }
 
-/// On a chain the inertia of gains that are accelerations is what the joint feels with the others free, rotor included.
+/// On a chain, the inertia of an acceleration drive is the joint's effective inertia with the other joints free,
+/// including the rotor.
 #[test]
 fn felt_inertia() {
     let a = Joint::lever("a", 3.0, 0.2, 0.02);
@@ -318,7 +321,8 @@ fn felt_inertia() {
     }
 }
 
-/// A damped planar joint between base and arm is no drive, and leaves the effort of the arm's drive the law at the new state.
+/// A damped planar joint between base and arm is not a drive; the effort of the arm's drive remains the law at the new
+/// state.
 #[test]
 fn damped_planar_joint() {
     let cart = Joint { axis: [0.0, 0.0, 1.0], mass: 2.0, ..Joint::new("cart", "planar").damped(50.0) };
@@ -335,8 +339,8 @@ fn damped_planar_joint() {
     assert!(env.data().qpos()[0].abs() > 1e-4, "the cart moves");
 }
 
-/// A velocity drive (kp = 0) holds v* where nothing pushes, and v* - load / kd under a load: M a = 0 = kd (v* - v) - f.
-/// The way there is (M / (M + h kd))^n, below 1e-15 after 400 steps. With friction f and damping B it gives f + B v.
+/// A velocity drive (kp = 0) holds v* without a load, and v* - load / kd under a load: M a = 0 = kd (v* - v) - f. It
+/// converges with (M / (M + h kd))^n, below 1e-15 after 400 steps. With friction f and damping B its effort is f + B v.
 #[test]
 fn velocity_target() {
     let (m, kd, aim, load) = (0.2, 3.0, 1.5, 0.9);
@@ -359,7 +363,7 @@ fn velocity_target() {
     assert_number("effort", world.effort()[0], f + b * v, EXACT);
 }
 
-/// The setters write what the law reads; efforts and velocities stay until changed, a reset clears them.
+/// The setters write the inputs of the law; efforts and velocities stay until changed, and a reset clears them.
 #[test]
 fn setters() {
     let case = CASES[5];
@@ -378,8 +382,8 @@ fn setters() {
     assert_eq!((world.q()[0], world.v()[0]), (0.0, 0.0), "a reset leaves nothing to push");
 }
 
-/// A passive joint takes efforts too: M a = tau, clamped to the file's limit, also where the model has no drive at all.
-/// Otherwise it is free: a pendulum whose target is read back as its position.
+/// A passive joint accepts efforts too: M a = tau, clamped to the file's limit, even if the model has no drive at all.
+/// Otherwise the joint is free: a pendulum whose target reads back as its position.
 #[test]
 fn joint_without_a_drive() {
     let mut world = world(&[Joint::wheel("j", 0.2).effort(3.0)], no_drive(), weightless());
@@ -403,7 +407,8 @@ fn joint_without_a_drive() {
     world.assert_well();
 }
 
-/// Targets clamp to the usable range: the joint's own, narrowed by those of its followers; the clamped one is read back.
+/// Targets are clamped to the usable range: the joint's own, narrowed by those of its followers; the clamped target is
+/// read back.
 #[test]
 fn target_range() {
     let mut world = world(&[Joint::wheel("j", 0.1).range(-0.4, 0.7).effort(50.0)], gains(1e3, 1e2), weightless());
@@ -414,7 +419,7 @@ fn target_range() {
         let limit = Tolerance::mixed(1e-6, "of the way 1.1^-200 is left after 2 s: kd / kp is ten steps");
         assert_number("position", world.q()[0], expected, limit);
     }
-    // The follower turns 1.5 times as far and may go to 0.6: the driver may go to 0.4, though its own range ends at 2.
+    // The follower moves 1.5 times as far and may reach 0.6: the driver may reach 0.4, though its own range ends at 2.
     let driver = Joint::wheel("d", 0.1).range(-0.2, 2.0).effort(50.0);
     let follower = Joint::wheel("f", 0.01).range(-1.0, 0.6).effort(0.0).following("d", 1.5);
     for model in [DriveModel::Implicit, DriveModel::Actuator] {
@@ -439,8 +444,9 @@ fn target_range() {
         assert_number("driver", world.q()[0], 0.4, limit);
         assert_number("follower", world.q()[1], 0.6, Tolerance::mixed(1e-5, "as for the driver"));
     }
-    // PR2's gripper: the follower turns against its driver and its own range is on the wrong side of 0. It left the driver no
-    // range, which was then frozen. Now the driver has its own range, and the follower goes with it.
+    // PR2's gripper: the follower turns against its driver, and its own range is on the wrong side of 0. Regression: no
+    // range was left for the driver, which was frozen. Now the driver has its own range, and the follower moves with
+    // it.
     let driver = Joint::wheel("d", 0.1).range(0.0, 0.548).effort(50.0);
     for (what, range) in
         [("one point is left", [0.0, 0.548]), ("nothing is left", [0.2, 0.5]), ("a hair", [-1e-4, 0.5])]

@@ -1,4 +1,4 @@
-//! Drives: what a joint does when it is commanded, law by law.
+//! Drives: the response of a joint to its targets, law by law.
 
 mod actuators;
 mod export;

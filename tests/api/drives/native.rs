@@ -1,9 +1,10 @@
-//! `DriveModel::Actuator`: MuJoCo's own actuator, the law at the start of the step (`law.rs` holds it against the
+//! `DriveModel::Actuator`: MuJoCo's own actuator, with the law at the start of the step (`law.rs` compares it with the
 //! recurrence), and the integrators.
 //!
-//! Stable while 4 M + 2 h B - 2 h Kd - h² Kp is positive definite; beyond, `add_robot` warns and names the largest step.
-//! Judge of that number: MuJoCo alone on the same document, 2 % below and above. Integrators: row drives with RK4 are an
-//! error; RK4 with actuators integrates with order 4: a pendulum keeps its energy to 1e-6 where Euler's error is 1e-3.
+//! It is stable while 4 M + 2 h B - 2 h Kd - h² Kp is positive definite; beyond, `add_robot` warns and names the
+//! largest step. Reference of that number: MuJoCo alone on the same document, 2 % below and above. Integrators: row
+//! drives with RK4 are an error. RK4 with actuators integrates with order 4: a pendulum keeps its energy to 1e-6, where
+//! Euler's error is 1e-3.
 
 use crate::drives::law::EXACT;
 use crate::drives::worlds::*;
@@ -12,7 +13,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::sim::{Error, IdealPd, Integrator};
 
-/// Largest speed after 3000 steps of plain MuJoCo from a slight motion, relative to it.
+/// Largest speed after 3000 steps of plain MuJoCo from a slight motion, relative to the initial speed.
 fn growth(xml: &str, h: f64) -> f64 {
     let from = xml.find("timestep=\"").unwrap() + "timestep=\"".len();
     let to = from + xml[from..].find('"').unwrap();
@@ -68,7 +69,7 @@ fn integrators_that_change_the_solution() {
         assert!(error.to_string().contains("DriveModel::Actuator"), "{error}");
         of(&["j"], native(10.0, 1.0), integrator).unwrap();
         of(&["j"], no_drive(), integrator).unwrap();
-        // A robot has rows only for joints without a model of their own (`actuators.rs` has the laws).
+        // A robot has rows only for joints without an actuator model (`actuators.rs` has the laws).
         of(&["a", "b"], modelled("[ab]", IdealPd {}, 10.0, 1.0), integrator).unwrap();
         let error = of(&["a", "b"], modelled("a", IdealPd {}, 10.0, 1.0), integrator).unwrap_err();
         assert!(matches!(*error, Error::Integrator { .. }), "joint b is a row");
@@ -86,8 +87,9 @@ fn integrators_that_change_the_solution() {
     }
 }
 
-/// The solver's acceleration, which `qacc` returns, is that of the force, a = -B v / M. MuJoCo's Euler takes the damping
-/// at the end of the step, v' = v + h M a / (M + h B). Row drives do that inside the solver: there they are the same.
+/// The solver's acceleration, returned by `qacc`, is that of the force, a = -B v / M. MuJoCo's Euler evaluates the
+/// damping at the end of the step, v' = v + h M a / (M + h B). Row drives do so inside the solver, where both are the
+/// same.
 #[test]
 fn accelerations_of_the_solver() {
     let (m, b, speed) = (0.2, 0.5, 2.0);

@@ -1,9 +1,10 @@
-//! Dry friction, damping and rotor inertia of joints that are changed while they run, per joint and per environment.
+//! Changes of dry friction, damping and rotor inertia at run time, per joint and per environment.
 //!
-//! A slide of mass m with damping b and rotor inertia a, without other loads, has after one step of MuJoCo's Euler, which
-//! integrates damping implicitly, the speed v (m + a) / (m + a + h b); pushed by F from rest, h F / (m + a + h b). Both are a
-//! handful of operations: 1e-12. Under dry friction f alone it comes to rest after m v² / 2 f; the constraint is soft, and
-//! short steps are off by h v: 1 %. Controls: environments that were not named do the same as before, to the last bit.
+//! A slide of mass m with damping b and rotor inertia a, without other loads, has the speed v (m + a) / (m + a + h b)
+//! after one step of MuJoCo's Euler, which integrates damping implicitly. Pushed by F from rest, its speed is h F /
+//! (m + a + h b). Both are a few operations: 1e-12. Under dry friction f alone it stops after m v² / 2 f; the
+//! constraint is soft, and short steps are off by h v: 1 %. Controls: the motion of the other environments stays
+//! bit-identical.
 
 use crate::drives::worlds::*;
 use kinetoscope::ndarray::{Array2, array};
@@ -17,13 +18,13 @@ const M: [f64; 2] = [2.0, 0.5];
 const ENVS: usize = 3;
 const ENV1: Option<&[EnvId]> = Some(&[EnvId(1)]);
 
-/// Two slides that do not feel each other.
+/// Two independent slides.
 fn slides(damping: f64, friction: f64, drive: DriveCfg, dt: f64) -> World {
     let slide = |name: &str, m: f64| Joint::slide(name, m).damped(damping).rough(friction);
     world(&[slide("a", M[0]), slide("b", M[1])], drive, at_dt(dt, weightless_envs(ENVS)))
 }
 
-/// An explicit model of joint a beside a row or an actuator.
+/// An explicit model of joint a next to a row or an actuator.
 fn beside(model: DriveModel) -> DriveCfg {
     DriveCfg { model, actuators: vec![("a".into(), IdealPd {}.into())], ..gains(0.0, 0.0) }
 }
@@ -41,7 +42,7 @@ fn set_all(world: &mut World, [friction, damping, armature]: &[Array2<f64>; 3], 
     robot.set_armature(armature, None, envs).unwrap();
 }
 
-/// Speeds by environment and joint.
+/// Asserts the speeds by environment and joint.
 fn assert_speeds(world: &World, expected: impl Fn((usize, usize)) -> f64) {
     assert_close("speeds", world.view().qvel(), Array2::from_shape_fn((ENVS, 2), expected), EXACT);
 }
@@ -65,7 +66,7 @@ fn rotor_inertia() {
     let v = world.view().qvel();
     assert_speeds(&world, |at| H * 4.0 / (M[at.1] + armature[at]));
     assert_eq!(v.row(1), other.view().qvel().row(1), "bit for bit");
-    // Implicit damping has a half of its own in MuJoCo's armature, of which nothing shows.
+    // Implicit damping has its own share in MuJoCo's armature, which must not show in the results.
     let (rotor, damping) = (1e-3, 40.0);
     assert_ne!((rotor + H * damping) - H * damping, rotor, "the control: where the half is taken off again");
     let mut world = slides(damping, 0.0, DriveCfg { armature: rotor.into(), ..gains(0.0, 0.0) }, H);
@@ -75,7 +76,7 @@ fn rotor_inertia() {
     assert_eq!(world.sim.properties().bytes(EnvId(0)).unwrap(), 0, "nothing is another");
 }
 
-/// Damping of a joint is not that of its drive; a drive without stiffness and damping is a row that gives nothing.
+/// The damping of a joint is independent of its drive's; a drive without stiffness and damping is a row without effort.
 #[test]
 fn damping() {
     for drive in [no_drive(), gains(0.0, 0.0)] {
@@ -92,8 +93,8 @@ fn damping() {
     }
 }
 
-/// Friction of the file, and of joints that had none: all but those whose implicit drive has its place, unless the robot
-/// was given room for it.
+/// Friction of the file, and friction of joints without any in the file. The latter can be set except for joints with
+/// an implicit drive, which uses the friction row, unless the robot's configuration reserves another row.
 #[test]
 fn dry_friction() {
     let room = DriveCfg { friction: Some(0.0.into()), ..gains(0.0, 0.0) };
@@ -121,7 +122,7 @@ fn dry_friction() {
         }
         assert_eq!(ways.row(0), ways.row(2), "bit for bit");
         if own == 0.0 {
-            // Without friction again it slides on.
+            // Without friction it slides on.
             let mut robot = world.robot();
             robot.set_friction(&array![[0.0, 0.0]], None, None).unwrap();
             robot.write_qvel(&array![[1.0, 1.0]], None, None).unwrap();
@@ -131,7 +132,7 @@ fn dry_friction() {
     }
 }
 
-/// Damping and rotor inertia of joints that were added without.
+/// Damping and rotor inertia of joints that were added without either.
 #[test]
 fn joints_without_any() {
     for drive in [no_drive(), gains(0.0, 0.0)] {
@@ -151,8 +152,8 @@ fn joints_without_any() {
     }
 }
 
-/// They stay through a reset, a recompilation and a restored snapshot, which holds the state and the settings of drives:
-/// resistance belongs to the environment.
+/// The values persist through a reset, a recompilation and a restored snapshot. A snapshot holds the state and the
+/// settings of drives; resistance belongs to the environment.
 #[test]
 fn lasting() {
     let mut world = slides(1.5, 1.0, gains(10.0, 1.0), H);
@@ -167,7 +168,7 @@ fn lasting() {
     assert_eq!(resistance(&world), set, "through a reset");
     world.sim.add_rigid_object(RigidObjectCfg::default()).unwrap();
     assert_eq!(resistance(&world), set, "when more is added");
-    // They are the environment's properties, by the same numbers.
+    // The values are properties of the environment.
     let properties = world.sim.properties().of(EnvId(1)).unwrap();
     assert_eq!(properties.get(Property::DryFriction, "robot/b").unwrap(), [2.5]);
     assert_eq!(properties.get(Property::Armature, "robot/a").unwrap(), [0.125]);
@@ -183,7 +184,7 @@ fn lasting() {
     for (found, own) in resistance(&world).iter().zip(&own) {
         assert_eq!(found, own.broadcast((ENVS, 2)).unwrap());
     }
-    // Both halves of the damping that is integrated with the drives stay: the model's and the environment's.
+    // Both parts of the damping that is integrated with the drives persist: the model's and the environment's.
     let mut world = slides(1.5, 0.0, gains(0.0, 0.0), H);
     let (snapshot, damping) = (world.sim.snapshot(None).unwrap(), [40.0, 8.0]);
     world.robot().set_joint_damping(&array![damping], None, None).unwrap();
@@ -201,13 +202,13 @@ fn read_and_set_again() {
         let read = resistance(&world);
         assert_eq!([read[0].row(0), read[1].row(0)], [array![1.0, 0.0].view(), array![1.5, 0.0].view()]);
         set_all(&mut world, &read, None);
-        // Both at once: joint b stays without.
+        // Both at once: joint b stays without resistance.
         let mut robot = world.robot();
         robot.set_friction(&array![[2.0, 0.0]], None, ENV1).unwrap();
         robot.set_joint_damping(&array![[0.0, 0.0]], None, Some(&[EnvId(2)])).unwrap();
         let expected = [array![[1.0, 0.0], [2.0, 0.0], [1.0, 0.0]], array![[1.5, 0.0], [1.5, 0.0], [0.0, 0.0]]];
         assert_eq!(resistance(&world)[..2], expected);
-        // The control: an implicit drive without a place beside it has no friction.
+        // Control: an implicit drive without a separate friction row cannot have friction.
         let more = world.robot().set_friction(&array![[1.0, 0.1]], None, None);
         if has_place {
             more.unwrap();
@@ -219,7 +220,7 @@ fn read_and_set_again() {
     }
 }
 
-/// Negative numbers, and friction without a place; other mistakes are in `tests/input/every_writer.rs`.
+/// Negative numbers, and friction without a row; other mistakes are in `tests/input/every_writer.rs`.
 #[test]
 fn mistakes() {
     let mut world = slides(1.5, 1.0, no_drive(), H);
@@ -236,8 +237,8 @@ fn mistakes() {
     assert_eq!(bare.view().friction(), zeros());
 }
 
-/// A joint in front of one with an implicit drive gets dry friction in one environment, which moves the rows that MuJoCo
-/// makes for both. Each is the law still: the drive's effort is kp (q* - q') - kd v' at the end of the step.
+/// A joint in front of one with an implicit drive gets dry friction in one environment, which shifts MuJoCo's rows for
+/// both. The law still holds: the drive's effort is kp (q* - q') - kd v' at the end of the step.
 #[test]
 fn friction_in_front_of_a_drive() {
     let (stiffness, damping) = (50.0.into(), 4.0.into());
@@ -253,7 +254,7 @@ fn friction_in_front_of_a_drive() {
             let law = 50.0 * (0.2 - q[(env, 1)]) - 4.0 * v[(env, 1)];
             assert!((effort[(env, 1)] - law).abs() < 1e-9, "environment {env}: {}, not {law}", effort[(env, 1)]);
         }
-        // The solver takes other steps to the same minimum.
+        // The solver takes other iterations to the same minimum.
         for (a, b) in [(q[(0, 1)], q[(1, 1)]), (v[(0, 1)], v[(1, 1)])] {
             assert!((a - b).abs() < 1e-12, "the other joint's friction changes nothing here: {a} {b}");
         }

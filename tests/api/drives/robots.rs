@@ -1,23 +1,23 @@
 //! Whole robots: the tutorial's gains and cycle on arms and hands, and mimic joints.
 //!
-//! **At rest** every drive that is not at its limit stands at q* - tau_g / kp. The judge is the torque that `kinetoscope_robot::dynamics`
-//! computes from the URDF at the positions found (without drives and MuJoCo); a driver carries its own load and, times their
-//! ratio, those of its followers. Tolerance 0.2 mrad, two-sided: what motion is left after 4 s (kd / kp = 0.1 s) is exp(-40);
-//! the rest is for the couplings, whose 1e-4 of yield shares the load a little differently. Without the sag in it the arm
-//! would be off by up to 4 mrad.
+//! **At rest** every drive below its limit is at q* - tau_g / kp. The reference is the torque that
+//! `kinetoscope_robot::dynamics` computes from the URDF at the measured positions (without drives and MuJoCo). A driver
+//! carries its own load and, times their ratio, those of its followers. Tolerance 0.2 mrad, two-sided: exp(-40) of the
+//! motion is left after 4 s (kd / kp = 0.1 s); the rest is for the couplings, whose compliance of 1e-4 shares the load
+//! slightly differently. Without the sag the arm would be off by up to 4 mrad.
 //!
 //! **The tutorial's gains** (arm 1e4 / 1e3, hand 1e3 / 1e2) at dt 0.01 on links down to 10 g with effort limits that
-//! saturate: no warnings, no NaN, the limit held exactly, settled within 0.5 s: |q* - q| < 20 mrad from then on. What the
-//! limits allow is far below: 28 N m on 0.02 kg m² need 2 sqrt(0.5 / 1400) = 0.04 s, 150 N m on the whole arm (6 kg m²)
-//! 2 sqrt(0.5 / 25) = 0.28 s, then kd / kp = 0.1 s is the time constant of the overdamped drive: ln(0.5 / 0.02) x 0.1 s =
-//! 0.32 s. A fine-step reference of the same arm (dt 1e-5) settles in 0.33 s. At every step each drive's effort is the law
-//! at the new state, clamp(kp (q* - q') - kd v'), within 1e-6 of its limit (the solver stops at a relative improvement of
-//! 1e-8). Control: the same robot with MuJoCo's own actuators diverges.
+//! saturate: no warnings, no NaN, the limit held exactly, settled within 0.5 s: |q* - q| < 20 mrad from then on. The
+//! limits allow much less: 28 N m on 0.02 kg m² need 2 sqrt(0.5 / 1400) = 0.04 s, 150 N m on the whole arm (6 kg m²) 2
+//! sqrt(0.5 / 25) = 0.28 s, then kd / kp = 0.1 s is the time constant of the overdamped drive: ln(0.5 / 0.02) x 0.1 s =
+//! 0.32 s. A fine-step reference of the same arm (dt 1e-5) settles in 0.33 s. At every step each drive's effort is the
+//! law at the new state, clamp(kp (q* - q') - kd v'), within 1e-6 of its limit (the solver stops at a relative
+//! improvement of 1e-8). Control: the same robot with MuJoCo's own actuators diverges.
 //!
-//! **Mimic joints** follow within 0.02 rad: during the fastest step of the bundled hand, and under gravity. A coupling is a
-//! constraint of impedance d = 0.9999 with the time constant of one step: it lags by (1 - d) / d of what its load would do,
-//! 1e-4 x 28 mrad for a finger link under its own weight. Found is far less than the bound. Control: MuJoCo's default
-//! impedance 0.9 and time constant 20 ms lag by more.
+//! **Mimic joints** follow within 0.02 rad, during the fastest step of the bundled hand and under gravity. A coupling
+//! is a constraint of impedance d = 0.9999 with the time constant of one step: its lag is (1 - d) / d of the
+//! displacement by its load, 1e-4 x 28 mrad for a finger link under its own weight. The measured lag is far below the
+//! bound. Control: MuJoCo's default impedance 0.9 and time constant 20 ms have a larger lag.
 
 use crate::drives::worlds::*;
 use kinetoscope::ndarray::Array3;
@@ -51,7 +51,7 @@ fn cycle([arm, hand]: [PathBuf; 2], arm_joints: &str, hand_joints: &str) {
         (&hand, of_hand(0)),
         (&hand, of_hand(1)),
     ];
-    // Drives are those of the joints that follow none.
+    // Drives belong to the joints that are not followers.
     let followers: Vec<bool> = (0..dof).map(|i| view.is_mimic(JointIndex(i)).unwrap()).collect();
     assert!((0..dof).all(|i| view.is_driven(JointIndex(i)).unwrap() != followers[i]));
     assert!(followers.contains(&true) && followers.contains(&false));
@@ -148,7 +148,7 @@ fn settling() {
         let limit = Tolerance::mixed(1e-6, "of the step exp(-20) is left after 2 s");
         assert_number("left is gravity's share", STEP - world.q()[i], load / of(i).0, limit);
     }
-    // The control.
+    // Control.
     let drive = DriveCfg { model: DriveModel::Actuator, ..tutorial_gains("a.*", "h.*") };
     let mut world = self::world(&arm_and_hand(), drive, earth());
     world.aim(&vec![STEP; n]);
@@ -156,7 +156,7 @@ fn settling() {
     assert_eq!(world.sim.diverged().len(), 1);
 }
 
-/// Limits a little above gravity's load, so that every one of them binds: held exactly, and settled all the same.
+/// Limits slightly above gravity's load, so that every limit binds: they are held exactly, and the robot still settles.
 #[test]
 fn binding_limits() {
     let mut joints = arm_and_hand();
@@ -229,7 +229,7 @@ fn mimic_lag() {
         assert!(moving < 0.02 && resting < 0.001, "gravity {gravity:?}: {moving} rad in motion, {resting} at rest");
         assert!(fastest > 3.0, "a fast step");
     }
-    // The control: a hanging link, with MuJoCo's defaults and with ours.
+    // Control: a hanging link, with MuJoCo's defaults and with ours.
     let [default, ours] = ["", "solref=\"0.02 1\" solimp=\"0.9999 0.9999 0.001 0.5 2\""].map(|coupling| {
         let mut data = plain(&format!(
             "<mujoco><option timestep=\"0.01\"/><worldbody><body><joint name=\"d\" axis=\"1 0 0\" armature=\"1\"/>\
@@ -244,7 +244,7 @@ fn mimic_lag() {
     assert!(default > 50.0 * ours && default > 1e-3, "{default} {ours}");
 }
 
-/// A force on each link that a follower moves, along each of its axes: 5 N on links of 20 g and less.
+/// A force on each link moved by a follower, along each of its axes: 5 N on links of 20 g and less.
 #[test]
 fn mimic_lag_under_load() {
     let mut world = hand(EARTH);
@@ -260,7 +260,7 @@ fn mimic_lag_under_load() {
             worst.max(lag(world))
         })
     };
-    // The control: without the load, on the way to rest and at rest.
+    // Control: without the load, during the motion and at rest.
     let (unloaded, mut loaded) = (worst(&mut world), 0.0_f64);
     for (axis, newtons) in [(0, 5.0), (0, -5.0), (1, 5.0), (1, -5.0), (2, 5.0), (2, -5.0)] {
         let forces = Array3::from_shape_fn((1, followers.len(), 3), |(_, _, k)| if k == axis { newtons } else { 0.0 });

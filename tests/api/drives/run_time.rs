@@ -1,8 +1,8 @@
-//! Drives that are changed while they run: gains, types and limits, per joint and per environment.
+//! Changes of drives at run time: gains, types and limits, per joint and per environment.
 //!
-//! The laws are those of `law.rs`, with their tolerance of 1e-9: a joint of constant inertia M without other loads goes to
-//! v' = (M v + h kp (q* - q)) / (M + h kd + h² kp). Control: an environment that was not named does the same as before, to
-//! the last bit.
+//! The laws are those of `law.rs`, with their tolerance of 1e-9: a joint of constant inertia M without other loads has
+//! v' = (M v + h kp (q* - q)) / (M + h kd + h² kp). Control: the motion of an environment that is not named stays
+//! bit-identical.
 
 use crate::drives::law::EXACT;
 use crate::drives::worlds::*;
@@ -19,14 +19,14 @@ const FIRST: Option<&[JointIndex]> = Some(&[JointIndex(0)]);
 const SECOND: Option<&[JointIndex]> = Some(&[JointIndex(1)]);
 const ENV1: Option<&[EnvId]> = Some(&[EnvId(1)]);
 
-/// Two wheels that do not feel each other, in three environments, with targets set.
+/// Two independent wheels in three environments, with targets set.
 fn wheels(drive: DriveCfg) -> World {
     let mut world = world(&[Joint::wheel("a", M[0]), Joint::wheel("b", M[1])], drive, weightless_envs(ENVS));
     world.aim(&[AIM; 2]);
     world
 }
 
-/// The same, the first within a range.
+/// Two wheels, the first with position limits.
 fn ranged() -> World {
     let joints = [Joint::wheel("a", M[0]).range(-1.0, 2.0), Joint::wheel("b", M[1])];
     world(&joints, gains(100.0, 10.0), weightless_envs(ENVS))
@@ -37,7 +37,7 @@ fn first_speed(m: f64, kp: f64, kd: f64) -> f64 {
     H * kp * AIM / (m + H * kd + H * H * kp)
 }
 
-/// Everything that getters of drives return.
+/// Results of all drive getters, as text.
 fn settings(world: &World) -> String {
     let view = world.view();
     let tables = [view.stiffness(), view.damping(), view.qf_limits(), view.qvel_limits()];
@@ -50,7 +50,7 @@ fn gains_per_joint_and_environment() {
     let mut world = wheels(gains(100.0, 10.0));
     let mut robot = world.robot();
     robot.set_stiffness(&array![[300.0], [50.0]], SECOND, Some(&[EnvId(2), EnvId(1)])).unwrap();
-    // A single row is for all of them; columns in the order given.
+    // A single row applies to all environments; columns are in the given order.
     let swapped = [JointIndex(1), JointIndex(0)];
     robot.set_damping(&array![[7.0, 20.0]], Some(&swapped), Some(&[EnvId(1), EnvId(2)])).unwrap();
     let kp = array![[100.0, 100.0], [100.0, 50.0], [100.0, 300.0]];
@@ -66,7 +66,7 @@ fn gains_per_joint_and_environment() {
     other.step(1);
     assert_eq!(v.row(0), other.view().qvel().row(0), "not named");
     assert!((v[(1, 1)] - other.view().qvel()[(1, 1)]).abs() > 0.1, "the control: gains matter");
-    // Stiffness and damping of 0 leave the feed-forward effort alone: M a = tau.
+    // With zero stiffness and damping only the feed-forward effort acts: M a = tau.
     world.sim.reset(None).unwrap();
     let mut robot = world.robot();
     robot.set_stiffness(&array![[0.0, 0.0]], None, None).unwrap();
@@ -99,7 +99,7 @@ fn drive_types() {
         assert_eq!(v[(2, joint)], 0.0, "none");
     }
     assert_eq!(world.view().qf().row(2).to_vec(), [0.0; 2]);
-    // And back: stiffness and damping are in the unit of the type, so they mean torques again.
+    // And back: stiffness and damping are in the unit of the type, so they are torques again.
     world.sim.reset(None).unwrap();
     set(&mut world, DriveType::Force, 1);
     set(&mut world, DriveType::Force, 2);
@@ -145,16 +145,16 @@ fn position_limits() {
         let expected = if env == 1 { tight.index_axis(Axis(0), 0) } else { own.view() };
         assert_eq!(world.view().qpos_limits().index_axis(Axis(0), env), expected, "environment {env}");
     }
-    // Present targets are clamped at once, later ones when they are set.
+    // Current targets are clamped at once, later ones when they are set.
     assert_eq!(world.view().qpos_target(), array![[1.5, 1.5], [0.5, 0.25], [1.5, 1.5]]);
     world.aim(&[-9.0, -9.0]);
     assert_eq!(world.view().qpos_target(), array![[-1.0, -9.0], [-0.5, -9.0], [-1.0, -9.0]]);
-    // Wider again, up to the robot's own.
+    // Wider again, up to the robot's own limits.
     world.robot().set_qpos_limits(&array![[[-1.0, 2.0]]], FIRST, ENV1).unwrap();
     world.aim(&[-9.0, -9.0]);
     assert_eq!(world.view().qpos_target().column(0).to_vec(), [-1.0; 3]);
-    // A stop is where it was: a load pushes beyond a tighter limit, not beyond the stop (which yields by the depth that
-    // MuJoCo's constraint needs to hold 40 N m).
+    // Joint stops do not move: a load pushes beyond a tighter limit, but not beyond the stop (which yields by the depth
+    // that MuJoCo's constraint needs to hold 40 N m).
     world.robot().set_qpos_limits(&array![[[-0.1, 0.1]]], FIRST, None).unwrap();
     world.robot().set_qf_target(&array![[240.0, 0.0]], None, None).unwrap();
     world.step(500);
@@ -162,7 +162,7 @@ fn position_limits() {
     assert!(q > 1.99 && q < 2.1, "{q}");
 }
 
-/// middle ± half of the range times the factor.
+/// Center ± half of the range times the factor.
 #[test]
 fn soft_limits() {
     let files = Files::default();
@@ -184,7 +184,7 @@ fn soft_limits() {
     }
 }
 
-/// Speed limits come from the file or the configuration, are read back, and bound nothing.
+/// Velocity limits come from the file or the configuration and are read back, but do not limit the motion.
 #[test]
 fn speed_limits() {
     let drive = DriveCfg { max_velocity: Some([("b", 3.0)].into()), ..gains(100.0, 1.0) };
@@ -197,7 +197,7 @@ fn speed_limits() {
     assert!(world.v()[1] > 0.5, "{:?}", world.v());
 }
 
-/// Gains and limits stay through a reset, and through the recompilation for another object.
+/// Gains and limits persist through a reset, and through the recompilation for another object.
 #[test]
 fn changes_of_the_world() {
     let mut world = wheels(gains(100.0, 10.0));
@@ -216,10 +216,10 @@ fn changes_of_the_world() {
     assert_number("the law of the new gains", world.view().qvel()[(2, 1)], first_speed(M[1], 300.0, 10.0), EXACT);
 }
 
-/// A call of a setter, and parts of its message.
+/// A call of a setter, and parts of its error message.
 type Mistake = (fn(&mut RobotMut<'_>) -> Result<()>, &'static [&'static str]);
 
-/// Mistakes in numbers and indices of every writer are in `tests/input/every_writer.rs`; these are about their messages.
+/// Error messages of the setters; invalid numbers and indices of every writer are in `tests/input/every_writer.rs`.
 const MISTAKES: &[Mistake] = &[
     (|r| r.set_stiffness(&array![[1.0]], None, None), &["set_stiffness has shape [1, 1]", "[3, 2]", "one row for all"]),
     (|r| r.set_stiffness(&array![[-1.0, 1.0]], None, None), &["set_stiffness[0, 0]", "joint \"a\"", "-1", ">= 0"]),
@@ -284,13 +284,14 @@ fn mistakes() {
             assert_eq!(settings(&world), before, "{error}");
         }
     }
-    // Each once is right, in any order.
+    // Unique indices are valid in any order.
     let (joints, envs) = ([JointIndex(1), JointIndex(0)], [EnvId(2), EnvId(0)]);
     world.robot().set_stiffness(&array![[1.0, 2.0]], Some(&joints), Some(&envs)).unwrap();
     assert_eq!(world.view().stiffness(), array![[2.0, 1.0], [100.0, 100.0], [2.0, 1.0]]);
 }
 
-/// Joints without a drive cannot be given one, and MuJoCo's own actuators keep their gains: both say what to do.
+/// Joints without a drive cannot get one at run time, and MuJoCo's own actuators keep their gains: both errors name a
+/// fix.
 #[test]
 fn drives_that_cannot_change() {
     for (name, call) in SETTERS.into_iter().filter(|(name, _)| *name != "set_qvel_limits") {
@@ -300,7 +301,7 @@ fn drives_that_cannot_change() {
         assert!(right && error.to_string().contains("drive type none"), "{error}");
         let mut own = world(&[Joint::wheel("j", 0.1)], native(10.0, 1.0), weightless());
         match call(&mut own.robot(), 1, None, None) {
-            // Targets are ours to clamp, whatever drives.
+            // Targets are clamped outside of MuJoCo, for any kind of drive.
             Ok(()) => assert_eq!(name, "set_qpos_limits"),
             Err(Error::GainsInModel { argument, joint, .. }) => assert_eq!((argument, &*joint), (name, "j")),
             Err(error) => panic!("{error}"),

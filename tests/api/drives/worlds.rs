@@ -1,5 +1,5 @@
-//! Worlds for the drive laws: URDF chains written from a few numbers, loaded through the public API. Nothing here judges
-//! anything; the laws, derivations and tolerances stand at the top of each test file.
+//! Test worlds for the drive laws: URDF chains from a few numbers, loaded through the public API. The laws, derivations
+//! and tolerances are at the top of each test file.
 
 use kinetoscope::mujoco as mj;
 use kinetoscope::ndarray::Array2;
@@ -19,7 +19,7 @@ pub(crate) const EARTH: Vector3<f64> = Vector3::new(0.0, 0.0, -9.81);
 /// Time step \[s\].
 pub(crate) const H: f64 = 0.01;
 
-/// One joint and the link it moves.
+/// One joint and its child link.
 #[derive(Clone, Debug)]
 pub(crate) struct Joint {
     pub(crate) name: String,
@@ -36,12 +36,12 @@ pub(crate) struct Joint {
     pub(crate) com: [f64; 3],
     /// Moments about the center of mass.
     pub(crate) inertia: [f64; 3],
-    /// Content of the link.
+    /// Collision elements of the link.
     pub(crate) collision: String,
 }
 
 impl Joint {
-    /// A joint without limits that moves a point-like mass; hangs from `base`.
+    /// A joint without limits on `base`, with a point-like mass.
     pub(crate) fn new(name: &str, kind: &'static str) -> Self {
         Self {
             name: name.into(),
@@ -60,17 +60,17 @@ impl Joint {
         }
     }
 
-    /// A hinge about y whose moment of inertia about its axis is `moment`, weightless under gravity.
+    /// A hinge about y with the moment of inertia `moment` about its axis, without gravity torque.
     pub(crate) fn wheel(name: &str, moment: f64) -> Self {
         Self { inertia: [moment; 3], mass: 0.01, ..Self::new(name, "continuous") }
     }
 
-    /// A hinge about y with a mass at `length` along x: gravity (0, 0, -g) turns it with `m g length cos q`.
+    /// A hinge about y with a mass at `length` along x: gravity (0, 0, -g) acts with the torque `m g length cos q`.
     pub(crate) fn lever(name: &str, mass: f64, length: f64, moment: f64) -> Self {
         Self { mass, com: [length, 0.0, 0.0], inertia: [moment; 3], ..Self::new(name, "continuous") }
     }
 
-    /// A slide along x of `mass`, with ends that are far away.
+    /// A slide along x of `mass`, with distant limits.
     pub(crate) fn slide(name: &str, mass: f64) -> Self {
         Self { mass, axis: [1.0, 0.0, 0.0], ..Self::new(name, "prismatic") }.range(-1e3, 1e3).effort(0.0)
     }
@@ -105,7 +105,7 @@ impl Joint {
     }
 }
 
-/// The joints as URDF, `base` being the root.
+/// The joints as URDF, with the root `base`.
 pub(crate) fn urdf(joints: &[Joint]) -> String {
     let v = |x: [f64; 3]| format!("{} {} {}", x[0], x[1], x[2]);
     let mut elements = String::from("<link name=\"base\"/>\n");
@@ -144,7 +144,7 @@ pub(crate) fn weightless() -> SimulationManagerCfg {
     SimulationManagerCfg { threads: Some(1), ..weightless_cfg(1) }
 }
 
-/// The same in `num_envs` environments.
+/// As [`weightless`], in `num_envs` environments.
 pub(crate) fn weightless_envs(num_envs: usize) -> SimulationManagerCfg {
     SimulationManagerCfg { num_envs, ..weightless() }
 }
@@ -166,7 +166,7 @@ pub(crate) fn native(kp: f64, kd: f64) -> DriveCfg {
     DriveCfg { model: DriveModel::Actuator, ..gains(kp, kd) }
 }
 
-/// Gains with an explicit model for the joints of a pattern, which may turn at up to 7.5 rad/s.
+/// Gains with an explicit model for the joints of a pattern, with a velocity limit of 7.5 rad/s.
 pub(crate) fn modelled(joints: &str, model: impl Into<ActuatorModel>, kp: f64, kd: f64) -> DriveCfg {
     let actuators = vec![(joints.into(), model.into())];
     DriveCfg { actuators, max_velocity: Some(7.5.into()), ..gains(kp, kd) }
@@ -185,7 +185,7 @@ pub(crate) fn try_world(joints: &[Joint], drive: DriveCfg, cfg: SimulationManage
     Ok(World { sim, robot })
 }
 
-/// A robot of any configuration.
+/// A simulation with one robot of any configuration.
 #[track_caller]
 pub(crate) fn load(cfg: RobotCfg, manager: SimulationManagerCfg) -> World {
     let mut sim = kinetoscope_testkit::worlds::sim(manager);
@@ -222,12 +222,12 @@ impl World {
         self.view().qpos_target().row(0).to_vec()
     }
 
-    /// Position targets of all joints.
+    /// Sets the position targets of all joints.
     pub(crate) fn aim(&mut self, targets: &[f64]) {
         self.robot().set_qpos_target(&row(targets), None, None).unwrap();
     }
 
-    /// Targets of position, velocity and effort of all joints.
+    /// Sets the targets of position, velocity and effort of all joints.
     pub(crate) fn command<const N: usize>(&mut self, targets: [[f64; 3]; N]) {
         let of = |k: usize| row(&targets.map(|target| target[k]));
         let mut robot = self.robot();
@@ -240,7 +240,7 @@ impl World {
         self.sim.update(steps);
     }
 
-    /// A copy of the environment, to step by hand below the public API.
+    /// A copy of the environment, for stepping below the public API.
     pub(crate) fn env(&self) -> Env {
         let (model, drives, qpos, qvel) = self.sim.batch().read(0, |env| {
             let data = env.data();
@@ -252,12 +252,12 @@ impl World {
         env
     }
 
-    /// A warning says that the drives are unstable at this time step.
+    /// True if a warning reports unstable drives at this time step.
     pub(crate) fn warned_unstable(&self) -> bool {
         self.sim.warnings().counts().keys().any(|name| name.contains("unstable"))
     }
 
-    /// No environment diverged and MuJoCo raised no warning.
+    /// Asserts that no environment diverged and MuJoCo gave no warning.
     #[track_caller]
     pub(crate) fn assert_well(&self) {
         assert!(self.sim.diverged().is_empty(), "{:?}", self.sim.diverged());
@@ -266,8 +266,8 @@ impl World {
         assert!(self.q().iter().chain(&self.v()).all(|x| x.is_finite()));
     }
 
-    /// Gravity's load on every drive at the present positions: the joint's own torque plus those of its followers,
-    /// each times its ratio (virtual work of `q_f = m q`).
+    /// Gravity load of every drive at the current positions: the joint's own torque plus those of its followers, each
+    /// times its ratio (virtual work of `q_f = m q`).
     pub(crate) fn load_by_gravity(&self, gravity: &Vector3<f64>) -> Vec<f64> {
         let view = self.view();
         let mut at = Configuration::zero(view.description());
@@ -297,7 +297,7 @@ pub(crate) fn row(values: &[f64]) -> Array2<f64> {
     Array2::from_shape_vec((1, values.len()), values.to_vec()).unwrap()
 }
 
-/// Sets the state of an environment made by hand.
+/// Sets the state of a separate environment.
 pub(crate) fn push(env: &mut Env, q: &[f64], v: &[f64]) {
     env.write(|data| {
         data.qpos_mut().copy_from_slice(q);
@@ -305,7 +305,7 @@ pub(crate) fn push(env: &mut Env, q: &[f64], v: &[f64]) {
     });
 }
 
-/// Sets the targets of the first drive of an environment made by hand.
+/// Sets the targets of the first drive of a separate environment.
 pub(crate) fn command(env: &mut Env, [position, velocity, effort]: [f64; 3]) {
     (env.drives.position[0], env.drives.velocity[0], env.drives.feedforward[0]) = (position, velocity, effort);
 }
@@ -322,7 +322,7 @@ pub(crate) fn plain(xml: &str) -> mj::Data {
     mj::Data::new(&compiled.into_model()).unwrap()
 }
 
-/// MJCF of one body on a hinge about y with these attributes, its mass \[kg\] at `length` along x.
+/// MJCF of one body on a hinge about y with these attributes and a mass \[kg\] at `length` along x.
 pub(crate) fn hinge_mjcf(option: &str, joint: &str, [mass, length, moment]: [f64; 3]) -> String {
     format!(
         "<mujoco><option timestep=\"{H}\" {option}/><worldbody><body><joint type=\"hinge\" axis=\"0 1 0\" {joint}/>\
@@ -337,7 +337,7 @@ pub(crate) fn arm_and_hand() -> Vec<Joint> {
     const Y: [f64; 3] = [0.0, 1.0, 0.0];
     const Z: [f64; 3] = [0.0, 0.0, 1.0];
     let mut joints: Vec<Joint> = Vec::new();
-    // Name, height above the one before, axis, mass, moments, height of the center of mass, effort limit.
+    // Name, height above the previous joint, axis, mass, moments, height of the center of mass, effort limit.
     for (name, z, axis, mass, inertia, com, effort) in [
         ("a1", 0.15, Z, 6.0, [0.03, 0.03, 0.02], 0.05, 150.0),
         ("a2", 0.18, Y, 5.5, [0.08, 0.08, 0.012], 0.2, 150.0),

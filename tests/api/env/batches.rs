@@ -1,4 +1,4 @@
-//! The same bits for any number of threads, environments and processes.
+//! The number of threads, environments and processes does not change a bit.
 
 use super::tasks::{cfg, everything, policy};
 use kinetoscope::ndarray::Array2;
@@ -7,7 +7,7 @@ use kinetoscope::sim::Shard;
 use kinetoscope::tasks::Ended;
 use kinetoscope_testkit::bits::bits;
 
-/// All bits of 150 steps, by environment, and the reasons of all ends.
+/// All bits of 150 steps, by environment, and the reasons of all episode ends.
 fn run(settings: SimulationManagerCfg) -> (Vec<Vec<u64>>, Vec<Vec<String>>) {
     let mut env = everything(settings);
     let n = env.num_envs();
@@ -39,7 +39,7 @@ fn threads() {
     for threads in [2, 3, 5] {
         assert!(run(cfg(9, threads)) == one, "{threads} threads");
     }
-    // There was something to compare: episodes that ended for both reasons, differently in each environment.
+    // The comparison is meaningful: episodes ended for both reasons, differently in each environment.
     let reasons: Vec<&str> = one.1.iter().flatten().filter_map(|end| end.split(' ').next()).collect();
     assert!(reasons.contains(&"fell") && reasons.contains(&"time"), "{reasons:?}");
     assert!((1..9).all(|e| one.0[e] != one.0[0]));

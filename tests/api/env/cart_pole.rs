@@ -1,4 +1,4 @@
-//! A task is, bit for bit, a hand-written loop over the plain API.
+//! A task equals, bit for bit, a hand-written loop over the plain API.
 
 use super::tasks::{cfg, world};
 use kinetoscope::ndarray::{Array1, Array2, Axis, array, concatenate};
@@ -14,13 +14,13 @@ const DECIMATION: u32 = 2;
 const FALLEN: f64 = 0.15;
 const BOUND: f64 = 2.0;
 
-/// The start of an episode: both loops draw it by themselves.
+/// The random start of an episode; both loops compute it independently.
 fn start(seed: u64, env: usize, episode: u64) -> Array2<f64> {
     let mut random = Random::keyed(seed, env as u64, &format!("my own start {episode}"));
     array![[0.4 * (random.uniform() - 0.5), 0.2 * (random.uniform() - 0.5)]]
 }
 
-/// Holds the pole in half of the environments, and lets it fall in the others; beyond the bounds at times.
+/// Holds the pole in half of the environments and lets it fall in the others; some actions exceed the bounds.
 fn command(observations: &Array2<f64>) -> Array2<f64> {
     Array2::from_shape_fn((observations.nrows(), 1), |(env, _)| {
         let o = observations.row(env);
@@ -129,6 +129,6 @@ fn loop_by_hand() {
         }
         seen = step.observations;
     }
-    // Control: both ends, and actions beyond the bounds, were there to be compared.
+    // Control: the comparison includes both kinds of ends, and actions beyond the bounds.
     assert!(fell > 10 && in_time >= 3 && clamped > 3, "{fell} fell, {in_time} did not, {clamped} were clamped");
 }

@@ -1,4 +1,4 @@
-//! `kinetoscope_tasks::check` finds nothing in good tasks, and the fault of broken ones.
+//! `kinetoscope_tasks::check` finds nothing in valid tasks, and the fault of broken ones.
 
 use super::tasks::{cart_env, cart_task, cfg, everything, world};
 use super::vector_env::Carts;
@@ -10,7 +10,7 @@ fn good_tasks() {
     assert_eq!(check(&mut cart_env(3, Some(20)), 7), []);
     assert_eq!(check(&mut cart_env(1, None), 7), []);
     assert_eq!(check(&mut everything(cfg(4, 2)), 11), []);
-    // Carts by hand accept two mistakes.
+    // The hand-written carts accept two kinds of invalid actions.
     let taken = |finding: &Finding| matches!(finding, Finding::Accepted { .. });
     let found = check(&mut Carts::new(3, 1.0, 20), 7);
     assert!(found.iter().all(taken) && found.len() == 2, "{found:?}");
@@ -18,7 +18,7 @@ fn good_tasks() {
     assert!(said[0].contains("a column too many") && said[1].contains("no number"), "{said:?}");
 }
 
-/// The fault of an environment.
+/// Faults of an environment that the check must detect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Fault {
     None,
@@ -35,7 +35,7 @@ pub(super) enum Fault {
     TakesAnyMask,
 }
 
-/// A good task with something wrong around it.
+/// A valid task with a fault added.
 pub(super) struct Broken {
     inner: Env,
     fault: Fault,
@@ -106,7 +106,7 @@ impl VectorEnv for Broken {
             Fault::FinalIsZero => step.final_observations.fill(0.0),
             Fault::NoReward => step.rewards[2] = f64::NAN,
             Fault::NeverBeginsAnew if self.over.is_some() || step.truncated.iter().any(|over| *over) => {
-                // It stays where its episode ended, which it says again and again.
+                // The environment stays at the end of its episode and reports that end in every step.
                 let over = self.over.get_or_insert_with(|| step.final_observations.clone()).clone();
                 (step.observations, step.final_observations) = (over.clone(), over);
                 step.truncated.fill(true);
@@ -117,7 +117,7 @@ impl VectorEnv for Broken {
     }
 }
 
-/// True for the finding that is looked for.
+/// True for the expected finding.
 type Is = fn(&Finding) -> bool;
 
 #[test]

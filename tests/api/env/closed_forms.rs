@@ -1,4 +1,4 @@
-//! Rewards and observations against Newton's law.
+//! Rewards and observations, compared with Newton's law.
 
 use super::tasks::{cart_env, cart_task, cfg, world};
 use kinetoscope::ndarray::{Array2, array};
@@ -8,8 +8,8 @@ use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 const DT: f64 = 0.01;
 const FORCE: f64 = 4.0;
 
-/// The place of a cart of 1 kg after k steps under a constant force. MuJoCo's Euler is semi-implicit: v_k = k h F / m, and
-/// x_k = x_(k-1) + h v_k, so x_k = h² F / m (1 + 2 + ... + k).
+/// The position \[m\] of a cart of 1 kg after k steps under a constant force. MuJoCo's Euler is semi-implicit: v_k = k
+/// h F / m, and x_k = x_(k-1) + h v_k, so x_k = h² F / m (1 + 2 + ... + k).
 fn place(k: u64) -> f64 {
     DT * DT * FORCE * (k * (k + 1) / 2) as f64
 }
@@ -39,7 +39,7 @@ fn pushed_cart() {
             }
         }
     }
-    // Control: a force that is 1 % larger is told apart.
+    // Control: a force that is 1 % larger gives another position.
     let other = env.step(&array![[1.01 * FORCE], [0.0], [0.0]]).unwrap();
     assert!((other.final_observations[(0, 0)] - place(1)).abs() > 1e3 * ROUNDING.absolute);
 }
@@ -49,7 +49,7 @@ fn decimation() {
     let run = |every: bool| {
         let (sim, robot) = world(cfg(1, 1), false);
         let space = Space::uniform(["force"], [-10.0, 10.0]).unwrap();
-        // Pushes until the cart is 5 mm away: with a look at the state before each physics step, or only before the first.
+        // Pushes until the cart is 5 mm away. The state is read before each physics step, or only before the first.
         let push = ActionTerm::new("push", space, move |sim, forces| {
             let far = sim.robot(robot).qpos()[(0, 0)] > 0.005;
             let force = if far { Array2::zeros((1, 1)) } else { forces.to_owned() };

@@ -1,4 +1,4 @@
-//! Starts and ends of episodes, and the observations there.
+//! Starts and ends of episodes, and the observations at them.
 
 use super::tasks::{cart_env, cart_task, cfg, everything, idle, policy, world};
 use kinetoscope::ndarray::{Array1, Array2, array};
@@ -36,7 +36,7 @@ fn time_limit() {
             }
         }
     }
-    // Without a limit nothing ends.
+    // Without a limit no episode ends.
     let mut env = cart_env(1, None);
     env.reset(None, None).unwrap();
     assert!((0..100).all(|_| !env.step(&array![[1.0]]).unwrap().truncated[0]));
@@ -112,7 +112,7 @@ fn masks() {
             assert_eq!(bits(seen.row(e)), bits(undisturbed.row(e)), "step {k}, environment {e}");
         }
     }
-    // Those that were reset are where a batch with that seed is.
+    // The reset environments are in the state of a batch with that seed.
     let mut with_seed = everything(cfg(5, 2));
     let mut expected = with_seed.reset(None, Some(9)).unwrap();
     for _ in 17..60 {
@@ -121,7 +121,7 @@ fn masks() {
     assert_eq!(bits(expected.row(1)), bits(seen.row(1)));
 }
 
-/// Environments and their steps, of each time that an event happened.
+/// Global environment, episode and step of each event.
 type Log = Arc<Mutex<Vec<(usize, u64, u64)>>>;
 
 #[test]
@@ -159,7 +159,7 @@ fn events() {
         let step = env.step(&actions).unwrap();
         let of_episode = (k - 1) % 10 + 1;
         assert_eq!(step.final_observations[(0, 0)], of_episode as f64);
-        // In steps 4 and 8; step 10 ends the episode, and events do not happen to what has ended.
+        // In steps 4 and 8; step 10 ends the episode, and an ended episode has no events.
         assert_eq!(taken(&fixed).len(), if of_episode % 4 == 0 { 3 } else { 0 }, "step {of_episode}");
         assert_eq!(taken(&reset).len(), if of_episode == 10 { 3 } else { 0 });
         for (e, _, _) in taken(&drawn) {
@@ -198,7 +198,7 @@ fn commands() {
     assert!(changes >= 12, "{changes}");
 }
 
-/// Steps two tasks alike; `act`, a reset that the task has not asked for, is done to the first after 10 steps.
+/// Steps two equal tasks; after 10 steps, `act` applies an external reset to the first.
 fn disturbed(act: impl FnOnce(&mut Env)) -> (Env, Env) {
     let (mut env, mut calm) = (everything(cfg(3, 2)), everything(cfg(3, 2)));
     let (mut seen, mut same) = (env.reset(None, Some(5)).unwrap(), calm.reset(None, Some(5)).unwrap());
@@ -217,7 +217,7 @@ fn disturbed(act: impl FnOnce(&mut Env)) -> (Env, Env) {
     for e in [0, 2] {
         assert_eq!(step.observations.row(e), other.observations.row(e), "the others do not notice");
     }
-    // The next episode is the one that follows a reset of the task's own: with its start, its command, its noise.
+    // The next episode equals the one after a reset by the task itself: with its start, its command and its noise.
     let again = calm.reset(Some(&[false, true, false]), None).unwrap();
     assert_eq!(step.observations.row(1), again.row(1));
     (env, calm)
@@ -226,14 +226,14 @@ fn disturbed(act: impl FnOnce(&mut Env)) -> (Env, Env) {
 #[test]
 fn reset_by_program() {
     let (mut env, mut calm) = disturbed(|env| env.sim_mut().reset(Some(&[EnvId(1)])).unwrap());
-    // It goes on as if nothing had happened.
+    // It continues undisturbed.
     let (mut a, mut b) = (env.observations().to_owned(), calm.observations().to_owned());
     for _ in 0..20 {
         let (one, other) = (env.step(&policy(a.view())).unwrap(), calm.step(&policy(b.view())).unwrap());
         assert_eq!((&one.observations, &one.info), (&other.observations, &other.info));
         (a, b) = (one.observations, other.observations);
     }
-    // The simulation is given back without its observer.
+    // The simulation is returned without the task's observer.
     let mut sim = env.into_sim();
     sim.reset(None).unwrap();
     sim.update(1);
@@ -249,7 +249,7 @@ fn reset_by_viewer() {
     });
 }
 
-/// A reset of the task itself does not count as a foreign one; `time_limit` asserts the same of ends of episodes.
+/// A reset by the task itself does not count as external; `time_limit` asserts the same for ends of episodes.
 #[test]
 fn reset_by_task() {
     let mut env = cart_env(2, Some(3));
@@ -262,7 +262,7 @@ fn reset_by_task() {
     assert!(env.step(&array![[1.0], [2.0]]).unwrap().info.ended.is_empty());
 }
 
-/// A cart that can be pushed by any finite number.
+/// A cart with an action of any finite force.
 fn free_cart(num_envs: usize) -> Env {
     let (sim, robot) = world(cfg(num_envs, 2), false);
     let space = Space::uniform(["force"], [-1e308, 1e308]).unwrap();
@@ -301,7 +301,7 @@ fn diverged() {
             let [ended] = &step.info.ended[..] else { panic!("{:?}", step.info.ended) };
             assert_eq!((ended.env, ended.steps), (EnvId(5), 20));
             let EndReason::Diverged(why) = &ended.reason else { panic!("{}", ended.reason) };
-            // Three physics steps in a step: 19 went well.
+            // A step has three physics steps, and 19 steps succeeded.
             assert!(why.starts_with("step 57: "), "{why}");
             assert_eq!(step.final_observations.row(5), before.row(5), "the last good state");
             assert_eq!(step.observations.row(5).to_vec(), [0.0, 0.0], "revived");
@@ -309,13 +309,13 @@ fn diverged() {
         }
         before = step.observations;
     }
-    // The revived episode is 29 steps old, the others end now.
+    // The revived episode is 29 steps old; the others end now.
     let step = env.step(&actions(50, false)).unwrap();
     assert_eq!(step.truncated.iter().filter(|t| **t).count(), 7);
     assert!(!step.truncated[5] && env.now().episode_steps()[5] == 30);
 }
 
-/// A state that is written between steps and cannot be stepped on ends the same way.
+/// A state that is written between steps and diverges ends the episode in the same way.
 #[test]
 fn diverged_by_hand() {
     let (sim, robot) = world(cfg(2, 1), false);

@@ -1,4 +1,4 @@
-//! Mistakes of users give typed errors, and a reset goes on after them.
+//! Mistakes of users give typed errors, and a reset recovers from them.
 
 use super::tasks::{cart_task, cfg, idle, world};
 use kinetoscope::ndarray::{Array1, Array2, array};
@@ -12,7 +12,7 @@ fn empty() -> EnvBuilder {
     EnvBuilder::new(world(cfg(2, 1), false).0, EnvCfg::default())
 }
 
-/// A task that observes the number 1.
+/// A task with the constant observation 1.
 fn builder() -> EnvBuilder {
     empty().action(idle()).observation(ones("one"))
 }
@@ -107,7 +107,7 @@ fn unknown_names() {
     assert!(matches!(&error, EnvError::UnknownName { candidates, .. } if *candidates == ["idle/a"]), "{error}");
 }
 
-/// Terms that return nonsense end the step; a reset starts again.
+/// Terms that return invalid values end the step with an error; a reset starts again.
 #[test]
 fn terms_in_steps() {
     let reward = |weight, value: fn(usize) -> Array1<f64>| {
@@ -131,7 +131,7 @@ fn terms_in_steps() {
         assert!(error.to_string().contains(what), "{what}: {error}");
         assert!(matches!(env.step(&actions), Err(EnvError::ResetFirst { env: 0 })), "{what}");
     }
-    // Numbers that are not finite never are observations; a clip makes an infinite one finite.
+    // Non-finite numbers are never observations; a clip makes an infinite number finite.
     for (value, clip, good) in [(f64::NAN, true, false), (f64::INFINITY, false, false), (f64::INFINITY, true, true)] {
         let term = ObservationTerm::new("late", ["x"], move |now| {
             let late = |(e, _): (usize, usize)| if now.episode_steps()[e] == 3 { value } else { 0.0 };
@@ -153,7 +153,7 @@ fn terms_in_steps() {
             }
         }
     }
-    // At the start of an episode, too.
+    // The same at the start of an episode.
     let bad = CommandTerm::new("goal", ["x"], |_| [f64::NAN]);
     let error = builder().command(bad).build().unwrap().reset(None, None).unwrap_err();
     assert!(matches!(&error, EnvError::NotFinite { column, .. } if column == "x"), "{error}");

@@ -1,4 +1,4 @@
-//! Tasks: against loops over the plain API, closed forms, and themselves in other batches.
+//! Tasks, compared with loops over the plain API, with closed forms, and with themselves in other batches.
 
 mod batches;
 mod cart_pole;

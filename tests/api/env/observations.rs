@@ -8,7 +8,7 @@ use kinetoscope::tasks::{Env, EnvBuilder, EnvCfg, EnvError, Noise, ObservationTe
 /// Gravity of the default world \[m/s²\].
 const G: f64 = 9.81;
 
-/// A task of terms that observe the number 2 in two columns each.
+/// A task with terms that observe the number 2 in two columns each.
 fn of_twos(terms: impl IntoIterator<Item = ObservationTerm>) -> Env {
     let (sim, _) = world(cfg(4, 1), false);
     let builder = EnvBuilder::new(sim, EnvCfg::default()).action(idle());
@@ -28,7 +28,7 @@ fn spaces() {
     }
     let error = Space::uniform(["a", "b", "a"], [0.0, 1.0]).expect_err("repeated");
     assert!(matches!(&error, EnvError::RepeatedColumn { column } if column == "a"), "{error}");
-    // A column that holds one number only is a column.
+    // Equal bounds are valid.
     assert!(Space::uniform(["a"], [2.0, 2.0]).is_ok_and(|space| space.contains(array![2.0].view())));
     let space = Space::new([("a", [-1.0, 1.0]), ("b", [0.0, f64::INFINITY])]).expect("good bounds");
     for (row, inside) in [
@@ -44,7 +44,7 @@ fn spaces() {
     assert_eq!(space.column("b").ok(), Some(1));
     let Err(EnvError::UnknownName { candidates, .. }) = space.column("c") else { panic!("there is no column c") };
     assert_eq!(candidates, ["a", "b"]);
-    // Columns of several terms have the names of their terms, and keep their bounds.
+    // Column names are prefixed by the names of their terms, and columns keep their bounds.
     let terms = [twos("one", ["x", "y"]).clipped([-1.0, 1.0]), twos("two", ["x", "z"]).clipped([0.0, 3.0])];
     let env = of_twos(terms);
     let space = env.observation_space();
@@ -57,7 +57,7 @@ fn noise_clip_scale() {
     let one = Noise::Uniform { low: 1.0, high: 1.0 };
     let infinite = [f64::NEG_INFINITY, f64::INFINITY];
     let term = || twos("two", ["a", "b"]);
-    // Noise comes first, then the clip, then the scale.
+    // Noise is applied first, then the clip, then the scale.
     for (what, term, value, [low, high]) in [
         ("plain", term(), 2.0, infinite),
         ("clip and scale", term().scaled(-3.0).clipped([-1.0, 1.5]), -4.5, [-4.5, 3.0]),
@@ -70,8 +70,9 @@ fn noise_clip_scale() {
     }
 }
 
-/// Of n numbers the mean scatters by sigma / sqrt(n), the variance of normal ones by sigma² sqrt(2 / n), that of uniform ones of
-/// width 1 by sqrt(1 / 180 / n). Six times that fails once in 5e8 seeds, and the seed is fixed.
+/// For n numbers the mean has the standard deviation sigma / sqrt(n). The variance has sigma² sqrt(2 / n) for normal
+/// numbers, and sqrt(1 / 180 / n) for uniform numbers of width 1. A bound of six standard deviations fails once in 5e8
+/// seeds, and the seed is fixed.
 #[test]
 fn noise_moments() {
     for (noise, mean, variance, of_variance) in [
@@ -97,8 +98,9 @@ fn noise_moments() {
     }
 }
 
-/// A cart of 1 kg that is pushed by F feels F along its rail and gravity upwards, already in the step of the push: an
-/// accelerometer integrates nothing. Accelerations of one body are solved to rounding of the largest number in them.
+/// The accelerometer of a cart of 1 kg pushed by F reads F along the rail and gravity upward, already in the step of
+/// the push, because it does not integrate. Accelerations of one body are solved to rounding of their largest
+/// component.
 #[test]
 fn accelerometer() {
     let (mut sim, robot) = world(cfg(3, 2), false);

@@ -1,4 +1,4 @@
-//! The worlds and tasks of these tests.
+//! Worlds and tasks of the task tests.
 
 use kinetoscope::ndarray::{Array2, Array3, ArrayView2, Axis, array};
 use kinetoscope::prelude::*;
@@ -9,7 +9,7 @@ use kinetoscope::tasks::{
 };
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 
-/// A cart of 1 kg on a rail and, where it is wanted, a pole of 0.1 kg and 0.5 m on it.
+/// A cart of 1 kg on a rail, and optionally a pole of 0.1 kg and 0.5 m on it.
 pub(crate) fn cart(with_pole: bool) -> String {
     let pole = r#"<body name="pole"><joint name="hinge" type="hinge" axis="0 1 0"/>
         <geom type="capsule" fromto="0 0 0 0 0 0.5" size="0.02" mass="0.1"/></body>"#;
@@ -32,7 +32,7 @@ pub(crate) fn world(cfg: SimulationManagerCfg, with_pole: bool) -> (SimulationMa
     (sim, robot)
 }
 
-/// Pushes the cart, sees where it is, is rewarded for staying near 0.
+/// A task that pushes the cart, observes its position, and rewards staying near 0.
 pub(crate) fn cart_task(sim: SimulationManager, robot: RobotId, cfg: EnvCfg) -> EnvBuilder {
     let push = terms::joint_efforts(&sim, "push", robot, &["slide"], 10.0).unwrap();
     EnvBuilder::new(sim, cfg)
@@ -49,7 +49,7 @@ pub(crate) fn cart_env(num_envs: usize, episode_steps: Option<u64>) -> Env {
     cart_task(sim, robot, EnvCfg { episode_steps, ..Default::default() }).build().unwrap()
 }
 
-/// A task that uses every kind of term: a pole on a cart with noise, commands, pushes, other masses, random starts.
+/// A task with every kind of term: a pole on a cart with noise, commands, pushes, randomized masses and random starts.
 pub(crate) fn everything(cfg: SimulationManagerCfg) -> Env {
     let (sim, robot) = world(cfg, true);
     let push = terms::joint_efforts(&sim, "push", robot, &["slide"], 10.0).unwrap();
@@ -101,13 +101,13 @@ pub(crate) fn everything(cfg: SimulationManagerCfg) -> Env {
         .unwrap()
 }
 
-/// A policy that holds the pole for a while: a function of the row alone.
+/// A policy that balances the pole for a while; it depends only on the row of observations.
 pub(crate) fn policy(o: ArrayView2<'_, f64>) -> Array2<f64> {
     let force = |(e, _): (usize, usize)| 25.0 * o[(e, 1)] + 30.0 * o[(e, 2)] + 3.0 * (o[(e, 0)] - o[(e, 4)]);
     Array2::from_shape_fn((o.nrows(), 1), force)
 }
 
-/// An action that does nothing, of one column.
+/// An action without effect, with one column.
 pub(crate) fn idle() -> ActionTerm {
     ActionTerm::new("idle", Space::uniform(["a"], [-1.0, 1.0]).unwrap(), |_, _| Ok(()))
 }

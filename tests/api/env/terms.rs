@@ -1,4 +1,4 @@
-//! Terms of the library: what they say of states that are known.
+//! Library terms, evaluated in known states.
 
 use super::tasks::{cfg, idle};
 use kinetoscope::ndarray::{Array2, ArrayView1, Axis, array, s};
@@ -13,7 +13,7 @@ use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use nalgebra::Vector3;
 use std::f64::consts::FRAC_PI_2;
 
-/// A box of 2 kg that floats, with a lever on a hinge from -1 to 2 rad.
+/// A floating box of 2 kg, with a lever on a hinge from -1 to 2 rad.
 const FLOATER: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="trunk" pos="0 0 1"><freejoint name="float"/>
     <geom type="box" size="0.2 0.1 0.05" mass="2"/>
     <body name="lever" pos="0 0 0.3"><joint name="hinge" axis="0 1 0" range="-1 2"/><geom size="0.03" mass="0.1"/></body></body>
@@ -23,7 +23,7 @@ fn floater(num_envs: usize, ground: bool) -> (SimulationManager, RobotId) {
     let plain = cfg(num_envs, 1);
     let ground = if ground { SimulationManagerCfg::default().ground } else { None };
     let mut sim = SimulationManager::new(SimulationManagerCfg { ground, ..plain }).unwrap();
-    // Soft limits from -0.1 to 1.1: the middle of its range and 0.4 of its half.
+    // Soft limits from -0.1 to 1.1: the middle of the range ± 0.4 of its half.
     let robot = RobotCfg { fix_base: false, soft_limit_factor: 0.4, ..passive(mjcf_robot("floater", FLOATER)) };
     let robot = sim.add_robot(robot).unwrap();
     (sim, robot)
@@ -42,7 +42,7 @@ fn begin(task: EnvBuilder) -> Env {
     env
 }
 
-/// One step in which nothing is done: why each environment ended, if it did.
+/// Takes one step without action; returns the termination term that ended each environment, if any.
 fn ends(env: &mut Env) -> Vec<Option<String>> {
     let n = env.num_envs();
     let step = env.step(&Array2::zeros((n, 1))).unwrap();
@@ -55,7 +55,7 @@ fn ends(env: &mut Env) -> Vec<Option<String>> {
     ends
 }
 
-/// In which environments an episode ends whose roots begin at rows of poses.
+/// True for each environment whose episode ends if its root starts at the row of `poses`.
 fn ended_at(term: impl FnOnce(&SimulationManager, RobotId) -> TerminationTerm, poses: &Array2<f64>) -> Vec<bool> {
     let (sim, robot) = floater(poses.nrows(), false);
     let term = term(&sim, robot);
@@ -66,14 +66,14 @@ fn ended_at(term: impl FnOnce(&SimulationManager, RobotId) -> TerminationTerm, p
 
 #[test]
 fn low_and_lying_roots() {
-    // In a step of 0.01 s or less they fall by no more than g h² = 1 mm.
+    // In a step of at most 0.01 s the roots fall by at most g h² = 1 mm.
     let poses = array![
         [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0],
         [0.0, 0.0, 0.502, 1.0, 0.0, 0.0, 0.0],
         [0.0, 0.0, 0.499, 1.0, 0.0, 0.0, 0.0],
     ];
     assert_eq!(ended_at(|_, robot| terms::base_below("low", robot, 0.5), &poses), [false, false, true]);
-    // Turned about x by 0.5, about y by 0.7, about z by 3 rad: only the first two lean, the second beyond 0.6.
+    // Rotated about x by 0.5, about y by 0.7 and about z by 3 rad: only the first two tilt, the second beyond 0.6.
     let turned = |axis: usize, angle: f64| {
         let mut row = vec![0.0, 0.0, 1.0, (0.5 * angle).cos(), 0.0, 0.0, 0.0];
         row[4 + axis] = (0.5 * angle).sin();
@@ -97,7 +97,7 @@ fn time_and_joint_limits() {
     for _ in 0..2 {
         assert_eq!(ends(&mut env), [None, None, None]);
     }
-    // The others began anew one step later.
+    // The other environments restarted one step later.
     let step = env.step(&Array2::zeros((3, 1))).unwrap();
     assert_eq!((step.truncated.to_vec(), step.terminated.to_vec()), (vec![true, false, false], vec![false; 3]));
 }
@@ -108,7 +108,8 @@ fn illegal_contact() {
     let sensor = sim.add_sensor("touch", ContactSensorCfg::of("floater/trunk")).unwrap();
     let touched = terms::illegal_contact("touched", sensor, 5.0);
     let mut env = begin(task(sim, robot).termination(touched));
-    // One stands on the ground to a tenth of a millimetre, which carries its 2.1 kg, one is a metre above it.
+    // One robot rests on the ground at a depth of a tenth of a millimeter, which carries its 2.1 kg; the other is a
+    // meter above it.
     let poses = array![[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0499, 1.0, 0.0, 0.0, 0.0]];
     env.sim_mut().robot_mut(robot).write_root_pose(&poses, None).unwrap();
     let mut all = [false; 2];
@@ -150,11 +151,11 @@ fn root_ranges() {
     ] {
         let round = 1e-12;
         assert!(values.iter().all(|x| low - round <= *x && *x <= high + round), "{name}: {values:?}");
-        // The mean of N numbers is uniform's within five of its standard deviations, width / sqrt(12 N).
+        // The mean of N numbers is within five standard deviations of a uniform distribution, width / sqrt(12 N).
         let mean = values.iter().sum::<f64>() / N as f64;
         let deviation = (high - low) / (12.0 * N as f64).sqrt();
         assert!((mean - 0.5 * (low + high)).abs() < 5.0 * deviation, "{name}: {mean}");
-        // None in the outer tenths has a chance of 0.9^N, below 1e-18.
+        // The probability of no sample in an outer tenth is 0.9^N, below 1e-18.
         let width = high - low;
         assert!(values.iter().any(|x| *x < low + 0.1 * width), "{name}");
         assert!(values.iter().any(|x| *x > high - 0.1 * width), "{name}");
@@ -162,7 +163,8 @@ fn root_ranges() {
     assert!(column(&poses, 2).iter().all(|z| (z - 1.1).abs() < 1e-12));
     assert!(speeds.column(1).iter().chain(speeds.column(4)).all(|v| *v == 0.0));
 
-    // The axes are the root's own: yaw leaves the z axis of a robot that lies on its side, not that of the environment.
+    // The ranges are in the root's own axes: for a robot on its side, yaw keeps the z axis of the robot, not that of
+    // the environment.
     let mut sim = SimulationManager::new(SimulationManagerCfg { ground: None, ..cfg(N, 1) }).unwrap();
     let lying = Pose::rotation([FRAC_PI_2, 0.0, 0.0].into());
     let robot = RobotCfg { fix_base: false, init_pose: lying, ..passive(mjcf_robot("floater", FLOATER)) };
@@ -181,7 +183,7 @@ fn joint_ranges() {
     let (sim, robot) = floater(N, false);
     let event = terms::reset_joints_by_offset(&sim, "start", robot, &["hinge"], [-3.0, 0.5], [1.0, 1.5]).unwrap();
     let [_, _, places, speeds] = begun(event, robot, sim);
-    // From -3 to 0.5 about the start at 0; what is below the limit of -1 is there: 2 of 3.5 of them.
+    // From -3 to 0.5 about the start at 0; positions below the limit of -1 are clamped to it: 2 of 3.5 of them.
     let at_limit = places.iter().filter(|x| **x == -1.0).count() as f64 / N as f64;
     // Five standard deviations of a share p of N, sqrt(p (1 - p) / N).
     let share: f64 = 2.0 / 3.5;
@@ -204,14 +206,15 @@ fn root_state() {
         .build()
         .unwrap();
     env.reset(None, Some(1)).unwrap();
-    // The second lies on its side: a quarter turn about x. Both go along the world's x and turn about it.
+    // The second root lies on its side, by a quarter turn about x. Both move along the world's x and rotate about it.
     let half = 0.5f64.sqrt();
     let poses = array![[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, half, half, 0.0, 0.0]];
     env.sim_mut().robot_mut(robot).write_root_pose(&poses, None).unwrap();
     env.sim_mut().robot_mut(robot).write_root_velocity(&array![[0.3, 0.2, 0.0, 0.0, 0.0, 0.0]], None).unwrap();
     let step = env.step(&Array2::zeros((2, 1))).unwrap();
     let (seen, dt) = (&step.final_observations, env.step_dt());
-    // z, v, w, down: of the second y is the world's z and z the world's minus y. Gravity adds g dt to what falls.
+    // z, v, w, down: for the second root, y is the world's z and z the world's minus y. Gravity adds g dt to falling
+    // velocities.
     let fall = 9.81 * dt;
     let lever = Tolerance::absolute(
         0.02 * fall,
@@ -223,7 +226,8 @@ fn root_state() {
         let found = [0, 1, 2].map(|k| seen[(env, first + k)]);
         assert_close(&format!("environment {env}, column {first}"), found, expected, lever);
     }
-    // 1 of being there, then the two; what is off is 0.2 m/s of 0.5 for the first and what it falls for the second.
+    // 1 for being there, then the two rewards; the error is 0.2 m/s of 0.5 for the first root, and its fall velocity
+    // for the second.
     let rewards = &step.info.reward_terms;
     let expected = [0.2, fall].map(|off: f64| 2.0 * (-(off / 0.5).powi(2)).exp());
     assert_close("being there", rewards.column(1), [0.0, 1.0], lever);

@@ -1,4 +1,4 @@
-//! The task of the example `train_reach` passes the checks of tasks.
+//! The task of the example `train_reach` passes the task checks.
 
 #[allow(dead_code, unused_imports, reason = "only its task is used")]
 #[path = "../../../examples/train_reach.rs"]
@@ -17,7 +17,7 @@ fn passes_checks() {
     let mut env = task(&args, Arc::new(AtomicUsize::new(TARGETS))).unwrap();
     let findings = check(&mut env, 7);
     assert!(findings.is_empty(), "{}", findings.iter().map(|finding| format!("{finding}\n")).collect::<String>());
-    // Control: rewards that are no number are found.
+    // Control: NaN rewards are found.
     let findings = check(&mut Broken::around(env, Fault::NoReward), 7);
     assert!(findings.iter().any(|finding| matches!(finding, Finding::Reward { .. })), "{findings:?}");
 }

@@ -1,4 +1,4 @@
-//! One loop over batches of environments that are made in different ways.
+//! One generic loop over different implementations of batched environments.
 
 use super::tasks::{cart_env, cart_task, cfg, world};
 use kinetoscope::ndarray::{Array1, Array2, ArrayView2, Axis, array};
@@ -7,12 +7,12 @@ use kinetoscope::tasks::{EnvCfg, EnvError, Info, Space, Step, VectorEnv};
 /// The time step of the tests' worlds \[s\].
 const DT: f64 = 0.01;
 
-/// Carts on rails by their equation alone: v' = F / m, x' = v, by semi-implicit Euler as MuJoCo does it.
+/// Carts on rails by their equation alone: v' = F / m, x' = v, in semi-implicit Euler steps as in MuJoCo.
 pub(crate) struct Carts {
     spaces: [Space; 2],
     mass: f64,
     limit: u64,
-    /// Place, velocity and steps of each.
+    /// Position, velocity and step count of each cart; `None` before the first reset.
     carts: Vec<Option<(f64, f64, u64)>>,
 }
 
@@ -90,14 +90,14 @@ impl VectorEnv for Carts {
     }
 }
 
-/// The log of a loop: observations, rewards and ends.
+/// Results of a loop: observations, rewards and ends.
 #[derive(Debug, Default)]
 struct Log {
     numbers: Vec<f64>,
     ends: Vec<(usize, usize)>,
 }
 
-/// A loop as learning code has it, for any type of environments. The middle cart begins anew after 13 steps.
+/// A training loop for any type of environment. The middle cart restarts after 13 steps.
 fn drive<E: VectorEnv>(env: &mut E, steps: usize) -> Result<Log, E::Error> {
     let mut log = Log::default();
     let n = env.num_envs();
@@ -106,7 +106,7 @@ fn drive<E: VectorEnv>(env: &mut E, steps: usize) -> Result<Log, E::Error> {
         if k == 13 {
             seen = env.reset(Some(&(0..n).map(|env| env == 1).collect::<Vec<bool>>()), None)?;
         }
-        // Beyond the bounds, too.
+        // Some actions exceed the bounds.
         let actions =
             Array2::from_shape_fn((n, env.action_space().len()), |(e, _)| 6.0 * (e + 1) as f64 - 30.0 * seen[(e, 0)]);
         let step = env.step(actions.view())?;
@@ -127,10 +127,11 @@ fn one_loop() {
     assert_eq!(of_task.ends, by_hand.ends);
     assert_eq!(by_hand.ends[..3], [(19, 0), (19, 2), (32, 1)]);
     assert_eq!(of_task.numbers.len(), 50 * 9);
-    // 20 steps of sums of numbers below 1 in another order, and a feedback that is no gain above 1: rounding of 20 x 20 x 2^-53.
+    // 20 steps of sums of numbers below 1 in another order, and a feedback with a gain of at most 1: rounding of 20 x
+    // 20 x 2^-53.
     let apart = |a: &Log, b: &Log| a.numbers.iter().zip(&b.numbers).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(apart(&of_task, &by_hand) < 1e-12, "{}", apart(&of_task, &by_hand));
-    // The control: carts that are a thousandth heavier are elsewhere.
+    // Control: carts with 0.1 % more mass move differently.
     let heavy = drive(&mut Carts::new(3, 1.001, 20), 50).unwrap();
     assert!(apart(&of_task, &heavy) > 1e-5);
 }
@@ -140,7 +141,7 @@ fn errors() {
     let mut carts = Carts::new(2, 1.0, 5);
     assert_eq!(carts.step(array![[1.0], [1.0]].view()).unwrap_err(), CartError::ResetFirst(0));
     assert_eq!(carts.reset(Some(&[true]), None).unwrap_err(), CartError::Count { found: 1, expected: 2 });
-    // Which one it is may be chosen while the program runs.
+    // The type of environment can be chosen at run time.
     let (sim, robot) = world(cfg(2, 1), false);
     let task = cart_task(sim, robot, EnvCfg::default()).build().unwrap();
     let mut chosen: Box<dyn VectorEnv<Error = EnvError, Info = Info>> = Box::new(task);

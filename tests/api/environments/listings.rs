@@ -1,4 +1,5 @@
-//! Contents of a simulation by name and by handle: for programs that did not build it, such as views and recorders.
+//! Entities of a simulation by name and by handle, for programs that did not build the simulation, such as viewers and
+//! recorders.
 
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::Imu;
@@ -47,7 +48,8 @@ fn in_order() {
     assert!((0..6).all(|joint| sim.robot(robots[0]).is_driven(JointIndex(joint)).unwrap()));
 }
 
-/// A camera of every fifth step, and an IMU of every step, after each of a dozen steps.
+/// A camera with an image every fifth step, and an IMU with a measurement every step, checked after each of a dozen
+/// steps.
 #[test]
 fn due_sensors() {
     let World { mut sim, .. } = world();
@@ -58,7 +60,8 @@ fn due_sensors() {
     }
 }
 
-/// A body that falls and turns, against the object's own state; a robot's base carries the whole robot.
+/// Motion of a falling and rotating body, compared with the object's own state; the first moving link of a robot
+/// carries its whole mass.
 #[test]
 fn body_motion() {
     let World { mut sim, robots, .. } = world();
@@ -79,7 +82,7 @@ fn body_motion() {
     assert!((motion.carried_mass - 2.0).abs() < 1e-12 && !motion.is_fixed);
     let base = sim.scene().body_motion(EnvId(0), place("left/base_link")).unwrap();
     assert!(base.is_fixed);
-    // All that has mass hangs on the first link: the file gives the base none. Six numbers are added, in another order.
+    // All mass hangs on the first link, because the file gives the base none. Six numbers are added in another order.
     let link = sim.scene().body_motion(EnvId(0), place("left/link1")).unwrap();
     let last = sim.scene().body_motion(EnvId(0), place("left/link6")).unwrap();
     let total = sim.robot(robots[0]).total_mass();

@@ -1,4 +1,4 @@
-//! Questions of viewers, and checks of the configuration: by MuJoCo's arrays and by closed forms.
+//! Queries of viewers, compared with MuJoCo's arrays and closed forms; checks of the configuration.
 
 use super::worlds::{all_bits, arm, cfg, cube};
 use kinetoscope::ndarray::array;
@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 const G: f64 = 9.81;
 
-/// A cube at rest presses with its weight; one that falls touches nothing. Asking changes nothing.
+/// A cube at rest presses with its weight; a falling cube has no contact. The query changes nothing.
 #[test]
 fn contacts() {
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
@@ -23,10 +23,10 @@ fn contacts() {
     assert_eq!(all_bits(&sim), before);
     assert_eq!((contacts.len(), contacts[0].len(), contacts[1].len()), (2, 4, 0));
     let weight: f64 = contacts[0].iter().map(|contact| contact.normal_force).sum();
-    // It rests: its acceleration is below 1e-4 m/s² after 3 s.
+    // The cube is at rest: its acceleration is below 1e-4 m/s² after 3 s.
     assert!((weight - mass * G).abs() < 1e-4 * mass * G, "{weight}");
     for contact in &contacts[0] {
-        // The ground is the world; the force on the cube is up.
+        // The ground is the world; the force on the cube points up.
         let sign = if contact.bodies == [None, Some(0)] { 1.0 } else { -1.0 };
         assert!(contact.bodies == [None, Some(0)] || contact.bodies == [Some(0), None], "{contact:?}");
         assert!((sign * contact.normal[2] - 1.0).abs() < 1e-9 && sign * contact.force[2] > 0.0, "{contact:?}");
@@ -38,7 +38,7 @@ fn contacts() {
     assert!(matches!(sim.scene_mut().contacts(Some(&[EnvId(2)])), Err(Error::UnknownIndex { index: 2, .. })));
 }
 
-/// Everything that a look holds is what MuJoCo's arrays and the readers of robots and objects say.
+/// Every field of the snapshot agrees with MuJoCo's arrays and with the getters of robots and objects.
 #[test]
 fn look() {
     let mut sim = SimulationManager::new(cfg(2, 1)).unwrap();
@@ -78,8 +78,8 @@ fn look() {
     assert!(matches!(sim.scene_mut().look(EnvId(2), &mut look), Err(Error::UnknownIndex { index: 2, .. })));
 }
 
-/// F at r from the middle of a cube: after a step v = h F / m and w = h r x F / I, I = m a²/6; again in the next; no more once
-/// it is let go.
+/// A force F at r from the middle of a cube: after a step v = h F / m and w = h r x F / I, I = m a²/6; the same in the
+/// next step; no more after release.
 #[test]
 fn pull() {
     let settings = SimulationManagerCfg { gravity: [0.0; 3].into(), ground: None, ..cfg(2, 1) };

@@ -1,7 +1,7 @@
-//! Sizes and colors of single environments: what cameras and rays see, and what bodies lie on.
+//! Sizes and colors per environment: camera images, rays and contacts.
 //!
-//! The judge of most of it is a scene that was built with the sizes and colors that an environment of another got: the same
-//! bits, in images and in motion.
+//! The main reference is a scene built with the sizes and colors that were set in a single environment of another
+//! scene: images and motions must have the same bits.
 
 use super::worlds::{ALL, get, set};
 use kinetoscope::mujoco::{ObjectKind, TARGET, Target};
@@ -17,14 +17,14 @@ use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{sr5, text_robot};
 
-/// The camera, above everything and looking straight down.
+/// Position of the camera, above all objects and looking straight down \[m\].
 const EYE: [f64; 3] = [0.1, -0.05, 2.0];
 
 fn cfg() -> SimulationManagerCfg {
     kinetoscope_testkit::worlds::cfg(3, 2)
 }
 
-/// An object whose mass and moments do not follow from its size.
+/// An object whose mass and moments do not depend on its size.
 fn object(uid: &str, shape: ObjectShape, at: [f64; 3]) -> RigidObjectCfg {
     RigidObjectCfg {
         inertia: Some([0.01, 0.012, 0.014]),
@@ -33,7 +33,7 @@ fn object(uid: &str, shape: ObjectShape, at: [f64; 3]) -> RigidObjectCfg {
     }
 }
 
-/// Sizes and colors, the same in all environments but those that get their own.
+/// Sizes and colors of the scene's objects.
 #[derive(Clone, Copy)]
 struct Look {
     cube: [f64; 3],
@@ -48,7 +48,8 @@ const NOMINAL: Look =
 const OWN: Look =
     Look { cube: [0.3, 0.14, 0.26], ball: 0.17, post: [0.06, 0.5], pill: [0.11, 0.1], color: [0.9, 0.2, 0.1, 1.0] };
 
-/// Things of every kind that has sizes, far enough apart for both looks, above the ground; a mesh that has none.
+/// Objects of every kind with sizes, above the ground and far enough apart for both appearances; and a mesh without
+/// sizes.
 fn world(look: Look) -> SimulationManager {
     let mut sim = SimulationManager::new(cfg()).unwrap();
     let cube = object("cube", ObjectShape::Box { size: look.cube }, [0.0, 0.0, 0.3]);
@@ -66,11 +67,11 @@ fn world(look: Look) -> SimulationManager {
     sim
 }
 
-/// Gives an environment the other look.
+/// Applies an appearance to one environment.
 fn dress(sim: &mut SimulationManager, env: usize, look: Look) {
     let values: [(usize, Property, &str, &[f64]); 5] = [
         (env, Property::Size, "cube", &look.cube.map(|length| length / 2.0)),
-        // Numbers that a ball does not use are not kept.
+        // Numbers that a ball does not use are ignored.
         (env, Property::Size, "ball", &[look.ball, 7.0, -1.0]),
         (env, Property::Size, "post", &[look.post[0], look.post[1] / 2.0, 0.0]),
         (env, Property::Size, "pill", &[look.pill[0], look.pill[1] / 2.0, 0.0]),
@@ -103,7 +104,7 @@ fn images(sim: &SimulationManager, id: SensorId<Camera>) -> Images {
     (color.to_owned(), depth.to_owned(), camera.mask().unwrap().to_owned(), camera.normal().unwrap().to_owned())
 }
 
-/// True if environment `a` of one looks as environment `b` of the other, in every bit of every channel.
+/// True if environment `a` of `one` and environment `b` of `other` have the same bits in every channel.
 fn same(one: &Images, a: usize, other: &Images, b: usize) -> bool {
     one.0.index_axis(Axis(0), a) == other.0.index_axis(Axis(0), b)
         && one.1.index_axis(Axis(0), a) == other.1.index_axis(Axis(0), b)
@@ -115,7 +116,7 @@ fn same(one: &Images, a: usize, other: &Images, b: usize) -> bool {
 fn as_built() {
     let (mut sim, mut built) = (world(NOMINAL), world(OWN));
     let mut plain = world(NOMINAL);
-    // One camera from before, one from after.
+    // One camera is created before the change, one after.
     let before = sim.add_sensor("before", above()).unwrap();
     let nominal = images(&sim, before);
     dress(&mut sim, 1, OWN);
@@ -139,15 +140,15 @@ fn as_built() {
             assert_eq!((mine.row(1), mine.row(0)), (built.row(1), plain.row(0)), "{uid} after {steps} steps");
         }
     }
-    // Back to what it was, through a reset, which leaves properties alone.
+    // Back to nominal; a reset of the state before that leaves the properties unchanged.
     sim.reset(None).unwrap();
     assert!(!same(&images(&sim, before), 1, &nominal, 1));
     sim.properties_mut().reset(ALL).unwrap();
     assert!((0..3).all(|env| same(&images(&sim, before), env, &nominal, env)));
 }
 
-/// MuJoCo's contacts are soft: on four or fewer corners a body of any mass sinks in by up to about
-/// (1 - d) g / (d k) = 0.1 g / (0.9 · 2770 /s²) = 0.4 mm with its default reference (k = 1 / (0.95 · 0.02 s)²).
+/// MuJoCo's contacts are soft: on at most four corners a body of any mass sinks in by up to about (1 - d) g / (d k) =
+/// 0.1 g / (0.9 · 2770 /s²) = 0.4 mm with its default reference (k = 1 / (0.95 · 0.02 s)²).
 #[test]
 fn resting_heights() {
     let mut sim = world(NOMINAL);
@@ -166,7 +167,7 @@ fn resting_heights() {
     }
 }
 
-/// A ray at (x, y) from the optical axis, per metre of depth, meets a ball of radius r below at distance d in the depth
+/// A ray at (x, y) from the optical axis, per meter of depth, meets a ball of radius r below at distance d in the depth
 /// (d - sqrt(d² - (1 + x² + y²)(d² - r²))) / (1 + x² + y²). Images are in single precision.
 #[test]
 fn depth_of_ball() {
@@ -190,12 +191,12 @@ fn depth_of_ball() {
             let (x, y) = ((u as f64 - 60.0) / 100.0, (v as f64 - 50.0) / 100.0);
             let a = 1.0 + x * x + y * y;
             let inside = d * d - a * (d * d - radius * radius);
-            // Off the outline, where a pixel may be seen or not.
+            // Pixels near the outline are skipped: rounding decides whether they hit.
             if inside < 0.02 * d * d * (a - 1.0).max(1e-9) {
                 continue;
             }
             let expected = (d - inside.sqrt()) / a;
-            // At the limit the depth changes by d δ / sqrt(inside) with an error δ of the slope.
+            // Near the outline the depth changes by d δ / sqrt(inside) with an error δ of the slope.
             let tolerance = 2e-6 * (1.0 + d / inside.sqrt());
             for found in [depth[(env, v, u)], rays.depth()[(env, v, u)]] {
                 let found = f64::from(found);
@@ -209,8 +210,8 @@ fn depth_of_ball() {
     }
 }
 
-/// MuJoCo's own rays in the environment's own model, beside ours from the sensor.
-/// MuJoCo's pass through what has an opacity of 0.
+/// MuJoCo's rays in the environment's own model, compared with the sensor's rays. MuJoCo's rays pass through geoms with
+/// an opacity of 0.
 #[test]
 fn mujoco_rays() {
     let mut sim = world(NOMINAL);
@@ -243,7 +244,7 @@ fn mujoco_rays() {
     assert!(apart[1] > 30 && apart[2] > 3, "control: {apart:?} rays of the others hit something else");
 }
 
-/// A link of boxes, a mesh beside them, and what is seen instead of it.
+/// A link with collision boxes and a mesh, and visual shapes in place of them.
 fn arm(scale: f64) -> String {
     let size = |full: f64| format!("{} {} {}", full * scale, 0.5 * full * scale, 0.25 * full * scale);
     format!(
@@ -274,7 +275,7 @@ fn robot_links() {
     sim.properties_mut().randomize(&larger, Some(&[EnvId(2)])).unwrap();
     let (seen, expected) = (images(&sim, camera), images(&built, judge));
     assert!(same(&seen, 2, &expected, 2) && same(&seen, 0, &nominal, 0) && !same(&seen, 2, &nominal, 2));
-    // The shape that collides is scaled as well, and nothing weighs more.
+    // The collision shape is scaled as well, and masses do not change.
     sim.batch().read(2, |env| {
         let model = env.data().model();
         let geom = model.id(ObjectKind::Geom, "arm/fore/collision0").unwrap();
@@ -286,7 +287,7 @@ fn robot_links() {
     let red = [0.9_f64, 0.05, 0.05, 1.0];
     set(&mut sim, &[(2, Property::Color, "arm/fore", &red)]);
     assert_eq!(get(&sim, 2, Property::Color, "arm/fore"), red);
-    // Red instead of blue, in the mean over what is not ground; highlights are white.
+    // Red instead of blue, on average over all pixels but the ground; highlights are white.
     let image = images(&sim, camera);
     let sum = |channel: usize| {
         let arm = image.2.index_axis(Axis(0), 2);
@@ -297,13 +298,13 @@ fn robot_links() {
     assert_eq!(images(&sim, camera).1, seen.1, "a color changes no depth");
 }
 
-/// Meshes keep their sizes, but not their colors, and neither ground nor terrain has a size.
+/// Meshes have no sizes but have colors; ground and terrain have no size.
 #[test]
 fn names() {
     let mut sim = world(NOMINAL);
     sim.add_robot(RobotCfg { init_pose: Pose::translation(3.0, 0.0, 0.0), ..sr5("sr5") }).unwrap();
     let properties = sim.properties().of(EnvId(0)).unwrap();
-    // The links of the arm are boxes, cylinders and balls as well.
+    // The links of the arm include boxes, cylinders and balls.
     let mut sized = properties.names(Property::Size);
     sized.retain(|name| !name.starts_with("sr5/"));
     assert_eq!(sized, ["cube", "ball", "post", "pill"]);
@@ -317,7 +318,7 @@ fn names() {
     let before = images(&sim, camera);
     let cone = sim.rigid_object(sim.entities().rigid_object_id("cone").unwrap()).mask_id();
     let seen = |p: &Images, env: usize| p.2.index_axis(Axis(0), env).iter().filter(|id| **id == cone).count();
-    // Draws are of colors, and leave the opacity: 1, though a factor of 1.5 would be beyond it.
+    // Randomized colors keep the opacity of 1, although a factor of 1.5 would exceed it.
     let black = Randomization::new().with(Property::Color, "cone", Draw::Set([0.0, 0.0]));
     sim.properties_mut()
         .randomize(&black.with(Property::Color, "cube", Draw::Scale([1.5, 1.5])), Some(&[EnvId(0)]))
@@ -345,7 +346,7 @@ fn draws() {
     let mut other = world(NOMINAL);
     other.properties_mut().randomize(&draw, ALL).unwrap();
     assert_eq!((sizes(&other, 0), sizes(&other, 2)), (first.clone(), third));
-    // What is the environment's own, array by array.
+    // The environment's own arrays, one by one.
     let base = sim.batch().model().clone();
     let own: Vec<(&str, usize)> = sim.batch().read(0, |env| env.data().model().own_arrays().collect());
     let geoms = base.ngeom();
@@ -356,13 +357,13 @@ fn draws() {
     for array in &expected {
         assert!(own.contains(array), "{array:?} of {own:?}");
     }
-    // 4.x has boxes around bodies and the reach of joints as well.
+    // 4.x also updates the bounding boxes of bodies and the reach of joints.
     let rest: Vec<&str> = own.iter().filter(|array| !expected.contains(array)).map(|(name, _)| *name).collect();
     let follows = |name: &&str| TARGET == Target::V4 && ["bvh_aabb", "dof_length"].contains(name);
     assert!(rest.iter().all(follows), "{rest:?}");
     assert_eq!(sim.properties().bytes(EnvId(1)).unwrap(), 0);
     assert!(sim.batch().read(1, |env| env.data().model().arrays_apart(&base).is_empty()));
-    // More is added: the look stays, in images too.
+    // Adding an entity keeps the appearance, also in images.
     let before = images(&sim, camera);
     sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [9.0, 9.0, 0.05])).unwrap();
     assert_eq!(sizes(&sim, 0), first);
@@ -370,7 +371,7 @@ fn draws() {
     assert!((0..3).all(|env| same(&before, env, &after, env)) && !same(&before, 0, &before, 1));
 }
 
-/// Views from outside show the same.
+/// Scene snapshots for viewers show the same.
 #[test]
 fn stills() {
     let mut sim = world(NOMINAL);
@@ -399,7 +400,7 @@ fn mistakes() {
         (Property::Size, "cube", &[0.1, -0.1, 0.1], &cube),
         (Property::Size, "cube", &[0.1, 0.1, f64::NAN], &cube),
         (Property::Size, "cube", &[0.1, 2e6, 0.1], &cube),
-        // A capsule has a length.
+        // A capsule needs a length.
         (Property::Size, "pill", &[0.1, 0.0, 0.0], &["\"pill\""]),
         (Property::Color, "cube", &[1.1, 0.0, 0.0, 1.0], &["opacity"]),
         (Property::Color, "cube", &[0.0, -0.1, 0.0, 1.0], &["opacity"]),
@@ -415,8 +416,8 @@ fn mistakes() {
     assert!((0..3).all(|env| sim.properties().bytes(EnvId(env)).unwrap() == 0), "nothing has changed");
 }
 
-/// A pattern for nothing that can be seen is a mistake: draws of colors leave opacities, and rays pass what is invisible.
-/// Once an environment shows it, rays hit it there.
+/// A pattern that matches only invisible entities is an error: randomized colors keep opacities, and rays pass through
+/// invisible shapes. Rays hit such a shape in the environments that make it visible.
 #[test]
 fn invisible_patterns() {
     let mut sim = world(NOMINAL);
@@ -434,7 +435,7 @@ fn invisible_patterns() {
     };
     let said = sim.add_sensor("nothing", rays("ghost")).unwrap_err().to_string();
     assert!(said.contains("ghost") && said.contains("post"), "{said}");
-    // Controls: with something that is seen, the pattern is right, and the ghost stays one.
+    // Controls: together with a visible entity the pattern is valid, and the ghost stays invisible.
     sim.properties_mut().randomize(&draw("ghost|cube"), ALL).unwrap();
     let both = sim.add_sensor("both", rays("ghost|cube")).unwrap();
     assert_eq!(get(&sim, 1, Property::Color, "ghost")[3], 0.0);
@@ -446,11 +447,11 @@ fn invisible_patterns() {
         [0, 1, 2].map(|env| distances.row(env).iter().filter(|d| d.is_finite()).count())
     };
     assert_eq!(hit(&sim, ghost), [0, 9, 0]);
-    // The same for the pattern of two, which was there before: when it was built makes no difference.
+    // The same for the earlier pattern of two entities, independent of its creation time.
     assert_eq!(hit(&sim, both), [0, 9, 0]);
     let late = sim.add_sensor("late", rays("ghost|cube")).unwrap();
     assert_eq!(hit(&sim, late), [0, 9, 0]);
-    // Nor does it that sensors are built again, even while the ghost is invisible.
+    // The same after sensors are rebuilt, even while the ghost is invisible.
     sim.add_rigid_object(object("first", ObjectShape::cube(0.1), [8.0, 8.0, 0.05])).unwrap();
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 9, 0]));
     sim.properties_mut().reset(ALL).unwrap();
@@ -458,7 +459,7 @@ fn invisible_patterns() {
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 0, 0]));
     show(&mut sim);
     assert!([ghost, both, late].into_iter().all(|id| hit(&sim, id) == [0, 9, 0]));
-    // Control: a new sensor is refused still, once the ghost is invisible.
+    // Control: a new sensor is refused while the ghost is invisible.
     sim.properties_mut().reset(ALL).unwrap();
     assert!(sim.add_sensor("refused", rays("ghost")).is_err());
 }

@@ -1,4 +1,4 @@
-//! Work with single environments: states to go back to, rollouts, properties of their own, shares of several processes.
+//! Operations on single environments: snapshots, rollouts, properties per environment, shards of several processes.
 
 mod listings;
 mod looked_at;

@@ -1,4 +1,5 @@
-//! Observers are called where they asked to be, are told of what others do, and change no number.
+//! Observers are called at their requested steps, receive the changes of other observers, and do not affect the
+//! results.
 
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::Imu;
@@ -6,10 +7,10 @@ use kinetoscope::sim::{Error, Moment, ObjectId, Observer, ObserverId};
 use kinetoscope_testkit::worlds::{add_ball, object, row};
 use std::sync::{Arc, Mutex};
 
-/// The moments that were told, with the step of the first environment.
+/// The received events, with the step of the first environment.
 type Diary = Arc<Mutex<Vec<(u64, Moment)>>>;
 
-/// Is due at every `every`-th step of the first environment, and does something then.
+/// An observer that is due at every `every`-th step of the first environment and runs `act`.
 struct Watch {
     every: u64,
     diary: Diary,
@@ -75,7 +76,7 @@ fn steps_of_their_own() {
     }
 }
 
-/// By type, in the order of adding; a removed one is not found, nor one of another simulation.
+/// Look-up by type, in the order of addition. Removed observers and observers of another simulation are not found.
 #[test]
 fn by_type() {
     struct Other;
@@ -145,7 +146,7 @@ fn acts_of_others() {
     let mut all = every(1, 4);
     all.push(reset);
     all.extend(every(1, 3));
-    // The fifth step itself, told after the steps that the other did when it was told.
+    // The fifth step itself is reported after the steps that the other observer took during its call.
     all.push((3, Moment::Stepped));
     assert_eq!(entries(&hearers), all);
     assert_eq!(sim.observers().get(hearer).unwrap().every, 1);

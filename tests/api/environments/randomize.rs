@@ -1,4 +1,5 @@
-//! Properties of single environments: held against the laws of physics, shared where nothing differs, kept by name.
+//! Randomized properties per environment: compared with laws of physics, shared between equal environments, addressed
+//! by name.
 
 use super::worlds::{ALL, all_bits, all_properties, all_values, arm, cfg, cube, get, set, values, world};
 use kinetoscope::mujoco::{ObjectKind, TARGET, Target};
@@ -13,8 +14,8 @@ use std::f64::consts::TAU;
 
 const G: f64 = 9.81;
 
-/// A physical pendulum: T = 2 pi sqrt((I + m d² + armature) / (m g d)). The amplitude of 0.02 rad makes it longer by
-/// a² / 16 = 2.5e-5, the step of 1 ms by (omega h)² / 24 < 2e-6.
+/// A physical pendulum: T = 2 pi sqrt((I + m d² + armature) / (m g d)). The amplitude a of 0.02 rad prolongs it by a² /
+/// 16 = 2.5e-5, the step of 1 ms by (omega h)² / 24 < 2e-6.
 #[test]
 fn pendulums() {
     let text = r#"<mujoco><worldbody><body name="rod" pos="0 0 2"><joint name="hinge" axis="0 1 0" armature="0.1"/>
@@ -30,7 +31,8 @@ fn pendulums() {
         (5, Property::Armature, "p/hinge", &[0.3]),
     ];
     set(&mut sim, &envs);
-    // Mass, moment, distance, gravity, armature. Moments go with the mass; the armature does not, so that the mass matters.
+    // Mass, moment, distance, gravity, armature. Moments scale with the mass; the armature does not, so the mass
+    // matters.
     let laws = [
         (1.0, 0.02, 0.5, G, 0.1),
         (1.0, 0.02, 0.5, 3.7, 0.1),
@@ -59,12 +61,12 @@ fn pendulums() {
     for (env, (period, expected)) in periods.zip(expected).enumerate() {
         assert!((period / expected - 1.0).abs() < 4e-5, "environment {env}: {period} instead of {expected}");
     }
-    // Control: each property changes the period by far more than that.
+    // Control: each property changes the period by much more.
     assert!(expected[1..].iter().all(|period| (period / expected[0] - 1.0).abs() > 0.01), "{expected:?}");
 }
 
-/// Sliding on the ground, the momentum that is lost is mu times that of the normal force, m (g t + dv_z), whatever bounces
-/// there are. MuJoCo's friction creeps a little instead of being exactly at its limit: 1 %.
+/// For a box sliding on the ground, the lost momentum is mu times that of the normal force, m (g t + dv_z), with any
+/// bounces. MuJoCo's friction creeps slightly instead of being exactly at its limit: 1 %.
 #[test]
 fn sliding_boxes() {
     let mut sim = SimulationManager::new(SimulationManagerCfg { cone: Cone::Elliptic, ..cfg(3, 2) }).unwrap();
@@ -87,7 +89,7 @@ fn sliding_boxes() {
     assert!(lost[1] > 1.5 * lost[0], "{lost:?}");
 }
 
-/// A wheel about its centre, without a drive.
+/// An undriven wheel about its center.
 fn wheel(files: &Files) -> RobotCfg {
     let dynamics = r#"<dynamics damping="0.2" friction="0.05"/>"#;
     let spin = urdf::joint("spin", "continuous", ["post", "disc"], [0.0; 3], "0 1 0", dynamics);
@@ -95,7 +97,7 @@ fn wheel(files: &Files) -> RobotCfg {
     passive(text_robot(files, "wheel", &urdf::robot("wheel", &format!("<link name=\"post\"/>{spin}{disc}"))))
 }
 
-/// With damping inside the solve: v' = v - h (B v + f) / (I + A + h B), f the dry friction while it turns.
+/// With damping inside the solve: v' = v - h (B v + f) / (I + A + h B), where f is the dry friction during rotation.
 #[test]
 fn wheels() {
     let mut sim = SimulationManager::new(cfg(4, 1)).unwrap();
@@ -115,12 +117,12 @@ fn wheels() {
     let laws = [(0.2, 0.05, 0.0), (0.7, 0.05, 0.0), (0.2, 0.11, 0.0), (0.1, 0.05, 0.4)];
     for (env, (b, f, a)) in laws.into_iter().enumerate() {
         let (expected, found) = (before - h * (b * before + f) / (0.5 + a + h * b), after[(env, 0)]);
-        // MuJoCo's friction rows are hard to 1 in 10⁴ (impedance 0.9999).
+        // MuJoCo's friction rows are exact to 1 in 10⁴ (impedance 0.9999).
         assert!((found - expected).abs() < 1e-6, "environment {env}: {found} instead of {expected}");
     }
 }
 
-/// A world with a bar that a drive of 500 N m/rad holds out, without ground.
+/// A world without ground, with a bar held horizontally by a drive of 500 N m/rad.
 fn lever(num_envs: usize, drive_type: DriveType) -> (SimulationManager, RobotId) {
     let limit = urdf::limit([-3.0, 3.0], 100.0, 10.0);
     let hinge = urdf::joint("hinge", "revolute", ["post", "bar"], [0.0; 3], "0 1 0", &limit);
@@ -132,7 +134,7 @@ fn lever(num_envs: usize, drive_type: DriveType) -> (SimulationManager, RobotId)
     (sim, id)
 }
 
-/// A link that is held out sags by the torque of its weight over the stiffness; a weak drive gives its limit.
+/// A horizontal link sags by the torque of its weight over the stiffness; a weak drive gives its limit.
 #[test]
 fn gains_per_environment() {
     let (mut sim, id) = lever(3, DriveType::default());
@@ -151,15 +153,16 @@ fn gains_per_environment() {
         assert!((kp * q - weight).abs() < 1e-5 * weight, "environment {env}: {} instead of {weight}", kp * q);
     }
     assert!((effort[(2, 0)].abs() - 4.0).abs() < 1e-9, "{effort}");
-    // Gains are of the environment: they stay where they are, and a snapshot takes them nowhere else.
+    // Randomized gains belong to the environment: they persist, and a snapshot does not transfer them.
     let snapshot = sim.snapshot(Some(&[EnvId(2)])).unwrap();
     sim.restore(&snapshot, Some(&[EnvId(0), EnvId(1), EnvId(2)])).unwrap();
     assert_eq!(sim.robot(id).qf_limits(), array![[100.0], [100.0], [4.0]]);
     assert_eq!(sim.robot(id).stiffness(), array![[500.0], [200.0], [500.0]]);
 }
 
-/// The usual reset of learning goes back to a snapshot from before the draw. What was drawn stays and acts, and what was
-/// set at run time comes from the snapshot. Held out, the drive gives kp q, which is the weight's torque.
+/// The usual reset of learning restores a snapshot taken before the randomization. Randomized gains persist and act,
+/// and gains set at run time come from the snapshot. For the horizontal bar the drive gives kp q, the torque of the
+/// weight.
 #[test]
 fn drawn_gains_restored() {
     for drive_type in [DriveType::Force, DriveType::Acceleration] {
@@ -182,7 +185,7 @@ fn drawn_gains_restored() {
             assert_eq!(sim.robot(id).stiffness(), asked);
             assert_eq!(sim.robot(id).damping(), Array2::from_elem((3, 1), damping));
         }
-        // A rollout from the snapshot goes where stepping goes.
+        // A rollout from the snapshot equals stepping.
         let rollout = sim.rollout(&Array3::<f64>::zeros((1, 1500, 1)), Some(&start), ALL).unwrap();
         sim.restore(&start, ALL).unwrap();
         sim.update(1500);
@@ -191,13 +194,13 @@ fn drawn_gains_restored() {
             let q = q[(env, 0)];
             assert_eq!(rollout.states[(env, 1499, 0)], q, "environment {env}");
             let weight = 2.0 * G * 0.5 * q.cos();
-            // As in the test above: what is left of the motion.
+            // As in the test above: the rest of the motion.
             assert!((kp * q - weight).abs() < 1e-5 * weight, "environment {env}: {} instead of {weight}", kp * q);
         }
-        // What was drawn in one environment is not what another goes on with.
+        // Randomized values do not move to other environments.
         sim.restore(&later, Some(&[EnvId(2), EnvId(0), EnvId(1)])).unwrap();
         assert_eq!(sim.robot(id).stiffness(), asked);
-        // A gain that is set is drawn no longer, and a nominal one neither.
+        // A gain that is set overrides the randomized one; a nominal one removes it.
         sim.robot_mut(id).set_stiffness(&array![[333.0]], None, Some(&[EnvId(1)])).unwrap();
         sim.properties_mut().reset(Some(&[EnvId(2)])).unwrap();
         sim.restore(&start, ALL).unwrap();
@@ -205,8 +208,9 @@ fn drawn_gains_restored() {
     }
 }
 
-/// A drawn gain counts as drawn, also where it equals the gain below it: it stays when a plain state is
-/// restored, before and after it was itself restored. One that is set is not, also where it is set to what was drawn.
+/// A randomized gain counts as randomized even if it equals the underlying gain: it persists when a plain state is
+/// restored, before and after it was itself restored. A gain that is set does not count as randomized, even if it is
+/// set to the randomized value.
 #[test]
 fn drawn_equal_to_set() {
     let (mut sim, id) = lever(2, DriveType::default());
@@ -230,32 +234,32 @@ fn drawn_equal_to_set() {
         }
     };
     let (nominal, drawn) = ([500.0, 100.0, 100.0], [stiffness, damping, effort]);
-    // Set in both, then drawn to the same in one.
+    // Set in both environments, then randomized to the same value in one.
     set_all(&mut sim);
     draw_all(&mut sim);
     let both = sim.snapshot(ALL).unwrap();
     sim.restore(&start, ALL).unwrap();
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (nominal, drawn), "it was drawn");
-    // The other way: drawn first, and a state that has the same below it is restored.
+    // The other order: randomized first, then a state with the same underlying gains is restored.
     sim.properties_mut().reset(ALL).unwrap();
     draw_all(&mut sim);
     sim.restore(&both, ALL).unwrap();
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (drawn, drawn));
-    // Restored with the properties of then, it is drawn still.
+    // Restored with its properties, the gain still counts as randomized.
     sim.properties_mut().reset(ALL).unwrap();
     sim.properties_mut().restore(&both, ALL).unwrap();
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (drawn, drawn));
     sim.restore(&start, ALL).unwrap();
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (nominal, drawn), "it was drawn when the snapshot was taken");
-    // Control: set to the very same, it is drawn no longer.
+    // Control: setting the same value ends the randomization.
     set_all(&mut sim);
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (drawn, drawn));
     sim.restore(&start, ALL).unwrap();
     assert_eq!((gains(&sim, 0), gains(&sim, 1)), (nominal, nominal));
 }
 
-/// A draw is known by its record: it stays drawn where it is the nominal value, and through types of drives in which it does
-/// not act or is written in another unit.
+/// Randomization is tracked by a record, not by value: it persists if the value is nominal, and through drive types in
+/// which the gain has no effect or another unit.
 #[test]
 fn drawn_across_drive_types() {
     let (mut sim, id) = lever(2, DriveType::default());
@@ -271,7 +275,7 @@ fn drawn_across_drive_types() {
         assert_eq!(kp(&sim), [200.0, value]);
         assert_eq!(sim.robot(id).stiffness(), array![[200.0], [value]]);
     }
-    // Undrawn where it is nominal, too.
+    // The reset also clears a randomized value that is nominal.
     sim.properties_mut().randomize(&draw(500.0), Some(&[EnvId(1)])).unwrap();
     sim.properties_mut().reset(ALL).unwrap();
     sim.restore(&set, ALL).unwrap();
@@ -301,7 +305,7 @@ fn ranges() {
         for name in ["arm/link3", "cube", "machine/tip"] {
             assert!((0.8..1.2).contains(&ratio(Property::Mass, name)));
         }
-        // The moments of the arm have a factor of their own on top of that of the mass.
+        // The moments of the arm have their own factor on top of that of the mass.
         let own = ratio(Property::Inertia, "arm/link3") / ratio(Property::Mass, "arm/link3");
         assert!((0.9..1.1).contains(&own) && own != 1.0, "{own}");
         assert_eq!(ratio(Property::Inertia, "cube"), ratio(Property::Mass, "cube"));
@@ -314,7 +318,7 @@ fn ranges() {
         assert_eq!(ratio(Property::Stiffness, "arm/JOINT5"), 1.0);
         assert!((0.5..1.0).contains(&ratio(Property::MaxEffort, "arm/JOINT4")));
         assert_eq!(get(&sim, env, Property::Mass, "pile1"), [0.2]);
-        // What MuJoCo steps with is what was drawn.
+        // MuJoCo steps with the randomized values.
         sim.batch().read(env, |env| {
             let model = env.data().model();
             let cube = model.id(ObjectKind::Body, "cube").unwrap();
@@ -322,7 +326,7 @@ fn ranges() {
             assert_eq!(model.gravity()[..], *properties.get(Property::Gravity, "gravity").unwrap());
         });
     }
-    // Draws are for the nominal values: they do not drift. They differ from draw to draw, too.
+    // Randomization is relative to the nominal values, so values do not drift. They also differ between calls.
     let first = get(&sim, 1, Property::Mass, "cube");
     for _ in 0..50 {
         sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
@@ -346,7 +350,8 @@ fn seeds() {
         assert_ne!(values(&eight, env), values(&eight, env + 1));
     }
     assert_ne!(values(&draw(3, 1, 6), 0), values(&three, 0), "another seed");
-    // An environment's second draw does not depend on what others drew in between, nor on what else is drawn.
+    // An environment's second randomization does not depend on those of other environments in between, nor on other
+    // properties.
     three.properties_mut().randomize(&all_properties(), Some(&[EnvId(1)])).unwrap();
     eight.properties_mut().randomize(&all_properties(), Some(&[EnvId(0), EnvId(4)])).unwrap();
     assert_ne!(values(&eight, 1), values(&three, 1));
@@ -355,7 +360,7 @@ fn seeds() {
     let only = Randomization::new().with(Property::Mass, "cube", Draw::Scale([0.8, 1.2]));
     three.properties_mut().randomize(&only, Some(&[EnvId(0)])).unwrap();
     assert_eq!(get(&three, 0, Property::Mass, "cube"), get(&eight, 0, Property::Mass, "cube"));
-    // By a function: one stream of numbers for each environment and draw.
+    // By a function: one random stream for each environment and call.
     let mut streams = Vec::new();
     for sim in [&mut eight, &mut three] {
         let mut numbers = Vec::new();
@@ -390,14 +395,15 @@ fn memory() {
         ["dof_M0", "dof_invweight0", "geom_friction"],
     );
     assert_eq!(apart, [&bodies[..], &others].concat());
-    // Counted array by array: 8 bytes a number.
+    // Counted array by array: 8 bytes per number.
     let (bodies, dofs, geoms) = (base.nbody(), base.nv(), base.ngeom());
     let at_least = 8 * (bodies * (3 + 2 + 1 + 1) + dofs * 2 + geoms * 3);
     let bytes = sim.properties().bytes(EnvId(1)).unwrap();
     let arrays: usize = own.own_arrays().map(|(_, bytes)| bytes).sum();
     let small = 8 * (base.ntendon() + base.nactuator() + 3 * base.nlight());
     assert!(arrays >= at_least && arrays <= at_least + small, "{arrays} {at_least}");
-    // Beside the model: the lists of masses, of the moments that go with them and of friction, whole ones, 8 bytes a number.
+    // Outside of the model: full lists of masses, of the moments that scale with them, and of friction, 8 bytes per
+    // number.
     let masses = sim.properties().of(EnvId(1)).unwrap().names(Property::Mass).len();
     let collides = |geom: &usize| base.geom_contype()[*geom] != 0 || base.geom_conaffinity()[*geom] != 0;
     let shapes = (0..geoms).filter(collides).count();
@@ -406,7 +412,7 @@ fn memory() {
     assert!(own.own_bytes() > arrays && own.own_bytes() < arrays + (16 << 10), "{} for {arrays}", own.own_bytes());
     assert!(bytes < base.shared_bytes(), "{bytes} of {}", base.shared_bytes());
 
-    // Nominal again: all is shared, and goes on as if nothing had been.
+    // Nominal again: everything is shared, and the simulation continues as without the randomization.
     sim.properties_mut().reset(ALL).unwrap();
     assert!(model(&sim, 1).arrays_apart(&base).is_empty() && sim.properties().bytes(EnvId(1)).unwrap() == 0);
     let (mut other, _) = world(cfg(4, 1));
@@ -434,7 +440,7 @@ fn growing_buffers() {
     sim.reset(None).unwrap();
     assert_eq!(all_values(&sim), drawn);
     assert_eq!(own(&sim, 0), arrays);
-    // And it is what is stepped with: one step of free fall.
+    // The simulation steps with it: one step of free fall.
     let before = sim.rigid_object(ids.cube).velocity();
     sim.update(1);
     let after = sim.rigid_object(ids.cube).velocity();
@@ -465,7 +471,7 @@ fn later_entities() {
         assert_eq!(get(&sim, env, Property::Mass, "late"), [1.0]);
     }
     assert_eq!(sim.properties().bytes(EnvId(0)).unwrap(), 0);
-    // The same as drawn after everything was there: names are keys.
+    // The same values as with all entities present from the start: names are the keys.
     let (mut other, _) = world(cfg(3, 1));
     other.add_rigid_object(cube("late", 1.0, [2.0, 2.0, 0.05])).unwrap();
     other.properties_mut().randomize(&all_properties(), Some(&[EnvId(1), EnvId(2)])).unwrap();
@@ -498,7 +504,7 @@ fn snapshots_and_rollouts() {
     fresh.restore(&snapshot, ALL).unwrap();
     let again = fresh.rollout(&controls, None, ALL).unwrap();
     assert!(again.states == rollout.states);
-    // Control: with nominal properties it goes elsewhere.
+    // Control: nominal properties give other states.
     fresh.properties_mut().reset(ALL).unwrap();
     assert!(fresh.rollout(&controls, Some(&snapshot), ALL).unwrap().states != rollout.states);
 }
@@ -510,7 +516,7 @@ fn mistakes() {
     for (property, name, draw, expected) in [
         (Property::Mass, "cube", Draw::Add([-2.0, -1.0]), "kg"),
         (Property::Mass, "cube", Draw::Set([5e-16, 5e-16]), "at least 1e-15 kg"),
-        // Such a mass is allowed, but not the moments that go with it here.
+        // Such a mass is allowed, but not the moments that scale with it here.
         (Property::Mass, "cube", Draw::Set([2e-15, 2e-15]), "moments of inertia must be positive"),
         (Property::Inertia, "cube", Draw::Add([-1.0, -1.0]), "positive"),
         (Property::Friction, "ground", Draw::Set([-0.1, -0.1]), ">= 0"),
@@ -534,7 +540,7 @@ fn mistakes() {
     for range in [[1.0, 0.5], [f64::NAN, 1.0], [0.0, f64::INFINITY]] {
         assert_error(sim.properties_mut().randomize(&mass("cube", Draw::Set(range)), ALL), "Randomization(Range", &[]);
     }
-    // A joint whose implicit drive replaces its friction, and the free joint of an object, have no such property.
+    // Joints whose implicit drive uses the friction row, and the free joint of an object, do not have this property.
     let none = Randomization::new().with(Property::DryFriction, "arm/JOINT1|cube/free", Draw::Set([1.0, 1.0]));
     assert_error(sim.properties_mut().randomize(&none, ALL), "Randomization(Pattern { property: \"dry_friction\"", &[]);
     type Set = (Property, &'static str, &'static [f64]);
@@ -551,14 +557,14 @@ fn mistakes() {
         sim.properties_mut().randomize(&Randomization::new(), Some(&[EnvId(7)])),
         Err(Error::UnknownIndex { .. })
     ));
-    // The first environment was good, the second not: neither changes.
+    // The first environment was valid, the second not: neither changes.
     let half = sim
         .properties_mut()
         .randomize_with(ALL, |_, env, p| p.set(Property::Mass, "cube", &[1.0 - 2.0 * env.0 as f64]));
     assert!(matches!(half, Err(Error::Randomization(RandomizationError::Value { env: 1, .. }))));
     assert_eq!(get(&sim, 0, Property::Mass, "cube"), [0.5]);
     assert_eq!(all_bits(&sim), before);
-    // Failed draws do not count as draws.
+    // Failed calls do not advance the random streams.
     let (mut other, _) = world(cfg(2, 1));
     for sim in [&mut sim, &mut other] {
         sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
@@ -566,8 +572,8 @@ fn mistakes() {
     assert_eq!(values(&sim, 1), values(&other, 1));
 }
 
-/// 4.x keeps only the diagonal of the inertia matrix of a free body whose centre of mass is in its origin, unless the file
-/// says otherwise; the objects of the scene say so.
+/// 4.x keeps only the diagonal of the inertia matrix of a free body whose center of mass is at its origin, unless the
+/// file disables this; the objects of the scene disable it.
 #[test]
 fn centred_body_of_file() {
     let (mut sim, _) = world(cfg(2, 1));
@@ -591,12 +597,13 @@ fn centred_body_of_file() {
 fn centred_object() {
     let (mut sim, ids) = world(cfg(2, 1));
     set(&mut sim, &[(1, Property::CenterOfMass, "cube", &[0.03, 0.0, 0.0])]);
-    // Free fall without spin: a force in the centre of mass turns nothing, and the origin turns about the centre.
+    // Free fall without spin: a force at the center of mass causes no rotation, and the origin rotates about the
+    // center.
     sim.rigid_object_mut(ids.cube).write_velocity(&Array2::zeros((1, 6)), ALL).unwrap();
     sim.update(10);
     let fallen = sim.rigid_object(ids.cube).velocity();
     assert!(fallen.row(1).iter().zip(&fallen.row(0)).all(|(a, b)| (a - b).abs() < 1e-12), "{fallen}");
-    // With a spin about z the origin is accelerated to the centre: |a| = w² d.
+    // With a spin about z the origin is accelerated toward the center: |a| = w² d.
     sim.rigid_object_mut(ids.cube).write_velocity(&array![[0.0, 0.0, 0.0, 0.0, 0.0, 2.0]], ALL).unwrap();
     let before = sim.rigid_object(ids.cube).velocity();
     sim.update(1);
@@ -606,7 +613,7 @@ fn centred_object() {
     assert!(change[(0, 0)].abs() + change[(0, 1)].abs() < 1e-9);
 }
 
-/// The forward pass after a draw waits for the next read or step; its time changes nothing, to the last bit.
+/// The forward pass after a randomization is delayed until the next read or step; the delay does not change a bit.
 #[test]
 fn lazy_forward_pass() {
     let masses = Randomization::new().with(Property::Mass, ".*", Draw::Scale([0.5, 2.0]));
@@ -625,7 +632,7 @@ fn lazy_forward_pass() {
         if reset {
             sim.reset(Some(&[EnvId(2)])).unwrap();
         }
-        // What is read then is of the new masses: MuJoCo's inertia matrix.
+        // The read values belong to the new masses: MuJoCo's inertia matrix.
         let of_mass = |env: usize| sim.batch().read(env, |env| env.data().mass_matrix().unwrap());
         let matrices: Vec<Vec<f64>> = (0..3).map(of_mass).collect();
         let masses = sim.rigid_object(ids.cube).mass();

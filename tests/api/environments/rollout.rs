@@ -1,4 +1,4 @@
-//! A rollout gives what stepping by hand gives, and changes nothing.
+//! A rollout gives the same results as stepping by hand, and changes nothing.
 
 use super::worlds::{ALL, Ids, all_bits, cfg, world};
 use kinetoscope::ndarray::{Array2, Array3, Axis, concatenate, s};
@@ -11,7 +11,7 @@ fn controls(rows: usize) -> Array3<f64> {
     Array3::from_shape_fn((rows, STEPS, 7), |(n, t, k)| (0.7 * n as f64 + 0.05 * t as f64 + k as f64).sin() * 2.0)
 }
 
-/// Gives the controls of step `t` and steps.
+/// Sets the controls of step `t` and steps.
 fn step(sim: &mut SimulationManager, ids: Ids, controls: &Array3<f64>, t: usize) {
     let now = controls.index_axis(Axis(1), t);
     sim.robot_mut(ids.arm).set_qpos_target(now.slice(s![.., ..6]), None, None).unwrap();
@@ -50,11 +50,11 @@ fn steps_by_hand() {
             assert!(states(&sim) == rollout.states.index_axis(Axis(1), t), "step {t}");
         }
         let end = all_bits(&sim);
-        // The end is a state to go on from.
+        // The end is a state that can be restored.
         sim.restore(&rollout.end, ALL).unwrap();
         assert_eq!(all_bits(&sim), end);
 
-        // From a snapshot, whatever is present; and many rows in one environment.
+        // From a snapshot, independent of the current state; and many rows in one environment.
         let again = sim.rollout(&controls, Some(&present), ALL).unwrap();
         assert!(again.states == rollout.states);
         sim.restore(&present, ALL).unwrap();
@@ -80,7 +80,7 @@ fn names() {
     assert_eq!(states.len(), model.nq() + model.nv());
     let rollout = sim.rollout(&Array3::zeros((1, 1, 7)), None, ALL).unwrap();
     let column = |name: &str| states.iter().position(|n| n == name).unwrap();
-    // Free fall of one step from rest but for what the world wrote; the height is where the name says.
+    // One step of free fall from rest, except for the velocities set by the world; the height is in the named column.
     let height = rollout.states[(0, 0, column("qpos cube/free[2]"))];
     let velocity = rollout.states[(0, 0, column("qvel cube/free[2]"))];
     let first = 2.0 * 2.0_f64.sin() - 9.81 * 0.01;
@@ -98,8 +98,8 @@ fn clamped_targets() {
     assert_eq!(sim.robot(ids.arm).qpos_target().row(0), limits.slice(s![0, .., 1]));
 }
 
-/// Controls were once clamped to the limits that the robot was added with, not to those that a row's state has:
-/// `set_qpos_limits` changes them in an environment, and they go with its state.
+/// Regression: controls were clamped to the limits at the creation of the robot instead of those of the start state.
+/// `set_qpos_limits` changes limits in an environment, and they are part of its state.
 #[test]
 fn limits_of_start() {
     let (mut sim, ids) = world(cfg(2, 1));
@@ -108,7 +108,7 @@ fn limits_of_start() {
     sim.robot_mut(ids.arm).set_qpos_limits(&tight, None, Some(&[EnvId(1)])).unwrap();
     let narrow = sim.snapshot(ALL).unwrap();
     let controls = controls(2);
-    // What is present has other limits than the state that is started from, in both directions.
+    // The current state has other limits than the start state, in both directions.
     for (present, start) in [(&narrow, None), (&narrow, Some(&wide)), (&wide, Some(&narrow))] {
         sim.restore(present, ALL).unwrap();
         let rollout = sim.rollout(&controls, start, ALL).unwrap();
@@ -125,13 +125,13 @@ fn limits_of_start() {
             let asked = controls[(env, STEPS - 1, joint)];
             assert_eq!(*target, asked.clamp(limits[(env, joint, 0)], limits[(env, joint, 1)]));
         }
-        // It matters here: the last controls are beyond the tight limits of environment 1.
+        // The limits matter here: the last controls exceed the tight limits of environment 1.
         let is_tight = start.is_none_or(|start| std::ptr::eq(start, &narrow));
         let inside =
             targets.row(1).iter().zip(tight.outer_iter().next().unwrap().rows()).all(|(x, ends)| x.abs() <= ends[1]);
         assert_eq!(inside, is_tight);
     }
-    // A state takes its limits to whichever environment it is tried in.
+    // A state keeps its limits in every environment.
     sim.restore(&wide, ALL).unwrap();
     let there = sim.rollout(&controls, Some(&narrow), ALL).unwrap();
     let elsewhere = sim.rollout(&controls, Some(&narrow), Some(&[EnvId(0); 2])).unwrap();

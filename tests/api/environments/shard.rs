@@ -1,4 +1,4 @@
-//! Two processes of four environments are one of eight.
+//! Two processes with four environments equal one process with eight.
 
 use super::worlds::{Ids, all_bits, cfg, world};
 use kinetoscope::prelude::*;
@@ -6,8 +6,8 @@ use kinetoscope::sensors::{JointStateCfg, NoiseCfg};
 use kinetoscope::sim::{Error, Shard};
 use kinetoscope_testkit::bits::bits;
 
-/// Bits of states and of what a noisy sensor says, after draws, steps and resets. `first` is the global index of the
-/// manager's first environment.
+/// Bits of states and of a noisy sensor's measurements, after randomizations, steps and resets. `first` is the global
+/// index of the manager's first environment.
 fn run(num_envs: usize, shard: Shard, first: usize) -> Vec<(Vec<u64>, Vec<u64>)> {
     let (mut sim, ids) = world_alike(SimulationManagerCfg { seed: 11, shard, ..cfg(num_envs, 2) });
     let noise = [("positions".to_string(), NoiseCfg { bias_std: 0.1, ..NoiseCfg::white(0.01) })].into();
@@ -19,7 +19,7 @@ fn run(num_envs: usize, shard: Shard, first: usize) -> Vec<(Vec<u64>, Vec<u64>)>
         .with(Property::Gravity, "gravity", Draw::Add([-0.3, 0.3]));
     sim.properties_mut().randomize(&random, None).unwrap();
     sim.update(50);
-    // Some environments start again and are drawn again, those of global indices 1 and 6.
+    // The environments with the global indices 1 and 6 are reset and randomized again.
     let again: Vec<EnvId> = [1, 6].iter().filter_map(|&g: &usize| g.checked_sub(first)).map(EnvId).collect();
     let again: Vec<EnvId> = again.into_iter().filter(|env| env.0 < num_envs).collect();
     sim.reset(Some(&again)).unwrap();
@@ -87,7 +87,7 @@ fn variables_of_launchers() {
     assert!(ask(&[("RANK", "2")]).contains("Err(Incomplete"));
 }
 
-/// The child of the test above.
+/// The child process of the test above.
 #[test]
 #[ignore = "runs in a process of its own"]
 fn child() {

@@ -1,4 +1,5 @@
-//! Sizes that are no property of an environment: meshes, planes and height fields say why, and what to do.
+//! Shapes without a randomizable size: the errors of meshes, planes and height fields name the reason and an
+//! alternative.
 
 use super::worlds::{cfg, cube};
 use kinetoscope::mujoco::ObjectKind;
@@ -7,7 +8,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::{Error, RandomizationError};
 use kinetoscope_testkit::worlds::object;
 
-/// Two cones of one mesh, a small plane, a ball far beside it, and a body of a box and a mesh.
+/// Two bodies with one mesh, a small plane, a ball far away from it, and a body with a box and a mesh.
 const PART: &str = r#"<mujoco><asset><mesh name="spike" vertex="0 0 0  0.2 0 0  0 0.2 0  0 0 0.2"/></asset><worldbody>
     <geom name="shelf" type="plane" size="0.5 0.5 0.1" pos="0 0 1"/>
     <body name="one" pos="-1 0 2"><freejoint/><geom type="mesh" mesh="spike"/></body>
@@ -62,14 +63,14 @@ fn without_size() {
             assert!(of == name && parts.iter().all(|part| error.to_string().contains(part)), "{error}");
         }
     }
-    // Nothing of that name at all is another mistake.
+    // An unknown name is a different error.
     let typo = Randomization::new().with(Property::Size, "cubes", Draw::Scale([0.9, 1.1]));
     let error = sim.properties_mut().randomize(&typo, None).unwrap_err();
     assert!(matches!(error, Error::Randomization(RandomizationError::Pattern { .. })), "{error:?}");
     assert!(sim.properties().of(EnvId(0)).unwrap().get(Property::Size, "cubes").is_err());
 }
 
-/// A pattern that reaches things of both kinds draws those that have sizes, and of a body the shapes that have.
+/// A pattern that matches entities of both kinds randomizes those with sizes, and within a body the shapes with sizes.
 #[test]
 fn mixed_patterns() {
     let mut sim = world();
@@ -82,8 +83,8 @@ fn mixed_patterns() {
     }
 }
 
-/// The reasons are true. A ball that falls beside a plane of half a metre comes to rest at the plane's height: MuJoCo's
-/// contacts yield by less than a millimetre under 40 N. Two bodies of one mesh share its vertices.
+/// The reasons are true. A ball that falls next to a plane of half a meter comes to rest at the plane's height:
+/// MuJoCo's contacts yield by less than a millimeter under 40 N. Two bodies with one mesh share its vertices.
 #[test]
 fn planes_and_meshes() {
     let mut sim = world();

@@ -1,4 +1,5 @@
-//! Going on from a snapshot is going on: the same bits, wherever it is restored; and wrong ones are told apart.
+//! Continuing from a snapshot gives the same bits, in any manager and environment; snapshots of other scenes are
+//! refused.
 
 use super::worlds::{ALL, all_bits, all_properties, all_values, arm, bits_of, cfg, cube, fewest_contacts, world};
 use kinetoscope::ndarray::{Array2, Array3, array};
@@ -10,7 +11,7 @@ use kinetoscope_testkit::urdf;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::text_robot;
 
-/// A snapshot after 500 steps, and the bits there and 300 steps later.
+/// A snapshot after 500 steps, with the bits at that time and 300 steps later.
 fn run(settings: SimulationManagerCfg) -> (SimulationManager, Snapshot, Vec<Vec<u64>>, Vec<Vec<u64>>) {
     let (mut sim, _) = world(settings);
     sim.update(500);
@@ -32,14 +33,14 @@ fn same_bits() {
         sim.update(300);
         assert!(all_bits(&sim) == end, "and goes on as before");
 
-        // A manager that the same program built, with another number of threads, which has never been there.
+        // A new manager of the same program, with another number of threads.
         let (mut fresh, _) = world(SimulationManagerCfg { threads: Some(3), ..settings });
         fresh.restore(&snapshot, ALL).unwrap();
         assert!(all_bits(&fresh) == there);
         fresh.update(300);
         assert!(all_bits(&fresh) == end);
 
-        // Control: without it the manager is somewhere else.
+        // Control: without the snapshot the manager is in another state.
         let (mut other, _) = world(fresh.cfg().clone());
         other.update(300);
         assert!(all_bits(&other) != end);
@@ -54,7 +55,7 @@ fn other_environments() {
     assert_eq!(all_bits(&sim), [there[2].clone(), there[1].clone(), there[0].clone()]);
     sim.update(300);
     assert_eq!(all_bits(&sim), [end[2].clone(), end[1].clone(), end[0].clone()]);
-    // One to all, and into a manager of one.
+    // One to all, and into a manager with one environment.
     sim.restore(&snapshot, ALL).unwrap();
     let one = sim.snapshot(Some(&[EnvId(1)])).unwrap();
     assert_eq!((one.len(), one.env_ids()), (1, vec![EnvId(1)]));
@@ -64,7 +65,7 @@ fn other_environments() {
     single.restore(&one, Some(&[EnvId(0)])).unwrap();
     single.update(300);
     assert_eq!(all_bits(&single)[0], end[1]);
-    // A subset leaves the others alone.
+    // A subset leaves the others unchanged.
     sim.update(10);
     let before = all_bits(&sim);
     sim.restore(&one, Some(&[EnvId(2)])).unwrap();
@@ -132,7 +133,7 @@ fn other_scenes() {
     few.add_robot(arm()).unwrap();
     assert!(matches!(few.restore(&snapshot, ALL), Err(Error::UnknownIndex { index: 2, .. })));
     assert_eq!(all_bits(&sim), before);
-    // Something was added: what was taken before is of another scene.
+    // After an addition, earlier snapshots belong to another scene.
     sim.add_rigid_object(cube("late", 1.0, [1.0, 1.0, 1.0])).unwrap();
     assert!(matches!(sim.restore(&snapshot, ALL), Err(Error::Snapshot(SnapshotError::OtherScene { .. }))));
 }
@@ -141,7 +142,7 @@ fn other_scenes() {
 fn other_settings() {
     let build = |settings| {
         let mut sim = SimulationManager::new(settings).unwrap();
-        // No robot: the drives of `arm` go with Euler's integrator alone.
+        // Without a robot, because the drives of `arm` require Euler's integrator.
         sim.add_rigid_object(cube("box", 1.0, [0.0, 0.0, 1.0])).unwrap();
         sim
     };
@@ -151,7 +152,7 @@ fn other_settings() {
     let snapshot = Snapshot::load(file.path()).unwrap();
     let others = [
         (SimulationManagerCfg { physics_dt: 0.005, ..cfg(1, 1) }, "timestep 0.005"),
-        // The same steps of MuJoCo, of which two are one.
+        // The same MuJoCo steps, but two of them per update.
         (SimulationManagerCfg { physics_dt: 0.02, substeps: 2, ..cfg(1, 1) }, "2 substeps"),
         (SimulationManagerCfg { integrator: Integrator::Rk4, ..cfg(1, 1) }, "RK4"),
         (SimulationManagerCfg { cone: Cone::Elliptic, ..cfg(1, 1) }, "elliptic"),
@@ -178,7 +179,7 @@ fn diverged() {
     sim.update(5);
     let reason = sim.diverged();
     assert_eq!(reason.len(), 1);
-    // MuJoCo's own warnings are those of this environment alone.
+    // MuJoCo's warnings are counted per environment.
     let counts = [0, 1, 2].map(|env| sim.warnings().env_counts(EnvId(env)).unwrap());
     assert!(counts[0].is_empty() && !counts[1].is_empty() && counts[2].is_empty(), "{counts:?}");
     assert!(counts[1].iter().all(|(name, count)| sim.warnings().counts()[*name] == *count), "{counts:?}");
@@ -221,7 +222,7 @@ fn sensors() {
     assert_eq!(sensor.positions().row(1), sim.robot(robot).qpos().row(1));
 }
 
-/// Delay lines, drives that were changed and wrenches are part of it, in memory and in a file.
+/// Delay lines, changed drives and wrenches are part of a snapshot, in memory and in a file.
 #[test]
 fn drives_and_wrenches() {
     let delayed = DelayedPd { delay: 4, max_delay: 9 }.into();
@@ -267,14 +268,14 @@ fn drives_and_wrenches() {
     assert!(go(&mut fresh, its, 60) == end, "the same bits from a file");
     sim.restore(&snapshot, ALL).unwrap();
     assert!(go(&mut sim, id, 60) == end, "and from memory");
-    // Control: without any of these, it goes elsewhere.
+    // Control: without these changes the states differ.
     let (mut other, its) = build();
     go(&mut other, its, 0);
     assert!(go(&mut other, its, 60) != end);
 }
 
-/// From memory and from a file, into the manager itself and one that was built alike: the same bits with the properties of
-/// then, and the next draws are those of then.
+/// From memory and from a file, into the same manager and an equal one: the same bits with the properties of the
+/// snapshot, and the next randomizations repeat as well.
 #[test]
 fn with_properties() {
     let dir = tempfile::tempdir().unwrap();
@@ -291,7 +292,8 @@ fn with_properties() {
     sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
     let next = all_values(&sim);
     assert!(had != next && (0..3).all(|env| had[env] != next[env]));
-    // In itself, from memory, after other properties; in another manager, from the file, where something else was drawn.
+    // In the same manager, from memory, after other properties; in another manager, from the file, after another
+    // randomization.
     let (mut fresh, _) = world(cfg(3, 1));
     fresh.properties_mut().randomize_with(ALL, |_, _, p| p.set(Property::Friction, "ground", &[0.1])).unwrap();
     let loaded = Snapshot::load(&path).unwrap();
@@ -303,31 +305,32 @@ fn with_properties() {
         assert!(all_bits(sim) == end, "and goes on as before");
         sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
         assert!(all_values(sim) == next, "the next draw is the next one");
-        // What is drawn is drawn still: a gain stays when a plain state is restored, and one that was set does not.
+        // Restored gains still count as randomized: a randomized gain persists when a plain state is restored, a set
+        // gain does not.
         sim.properties_mut().restore(snapshot, ALL).unwrap();
         assert_eq!(sim.robot(sim.entities().robot_id("arm").unwrap()).stiffness(), stiffness);
     }
-    // Control: a plain restore leaves properties alone, and goes elsewhere.
+    // Control: a plain restore leaves properties unchanged, and the states differ.
     sim.properties_mut().reset(ALL).unwrap();
     sim.restore(&snapshot, ALL).unwrap();
     assert!(all_values(&sim) != had);
     sim.update(80);
     assert!(all_bits(&sim) != end);
-    // Into other environments: each has what the one of the snapshot had.
+    // Into other environments: each gets the properties of the snapshot's row.
     let now = sim.snapshot(ALL).unwrap();
     sim.properties_mut().restore(&now, ALL).unwrap();
     fresh.properties_mut().restore(&loaded, Some(&[EnvId(2), EnvId(1), EnvId(0)])).unwrap();
     assert_eq!(all_values(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
     fresh.update(80);
     assert!(all_bits(&fresh) == [end[2].clone(), end[1].clone(), end[0].clone()]);
-    // A rollout ends with the properties it was done with.
+    // The end of a rollout includes the properties of the rollout.
     let rollout = fresh.rollout(&Array3::zeros((1, 5, 7)), None, ALL).unwrap();
     fresh.properties_mut().reset(ALL).unwrap();
     fresh.properties_mut().restore(&rollout.end, ALL).unwrap();
     assert_eq!(all_values(&fresh), [had[2].clone(), had[1].clone(), had[0].clone()]);
 }
 
-/// A scene of the same states in which something has not the property any more: another scene, and nothing changes.
+/// A scene with the same states in which an entity lacks the property is refused as another scene, and nothing changes.
 #[test]
 fn missing_properties() {
     let build = |size: bool| {

@@ -1,4 +1,4 @@
-//! A world with everything that has a state: drives that bind, contacts, raw quaternions, activations, bodies moved by hand.
+//! A world with every kind of state: saturated drives, contacts, raw quaternions, activations and mocap bodies.
 
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
@@ -15,7 +15,7 @@ pub(crate) fn cube(uid: &str, mass: f64, at: [f64; 3]) -> RigidObjectCfg {
     kinetoscope_testkit::worlds::cube(uid, 0.1, mass, at)
 }
 
-/// A pendulum with a filtered motor, which has an activation, and a hand that is moved.
+/// A pendulum with a filtered motor, which has an activation, and a mocap hand.
 const MACHINE: &str = r#"<mujoco><worldbody>
     <body name="hand" mocap="true" pos="0 2 0.5"><geom size="0.05" contype="0" conaffinity="0"/></body>
     <body name="rod" pos="0 2 0.4"><joint name="ball" type="ball" damping="0.01"/>
@@ -33,7 +33,7 @@ pub(crate) struct Ids {
     pub(crate) machine: MjcfId,
 }
 
-/// Every environment has commands of its own.
+/// A world with different commands in every environment.
 pub(crate) fn world(settings: SimulationManagerCfg) -> (SimulationManager, Ids) {
     let mut sim = SimulationManager::new(settings).unwrap();
     let ids = Ids {
@@ -47,7 +47,7 @@ pub(crate) fn world(settings: SimulationManagerCfg) -> (SimulationManager, Ids) 
     let n = sim.num_envs();
     let per_env =
         |width, scale: f64| Array2::from_shape_fn((n, width), |(e, k)| scale * (1.3 * e as f64 + k as f64).sin());
-    // Down to the ground: the drives bind.
+    // Targets below the ground, so that the drives saturate.
     let targets = Array2::from_shape_fn((n, 6), |(e, k)| if k == 1 { 1.7 } else { 0.2 + 0.05 * e as f64 });
     let mut arm = sim.robot_mut(ids.arm);
     arm.set_qpos_target(&targets, None, None).unwrap();
@@ -60,7 +60,7 @@ pub(crate) fn world(settings: SimulationManagerCfg) -> (SimulationManager, Ids) 
     (sim, ids)
 }
 
-/// Bits of everything that decides the next step, and of what the drives gave.
+/// Bits of everything that determines the next step, and of the efforts of the drives.
 pub(crate) fn bits_of(env: &Env) -> Vec<u64> {
     let (data, drives) = (env.data(), &env.drives);
     let state = [&[data.time()], data.qpos(), data.qvel(), data.act(), data.qacc_warmstart()];
@@ -93,14 +93,14 @@ pub(crate) fn get(sim: &SimulationManager, env: usize, property: Property, name:
     sim.properties().of(EnvId(env)).unwrap().get(property, name).unwrap().to_vec()
 }
 
-/// The fewest contacts of any environment.
+/// The smallest number of contacts of any environment.
 pub(crate) fn fewest_contacts(sim: &SimulationManager) -> usize {
     let mut fewest = usize::MAX;
     sim.batch().for_each(|_, env| fewest = fewest.min(env.data().contact().len()));
     fewest
 }
 
-/// A draw of everything that an environment can have for itself.
+/// A randomization of every property that can differ between environments.
 pub(crate) fn all_properties() -> Randomization {
     Randomization::new()
         .with(Property::Mass, "arm/.*|cube|machine/.*", Draw::Scale([0.8, 1.2]))

@@ -1,5 +1,5 @@
-//! Inverse kinematics of whole arms: reachable poses are found, limits hold, followers follow, what a target leaves free
-//! goes to the posture asked for, and solutions do not depend on the batch.
+//! Inverse kinematics of whole arms: reachable poses are found, limits hold, and mimic joints follow. A null space is
+//! used for the requested posture, and solutions do not depend on the batch.
 
 use super::*;
 use kinetoscope::ndarray::array;
@@ -8,9 +8,9 @@ use kinetoscope_testkit::urdf::joint;
 use nalgebra::DMatrix;
 use std::f64::consts::{PI, TAU};
 
-/// Targets are where MuJoCo puts `link` at random positions, or at positions that have one, two or three joints at their
-/// limits; each search starts from the default positions. What it finds is within the limits; what it says of it, success
-/// or not, is what MuJoCo says. 99 % are found.
+/// Targets are MuJoCo's poses of `link` at random positions, or at positions with one, two or three joints at their
+/// limits. Each search starts from the default positions. Solutions must be within the limits, MuJoCo must confirm the
+/// reported success or failure, and 99 % must be found.
 fn check(name: &str, cfg: RobotCfg, link: &str, at_limits: bool) {
     let (mut sim, id) = simulation(1, cfg);
     let limits = sim.robot(id).qpos_limits();
@@ -26,7 +26,7 @@ fn check(name: &str, cfg: RobotCfg, link: &str, at_limits: bool) {
     let mut solved = 0;
     for at in 0..targets {
         let target = placed(&mut sim, id, &reachable.select(Axis(0), &[at]), link);
-        // The start is where the robot is, or what is given.
+        // The start is the robot's state, or given explicitly.
         if !at_limits {
             placed(&mut sim, id, &start, link);
         }
@@ -42,7 +42,7 @@ fn check(name: &str, cfg: RobotCfg, link: &str, at_limits: bool) {
     }
     println!("{name}: {solved} of {targets} solved");
     assert!(solved >= targets * 99 / 100, "{name}: {solved} of {targets}");
-    // The control: the default position itself is no solution of these.
+    // Control: the default position itself is not a solution.
     let first = placed(&mut sim, id, &reachable.select(Axis(0), &[0]), link);
     let (far, _) = apart(&placed(&mut sim, id, &start, link), &first);
     assert!(far > 0.01, "{name}: {far}");
@@ -68,7 +68,7 @@ fn poses_at_limits() {
     check("seven axes", seven_axes(), "link8", true);
 }
 
-/// A joint without limits takes the shortest way, and goes on from where it is: no unneeded turns.
+/// A joint without limits takes the shortest way from its start, without unneeded turns.
 #[test]
 fn no_unneeded_turns() {
     let joints = [
@@ -88,8 +88,8 @@ fn no_unneeded_turns() {
     }
 }
 
-/// An arm whose second joint follows the first: what was found, written into MuJoCo with the follower where it belongs, is
-/// at the target. The follower's own limits bind the joint that it follows.
+/// An arm whose second joint is a mimic of the first: the solution, written into MuJoCo with the follower's position,
+/// reaches the target. The follower's own limits bind its driver.
 #[test]
 fn followers() {
     let limit = wide([-1.5, 1.5]);
@@ -113,7 +113,7 @@ fn followers() {
     }
 }
 
-/// Joints that do not move the frame stay where the search starts.
+/// Joints that do not move the frame keep their start positions.
 #[test]
 fn idle_joints() {
     let (sim, id) = simulation(1, arm_and_hand());
@@ -142,20 +142,20 @@ fn batch_order() {
     for (k, &env) in order.iter().enumerate() {
         assert_eq!(some.qpos.row(k), whole.qpos.row(env));
         assert_eq!(some.position_error[k].to_bits(), whole.position_error[env].to_bits());
-        // Another environment, the only one of its simulation, and a typed pose.
+        // Another environment, in a simulation with only this one, and a typed pose.
         let (alone, id) = simulation(1, seven_axes());
         let one = alone.robot(id).compute_ik(&[pose_in(&targets, env)], "arm", &cfg, None, None).unwrap();
         let expected = (whole.qpos.row(env), whole.seed[env], whole.iterations[env]);
         assert_eq!((one.qpos.row(0), one.seed[0], one.iterations[0]), expected);
     }
-    // Another seed gives other starts to those that need them.
+    // Another seed gives other starts to the problems that need several starts.
     let other = robot.compute_ik(&targets, "arm", &IkCfg { seed: 1, ..cfg }, None, None).unwrap();
     let differ = (0..8).filter(|&env| other.qpos.row(env) != whole.qpos.row(env)).count();
     let needed = (0..8).filter(|&env| whole.seed[env] > 0).count();
     assert!(needed > 0 && differ <= needed && differ > 0, "{differ} of {needed}");
 }
 
-/// One target for all environments, each of which has its root elsewhere: the hand is at the same place in every one.
+/// One target for all environments, each with another root pose: the hand reaches the same place in every environment.
 #[test]
 fn moving_roots() {
     let (mut sim, id) = simulation(3, RobotCfg { fix_base: false, ..seven_axes() });
@@ -173,11 +173,11 @@ fn moving_roots() {
     let all = target.select(Axis(0), &[0, 0, 0]);
     let off = apart(&placed(&mut sim, id, &found.qpos, "link8"), &all);
     assert!(reaches(off), "{off:?}");
-    // The control: what is right for one root is wrong for another.
+    // Control: the solution for one root is wrong for another.
     assert!(apart(&placed(&mut sim, id, &found.qpos.select(Axis(0), &[0, 0, 0]), "link8"), &all).0 > 0.05);
 }
 
-/// The state does not change, whatever is computed.
+/// Computations do not change the state.
 #[test]
 fn nothing_is_written() {
     let (mut sim, id) = simulation(2, sr5());
@@ -196,8 +196,8 @@ fn distance(qpos: &Array2<f64>) -> f64 {
     qpos.iter().zip(READY).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The motion of the joints that leaves the frame where it is: the singular vector of the Jacobian's missing singular
-/// value; and the smallest one that it has.
+/// The null-space motion of the joints: the singular vector of the vanishing singular value of the Jacobian; and the
+/// smallest remaining singular value.
 fn self_motion(sim: &SimulationManager, id: RobotId, qpos: &Array2<f64>) -> (Vec<f64>, f64) {
     let jacobian = sim.robot(id).jacobian("arm", Some(qpos.view()), None).unwrap();
     let svd = DMatrix::from_fn(7, 7, |row, k| if row < 6 { jacobian[(0, row, k)] } else { 0.0 }).svd(false, true);
@@ -206,9 +206,9 @@ fn self_motion(sim: &SimulationManager, id: RobotId, qpos: &Array2<f64>) -> (Vec
     (svd.v_t.unwrap().row(svd.singular_values.imin()).iter().copied().collect(), values[1])
 }
 
-/// An arm of seven axes keeps its pose and comes as near to the posture as it can: on the curve of positions that reach
-/// the target the distance has no slope any more, unless a limit is in the way, or a singular position, where that
-/// curve has a bend that steps of finite length do not follow.
+/// An arm of seven axes keeps its pose and minimizes the distance to the posture: on the curve of positions that reach
+/// the target the distance is stationary. Exceptions are an active limit, and a singular position, where that curve has
+/// a bend that steps of finite length do not follow.
 #[test]
 fn posture() {
     let (mut sim, id) = simulation(1, seven_axes());
@@ -242,7 +242,7 @@ fn posture() {
     assert!(nearer >= 50 && still >= 30 && stuck <= 40, "{nearer} {still} {stuck}");
 }
 
-/// A small gain goes a small part of the way; six axes have nothing to give.
+/// A small gain moves a small part of the way; six axes have no null space.
 #[test]
 fn posture_gains() {
     let (sim, id) = simulation(1, seven_axes());

@@ -1,8 +1,8 @@
-//! Poses and Jacobians against MuJoCo: in the simulation, against slopes of poses, and with MuJoCo's own reader of URDF
-//! files.
+//! Poses and Jacobians compared with MuJoCo: in the simulation, with difference quotients of poses, and with MuJoCo's
+//! own URDF reader.
 //!
-//! Both sides multiply the same transforms, a dozen of them, in a different order: positions of a metre differ by some
-//! units of 2e-16. 1e-12 is the bound asked for.
+//! Both sides multiply the same dozen transforms in a different order: positions of a meter differ by some units of
+//! 2e-16. The required bound is 1e-12.
 
 use super::*;
 use kinetoscope::mujoco as mj;
@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 const BOUND: Tolerance =
     Tolerance::absolute(1e-12, "a dozen transforms of size 1, some units of 2e-16, in another order");
 
-/// The joint that a joint follows, multiplier and offset (itself, 1 and 0 if it follows none).
+/// Driver of a joint, multiplier and offset (itself, 1 and 0 for a joint without a driver).
 type Driver = (JointIndex, f64, f64);
 
 fn tilted() -> Pose {
@@ -27,7 +27,8 @@ fn tool() -> Pose {
     Pose::new(Vector3::new(0.07, -0.02, 0.11), Vector3::new(0.3, 0.2, -0.4))
 }
 
-/// `mj_jac` at a point of a body, a column for each joint, those of followers added to what they follow.
+/// `mj_jac` at a point of a body, with a column for each joint; columns of followers are added to those of their
+/// drivers.
 fn mj_jac(data: &Data, body: usize, at: [f64; 3], joints: &[String], drivers: &[Driver]) -> Array2<f64> {
     let (model, nv) = (data.model(), data.model().nv());
     let (mut linear, mut angular) = (vec![0.0; 3 * nv], vec![0.0; 3 * nv]);
@@ -57,8 +58,8 @@ fn judge(sim: &SimulationManager, id: RobotId, body: &str, point: &Array2<f64>) 
     jacobian
 }
 
-/// Columns as central differences of poses over 2 h = 2e-4: they are wrong by h² / 6 times third derivatives, which for
-/// arms of a metre are of about 1, so by 2e-9, and by 1e-16 / h of rounding.
+/// Columns as central differences of poses over 2 h = 2e-4. Their error is h² / 6 times third derivatives, which are
+/// about 1 for arms of a meter, so 2e-9, and 1e-16 / h of rounding.
 fn differences(sim: &SimulationManager, id: RobotId, tip: Tip<'_>, qpos: &Array2<f64>) -> Array3<f64> {
     const H: f64 = 1e-4;
     let mut slopes = Array3::zeros((sim.num_envs(), 6, qpos.ncols()));
@@ -86,8 +87,8 @@ fn largest(a: &Array3<f64>, b: &Array3<f64>) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// A URDF file as MuJoCo reads it, with all links as bodies; its root link is the world. Nothing of what reads the files
-/// here, or writes the scene, has a part in it.
+/// A URDF file read by MuJoCo, with all links as bodies; its root link is the world. It is independent of our URDF
+/// reader and scene writer.
 struct Reader(Data);
 
 impl Reader {
@@ -95,7 +96,7 @@ impl Reader {
         let text = std::fs::read_to_string(urdf).unwrap();
         let element = text.find("<robot").unwrap();
         let inside = element + text[element..].find('>').unwrap() + 1;
-        // Links without mass are refused otherwise; masses move nothing here.
+        // Massless links are refused otherwise; masses do not affect the kinematics.
         let settings = r#"<mujoco><compiler fusestatic="false" boundmass="1e-3" boundinertia="1e-6" balanceinertia="true"/></mujoco>"#;
         let text = format!("{}{settings}{}", &text[..inside], &text[inside..]);
         Self(Data::new(&mj::compile(&text, &[]).unwrap().into_model()).unwrap())
@@ -110,7 +111,7 @@ impl Reader {
         self.0.forward().unwrap();
     }
 
-    /// Body of a link; the world for the root link, which has none.
+    /// Body of a link; the world for the root link, which has no body.
     fn body(&self, link: &str, root: &str) -> usize {
         let body = self.0.model().id(ObjectKind::Body, link);
         if link == root { body.unwrap_or(0) } else { body.unwrap() }
@@ -122,8 +123,8 @@ impl Reader {
     }
 }
 
-/// The driver of every joint, as the file says: position = multiplier * position(joint) + offset, one after the other
-/// where a follower is followed.
+/// The driver of every joint from the file: position = multiplier * position(joint) + offset, resolved through chains
+/// of followers.
 fn followed(urdf: &Path, names: &[String]) -> Vec<Driver> {
     let text = std::fs::read_to_string(urdf).unwrap();
     let document = roxmltree::Document::parse(&text).unwrap();
@@ -144,15 +145,15 @@ fn followed(urdf: &Path, names: &[String]) -> Vec<Driver> {
     names.iter().map(of).collect()
 }
 
-/// Every link at random positions is where MuJoCo puts it, in the simulation and, of a URDF file, as its own reader does,
-/// which turns roll, pitch and yaw into quaternions by another formula; the Jacobian of a tool on `link`, which is part of
-/// `body`, is MuJoCo's and the slope of poses.
+/// Checks a robot at random positions. Every link pose agrees with the simulation and, for a URDF file, with MuJoCo's
+/// own reader, which converts roll, pitch and yaw to quaternions by another formula. The Jacobian of a tool on `link`,
+/// which is part of `body`, agrees with MuJoCo's and with differences of poses.
 fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&str; 2], urdf: Option<&Path>) {
     let qpos = random_qpos(sim, id, sim.num_envs(), 9);
     let links = sim.robot(id).compute_link_fk(&qpos, None).unwrap();
     let tip = Tip::of_link(link).with_tcp(tool());
     let jacobian = sim.robot(id).jacobian(tip, Some(qpos.view()), None).unwrap();
-    // Nothing was written: the links are elsewhere. The control of everything below.
+    // Nothing was written: the links are at other poses. This is the control of everything below.
     let last = *sim.robot(id).link_names().last().unwrap();
     let before = sim.robot(id).link_pose(last).unwrap();
     let (far, turned) = apart(&before, &links.index_axis(Axis(1), links.len_of(Axis(1)) - 1).to_owned());
@@ -171,7 +172,7 @@ fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&s
     assert_eq!(robot.jacobian(tip, None, None).unwrap(), jacobian, "{name}: where the joints are");
     let mujoco = largest(&jacobian, &judge(sim, id, body, &robot.compute_fk(&qpos, tip, None).unwrap()));
     let slopes = largest(&jacobian, &differences(sim, id, tip, &qpos));
-    // The control: at another point it is another Jacobian.
+    // Control: at another point the Jacobian differs.
     let elsewhere = largest(&jacobian, &judge(sim, id, body, &robot.link_pose(link).unwrap()));
     assert_number(name, mujoco, 0.0, BOUND);
     assert!(slopes < 1e-7 && elsewhere > 1e-3, "{name}: {slopes} {elsewhere}");
@@ -204,7 +205,7 @@ fn check(name: &str, sim: &mut SimulationManager, id: RobotId, [link, body]: [&s
             }
         }
     }
-    // The controls: the tip moves, and at another point there is another Jacobian.
+    // Controls: the tip moves, and at another point the Jacobian differs.
     assert!(moved > 0.05 && elsewhere > 1e-3, "{name}: {moved} {elsewhere}");
 }
 
@@ -236,7 +237,7 @@ fn vendors_robot() {
     check("the vendor's SR5", &mut sim, id, ["xMateSR5_link6"; 2], None);
 }
 
-/// Roots that moved, differently in each environment.
+/// Moved roots, different in each environment.
 #[test]
 fn moving_roots() {
     const ROOTS: [[f64; 7]; 4] = [
@@ -252,7 +253,7 @@ fn moving_roots() {
     check("quadruped", &mut sim, id, ["LF_FOOT", "LF_SHANK"], Some(&urdf));
 }
 
-/// A link behind a planar joint: it slid and turned to where it is, and what hangs on it is placed from there.
+/// A link behind a planar joint: after the joint has slid and rotated, child links are placed from its current pose.
 #[test]
 fn planar_joint() {
     let joints = [
@@ -267,7 +268,7 @@ fn planar_joint() {
     check("planar", &mut sim, id, ["arm"; 2], None);
 }
 
-/// A slide, a follower that slides against it at half its speed, and a follower that turns.
+/// A slide, a follower that slides against it at half its speed, and a follower that rotates.
 #[test]
 fn slides_and_followers() {
     let limit = wide([-1.0, 1.0]);
@@ -283,7 +284,7 @@ fn slides_and_followers() {
     assert!(jacobian.iter().enumerate().all(|(k, x)| k % 3 == 0 || *x == 0.0), "followers have no columns: {jacobian}");
 }
 
-/// Rows, columns and names: a part, a link, a tool; one row for all; joints outside of the part stay where they are.
+/// Rows, columns and names: a part, a link, a tool; one row for all; joints outside of the part keep their positions.
 #[test]
 fn tips() {
     let (mut sim, id) = simulation(3, arm_and_hand());
@@ -296,13 +297,14 @@ fn tips() {
         let (far, turned) = apart(ours, judge);
         assert_close(what, [far, turned], [0.0; 2], BOUND);
     };
-    // The arm ends in the link on its flange, by a name that may be a part or a link.
+    // The arm ends at the link on its flange; a name may denote a part or a link.
     for tip in [Tip::of_part("arm"), Tip::of_part("arm").at("ee_link"), "arm".into()] {
         near(&format!("{tip:?}"), &robot.compute_fk(&of_part(&arm), tip, None).unwrap(), &judge);
     }
     near("a link by its name", &robot.compute_fk(&qpos, "ee_link", None).unwrap(), &judge);
 
-    // A finger by the joints of the hand: the arm stays where it is. The columns of followers count for nothing.
+    // A finger with the joints of the hand as columns: the arm keeps its positions, and the columns of followers are
+    // ignored.
     let finger = Tip::of_part("hand").at("left_index_dist");
     let mut columns = of_part(&hand);
     let found = robot.compute_fk(&columns, finger, None).unwrap();

@@ -1,4 +1,4 @@
-//! Mistakes are errors that name them.
+//! Mistakes give errors that name them.
 
 use super::*;
 use kinetoscope::ndarray::array;
@@ -25,12 +25,12 @@ fn names() {
     says(robot.jacobian("hand", None, None), &several);
     let ik = |tip: Tip<'_>| robot.compute_ik(&Pose::identity(), tip, &IkCfg::default(), None, None);
     says(ik("hand".into()), &several);
-    // Nothing of the part is above the link; nothing at all is above the root. Where it is can be asked nevertheless.
+    // No joint of the part moves the link, and no joint moves the root. Their poses can still be computed.
     let above = ["robot \"robot\"", "control part \"hand\"", "\"link4\"", "\"JOINT1\"", "\"JOINT4\""];
     says(ik(Tip::of_part("hand").at("link4")), &above);
     says(ik(Tip::of_part("arm").at("base_link")), &["\"base_link\"", "it stands fixed"]);
     assert_eq!(robot.jacobian(Tip::of_part("arm").at("base_link"), None, None).unwrap().dim(), (2, 6, 6));
-    // A part of followers only, which says whose joints would move it; a part without joints.
+    // A part of followers only, whose error names the drivers; and a part without joints.
     for (part, joints, parts) in [
         (
             "tips",
@@ -73,7 +73,7 @@ fn numbers_and_shapes() {
     says(from(&bad), &["\"JOINT3\""]);
     let tcp = Tip::of_part("arm").with_tcp(Pose::translation(f64::NAN, 0.0, 0.0));
     says(robot.compute_fk(&array![[0.0; 6]], tcp, None), &["tcp", "finite"]);
-    // Absurd targets end, without success.
+    // Unreachable targets terminate without success.
     for far in [1e3, 1e9, 1e30] {
         let found = robot.compute_ik(&Pose::translation(far, -far, far), "arm", &IkCfg::default(), None, None).unwrap();
         assert!(!found.success[0] && found.qpos.iter().all(|q| q.is_finite()), "{found:?}");
@@ -81,7 +81,7 @@ fn numbers_and_shapes() {
     }
 }
 
-/// Every number of a configuration is checked, by itself and when it is used.
+/// Every number of a configuration is checked, alone and on use.
 #[test]
 fn configurations() {
     let (sim, id) = simulation(1, sr5());

@@ -1,4 +1,4 @@
-//! Kinematics of robots: poses, Jacobians and inverse kinematics, judged by MuJoCo and by closed forms.
+//! Kinematics of robots: poses, Jacobians and inverse kinematics, compared with MuJoCo and with closed forms.
 
 mod inverse;
 mod judges;
@@ -26,7 +26,7 @@ fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/arms").join(name)
 }
 
-/// All movable joints of a file are the part `arm`.
+/// A robot whose movable joints form the part `arm`.
 fn arm(urdf: impl AsRef<Path>) -> RobotCfg {
     RobotCfg {
         control_parts: vec![("arm".into(), vec![".*".into()])],
@@ -46,7 +46,7 @@ fn six_axes() -> RobotCfg {
     arm(file("six_axes.urdf"))
 }
 
-/// The bundled arm and hand, as the tutorials put them together.
+/// The bundled arm and hand, assembled as in the tutorials.
 fn arm_and_hand() -> RobotCfg {
     let mut robot = kinetoscope_testkit::worlds::arm_and_hand("robot");
     robot.urdf.components[1].transform = kinetoscope::scene::pose::from_xyz_rpy([0.0, 0.0, 0.02], [1.5, 0.1, 0.0]);
@@ -54,7 +54,7 @@ fn arm_and_hand() -> RobotCfg {
     robot
 }
 
-/// A robot of links, each a ball of 1 kg, and joints, which are the part `arm`.
+/// A robot of links, each a ball of 1 kg, and joints, which form the part `arm`.
 fn built(num_envs: usize, links: &[&str], joints: &[String]) -> (SimulationManager, RobotId) {
     let files = Files::default();
     let links: String = links.iter().map(|name| link(name, 1.0, 0.01, [0.0; 3], "")).collect();
@@ -65,7 +65,8 @@ fn wide(range: [f64; 2]) -> String {
     limit(range, 9.0, 9.0)
 }
 
-/// Uniformly random positions within the limits (within a turn for joints without limits); mimic joints where they belong.
+/// Uniformly random positions within the limits (within a turn for joints without limits); mimic joints follow their
+/// drivers.
 fn random_qpos(sim: &SimulationManager, robot: RobotId, rows: usize, seed: u64) -> Array2<f64> {
     let robot = sim.robot(robot);
     let limits = robot.qpos_limits();
@@ -98,7 +99,7 @@ fn apart(a: &Array2<f64>, b: &Array2<f64>) -> (f64, f64) {
     each.fold((0.0, 0.0), |most, one| (f64::max(most.0, one.0), f64::max(most.1, one.1)))
 }
 
-/// The poses of a link at these joint positions, by MuJoCo.
+/// MuJoCo's poses of a link at these joint positions.
 fn placed(sim: &mut SimulationManager, id: RobotId, qpos: &Array2<f64>, link: &str) -> Array2<f64> {
     sim.robot_mut(id).write_qpos(qpos, None, None).unwrap();
     sim.robot(id).link_pose(link).unwrap()

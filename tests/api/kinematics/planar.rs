@@ -1,4 +1,4 @@
-//! An arm of two links in a plane: everything has a closed form.
+//! A planar arm of two links, with closed forms for everything.
 
 use super::*;
 use kinetoscope::robot::kinematics::{Chain, IkSolver};
@@ -24,7 +24,7 @@ fn position() -> IkCfg {
     IkCfg { task: IkTask::Position, ..Default::default() }
 }
 
-/// Shoulder and elbow for the point (x, y): the law of cosines, elbow turned to the side of `side`.
+/// Shoulder and elbow angles for the point (x, y) by the law of cosines, with the elbow on the side given by `side`.
 fn closed_form(x: f64, y: f64, side: f64) -> [f64; 2] {
     let cosine = (x * x + y * y - L1 * L1 - L2 * L2) / (2.0 * L1 * L2);
     let elbow = side * cosine.acos();
@@ -35,9 +35,9 @@ fn at(x: f64, y: f64) -> Array2<f64> {
     row(&[x, y, 0.0, 1.0, 0.0, 0.0, 0.0])
 }
 
-/// A position alone has two solutions, and each start finds its own; a pose has one: that whose hand points as wanted, from
-/// wherever the search starts. 1e-4 m at the hand are at most 1e-4 / 0.1 rad at a joint, the smallest singular value of these
-/// Jacobians being above 0.1; the finish leaves far less.
+/// A position alone has two solutions, and each start leads to its own; a pose has one solution, with the requested
+/// hand direction, from any start. 1e-4 m at the hand are at most 1e-4 / 0.1 rad at a joint, because the smallest
+/// singular value of these Jacobians is above 0.1; the final iterations leave far less.
 #[test]
 fn solutions() {
     let (sim, id) = two_links([-3.2, 3.2]);
@@ -62,9 +62,9 @@ fn solutions() {
     }
 }
 
-/// Beyond the outer circle and inside of the inner one the distance to them is left, the hand points at the target or
-/// away from it, and it says that it failed. The search ends where the error does not grow smaller in double precision:
-/// it is quadratic in the angle that is still missing, of about 1e-7.
+/// Beyond the outer circle and inside of the inner one the distance to the circle remains, the hand points toward or
+/// away from the target, and the search reports a failure. The search ends when the error stops decreasing in double
+/// precision: it is quadratic in the remaining angle, about 1e-7.
 #[test]
 fn out_of_reach() {
     let (sim, id) = two_links([-3.2, 3.2]);
@@ -80,10 +80,10 @@ fn out_of_reach() {
         let circle = if r > L1 { L1 + L2 } else { L1 - L2 };
         assert!((hand[(0, 0)].hypot(hand[(0, 1)]) - circle).abs() < 1e-9, "{hand}");
     }
-    // The control: a hair inside it succeeds.
+    // Control: a target slightly inside succeeds.
     let found = solve(&at(L1 + L2 - 1e-6, 0.0));
     assert!(found.success[0], "{found:?}");
-    // Out of the plane the height is left.
+    // Out of the plane the height remains as the error.
     let mut target = at(0.5, 0.2);
     target[(0, 2)] = 0.25;
     let found = solve(&target);
@@ -92,8 +92,8 @@ fn out_of_reach() {
     assert!(expected.iter().any(|e| (found.qpos[(0, 0)] - e[0]).abs() + (found.qpos[(0, 1)] - e[1]).abs() < 1e-5));
 }
 
-/// An elbow that cannot stretch: it stays at its limit, and the hand as far out as that lets it, which is the third
-/// side of the triangle. Just inside, the elbow is a little bent.
+/// An elbow with a limit: it stays at its limit, and the hand is as far out as the limit allows, at the third side of
+/// the triangle. Slightly inside, the elbow is slightly bent.
 #[test]
 fn elbow_limit() {
     let (sim, id) = two_links([0.8, 2.5]);
@@ -105,7 +105,7 @@ fn elbow_limit() {
     assert!(inside.success[0] && inside.qpos[(0, 1)] > 0.8, "{inside:?}");
 }
 
-/// A variable moves a frame exactly where the frame turns with it.
+/// A variable moves a frame only if the frame is downstream of its joint.
 #[test]
 fn moved_by() {
     let (sim, id) = two_links([-3.2, 3.2]);
@@ -120,7 +120,7 @@ fn moved_by() {
     }
 }
 
-/// Chains and solvers by themselves: two links, and a slide that the hand is not on, the second column of three.
+/// Chains and solvers without a robot: two links, and a slide that does not move the hand, the second column of three.
 #[test]
 fn chains() {
     let joints = [
@@ -140,12 +140,12 @@ fn chains() {
     assert_eq!((chain.variables(), [0, 1, 2].map(|k| chain.is_moved_by(k))), (3, [true, false, true]));
     assert!((chain.reach() - (L1 + L2)).abs() < 1e-15);
     assert!(is_hand(&chain.pose(&[0.4, 9.0, -1.1]), 0.4, -1.1));
-    // Nowhere farther, and there where it is stretched.
+    // No farther than its reach, and exactly there when stretched.
     let far = |elbow: f64| chain.pose(&[0.4, 0.0, elbow]).translation.vector.norm();
     assert!((0..63).all(|k| far(0.1 * f64::from(k)) <= chain.reach() + 1e-15));
     assert!((far(0.0) - chain.reach()).abs() < 1e-15);
 
-    // Joints that are held stay where they are, and the rest is counted anew.
+    // Held joints keep their positions, and the remaining variables are renumbered.
     let held = chain.clone().held(&[2], &[0.7, 0.2, 0.5]);
     assert_eq!(held.variables(), 1);
     assert!([-1.0, 0.0, 2.0].into_iter().all(|elbow| is_hand(&held.pose(&[elbow]), 0.7, elbow)));

@@ -1,4 +1,4 @@
-//! Near positions in which a direction is lost: where neighbouring targets have neighbouring solutions, those are found.
+//! Near singular positions: if neighboring targets have neighboring solutions, the solver finds them.
 
 use super::*;
 use kinetoscope::ndarray::ArrayView2;
@@ -8,12 +8,12 @@ use kinetoscope::sim::Robot;
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// How far JOINT5 is from where a direction is lost \[rad\].
+/// Distances of JOINT5 from the singularity \[rad\].
 const NEAR: [f64; 7] = [0.0, 1e-6, -1e-6, 1e-4, -1e-4, 1e-2, -1e-2];
 /// Distance of targets \[m\], \[rad\].
 const AWAY: (f64, f64) = (1e-3, 2e-3);
 
-/// Solvers that have one start, and the usual number.
+/// Solver configurations with one start, and with the default number of starts.
 fn solvers() -> [IkCfg; 2] {
     [IkCfg { num_seeds: 1, ..IkCfg::default() }, IkCfg::default()]
 }
@@ -37,8 +37,8 @@ fn jacobian(robot: &Robot<'_>, tip: Tip<'_>, q: &[f64]) -> Matrix6<f64> {
     Matrix6::from_fn(|i, k| jacobian[(0, i, k)])
 }
 
-/// A shoulder, an elbow and three axes through one point. With the last but one at zero, the two beside it are one line, and
-/// the tool turns about no axis that is square to both that line and the axis between.
+/// A shoulder, an elbow and three axes through one point. With the fifth joint at zero, the fourth and sixth axes are
+/// collinear, and the tool cannot rotate about the axis perpendicular to that line and the fifth axis.
 fn spherical_wrist() -> (SimulationManager, RobotId) {
     let (links, mut joints) = (["foot", "a", "b", "c", "d", "e", "f"], Vec::new());
     for (k, (z, axis)) in [0.3, 0.0, 0.4, 0.2, 0.2, 0.0].into_iter().zip(["z", "y", "y", "z", "y", "z"]).enumerate() {
@@ -56,12 +56,12 @@ fn spherical_wrist() -> (SimulationManager, RobotId) {
     built(1, &links, &joints)
 }
 
-/// The tilt of the tool's axis against the forearm is a vector whose length is j5 and whose direction turns with j4. A turn
-/// of the tool by delta at the angle phi to the axis of j5 adds (delta cos phi, delta sin phi) to (j5, 0): j4 turns by the
-/// angle between, or, with j5 of the other sign, by the rest of half a turn. The nearer of both is found, unless they are
-/// nearly alike (both within 0.27 of a right angle, which is 1.57): then either. The other joints turn by delta at most, j6 as
-/// j4. What the rotation is off by at the end, e, is an angle of asin(e / length of the new tilt) at j4; tilts of 2e-3 and
-/// 1e-2 bend this by less than 1e-3.
+/// The tilt of the tool's axis against the forearm is a vector of length j5 whose direction rotates with j4. A rotation
+/// of the tool by delta at the angle phi to the axis of j5 adds (delta cos phi, delta sin phi) to (j5, 0). j4 turns by
+/// the angle between both vectors or, with the opposite sign of j5, by the rest of half a turn. The solver finds the
+/// nearer of both, unless they are similar (both within 0.27 of a right angle, which is 1.57): then either. The other
+/// joints turn by at most delta, j6 as j4. A final rotation error e is an angle of asin(e / length of the new tilt) at
+/// j4; tilts of 2e-3 and 1e-2 change this by less than 1e-3.
 #[test]
 fn spherical_wrist_turn() {
     let (sim, id) = spherical_wrist();
@@ -77,7 +77,7 @@ fn spherical_wrist_turn() {
         for step in 0..24 {
             let phi = f64::from(step) * PI / 12.0;
             let (tilt, side) = (near + delta * phi.cos(), delta * phi.sin());
-            // Where the new tilt is none, any j4 will do.
+            // If the new tilt is zero, any j4 is valid.
             let length = tilt.hypot(side);
             if length < 1e-4 {
                 continue;
@@ -96,21 +96,21 @@ fn spherical_wrist_turn() {
                 assert!(found.success[0] && found.seed[0] == 0, "{what}");
                 let slack = (found.rotation_error[0] / length).min(1.0).asin() + 1e-3;
                 assert!(largest(found.qpos.view(), &q) <= most + slack, "at most {most}: {what}");
-                // The start is no solution.
+                // The start is not a solution.
                 assert!(found.iterations[0] > 0, "{what}");
             }
         }
     }
 }
 
-/// Bent, with the axes of JOINT4 and JOINT6 parallel where `last` is zero, and with that of JOINT5 parallel to those of JOINT2
-/// and JOINT3.
+/// A bent posture. The axes of JOINT4 and JOINT6 are parallel if `near` is zero, and the axis of JOINT5 is parallel to
+/// those of JOINT2 and JOINT3.
 fn bent(near: f64) -> [f64; 6] {
     [0.3, 0.3, -1.5, 0.0, near, 0.4]
 }
 
-/// A neighbour at joint positions `from + s * way`, with the largest `s` up to 0.3 for which the frame is not farther away than
-/// asked.
+/// A neighbor at joint positions `from + s * way`, with the largest `s` up to 0.3 for which the frame stays within the
+/// distance [`AWAY`].
 fn neighbour(robot: &Robot<'_>, tip: Tip<'_>, from: &[f64], way: &Vector6<f64>) -> (Vec<f64>, Pose) {
     let fk = |s: f64| {
         let q: Vec<f64> = from.iter().zip(way).map(|(q, w)| q + s * w).collect();
@@ -130,17 +130,17 @@ fn neighbour(robot: &Robot<'_>, tip: Tip<'_>, from: &[f64], way: &Vector6<f64>) 
     fk(low)
 }
 
-/// The lost direction is a fold: along the way n of the joints that moves the frame least, where the frame is in the lost direction is
-/// a parabola. A target beside it has two solutions, about as far from its vertex as each other, or none. Targets here are
-/// made of a solution; going down leads to it, or to the other, which is no farther from the start than twice as far. One
-/// start is enough for all of them.
+/// The singular direction is a fold. Along the joint direction n that moves the frame least, the position of the frame
+/// in the lost direction is a parabola. A target near it has two solutions, about equally far from the vertex, or none.
+/// Targets here are made from a solution; descent leads to that solution, or to the other one, which is at most twice
+/// as far from the start. One start is enough for all of them.
 #[test]
 fn nearby_solutions() {
     let (sim, id) = simulation(1, sr5());
     let robot = sim.robot(id);
     let tip = Tip::of_part("arm").at("ee_link");
     let svd = jacobian(&robot, tip, &bent(0.0)).svd(false, true);
-    // Metres and radians for radians: a direction is lost, and only one.
+    // In meters and radians per radian: exactly one direction is lost.
     assert!(svd.singular_values[5] < 1e-9 && svd.singular_values[4] > 0.05, "{:?}", svd.singular_values);
     let least = svd.v_t.unwrap().row(5).transpose();
     let mut farthest = 0.0_f64;
@@ -164,13 +164,14 @@ fn nearby_solutions() {
             }
         }
     }
-    // JOINT4 and JOINT6 turn far for what the frame moves: the axes are 0.136 m apart, 0.136 t² / 2 is 1 mm at t = 0.12.
+    // JOINT4 and JOINT6 turn far for a small motion of the frame: the axes are 0.136 m apart, 0.136 t² / 2 is 1 mm at
+    // t = 0.12.
     assert!((0.08..0.15).contains(&farthest), "{farthest}");
 }
 
-/// Of targets in any direction some have no solution nearby: on the side to which the arm does not bend. One start says so;
-/// more starts find one, which may be another posture of the arm. What one start finds is within twice the 0.12 rad of the
-/// fold, and more starts give the same.
+/// Some targets have no solution nearby, on the side to which the arm does not bend. One start reports failure; more
+/// starts find a solution, which may be another posture of the arm. A solution from one start is within twice the 0.12
+/// rad of the fold, and more starts give the same.
 #[test]
 fn far_solutions() {
     let (sim, id) = simulation(1, sr5());
@@ -191,7 +192,7 @@ fn far_solutions() {
                 nearby += 1;
                 assert!(largest(one.qpos.view(), &q) < 0.25 && many.qpos == one.qpos, "{near:e}, {k}: {one:?}");
             } else {
-                // Beside the edge of what is near a target may be within the tolerances of it.
+                // A target slightly out of reach may be within the tolerances.
                 far_away += usize::from(largest(many.qpos.view(), &q) > 0.5);
             }
         }
@@ -199,7 +200,8 @@ fn far_solutions() {
     assert!(nearby > 20 && far_away > 0, "{nearby} {far_away}");
 }
 
-/// Poses between two ends, solved one after the other, each from the one before: the longest step of a joint.
+/// Solves poses between two ends one after the other, each from the previous solution; returns the longest step of a
+/// joint.
 fn follow(robot: &Robot<'_>, tip: Tip<'_>, ends: [&[f64]; 2]) -> f64 {
     let [from, to] = ends.map(|q| frame(robot, tip, q));
     let (mut q, mut longest) = (ends[0].to_vec(), 0.0_f64);
@@ -213,9 +215,9 @@ fn follow(robot: &Robot<'_>, tip: Tip<'_>, ends: [&[f64]; 2]) -> f64 {
     longest
 }
 
-/// JOINT5 goes through zero with the other joints where they are at both ends: the bundled arm follows it by 6 mrad in each of
-/// 100 steps, and by less than three times that. A spherical wrist that does not meet the singular position to the last bit
-/// has to turn by half a turn on the way: no step is more than it has to be, a right angle or what is left of half a turn.
+/// JOINT5 passes through zero, with the other joints equal at both ends. The bundled arm follows with 6 mrad in each of
+/// 100 steps, and with less than three times that. A spherical wrist that does not hit the singular position exactly
+/// has to turn by half a turn on the way: no step exceeds the necessary one, a right angle or the rest of half a turn.
 #[test]
 fn lines() {
     let (sim, id) = simulation(1, sr5());
@@ -233,8 +235,8 @@ fn lines() {
     }
 }
 
-/// Half a turn is where the way round is not told from the way back: of the base, and of each axis of the wrist, whose other joints
-/// stay. Each of these targets has a solution: that half a turn.
+/// At half a turn, both directions of rotation are equally long: of the base, and of each axis of the wrist, with the
+/// other joints unchanged. Each of these targets has a solution: that half a turn.
 #[test]
 fn half_a_turn() {
     let (mut sim, id) = simulation(1, sr5());

@@ -1,4 +1,4 @@
-//! Files that cannot be parts, settings that are not taken over, scene files, and files that are written.
+//! Files that are refused, settings that are ignored, scene files, and exported files.
 
 use super::*;
 use kinetoscope::mujoco::{TARGET, Target, compile_file};
@@ -10,7 +10,7 @@ use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::count_diagnostics;
 
-/// The error of adding a part, which changes nothing.
+/// The error of a refused part; asserts that the scene is unchanged.
 fn refused(cfg: MjcfCfg) -> String {
     let mut sim = empty(1);
     let before = sim.scene().mjcf().to_string();
@@ -19,7 +19,7 @@ fn refused(cfg: MjcfCfg) -> String {
     error
 }
 
-/// Files that MuJoCo refuses are named with element and line; what is no XML with the line where it begins.
+/// Files refused by MuJoCo are named with element and line; invalid XML with the line of the faulty element.
 #[test]
 fn bad_files() {
     let files = Files::default();
@@ -36,7 +36,7 @@ fn bad_files() {
             "<mujoco>\n<worldbody>\n<body name=\"light\"><freejoint/></body></worldbody></mujoco>",
             &["mass.xml", "light"],
         ),
-        // A body that is not closed, a missing sign, a value without quotes, an end of nothing.
+        // An unclosed body, a missing bracket, an unquoted value, a closing tag without an opening one.
         ("open.xml", "<mujoco>\n <worldbody>\n  <body>\n </worldbody>\n</mujoco>\n", &["^3: "]),
         ("sign.xml", "<mujoco>\n <worldbody>\n  <geom size=\"1\"\n </worldbody>\n</mujoco>\n", &["^3: "]),
         ("quotes.xml", "<mujoco>\n <worldbody>\n  <geom size=1/>\n </worldbody>\n</mujoco>\n", &["^3: "]),
@@ -57,9 +57,9 @@ fn bad_files() {
     }
 }
 
-/// Root cause: the first sensor that cannot be written refused the whole file, of which everything else could be used.
-/// Sensors that a part cannot have are left out and named with their line; the others measure on, with their own numbers,
-/// although other columns stand before theirs in the scene.
+/// Regression: the first unsupported sensor refused the whole file, although everything else was usable. Unsupported
+/// sensors are left out and named with their line. The other sensors keep their own values, although other columns
+/// precede theirs in the scene.
 #[test]
 fn left_out_sensors() {
     let files = Files::default();
@@ -116,7 +116,7 @@ fn unique_names() {
     assert_error(sim.entities().mjcf_id("n"), "", &["known are \"m\""]);
 }
 
-/// Elements that only 4.x has and that are not written back are refused by name, never left out; sensors are left out.
+/// Elements of 4.x that cannot be written back are refused by name, never left out; unsupported sensors are left out.
 #[test]
 fn newer_elements() {
     let part = |inside: &str, after: &str| {
@@ -152,7 +152,8 @@ fn newer_elements() {
     }
 }
 
-/// Settings of the whole model are the scene's: each that differs is said, with both values and where it was stated.
+/// Settings of the whole model are those of the scene. Each difference is reported with both values and its source
+/// line.
 #[test]
 fn ignored_settings() {
     let files = Files::default();
@@ -175,7 +176,7 @@ fn ignored_settings() {
     }
     let settings = sim.diagnostics().iter().filter(|d| d.kind == DiagnosticKind::SettingIgnored).count();
     assert_eq!(settings, 5, "{:#?}", sim.diagnostics());
-    // A setting that a file leaves to MuJoCo and the scene has otherwise is said too.
+    // A setting that the file leaves at MuJoCo's default, and that differs in the scene, is reported too.
     let mut other = SimulationManager::new(SimulationManagerCfg { ground: None, ..Default::default() }).unwrap();
     other.add_mjcf(MjcfCfg::text("plain", "<mujoco><worldbody><geom size=\"1\"/></worldbody></mujoco>")).unwrap();
     let said = count_diagnostics(&other, &["timestep is 0.002, MuJoCo's default; the scene's 0.01 holds"]);
@@ -195,7 +196,7 @@ fn scene_files() {
     assert_eq!(scene.sensor::<MujocoSensor>("own").unwrap().values().dim(), (1, 3));
     scene.mjcf_part_mut("m").unwrap().set_ctrl(&array![[0.1, 0.2, 0.3]], None, None).unwrap();
     assert_eq!(scene.robot("m").unwrap_err().to_string(), "\"m\" is a MJCF part, not a robot");
-    // Written and read again it is the same.
+    // A scene file is unchanged by writing and reading it again.
     let cfg = SceneCfg::from_file(&file).unwrap();
     let again = SceneCfg::from_toml(&cfg.to_toml(&EntityTypes::default()).unwrap(), "x.toml", &EntityTypes::default());
     let (EntityCfg::Mjcf(a), EntityCfg::Mjcf(b)) = (&cfg.entities[0].1, &again.unwrap().entities[0].1) else {
@@ -210,7 +211,7 @@ fn scene_files() {
     assert_error(unknown, "", &["s.toml:3", "`path`"]);
 }
 
-/// The exported model is the one that runs.
+/// The exported model equals the running model.
 #[test]
 fn exported() {
     let (mut sim, _) = with(1, MACHINE);
@@ -229,18 +230,19 @@ fn exported() {
     }
 }
 
-/// One of every element that 4.x knows and 2.2.2 does not.
+/// One of every element that 4.x supports and 2.2.2 does not.
 const NEWER: &str = include_str!("../../data/mjcf/newer.xml");
 
-/// Root cause: the writer asked which MuJoCo compiled the file, not which is to read it, so that the file for 2.2.2 had
-/// attributes that make 2.2.2 refuse it. They are left out there, each of them is said, and nothing else is.
+/// Regression: the writer used the version that compiled the file instead of the version that reads it, so that the
+/// file for 2.2.2 had attributes that 2.2.2 refuses. These attributes are left out, each with a diagnostic, and nothing
+/// else is left out.
 #[test]
 fn exported_for_2_2_2() {
     let files = Files::default();
     let read = |file: &str| std::fs::read_to_string(files.folder().join(file)).unwrap();
     let mut sim = empty(1);
     if TARGET == Target::V2 {
-        // The judge of the list below: 2.2.2 knows none of them.
+        // Reference for the list below: 2.2.2 supports none of them.
         assert_error(sim.add_mjcf(MjcfCfg::text("new", NEWER)), "", &["metallic"]);
         return;
     }
@@ -270,14 +272,14 @@ fn exported_for_2_2_2() {
     }
     assert_eq!(said, [""; 0], "and nothing else");
     assert!(left_out.iter().all(|d| d.kind == DiagnosticKind::ExportReduced));
-    // Beside the comments, no word of them is in the one file, and each is in the other.
+    // Outside of comments, none of these words is in the file for 2.2.2, and each is in the file for 4.x.
     let old: String = read("robot.mjcf2.xml").lines().filter(|l| !l.trim_start().starts_with("<!--")).collect();
     let new = read("robot.mjcf4.xml");
     let words =
         ["gravcomp", "actuatorfrc", "<weld", "site1", "filterexact", "jointactuatorfrc", "e_kinetic", "e_potential"];
     assert!(words.iter().all(|word| !old.contains(word) && new.contains(word)), "{old}\n{new}");
     assert_eq!((old.matches("armature=\"0.2\"").count(), new.matches("armature=\"0.2\"").count()), (0, 1));
-    // The rest is there.
+    // The rest of the file is kept.
     for word in ["dyntype=\"filter\"", "name=\"new/follow\"", "<jointpos name=\"new/angle\"", "name=\"new/pull\""] {
         assert!(old.contains(word), "{word}");
     }

@@ -1,4 +1,4 @@
-//! The handle of a part: names, reads and writes of each environment, bodies moved by hand.
+//! The handle of a part: names, reads and writes per environment, mocap bodies.
 
 use super::*;
 use kinetoscope::mujoco::ObjectKind;
@@ -37,15 +37,15 @@ fn reads_and_writes() {
     assert_eq!(sim.mjcf_part(part).ctrl(), array![[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.7, 0.0, 0.0]]);
     sim.update(1);
     let force = sim.mjcf_part(part).actuator_force();
-    // A position servo: kp (ctrl - angle), of the state before the step.
+    // A position servo: kp (ctrl - angle), evaluated before the step.
     for (env, ctrl) in [(0, 0.0), (2, 0.7)] {
         assert!((force[(env, 0)] - 3.0 * (ctrl - start[(0, 0)])).abs() < 1e-12, "{force}");
     }
     sim.reset(None).unwrap();
     assert_eq!(sim.mjcf_part(part).ctrl(), Array2::<f64>::zeros((3, 3)));
     assert_eq!(sim.mjcf_part(part).qpos(), start);
-    // Mistakes that `every_writer` does not make: quaternions among positions, columns for actuators. Of two columns for one
-    // actuator the last one held silently.
+    // Mistakes that are not covered by `every_writer`: quaternions among positions, columns for actuators. Regression:
+    // of two columns for one actuator the last one was used without an error.
     let nq = start.ncols();
     let mut write = sim.mjcf_part_mut(part);
     assert_error(write.write_qpos(&Array2::zeros((3, nq - 1)), None), "", &["write_qpos", &nq.to_string()]);
@@ -59,7 +59,7 @@ fn reads_and_writes() {
     assert_eq!(write.read().qpos(), start);
 }
 
-/// A body moved by hand goes where it is put, in its environment; what is welded to it follows.
+/// A mocap body takes its written pose in its environment, and welded bodies follow.
 #[test]
 fn mocap_bodies() {
     let text = MACHINE.replace("</equality>", "<weld body1=\"target\" body2=\"ball\"/></equality>");
@@ -76,13 +76,13 @@ fn mocap_bodies() {
     assert_eq!(sim.sensor(id).unwrap().source_pos_w()[(1, 0)], 0.6, "seen at once");
     sim.update(1000);
     assert_eq!(at(&sim, "target", 1), [0.6, 0.4, 0.5, 1.0], "it stays");
-    // The ball started at (0.5, 0.3, 0.3), relative to a target at (1, 1, 1): (-0.5, -0.7, -0.7) from it. Welds are soft: they
-    // hang a little low, and the string of the ball's neighbours does not touch it.
+    // The ball started at (0.5, 0.3, 0.3), with the target at (1, 1, 1): (-0.5, -0.7, -0.7) relative to the target.
+    // Welds are soft: they sag slightly, and the tendon of the ball's neighbors does not touch it.
     for (env, x, y) in [(1, 0.1, -0.3), (0, 0.5, 0.3)] {
         let ball = at(&sim, "ball", env);
         assert!((ball[0] - x).abs() < 1e-3 && (ball[1] - y).abs() < 1e-3, "{env}: {ball:?}");
     }
-    // More in the scene does not move it.
+    // Adding an entity does not move it.
     sim.add_rigid_object(kinetoscope_testkit::worlds::object("cube", ObjectShape::cube(0.1), [5.0, 0.0, 1.0])).unwrap();
     assert_eq!(at(&sim, "target", 1), [0.6, 0.4, 0.5, 1.0]);
     assert_error(sim.mjcf_part_mut(part).write_mocap_pose("ball", &place, None), "", &["\"target\"", "mocap"]);

@@ -1,4 +1,4 @@
-//! MJCF files as parts of a scene, held against MuJoCo with the same file alone.
+//! MJCF files as parts of a scene, compared with MuJoCo and the same file alone.
 
 mod files;
 mod handle;
@@ -13,7 +13,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::sim::MjcfId;
 use kinetoscope_testkit::worlds::{empty_cfg, sim};
 
-/// 500 steps a second, an empty scene.
+/// An empty scene with 500 steps per second.
 pub(crate) fn empty(num_envs: usize) -> SimulationManager {
     sim(SimulationManagerCfg { physics_dt: 0.002, ..empty_cfg(num_envs) })
 }
@@ -25,12 +25,13 @@ fn with(num_envs: usize, text: impl Into<String>) -> (SimulationManager, MjcfId)
     (sim, part)
 }
 
-/// A text alone, as MuJoCo compiles it.
+/// A text compiled by MuJoCo alone.
 fn alone(text: &str) -> Model {
     mj::compile(text, &[]).unwrap().into_model()
 }
 
-/// Data of a model with the buffers of the simulation: MuJoCo alone drops contacts that have no room.
+/// Data of a model with the buffer sizes of the simulation, because plain MuJoCo drops contacts that exceed its
+/// buffers.
 fn data_of(sim: &SimulationManager, model: &Model, ctrl: &[f64]) -> Data {
     let buffers = sim.batch().read(0, |env| env.data().model().buffers());
     let mut data = Data::new(&model.with_buffers(buffers)).unwrap();
@@ -38,5 +39,5 @@ fn data_of(sim: &SimulationManager, model: &Model, ctrl: &[f64]) -> Data {
     data
 }
 
-/// Every kind of element that both lines of MuJoCo know, in one small file with degrees, classes and frames at odd angles.
+/// Every kind of element of both supported MuJoCo versions, in one small file with degrees, classes and rotated frames.
 const MACHINE: &str = include_str!("../../data/mjcf/machine.xml");

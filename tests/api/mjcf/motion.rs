@@ -1,4 +1,4 @@
-//! Parts move as their files do alone, also twice in a scene, beside robots and after more was added.
+//! Parts move as their files do alone: two copies in a scene, parts beside robots, and after additions.
 
 use super::*;
 use kinetoscope::mujoco::{ObjectKind, compile_file};
@@ -8,15 +8,15 @@ use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{errors, pose_in, row, sr5};
 
-/// A double pendulum that hangs in the world, and a block that flies: nothing touches.
+/// A double pendulum and a free block without contacts.
 const SWING: &str = r#"<mujoco><worldbody>
   <body pos="0 0 1"><joint name="a" axis="0 1 0"/><geom type="box" size="0.02 0.02 0.1" pos="0 0 -0.1"/>
     <body pos="0 0 -0.2"><joint name="b" axis="1 0 0"/><geom type="box" size="0.02 0.03 0.1" pos="0.02 0 -0.1"/></body></body>
   <body name="block" pos="0.5 0 1"><freejoint/><geom type="box" size="0.1 0.05 0.02"/></body>
   </worldbody></mujoco>"#;
 
-/// Two parts of one file each move as it does alone, where their pose says; the turn is about gravity, which it does not
-/// change.
+/// Two parts of one file each move as the file does alone, relative to their poses; the rotation is about the axis of
+/// gravity, which does not change it.
 #[test]
 fn copies() {
     let (mut sim, first) = with(1, SWING);
@@ -28,7 +28,7 @@ fn copies() {
     let mut qvel = [0.4, -0.9, 0.1, 0.2, 0.3, 1.0, -2.0, 0.5];
     data.qvel_mut().copy_from_slice(&qvel);
     sim.mjcf_part_mut(first).write_qvel(&row(qvel), None).unwrap();
-    // The velocity of the free block is in the world.
+    // The velocity of the free block is in world axes.
     let turned = turn.rotation * nalgebra::Vector3::new(qvel[2], qvel[3], qvel[4]);
     qvel[2..5].copy_from_slice(turned.as_slice());
     sim.mjcf_part_mut(second).write_qvel(&row(qvel), None).unwrap();
@@ -37,8 +37,8 @@ fn copies() {
         data.step().unwrap();
     }
     let [a, b] = [first, second].map(|part| sim.mjcf_part(part).qpos().row(0).to_vec());
-    // Each of 200 steps rounds numbers of about 1 (2e-16). What a pendulum of 0.2 m makes of that grows by sqrt(g / l) = 7
-    // per second at most, in 0.4 s sixteenfold: 6e-13.
+    // Each of 200 steps rounds numbers of about 1 (2e-16). A pendulum of 0.2 m amplifies errors by at most sqrt(g /
+    // l) = 7 per second, in 0.4 s sixteenfold: 6e-13.
     let rounding = Tolerance::absolute(1e-12, "200 roundings that grow sixteenfold in 0.4 s");
     assert_close("first", &a, data.qpos(), rounding);
     assert_close("second", &b[..2], &data.qpos()[..2], rounding);
@@ -50,7 +50,7 @@ fn copies() {
     assert!((a[0] - model.qpos0()[0]).abs() > 0.05, "it swings");
 }
 
-/// Every number that MuJoCo compiled of the file is in the scene to the last digits, index by index.
+/// Every number that MuJoCo compiled from the file is in the scene to the last digits, index by index.
 #[test]
 fn numbers() {
     let file = alone(MACHINE);
@@ -63,7 +63,7 @@ fn numbers() {
         let width = here.len() / count.max(1);
         for index in 0..count {
             let named = file.name(kind, index).and_then(|n| scene.id(kind, &format!("machine/{n}")));
-            // The first part has as many of them before as the scene has more.
+            // The part's elements are the last ones in the scene.
             let at = named.unwrap_or(total - count + index);
             let (a, b) = (&here[width * index..width * (index + 1)], &there[width * at..width * (at + 1)]);
             compared += width;
@@ -86,7 +86,7 @@ fn numbers() {
     let tail = |here: &[f64], there: &[f64]| {
         here.iter().zip(&there[there.len() - here.len()..]).all(|(x, y)| same_number(*x, *y))
     };
-    // The body of what stands in the file's world is one more, before all others.
+    // Elements in the file's world get an additional body, before all others.
     for (what, here, there) in [
         ("qpos0", file.qpos0(), scene.qpos0()),
         ("qpos_spring", file.qpos_spring(), scene.qpos_spring()),
@@ -109,7 +109,7 @@ fn numbers() {
     assert!(!tail(&[file.qpos0()[0] + 1e-9], &[file.qpos0()[0]]), "a control: this comparison sees 1e-9");
 }
 
-/// A file with one of everything moves in a scene as it does alone.
+/// A file with an element of every type moves in a scene as in plain MuJoCo.
 #[test]
 fn whole_machine() {
     let (mut sim, part) = with(1, MACHINE);
@@ -124,7 +124,7 @@ fn whole_machine() {
     assert!(act[0] > 0.1);
 }
 
-/// A slanted wedge with a texture on it, whose origin is far from its middle.
+/// A slanted wedge with a texture, whose origin is far from its center.
 const WEDGE: &str = "v 0.1 0.1 0.1\nv 0.5 0.1 0.1\nv 0.1 0.4 0.1\nv 0.1 0.1 0.4\nvt 0.1 0.2\nvt 0.9 0.3\nvt 0.4 0.8\nvt 0.7 0.6\n\
                      f 1/1 3/3 2/2\nf 1/1 2/2 4/4\nf 1/1 4/3 3/2\nf 2/1 3/2 4/4\n";
 
@@ -143,7 +143,7 @@ fn corners(model: &Model) -> Vec<([f64; 3], [f32; 2])> {
     mesh.faces.iter().zip(mesh.face_texcoords).flat_map(corner).collect()
 }
 
-/// A mesh of a file is where it was, its texture too, and it falls as alone.
+/// A mesh of a file keeps its pose and its texture, and falls as alone.
 #[test]
 fn meshes() {
     let files = Files::default();
@@ -178,8 +178,8 @@ fn far_arm() -> RobotCfg {
     RobotCfg { init_pose: Pose::translation(5.0, 0.0, 0.0), ..sr5("robot") }
 }
 
-/// A robot with implicit drives moves beside parts as it does alone: its rows are found among the part's equalities and
-/// friction.
+/// The motion of a robot with implicit drives is independent of parts in the scene: its rows are located among the
+/// part's equalities and friction.
 #[test]
 fn drives_beside_parts() {
     let run = |with_parts: bool| {
@@ -198,13 +198,13 @@ fn drives_beside_parts() {
         (sim.robot(robot).qpos(), sim.robot(robot).qf())
     };
     let ((alone, efforts), (beside, efforts_beside)) = (run(false), run(true));
-    // The solver stops at a residual of 1e-8 of the whole scene, which is another one.
+    // The solver stops at a residual of 1e-8 of the whole scene, which differs.
     assert!((&alone - &beside).iter().all(|d| d.abs() < 1e-6), "{alone} {beside}");
     assert!((&efforts - &efforts_beside).iter().all(|d| d.abs() < 1e-3), "{efforts} {efforts_beside}");
     assert!(efforts.iter().any(|effort| effort.abs() > 1.0) && alone.iter().any(|q| q.abs() > 0.3));
 }
 
-/// A part in motion is bit-equal after more was added.
+/// A moving part has the same bits after additions.
 #[test]
 fn additions() {
     let (mut sim, part) = with(2, MACHINE);
@@ -218,7 +218,7 @@ fn additions() {
     let before = state(&sim);
     assert!(before.4[0] != before.4[1] && before.4[0] > 0.0);
     sim.add_robot(far_arm()).unwrap();
-    // On 2.2.2 actuators with an activation stand behind those of the later part.
+    // On 2.2.2 actuators with an activation follow those of the later part.
     let stateless = r#"<mujoco><worldbody><body pos="9 0 1"><joint name="j"/><geom size="0.1"/></body></worldbody>
         <actuator><motor joint="j"/></actuator></mujoco>"#;
     sim.add_mjcf(MjcfCfg::text("late", stateless)).unwrap();

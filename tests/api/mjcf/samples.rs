@@ -1,4 +1,4 @@
-//! MuJoCo's own sample models, each a part of a scene.
+//! MuJoCo's own sample models, each as a part of a scene.
 
 use super::*;
 use kinetoscope::mujoco as mj;
@@ -8,7 +8,7 @@ use kinetoscope::sim::Error;
 use kinetoscope_testkit::needs::{files_below, sample_model};
 use std::path::Path;
 
-/// The file with the options of [`empty`] behind its own, by MuJoCo alone.
+/// The file compiled by MuJoCo alone, with the options of [`empty`] after its own.
 fn plainly(file: &Path) -> Model {
     let flags = if TARGET == Target::V2 { r#"passive="enable""# } else { r#"spring="enable" damper="enable""# };
     let name = file.file_name().unwrap().to_str().unwrap();
@@ -20,7 +20,8 @@ fn plainly(file: &Path) -> Model {
         <flag constraint="enable" equality="enable" frictionloss="enable" limit="enable" contact="enable" {flags}
             gravity="enable" actuation="enable"/></option></mujoco>"#
     );
-    // Beside the file, so that its own includes and meshes are found; a copy of the folder, which is not ours.
+    // In a copy of the file's folder, so that its includes and meshes are found and the original folder is not
+    // modified.
     let dir = tempfile::tempdir().unwrap();
     copy(file.parent().unwrap(), dir.path());
     std::fs::write(dir.path().join("plainly.xml"), text).unwrap();
@@ -35,13 +36,13 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Largest difference of two rows, relative to the larger of 1 and their largest number.
+/// Largest difference between two rows, relative to the larger of 1 and their largest number.
 fn apart(a: &[f64], b: &[f64]) -> f64 {
     let scale = a.iter().fold(1.0_f64, |s, x| s.max(x.abs()));
     a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max) / scale
 }
 
-/// The sample models of Debian's package of 2.2.2, and the words of 4.x for its refusal, if it refuses one.
+/// The sample models of Debian's package of 2.2.2, and the error text of 4.x for models that it refuses.
 const SAMPLES: [(&str, &str); 18] = [
     ("adhesion/active_adhesion.xml", "Element 'composite', line 97"),
     ("composite/cloth.xml", "Element 'composite', line 27"),
@@ -63,8 +64,8 @@ const SAMPLES: [(&str, &str); 18] = [
     ("tendon_arm/arm26.xml", "Lengthrange computation did not converge in actuator 1"),
 ];
 
-/// Mass, sizes and the motion of 100 steps are those of the file alone. The models that are parts, those that are refused, and
-/// why, are exactly known.
+/// Mass, sizes and the motion of 100 steps equal those of the file alone. The test lists the accepted models and, for
+/// each refused model, the reason.
 #[test]
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
 fn every_sample() {
@@ -91,7 +92,7 @@ fn every_sample() {
         for found in [mass(model), sim.mjcf_part(part).total_mass()] {
             assert!((found - mass(&plain)).abs() <= 1e-12 * mass(&plain), "{name}: {found}");
         }
-        // Many bodies that are all in contact take minutes; ten steps of them say as much.
+        // Models with many bodies in contact take minutes, so they run for ten steps only.
         let steps = if plain.nv() > 400 { 10 } else { 100 };
         let controls = Array2::from_elem((1, plain.nu()), 0.2);
         sim.mjcf_part_mut(part).set_ctrl(&controls, None, None).unwrap();

@@ -1,4 +1,4 @@
-//! Sensors of parts: MuJoCo's own, joints and actuators, wrenches and frames, against MuJoCo and closed forms.
+//! Sensors of parts: MuJoCo's own, joints and actuators, wrenches and frames, compared with MuJoCo and closed forms.
 
 use super::*;
 use kinetoscope::mujoco::{ObjectKind, Overflow};
@@ -30,8 +30,9 @@ fn roomy(sim: &SimulationManager, ctrl: &[f64]) -> Data {
     data
 }
 
-/// `mj_step` leaves all sensors of the state before it; here positions and velocities are of the state after it. Stepped
-/// side by side, every value has the same bits: what is solved those of this `mj_step`, the rest those of the next.
+/// `mj_step` leaves all sensors at the state before the step; here positions and velocities are of the state after it.
+/// Stepped in parallel, every value has the same bits: solved values equal those of this `mj_step`, the others those of
+/// the next.
 #[test]
 fn bit_for_bit() {
     const STEPS: usize = 200;
@@ -62,11 +63,11 @@ fn bit_for_bit() {
         }
     }
     assert!(checked[0] > 10 * STEPS && checked[1] > 10 * STEPS, "{checked:?}");
-    // The other instant gives other numbers: the comparison can fail.
+    // The values of the other time differ, so the comparison can fail.
     assert!(differs > 20 * STEPS, "{differs} of {checked:?}");
 }
 
-/// A write is seen at once, by sensors of forces too, and all of them are of the state as it is.
+/// A write refreshes all sensors at once, including force sensors.
 #[test]
 fn after_a_write() {
     let (mut sim, part, id) = sensing(2);
@@ -90,7 +91,7 @@ fn after_a_write() {
             plain.set_time(env.data().time());
         });
         plain.forward().unwrap();
-        // Quaternions were normalised once more: the last bits of positions, times the stiffest contact (1e6 N/m).
+        // Quaternions are normalized once more: the last bits of positions, times the stiffest contact (1e6 N/m).
         for (value, expected) in sensor.values().row(env).iter().zip(plain.sensordata()) {
             assert!((value - expected).abs() <= 1e-9 * expected.abs().max(1.0), "{value} is not {expected}");
         }
@@ -123,15 +124,15 @@ fn names_and_units() {
 /// A joint of every type, and actuators without and with an activation.
 const MOVERS: &str = include_str!("../../data/mjcf/movers.xml");
 
-/// A motor exerts its control times its gear, a servo 10 N/m times its error at the beginning of the step, and a filter of
-/// 0.1 s comes near its control by one fiftieth in each step of 2 ms.
+/// The force of a motor is its control times its gear. That of a servo is 10 N/m times its error at the beginning of
+/// the step. A filter of 0.1 s approaches its control by one fiftieth in each step of 2 ms.
 #[test]
 fn joints_and_actuators() {
     const CONTROLS: [[f64; 3]; 2] = [[0.3, 0.5, 0.2], [-0.1, 0.4, 0.0]];
     let (mut sim, part) = with(2, MOVERS);
     let joints = sim.add_sensor("joints", JointStateCfg::default()).unwrap();
     let actuators = sim.add_sensor("actuators", ActuatorStateCfg::default()).unwrap();
-    // The ball and the free joint have no single number.
+    // The ball joint and the free joint have no scalar position.
     assert_eq!(sim.sensor(joints).unwrap().joint_names(), ["m/turn", "m/push"]);
     assert_eq!(sim.sensor(actuators).unwrap().actuator_names(), ["m/motor", "m/servo", "m/lag"]);
     sim.mjcf_part_mut(part).set_ctrl(&Array2::from(CONTROLS.to_vec()), None, None).unwrap();
@@ -158,13 +159,13 @@ fn joints_and_actuators() {
             assert_eq!(of(joint.positions()), [0, 1].map(|k| qpos[(env, columns[k].start)]));
         }
         let speed = (joint.positions()[(0, 0)] - before[(0, 0)]) / 0.002;
-        // Euler: the position went by the new velocity.
+        // Euler: the position changes by the new velocity.
         assert!((joint.velocities()[(0, 0)] - speed).abs() < 1e-10, "{speed}");
     }
     assert!(sim.sensor(joints).unwrap().positions()[(0, 1)].abs() > 1e-3, "the control: it moves");
 }
 
-/// Joints and actuators of robots come first, whatever was added first; their drives are actuators too.
+/// Joints and actuators of robots come first, independent of the order of addition; their drives are actuators too.
 #[test]
 fn joints_of_robots() {
     let (mut sim, _) = with(1, MOVERS);
@@ -185,19 +186,19 @@ fn joints_of_robots() {
     assert_error(empty(1).add_sensor("none", ActuatorStateCfg::default()), "", &["measure nothing"]);
 }
 
-/// Masses with centres in the frame of the arm: the arm's own, and that of the tool, which is welded to it and has its mass
-/// in its origin.
+/// Masses with their centers in the frame of the arm: the arm's own, and that of the tool, which is welded to the arm
+/// and has its mass at its origin.
 const LOADS: [(f64, [f64; 3]); 2] = [(1.5, [0.2, 0.0, -0.1]), (2.0, [0.35, 0.1, -0.4])];
 const PALM: [f64; 3] = [0.05, -0.02, 0.1];
 
-/// A crane that stands in one environment and turns freely about the vertical in the other. What its joint exerts carries
-/// all that is beyond it and bends its way: `F = sum m (omega x (omega x c) - g)`, and about the palm
-/// `T = sum (c - p) x m (omega x (omega x c) - g)`, both turned into the axes of the palm.
+/// A crane that is at rest in one environment and rotates freely about the vertical in the other. Its joint carries all
+/// bodies beyond it and keeps them on their circle: `F = sum m (omega x (omega x c) - g)`, and about the palm `T = sum
+/// (c - p) x m (omega x (omega x c) - g)`, both in the axes of the palm.
 #[test]
 fn wrench_at_a_site() {
     let turn = from_xyz_rpy([0.0; 3], [0.4, -0.2, 0.7]).rotation;
     let joined = |v: &[f64]| v.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
-    // Moments that are alike about all axes: turning needs no torque of its own.
+    // Equal moments about all axes, so that rotation needs no additional torque.
     let inertial = |mass: f64, at: &[f64]| {
         format!(r#"<inertial pos="{}" mass="{mass}" diaginertia="0.01 0.01 0.01"/>"#, joined(at))
     };
@@ -211,7 +212,7 @@ fn wrench_at_a_site() {
         joined(&[turn.w, turn.i, turn.j, turn.k]),
     );
     let mut sim = empty(2);
-    // The part stands turned about the vertical, which changes nothing in the axes of its bodies.
+    // The part is rotated about the vertical, which changes nothing in the axes of its bodies.
     let init_pose = from_xyz_rpy([0.3, -0.2, 0.1], [0.0, 0.0, 0.5]);
     let part = sim.add_mjcf(MjcfCfg { init_pose, ..MjcfCfg::text("m", crane) }).unwrap();
     let cfg = JointWrenchCfg { links: vec!["m/arm".into()], frames: vec!["m/palm".into()], ..Default::default() };
@@ -244,13 +245,13 @@ fn wrench_at_a_site() {
         }
         sim.update(30);
     }
-    // The controls: the palm is elsewhere and turned, and turning is felt.
+    // Controls: the palm has another position and orientation, and the rotation has an effect.
     let (still, turning) = (wrench_about(palm, 0.0), wrench_about(palm, 3.0));
     assert!((still.1 - wrench_about(Vector3::zeros(), 0.0).1).norm() > 1.0 && (turning.0 - still.0).norm() > 1.0);
     assert!((turn.inverse() * still.0 - still.0).norm() > 1.0);
 }
 
-/// Sites are frames where MuJoCo has them, for sensors of frames, cameras and the handle of the part.
+/// Sites have MuJoCo's poses for frame sensors, cameras and the handle of the part.
 #[test]
 fn sites() {
     const SITES: [&str; 6] = ["hook", "elbow", "plate.site", "palm", "axle", "inside"];
@@ -284,7 +285,7 @@ fn sites() {
             let (p, q) = (at(transformer.target_pos_w()), at(transformer.target_quat_w()));
             is_there("frame", from_row(&[p[0], p[1], p[2], q[0], q[1], q[2], q[3]]), rotation);
             if *site == "palm" {
-                // A camera without a placement of its own looks along the site's z axis.
+                // A camera without its own placement looks along the site's z axis.
                 let at = sim.sensor(camera).unwrap().pose_w(CameraConvention::World);
                 assert!((0..3).all(|k| (at[(env, k)] - position[k]).abs() < 1e-12), "the camera stands on the site");
                 let at = sim.sensor(camera).unwrap().pose_w(CameraConvention::Ros).to_owned();
@@ -294,7 +295,7 @@ fn sites() {
         }
         assert_ne!(transformer.target_pos_w()[(env, 1, 0)], transformer.target_pos_w()[(env, 3, 0)]);
     }
-    // Another site is another place, and turned: the comparison above can fail.
+    // Another site has another pose, so the comparison above can fail.
     let hook = pose_in(&sim.mjcf_part(part).site_pose("hook").unwrap(), 0);
     assert!(hook.rotation.angle_to(&UnitQuaternion::identity()) > 0.1);
     let expected = init_pose.transform_point(&nalgebra::Point3::new(0.1, -0.2, 0.9));
@@ -302,7 +303,7 @@ fn sites() {
     assert!(sim.sensor(imu).unwrap().ang_vel_b().iter().any(|w| w.abs() > 1e-3), "it is read");
 }
 
-/// A site, and a body that no joint moves, are moved by the body that has one.
+/// The error for a site or a body without joints names the body that carries it.
 #[test]
 fn welded_frames() {
     let (mut sim, _) = with(1, MACHINE);

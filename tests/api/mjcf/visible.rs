@@ -1,4 +1,4 @@
-//! Parts as cameras and contact sensors see them.
+//! Parts in camera images and contact sensors.
 
 use super::*;
 use kinetoscope::mujoco as mj;
@@ -11,7 +11,7 @@ use kinetoscope_testkit::worlds::{cube, sr5};
 /// A textured, lit world with a mesh, a height field and a cube texture.
 const LOOKS: &str = include_str!("../../data/mjcf/looks.xml");
 
-/// A part is drawn as the file alone is.
+/// A part is rendered like the file alone.
 #[test]
 fn looks_of_the_file() {
     let file = Visible::of_model(&alone(LOOKS));
@@ -47,24 +47,24 @@ fn looks_of_the_file() {
     assert_eq!(seen.mask().unwrap()[(0, 4, 4)], sim.scene().mask_ids()[0].id);
 }
 
-/// A weight on a string from a hook.
+/// A weight on a tendon from a hook.
 const WINCH: &str = r#"<mujoco><worldbody><site name="hook" pos="0 0 1"/>
     <body name="weight" pos="0 0 0.6"><joint name="lift" type="slide" axis="0 0 1"/><geom size="0.05" mass="1"/>
       <site name="eye"/></body></worldbody>
   <tendon><spatial name="string" width="0.01" rgba="1 0 0 1"><site site="hook"/><site site="eye"/></spatial></tendon>
   <actuator><position joint="lift" kp="100"/></actuator></mujoco>"#;
 
-/// A string is a vertical bar between its ends in every environment, whatever the weight in the others does: depth, mask and
-/// height of what is seen are those of the closed form, by every renderer, and the same bits for any number of threads and
-/// environments. Rays of casters pass it.
+/// A tendon is rendered as a vertical bar between its ends in every environment, independent of the other environments.
+/// Depth, mask and visible height match the closed form for every renderer, with the same bits for any number of
+/// threads and environments. Ray casters pass through tendons.
 ///
-/// Root cause once: cameras drew geoms only.
+/// Regression: cameras rendered only geoms.
 #[test]
 fn tendons() {
     let images = |num_envs: usize, threads: usize, renderer: Renderer| {
         let mut sim = sim(SimulationManagerCfg { physics_dt: 0.002, threads: Some(threads), ..empty_cfg(num_envs) });
         let part = sim.add_mjcf(MjcfCfg::text("winch", WINCH)).unwrap();
-        // The next thing has ids after those of the part's tendon.
+        // The next entity has ids after those of the part's tendon.
         sim.add_rigid_object(cube("cube", 0.1, 1.0, [0.0, 3.0, 0.0])).unwrap();
         let placement = Placement::LookAt { eye: [1.0, 0.0, 0.8], target: [0.0, 0.0, 0.8], up: [0.0, 0.0, 1.0] };
         let camera = CameraCfg {
@@ -106,13 +106,13 @@ fn tendons() {
     for renderer in [Renderer::Raster, Renderer::FastRayTraced] {
         let (depth, mask, color, id, lowest) = images(3, 1, renderer);
         for (env, low) in lowest.iter().enumerate() {
-            // The surface is a radius nearer.
+            // The surface is closer by the radius.
             let at = (env, 40, 40);
             assert!((f64::from(depth[at]) - 0.99).abs() < 1e-4 && mask[at] == id, "{renderer:?}: {}", depth[at]);
             // Up to the hook at z = 1, 0.2 above the middle, and down to the ball.
             let rows =
                 |wanted: &dyn Fn(i32) -> bool| (0..81).filter(|row| wanted(mask[(env, *row, 40)])).count() as f64;
-            // The ball hides it from 0.05 above the eye on; its outline is a little above that.
+            // The ball hides the tendon from 0.05 above the site `eye`; its outline is slightly above that.
             let expected = 80.0 * (1.01 - (low + 0.05)) / 0.99;
             let found = rows(&|m| m == id);
             assert!((found - expected).abs() < 2.5, "{renderer:?}, environment {env}: {found} rows, not {expected}");
@@ -126,8 +126,8 @@ fn tendons() {
     }
 }
 
-/// A robot collides with a part's body, as MuJoCo's default bits say: a ball falls on the arm; one without the lowest bit
-/// falls past it. The arm's own bit is the second one.
+/// A robot collides with a part's body according to MuJoCo's default bits: a ball falls on the arm, and a ball without
+/// the lowest bit falls past the arm. The arm's own bit is the second one.
 #[test]
 fn collisions_with_robots() {
     for (contype, expected) in [(1, true), (2, false)] {
@@ -153,8 +153,8 @@ fn collisions_with_robots() {
     }
 }
 
-/// Contacts of a part's bodies are the part's: a contact sensor reads the weight of a block that stands on the part's world,
-/// and on the scene's ground. 2 kg stand, with 1 kg on them: ground and cube together give the block's weight.
+/// A contact sensor on a part's body reads the weight of a block, on the part's world and on the scene's ground. The
+/// block of 2 kg carries 1 kg: the forces of ground and cube sum to the block's weight.
 #[test]
 fn contacts() {
     let block = r#"<mujoco><worldbody><body name="block" pos="0 0 0.1"><freejoint/>
@@ -171,7 +171,8 @@ fn contacts() {
     }
 }
 
-/// MuJoCo 4 knows metals; they are drawn, and stay what they are when the part is written into the scene. 2.2.2 does not.
+/// MuJoCo 4 supports metallic materials: they are rendered, and survive the writing of the part into the scene. 2.2.2
+/// does not support them.
 #[test]
 fn metals() {
     let looks = |more: &str| {

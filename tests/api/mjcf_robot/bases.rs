@@ -1,4 +1,4 @@
-//! Fixed and free bases, and robots whose first body is joined to the world.
+//! Fixed and floating bases, and robots whose first body is jointed to the world.
 
 use super::*;
 use kinetoscope::ndarray::array;
@@ -7,7 +7,7 @@ use kinetoscope::sim::Error;
 use kinetoscope_testkit::refusal::assert_error;
 use std::f64::consts::FRAC_PI_2;
 
-/// A cart with a wheel; `%` is the joint of the cart.
+/// A cart with a wheel; `%` is replaced by the joint of the cart.
 const CART: &str = r#"<mujoco><worldbody><body name="cart" pos="0.5 0 1" euler="0 0 90">%
     <geom type="box" size="0.2 0.1 0.05" mass="2"/>
     <body name="wheel" pos="0.2 0 0"><joint name="axle" axis="0 1 0"/><geom size="0.05" mass="0.3"/></body></body>
@@ -17,10 +17,10 @@ fn cart(held: &str, fix_base: bool) -> RobotCfg {
     RobotCfg { fix_base, ..passive(robot("cart", &CART.replace('%', held))) }
 }
 
-/// MuJoCo's Euler rule falls by g h² n (n + 1) / 2 in n steps of h.
+/// Distance fallen after n steps of h with MuJoCo's Euler: g h² n (n + 1) / 2 \[m\].
 const FALLEN: f64 = 9.81 * 0.002 * 0.002 * 100.0 * 101.0 / 2.0;
 
-/// The configuration says if the base is free, whatever the file has.
+/// The configuration decides if the base is floating, independent of the file.
 #[test]
 fn fixed_or_free() {
     let start = array![[0.5, 0.0, 1.0, 0.5f64.sqrt(), 0.0, 0.0, 0.5f64.sqrt()]];
@@ -46,7 +46,7 @@ fn fixed_or_free() {
             at_start(sim.robot(id).root_pose());
         }
     }
-    // `init_pose` moves the world of the file: (0.5, 0, 1) turned by 90 degrees about z, the cart by another 90.
+    // `init_pose` moves the world of the file: (0.5, 0, 1) rotated by 90 degrees about z, the cart by another 90.
     let init_pose = kinetoscope::scene::pose::from_xyz_rpy([1.0, 2.0, 3.0], [0.0, 0.0, FRAC_PI_2]);
     let (sim, id) = with(1, RobotCfg { init_pose, ..cart(r#"<freejoint name="float"/>"#, false) });
     let seen = sim.robot(id).root_pose();
@@ -54,8 +54,8 @@ fn fixed_or_free() {
     assert!((sim.robot(id).default_root_state()[(0, 1)] - 2.5).abs() < 1e-15);
 }
 
-/// The free joint of a damped body, as an inherited default makes it, is damped as MuJoCo damps it. Without damping it falls
-/// by 0.79 m.
+/// The damping of a free joint, as set by an inherited default, acts as in MuJoCo. Without damping the body falls by
+/// 0.79 m.
 #[test]
 fn damped_free_joint() {
     let held = r#"<joint name="float" type="free" damping="3"/>"#;
@@ -88,8 +88,8 @@ fn joined_to_the_world() {
     assert_error(free, "", &["joint \"rail\" holds the root body \"cart\"", "fix_base: true"]);
 }
 
-/// A frame without mass that a file fixes gets the mass that a free body needs, as a URDF's does, and that is said once. A
-/// base that stands fixed needs none.
+/// A massless body fixed in the file gets the minimal mass of a floating base, as a URDF's does, with one diagnostic. A
+/// fixed base needs no mass.
 #[test]
 fn massless_base() {
     let text = r#"<mujoco><worldbody><body name="frame"><body name="arm"><joint name="j" axis="0 0 1"/>
@@ -102,7 +102,7 @@ fn massless_base() {
             assert_eq!(sim.robot(id).total_mass(), 1.0);
             let start = sim.robot(id).root_pose()[(0, 2)];
             sim.update(100);
-            // All parts fall alike.
+            // All bodies fall alike.
             let fallen = start - sim.robot(id).root_pose()[(0, 2)];
             assert!((fallen - FALLEN).abs() < 1e-6, "{fallen} {FALLEN}");
         }

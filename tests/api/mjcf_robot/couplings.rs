@@ -1,4 +1,4 @@
-//! Equalities of joints: those that are mimics, and those that only hold.
+//! Equality constraints of joints: mimic joints, and constraints that only hold.
 
 use super::*;
 use kinetoscope::ndarray::array;
@@ -8,7 +8,7 @@ use kinetoscope::sim::Error;
 use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::worlds::count_diagnostics;
 
-/// A drive, a finger on either side, and a third joint; `%` are the equalities.
+/// A driven crank, a finger on either side, and a fourth joint; `%` is replaced by the equalities.
 const HAND: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="palm"><geom size="0.03" mass="1"/>
     <body name="crank"><joint name="crank" axis="0 0 1" range="-1 1" ref="0.1"/><geom size="0.02" pos="0.05 0 0" mass="0.2"/></body>
     <body name="left" pos="0 0.1 0"><joint name="left" axis="0 0 1" range="-2 2" ref="-0.2"/>
@@ -26,7 +26,7 @@ fn hand(equalities: &str) -> RobotCfg {
     robot("hand", &HAND.replace('%', equalities))
 }
 
-/// `left - ref = 0.05 - 1.5 (crank - ref)`: what MuJoCo's equation says; `right` follows `left`, and so the crank.
+/// `left - ref = 0.05 - 1.5 (crank - ref)`, as in MuJoCo's equation; `right` follows `left`, and thus the crank.
 fn implied(crank: f64) -> (f64, f64) {
     let left = -0.2 + 0.05 - 1.5 * (crank - 0.1);
     (left, 0.1 * (left + 0.2))
@@ -45,7 +45,7 @@ fn lines() {
     {
         assert!((found - expected).abs() < 1e-15, "{drivers:?}");
     }
-    // Followers start where they belong, other joints where the file has them.
+    // Followers start at their implied positions, other joints at those of the file.
     let (left, right) = implied(0.1);
     let start = sim.robot(id).default_qpos();
     assert!((start - array![[0.1, left, right, 0.0]]).iter().all(|d| d.abs() < 1e-15));
@@ -55,17 +55,17 @@ fn lines() {
         let qpos = sim.robot(id).qpos();
         let (left, right) = implied(qpos[(0, 0)]);
         assert!((qpos[(0, 0)] - target).abs() < 1e-3, "{qpos}");
-        // MuJoCo's couplings give way a little; light fingers that nothing holds hardly.
+        // MuJoCo's couplings yield slightly, those of light unloaded fingers hardly.
         assert!((qpos[(0, 1)] - left).abs() < 1e-3 && (qpos[(0, 2)] - right).abs() < 1e-3, "{qpos}: {left} {right}");
         let targets = sim.robot(id).qpos_target();
         assert!((targets[(0, 1)] - implied(target).0).abs() < 1e-12, "{targets}");
     }
-    // Forward kinematics follow too.
+    // Forward kinematics apply the couplings too.
     let fk = sim.robot(id).compute_fk(&array![[0.3, 9.0, 9.0, 0.0]], "right", None).unwrap();
     assert!((fk[(0, 0)] - implied(0.3).1).abs() < 1e-12, "{fk}");
 }
 
-/// A parabola, a joint that is held where it is, and a circle of lines: nothing is driven against them.
+/// A parabola, a constant position, and a cycle of linear couplings: joints are not driven against them.
 #[test]
 fn curves_and_circles() {
     let circle = format!("{LINES}<joint joint1=\"crank\" joint2=\"right\" polycoef=\"0 1 0 0 0\"/>");
@@ -78,8 +78,9 @@ fn curves_and_circles() {
         assert_eq!(count_diagnostics(&sim, &["no mimic says it"]), 1, "{:?}", sim.diagnostics());
         let Some(expected) = qpos else {
             assert!(count_diagnostics(&sim, &["joint \"crank\" has no drive"]) > 0, "{:?}", sim.diagnostics());
-            // crank = 0.1 + right, right = 0.1 (left + 0.2) and left = -0.15 - 1.5 (crank - 0.1): they meet in one point only,
-            // right = 0.1 (0.05 - 1.5 right). Lines that are solved together give way to none: within 1e-3 there.
+            // crank = 0.1 + right, right = 0.1 (left + 0.2) and left = -0.15 - 1.5 (crank - 0.1) have one common
+            // solution, right = 0.1 (0.05 - 1.5 right). The couplings are solved together, so the joints settle within
+            // 1e-3 of the solution.
             let right = 0.005 / 1.15;
             assert_eq!(sim.robot(id).stiffness().row(0).to_vec(), [0.0, 0.0, 0.0, 1e4]);
             sim.update(1000);
@@ -100,9 +101,9 @@ fn curves_and_circles() {
     }
 }
 
-/// Followers by curves start on them, wherever the joint starts that they follow, also through mimics and other curves: MuJoCo's
-/// equalities are off by nothing, and nothing moves. Positions are right up to rounding, 1e-15 of 1. (The forces of
-/// the equalities are not solved before the first step: MuJoCo 4 leaves there what the memory held.)
+/// Followers of polynomials start on their curve for any start of their driver, also through mimics and other curves:
+/// MuJoCo's equalities have no residual, and nothing moves. Positions are exact up to rounding, 1e-15 of 1. (The forces
+/// of the equalities are not solved before the first step: MuJoCo 4 leaves old memory there.)
 #[test]
 fn starts_on_curves() {
     let parabola = r#"<joint joint1="left" joint2="crank" polycoef="0.02 0.5 0.8 -0.3 0.1"/>"#;
@@ -113,13 +114,13 @@ fn starts_on_curves() {
     let constant = r#"<joint joint1="left" polycoef="0.3 0 0 0 0"/>"#;
     for (equalities, crank, left, right) in [
         (parabola, 0.5, at(0.4), 0.0),
-        // A joint without a given start begins where the file does.
+        // A joint without a given start begins at the position of the file.
         (parabola, 0.1, at(0.0), 0.0),
         (chain.as_str(), -0.4, at(-0.5), behind(-0.5, 0.2)),
         (of_mimic.as_str(), -0.4, at(-0.5), behind(-0.5, 0.0)),
         (constant, 0.5, -0.2 + 0.3, 0.0),
     ] {
-        // A start that is given for the follower itself holds no more than of a mimic.
+        // A start given for the follower itself is ignored, as for a mimic.
         let mut init_qpos = vec![("left".to_string(), 1.5)];
         if crank != 0.1 {
             init_qpos.push(("crank".into(), crank));
@@ -139,7 +140,7 @@ fn starts_on_curves() {
         }
         assert_eq!(count_diagnostics(&sim, &["the start position"]), 0, "{:?}", sim.diagnostics());
     }
-    // A circle of curves, and two for one joint, say no place: the file's own.
+    // A cycle of curves, and two curves for one joint, do not determine a position: the file's own is used.
     let circle = format!("{parabola}<joint joint1=\"crank\" joint2=\"left\" polycoef=\"0 0 1 0 0\"/>");
     let twice = format!("{parabola}{constant}");
     for (equalities, starts) in [(circle, [0.1, at(0.0)]), (twice, [0.1, -0.2])] {
@@ -149,8 +150,8 @@ fn starts_on_curves() {
     }
 }
 
-/// left - ref = (crank - ref)⁴ on a crank without limits, or with a factor on one that has them: 1e100⁴ is no number, and a
-/// start beyond the follower's own limits is said.
+/// left - ref = (crank - ref)⁴ on a crank without limits, or with a factor on a crank with limits: 1e100⁴ overflows,
+/// and a start beyond the follower's own limits is reported.
 #[test]
 fn starts_beyond_limits() {
     let quartic = r#"<joint joint1="left" joint2="crank" polycoef="0 0 0 0 1"/>"#;
@@ -173,7 +174,8 @@ fn starts_beyond_limits() {
     assert_eq!(starts(1.3).unwrap().1, Vec::<String>::new());
 }
 
-/// A follower by a curve would have to move with the joints that are searched: refused, where it moves the frame.
+/// A follower of a polynomial would have to move with the solved joints: inverse kinematics refuse it if it moves the
+/// frame.
 #[test]
 fn inverse_kinematics() {
     let (sim, id) = with(1, hand(r#"<joint joint1="left" joint2="crank" polycoef="0 0.5 0.8 0 0"/>"#));
@@ -185,6 +187,6 @@ fn inverse_kinematics() {
     let Err(Error::Kinematics { error, .. }) = ik("left") else { panic!("accepted") };
     let is_named = |joint: &str, link: &str| joint == "left" && link == "left";
     assert!(matches!(&*error, KinematicsError::CurveFollower { joint, link } if is_named(joint, link)), "{error}");
-    // Controls: neither its driver's own link nor another is moved by it.
+    // Controls: the follower moves neither its driver's own link nor the link of another joint.
     assert!(ik("crank").unwrap().success[0] && ik("other").unwrap().success[0]);
 }

@@ -1,4 +1,4 @@
-//! Drives that a file's actuators say, of single joints, followers and tendons, and what the configuration changes of them.
+//! Drives from a file's actuators, on single joints, followers and tendons, and their changes by the configuration.
 
 use super::*;
 use kinetoscope::mujoco as mj;
@@ -6,23 +6,23 @@ use kinetoscope::ndarray::array;
 use kinetoscope::sim::DriveType;
 use kinetoscope_testkit::worlds::{count_diagnostics, empty_cfg, gains};
 
-/// Five joints: a servo with a gear, a motor, a servo of velocity, two on a tendon, and one that nothing acts on; the last
-/// two actuators are of one joint.
+/// A position servo with a gear, a motor, a velocity servo, two joints on a tendon, and a joint without an actuator;
+/// the last two actuators act on one joint.
 const MACHINE: &str = include_str!("../../data/mjcf/actuators.xml");
 
 fn is_said(sim: &SimulationManager, words: &[&str]) {
     assert!(count_diagnostics(sim, words) > 0, "{words:?}: {:#?}", sim.diagnostics());
 }
 
-/// Gains and limits are those of the file unless the configuration names others.
+/// Gains and limits are those of the file unless the configuration overrides them.
 #[test]
 fn gains_and_limits() {
     let (sim, id) = with(1, robot("m", MACHINE));
     let of = sim.robot(id);
     assert_eq!(of.joint_names(), ["servo", "motor", "wheel", "finger1", "finger2", "idle"]);
     let infinite = f64::INFINITY;
-    // Gear and coefficients count twice in gains and once in efforts; 1e4 and 1e3 where the file says only that there is an
-    // effort.
+    // Gear and coefficients are squared in gains and linear in efforts; 1e4 and 1e3 are the defaults for motors without
+    // gains.
     assert_eq!(of.stiffness(), array![[120.0, 1e4, 0.0, 25.0, 400.0, 0.0]]);
     assert_eq!(of.damping(), array![[0.0, 1e3, 0.7, 0.0, 0.0, 0.0]]);
     assert_eq!(of.qf_limits(), array![[8.0, 11.0, infinite, 5.0, 20.0, infinite]]);
@@ -32,7 +32,7 @@ fn gains_and_limits() {
     is_said(&sim, &["the place of the actuators \"p\", \"m\", \"v\", \"m2\""]);
     is_said(&sim, &["actuator \"t\" acts on the tendon \"both\""]);
 
-    // Named joints have what is said of them, and an idle one that is named is driven.
+    // The configuration overrides the named joints; a named joint without an actuator is driven too.
     let drive = DriveCfg {
         stiffness: [("servo|idle", 50.0)].into(),
         max_effort: Some([("motor", 7.0)].into()),
@@ -46,7 +46,7 @@ fn gains_and_limits() {
     assert_eq!(of.qf_limits()[(0, 1)], 7.0);
     assert_eq!((of.armature()[(0, 0)], of.armature()[(0, 2)]), (0.1, 0.4));
 
-    // One number for all is for all. Without any actuator all joints are driven, as in a URDF.
+    // A single number applies to all joints. Without any actuator all joints are driven, as in a URDF.
     let bare = format!("{}</mujoco>", &MACHINE[..MACHINE.find("<tendon>").unwrap()]);
     for (cfg, stiffness) in
         [(RobotCfg { drive: gains(9.0, 2.0), ..robot("m", MACHINE) }, 9.0), (robot("m", &bare), 1e4)]
@@ -55,7 +55,7 @@ fn gains_and_limits() {
         assert!(sim.robot(id).stiffness().iter().all(|k| *k == stiffness));
     }
 
-    // The softness of dry friction is the drives' where they hold it: a file that sets its own is told so.
+    // The softness of dry friction is that of the drives that hold it: a file with its own softness gets a diagnostic.
     for (softness, times) in [("", 0), (r#"solreffriction="0.05 1""#, 1), (r#"solimpfriction="0.8 0.9 0.001""#, 1)] {
         let text = MACHINE.replace(r#"frictionloss="0.3""#, &format!(r#"frictionloss="0.3" {softness}"#));
         let (sim, _) = with(1, robot("m", &text));
@@ -66,8 +66,8 @@ fn gains_and_limits() {
 /// `a` follows `b` by -0.5 and `c` follows `a` by 3; the actuators are at the ends of the chain.
 pub(super) const CHAIN: &str = include_str!("../../data/mjcf/chain.xml");
 
-/// An actuator of a follower drives the joint that it follows. By virtual work: `k = 100 (2 · 0.5)² + 10 · 1.5²`,
-/// `d = 4 · 1.5²`, `F = 30 · 2 · 0.5 + 20 · 1.5`. Against a spring of k / 2 the drive comes two thirds of the way.
+/// An actuator of a follower drives the follower's driver. By virtual work: `k = 100 (2 · 0.5)² + 10 · 1.5²`, `d = 4 ·
+/// 1.5²`, `F = 30 · 2 · 0.5 + 20 · 1.5`. Against a spring of k / 2 the drive reaches two thirds of the way.
 #[test]
 fn followers() {
     let (mut sim, id) = with(1, robot("r", CHAIN));
@@ -79,10 +79,10 @@ fn followers() {
     sim.robot_mut(id).set_qpos_target(&array![[0.3]], Some(&[b]), None).unwrap();
     sim.update(2000);
     let qpos = sim.robot(id).qpos();
-    // Nothing moves any more, so no coupling is loaded: the decay of four seconds is left.
+    // Nothing moves any more, so no coupling is loaded: only the decay of four seconds is left.
     assert!(largest(&(&qpos - &array![[-0.1, 0.2, -0.3]])) < 1e-4, "{qpos}");
 
-    // A joint on a curve follows nothing that a drive could stand for; that its actuator is gone is said.
+    // A follower of a polynomial cannot be represented by its driver's drive; the diagnostic names the lost actuator.
     let (sim, id) = with(1, robot("r", &CHAIN.replace("0 -0.5 0 0 0", "0 -0.5 0.1 0 0")));
     assert!(sim.robot(id).drive_types().iter().all(|kind| *kind == DriveType::None));
     for name in ["pa", "pc"] {
@@ -90,7 +90,7 @@ fn followers() {
     }
 }
 
-/// Two fingers on one tendon, the pattern of parallel grippers; `%` is the polynomial of the second.
+/// Two fingers on one tendon, as in parallel grippers; `%` is replaced by the linear coefficient of the second.
 pub(super) const GRIPPER: &str = r#"<mujoco><compiler angle="radian" autolimits="true"/><option timestep="0.0001" gravity="0 0 0"/>
   <default><geom contype="0" conaffinity="0"/></default><worldbody><body name="palm"><geom size="0.03" mass="1"/>
     <body name="left"><joint name="left" type="slide" axis="0 1 0" range="0 0.04"/><geom size="0.01" mass="0.5"/></body>
@@ -101,10 +101,10 @@ pub(super) const GRIPPER: &str = r#"<mujoco><compiler angle="radian" autolimits=
   <actuator><general name="grip" tendon="split" gaintype="fixed" biastype="affine" gainprm="0.01568627451 0 0"
     biasprm="0 -100 -10" ctrlrange="0 255" forcerange="-100 100"/></actuator></mujoco>"#;
 
-/// A gripper closes as the tendon that moves both fingers. MuJoCo with the file alone is the judge, at its own step of
-/// h = 1e-4 s: m = 1 kg, k = 100, d = 10, so ω = 10 and ζ = 1/2. Our drive is evaluated at the end of the step, which adds
-/// h k = 0.01 to d, 0.1 percent; the coupling, loaded by half of the force of at most 3 N at 0.5 kg, gives way by less than
-/// 6 m/s² (0.002 s)² = 2.4e-5 m. So 1e-4 m of 0.03.
+/// A gripper closes like the tendon that moves both fingers. The reference is MuJoCo with the file alone, at its own
+/// step of h = 1e-4 s: m = 1 kg, k = 100, d = 10, so ω = 10 and ζ = 1/2. Our drive is evaluated at the end of the step,
+/// which adds h k = 0.01 to d, 0.1 percent. The coupling, loaded by half of a force of at most 3 N at 0.5 kg, yields by
+/// less than 6 m/s² (0.002 s)² = 2.4e-5 m. The tolerance is 1e-4 m of 0.03.
 #[test]
 fn gripper() {
     let text = GRIPPER.replace('%', "1");
@@ -136,14 +136,14 @@ fn gripper() {
     });
     assert!(same < 1e-4 && half > 2e-3, "{same} m; the control, half the stiffness: {half} m");
 
-    // A tendon that keeps its length while the fingers go drives nothing.
+    // A tendon whose length does not change with the fingers drives nothing.
     let (sim, id) = with(1, robot("r", &GRIPPER.replace('%', "-1")));
     assert_eq!(sim.robot(id).drive_types()[(0, 0)], DriveType::None);
     assert_eq!(sim.robot(id).stiffness(), Array2::<f64>::zeros((1, 2)));
     is_said(&sim, &["actuator \"grip\"", "never moves \"left\""]);
 }
 
-/// The scale of a control is no part of the gains, and differences between a drive and the actuator are said, one by one.
+/// The scale of a control is not part of the gains, and each difference between a drive and the actuator is reported.
 #[test]
 fn differences() {
     let scaled = r#"gaintype="fixed" biastype="affine" gainprm="0.0157 0 0" biasprm="0 -100 -10""#;

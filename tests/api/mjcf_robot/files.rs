@@ -9,7 +9,7 @@ use kinetoscope_testkit::refusal::assert_error;
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{errors, gains, pose_in, urdf_robot};
 
-/// Elements without a name are called by their number.
+/// Unnamed elements are named by their number.
 #[test]
 fn unnamed_elements() {
     let text = r#"<mujoco><worldbody><body><geom size="0.1" mass="1"/>
@@ -17,7 +17,7 @@ fn unnamed_elements() {
         <body><joint name="joint0" axis="0 0 1" pos="0.1 0 0"/><joint axis="0 1 0" pos="0 0.1 0"/><geom size="0.1" mass="1"/>
           <site name="joint1"/></body></body></worldbody></mujoco>"#;
     let (sim, id) = with(1, robot("r", text));
-    // The joint that is joint0 in the file keeps its name, the one before it that has none gets another.
+    // The joint named joint0 in the file keeps its name; the unnamed joint before it gets another.
     assert_eq!(sim.robot(id).joint_names(), ["joint0_", "joint0", "joint2"]);
     let links = ["body1", "joint1", "body3", "joint1.site"];
     assert_eq!(sim.robot(id).link_names(), links, "a site that is called as a body");
@@ -42,8 +42,8 @@ fn control_parts() {
     assert_eq!(of.stiffness().row(0).to_vec(), [500.0, 500.0, 500.0, 40.0, 40.0, 40.0, 40.0]);
     assert_eq!(of.qpos().row(0).to_vec(), [0.25, 0.25, 0.25, 0.05, 0.0, 0.0, 0.0]);
     assert_error(of.link_id("hnd"), "", &["\"hand\""]);
-    // Frames behind the joints of a body have no names, where a joint follows or the anchor is beside the body's origin: two
-    // of the shoulder, two of the carriage, one of the hand.
+    // Frames behind the joints of a body are unnamed if another joint follows or the anchor is off the body's origin:
+    // two of the shoulder, two of the carriage, one of the hand.
     assert!(of.link_id("pan.frame").is_err());
     let named: Vec<&str> = of.description().named_links().iter().map(|link| link.name.as_str()).collect();
     assert_eq!(named[..6], ["base", "shoulder", "fore", "carriage", "plate", "hand"]);
@@ -51,8 +51,8 @@ fn control_parts() {
     assert_eq!(of.description().links.len() - named.len(), 2 + 2 + 1);
 }
 
-/// A dump opens in plain MuJoCo and is the same robot, drives included. As a URDF it is the same tree: its joints and masses,
-/// without shapes.
+/// A dump loads in plain MuJoCo and describes the same robot, including drives. As a URDF it has the same tree, joints
+/// and masses, without shapes.
 #[test]
 fn dumps() {
     let (mut sim, id) = with(1, RobotCfg { drive: gains(300.0, 30.0), ..robot("odd", ODD) });
@@ -72,7 +72,7 @@ fn dumps() {
     let (far, angle) = errors(&(base.inverse() * tip), &pose_in(&other.robot(again).link_pose("tip").unwrap(), 0));
     assert!(far < 1e-9 && angle < 1e-7, "{far} {angle}");
 
-    // A slide without limits and without efforts can be read again, and is not limited then.
+    // A slide without limits and efforts can be read again, and is then unlimited.
     let text = r#"<mujoco><worldbody><body name="base"><geom size="0.1" mass="1"/><body name="cart">
         <joint name="rail" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body></body></worldbody></mujoco>"#;
     let ((sim, id), files) = (with(1, robot("cart", text)), Files::default());
@@ -82,9 +82,9 @@ fn dumps() {
     assert_eq!(other.robot(again).qpos_limits()[(0, 0, 1)], f64::INFINITY);
 }
 
-/// Each joint of the humanoid comes to rest, with its trunk held, in the static equilibrium of springs, gravity and the drive.
-/// The judge of the torque is MuJoCo's bias and passive force there, which the stiffness of the drive turns into a sag:
-/// `kp (q* - q) = τ`. Without drives the same robot moves by radians.
+/// With a fixed trunk, each joint of the humanoid settles in the static equilibrium of springs, gravity and drive. The
+/// reference torque is MuJoCo's bias and passive force there, which causes the sag `kp (q* - q) = τ`. Without drives
+/// the same robot moves by radians.
 #[test]
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
 fn humanoid() {
@@ -106,7 +106,8 @@ fn humanoid() {
         env.data().qfrc_bias().iter().zip(env.data().qfrc_passive()).map(|(bias, passive)| bias - passive).collect()
     });
     assert_eq!(load.len(), 21);
-    // The solver stops at 1e-8 of the scale of the scene; 1e-3 of the largest load is far above and far below a wrong sign.
+    // The solver stops at 1e-8 of the scale of the scene; 1e-3 of the largest load is far above that, and far below the
+    // effect of a wrong sign.
     assert!(largest(&load) > 1.0, "something is carried: {load:?}");
     for (joint, load_) in load.iter().enumerate() {
         assert!(speed[(0, joint)].abs() < 1e-4, "joint {joint} rests: {}", speed[(0, joint)]);
@@ -119,8 +120,8 @@ fn humanoid() {
     assert!(largest(&off) > 0.3, "{off}");
 }
 
-/// Every other sample model is a robot or a typed error, never a panic, and steps. What MuJoCo compiles alone it compiles in
-/// the scene: an error of the scene's document is ours.
+/// Every other sample model is a robot that steps or a typed error, never a panic. Every file that MuJoCo compiles
+/// alone compiles in the scene: an error in the scene's document would be ours.
 #[test]
 #[ignore = "needs MuJoCo's sample models: cargo xtask test"]
 fn other_samples() {

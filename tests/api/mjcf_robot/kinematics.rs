@@ -1,4 +1,4 @@
-//! Forward and inverse kinematics, judged by MuJoCo with the file alone: not by the scene that is written from it.
+//! Forward and inverse kinematics, compared with MuJoCo and the file alone, independent of the written scene.
 
 use super::*;
 use kinetoscope::mujoco as mj;
@@ -8,7 +8,7 @@ use kinetoscope::robot::kinematics::{IkCfg, Tip};
 use kinetoscope::scene::pose::{from_row, from_xyz_rpy, to_row};
 use kinetoscope_testkit::worlds::{errors, pose_in};
 
-/// A body or a site, as MuJoCo has it.
+/// MuJoCo's pose of a body or a site.
 fn place(data: &Data, name: &str) -> [f64; 7] {
     let model = data.model();
     match model.id(ObjectKind::Body, name) {
@@ -26,7 +26,7 @@ fn place(data: &Data, name: &str) -> [f64; 7] {
     }
 }
 
-/// The file alone, with its joints somewhere.
+/// The file alone, with its joints at the given positions.
 fn file_at(joints: &[String], qpos: &[f64]) -> Data {
     let mut data = Data::new(&mj::compile(ODD, &[]).unwrap().into_model()).unwrap();
     for (joint, &value) in joints.iter().zip(qpos) {
@@ -38,7 +38,8 @@ fn file_at(joints: &[String], qpos: &[f64]) -> Data {
     data
 }
 
-/// Computed and read poses are where MuJoCo puts bodies and sites; a turned and moved world of the file turns and moves all.
+/// Computed and read poses equal MuJoCo's poses of bodies and sites; a rotated and translated file world moves all of
+/// them.
 #[test]
 fn links() {
     let init_pose = from_xyz_rpy([0.4, 0.2, -0.1], [0.3, -0.2, 1.0]);
@@ -66,12 +67,12 @@ fn links() {
         }
     }
     assert!(farthest > 0.2, "{farthest}");
-    // The root stands where the file has it in its world.
+    // The root has its pose from the file.
     let [root, now] = [sim.robot(id).default_root_pose(), sim.robot(id).root_pose()];
     assert!(errors(&pose_in(&root, 0), &pose_in(&now, 0)).0 < 1e-12);
 }
 
-/// Jacobians are `mj_jac` of the file alone at the tip.
+/// Jacobians equal `mj_jac` of the file alone at the tip.
 #[test]
 fn jacobians() {
     let (sim, id) = with(1, passive(robot("odd", ODD)));
@@ -96,7 +97,7 @@ fn jacobians() {
     }
 }
 
-/// Random reachable poses of the tip are found from the start, and MuJoCo says that they are.
+/// Random reachable poses of the tip are solved from the start, and MuJoCo confirms the solutions.
 #[test]
 fn reachable_poses() {
     const TARGETS: usize = 300;
@@ -112,7 +113,7 @@ fn reachable_poses() {
     for k in 0..TARGETS {
         let target = at(&mut sim, &rows.select(Axis(0), &[k]));
         let far_away = errors(&at(&mut sim, &start), &target).0;
-        // The only site that hangs on the hand is the end of the part.
+        // The only site on the hand is the tip of the part.
         let wanted = row(to_row(&target));
         let found = sim.robot(id).compute_ik(&wanted, Tip::of_part("arm"), &IkCfg::default(), None, None).unwrap();
         let (far, turned) = errors(&at(&mut sim, &found.qpos), &target);

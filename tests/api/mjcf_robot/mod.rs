@@ -1,4 +1,4 @@
-//! MJCF files as robots, held against MuJoCo with the same file alone and against the same robot from a URDF.
+//! MJCF files as robots, compared with MuJoCo and the same file alone, and with the same robot from a URDF.
 
 mod bases;
 mod couplings;
@@ -31,7 +31,7 @@ fn alone(text: &str) -> Model {
     mj::compile(&text, &[]).unwrap().into_model()
 }
 
-/// `count` rows of positions between the limits of the robot's joints, which all have some.
+/// `count` rows of positions between the limits of the robot's joints, all of which have limits.
 fn random_qpos(sim: &SimulationManager, id: RobotId, count: usize) -> Array2<f64> {
     let limits = sim.robot(id).qpos_limits();
     let mut random = Random::keyed(7, 0, "positions");
@@ -46,8 +46,8 @@ fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
     values.into_iter().fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// An arm of seven axes with everything that MJCF has and URDF has not: two joints in one body, anchors off the origin,
-/// positions in which the file starts, a spring, a body that is fixed to another, sites, degrees.
+/// An arm of seven axes with the features that MJCF has and URDF lacks: two joints in one body, anchors off the origin,
+/// start positions, a spring, a body fixed to another, sites, degrees.
 const ODD: &str = include_str!("../../data/mjcf/odd.xml");
 
 /// Joints of [`ODD`].

@@ -28,8 +28,8 @@ fn names_and_numbers() {
     assert_eq!(robot.qpos(), start);
 }
 
-/// Gravity, centrifugal and Coriolis forces and the mass matrix at random states: both are MuJoCo's, on numbers that were
-/// written and read once; forces are of 10 N m, so 1e-12 is a few hundred roundings.
+/// Gravity, centrifugal and Coriolis forces and the mass matrix at random states. Both sides are computed by MuJoCo,
+/// from numbers that were written and read once. Forces are about 10 N m, so 1e-12 is a few hundred rounding errors.
 #[test]
 fn bias_and_mass_matrix() {
     let (mut sim, id) = with(1, passive(robot("odd", ODD)));
@@ -46,7 +46,7 @@ fn bias_and_mass_matrix() {
         data.forward().unwrap();
         sim.batch().read(0, |env| {
             let (mut ours, theirs) = (env.data().mass_matrix().unwrap(), data.mass_matrix().unwrap());
-            // The scene's has the part that is integrated with the drives: h B of the elbow.
+            // The scene's matrix includes the damping that is integrated with the drives: h B of the elbow.
             ours[2 * 7 + 2] -= 0.002 * 0.2;
             let bias = env.data().qfrc_bias().iter().zip(data.qfrc_bias());
             for (ours, theirs) in bias.chain(ours.iter().zip(&theirs)) {
@@ -58,9 +58,9 @@ fn bias_and_mass_matrix() {
     assert!(most > 10.0, "{most}");
 }
 
-/// Falling and swinging without drives, inside of all limits. Damping moves into the solve, which is the same where nothing
-/// else is solved: `(M + h B) a = f - B v` both here and in MuJoCo's implicit damping. 0.1 s are too short for chaos: 1e-9 is
-/// far above what rounding grows to.
+/// Falling and swinging without drives, inside of all limits. Damping moves into the solve, which is equivalent if
+/// nothing else is solved: `(M + h B) a = f - B v` both here and in MuJoCo's implicit damping. 0.1 s are too short for
+/// chaos: 1e-9 is far above amplified rounding.
 #[test]
 fn passive_fall() {
     let speeds = [0.3, -0.2, 0.5, 0.05, 1.0, -0.4, 0.7];
@@ -77,12 +77,12 @@ fn passive_fall() {
     let ours = falls(ODD);
     assert!(data.qpos().iter().zip(data.model().qpos0()).any(|(a, b)| (a - b).abs() > 0.05), "it moved");
     assert!(largest(&(&ours - &expected)) < 1e-9, "{ours} {expected}");
-    // The control: without the spring it falls elsewhere.
+    // Control: without the spring it falls differently.
     assert!((falls(&ODD.replace(r#"stiffness="1.5""#, ""))[(0, 2)] - expected[(0, 2)]).abs() > 1e-4);
 }
 
-/// Payloads come on top of the file's masses. The centre of mass of the fore-arm stays; that of the hand goes to
-/// (0.3 c + 0.25 s) / 0.55 with the site s.
+/// Payloads are added to the file's masses. The center of mass of the forearm stays; that of the hand moves to (0.3 c +
+/// 0.25 s) / 0.55 with the site s.
 #[test]
 fn payloads() {
     let payload = vec![("fore".into(), 0.5), ("tip".into(), 0.25)];
@@ -101,8 +101,8 @@ fn payloads() {
     assert!((sim.robot(id).total_mass() - 7.2 - 0.75).abs() < 1e-12);
 }
 
-/// Six axes, from stiff and weak to soft, one of them a slide, with friction and damping of the joints: axis, place, mass of
-/// the link behind, limits, damping and friction of the joint, effort, stiffness and damping of the drive.
+/// Six axes from stiff to soft, one of them a slide, with friction and damping of the joints. Columns: axis, position,
+/// mass of the child link, limits, damping and friction of the joint, effort, stiffness and damping of the drive.
 const ARM: [[&str; 10]; 6] = [
     ["0 0 1", "0 0 0.1", "5", "-2.5", "2.5", "0", "2", "80", "900", "60"],
     ["0 1 0", "0.05 0 0.2", "4", "-2.5", "2.5", "1.5", "0", "80", "900", "60"],
@@ -112,7 +112,7 @@ const ARM: [[&str; 10]; 6] = [
     ["1 0 0", "0 0 0.1", "0.5", "-0.1", "0.2", "0", "0", "80", "900", "60"],
 ];
 
-/// The arm as MJCF and as URDF. Friction of joints is as hard as that of robots from URDF files: the MJCF says so.
+/// The arm as MJCF and as URDF. The MJCF sets the hardness of joint friction to that of robots from URDF files.
 fn arm() -> [String; 2] {
     let (mut bodies, mut actuators, mut urdf) = (String::new(), String::new(), String::new());
     let link = |name: &str, mass: &str, com: &str, [x, y, z]: [&str; 3]| {
@@ -154,7 +154,7 @@ fn arm() -> [String; 2] {
 /// Positions and efforts.
 type Sample = (Array2<f64>, Array2<f64>);
 
-/// [`Sample`]s after each tenth of a second of steps that saturate drives.
+/// [`Sample`]s after each tenth of a second of a motion with saturated drives.
 fn steps(cfg: RobotCfg) -> (SimulationManager, RobotId, Vec<Sample>) {
     let (mut sim, id) = with(2, cfg);
     let targets = array![[0.5, -0.7, 1.0, 0.8, -1.2, 0.1], [-1.0, 0.4, -0.6, 1.5, 0.3, -0.05]];
@@ -167,15 +167,15 @@ fn steps(cfg: RobotCfg) -> (SimulationManager, RobotId, Vec<Sample>) {
     (sim, id, seen)
 }
 
-/// Both are the same rows on the same inertias, which differ by the rounding of principal axes; the arm is driven, so nothing
-/// grows: 1e-9 in positions of 1 rad, and in efforts of 100 N m times the stiffness of that.
+/// Both robots have the same rows and inertias up to rounding of the principal axes. The arm is driven, so differences
+/// do not grow: 1e-9 in positions of 1 rad, and in efforts of 100 N m that times the stiffness.
 #[test]
 fn same_as_urdf() {
     let files = Files::default();
     let [mjcf, urdf] = arm();
     for model in [DriveModel::Implicit, DriveModel::Actuator] {
         let of_mjcf = RobotCfg { drive: DriveCfg { model, ..Default::default() }, ..robot("arm", &mjcf) };
-        // The drives of the URDF robot have to be given the gains of the MJCF file.
+        // The drives of the URDF robot get the gains of the MJCF file.
         let of_urdf = |elbow: f64| {
             let gain = |column: usize, elbow: f64| {
                 let of = |k: usize| ARM[k][column].parse::<f64>().unwrap() * if k == 2 { elbow } else { 1.0 };
@@ -203,7 +203,7 @@ fn same_as_urdf() {
         }
         assert!(largest(&mine[0].1) > 79.0, "a drive is at its limit: {}", mine[0].1);
         assert!((mine[9].0[(0, 0)] - 0.5).abs() < 0.05, "{}", mine[9].0);
-        // The control: one percent less stiffness of one joint is seen.
+        // Control: one percent less stiffness of one joint is detected.
         assert!(largest(&(&steps(of_urdf(0.99)).2[9].0 - &other[9].0)) > 1e-6, "{model:?}");
     }
 }
@@ -224,8 +224,8 @@ fn quadrupeds() -> [(SimulationManager, RobotId); 2] {
     })
 }
 
-/// Joints, masses, limits and frames are the same. Degrees with six digits are right to 1e-6 rad; lengths and masses are the
-/// same numbers, principal axes are rounded.
+/// Joints, masses, limits and frames are the same. Degrees with six digits are accurate to 1e-6 rad; lengths and masses
+/// are equal numbers, and principal axes are rounded.
 #[test]
 fn quadruped() {
     let [(a, urdf), (b, xml)] = quadrupeds();
@@ -244,7 +244,7 @@ fn quadruped() {
     assert!(there.iter().zip(&here).all(|(a, b)| (a - b).abs() < 1e-8) && there[2] > 500.0, "{there:?} {here:?}");
 }
 
-/// Both stand on four feet, which carry the weight.
+/// Both quadrupeds stand on four feet, which carry the weight.
 #[test]
 fn quadruped_stands() {
     for (mut sim, id) in quadrupeds() {
@@ -252,7 +252,7 @@ fn quadruped_stands() {
         sim.update((2.0 / sim.cfg().physics_dt).round() as u32);
         assert!(sim.diverged().is_empty());
         let weight: f64 = sim.sensor(feet).unwrap().net_forces_w().index_axis(Axis(2), 2).row(0).iter().sum();
-        // The mass has three decimals: 5e-4 kg are 5e-3 N; as much again is an acceleration of 1e-4 m/s² that is left.
+        // The mass has three decimals: 5e-4 kg are 5e-3 N; the same again for a remaining acceleration of 1e-4 m/s².
         assert!((weight - 52.135 * 9.81).abs() < 1e-2, "{weight} N");
         assert_eq!(sim.batch().read(0, |env| env.data().contact().len()), 4);
         assert!(sim.robot(id).root_pose()[(0, 2)] > 0.4);

@@ -1,5 +1,5 @@
-//! Properties of single environments of robots from MJCF: what is drawn and set moves them as a file that says so, and as laws
-//! of physics say.
+//! Properties per environment for robots from MJCF: randomized and set values act like a changed file, and according to
+//! laws of physics.
 
 use super::drives::{CHAIN, GRIPPER};
 use super::*;
@@ -7,11 +7,12 @@ use kinetoscope::ndarray::array;
 use kinetoscope::sim::{DriveModel, DriveType, Error};
 use kinetoscope_testkit::worlds::gains;
 
-/// A sled that slides on the ground, with an arm, a finger that follows it, a foot that may be larger, and a servo on a
-/// tendon over arm and finger. All masses are said, so that no size and no geom changes them.
+/// A sled on the ground with an arm, a finger that follows the arm, a foot of variable size, and a servo on a tendon
+/// over arm and finger. All masses are explicit, so that sizes and geoms do not change them.
 const SLED: &str = include_str!("../../data/mjcf/sled.xml");
 
-/// A scene on ground that is nearly without friction, which MuJoCo takes the larger of; the sled moves.
+/// A scene with the moving sled. The ground has almost no friction, because MuJoCo uses the larger friction of two
+/// geoms.
 fn sledding(text: &str, envs: usize) -> (SimulationManager, RobotId) {
     let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg {
         physics_dt: 0.002,
@@ -36,11 +37,11 @@ fn far(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |far, (a, b)| far.max((a - b).abs()))
 }
 
-/// A property that one environment gets, its value, and the numbers of another file: its words before and after.
+/// A property changed in one environment, its value, and the equivalent edit of the file: old and new text.
 type Change = (Property, &'static str, &'static [f64], [&'static str; 2]);
 
-/// The judge is MuJoCo with another file. Both are compiled from the same numbers, but for constants that are computed in another
-/// order, so they differ by roundings, which 0.3 s of sliding on the same face do not make larger than 1e-9.
+/// The reference is MuJoCo with a changed file. Both are compiled from the same numbers, except for constants computed
+/// in another order. They differ by rounding, which 0.3 s of sliding on the same face do not amplify beyond 1e-9.
 #[test]
 fn as_another_file() {
     let heavy = [r#"mass="0.8" diaginertia="0.002 0.006 0.006""#, r#"mass="1.6" diaginertia="0.004 0.012 0.012""#];
@@ -72,7 +73,7 @@ fn as_another_file() {
     }
 }
 
-/// The setters of a robot are the properties above, for followers too.
+/// The setters of a robot write these properties, also for followers.
 #[test]
 fn setters() {
     let (mut sim, id) = sledding(SLED, 3);
@@ -88,9 +89,9 @@ fn setters() {
     assert_eq!(robot.friction(), array![[0.2, 0.0], [0.2, 0.0], [1.5, 0.0]]);
 }
 
-/// A disc about z: dry friction F alone slows it by F / I, so v = v0 - F t / I until it stands; an effort τ speeds it up by
-/// (τ - F) / (I + armature). Both are linear in time, which Euler's steps follow exactly; MuJoCo's friction is at its bound
-/// as long as the disc turns by more than its regularisation lets it creep.
+/// A disc about z: dry friction F alone slows it by F / I, so v = v0 - F t / I until it stops; an effort τ accelerates
+/// it by (τ - F) / (I + armature). Both are linear in time, so that Euler's steps are exact. MuJoCo's friction is at
+/// its limit while the disc rotates faster than the creep allowed by the regularization.
 #[test]
 fn friction_and_armature() {
     let text = |actuator: &str, friction: &str| {
@@ -127,14 +128,14 @@ fn friction_and_armature() {
         sim.reset(None).unwrap();
         assert_eq!(sim.robot(id).friction(), array![[0.3], [0.6], [0.6]], "{what}: it stays through a reset");
     }
-    // A row without room for it says so.
+    // An implicit drive without a separate friction row gives an error.
     let (mut sim, id) = with(1, RobotCfg { drive: weak(DriveModel::Implicit), ..robot("r", &text(idle, "")) });
     let error = sim.robot_mut(id).set_friction(&array![[0.3]], None, None).unwrap_err();
     assert!(matches!(&error, Error::UnknownName { name, .. } if name == "r/spin"), "{error}");
 }
 
-/// Against a spring of the stiffness s a drive of k comes to target · k / (k + s), whatever it was made of: actuators of two
-/// followers, or of a tendon over both fingers.
+/// Against a spring of stiffness s a drive of k settles at target · k / (k + s), for actuators of two followers and of
+/// a tendon over both fingers.
 #[test]
 fn coupled_drives() {
     let gripper = GRIPPER
@@ -152,7 +153,7 @@ fn coupled_drives() {
         let stiff = Randomization::new().with(Property::Stiffness, &name, Draw::Scale([3.0, 3.0]));
         sim.properties_mut().randomize(&stiff, Some(&[EnvId(2)])).unwrap();
         sim.robot_mut(id).set_qf_limits(&array![[0.1 * spring * target]], Some(&[column]), Some(&[EnvId(3)])).unwrap();
-        // Of the joint, enough to be at rest soon: a drive at its limit damps nothing.
+        // Joint damping, to settle quickly: a saturated drive has no damping.
         sim.robot_mut(id).set_joint_damping(&array![[20.0]], Some(&[column]), None).unwrap();
         sim.robot_mut(id).set_qpos_target(&row([target]), Some(&[column]), None).unwrap();
         sim.update(4000);
@@ -160,13 +161,13 @@ fn coupled_drives() {
         let share = |k: f64| k / (k + spring);
         for (env, expected) in [share(nominal), 0.5, share(3.0 * nominal), 0.1].into_iter().enumerate() {
             let found = qpos[(env, column.0)] / target;
-            // Couplings carry the springs of followers, and give way by less than a thousandth of what they move.
+            // Couplings carry the springs of followers, and yield by less than a thousandth of the motion.
             assert!((found - expected).abs() < 1e-3, "{driver} in {env}: {found}, not {expected}");
         }
     }
 }
 
-/// Everything that such a robot has is drawn, goes with snapshots and is carried over when more is added.
+/// All properties of such a robot are randomized, are part of snapshots and are carried over after additions.
 #[test]
 fn draws_in_snapshots() {
     let draw = Randomization::new()
@@ -204,18 +205,18 @@ fn draws_in_snapshots() {
     sim.update(100);
     let state = |sim: &SimulationManager| (sim.robot(id).root_pose(), sim.robot(id).qpos(), sim.robot(id).qf());
     let end = state(&sim);
-    // Drawn again and moved on, then back: the same bits.
+    // Randomized again and moved on, then restored: the same bits.
     sim.properties_mut().randomize(&draw, None).unwrap();
     assert!(values(&sim) != drawn);
     sim.properties_mut().restore(&snapshot, None).unwrap();
     assert!(values(&sim) == drawn);
     sim.update(100);
     assert_eq!(state(&sim), end);
-    // More is added: properties stay, by name.
+    // After an addition properties persist, by name.
     sim.add_robot(RobotCfg { init_pose: Pose::translation(5.0, 0.0, 0.5), ..robot("second", SLED) }).unwrap();
     assert!(values(&sim) == drawn);
     assert_eq!(state(&sim), end);
-    // Control: with nominal properties what moves goes elsewhere.
+    // Control: with nominal properties the motion differs.
     sim.properties_mut().reset(None).unwrap();
     assert!(values(&sim)[0] == drawn[1], "nominal again");
     let (mut plain, plain_id) = sledding(SLED, 3);

@@ -1,5 +1,5 @@
-//! Files that are no robots: typed errors that name what is wrong and where, and nothing was added; parts of a file that a
-//! robot leaves out; and files that only MuJoCo 4.x reads.
+//! Files that are not valid robots: typed errors that name the mistake and its place, with the scene unchanged; parts
+//! of a file that a robot leaves out; and files that only MuJoCo 4.x reads.
 
 use super::*;
 use kinetoscope::mujoco::{TARGET, Target};
@@ -22,7 +22,7 @@ fn of_file(path: impl AsRef<std::path::Path>) -> RobotCfg {
     RobotCfg { mjcf: Some(MjcfFile::new(path.as_ref())), ..Default::default() }
 }
 
-/// The reason why a text is no robot; the message begins with the line if there is one.
+/// The reason for refusing a text; asserts that the message begins with the line if there is one.
 fn reason(text: &str) -> (RobotFileError, String) {
     let error = refused(robot("r", text));
     let said = error.to_string();
@@ -67,8 +67,7 @@ fn no_robots() {
     }
 }
 
-/// Joints and actuators that no drive stands for are named with their line, in the file that includes them and in those it
-/// includes.
+/// Joints and actuators without an equivalent drive are named with their line, in the main file and in included files.
 #[test]
 fn named_elements() {
     let files = Files::default();
@@ -97,7 +96,7 @@ fn named_elements() {
     }));
 }
 
-/// Elements of the file's world are left out, and said.
+/// Elements of the file's world are left out with a diagnostic.
 #[test]
 fn world_of_the_file() {
     let text = r#"<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/><light name="sun" pos="0 0 3"/>
@@ -118,9 +117,9 @@ fn world_of_the_file() {
 
 const NO_BITS: &str = r#"contype="0" conaffinity="0""#;
 
-/// The scene's world is another than the file's. A ball of 0.1 m stands on the scene's ground whatever its bits in the file,
-/// also where the file pairs it with its own floor or excludes it from its world, which is said; a ball that collides with
-/// nothing falls 20 m.
+/// The scene's world replaces the file's. A ball of 0.1 m rests on the scene's ground for any collision bits in the
+/// file. Pairs with the file's own floor and exclusions of its world are ignored with a diagnostic. A ball without
+/// collisions falls 20 m.
 #[test]
 fn ground() {
     let (pair, exclude) = (r#"<pair geom1="foot" geom2="floor"/>"#, r#"<exclude body1="world" body2="b"/>"#);
@@ -148,7 +147,7 @@ fn ground() {
         assert!(right, "{bits} {contact}: {height}");
         assert_eq!(count_diagnostics(&sim, words), said, "{bits} {contact}: {:?}", sim.diagnostics());
     }
-    // Pairs within a robot are named where it does not collide with itself.
+    // Pairs within a robot give a diagnostic if self-collision is off.
     let text = r#"<mujoco><worldbody><body name="a"><geom name="g" size="0.1" mass="1"/><body name="b" pos="1 0 0">
         <joint name="j" axis="0 0 1"/><geom name="h" size="0.1" mass="1"/></body></body></worldbody>
         <contact><pair geom1="g" geom2="h"/></contact></mujoco>"#;
@@ -159,7 +158,7 @@ fn ground() {
     }
 }
 
-/// A pendulum with these attributes of its body and of its joint; `after` stands behind the bodies.
+/// A pendulum with these attributes of its body and of its joint; `after` follows the bodies.
 fn pendulum(body: &str, joint: &str, after: &str) -> String {
     format!(
         r#"<mujoco><compiler angle="radian"/><worldbody><body name="base"><geom size="0.01" mass="1"/>
@@ -168,7 +167,7 @@ fn pendulum(body: &str, joint: &str, after: &str) -> String {
     )
 }
 
-/// Adds a robot; `None` where this MuJoCo does not know an attribute of its file, which is an error then.
+/// Adds a robot; `None` if this MuJoCo version does not support an attribute of the file, which must then be an error.
 fn newer(cfg: RobotCfg) -> Option<(SimulationManager, RobotId)> {
     let mut sim = empty(1);
     match sim.add_robot(cfg) {
@@ -184,7 +183,7 @@ fn newer(cfg: RobotCfg) -> Option<(SimulationManager, RobotId)> {
     }
 }
 
-/// A body that MuJoCo lifts by half is lifted by the other half, and no further.
+/// A body with half gravity compensation in MuJoCo gets the other half, and no more.
 #[test]
 fn newer_gravity_compensation() {
     let Some((mut sim, id)) = newer(passive(robot("r", &pendulum(r#"gravcomp="0.5""#, "", "")))) else { return };
@@ -196,12 +195,12 @@ fn newer_gravity_compensation() {
     };
     let off = moved(true, 500);
     assert!(off.abs() < 1e-9, "{off}");
-    // Half of g at 0.3 m: 16.35 rad/s² times (0.1 s)² / 2, while it is near the horizon.
+    // Half of g at 0.3 m: 16.35 rad/s² times (0.1 s)² / 2, near the horizontal.
     let fallen = moved(false, 50);
     assert!((fallen - 0.0817).abs() < 4e-3, "{fallen}");
 }
 
-/// The file's limit of actuators' forces is that of the drive, and the configuration may raise it.
+/// The file's limit of actuator forces is that of the drive; the configuration may raise it.
 #[test]
 fn newer_force_limit() {
     let text = pendulum("", r#"actuatorfrcrange="-5 5""#, r#"<actuator><position joint="j" kp="100"/></actuator>"#);
@@ -221,7 +220,7 @@ fn newer_force_limit() {
     }
 }
 
-/// Sensors of actuators' forces are left out by name.
+/// Sensors of actuator forces are left out by name.
 #[test]
 fn newer_sensors() {
     let after = r#"<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>

@@ -7,7 +7,7 @@ use kinetoscope::sensors::ray::HitTargets;
 use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope_testkit::worlds::gains;
 
-/// Gravity compensation of all links holds an arm that nothing else holds.
+/// Gravity compensation of all links holds an arm without drives.
 #[test]
 fn gravity_compensation() {
     let (mut sim, id) = with(2, passive(robot("odd", &ODD.replace(r#"stiffness="1.5""#, ""))));
@@ -18,8 +18,8 @@ fn gravity_compensation() {
     assert!(largest(off.row(1)) < 1e-9 && largest(off.row(0)) > 0.05, "{off}");
 }
 
-/// Two fingers that close on each other: they pass through each other unless told to collide; a pair of the file holds only
-/// then. The centres stay a diameter of 0.04 m apart: each finger has gone (0.12 - 0.04) / 2.
+/// Two closing fingers pass through each other unless self-collision is on; a contact pair of the file is only active
+/// then. The centers stay a diameter of 0.04 m apart: each finger has moved (0.12 - 0.04) / 2.
 #[test]
 fn self_collision() {
     let text = r#"<mujoco><compiler angle="radian"/><worldbody><body name="palm"><geom name="palm" size="0.02" mass="1"/>
@@ -39,7 +39,7 @@ fn self_collision() {
     }
 }
 
-/// A leg that stands on a foot, with its body on a slide, and sensors of its own.
+/// A leg on a foot, with its body on a slide, and its own sensors.
 const LEG: &str = include_str!("../../data/mjcf/leg.xml");
 
 /// Sensors find the links of a robot by name.
@@ -67,13 +67,13 @@ fn sensors() {
         assert_eq!((entry.object.as_str(), entry.class.as_str()), ("leg", "robot"));
         sim.update(400);
         assert!(sim.diverged().is_empty());
-        // The foot carries 5 kg, the body touches nothing.
+        // The foot carries 5 kg, the body has no contact.
         let sensor = sim.sensor(contact).unwrap();
         let [foot, body] = ["leg/foot", "leg/body"].map(|name| sensor.find_bodies(name).unwrap()[0]);
         for forces in sensor.net_forces_w().axis_iter(Axis(0)) {
             assert!((forces[(foot, 2)] - 5.0 * 9.81).abs() < 0.1 && largest(forces.row(body)) == 0.0, "{forces}");
         }
-        // An accelerometer at rest measures g upwards.
+        // An accelerometer at rest measures g upward.
         let acc = sim.sensor(imu).unwrap().lin_acc_b().to_owned();
         assert!((acc[(0, 2)] - 9.81).abs() < 0.05 && acc[(0, 0)].abs() < 0.05, "{acc}");
         let own = sim.sensor(own).unwrap();
@@ -83,7 +83,7 @@ fn sensors() {
         if with_part {
             assert!((own.value("part/clock").unwrap()[(0, 0)] - sim.time()[0]).abs() < 0.01);
         }
-        // Rays from the body meet the foot below it, 0.05 m high and wide as the pattern.
+        // Rays from the body hit the foot below it, 0.05 m high and as wide as the pattern.
         let foot = sim.robot(id).link_pose("foot").unwrap()[(0, 2)];
         let hits = sim.sensor(scanner).unwrap().hits().to_owned();
         let heights: Vec<f64> = hits.axis_iter(Axis(1)).map(|hit| hit[(0, 2)]).collect();

@@ -1,4 +1,4 @@
-//! Bounces against the closed form; pairs that never collide.
+//! Bounces compared with the closed form; collision exclusions.
 
 use super::*;
 use kinetoscope::sim::{Cone, ObjectId};
@@ -8,7 +8,8 @@ fn bouncy(uid: &str, mass: f64, restitution: Option<f64>) -> RigidObjectCfg {
     RigidObjectCfg { restitution, ..ball(uid, 0.1, mass, [0.0; 3]) }
 }
 
-/// Velocities of two balls after the one on the left came with 1 m/s; the surfaces meet `phase` of a step after one.
+/// Velocities of two balls after a collision of the left one with 1 m/s; the surfaces meet at the fraction `phase` of a
+/// step.
 fn meet(mut sim: SimulationManager, [left, right]: [RigidObjectCfg; 2], phase: f64) -> [f64; 2] {
     let at = |cfg, x| RigidObjectCfg { init_pose: Pose::translation(x, 0.0, 0.0), ..cfg };
     let left = sim.add_rigid_object(at(left, -0.15 - 1e-3 * phase)).unwrap();
@@ -18,8 +19,9 @@ fn meet(mut sim: SimulationManager, [left, right]: [RigidObjectCfg; 2], phase: f
     [left, right].map(|id| sim.rigid_object(id).velocity()[(0, 0)])
 }
 
-/// The error that ten steps in a contact leave of the closed form, over all places in a step where the surfaces may meet:
-/// worked out with the recursion of `tests/physics/bounce.rs` for 400 of them, as [`RigidObjectCfg::restitution`] says it; straight lines between.
+/// Error band of the restitution due to a contact of ten steps: restitution, lower and upper error. The band covers all
+/// fractions of a step at which the surfaces may meet, computed for 400 of them with the recursion of
+/// `tests/physics/bounce.rs`, as documented at [`RigidObjectCfg::restitution`]; linear in between.
 const BAND: [[f64; 3]; 6] = [
     [0.14, -0.08, 0.04],
     [0.3, -0.08, 0.04],
@@ -36,8 +38,8 @@ fn is_near(found: f64, wanted: f64) -> bool {
     (low + part * (lower - low)..=high + part * (higher - high)).contains(&(found - wanted))
 }
 
-/// Relative velocity after and before is the restitution, whatever the masses; momentum stays. Eleven places in a step where
-/// they may meet.
+/// The ratio of relative velocities is the restitution for any masses; momentum is conserved. Eleven fractions of a
+/// step at which the balls may meet.
 #[test]
 fn two_balls() {
     for masses in [[1.0, 1.0], [0.2, 5.0]] {
@@ -50,12 +52,12 @@ fn two_balls() {
             }
         }
     }
-    // The control: what is good at 0.5 is not at 0.8.
+    // Control: an error accepted at 0.5 is not accepted at 0.8.
     assert!(is_near(0.45, 0.5) && !is_near(0.75, 0.8) && !is_near(0.99, 1.0));
 }
 
-/// MuJoCo's pyramids lean on the friction coefficient: the bounce does not. mu² (1 + mu²) / 2 of at most 10, times 1e-4: a
-/// thousandth of the force.
+/// MuJoCo's friction pyramids depend on the friction coefficient; the bounce does not. mu² (1 + mu²) / 2 of at most 10,
+/// times 1e-4: a thousandth of the force.
 #[test]
 fn friction() {
     let parted = |cone, mu: f64, wanted| {
@@ -73,7 +75,7 @@ fn friction() {
     }
 }
 
-/// The less bouncy of two counts; one that has a restitution brings it to one that has none.
+/// The smaller of two restitutions counts; an object with a restitution applies it to an object without one.
 #[test]
 fn combinations() {
     let parted = |[left, right]: [Option<f64>; 2]| {
@@ -85,7 +87,7 @@ fn combinations() {
     assert_eq!(parted([high, low]), parted([low, low]));
     assert!((parted([None, high]) - parted([high, high])).abs() < 1e-5);
     assert!(parted([high, high]) > 0.8 && parted([low, low]) < 0.4);
-    // The control: without any, MuJoCo's own contacts.
+    // Control: without any restitution, MuJoCo's own contacts.
     assert!(parted([None, None]) < 0.2, "{}", parted([None, None]));
 }
 
@@ -101,7 +103,7 @@ fn contacts(sim: &SimulationManager) -> usize {
     sim.batch().read(1, |env| env.data().contact().len())
 }
 
-/// Objects pass through each other, and through the world, from then on when it is said.
+/// Excluded objects pass through each other, or through the world, from the call on.
 #[test]
 fn excluded_objects() {
     let stand = |sim: &mut SimulationManager, ids: [ObjectId; 2], expected: [f64; 2]| {
@@ -129,7 +131,7 @@ fn excluded_objects() {
     stand(&mut sim, ids, [0.2, 0.1]);
 }
 
-/// A robot by its name is all of its links; its own links among each other need their pair.
+/// The name of a robot stands for all of its links; pairs of its own links must be given explicitly.
 #[test]
 fn excluded_links() {
     let build = |name: Option<&str>| {
@@ -146,6 +148,6 @@ fn excluded_links() {
     let (found, tip) = build(None);
     assert!(found > 0, "the control");
     assert_eq!(build(Some("arm")).0, 0);
-    // One body of two that reach into it, or all of what reaches into it: never more contacts than before.
+    // Excluding one link of several in contact leaves fewer contacts than before.
     assert!(build(Some(&format!("arm/{tip}"))).0 < found);
 }

@@ -1,4 +1,4 @@
-//! Meshes that are not convex: in pieces, and triangle by triangle.
+//! Concave meshes: convex pieces, and triangle by triangle.
 
 use super::*;
 use kinetoscope::ndarray::array;
@@ -10,19 +10,19 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 
 const R: f64 = 0.05;
 
-/// An L: a foot of 25 cm height from x = 0 to 1, a wall up to 1 m at its beginning.
+/// An L profile: a foot of 25 cm height from x = 0 to 1, with a wall up to 1 m at its beginning.
 fn ell() -> TriMesh {
     let outline = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.25], [0.25, 0.25], [0.25, 1.0], [0.0, 1.0]];
     prism(&outline, &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]], 1)
 }
 
-/// A valley along y whose sides rise at 45 degrees from z = 0.
+/// A valley along y with sides that rise at 45 degrees from z = 0.
 fn valley(parts: u32) -> TriMesh {
     let outline = [[-0.5, -0.2], [0.5, -0.2], [0.5, 0.5], [0.0, 0.0], [-0.5, 0.5]];
     prism(&outline, &[[0, 1, 3], [1, 2, 3], [0, 3, 4]], parts)
 }
 
-/// Half a hollow ball, open above, its middle in the origin.
+/// A hollow hemisphere, open above, with its center at the origin.
 fn bowl(inner: f32, outer: f32, rings: u32, sides: u32) -> TriMesh {
     let ring = |radius: f32, k: u32| {
         let (across, down) = (FRAC_PI_2 * k as f32 / rings as f32).sin_cos();
@@ -31,7 +31,7 @@ fn bowl(inner: f32, outer: f32, rings: u32, sides: u32) -> TriMesh {
             [radius * across * cos, radius * across * sin, -radius * down]
         })
     };
-    // From the lowest point up, inside and then outside.
+    // Vertices from the lowest point upward, first inside, then outside.
     let mut positions = vec![[0.0, 0.0, -inner]];
     positions.extend((1..=rings).flat_map(|k| ring(inner, k)));
     let first = positions.len() as u32;
@@ -43,7 +43,7 @@ fn bowl(inner: f32, outer: f32, rings: u32, sides: u32) -> TriMesh {
         for k in 0..rings {
             let quad = |base| [at(base, k, s), at(base, k, s + 1), at(base, k + 1, s + 1), at(base, k + 1, s)];
             let ([a, b, c, d], [e, f, g, h]) = (quad(0), quad(first));
-            // Inside, seen from the middle; outside, seen from below.
+            // Inside, seen from the center; outside, seen from below.
             let all = [[a, d, c], [a, c, b], [e, g, h], [e, f, g]];
             triangles.extend(all.into_iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[0] != t[2]));
         }
@@ -53,7 +53,7 @@ fn bowl(inner: f32, outer: f32, rings: u32, sides: u32) -> TriMesh {
     TriMesh::from_triangles(positions, triangles)
 }
 
-/// A ball of radius R that stops by itself.
+/// A ball of radius R with damping.
 fn marble(at: [f64; 3]) -> RigidObjectCfg {
     RigidObjectCfg { linear_damping: 2.0, angular_damping: 0.01, ..ball("ball", R, 0.5, at) }
 }
@@ -62,7 +62,7 @@ fn collides(mesh: RigidObjectCfg, mesh_collision: MeshCollision) -> RigidObjectC
     RigidObjectCfg { mesh_collision, ..mesh }
 }
 
-/// The place of a ball after three seconds in a mesh that stands, without ground.
+/// The position of a ball after three seconds in a static mesh, without ground.
 fn lies(mesh: &TriMesh, collision: MeshCollision, from: [f64; 3]) -> [f64; 3] {
     let files = Files::default();
     let mut sim = empty(1);
@@ -83,11 +83,12 @@ fn triangles(thickness: f64) -> MeshCollision {
     MeshCollision::Triangles { thickness }
 }
 
-/// A ball lies on the foot of an L, at its height and the ball's radius. On the hull there is a slope from the wall's top to
-/// the foot's end, which it rolls down and off.
+/// A ball rests on the foot of an L, at its height plus the ball's radius. On the convex hull there is a slope from the
+/// wall's top to the foot's end, so that the ball rolls off.
 ///
-/// The middle of a ball in a bowl is nowhere nearer to the bowl's middle than the inner radius less the ball's, less what the
-/// pieces may be above the surface (4 mm), and nowhere farther; chords of 48 sides are 0.2 (1 - cos(π/48)) = 0.43 mm inside.
+/// The distance of a ball's center from the bowl's center is at least the inner radius minus the ball's radius, minus
+/// the distance of the pieces above the surface (4 mm), and at most the difference of the radii; chords of 48 sides are
+/// 0.2 (1 - cos(π/48)) = 0.43 mm inside.
 #[test]
 fn balls_on_pieces() {
     let from = [0.6, 0.0, 0.9];
@@ -102,14 +103,14 @@ fn balls_on_pieces() {
     let found = lies(&mesh, pieces(200, 4e-3), [0.06, -0.03, 0.1]);
     let gap = 0.2 - R - found.iter().map(|x| x * x).sum::<f64>().sqrt();
     assert!(gap > -SOFT.absolute && gap < 4e-3 + 0.43e-3, "{found:?} {gap}");
-    // It lies low: a flat part of a piece is 2 sqrt(2 · 0.2 · 0.004) = 8 cm wide, 4 cm from its middle.
+    // The ball rests low: a flat facet of a piece is 2 sqrt(2 · 0.2 · 0.004) = 8 cm wide, 4 cm from its middle.
     assert!(found[2] < -0.15 + 4.5e-3 && found[0].hypot(found[1]) < 0.05, "{found:?}");
     let hull = lies(&mesh, MeshCollision::Hull, [0.0, 0.0, 0.1]);
     assert_number("the control: it lies on the rim", hull[2], R, SOFT);
 }
 
-/// A ball between two planes at 45 degrees has its middle R sqrt(2) above their line; on the hull it lies on top. In a bowl
-/// chords of 24 sides and 12 rings are 0.2 (1 - cos(π/24)) = 1.7 mm inside.
+/// A ball between two planes at 45 degrees has its center R sqrt(2) above their line; on the hull it rests on top. In a
+/// bowl chords of 24 sides and 12 rings are 0.2 (1 - cos(π/24)) = 1.7 mm inside.
 #[test]
 fn balls_on_triangles() {
     let from = [0.1, 0.03, 0.3];
@@ -128,8 +129,8 @@ fn balls_on_triangles() {
     }
 }
 
-/// Sliding along a valley over edges between coplanar triangles, without friction and damping: it neither climbs nor stops,
-/// but every edge brakes it a little, as `MeshCollision::Triangles` says.
+/// Sliding along a valley over edges between coplanar triangles, without friction and damping. The ball neither climbs
+/// nor stops, but every edge slows it slightly, as documented at `MeshCollision::Triangles`.
 #[test]
 fn sliding_over_edges() {
     let files = Files::default();
@@ -152,7 +153,8 @@ fn sliding_over_edges() {
     assert!((highest - height).abs() < 2e-3, "and did not jump: {highest}");
 }
 
-/// A triangle of 1 mm by 2e-10 m has a prism of less than MuJoCo takes: it is left out and said, and the scene stands.
+/// The prism of a triangle of 1 mm by 2e-10 m is below MuJoCo's minimum: it is left out with a diagnostic, and the
+/// scene is valid.
 #[test]
 fn slivers() {
     let files = Files::default();
@@ -170,7 +172,7 @@ fn slivers() {
     assert_number("height", sim.rigid_object(ball).pose()[(0, 2)], R, SOFT);
 }
 
-/// An L that moves collides in pieces too, and weighs what its triangles enclose.
+/// A moving L collides in pieces too, with the mass of the enclosed volume.
 #[test]
 fn moving_pieces() {
     let files = Files::default();
@@ -183,7 +185,7 @@ fn moving_pieces() {
     let (lies, stands) = (sim.rigid_object(ball).pose(), sim.rigid_object(id).pose());
     assert_number("the ball", lies[(0, 2)], 0.25 + R, SOFT * 2.0);
     assert_number("the L", stands[(0, 2)], 0.0, SOFT);
-    // Friction of all pieces at once, and one mask id.
+    // Friction applies to all pieces, which share one mask id.
     sim.rigid_object_mut(id).set_friction(&array![[0.3, 0.01, 0.001]], None).unwrap();
     sim.batch().read(0, |env| {
         let model = env.data().model();
@@ -213,7 +215,7 @@ fn refusals() {
         let kind = if parts.len() == 1 { "Config { field: \"mesh_collision\"" } else { "" };
         assert_error(sim.add_rigid_object(cfg), kind, parts);
     }
-    // Too few pieces are said.
+    // A limit of too few pieces gives a diagnostic.
     let round = ObjectShape::mesh(obj(&files, "bowl.obj", &bowl(0.2, 0.23, 6, 24)));
     sim.add_rigid_object(collides(object("o", round, [0.0; 3]), pieces(3, 1e-4))).unwrap();
     let said = count_diagnostics(&sim, &["3 convex pieces"]);

@@ -1,4 +1,4 @@
-//! Groups of objects: read and written together, each an object as any other.
+//! Groups of objects: read and written together, while each member remains a normal object.
 
 use super::*;
 use kinetoscope::ndarray::{Array3, Axis};
@@ -14,7 +14,7 @@ fn objects(sim: &SimulationManager, id: GroupId) -> Vec<ObjectId> {
     sim.rigid_object_group(id).names().iter().map(|name| sim.entities().rigid_object_id(name).unwrap()).collect()
 }
 
-/// Rows are those of the objects in order, in every environment; what falls falls by g h² n (n + 1) / 2.
+/// Rows are in the order of the objects, in every environment; a free object falls by g h² n (n + 1) / 2.
 #[test]
 fn poses() {
     let mut sim = empty(2);
@@ -44,12 +44,13 @@ fn poses() {
     assert_eq!(sim.rigid_object(other).pose()[(1, 0)], 9.0);
 }
 
-/// Objects that fly without gravity go on by v t and turn by w t; velocities are read as they were written, in world axes.
+/// Objects without gravity move by v t and rotate by w t; velocities are read as they were written, in world axes.
 #[test]
 fn velocities() {
     let mut sim = weightless(2);
     let id = sim.add_rigid_object_group(blocks()).unwrap();
-    // The cubes lie turned, so that world axes are not theirs. A cube has the same moment about every axis: it spins on.
+    // The cubes are rotated, so that world axes differ from theirs. A cube has the same moment about every axis, so its
+    // spin is constant.
     let turned = Array3::from_shape_fn((1, 3, 7), |(_, k, c)| [0.0, k as f64, 5.0, 0.6, 0.8, 0.0, 0.0][c]);
     sim.rigid_object_group_mut(id).write_pose(&turned, None).unwrap();
     let velocities = Array3::from_shape_fn((2, 3, 6), |(e, k, c)| {
@@ -69,7 +70,7 @@ fn velocities() {
         let moved = after[(e, k, c)] - before[(e, k, c)];
         assert!((moved - 0.2 * velocity).abs() < 1e-12, "environment {e}, object {k}: {moved}");
     }
-    // One row for one environment; the other flies on.
+    // One row for one environment; the other continues.
     sim.rigid_object_group_mut(id).write_velocity(&Array3::zeros((1, 3, 6)), Some(SECOND)).unwrap();
     let velocity = sim.rigid_object_group(id).velocity();
     assert!(velocity.index_axis(Axis(0), 1).iter().all(|v| *v == 0.0));
@@ -123,7 +124,8 @@ fn refusals() {
     assert_eq!((group.read().pose(), group.read().velocity()), before);
     group.write_pose(&poses, None).unwrap();
     assert_eq!(group.read().pose(), poses, "the control");
-    // One that stands is moved with the others; one that is moved by hand has no velocity, and then none is told.
+    // A static member is moved with the others. A kinematic member has no velocity, so writing velocities to its group
+    // is refused.
     for (uid, body_type) in [("static", BodyType::Static), ("mixed", BodyType::Kinematic)] {
         let mut cfg = blocks();
         cfg.objects[1].body_type = body_type;

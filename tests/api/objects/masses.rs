@@ -1,5 +1,5 @@
-//! Mass, centre of mass, moments, damping, friction and margins, of the configuration and of single environments, by how
-//! objects move.
+//! Mass, center of mass, moments, damping, friction and margins, from the configuration and per environment, measured
+//! by the motion of objects.
 
 use super::*;
 use kinetoscope::mujoco::{TARGET, Target};
@@ -7,7 +7,7 @@ use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::sim::{ObjectId, WrenchFrame};
 use kinetoscope_testkit::refusal::assert_error;
 
-/// F t / m in each environment; with the mass go the moments, T t / I, of a cube m a²/6.
+/// F t / m in each environment; moments scale with the mass, T t / I, for a cube m a²/6.
 #[test]
 fn mass() {
     let mut sim = weightless(3);
@@ -26,18 +26,19 @@ fn mass() {
         assert!((v[(env, 5)] / (0.01 * 0.5 / moment) - 1.0).abs() < 1e-9, "{v}");
         assert!((sim.rigid_object(id).inertia()[(env, 2)] / moment - 1.0).abs() < 1e-12);
     }
-    // It is the environment's: a reset ends the force, and leaves the mass.
+    // The mass belongs to the environment: a reset removes the force, and keeps the mass.
     sim.reset(None).unwrap();
     assert_eq!(sim.rigid_object(id).mass().to_vec(), masses);
     sim.update(10);
     assert!(sim.rigid_object(id).velocity().iter().all(|v| *v == 0.0));
-    // The configuration is what it was.
+    // The configuration is unchanged.
     assert_eq!(sim.rigid_object(id).nominal_mass(), 2.0);
     sim.properties_mut().reset(None).unwrap();
     assert_eq!(sim.rigid_object(id).mass().to_vec(), [2.0; 3]);
 }
 
-/// With the centre of mass at rest and a spin w about z the origin goes round it: after half a turn it is 2 d farther.
+/// With the center of mass at rest and a spin w about z the origin circles it: after half a turn the origin has moved
+/// by 2 d.
 #[test]
 fn centre_of_mass() {
     let (d, w) = (0.04, 2.0);
@@ -51,23 +52,24 @@ fn centre_of_mass() {
     let cfg = RigidObjectCfg { center_of_mass: Some([d, 0.0, 0.0]), ..cube("object", 0.1, 2.0, [0.0; 3]) };
     let id = sim.add_rigid_object(cfg).unwrap();
     assert_eq!(sim.rigid_object(id).center_of_mass(), array![[d, 0.0, 0.0]]);
-    // A force in it for a second: F t / m, and no spin.
+    // A force at the center of mass for a second: F t / m, and no spin.
     pull(&mut sim, id, [0.0, 3.0, 0.0], [0.0; 3]);
     sim.update(1000);
     let v = sim.rigid_object(id).velocity();
     assert!((v[(0, 1)] - 1.5).abs() < 1e-9 && v.row(0).iter().skip(3).all(|w| w.abs() < 1e-9), "{v}");
     sim.reset(None).unwrap();
     let [x, y] = half_a_turn(&mut sim, id);
-    // Steps turn the velocity of the origin after its place: a circle of 0.04 m is off by at most 2 d w h = 1.6e-4 m.
+    // A step rotates the velocity of the origin after its position: a circle of 0.04 m is off by at most 2 d w h =
+    // 1.6e-4 m.
     assert!((x - 2.0 * d).abs() < 4e-4 && y.abs() < 4e-4, "{x} {y}");
-    // Control: a cube with its own centre goes straight on.
+    // Control: a cube with its nominal center moves straight on.
     let mut sim = weightless(2);
     let id = sim.add_rigid_object(RigidObjectCfg::default()).unwrap();
     let [x, y] = half_a_turn(&mut sim, id);
     assert!(x.abs() < 1e-9 && y < -0.1, "{x} {y}");
 
-    // Of one environment: on both lines of MuJoCo a cube that is nominally centred may have its centre of mass elsewhere.
-    // The origin is then accelerated to it by w² d; the spin turns by 2e-3 rad within the step.
+    // Per environment: on both supported MuJoCo versions a nominally centered cube may have its center of mass
+    // elsewhere. The origin is then accelerated toward it by w² d; the cube rotates by 2e-3 rad within the step.
     sim.reset(None).unwrap();
     sim.rigid_object_mut(id).set_center_of_mass(&array![[0.03, 0.0, 0.0]], Some(SECOND)).unwrap();
     assert_eq!(sim.rigid_object(id).center_of_mass(), array![[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]]);
@@ -79,7 +81,7 @@ fn centre_of_mass() {
     assert!(gained.row(0).iter().all(|a| a.abs() < 1e-9), "{gained}");
 }
 
-/// t T / I about each axis, of the moments of the configuration, and of one environment; the cube's own are 1/600.
+/// t T / I about each axis, for moments from the configuration and of one environment; the cube's own are 1/600.
 #[test]
 fn moments() {
     let moments = [0.02, 0.03, 0.04];
@@ -106,8 +108,9 @@ fn moments() {
     }
 }
 
-/// MuJoCo's Euler takes damping at the end of the step: v' = v / (1 + h c / m), and so for each turn about a principal axis,
-/// with b / I. Configured, drawn, set, and set while it moves; each environment turns about another axis of a box.
+/// MuJoCo's Euler evaluates damping at the end of the step: v' = v / (1 + h c / m), and with b / I for each rotation
+/// about a principal axis. Damping is configured, randomized, set, and set during the motion; each environment rotates
+/// about another axis of a box.
 #[test]
 fn damping() {
     let mut sim = weightless(4);
@@ -148,7 +151,7 @@ fn damping() {
         }
     };
     go_on(&mut sim, &damping);
-    // Adding something leaves it, and it changes from one step to the next.
+    // An addition keeps the damping, and a change acts from the next step on.
     sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [0.0, 9.0, 0.0])).unwrap();
     assert_eq!(sim.rigid_object(id).damping(), damping);
     sim.rigid_object_mut(id).set_damping(&array![[0.0, 0.004]], Some(&[EnvId(0)])).unwrap();
@@ -165,8 +168,8 @@ fn damping() {
     assert_error(negative, "", &["linear_damping", ">= 0"]);
 }
 
-/// A force on a block on the ground moves it beyond mu m g, and not below it. A static object has friction too, and the mass
-/// of its configuration to read.
+/// A force on a block on the ground moves it above mu m g, and not below. A static object also has friction, and its
+/// configured mass can be read.
 #[test]
 fn friction() {
     let cfg = SimulationManagerCfg {
@@ -183,12 +186,13 @@ fn friction() {
     sim.rigid_object_mut(id).set_friction(&rows, Some(&[EnvId(2), EnvId(3)])).unwrap();
     let read = sim.rigid_object(id).friction();
     assert_eq!(read, array![[0.5, 0.005, 0.0001], [0.5, 0.005, 0.0001], [0.3, 0.005, 0.0001], [0.6, 0.01, 0.0002]]);
-    // MuJoCo steps with all three.
+    // MuJoCo uses all three coefficients.
     let of_geoms = sim.batch().read(3, |env| env.data().model().geom_friction().to_vec());
     assert!(of_geoms.chunks(3).any(|of| of == [0.6, 0.01, 0.0002]), "{of_geoms:?}");
     // 10 % below and above the threshold of 0.5, then 8.83 N: above that of 0.3, below that of 0.6.
     let pull = [0.45, 0.55, 0.45, 0.45].map(|part| part * 2.0 * 9.81);
-    // At the height of the ground, so that nothing tips: the torque of a force 5 cm above it is taken back.
+    // The force acts at the height of the ground, so that the block does not tip: its torque 5 cm above the ground is
+    // compensated.
     let force = Array2::from_shape_fn((4, 3), |(e, k)| if k == 0 { pull[e] } else { 0.0 });
     let torque = Array2::from_shape_fn((4, 3), |(e, k)| if k == 1 { -0.05 * pull[e] } else { 0.0 });
     sim.update(200);
@@ -196,7 +200,7 @@ fn friction() {
     sim.rigid_object_mut(id).set_external_wrench(&force, &torque, WrenchFrame::World, None).unwrap();
     sim.update(500);
     let moved = sim.rigid_object(id).pose() - start;
-    // MuJoCo's friction creeps; what slides goes a t²/2 = (F/m - mu g) t²/2.
+    // MuJoCo's friction creeps; a sliding block moves by a t²/2 = (F/m - mu g) t²/2.
     for (env, expected) in [(1, 0.05 * 9.81 / 2.0), (2, 0.15 * 9.81 / 2.0)] {
         assert!((moved[(env, 0)] / expected - 1.0).abs() < 0.05, "{env}: {} {expected}", moved[(env, 0)]);
     }
@@ -211,7 +215,7 @@ fn friction() {
     assert_error(refused, "NotDynamic { argument: \"set_mass\", object: \"shelf\"", &[]);
 }
 
-/// On the ground a margin is air; between two, 2.2.2 takes the larger, 4.x the sum.
+/// On the ground a margin is a gap; between two margins, 2.2.2 uses the larger, 4.x the sum.
 #[test]
 fn margins() {
     let mut sim = sim(SimulationManagerCfg { physics_dt: 2e-3, ..Default::default() });

@@ -1,4 +1,4 @@
-//! Objects that are meshes, and cones: mass, sensors, collision and export.
+//! Mesh objects and cones: mass, sensors, collision and export.
 
 use super::*;
 use kinetoscope::mujoco::{ObjectKind, TARGET, Target, compile_file};
@@ -9,7 +9,7 @@ use kinetoscope::sensors::ray::{HitTargets, RayCasterCfg};
 use kinetoscope::sim::ObjectId;
 use nalgebra::{Matrix3, Vector3};
 
-/// Mass, centre of mass and tensor about it, in the object's frame, as MuJoCo has them.
+/// MuJoCo's mass, center of mass and inertia tensor about it, in the object's frame.
 fn body(sim: &SimulationManager, id: ObjectId) -> (f64, Vector3<f64>, Matrix3<f64>) {
     let uid = sim.rigid_object(id).uid();
     sim.batch().read(0, |env| {
@@ -23,7 +23,8 @@ fn body(sim: &SimulationManager, id: ObjectId) -> (f64, Vector3<f64>, Matrix3<f6
     })
 }
 
-/// Sides that single precision has: mass, centre and moments of the mesh are those of the box, to rounding.
+/// Side lengths that are exact in single precision: mass, center and moments of the mesh equal those of the box, up to
+/// rounding.
 #[test]
 fn box_mesh() {
     let files = Files::default();
@@ -40,8 +41,8 @@ fn box_mesh() {
     assert_eq!(sim.rigid_object(meshed).nominal_mass(), m);
 }
 
-/// The frame of a mesh is that of its file: a brick that has its corner there has its centre of mass elsewhere, here twice
-/// as long and mirrored down. The same triangles from STL weigh the same, to the last bit.
+/// The frame of a mesh is that of its file: a brick with a corner at the origin has its center of mass elsewhere, here
+/// twice as long and mirrored downward. The same triangles from STL have the same mass, to the last bit.
 #[test]
 fn frame_and_format() {
     let files = Files::default();
@@ -63,7 +64,7 @@ fn frame_and_format() {
     let [a, b] = [("obj", obj(&files, "c.obj", &channel())), ("stl", files.write("c.stl", stl))]
         .map(|(uid, path)| sim.add_rigid_object(object(uid, ObjectShape::mesh(path), [0.0; 3])).unwrap());
     assert_eq!(body(&sim, a), body(&sim, b));
-    // Floor and two walls, in water.
+    // Floor and two walls, with the density of water.
     let mass = 1000.0 * (1.0 * 0.1 + 2.0 * 0.2 * 0.4);
     assert!((sim.rigid_object(a).nominal_mass() / mass - 1.0).abs() < 1e-6);
 }
@@ -77,8 +78,8 @@ fn scanner(x: f64, y: f64, resolution: f64, side: f64, target: &str) -> RayCaste
     }
 }
 
-/// Rays meet the triangles, down in the hollow; MuJoCo's own ray, of the hull, ends at its top, and so does
-/// a ball that lies on it.
+/// Rays hit the triangles, down in the hollow. MuJoCo's own ray hits the hull and ends at its top, where a ball also
+/// comes to rest.
 #[test]
 fn hollow_and_hull() {
     let files = Files::default();
@@ -108,12 +109,13 @@ fn hollow_and_hull() {
         let ray = sim.batch().read(0, |env| env.data().ray([0.35, 0.1, 2.0], [0.0, 0.0, -1.0], groups)).unwrap();
         ray.map(|hit| hit.distance)
     };
-    // The control: group 3 is where hulls are, and cameras do not look there.
+    // Control: hulls are in group 3, which cameras do not render.
     assert!((mujoco(0b1000).unwrap() - 1.5).abs() < 1e-6, "{:?}", mujoco(0b1000));
     assert_eq!(mujoco(0b0011), None);
 }
 
-/// Closed forms: a third of the cylinder, 3/10 m r² about the axis, 3/20 m r² + 3/80 m h² across, a quarter of the height.
+/// Closed forms: a third of the cylinder's mass, 3/10 m r² about the axis, 3/20 m r² + 3/80 m h² across, center at a
+/// quarter of the height.
 #[test]
 fn cone() {
     let mut sim = sim(SimulationManagerCfg { physics_dt: 1e-3, ..Default::default() });
@@ -129,7 +131,7 @@ fn cone() {
     let scanner = sim.add_sensor("scanner", scanner(0.0, 0.0, 0.02, 0.3, "cone")).unwrap();
     sim.update(500);
     let pose = sim.rigid_object(cone).pose();
-    // MuJoCo's soft contacts let it sink by a little.
+    // MuJoCo's soft contacts let it sink in slightly.
     assert!((pose[(0, 2)] - h / 2.0).abs() < 1e-3 && pose[(0, 3)] > 1.0 - 1e-6, "{pose}");
     let scan = sim.sensor(scanner).unwrap();
     let foot = pose[(0, 2)] - h / 2.0;
@@ -139,7 +141,8 @@ fn cone() {
         let surface = foot + h * (1.0 - x.hypot(y) / r);
         if surface > foot + 0.01 {
             hits += 1;
-            // Inside of the round cone by at most h (1 - cos(π/64)) = 3.6e-4 m; it may lean by what it sank.
+            // The tessellated cone is inside of the round one by at most h (1 - cos(π/64)) = 3.6e-4 m; it may tilt by
+            // its penetration.
             let below = surface - scan.hits()[(0, ray, 2)];
             assert!((-2e-4..=6e-4).contains(&below), "{x} {y}: {below}");
         }
@@ -147,9 +150,10 @@ fn cone() {
     assert!(hits > 100, "{hits}");
 }
 
-/// A mesh that does not enclose a volume is said, and weighed as its hull: a brick without its last side, whose corners are
-/// all there, and two bricks of which one is inside out, not as their difference. The outline of their hull in x and z is a
-/// square and a half, and a trapezoid 1 m long between them and down to 0.25 m.
+/// A mesh that does not enclose a volume gives a diagnostic, and has the mass of its hull: a brick without its last
+/// side, whose corners all exist, and two bricks of which one is inverted. For the latter the mass is not that of the
+/// difference. The outline of their hull in x and z is one and a half squares, and a trapezoid 1 m long between them
+/// and down to 0.25 m.
 #[test]
 fn open_meshes() {
     let files = Files::default();
@@ -176,7 +180,7 @@ fn open_meshes() {
     }
 }
 
-/// The exported model has the hull to collide and the mesh to be seen, and weighs the same.
+/// The exported model has the hull for collisions and the mesh as visual, and the same mass.
 #[test]
 fn exported() {
     let files = Files::default();

@@ -1,5 +1,5 @@
-//! Objects that are put in a place: kinematic ones, which push and are not pushed, and static ones, which may stand elsewhere
-//! in each environment.
+//! Objects with written poses: kinematic objects, which push but are not pushed, and static objects, which may have a
+//! different pose in each environment.
 
 use super::*;
 use kinetoscope::ndarray::Array2;
@@ -15,8 +15,8 @@ fn at(x: f64, z: f64) -> [f64; 7] {
     [x, 0.0, z, 1.0, 0.0, 0.0, 0.0]
 }
 
-/// A paddle that advances 1 mm per step in one environment, against a heavy ball in both: the ball is kept ahead of it there,
-/// the paddle is exactly where it was put, and the ball in the other environment rests.
+/// A paddle advances 1 mm per step in one environment, toward a heavy ball. The ball is pushed ahead of it, the paddle
+/// has exactly its written pose, and the ball in the other environment rests.
 #[test]
 fn paddle_pushes() {
     let mut sim = weightless(2);
@@ -30,14 +30,15 @@ fn paddle_pushes() {
         assert_eq!([pose[(1, 0)], pose[(0, 0)]], [x, 0.0]);
     }
     let (x, v) = (sim.rigid_object(ball).pose(), sim.rigid_object(ball).velocity());
-    // Ahead of the face at 1.05 m by its radius, at the paddle's 1 m/s. To MuJoCo the paddle stands: the contact is where
-    // b v = k r, with the defaults of solref (0.02 s, 1) and solimp (0.95) r = 2 * 0.95 * 0.02 s * 1 m/s.
+    // The ball is ahead of the face at 1.05 m by its radius, with the paddle's 1 m/s. For MuJoCo the paddle is static:
+    // the contact is where b v = k r, with the defaults of solref (0.02 s, 1) and solimp (0.95) r = 2 * 0.95 * 0.02 s *
+    // 1 m/s.
     assert!((1.25 - x[(1, 0)] - 0.038).abs() < 2e-3 && (v[(1, 0)] - 1.0).abs() < 1e-3, "{x} {v}");
     assert_eq!([x[(0, 0)], v[(0, 0)]], [0.4, 0.0]);
     assert!(sim.rigid_object(paddle).velocity().iter().all(|v| *v == 0.0));
 }
 
-/// Reset, snapshots and additions know where a kinematic object is.
+/// Reset, snapshots and additions handle the pose of a kinematic object.
 #[test]
 fn kinematic_state() {
     let mut sim = empty(3);
@@ -49,7 +50,7 @@ fn kinematic_state() {
     sim.update(5);
     assert_eq!(sim.rigid_object(paddle).pose(), there);
     let snapshot = sim.snapshot(None).unwrap();
-    // An object that is added later comes before it in MuJoCo's lists, or after: it stays where it is.
+    // A later object comes before or after it in MuJoCo's lists: the pose is kept.
     let other = sim.add_rigid_object(kinematic(object("other", ObjectShape::cube(0.1), [9.0; 3]))).unwrap();
     sim.add_rigid_object(object("cube", ObjectShape::cube(0.1), [5.0; 3])).unwrap();
     assert_eq!(sim.rigid_object(paddle).pose(), there);
@@ -60,7 +61,7 @@ fn kinematic_state() {
     let pose = sim.rigid_object(paddle).pose();
     assert_eq!(pose.row(1).to_vec(), init);
     assert_eq!((pose.row(0), pose.row(2)), (there.row(0), there.row(2)));
-    // The snapshot is of the scene before more was added.
+    // The snapshot belongs to the scene before the addition.
     assert!(sim.restore(&snapshot, None).is_err());
     let now = sim.snapshot(None).unwrap();
     sim.reset(None).unwrap();
@@ -69,7 +70,7 @@ fn kinematic_state() {
     assert_eq!((pose.row(2), pose.row(0).to_vec(), pose.row(1)), (there.row(0), init.to_vec(), there.row(2)));
 }
 
-/// A ray sees a kinematic object where it was put, at once, in each environment where it is there.
+/// A ray hits a kinematic object at its written pose, at once, in each environment.
 #[test]
 fn rays_see_it() {
     let mut sim = empty(2);
@@ -88,7 +89,7 @@ fn rays_see_it() {
     assert!((distances[(0, 0)] - 3.95).abs() < 1e-9 && (distances[(1, 0)] - 3.2).abs() < 1e-9, "{distances}");
 }
 
-/// A shelf of 4 cm and a ball above it.
+/// A shelf of 4 cm thickness and a ball above it.
 pub(super) fn shelf(num_envs: usize, height: f64) -> (SimulationManager, ObjectId, ObjectId) {
     let mut sim = empty(num_envs);
     let size = ObjectShape::Box { size: [0.4, 0.4, 0.04] };
@@ -97,7 +98,7 @@ pub(super) fn shelf(num_envs: usize, height: f64) -> (SimulationManager, ObjectI
     (sim, shelf, ball)
 }
 
-/// A ball lies where the shelf of its environment is.
+/// A ball rests on the shelf of its environment.
 #[test]
 fn shelves() {
     let heights = [0.5, 0.8, 1.0];
@@ -110,17 +111,17 @@ fn shelves() {
     let lies = sim.rigid_object(ball).pose();
     for (env, height) in heights.into_iter().enumerate() {
         assert_number(&format!("environment {env}"), lies[(env, 2)], height + 0.07, SOFT);
-        // The judge: a scene that was built so.
+        // Reference: a scene built with that height.
         let (mut built, _, ball) = shelf(3, height);
         built.update(1500);
         assert_eq!(built.rigid_object(ball).pose().row(env), lies.row(env), "bit for bit");
     }
-    // The environment that was not named shares everything; the others have two arrays and what follows from them.
+    // The environment that was not named shares everything; the others have two own arrays and those derived from them.
     let base = sim.batch().model().clone();
     assert!(sim.batch().read(0, |env| env.data().model().arrays_apart(&base).is_empty()));
     let own: Vec<&str> = sim.batch().read(1, |env| env.data().model().own_arrays().map(|(name, _)| name).collect());
     assert!(own.contains(&"body_pos") && own.len() <= 4, "{own:?}");
-    // It stands there after a reset and when more is added, until properties are nominal again.
+    // The pose persists through a reset and an addition, until properties are nominal again.
     sim.reset(None).unwrap();
     sim.add_rigid_object(object("late", ObjectShape::cube(0.1), [5.0; 3])).unwrap();
     assert_eq!(sim.rigid_object(shelf_id).pose(), places);
@@ -129,13 +130,13 @@ fn shelves() {
     assert_eq!((pose[(1, 2)], pose[(2, 2)]), (heights[0], heights[2]));
 }
 
-/// A ramp at angle a: a ball that slides without friction has the acceleration g sin a along it.
+/// A ramp at angle a: a ball that slides without friction has the acceleration g sin a along the ramp.
 #[test]
 fn ramp() {
     let (mut sim, shelf_id, ball) = shelf(2, 0.5);
     let angle = 0.3_f64;
     let (sin, cos) = (angle / 2.0).sin_cos();
-    // Quaternions are normalised.
+    // Quaternions are normalized.
     let turned = row([0.0, 0.0, 0.5, 3.0 * cos, 0.0, 3.0 * sin, 0.0]);
     sim.rigid_object_mut(shelf_id).write_pose(&turned, Some(SECOND)).unwrap();
     let read = sim.rigid_object(shelf_id).pose();
@@ -146,7 +147,7 @@ fn ramp() {
             p.set(Property::Friction, "ball", &[0.0])
         })
         .unwrap();
-    // On the surface, which is 2 cm from its middle: the ball's middle is 7 cm along the normal.
+    // On the surface, which is 2 cm from the shelf's middle: the ball's center is 7 cm along the normal.
     let place = at(0.07 * angle.sin(), 0.5 + 0.07 * angle.cos());
     sim.rigid_object_mut(ball).write_pose(&row(place), Some(SECOND)).unwrap();
     sim.update(150);
@@ -157,7 +158,7 @@ fn ramp() {
     assert!((along / expected - 1.0).abs() < 0.01, "{along}, not {expected}");
 }
 
-/// Random places by name, as any property; rays meet the shelf where MuJoCo's do.
+/// Randomized poses by name, as for any property; rays hit the shelf where MuJoCo's rays do.
 #[test]
 fn drawn_places() {
     let (mut sim, shelf_id, _) = shelf(2, 0.5);

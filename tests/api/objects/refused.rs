@@ -1,5 +1,5 @@
-//! Configurations, mesh files and writes that are refused: the error names them, and nothing changes. Mistakes that every
-//! writer can make are in `tests/input/every_writer.rs`.
+//! Refused configurations, mesh files and writes: the error names them, and nothing changes. Mistakes common to all
+//! writers are in `tests/input/every_writer.rs`.
 
 use super::*;
 use kinetoscope::mujoco::ObjectKind;
@@ -20,7 +20,8 @@ fn configurations() {
         ("inertia", RigidObjectCfg { inertia: Some([1.0, 1.0, 3.0]), ..cube() }),
         ("inertia", RigidObjectCfg { inertia: Some([1.0, 0.0, 1.0]), ..cube() }),
         ("inertia", RigidObjectCfg { inertia: Some([1.0, nan, 1.0]), ..cube() }),
-        // By the last bit: 0.237 + 0.694 is below 0.931 in double precision, while twice 0.931 is not above the sum.
+        // Decided by the last bit: 0.237 + 0.694 is below 0.931 in double precision, while twice 0.931 is not above the
+        // sum.
         ("inertia", RigidObjectCfg { inertia: Some([0.237, 0.694, 0.931]), ..cube() }),
         ("mass", RigidObjectCfg { mass: Some(-1.0), ..cube() }),
         ("mass", RigidObjectCfg { mass: Some(0.0), ..cube() }),
@@ -44,7 +45,7 @@ fn configurations() {
     for uid in ["world", "a/b"] {
         assert!(sim.add_rigid_object(object(uid, ObjectShape::cube(0.1), [0.0; 3])).is_err(), "{uid}");
     }
-    // Control: what is left out of each is good.
+    // Control: the unmodified configuration is valid.
     sim.add_rigid_object(cube()).unwrap();
 }
 
@@ -88,7 +89,7 @@ fn writes() {
     let variant = |argument| format!("NotDynamic {{ argument: {argument:?}");
     assert_refused(results.map(|(argument, result)| (argument, result, variant(argument), [])));
     assert_error(sim.rigid_object_mut(stands).write_velocity(&velocity, None), "FixedBody(\"fixed\")", &[]);
-    // Poses of objects of every type; the wrench names which of its two tables.
+    // Poses of objects of every type; the wrench error names one of its two tables.
     let twice = Some(&[EnvId(2), EnvId(0), EnvId(2)][..]);
     let rows = |columns| Array2::from_elem((3, columns), 1.0);
     let repeated = |result: Result<()>, called: &str| match result {
@@ -105,7 +106,7 @@ fn writes() {
     let mut object = sim.rigid_object_mut(free);
     let wrench = object.set_external_wrench(&rows(3), &rows(3), WrenchFrame::World, twice);
     repeated(wrench, "set_external_wrench (forces)");
-    // The last environment's row is bad: none has changed.
+    // The row of the last environment is invalid: no environment has changed.
     let results = [
         ("one mass", object.set_mass(&array![2.0, 2.0, -1.0], None)),
         ("all masses", object.set_mass(&array![0.0], None)),
@@ -122,7 +123,7 @@ fn writes() {
     }
 }
 
-/// Places of single environments: only of static objects, finite, turned by quaternions of length 1.
+/// Poses per environment: only for static objects, finite, with unit quaternions.
 #[test]
 fn places() {
     let (mut sim, shelf, _) = moved::shelf(2, 0.5);

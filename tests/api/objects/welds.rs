@@ -1,4 +1,4 @@
-//! Welds: held bodies move as one, in the environment where it is held, and snapshots know it.
+//! Welds: attached bodies move as one, in the environments where the weld is attached; snapshots include welds.
 
 use super::*;
 use kinetoscope::ndarray::{Array2, Array3, Axis, array};
@@ -14,7 +14,7 @@ fn small(uid: &str, x: f64) -> RigidObjectCfg {
     cube(uid, 0.05, 0.3, [x, 0.0, 1.0])
 }
 
-/// Two cubes of 1 and 3 kg half a metre apart, the second turned, and a weld between them that holds nothing yet.
+/// Two cubes of 1 and 3 kg half a meter apart, the second rotated, and a detached weld between them.
 fn cubes(num_envs: usize) -> (SimulationManager, [ObjectId; 2], WeldId) {
     let mut sim = weightless(num_envs);
     let first = sim.add_rigid_object(cube("first", 0.1, 1.0, [0.0; 3])).unwrap();
@@ -24,7 +24,7 @@ fn cubes(num_envs: usize) -> (SimulationManager, [ObjectId; 2], WeldId) {
     (sim, [first, second], held)
 }
 
-/// Pose of the second in the first.
+/// Pose of the second object in the frame of the first.
 fn relative(sim: &SimulationManager, [first, second]: [ObjectId; 2], env: usize) -> Pose {
     let [a, b] = [first, second].map(|id| pose_in(&sim.rigid_object(id).pose(), env));
     a.inverse() * b
@@ -43,7 +43,7 @@ fn attached(sim: &SimulationManager, weld: WeldId) -> Vec<bool> {
     sim.weld(weld).is_attached().to_vec()
 }
 
-/// F t / (m1 + m2) where they are held, F t / m1 where not; after the release the second goes on as it was.
+/// F t / (m1 + m2) where they are attached, F t / m1 elsewhere; after the release the second object keeps its velocity.
 #[test]
 fn held_as_one() {
     let (mut sim, ids, held) = cubes(2);
@@ -54,7 +54,7 @@ fn held_as_one() {
     push(&mut sim, ids[0], 2.0);
     sim.update(500);
     let v = ids.map(|id| sim.rigid_object(id).velocity());
-    // The weld gives way by 1e-4 of the acceleration that its load would cause, at first.
+    // At first the weld yields by 1e-4 of the acceleration that its load would cause.
     assert!((v[0][(1, 0)] - 0.25).abs() < 1e-3 && (v[1][(1, 0)] - 0.25).abs() < 1e-3, "{v:?}");
     assert!((v[0][(1, 0)] + 3.0 * v[1][(1, 0)] - 1.0).abs() < 1e-9, "momentum is F t: {v:?}");
     assert!((v[0][(0, 0)] - 1.0).abs() < 1e-9 && v[1][(0, 0)] == 0.0, "{v:?}");
@@ -67,7 +67,7 @@ fn held_as_one() {
     assert!((sim.rigid_object(ids[0]).velocity()[(1, 0)] - v[0][(1, 0)] - 1.0).abs() < 1e-9);
 }
 
-/// It holds how they lie at the moment, each time.
+/// Each attachment holds the current relative pose.
 #[test]
 fn attaching_again() {
     let (mut sim, ids, _) = cubes(1);
@@ -82,7 +82,7 @@ fn attaching_again() {
     sim.update(300);
     assert!(apart(&relative(&sim, ids, 0), &before) < 1e-3, "{}", apart(&relative(&sim, ids, 0), &before));
     assert!(sim.rigid_object(ids[0]).velocity().iter().any(|v| v.abs() > 0.01));
-    // A reset lets go.
+    // A reset detaches the weld.
     sim.reset(None).unwrap();
     assert_eq!(attached(&sim, held), [false]);
     push(&mut sim, ids[0], 1.0);
@@ -90,7 +90,7 @@ fn attaching_again() {
     assert_eq!(sim.rigid_object(ids[1]).velocity(), Array2::<f64>::zeros((1, 6)));
 }
 
-/// To a link of an arm that is driven, and to the world, against gravity.
+/// Welds to a link of a driven arm, and to the world, against gravity.
 #[test]
 fn links_and_world() {
     let mut sim = sim(SimulationManagerCfg { physics_dt: 2e-3, ..empty_cfg(2) });
@@ -111,14 +111,14 @@ fn links_and_world() {
     sim.update(500);
     let moved = sim.robot(arm).link_pose(&tip).unwrap();
     assert!((&moved - &start).iter().any(|d| d.abs() > 0.1), "the arm moved: {moved}");
-    // 0.3 kg on a lever of a metre: the weld is soft by 1e-4 of what that would accelerate.
+    // 0.3 kg on a lever of a meter: the weld yields by 1e-4 of the acceleration that the load would cause.
     assert!(apart(&in_link(&sim), &before) < 2e-3, "{}", apart(&in_link(&sim), &before));
     let hung = sim.rigid_object(ids[1]).pose();
     assert!((hung[(1, 2)] - 1.0).abs() < 1e-5 && hung[(0, 2)] < -3.0, "{hung}");
 }
 
-/// A snapshot has which welds hold, and how: going on from it is bit-identical, in memory and from a file, in another
-/// environment, and after the weld was released or held otherwise.
+/// A snapshot includes the attached welds and their relative poses. Continuing from it is bit-identical: from memory
+/// and from a file, in another environment, and after the weld was released or attached differently.
 #[test]
 fn snapshots() {
     let (mut sim, ids, held) = cubes(3);
@@ -135,7 +135,7 @@ fn snapshots() {
     };
     let expected = run(&mut sim);
     assert!(expected[1].1[(1, 0)] > 0.01 && expected[1].1[(0, 0)] == 0.0);
-    // Otherwise in every environment.
+    // Attached differently in every environment.
     sim.weld_mut(held).release(Some(SECOND)).unwrap();
     sim.update(20);
     sim.weld_mut(held).attach(None).unwrap();
@@ -154,7 +154,7 @@ fn snapshots() {
     }
 }
 
-/// Models of its own for other reasons, and scenes that grow, keep what is held.
+/// Environments with their own models for other reasons, and growing scenes, keep attached welds.
 #[test]
 fn masses_and_additions() {
     let (mut sim, ids, held) = cubes(2);
@@ -174,7 +174,7 @@ fn masses_and_additions() {
     assert!(apart(&relative(&sim, ids, 1), &before) < 1e-4);
 }
 
-/// Held to an object that stands far away, as to the world: a cube hangs where it was, neither lower nor turned.
+/// Attached to a distant static object, as to the world: a cube keeps its pose, without sag or rotation.
 #[test]
 fn far_and_fixed() {
     for (body_type, turned) in [BodyType::Static, BodyType::Kinematic].iter().flat_map(|t| [(*t, false), (*t, true)]) {
@@ -185,16 +185,16 @@ fn far_and_fixed() {
         let held = sim.add_weld(weld(pair[0], pair[1])).unwrap();
         assert_eq!([sim.weld(held).cfg().first.as_str(), sim.weld(held).cfg().second.as_str()], pair);
         sim.weld_mut(held).attach(None).unwrap();
-        // A quarter of a turn in the time, if nothing held it.
+        // Without the weld the cube would rotate by a quarter of a turn in the meantime.
         sim.rigid_object_mut(id).write_velocity(&row([0.0, 0.0, 0.0, 0.0, 0.0, 1.5]), None).unwrap();
         sim.update(500);
         let (off, angle) = errors(&pose_in(&sim.rigid_object(id).pose(), 0), &Pose::translation(0.0, 0.0, 1.0));
-        // One step of 1.5 rad/s before it is stopped, twice over; 1e-4 of the weight.
+        // Twice the motion of one step at 1.5 rad/s before the weld stops the cube; 1e-4 of the weight.
         assert!(off < 1e-5 && angle < 1e-2, "{body_type:?} {pair:?}: {off} {angle}");
     }
 }
 
-/// A snapshot knows between which bodies a weld is: of another scene where they are others.
+/// A snapshot contains the bodies of its welds: a scene with a weld between other bodies rejects it.
 #[test]
 fn snapshots_of_other_pairs() {
     let build = |second: &str| {
@@ -208,12 +208,12 @@ fn snapshots_of_other_pairs() {
     let snapshot = sim.snapshot(None).unwrap();
     let error = other.restore(&snapshot, None).unwrap_err().to_string();
     assert!(error.contains("\"second\"") && error.contains("\"third\""), "{error}");
-    // Controls.
+    // Control: scenes with the same weld accept the snapshot.
     sim.restore(&snapshot, None).unwrap();
     build("second").restore(&snapshot, None).unwrap();
 }
 
-/// A rollout starts with the welds of its start, whatever holds in the environment.
+/// A rollout starts with the welds of its start snapshot, regardless of the current welds of the environment.
 #[test]
 fn rollouts() {
     let (mut sim, ids, held) = cubes(2);

@@ -1,4 +1,4 @@
-//! Heights of lowest collision points, against closed forms and against the distances of MuJoCo's own contacts.
+//! Heights of lowest collision points, against closed forms and against the distances of MuJoCo's contacts.
 
 use super::ENVS;
 use kinetoscope::prelude::*;
@@ -10,13 +10,13 @@ use nalgebra::{UnitQuaternion, Vector3};
 const EXACT: Tolerance = Tolerance::absolute(1e-12, "a thousand times the rounding of a few numbers of size 1");
 const SINGLE: Tolerance = Tolerance::absolute(1e-7, "vertices of meshes are in single precision");
 
-/// A tetrahedron with its middle in the origin of its geom.
+/// A tetrahedron with its centroid in the origin of its geom.
 const CORNERS: [[f64; 3]; 4] = [[0.3, 0.0, -0.1], [-0.15, 0.26, -0.1], [-0.15, -0.26, -0.1], [0.0, 0.0, 0.3]];
 
-/// A wheel without a collision shape: a robot has a joint.
+/// A wheel without a collision shape, because a robot needs a joint.
 const WHEEL: &str = "<body name=\"wheel\"><joint name=\"spin\"/><geom size=\"0.01\" contype=\"0\" conaffinity=\"0\" mass=\"0.01\"/></body>";
 
-/// A free body with a collision shape, and beside it a larger visual that is not counted.
+/// Returns a free body with a collision shape, and a larger visual shape that must be ignored.
 fn body(geom: &str) -> String {
     let vertices: Vec<String> = CORNERS.iter().flatten().map(f64::to_string).collect();
     format!(
@@ -26,14 +26,14 @@ fn body(geom: &str) -> String {
     )
 }
 
-/// Distance of the deepest contact in environment 0.
+/// Returns the distance of the deepest contact in environment 0 \[m\].
 fn deepest(sim: &SimulationManager) -> f64 {
     sim.batch().read(0, |env| env.data().contact().iter().map(|contact| contact.dist).fold(f64::INFINITY, f64::min))
 }
 
 #[test]
 fn closed_forms_and_contacts() {
-    // Each shape with its depth below its middle, where `d` is the world's z in its axes.
+    // Each shape with its depth below its center, where `d` is the world's z axis in the axes of the shape.
     type Depth = fn(Vector3<f64>) -> f64;
     let shapes: [(&str, Depth, Tolerance); 6] = [
         ("type=\"sphere\" size=\"0.2\"", |_| 0.2, EXACT),
@@ -52,7 +52,7 @@ fn closed_forms_and_contacts() {
             let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
             let below = depth(rotation.inverse() * Vector3::z());
             let free = || RobotCfg { fix_base: false, ..mjcf_robot("body", &body(shape)) };
-            // 5 mm into the ground, so that there is a contact.
+            // 5 mm into the ground, so that a contact exists.
             let init_pose = Pose::from_parts([0.0, 0.0, below - 0.005].into(), rotation);
             let mut deep = sim(cfg(ENVS, 2));
             let robot = deep.add_robot(RobotCfg { init_pose, ..free() }).unwrap();
@@ -64,7 +64,7 @@ fn closed_forms_and_contacts() {
             let by_contact = Tolerance { absolute: tolerance.absolute.max(1e-9), ..tolerance };
             assert_number(&format!("{shape}: contact"), deepest(&deep), -0.005, by_contact);
 
-            // The clearance holds at the start and after a reset; the rest of the pose stays.
+            // The clearance holds at the start and after a reset; the rest of the pose is unchanged.
             let init_pose = Pose::from_parts([0.5, 0.0, 77.0].into(), rotation);
             let mut standing = sim(cfg(ENVS, 2));
             let robot = standing.add_robot(RobotCfg { init_pose, ground_clearance: Some(0.02), ..free() }).unwrap();
@@ -79,7 +79,7 @@ fn closed_forms_and_contacts() {
     }
 }
 
-/// Heights of links, of which some belong to the world.
+/// Lowest heights of links, including links that are fixed to the world.
 #[test]
 fn links() {
     let arm = r#"<mujoco><worldbody><body name="base"><geom type="box" size="0.1 0.1 0.05"/>
@@ -106,7 +106,7 @@ fn links() {
     assert_number("the robot", robot.lowest_heights()[0], -0.25, EXACT);
 }
 
-/// A clearance that cannot be had.
+/// Errors of a clearance that cannot be computed.
 #[test]
 fn no_clearance() {
     let visual = format!(

@@ -1,4 +1,4 @@
-//! The bundled quadruped: the numbers that scripts for ANYmal C rely on, and that it stands still on four feet.
+//! The bundled quadruped: the numbers that scripts for ANYmal C rely on, and standing still on four feet.
 
 use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
@@ -51,7 +51,7 @@ fn numbers_of_the_tutorial() {
     }
 }
 
-/// The same angles put every foot of the bundled and of the vendor's robot at the same place.
+/// Equal joint angles give equal foot positions for the bundled robot and the vendor's robot.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn feet_of_anymal() {
@@ -66,21 +66,21 @@ fn feet_of_anymal() {
         }
         for leg in LEGS {
             let [a, b] = ids.map(|id| pose_in(&sim.robot(id).link_pose(&format!("{leg}_FOOT")).unwrap(), 0));
-            // The vendor's angles of mounting are written with 12 digits.
+            // The vendor's file contains mounting angles of 12 digits.
             assert!((a.translation.vector - b.translation.vector).amax() < 1e-9, "{leg}: {a} {b}");
         }
     }
 }
 
-/// 60 s on the ground.
+/// Measurements of 60 s of standing on the ground.
 struct Stood {
-    /// Largest less smallest height of the base in the last 30 s \[m\].
+    /// Range of the height of the base in the last 30 s \[m\].
     drift: f64,
-    /// Mean over the last second of the sum of the vertical forces on the feet, over the weight.
+    /// Ratio of the sum of the vertical forces on the feet to the weight, mean over the last second.
     carried: f64,
-    /// Feet that carried something in all of the last second.
+    /// Number of feet that carried more than 1 N throughout the last second.
     feet: usize,
-    /// Largest force on anything but a foot, in the last 30 s \[N\].
+    /// Largest contact force on other bodies than the feet in the last 30 s \[N\].
     elsewhere: f64,
 }
 
@@ -133,7 +133,7 @@ fn standing_of_anymal() {
     check("vendor", vendor());
 }
 
-/// The control: with MuJoCo's default contacts its feet creep apart.
+/// Control: with MuJoCo's default contacts the feet creep apart.
 #[test]
 fn standing_without_the_preset() {
     let stood = stand(bundled(), SimulationManagerCfg { physics_dt: 0.005, ..Default::default() });

@@ -1,9 +1,9 @@
-//! The state of a robot, against MuJoCo's own Jacobians and closed forms.
+//! The state of a robot, against MuJoCo's Jacobians and closed forms.
 //!
-//! The velocity of a point that moves with a body is `mj_jac` times the generalized velocity: another way through MuJoCo
-//! than ours, which reads `cvel`. Both sum products of a few numbers of size 1 to 10: 1e-12 is a thousand times the
-//! rounding. Control: the velocity of the frame's origin and that of the center of mass differ by far more. Mistakes in
-//! arrays and indices of writers are in `tests/input/every_writer.rs`.
+//! The velocity of a point of a body is `mj_jac` times the generalized velocity; the robot state reads `cvel` instead.
+//! Both sum products of a few numbers of size 1 to 10: 1e-12 is a thousand times the rounding. Control: the velocities
+//! of the frame's origin and of the center of mass differ far more. Mistakes in arrays and indices of writers are in
+//! `tests/input/every_writer.rs`.
 
 use super::ENVS;
 use kinetoscope::mujoco::ObjectKind;
@@ -18,7 +18,8 @@ use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion, Vector3};
 const EXACT: Tolerance = Tolerance::absolute(1e-12, "a thousand times the rounding of a few numbers of size 1 to 10");
 const G: f64 = 9.81;
 
-/// A base with its mass off its origin, an arm on a hinge, a finger that follows it, and a tool that is fixed to the arm.
+/// A base with its center of mass off its origin, an arm on a hinge, a finger that mimics the hinge, and a tool fixed
+/// to the arm.
 const ROBOT: &str = r#"<robot name="r">
   <link name="base"><inertial><origin xyz="0.1 -0.05 0.2"/><mass value="2"/>
     <inertia ixx="0.03" ixy="0.001" ixz="0" iyy="0.02" iyz="0" izz="0.04"/></inertial></link>
@@ -47,7 +48,7 @@ fn sim_with(gravity: f64, fix_base: bool) -> (SimulationManager, RobotId) {
     (sim, id)
 }
 
-/// A ball of 2 kg with a passive hinge through its middle that turns a second ball: nothing that one does moves the other.
+/// Two balls of 2 kg with one center, connected by a passive hinge: neither ball can move the other.
 fn two_balls(gravity: f64, fix_base: bool) -> (SimulationManager, RobotId) {
     let (files, mut sim) = (Files::default(), sim(gravity));
     let ball = |name| link(name, 2.0, 0.02, [0.0; 3], "");
@@ -58,7 +59,7 @@ fn two_balls(gravity: f64, fix_base: bool) -> (SimulationManager, RobotId) {
     (sim, id)
 }
 
-/// The robot somewhere, turned and moving, another way in each environment.
+/// The robot with a different pose and motion in each environment.
 fn tumbling() -> (SimulationManager, RobotId) {
     let (mut sim, id) = sim_with(G, false);
     let mut robot = sim.robot_mut(id);
@@ -75,7 +76,7 @@ fn tumbling() -> (SimulationManager, RobotId) {
     (sim, id)
 }
 
-/// Velocity of a point of a body and its angular velocity, by MuJoCo's Jacobian.
+/// Velocity of a point of a body and angular velocity of the body, from MuJoCo's Jacobian.
 fn by_jacobian(sim: &SimulationManager, env: usize, body: &str, point: [f64; 3]) -> [f64; 6] {
     sim.batch().read(env, |env| {
         let (data, nv) = (env.data(), env.data().model().nv());
@@ -107,7 +108,7 @@ fn links() {
                 assert_close(&what, velocity.row(env), expected, EXACT);
             }
         }
-        // The tool is at its mount on the arm.
+        // The tool has its mounting pose on the arm.
         let turn = UnitQuaternion::from_euler_angles(1.0, 0.5, -0.3);
         let mount = Pose::from_parts(Translation3::new(0.35, 0.02, -0.1), turn);
         for env in 0..ENVS {
@@ -120,7 +121,7 @@ fn links() {
     }
 }
 
-/// Of its frame, its center of mass, and in its own axes.
+/// Root state: of the frame, of the center of mass, and in the axes of the root link.
 #[test]
 fn root() {
     let (mut sim, id) = tumbling();
@@ -139,7 +140,7 @@ fn root() {
             let at_com = by_jacobian(&sim, env, "robot/base", center.into());
             let apart = (0..3).fold(0.0_f64, |apart, k| apart.max((at_com[k] - at_frame[k]).abs()));
             assert!(apart > 1e-3, "the control: the two differ");
-            // In the root's axes: the rotation matrix, transposed, column by column.
+            // In the root's axes: the columns of the rotation matrix are the rows of its transpose.
             let axes = root.rotation.to_rotation_matrix();
             let in_axes = |v: &[f64]| -> [f64; 3] {
                 std::array::from_fn(|k| (0..3).map(|i| axes.matrix()[(i, k)] * v[i]).sum::<f64>())
@@ -161,7 +162,7 @@ fn root() {
     }
 }
 
-/// A free base is the law `free_fall` and `mjcf_robot::bases::fixed_or_free`.
+/// A fixed root. For a free base see the law `free_fall` and `mjcf_robot::bases::fixed_or_free`.
 #[test]
 fn fixed_root() {
     let (mut sim, id) = two_balls(G, true);
@@ -176,8 +177,8 @@ fn fixed_root() {
     assert_eq!(sim.robot(id).root_com_velocity(), Array2::<f64>::zeros((ENVS, 6)));
 }
 
-/// A velocity in world axes stays in world axes when the root link is put elsewhere and turned; a ball goes on as it is. One
-/// of the center of mass moves the frame by its arm.
+/// A written root velocity is in world axes and stays there when the root link is moved and rotated; the second ball
+/// keeps its motion. A written velocity of the center of mass moves the frame according to its lever arm.
 #[test]
 fn written_root() {
     let (mut sim, id) = two_balls(0.0, false);
@@ -197,7 +198,7 @@ fn written_root() {
         assert_close("velocity", sim.robot(id).root_velocity().row(env), moving, limit);
     }
     sim.update(100);
-    // One second later: 2 rad about the world's z. Semi-implicit steps of a ball are exact up to rounding.
+    // One second later: 2 rad about the world's z.
     for env in 0..ENVS {
         let limit = Tolerance::absolute(1e-9, "semi-implicit steps of a ball are exact up to rounding");
         assert_close("velocity after a second", sim.robot(id).root_velocity().row(env), moving, limit);
@@ -224,7 +225,7 @@ fn written_root() {
     }
 }
 
-/// v' = v + h a, by the integrator's definition; the root here is fixed, so no quaternion is in the way.
+/// v' = v + h a, by the definition of the integrator. The root is fixed here, so no quaternion is integrated.
 #[test]
 fn accelerations_of_a_step() {
     let (mut sim, id) = sim_with(G, true);
@@ -235,13 +236,12 @@ fn accelerations_of_a_step() {
         let before = sim.robot(id).qvel();
         sim.update(1);
         let (after, acceleration) = (sim.robot(id).qvel(), sim.robot(id).qacc());
-        // Differences of velocities of size 1 lose 1e-16 / h.
         let limit = Tolerance::absolute(1e-11, "differences of velocities of size 1 lose 1e-16 / h");
         assert_close("acceleration", &acceleration, &((after - before) / 0.01), limit);
         apart = apart.max((acceleration[(0, 0)] - acceleration[(1, 0)]).abs());
     }
     assert!(apart > 10.0, "the control: the drive of environment 1 pushes: {apart}");
-    // A write leaves them, a reset does not.
+    // A write keeps the accelerations; a reset zeroes them.
     let last = sim.robot(id).qacc();
     sim.robot_mut(id).write_qvel(&array![[0.5, -0.5]], None, None).unwrap();
     assert_eq!(sim.robot(id).qacc(), last);
@@ -250,11 +250,11 @@ fn accelerations_of_a_step() {
     assert_eq!((after.row(0), after.row(1).to_vec()), (last.row(0), vec![0.0; 2]));
 }
 
-/// A state that is taken over with its accelerations goes on to the last bit as the one that it was taken from: they are
-/// the start of the solver. From any start it ends within its tolerance: Newton's method stops when the cost,
-/// (a - a*)' M (a - a*) / 2 near its end, falls by less than 1e-8 of nv times the mean inertia. The smallest inertia here,
-/// 0.001 kg m², is a thirteenth of the mean, so that a is within sqrt(2e-8 * 2 * 13) = 7.2e-4 rad/s², and the velocity of one
-/// step within 7.2e-6 rad/s.
+/// A state that is copied with its accelerations continues bit-identically, because the accelerations warm-start the
+/// solver. From any other start the result is within the solver's tolerance. Newton's method stops when the cost, (a -
+/// a*)' M (a - a*) / 2 near its minimum, falls by less than 1e-8 of nv times the mean inertia. The smallest inertia
+/// here, 0.001 kg m², is a thirteenth of the mean. So a is within sqrt(2e-8 * 2 * 13) = 7.2e-4 rad/s², and the velocity
+/// of one step within 7.2e-6 rad/s.
 #[test]
 fn written_accelerations() {
     let targets = array![[1.0, 0.0], [-0.7, 0.0], [0.2, 0.0]];
@@ -287,7 +287,7 @@ fn written_accelerations() {
         let [_, velocity, acceleration] = state(other, *here);
         let limit = Tolerance::absolute(7.2e-6, "the end of Newton's method, see above");
         assert_close(&format!("start {k} of the solver"), &velocity, &after, limit);
-        // The written ones are gone: the step found its own.
+        // The written accelerations are replaced by those of the step.
         for (index, a) in acceleration.indexed_iter() {
             let found = (velocity[index] - v[index]) / 0.01;
             let limit = Tolerance::absolute(1e-10 * (1.0 + a.abs()), "differences of velocities lose 1e-16 / h");
@@ -300,7 +300,7 @@ fn written_accelerations() {
         same.update(1);
         sim.update(1);
     }
-    // The control: an effort of the same size does move the joint.
+    // Control: an effort of the same size moves the joint.
     let before = sim.robot(id).qvel();
     sim.robot_mut(id).set_qf_target(&array![[50.0, 0.0]], None, Some(&[EnvId(0)])).unwrap();
     sim.update(1);
@@ -308,7 +308,7 @@ fn written_accelerations() {
     assert!(push[(0, 0)].abs() > 0.1 && push[(1, 0)].abs() < 0.1, "{push}");
 }
 
-/// Single joints of single environments; a snapshot keeps what was written, and a reset does not.
+/// Writes for single joints of single environments; a snapshot contains written accelerations, and a reset zeroes them.
 #[test]
 fn written_accelerations_of_single_joints() {
     let (mut sim, id) = sim_with(0.0, true);
@@ -325,7 +325,7 @@ fn written_accelerations_of_single_joints() {
         assert_error(sim.robot_mut(id).write_qacc(&array![values], None, None), "", &[part]);
         assert_eq!(sim.robot(id).qacc(), written, "{part}");
     }
-    // The largest that may be does no harm: with no force on it the joint stays where it is.
+    // The largest valid value does no harm: without a force the joint keeps its position.
     sim.robot_mut(id).write_qacc(&array![[1e10, -1e10]], None, None).unwrap();
     sim.update(1);
     assert!(sim.diverged().is_empty());
@@ -346,7 +346,7 @@ fn targets_and_defaults() {
     let mut robot = sim.robot_mut(id);
     robot.set_qvel_target(&array![[0.5, 9.0]], None, Some(&[EnvId(1)])).unwrap();
     robot.set_qf_target(&array![[-2.5, 9.0]], None, Some(&[EnvId(2)])).unwrap();
-    // The follower's columns are ignored. Targets stay until changed or reset.
+    // The follower's columns are ignored. Targets persist until a change or a reset.
     let targets = |sim: &SimulationManager| [sim.robot(id).qvel_target(), sim.robot(id).qf_target()];
     let expected = [array![[0.0, 0.0], [0.5, 0.0], [0.0, 0.0]], array![[0.0, 0.0], [0.0, 0.0], [-2.5, 0.0]]];
     assert_eq!(targets(&sim), expected);
@@ -369,7 +369,7 @@ fn names_and_patterns() {
     assert_eq!(view.active_joint_ids(None).unwrap(), [hinge]);
     assert_eq!(view.active_joint_ids("all").unwrap(), [hinge]);
     assert_eq!(view.joint_ids("all").unwrap().len(), 2);
-    // Without a part: of the whole robot, which is the columns of every table.
+    // Without a control part, the joints are those of the whole robot in the column order of all tables.
     assert_eq!(view.joint_ids(None).unwrap(), [hinge, follower]);
     assert_eq!((view.active_joint_names(), view.mimic_joint_ids()), (vec!["hinge"], vec![follower]));
     assert_eq!(view.mimic_drivers(), [(hinge, 1.0, 0.0), (hinge, -1.0, 0.0)]);
@@ -382,7 +382,7 @@ fn names_and_patterns() {
     assert_error(view.active_joint_ids("al"), "", &["control part \"al\"", "\"all\""]);
 }
 
-/// Targets by the name of a part: its joints in the order of its patterns, and no other joint.
+/// Targets by the name of a control part: its joints in the order of its patterns, and no other joint.
 #[test]
 fn parts() {
     let mut sim = kinetoscope_testkit::worlds::sim(empty_cfg(2));

@@ -1,7 +1,7 @@
 //! Forces on links and gravity compensation, against Newton's laws.
 //!
-//! MuJoCo's Euler step is v' = v + h F / m. Tolerance 1e-9: rounding of 1e-16 a step, over at most 200 steps, and of the
-//! solve of two bodies that differ by a factor of 100 in their inertia.
+//! MuJoCo's Euler step is v' = v + h F / m. Tolerance 1e-9: rounding of 1e-16 per step over at most 200 steps, and of
+//! the solve of two bodies whose inertias differ by a factor of 100.
 
 use super::ENVS;
 use kinetoscope::ndarray::{Array2, Array3, array};
@@ -27,8 +27,8 @@ fn sim_of(urdf: &str, gravity: f64, fix_base: bool) -> (SimulationManager, Robot
     (sim, id)
 }
 
-/// A free ball of 2 kg, a second one of 2 kg in its middle that turns about z by a passive hinge, and a grip of no mass
-/// that is fixed to the first, turned by a quarter about z; and their links.
+/// A free ball of 2 kg, and a second ball of 2 kg in its center that rotates about z on a passive hinge. A massless
+/// grip is fixed to the first ball, rotated by a quarter turn about z. Returns their links, too.
 fn balls(gravity: f64) -> (SimulationManager, RobotId, [LinkId; 3]) {
     let ball = |name| link(name, 2.0, 0.02, [0.0; 3], "");
     let spin = joint("spin", "continuous", ["outer", "inner"], [0.0; 3], "0 0 1", "");
@@ -44,7 +44,7 @@ fn zero() -> Array3<f64> {
     Array3::zeros((1, 1, 3))
 }
 
-/// 4 kg in all: a = F / 4 until the force changes; a torque turns the inner ball alone, alpha = tau / I.
+/// Total mass 4 kg: a = F / 4 until the force changes. A torque rotates the inner ball alone: alpha = tau / I.
 #[test]
 fn force_until_it_changes() {
     let (mut sim, id, [outer, inner, _]) = balls(0.0);
@@ -59,7 +59,8 @@ fn force_until_it_changes() {
     assert_eq!((read.dim(), read[(2, outer.0, 1)], read[(0, inner.0, 5)]), ((ENVS, 3, 6), -2.0, 0.5));
     assert_eq!(read.iter().filter(|x| **x != 0.0).count(), 6);
     let t = 20.0 * H;
-    // Another link's wrench does not end this one; a new one of the same link does, and zeros are none.
+    // A wrench of another link does not end this wrench. A new wrench of the same link replaces it, and zeros remove
+    // it.
     for (steps, share, ends) in [(20, 1.0, None), (10, 1.5, Some(inner)), (10, 1.5, Some(outer))] {
         if let Some(link) = ends {
             set(&mut sim, &zero(), &zero(), link, None);
@@ -75,7 +76,7 @@ fn force_until_it_changes() {
     assert_eq!(sim.robot(id).external_wrenches(), Array3::<f64>::zeros((ENVS, 3, 6)));
 }
 
-/// A ball that turns by w about z: after k steps it is turned by w h k, and so is a force in its axes.
+/// A ball that rotates at w about z: after k steps the ball, and a force in its axes, is rotated by w h k.
 #[test]
 fn force_in_axes_of_a_link() {
     let (mut sim, id, [outer, _, grip]) = balls(0.0);
@@ -91,12 +92,12 @@ fn force_in_axes_of_a_link() {
     for k in 0..200 {
         sim.update(1);
         let (angle, v) = (w * H * f64::from(k), sim.robot(id).root_velocity());
-        // The grip is a quarter turn ahead; the world does not turn.
+        // The grip is a quarter turn ahead; the world does not rotate.
         let angles = [angle, angle + std::f64::consts::FRAC_PI_2, 0.0];
         for (env, ([x, y], angle)) in expected.iter_mut().zip(angles).enumerate() {
             *x += H * 5.0 / 4.0 * angle.cos();
             *y += H * 5.0 / 4.0 * angle.sin();
-            // No torque comes of it: the force acts in the center of mass, wherever the grip is.
+            // The force causes no torque: it acts at the center of mass, regardless of the position of the grip.
             assert_close(&format!("environment {env}, step {k}"), v.row(env), [*x, *y, 0.0, 0.0, 0.0, w], EXACT);
         }
     }
@@ -105,8 +106,8 @@ fn force_in_axes_of_a_link() {
     assert_close("what is read is in world axes", [0, 1, 2].map(|k| read[(1, grip.0, k)]), &in_world, EXACT);
 }
 
-/// Two levers on one another under gravity, without drives: compensated, they stay where they are; with one of them
-/// compensated, the free fall of the other is MuJoCo's without the first one's mass.
+/// Two levers in a chain under gravity, without drives. With compensation, they keep their pose. With compensation of
+/// one lever, the other falls as in MuJoCo without the first lever's mass.
 #[test]
 fn gravity_compensation() {
     let start = [0.3, -0.8];
@@ -125,7 +126,7 @@ fn gravity_compensation() {
     robot.set_gravity_compensation(true, Some(&[a]), Some(&[EnvId(1)])).unwrap();
     let on = sim.robot(id).gravity_compensation();
     assert_eq!(on, array![[true, true, true], [false, true, false], [false; 3]]);
-    // Forces of gravity on the joints, by virtual work: -m g z of the centers of mass that have weight.
+    // Generalized forces of gravity by virtual work: the derivative of -m g z of the centers of mass that have weight.
     let height = |q: [f64; 2], weight: [f64; 2]| {
         let ([za, zb], turn) = ([-(0.25 * q[0].sin()), -(0.5 * q[0].sin())], q[0] + q[1]);
         weight[0] * za + weight[1] * (zb - 0.2 * turn.sin() + 0.1 * turn.cos())
@@ -141,12 +142,12 @@ fn gravity_compensation() {
     let speeds = sim.robot(id).qvel();
     assert_close("nothing has weight", speeds.row(0), [0.0; 2], EXACT);
     for (env, weight) in [(1, [0.0, 1.0]), (2, [3.0, 1.0])] {
-        // From rest M v' = h load, with MuJoCo's own M.
+        // From rest M v' = h load, with MuJoCo's M.
         let mass = sim.batch().read(2, |env| env.data().mass_matrix().unwrap());
         let v = speeds.row(env);
         let momentum = [mass[0] * v[0] + mass[1] * v[1], mass[2] * v[0] + mass[3] * v[1]];
         for (found, tau) in momentum.into_iter().zip(load(weight)) {
-            // M is that after the step, 1e-2 rad further; the difference quotient is good to 1e-9.
+            // M is that after the step, 1e-2 rad further; the difference quotient is accurate to 1e-9.
             assert!((found - H * tau).abs() < 0.01 * (H * tau).abs(), "{momentum:?} {tau}");
         }
     }
@@ -154,7 +155,7 @@ fn gravity_compensation() {
     let q = sim.robot(id).qpos();
     assert_close("it stays for a second", q.row(0), start, EXACT);
     assert!((q[(2, 0)] - 0.3).abs() > 0.5, "the control falls: {q}");
-    // Off again: it falls as the control did, from the start.
+    // Without compensation again: it falls as in the control, from the start.
     sim.robot_mut(id).set_gravity_compensation(false, Some(&[a, b]), None).unwrap();
     sim.reset(None).unwrap();
     sim.robot_mut(id).write_qpos(&array![start], None, None).unwrap();
@@ -162,8 +163,8 @@ fn gravity_compensation() {
     assert_eq!(sim.robot(id).qpos().row(0), q.row(2));
 }
 
-/// Half of a falling robot without weight falls at half of g. A reset ends wrenches and keeps the compensation; a new model
-/// keeps both.
+/// A falling robot with compensation for half of its mass falls at g / 2. A reset ends wrenches and keeps the
+/// compensation; a new model keeps both.
 #[test]
 fn changes_of_the_world() {
     let (mut sim, id, [outer, inner, grip]) = balls(G);
@@ -181,7 +182,7 @@ fn changes_of_the_world() {
     sim.update(10);
     let v = sim.robot(id).root_velocity();
     assert_close("after the reset", v.row(1), [0.0, 0.0, -10.0 * H * G / 2.0, 0.0, 0.0, 0.0], EXACT);
-    // Parts that are fixed to the outer ball form one body with it.
+    // Links that are fixed to the outer ball form one body with it.
     sim.robot_mut(id).set_gravity_compensation(true, Some(&[grip]), Some(&[EnvId(0)])).unwrap();
     let on = sim.robot(id).gravity_compensation();
     assert_eq!([on.row(0), on.row(1)], [array![true, true, true].view(), array![false, true, false].view()]);
@@ -221,7 +222,7 @@ fn mistakes() {
         assert_error(sim.robot_mut(id).set_gravity_compensation(true, links, envs), "", &[part]);
         assert_eq!(sim.robot(id).gravity_compensation(), Array2::from_elem((ENVS, 3), false));
     }
-    // No environment and no link is no mistake.
+    // Empty lists of environments or links are valid.
     let mut robot = sim.robot_mut(id);
     robot.set_external_wrench(&three(0, 3), &three(0, 3), WrenchFrame::Link, None, Some(&[])).unwrap();
     robot.set_external_wrench(&three(3, 0), &three(1, 0), WrenchFrame::Link, Some(&[]), None).unwrap();

@@ -1,4 +1,4 @@
-//! Every kind of entity from a file, a sensor of one's own among them.
+//! Entities of every type from a file, including a user-defined sensor.
 
 use crate::sensors::custom::{Speed, SpeedCfg};
 use kinetoscope::prelude::*;
@@ -15,7 +15,7 @@ fn read(text: &str) -> SceneCfg {
     SceneCfg::from_toml(text, "somewhere/scene.toml", &EntityTypes::default()).unwrap()
 }
 
-/// Asserts that a file of these lines declares a sensor `s` of this kind with this configuration.
+/// Asserts that a file of these lines declares a sensor `s` of this type with this configuration.
 #[track_caller]
 fn assert_sensor<C: std::fmt::Debug + PartialEq + 'static>(kind: &str, lines: &str, expected: &C) {
     let scene = read(&format!("[entities.s]\ntype = \"{kind}\"\n{lines}"));
@@ -158,7 +158,7 @@ fn sensors() {
         let expected = RayCasterCfg { pattern, targets: HitTargets::StaticOnly, ..Default::default() };
         assert_sensor("ray_caster", &format!("targets = \"static_only\"\npattern.{text}"), &expected);
     }
-    // A kind without fields may be named alone or with an empty table; fields with defaults may be left out.
+    // A variant without fields may be named alone or with an empty table; fields with defaults may be left out.
     let expected =
         RayCasterCfg { alignment: RayAlignment::World, targets: HitTargets::StaticOnly, ..RayCasterCfg::default() };
     let text = "pattern.grid = {}\nalignment = { world = {} }\ntargets = \"static_only\"";
@@ -239,7 +239,7 @@ fn own_sensor() {
     let error = cfg.to_toml(&EntityTypes::default()).unwrap_err().to_string();
     assert!(error.contains("speed") && error.contains("with_sensor"), "{error}");
     assert!(SceneCfg::from_toml(text, "scene.toml", &EntityTypes::default()).is_err());
-    // From a file the same; without the type it says which there are.
+    // The same from a file; without the type, the error lists the registered types.
     let files = tempfile::tempdir().unwrap();
     let path = files.path().join("own.toml");
     std::fs::write(&path, text).unwrap();

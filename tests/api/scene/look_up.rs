@@ -1,4 +1,4 @@
-//! Entities by name and type, and the errors where either is wrong.
+//! Entities by name and type, and the errors of a wrong name or type.
 
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::camera::Camera;
@@ -11,7 +11,7 @@ fn cube(x: f64) -> RigidObjectCfg {
 }
 
 fn two_cubes() -> SceneCfg {
-    // The sensor stands before what it watches.
+    // The sensor is listed before the body that it measures.
     SceneCfg::new(SimulationManagerCfg { num_envs: 3, ..Default::default() })
         .with("touch", ContactSensorCfg::of("{ENV_REGEX_NS}/zebra"))
         .with("zebra", cube(0.0))

@@ -1,4 +1,4 @@
-//! Mistakes in scene files: each error names the file, the line, and what would be right.
+//! Mistakes in scene files: each error names the file, the line, and the valid alternatives.
 
 use super::parts;
 use super::round_trip::QUADRUPED;
@@ -13,11 +13,11 @@ fn yaml(text: &str) -> Result<SceneCfg> {
     SceneCfg::from_yaml(text, "dir/scene.yaml", &EntityTypes::default())
 }
 
-/// The line, the text, and parts of the message, separated by `|`. A text that begins with `@kind` is an entity of this kind,
-/// whose keys begin in line 3.
+/// The line, the text, and parts of the message, separated by `|`. A text that begins with `@kind` is an entity of this
+/// type, whose keys begin in line 3.
 type Rows<'a> = &'a [(u32, &'a str, &'a str)];
 
-/// Asserts that each text gives an error of its line, with all parts.
+/// Asserts that each text gives an error with its line and all parts of its message.
 fn assert_rows(file: &str, read: fn(&str) -> Result<SceneCfg>, rows: Rows<'_>) {
     let mut wrong = Vec::new();
     for &(line, text, parts) in rows {
@@ -52,11 +52,11 @@ fn keys() {
         (1, "exclude_collision = []", "`exclude_collision`|`exclude_collisions`"),
         (3, "@weld\nfrist = \"a\"", "frist|`first`|`second`"),
         (4, "@rigid_object_group\nobjects = [\n{ uid = \"a\", mas = 1 }]", "mas|`mass`"),
-        // Names stand in one place only.
+        // The name is only in the table header.
         (3, "@rigid_object\nuid = \"o\"", "\"s\"|uid"),
         (3, "@weld\nuid = \"a\"", "\"s\"|uid"),
         (3, "@terrain\nuid = \"t\"", "uid"),
-        // Not TOML.
+        // Invalid TOML.
         (3, "[simulation]\nnum_envs = 1\nnum_envs = 2", "duplicate"),
         (3, "[entities.a]\ntype = \"imu\"\n[entities.a]\ntype = \"imu\"", "duplicate"),
         (1, "a b", ""),
@@ -73,14 +73,14 @@ fn kinds() {
         (2, "[simulation]\npreset = \"walking\"", "`legged`|`manipulation`"),
         (3, "@camera\nchannels = [\n\"rgb\",\n\"deph\"]", "deph|depth"),
         (2, "[simulation]\nintegrator = \"eular\"", "eular|`euler`"),
-        // A terrain without a generator, with two, with an unknown one.
+        // A terrain without a generator, with two generators, with an unknown generator.
         (3, "@terrain\nheights = {}", "no generator is named|`rough`|`slope`|`pyramid_stairs`"),
         (3, "@terrain\nheights = { rough = {}, slope = {} }", "one generator|two"),
         (3, "@terrain\nheights = { slope = {}, rough = {} }", "two"),
         (3, "@terrain\nheights.hills = {}", "hills|`rough`"),
         (3, "@terrain\nheights.stairs = {}", "stairs|`pyramid_stairs`"),
         (3, "@terrain\nheights = 3", "rows of heights|generator"),
-        // One of several kinds must be named: by its name alone, or as a table of one.
+        // A variant must be named: by its name alone, or as a table with one key.
         (3, "@ray_caster\npattern = {}", "nothing is named|`grid`|`lidar`|`pinhole`"),
         (3, "@ray_caster\npattern = \"grid\"", "`grid`|too little|{ grid = ... }"),
         (3, "@ray_caster\npattern = \"gird\"", "`gird`|one of `grid`"),
@@ -132,7 +132,7 @@ fn values() {
         (3, "@robot\nurdf.components = [{ name = \"arm\" }]", "urdf"),
         (3, "@rigid_object\ninit_pose = [0, 0, 0, 0, 0, 0, 0]", "no rotation"),
         (3, "@terrain\nheights = [[0, 1], [0]]", "row 1 has 1 heights|has 2"),
-        // Found in the whole table, thus with the line of the entity.
+        // The error belongs to the whole table, so it has the line of the entity.
         (2, "\n[entities.t]\ntype = \"terrain\"\nheights.rough.cell = 0", "rough terrain|cell is 0"),
         (2, "\n[entities.t]\ntype = \"terrain\"\nsize = [1, 1]\nheights.slope = {}", "leave out the `size`"),
         (1, "exclude_collisions = 3", "list of pairs"),
@@ -166,7 +166,7 @@ fn in_yaml() {
     assert_rows("dir/scene.yaml", yaml, rows);
 }
 
-/// Mistakes that only building finds have the line of the entity.
+/// Errors of scene construction have the line of the entity.
 #[test]
 fn in_building() {
     let text = |from: &str, to: &str| parts::TEXT.replace(from, to);
@@ -204,7 +204,8 @@ fn in_building() {
     assert!(message.starts_with("no/such/scene.toml: "), "{message}");
 }
 
-/// Any text gives a scene or an error with a line of the file: files are cut, and get signs where they do not belong.
+/// Any text gives a scene or an error with a line of the file. The texts are truncated files, and files with inserted
+/// characters.
 #[test]
 fn any_text() {
     let file = std::fs::read_to_string(assets::path("scenes/quadruped.toml").unwrap()).unwrap();

@@ -1,4 +1,4 @@
-//! Scenes that are declared: from Rust, from files, and the same from both.
+//! Declarative scenes: from Rust, from files, and their equality.
 
 mod kinds;
 mod look_up;

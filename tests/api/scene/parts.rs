@@ -1,4 +1,4 @@
-//! Groups, welds and pairs that never collide: from Rust, from files, the same from both.
+//! Groups, welds and excluded collision pairs: from Rust, from files, and their equality.
 
 use kinetoscope::ndarray::{Array3, Axis};
 use kinetoscope::prelude::*;
@@ -6,8 +6,8 @@ use kinetoscope::sensors::ContactSensor;
 use kinetoscope::sim::{EntityTypes, Error, RigidObjectGroupCfg, WeldCfg};
 use kinetoscope_testkit::worlds::object;
 
-/// A ball above a block on the ground, two cubes in the air, of which a weld that stands before them may hold the first to the
-/// world.
+/// A ball above a block on the ground, two cubes in the air, and a weld between the first cube and the world. The weld
+/// is declared before the cubes.
 pub(crate) const TEXT: &str = r#"
 exclude_collisions = [
     ["{ENV}/ball", "block"],
@@ -61,8 +61,8 @@ fn read(text: &str) -> SceneCfg {
     SceneCfg::from_toml(text, "dir/scene.toml", &EntityTypes::default()).unwrap()
 }
 
-/// Heights of ball and block, poses of the cubes, and whether the ball was felt on the block, after a second with the nail in
-/// the second environment.
+/// Runs one second with the weld attached in the second environment. Returns the heights of ball and block, the poses
+/// of the cubes, and true if a contact of the ball with the block was measured.
 fn run(cfg: SceneCfg) -> ([f64; 2], Array3<f64>, bool) {
     let mut scene = InteractiveScene::new(cfg).unwrap();
     assert_eq!(scene.keys().collect::<Vec<_>>(), ["nail", "touch", "block", "ball", "cubes"]);
@@ -77,13 +77,13 @@ fn run(cfg: SceneCfg) -> ([f64; 2], Array3<f64>, bool) {
     ([height("ball"), height("block")], cubes, felt.iter().any(|f| *f != 0.0))
 }
 
-/// An excluded pair falls through to the ground, the welded cube hangs, the others have landed; the controls are the scene
-/// without the pair and the first environment.
+/// An excluded pair falls through to the ground, the welded cube hangs, and the others have landed. Controls: the scene
+/// without the exclusion, and the first environment.
 #[test]
 fn effects() {
     let ([ball, block], cubes, felt) = run(read(TEXT));
     assert!((ball - 0.1).abs() < 1e-3 && (block - 0.2).abs() < 1e-3 && !felt, "{ball} {block} {felt}");
-    // A weld against the world gives way by 1e-4 of the acceleration of its load; a fall of a metre takes 0.45 s.
+    // A weld to the world yields by 1e-4 of the acceleration of its load; a fall of a meter takes 0.45 s.
     assert!((cubes[(1, 0, 2)] - 1.0).abs() < 1e-4, "{cubes}");
     for (env, object) in [(0, 0), (0, 1), (1, 1)] {
         assert!((cubes[(env, object, 2)] - 0.05).abs() < 1e-3, "{cubes}");
@@ -121,7 +121,7 @@ fn look_up() {
     assert!(matches!(scene.weld_mut("nale"), Err(Error::UnknownName { candidates, .. }) if candidates[0] == "nail"));
 }
 
-/// Meshes of the objects of a group lie beside the file, as those of single objects do.
+/// Mesh paths of the objects of a group are relative to the file, as those of single objects.
 #[test]
 fn relative_paths() {
     let cfg = read(

@@ -1,4 +1,5 @@
-//! The scene of the tutorial, from the bundled file and from Rust: the same bits, and the numbers that the tutorial prints.
+//! The scene of the tutorial, from the bundled file and from Rust: bit-identical results, and the numbers that the
+//! tutorial prints.
 
 use kinetoscope::prelude::*;
 use kinetoscope::sensors::ContactSensor;
@@ -55,9 +56,9 @@ pub(crate) fn declared() -> SceneCfg {
         .with("contact_forces", contacts)
 }
 
-/// Everything that the scene says after `steps`: equal bits or not at all.
+/// Bits of the robot state and of all sensor readings after `steps` steps.
 pub(crate) fn says(scene: &mut InteractiveScene, steps: u32) -> Vec<Vec<u64>> {
-    // Environments that differ, so that a mix-up would be seen.
+    // Different starts of the environments, so that a mix-up is detected.
     let mut start = scene.robot("robot").unwrap().qpos();
     start.row_mut(1).iter_mut().for_each(|angle| *angle += 0.05);
     scene.robot_mut("robot").unwrap().write_qpos(&start, None, None).unwrap();
@@ -82,7 +83,7 @@ fn same_bits() {
     let mut from_rust = InteractiveScene::new(declared()).unwrap();
     let expected = says(&mut from_rust, 100);
     assert_eq!(says(&mut from_file, 100), expected);
-    // The control: a drive that is a little softer is seen in every number that moves.
+    // Control: a slightly softer drive changes every number that moves.
     let mut softer = declared();
     let Some((_, EntityCfg::Robot(robot))) = softer.entities.first_mut() else { panic!("the robot is first") };
     robot.drive.stiffness = 79.0.into();

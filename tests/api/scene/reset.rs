@@ -1,4 +1,4 @@
-//! Resets of a scene: Isaac Lab's, which clears buffers and keeps what was written, and the one to the start.
+//! Resets of a scene: `reset` as in Isaac Lab, which clears buffers and keeps written state, and `reset_to_default`.
 
 use super::quadruped::bundled;
 use kinetoscope::ndarray::{Array2, Array3};
@@ -7,7 +7,7 @@ use kinetoscope::sensors::ContactSensor;
 use kinetoscope::sensors::ray::RayCaster;
 use kinetoscope::sim::WrenchFrame;
 
-/// `scene.reset()` undid what was written: the tutorial's noise on joint positions was lost.
+/// Regression: `scene.reset()` discarded written state, so the tutorial's noise on joint positions was lost.
 #[test]
 fn written_state_stays() {
     let mut scene = InteractiveScene::new(bundled()).unwrap();
@@ -29,7 +29,7 @@ fn written_state_stays() {
     let same = |found: &Array2<f64>, written: &Array2<f64>| (found - written).iter().all(|off| off.abs() < 1e-15);
     assert!(same(&robot.qpos(), &joints) && same(&robot.qvel(), &speeds));
     assert!(same(&robot.root_state(), &root), "{:?}", robot.root_state());
-    // Only the named environment's buffers are cleared; its sensors see the written state: 0.25 m higher.
+    // Only the buffers of the named environment are cleared; its sensors measure the written state: 0.25 m higher.
     let pushed: Vec<f64> = (0..2).map(|env| robot.external_wrenches()[(env, 0, 0)]).collect();
     assert_eq!(pushed, [3.0, 0.0]);
     let counts =
@@ -40,7 +40,7 @@ fn written_state_stays() {
     assert!((height(1) - height(0) - 0.25).abs() < 1e-12, "{} {}", height(0), height(1));
     assert!(scene.sim().time().iter().all(|time| *time > 0.0), "time goes on");
 
-    // The other reset puts everything back.
+    // `reset_to_default` restores everything.
     scene.reset_to_default(None).unwrap();
     let robot = scene.robot("robot").unwrap();
     assert!(same(&robot.qpos(), &robot.default_qpos()) && same(&robot.root_state(), &robot.default_root_state()));

@@ -1,4 +1,4 @@
-//! A scene that is written and read again is the same scene.
+//! A scene is unchanged by writing and reading.
 
 use super::quadruped::declared;
 use kinetoscope::ndarray::array;
@@ -31,7 +31,7 @@ entities:
     sampling.history_length: 6
 "#;
 
-/// Every kind of entity, with numbers that need all their digits.
+/// Entities of every type, with numbers that need all their digits.
 fn every_kind() -> SceneCfg {
     let third = 1.0 / 3.0;
     let noise = NoiseCfg { std: third, bias_std: 1e-300, ..Default::default() };
@@ -91,7 +91,7 @@ fn again(cfg: &SceneCfg) -> SceneCfg {
     SceneCfg::from_toml(&cfg.to_toml(&types).unwrap(), "elsewhere/scene.toml", &types).unwrap()
 }
 
-/// `Debug` writes every number with as many digits as tell it from all others.
+/// The `Debug` output contains every number with enough digits to identify it.
 #[test]
 fn every_field() {
     for cfg in [SceneCfg::default(), declared(), every_kind()] {
@@ -100,7 +100,7 @@ fn every_field() {
         assert_eq!(read.simulation, cfg.simulation);
         assert_eq!(read.keys().collect::<Vec<_>>(), cfg.keys().collect::<Vec<_>>());
         for ((name, read), (_, cfg)) in read.entities.iter().zip(&cfg.entities) {
-            // The uid is the name, whatever stood there.
+            // The uid is the name, regardless of the written uid.
             let cfg = match cfg.clone() {
                 EntityCfg::Robot(robot) => RobotCfg { uid: name.clone(), ..*robot }.into(),
                 EntityCfg::RigidObject(object) => RigidObjectCfg { uid: name.clone(), ..*object }.into(),
@@ -119,7 +119,7 @@ fn seed_beyond_toml() {
     assert!(message.contains("simulation"), "{message}");
 }
 
-/// A value of TOML as lines of YAML, tables and lists below their keys.
+/// Writes a TOML value as YAML lines, with tables and lists below their keys.
 fn yaml(value: &toml::Value, indent: usize, out: &mut String) {
     use std::fmt::Write as _;
     let space = " ".repeat(indent);
@@ -147,7 +147,7 @@ fn yaml(value: &toml::Value, indent: usize, out: &mut String) {
     }
 }
 
-/// The same scene in YAML's words is the same scene.
+/// The same scene in YAML is the same scene.
 #[test]
 fn in_yaml() {
     let types = EntityTypes::default();
@@ -178,7 +178,7 @@ fn yaml_files() {
         scene.update(1);
         assert_eq!(scene.robot("robot").unwrap().stiffness()[(0, 0)], 80.0);
     }
-    // The same text is no TOML.
+    // The same text is not valid TOML.
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, &text).unwrap();
     assert!(matches!(SceneCfg::from_file(&path), Err(Error::SceneFile { .. })));

@@ -1,4 +1,4 @@
-//! Terrain, a ray caster on it and a camera of rays: from a file and from Rust, the same.
+//! A terrain, a ray caster on it and a ray-cast camera: from a file and from Rust, with equal results.
 
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
@@ -90,7 +90,7 @@ fn declared() -> SceneCfg {
     SceneCfg::new(simulation).with("hills", hills).with("ball", ball).with("scanner", scanner).with("eye", eye)
 }
 
-/// The file and the declaration in Rust are written alike, and what is written is read as it was.
+/// The file and the declaration in Rust are written as the same text, and reading the text preserves the scene.
 #[test]
 fn same_text() {
     let types = EntityTypes::default();
@@ -99,7 +99,7 @@ fn same_text() {
     assert_eq!(read(&text).to_toml(&types).unwrap(), text);
     let other = read(&FILE.replace("seed = 7", "seed = 8")).to_toml(&types).unwrap();
     assert_ne!(other, text, "control: another terrain is another scene");
-    // All of the field is below the ball.
+    // The whole field of view is below the ball.
     let mut scene = InteractiveScene::new(declared()).unwrap();
     scene.update(1);
     let (hills, scanner) = (scene.terrain("hills").unwrap(), scene.sensor::<RayCaster>("scanner").unwrap());
@@ -130,7 +130,7 @@ fn heights() {
         assert_eq!(terrain(&format!("heights.{text}")), expected);
         assert_eq!((&expected.heights, expected.size), (&generator.heights().unwrap(), generator.size()));
     }
-    // What is no name of a height is refused in Rust, too.
+    // Invalid generator parameters are also rejected in Rust.
     let error = TerrainCfg::generated("t", RoughTerrain { cell: 0.0, ..Default::default() }).unwrap_err();
     assert!(error.to_string().contains("cell is 0"), "{error}");
     let scene = InteractiveScene::new(read("[entities.t]\ntype = \"terrain\"")).unwrap();

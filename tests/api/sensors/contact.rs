@@ -11,16 +11,17 @@ use nalgebra::Vector3;
 
 const EXACT: Tolerance =
     Tolerance::absolute(1e-9, "rounding of tens of newtons, from velocities divided by the step of 5 ms");
-/// Relative error of forces at rest. Contacts forget motion with their time constant of 20 ms: after five seconds e^-250 of
-/// it is left. The rest is the solver's tolerance of 1e-8.
+/// Relative error of forces at rest. Contact dynamics decay with a time constant of 20 ms: e^-250 is left after five
+/// seconds. The rest is the solver's tolerance of 1e-8.
 const REST: Tolerance = Tolerance::absolute(1e-8, "the solver's, for forces of 1 N at rest");
-/// Relative error of forces while a motion dies away, whose acceleration is below a thousandth of gravity.
+/// Relative error of forces during a decaying motion, whose acceleration is below a thousandth of gravity.
 const STILL: Tolerance = Tolerance::absolute(1e-3, "less than a thousandth of gravity is left, for forces of 1 N");
 const SUM: Tolerance =
     Tolerance::absolute(1e-11, "rounding of 60 N in some hundred sums, and of velocities of 1e-2 m/s / 5 ms: 1e-12");
 const STAMP: Tolerance = Tolerance::absolute(1e-12, "rounding of ten sums of the step");
-/// Distance of contact points, which are in the middle of the overlap, from the face \[m\]. At rest MuJoCo's contact has
-/// `d k r = (1 - d) g` with an impedance d of at least 0.9 and k = 0.9 / (0.95 * 0.02)² = 2490 /s²: r is 0.44 mm at most, half of it 0.22 mm.
+/// Distance of contact points, which are in the middle of the overlap, from the face \[m\]. At rest MuJoCo's contact
+/// has `d k r = (1 - d) g` with an impedance d of at least 0.9 and k = 0.9 / (0.95 * 0.02)² = 2490 /s²: r is 0.44 mm at
+/// most, half of it 0.22 mm.
 const OVERLAP: Tolerance = Tolerance::absolute(2.2e-4, "half of the overlap of a contact at rest");
 
 fn strings(names: &[&str]) -> Vec<String> {
@@ -31,8 +32,8 @@ fn velocity(sim: &SimulationManager, object: ObjectId) -> Vector3<f64> {
     row(&sim.rigid_object(object).velocity(), 0, 0)
 }
 
-/// In every step of a fall, a bounce and the rest after it: the force of the contacts is what the change of velocity needs,
-/// `m (dv / dt - g)`, and at rest it is the weight.
+/// In every step of a fall, a bounce and the rest after it, the contact force equals the change of momentum without
+/// gravity, `m (dv / dt - g)`. At rest it is the weight.
 #[test]
 fn newtons_second_law() {
     let mut sim = sim(1);
@@ -70,8 +71,8 @@ fn pairs(bodies: &str, filters: &[&str]) -> ContactSensorCfg {
     }
 }
 
-/// A box of 1.5 kg on a plank that leans. The plank holds it with m g cos along its normal and m g sin up the slope, at the
-/// middle of the face that lies on it. The control is a level plank, without friction.
+/// A box of 1.5 kg on an inclined plank. The plank pushes with m g cos along its normal and m g sin up the slope, at
+/// the center of the contact face. Control: a level plank, which has no friction force.
 #[test]
 fn leaning_plank() {
     for degrees in [20.0_f64, 0.0] {
@@ -117,9 +118,8 @@ fn vector(array: &Array3<f64>, a: usize, b: usize) -> Vector3<f64> {
     Vector3::from_fn(|k, _| array[(a, b, k)])
 }
 
-/// Three boxes on top of each other under a gravity that leans, every pair at once: actions and reactions are equal to the
-/// last bit, at the same points; normal force and friction together are what everything above needs to move as it does,
-/// `m (dv / dt - g)`.
+/// Three stacked boxes under inclined gravity, with every pair measured. Actions and reactions are bit-identical, at
+/// the same points. Normal force and friction together accelerate everything above, `m (dv / dt - g)`.
 #[test]
 fn action_and_reaction() {
     let (sin, cos) = 10.0_f64.to_radians().sin_cos();
@@ -155,15 +155,15 @@ fn action_and_reaction() {
         assert_close("total force", sensor.total_forces_w().slice(s![0, a, ..]), needed[a].as_slice(), SUM);
         let others = (0..3).map(|b| vector(&force, a, b)).sum::<Vector3<f64>>();
         assert_close("sum of the boxes", &vector(&force, a, 4), others.as_slice(), EXACT * 1e2);
-        // Up the slope, which is -x. The stack still rocks a little: by what moves the boxes, and by the lean of their faces,
-        // which turns normal forces, but for a twentieth at most.
+        // Up the slope, which is -x. The stack still rocks a little. The bound contains the acceleration of the boxes
+        // and the tilt of their faces, which rotates normal forces; it is a twentieth of the weight component at most.
         let weight: f64 = masses[a..].iter().sum::<f64>() * G;
         let rocking = (above + weight / G * gravity).x.abs() + force[(a, below, 0)].abs();
         assert!(rocking < 0.05 * weight * sin, "{rocking} of {weight}");
         let limit = Tolerance::absolute(rocking + 1e-11, "what the stack still rocks");
         assert_number("friction", friction[(a, below, 0)], -weight * sin, limit);
         let at = vector(&points, a, below) - row(&sim.rigid_object(boxes[a]).pose(), 0, 0);
-        // The load on a contact is up to (1/3 + 1/2) * 3 = 2.5 times the acceleration of one box alone.
+        // The load on a contact is up to (1/3 + 1/2) * 3 = 2.5 times that of one box alone.
         assert!((at.z + 0.1).abs() < 2.5 * OVERLAP.absolute && at.x.abs() < 0.1 && at.y.abs() < 0.1, "{at}");
         let net = sensor.friction_forces_w();
         let all = vector(&friction, a, 3) + vector(&friction, a, 4);
@@ -177,7 +177,7 @@ fn action_and_reaction() {
     }
 }
 
-/// Right after a write, forces are those of the state that was written, and so are their stamps.
+/// Right after a write, forces and their stamps are those of the written state.
 #[test]
 fn forces_after_a_write() {
     let mut sim = sim(2);
@@ -200,7 +200,7 @@ fn forces_after_a_write() {
     assert_close("stamps after the reset", stamps(&sim), [0.05, 0.0], STAMP);
 }
 
-/// RK4 solves its steps in the middle of them; sensors get forces solved for the beginning, as with Euler.
+/// RK4 solves within its steps; sensors get forces solved for the beginning of the step, as with Euler.
 #[test]
 fn forces_of_rk4() {
     let first = |integrator| {
@@ -216,7 +216,7 @@ fn forces_of_rk4() {
     assert_eq!((force, stamp), first(Integrator::Euler));
 }
 
-/// A diverged environment measures nothing more until it is reset, and the others do not notice.
+/// A diverged environment keeps its last measurement until it is reset, without an effect on the other environments.
 #[test]
 fn diverged_environment() {
     let forces = |blow_up: bool| {
@@ -248,7 +248,7 @@ fn diverged_environment() {
             };
             let last = values(&sim);
             assert!(last.iter().all(|value| value.is_finite()));
-            // Nor does a write to a diverged environment change what is read of it.
+            // A write to a diverged environment does not change its readings either.
             sim.rigid_object_mut(box_).write_velocity(&array![[0.0; 6]], Some(&[EnvId(1)])).unwrap();
             kinetoscope_testkit::bits::assert_same_bits("the last measurement", &values(&sim), &last);
             let late = sim.add_sensor("late", ImuCfg::on("box")).unwrap();
@@ -296,7 +296,7 @@ fn history_and_reset() {
             }
         }
         check(&sim, &told);
-        // One in the middle of a period, then two others.
+        // A reset in the middle of a period, then a reset of two other environments.
         let reset: &[EnvId] = match step {
             13 => &[EnvId(1)],
             26 => &[EnvId(2), EnvId(0)],
@@ -310,10 +310,10 @@ fn history_and_reset() {
     assert!(told[1].iter().all(|(force, _)| *force > G), "there was something to remember");
 }
 
-/// Two balls that bounce, from different heights. A fall from `z` is at `z - g dt² k (k + 1) / 2` after k steps
-/// (semi-implicit Euler), and touches in the first step that begins below the radius. After that the judge is Newton: the
-/// ground pushed in the steps that changed the velocity more than gravity does. Times of all phases in the air and on the
-/// ground are exact to the step, at any period and stride, and every beginning is reported once.
+/// Two balls bounce from different heights. A fall from `z` is at `z - g dt² k (k + 1) / 2` after k steps
+/// (semi-implicit Euler), and touches in the first step that begins below the radius. After that the reference is
+/// Newton's law: the ground pushed in the steps that changed the velocity more than gravity does. Times of all phases
+/// in the air and on the ground are exact to the step, at any period and stride, and every beginning is reported once.
 #[test]
 fn bounces() {
     let heights = [0.6, 0.9];
@@ -326,7 +326,7 @@ fn bounces() {
             sim.rigid_object_mut(ball).write_pose(&up, Some(&[EnvId(1)])).unwrap();
             (sim, ball)
         };
-        // The same world without a sensor, step by step.
+        // Reference: the same world without a sensor, step by step.
         let ((mut sim, ball), (mut judge, other)) = (world(), world());
         let dt = sim.cfg().physics_dt;
         let sampling = SamplingCfg::every(f64::from(period) * dt);
@@ -337,7 +337,8 @@ fn bounces() {
             (0..).find(|&k| fall(k) < 0.1).unwrap()
         });
         let mut speed: Array2<f64> = Array2::zeros((2, 6));
-        // Of each environment: does it touch, since how many steps, and the lengths of finished phases [air, contact].
+        // For each environment: contact flag, steps since its last change, and the lengths of finished phases \[air,
+        // contact\].
         let mut phases = [(false, 0_u32, [0_u32; 2]); 2];
         let mut measured = phases;
         let (mut begun, mut told) = ([[0_u32; 2]; 2], [[0_u32; 2]; 2]);
@@ -385,7 +386,8 @@ fn bounces() {
         }
         for env in 0..2 {
             assert!(begun[env][1] > 3, "it bounces: {begun:?}");
-            // Each beginning once; several within one period are told together, and with strides some are told between.
+            // Each beginning is reported once. Several within one period are reported together; some are reported
+            // between strides.
             if (period, stride) == (1, 1) {
                 assert_eq!(told[env], begun[env]);
             } else if (period, stride) == (5, 1) {

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Height of the last body, at every step, or lazily every 0.03 s; counts its measurements.
+/// Height of the last body, eager at every step or lazy every 0.03 s; counts its measurements.
 #[derive(Clone, Default)]
 struct HeightCfg {
     lazy: bool,
@@ -55,7 +55,7 @@ impl Sensor for Height {
     }
 }
 
-/// A lazy sensor holds what it would have measured when it was due, and measures once for all readers.
+/// A lazy sensor holds the measurement of its due time, and measures once for all readers.
 #[test]
 fn eager_and_lazy() {
     let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(3, 2));
@@ -67,7 +67,7 @@ fn eager_and_lazy() {
     let height = |sim: &SimulationManager| sim.robot(robot).link_pose("ee_link").unwrap().column(2).to_vec();
     let start = height(&sim);
     assert_eq!(sim.sensor(lazy).unwrap().0, start);
-    // The instant of the last measurement, not that of the reading: periods are three steps.
+    // The time of the last measurement, not that of the reading: periods are three steps.
     for (steps, moves) in [(2, false), (10, true), (2, false)] {
         let before = sim.sensor(lazy).unwrap().0.clone();
         sim.update(steps);
@@ -81,7 +81,7 @@ fn eager_and_lazy() {
     assert_eq!(cfg.measured.load(Ordering::Relaxed), 1, "four measurements were due, one was made");
 }
 
-/// Speed of a body above a level, with everything that a sampler provides: rate, latency, noise.
+/// Speed of a body above a height, with everything that a sampler provides: rate, latency, noise.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SpeedCfg {
@@ -149,7 +149,7 @@ fn sampler() {
     let sampling = SamplingCfg { latency_steps: 4, ..SamplingCfg::every(0.01) };
     let id = sim.add_sensor("speed", SpeedCfg { body: "ball".into(), level: 0.0, sampling }).unwrap();
     sim.update(101);
-    // The newest capture that is 4 steps old is that of step 96.
+    // The newest sample of at least 4 steps of age is that of step 96.
     let limit = Tolerance::absolute(1e-12, "rounding of 96 sums of numbers up to 5");
     assert_close("speed", sim.sensor(id).unwrap().sampler.values("speed"), [9.81 * 96.0 * 0.005; 2], limit);
 }

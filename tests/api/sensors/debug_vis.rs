@@ -1,4 +1,4 @@
-//! Markers of sensors, against closed forms, and the switch for them.
+//! Debug markers of sensors, against closed forms, and the switch for them.
 
 use super::worlds::{G, add_robot, cfg, cube, joint, link, look_at, sim};
 use kinetoscope::prelude::*;
@@ -8,7 +8,7 @@ use kinetoscope::sensors::ray::pattern::Grid;
 use kinetoscope::sensors::{FrameTransformerCfg, Imu, JointWrenchCfg, SensorCfg, TargetFrameCfg};
 use nalgebra::Vector3;
 
-/// A load that hangs from a crane, and a box that has come to rest on the ground.
+/// A load that hangs from a crane, and a box at rest on the ground.
 fn world() -> SimulationManager {
     let mut content = link("base", 1.0, 0.1, [0.0; 3], "") + &link("load", 3.0, 0.01, [0.0, 0.0, -0.4], "");
     content += &joint("pivot", "continuous", ["base", "load"], [0.0, 0.0, 2.0], "0 1 0");
@@ -19,7 +19,7 @@ fn world() -> SimulationManager {
     sim
 }
 
-/// Markers of one sensor in environment 1; none where `debug_vis` is off.
+/// Returns the markers of one sensor in environment 1; checks that `debug_vis: false` gives no markers.
 fn shown<C: SensorCfg + Send + 'static>(cfg: impl Fn(bool) -> C) -> Vec<Marker> {
     let mut sim = world();
     sim.add_sensor("quiet", cfg(false)).unwrap();
@@ -36,7 +36,7 @@ fn wrench_of_load(debug_vis: bool) -> JointWrenchCfg {
     JointWrenchCfg { links: vec!["load".into()], debug_vis, ..Default::default() }
 }
 
-/// The tail of an arrow and its vector.
+/// Returns the tail of an arrow and its vector.
 fn arrow(marker: &Marker) -> (Vector3<f64>, Vector3<f64>) {
     let MarkerKind::Arrow { length, .. } = marker.kind else { panic!("{marker:?} is no arrow") };
     (place(marker), marker.pose.rotation * (Vector3::z() * f64::from(length)))
@@ -65,12 +65,12 @@ fn imu_and_wrench() {
     assert!(markers.len() == 2 && is_axes(&markers[0]), "{markers:?}");
     assert_arrow(&markers[1], [0.1, 0.2, 0.3], [0.0, 0.0, G / 20.0], 1e-6);
     let markers = shown(wrench_of_load);
-    // The load hangs: a force of its weight in the pivot, and no torque except for rounding.
+    // The load hangs: the pivot carries its weight, without a torque except for rounding.
     assert_arrow(&markers[0], [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);
     assert!(markers[1..].iter().all(|torque| arrow(torque).1.norm() < 1e-6), "{markers:?}");
 }
 
-/// Nothing touches the load: its ball is green. The ball of the box is red, with an arrow.
+/// The load has no contact: its ball is green. The ball of the box is red, with an arrow.
 #[test]
 fn contacts() {
     let markers = shown(|debug_vis| ContactSensorCfg { debug_vis, ..ContactSensorCfg::of("box|load") });
@@ -81,7 +81,7 @@ fn contacts() {
         assert_eq!(found.len(), 1, "{markers:?}");
         place(found[0])
     };
-    // The box has sunk into its soft contact by less than a millimetre, and rests to a thousandth of its weight.
+    // The box has sunk into its soft contact by less than a millimeter; the force is its weight to within a thousandth.
     assert!((ball(true) - Vector3::new(1.0, 0.5, 0.1)).norm() < 1e-3, "{markers:?}");
     assert!((ball(false) - Vector3::new(0.0, 0.0, 2.0)).norm() < 1e-6, "{markers:?}");
     assert_eq!(arrows.len(), 1, "{markers:?}");
@@ -102,8 +102,8 @@ fn frames_and_rays() {
     assert_eq!(places, [[4.75, 4.75, 0.0], [4.75, 5.25, 0.0], [5.25, 4.75, 0.0], [5.25, 5.25, 0.0]]);
 }
 
-/// A camera at (1, 0, 1) that looks along -x, of either kind. The corners of its image are half as far to the sides and three
-/// eighths as far up and down as they are away: the arrows end 0.3 m before the camera.
+/// A raster camera and a ray-cast camera at (1, 0, 1) that look along -x. At unit distance the image corners are at 1/2
+/// to the sides and 3/8 up and down; the arrows end 0.3 m in front of the camera.
 #[test]
 fn cameras() {
     let extrinsics = || look_at([1.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
@@ -132,8 +132,8 @@ fn cameras() {
     }
 }
 
-/// Markers that are switched on while the simulation runs are those of a sensor that was configured so, wherever the bodies
-/// are by then, and no measurement changes.
+/// Enabling markers at run time gives the markers of a sensor that was configured with them, at the current poses of
+/// the bodies, and changes no measurement.
 #[test]
 fn switch() {
     let mut sim = world();
@@ -163,7 +163,7 @@ fn switch() {
     assert_arrow(&of_load[0].1, [0.0, 0.0, 2.0], [0.0, 0.0, 3.0 * G / 500.0], 1e-6);
     assert!(sim.sensor(off).unwrap().pos_w().is_none(), "poses are for markers, and not measured");
     assert_eq!(sim.sensor(off).unwrap().sample_counts().to_vec(), [4, 4], "no sensor was restarted");
-    // The switch stays where an object is added later, which builds all sensors again.
+    // The switch persists when an object is added later, which rebuilds all sensors.
     sim.add_rigid_object(cube("late", 0.2, 1.0, [3.0, 3.0, 0.1])).unwrap();
     assert_eq!([off, on].map(|id| sim.scene().debug_vis(id).unwrap()), [false, false]);
     assert!(sim.scene().debug_vis(load).unwrap());
@@ -176,7 +176,7 @@ fn switch_by_name() {
         SceneCfg::new(cfg(1)).with("box", cube("box", 0.2, 2.0, [0.0, 0.0, 0.1])).with("imu", ImuCfg::on("box"));
     let mut scene = InteractiveScene::new(scene).unwrap();
     assert_eq!(scene.sim().scene().markers(), []);
-    // It stands: the arrow is there.
+    // The box is at rest: the arrow exists.
     scene.update(50);
     scene.set_debug_vis("{ENV}/imu", true).unwrap();
     assert_eq!(scene.sim().scene().markers().len(), 2);

@@ -1,4 +1,4 @@
-//! Frames seen from frames, against the poses of the links; and handles of sensors.
+//! Frame transformers, against the poses of the links; and handles of sensors.
 
 use super::worlds::{cube, pose_in, sim, sr5};
 use kinetoscope::ndarray::{ArrayView3, Axis, array};
@@ -54,7 +54,7 @@ fn targets_from_the_source() {
     assert_ne!(sensor.target_pos_source().index_axis(Axis(0), 0), sensor.target_pos_source().index_axis(Axis(0), 1));
 }
 
-/// A handle of one manager is not valid in another, even where that has a sensor of the same kind at the same index.
+/// A handle of one manager is not valid in another manager, even if a sensor of the same type has the same index there.
 #[test]
 fn handles_of_another_manager() {
     let [mut sim, mut other] = [sim(1), sim(1)];

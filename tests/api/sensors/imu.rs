@@ -1,5 +1,5 @@
-//! Accelerations against closed forms and against the change of the velocities. A turntable and a pendulum, with a sensor on a
-//! fused link, are laws of `physics::contacts`.
+//! Accelerations against closed forms and against the change of the velocities. For a turntable and a pendulum with a
+//! sensor on a fused link see the laws of `physics::contacts`.
 
 use super::worlds::{G, cube, fixed, pose_in, row, sim};
 use kinetoscope::ndarray::array;
@@ -10,7 +10,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 const EXACT: Tolerance = Tolerance::absolute(1e-9, "rounding of velocities divided by the step of 5 ms");
 
-/// Zero in free fall, gravity upwards at rest.
+/// Zero in free fall, gravity upward at rest.
 #[test]
 fn free_fall_and_rest() {
     let mut sim = sim(1);
@@ -30,8 +30,8 @@ fn free_fall_and_rest() {
     }
 }
 
-/// A box that tumbles freely, seen from a corner: the acceleration there is `alpha x r + omega x (omega x r)`, with alpha from
-/// the change of the angular velocity in the axes of the body, which is what MuJoCo integrates.
+/// A freely tumbling box, measured at a corner: the acceleration is `alpha x r + omega x (omega x r)`. Alpha comes from
+/// the change of the angular velocity in the axes of the body, which MuJoCo integrates.
 #[test]
 fn tumbling_corner() {
     let mut sim = sim(1);
@@ -60,7 +60,7 @@ fn tumbling_corner() {
     }
 }
 
-/// With a period of many steps and over a reset, the reading is still the acceleration of one instant.
+/// With a period of many steps, and over a reset, the reading is the acceleration of one step.
 #[test]
 fn period_and_reset() {
     let mut sim = sim(1);

@@ -1,4 +1,5 @@
-//! Wrong configurations of every kind of sensor: typed errors that name the candidates, and a simulation that is unchanged.
+//! Wrong configurations of every type of sensor: typed errors that list the candidates, without a change of the
+//! simulation.
 
 use super::worlds::{cube, sim, sr5};
 use kinetoscope::prelude::*;
@@ -15,7 +16,7 @@ use nalgebra::{Quaternion, UnitQuaternion};
 const NAN: f64 = f64::NAN;
 const INFINITY: f64 = f64::INFINITY;
 
-/// An arm, a cube, and a pendulum with a sensor of its own.
+/// An arm, a cube, and a pendulum with an MJCF sensor.
 fn world() -> SimulationManager {
     let mut sim = sim(2);
     sim.add_robot(sr5("arm")).unwrap();
@@ -26,7 +27,7 @@ fn world() -> SimulationManager {
     sim
 }
 
-/// The error of a sensor that is refused; it names the sensor.
+/// Returns the error of a rejected sensor; the error names the sensor.
 #[track_caller]
 fn refused<C: SensorCfg + Clone + Send + 'static>(sim: &mut SimulationManager, cfg: &C) -> SensorError {
     let error = sim.add_sensor("mine", cfg.clone()).map(|_| ()).unwrap_err();
@@ -36,7 +37,7 @@ fn refused<C: SensorCfg + Clone + Send + 'static>(sim: &mut SimulationManager, c
     *error
 }
 
-/// Asserts that each configuration is refused with an error of the pattern.
+/// Asserts that each configuration is rejected with an error of the pattern.
 macro_rules! refuses {
     ($sim:expr, $pattern:pat if $guard:expr => $cfg:expr) => {
         let error = refused($sim, &$cfg);
@@ -47,7 +48,7 @@ macro_rules! refuses {
     };
 }
 
-/// Asserts that each configuration is refused for an unknown name, with a candidate.
+/// Asserts that each configuration is rejected for an unknown name, with a candidate.
 macro_rules! unknown {
     ($sim:expr, $(($cfg:expr, $wrong:expr, $near:expr)),+ $(,)?) => {
         $(
@@ -57,7 +58,7 @@ macro_rules! unknown {
     };
 }
 
-/// Asserts that each configuration is refused for measuring nothing, with the field and a candidate.
+/// Asserts that each configuration is rejected for an empty selection, with the field and a candidate.
 macro_rules! nothing {
     ($sim:expr, $(($cfg:expr, $chosen:expr, $near:expr)),+ $(,)?) => {
         $(
@@ -80,7 +81,7 @@ fn frames(source: &str, targets: &[&str]) -> FrameTransformerCfg {
     FrameTransformerCfg::from(source, targets.iter().map(|target| TargetFrameCfg::of(*target)).collect())
 }
 
-/// A camera of either kind.
+/// A raster camera and a ray-cast camera.
 fn cameras(extrinsics: Extrinsics) -> (CameraCfg, RayCasterCameraCfg) {
     let camera = CameraCfg { width: 8, height: 8, extrinsics: extrinsics.clone(), ..Default::default() };
     (camera, RayCasterCameraCfg { width: 8, height: 8, extrinsics, ..Default::default() })
@@ -112,7 +113,7 @@ fn names() {
         (camera, "lnk6", "arm/link6"),
         (of_rays, "lnk6", "arm/link6"),
     );
-    // The text of two of them.
+    // The message texts of two errors.
     let text = refused(sim, &JointStateCfg { joints: some("JOINT7"), ..Default::default() }).to_string();
     assert!(text.contains("no joint \"JOINT7\"") && text.contains("JOINT6"), "{text}");
     let text = refused(sim, &frames("cub", &["cube"])).to_string();
@@ -122,7 +123,7 @@ fn names() {
     // A fused link has no joint to measure.
     refuses!(sim, SensorError::FusedLink { link, carrier } if link == "arm/ee_link" && carrier == "arm/link6" =>
         wrench(&["ee_link"], &[]));
-    // Two bodies of the name, and patterns with errors.
+    // Two bodies of the same name, and invalid patterns.
     sim.add_robot(sr5("other")).unwrap();
     refuses!(sim, SensorError::AmbiguousName { candidates, .. } if *candidates == ["arm/link6", "other/link6"] =>
         ImuCfg::on("link6"));
@@ -136,7 +137,7 @@ fn empty_selections() {
     let sim = &mut world();
     refuses!(sim, SensorError::NoBodies { candidates } if candidates.contains(&"cube".to_string()) =>
         ContactSensorCfg::default());
-    // Rays without targets would read as misses for ever.
+    // Rays without targets would always read as misses.
     let targets = || HitTargets::Named(Vec::new());
     nothing!(
         sim,
@@ -195,7 +196,7 @@ fn numbers_of_rays() {
     }
 }
 
-/// Offsets with NaN or infinity, and quaternions that are no rotations.
+/// Offsets with NaN or infinity, and quaternions that are not rotations.
 #[test]
 fn offsets() {
     let sim = &mut world();
@@ -211,7 +212,7 @@ fn offsets() {
             FrameTransformerCfg { targets: vec![of_target.clone()], ..frames("cube", &[]) },
             RayCasterCfg { offset, ..Default::default() },
         );
-        // Cameras normalise a quaternion that is only too long.
+        // Cameras normalize a quaternion that is only too long.
         if offset == long {
             continue;
         }
@@ -237,7 +238,7 @@ fn numbers_of_cameras() {
     );
 }
 
-/// Errors of all kinds of sensors with one sampling.
+/// Errors of all types of sensors with one sampling.
 fn with_sampling(sim: &mut SimulationManager, sampling: &SamplingCfg) -> Vec<SensorError> {
     let sampling = || sampling.clone();
     vec![
@@ -253,7 +254,7 @@ fn with_sampling(sim: &mut SimulationManager, sampling: &SamplingCfg) -> Vec<Sen
     ]
 }
 
-/// Refused sensors leave nothing behind: the simulation goes on as another that was not asked.
+/// Rejected sensors leave no trace: the simulation continues as one without the attempts.
 #[test]
 fn samplings() {
     let sim = &mut world();
@@ -273,7 +274,7 @@ fn samplings() {
     }
     let good = SamplingCfg::default;
     let noise = |channel: &str, std| [(channel.to_string(), NoiseCfg::white(std))].into();
-    // A history larger than any memory is refused before it is allocated.
+    // A history larger than any memory is rejected before allocation.
     for (history_length, latency_steps) in [(usize::MAX, 0), (0, u32::MAX), (1 << 40, 7)] {
         for error in with_sampling(sim, &SamplingCfg { history_length, latency_steps, ..good() }) {
             assert!(matches!(error, SensorError::TooLarge { .. }), "{error:?}");

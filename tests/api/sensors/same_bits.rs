@@ -1,5 +1,5 @@
-//! Sensors change no bit of the motion. Threads, strides and the number of environments change no bit of the readings, of
-//! any kind of sensor, eager or lazy.
+//! Sensors do not change the motion in any bit. The readings of all types of sensors, eager or lazy, are bit-identical
+//! for all numbers of threads, strides and environments.
 
 use super::worlds::{cfg, cube, look_at, sr5};
 use kinetoscope::mujoco as mj;
@@ -17,13 +17,13 @@ use kinetoscope::sim::{EntityTypes, Integrator};
 use kinetoscope_testkit::bits::Bits;
 use std::collections::BTreeMap;
 
-/// A pendulum with sensors of its own.
+/// A pendulum with MJCF sensors.
 const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8"><joint name="hinge" axis="0 1 0.3"/>
     <geom type="capsule" size="0.03" fromto="0 0 0 0.4 0 0.1"/><site name="tip" pos="0.4 0 0.1" euler="20 0 30"/></body></worldbody>
   <sensor><accelerometer name="acc" site="tip"/><gyro name="gyro" site="tip"/><framequat name="turn" objtype="site" objname="tip"/>
     <force name="force" site="tip"/></sensor></mujoco>"#;
 
-/// Late, lossy, and noisy in one channel.
+/// A sampling with latency, dropout, and noise in one channel.
 fn noisy(channel: &str, seconds: f64) -> SamplingCfg {
     let noise = NoiseCfg { bias_walk: 0.1, ..NoiseCfg::white(0.1) };
     let noise = [(channel.to_string(), noise)].into();
@@ -37,8 +37,8 @@ fn spin(num_envs: usize) -> Array2<f64> {
     Array2::from_shape_fn((num_envs, 6), |(env, axis)| (1.3 * env as f64 + 0.7 * axis as f64).sin())
 }
 
-/// An arm with drives that bind (if wanted), boxes that tumble and a pendulum. All environments differ. There are more
-/// contacts than buffers have room for at first: steps are repeated while they are captured.
+/// An arm with saturating drives (if `with_arm`), tumbling boxes and a pendulum. All environments differ. The contacts
+/// exceed the initial buffers, so steps are repeated while they are captured.
 fn world(settings: SimulationManagerCfg, with_arm: bool) -> (SimulationManager, Option<RobotId>) {
     let n = settings.num_envs;
     let mut sim = kinetoscope_testkit::worlds::sim(settings);
@@ -60,10 +60,10 @@ fn world(settings: SimulationManagerCfg, with_arm: bool) -> (SimulationManager, 
     (sim, arm)
 }
 
-/// Bits of all readings of an environment, by the name of the kind in scene files.
+/// Bits of all readings of an environment, by the name of the type in scene files.
 type Readings = BTreeMap<&'static str, Vec<u64>>;
 
-/// Bits of one environment of batches, their first axis.
+/// Bits of one environment of several batches. The first axis of a batch is the environment.
 struct Words(usize, Vec<u64>);
 
 impl Words {
@@ -71,7 +71,7 @@ impl Words {
         self.1.extend(batch.index_axis(Axis(0), self.0).iter().map(|x| x.bits()));
     }
 
-    /// Everything that a sampler has: all channels and stamps, now and before.
+    /// Appends all data of a sampler: all channels and stamps, with their histories.
     fn add_sampled(&mut self, sensor: &impl Sampled) {
         let sampler = sensor.sampler();
         self.add(&sensor.sample_counts());
@@ -87,7 +87,7 @@ impl Words {
 
 type Reader = Box<dyn Fn(&SimulationManager, &mut Words)>;
 
-/// Sensors, by the name of their kind in scene files, each with its reader.
+/// Sensors, by the name of their type in scene files, each with its reader.
 #[derive(Default)]
 struct Readers(Vec<(&'static str, Reader)>);
 
@@ -106,7 +106,7 @@ impl Readers {
         ));
     }
 
-    /// Appends what every sensor reads in each environment.
+    /// Appends the readings of every sensor in each environment.
     fn read(&self, sim: &SimulationManager, readings: &mut [Readings]) {
         for (env, readings) in readings.iter_mut().enumerate() {
             for (kind, read) in &self.0 {
@@ -118,8 +118,8 @@ impl Readers {
     }
 }
 
-/// Adds a sensor of every kind. There is work for three threads: 5 cameras of 128 by 96 pixels take some 2 ms, rays are
-/// 13000 and 15000.
+/// Adds a sensor of every type, with enough work for three threads: 5 cameras of 128 by 96 pixels take some 2 ms; the
+/// rays are 13000 and 15000.
 fn add_sensors(sim: &mut SimulationManager, sampling: Sampling) -> Readers {
     let on = |name: &str| Extrinsics { parent: Some(name.into()), ..Default::default() };
     let camera = CameraCfg {
@@ -218,7 +218,7 @@ fn add_sensors(sim: &mut SimulationManager, sampling: Sampling) -> Readers {
     readers
 }
 
-/// Readings of all environments, with a reset on the way.
+/// Returns the readings of all environments, with a reset in the middle.
 fn readings(num_envs: usize, threads: usize, seed: u64, stride: u32) -> Vec<Readings> {
     let settings = SimulationManagerCfg { threads: Some(threads), seed, ..cfg(num_envs) };
     let (mut sim, _) = world(settings, true);
@@ -250,13 +250,13 @@ fn threads_environments_and_strides() {
     assert_same("2 threads", &readings(5, 2, 5, 6), &one);
     assert_same("3 threads and single steps", &readings(5, 3, 5, 1), &one);
     assert_same("2 environments", &readings(2, 1, 5, 6), &one[..2]);
-    // The controls: environments differ, and noise comes from the seed, in all but the camera, which has none.
+    // Controls: environments differ, and noise depends on the seed for all sensors but the camera, which has no noise.
     let other = readings(5, 1, 6, 6);
     for (kind, words) in &one[0] {
         assert!(words != &one[1][kind], "{kind} is the same in two environments");
         assert!((0..5).all(|env| one[env][kind] == other[env][kind]) == (*kind == "camera"), "{kind}");
     }
-    // A new kind must be here, too.
+    // A new sensor type must be added here, too.
     let things = ["robot", "articulation", "rigid_object", "rigid_object_group", "terrain", "mjcf", "weld"];
     let types = EntityTypes::default();
     let mut kinds: Vec<&str> = types.names().filter(|name| !things.contains(name)).collect();
@@ -264,8 +264,8 @@ fn threads_environments_and_strides() {
     assert!(one[0].keys().eq(&kinds), "{kinds:?}");
 }
 
-/// Eager and lazy sensors read the same, for readers later than one measurement, with resets and writes in between. Lazy
-/// sensors count the measurements that were due.
+/// Eager and lazy sensors have equal readings, for readings with several measurements in between, with resets and
+/// writes. Lazy sensors count the measurements that were due.
 #[test]
 fn eager_and_lazy() {
     let exact: [Sampling; 2] = [
@@ -296,7 +296,7 @@ fn eager_and_lazy() {
     assert_same("lazy sensors", &lazy, &eager);
 }
 
-/// States of a simulation with targets, writes and resets on the way.
+/// Returns the states of a simulation with targets, writes and resets.
 fn states(settings: SimulationManagerCfg, with_arm: bool, with_sensors: bool) -> Vec<Vec<u64>> {
     let n = settings.num_envs;
     let (mut sim, arm) = world(settings, with_arm);
@@ -335,7 +335,7 @@ fn states(settings: SimulationManagerCfg, with_arm: bool, with_sensors: bool) ->
 fn motion_with_and_without_sensors() {
     let substeps = || SimulationManagerCfg { substeps: 2, ..cfg(3) };
     assert!(states(substeps(), true, true) == states(substeps(), true, false));
-    // RK4 solves its steps in the middle of them; sensors get values solved for their beginning.
+    // RK4 solves within its steps; sensors get values solved for the beginning of the step.
     let rk4 = || SimulationManagerCfg { integrator: Integrator::Rk4, ..cfg(3) };
     assert!(states(rk4(), false, true) == states(rk4(), false, false));
 }

@@ -1,4 +1,4 @@
-//! When sensors measure, and what they remember.
+//! Schedules and histories of sensors.
 
 use super::worlds::{cfg, cube, sr5};
 use kinetoscope::ndarray::{Array2, ArrayD, ArrayViewD, Axis, array};
@@ -11,18 +11,18 @@ fn remembering(sampling: SamplingCfg) -> SamplingCfg {
     SamplingCfg { history_length: LENGTH, ..sampling }
 }
 
-/// Compares readings, oldest first, with a history of shape (N, T, ...).
+/// Asserts that a history of shape (N, T, ...) holds the newest readings; `read` is oldest first.
 fn assert_newest_first(name: &str, read: &[ArrayD<f64>], history: &ArrayViewD<'_, f64>) {
     assert_eq!(history.shape()[1], LENGTH, "{name}");
     for (age, expected) in read.iter().rev().take(LENGTH).enumerate() {
         assert_eq!(history.index_axis(Axis(1), age), expected.view(), "{name}, {age} samples ago");
     }
-    // Three readings that are all the same would not tell their order.
+    // Control: equal readings would not verify their order.
     assert!(read[read.len() - 1] != read[read.len() - 2], "{name} does not change");
 }
 
-/// A sensor with a period of 5 steps holds the joint positions of the last multiple of 5. A reset restarts the clock of its
-/// environment only.
+/// A sensor with a period of 5 steps holds the joint positions of the last multiple of 5. A reset restarts the clock of
+/// its environment only.
 #[test]
 fn joint_state() {
     let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(2, 2));
@@ -52,13 +52,13 @@ fn joint_state() {
         sim.update(steps);
         assert_eq!(sim.sensor(id).unwrap().sample_counts().to_vec(), counts);
     }
-    // Efforts are those of the drives: gravity's about JOINT2.
+    // Efforts are those of the drives: they carry the weight about JOINT2.
     sim.update(400);
     assert_eq!(sim.sensor(always).unwrap().efforts(), sim.robot(robot).qf().view());
     assert!(sim.robot(robot).qf()[(0, 1)].abs() > 5.0);
 }
 
-/// Forces of a cube that falls onto an edge, so that it tumbles: forces of all directions.
+/// Forces of a cube that falls onto an edge and tumbles, so that forces have all directions.
 #[test]
 fn contact_history() {
     let mut sim = kinetoscope_testkit::worlds::sim(kinetoscope_testkit::worlds::cfg(2, 2));
@@ -85,12 +85,12 @@ fn contact_history() {
 
 const STEPS: u64 = 1_000_000;
 
-/// Steps of 5 ms between two measurements, and their latency.
+/// Steps of 5 ms between two measurements, and their latency in steps.
 const RATES: [(u64, u32); 4] = [(1, 0), (3, 0), (20, 0), (20, 7)];
 
-/// A cube that drifts with 1 mm/s in empty space: its place is the time. Every measurement falls on its tick, to the last
-/// one, for any number of steps at once. In single precision, intervals of 20 steps become 21 after 3200 of them, and 762 of
-/// the 10000 in a thousand seconds are wrong.
+/// A cube drifts at 1 mm/s in empty space, so its position is the time. Every measurement is at its tick, up to the
+/// last, for any number of steps per call. In single precision, intervals of 20 steps would become 21 after 3200 of
+/// them, and 762 of the 10000 in a thousand seconds would be wrong.
 #[test]
 fn million_steps() {
     let empty = SimulationManagerCfg { ground: None, gravity: [0.0; 3].into(), threads: Some(1), ..cfg(1) };
@@ -106,7 +106,7 @@ fn million_steps() {
     });
     let (mut step, mut block) = (0, 1);
     while step < STEPS {
-        // Blocks of 1 to 4999 steps, that no period divides for long.
+        // Blocks of 1 to 4999 steps, which no period divides for long.
         block = (block * 7 + 3) % 5000;
         let block_steps = block.max(1).min(STEPS - step);
         sim.update(block_steps as u32);
@@ -121,7 +121,7 @@ fn million_steps() {
                 let (stamp, time) = (sensor.stamp_history()[(0, age)], tick as f64 * dt);
                 let rounding = tick as f64 * time * f64::EPSILON / 2.0;
                 assert!((stamp - time).abs() <= rounding, "period {period}, step {step}: {stamp} s, not {time} s");
-                // The place, too, is a sum of so many small numbers, of five metres: 6e-10.
+                // The position is also a sum of small numbers, up to 5 m: 6e-10.
                 let place = sensor.sampler().history("source_pos_w")[(0, age, 0)];
                 assert!((place - 1e-3 * tick as f64 * dt).abs() < 1e-9, "{place} m at tick {tick}");
             }

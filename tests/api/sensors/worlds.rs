@@ -19,7 +19,8 @@ pub(crate) fn sim(num_envs: usize) -> SimulationManager {
     kinetoscope_testkit::worlds::sim(cfg(num_envs))
 }
 
-/// Adds a robot of these links and joints: fixed and without drives, but for what `change` does.
+/// Adds a robot of these links and joints, with a fixed base and without drives, after applying `change` to its
+/// configuration.
 pub(crate) fn add_robot(
     sim: &mut SimulationManager,
     uid: &str,

@@ -1,4 +1,4 @@
-//! Forces and torques of joints, against closed forms. A load at rest and a load that turns are the law
+//! Forces and torques of joints, against closed forms. For a load at rest and a rotating load see the law
 //! `physics::contacts::joint_wrench`.
 
 use super::worlds::{G, add_robot, joint, link, sim, sr5};
@@ -16,8 +16,8 @@ const SUMS: Tolerance = Tolerance::absolute(
     "hundreds of newtons, summed in another order; MuJoCo keeps principal axes as quaternions of 16 digits",
 );
 
-/// A moving arm by Newton and Euler: what the joint of a link exerts is what all links beyond it need to be accelerated, by
-/// the readings of an IMU in the centre of mass of each.
+/// A moving arm by Newton and Euler: the joint wrench accelerates all links beyond the joint. Their accelerations come
+/// from an IMU at the center of mass of each link.
 #[test]
 fn newton_euler() {
     let mut sim = sim(1);
@@ -56,9 +56,9 @@ fn newton_euler() {
     assert!(fastest > 1.0, "it moved: {fastest} rad/s");
 }
 
-/// A load that hangs beside a vertical axis, measured by a mount that is tilted, below the axis: the force is the weight,
-/// the torque the weight times the arm from the mount to the centre of mass, both in the axes of the mount. The base, which
-/// does not turn, is held with the weight of everything.
+/// A load that hangs beside a vertical axis, measured in a tilted mount frame below the joint. The force is the weight.
+/// The torque is the weight times the lever arm from the mount to the center of mass. Both are in the axes of the
+/// mount. The base does not rotate and is held with the weight of everything.
 #[test]
 fn mount_frame() {
     let (of_arm, of_mount, of_load) = (1.0, 0.5, 3.0);
@@ -73,7 +73,7 @@ fn mount_frame() {
     let links = vec!["arm".into(), "crane/base".into()];
     let frames = vec!["mount".into(), "arm".into()];
     let id = sim.add_sensor("wrench", JointWrenchCfg { links, frames, ..Default::default() }).unwrap();
-    // Turned about the vertical, it hangs as it did.
+    // Rotated about the vertical, the load keeps its rest position relative to the arm.
     sim.robot_mut(crane).write_qpos(&array![[0.0], [1.2]], None, None).unwrap();
     let mount = from_xyz_rpy([0.1, 0.2, -0.3], [0.4, -0.2, 0.7]);
     let up = |mass: f64| Vector3::new(0.0, 0.0, mass * G);

@@ -1,5 +1,5 @@
-//! Terrain in a simulation: heights that rays measure, against the array and against `mj_ray`; objects that lie
-//! on it; exports; and refused terrains.
+//! Terrain in a simulation: heights measured by rays, against the array and against `mj_ray`; objects at rest on it;
+//! exports; and invalid terrains.
 
 use kinetoscope::mujoco::{TARGET, Target, compile_file};
 use kinetoscope::ndarray::Array2;
@@ -14,7 +14,7 @@ use nalgebra::Point3;
 
 const RADIUS: f64 = 0.25;
 
-/// A grid of heights that no two points share, 3 m by 2 m, moved and turned.
+/// A terrain of 3 m by 2 m with distinct heights at neighboring points, moved and rotated.
 fn bumps() -> TerrainCfg {
     let heights = Array2::from_shape_fn((21, 31), |(r, c)| 0.3 * (0.7 * c as f64).sin() * (0.4 * r as f64).cos() - 0.1);
     let init_pose = from_xyz_rpy([0.4, -0.3, 0.2], [0.0, 0.0, 0.5]);
@@ -28,12 +28,12 @@ fn pit() -> TerrainCfg {
     TerrainCfg { uid: "pit".into(), heights, size: [4.0, 4.0], ..Default::default() }
 }
 
-/// Two environments with nothing else in them.
+/// Two environments without a ground.
 fn empty() -> SimulationManager {
     sim(SimulationManagerCfg { ground: None, ..cfg(2, 2) })
 }
 
-/// A ball beside the middle of the pit, above the surface.
+/// Adds a ball beside the middle of the pit, above the surface.
 fn add_ball(sim: &mut SimulationManager) -> ObjectId {
     sim.add_rigid_object(ball("ball", RADIUS, 0.5, [0.13, -0.08, 0.8])).unwrap()
 }
@@ -42,7 +42,7 @@ fn height_of(sim: &SimulationManager, ball: ObjectId) -> f64 {
     sim.rigid_object(ball).pose()[(0, 2)]
 }
 
-/// Height of the surface as the configuration describes it, computed with barycentric weights; `None` beside it.
+/// Returns the height of the surface from the configuration, computed with barycentric weights; `None` outside it.
 fn height(cfg: &TerrainCfg, heights: &Array2<f64>, [x, y]: [f64; 2]) -> Option<f64> {
     let local = cfg.init_pose.inverse() * Point3::new(x, y, 0.0);
     let (rows, columns) = heights.dim();
@@ -59,8 +59,8 @@ fn height(cfg: &TerrainCfg, heights: &Array2<f64>, [x, y]: [f64; 2]) -> Option<f
     Some(cfg.init_pose.translation.z + shared + lone * (s - t).abs())
 }
 
-/// MuJoCo keeps elevations in single precision: an error of 2^-25 of the range of 0.6 m, 2e-8 m. Control: heights of the
-/// neighboring points are found out. `height_at` is exact.
+/// MuJoCo keeps elevations in single precision: an error of 2^-25 of the range of 0.6 m, 2e-8 m. `height_at` is exact.
+/// Control: the heights of the neighboring points are measurably different.
 #[test]
 fn rays() {
     let cfg = bumps();
@@ -68,7 +68,7 @@ fn rays() {
     let shifted = Array2::from_shape_fn(cfg.heights.dim(), |(r, c)| cfg.heights[(r, (c + 1).min(last))]);
     let mut sim = empty();
     let id = sim.add_terrain(cfg.clone()).unwrap();
-    // Straight down over the whole field and beyond, none through a point of the grid.
+    // Straight down over the whole field and beyond, without a ray through a grid point.
     let scanner = RayCasterCfg {
         offset: Pose::translation(0.413, -0.287, 5.0),
         pattern: Grid { resolution: 0.037, size: [4.0, 4.0], ..Grid::default() }.into(),
@@ -109,9 +109,9 @@ fn rays() {
     assert!(control > 0.05, "the control: {control} m");
 }
 
-/// The ball comes to rest on all four walls, each at 45 degrees, a radius away from its middle: which is sqrt(2) radii above
-/// the bottom. MuJoCo's soft contacts let a ball of 0.5 kg sink by less than a millimeter. Contact sensors feel the terrain
-/// as a part of the world: at rest, its walls together carry the ball's weight.
+/// The ball comes to rest on all four walls, which have a slope of 45 degrees: its center is sqrt(2) radii above the
+/// bottom. MuJoCo's soft contacts let a ball of 0.5 kg sink by less than a millimeter. Contact sensors treat the
+/// terrain as a part of the world: at rest, its walls together carry the ball's weight.
 #[test]
 fn ball_at_rest() {
     let mut sim = empty();
@@ -128,7 +128,7 @@ fn ball_at_rest() {
         let place = [0.0, 0.0, 2.0_f64.sqrt() * RADIUS];
         assert!(center.iter().zip(place).all(|(a, b)| (a - b).abs() < 2e-3), "{center:?}, not {place:?}");
         for (k, weight) in [0.0, 0.0, 0.5 * 9.81].into_iter().enumerate() {
-            // The remaining motion, below 1e-3 m/s, is braked at some 0.01 s: below 0.05 N.
+            // The remaining motion, below 1e-3 m/s, decelerates within some 0.01 s: below 0.05 N.
             let total = sensor.total_forces_w()[(env, 0, k)];
             assert!((total - weight).abs() < 0.05, "axis {k}: {total}");
             let (normal, of_world) = (sensor.net_forces_w()[(env, 0, k)], sensor.force_matrix_w()[(env, 0, 0, k)]);
@@ -137,7 +137,8 @@ fn ball_at_rest() {
     }
 }
 
-/// It can be added when objects are falling already, which go on from their states. Control: without it they fall, g t² / 2.
+/// A terrain can be added while objects fall; they continue from their states. Control: without the terrain they fall
+/// by g t² / 2.
 #[test]
 fn added_later() {
     let mut sim = empty();
@@ -155,7 +156,7 @@ fn added_later() {
     assert!(height_of(&sim, ball) < -4.0);
 }
 
-/// The exported files hold the terrain.
+/// The exported files contain the terrain.
 #[test]
 fn export() {
     let mut sim = empty();
@@ -200,7 +201,7 @@ fn mistakes() {
     let mut add = |uid: &str, cfg| sim.add_terrain(TerrainCfg { uid: uid.into(), ..cfg });
     assert_refused(rows.map(|(uid, cfg, part)| (part, add(uid, cfg), "", [part])));
     assert_eq!(sim.scene().mask_ids().len(), 1);
-    // A name with characters that mean something in XML, and heights that are all the same.
+    // A name with XML special characters, and equal heights.
     let flat = TerrainCfg { uid: "<\"flat\" & wide>".into(), heights: Array2::from_elem((2, 2), 0.3), ..bumps() };
     let flat = sim.add_terrain(flat).unwrap();
     assert_eq!(sim.entities().terrain(flat).height_at([0.0, 0.0]), Some(0.3));

@@ -1,4 +1,4 @@
-//! Files that examples write, byte by byte as their formats say.
+//! Files that the examples write, checked byte by byte against their formats.
 
 use kinetoscope::ndarray::{Array, Dimension, arr1, arr2, arr3};
 use kinetoscope::record::npy;
@@ -8,10 +8,10 @@ use kinetoscope_testkit::urdf::Files;
 #[allow(dead_code, reason = "examples use the rest")]
 mod ply;
 
-/// The type that the `super` of `ply` has in examples.
+/// The type that `super` provides to `ply` in the examples.
 type Result<T = ()> = std::result::Result<T, Box<dyn std::error::Error>>;
 
-/// Names, types and order of Greg Turk, The PLY Polygon File Format, 1994; numbers of IEEE 754.
+/// Names, types and order of the elements follow Greg Turk, The PLY Polygon File Format, 1994; numbers are IEEE 754.
 #[test]
 fn ply_bytes() {
     let points = [([0.5, -1.0, 2.0], [1, 2, 3]), ([0.0, 0.25, -4.0], [255, 0, 128])];
@@ -31,8 +31,8 @@ fn ply_bytes() {
     assert!(nowhere.to_string().contains("folder.ply"), "{nowhere}");
 }
 
-/// Compares an array with the bytes that `numpy.save` (2.x) writes for it: the dictionary is filled up with spaces to byte
-/// 127, and ended with a line feed.
+/// Compares an array with the bytes of `numpy.save` (2.x): the dictionary is padded with spaces to byte 127 and ends
+/// with a line feed.
 #[track_caller]
 fn check_npy<S: npy::Number, D: Dimension>(array: &Array<S, D>, [kind, shape]: [&str; 2], data: &[u8]) {
     let dictionary = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
@@ -52,7 +52,7 @@ fn npy_as_numpy_writes() {
     check_npy(&arr3(&[[[255_u8]]]), ["|u1", "1, 1, 1"], b"\xff");
     check_npy(&arr2::<u8, 4>(&[]), ["|u1", "0, 4"], b"");
     check_npy(&arr1(&[-2.5_f64]), ["<f8", "1,"], b"\x00\x00\x00\x00\x00\x00\x04\xc0");
-    // An array in Fortran order in memory is written in C order.
+    // An array with Fortran order in memory is written in C order.
     let turned = arr2(&[[0, 2], [1, 3]]).reversed_axes();
     assert!(!turned.is_standard_layout());
     check_npy(&turned, ["<i4", "2, 2"], b"\x00\x00\x00\x00\x01\x00\x00\x00\x02\x00\x00\x00\x03\x00\x00\x00");

@@ -1,4 +1,4 @@
-//! First views: what is drawn fills the image, and nothing of it is cut off. The judge is the mask channel, pixel by pixel.
+//! Initial camera views: the scene fills the image and nothing is cut off, checked pixel by pixel on the mask channel.
 
 use super::view;
 use kinetoscope::prelude::*;
@@ -10,7 +10,7 @@ use kinetoscope::sim::{FreeCamera, Still};
 use kinetoscope_testkit::urdf::Files;
 use kinetoscope_testkit::worlds::{sr5, text_robot, urdf_robot};
 
-/// Share of the width and of the height of the image that the box around everything but the ground has, and whether the box
+/// The width and height of the bounding box of all objects but the ground, as shares of the image; and true if the box
 /// touches the border.
 fn filled(still: &Still, view: &View) -> ([f64; 2], bool) {
     let [width, height] = [view.width, view.height];
@@ -36,15 +36,16 @@ fn of_free(size: [usize; 2], free: FreeCamera) -> View {
     view(size, free.fovy, &look_at_pose(free.eye, free.target, [0.0, 0.0, 1.0]).unwrap(), free.clip)
 }
 
-/// A body that is drawn as a mesh and collides with nothing: MuJoCo's model has a ball of a millimetre in its place.
+/// A body with a visual mesh and no collision shape: MuJoCo's model represents it by a ball of a millimeter.
 fn mesh_alone(files: &Files) -> RobotCfg {
     files.write("mesh.obj", "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
     let text = r#"<robot name="r"><link name="a"><visual><geometry><mesh filename="mesh.obj"/></geometry></visual></link></robot>"#;
     text_robot(files, "robot", text)
 }
 
-/// Cause: the first view was that of MuJoCo's extent, which knows neither the visual meshes of a URDF nor the shape of the image,
-/// and that of windows was made for centers of mass: an arm had a quarter of the height, and robots in front were cut off.
+/// Regression: the first view used MuJoCo's model extent, which ignores a URDF's visual meshes and the aspect ratio of
+/// the image. The view of windows was fitted to centers of mass: an arm had a quarter of the height, and robots in
+/// front were cut off.
 #[test]
 fn fill_the_image() {
     let files = Files::default();
@@ -60,7 +61,7 @@ fn fill_the_image() {
         for ground in [None, Some(GroundCfg::default())] {
             let cfg = SimulationManagerCfg { num_envs, ground, ..Default::default() };
             let mut sim = kinetoscope_testkit::worlds::sim(cfg);
-            // Parts below the ground are not seen.
+            // Objects below the ground would be hidden.
             sim.add_robot(RobotCfg { ground_clearance: Some(0.0), ..robot.clone() }).unwrap();
             let still = Still::overview(&mut sim, None, &[]).unwrap();
             for size in [[320, 180], [120, 160], [200, 50]] {
@@ -71,7 +72,7 @@ fn fill_the_image() {
                     assert!((0.6..=0.95).contains(&share) && !cut, "{name} at {size:?}: {shares:?}, cut off: {cut}");
                 }
             }
-            // The control: from twice as far away it is too small.
+            // Control: at twice the distance the scene is too small.
             let near = still.first_view([320, 180]);
             let eye = [0, 1, 2].map(|k| 2.0 * near.eye[k] - near.target[k]);
             let (shares, _) = filled(&still, &of_free([320, 180], FreeCamera { eye, ..near }));
@@ -80,7 +81,8 @@ fn fill_the_image() {
     }
 }
 
-/// An MJCF file is seen in the direction that its author chose, without the floor and the walls around.
+/// The view of an MJCF file keeps the azimuth and elevation of the file, and ignores the floor and the surrounding
+/// walls.
 #[test]
 fn of_mjcf() {
     let files = Files::default();

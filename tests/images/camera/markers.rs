@@ -1,4 +1,4 @@
-//! Markers of sensors, in the colours of cameras that draw them.
+//! Debug markers of sensors in the color images of cameras with `draw_markers`.
 
 use kinetoscope::prelude::*;
 use kinetoscope::render::frame::Channels;
@@ -12,11 +12,11 @@ use kinetoscope_testkit::worlds::{cfg, fixed, look_at, object};
 const SIDE: usize = 64;
 /// Focal length \[pixels\].
 const FOCAL: f64 = 60.0;
-/// Place of the camera \[m\]; it looks along -x.
+/// Position of the camera \[m\]; it looks along -x.
 const EYE: [f64; 3] = [2.0, 0.0, 1.0];
 const RADIUS: f64 = 0.4;
 
-/// Shows a red ball in environment 1, which rises by `rise` \[m\] from step to step.
+/// A sensor with a marker: a red ball in environment 1 that rises by `rise` \[m\] per step.
 #[derive(Clone, Copy, Debug)]
 struct Ball {
     rise: f64,
@@ -24,7 +24,7 @@ struct Ball {
 }
 
 impl Ball {
-    /// Center of the ball after some steps.
+    /// Center of the ball after `step` steps \[m\].
     fn at(self, step: u64) -> [f64; 3] {
         [0.0, 0.1, 1.05 + self.rise * step as f64]
     }
@@ -65,7 +65,7 @@ impl Sensor for Ball {
     }
 }
 
-/// A camera without shadows: those of a ball are beside it.
+/// A camera without shadows, which would show beside the ball.
 fn camera(renderer: Renderer, draw_markers: bool) -> CameraCfg {
     CameraCfg {
         width: SIDE,
@@ -87,18 +87,20 @@ fn world() -> SimulationManager {
     sim
 }
 
-/// The distance of the ray through a pixel's centre to the edge of the ball \[pixels\]; negative inside. The ray's direction in
-/// the camera is ((u - cx) / f, (v - cy) / f, 1), and it meets the ball where its angle to the centre is at most
-/// asin(r / d). A pixel is at least 1 / f (1 + tan²) wide as an angle, which is 0.78 / f in the corners.
+/// Distance of the ray through a pixel's center from the outline of the ball \[pixels\]; negative inside.
+///
+/// The ray's direction in the camera frame is ((u - cx) / f, (v - cy) / f, 1). It meets the ball if its angle to the
+/// center is at most asin(r / d). The angular width of a pixel is at least 1 / f (1 + tan²), which is 0.78 / f in the
+/// corners.
 fn beyond_the_edge(center: [f64; 3], u: usize, v: usize) -> f64 {
     let ray = [u, v].map(|k| (k as f64 + 0.5 - SIDE as f64 / 2.0) / FOCAL);
     let ray = nalgebra::Vector3::new(ray[0], ray[1], 1.0);
-    // Looking along -x with z up: right in the image is +y, down is -z.
+    // The camera looks along -x with z up: right in the image is +y, down is -z.
     let to = nalgebra::Vector3::new(center[1] - EYE[1], EYE[2] - center[2], EYE[0] - center[0]);
     (ray.angle(&to) - (RADIUS / to.norm()).asin()) * FOCAL / 0.78
 }
 
-/// Colours of environment `env`: row after row, red, green, blue.
+/// RGB colors of environment `env`, in row-major order.
 fn colors(sim: &SimulationManager, id: SensorId<Camera>, env: usize) -> Vec<[u8; 3]> {
     let camera = sim.sensor(id).unwrap();
     let color = camera.color().unwrap();
@@ -109,7 +111,8 @@ fn is_red([r, g, b]: [u8; 3]) -> bool {
     r > 60 && u32::from(r) > 2 * u32::from(g.max(b))
 }
 
-/// Inside of the edge every pixel is the ball's, beyond it every pixel is what it was (or not red).
+/// Asserts that all pixels inside the outline show the ball. Pixels outside must be unchanged, or not red if
+/// `same_elsewhere` is false.
 #[track_caller]
 fn covers(center: [f64; 3], with: &[[u8; 3]], without: &[[u8; 3]], same_elsewhere: bool) {
     let (mut inside, mut outside) = (0, 0);
@@ -124,7 +127,7 @@ fn covers(center: [f64; 3], with: &[[u8; 3]], without: &[[u8; 3]], same_elsewher
             assert!(same, "pixel {k}, {beyond} pixels outside, is {:?} instead of {:?}", with[k], without[k]);
         }
     }
-    // A disc of 0.4 m at 2 m through 60 pixels has a radius of about 12.
+    // A disc of 0.4 m at 2 m, with a focal length of 60 pixels, has a radius of about 12 pixels.
     assert!((300..600).contains(&inside) && outside > 3000, "{inside} inside, {outside} outside");
 }
 
@@ -135,7 +138,7 @@ fn every_renderer() {
         let exact = renderer != few;
         let (mut sim, mut bare) = (world(), world());
         let ball = sim.add_sensor("ball", STILL).unwrap();
-        // Noise of the path tracer is drawn by the name of the camera.
+        // The noise of the path tracer is keyed by the name of the camera.
         let [off, on] =
             [("off", false), ("on", true)].map(|(name, draw)| sim.add_sensor(name, camera(renderer, draw)).unwrap());
         let reference = bare.add_sensor("off", camera(renderer, false)).unwrap();
@@ -156,7 +159,7 @@ fn every_renderer() {
                 assert_eq!(other.position().unwrap(), bare.position().unwrap(), "{renderer:?}");
             }
         }
-        // The control: the switch of the sensor, from the next image on.
+        // Control: the sensor's debug switch removes the marker from the next image on.
         sim.scene_mut().set_debug_vis(ball, false).unwrap();
         assert!(colors(&sim, on, 1).iter().any(|pixel| is_red(*pixel)), "the captured image stays");
         sim.update(1);
@@ -168,7 +171,7 @@ fn every_renderer() {
     }
 }
 
-/// However late an image is read, and however late it arrives: the ball is where it was at its instant.
+/// The ball is shown at its position at the capture time, for lazy rendering and for delayed images.
 #[test]
 fn instant_of_the_image() {
     for (lazy, latency_steps, seen_at) in [(true, 0, 10), (false, 0, 10), (true, 4, 10), (false, 4, 10), (true, 8, 5)] {
@@ -182,13 +185,13 @@ fn instant_of_the_image() {
         assert_eq!(sim.cfg().physics_dt, 0.01);
         sim.update(14);
         covers(RISING.at(seen_at), &colors(&sim, on, 1), &colors(&sim, off, 1), true);
-        // A write to the state is seen at once, and so are its markers.
+        // A write to the state refreshes the image and its markers at once.
         sim.reset(None).unwrap();
         covers(RISING.at(0), &colors(&sim, on, 1), &colors(&sim, off, 1), true);
     }
 }
 
-/// An image with exposure time and rolling shutter shows markers, too, which stand still.
+/// Images with exposure time and rolling shutter show markers too; the markers do not move within an exposure.
 #[test]
 fn shutter() {
     let mut sim = world();
@@ -204,7 +207,7 @@ fn shutter() {
     assert_eq!(sim.sensor(on).unwrap().depth().unwrap(), sim.sensor(off).unwrap().depth().unwrap());
 }
 
-/// Nearer objects hide markers, and a camera does not draw its own: its frame would be all it sees.
+/// Closer objects occlude markers. A camera does not draw its own marker, whose frustum would cover the image.
 #[test]
 fn hidden_and_own() {
     let mut sim = world();
@@ -215,7 +218,7 @@ fn hidden_and_own() {
     sim.scene_mut().set_debug_vis(off, false).unwrap();
     let on = sim.add_sensor("on", cfg(true)).unwrap();
     assert_eq!(colors(&sim, on, 1), colors(&sim, off, 1));
-    // The control: markers of another camera are seen.
+    // Control: markers of another camera are visible.
     let extrinsics = look_at([1.5, 0.3, 1.0], [0.8, 0.3, 1.2]);
     sim.add_sensor("other", CameraCfg { extrinsics, ..cfg(false) }).unwrap();
     sim.update(1);

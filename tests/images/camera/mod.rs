@@ -1,4 +1,4 @@
-//! Cameras in a simulation, against MuJoCo's own rays and against the poses of the simulation.
+//! Cameras in a simulation, compared with MuJoCo's rays and with the poses of the simulation.
 
 mod files;
 mod first_views;

@@ -1,4 +1,4 @@
-//! Every sample model of MuJoCo and every vendor robot can be drawn; cameras of files.
+//! Rendering of MuJoCo's sample models and the vendor robots; cameras defined in MJCF files.
 
 use super::view;
 use kinetoscope::mujoco as mj;
@@ -10,7 +10,7 @@ use kinetoscope::sim::{Result, Still};
 use kinetoscope_testkit::needs::{files_below, sample_model};
 use kinetoscope_testkit::urdf::Files;
 
-/// Draws a still from the place of MuJoCo's viewers, and returns the share of pixels that see something.
+/// Renders a scene from the free camera of MuJoCo's viewers; returns the share of pixels with an object.
 fn seen(still: &Still) -> f64 {
     let free = still.free_camera();
     let pose = look_at_pose(free.eye, free.target, [0.0, 0.0, 1.0]).unwrap();
@@ -67,8 +67,8 @@ fn vendor_robots() {
     }
 }
 
-/// Cameras are those of the file in its order, at the poses of the file for the positions given: with ROS's axes, MuJoCo's
-/// turned by half a turn about x. A hinge at 0.5 rad about z turns its camera.
+/// Cameras keep the order and the poses of the file at the given joint positions. Their axes follow ROS: MuJoCo's
+/// camera axes, rotated by half a turn about x. A hinge at 0.5 rad about z rotates its camera.
 #[test]
 fn cameras_of_a_file() {
     let files = Files::default();
@@ -84,7 +84,7 @@ fn cameras_of_a_file() {
     for (camera, at, turn) in [(fixed, [1.0, 2.0, 3.0], 0.0_f64), (moved, [0.2 * cos, 0.2 * sin, 1.0], 0.5)] {
         let pose = camera.world_from_camera;
         assert!((pose.translation.vector - nalgebra::Vector3::from(at)).norm() < 1e-9, "{pose}");
-        // Right is x, down is -y; it looks along -z.
+        // Right is x, down is -y; the camera looks along -z.
         let axes = [[turn.cos(), turn.sin(), 0.0], [turn.sin(), -turn.cos(), 0.0], [0.0, 0.0, -1.0]];
         for (k, axis) in axes.into_iter().enumerate() {
             let found = pose.rotation * nalgebra::Vector3::ith(k, 1.0);

@@ -1,9 +1,9 @@
-//! Our images against those of MuJoCo's own renderer, drawn by a Python with MuJoCo 4
-//! (`cargo xtask test --mujoco 4` makes it).
+//! Comparison with images of MuJoCo's own renderer, made by a Python with MuJoCo 4 (installed by `cargo xtask test
+//! --mujoco 4`).
 //!
-//! Pixels at silhouettes are left out: where the 3 by 3 pixels around one do not all show the same geom, or where depth
-//! has a step or a kink among them. The renderers differ in what they round: MuJoCo draws round shapes as polyhedra and
-//! pixels through a depth buffer.
+//! Pixels at silhouettes are excluded: pixels whose 3 x 3 neighborhood shows several geoms, or a step or a kink of the
+//! depth. The renderers differ in their approximations: MuJoCo tessellates round shapes and quantizes depth in a depth
+//! buffer.
 
 use super::view;
 use kinetoscope::mujoco as mj;
@@ -26,7 +26,7 @@ const FOVY_DEG: f64 = 45.0;
 /// Images of a renderer.
 struct Images {
     depth: Vec<f32>,
-    /// The element that MuJoCo's renderer shows (see the script), or -1; of ours, the mask.
+    /// Element number of MuJoCo's renderer (see the script), or -1; the mask id for our renderer.
     ids: Vec<i32>,
     color: Vec<[u8; 3]>,
 }
@@ -36,7 +36,7 @@ fn theirs(model: &Path, folder: &Path) -> Images {
     let [width, height] = SIZE.map(|n| n.to_string());
     let mut command = Command::new(python_renderer());
     command.arg(script).arg(model).args(["judge", &width, &height]).arg(folder);
-    // Its MuJoCo writes a log of warnings to the folder that it runs in.
+    // MuJoCo writes its warning log to the working directory.
     let status = command.current_dir(folder).status();
     assert!(status.unwrap().success(), "MuJoCo's renderer did not draw");
     let bytes = |name: &str| std::fs::read(folder.join(name)).unwrap();
@@ -47,7 +47,7 @@ fn theirs(model: &Path, folder: &Path) -> Images {
     }
 }
 
-/// The mask ids of elements: of geoms by number, and by name those of tendons, skins and flexes with their class.
+/// Mask ids of the elements: of geoms by index; of tendons, skins and flexes by class.
 struct MaskIds {
     geoms: Vec<i32>,
     others: [Vec<i32>; 3],
@@ -61,7 +61,7 @@ impl MaskIds {
     }
 }
 
-/// Ours of the same file, with the mask ids of its elements.
+/// Our images of the same file, with the mask ids of its elements.
 fn ours(model: &Path, eye: [f64; 3], target: [f64; 3]) -> (Images, MaskIds) {
     let model = mj::compile_file(model).unwrap().into_model();
     let mut data = mj::Data::new(&model).unwrap();
@@ -83,13 +83,13 @@ fn ours(model: &Path, eye: [f64; 3], target: [f64; 3]) -> (Images, MaskIds) {
         let name = model.name(ObjectKind::Geom, geom).unwrap_or_else(|| format!("geom {geom}"));
         visible.ids().iter().find(|id| id.geoms.contains(&name)).map_or(0, |id| id.id)
     };
-    // In MuJoCo's order, all of them drawn.
+    // In MuJoCo's order; the model renders all of them.
     let of_class = |class: &str| visible.ids().iter().filter(|id| id.class == class).map(|id| id.id).collect();
     let others = ["tendon", "skin", "flex"].map(of_class);
     (images, MaskIds { geoms: (0..model.ngeom()).map(mask_of).collect(), others })
 }
 
-/// The MJCF with a camera "judge" in its world.
+/// The MJCF with a camera named "judge" in its world body.
 fn with_camera(mjcf: &str, eye: [f64; 3], target: [f64; 3]) -> String {
     let rotation = look_at_pose(eye, target, [0.0, 0.0, 1.0]).unwrap().rotation;
     // MuJoCo's cameras look along -z, with y up.
@@ -101,30 +101,32 @@ fn with_camera(mjcf: &str, eye: [f64; 3], target: [f64; 3]) -> String {
     format!("{world}{camera}{end}")
 }
 
-/// The colours of a pixel in two images.
+/// Colors of one pixel in two images.
 type Pair = ([f64; 3], [f64; 3]);
 
-/// How two images of one scene agree.
+/// Agreement of two images of one scene.
 #[derive(Debug)]
 struct Agreement {
-    /// Pixels that show something, and those of them that are off silhouettes.
+    /// Number of pixels with an object, and of those the number off silhouettes.
     seen: usize,
     compared: usize,
-    /// Share of the compared pixels where masks are the same and depths differ by less than [`DEPTH`] of them.
+    /// Share of the compared pixels with the same mask and a relative depth difference below [`DEPTH`].
     same: f64,
     /// Correlation of the brightness of the compared pixels.
     brightness: f64,
-    /// Mean distance of their colors when both are made equally bright, 0..=1, of pixels that are not nearly black ([`DARK`]).
+    /// Mean color distance at equal brightness, 0..=1, over the pixels that are not nearly black ([`DARK`]).
     hue: f64,
 }
 
-/// MuJoCo draws a circle as a polygon of 256 corners, which is up to r (1 - cos(pi / 256)) = 7.5e-5 r inside of it: 0.02 mm
-/// for the largest shapes here. A slanted surface shows it longer, at 20 times at most where the neighbours still agree with
-/// a plane: 0.4 mm, of depths above 1 m.
+/// Largest relative difference of depths.
+///
+/// MuJoCo renders a circle as a polygon of 256 corners, which is up to r (1 - cos(pi / 256)) = 7.5e-5 r inside of the
+/// circle: 0.02 mm for the largest shapes here. On a slanted surface the depth error grows by a factor of at most 20,
+/// where the neighbors still agree with a plane: 0.4 mm, for depths above 1 m.
 const DEPTH: f64 = 5e-4;
 
-/// Brightness below which a pixel has no hue to compare: rounding to whole numbers moves a channel by up to 0.5, which is more
-/// than 3 % of the brightness there.
+/// Brightness below which the hue of a pixel is ignored: rounding to integers changes a channel by up to 0.5, which is
+/// more than 3 % of the brightness there.
 const DARK: f64 = 16.0;
 
 fn compare(theirs: &Images, ours: &Images, mask_of: &MaskIds) -> Agreement {
@@ -145,7 +147,7 @@ fn compare(theirs: &Images, ours: &Images, mask_of: &MaskIds) -> Agreement {
                 same += usize::from(ours.ids[k] == 0 && ours.depth[k].is_infinite());
                 continue;
             };
-            // Inverse depth of a plane is linear in the image.
+            // The inverse depth of a plane is linear in the image.
             let inverse = |n: usize| 1.0 / f64::from(theirs.depth[n]);
             let bend = |a: usize, b: usize| (inverse(a) + inverse(b) - 2.0 * inverse(k)).abs() / inverse(k);
             let bent = (0..4).any(|i| bend(around[i], around[8 - i]) > 2e-3);
@@ -176,7 +178,7 @@ fn compare(theirs: &Images, ours: &Images, mask_of: &MaskIds) -> Agreement {
     Agreement { seen, compared, same: same as f64 / compared as f64, brightness: covariance / (va * vb).sqrt(), hue }
 }
 
-/// `files` has what the model refers to.
+/// Checks one scene; `files` holds the assets of the model.
 fn check(name: &str, files: &Files, mjcf: &str, eye: [f64; 3], target: [f64; 3]) {
     let file = files.write("judged.xml", with_camera(mjcf, eye, target));
     let theirs = theirs(&file, files.folder());
@@ -185,12 +187,13 @@ fn check(name: &str, files: &Files, mjcf: &str, eye: [f64; 3], target: [f64; 3])
     println!("{name}: {agreement:?}");
     assert!(agreement.seen > 20_000 && agreement.compared > SIZE[0] * SIZE[1] / 2, "{name}: {agreement:?}");
     assert!(agreement.same >= 0.999, "{name}: {agreement:?}");
-    // Light differs: ours bends what is bright, and shades pixels, not vertices. Bright and dark areas and hues must be alike.
+    // Lighting differs: our renderer tone-maps highlights, and shades per pixel instead of per vertex. Bright and dark
+    // areas and hues must agree.
     assert!(agreement.brightness > 0.97 && agreement.hue < 0.06, "{name}: {agreement:?}");
     let exchanged = Images { color: images.color.iter().map(|&[r, g, b]| [b, r, g]).collect(), ..images };
     let wrong = compare(&theirs, &exchanged, &mask_of);
     assert!(wrong.hue > 1.5 * agreement.hue, "{name}: exchanged colours go unnoticed: {wrong:?}");
-    // The control: a camera that looks 5 mm past the target.
+    // Control: a camera that looks 5 mm past the target.
     let aside = ours(&file, eye, [target[0] + 0.005, target[1], target[2] + 0.005]).0;
     let wrong = compare(&theirs, &aside, &mask_of);
     assert!(wrong.same < 0.99, "{name}: a turned camera goes unnoticed: {wrong:?}");
@@ -203,7 +206,7 @@ fn humanoid() {
     check("humanoid", &Files::default(), &mjcf, [2.5, -2.0, 1.8], [0.0, 0.0, 0.9]);
 }
 
-/// The vendor's arm with its real meshes, as it is exported.
+/// The vendor's arm with its original meshes, as exported.
 #[test]
 #[ignore = "needs MuJoCo's own renderer: cargo xtask test --mujoco 4"]
 fn arm() {
@@ -215,7 +218,7 @@ fn arm() {
     check("vendor SR5", &files, &mjcf, [1.5, -1.1, 1.1], [0.1, 0.0, 0.5]);
 }
 
-/// Tendons with and without something to go around, and slack ones; a skin over two bones; cloth, a cable and a solid.
+/// Tendons with and without wrapping, and slack ones; a skin over two bones; a cloth, a cable and a solid flex.
 const DEFORMING: &str = r#"<mujoco>
   <visual><headlight ambient="0.3 0.3 0.3" diffuse="0.6 0.6 0.6"/></visual>
   <worldbody>
@@ -248,7 +251,7 @@ const DEFORMING: &str = r#"<mujoco>
       vertweight="0.5 0.5 0.5 0.5 1 1 1 1"/>
   </skin></deformable></mujoco>"#;
 
-/// Root cause once: cameras drew geoms and sites only.
+/// Regression: cameras rendered only geoms and sites.
 #[test]
 #[ignore = "needs MuJoCo's own renderer: cargo xtask test --mujoco 4"]
 fn tendons_skins_and_flexes() {

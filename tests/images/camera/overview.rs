@@ -12,21 +12,21 @@ use kinetoscope_testkit::worlds::{cfg, fixed, mask_id, object};
 
 const SIZE: [usize; 2] = [400, 400];
 
-/// A ball of 10 cm beside the middle of every environment, environments 3 m apart.
+/// A ball of 10 cm next to the center of every environment; the environments are 3 m apart.
 fn balls(num_envs: usize) -> SimulationManager {
     let mut sim = kinetoscope_testkit::worlds::sim(SimulationManagerCfg { arena_space: 3.0, ..cfg(num_envs, 2) });
     sim.add_rigid_object(fixed(object("ball", ObjectShape::Sphere { radius: 0.1 }, [0.4, -0.2, 0.1]))).unwrap();
     sim
 }
 
-/// From 12 m above.
+/// A view from 12 m above.
 fn above() -> View {
     let pose = look_at_pose([0.0, 0.0, 12.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
     let (world_from_camera, [width, height]) = (PoseF32::from(&pose), SIZE);
     View { width, height, fx: 500.0, fy: 500.0, cx: 200.0, cy: 200.0, near: 0.1, far: 50.0, world_from_camera }
 }
 
-/// Masks and positions from above.
+/// Mask and position image from above.
 struct Seen(Vec<i32>, Vec<[f32; 3]>);
 
 impl Seen {
@@ -36,7 +36,8 @@ impl Seen {
         Self(frame.mask.unwrap(), frame.position.unwrap().as_chunks().0.to_vec())
     }
 
-    /// Number of pixels of an object within 0.5 m of `place`; the middle of them must be within 3 cm.
+    /// Number of pixels of an object within 0.5 m of `place` \[m\]; asserts that their mean position is within 3 cm of
+    /// it.
     fn near(&self, id: i32, place: [f64; 2]) -> usize {
         let near = |p: &[f32; 3]| (0..2).all(|k| (f64::from(p[k]) - place[k]).abs() < 0.5);
         let chosen: Vec<_> = self.0.iter().zip(&self.1).filter(|(mask, p)| **mask == id && near(p)).collect();
@@ -56,8 +57,8 @@ fn environments_and_markers() {
     let mut of_balls = 0;
     for env in 0..5 {
         let count = seen.near(id, [origins[(env, 0)] + 0.4, origins[(env, 1)] - 0.2]);
-        // A pixel is 24 mm wide down there: the ball is some 54 of them. The side that faces the camera is what is seen,
-        // whose middle is off by less than a tenth of the radius at 25 degrees.
+        // A pixel is 24 mm wide at this distance, so the ball covers about 54 pixels. Only the side that faces the
+        // camera is visible; its mean is off by less than a tenth of the radius at 25 degrees.
         assert!((35..75).contains(&count), "environment {env}: {count} pixels");
         of_balls += count;
     }
@@ -83,7 +84,7 @@ fn selection_and_refusals() {
     assert!(Still::overview(&mut sim, None, &[(EnvId(9), marker)]).is_err());
 }
 
-/// Persistent worker threads draw the images of a single thread, and go on drawing after another pool was dropped.
+/// Persistent worker threads render the same images as a single thread, and continue after another pool was dropped.
 #[test]
 fn persistent_threads() {
     let mut sim = balls(5);

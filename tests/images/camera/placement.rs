@@ -1,4 +1,4 @@
-//! Images from the right place, with the right content, in every environment.
+//! Placement of cameras, and content of their images, in every environment.
 
 use kinetoscope::ndarray::{Axis, array};
 use kinetoscope::prelude::*;
@@ -14,7 +14,7 @@ fn sim(num_envs: usize, threads: usize) -> (SimulationManager, RobotId, ObjectId
     (sim, robot, cube)
 }
 
-/// The camera of the tutorial, above the cube, looking straight down.
+/// The camera of the tutorial: above the cube, looking straight down.
 fn above() -> CameraCfg {
     let placement = Placement::Pose { pos: [1.2, -0.2, 1.5], rotation: from_wxyz([0.0, 0.0, 1.0, 0.0]) };
     CameraCfg {
@@ -29,7 +29,7 @@ fn above() -> CameraCfg {
     }
 }
 
-/// A camera on a link is a free camera at the composed pose: the same bits.
+/// A camera on a link renders the same bits as a free camera at the composed pose.
 #[test]
 fn camera_on_a_link() {
     let (mut sim, robot, _) = sim(1, 1);
@@ -51,7 +51,7 @@ fn camera_on_a_link() {
     assert!(a.mask().unwrap().iter().any(|&m| m != 0));
 }
 
-/// An object that is moved in one environment is moved in the images of that environment only.
+/// An object moved in one environment moves only in the images of that environment.
 #[test]
 fn environments() {
     let (mut sim, _, cube) = sim(3, 2);
@@ -59,7 +59,7 @@ fn environments() {
     let of_cube = sim.rigid_object(cube).mask_id();
     let before = sim.sensor(id).unwrap().mask().unwrap().to_owned();
     sim.rigid_object_mut(cube).write_pose(&array![[5.0, 5.0, 0.5, 1.0, 0.0, 0.0, 0.0]], Some(&[EnvId(1)])).unwrap();
-    // A write is seen at once: nothing stale.
+    // A write refreshes the images at once.
     let mask = sim.sensor(id).unwrap().mask().unwrap().to_owned();
     for env in 0..3 {
         let [mask, before] = [&mask, &before].map(|mask| mask.index_axis(Axis(0), env));
@@ -68,7 +68,7 @@ fn environments() {
     }
 }
 
-/// Fused links keep ids of their own, and ids stay when more is added.
+/// Fused links keep their own ids, and ids do not change when entities are added.
 #[test]
 fn mask_ids() {
     let (mut sim, ..) = sim(1, 1);

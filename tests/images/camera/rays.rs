@@ -1,7 +1,8 @@
-//! Depth, mask, normal and position of every pixel against `mj_ray`, on MuJoCo's sample models and on random scenes.
+//! Depth, mask, normal and position of every pixel compared with `mj_ray`, on MuJoCo's sample models and on random
+//! scenes.
 //!
-//! Both see planes from the front and solids from both sides. Pixels at silhouettes are left out: where the four rays
-//! around a pixel's centre, half a pixel away, hit other geoms than its own, or leave its tangent plane.
+//! Renderer and `mj_ray` both see planes from the front and solids from both sides. Pixels at silhouettes are excluded:
+//! pixels for which a ray half a pixel away from the center hits another geom or leaves the tangent plane.
 
 use super::view;
 use crate::rays::judge::{Dice, FAN, GROUPS, at_rest, data_of, data_with, height_field, mask_of};
@@ -18,7 +19,7 @@ use nalgebra::Vector3;
 
 const SIZE: [usize; 2] = [160, 120];
 
-/// A camera in the world of `data`, which casts rays of MuJoCo.
+/// A camera in the world of `data` that casts rays with `mj_ray`.
 struct RayCamera<'a> {
     data: &'a Data,
     view: View,
@@ -27,7 +28,7 @@ struct RayCamera<'a> {
 
 struct Hit {
     geom: usize,
-    /// Depth along the optical axis: the distance in multiples of the direction.
+    /// Depth along the optical axis \[m\]: the ray parameter of a direction with z = 1 in the camera frame.
     depth: f64,
     point: Vector3<f64>,
     direction: Vector3<f64>,
@@ -38,7 +39,7 @@ impl RayCamera<'_> {
         let [fx, fy, cx, cy, near, far] =
             [self.view.fx, self.view.fy, self.view.cx, self.view.cy, self.view.near, self.view.far].map(f64::from);
         let direction = self.pose.rotation * Vector3::new((u - cx) / fx, (v - cy) / fy, 1.0);
-        // The camera sees nothing nearer than its near plane, a ray starts there.
+        // The ray starts at the near plane, because the camera sees nothing closer.
         let origin = self.pose.translation.vector + direction * near;
         let hit = self.data.ray(origin.into(), direction.into(), GROUPS).unwrap()?;
         let depth = hit.distance + near;
@@ -46,20 +47,20 @@ impl RayCamera<'_> {
         (depth < far).then_some(Hit { geom: hit.geom, depth, point, direction })
     }
 
-    /// The normal of the surface at a pixel, from four rays a hundredth of a pixel around it; `None` where they do not lie
-    /// in one plane: there is an edge between them.
+    /// The surface normal at a pixel, from four rays a hundredth of a pixel around it. `None` if their hits are not in
+    /// one plane, because an edge lies between them.
     fn tangent_plane(&self, u: f64, v: f64) -> Option<Vector3<f64>> {
         const STEP: f64 = 0.01;
         let at = |du, dv| self.ray(u + du * STEP, v + dv * STEP).map(|hit| hit.point);
         let (left, right, up, down) = (at(-1.0, 0.0)?, at(1.0, 0.0)?, at(0.0, -1.0)?, at(0.0, 1.0)?);
         let plane = (right - left).cross(&(down - up)).try_normalize(1e-300)?;
-        // Both diagonals cross in the plane, up to the curvature, whose effect shrinks with the step.
+        // Both diagonals intersect in the plane, except for the curvature, whose effect vanishes with the step.
         let gap = ((left + right) - (up + down)).dot(&plane).abs() / 2.0;
         (gap < 1e-3 * (right - left).norm().min((down - up).norm())).then_some(plane)
     }
 }
 
-/// A camera of rays in `rays`, and the rasterizer's image of `seen` from there.
+/// A ray camera in `rays`, and the rasterized image of `seen` from the same view.
 fn images<'a>(
     seen: &Data,
     rays: &'a Data,
@@ -80,7 +81,7 @@ fn images<'a>(
     (RayCamera { data: rays, view, pose }, frame, visible)
 }
 
-/// Compares every pixel that is off silhouettes.
+/// Compares every pixel off silhouettes.
 fn check(name: &str, data: &Data, eye: [f64; 3], target: [f64; 3], clip: [f64; 2], least: usize) {
     let (camera, frame, visible) = images(data, data, eye, target, clip);
     let (depth, mask) = (frame.depth.unwrap(), frame.mask.unwrap());
@@ -99,7 +100,7 @@ fn check(name: &str, data: &Data, eye: [f64; 3], target: [f64; 3], clip: [f64; 2
         if !around.iter().all(|a| a.as_ref().is_some_and(|a| a.geom == hit.geom)) {
             continue;
         }
-        // The surface around the pixel as a plane: rays must agree with it, or there is an edge.
+        // The surface around the pixel as a plane: rays that disagree with it indicate an edge.
         let corner = around.map(|a| a.unwrap().point);
         let (a, b) = (corner[3] - corner[0], corner[2] - corner[1]);
         let Some(plane) = a.cross(&b).try_normalize(1e-300) else { continue };
@@ -130,7 +131,7 @@ fn check(name: &str, data: &Data, eye: [f64; 3], target: [f64; 3], clip: [f64; 2
     assert!(worst_normal_deg < 0.5, "{name}: a normal is {worst_normal_deg} degrees off the surface");
 }
 
-/// Every primitive at random places; cameras outside and inside of shapes; near and far planes far apart.
+/// All primitives at random poses, with cameras outside and inside of shapes, and widely spaced near and far planes.
 #[test]
 fn random_scenes() {
     let mut dice = Dice(12345);
@@ -139,7 +140,7 @@ fn random_scenes() {
         let eye = dice.numbers([[-3.0, 3.0], [-3.0, -1.5], [0.5, 2.5]]);
         check(&format!("scene {scene}"), &data, eye, [0.0, 0.0, 0.5], [0.01, 50.0], 8000);
         check(&format!("scene {scene}, far apart"), &data, eye, [0.0, 0.0, 0.5], [1e-4, 1e5], 8000);
-        // Inside of the first shape, whose centre is where its body is.
+        // Inside of the first shape, whose center is the origin of its body.
         let inside: [f64; 3] = data.xpos()[3..6].try_into().unwrap();
         check(&format!("scene {scene}, inside"), &data, inside, [0.0, 0.3, 0.5], [1e-3, 50.0], 5000);
     }
@@ -164,7 +165,7 @@ fn sample_models() {
     }
 }
 
-/// A height field and a mesh from text: triangles of both, and the field's walls.
+/// A height field and a mesh, including the walls of the field.
 #[test]
 fn height_fields_and_meshes() {
     let elevation = |k: i32| (((k % 17) as f32 * 0.7).sin() * ((k / 17) as f32 * 0.5).cos() + 1.0) / 2.0;
@@ -176,7 +177,7 @@ fn height_fields_and_meshes() {
     }
 }
 
-/// The control: a scene that is a centimetre lower is found out.
+/// Control: the test detects a scene that is a centimeter lower.
 #[test]
 fn one_centimetre() {
     let [data, moved] = [0.0, -0.01].map(|z: f64| {

@@ -1,4 +1,4 @@
-//! Every renderer shows the scenes of the examples `create_sensor` and `render_model` as the rasterizer does.
+//! Agreement of all renderers with the rasterizer, on the scenes of the examples `create_sensor` and `render_model`.
 
 use super::view;
 use kinetoscope::prelude::*;
@@ -12,7 +12,7 @@ use std::f64::consts::FRAC_PI_2;
 
 const SIZE: [usize; 2] = [320, 240];
 
-/// Cameras above the cube and on the tip of the arm, as the example has them; and beside the arm, so that all of it is seen.
+/// The example's cameras above the cube and on the tip of the arm, and one beside the arm that shows all of it.
 fn places() -> [(&'static str, Extrinsics); 3] {
     let above = Placement::Pose { pos: [1.2, -0.2, 1.5], rotation: from_wxyz([0.0, 0.0, 1.0, 0.0]) };
     let angles = [(-35f64).to_radians(), 135f64.to_radians(), 0.0];
@@ -64,7 +64,7 @@ fn images(extrinsics: &Extrinsics, renderers: [Renderer; 4]) -> [Frame; 4] {
     })
 }
 
-/// True where a pixel and those around it show the same, which is no silhouette.
+/// True if a pixel and its neighbors show the same surface, so that the pixel is not at a silhouette.
 fn is_whole(frame: &Frame, [x, y]: [usize; 2]) -> bool {
     let (mask, depth) = (frame.mask.as_ref().unwrap(), frame.depth.as_ref().unwrap());
     let here = y * SIZE[0] + x;
@@ -74,9 +74,11 @@ fn is_whole(frame: &Frame, [x, y]: [usize; 2]) -> bool {
     })
 }
 
-/// Compares masks, depths to 1e-4 and normals to half a degree with the rasterizer's, off the silhouettes of each image by
-/// itself: a pixel that shows something else in the other is compared. Centres of pixels on edges between triangles may have
-/// the normal of either of them. True if colors differ, as of another renderer they do somewhere.
+/// Asserts agreement with the rasterizer in masks, in depths to 1e-4 and in normals to half a degree. Returns true if
+/// colors differ, as they do somewhere for another renderer.
+///
+/// Silhouettes are excluded per image: a pixel that shows another object in only one of the images is still compared. A
+/// pixel center on an edge between triangles may have the normal of either triangle.
 fn assert_alike(what: &str, renderer: Renderer, raster: &Frame, other: &Frame) -> bool {
     let (a, b) = (raster, other);
     let (mut compared, mut different, mut turned, mut hits) = (0, 0, 0, 0);
@@ -102,7 +104,7 @@ fn assert_alike(what: &str, renderer: Renderer, raster: &Frame, other: &Frame) -
     raster.color != b.color
 }
 
-/// Asserts that each renderer that draws light in another way than the rasterizer made another image somewhere.
+/// Asserts that each renderer with its own lighting produced a color image that differs from the rasterizer's.
 fn assert_other_renderers(differs: &[(Renderer, bool)]) {
     for (renderer, _) in differs.iter().filter(|(renderer, _)| *renderer != Renderer::FastRayTraced) {
         assert!(
@@ -112,7 +114,7 @@ fn assert_other_renderers(differs: &[(Renderer, bool)]) {
     }
 }
 
-/// Images are about as bright, too: the same lights, the same light from all around.
+/// The brightness agrees too: same lights, same ambient light.
 #[test]
 fn example_create_sensor() {
     let paths = Renderer::RayTraced { samples: 1, max_bounces: 1, denoise: true, seed: 0 };
@@ -130,7 +132,7 @@ fn example_create_sensor() {
     assert_other_renderers(&differs);
 }
 
-/// Files with glass, mirrors and lights of a size, and a robot.
+/// A file with glass, mirrors and area lights, and a robot.
 #[test]
 fn example_render_model() {
     let still_life = Still::of_mjcf(assets::path("scenes/still_life.xml").unwrap(), None).unwrap();
@@ -140,7 +142,7 @@ fn example_render_model() {
     let front = still_life.camera("front").unwrap();
     let free = robot.free_camera();
     let aside = look_at_pose(free.eye, free.target, [0.0, 0.0, 1.0]).unwrap();
-    // From as near as half the angle makes it: MuJoCo's viewers begin far away.
+    // A closer view, at half the distance: MuJoCo's viewers start far away.
     let near = 0.5 * free.fovy;
     let all = [("still life", &still_life, front.world_from_camera, front.fovy), ("robot", &robot, aside, near)];
     let mut differs = Vec::new();

@@ -1,4 +1,4 @@
-//! The instants that cameras capture, and the images that they draw.
+//! Capture times of cameras, and the images captured at them.
 
 use kinetoscope::prelude::*;
 use kinetoscope::render::frame::Depth;
@@ -7,7 +7,7 @@ use kinetoscope::sensors::camera::{Camera, Imperfections};
 use kinetoscope::sensors::{JointStateCfg, NoiseCfg};
 use kinetoscope_testkit::worlds::{cfg, look_at, object};
 
-/// A camera on the ground, below a ball that falls.
+/// A camera on the ground, below a falling ball.
 fn world(num_envs: usize, camera: CameraCfg) -> (SimulationManager, SensorId<Camera>) {
     let mut sim = kinetoscope_testkit::worlds::sim(cfg(num_envs, 2));
     sim.add_rigid_object(object("ball", ObjectShape::Sphere { radius: 0.1 }, [0.0, 0.0, 3.0])).unwrap();
@@ -27,10 +27,10 @@ fn below(update_period: f64) -> CameraCfg {
     }
 }
 
-/// The depth of the falling ball at pixel (15, 15), half a pixel off the optical axis along both directions.
+/// Expected depth of the falling ball at pixel (15, 15) \[m\], half a pixel off the optical axis in both directions.
 ///
-/// The ball's centre is c above the camera: after n steps of MuJoCo's semi-implicit Euler c = 2.9 - g h² n (n + 1) / 2. The
-/// ray t (a, a, 1) with a = 0.5 / f meets the sphere of radius r where |t (a, a, 1) - (0, 0, c)| = r.
+/// The ball's center is c above the camera: after n steps of MuJoCo's semi-implicit Euler c = 2.9 - g h² n (n + 1) / 2.
+/// The ray t (a, a, 1) with a = 0.5 / f meets the sphere of radius r where |t (a, a, 1) - (0, 0, c)| = r.
 fn gap(step: u64) -> f64 {
     let (h, n, r) = (0.01, step as f64, 0.1);
     let c = 2.9 - 9.81 * h * h * n * (n + 1.0) / 2.0;
@@ -39,7 +39,7 @@ fn gap(step: u64) -> f64 {
     (c - (c * c - square * (c * c - r * r)).sqrt()) / square
 }
 
-/// True if a depth is that of a step, to single precision of the renderer.
+/// True if `found` is the depth at a step, to the renderer's single precision.
 fn is_of(found: f64, step: u64) -> bool {
     (found / gap(step) - 1.0).abs() < 1e-5
 }
@@ -49,8 +49,8 @@ fn middle(sim: &SimulationManager, id: SensorId<Camera>) -> [f64; 2] {
     [0, 1].map(|env| f64::from(depth[(env, 15, 15)]))
 }
 
-/// An image shows the instant at which it was due, however late it is read, and is drawn once. A reset of one environment
-/// refreshes its image and restarts its clock, and leaves the other's alone.
+/// An image shows its scheduled instant even if it is read later, and is rendered once. A reset of one environment
+/// refreshes its image and restarts its schedule; the other environment is unaffected.
 #[test]
 fn due_instant_and_reset() {
     let (mut sim, id) = world(2, below(0.05));
@@ -78,7 +78,7 @@ fn due_instant_and_reset() {
     assert_eq!(sim.sensor(id).unwrap().frame_counts().to_vec(), [1, 11]);
 }
 
-/// `update(n)` is n times `update(1)`, images included.
+/// `update(n)` equals n calls of `update(1)`, including images.
 #[test]
 fn strides() {
     let noise = [("depth".to_string(), NoiseCfg { std: 0.01, bias_walk: 0.1, ..Default::default() })].into();
@@ -102,8 +102,8 @@ fn strides() {
     }
 }
 
-/// Steps are 10 ms, images two steps apart and three steps late: after 20 steps, the newest to be seen is that of step 16. A
-/// write to the state is seen at once.
+/// Steps of 10 ms, images every two steps with a latency of three steps: after 20 steps, the newest visible image is
+/// that of step 16. A write to the state refreshes the image at once.
 #[test]
 fn latency() {
     let (mut sim, id) = world(2, CameraCfg { latency_steps: 3, history_length: 4, ..below(0.02) });

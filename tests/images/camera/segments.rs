@@ -1,4 +1,4 @@
-//! Segments and boxes of a simulation: ids, classes and frames are those of its robots and objects.
+//! Segmentation and 3D boxes in a simulation: ids, classes and frames agree with its robots and objects.
 
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
@@ -25,7 +25,7 @@ fn world() -> (SimulationManager, RobotId, SensorId<Camera>) {
     (sim, robot, id)
 }
 
-/// Classes are those of the configuration of an object, and those of labels.
+/// Classes come from the configuration of an object and from labels.
 #[test]
 fn classes() {
     let (sim, _, id) = world();
@@ -42,7 +42,7 @@ fn classes() {
     assert_eq!(names(&cfg, SegmentLevel::Semantic), ["ground", "robot", "tip", "furniture", "toy"]);
     let links = names(&plain, SegmentLevel::Link);
     assert!(links.iter().any(|name| name == "sr5/link6"), "{links:?}");
-    // Every mask id is in the table; colours differ where classes do.
+    // Every mask id is in the table; colors differ between classes.
     let all = sim.scene().segmentation(&cfg).unwrap();
     let mask = sim.sensor(id).unwrap().mask().unwrap();
     let classes = all.segment(SegmentLevel::Semantic, mask);
@@ -64,7 +64,8 @@ fn classes() {
     assert!(Thing::from(&sim.scene().mask_ids()[0]).name() == "ground");
 }
 
-/// Boxes are in the links' own frames: they stay the same however the arm moves, and hold all that is seen of the link.
+/// 3D boxes are in the frames of the links: they do not change with the motion of the arm, and contain every visible
+/// point of the link.
 #[test]
 fn boxes() {
     let (mut sim, robot, id) = world();
@@ -88,7 +89,7 @@ fn boxes() {
                 None => sim.rigid_object(sim.entities().rigid_object_id(&entry.object).unwrap()).pose(),
             };
             let expected = pose_in(&expected, env);
-            // Poses that are drawn are in single precision.
+            // Render poses are in single precision.
             let apart = (of_box.translation.vector - expected.translation.vector).norm();
             let angle = of_box.rotation.angle_to(&expected.rotation);
             assert!(apart < 1e-6 && angle < 1e-6, "{entry:?}: {of_box} {expected}");
@@ -101,13 +102,13 @@ fn boxes() {
             for ((v, u), _) in mask.index_axis(Axis(0), env).indexed_iter().filter(|(_, seen)| **seen == id) {
                 let p = Point3::from([0, 1, 2].map(|k| f64::from(position[(env, v, u, k)])));
                 let local = of_box.inverse() * p;
-                // Level of detail moves no point by more than 1 mm.
+                // Level of detail moves points by at most 1 mm.
                 assert!((0..3).all(|k| local[k] > min[k] - 1.1e-3 && local[k] < max[k] + 1.1e-3), "{entry:?}: {local}");
             }
         }
     }
     assert!(moved > 5, "{moved} boxes of links moved");
-    // The robot as a whole is in the box of its base.
+    // The box of the whole robot is in the frame of its base.
     let whole = all.boxes_3d(SegmentLevel::Instance, sim.sensor(id).unwrap(), 0).unwrap();
     let ids: Vec<i32> = all.segments(SegmentLevel::Instance).iter().map(|segment| segment.id).collect();
     assert!(whole.iter().map(|found| found.id).eq(ids.iter().copied()));

@@ -1,4 +1,4 @@
-//! Stereo cameras in a simulation: from a scene file, and on a robot.
+//! Stereo cameras in a simulation, from a scene file and on a robot.
 
 use kinetoscope::ndarray::{Array2, Axis};
 use kinetoscope::prelude::*;
@@ -34,8 +34,8 @@ fn scene() -> InteractiveScene {
     scene
 }
 
-/// Points that are computed of the disparity, z = fx b / d, are those of the position channel: to some ulps of a metre, and
-/// of depths of ten.
+/// Points computed from the disparity, z = fx b / d, agree with the position channel to a few ulps of a meter and of
+/// ten meters of depth.
 #[test]
 fn disparity() {
     let scene = scene();

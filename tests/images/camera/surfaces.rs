@@ -1,4 +1,4 @@
-//! Surfaces and lights of a configuration are those of the scene that is drawn, on both versions of MuJoCo.
+//! Materials and lights of a configuration in the rendered scene, on both supported MuJoCo versions.
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::decode_srgb;
@@ -11,7 +11,7 @@ const PART: &str = r#"<mujoco><asset><material name="brass" specular="0.9" emiss
     <geom name="plate" type="box" size="1 1 0.01"/>
     <body name="bell" pos="0 0 1"><freejoint/><geom size="0.1" material="brass"/></body></worldbody></mujoco>"#;
 
-/// A surface with these fields, the others by default.
+/// A surface with the given fields and defaults for the others.
 macro_rules! surface {
     ($($field:ident: $value:expr),+) => {
         SurfaceCfg { $($field: Some($value),)+ ..Default::default() }
@@ -62,7 +62,7 @@ fn check(sim: &mut SimulationManager) {
     assert!(kinds[0] >= 2 && kinds[1] >= 1 && kinds[2] >= 1, "{links:?}");
     let mut material = |name: &str| materials(sim, name).remove(0);
     let (bell, plate, water) = (material("part/bell"), material("part"), material("drop"));
-    // The numbers of the file, and those of the configuration besides.
+    // The file's values are kept, and the configuration adds to them.
     assert_eq!((bell.specular, bell.emission, bell.metallic), (0.9, 0.25, 0.5));
     assert_eq!((plate.emission, plate.metallic, plate.specular), (2.0, 0.0, 0.5));
     assert_eq!((water.refractive_index, water.transmission), (1.33, 0.75));
@@ -77,14 +77,14 @@ fn surfaces_of_everything() {
         let mut scene = InteractiveScene::new(cfg).unwrap();
         let sim = scene.sim_mut();
         check(sim);
-        // One more object compiles everything again.
+        // Another object forces a new compilation of the scene.
         sim.add_rigid_object(RigidObjectCfg { uid: "more".into(), ..Default::default() }).unwrap();
         check(sim);
         assert_eq!(materials(sim, "more")[0].transmission, 0.0, "of no other object");
     }
 }
 
-/// An environment with a colour of its own keeps the surface of all.
+/// An environment with its own color keeps the shared surface.
 #[test]
 fn own_colour() {
     let mut sim = sim(cfg(2, 2));
@@ -167,7 +167,7 @@ fn lights() {
     }
 }
 
-/// A dome lights all sides of everything, in place of the light that simulations have by themselves, and is no light of MuJoCo.
+/// A dome light illuminates all sides of every object in place of the default light, and is not a light of MuJoCo.
 #[test]
 fn dome() {
     let ambient = |lights: Vec<LightCfg>| {
@@ -181,7 +181,7 @@ fn dome() {
     assert_eq!((found.sky, found.ground, lamps), (expected([0.25; 3]), expected([0.25; 3]), 1));
     let (own, _) = ambient(vec![LightCfg::default()]);
     assert!(own.sky[2] > own.sky[0] && own.ground != own.sky, "the control: {own:?}");
-    // In a file.
+    // The same in a scene file.
     let text = "[simulation]\nlights = [{ kind = { dome = { intensity = 0.5 } }, color = [1, 0.75, 0] }]";
     let read = SceneCfg::from_toml(text, "scene.toml", &EntityTypes::default()).unwrap();
     assert_eq!(read.simulation.lights, [first]);

@@ -1,4 +1,4 @@
-//! Ray-cast cameras and rasterized cameras, placed and given lenses by the same calls, see the same.
+//! Agreement of ray-cast cameras and rasterized cameras with the same placement and the same intrinsics.
 
 use crate::rays::scanner::tumbling;
 use kinetoscope::ndarray::{Axis, s};
@@ -8,12 +8,12 @@ use kinetoscope::sensors::ray::RayCasterCameraCfg;
 
 const LENSES: [Intrinsics; 2] = [
     Intrinsics::Fovy { radians: 0.7 },
-    // Off the middle, pixels that are no squares.
+    // An off-center principal point and non-square pixels.
     Intrinsics::Pixels { fx: 110.0, fy: 95.0, cx: 52.5, cy: 50.25 },
 ];
 
-/// Numbers of pixels of both environments that are compared, that differ in mask, depth or point, and that differ in normals,
-/// where the rasterizer has `lens` in environment 1.
+/// Numbers of compared pixels, of pixels that differ in mask, depth or point, and of pixels that differ in normals,
+/// over both environments. The rasterizer has the intrinsics `lens` in environment 1.
 fn compare(lens: Intrinsics) -> [usize; 3] {
     let (mut sim, _) = tumbling(2, 2);
     let (width, height) = (120, 90);
@@ -42,12 +42,12 @@ fn compare(lens: Intrinsics) -> [usize; 3] {
     });
     let mut counts = [0; 3];
     for (at, id) in rays.mask().indexed_iter() {
-        // Beyond the rasterizer's far plane of 100 m there is still ground.
+        // Beyond the rasterizer's far plane of 100 m, the rays still hit the ground.
         if rays.depth()[at] > 99.0 {
             continue;
         }
-        // The rasterizer's planes of 1/z are in single precision: ten roundings of 6e-8, where a surface is seen at a
-        // slant of up to 80 degrees six times that. Points have that error along their ray, in three numbers.
+        // The rasterizer's planes of 1/z are in single precision: ten rounding errors of 6e-8, and six times that at a
+        // slant of up to 80 degrees. Points have this error along their ray, in three coordinates.
         let close = (rays.depth()[at] / depth[at] - 1.0).abs() < 5e-6;
         let (env, v, u) = at;
         let [a, b] = &points[env];
@@ -61,9 +61,9 @@ fn compare(lens: Intrinsics) -> [usize; 3] {
     counts
 }
 
-/// Coverage is snapped to 1/256 pixel, so that outlines are off by 1/512 at most: of the some 1500 pixels on those of a
-/// box, a wall and a ball in two images, 1500 / 256 = 6 have their centre as near as that. Twice as many are too many. The
-/// control is a lens that is half a percent longer.
+/// Coverage is snapped to 1/256 pixel, so outlines are off by at most 1/512 pixel. The outlines of a box, a wall and a
+/// ball in two images have about 1500 pixels; 1500 / 256 = 6 of them have their center within that distance. The limit
+/// is twice as many. The control is a focal length that is half a percent longer.
 #[test]
 fn same_images() {
     let [compared, differing, turned] = compare(LENSES[1]);

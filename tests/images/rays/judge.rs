@@ -1,4 +1,4 @@
-//! Our rays against `mj_ray`, on the same geoms at the same poses.
+//! Comparison of our ray casts with `mj_ray`, on the same geoms at the same poses.
 
 use kinetoscope::mujoco as mj;
 use kinetoscope::mujoco::Data;
@@ -8,16 +8,16 @@ use kinetoscope::scene::Ray;
 use kinetoscope::sim::Visible;
 use std::sync::Arc;
 
-/// Geom groups that are seen.
+/// Bit mask of the visible geom groups.
 pub(crate) const GROUPS: u32 = 0b111;
 /// Largest difference of distances \[m\].
 pub(crate) const EXACT: f64 = 1e-6;
 
-/// Numbers that are the same in every run.
+/// Pseudo-random numbers, the same in every run.
 pub(crate) struct Dice(pub(crate) u64);
 
 impl Dice {
-    /// Between `low` and `high`.
+    /// A number between `low` and `high`.
     pub(crate) fn number(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         low + (high - low) * (self.0 >> 33) as f64 / f64::from(1u32 << 31)
@@ -31,13 +31,14 @@ impl Dice {
         self.numbers([[-size, size]; 3])
     }
 
-    /// From within `far` of the origin to within `near` of it.
+    /// A ray from a point within `far` of the origin to a point within `near` of the origin.
     pub(crate) fn ray(&mut self, far: f64, near: f64) -> Ray {
         let (origin, target) = (self.point(far), self.point(near));
         ray_through(origin, target)
     }
 
-    /// A body at a random pose in `range`. Every `free`-th one moves; rays find the others by the BVH of the world.
+    /// A body at a random pose in `range`. Every `free`-th body has a free joint; rays find the static ones through the
+    /// BVH of the world.
     pub(crate) fn body(
         &mut self,
         [k, free]: [usize; 2],
@@ -79,7 +80,7 @@ pub(crate) fn height_field(rows: i32, elevation: impl FnMut(i32) -> f32) -> mj::
     mj::Asset { name: "terrain.bin".into(), bytes }
 }
 
-/// A model at rest: a world of these elements.
+/// Simulation data of a world with these elements, at rest.
 pub(crate) fn data_of(world: &str) -> Data {
     data_with("", world, &[])
 }
@@ -115,7 +116,7 @@ fn ours(data: &Data, rays: &[Ray], max_distance: f64) -> Vec<RayHit> {
     hits
 }
 
-/// Hits of rays in `judge` by MuJoCo, and the number of rays whose hit in `seen` by ours is another one.
+/// Number of hits of `mj_ray` in `judge`, and number of rays for which our hit in `seen` differs.
 pub(crate) fn compare(seen: &Data, judge: &Data, rays: &[Ray]) -> (usize, usize) {
     let visible = Visible::of_model(seen.model());
     let (mut hits, mut differing) = (0, 0);

@@ -1,4 +1,4 @@
-//! Ray casters in a simulation, against MuJoCo's own rays and closed forms.
+//! Ray casters in a simulation, compared with MuJoCo's rays and with closed forms.
 
 mod cameras;
 pub(crate) mod judge;

@@ -1,11 +1,11 @@
-//! Random scenes of every kind of geom: distances and geoms are those of `mj_ray`.
+//! Random scenes of every kind of geom: distances and geoms agree with `mj_ray`.
 
 use crate::rays::judge::{Dice, FAN, check, compare, data_of, data_with, height_field, ray_through};
 use kinetoscope::scene::Ray;
 
 const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
 
-/// Rays from 20 m away, from near, and from inside of shapes. Half of the bodies are welded to the world.
+/// Rays from 20 m away, from close by, and from inside of shapes. Half of the bodies are welded to the world.
 #[test]
 fn shapes() {
     let mut dice = Dice(1);
@@ -22,14 +22,14 @@ fn shapes() {
     }
 }
 
-/// A height field, meshes that move and meshes that do not. The field has as many rows as columns: otherwise `mj_ray`
-/// (measured on 2.2.2) puts the upper ends of the field's walls elsewhere than its triangles.
+/// A height field, moving meshes and static meshes. The field is square: otherwise `mj_ray` (measured on 2.2.2) places
+/// the upper ends of the field's walls apart from its triangles.
 #[test]
 fn terrain_and_meshes() {
     let mut dice = Dice(2);
     let terrain = height_field(33, |_| dice.number(0.0, 1.0) as f32);
     let vertices: Vec<String> = (0..30).map(|_| dice.point(0.3).map(|x| format!("{x}")).join(" ")).collect();
-    // Without faces MuJoCo takes the convex hull.
+    // Without faces MuJoCo uses the convex hull.
     let hull = format!("<mesh name='hull' vertex='{}'/>", vertices.join("  "));
     let mut world = "<geom name='terrain' type='hfield' hfield='h' euler='3 -2 40' pos='.1 .2 0'/>".to_string();
     for k in 0..14 {
@@ -51,7 +51,7 @@ fn terrain_and_meshes() {
     check("terrain and meshes", &data, &rays, 6000);
 }
 
-/// The control: shapes that are ten micrometres elsewhere are found out.
+/// Control: the test detects shapes that are displaced by ten micrometers.
 #[test]
 fn ten_micrometres() {
     let at = |z: f64| {

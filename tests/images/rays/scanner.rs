@@ -1,4 +1,4 @@
-//! Ray casters on bodies that move.
+//! Ray casters on moving bodies.
 
 use crate::rays::judge::{EXACT, GROUPS};
 use kinetoscope::ndarray::{Array2, Array3, array};
@@ -35,7 +35,7 @@ fn height_scanner(targets: HitTargets) -> RayCasterCfg {
     }
 }
 
-/// 187 rays straight down stay level over a tumbling trunk, and hit the plane exactly.
+/// 187 vertical rays keep their direction on a tumbling body, and hit the plane exactly.
 #[test]
 fn height_scan() {
     let (mut sim, trunk) = tumbling(3, 1);
@@ -66,7 +66,7 @@ fn height_scan() {
     assert_eq!(sim.sensor(id).unwrap().sample_counts(), array![10, 10, 10]);
 }
 
-/// A lidar on the tumbling trunk measures in every environment what `mj_ray` measures there.
+/// A lidar on the tumbling body agrees with `mj_ray` in every environment.
 #[test]
 fn lidar() {
     let (mut sim, trunk) = tumbling(3, 1);
@@ -107,7 +107,7 @@ fn lidar() {
     assert!(hits > 1000 && misses > 1000 && selves > 100, "{hits} {misses} {selves}");
 }
 
-/// A lidar on a link that is fused to another does not see the body that carries it, but the rest of the robot.
+/// A lidar on a fused link excludes the body that carries it, but sees the rest of the robot.
 #[test]
 fn carrier() {
     let mut sim = kinetoscope_testkit::worlds::sim(cfg(1, 1));

@@ -1,5 +1,7 @@
-//! Mass, centre of mass and inertia of the whole robot in MuJoCo against the links of the URDF, composed here: moments
-//! about the origin of the world, forward kinematics from the description, and nothing of the code under test.
+//! Mass, center of mass and inertia of the whole robot in MuJoCo, compared with the links of the URDF.
+//!
+//! The expected values are composed here, independent of the tested code: moments about the world origin, with forward
+//! kinematics from the description.
 
 use super::robots::simulation;
 use kinetoscope::mujoco::Data;
@@ -22,7 +24,7 @@ fn point(mass: f64, at: Vector3<f64>) -> Matrix3<f64> {
 }
 
 impl Sum {
-    /// Adds a body with this inertia about its centre of mass, in axes that are turned so.
+    /// Adds a body with this inertia about its center of mass, in axes rotated by `turn`.
     fn add(&mut self, mass: f64, com: Vector3<f64>, inertia: Matrix3<f64>, turn: UnitQuaternion<f64>) {
         let turn = turn.to_rotation_matrix();
         self.mass += mass;
@@ -34,7 +36,7 @@ impl Sum {
         self.moment / self.mass
     }
 
-    /// About the centre of mass.
+    /// Inertia about the center of mass.
     fn central(&self) -> Matrix3<f64> {
         self.inertia - point(self.mass, self.com())
     }

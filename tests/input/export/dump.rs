@@ -1,4 +1,4 @@
-//! The files of a dump against the simulation they come from.
+//! The files of a dump, compared with the simulation that wrote them.
 
 use super::robots::{anymal, bundled, dump, simulation};
 use crate::support::exported;
@@ -16,7 +16,7 @@ fn names(model: &Model, kind: ObjectKind) -> Vec<String> {
     (0..).map_while(|i| model.name(kind, i)).collect()
 }
 
-/// The exported model is the one that runs.
+/// The exported model equals the running model.
 fn model(cfg: RobotCfg) {
     let uid = cfg.uid.clone();
     let (sim, id) = simulation(cfg);
@@ -37,7 +37,7 @@ fn model(cfg: RobotCfg) {
     ] {
         assert!(mine.iter().zip(theirs).all(|(a, b)| (a - b).abs() < tolerance), "{uid}: {what} {mine:?} {theirs:?}");
     }
-    // A link that was fused keeps its frame: as a site here, by its name there.
+    // A fused link keeps its frame: as a site in the export, by its name in the simulation.
     let mut data = Data::new(&export).unwrap();
     data.qpos_mut().copy_from_slice(&sim.batch().read(0, |env| env.data().qpos().to_vec()));
     data.forward().unwrap();
@@ -49,7 +49,8 @@ fn model(cfg: RobotCfg) {
     assert!(export.nmesh() >= run.nmesh(), "{uid}");
 }
 
-/// The exported model, in plain MuJoCo, with its own actuators: a second at its own time step, targets at the start.
+/// The exported model runs in plain MuJoCo with its own actuators: 100 steps at its time step, targets at the start
+/// positions.
 fn steps(cfg: RobotCfg) {
     let uid = cfg.uid.clone();
     let (sim, _) = simulation(cfg);
@@ -85,7 +86,7 @@ fn same_bytes(cfg: RobotCfg) {
     for (name, bytes) in &a {
         assert!(*bytes == b[name], "{name} differs");
     }
-    // Into the same folder, after some steps: a dump is of the model, not of its state.
+    // A second dump into the same folder, after some steps: a dump holds the model, not its state.
     sim.update(5);
     sim.dump(first.path()).unwrap();
     assert!(files(first.path()) == a);
@@ -97,14 +98,14 @@ fn diagnostics(cfg: RobotCfg) {
     let dir = dump(&sim);
     let text = std::fs::read_to_string(dir.path().join("diagnostics.txt")).unwrap();
     let of_export = sim.dump(dir.path()).unwrap();
-    // All that an export of a robot gives up: its drives are heavier where joints follow others.
+    // The only difference of an export: drives are heavier on joints with mimic followers.
     assert!(of_export.iter().all(|d| d.kind == DiagnosticKind::ExportHeavier), "{of_export:?}");
     let expected: String = sim.diagnostics().iter().chain(&of_export).map(|d| format!("{d}\n")).collect();
     assert_eq!(text, expected);
     assert!(sim.diagnostics().len() >= least);
 }
 
-/// The dumped URDF is the same robot.
+/// The dumped URDF describes the same robot.
 fn urdf(cfg: RobotCfg) {
     let (sim, id) = simulation(cfg);
     let dir = dump(&sim);
@@ -112,7 +113,7 @@ fn urdf(cfg: RobotCfg) {
     assert_same(sim.robot(id).description(), &again);
 }
 
-/// Its textures, its mass, and where its inertias were repaired.
+/// Textures, mass, and the source lines of repaired inertias.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn anymal_c() {
@@ -130,7 +131,7 @@ fn anymal_c() {
         let source = diagnostic.source.as_ref().unwrap();
         assert!(source.file.ends_with("anymal.urdf"), "{diagnostic}");
         let link = diagnostic.message.split('"').nth(1).unwrap();
-        // The line is of the inertial element, which stands in the link of that name.
+        // The line is that of the inertial element inside the link of that name.
         let before: Vec<&str> = urdf.lines().take(source.line as usize).collect();
         assert!(before.last().unwrap().contains("<inertial"), "{diagnostic}");
         let opened = before.iter().rev().find(|line| line.contains("<link")).unwrap();
@@ -138,7 +139,7 @@ fn anymal_c() {
     }
 }
 
-/// Meshes whose names are alike do not overwrite each other.
+/// Meshes with equal file names do not overwrite each other.
 #[test]
 fn alike_names_of_meshes() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,12 +1,12 @@
-//! The MJCF of the bundled robots, for both lines of MuJoCo, as it is kept in `tests/data`.
+//! Golden files: the MJCF of the bundled robots for both supported MuJoCo versions, stored in `tests/data`.
 //!
-//! `KINETOSCOPE_BLESS=1` writes the files anew (`cargo xtask bless`).
+//! `KINETOSCOPE_BLESS=1` rewrites the files (`cargo xtask bless`).
 
 use super::robots::{bundled_robots, dump, simulation};
 use kinetoscope::mujoco::{TARGET, Target};
 use std::path::Path;
 
-/// Compares with `tests/data/<name>`; where they differ, writes the found text beside it.
+/// Compares a text with `tests/data/<name>`; writes the actual text next to a file that differs.
 fn compare(name: &str, found: &str) -> Result<(), String> {
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
     std::fs::create_dir_all(golden.parent().unwrap()).unwrap();
@@ -41,7 +41,7 @@ fn mjcf() {
             Target::V2 => "run2",
             Target::V4 => "run4",
         };
-        // The exports are written for both lines by every build, the model that runs for its own.
+        // Every build writes the exports for both versions, and the running model for its own version.
         for (file, golden) in [("robot.mjcf2.xml", "mjcf2"), ("robot.mjcf4.xml", "mjcf4"), ("run.mjcf.xml", run)] {
             let text = std::fs::read_to_string(dir.path().join(file)).unwrap();
             wrong.extend(compare(&format!("{name}.{golden}.xml"), &text).err());

@@ -1,6 +1,8 @@
-//! `SimulationManager::dump`: the files load in plain MuJoCo, describe the same robot, and have the same bytes every time.
+//! `SimulationManager::dump`: the files load in plain MuJoCo, describe the same robot, and have the same bytes every
+//! time.
 
-/// Two tests of each check function of one robot: `bundled::...`, and `vendors::...`, which needs files of vendors.
+/// Expands each check function of one robot to two tests: `bundled::...`, and `vendors::...`, which needs the vendors'
+/// files.
 macro_rules! of_each_robot {
     ($($check:ident)*) => {
         mod bundled {

@@ -1,4 +1,4 @@
-//! The robots that are exported: the bundled ones, and those of vendors.
+//! Robots for the export tests: the bundled ones, and those of vendors.
 
 use kinetoscope::prelude::*;
 use kinetoscope::scene::pose::from_xyz_rpy;
@@ -25,14 +25,14 @@ pub(crate) fn vendor_arm_and_hand() -> RobotCfg {
     arm_and_hand("inspire", robot("rokae_description/urdf/SR5.urdf"), robot("inspire_hand/DFQ_left_hand.urdf"))
 }
 
-/// ANYmal C, free in space.
+/// ANYmal C with a floating base.
 pub(crate) fn anymal() -> RobotCfg {
     let init_pose = from_xyz_rpy([0.0, 0.0, 0.6], [0.0; 3]);
     let urdf = robot("anymal_c_simple_description/urdf/anymal.urdf");
     RobotCfg { fix_base: false, init_pose, ..urdf_robot("anymal", urdf) }
 }
 
-/// The bundled arm with the hand, and the hand alone on a base that moves.
+/// The bundled arm with the hand, and the hand alone on a floating base.
 pub(crate) fn bundled_robots() -> [RobotCfg; 2] {
     let hand = urdf_robot("hand", assets::path("revo1_left/revo1_left.urdf").unwrap());
     let init_pose = from_xyz_rpy([0.1, 0.2, 0.5], [0.3, 0.2, 0.1]);
@@ -50,7 +50,7 @@ pub(crate) fn simulation(robot: RobotCfg) -> (SimulationManager, RobotId) {
     (sim, id)
 }
 
-/// Writes a dump into a folder of its own.
+/// Writes a dump into a new temporary folder.
 pub(crate) fn dump(sim: &SimulationManager) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     sim.dump(dir.path()).unwrap();

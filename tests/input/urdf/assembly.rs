@@ -1,4 +1,4 @@
-//! Several URDF files become one robot: who hangs from whom, names, and refusals.
+//! Assembly of several URDF files into one robot: parent links, names, and refusals.
 
 use kinetoscope::prelude::*;
 use kinetoscope::robot::description::RobotDescription;
@@ -9,8 +9,8 @@ use kinetoscope_testkit::urdf::{Files, joint, limit};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::path::{Path, PathBuf};
 
-/// Writes a URDF of `parent joint child` triples; joints that start with `r` are revolute. The first link is the first
-/// parent.
+/// Writes a URDF of `parent joint child` triples; joints that start with `r` are revolute. The first parent is the
+/// first link.
 fn write(files: &Files, name: &str, tree: &str) -> PathBuf {
     let (mut links, mut joints) = (Vec::<&str>::new(), String::new());
     for edge in tree.split(',') {
@@ -46,7 +46,7 @@ fn cfg(components: Vec<ComponentCfg>) -> UrdfCfg {
     UrdfCfg { components, ..Default::default() }
 }
 
-/// The robot, checked for what holds for every merged robot, and its diagnostics.
+/// The merged robot and its diagnostics; asserts the invariants of every merged robot.
 #[track_caller]
 fn merged(cfg: &UrdfCfg) -> (RobotDescription, Vec<Diagnostic>) {
     let assembly = assemble(cfg).unwrap();
@@ -72,7 +72,7 @@ fn joint_names(robot: &RobotDescription) -> Vec<&str> {
     robot.joints.iter().map(|l| l.name.as_str()).collect()
 }
 
-/// The parent link of the root of a component.
+/// The parent link of a component's root.
 fn attached_to<'r>(robot: &'r RobotDescription, component: &str) -> Option<&'r str> {
     let links = robot.links.iter().filter(|l| l.component == component);
     let parents = links.filter_map(|l| l.parent_joint).map(|j| robot.link(robot.joint(j).parent));
@@ -83,7 +83,7 @@ fn clashes(diagnostics: &[Diagnostic]) -> Vec<String> {
     diagnostics.iter().filter(|d| d.kind == DiagnosticKind::NameClash).map(ToString::to_string).collect()
 }
 
-/// The caller names the file of each mesh and texture.
+/// The caller sets the file name of each mesh and texture.
 #[test]
 fn file_names() {
     let files = Files::default();
@@ -105,7 +105,7 @@ fn file_names() {
     for name in names {
         assert_eq!(written.matches(&format!("filename=\"package://m/{name}\"")).count(), 1, "{name} in {written}");
     }
-    // The control: without names, absolute paths.
+    // Control: without given names, paths are absolute.
     let here = files.folder().join("deep/hit.stl");
     assert!(write_urdf(&robot).contains(&*here.to_string_lossy()) && !written.contains(&*here.to_string_lossy()));
 }
@@ -125,7 +125,7 @@ fn one_component() {
     assert_eq!(link_names(&robot)[..2], ["base_link", "my_base_link"]);
     assert_eq!(joint_names(&robot), ["BASE_TO_LEFT_ARM_CONNECTOR", "MY_R1", "MY_R2", "MY_CAMERA_MOUNT", "MY_TOOL"]);
     assert_eq!((robot.joints[0].parent_from_joint, robot.root.0, robot.name.as_str()), (moved(), 0, "n"));
-    // The file's own base_link keeps its name, the added link makes way.
+    // The file's own base_link keeps its name, and the added link gets another.
     let (robot, diagnostics) = merged(&cfg(vec![at]));
     assert_eq!(link_names(&robot)[..2], ["base_link_2", "base_link"]);
     assert_eq!(clashes(&diagnostics).len(), 1);
@@ -183,7 +183,7 @@ fn two_arms_and_hands() {
         assert_eq!(attached_to(&robot, component), Some(link), "{component}");
     }
     assert!(["LEFT_R_THUMB_M", "LEFT_R1"].iter().all(|name| joint_names(&robot).contains(name)));
-    // Two base_links on each side: the arm's, and the hand's under its component's name.
+    // Two links named base_link on each side: the arm's, and the hand's with the name of its component.
     assert!(["left_base_link", "left_hand_base_link"].iter().all(|name| link_names(&robot).contains(name)));
     assert_eq!(robot, assemble(&cfg).unwrap().description);
 }
@@ -236,7 +236,7 @@ fn links_by_name() {
     assert_eq!(attached_to(&with(None, None).unwrap().description, "my_tool"), Some("ee_link"));
     let robot = with(Some("camera"), Some("flange")).unwrap().description;
     assert_eq!(attached_to(&robot, "my_tool"), Some("camera"));
-    // Also where other links come first: those of an added base.
+    // Also if other links come first: those of an added base.
     let robot = ComponentCfg { transform: moved(), ..ComponentCfg::new("robot", arm(&files)) };
     let [parent, parent_link] = ["robot", "camera"].map(|name| Some(name.to_owned()));
     let on_camera = ComponentCfg { parent, parent_link, ..ComponentCfg::new("my_tool", &tool) };

@@ -1,4 +1,4 @@
-//! Bad URDF files: each gives a typed error that names the place, the element, and what would be right.
+//! Invalid URDF files: each gives a typed error that names the place, the element, and the correct form.
 
 use kinetoscope::robot::diagnostic::DiagnosticKind;
 use kinetoscope::robot::urdf::{
@@ -16,12 +16,12 @@ fn parse_strictly(text: &str) -> Result<UrdfFile, UrdfError> {
     parse_str_with(text, Path::new("robot.urdf"), Strictness::Strict)
 }
 
-/// A robot whose line 2 is `body` and which has the links `a`, `b`.
+/// A robot with the links `a` and `b` and `body` in line 2.
 fn robot(body: &str) -> String {
     format!("<robot name=\"r\">\n{body}\n<link name=\"a\"/><link name=\"b\"/></robot>")
 }
 
-/// A joint from `a` to `b` at line 2.
+/// A joint from `a` to `b` in line 2.
 fn joint(attributes: &str, body: &str) -> String {
     robot(&format!("<joint name=\"j\" {attributes}>{body}<parent link=\"a\"/><child link=\"b\"/></joint>"))
 }
@@ -30,7 +30,7 @@ fn revolute(body: &str) -> String {
     joint("type=\"revolute\"", body)
 }
 
-/// A robot with one link `l`, whose content is at line 2.
+/// A robot with one link `l` with its content in line 2.
 fn link(body: &str) -> String {
     format!("<robot name=\"r\"><link name=\"l\">\n{body}\n</link></robot>")
 }
@@ -263,9 +263,9 @@ fn warnings() {
     assert!(file.diagnostics[0].message.contains("<colision> is not read and was ignored (<collision>?)"));
 }
 
-/// Departures from URDF with a clear meaning were refused, although pinocchio, pybullet and MuJoCo read them: Unitree's Go2 has
-/// two materials in a visual, Upkie a box of size 0, and so on. Each is one warning with its place, and in strict reading (the
-/// control) an error with the same words.
+/// Lenient reading of departures from URDF with a clear meaning. Pinocchio, pybullet and MuJoCo read them: Unitree's
+/// Go2 has two materials in a visual, Upkie a box of size 0, and so on. Each gives one warning with its place. In
+/// strict reading (the control), each gives an error with the same message.
 #[test]
 fn lenient_reading() {
     use DiagnosticKind::*;
@@ -389,7 +389,7 @@ fn lenient_reading() {
     let partial = file.links[0].partial_inertial.as_ref().unwrap();
     assert!(file.links[0].inertial.is_none() && partial.mass.is_none() && partial.inertia.is_none());
     assert_eq!((partial.density, partial.link_from_com.unwrap().translation.vector.z), (Some(7800.0), 3.0));
-    // The place of what follows a repaired text is the same; an error of the line that was changed names its column.
+    // The repair of a text does not move the places of later elements; an error in a repaired line names its column.
     let text =
         "<!-- c -->\n<?xml version=\"1.0\"?><robot drake:a=\"b\">\n<link name=\"l\"><b:c/><visual/></link></robot>";
     let error = parse(text).unwrap_err().to_string();
@@ -400,14 +400,14 @@ fn lenient_reading() {
             .to_string()
             .starts_with("robot.urdf:1: column")
     );
-    // Several declarations, with characters of several bytes.
+    // Several XML declarations, with multi-byte characters.
     let file =
         read("\n<?xml é?>\n<!-- ü --><?xml üü?>\n<?xml é?><robot a:b=\"c\"><link name=\"l\"/></robot>".to_owned());
     let places = |d: &kinetoscope::robot::diagnostic::Diagnostic| (d.kind, d.source.as_ref().unwrap().line);
     let expected =
         [(DeclarationMisplaced, 2), (DeclarationMisplaced, 3), (DeclarationMisplaced, 4), (NamespaceUnbound, 4)];
     assert_eq!(file.diagnostics.iter().map(places).collect::<Vec<_>>(), expected);
-    // Controls: the meaning of these is not clear.
+    // Controls: departures without a clear meaning.
     let rows = [
         ("negative size", shape("<box size=\"0 -1 1\"/>"), "Value", "positive"),
         ("four scales", shape("<mesh filename=\"a\" scale=\"1 1 1 1\"/>"), "Number", "there are four"),

@@ -1,7 +1,8 @@
-//! Mass properties that URDF files leave out, give in part, or give as no such body can have them.
+//! Mass properties that URDF files leave out, give incompletely, or give with physically impossible values.
 //!
-//! Judges: closed forms of solids, and MuJoCo's own mass properties of a body with the same geoms and density. Tolerance 1e-12
-//! of the value: both are a few operations on the same numbers. Meshes are read in single precision: 1e-6.
+//! References: closed forms of solids, and MuJoCo's own mass properties of a body with the same geoms and density. The
+//! relative tolerance is 1e-12: both are a few operations on the same numbers. Meshes are read in single precision:
+//! 1e-6.
 
 use kinetoscope::mujoco::compile;
 use kinetoscope::prelude::*;
@@ -14,7 +15,7 @@ use kinetoscope_testkit::refusal::assert_refused;
 use kinetoscope_testkit::urdf::{Files, collision, joint, limit, robot};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-/// A fixed base with a link of this content on a hinge; the link is in line 3.
+/// A fixed base with a hinged link of this content; the link is in line 3.
 fn hinged(link: &str) -> String {
     let joint = joint("hinge", "revolute", ["base", "l"], [0.0; 3], "0 1 0", &limit([-1.0, 1.0], 10.0, 1.0));
     robot("r", &format!("<link name=\"base\"/>\n<link name=\"l\">{link}</link>\n{joint}"))
@@ -42,7 +43,7 @@ fn inertial_of(sim: &SimulationManager, id: RobotId, link: &str) -> Option<Inert
     description.link(description.link_id(link).unwrap()).inertial.clone()
 }
 
-/// Mass, centre of mass and the tensor about it, all in the frame of the link.
+/// Mass, center of mass and the inertia tensor about it, all in the frame of the link.
 type Mass = (f64, Vector3<f64>, Matrix3<f64>);
 
 fn in_link_frame(inertial: &Inertial) -> Mass {
@@ -70,7 +71,7 @@ fn assert_near(what: &str, found: &Mass, expected: &Mass, tolerance: f64) {
     assert_near_with(what, found, expected, [tolerance; 2]);
 }
 
-/// Tolerances of mass, centre and moments, and of the tensor.
+/// Asserts equality up to two relative tolerances: one for mass, center and principal moments, one for the tensor.
 #[track_caller]
 fn assert_near_with(what: &str, found: &Mass, expected: &Mass, [tolerance, of_tensor]: [f64; 2]) {
     let (mass, size) = (expected.0, expected.2.amax());
@@ -87,14 +88,14 @@ fn assert_near_with(what: &str, found: &Mass, expected: &Mass, [tolerance, of_te
     assert!((found.2 - expected.2).amax() <= of_tensor * size, "{what}: {} instead of {}", found.2, expected.2);
 }
 
-/// MuJoCo keeps moments and axes: its axes are as exact as the square root of the rounding of the tensor.
+/// MuJoCo stores moments and axes: its axes are only as exact as the square root of the tensor's rounding error.
 const AGAINST_MUJOCO: [f64; 2] = [1e-12, 1e-7];
 
-/// A box of 0.1 x 0.2 x 0.4 m as OBJ, a corner in the origin.
+/// A box of 0.1 x 0.2 x 0.4 m as OBJ, with a corner at the origin.
 const BRICK: &str = "v 0 0 0\nv 0.1 0 0\nv 0.1 0.2 0\nv 0 0.2 0\nv 0 0 0.4\nv 0.1 0 0.4\nv 0.1 0.2 0.4\nv 0 0.2 0.4\n\
                      f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-/// Links with shapes and without `<inertial>` had 1e-6 kg: Isaac Gym's Panda weighed 9e-6 kg.
+/// Regression: links with shapes and without `<inertial>` had 1e-6 kg, so that Isaac Gym's Panda weighed 9e-6 kg.
 #[test]
 fn links_without_inertial() {
     let at = |xyz: &str, rpy: &str, shape: &str| {
@@ -134,7 +135,7 @@ fn links_without_inertial() {
             let warning = sim.diagnostics().iter().find(|d| d.kind == DiagnosticKind::InertiaFromShapes).unwrap();
             assert_eq!(warning.source.as_ref().unwrap().line, 3);
         }
-        // Visual shapes count where there are no others.
+        // Visual shapes count for links without collision shapes.
         let (sim, id) = loaded(&hinged(&shapes.replace("collision", "visual")), DENSITY);
         assert_near_with(
             what,
@@ -164,7 +165,8 @@ fn links_without_inertial() {
     let expected = (mass, Vector3::zeros(), Matrix3::from_diagonal_element(0.1 * mass));
     assert_near("ball", &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
 
-    // Frames without shapes stay minimal; a link that is fixed to one with mass keeps none; a base that stands needs none.
+    // Links without shapes keep minimal values. A link fixed to a link with mass gets no mass of its own, and a fixed
+    // base needs none.
     let (sim, _) = loaded(&hinged(""), DENSITY);
     assert_eq!(warnings(&sim), ["massless-link"]);
     let shape = collision("<sphere radius=\"0.1\"/>", [0.0; 3]);
@@ -175,7 +177,7 @@ fn links_without_inertial() {
         hinged(&shape).replace("</robot>", &format!("{heavy}{weld}</robot>")).replace("<link name=\"base\"/>", &base);
     let (sim, id) = loaded(&urdf, DENSITY);
     assert_eq!((sim.robot(id).description().total_mass(), warnings(&sim)), (1.0, vec![]));
-    // Control: without the heavy one they weigh something.
+    // Control: without the mass of the heavy link, their shapes give them mass.
     let (sim, id) = loaded(&urdf.replace(&heavy, "<link name=\"heavy\"/>"), DENSITY);
     assert!(sim.robot(id).description().total_mass() > 4.0);
 
@@ -189,7 +191,8 @@ fn links_without_inertial() {
     assert_refused(rows);
 }
 
-/// `<inertial>` without `<mass>` or without `<inertia>` was refused: Isaac Gym's cubes have `<density>`, airo's cameras a mass.
+/// Regression: `<inertial>` without `<mass>` or without `<inertia>` was refused, although Isaac Gym's cubes have
+/// `<density>` and airo's cameras only a mass.
 #[test]
 fn partial_inertials() {
     let shape = collision("<box size=\"0.1 0.2 0.4\"/>", [1.0, 0.0, 0.0]);
@@ -214,13 +217,14 @@ fn partial_inertials() {
         let (sim, id) = loaded(&urdf, DENSITY);
         assert_near(&what, &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
         assert_eq!(warnings(&sim), ["inertial-incomplete"], "{what}");
-        // A URDF written from the assembled file leaves the missing values out, too.
+        // A URDF written from the assembled file also leaves the missing values out.
         let cfg = kinetoscope_testkit::worlds::text_robot(&files, "r", &urdf);
         let written = write_urdf(&kinetoscope::robot::urdf::assemble(&cfg.urdf).unwrap().description);
         let (sim, id) = loaded(&written, DENSITY);
         assert_near(&what, &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
     }
-    // Without shapes a mass is a ball of water, 2/5 m r² with r = (3 m / 4 pi rho)^(1/3); without mass there is nothing.
+    // A mass without shapes counts as a ball of water, 2/5 m r² with r = (3 m / 4 pi rho)^(1/3); without a mass, the
+    // inertial is ignored.
     let (sim, id) = loaded(&hinged("<inertial><mass value=\"2\"/></inertial>"), DENSITY);
     let radius = (1.5e-3 / std::f64::consts::PI).cbrt();
     let expected = (2.0, Vector3::zeros(), Matrix3::from_diagonal_element(0.8 * radius * radius));
@@ -233,9 +237,11 @@ fn partial_inertials() {
     assert!(inertial_of(&sim, id, "l").is_none() && warnings(&sim).contains(&"massless-link"));
 }
 
-/// pybullet's random objects have moments (1, 1, 0) for 0.1 kg. Repaired to (1, 1, 1.7e-8) they were needles of 3 m, which
-/// diverged on the ground. With what a box of this mass has they fall and lie still. So do objects with the inertia of a body
-/// many times their size, which were kept: they took seconds to tip over.
+/// Regression: implausible inertias.
+///
+/// Pybullet's random objects have moments (1, 1, 0) for 0.1 kg. Repaired to (1, 1, 1.7e-8) they behaved as needles of 3
+/// m, which diverged on the ground. With the inertia of a box of this mass they fall and come to rest. Objects with the
+/// inertia of a body many times their size were kept unchanged, and took seconds to tip over.
 #[test]
 fn absurd_inertias() {
     let object = |mass: f64, [a, b, c]: [f64; 3]| {
@@ -259,7 +265,8 @@ fn absurd_inertias() {
         ("(1, 1, 0)", 0.1, [1.0, 1.0, 0.0], "(1, 1, 0)"),
         ("zero", 0.1, [0.0; 3], "(0, 0, 0)"),
         ("no triangle", 0.1, [1.0, 0.1, 0.1], "(1, 0.1, 0.1)"),
-        // A rigid body has these, but none of this size; no motor moves this one, so that no rotor is in it.
+        // A rigid body can have these moments, but not with this size. The body has no joint motor, so the moments
+        // cannot include a rotor.
         ("a ball of 5 m", 0.1, [1.0; 3], "(1, 1, 1)"),
         ("above the bound", 1.0, [0.57; 3], "(0.57, 0.57, 0.57)"),
     ] {
@@ -278,8 +285,9 @@ fn absurd_inertias() {
         assert!((height - 0.025).abs() < 1e-3, "{what} lies at {height} m");
         assert!(speed.iter().all(|v| v.abs() < 1e-2), "{what} moves: {speed}");
     }
-    // Controls, which are kept: the reach is 0.075 m, so that 10 times that is 0.5625 kg m² for 1 kg. A box of 1 kg and
-    // 500 cm³ has 2000 kg/m³; one of 15 kg would be denser than osmium, so that the box is a placeholder.
+    // Controls with unchanged inertia: the reach is 0.075 m, so that 10 times that reach gives 0.5625 kg m² for 1 kg. A
+    // box of 1 kg and 500 cm³ has 2000 kg/m³; a box of 15 kg would be denser than osmium, so its shape is a
+    // placeholder.
     for (what, mass, moments, kinds) in [
         ("below the bound", 1.0, [0.55; 3], vec![]),
         ("no triangle, within the bound", 1.0, [0.1, 0.1, 0.3], vec!["inertia-repaired"]),
@@ -290,7 +298,7 @@ fn absurd_inertias() {
         assert_near(what, &in_link_frame(&inertial_of(&sim, id, "l").unwrap()), &expected, 1e-12);
         assert_eq!(warnings(&sim), kinds, "{what}");
     }
-    // Behind a joint, an inertia may hold the rotor of a motor with gears: it is kept, and warned about.
+    // The inertia behind a joint may include the rotor of a geared motor: it is kept with a warning.
     let shape = collision("<box size=\"0.1 0.1 0.05\"/>", [0.0; 3]);
     let inertia = "<inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/>";
     let (sim, id) = loaded(&hinged(&format!("<inertial><mass value=\"1\"/>{inertia}</inertial>{shape}")), DENSITY);
@@ -302,7 +310,7 @@ fn absurd_inertias() {
     assert_eq!(warnings(&load(&object(1.0, [0.57; 3]).replace("</link>", large)).0), [""; 0]);
 }
 
-/// A URDF of which cameras see nothing gave an empty picture without a word.
+/// Regression: a URDF without anything visible gave an empty image without a warning.
 #[test]
 fn nothing_to_draw() {
     let link = kinetoscope_testkit::urdf::link("l", 1.0, 0.01, [0.0; 3], "");
@@ -323,7 +331,7 @@ fn nothing_to_draw() {
     }
 }
 
-/// A visual mesh that is missing was warned about twice: when the robot was read, and when it was drawn.
+/// Regression: a missing visual mesh was warned about twice, on reading and on rendering the robot.
 #[test]
 fn missing_visual_mesh() {
     let mesh = |name: &str| format!("<visual><geometry><mesh filename=\"{name}\"/></geometry></visual></link>");

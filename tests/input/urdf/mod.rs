@@ -9,7 +9,8 @@ mod masses;
 mod robots;
 mod robustness;
 
-/// Asserts that two descriptions are of the same robot, to rounding in poses and axes, with meshes in the same files.
+/// Asserts that two descriptions are of the same robot, up to rounding in poses and axes, with meshes in the same
+/// files.
 pub(crate) fn assert_same(a: &RobotDescription, b: &RobotDescription) {
     let near = |x: &Pose, y: &Pose| {
         (x.translation.vector - y.translation.vector).norm() < 1e-12 && x.rotation.angle_to(&y.rotation) < 1e-12

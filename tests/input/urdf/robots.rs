@@ -1,4 +1,5 @@
-//! Real robots: reading agrees with their vendors' files and with urdf_rs, and writing loses nothing.
+//! Real robots: the parsed robots agree with their vendors' files and with urdf_rs, and a written URDF keeps all
+//! content.
 
 use super::assert_same;
 use kinetoscope::prelude::*;
@@ -21,7 +22,7 @@ fn count(robot: &RobotDescription, kind: JointKind) -> usize {
     robot.joints.iter().filter(|j| j.kind == kind).count()
 }
 
-/// The scales of the collision meshes, whose files exist.
+/// The scales of the collision meshes; asserts that their files exist.
 fn mesh_scales(robot: &RobotDescription) -> Vec<f64> {
     let scale = |geometry: &Geometry| match geometry {
         Geometry::Mesh { path, scale, .. } if path.is_file() => scale.x,
@@ -30,7 +31,7 @@ fn mesh_scales(robot: &RobotDescription) -> Vec<f64> {
     robot.links.iter().flat_map(|link| &link.collisions).map(|c| scale(&c.geometry)).collect()
 }
 
-/// Numbers of the vendors' files, and of two of them together.
+/// Joint counts, masses, roots and diagnostics of the vendors' files, and of two of them combined.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn vendors() {
@@ -71,7 +72,7 @@ fn vendors() {
     assert_eq!((both.drivable_joints().count(), both.name.as_str()), (18, "xMateSR5_Lhand"));
 }
 
-/// Materials and meshes, exactly, without the URIs of the meshes.
+/// Materials and meshes without the URIs of the meshes, for exact comparison.
 fn looks(robot: &RobotDescription) -> Vec<(Option<Material>, Geometry)> {
     let shape = |geometry: &Geometry| match geometry.clone() {
         Geometry::Mesh { path, scale, .. } => Geometry::Mesh { uri: String::new(), path, scale },
@@ -119,7 +120,7 @@ fn vendor_numbers_of_urdf_rs() {
     }
 }
 
-/// Every URDF of every vendor: a robot that steps with finite numbers, or a typed error that names the file.
+/// Every URDF of every vendor gives a robot that steps with finite numbers, or a typed error that names the file.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn every_real_robot() {

@@ -1,4 +1,5 @@
-//! Hostile files: huge, deep, cut off or damaged. The answer is always a robot or an error, soon, and never a panic.
+//! Hostile files: huge, deeply nested, truncated or damaged. The result is always a robot or an error, in bounded time,
+//! and never a panic.
 
 use kinetoscope::robot::description::JointId;
 use kinetoscope::robot::urdf::{UrdfCfg, UrdfError, assemble, parse_file, parse_str, write_urdf};
@@ -95,7 +96,7 @@ fn long_chain() {
     assert!(write_urdf(&robot).len() > text.len());
     assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
 
-    // The same, closed to a circle: the walk that finds it must not recurse either.
+    // The same chain closed to a cycle: the cycle search must not recurse either.
     let circle = text.replace(
         "<link name=\"l0\"/>",
         "<link name=\"l0\"/><joint name=\"back\" type=\"fixed\"><parent link=\"l199999\"/><child link=\"l0\"/></joint>",

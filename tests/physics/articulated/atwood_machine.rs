@@ -1,12 +1,13 @@
-//! Atwood's machine: two masses on a rope over a pulley, a = g (m₁ - m₂)/(m₁ + m₂). The rope is a mimic joint with the ratio
-//! -1.
+//! Atwood's machine: two masses on a rope over a pulley, a = g (m₁ - m₂)/(m₁ + m₂). The rope is a mimic joint with the
+//! ratio -1.
 //!
-//! Tolerance: the coupling is soft by 1e-4, which shows in places only: once the rope is taut, after some steps, what it
-//! yields holds its load, and the velocities are a rigid rope's. Rounding of 500 sums of up to 5 m/s: 1e-12.
+//! Tolerance: the compliance of the coupling, 1e-4, affects positions only. Once the rope is taut, after some steps,
+//! its stretch carries the load, and the velocities are those of a rigid rope. Rounding of 500 sums of up to 5 m/s:
+//! 1e-12.
 
 use crate::lab::*;
 
-/// Velocities of both after half a second.
+/// Velocities of both masses after half a second.
 fn fell(masses: [f64; 2], coupled: bool) -> [f64; 2] {
     let links = [base(), Link::new("left", masses[0], [0.01; 3]), Link::new("right", masses[1], [0.01; 3])];
     let down = [0.0, 0.0, -1.0];

@@ -1,7 +1,8 @@
-//! A bead on a rod that turns with Ω flies out: r'' = Ω² r, so r = r₀ cosh Ω t, and the turn of the rod takes the torque
-//! 2 m r r' Ω. The rod is a platform of 1e6 kg m², which the bead hardly slows.
+//! A bead on a rod that rotates with Ω moves outward: r'' = Ω² r, so r = r₀ cosh Ω t, and the rotation of the rod takes
+//! the torque 2 m r r' Ω. The rod is a platform of 1e6 kg m², which the bead hardly slows.
 //!
-//! Tolerance: the platform loses m (r² - r₀²)/I of Ω, 2e-6, of which the radius feels Ω t tanh of as much: 1e-5 of r.
+//! Tolerance: the platform loses m (r² - r₀²)/I of Ω, 2e-6. The relative effect on the radius is Ω t tanh(Ω t) times
+//! this: 1e-5 of r.
 
 use crate::lab::*;
 
@@ -10,7 +11,7 @@ const MASS: f64 = 0.5;
 const SPIN: f64 = 3.0;
 const START: f64 = 0.2;
 
-/// Radius and its velocity after 1 s, and what the platform lost of its angular momentum \[kg m²/s\].
+/// Radius and radial velocity after 1 s, and the angular momentum lost by the platform \[kg m²/s\].
 fn flown(spin: f64) -> [f64; 3] {
     let links = [base(), Link::new("platform", 1e3, [PLATFORM; 3]), Link::point("bead", MASS, [0.0; 3])];
     let turn = Joint::hinge("turn", ["base", "platform"], [0.0, 0.0, 1.0]);

@@ -1,5 +1,5 @@
-//! Coriolis and centrifugal forces: without gravity, the efforts c(q, q̇) that the judge asks for q̈ = 0 keep all velocities
-//! as they are.
+//! Coriolis and centrifugal forces: without gravity, the efforts c(q, q̇) computed by the reference for q̈ = 0 keep all
+//! velocities constant.
 //!
 //! Tolerance: as for the mass matrix, rounding of v/h and the condition of M; 1e-9.
 
@@ -7,7 +7,7 @@ use super::subjects::{KINDS, Kind, Subject, apart};
 use crate::law::{law, worse};
 use nalgebra::Vector3;
 
-/// The largest acceleration; `part` of the efforts are applied.
+/// The largest acceleration with the share `part` of the efforts applied.
 fn accelerated(kind: Kind, part: f64) -> f64 {
     let mut subject = Subject::new(kind, Vector3::zeros());
     let still = vec![0.0; subject.dof()];

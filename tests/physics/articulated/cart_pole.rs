@@ -1,8 +1,9 @@
-//! A pole on a free cart. With J = I + m l² about the hinge and M + m in all, small angles obey
-//! `(J - m² l²/(M + m)) θ'' = ∓ m g l θ`: hanging it swings as cos ω t, upright it falls as cosh ω t, with
-//! `ω² = m g l/(J - m² l²/(M + m))`. The cart moves by -m l θ/(M + m) against it.
+//! A pole on a free cart. With J = I + m l² about the hinge and the total mass M + m, small angles obey `(J - m²
+//! l²/(M + m)) θ'' = ∓ m g l θ`: a hanging pole swings as cos ω t, an upright one falls as cosh ω t, with `ω² = m g
+//! l/(J - m² l²/(M + m))`. The cart moves by -m l θ/(M + m) in the opposite direction.
 //!
-//! Tolerance: third-order terms, ε² of the angle grown by ω t/4: 1e-5 of the angle, with ε = 1e-3 hanging and 1e-5 upright.
+//! Tolerance: third-order terms, ε² of the angle times the growth ω t/4: 1e-5 of the angle, with ε = 1e-3 hanging and
+//! 1e-5 upright.
 
 use crate::lab::*;
 use std::f64::consts::PI;
@@ -12,7 +13,7 @@ const POLE: f64 = 0.4;
 const ARM: f64 = 0.3;
 const MOMENT: f64 = 0.012;
 
-/// Angle of the pole from where it started (hanging at 0, upright at π) and place of the cart after `seconds`.
+/// Angle of the pole from its start (hanging at 0, upright at π) and position of the cart after `seconds`.
 fn moved(upright: bool, small: f64, seconds: f64, cart: f64) -> [f64; 2] {
     let links = [
         base(),
@@ -40,7 +41,7 @@ fn holds() {
         let [swing, cart] = moved(false, small, 2.0, CART);
         let angle = small * (2.0 * omega).cos();
         m.row("angle after 2 s, hanging", "rad", angle, swing, third_order(small));
-        // The hinge turns about y: below it a positive angle is towards -x, and the cart goes the other way.
+        // The hinge turns about y: below the hinge a positive angle points to -x, and the cart moves the other way.
         let reaction = POLE * ARM / all * (angle - small);
         m.row("place of the cart after 2 s", "m", reaction, cart, third_order(small));
         let grown = tiny * (0.8 * omega).cosh();

@@ -1,15 +1,15 @@
-//! A pendulum that goes round in a cone: Ω² = g/(L cos θ) keeps its angle. The pivot is a hinge about the vertical, which a
-//! weightless ring carries, and one across it.
+//! A conical pendulum: Ω² = g/(L cos θ) keeps its angle. The pivot consists of a hinge about the vertical, carried by a
+//! weightless ring, and a horizontal hinge.
 //!
-//! Tolerance: the moments of ring and bob are the same about all axes, so that they have no part in a steady motion; rounding
-//! of 3000 sums of up to 13 rad, 2e-15 each, 1e-11.
+//! Tolerance: the moments of ring and bob are the same about all axes, so they do not affect a steady motion. Rounding
+//! of 3000 sums of up to 13 rad, 2e-15 each: 1e-11.
 
 use crate::lab::*;
 
 const LENGTH: f64 = 0.8;
 const ANGLE: f64 = 0.9;
 
-/// Angle gone round and angle of the cone after 3 s, started with `part` of the velocity.
+/// Angle about the vertical and angle of the cone after 3 s, started with the share `part` of the steady velocity.
 fn swung(part: f64) -> [f64; 2] {
     let omega = part * (G / (LENGTH * ANGLE.cos())).sqrt();
     let mut lab = Lab::new(rk4(earth()));

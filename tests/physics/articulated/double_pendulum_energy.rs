@@ -1,8 +1,9 @@
-//! A double pendulum of two rods falls from the horizontal: its energy, counted by the judge from the URDF, stays.
+//! A double pendulum of two rods falls from the horizontal: its energy, computed by the reference from the URDF, is
+//! conserved.
 //!
-//! Tolerance: what a step of RK4 changes the energy by is known where the step is written out
-//! ([`double_pendulum`](crate::numerical::double_pendulum)). All of the 5000 steps, as if of one sign, and rounding: half a
-//! digit of each number of the state in each step. Control: Euler.
+//! Tolerance: the energy change of an RK4 step is known from explicit steps of the rods
+//! ([`double_pendulum`](crate::numerical::double_pendulum)). The bound adds all 5000 steps with the same sign, and
+//! rounding of half a digit of each state variable in each step. Control: Euler.
 
 use super::newton_euler::{Motion, Tree, joints};
 use super::subjects::EARTH;
@@ -13,7 +14,7 @@ use std::f64::consts::FRAC_PI_2;
 const START: ([f64; 2], [f64; 2]) = ([FRAC_PI_2, 0.0], [0.0, 0.0]);
 const STEPS: u32 = 5_000;
 
-/// Two rods of 1 kg and 1 m.
+/// URDF of two rods of 1 kg and 1 m.
 pub(crate) fn text() -> String {
     let rod = |name| Link::new(name, 1.0, [1.0 / 12.0, 1.0 / 12.0, 1e-3]).at([0.0, 0.0, -0.5]);
     let upper = Joint::hinge("upper", ["base", "a"], [0.0, 1.0, 0.0]);
@@ -44,7 +45,7 @@ fn change(cfg: SimulationManagerCfg) -> (f64, Vec<[f64; 2]>) {
     (worst, curve)
 }
 
-/// What the energy of rods may change by in as many steps \[J\]: the steps of RK4, written out, and rounding.
+/// Largest energy change of the rods over as many steps \[J\]: explicit RK4 steps, and rounding.
 fn bound() -> f64 {
     let mut rods = Rods::of_joints(START.0, START.1);
     let mut bound = 0.0;

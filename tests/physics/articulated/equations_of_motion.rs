@@ -1,15 +1,17 @@
-//! The equation of motion of whole robots, M q̈ + c(q, q̇) + g(q) = τ: efforts are applied, a step is taken, and the
-//! accelerations found must need exactly these efforts by the recursive Newton-Euler algorithm on the URDF files
-//! ([`newton_euler`](super::newton_euler)). The joints pass through states with all of the terms in them.
+//! The equation of motion of whole robots, M q̈ + c(q, q̇) + g(q) = τ. Efforts are applied and a step is taken. By the
+//! recursive Newton-Euler algorithm on the URDF files ([`newton_euler`](super::newton_euler)), the resulting
+//! accelerations must require exactly these efforts. The states of the joints involve all terms of the equation.
 //!
-//! Tolerance: rounding of the velocities, divided by h = 1 ms, and what a Cholesky factorisation of n rows leaves, (3 n + 1) ε
-//! |M| |q̈| (Higham, Accuracy and Stability of Numerical Algorithms, § 10.1), both through the judge's mass matrix.
+//! Tolerance: rounding of the velocities, divided by h = 1 ms, and the residual of a Cholesky factorization of n rows,
+//! (3 n + 1) ε |M| |q̈| (Higham, Accuracy and Stability of Numerical Algorithms, § 10.1), both multiplied by the
+//! reference's mass matrix.
 
 use super::subjects::{EARTH, KINDS, Subject, apart};
 use crate::law::{law, worse};
 use nalgebra::Vector3;
 
-/// The efforts that rounding of velocities and of the solution for the accelerations is worth \[N m\], the largest.
+/// The effort error from rounding of the velocities and of the solved accelerations \[N m\], the largest over the
+/// joints.
 fn rounding(subject: &Subject, [q, v, a]: [&[f64]; 3]) -> f64 {
     let none = vec![0.0; q.len()];
     let mut efforts = vec![0.0; q.len()];

@@ -1,9 +1,9 @@
-//! A rod that is hinged at one end falls from the horizontal: θ'' = m g L/2/(m L²/3) = 3 g/(2 L), its tip falls with 3/2 g,
+//! A rod hinged at one end falls from the horizontal: θ'' = m g L/2/(m L²/3) = 3 g/(2 L). Its tip falls with 3/2 g,
 //! faster than a free body. Energy: ω² = 3 g sin θ/L at the angle θ below the horizontal.
 //!
-//! Tolerance: of the first step, 20 roundings of half a digit between the file and the velocity of the tip. After 0.4 s, what the
-//! classical Runge-Kutta method is off by, found by its steps for this equation, written without MuJoCo; and rounding, four half
-//! digits in each of 400 steps.
+//! Tolerance of the first step: 20 roundings of half a digit between the file and the velocity of the tip. Tolerance
+//! after 0.4 s: the error of the classical Runge-Kutta method, from its steps for this equation written without MuJoCo,
+//! and rounding of four half digits in each of 400 steps.
 
 use crate::lab::*;
 
@@ -26,11 +26,11 @@ fn fell(moment: f64) -> [f64; 3] {
     };
     let (velocity, angle, _) = fallen(earth(), 1e-3);
     let (_, q, v) = fallen(rk4(earth()), 0.4);
-    // The tip has turned by the angle of the step.
+    // The tip has rotated by the angle of the step.
     [velocity / 1e-3 / angle.cos(), q, v]
 }
 
-/// How far ω is from √(3 g sin θ/L) after 0.4 s by the classical Runge-Kutta method, in parts of it.
+/// Relative error of ω against √(3 g sin θ/L) after 0.4 s by the classical Runge-Kutta method.
 fn runge_kutta() -> f64 {
     let h = 1e-3;
     let rate = |[angle, velocity]: [f64; 2]| [velocity, 1.5 * G / LENGTH * angle.cos()];
@@ -55,7 +55,7 @@ fn holds() {
         let of_law = |angle: f64, velocity: f64| velocity / (3.0 * G * angle.sin() / LENGTH).sqrt();
         let steps = runge_kutta().abs() + 400.0 * 4.0 * f64::EPSILON / 2.0;
         m.row("velocity after 0.4 s, of √(3 g sin θ/L)", "", 1.0, of_law(angle, velocity), (steps, "RK4"));
-        // A point at the middle: g/(L/2), and the tip at 2 g.
+        // A point mass at the middle: the angular acceleration is g/(L/2), and the tip falls with 2 g.
         let [light, point_angle, point_velocity] = fell(1e-3 * moment);
         m.control("acceleration of the tip", "with the mass in the middle", light);
         let other = of_law(point_angle, point_velocity);

@@ -1,17 +1,19 @@
-//! A four-bar linkage: frame d, crank a, coupler b, rocker c. Freudenstein's equation ties the angles of crank and rocker:
-//! `d/a cos θ₄ - d/c cos θ₂ + (a² - b² + c² + d²)/(2 a c) = cos(θ₂ - θ₄)`, and its derivative their velocities:
-//! `θ₄' = a θ₂' sin(θ₂ - θ₃)/(c sin(θ₄ - θ₃))`. The loop is closed by a weld of the rocker to a pin at the coupler's end.
+//! A four-bar linkage: frame d, crank a, coupler b, rocker c. Freudenstein's equation relates the angles of crank and
+//! rocker: `d/a cos θ₄ - d/c cos θ₂ + (a² - b² + c² + d²)/(2 a c) = cos(θ₂ - θ₄)`. Its derivative relates their
+//! velocities: `θ₄' = a θ₂' sin(θ₂ - θ₃)/(c sin(θ₄ - θ₃))`. The loop is closed by a weld of the rocker to a pin at the
+//! coupler's end.
 //!
-//! Tolerance: a velocity v(n+1) obeys the loop of the place q(n) and is looked at in q(n+1): it is off by h θ₄'' = h |dk/dθ₂| ω²
-//! at most, k being θ₄'/θ₂'. Over a turn, the crank's ω² following from the energy, that is 0.057 rad/s. The weld is a
-//! critically damped spring of the time constant 2 h and is stretched by (2 h)² θ₄'' at most, where it does not know of θ₄'';
-//! times what Freudenstein's equation makes of an angle, |d/a sin θ₄ + sin(θ₂ - θ₄)|, that is 4.8e-4 over a turn.
+//! Tolerance: a velocity v(n+1) satisfies the loop at the position q(n) and is compared at q(n+1). Its error is at most
+//! h θ₄'' = h |dk/dθ₂| ω², with k = θ₄'/θ₂'. Over a turn, with ω² of the crank from the energy, that is 0.057 rad/s.
+//! The weld is a critically damped spring of the time constant 2 h. If it ignores θ₄'', it is stretched by at most (2
+//! h)² θ₄''. Times the sensitivity of Freudenstein's equation, |d/a sin θ₄ + sin(θ₂ - θ₄)|, that is 4.8e-4 over a turn.
 //!
-//! The lines of MuJoCo differ within that, by two terms in the rows of a weld. 4.x takes J' q' into their reference acceleration,
-//! so that the weld knows of θ₄''; 2.2.2 does not. And 4.x regularizes the three rows of rotation by the inverse inertia of
-//! rotations, 2.2.2 all six by that of translations. With both written into the rows of 2.2.2 between the halves of its steps
-//! (`efc_aref`, `efc_R` and `efc_D`), this mechanism gives the numbers of 4.0.0 to nine digits; with the first alone the velocity
-//! is off by 0.02823 rad/s, with the second alone by 0.04124. Solver, tolerance and warm start change nothing.
+//! The supported MuJoCo versions differ within that tolerance, by two terms in the rows of a weld. First, 4.x adds J'
+//! q' to the reference acceleration, so that the weld accounts for θ₄''; 2.2.2 does not. Second, 4.x regularizes the
+//! three rows of rotation by the inverse inertia of rotations, 2.2.2 all six rows by that of translations. With both
+//! terms written into the rows of 2.2.2 between the halves of its steps (`efc_aref`, `efc_R` and `efc_D`), this
+//! mechanism gives the numbers of 4.0.0 to nine digits. With the first term alone the velocity is off by 0.02823 rad/s,
+//! with the second alone by 0.04124. Solver, tolerance and warm start have no effect.
 
 use crate::lab::*;
 use kinetoscope::sim::WeldCfg;
@@ -21,14 +23,14 @@ const CRANK: f64 = 0.1;
 const COUPLER: f64 = 0.28;
 const ROCKER: f64 = 0.22;
 
-/// What Freudenstein's equation leaves.
+/// Residual of Freudenstein's equation.
 fn residual(crank: f64, rocker: f64) -> f64 {
     let [a, b, c, d] = [CRANK, COUPLER, ROCKER, FRAME];
     d / a * rocker.cos() - d / c * crank.cos() + (a * a - b * b + c * c + d * d) / (2.0 * a * c)
         - (crank - rocker).cos()
 }
 
-/// Angles of coupler and rocker: the triangle over the diagonal from the crank's end to the rocker's pivot.
+/// Angles of coupler and rocker, from the triangle over the diagonal between the crank's end and the rocker's pivot.
 fn closed(crank: f64) -> [f64; 2] {
     let (x, y) = (FRAME - CRANK * crank.cos(), -CRANK * crank.sin());
     let (diagonal, direction) = (x.hypot(y), y.atan2(x));
@@ -45,7 +47,7 @@ fn velocities(crank: f64, v: f64) -> [f64; 2] {
     [of_coupler, CRANK * v * (crank - coupler).sin() / (ROCKER * (rocker - coupler).sin())]
 }
 
-/// Largest residual, largest error of the rocker's velocity and turns of the crank in 2 s.
+/// Largest residual, largest velocity error of the rocker, and turns of the crank in 2 s.
 fn turned(attached: bool) -> [f64; 3] {
     let bar = |name, length: f64| {
         let moment = 0.3 * length * length / 12.0;
@@ -71,7 +73,7 @@ fn turned(attached: bool) -> [f64; 3] {
     let weld = lab.sim.add_weld(weld).unwrap();
     let (q, v) = (0.8, 8.0);
     let ([coupler, rocker], [coupler_v, rocker_v]) = (closed(q), velocities(q, v));
-    // The pin is as the rocker.
+    // The pin has the orientation of the rocker.
     let positions = [q, coupler - q, rocker - coupler, rocker];
     lab.write_joints(robot, &positions, &[v, coupler_v - v, rocker_v - coupler_v, rocker_v]);
     if attached {

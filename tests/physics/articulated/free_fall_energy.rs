@@ -1,22 +1,24 @@
-//! A quadruped falls free while it turns and its legs swing, which nothing drives: its energy, counted by the judge from the
-//! URDF, stays. And SimBenchmark's energy test, where nothing turns: Euler has z(n) = z₀ - g h² n (n + 1)/2 and v(n) = -g h n,
-//! so that the energy falls by ½ m g² h t, with the mean square (½ m g² h)² h² (N + 1)(2 N + 1)/6 over N steps; m is what
-//! the simulation says that it weighs, the energy is the judge's.
+//! Energy of a falling quadruped whose trunk rotates and whose undriven legs swing: the energy, computed by the
+//! reference from the URDF, is conserved.
 //!
-//! For many steps that is SimBenchmark's (m g² h/2)² T²/3: 8.39 J² for the 52.135 kg of ANYmal C, which are those of the
-//! bundled quadruped, in 2 s by steps of 1 ms. (Published for MuJoCo 1.50: 3.48, what the
-//! formula has for 33.6 kg. Source: leggedrobotics, SimBenchmark, "ANYmal energy test".)
+//! The second case is SimBenchmark's energy test without rotation. Euler has z(n) = z₀ - g h² n (n + 1)/2 and v(n) = -g
+//! h n, so that the energy falls by ½ m g² h t, with the mean square (½ m g² h)² h² (N + 1)(2 N + 1)/6 over N steps.
+//! The mass m is that of the simulation; the energy is that of the reference.
 //!
-//! Tolerance where legs swing: RK4 is off by (λ h)⁴/120 per radian, with λ, the rates of trunk and a leg's three joints added up,
-//! and λ T radians. An angle that is off by ε moves each link by its distance from the trunk's frame times ε at most, against its
-//! weight, and changes what moves by 2 ε of its energy. RK4 of 2.2.2 turns free bodies with order 2 (law
-//! `order_of_free_rotation`): what two turns about axes ω and ω + ω' h leave is h³ |ω x ω'|/12 in a step, ω' <= λ ω, so that the whole
-//! is turned by λ ω² h² T/12, against the weight at the arm of the centre of mass. All of that is counted by the judge from the
-//! URDF and the start.
+//! For many steps this becomes SimBenchmark's (m g² h/2)² T²/3: 8.39 J² for the 52.135 kg of ANYmal C, which is also
+//! the mass of the bundled quadruped, in 2 s by steps of 1 ms. (Published for MuJoCo 1.50: 3.48, which the formula
+//! gives for 33.6 kg. Source: leggedrobotics, SimBenchmark, "ANYmal energy test".)
 //!
-//! Tolerance of mean squares: N steps round heights of up to g T²/2 and velocities of up to g T to half a digit, which is N ε/2 of m
-//! g² T²/2 + m g² T² at most. That is 3 N ε T/h/2 = 3/2 N² ε of Euler's change, and twice of its square. RK4 has no
-//! error but this. The formula for many steps leaves out 3/(2 N) + 1/(2 N²) of itself.
+//! Tolerance for swinging legs: the error of RK4 is (λ h)⁴/120 per radian, over λ T radians, where λ is the sum of the
+//! rates of the trunk and of a leg's three joints. An angle error of ε moves each link, against its weight, by at most
+//! ε times its distance from the trunk's frame, and changes the kinetic energy by 2 ε of itself. RK4 of 2.2.2
+//! integrates free rotation with order 2 (law `order_of_free_rotation`). Two rotations about the axes ω and ω + ω' h
+//! leave h³ |ω x ω'|/12 per step, with ω' <= λ ω. The whole body is thus rotated by λ ω² h² T/12, with its weight at
+//! the lever arm of the center of mass. The reference computes all terms from the URDF and the start.
+//!
+//! Tolerance of mean squares: N steps round heights of up to g T²/2 and velocities of up to g T to half a digit, which
+//! is at most N ε/2 of m g² T²/2 + m g² T². That is 3 N ε T/h/2 = 3/2 N² ε of Euler's change, and twice that of its
+//! square. RK4 has no other error here. The formula for many steps neglects 3/(2 N) + 1/(2 N²) of itself.
 
 use super::newton_euler::{Motion, Tree, joints};
 use super::subjects::EARTH;
@@ -25,21 +27,23 @@ use kinetoscope::mujoco::{TARGET, Target};
 use nalgebra::{Point3, Vector3};
 use std::path::PathBuf;
 
-/// What the energy does in a fall, and what the robot weighs \[kg\].
+/// Energy change during a fall, and mass of the robot \[kg\].
 #[derive(Debug)]
 struct Fall {
     /// Largest change \[J\].
     largest: f64,
-    /// Mean of the square of the change \[J²\].
+    /// Mean square of the change \[J²\].
     mean_square: f64,
     mass: f64,
-    /// Mass times distance of the links from the trunk's frame, and of the centre of mass \[kg m\]; energy of what moves \[J\].
+    /// Mass times distance of the links from the trunk's frame, the same for the center of mass \[kg m\], and the
+    /// kinetic energy \[J\].
     start: [f64; 3],
     /// The change over time \[s, J\].
     curve: Vec<[f64; 2]>,
 }
 
-/// A fall for `seconds`, that starts with these `swing` \[rad/s\] of the legs and `spin` \[rad/s\] of the trunk.
+/// A fall of `seconds` that starts with the joint velocities `swing` of the legs and the angular velocity `spin` of the
+/// trunk \[rad/s\].
 fn fallen(path: PathBuf, cfg: SimulationManagerCfg, seconds: f64, swing: f64, spin: [f64; 3]) -> Fall {
     let mut lab = Lab::new(cfg);
     let tree = Tree::read(&path);
@@ -92,7 +96,7 @@ fn quadruped() -> PathBuf {
     assets::path("quadruped/quadruped.urdf").unwrap()
 }
 
-/// The mean square of the change by Euler: over these steps, and for many.
+/// Mean square of the energy change by Euler: for this number of steps, and in the limit of many steps.
 fn of_euler(mass: f64, h: f64, n: f64) -> [f64; 2] {
     let rate = 0.5 * mass * G * G * h;
     [rate * rate * h * h * (n + 1.0) * (2.0 * n + 1.0) / 6.0, rate * rate * (n * h).powi(2) / 3.0]
@@ -149,7 +153,7 @@ fn holds() {
     });
 }
 
-/// The formula on ANYbotics' own ANYmal C, where its description is there.
+/// The formula on ANYbotics' own ANYmal C, if its description is available.
 #[test]
 #[ignore = "needs real robots: cargo xtask test"]
 fn holds_for_anymal() {

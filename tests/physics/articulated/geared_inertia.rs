@@ -1,6 +1,8 @@
-//! Two wheels, the second coupled to turn n times as fast: an effort τ on the first feels I₁ + n² I₂.
+//! Two wheels, the second coupled with the ratio n to the first: an effort τ on the first acts on the inertia I₁ + n²
+//! I₂.
 //!
-//! Tolerance: as for `atwood_machine`, a soft coupling yields in places and not in velocities; rounding of 500 sums, 1e-12.
+//! Tolerance: as for `atwood_machine`, the compliance of the coupling affects positions and not velocities. Rounding of
+//! 500 sums: 1e-12.
 
 use crate::lab::*;
 

@@ -1,13 +1,13 @@
-//! The efforts g(q) that the judge asks for q̇ = q̈ = 0 hold a robot where it is: it has no velocity after a step, and none
-//! but what rounding grows to after a tenth of a second (a robot that stands on its efforts falls over like e^(λt), with λ
-//! of some 10 per second).
+//! Gravity compensation: the efforts g(q) computed by the reference for q̇ = q̈ = 0 hold a robot in place. After one
+//! step it has no velocity. After a tenth of a second its velocity is only that of amplified rounding: a robot balanced
+//! by its efforts falls over as e^(λt), with λ of about 10 per second.
 //!
-//! Tolerance: 1e-12 m/s² of rounding in a step; times e^1 and the time, 1e-10.
+//! Tolerance: 1e-12 m/s² of rounding in a step, times e^1 and the time: 1e-10.
 
 use super::subjects::{EARTH, KINDS, Kind, Subject, apart};
 use crate::law::{law, worse};
 
-/// The largest velocity after a step and after a tenth of a second, held by `part` of the efforts.
+/// The largest velocity after one step and after a tenth of a second, held by the share `part` of the efforts.
 fn moved(kind: Kind, part: f64) -> [f64; 2] {
     let mut worst = [0.0_f64; 2];
     for k in 0..5 {

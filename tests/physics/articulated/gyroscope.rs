@@ -1,8 +1,9 @@
-//! The rotor in a wrist: a yaw drive turns with Ω, a pitch drive holds level, and the rotor spins with ω about its axis,
-//! which the yaw turns round. Its angular momentum I ω turns with it: dL/dt = Ω x I ω, a torque I ω Ω about the pitch axis.
+//! The rotor of a gyroscope: a yaw drive rotates with Ω, a pitch drive holds the rotor level, and the rotor spins with
+//! ω about its axis, which rotates with the yaw. The angular momentum I ω rotates with it: dL/dt = Ω x I ω, a torque I
+//! ω Ω about the pitch axis.
 //!
-//! Tolerance: the pitch drive sags by δ = τ/kp = 1.2e-4 rad, at which the yaw turns the wrist's other moments out of their
-//! axes: I Ω² δ = 5e-6 N m. The yaw drive has come to rest after 2 s.
+//! Tolerance: the pitch drive sags by δ = τ/kp = 1.2e-4 rad, so that the wrist's other moments leave their principal
+//! axes: I Ω² δ = 5e-6 N m. The yaw drive has settled after 2 s.
 
 use crate::lab::*;
 
@@ -10,7 +11,7 @@ const ROTOR: f64 = 0.02;
 const YAW: f64 = 1.5;
 const SPIN: f64 = 40.0;
 
-/// Efforts of the yaw and of the pitch drive after `seconds`, and the spin of the rotor.
+/// Efforts of the yaw and the pitch drive after `seconds`, and the spin of the rotor.
 fn held(yaw: f64, spin: f64, seconds: f64) -> [f64; 3] {
     let across = 0.6 * ROTOR;
     let links = [

@@ -1,13 +1,14 @@
-//! A quadruped floats weightless and its drives move its legs: what they do is internal, and momentum and angular momentum,
-//! counted by the judge from the URDF, stay 0.
+//! A weightless quadruped whose drives move its legs: all efforts are internal, so that linear and angular momentum,
+//! computed by the reference from the URDF, stay 0.
 //!
-//! Tolerance: RK4 with explicit drives whose gains reach 30 rad/s: (λ h)⁴ = 1e-6 of the momenta inside, some kg m/s, while
-//! they move; 2.2.2, with its orientation of order 2, 1e-6. 1e-5. Euler is a thousand times worse.
+//! Tolerance: RK4 with explicit drives, whose gains reach 30 rad/s: (λ h)⁴ = 1e-6 of the internal momenta of some kg
+//! m/s while the legs move. The orientation of order 2 in 2.2.2 adds 1e-6. In total 1e-5; Euler is a thousand times
+//! worse.
 
 use super::newton_euler::{Motion, Tree, joints};
 use crate::lab::*;
 
-/// Largest momentum \[kg m/s\] and angular momentum \[kg m²/s\] in 1 s, and the largest velocity of a joint.
+/// Largest momentum \[kg m/s\] and angular momentum \[kg m²/s\] in 1 s, and the largest joint velocity.
 fn largest(cfg: SimulationManagerCfg) -> [f64; 3] {
     let mut lab = Lab::new(cfg);
     let path = assets::path("quadruped/quadruped.urdf").unwrap();

@@ -1,7 +1,7 @@
-//! Jacobians against differences of poses: J e_j = (p(q + ε e_j) - p(q - ε e_j))/2ε, with the turn R(q + ε) R(q - ε)⁻¹ as a
-//! vector in the place of the difference of angles. The poses are those of the simulation after the joints were put there.
+//! Jacobians compared with differences of poses: J e_j = (p(q + ε e_j) - p(q - ε e_j))/2ε, with the rotation vector of
+//! R(q + ε) R(q - ε)⁻¹ for the angular part. The poses are those of the simulation after writing the joint positions.
 //!
-//! Tolerance: ε²/6 of third derivatives of order 1 m, and 1e-16/ε of rounding: 1e-9 with ε = 1e-5, as 1e-8.
+//! Tolerance: ε²/6 of third derivatives of order 1 m, and 1e-16/ε of rounding: 1e-9 with ε = 1e-5; the law allows 1e-8.
 
 use super::subjects::{EARTH, KINDS, Kind, Subject};
 use crate::lab::row;
@@ -11,7 +11,7 @@ use kinetoscope::scene::pose::from_row;
 
 const STEP: f64 = 1e-5;
 
-/// The largest error of the linear and of the angular part; `base` links count the joint axes in.
+/// The largest error of the linear and of the angular part; the joint positions are off by `shift` in the Jacobian.
 fn errors(kind: Kind, shift: f64) -> [f64; 2] {
     let mut subject = Subject::new(kind, EARTH);
     let last = match kind {

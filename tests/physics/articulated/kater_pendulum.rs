@@ -1,6 +1,6 @@
-//! Kater's pendulum: hung at l from its centre of mass or, turned over, at k²/l on the other side, k being its radius of
-//! gyration, a body swings with the same period: that of a point at l + k²/l. I = m (k² + l²), and I/(m l) is symmetric in l
-//! and k²/l.
+//! Kater's pendulum: a body suspended at l from its center of mass swings with the same period as suspended at k²/l on
+//! the other side, where k is its radius of gyration. The period is that of a point mass at l + k²/l. I = m (k² + l²),
+//! and I/(m l) is symmetric in l and k²/l.
 //!
 //! Tolerance: as for `pendulum_period`, 1e-9 of the period.
 
@@ -12,7 +12,7 @@ const GYRATION: f64 = 0.3;
 const NEAR: f64 = 0.2;
 const ANGLE: f64 = 0.5;
 
-/// Period of the pendulum hung at `length` from its centre of mass.
+/// Period of the pendulum suspended at `length` from its center of mass.
 fn period(length: f64) -> f64 {
     let mut lab = Lab::new(rk4(earth()));
     let moment = MASS * GYRATION * GYRATION;

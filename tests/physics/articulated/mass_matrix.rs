@@ -1,14 +1,14 @@
-//! The mass matrix, column by column: at rest and weightless, the efforts M e_j accelerate joint j by 1 and no other. M e_j
-//! is the judge's answer to q̈ = e_j.
+//! The mass matrix, column by column: at rest and weightless, the efforts M e_j accelerate joint j by 1 and no other
+//! joint. The reference computes M e_j as its efforts for q̈ = e_j.
 //!
-//! Tolerance: rounding of the factorisation, 1e-16 times the condition of M, up to 1e5 with fingers of 50 g on an arm of
-//! 4 kg; 1e-9.
+//! Tolerance: rounding of the factorization, 1e-16 times the condition of M, up to 1e5 with fingers of 50 g on an arm
+//! of 4 kg: 1e-9.
 
 use super::subjects::{KINDS, Kind, Subject, apart};
 use crate::law::{law, worse};
 use nalgebra::Vector3;
 
-/// The largest error of an acceleration; the efforts are those for joints that are `shift` off.
+/// The largest error of an acceleration, with efforts computed at joint positions that are off by `shift`.
 fn error(kind: Kind, shift: f64) -> f64 {
     let mut subject = Subject::new(kind, Vector3::zeros());
     let still = vec![0.0; subject.dof()];

@@ -1,4 +1,4 @@
-//! Mechanisms: bodies that joints hold together.
+//! Mechanisms: bodies connected by joints.
 
 mod newton_euler;
 mod subjects;

@@ -1,10 +1,10 @@
-//! An independent judge: URDF read by a few lines of its own, and the recursive Newton-Euler algorithm in world axes. It
-//! shares no code with the product.
+//! An independent reference implementation: a minimal URDF reader, and the recursive Newton-Euler algorithm in world
+//! axes. It shares no code with the product.
 //!
 //! Outward, for a joint at r from its parent's origin with axis a (world): ω' = ω + a q̇, α' = α + a q̈ + ω x a q̇,
-//! p̈' = p̈ + α x r + ω x (ω x r) for a hinge, and for a slide ω' = ω, α' = α, p̈' = ... + 2 ω x a q̇ + a q̈. Inward, about
-//! each link's origin: f = m p̈_com + Σ f_child, n = I α + ω x I ω + c x m p̈_com + Σ (n_child + r x f_child); the effort is
-//! a·n or a·f. Gravity is an acceleration of the base by -g. Source: Luh, Walker, Paul 1980.
+//! p̈' = p̈ + α x r + ω x (ω x r) for a hinge; for a slide ω' = ω, α' = α, p̈' = ... + 2 ω x a q̇ + a q̈. Inward, about
+//! each link's origin: f = m p̈_com + Σ f_child, n = I α + ω x I ω + c x m p̈_com + Σ (n_child + r x f_child); the
+//! effort is a·n or a·f. Gravity is an acceleration of the base by -g. Source: Luh, Walker, Paul 1980.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use std::path::Path;
 pub(super) struct Body {
     pub(super) mass: f64,
     pub(super) com: Vector3<f64>,
-    /// About the centre of mass, in the axes of the link.
+    /// Inertia about the center of mass, in the axes of the link.
     pub(super) inertia: Matrix3<f64>,
 }
 
@@ -28,7 +28,7 @@ struct Joint {
     axis: Vector3<f64>,
 }
 
-/// A robot as its files have it.
+/// The kinematic tree of a robot's files.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
     bodies: BTreeMap<String, Body>,
@@ -36,7 +36,7 @@ pub(super) struct Tree {
     root: String,
 }
 
-/// How a link's frame moves, in world axes.
+/// Motion of a link's frame, in world axes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion {
     pub(super) pose: Isometry3<f64>,
@@ -47,17 +47,17 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// At rest in the origin, where gravity is `gravity`.
+    /// At rest at the origin, under `gravity`.
     pub(super) fn rest(gravity: Vector3<f64>) -> Self {
         let zero = Vector3::zeros();
         Self { pose: Isometry3::identity(), velocity: zero, spin: zero, acceleration: -gravity, spin_up: zero }
     }
 }
 
-/// Position, velocity and acceleration of each joint by its name; 0 where it is not named.
+/// Position, velocity and acceleration of each joint by its name; 0 for missing joints.
 pub(super) type Joints = BTreeMap<String, [f64; 3]>;
 
-/// The joints of a robot, in its order.
+/// The joint states of a robot, in its order.
 pub(super) fn joints(names: &[String], q: &[f64], v: &[f64], a: &[f64]) -> Joints {
     (0..names.len()).map(|k| (names[k].clone(), [q[k], v[k], a[k]])).collect()
 }
@@ -80,7 +80,7 @@ impl Tree {
         let pose = |origin: Option<roxmltree::Node<'_, '_>>| {
             let xyz = numbers(origin, "xyz").unwrap_or_default();
             let rpy = numbers(origin, "rpy").unwrap_or_default();
-            // About the fixed x, then y, then z.
+            // Rotations about the fixed x, then y, then z axis.
             let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), rpy.z)
                 * Rotation3::from_axis_angle(&Vector3::y_axis(), rpy.y)
                 * Rotation3::from_axis_angle(&Vector3::x_axis(), rpy.x);
@@ -127,7 +127,7 @@ impl Tree {
         self.root = self.bodies.keys().find(|name| !is_child(name)).unwrap().clone();
     }
 
-    /// `other`, fixed to `link` at `link_from_root`. Their names must differ.
+    /// Adds the tree `other`, fixed to `link` at `link_from_root`. Link names must differ.
     pub(super) fn with(mut self, other: Self, link: &str, link_from_root: Isometry3<f64>) -> Self {
         self.joints.push(Joint {
             name: "mount".into(),
@@ -170,14 +170,14 @@ impl Tree {
         }
     }
 
-    /// Efforts of the joints by their names.
+    /// Joint efforts by joint name.
     pub(super) fn efforts(&self, joints: &Joints, root: Motion) -> BTreeMap<String, f64> {
         let mut efforts = BTreeMap::new();
         self.inward(&self.root, &root, joints, &mut efforts);
         efforts
     }
 
-    /// Force on a link and all it carries, and the moment about its origin.
+    /// Force on a link and its subtree, and the moment about the link's origin.
     fn inward(
         &self,
         link: &str,
@@ -205,7 +205,7 @@ impl Tree {
         (force, moment)
     }
 
-    /// How every link moves.
+    /// The motion of every link.
     pub(super) fn motions(&self, joints: &Joints, root: Motion) -> Vec<(&Body, Motion)> {
         let mut found = Vec::new();
         let mut open = vec![(self.root.as_str(), root)];
@@ -219,7 +219,7 @@ impl Tree {
         found
     }
 
-    /// Momentum, and angular momentum about the world's origin.
+    /// Linear momentum, and angular momentum about the world's origin.
     pub(super) fn momentum(&self, joints: &Joints, root: Motion) -> (Vector3<f64>, Vector3<f64>) {
         let (mut linear, mut angular) = (Vector3::zeros(), Vector3::zeros());
         for (body, motion) in self.motions(joints, root) {
@@ -230,7 +230,7 @@ impl Tree {
         (linear, angular)
     }
 
-    /// Kinetic and potential energy \[J\].
+    /// Kinetic plus potential energy \[J\].
     pub(super) fn energy(&self, joints: &Joints, root: Motion, gravity: Vector3<f64>) -> f64 {
         let of_body = |(body, motion): (&Body, Motion)| {
             let (place, velocity, turned) = of_com(body, &motion);
@@ -241,7 +241,7 @@ impl Tree {
     }
 }
 
-/// Place and velocity of a centre of mass, and the inertia in world axes.
+/// Position and velocity of a center of mass, and the inertia in world axes.
 fn of_com(body: &Body, motion: &Motion) -> (Vector3<f64>, Vector3<f64>, Matrix3<f64>) {
     let turn = motion.pose.rotation.to_rotation_matrix();
     let c = turn * body.com;

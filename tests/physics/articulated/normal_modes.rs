@@ -1,14 +1,15 @@
-//! Two equal pendulums, one below the other, have two modes: ω² = (2 ∓ √2) g/L, in which the lower swings ±√2 as far as the
-//! upper, both angles from the vertical. Started in one they stay in it: θ₁ = ε cos ω t.
+//! Two equal pendulums, one below the other, have two modes: ω² = (2 ∓ √2) g/L. In these modes the lower pendulum
+//! swings ±√2 as far as the upper, both angles measured from the vertical. A motion started in one mode stays in that
+//! mode: θ₁ = ε cos ω t.
 //!
-//! Tolerance: the motion is linear up to ε² of it, which shifts ω t by some ε² ω t: 2e-7 of ε = 1e-4 rad; 1e-6.
+//! Tolerance: the motion is linear up to ε² of itself, which shifts ω t by about ε² ω t: 2e-7 of ε = 1e-4 rad; 1e-6.
 
 use crate::lab::*;
 
 const LENGTH: f64 = 0.5;
 const SMALL: f64 = 1e-4;
 
-/// Angles from the vertical after 2 s, having started with the lower at `ratio` times the upper.
+/// Angles from the vertical after 2 s, started with the lower angle at `ratio` times the upper.
 fn swung(ratio: f64) -> [f64; 2] {
     let bob = |name| Link::point(name, 0.7, [0.0, 0.0, -LENGTH]);
     let upper = Joint::hinge("upper", ["base", "a"], [0.0, 1.0, 0.0]);

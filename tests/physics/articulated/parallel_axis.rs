@@ -1,6 +1,7 @@
-//! Links that fixed joints hold, of one file or of several that are merged, are one body: m = Σ m, c = Σ m c/m, and I = Σ (R I Rᵀ + m (|d|² 1 - d dᵀ)) about c, d being
-//! from c to each centre. By how it moves: a torque τ for one step from rest gives ω = h I⁻¹ τ, a force F in its centre of
-//! mass v = h F/m and no turn.
+//! Links connected by fixed joints, in one file or in several merged files, form one body: m = Σ m, c = Σ m c/m, and
+//! I = Σ (R I Rᵀ + m (|d|² 1 - d dᵀ)) about c, with d from c to each center. The body is identified by its motion: a
+//! torque τ for one step from rest gives ω = h I⁻¹ τ, and a force F at its center of mass gives v = h F/m without
+//! rotation.
 //!
 //! Tolerance: rounding of the principal axes, 1e-12.
 
@@ -10,7 +11,7 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 const TORQUE: [f64; 3] = [0.5, -0.8, 1.1];
 const FORCE: [f64; 3] = [4.0, 5.0, -6.0];
 
-/// A link, and its frame in the root's.
+/// The links, with position and rotation of their frames in the root's frame.
 fn parts() -> Vec<(Link, [f64; 3], [f64; 3])> {
     let inertia = |s: f64| s * Matrix3::new(3.0, 0.4, -0.2, 0.4, 2.5, 0.3, -0.2, 0.3, 2.0);
     let link =
@@ -27,7 +28,7 @@ fn isometry(xyz: [f64; 3], rpy: [f64; 3]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(Vector3::from(xyz)), UnitQuaternion::from_rotation_matrix(&turn))
 }
 
-/// Mass, centre of mass and inertia about it.
+/// Composed mass, center of mass and inertia about it.
 fn composed() -> (f64, Vector3<f64>, Matrix3<f64>) {
     let bodies: Vec<(f64, Vector3<f64>, Matrix3<f64>)> = parts()
         .into_iter()
@@ -46,16 +47,16 @@ fn composed() -> (f64, Vector3<f64>, Matrix3<f64>) {
     (mass, com, bodies.iter().map(about).sum())
 }
 
-/// How the parts are put together.
+/// Assembly of the parts.
 #[derive(Clone, Copy, Debug)]
 enum Robot {
-    /// One file, in which fixed joints hold them.
+    /// One file with fixed joints.
     OneFile,
-    /// A file each, merged.
+    /// One file per part, merged.
     Merged,
 }
 
-/// What it weighs, and how it moves after a step from rest.
+/// Mass of the body, and its motion after one step from rest.
 #[derive(Debug)]
 struct Moved {
     mass: f64,
@@ -64,7 +65,7 @@ struct Moved {
     spin: Vector3<f64>,
 }
 
-/// A step with a force in the centre of mass and a torque.
+/// One step with a force at the center of mass and a torque.
 fn moved(kind: Robot, parts: &[(Link, [f64; 3], [f64; 3])], force: [f64; 3], torque: [f64; 3]) -> Moved {
     let start = Vector3::new(1.0, 2.0, 3.0);
     let mut lab = Lab::new(weightless());
@@ -107,7 +108,7 @@ fn holds() {
     law(module_path!(), "I = Σ (R I Rᵀ + m (|d|² 1 - d dᵀ)), c = Σ m c/Σ m", |m| {
         let (mass, com, inertia) = composed();
         let spin = 1e-3 * inertia.try_inverse().unwrap() * Vector3::from(TORQUE);
-        // The same parts, moved so that all centres of mass are in one point.
+        // The same parts, shifted so that all centers of mass coincide.
         let concentric = parts()
             .into_iter()
             .map(|(link, xyz, rpy)| {
@@ -132,7 +133,7 @@ fn holds() {
                 let quantity = format!("angular velocity by a torque, {axis}, {name}");
                 m.row(&quantity, "rad/s", spin[k], turned.spin[k], rounding);
                 m.control(&quantity, "with all centres of mass in one point", no_arms.spin[k]);
-                // The frame goes round the centre of mass, which stands.
+                // The frame rotates about the center of mass, which is at rest.
                 let (quantity, at_frame) =
                     (format!("velocity of the frame by a torque, {axis}, {name}"), spin.cross(&-com));
                 m.row(&quantity, "m/s", at_frame[k], turned.velocity[k], rounding);

@@ -1,10 +1,10 @@
-//! A skater pulls in the arms: a mass on a turning platform is drawn in along a rail, and nothing turns the platform from
-//! outside: ω (I + m r²) stays, and the energy grows by the work that is done.
+//! A skater pulls in the arms: a mass on a rotating platform is pulled inward along a rail, without external torque.
+//! The angular momentum ω (I + m r²) is conserved, and the energy grows by the work done.
 //!
-//! Where it ends: the spring k, aimed at a, holds it on its way round, k (r - a) = m ω² r, and with ω = L/(I + m r²) that is one
-//! equation for r.
+//! Final radius: the spring k with the target a holds the mass on its circle, k (r - a) = m ω² r, which with ω = L/(I +
+//! m r²) is one equation for r.
 //!
-//! Tolerance: RK4, (ω h)⁴ per radian: 1e-8 of ω, which is as much of r. What is left of the way after 10 s is e^-35.
+//! Tolerance: RK4, (ω h)⁴ per radian: 1e-8 of ω, and as much of r. After 10 s, e^-35 of the motion is left.
 
 use crate::lab::*;
 use kinetoscope::sim::DriveModel;
@@ -12,7 +12,7 @@ use kinetoscope::sim::DriveModel;
 const PLATFORM: f64 = 0.2;
 const MASS: f64 = 1.5;
 
-/// Angular velocity and radius after 10 s; the mass starts at 0.5 m with 2 rad/s, and is drawn to 0.1 m.
+/// Angular velocity and radius after 10 s; the mass starts at 0.5 m with 2 rad/s, with its target at 0.1 m.
 fn drawn(stiffness: f64) -> [f64; 2] {
     let links = [base(), Link::new("platform", 2.0, [0.1, 0.1, PLATFORM]), Link::point("mass", MASS, [0.0; 3])];
     let turn = Joint::hinge("turn", ["base", "platform"], [0.0, 0.0, 1.0]);
@@ -37,7 +37,7 @@ fn holds() {
         let [omega, radius] = drawn(300.0);
         let momentum = 2.0 * (PLATFORM + MASS * 0.25);
         let spin = |r: f64| momentum / (PLATFORM + MASS * r * r);
-        // The right side changes by a fifth of what r does: this converges.
+        // The right side changes by a fifth of the change of r, so the iteration converges.
         let end = (0..200).fold(0.1, |r, _| 300.0 * 0.1 / (300.0 - MASS * spin(r).powi(2)));
         let expected = spin(end);
         let left = drawn(0.0);

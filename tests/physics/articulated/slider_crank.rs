@@ -1,9 +1,9 @@
-//! A slider-crank: crank r, rod l. The slider is at x = r cos θ + √(l² - r² sin² θ), with x' = -r θ' sin θ (1 + r cos θ/√(l² -
-//! r² sin² θ)). The loop is closed by a weld of the slider to a pin, which turns at the end of the rod.
+//! A slider-crank: crank r, rod l. The slider is at x = r cos θ + √(l² - r² sin² θ), with x' = -r θ' sin θ (1 + r cos
+//! θ/√(l² - r² sin² θ)). The loop is closed by a weld of the slider to a pin at the end of the rod.
 //!
-//! Tolerance: as for `four_bar`: a velocity v(n+1) obeys the loop of q(n) and is looked at in q(n+1), off by h |dk/dθ| ω² with
-//! k = x'/θ'. Over a turn, ω² following from the energy, |dk/dθ| ω² is 11.6 m/s² at most: 1.16e-2 m/s. The weld, a
-//! critically damped spring of the time constant 2 h, is stretched by (2 h)² of that at most: 4.7e-5 m.
+//! Tolerance: as for `four_bar`, a velocity v(n+1) satisfies the loop at q(n) and is compared at q(n+1), with an error
+//! of h |dk/dθ| ω², k = x'/θ'. Over a turn, with ω² from the energy, |dk/dθ| ω² is at most 11.6 m/s²: 1.16e-2 m/s. The
+//! weld, a critically damped spring of the time constant 2 h, is stretched by at most (2 h)² of that: 4.7e-5 m.
 
 use crate::lab::*;
 use kinetoscope::sim::WeldCfg;
@@ -11,7 +11,7 @@ use kinetoscope::sim::WeldCfg;
 const CRANK: f64 = 0.1;
 const ROD: f64 = 0.35;
 
-/// Largest errors of the slider's place and velocity in 2 s.
+/// Largest errors of the slider's position and velocity in 2 s.
 fn errors(closed: bool) -> [f64; 2] {
     let links = [
         base(),
@@ -36,7 +36,7 @@ fn errors(closed: bool) -> [f64; 2] {
     let weld = WeldCfg { uid: "weld".into(), first: "robot/pin".into(), second: "robot/slider".into() };
     let weld = lab.sim.add_weld(weld).unwrap();
     let (q, v) = (0.5_f64, 8.0);
-    // The rod's angle from the line of the slider, and what keeps the pin level.
+    // The rod's angle from the line of the slider, and the velocity that keeps the pin level.
     let psi = -(CRANK * q.sin() / ROD).asin();
     let psi_v = -CRANK * v * q.cos() / (ROD * psi.cos());
     lab.write_joints(robot, &[q, psi - q, -psi, place(q)], &[v, psi_v - v, -psi_v, speed(q, v)]);

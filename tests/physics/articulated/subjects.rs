@@ -1,5 +1,5 @@
-//! Robots that laws of dynamics are tried on: the bundled arm, and one that is merged from two files with everything turned
-//! and shifted against everything.
+//! Robots for the laws of dynamics: the bundled arm, and a robot merged from two files with rotated and shifted frames
+//! and inertias.
 
 use super::newton_euler::{Joints, Motion, Tree, joints};
 use crate::lab::*;
@@ -7,7 +7,7 @@ use crate::law::worse;
 use kinetoscope::scene::pose::from_xyz_rpy;
 use nalgebra::{Matrix3, Vector3};
 
-/// A robot in a simulation, and the judge of it.
+/// A robot in a simulation, with its reference model.
 #[derive(Debug)]
 pub(super) struct Subject {
     pub(super) lab: Lab,
@@ -16,18 +16,18 @@ pub(super) struct Subject {
     pub(super) names: Vec<String>,
 }
 
-/// Which robot.
+/// Kind of the robot.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Kind {
     /// The bundled SR5.
     Arm,
-    /// An arm of four joints with a gripper of two fingers, from two files.
+    /// An arm of four joints with a gripper of two fingers, merged from two files.
     Merged,
 }
 
 pub(super) const KINDS: [(Kind, &str); 2] = [(Kind::Arm, "SR5"), (Kind::Merged, "merged arm and gripper")];
 
-/// A link with an inertia that is in no principal axes, turned and away from the link's frame.
+/// A link whose inertia is rotated and shifted against its frame and has off-diagonal terms.
 fn skewed(name: &str, mass: f64, size: f64, k: f64) -> Link {
     let unit = mass * size * size;
     let off = |x: f64| 0.1 * unit * (x + k).sin();
@@ -73,7 +73,7 @@ fn gripper() -> String {
 }
 
 impl Subject {
-    /// A passive one with a fixed base, in steps of a millisecond.
+    /// A passive robot with a fixed base and a time step of a millisecond.
     pub(super) fn new(kind: Kind, gravity: Vector3<f64>) -> Self {
         let mut lab = Lab::new(SimulationManagerCfg { gravity, ..earth() });
         let (urdf, tree) = match kind {
@@ -101,7 +101,7 @@ impl Subject {
         self.names.len()
     }
 
-    /// Numbers between -`size` and `size`, others for each `k`.
+    /// Deterministic numbers between -`size` and `size`, different for each `k`.
     pub(super) fn spread(&self, size: f64, k: usize) -> Vec<f64> {
         (0..self.dof()).map(|j| size * (1.7 * k as f64 + 2.3 * j as f64 + size).sin()).collect()
     }
@@ -110,13 +110,13 @@ impl Subject {
         joints(&self.names, q, v, a)
     }
 
-    /// The judge's efforts, in the order of the robot's joints.
+    /// The reference's efforts, in the order of the robot's joints.
     pub(super) fn efforts(&self, q: &[f64], v: &[f64], a: &[f64], gravity: Vector3<f64>) -> Vec<f64> {
         let efforts = self.tree.efforts(&self.joints(q, v, a), Motion::rest(gravity));
         self.names.iter().map(|name| efforts[name]).collect()
     }
 
-    /// Accelerations in one step from this state under these efforts: the change of the velocities.
+    /// Accelerations over one step from this state under these efforts, from the change of the velocities.
     pub(super) fn accelerations(&mut self, q: &[f64], v: &[f64], efforts: &[f64]) -> Vec<f64> {
         self.lab.write_joints(self.robot, q, v);
         self.lab.push_joints(self.robot, efforts);
@@ -126,7 +126,7 @@ impl Subject {
     }
 }
 
-/// The largest difference of two lists.
+/// The largest difference between two lists.
 pub(super) fn apart(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, worse)
 }

@@ -1,6 +1,6 @@
-//! Virtual work: a force F in the centre of mass of a link and a torque T on it are held by the efforts -Jᵀ (F, T), J being
-//! the Jacobian of that point: nothing accelerates. The point is where the force acts, so J of the link's frame gets the
-//! torque T + c x F.
+//! Virtual work: a force F at the center of mass of a link and a torque T on the link are balanced by the efforts -Jᵀ
+//! (F, T), where J is the Jacobian of that point, so that nothing accelerates. J of the link's frame needs the torque
+//! T + c x F, because the force acts at the center of mass.
 //!
 //! Tolerance: as for the mass matrix; 1e-9 of accelerations.
 
@@ -10,7 +10,7 @@ use crate::law::{law, worse};
 use kinetoscope::robot::kinematics::Tip;
 use nalgebra::Vector3;
 
-/// The largest acceleration; `part` of the efforts are applied.
+/// The largest acceleration with the share `part` of the efforts applied.
 fn accelerated(kind: Kind, part: f64) -> f64 {
     let mut worst = 0.0_f64;
     for k in 0..4 {
@@ -21,7 +21,7 @@ fn accelerated(kind: Kind, part: f64) -> f64 {
         };
         let (q, still) = (subject.spread(0.5, k), vec![0.0; subject.dof()]);
         let (force, torque) = (Vector3::new(3.0, -5.0, 2.0), Vector3::new(0.4, 0.1, -0.3));
-        // What the force accelerates is read off the judge: no effort, but the wrench as an effort of each joint.
+        // The effort of each joint that balances the wrench, from the Jacobian of the link's frame.
         let robot = subject.lab.sim.robot(subject.robot);
         let jacobian = robot.jacobian(Tip::from(link.as_str()), Some(row(&q).view()), None).unwrap();
         let id = robot.link_id(&link).unwrap();

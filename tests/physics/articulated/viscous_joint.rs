@@ -1,5 +1,5 @@
-//! A wheel in an oil bearing: I ω' = -c ω. MuJoCo's Euler takes the damping at the end of the step, ω(n+1) = ω(n)/(1 + h c/I),
-//! so that ω(n) = ω₀ (1 + h c/I)^-n, which goes to ω₀ e^(-c t/I) with the step.
+//! A wheel with viscous damping: I ω' = -c ω. MuJoCo's Euler evaluates the damping at the end of the step, ω(n+1) =
+//! ω(n)/(1 + h c/I), so that ω(n) = ω₀ (1 + h c/I)^-n, which converges to ω₀ e^(-c t/I) with the step.
 //!
 //! Tolerance: rounding of 1000 divisions.
 

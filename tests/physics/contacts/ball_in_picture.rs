@@ -1,28 +1,28 @@
-//! How a pinhole camera sees a ball: in closed form.
+//! Closed form of a ball's image in a pinhole camera.
 //!
-//! A ball of radius R at (x, y, z) of the optical frame is inside of the cone that touches it. The plane of the picture
-//! cuts an ellipse from it, with s = z² - R²:
+//! A ball of radius R at (x, y, z) in the optical frame is enclosed by its tangent cone. The image plane cuts the cone
+//! in an ellipse, with s = z² - R²:
 //!
 //! ```text
 //! middle (c + f (x, y) z/s),   area π f² R² √(x² + y² + s)/s^(3/2)
 //! ```
 //!
-//! (Its half axes are f R/√s across and f R √(x² + y² + s)/s along the way to the principal point.)
+//! (Its half axes are f R/√s across the direction to the principal point, and f R √(x² + y² + s)/s along it.)
 
 use kinetoscope::ndarray::{ArrayView2, ArrayView3, Axis};
 use std::f64::consts::PI;
 
-/// Size of the picture, its focal length and principal point \[pixels\].
+/// Image size, focal length and principal point \[pixels\].
 pub(super) const SIZE: [usize; 2] = [320, 240];
 pub(super) const FOCAL: f64 = 280.0;
 pub(super) const MIDDLE: [f64; 2] = [160.0, 120.0];
 
-/// What a picture shows of one thing.
+/// Image moments of one object.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     /// Area \[pixels\].
     pub(super) area: f64,
-    /// Mean of the centres of its pixels \[pixels\].
+    /// Mean of its pixel centers \[pixels\].
     pub(super) centroid: [f64; 2],
 }
 
@@ -33,7 +33,7 @@ pub(super) fn expected([x, y, z]: [f64; 3], radius: f64) -> Seen {
     Seen { area, centroid: [MIDDLE[0] + FOCAL * x * z / s, MIDDLE[1] + FOCAL * y * z / s] }
 }
 
-/// The pixels of a mask id.
+/// Moments of the pixels with a mask id.
 pub(super) fn found(mask: &ArrayView3<'_, i32>, id: i32) -> Seen {
     let mask: ArrayView2<'_, i32> = mask.index_axis(Axis(0), 0);
     let (mut area, mut sum) = (0.0, [0.0; 2]);

@@ -1,13 +1,13 @@
-//! Friction is against the motion, and as large in all directions: f = -μ N v/|v|. Elliptic cones do that. A pyramid
-//! with its edges along x and y is smaller between them: |f_x| + |f_y| <= μ N, which is μ N/√2 at 45°.
+//! Friction opposes the motion and has the same magnitude in all directions: f = -μ N v/|v|. Elliptic cones satisfy
+//! this. A pyramid with its edges along x and y is smaller between them: |f_x| + |f_y| <= μ N, which is μ N/√2 at 45°.
 //!
-//! A ball slides without spin: its one contact moves as the ball does, along a straight line, for friction turns it about the
-//! horizontal across that line only. It slides for 2 v/(7 μ g), of which the law sees the first half. So the sum of friction over the sum of
-//! normal forces is exact, hop as the ball may. (Corners of a plate, which turns a little, move in other directions than the
-//! plate.)
+//! A ball slides without spin. Its one contact moves with the ball along a straight line, because friction rotates the
+//! ball only about the horizontal axis across that line. The ball slides for 2 v/(7 μ g); the law uses the first half.
+//! The sum of friction over the sum of normal forces is therefore exact, even if the ball hops. (Corners of a plate,
+//! which rotates slightly, would move in other directions than the plate.)
 //!
-//! Tolerance: rounding of a sum of as many forces as there are steps, each to half a digit, and each the answer of a solver in
-//! which some 20 numbers are added up.
+//! Tolerance: rounding of one sum per step, each force to half a digit, and each force from a solver that adds some 20
+//! numbers.
 
 use crate::lab::*;
 use kinetoscope::sim::Cone;
@@ -16,13 +16,13 @@ use nalgebra::{Rotation2, Vector2};
 
 const FRICTION: f64 = 0.3;
 const SPEED: f64 = 4.0;
-/// The ball slides for 0.388 s, with half of the friction for twice as long.
+/// The ball slides for 0.388 s, and twice as long with half of the friction.
 const STEPS: u32 = 194;
 
 /// Rounding of the sums.
 const ROUNDING: f64 = STEPS as f64 * 20.0 * f64::EPSILON / 2.0;
 
-/// Friction in parts of the normal force, of a ball that slides at this angle to x.
+/// Ratio of friction to normal force, as a vector, for a ball that slides at this angle to x.
 fn slid(angle: f64, cone: Cone, coefficient: f64) -> Vector2<f64> {
     let mut lab = Lab::new(SimulationManagerCfg { cone, ..slope(0.0, coefficient) });
     let ball = lab.object(ball("ball", 0.2, 1.5, [0.0, 0.0, 0.2]));
@@ -40,7 +40,7 @@ fn slid(angle: f64, cone: Cone, coefficient: f64) -> Vector2<f64> {
     friction / normal
 }
 
-/// Parts along the direction at this angle to x, and across it.
+/// Components along the direction at this angle to x, and across it.
 fn parts(friction: Vector2<f64>, angle: f64) -> [f64; 2] {
     let way = Rotation2::new(angle) * Vector2::x();
     [friction.dot(&way), way.perp(&friction)]

@@ -1,10 +1,10 @@
-//! A table on four legs at (±a, ±b) with a load W' at (x, y) on it. The lever rule gives what two legs of one side
-//! carry together: (W + W')/2 ± W' x/2a, and ± W' y/2b. How they share it is a matter of how they give way: legs of the
-//! same softness and a stiff table have planar forces, W/4 + W'/4 (1 ± x/a ± y/b).
+//! A table on four legs at (±a, ±b) with a load W' at (x, y) on it. The lever rule gives the sum of two legs on one
+//! side: (W + W')/2 ± W' x/2a, and ± W' y/2b. The distribution between them depends on their compliance: equally soft
+//! legs under a stiff table have planar forces, W/4 + W'/4 (1 ± x/a ± y/b).
 //!
-//! Tolerance: the table gives way by 0.1 mm on one side, which tilts it by 0.1 mrad and shifts its load by 0.1 mm of
-//! 0.4 m: 5e-4. The depth grows a little slower than the force (d = 0.9 to 0.91 in `soft_contact`), 2 % of it: so much
-//! of what is asymmetric.
+//! Tolerance: the table sinks by 0.1 mm on one side, which tilts it by 0.1 mrad and shifts its load by 0.1 mm of 0.4 m:
+//! 5e-4. The depth grows slightly slower than the force (d = 0.9 to 0.91 in `soft_contact`), by 2 %, which applies to
+//! the asymmetric part.
 
 use crate::lab::*;
 use kinetoscope_testkit::worlds::cube;
@@ -16,7 +16,7 @@ const HALF: [f64; 2] = [0.4, 0.25];
 const AT: [f64; 2] = [0.22, -0.08];
 const HEIGHT: f64 = 0.3;
 
-/// Which way from the middle the legs stand.
+/// Signs of the legs' x and y coordinates.
 const SIDES: [[f64; 2]; 4] = [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]];
 
 /// Upward forces on the four legs.

@@ -1,16 +1,17 @@
-//! An IMU in the bob of a pendulum feels the rod alone: along it g cos θ + ω² L, which with L ω² = 2 g (cos θ - cos θ₀)
-//! is g (3 cos θ - 2 cos θ₀): g (3 - 2 cos θ₀) at the bottom, g cos θ₀ at the ends; across it nothing. Half way up the
-//! rod it feels half of g sin θ across.
+//! An IMU in the bob of a pendulum measures only the force of the rod: g cos θ + ω² L along the rod and zero across it.
+//! With L ω² = 2 g (cos θ - cos θ₀) the first is g (3 cos θ - 2 cos θ₀): g (3 - 2 cos θ₀) at the bottom, g cos θ₀ at
+//! the ends. Half way up the rod, the IMU measures half of g sin θ across it.
 //!
-//! Tolerance: MuJoCo's Euler keeps H - h/2 ω ∂V/∂θ, which is H at the bottom and at the ends: the reading is off by (ω₀
-//! h)², 1e-7, and by what a step misses of an extremum, as much; 1e-6 g.
+//! Tolerance: MuJoCo's Euler conserves H - h/2 ω ∂V/∂θ, which is H at the bottom and at the ends. The reading is off by
+//! (ω₀ h)², 1e-7, and by the distance of a step from an extremum, as much: 1e-6 g.
 
 use crate::lab::*;
 
 const LENGTH: f64 = 1.0;
 const START: f64 = 1.0;
 
-/// Along the rod: most and least; across it: most, of a swing from `angle` with the IMU `part` of the way down.
+/// Largest and smallest reading along the rod and largest across it, for a swing from `angle`. The IMU is at the
+/// fraction `part` of the rod's length.
 fn felt(angle: f64, part: f64) -> [f64; 3] {
     let mut lab = Lab::new(with_dt(1e-4, earth()));
     let joint = Joint::hinge("pivot", ["base", "bob"], [0.0, 1.0, 0.0]);
@@ -19,7 +20,7 @@ fn felt(angle: f64, part: f64) -> [f64; 3] {
     let id = lab.sim.add_sensor("imu", ImuCfg { offset, ..ImuCfg::on("bob") }).unwrap();
     lab.write_joints(robot, &[angle], &[0.0]);
     let mut felt = [0.0_f64, f64::INFINITY, 0.0];
-    // A half swing takes 1.07 s from here.
+    // From here, half a swing takes 1.07 s.
     lab.watch(11_500, |_, sim| {
         let a = sim.sensor(id).unwrap().lin_acc_b();
         felt = [felt[0].max(a[(0, 2)]), felt[1].min(a[(0, 2)]), felt[2].max(a[(0, 0)].abs())];

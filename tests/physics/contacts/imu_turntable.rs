@@ -1,5 +1,5 @@
-//! An IMU at the radius r of a turntable that turns with ω and speeds up with α reads ω² r inwards, α r along its way
-//! and g upwards; ω and α about z; and the velocity ω r along its way.
+//! An IMU at the radius r of a turntable with angular velocity ω and angular acceleration α. It measures ω² r inward, α
+//! r along its path and g upward; ω and α about z; and the velocity ω r along its path.
 //!
 //! Tolerance: ω is constant, and α τ/I, to rounding: 1e-10.
 
@@ -10,7 +10,7 @@ const RADIUS: f64 = 0.4;
 const SPIN: f64 = 6.0;
 const TORQUE: f64 = 0.2;
 
-/// Acceleration, angular velocity and acceleration, and velocity, after 1 s.
+/// Acceleration, angular velocity, angular acceleration and velocity after 1 s.
 fn read(cfg: SimulationManagerCfg, place: [f64; 2], spin: f64, torque: f64) -> [f64; 7] {
     let mut lab = Lab::new(cfg);
     let links = [base(), Link::new("table", 2.0, [MOMENT; 3]), Link::new("tip", 0.0, [0.0; 3])];
@@ -32,11 +32,11 @@ fn holds() {
         let alpha = TORQUE / MOMENT;
         let cases = [("steady", 0.0), ("speeding up", TORQUE)];
         for (name, torque) in cases {
-            // What it reads is of the beginning of the last step.
+            // The reading belongs to the beginning of the last step.
             let omega = SPIN + torque / MOMENT * (1.0 - 1e-3);
             let alpha = if torque > 0.0 { alpha } else { 0.0 };
             let found = read(earth(), [RADIUS, 0.0], SPIN, torque);
-            // Each row without its own cause: one thing is different at a time.
+            // Controls: for each row, one cause is changed at a time.
             let farther = ("1 % farther out", read(earth(), [1.01 * RADIUS, 0.0], SPIN, torque));
             let beside = ("5 cm beside", read(earth(), [RADIUS, 0.05], SPIN, torque));
             let falling = ("without weight", read(weightless(), [RADIUS, 0.0], SPIN, torque));

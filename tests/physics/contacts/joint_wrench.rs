@@ -1,6 +1,6 @@
-//! What a joint exerts on its load. One that hangs is held with m g, and what is off its axis with the torque r x m g.
-//! One that turns with ω at the radius r is pulled inwards with m ω² r; and where its axis is not principal the bearing
-//! turns the angular momentum with it: ω x (I ω), which about z is ω² (-I_yz, I_xz, 0). A drive is felt about the axis.
+//! Wrench of a joint on its load. A hanging load is held with m g, and an off-axis load with the torque r x m g. A load
+//! that rotates with ω at the radius r is pulled inward with m ω² r. If its axis is not principal, the bearing rotates
+//! the angular momentum: ω x (I ω), which about z is ω² (-I_yz, I_xz, 0). A drive acts about the axis.
 //!
 //! Tolerance: rounding of accelerations over a step of 1 ms, times 3 kg: 1e-9.
 
@@ -39,7 +39,7 @@ fn holds() {
         let effort = 0.5;
         for (name, spin, effort) in [("at rest", 0.0, 0.0), ("turning", SPIN, 0.0), ("speeding up", SPIN, effort)] {
             let alpha = effort / moment;
-            // What it reads is of the beginning of the last step.
+            // The reading belongs to the beginning of the last step.
             let omega = spin + alpha * (0.2 - 1e-3);
             let square = omega * omega;
             let expected = [
@@ -51,7 +51,7 @@ fn holds() {
                 effort,
             ];
             let found = carried(SKEW, spin, MASS, effort);
-            // Each row without its own cause: one thing is different at a time.
+            // Controls: for each row, one cause is changed at a time.
             let slower = ("that turns by 0.5 rad/s less", carried(SKEW, spin - 0.5, MASS, effort));
             let pushed = ("that is driven with 0.1 N m more", carried(SKEW, spin, MASS, effort + 0.1));
             let heavier = ("that is 10 % heavier", carried(SKEW, spin, 1.1 * MASS, effort));

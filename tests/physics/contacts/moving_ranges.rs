@@ -1,10 +1,10 @@
-//! Ranges to shapes in motion. A ray along x at the height b over the centre of a ball of radius R that comes along x
-//! measures x(t) - √(R² - b²), x(t) = D - v t. One to the axis of a brick of edge a that turns with ω about it, at D,
-//! measures D - a/(2 cos φ), φ being ω t up to quarter turns, within 45°. One to a capsule that turns in a plane around
-//! D measures D - l/2 - R where its end looks at the ray, and D - R after a quarter turn.
+//! Ranges to moving shapes. A ray along x passes at the height b over the center of a ball of radius R that approaches
+//! along x: it measures x(t) - √(R² - b²), x(t) = D - v t. A ray toward the axis, at D, of a brick of edge a that
+//! rotates with ω measures D - a/(2 cos φ), where φ is ω t modulo quarter turns, within 45°. A ray to a capsule that
+//! rotates in a plane around D measures D - l/2 - R when its end faces the ray, and D - R after a quarter turn.
 //!
-//! Tolerance: motions without forces are exact; what is seen has single precision in sizes and poses, 6e-8 of 3 m, a
-//! few of them: 1e-6 m.
+//! Tolerance: motions without forces are exact. The ray targets have single precision in sizes and poses, 6e-8 of 3 m,
+//! with several rounding errors: 1e-6 m.
 
 use crate::lab::*;
 use kinetoscope::sensors::ray::pattern::Custom;
@@ -15,7 +15,7 @@ const RADIUS: f64 = 0.3;
 const OVER: f64 = 0.12;
 const EDGE: f64 = 0.5;
 const LENGTH: f64 = 0.8;
-/// Places of the three along y.
+/// Positions of the three shapes along y \[m\].
 const LANES: [f64; 3] = [0.0, 5.0, 10.0];
 
 /// Ranges to ball, brick and capsule after `seconds`.

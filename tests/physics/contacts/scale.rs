@@ -1,8 +1,8 @@
-//! What lies on a scale of stiffness k weighs m g: the contact carries it, and the scale, of mass M, gives way by (m +
-//! M) g/k, with that effort. In a lift that a force F accelerates it weighs m F/(m + M).
+//! A load on a scale of stiffness k weighs m g: the contact carries it, and the scale, of mass M, sinks by (m + M) g/k,
+//! with that effort. In an elevator accelerated by a force F the load weighs m F/(m + M).
 //!
-//! Tolerance: critically damped scale and contacts, e^-90 of the motion is left after 2 s; of the solver, 1e-6 of the
-//! weight.
+//! Tolerance: with critical damping of scale and contacts, e^-90 of the motion is left after 2 s; of the solver, 1e-6
+//! of the weight.
 
 use crate::lab::*;
 use kinetoscope_testkit::worlds::cube;
@@ -11,7 +11,7 @@ const PLATE: f64 = 2.0;
 const MASS: f64 = 3.0;
 const STIFFNESS: f64 = 1e4;
 
-/// Force on the load and on the plate, effort of the scale, and how far it gave way.
+/// Force on the load and on the plate, effort of the scale, and its displacement.
 fn weighed(mass: f64, drive: DriveCfg, force: f64) -> [f64; 4] {
     let mut lab = Lab::new(earth());
     let joint = Joint::slide("spring", ["base", "plate"], [0.0, 0.0, 1.0]);

@@ -1,13 +1,16 @@
-//! A ball in a depth picture: how many pixels it covers, where their middle is
-//! ([`ball_in_picture`](super::ball_in_picture)), and how near its nearest point is: D - R on the optical axis, D being
-//! the distance of its centre. Elsewhere the ray (x, y, 1) of a pixel meets it at the depth (b - √(b² - a (c² -
-//! R²)))/a, with a = x² + y² + 1, b = (x, y, 1)·c.
+//! A ball in a depth image: number of its pixels, their centroid ([`ball_in_picture`](super::ball_in_picture)), and the
+//! depth of the nearest point. That depth is D - R on the optical axis, where D is the distance of the center.
+//! Elsewhere the ray (x, y, 1) of a pixel meets the ball at the depth (b - √(b² - a (c² - R²)))/a, with a = x² + y² +
+//! 1, b = (x, y, 1)·c.
 //!
-//! Tolerance: a pixel is of the ball if the ray of its centre meets it, that is if the root is real. How many centres that are and
-//! where their middle is differs from the ellipse of `ball_in_picture` by what [`centres`] counts with this formula, which is all
-//! that a picture may be off by, but for pixels whose root is so near to 0 that single precision decides: a pixel each. Depths
-//! have single precision: some six roundings of 2⁻²⁴ of b², over 2 √ of the least root that is looked at, over a. The
-//! nearest pixel is half of one beside the axis, both ways, where the formula has it a little farther than D - R.
+//! Tolerance of area and centroid: a pixel belongs to the ball if the ray of its center meets the ball, that is, if the
+//! root is real. The set of these pixels differs from the ellipse of `ball_in_picture` by the amounts that [`centres`]
+//! counts with this formula. The image may differ only by that, and by one pixel for each root so close to 0 that
+//! single precision decides.
+//!
+//! Tolerance of depths: depths have single precision. The error is about six roundings of 2⁻²⁴ of b², over 2 √ of the
+//! smallest compared root, over a. The nearest pixel is half a pixel off the axis in both directions, where the formula
+//! gives slightly more than D - R.
 
 use super::ball_in_picture::{FOCAL, MIDDLE, SIZE, Seen, expected, found};
 use crate::lab::*;
@@ -18,22 +21,23 @@ use kinetoscope_testkit::worlds::{fixed, object};
 
 const RADIUS: f64 = 0.3;
 
-/// A ball of this radius at this place of the optical frame.
+/// A ball: center in the optical frame \[m\], and radius \[m\].
 type Ball = ([f64; 3], f64);
 
-/// The least root that is looked at: at the silhouette the depth falls off steeply.
+/// Smallest compared root: near the silhouette the depth changes steeply.
 const LEAST: f64 = 0.01;
-/// Roundings of single precision between a ray and its depth.
+/// Rounding error of single precision between a ray and its depth.
 const SINGLE: f64 = 6.0 / 16_777_216.0;
 
-/// Of the ray of a pixel's centre and a ball: a, b, and what is under the root.
+/// For the ray of a pixel's center and a ball: a, b, and the radicand.
 fn ray([u, v]: [usize; 2], center: [f64; 3], r: f64) -> [f64; 3] {
     let (x, y) = ((u as f64 + 0.5 - MIDDLE[0]) / FOCAL, (v as f64 + 0.5 - MIDDLE[1]) / FOCAL);
     let (a, b) = (x * x + y * y + 1.0, x * center[0] + y * center[1] + center[2]);
     [a, b, b * b - a * (center.iter().map(|c| c * c).sum::<f64>() - r * r)]
 }
 
-/// What is seen by the centres of pixels: area and middle, and how many of them single precision may take or leave.
+/// Moments of the pixel centers inside the silhouette, and the number of pixels that single precision may add or
+/// remove.
 fn centres(center: [f64; 3], r: f64) -> (Seen, f64) {
     let (mut area, mut sum, mut either) = (0.0, [0.0; 2], 0.0);
     for pixel in (0..SIZE[0]).flat_map(|u| (0..SIZE[1]).map(move |v| [u, v])) {
@@ -49,8 +53,8 @@ fn centres(center: [f64; 3], r: f64) -> (Seen, f64) {
     (Seen { area, centroid: sum.map(|x| x / area) }, either)
 }
 
-/// What the rasterizer or the rays show of a ball: area and middle, nearest depth, and the largest error of a pixel's
-/// depth against the closed form of the second ball, up to a metre.
+/// Measured moments of a ball, nearest depth, and the largest depth error against the closed form of the second ball,
+/// up to a meter. The image is rasterized, or ray-cast if `rays` is true.
 fn seen((at, radius): Ball, (center, r): Ball, rays: bool) -> (Seen, f64, f64) {
     let mut lab = Lab::new(weightless());
     // The optical frame (x right, y down, z forward) looks along the world's x.
@@ -96,13 +100,14 @@ fn holds() {
                 let of = |what: &str| format!("{what} {place}, {name}");
                 let (whole, either) = centres(at, RADIUS);
                 let pixels = "centres of pixels along the silhouette";
-                // Differences of numbers of this size are rounded.
+                // Differences of numbers of this size have rounding errors.
                 let edge = (whole.area - form.area).abs() * (1.0 + 1e-12) + either;
                 m.row(&of("area"), "pixels", form.area, ball.area, (edge, pixels));
                 m.control(&of("area"), "of a ball 2 % larger", other.area);
                 for (axis, letter) in ["u", "v"].into_iter().enumerate() {
                     let quantity = of(&format!("{letter} of the middle"));
-                    // A pixel more or less is at most the radius away from the middle, of as many as there are.
+                    // An additional pixel is at most the radius away from the centroid, and the weight of one of all
+                    // pixels.
                     let (is, was) = (form.centroid[axis], whole.centroid[axis]);
                     let edge = (was - is).abs() + either / form.area.sqrt() + 1e-12 * is;
                     m.row(&quantity, "pixels", is, ball.centroid[axis], (edge, pixels));

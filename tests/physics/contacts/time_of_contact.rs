@@ -1,9 +1,9 @@
-//! A ball that bounces with restitution e: it falls for √(2 H/g), then flies for e^k 2 √(2 H/g) at a time, and touches
-//! for as long as the spring takes that is its restitution: without damping half a period, which is ten steps
+//! A ball that bounces with restitution e: it falls for √(2 H/g), then each flight lasts e^k 2 √(2 H/g). Each contact
+//! lasts as long as its spring requires: without damping half a period, which is ten steps
 //! (`RigidObjectCfg::restitution`).
 //!
-//! Tolerance: a step on both ends; of the flights, what ten steps of a contact may leave of the restitution (`bounce.rs`), k
-//! times. Gravity makes a contact longer by 2 g/(v ω²), a hundredth of a step.
+//! Tolerance: one step at each end; for the flights, the restitution error of a contact of ten steps (`bounce.rs`), k
+//! times. Gravity prolongs a contact by 2 g/(v ω²), a hundredth of a step.
 
 use crate::bounce::off;
 use crate::lab::*;
@@ -14,7 +14,7 @@ const H: f64 = 2e-4;
 const HEIGHT: f64 = 0.5;
 const RADIUS: f64 = 0.1;
 
-/// Times in the air, the fall first, and times of contact.
+/// Durations of the flights, the fall first, and of the contacts \[s\].
 #[derive(Clone, Debug, Default)]
 struct Times {
     air: Vec<f64>,

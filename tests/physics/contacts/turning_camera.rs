@@ -1,10 +1,10 @@
-//! A camera that looks inwards from the rim of a turntable, at r, sees a ball that stands at (X, 0, Z) on its way:
-//! turned by θ = ω t it is at x = X sin(-θ), z = r - X cos θ of the camera's frame, y = z_c - Z, and in the picture
-//! where [`ball_in_picture`](super::ball_in_picture) says. A camera that stands at the rim, and a ball that goes round on the
-//! turntable, see the same the other way round: x = X sin θ.
+//! A camera at the rim of a turntable, at radius r, looks inward at a static ball at (X, 0, Z). After a rotation by θ =
+//! ω t the ball is at x = X sin(-θ), z = r - X cos θ of the camera's frame, y = z_c - Z; its image follows from
+//! [`ball_in_picture`](super::ball_in_picture). A static camera at the rim and a ball on the turntable give the
+//! mirrored motion: x = X sin θ.
 //!
-//! Tolerance: ω is constant to rounding. The middle of 1000 pixels is good to 0.1 pixels, its area to 4 √(2 π r) pixels
-//! (law `sphere_depth`).
+//! Tolerance: ω is constant to rounding. The centroid of 1000 pixels is accurate to 0.1 pixels, the area to 4 √(2 π r)
+//! pixels (law `sphere_depth`).
 
 use super::ball_in_picture::{FOCAL, MIDDLE, SIZE, Seen, expected, found};
 use crate::lab::*;
@@ -18,14 +18,14 @@ const BALL: [f64; 2] = [0.35, 0.2];
 const RADIUS: f64 = 0.08;
 const SPIN: f64 = 2.0;
 
-/// What is on the turntable; the other one stands.
+/// The rotating object; the other object is static.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Turns {
     Camera,
     Ball,
 }
 
-/// What the camera shows after `seconds`.
+/// Moments of the ball in the camera's image after `seconds`.
 fn seen(turns: Turns, spin: f64, seconds: f64) -> Seen {
     let mut lab = Lab::new(earth());
     let turn = Joint::hinge("turn", ["base", "table"], [0.0, 0.0, 1.0]);
@@ -38,7 +38,7 @@ fn seen(turns: Turns, spin: f64, seconds: f64) -> Seen {
         Turns::Ball => {
             let screw = Joint::fixed("screw", ["table", "ball"]).at([BALL[0], 0.0, BALL[1]]);
             let text = urdf(&[base(), table, Link::ball("ball", 0.1, RADIUS)], &[turn, screw]);
-            // To be seen, not touched.
+            // Visible, but without collisions.
             (text.replace("collision>", "visual>"), None, [RIM, 0.0, EYE])
         }
     };

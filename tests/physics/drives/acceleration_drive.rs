@@ -1,6 +1,6 @@
-//! Gains of an acceleration drive are multiplied by the inertia that the joint feels at the start, so that it moves
-//! heavy and light alike: v' = (v + h k (q* - q))/(1 + h d + h² k). In a chain that is 1/(M⁻¹)ᵢᵢ, with the other joints
-//! free: the first step of an explicit drive gives its joint just k (q* - q).
+//! The gains of an acceleration drive are multiplied by the joint's effective inertia at the start, so that heavy and
+//! light loads move alike: v' = (v + h k (q* - q))/(1 + h d + h² k). In a chain the effective inertia is 1/(M⁻¹)ᵢᵢ,
+//! with the other joints free: in the first step, an explicit drive accelerates its joint by k (q* - q).
 //!
 //! Tolerance: rounding of 100 steps.
 
@@ -12,7 +12,7 @@ const STIFFNESS: f64 = 90.0;
 const DAMPING: f64 = 15.0;
 const AIM: f64 = 0.4;
 
-/// Where a wheel of this moment is after 0.1 s.
+/// Position of a wheel of this moment after 0.1 s.
 fn wheel(drive_type: DriveType, moment: f64) -> f64 {
     let drive = DriveCfg { drive_type, ..implicit(STIFFNESS, DAMPING) };
     let mut wheel = Wheel::on(weightless(), drive, hinge(), moment);
@@ -21,7 +21,7 @@ fn wheel(drive_type: DriveType, moment: f64) -> f64 {
     wheel.q()
 }
 
-/// Acceleration of joint `which` of two levers in the first step, where only it is asked to move.
+/// Acceleration of joint `which` of two levers in the first step, with a target for this joint only.
 fn lever(drive_type: DriveType, which: usize) -> f64 {
     let y = [0.0, 1.0, 0.0];
     let rod = |name: &str, mass: f64| Link::brick(name, mass, [0.4, 0.05, 0.05]).at([0.2, 0.0, 0.0]).ghost();

@@ -1,13 +1,14 @@
-//! Rotor inertia J adds to the inertia of its own joint, and to nothing else: a torque τ turns a wheel with τ/(I + J);
-//! of two wheels on one shaft, the second on the first, the torque τ of the second turns both by
+//! Rotor inertia J adds to the inertia of its own joint only: a torque τ accelerates a wheel by τ/(I + J). For two
+//! wheels on one shaft, the second on the first, the torque τ of the second accelerates both by
 //!
 //! ```text
 //! (I₁ + I₂) a₁ + I₂ a₂ = 0,   I₂ a₁ + (I₂ + J) a₂ = τ
 //! ```
 //!
-//! and it neither weighs nor swings: the sag of a lever with a drive is m g l cos q/k with and without.
+//! The rotor has no weight: the sag of a driven lever is m g l cos q/k with and without it.
 //!
-//! Tolerance: constant accelerations, summed over 100 steps, to rounding; of the sag e^-20 of the way there, 0.1 rad.
+//! Tolerance: constant accelerations, summed over 100 steps, to rounding; for the sag, e^-20 of the initial distance of
+//! 0.1 rad.
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
@@ -21,7 +22,7 @@ fn with_rotor(rotor: f64, drive: DriveCfg) -> DriveCfg {
     DriveCfg { armature: rotor.into(), ..drive }
 }
 
-/// Acceleration of one wheel; of both of two, where only the second has a rotor.
+/// Acceleration of one wheel, and of two coupled wheels of which only the second has a rotor.
 fn turned(rotor: f64) -> [f64; 3] {
     let mut wheel = Wheel::new(weightless(), with_rotor(rotor, passive()));
     wheel.effort(TORQUE);
@@ -38,7 +39,7 @@ fn turned(rotor: f64) -> [f64; 3] {
     [wheel.v(), v[0], v[1]].map(|v| v / 0.1)
 }
 
-/// Error of a lever's drive under its weight, as a torque over k \[rad\], and the angle.
+/// Position error of a lever's drive under its weight, as gravity torque over k \[rad\], and the angle.
 fn sag(rotor: f64, mass: f64) -> [f64; 2] {
     let lever = Link::new("lever", mass, [0.01; 3]).at([0.3, 0.0, 0.0]);
     let mut lab = Lab::new(earth());

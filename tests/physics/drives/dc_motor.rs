@@ -1,9 +1,9 @@
-//! A motor's effort falls with its speed: τ = s (1 - v/v₀) up to a limit L. Asked for all it has, a wheel under a load
-//! τ speeds up with (L + τ)/I until v₁ = v₀ (1 - L/s), and from there as v₀' - (v₀' - v₁) e^(-s t/(I v₀)) to v₀' = v₀
-//! (1 + τ/s). In steps of h the exponential is (1 - h s/(I v₀))^n.
+//! The effort of a DC motor falls with its speed: τ = s (1 - v/v₀) up to a limit L. At full command, a wheel under a
+//! load τ accelerates with (L + τ)/I until v₁ = v₀ (1 - L/s). From there its velocity is v₀' - (v₀' - v₁) e^(-s t/(I
+//! v₀)), with v₀' = v₀ (1 + τ/s). In steps of h the exponential is (1 - h s/(I v₀))^n.
 //!
-//! Tolerance: rounding of 1000 sums; of continuous time, which starts on the line up to a step late, h s/(I v₀) of the
-//! way: 0.2 %.
+//! Tolerance: rounding of 1000 sums. The continuous solution enters the torque-speed line up to a step later, h s/(I
+//! v₀) of the velocity range: 0.2 %.
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;

@@ -1,7 +1,7 @@
-//! A controller that hears of its targets D steps late does what one that hears of them at once did D steps before:
-//! q_D(t) = q₀(t - D h), for targets that begin at the start. What it measures is not late: a load is answered at once.
+//! A controller with a target delay of D steps behaves like one without delay D steps earlier: q_D(t) = q₀(t - D h),
+//! for targets that begin at the start. Measurements are not delayed: the controller responds to a load at once.
 //!
-//! Tolerance: the same arithmetic, to the last bit.
+//! Tolerance: none, the arithmetic is the same.
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
@@ -9,7 +9,7 @@ use kinetoscope::sim::DelayedPd;
 
 const STEPS: usize = 300;
 
-/// Positions after each step, of a target that wobbles.
+/// Positions after each step for an oscillating target.
 fn followed(delay: u32) -> Vec<f64> {
     let model = DelayedPd { delay, max_delay: delay };
     let drive = DriveCfg { actuators: vec![(".*".into(), model.into())], ..implicit(MOMENT * 400.0, MOMENT * 20.0) };
@@ -24,7 +24,7 @@ fn followed(delay: u32) -> Vec<f64> {
         .collect()
 }
 
-/// Velocity after a step under a load of 1 N m from rest.
+/// Velocity after two steps from rest under a load in N m.
 fn answered(delay: u32, load: f64) -> f64 {
     let model = DelayedPd { delay, max_delay: delay };
     let drive = DriveCfg { actuators: vec![(".*".into(), model.into())], ..implicit(20.0, 1.0) };
@@ -46,7 +46,7 @@ fn holds() {
             m.row(&quantity, "rad", 0.0, apart(&followed(delay), delay as usize), (0.0, "the same arithmetic"));
             m.control(&quantity, "without the delay", apart(&at_once, delay as usize));
         }
-        // Two steps of h: the second with the drive's answer to the first.
+        // Two steps of h: the second includes the drive's response to the first.
         let first = 1e-3 / MOMENT;
         let second = first + 1e-3 / MOMENT * (1.0 - 20.0 * 1e-3 * first - first);
         m.row("velocity after two steps under a load", "rad/s", second, answered(9, 1.0), (1e-13, "rounding"));

@@ -1,11 +1,11 @@
-//! Dry friction f stops a wheel: v = v₀ - f t/I, after I v₀/f seconds and I v₀²/2f radians. What it holds creeps:
-//! MuJoCo's friction is a damper below its limit, R τ = -B v with R = (1 - d)/d/I and B = 1/(d h), so v = (1 - d) h τ/I
-//! with d = 0.9999.
+//! Dry friction f stops a wheel: v = v₀ - f t/I, after I v₀/f seconds and I v₀²/2f radians. Below its limit it creeps:
+//! MuJoCo's friction is then a damper, R τ = -B v with R = (1 - d)/d/I and B = 1/(d h), so v = (1 - d) h τ/I with d =
+//! 0.9999.
 //!
-//! Steps of h end at v(n) = v₀ - n h f/I, so that the way is short by h v₀/2.
+//! Steps of h end at v(n) = v₀ - n h f/I, so that the distance is short by h v₀/2.
 //!
-//! Tolerance: of velocities rounding; of the way what the last step leaves of the velocity that it takes, 1 - d of h f/I, for a step,
-//! and rounding; the creep is that at rest, 1e-6 of it.
+//! Tolerance: for velocities, rounding. For the distance, the velocity left by the last step, 1 - d of h f/I, for one
+//! step, and rounding. The creep is that at rest, 1e-6 of it.
 
 use super::wheel::{MOMENT, Wheel, hinge};
 use crate::lab::*;
@@ -14,7 +14,7 @@ use kinetoscope::sim::DriveModel;
 const FRICTION: f64 = 1.0;
 const START: f64 = 2.0;
 
-/// Velocity after 60 ms, velocity and way after 0.3 s, which is three times as long as it takes.
+/// Velocity after 60 ms, and velocity and distance after 0.3 s, three times the stopping time.
 fn stopped(drive: DriveCfg, friction: f64) -> [f64; 3] {
     let mut wheel = Wheel::on(weightless(), drive, hinge().dynamics(0.0, friction), MOMENT);
     wheel.lab.write_joints(wheel.robot, &[0.0], &[START]);

@@ -1,9 +1,9 @@
-//! A drive, of any mode and any model, that asks for more than its limit L gives L, to the last bit, and the wheel moves as under L:
-//! I q'' = L,
-//! which in steps of h from rest is v(n) = n h L/I and q(n) = n (n + 1)/2 h² L/I. A load τ > L takes it with (τ - L)/I.
+//! A drive of any mode and any model whose effort exceeds its limit L gives exactly L, and the wheel moves as under L:
+//! I q'' = L. In steps of h from rest, v(n) = n h L/I and q(n) = n (n + 1)/2 h² L/I. A load τ > L moves it with (τ -
+//! L)/I.
 //!
-//! Tolerance: none of the effort; of the motion rounding. Every step adds to numbers of up to x, half a digit of them, in the
-//! velocity and, from it, in the position: 200 ε x. (Under a load the far target stays out of reach.)
+//! Tolerance: none for the effort; rounding for the motion. Every step adds to numbers of up to x, with half a digit of
+//! error in the velocity and, from it, in the position: 200 ε x. (Under a load the far target stays out of reach.)
 
 use super::variants::{self, Variant};
 use super::wheel::{MOMENT, Wheel};
@@ -13,13 +13,13 @@ const LIMIT: f64 = 2.0;
 const STEPS: u32 = 200;
 const LOAD: f64 = 3.0;
 
-/// Least effort of the drive, position and velocity after 0.2 s; velocity under a load after as long.
+/// Smallest effort of the drive, position and velocity after 0.2 s, and velocity under a load after the same time.
 fn pushed(of: &Variant, limit: f64) -> [f64; 4] {
     let drive = DriveCfg { max_effort: Some(limit.into()), ..of.drive(100.0, 1.0) };
     let run = |load: f64| {
         let mut wheel = Wheel::new(weightless(), drive.clone());
         wheel.aim(100.0);
-        // Until the drive hears of it, it holds the wheel where it is.
+        // Until the delayed target arrives, the drive holds the wheel in place.
         wheel.lab.watch(of.delay(), |_, _| ());
         wheel.load(load);
         let (robot, mut least) = (wheel.robot, f64::INFINITY);

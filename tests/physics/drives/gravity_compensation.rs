@@ -1,12 +1,12 @@
-//! Links whose gravity is compensated weigh nothing and have all their inertia: an arm without drives stays where it
-//! is, a drive has no error, and an effort τ in a joint at rest gives the same acceleration as without gravity. The
-//! rest of the world falls.
+//! Links with gravity compensation weigh nothing and keep their inertia. An undriven arm stays in place, a drive has no
+//! error, and an effort τ in a joint at rest gives the same acceleration as without gravity. Other bodies still fall.
 //!
-//! Tolerance: the compensation is -m g in the centre of mass, gravity as MuJoCo sums it: they differ by rounding. A torque of
-//! gravity is the sum of three products over two links, 12 roundings of half a digit of 18 N m at most (3 kg at 0.25 m and
-//! 1.5 kg at 0.7 m). What it accelerates has 0.015 kg m² or more: the lower link has 0.02 about its middle, of which the upper one,
-//! with 0.25 or more about the shoulder, takes a tenth by giving way. The arm drifts by half of that times t² in a second, and the velocity of a
-//! step of h is itself rounded to ε v/h.
+//! Tolerance: the compensation is -m g at the center of mass, and MuJoCo sums gravity separately: they differ by
+//! rounding. A gravity torque is the sum of three products over two links, 12 roundings of half a digit of at most 18 N
+//! m (3 kg at 0.25 m and 1.5 kg at 0.7 m). The accelerated inertia is at least 0.015 kg m²: the lower link has 0.02
+//! about its middle, of which the upper link, with 0.25 or more about the shoulder, takes a tenth by moving. The arm
+//! drifts by half of the acceleration times t² in a second, and the velocity change of a step of h is itself rounded to
+//! ε v/h.
 
 use crate::lab::*;
 
@@ -28,10 +28,10 @@ fn arm(cfg: SimulationManagerCfg, drive: DriveCfg, compensated: bool) -> (Lab, R
     (lab, robot)
 }
 
-/// What rounding of the torques accelerates the arm with \[rad/s²\].
+/// Acceleration of the arm due to rounding of the torques \[rad/s²\].
 const ROUNDING: f64 = 12.0 * f64::EPSILON / 2.0 * 18.0 / 0.015;
 
-/// How far the undriven arm gets in a second, and how far a soft drive is off.
+/// Drift of the undriven arm in a second, and error of a soft drive.
 fn moved(compensated: bool) -> [f64; 2] {
     [passive(), implicit(200.0, 20.0)].map(|drive| {
         let (mut lab, robot) = arm(earth(), drive, compensated);
@@ -40,7 +40,7 @@ fn moved(compensated: bool) -> [f64; 2] {
     })
 }
 
-/// Acceleration of the elbow in the first step under 2 N m in it.
+/// Acceleration of the elbow in the first step under an effort of 2 N m.
 fn pushed(cfg: SimulationManagerCfg, compensated: bool) -> f64 {
     let (mut lab, robot) = arm(cfg, passive(), compensated);
     lab.push_joints(robot, &[0.0, 2.0]);

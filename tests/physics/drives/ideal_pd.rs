@@ -1,18 +1,18 @@
-//! A controller at the rate of the simulation, without damping, is a leapfrog: q(n+1) - 2 q(n) + q(n-1) = -(ω h)² q(n),
-//! ω² = k/I. From rest at q₀ it has the solution
+//! A controller at the rate of the simulation, without damping, is a leapfrog scheme: q(n+1) - 2 q(n) + q(n-1) = -(ω
+//! h)² q(n), ω² = k/I. From rest at q₀ its solution is
 //!
 //! ```text
 //! q(n) = q₀ (cos n θ - tan(θ/2) sin n θ),   cos θ = 1 - (ω h)²/2
 //! ```
 //!
-//! which neither grows nor falls as long as ω h < 2. Beyond, cos θ < -1: the roots -z and -1/z of the recurrence are real, z = c +
-//! √(c² - 1), c = (ω h)²/2 - 1, and q(n) = α (-z)ⁿ + β (-1/z)ⁿ with α and β from q(0) = q₀ and q(1) = q₀ (1 - (ω h)²): growth by z a
-//! step, up to what the second root leaves.
+//! The amplitude is constant as long as ω h < 2. Beyond, cos θ < -1: the roots -z and -1/z of the recurrence are real,
+//! z = c + √(c² - 1), c = (ω h)²/2 - 1. Then q(n) = α (-z)ⁿ + β (-1/z)ⁿ with α and β from q(0) = q₀ and q(1) = q₀ (1 -
+//! (ω h)²): growth by z per step, up to the contribution of the second root.
 //!
-//! Tolerance: rounding. A step rounds six times (target less position, times k, over I, times h, added to v, times h added to q):
-//! numbers of the size of the amplitude Q = q₀/cos(θ/2) times 1 + (ω h)², to ε/2 each. What is off in step k is off by
-//! sin((n - k) θ)/sin θ of it in step n: by n 3 ε Q (1 + (ω h)²)/sin θ in all. A growing solution grows as much as what is off,
-//! and has sinh for sin: the ratio of two is off by that of both.
+//! Tolerance: rounding. A step rounds six times (target less position, times k, over I, times h, added to v, times h
+//! added to q). The rounded numbers have the size of the amplitude Q = q₀/cos(θ/2) times 1 + (ω h)², to ε/2 each. An
+//! error in step k is multiplied by sin((n - k) θ)/sin θ in step n: in total n 3 ε Q (1 + (ω h)²)/sin θ. For a growing
+//! solution the error grows in proportion, with sinh for sin: the ratio of two positions has the errors of both.
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
@@ -53,7 +53,7 @@ fn holds() {
         let growth = |rate: f64| swung(rate, true, 15).map(f64::abs);
         let [before, after] = growth(2.1);
         let z = c + (c * c - 1.0).sqrt();
-        // Shares of the two roots of q(0) = 1 and q(1) = 1 - (ω h)².
+        // Coefficients of the two roots, from q(0) = 1 and q(1) = 1 - (ω h)².
         let large = (1.0 / z + 1.0 - square) / (1.0 / z - z);
         let at = |n: i32| (large * (-z).powi(n) + (1.0 - large) * (-1.0 / z).powi(n)).abs();
         let ratio = at(15) / at(14);

@@ -1,9 +1,9 @@
-//! A joint ends at its limits. They are as soft as contacts are: an effort τ presses it beyond by the depth of
-//! [`soft_contact`](crate::rigid_body::soft_contact) under A τ = τ/I. A drive never presses: its target ends at the
-//! limit.
+//! Joint limits are as soft as contacts: an effort τ presses the joint beyond its limit by the depth of
+//! [`soft_contact`](crate::rigid_body::soft_contact) under A τ = τ/I. A drive never presses: its target is clamped at
+//! the limit.
 //!
 //! Tolerance: the depth is a fixed point of arithmetic, of which e^-100 is left after 2 s: 1e-8 of it. The drive with
-//! k/d = 10/s comes as near as e^-30.
+//! k/d = 10/s converges to e^-30.
 
 use super::wheel::{MOMENT, Wheel, hinge};
 use crate::lab::*;
@@ -16,7 +16,7 @@ fn ends(limited: bool) -> Joint {
     if limited { hinge().limit(RANGE[0], RANGE[1], 1e3) } else { hinge() }
 }
 
-/// Where an effort ends, undriven.
+/// Final position under an effort, without a drive.
 fn pressed(effort: f64, limited: bool) -> f64 {
     let mut wheel = Wheel::on(weightless(), passive(), ends(limited), MOMENT);
     wheel.effort(effort);
@@ -24,7 +24,7 @@ fn pressed(effort: f64, limited: bool) -> f64 {
     wheel.q()
 }
 
-/// Where a drive ends that is asked for 2 rad.
+/// Final position of a drive with the target 2 rad.
 fn driven(limited: bool) -> f64 {
     let mut wheel = Wheel::on(weightless(), implicit(1e2, 1e1), ends(limited), MOMENT);
     wheel.aim(2.0);

@@ -1,14 +1,14 @@
-//! A joint that follows another, q₂ = n q₁ + b: a torque τ on the second is felt by the drive of the first as n τ, so
-//! that it gives way by n τ/k, and the second by n² τ/k.
+//! A mimic joint, q₂ = n q₁ + b: a torque τ on the follower acts on the drive of the leader as n τ, so that the leader
+//! yields by n τ/k, and the follower by n² τ/k.
 //!
-//! The coupling is a row of MuJoCo's with d = dmax = 0.9999 and a time constant of 2 h. At rest it yields by what `soft_contact`
-//! has for a contact, (1 - d)/d² A τ dmax² (2 h)² = (1 - d) A τ (2 h)², with A = 1/I₁ + 1/I₂, MuJoCo's estimate of its inverse
-//! inertia: the follower is there, 2.4e-8 rad beside n q₁ + b, which is part of the expected number.
+//! The coupling is a constraint row of MuJoCo with d = dmax = 0.9999 and a time constant of 2 h. At rest it yields as a
+//! contact in `soft_contact`, by (1 - d)/d² A τ dmax² (2 h)² = (1 - d) A τ (2 h)². A = 1/I₁ + 1/I₂ is MuJoCo's estimate
+//! of its inverse inertia. The follower is thus 2.4e-8 rad off n q₁ + b, which is part of the expected number.
 //!
-//! Tolerance: at rest rounding. A step rounds some six numbers, each of which moves the position by half a digit of it at most, and
-//! the slow rate of the drive, 13/s, forgets that: 3 ε q/(13 h). Of the motion exp(-13 · 4) is left. On the way the row is critically
-//! damped, so that it never yields by more than it would at rest under the largest load that it bears: the first, when the
-//! drive pulls with k q* on both inertias.
+//! Tolerance at rest: rounding. A step rounds about six numbers, each of which moves the position by at most half a
+//! digit, and the slow rate of the drive, 13/s, lets this error decay: 3 ε q/(13 h). Of the motion exp(-13 · 4) is
+//! left. Tolerance during the motion: the row is critically damped, so that it never yields by more than at rest under
+//! its largest load, the first, when the drive pulls with k q* on both inertias.
 
 use crate::lab::*;
 
@@ -19,7 +19,7 @@ const STIFFNESS: f64 = 40.0;
 const AIM: f64 = 0.3;
 const LOAD: f64 = 0.5;
 
-/// Both positions under the load at rest, and the worst of q₂ - n q₁ - b on the way.
+/// Both positions under the load at rest, and the largest |q₂ - n q₁ - b| during the motion.
 fn followed(coupled: bool) -> [f64; 3] {
     let wheel = |name, moment| Link::new(name, 1.0, [moment; 3]);
     let z = [0.0, 0.0, 1.0];
@@ -30,7 +30,7 @@ fn followed(coupled: bool) -> [f64; 3] {
     let text = urdf(&links, &[Joint::hinge("first_joint", ["base", "first"], z), follower]);
     let mut lab = Lab::new(weightless());
     let robot = lab.robot(&text, RobotCfg { drive: implicit(STIFFNESS, 4.0), ..RobotCfg::default() });
-    // Where nothing couples it the second joint has a drive, which holds it where it is.
+    // Without the coupling, the second joint has its own drive, which holds it in place.
     lab.sim.robot_mut(robot).set_qpos_target(&row(&[AIM, 0.0]), None, None).unwrap();
     let mut worst = 0.0_f64;
     lab.watch(1_000, |_, sim| {

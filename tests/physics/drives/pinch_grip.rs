@@ -1,21 +1,23 @@
-//! Two fingers of 10 g pinch a block of m with the effort limit F of their drives, far inside of what their gains ask
-//! for: at rest each presses with F, and their friction carries the block: 2 f = m g, as long as m g < 2 μ F. With less
-//! it slides with g - 2 μ F/m.
+//! Two fingers of 10 g pinch a block of mass m. The drives are at their effort limit F, far below the efforts of their
+//! gains. At rest each finger presses with F, and friction carries the block: 2 f = m g, as long as m g < 2 μ F. With
+//! less friction it slides with g - 2 μ F/m.
 //!
-//! Gains of 1e4 N/m and 1e3 N s/m in steps of 10 ms are h d/M = 1000: taken at the start of the step they throw the
-//! fingers through the block. That is the control.
+//! Gains of 1e4 N/m and 1e3 N s/m in steps of 10 ms are h d/M = 1000: evaluated at the start of the step, they throw
+//! the fingers through the block. That is the control.
 //!
-//! Exact, up to the solver's tolerance: the forces at rest; and of a block that slides the momentum of all three. What slides on
-//! soft contacts hops, and takes the fingers along, so that each of them presses with N = F - M u', u being its velocity towards
-//! the block. Friction is μ N at every step (law `sliding_block`): a + μ M (u₁' + u₂')/m = 2 μ F/m - g for any hops, as long as
-//! the drives are at their limit. (That is for the first 0.1 s: in MuJoCo 2.2.2 what slides with 0.7 m/s or more drives such light
-//! fingers off.) What sticks creeps (law `stick_creep`): a row of friction f, one at each of the four corners of a face, f = m g/8,
-//! holds with v = (1 - d)/d A f dmax tc/(2 impratio), d being that of a depth under F/4. A is MuJoCo's estimate of the inverse inertia,
-//! 1/m and that of a finger: 1/M in 4.x, in 2.2.2 the mean over three axes, of which it moves along one, 1/3M.
+//! Exact, up to the solver's tolerance: the forces at rest, and for a sliding block the momentum of all three bodies. A
+//! block that slides on soft contacts hops and moves the fingers, so that each finger presses with N = F - M u', where
+//! u is its velocity toward the block. Friction is μ N at every step (law `sliding_block`): a + μ M (u₁' + u₂')/m = 2 μ
+//! F/m - g for any hops, as long as the drives are at their limit. (This holds for the first 0.1 s: in MuJoCo 2.2.2 a
+//! block sliding with 0.7 m/s or more pushes such light fingers off.) A sticking block creeps (law `stick_creep`). A
+//! friction row, one at each of the four corners of a face, with f = m g/8, holds with v = (1 - d)/d A f dmax tc/(2
+//! impratio), where d is the impedance of a depth under F/4. A is MuJoCo's estimate of the inverse inertia, 1/m plus
+//! that of a finger: 1/M in 4.x; in 2.2.2 the mean over three axes, of which the finger moves along one, 1/3M.
 //!
-//! Tolerance of the solver: it ends where a step gains less than 1e-8 of the mean inertia times the number of degrees of freedom
-//! (two fingers, six of the block), none of which has more inertia than m; accelerations that are off by α cost m α²/2, so that
-//! forces are off by m α = m √(2 · 8 · 1e-8) at most, what slides by that over m, and what creeps by as much of itself as f.
+//! Tolerance of the solver: it stops when a step gains less than 1e-8 of the mean inertia times the number of degrees
+//! of freedom (two fingers, six of the block), none of which has more inertia than m. Accelerations that are off by α
+//! cost m α²/2, so that forces are off by at most m α = m √(2 · 8 · 1e-8). The error of the sliding acceleration is
+//! that over m; the relative error of the creep is that of f.
 
 use crate::lab::*;
 use crate::rigid_body::soft_contact::{LARGEST, TIME, depth, impedance};
@@ -29,21 +31,21 @@ const GRIP: f64 = 0.04;
 /// Mass of a finger \[kg\].
 const FINGER: f64 = 0.01;
 
-/// What was measured of a pinch.
+/// Measured quantities of a pinch.
 #[derive(Clone, Copy, Debug)]
 struct Pinch {
-    /// Normal forces of both fingers on the block along x \[N\], and the friction that lifts it.
+    /// Normal forces of both fingers on the block along x, and the friction that lifts it \[N\].
     left: f64,
     right: f64,
     friction: f64,
-    /// Upward velocity at the end \[m/s\], and mean acceleration in the first 0.1 s that nothing carries it \[m/s²\].
+    /// Final upward velocity \[m/s\], and mean acceleration in the first 0.1 s without external support \[m/s²\].
     velocity: f64,
     acceleration: f64,
-    /// Mean force that accelerated the fingers towards the block in that time \[N\], of both.
+    /// Mean force that accelerated both fingers toward the block in that time \[N\].
     hops: f64,
 }
 
-/// The block is carried from outside for 1.2 s, in which the fingers come to rest on it, and let go for 0.3 s.
+/// Supports the block for 1.2 s, in which the fingers come to rest on it, and releases it for 0.3 s.
 fn pinch(drive: DriveCfg, limit: f64, friction: f64) -> Pinch {
     let cfg = SimulationManagerCfg { friction: [friction, 0.0, 0.0], ground: None, ..slope(0.0, friction) };
     let mut lab = Lab::new(with_dt(0.01, cfg));
@@ -52,7 +54,7 @@ fn pinch(drive: DriveCfg, limit: f64, friction: f64) -> Pinch {
         let axis = [-x.signum(), 0.0, 0.0];
         Joint::slide(name, ["base", link], axis).at([x, 0.0, 0.0]).limit(-0.1, 0.1, limit)
     };
-    // A millimetre of air on each side.
+    // A gap of a millimeter on each side.
     let x = GRIP / 2.0 + 0.01 + 1e-3;
     let joints = [slide("left_joint", "left", -x), slide("right_joint", "right", x)];
     let hand = RobotCfg { uid: "hand".into(), drive, ..RobotCfg::default() };

@@ -6,13 +6,13 @@
 //! first at the target: (π - acos z)/ω';   overshoot: exp(-π z/√(1 - z²));   under a load τ: q* - q = τ/k
 //! ```
 //!
-//! and 5 % of the step are left at the last time where |e| = 0.05, found by halving in the formula. A delay of the
-//! target shifts all times by it.
+//! The settling time to 5 % is the last time with |e| = 0.05, found by bisection of the formula. A delay of the target
+//! shifts all times by itself.
 //!
-//! Tolerance: steps of h make both laws an oscillator that is a little off. At the end of the step, k (q + h q') and d
-//! (q' + h q''/2) change z by (1 - z²) ω h/2 and ω by z ω h/2; at its start z and ω change by less than that, with d
-//! (q' - h q''/2). Times are off by ω h of themselves and two steps, the overshoot by d ln/dz of it: π ω h/√(1 - z²) of
-//! itself holds twice that. Of the static error exp(-15) is left.
+//! Tolerance: steps of h turn both laws into a slightly different oscillator. Evaluated at the end of the step, k (q +
+//! h q') and d (q' + h q''/2) change z by (1 - z²) ω h/2 and ω by z ω h/2. Evaluated at its start, z and ω change by
+//! less than that, with d (q' - h q''/2). Times are off by ω h of themselves and two steps. The overshoot is off by d
+//! ln/dz of itself, for which π ω h/√(1 - z²) of itself is twice the bound. Of the static error, exp(-15) is left.
 
 use super::variants::{self, Variant};
 use super::wheel::{MOMENT, Wheel};
@@ -26,7 +26,7 @@ const AIM: f64 = 0.1;
 const LOAD: f64 = 0.3;
 const BAND: f64 = 0.05;
 
-/// What a step of the target looks like: times \[s\], overshoot of the step, error under a load \[rad\].
+/// Step response: times \[s\], relative overshoot, and error under a load \[rad\].
 #[derive(Clone, Debug)]
 struct Response {
     rise: f64,
@@ -42,7 +42,7 @@ fn error(t: f64) -> f64 {
     (-RATIO * OMEGA * t).exp() * (cos + RATIO / root * sin)
 }
 
-/// The last time at which 5 % of the step are left: after the first overshoot, before the undershoot, which is smaller.
+/// The last time with 5 % of the step left: after the first overshoot and before the smaller undershoot.
 fn settling() -> f64 {
     let half_period = PI / (OMEGA * (1.0 - RATIO * RATIO).sqrt());
     assert!(error(half_period) < -BAND && error(2.0 * half_period) < BAND);
@@ -54,7 +54,7 @@ fn settling() -> f64 {
     low
 }
 
-/// The drive whose poles are those of the formula; `stiffer` multiplies the stiffness.
+/// The drive with the poles of the formula; `stiffer` multiplies the stiffness.
 fn drive(of: &Variant, stiffer: f64) -> DriveCfg {
     of.drive(MOMENT * stiffer * OMEGA * OMEGA, MOMENT * 2.0 * RATIO * OMEGA)
 }

@@ -1,14 +1,14 @@
-//! Every kind of drive that there is, on the wheel: for laws that hold for all of them.
+//! Every kind of drive on the wheel, for laws that hold for all drives.
 
 use super::wheel::MOMENT;
 use crate::lab::*;
 use kinetoscope::sim::drive::JointInfo;
 use kinetoscope::sim::{ActuatorModel, DcMotor, DelayedPd, DriveModel, DriveType};
 
-/// Of the models that hear of their targets late \[steps\].
+/// Target delay of the delayed models \[steps\].
 const DELAY: u32 = 40;
 
-/// What makes a drive another one.
+/// Drive mode with its evaluation, or actuator model.
 #[derive(Clone, Debug)]
 enum Kind {
     Mode(DriveType, DriveModel),
@@ -22,7 +22,7 @@ pub(super) struct Variant {
     kind: Kind,
 }
 
-/// All modes, by all who evaluate them, and all models of actuators.
+/// All drive modes, each evaluated implicitly and by MuJoCo's actuators, and all actuator models.
 pub(super) fn all() -> Vec<Variant> {
     let of_mode = |mode: DriveType, model: DriveModel| {
         let name = match (mode, model) {
@@ -37,7 +37,7 @@ pub(super) fn all() -> Vec<Variant> {
     let modes = modes.flat_map(|&mode| [DriveModel::Implicit, DriveModel::Actuator].map(|model| of_mode(mode, model)));
     let laws = ActuatorModel::examples().into_iter().map(|example| {
         let name = example.law().name().to_string();
-        // Motors whose lines of torque and speed are far away.
+        // DC motors whose torque-speed curve does not limit the effort here.
         let model = match example {
             ActuatorModel::DcMotor(_) => DcMotor { saturation_effort: 1e4 }.into(),
             ActuatorModel::DelayedPd(_) => DelayedPd { delay: DELAY, max_delay: DELAY }.into(),
@@ -49,13 +49,13 @@ pub(super) fn all() -> Vec<Variant> {
 }
 
 impl Variant {
-    /// With these gains as the wheel feels them \[N m/rad, N m s/rad\].
+    /// The drive with these gains at the wheel \[N m/rad, N m s/rad\].
     pub(super) fn drive(&self, stiffness: f64, damping: f64) -> DriveCfg {
         match &self.kind {
             Kind::Mode(mode, model) => {
                 let unit = match mode {
                     DriveType::Force => 1.0,
-                    // Gains are accelerations.
+                    // Gains of acceleration drives are per unit of inertia.
                     DriveType::Acceleration => MOMENT,
                     other => other.mode().unit(&JointInfo { effective_inertia: MOMENT }).unwrap(),
                 };
@@ -69,7 +69,7 @@ impl Variant {
         }
     }
 
-    /// Steps after which a target acts.
+    /// Target delay \[steps\].
     pub(super) fn delay(&self) -> u32 {
         match &self.kind {
             Kind::Law(ActuatorModel::DelayedPd(model)) => model.delay,

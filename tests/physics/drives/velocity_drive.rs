@@ -1,8 +1,8 @@
 //! A drive without stiffness holds a velocity: I v' = d (v* - v) + τ, so v = (v* + τ/d)(1 - e^(-d t/I)) from rest.
 //! Evaluated at the end of the step v(n) = (v* + τ/d)(1 - (1 + h d/I)^-n), at its start with (1 - h d/I)^n.
 //!
-//! Tolerance: rounding of 200 sums; of continuous time, h d/I · d t/2I e^(-d t/I), which is at most h d/2I/e: 0.4 % of
-//! v* at h d/I = 0.02, doubled for the next order. At the end e^-20 is left.
+//! Tolerance: rounding of 200 sums. Against continuous time, h d/I · d t/2I e^(-d t/I), which is at most h d/2I/e: 0.4
+//! % of v* at h d/I = 0.02, doubled for the next order. At the end e^-20 is left.
 
 use super::wheel::{MOMENT, Wheel};
 use crate::lab::*;
@@ -11,7 +11,7 @@ const DAMPING: f64 = 1.0;
 const SPEED: f64 = 3.0;
 const LOAD: f64 = -0.4;
 
-/// Velocities after 50 ms and 1 s under the load, and the effort then.
+/// Velocities after 50 ms and 1 s under the load, and the effort after 1 s.
 fn driven(drive: DriveCfg, load: f64) -> [f64; 3] {
     let mut wheel = Wheel::new(weightless(), drive);
     wheel.speed(SPEED);

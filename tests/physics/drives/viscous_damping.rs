@@ -1,8 +1,8 @@
-//! Viscous damping B of a joint: what has v₀ comes to rest after I v₀/B radians; what an effort τ turns ends at τ/B; a
-//! velocity drive d holds d v*/(d + B). All three hold in steps of any length where damping is taken at the end of the
-//! step: the way is h v₀ Σ (1 + h B/I)^-n = I v₀/B.
+//! Viscous damping B of a joint: a body with velocity v₀ comes to rest after I v₀/B radians, an effort τ leads to the
+//! velocity τ/B, and a velocity drive d holds d v*/(d + B). All three hold in steps of any length if damping is
+//! evaluated at the end of the step: the distance is h v₀ Σ (1 + h B/I)^-n = I v₀/B.
 //!
-//! Tolerance: of the motion e^-20 is left after 2 s.
+//! Tolerance: e^-20 of the motion is left after 2 s.
 
 use super::wheel::{MOMENT, Wheel, hinge};
 use crate::lab::*;
@@ -13,7 +13,7 @@ const START: f64 = 4.0;
 const EFFORT: f64 = 0.8;
 const DRIVE: f64 = 1.5;
 
-/// Way to rest, velocity under an effort, and velocity of a drive that is asked for v₀.
+/// Distance to rest, velocity under an effort, and velocity of a drive with the target v₀.
 fn damped(model: DriveModel, damping: f64) -> [f64; 3] {
     let wheel =
         |drive: DriveCfg| Wheel::on(weightless(), DriveCfg { model, ..drive }, hinge().dynamics(damping, 0.0), MOMENT);

@@ -1,8 +1,8 @@
-//! A wheel on a motor, without gravity: what most laws of drives are measured on.
+//! A wheel on a motor without gravity, for most laws of drives.
 
 use crate::lab::*;
 
-/// Its moment of inertia \[kg m²\].
+/// Moment of inertia of the wheel \[kg m²\].
 pub(super) const MOMENT: f64 = 0.05;
 
 /// One wheel in a simulation.
@@ -30,22 +30,22 @@ impl Wheel {
         Self { lab, robot }
     }
 
-    /// Asks for a position \[rad\].
+    /// Sets the target position \[rad\].
     pub(super) fn aim(&mut self, position: f64) {
         self.lab.sim.robot_mut(self.robot).set_qpos_target(&row(&[position]), None, None).unwrap();
     }
 
-    /// Asks for a velocity \[rad/s\].
+    /// Sets the target velocity \[rad/s\].
     pub(super) fn speed(&mut self, velocity: f64) {
         self.lab.sim.robot_mut(self.robot).set_qvel_target(&row(&[velocity]), None, None).unwrap();
     }
 
-    /// Adds an effort to what the drive gives, or is all that there is where there is none \[N m\].
+    /// Sets the joint effort, which adds to that of the drive \[N m\].
     pub(super) fn effort(&mut self, effort: f64) {
         self.lab.push_joints(self.robot, &[effort]);
     }
 
-    /// A torque from outside \[N m\].
+    /// Sets an external torque \[N m\].
     pub(super) fn load(&mut self, torque: f64) {
         let [zero, torque] = [0.0, torque].map(|z| nalgebra::Vector3::new(0.0, 0.0, z));
         self.lab.push_link(self.robot, "wheel", zero, torque);

@@ -1,5 +1,5 @@
-//! Environments do not know of each other: environment 0 is the same, bit for bit, alone and with 63 others, of
-//! which another is pushed.
+//! Environments are independent: environment 0 is the same, bit for bit, alone and with 63 others, one of which is
+//! pushed.
 //!
 //! Tolerance: none. Control: one joint of environment 0 is 1e-12 rad/s faster.
 

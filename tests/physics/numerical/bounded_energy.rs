@@ -1,15 +1,16 @@
-//! Semi-implicit Euler is symplectic: it keeps a nearby energy, `H~ = H - (h/2) q̇ dV/dq`, so that a pendulum's energy goes
-//! up and down by up to (h/2) max |q̇ m g l sin q| and comes back, for as long as one likes. With q̇² = 2 (g/l)(cos q - cos
-//! q₀) the largest follows from the angles of one swing.
+//! Semi-implicit Euler is symplectic: it conserves a nearby energy, `H~ = H - (h/2) q̇ dV/dq`. A pendulum's energy thus
+//! oscillates by up to (h/2) max |q̇ m g l sin q|, without drift. With q̇² = 2 (g/l)(cos q - cos q₀) the largest value
+//! follows from the angles of one swing.
 //!
-//! Tolerance: the next term of H~, h ω of the first: 1.5 % at 5 ms. Runge-Kutta's energy does not swing at all but leaks.
+//! Tolerance: the next term of H~, h ω of the first: 1.5 % at 5 ms. With Runge-Kutta the energy does not oscillate but
+//! drifts.
 
 use crate::lab::*;
 
 const START: f64 = 1.2;
 const STEP: f64 = 5e-3;
 
-/// Largest changes of the energy per m g l in the first and in the last 10 s of 200, and the change over time.
+/// Largest changes of the energy per m g l in the first and the last 10 s of 200, and the change over time.
 fn changes(cfg: SimulationManagerCfg) -> ([f64; 2], Vec<[f64; 2]>) {
     let mut lab = Lab::new(cfg);
     let joint = Joint::hinge("pivot", ["base", "bob"], [0.0, 1.0, 0.0]);

@@ -1,5 +1,5 @@
-//! The double pendulum of [`convergence`](super::convergence) in steps of each integrator, written without MuJoCo: where the
-//! tolerances of orders come from.
+//! Explicit steps of the double pendulum of [`convergence`](super::convergence) for each integrator, written without
+//! MuJoCo: the source of the tolerances of orders.
 //!
 //! Two rods of 1 kg and 1 m at the angles a and b from the vertical, c = cos(a - b), s = sin(a - b):
 //!
@@ -7,14 +7,14 @@
 //! 4/3 a'' + c/2 b'' = -s/2 b'² - 3/2 g sin a,      c/2 a'' + 1/3 b'' = s/2 a'² - g/2 sin b
 //! ```
 //!
-//! Semi-implicit Euler takes h of these accelerations, then h of the new velocities. `implicit` solves (M - h D) v' = f for the
-//! accelerations, D being the derivative of the right side by the velocities: [0, -s b'; s a', 0].
+//! Semi-implicit Euler adds h of these accelerations, then h of the new velocities. `implicit` solves (M - h D) v' = f
+//! for the accelerations, where D is the derivative of the right side by the velocities: [0, -s b'; s a', 0].
 
 use super::convergence::{self, START, TIME};
 use crate::lab::G;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
-/// How a step is made.
+/// Integrator of the steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Steps {
     Euler,
@@ -22,7 +22,7 @@ pub(crate) enum Steps {
     RungeKutta,
 }
 
-/// Accelerations; with `h` \[s\] above 0 those of `implicit`.
+/// Accelerations; for `h` \[s\] above 0 those of `implicit`.
 fn accelerations(q: Vector2<f64>, v: Vector2<f64>, h: f64) -> Vector2<f64> {
     let (s, c) = (q.x - q.y).sin_cos();
     let mass = Matrix2::new(4.0 / 3.0, 0.5 * c, 0.5 * c, 1.0 / 3.0);
@@ -31,23 +31,23 @@ fn accelerations(q: Vector2<f64>, v: Vector2<f64>, h: f64) -> Vector2<f64> {
     (mass - h * by_velocity).try_inverse().unwrap() * force
 }
 
-/// A state: the angles of the rods \[rad\], and their velocities \[rad/s\].
+/// State: the angles of the rods \[rad\], and their velocities \[rad/s\].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rods(Vector4<f64>);
 
 impl Rods {
-    /// From the angles of the joints \[rad\] and their velocities \[rad/s\].
+    /// Converts the angles \[rad\] and velocities \[rad/s\] of the joints.
     pub(crate) fn of_joints([q, r]: [f64; 2], [v, w]: [f64; 2]) -> Self {
         Self(Vector4::new(q, q + r, v, v + w))
     }
 
-    /// The angles of the joints, and their velocities.
+    /// The angles and velocities of the joints.
     pub(crate) fn joints(self) -> ([f64; 2], [f64; 2]) {
         let x = self.0;
         ([x.x, x.y - x.x], [x.z, x.w - x.z])
     }
 
-    /// A step of `h` \[s\] later, or earlier.
+    /// The state after a step of `h` \[s\], which may be negative.
     pub(crate) fn after(self, steps: Steps, h: f64) -> Self {
         let x = self.0;
         let velocity = |x: Vector4<f64>| Vector2::new(x.z, x.w);
@@ -72,15 +72,15 @@ impl Rods {
         })
     }
 
-    /// Kinetic and potential energy \[J\], 0 at rest in the height of the upper joint:
-    /// 2/3 a'² + 1/6 b'² + c/2 a' b' - g (3/2 cos a + 1/2 cos b).
+    /// Kinetic plus potential energy \[J\], with zero potential at the height of the upper joint: 2/3 a'² + 1/6 b'² +
+    /// c/2 a' b' - g (3/2 cos a + 1/2 cos b).
     pub(crate) fn energy(self) -> f64 {
         let [a, b, v, w] = self.0.into();
         let kinetic = 2.0 / 3.0 * v * v + w * w / 6.0 + 0.5 * (a - b).cos() * v * w;
         kinetic - G * (1.5 * a.cos() + 0.5 * b.cos())
     }
 
-    /// What half a digit of each number of the state changes the energy by at most \[J\].
+    /// Largest energy change by rounding of half a digit of each state variable \[J\].
     pub(crate) fn rounding_of_energy(self) -> f64 {
         let [a, b, v, w] = self.0.into();
         let (s, c) = (a - b).sin_cos();
@@ -90,9 +90,9 @@ impl Rods {
         by.zip([a, b, v, w]).map(|(slope, x)| (slope * x).abs() * f64::EPSILON / 2.0).sum()
     }
 
-    /// How a step changes small differences of states.
+    /// Jacobian of a step with respect to the state.
     fn growth(self, steps: Steps, h: f64) -> Matrix4<f64> {
-        // A third of the digits: the best central difference of numbers that are exact to all of them.
+        // A third of the digits: the optimal step of a central difference of numbers with full precision.
         let small = f64::EPSILON.cbrt();
         let column = |i: usize| {
             let by = Vector4::ith(i, small);
@@ -103,8 +103,9 @@ impl Rods {
     }
 }
 
-/// Where steps of `sizes` \[s\] lead (below 0: back), and what rounding may change that by: half a digit of each number of
-/// each state, grown from there to the end; angles \[rad\] and velocities \[rad/s\] of joints, the larger of the two each.
+/// State after steps of `sizes` \[s\] (negative: backward), and the bound of its rounding error. The bound adds half a
+/// digit of each state variable in each step, propagated to the end: the larger angle \[rad\] and velocity \[rad/s\]
+/// error of the joints.
 pub(crate) fn swing(start: Rods, steps: Steps, sizes: &[f64]) -> (Rods, [f64; 2]) {
     let mut way = vec![start];
     for (k, &h) in sizes.iter().enumerate() {
@@ -116,7 +117,7 @@ pub(crate) fn swing(start: Rods, steps: Steps, sizes: &[f64]) -> (Rods, [f64; 2]
         rounding += grown.abs() * pair[1].0.abs() * (f64::EPSILON / 2.0);
         grown *= pair[0].growth(steps, h);
     }
-    // The angle of the lower joint is the difference of those of two rods.
+    // The angle of the lower joint is the difference of the angles of two rods.
     let [a, b, v, w] = rounding.into();
     (way[sizes.len()], [a + b, v + w])
 }
@@ -132,8 +133,8 @@ pub(super) fn errors(steps: &[f64], integrator: Steps) -> Vec<[f64; 2]> {
     convergence::errors(steps, &angles(Steps::RungeKutta, convergence::FINE), |h| angles(integrator, h))
 }
 
-/// The largest error of the angles \[rad\] by rounding, at steps of `h` or more: half a digit of angles of up to 3 rad in each step, of
-/// both answers.
+/// Bound of the angles' rounding error \[rad\] at steps of `h` or more: half a digit of angles of up to 3 rad in each
+/// step, of both solutions.
 pub(super) fn rounding(h: f64) -> f64 {
     (TIME / h + TIME / convergence::FINE) * 3.0 * f64::EPSILON / 2.0
 }

@@ -1,7 +1,7 @@
-//! Space has no direction: with gravity and the base both turned, and the base elsewhere, a robot's joints move as before.
+//! Isotropy of space: with gravity and the base both rotated, and the base translated, a robot's joints move as before.
 //!
-//! Tolerance: rounding of both, half a digit of each number of the state in each step, grown from there to the end as the
-//! steps written out in [`double_pendulum`](super::double_pendulum) grow it.
+//! Tolerance: rounding of both runs, half a digit of each state variable in each step, propagated to the end by the
+//! explicit steps of [`double_pendulum`](super::double_pendulum).
 
 use super::double_pendulum::{Rods, Steps, swing};
 use crate::articulated::double_pendulum_energy;
@@ -10,7 +10,7 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 const START: ([f64; 2], [f64; 2]) = ([1.0, 0.5], [0.0, 1.0]);
 
-/// Joint angles after a second, with gravity turned by `gravity` and the base by `base`.
+/// Joint angles after a second, with gravity rotated by `gravity` and the base by `base`.
 fn swung(gravity: UnitQuaternion<f64>, base: UnitQuaternion<f64>) -> Vec<f64> {
     let mut lab = Lab::new(SimulationManagerCfg { gravity: gravity * Vector3::new(0.0, 0.0, -G), ..earth() });
     let init_pose = Pose::from_parts(Translation3::new(3.0, -2.0, 1.0), base);

@@ -1,13 +1,13 @@
-//! Uniform motion cannot be felt: two balls that meet part in the same way when both, before it, move along with 7, -3 and
-//! 5 m/s more.
+//! Galilean invariance: two colliding balls separate in the same way if both have an additional velocity of 7, -3 and 5
+//! m/s.
 //!
-//! Tolerance: places of some metres instead of centimetres: 1e-15 of rounding in the depth times a stiffness of the contact
+//! Tolerance: positions of some meters instead of centimeters: 1e-15 of rounding in the depth times a contact stiffness
 //! of 1e5/s² over ten steps: 1e-10.
 
 use crate::lab::*;
 use kinetoscope_testkit::worlds::object;
 
-/// Velocities after half a second, less what both had from the start.
+/// Velocities after half a second, minus the common initial velocity.
 fn parted(along: [f64; 3], faster: f64) -> [Vector3<f64>; 2] {
     let mut lab = Lab::new(weightless());
     let mut ball = |uid: &str, at: [f64; 3]| {

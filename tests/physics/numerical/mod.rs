@@ -1,4 +1,4 @@
-//! What integrators and batches promise.
+//! Numerical guarantees of integrators and batches.
 
 mod convergence;
 pub(crate) mod double_pendulum;

@@ -1,7 +1,8 @@
-//! Semi-implicit Euler is of order 1: half the step, half the error, on a double pendulum that swings wide.
+//! Semi-implicit Euler is of order 1: half the step, half the error, on a double pendulum with large swings.
 //!
-//! Tolerance: C h (1 + D h + ...): the next terms, as the same steps have them that [`double_pendulum`](super::double_pendulum)
-//! writes out, and rounding. The error itself is that of these steps, up to rounding. Control: Runge-Kutta.
+//! Tolerance: the next terms of C h (1 + D h + ...), from the explicit steps of
+//! [`double_pendulum`](super::double_pendulum), and rounding. The error itself equals that of these steps up to
+//! rounding. Control: Runge-Kutta.
 
 use super::convergence::{double_pendulum, errors, off, order, reference};
 use super::double_pendulum::{self as written_out, Steps, rounding};

@@ -1,8 +1,8 @@
-//! RK4 of the orientation of a free body. Orientations do not add: 4.x advances them within a step as a Runge-Kutta-
-//! Munthe-Kaas method does, of order 4; 2.2.2 adds up angular velocities of different axes, which leaves order 2.
+//! RK4 of the orientation of a free body. Orientations do not add: within a step, 4.x advances them by a
+//! Runge-Kutta-Munthe-Kaas method of order 4; 2.2.2 adds angular velocities of different axes, which leaves order 2.
 //!
-//! Tolerance: the next terms of the error, as the same steps have them that [`free_rotation`](super::free_rotation) writes out for
-//! either line, and rounding: of as many steps as there are, half a digit of a quaternion each.
+//! Tolerance: the next terms of the error, from the explicit steps of [`free_rotation`](super::free_rotation) for
+//! either version, and rounding of half a digit of a quaternion in each step.
 
 use super::convergence::{errors, off, order};
 use super::free_rotation;
@@ -13,10 +13,11 @@ use kinetoscope::sim::Integrator;
 const MOMENTS: [f64; 3] = [0.01, 0.02, 0.025];
 const SPIN: [f64; 3] = [4.0, 1.0, 5.5];
 const TIME: f64 = 1.024;
-/// The steps of the answer \[s\]: off by 1e-11 with order 4; with order 2 by a thousandth of the smallest error below.
+/// Time step of the reference solution \[s\]. Its error is 1e-11 with order 4; with order 2 a thousandth of the
+/// smallest error below.
 const FINE: f64 = 2.5e-4;
 
-/// The quaternion of a top after 1.024 s.
+/// The quaternion of a free body after 1.024 s.
 fn orientation(integrator: Integrator, dt: f64) -> Vec<f64> {
     let mut lab = Lab::new(SimulationManagerCfg { integrator, ..with_dt(dt, weightless()) });
     let robot = lab.free(&urdf(&[Link::new("body", 1.0, MOMENTS)], &[]), [0.0; 3]);

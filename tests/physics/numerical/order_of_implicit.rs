@@ -1,5 +1,5 @@
-//! The integrators that are implicit in velocity are of order 1, too: `implicit`, and on 4.x `implicitfast`, which leaves
-//! the Coriolis terms out of the derivative and not out of the answer: without damping it is Euler.
+//! The velocity-implicit integrators are of order 1 too: `implicit`, and on 4.x `implicitfast`. The latter leaves the
+//! Coriolis terms out of the derivative but not out of the forces: without damping it equals Euler.
 //!
 //! Tolerance: as for `order_of_euler`.
 

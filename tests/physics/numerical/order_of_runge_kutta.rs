@@ -1,7 +1,7 @@
 //! The classical Runge-Kutta integrator is of order 4: half the step, a sixteenth of the error.
 //!
-//! Tolerance: the next terms of the error, as the same steps have them that [`double_pendulum`](super::double_pendulum) writes
-//! out, and rounding. The error itself is that of these steps, up to rounding. Control: Euler.
+//! Tolerance: the next terms of the error, from the explicit steps of [`double_pendulum`](super::double_pendulum), and
+//! rounding. The error itself equals that of these steps up to rounding. Control: Euler.
 
 use super::convergence::{double_pendulum, errors, off, order, reference};
 use super::double_pendulum::{self as written_out, Steps, rounding};

@@ -1,6 +1,6 @@
-//! `update(n)` is n times `update(1)`, bit for bit.
+//! `update(n)` equals n calls of `update(1)`, bit for bit.
 //!
-//! Tolerance: none. Control: a step less.
+//! Tolerance: none. Control: one step less.
 
 use super::scenes::{Fall, difference, legged};
 use crate::law::law;

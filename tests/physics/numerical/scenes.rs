@@ -1,9 +1,9 @@
-//! Scenes with everything in them, to be run in more than one way: quadrupeds with drives that fall on the ground.
+//! Scenes for comparisons of different runs: quadrupeds with drives that fall on the ground.
 
 use crate::lab::*;
 use crate::law::worse;
 
-/// A quadruped of each environment that falls from half a metre, otherwise turned and pushed in each.
+/// A quadruped in each environment that falls from half a meter, with its own rotation and push.
 #[derive(Debug)]
 pub(super) struct Fall {
     pub(super) sim: SimulationManager,
@@ -11,7 +11,7 @@ pub(super) struct Fall {
 }
 
 impl Fall {
-    /// `nudge` is added to the first joint's velocity in environment 0 \[rad/s\].
+    /// Creates the scene; `nudge` is added to the first joint's velocity in environment 0 \[rad/s\].
     pub(super) fn new(cfg: SimulationManagerCfg, nudge: f64) -> Self {
         let mut sim = SimulationManager::new(cfg).unwrap();
         let robot = RobotCfg {
@@ -44,33 +44,33 @@ impl Fall {
         robot.write_qvel(&row(&v), None, Some(&[EnvId(env)])).unwrap();
     }
 
-    /// Steps and finds no environment diverged and no warning of MuJoCo.
+    /// Steps; asserts that no environment diverged and MuJoCo gave no warning.
     #[track_caller]
     pub(super) fn update(&mut self, steps: u32) {
         self.sim.update(steps);
         assert_well(&self.sim);
     }
 
-    /// Everything that moves in one environment.
+    /// The complete state of one environment.
     pub(super) fn state(&self, env: usize) -> Vec<f64> {
         let robot = self.sim.robot(self.robot);
         let arrays = [robot.root_state(), robot.qpos(), robot.qvel(), robot.qf()];
         arrays.iter().flat_map(|array| array.row(env).to_vec()).collect()
     }
 
-    /// Whether something touches the ground, so that contacts are part of what is compared.
+    /// True if every robot touches the ground, so that the comparison includes contacts.
     pub(super) fn has_landed(&self) -> bool {
-        // What is below 0.7 m has fallen; what the ground does not stop is below 0 after half a second.
+        // A base below 0.7 m has fallen; without the ground it would be below 0 after half a second.
         (0..self.sim.num_envs()).all(|env| (0.1..0.7).contains(&self.state(env)[2]))
     }
 }
 
-/// The legged preset on `threads`, with `num_envs` environments.
+/// The legged preset with `threads` threads and `num_envs` environments.
 pub(super) fn legged(num_envs: usize, threads: usize) -> SimulationManagerCfg {
     SimulationManagerCfg { num_envs, threads: Some(threads), lights: Vec::new(), ..SimulationManagerCfg::legged() }
 }
 
-/// The largest difference of two states; infinite where their bits differ and their numbers do not.
+/// The largest difference between two states; infinite for equal numbers with different bits.
 pub(super) fn difference(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let apart = |(a, b): (&f64, &f64)| {

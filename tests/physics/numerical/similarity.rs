@@ -1,5 +1,6 @@
-//! Mechanical similarity: a pendulum three times as long swings √3 times as slowly (Landau, Lifshitz, Mechanics, § 10). With
-//! √3 times the step, Euler's recursion is the same numbers: h² g/L is, and velocities are 1/√3.
+//! Mechanical similarity: a pendulum three times as long swings √3 times as slowly (Landau, Lifshitz, Mechanics, § 10).
+//! With a step √3 times as long, Euler's recursion has the same numbers: h² g/L is unchanged, and velocities are scaled
+//! by 1/√3.
 //!
 //! Tolerance: rounding, 2000 steps; 1e-10. Control: the same step for both.
 

@@ -1,6 +1,7 @@
-//! Substeps are steps: 10 of them in `physics_dt` = 10 ms are ten updates of 1 ms, bit for bit, with drives and contacts.
+//! Substeps equal steps: 10 substeps in `physics_dt` = 10 ms are ten updates of 1 ms, bit for bit, with drives and
+//! contacts.
 //!
-//! Tolerance: none. Control: one step of 10 ms in their place.
+//! Tolerance: none. Control: one step of 10 ms instead.
 
 use super::scenes::{Fall, difference, legged};
 use crate::law::law;

@@ -1,6 +1,6 @@
-//! The same bits for any number of threads: sixteen quadrupeds fall on the ground, on 1 thread and on 8.
+//! The number of threads does not change a bit: sixteen quadrupeds fall on the ground, on 1 thread and on 8.
 //!
-//! Tolerance: none. Control: one joint of one of them is a billionth of a rad/s faster.
+//! Tolerance: none. Control: one joint of one robot is a billionth of a rad/s faster.
 
 use super::scenes::{Fall, difference, legged};
 use crate::law::law;

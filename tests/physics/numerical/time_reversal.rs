@@ -1,10 +1,10 @@
-//! Mechanics runs backwards as well: a double pendulum swings for a second, its velocities are turned round, and after
-//! another second it is where it started, at rest.
+//! Time reversal: a double pendulum swings for a second, its velocities are reversed, and after another second it is at
+//! its start, at rest.
 //!
-//! Tolerance: what 1000 steps of RK4 there and 1000 back leave, written out in
-//! [`double_pendulum`](super::double_pendulum). That is less than each step's own error would say: RK4 is of even order, so
-//! the first term of the error of a step is taken back by the step that returns. And rounding: half a digit of each number of
-//! the state in each step, grown from there to the end. Control: Euler, whose error is not taken back.
+//! Tolerance: the error of 1000 RK4 steps forward and 1000 back, from the explicit steps of
+//! [`double_pendulum`](super::double_pendulum). It is smaller than the error of the single steps: RK4 is of even order,
+//! so the backward step cancels the first error term of the forward step. Rounding adds half a digit of each state
+//! variable in each step, propagated to the end. Control: Euler, whose error is not canceled.
 
 use super::double_pendulum::{Rods, Steps, swing};
 use crate::articulated::double_pendulum_energy;
@@ -19,7 +19,7 @@ fn errors((q, v): ([f64; 2], [f64; 2])) -> [f64; 2] {
     [worse((q[0] - START[0]).abs(), (q[1] - START[1]).abs()), worse(v[0].abs(), v[1].abs())]
 }
 
-/// Angles and velocities of the joints after the way there and back.
+/// Angles and velocities of the joints after the way forth and back.
 fn returned(cfg: SimulationManagerCfg) -> ([f64; 2], [f64; 2]) {
     let mut lab = Lab::new(with_dt(STEP, cfg));
     let robot = lab.mechanism(&double_pendulum_energy::text());
@@ -32,9 +32,10 @@ fn returned(cfg: SimulationManagerCfg) -> ([f64; 2], [f64; 2]) {
     (pair(lab.q(robot)), pair(lab.v(robot)))
 }
 
-/// The same, written out: errors of the angles \[rad\] and velocities \[rad/s\], with what rounding may add to them.
+/// The same with explicit steps: errors of the angles \[rad\] and velocities \[rad/s\], including the bound of
+/// rounding.
 fn written_out() -> [f64; 2] {
-    // Steps back in time are steps of the pendulum whose velocities were turned round.
+    // A backward step equals a forward step of the pendulum with reversed velocities.
     let sizes = [[STEP; STEPS], [-STEP; STEPS]].concat();
     let (end, rounding) = swing(Rods::of_joints(START, [0.0; 2]), Steps::RungeKutta, &sizes);
     let left = errors(end.joints());

@@ -1,9 +1,9 @@
-//! A body without torques: energy ½ ωᵀ I ω and angular momentum R I ω, in world axes, stay.
+//! A torque-free body conserves its energy ½ ωᵀ I ω and its angular momentum R I ω in world axes.
 //!
 //! Tolerance: RK4's error of energy is (ω h)⁴/120 per radian: with ω = 7 rad/s, h = 1 ms and 70 rad that is 1e-9. The
-//! direction of the angular momentum has the order of the orientation, which is 2 in 2.2.2: (ω h)²/12 per radian of turning,
-//! of which the nutation, not the turn about the angular momentum itself, shows: a tenth of 3e-4. Euler, of order 1, misses
-//! by ω h/2 per radian, percents.
+//! direction of the angular momentum has the order of the orientation, which is 2 in 2.2.2: (ω h)²/12 per radian of
+//! rotation. Only the nutation contributes, not the rotation about the angular momentum itself: a tenth of 3e-4. Euler,
+//! of order 1, misses by ω h/2 per radian, percents.
 
 use crate::lab::*;
 use kinetoscope::mujoco::{TARGET, Target};

@@ -1,17 +1,17 @@
-//! Two balls of the same mass meet off the middle, without friction and without loss. The line of centres is at α with
-//! sin α = b/2r from the way of the first, b being the impact parameter: the second leaves along it with v cos α, the first
-//! across it with v sin α, at right angles to each other. Momentum stays always.
+//! Off-center collision of two balls of equal mass, without friction and without loss. The line of centers is at α with
+//! sin α = b/2r from the velocity of the first ball, where b is the impact parameter. The second ball leaves along this
+//! line with v cos α, the first across it with v sin α, at a right angle. Momentum is conserved in all cases.
 //!
-//! Tolerance: momentum to what MuJoCo's solver leaves, 1e-8 of the impulse m v cos α on each of the two balls. The bounce is
-//! a spring for about ten steps, in which the balls go 1 mm at 0.1 mm a step and the line of centres turns by as much over
-//! 2r: 0.5 %; twice, as they come and go: 1 %.
+//! Tolerance: momentum up to the solver's residual, 1e-8 of the impulse m v cos α on each of the two balls. The bounce
+//! is a spring for about ten steps, in which the balls move 1 mm at 0.1 mm a step and the line of centers turns by as
+//! much over 2r: 0.5 %, once on approach and once on separation: 1 %.
 
 use crate::lab::*;
 use kinetoscope_testkit::worlds::ball;
 
 const RADIUS: f64 = 0.1;
 
-/// Velocities after the second was hit, which alone is slowed by `drag` \[N s/m\].
+/// Velocities after the hit; only the second ball has the drag `drag` \[N s/m\].
 fn hit(impact: f64, restitution: f64, drag: f64) -> [Vector3<f64>; 2] {
     let mut lab = Lab::new(SimulationManagerCfg { friction: [0.0; 3], ..with_dt(1e-4, weightless()) });
     let mut ball = |uid: &str, at: [f64; 3], linear_damping: f64| {

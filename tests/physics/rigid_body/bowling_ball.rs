@@ -1,11 +1,12 @@
-//! A ball is put down with v₀ and no spin. Friction slows it and turns it until it rolls; the angular momentum about a
-//! point of the ground stays: m v₀ r = m v r + 2/5 m r² v/r, so v = 5/7 v₀ in the end, whatever the friction. It slides for
-//! t = 2 v₀/(7 μ g).
+//! A ball starts with v₀ and no spin. Friction slows it and spins it up until it rolls. The angular momentum about a
+//! point of the ground is conserved: m v₀ r = m v r + 2/5 m r² v/r, so v = 5/7 v₀ at the end for any friction. It
+//! slides for t = 2 v₀/(7 μ g).
 //!
-//! Tolerance: the point of contact is half of the depth above the ground's plane and nearer to the centre, as in
-//! `rolling_sphere`: v₀ δ/2r. While it slides, MuJoCo's elliptic cones lift a contact that slips with v as if it were μ B v
-//! deeper, so that it hops a little before it settles: the friction is μ times the normal force at every step, and the mean
-//! of that is m (g + c), with the mean acceleration upwards c (law `sliding_block`), up to the solver's tolerance.
+//! Tolerance: the contact point is half of the depth above the ground's plane and closer to the center, as in
+//! `rolling_sphere`: v₀ δ/2r. During sliding, MuJoCo's elliptic cones treat a contact that slips with v as if it were μ
+//! B v deeper, so that the ball hops slightly before it settles. The friction is μ times the normal force at every
+//! step, and the mean of the normal force is m (g + c), with the mean upward acceleration c (law `sliding_block`), up
+//! to the solver's tolerance.
 
 use super::sliding_block::SOLVER;
 use super::soft_contact::depth;
@@ -15,7 +16,7 @@ const RADIUS: f64 = 0.5;
 const START: f64 = 1.0;
 const FRICTION: f64 = 0.1;
 
-/// Mean deceleration from 0.1 s to 0.2 s, mean acceleration upwards then, and the velocity after 1 s.
+/// Mean deceleration from 0.1 s to 0.2 s, mean upward acceleration in that time, and the velocity after 1 s.
 fn bowled(friction: f64) -> [f64; 3] {
     let mut lab = Lab::new(slope(0.0, friction));
     let robot = lab.free(&urdf(&[Link::ball("ball", 3.0, RADIUS)], &[]), [0.0, 0.0, RADIUS - depth(G)]);

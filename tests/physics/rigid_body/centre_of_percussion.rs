@@ -1,6 +1,6 @@
-//! A rod that lies free is struck at one end. The impulse P moves its centre with P/m and turns it with P (L/2)/(m L²/12):
-//! the velocity at x from the centre, the strike being at -L/2, is P/m (1 - 6 x/L). Two thirds of the rod from the strike,
-//! at x = L/6, nothing moves: the centre of percussion. The struck end goes with 4 P/m.
+//! A free rod is struck at one end. The impulse P moves its center with P/m and rotates it with P (L/2)/(m L²/12). The
+//! velocity at x from the center, with the strike at -L/2, is P/m (1 - 6 x/L). At two thirds of the rod from the
+//! strike, x = L/6, the velocity is zero: the center of percussion. The struck end moves with 4 P/m.
 //!
 //! Tolerance: rounding of one step.
 
@@ -10,7 +10,7 @@ const LENGTH: f64 = 1.2;
 const MASS: f64 = 0.5;
 const FORCE: f64 = 300.0;
 
-/// Velocities across the rod at the struck end and at two thirds of it, which are frames of links that are fixed to it.
+/// Velocities across the rod at the struck end and at two thirds of it; both points are frames of fixed links.
 fn struck(off_centre: bool) -> [f64; 2] {
     let moment = MASS * LENGTH * LENGTH / 12.0;
     let mut lab = Lab::new(weightless());
@@ -22,7 +22,7 @@ fn struck(off_centre: bool) -> [f64; 2] {
     let torque = if off_centre { -FORCE * LENGTH / 2.0 } else { 0.0 };
     lab.push_link(robot, "rod", Vector3::new(0.0, FORCE, 0.0), Vector3::new(0.0, 0.0, torque));
     lab.run(1e-3);
-    // The rod has turned by 2.5e-3 rad by now; these are components in world axes of points of it.
+    // The rod has rotated by 2.5e-3 rad: world velocities of its points are transformed to its axes.
     ["end", "percussion"].map(|link| {
         let v = lab.sim.robot(robot).link_velocity(link).unwrap();
         let turned = lab.root(robot).rotation.inverse() * Vector3::new(v[(0, 0)], v[(0, 1)], v[(0, 2)]);
@@ -36,7 +36,7 @@ fn holds() {
         let [end, percussion] = struck(true);
         let central = struck(false);
         let impulse = FORCE * 1e-3;
-        // The axes have turned by ω h = 2.5 mrad since the velocity was P/m along the old y: its cosine shows.
+        // The axes have rotated by ω h = 2.5 mrad since the velocity was P/m along the old y, which adds a cosine.
         let spin = impulse * (LENGTH / 2.0) / (MASS * LENGTH * LENGTH / 12.0);
         let cosine = (spin * 1e-3).cos();
         let rounding = (1e-12, "rounding of one step");

@@ -1,15 +1,17 @@
-//! Balls roll on the back of a board that is pulled by F: with f₁ = μ₁ (M + n m) g against the board and f₂ between it and each
-//! ball, M a = F - f₁ - n f₂, m b = f₂, 2/5 m r² α = f₂ r, a = b + r α = 7/2 f₂/m. So f₂ = (F - f₁)/(7/2 M/m + n), b = f₂/m and
-//! a = 7/2 b, as long as f₂ < μ₂ m g. With less friction the balls slip: b = μ₂ g and M a = F - f₁ - n μ₂ m g.
+//! Balls roll on a board that is pulled by F. With the friction f₁ = μ₁ (M + n m) g against the board and f₂ between
+//! the board and each ball, M a = F - f₁ - n f₂, m b = f₂, 2/5 m r² α = f₂ r, a = b + r α = 7/2 f₂/m. So f₂ = (F -
+//! f₁)/(7/2 M/m + n), b = f₂/m and a = 7/2 b, as long as f₂ < μ₂ m g. With less friction the balls slip: b = μ₂ g and M
+//! a = F - f₁ - n μ₂ m g.
 //!
-//! The board is on a rail that has f₁ as its dry friction, so that it neither hops nor tips. (That of SimBenchmark slides on the
-//! ground and does both: law `conveyor_on_the_ground`.)
+//! The board is on a rail with the dry friction f₁, so that it neither hops nor tips. (The board of SimBenchmark slides
+//! on the ground and does both: law `conveyor_on_the_ground`.)
 //!
-//! Exact, up to the solver's tolerance: M a + n m b = F - f₁, whatever the balls do, as the rail's friction is at its limit at
-//! every step; and of balls that slip b - μ₂ c = μ₂ g, with their mean acceleration c upwards, for what slips hops (law
-//! `sliding_block`). Not exact: a and b of balls that roll. The arm of their friction is shorter by half of the depth δ, ρ = r -
-//! δ/2, which makes it a = b (1 + 5/2 ρ²/r²), so that M a grows by less: to first order b is off by 5/2 M δ/r of itself over 7/2 M +
-//! n m, and a by n m/M of what b is. δ is that of a load of m g on 1/m + 1/M, the most that MuJoCo takes for the inverse inertia.
+//! Exact, up to the solver's tolerance: M a + n m b = F - f₁ for any motion of the balls, because the rail's friction
+//! is at its limit at every step. Also exact: b - μ₂ c = μ₂ g for slipping balls with the mean upward acceleration c,
+//! because slipping balls hop (law `sliding_block`). Not exact: a and b of rolling balls. The lever arm of their
+//! friction is shorter by half of the depth δ, ρ = r - δ/2, so that a = b (1 + 5/2 ρ²/r²), and M a grows by less. To
+//! first order b is off by 5/2 M δ/r of itself over 7/2 M + n m, and a by n m/M times the error of b. δ is the depth
+//! under a load of m g on 1/m + 1/M, the largest inverse inertia that MuJoCo uses.
 
 use super::sliding_block::SOLVER;
 use super::soft_contact::depth;
@@ -20,21 +22,21 @@ use kinetoscope_testkit::worlds::ball;
 const BOARD: f64 = 10.0;
 const BALL: f64 = 1.0;
 const RADIUS: f64 = 0.5;
-/// Of the rail against the board, and of the balls.
+/// Friction of the rail against the board, and of the balls.
 const FRICTION: [f64; 2] = [0.4, 0.8];
-/// Too little for the balls to roll: they would need 0.066.
+/// Friction too low for rolling, which needs 0.066.
 const SLIPPERY: f64 = 0.03;
 const PULL: f64 = 80.0;
 const BALLS: usize = 4;
-/// When the means begin and end, after the pull has begun \[s\].
+/// Start and end of the averaging, after the start of the pull \[s\].
 const FROM: f64 = 0.8;
 const UNTIL: f64 = 1.6;
 
-/// Mean accelerations between [`FROM`] and [`UNTIL`].
+/// Mean accelerations between [`FROM`] and [`UNTIL`] \[m/s²\].
 struct Pulled {
-    /// Of the board.
+    /// Of the board, along the pull.
     board: f64,
-    /// Means over the balls, along the pull and upwards.
+    /// Mean over the balls, along the pull and upward.
     ball: [f64; 2],
 }
 
@@ -92,7 +94,7 @@ fn holds() {
             let pull = (PULL - drag()) / BOARD;
             for (quantity, found) in [("a + n m b/M", &rolling), ("a + n m b/M, balls slip", &slipping)] {
                 m.row(quantity, "m/s²", pull, force(found), solver);
-                // As if the balls weighed a tenth less.
+                // Equivalent to balls with 10 % less mass.
                 let other = found.board + 0.9 * n * BALL / BOARD * found.ball[0];
                 m.control(quantity, "without a tenth of the balls", other);
             }

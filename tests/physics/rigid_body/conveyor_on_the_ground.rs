@@ -1,29 +1,33 @@
-//! SimBenchmark's rolling test, as it is: 25 balls of 1 kg on a box of 10 kg, which slides on the ground, pulled obliquely by F =
-//! 150 N for 4 s. Friction μ₁ = 0.4 under the box, μ₂ = 0.8 between it and the balls. From rest, in the notation of `conveyor`:
+//! SimBenchmark's rolling test in its original form: 25 balls of 1 kg on a box of 10 kg, which slides on the ground and
+//! is pulled obliquely by F = 150 N for 4 s. The friction is μ₁ = 0.4 under the box and μ₂ = 0.8 between the box and
+//! the balls. From rest, in the notation of `conveyor`:
 //!
 //! ```text
 //! f₁ = μ₁ (M + n m) g,   b = (F - f₁)/(7/2 M + n m),   a = 7/2 b;   V = a t of the box, v = b t of a ball
 //! ```
 //!
-//! Its number is the mean square, over the time, of the distance of the velocities to these. (Published for MuJoCo 1.50: 0.0069
-//! m²/s² with Euler. Source: leggedrobotics, SimBenchmark, "Rolling test".) Here are the roots of it, of box and balls.
+//! SimBenchmark reports the mean square, over the time, of the velocity errors. (Published for MuJoCo 1.50: 0.0069
+//! m²/s² with Euler. Source: leggedrobotics, SimBenchmark, "Rolling test".) This law uses the root mean squares of box
+//! and balls.
 //!
-//! Nothing of this is exact in MuJoCo, as what slides on soft contacts hops, and the tolerance is what hops can do. A contact
-//! that slips with V is pushed as if it were μ₁ B V deeper, B = 2/(dmax tc) (law `sliding_block`), so that in a step of h its
-//! velocity changes by s = h μ₁ B V at most. A box that comes down with w sinks in by w h at most before it is pushed, and leaves
-//! when it has risen as far: from rest k steps of s lead k (k + 1)/2 s h up, to k s. So w = k s becomes a smaller w for k > 2, a
-//! larger one for k < 2 at most, and w <= 2 s. The ground has carried the weight but for the momentum w (M + n m) that is on its
-//! way up, and friction lacks, or exceeds, μ₁ of that. Box and rolling balls, M + 2/7 n m, are off by it, the box by
+//! Nothing of this is exact in MuJoCo, because bodies that slide on soft contacts hop; the tolerance bounds the effect
+//! of hops. A contact that slips with V is pushed as if it were μ₁ B V deeper, B = 2/(dmax tc) (law `sliding_block`).
+//! In a step of h its velocity thus changes by at most s = h μ₁ B V. A box that lands with w sinks in by at most w h
+//! before it is pushed, and leaves the contact after rising as far: from rest, k steps of s lead to the height k (k +
+//! 1)/2 s h and the velocity k s. So w = k s decreases for k > 2 and can increase only for k < 2, and w <= 2 s. The
+//! ground has carried the weight except for the upward momentum w (M + n m), and friction deviates by μ₁ times that.
+//! The velocity of the box with rolling balls, of the inertia M + 2/7 n m, is off by
 //!
 //! ```text
 //! e = 2 h μ₁² B V (M + n m)/(M + 2/7 n m)
 //! ```
 //!
-//! and a ball by 2/7 e, and by as much as the box gains on it while it is in the air, 2 w/g a.
+//! The velocity of a ball is off by 2/7 e, and by the velocity that the box gains on the ball while the ball is in the
+//! air, 2 w/g a.
 //!
-//! (Second to that, a box that lands on one corner is turned by its friction, and corners that turn do not move along the pull:
-//! an impulse that changes the corner's velocity by 2 w, 7 J/M, moves it by 3 μ₁ J/M across, ε = 6/7 μ₁ w/V of its way, and
-//! friction lacks ε²/2 = 4e-4 of itself. It is why `conveyor` is on a rail.)
+//! (A second-order effect: a box that lands on one corner is rotated by its friction, and its corners do not move along
+//! the pull. An impulse that changes the corner's velocity by 2 w, 7 J/M, moves it by 3 μ₁ J/M across, ε = 6/7 μ₁ w/V
+//! of its path, and friction is low by ε²/2 = 4e-4 of itself. For this reason `conveyor` uses a rail.)
 
 use super::soft_contact::{LARGEST, TIME};
 use crate::lab::*;
@@ -36,7 +40,7 @@ const BALL: f64 = 1.0;
 const RADIUS: f64 = 0.5;
 const FRICTION: [f64; 2] = [0.4, 0.8];
 const PULL: f64 = 150.0;
-/// Balls in a row, and rows.
+/// Number of balls in a row, and of rows.
 const ROWS: usize = 5;
 const SECONDS: f64 = 4.0;
 
@@ -47,7 +51,7 @@ fn expected() -> [f64; 2] {
     [3.5 * rolls, rolls]
 }
 
-/// Roots of the mean squares of what the velocities of box and balls are off by \[m/s\].
+/// Root mean squares of the velocity errors of box and balls \[m/s\].
 fn off(friction_of_balls: f64) -> [f64; 2] {
     let mut lab = Lab::new(slope(0.0, FRICTION[0]));
     let board = object("board", ObjectShape::Box { size: [20.0, 20.0, 0.5] }, [0.0, 0.0, 0.25]);
@@ -78,7 +82,7 @@ fn holds() {
         let ([board, ball], [alone, left]) = (off(FRICTION[1]), off(0.0));
         let [a, _] = expected();
         let others = (ROWS * ROWS) as f64 * BALL;
-        // The root of the mean square of a t over the time.
+        // The root mean square of a t over the time.
         let fast = a * SECONDS / 3.0_f64.sqrt();
         let hops = 2.0 * 1e-3 * FRICTION[0] * 2.0 / (LARGEST * TIME) * fast;
         let on_board = FRICTION[0] * hops * (BOX + others) / (BOX + 2.0 / 7.0 * others);

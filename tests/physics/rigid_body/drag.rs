@@ -1,7 +1,7 @@
-//! Viscous drag: m v' = -m g - c v. MuJoCo's Euler takes damping at the end of the step: v(n+1) = (v(n) - g h)/(1 + h c/m),
-//! so v(n) = -(m g/c) (1 - (1 + h c/m)^-n), whose limit m g/c is that of continuous time.
+//! Viscous drag: m v' = -m g - c v. MuJoCo's Euler evaluates damping at the end of the step: v(n+1) = (v(n) - g h)/(1 +
+//! h c/m), so v(n) = -(m g/c) (1 - (1 + h c/m)^-n), with the same limit m g/c as continuous time.
 //!
-//! Tolerance: rounding; at the end e^-25 of the limit is missing.
+//! Tolerance: rounding; e^-25 of the limit is missing at the end.
 
 use crate::lab::*;
 

@@ -1,15 +1,17 @@
-//! Spin about the middle axis turns over and over. Euler's equations have the solution ω₂ = c sn(λ t, k): between two
-//! changes of its sign are 2 K(k)/λ. With T twice the energy, L the angular momentum and I₁ < I₂ < I₃, for L² > I₂ T:
+//! Dzhanibekov effect: rotation about the middle axis flips repeatedly. Euler's equations have the solution ω₂ = c sn(λ
+//! t, k), with the time 2 K(k)/λ between two changes of its sign. With T twice the energy, L the angular momentum and
+//! I₁ < I₂ < I₃, for L² > I₂ T:
 //!
 //! ```text
 //! λ² = (I₃ - I₂)(L² - T I₁)/(I₁ I₂ I₃),   k² = (I₂ - I₁)(T I₃ - L²)/((I₃ - I₂)(L² - T I₁))
 //! ```
 //!
-//! (Landau, Lifshitz, Mechanics, § 37), with 1 and 3 swapped otherwise; K(k) is π/2 over the arithmetic-geometric mean of 1
-//! and √(1 - k²).
+//! (Landau, Lifshitz, Mechanics, § 37), with 1 and 3 swapped otherwise. K(k) is π/2 over the arithmetic-geometric mean
+//! of 1 and √(1 - k²).
 //!
-//! Tolerance: the flips are slow near the unstable axis, where an error of ω₁ or ω₃ shifts the next flip by its relative
-//! size over λ. RK4's is (ω h)⁴ of the angle, 1e-9; the crossing, read off a straight line, is good to h² ω'' h/ω' ~ 1e-8.
+//! Tolerance: the motion is slow near the unstable axis, where an error of ω₁ or ω₃ shifts the next flip by its
+//! relative size over λ. RK4's error is (ω h)⁴ of the angle, 1e-9; the linearly interpolated crossing is accurate to h²
+//! ω'' h/ω' ~ 1e-8.
 
 use crate::lab::*;
 use std::f64::consts::FRAC_PI_2;
@@ -24,7 +26,7 @@ pub(crate) fn complete_elliptic(k: f64) -> f64 {
     FRAC_PI_2 / a
 }
 
-/// Time between flips in the closed form \[s\].
+/// Time between flips in closed form \[s\].
 fn flip_time(w: [f64; 3]) -> f64 {
     let [mut i1, i2, mut i3] = MOMENTS;
     let twice_energy: f64 = (0..3).map(|k| MOMENTS[k] * w[k] * w[k]).sum();
@@ -37,7 +39,7 @@ fn flip_time(w: [f64; 3]) -> f64 {
     2.0 * complete_elliptic(k2.sqrt()) / rate.sqrt()
 }
 
-/// Times at which the spin about the middle axis changes its sign within 12 s \[s\].
+/// Times of the sign changes of the angular velocity about the middle axis within 12 s \[s\].
 fn flips(w: [f64; 3]) -> Vec<f64> {
     let mut lab = Lab::new(rk4(weightless()));
     let robot = lab.free(&urdf(&[Link::new("body", 1.0, MOMENTS)], &[]), [0.0; 3]);

@@ -1,8 +1,9 @@
-//! A ball falls from h and comes up again to e² h, e being its restitution; where nothing is lost, to h again and again.
+//! A ball falls from h and rises to e² h, where e is its restitution; without loss it rises to h after every bounce.
 //!
-//! Tolerance: a contact lasts ten steps, so that it matters where in a step the ball arrives: the worst of all such places,
-//! by the recursion of these steps (`bounce.rs`). A part x of the height in one bounce is (1 + x)^10 - 1 in ten. What comes
-//! out of one fall the recursion knows, but for what MuJoCo's impedance leaves.
+//! Tolerance: a contact lasts ten steps, so the result depends on the fraction of a step at which the ball arrives. The
+//! tolerance is the worst over all such fractions, by the recursion of these steps (`bounce.rs`). A relative height
+//! error x of one bounce is (1 + x)^10 - 1 after ten. The height after one fall is predicted by the recursion, up to
+//! the error of MuJoCo's impedance.
 
 use crate::bounce::{apex, apex_off, apex_rest};
 use crate::lab::*;
@@ -13,7 +14,7 @@ const H: f64 = 1e-4;
 const HEIGHT: f64 = 0.5;
 const RADIUS: f64 = 0.1;
 
-/// Greatest heights between bounces, and all heights, sampled.
+/// Apex heights between bounces, and all sampled heights.
 fn apexes(restitution: Option<f64>, bounces: usize) -> (Vec<f64>, Vec<[f64; 2]>) {
     let cfg = SimulationManagerCfg { ground: Some(GroundCfg::default()), ..with_dt(H, earth()) };
     let mut lab = Lab::new(cfg);

@@ -1,11 +1,11 @@
-//! A body falls. Semi-implicit Euler is v(n) = -g h n and z(n) = z(0) - h Σ g h k = z(0) - g h² n (n + 1)/2, exactly; a
-//! Runge-Kutta step of a constant acceleration is exact too: z(t) = z(0) - g t²/2.
+//! A falling body. Semi-implicit Euler gives v(n) = -g h n and z(n) = z(0) - h Σ g h k = z(0) - g h² n (n + 1)/2
+//! exactly; a Runge-Kutta step of a constant acceleration is exact too: z(t) = z(0) - g t²/2.
 //!
 //! Tolerance: rounding, 1000 sums of numbers below 10, each off by at most 1e-15.
 
 use crate::lab::*;
 
-/// Height after a second from 6 m.
+/// Height after a second of fall from 6 m.
 fn height(cfg: SimulationManagerCfg) -> f64 {
     let mut lab = Lab::new(cfg);
     let robot = lab.free(&urdf(&[Link::brick("body", 2.0, [0.1, 0.2, 0.3])], &[]), [0.0, 0.0, 6.0]);

@@ -1,10 +1,10 @@
-//! A block on a slope stays where tan θ < μ and slides with a = g (sin θ - μ cos θ) where tan θ > μ: 5 % below and above.
+//! A block on a slope sticks for tan θ < μ and slides with a = g (sin θ - μ cos θ) for tan θ > μ: 5 % below and above.
 //!
-//! Below, soft friction creeps, by the law `stick_creep`. Above, the momentum c of hops takes part, as in `sliding_block`:
-//! a + μ c = g (sin θ - μ cos θ).
+//! Below the threshold, soft friction creeps, by the law `stick_creep`. Above it, the momentum c of hops contributes,
+//! as in `sliding_block`: a + μ c = g (sin θ - μ cos θ).
 //!
-//! Tolerance: below, h tan θ/w = 2.4 % of the load goes to the lower corners: (2.4 %)² of the creep; the upper ones
-//! bear enough still to stick. Above, the solver's.
+//! Tolerance: below the threshold, h tan θ/w = 2.4 % of the load moves to the lower corners: (2.4 %)² of the creep; the
+//! upper corners still carry enough to stick. Above it, the solver's tolerance.
 
 use super::incline::{Descent, descent};
 use super::sliding_block::SOLVER;
@@ -18,7 +18,7 @@ fn block() -> Link {
     Link::brick("block", 1.2, [0.4, 0.4, HEIGHT])
 }
 
-/// Velocity after 2 s where tan θ is `part` of the friction.
+/// Velocity after 2 s on a slope with tan θ = `part` times the friction.
 fn velocity(part: f64, friction: f64) -> f64 {
     let mut lab = Lab::new(slope((part * FRICTION).atan(), friction));
     let robot = lab.free(&urdf(&[block()], &[]), [0.0, 0.0, 0.5 * HEIGHT]);

@@ -1,4 +1,4 @@
-//! What goes down a slope: a plane that gravity is tilted against, which is the same and needs no second shape.
+//! Descent on a slope, modeled as a plane with tilted gravity, which is equivalent and needs no second shape.
 
 use crate::lab::*;
 
@@ -7,15 +7,15 @@ use crate::lab::*;
 pub(super) struct Descent {
     /// Down the slope.
     pub(super) along: f64,
-    /// Away from it: soft contacts let what slides hop.
+    /// Perpendicular to the slope, because bodies that slide on soft contacts hop.
     pub(super) across: f64,
 }
 
-/// When the means begin and end, after a start at rest \[s\].
+/// Start and end of the averaging, after a start at rest \[s\].
 pub(super) const FROM: f64 = 0.5;
 pub(super) const UNTIL: f64 = 1.5;
 
-/// What a link does that starts in `pose` at rest: means from [`FROM`] to [`UNTIL`].
+/// Mean accelerations of a link that starts at rest in `pose`, from [`FROM`] to [`UNTIL`].
 pub(super) fn descent(cfg: SimulationManagerCfg, link: Link, pose: Pose) -> Descent {
     let mut lab = Lab::new(cfg);
     let cfg = RobotCfg { drive: passive(), fix_base: false, init_pose: pose, ..RobotCfg::default() };
@@ -27,7 +27,7 @@ pub(super) fn descent(cfg: SimulationManagerCfg, link: Link, pose: Pose) -> Desc
     Descent { along: gained.x, across: gained.z }
 }
 
-/// Mean acceleration down the slope, as [`descent`] has it \[m/s²\].
+/// Mean acceleration down the slope, averaged as in [`descent`] \[m/s²\].
 pub(super) fn acceleration(cfg: SimulationManagerCfg, link: Link, pose: Pose) -> f64 {
     descent(cfg, link, pose).along
 }

@@ -1,4 +1,4 @@
-//! Single bodies, and several that touch.
+//! Single rigid bodies, and several bodies in contact.
 
 mod incline;
 pub(crate) mod soft_contact;

@@ -1,9 +1,9 @@
-//! A ball meets a row of four that stand a little apart: each hands its whole velocity on, and the last goes on alone.
-//! m v = m Σ v, m v² = m Σ v² for two equal masses has no other solution.
+//! Newton's cradle: a ball hits a row of four balls with small gaps. Each ball passes on its whole velocity, and only
+//! the last one moves away. m v = m Σ v, m v² = m Σ v² for two equal masses has no other solution.
 //!
-//! Tolerance: a bounce of restitution e hands on (1 + e)/2 of the velocity and keeps (1 - e)/2. The ten steps of a contact
-//! leave e within off of 1 (`bounce.rs`): the last has four times off/2, the others keep off/2 of what they got, which is
-//! three bounces' off/2 too much at most.
+//! Tolerance: a bounce of restitution e passes on (1 + e)/2 of the velocity and keeps (1 - e)/2. The ten steps of a
+//! contact leave e within `off` of 1 (`bounce.rs`). The last ball has four times off/2; the others keep off/2 of their
+//! received velocity, which exceeds by at most three bounces' off/2.
 
 use crate::bounce::off;
 use crate::lab::*;
@@ -12,7 +12,8 @@ use kinetoscope_testkit::worlds::ball;
 
 const RADIUS: f64 = 0.1;
 
-/// Velocities of the five along the row, 2 s after the first was pushed, with a drag of `linear_damping` \[N s/m\].
+/// Velocities of the five balls along the row, 2 s after the first was pushed, with a drag of `linear_damping` \[N
+/// s/m\].
 fn knocked(restitution: Option<f64>, linear_damping: f64) -> Vec<f64> {
     let mut lab = Lab::new(with_dt(2e-4, weightless()));
     let balls: Vec<ObjectId> = (0..5)

@@ -1,6 +1,7 @@
-//! A thrown body. Semi-implicit Euler is v(n) = v0 + a h n and x(n) = x0 + v0 h n + a h² n (n + 1)/2, exactly. With
-//! v0z = g h (N + 1)/2 the body is back at its height after N steps, at the range v0x N h. Highest it is where its velocity
-//! changes sign, after n = (N + 1)/2 steps (or half a step off): v0z²/(2 g) less what half a step makes of it.
+//! A thrown body. Semi-implicit Euler gives v(n) = v0 + a h n and x(n) = x0 + v0 h n + a h² n (n + 1)/2 exactly. With
+//! v0z = g h (N + 1)/2 the body returns to its height after N steps, at the range v0x N h. It is highest when its
+//! velocity changes sign, after n = (N + 1)/2 steps (or half a step off), at v0z²/(2 g) minus the effect of half a
+//! step.
 //!
 //! Tolerance: rounding, 1200 sums of numbers below 10.
 
@@ -9,7 +10,7 @@ use crate::lab::*;
 const STEPS: u32 = 1201;
 const THROW: [f64; 2] = [3.0, -2.0];
 
-/// Where it is after the steps, and its greatest height.
+/// Position after the steps, and the greatest height.
 fn thrown(cfg: SimulationManagerCfg) -> ([f64; 3], f64) {
     let mut lab = Lab::new(cfg);
     let robot = lab.free(&urdf(&[Link::brick("body", 0.7, [0.1, 0.2, 0.3])], &[]), [0.0; 3]);
@@ -30,7 +31,7 @@ fn holds() {
         m.row("range along y", "m", THROW[1] * n * h, y, rounding);
         m.row("height after the flight", "m", 0.0, z, rounding);
         let up = G * h * (n + 1.0) / 2.0;
-        // n = (N + 1)/2 - 1 and (N + 1)/2 are equally high: v(n) = 0 at the second.
+        // The heights at n = (N + 1)/2 - 1 and (N + 1)/2 are equal: v(n) = 0 at the second.
         m.row("apex", "m", up * up / (2.0 * G) - up * h / 2.0, apex, rounding);
         let (place, high) = thrown(weightless());
         m.control("height after the flight", "without gravity", place[2]);

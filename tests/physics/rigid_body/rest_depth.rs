@@ -1,8 +1,8 @@
-//! A ball at rest sinks in by r = (1 - d)/d² g dmax² tc², whatever its mass, d being the impedance at that depth
+//! A ball at rest sinks in by r = (1 - d)/d² g dmax² tc² for any mass, where d is the impedance at that depth
 //! ([`soft_contact`](super::soft_contact)).
 //!
-//! Tolerance: a fixed point of arithmetic, against a simulation in which e^-100 of the motion is left after 2 s: 1e-8 of the
-//! depth.
+//! Tolerance: a fixed point of arithmetic, compared with a simulation in which e^-100 of the motion is left after 2 s:
+//! 1e-8 of the depth.
 
 use super::soft_contact::depth;
 use crate::lab::*;

@@ -1,7 +1,7 @@
-//! A cylinder rolls down a slope on its side: 1/2 m r² in the place of the ball's 2/5 m r²: a = 2/3 g sin θ.
+//! A cylinder rolls down a slope, with 1/2 m r² instead of the ball's 2/5 m r²: a = 2/3 g sin θ.
 //!
-//! Tolerance: as for a ball, half of the depth over the radius, with the depth under the whole weight (the contacts of a
-//! line share it).
+//! Tolerance: as for a ball, half of the depth over the radius, with the depth under the whole weight (the contacts of
+//! a line share it).
 
 use super::incline::acceleration;
 use super::soft_contact::depth;

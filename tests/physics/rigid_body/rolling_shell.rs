@@ -1,7 +1,7 @@
-//! A hollow ball rolls down a slope: as a full one, with 2/3 m r² in the place of 2/5 m r²: a = 3/5 g sin θ. The moment is
-//! the file's and not that of the shape.
+//! A hollow ball rolls down a slope, with 2/3 m r² instead of the solid ball's 2/5 m r²: a = 3/5 g sin θ. The moment is
+//! given by the file, not by the shape.
 //!
-//! Tolerance: as for a full ball, half of the depth over the radius.
+//! Tolerance: as for a solid ball, half of the depth over the radius.
 
 use super::incline::acceleration;
 use super::soft_contact::depth;

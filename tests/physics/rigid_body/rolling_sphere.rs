@@ -1,8 +1,9 @@
 //! A ball rolls down a slope without slipping. Force at the contact: m a = m g sin θ - f, 2/5 m r² α = f r, a = r α, so
 //! a = 5/7 g sin θ.
 //!
-//! Tolerance: the contact sinks in by δ and MuJoCo has it in the middle of the overlap, δ/2 nearer to the centre: the arm is
-//! shorter by δ/2r, and a by 4/7 of that. δ/2r allows for it, and for nothing near to the 2/7 that rolling takes.
+//! Tolerance: the contact sinks in by δ, and MuJoCo places it in the middle of the overlap, δ/2 closer to the center.
+//! The lever arm is shorter by δ/2r, and a changes by 4/7 of that. The tolerance δ/2r covers this, and is far below the
+//! 2/7 that rolling takes.
 
 use super::incline::acceleration;
 use super::soft_contact::depth;

@@ -1,27 +1,28 @@
 //! A block slides down a slope that is steeper than its friction: a = g (sin θ - μ cos θ).
 //!
-//! Elliptic cones have the friction at its limit, against the motion, at every step. Soft contacts hop, so that the normal
-//! force N is m g cos θ in the mean only up to the momentum that the block has gained away from the slope, and so is
-//! the friction: with the means a along and c across,
+//! Elliptic cones keep the friction at its limit, against the motion, at every step. Bodies on soft contacts hop: the
+//! mean normal force N is m g cos θ plus the rate of the momentum perpendicular to the slope, and friction follows it.
+//! With the means a along and c across the slope,
 //!
 //! ```text
 //! a + μ c = g (sin θ - μ cos θ)
 //! ```
 //!
-//! holds for any hops, and c vanishes with the time.
+//! holds for any hops, and c vanishes with time.
 //!
 //! Tolerance: the solver's, 1e-8 of the cost of a step.
 //!
-//! Pyramids have four edges at every contact; the one against the motion gives μ of its force as friction and is pushed by
-//! B μ v, the two beside it give none and are pushed by K r, r being the depth, which is at most that at rest, δ. So friction
-//! lacks at most 2 K δ/(B μ v), and 2 K δ/(B μ) ln(v₂/v₁)/(v₂ - v₁) in the mean between two velocities.
+//! Pyramids have four edges at every contact. The edge against the motion gives μ of its force as friction and is
+//! pushed by B μ v. The two edges beside it give no friction and are pushed by K r, where r is the depth, at most the
+//! depth δ at rest. Friction is thus low by at most 2 K δ/(B μ v), and by 2 K δ/(B μ) ln(v₂/v₁)/(v₂ - v₁) in the mean
+//! between two velocities.
 
 use super::incline::{Descent, FROM, UNTIL, descent};
 use super::soft_contact::{LARGEST, TIME, depth};
 use crate::lab::*;
 use kinetoscope::sim::Cone;
 
-/// The solver ends where a step gains less than this \[m/s²\].
+/// The solver stops when a step gains less than this \[m/s²\].
 pub(crate) const SOLVER: f64 = 1e-6;
 
 fn sliding(friction: f64, cone: Cone) -> Descent {
@@ -29,7 +30,7 @@ fn sliding(friction: f64, cone: Cone) -> Descent {
     descent(cfg, Link::brick("block", 1.2, [0.4, 0.4, 0.1]), Pose::translation(0.0, 0.0, 0.05))
 }
 
-/// What pyramids lack of friction, in the mean while the velocity goes from `a` [`FROM`] to `a` [`UNTIL`].
+/// Mean friction deficit of pyramids \[m/s²\] while the velocity grows from `a` [`FROM`] to `a` [`UNTIL`].
 fn lacking(friction: f64, a: f64, across_gravity: f64) -> f64 {
     let [stiffness, damping] = [1.0 / (LARGEST * TIME).powi(2), 2.0 / (LARGEST * TIME)];
     let at_one = 2.0 * stiffness * depth(across_gravity / 4.0) / (damping * friction);

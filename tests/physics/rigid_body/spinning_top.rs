@@ -1,9 +1,10 @@
-//! A heavy symmetric top on a point, leaning by θ, that precesses steadily with Ω needs the spin ω₃ about its axis with
-//! `m g l = Ω (I₃ ω₃ - I₁ Ω cos θ)`, I₁ being the moment across the axis about the point. It then goes on so: the lean stays,
-//! and after t the top has gone round by Ω t. The point is three hinges (precession, lean, spin) with rings between them.
+//! A heavy symmetric top on a point, tilted by θ, precesses steadily with Ω if the spin ω₃ about its axis satisfies `m
+//! g l = Ω (I₃ ω₃ - I₁ Ω cos θ)`, where I₁ is the moment across the axis about the point. The tilt then stays constant,
+//! and after t the top has precessed by Ω t. The point is modeled by three hinges (precession, tilt, spin) with rings
+//! between them.
 //!
-//! Tolerance: the rings' moments are the same about all axes, so that they have no gyroscopic torque, and nothing else in a
-//! steady motion; RK4 of a motion that is steady; rounding of 2000 sums of up to 300 rad, 1e-13 each: 1e-10.
+//! Tolerance: the rings' moments are the same about all axes, so they have no gyroscopic torque and no effect on a
+//! steady motion. RK4 of a steady motion; rounding of 2000 sums of up to 300 rad, 1e-13 each: 1e-10.
 
 use crate::lab::*;
 
@@ -11,10 +12,10 @@ const MASS: f64 = 0.5;
 const ARM: f64 = 0.1;
 const LEAN: f64 = 1.0;
 const PRECESSION: f64 = 2.0;
-/// Across and along the axis, about the centre of mass.
+/// Moments across and along the axis, about the center of mass \[kg m²\].
 const MOMENTS: [f64; 2] = [1.2e-3, 2e-3];
 
-/// Angle gone round and lean after 2 s of a top whose spin is `share` of what is steady.
+/// Precession angle and tilt after 2 s of a top with the fraction `share` of the steady spin.
 fn spun(share: f64) -> [f64; 2] {
     let across = MOMENTS[0] + MASS * ARM * ARM;
     let steady = (MASS * G * ARM / PRECESSION + across * PRECESSION * LEAN.cos()) / MOMENTS[1];
@@ -27,7 +28,7 @@ fn spun(share: f64) -> [f64; 2] {
     ];
     let mut lab = Lab::new(rk4(earth()));
     let robot = lab.mechanism(&urdf(&[base(), ring("ring"), ring("fork"), top], &joints));
-    // ω₃ is the spin of the joint and what the precession has along the axis.
+    // ω₃ is the velocity of the spin joint plus the component of the precession along the axis.
     let spin = share * steady - PRECESSION * LEAN.cos();
     lab.write_joints(robot, &[0.0, LEAN, 0.0], &[PRECESSION, 0.0, spin]);
     lab.run(2.0);

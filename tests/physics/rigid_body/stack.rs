@@ -1,11 +1,12 @@
-//! Five boxes, each a little smaller than the one below, so that four corners bear it. In each corner of the k-th joint
-//! f = n g m/4, n being the boxes above; A is 1/m on the ground and 2/m between two boxes. So the joints sink in by
-//! ([`soft_contact`](super::soft_contact)) `depth(5 g/4)` on the ground and `depth(2 n g/4)` between boxes, and the top is
-//! lower by their sum. 4.x does so; between two boxes 2.2.2 sinks in exactly twice as deep: where a face lies on a face, its `mjc_BoxBox`
-//! (engine_collision_box.c) reports half of the overlap as the distance. The law asks for that there.
+//! Five boxes, each slightly smaller than the one below, so that four corners carry it. In each corner of the k-th
+//! contact f = n g m/4, where n is the number of boxes above; A is 1/m on the ground and 2/m between two boxes. The
+//! contacts thus sink in by ([`soft_contact`](super::soft_contact)) `depth(5 g/4)` on the ground and `depth(2 n g/4)`
+//! between boxes, and the top sinks by their sum. This holds for 4.x. Between two boxes 2.2.2 sinks in exactly twice as
+//! deep: for face contacts, its `mjc_BoxBox` (engine_collision_box.c) reports half of the overlap as the distance. The
+//! law expects that in 2.2.2.
 //!
-//! Tolerance: a fixed point of arithmetic against what is left of the motion, e^(-t/tc) with tc below 0.1 s for five boxes and
-//! t = 3 s: 1e-13 of 1 mm, and rounding of heights of 0.5 m; 1e-12 m.
+//! Tolerance: a fixed point of arithmetic compared with the rest of the motion, e^(-t/tc) with tc below 0.1 s for five
+//! boxes and t = 3 s: 1e-13 of 1 mm, and rounding of heights of 0.5 m; 1e-12 m.
 
 use super::soft_contact::depth;
 use crate::lab::*;
@@ -15,7 +16,7 @@ use kinetoscope_testkit::worlds::object;
 
 const EDGE: f64 = 0.1;
 
-/// Heights of the middles after 3 s.
+/// Heights of the centers after 3 s.
 fn stacked(boxes: usize) -> Vec<f64> {
     let mut lab = Lab::new(slope(0.0, 1.0));
     let ids: Vec<ObjectId> = (0..boxes)

@@ -1,13 +1,13 @@
-//! What sticks creeps: MuJoCo's friction is a damper. A row of friction holds with `R f = -B v` at rest, with
-//! `R = (1 - d)/d A/impratio` and `B = 2/(dmax tc)`. A flat block on four corners has f = m g sin θ/4 in each and A = 1/m:
+//! Sticking bodies creep: MuJoCo's friction is a damper. A friction row holds with `R f = -B v` at rest, with `R = (1 -
+//! d)/d A/impratio` and `B = 2/(dmax tc)`. A flat block on four corners has f = m g sin θ/4 in each and A = 1/m:
 //!
 //! ```text
 //! v = (1 - d)/d g sin θ/4 dmax tc/(2 impratio),   d of the depth under m g cos θ/4
 //! ```
 //!
-//! Tolerance: the pull at the bottom tips the block, h tan θ/w = 1 % of the load goes to the lower corners, which changes
-//! their d one way and that of the upper ones the other: what is left is (1 %)² of the creep. The law is that creep is there, how large it is and that impratio
-//! divides it.
+//! Tolerance: friction at the base tips the block, so that h tan θ/w = 1 % of the load moves to the lower corners. This
+//! changes their d in one direction and that of the upper corners in the other: (1 %)² of the creep remains. The law
+//! checks that creep occurs, its magnitude, and that impratio divides it.
 
 use super::soft_contact::{LARGEST, TIME, depth, impedance};
 use crate::lab::*;
@@ -21,8 +21,8 @@ fn creep(impratio: f64) -> f64 {
     lab.root(robot).velocity.x
 }
 
-/// What a flat block creeps with on a slope of this angle \[rad\], whose lower corners bear `tipping` of their load more, and
-/// whose upper ones as much less: dampers side by side.
+/// Creep velocity of a flat block on a slope of this angle \[rad\]. The lower corners carry the fraction `tipping` of
+/// their load more and the upper ones as much less; the corners act as parallel dampers.
 pub(super) fn expected(angle: f64, impratio: f64, tipping: f64) -> f64 {
     let (sin, cos) = angle.sin_cos();
     let damping = |load: f64| {

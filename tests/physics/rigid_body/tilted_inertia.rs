@@ -1,6 +1,6 @@
-//! A torque on a body whose inertia is written in turned axes, away from its origin, and with products. Within one step from
-//! rest, ω = h R I⁻¹ Rᵀ τ with I = Q I_file Qᵀ, Q being the turn of `<inertial><origin rpy>`; the centre of mass stays, so
-//! that the frame's origin moves with ω x (-R c).
+//! A torque on a body whose inertia is given in rotated axes, away from its origin, and with products. One step from
+//! rest gives ω = h R I⁻¹ Rᵀ τ with I = Q I_file Qᵀ, where Q is the rotation of `<inertial><origin rpy>`. The center of
+//! mass stays at rest, so that the frame's origin moves with ω x (-R c).
 //!
 //! Tolerance: rounding of the principal axes, 1e-12 of the largest component, which is below 1.
 
@@ -27,7 +27,7 @@ fn holds() {
         let inertia = Matrix3::new(0.02, 0.004, -0.003, 0.004, 0.03, 0.002, -0.003, 0.002, 0.024);
         let body = Link { inertia, rpy: [0.4, -0.7, 1.1], ..Link::new("body", 1.7, [0.0; 3]).at([0.05, -0.02, 0.03]) };
         let turn = UnitQuaternion::from_euler_angles(-0.5, 0.9, 2.1);
-        // URDF's rpy are nalgebra's Euler angles: about the fixed x, then y, then z.
+        // URDF's rpy are nalgebra's Euler angles: about the fixed x, then y, then z axis.
         let q = Rotation3::from_euler_angles(0.4, -0.7, 1.1);
         let r = turn.to_rotation_matrix();
         let about = r.matrix() * q.matrix() * inertia * q.matrix().transpose() * r.matrix().transpose();

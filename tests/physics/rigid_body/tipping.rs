@@ -1,14 +1,14 @@
-//! A block on a slope that it cannot slide on stands while the weight is above its foot, tan θ < w/h, and tips over beyond:
-//! 5 % below and above. When it has tipped it lies on its long side, a quarter turn on.
+//! A block on a slope with high friction stands while its weight is above its base, tan θ < w/h, and tips over beyond:
+//! 5 % below and above. After tipping it lies on its long side, rotated by a quarter turn.
 //!
-//! Tolerance: standing, the lower edge sinks in deeper than the upper one, at most by the depth under all of the weight on
-//! its two corners, over the width of 0.2 m; lying, as little, on a side that is longer.
+//! Tolerance: for the standing block, the lower edge sinks in deeper than the upper one, at most by the depth under the
+//! whole weight on its two corners, over the width of 0.2 m. For the lying block it is the same on a longer side.
 
 use super::soft_contact::depth;
 use crate::lab::*;
 use std::f64::consts::FRAC_PI_2;
 
-/// The turn after 4 s \[rad\].
+/// The rotation after 4 s \[rad\].
 fn turned(part: f64, height: f64) -> f64 {
     let mut lab = Lab::new(slope((part * 0.5_f64).atan(), 3.0));
     let block = Link::brick("block", 2.0, [0.2, 0.3, height]);

@@ -1,21 +1,22 @@
-//! A body that tumbles while it flies: its centre of mass, which is not its frame's origin, goes along the parabola
-//! v t - g t²/2 as if nothing turned.
+//! A tumbling projectile: its center of mass, which is not its frame's origin, moves along the parabola v t - g t²/2
+//! independent of the rotation.
 //!
-//! Tolerance: the frame is integrated, and the centre of mass is where the orientation puts it. RK4 of 2.2.2 turns free bodies
-//! with order 2 (law `order_of_free_rotation`), which misses by 2e-4 m at 1 ms; so the place is the one for h -> 0, of steps
-//! of 1 ms and half of that: (4 x(h/2) - x(h))/3. The next term is ω h = 0.018 of it: 4e-6 m. With order 4 (4.x) all is off by
-//! (ω h)⁴ ω t/120, 3e-8 rad, times the offset of 0.1 m at most: 1e-8 m.
+//! Tolerance: MuJoCo integrates the frame, and the center of mass follows from the orientation. RK4 of 2.2.2 integrates
+//! free rotation with order 2 (law `order_of_free_rotation`), which gives an error of 2e-4 m at 1 ms. The position is
+//! therefore extrapolated to h -> 0 from steps of 1 ms and half of that: (4 x(h/2) - x(h))/3. The next term is ω h =
+//! 0.018 of the error: 4e-6 m. With order 4 (4.x) the error is (ω h)⁴ ω t/120, 3e-8 rad, times the offset of at most
+//! 0.1 m: 1e-8 m.
 
 use crate::lab::*;
 use kinetoscope::mujoco::{TARGET, Target};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
-/// The turn that it starts with: velocities are written in world axes, whatever it is.
+/// Initial orientation, which must not matter: velocities are written in world axes.
 fn start() -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(0.5, -0.8, 1.2)
 }
 
-/// Where the centre of mass is after 2 s in steps of `dt`, having been thrown with `throw` while the body turned with `spin`.
+/// Center of mass 2 s after the throw, in steps of `dt` \[m\].
 fn flown_in_steps(dt: f64, gravity: bool, com: [f64; 3]) -> Vector3<f64> {
     let mut lab = Lab::new(rk4(with_dt(dt, if gravity { earth() } else { weightless() })));
     let link = Link { rpy: [0.3, 0.2, 0.1], ..Link::new("body", 2.0, [0.02, 0.05, 0.06]).at(com) };
@@ -29,7 +30,7 @@ fn flown_in_steps(dt: f64, gravity: bool, com: [f64; 3]) -> Vector3<f64> {
     Vector3::new(com[(0, 0)], com[(0, 1)], com[(0, 2)])
 }
 
-/// As [`flown_in_steps`], for steps that go to 0.
+/// As [`flown_in_steps`], extrapolated to steps of 0.
 fn flown(gravity: bool, com: [f64; 3]) -> Vector3<f64> {
     let [whole, half] = [1e-3, 5e-4].map(|dt| flown_in_steps(dt, gravity, com));
     (4.0 * half - whole) / 3.0

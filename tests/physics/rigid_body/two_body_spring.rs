@@ -1,5 +1,5 @@
-//! Two bodies that a spring holds, and nothing else: their distance swings as q₀ cos ω t with ω² = k (1/m₁ + 1/m₂), and the
-//! centre of mass stays. A slide with an explicit drive of stiffness k is the spring.
+//! Two free bodies connected by a spring: their distance oscillates as q₀ cos ω t with ω² = k (1/m₁ + 1/m₂), and the
+//! center of mass stays at rest. A slide with an explicit drive of stiffness k is the spring.
 //!
 //! Tolerance: RK4 of a linear oscillator is off by (ω h)⁴ ω t/120 of the amplitude: 3e-9 after 2 s at 11.5 rad/s.
 
@@ -9,7 +9,7 @@ const MASSES: [f64; 2] = [1.0, 3.0];
 const STIFFNESS: f64 = 100.0;
 const STRETCH: f64 = 0.2;
 
-/// Stretch of the spring and place of the first body after 2 s.
+/// Stretch of the spring and position of the first body after 2 s.
 fn swung(stiffness: f64) -> [f64; 2] {
     let mut lab = Lab::new(rk4(weightless()));
     let cube = |name, mass| Link::brick(name, mass, [0.1; 3]).ghost();

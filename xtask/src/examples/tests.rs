@@ -1,4 +1,4 @@
-//! Tests of the table of examples and of what is looked at in their files.
+//! Tests of the table of examples and of the report checks.
 
 use super::*;
 use serde_json::json;
@@ -75,7 +75,7 @@ fn disparities() {
     }
 }
 
-/// A report of 16 environments, the first of which is `odd` and the others `rest`.
+/// A report of 16 environments: the first is `odd`, the others are `rest`.
 fn trial(successes: u64, odd: &Value, rest: &Value) -> Value {
     let environments: Vec<&Value> = std::iter::once(odd).chain(std::iter::repeat_n(rest, 15)).collect();
     json!({ "num_envs": 16, "successes": successes, "needed": 15, "environments": environments })
@@ -108,7 +108,7 @@ fn successes() {
 fn balance_and_learning() {
     let row = |tilt: f64, airborne: f64| json!({ "success": true, "diverged": null, "largest_tilt": tilt, "airborne": airborne });
     let good = row(0.3, 0.2);
-    // The first is hardly tilted; the second is never in the air.
+    // The first control is hardly tilted; the second is never in the air.
     for (odd, passes) in [(good.clone(), true), (row(0.05, 0.2), false), (row(0.3, 0.0), false)] {
         assert_eq!(balanced(&trial(16, &odd, &good)).is_ok(), passes, "{odd}");
     }

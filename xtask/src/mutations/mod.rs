@@ -1,4 +1,4 @@
-//! The ways in which `cargo xtask mutate` breaks the code, by subject, and the tests that have to notice.
+//! The mutations of `cargo xtask mutate` by subject, and the tests that must fail.
 
 mod mutation;
 mod physics;
@@ -13,7 +13,7 @@ pub(crate) use mutation::Mutation;
 const LISTS: [&[Mutation]; 6] =
     [physics::PHYSICS, robots::ROBOTS, sensors::SENSORS, renderer::RENDERER, recording::RECORDING, views::VIEWS];
 
-/// All of them.
+/// All mutations.
 pub(crate) fn all() -> impl Iterator<Item = &'static Mutation> {
     LISTS.into_iter().flatten()
 }

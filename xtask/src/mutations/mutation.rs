@@ -1,16 +1,16 @@
-//! [`Mutation`]: one change of one place.
+//! [`Mutation`]: one change of the code.
 
-/// One change of one place.
+/// One change of the code.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mutation {
-    /// The mistake, in a few words.
+    /// Short description of the mistake.
     pub(crate) name: &'static str,
     pub(crate) file: &'static str,
-    /// Stands in the file exactly once.
+    /// Replaced text, which occurs in the file exactly once.
     pub(crate) search: &'static str,
     pub(crate) replacement: &'static str,
-    /// The tests that are run: a test of the root package (`api`), of another package (`kinetoscope-record/record`) or the unit
-    /// tests of a package (`kinetoscope-scene`); and words in the names of the tests.
+    /// The test binary, and parts of the names of its tests. The binary is a test of the root package (`api`), a test
+    /// of another package (`kinetoscope-record/record`), or the unit tests of a package (`kinetoscope-scene`).
     pub(crate) tests: (&'static str, &'static [&'static str]),
 }
 

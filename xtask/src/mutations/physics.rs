@@ -1,4 +1,4 @@
-//! Mistakes in the equations of motion, drives and contacts, which the laws of physics have to notice.
+//! Mutations of the equations of motion, drives and contacts, which the laws of physics must detect.
 
 use super::Mutation;
 
@@ -242,7 +242,8 @@ pub(super) const PHYSICS: &[Mutation] = &[
         "weld anchored at the inverse pose",
         "sim/src/objects/weld.rs",
         ["to_row(&(first.inverse() * second))", "to_row(&(second.inverse() * first))"],
-        // Not the slider and crank: at its weld both bodies are turned alike, and where they are the same the inverse is too.
+        // The test `slider_crank` cannot detect this: at its weld both bodies have the same orientation and position,
+        // so the relative pose equals its inverse.
         &["four_bar"],
     ),
     Mutation::of(

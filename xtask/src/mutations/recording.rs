@@ -1,4 +1,4 @@
-//! Mistakes in recordings, in their files, and in what is read of them.
+//! Mutations of recordings, of their files, and of the reading of recordings.
 
 use super::Mutation;
 

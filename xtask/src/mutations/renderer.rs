@@ -1,4 +1,4 @@
-//! Mistakes in images of cameras, in rays, and in the meshes they show.
+//! Mutations of camera images, rays and rendered meshes.
 
 use super::Mutation;
 

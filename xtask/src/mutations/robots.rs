@@ -1,4 +1,4 @@
-//! Mistakes in what is made of files of robots, and in what is done with robots: objects, randomization, snapshots, kinematics, tasks.
+//! Mutations of robot files and robots: objects, randomization, snapshots, kinematics, tasks.
 
 use super::Mutation;
 

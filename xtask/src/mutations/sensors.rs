@@ -1,4 +1,4 @@
-//! Mistakes in when sensors measure, and in what they measure.
+//! Mutations of the schedule and of the measurements of sensors.
 
 use super::Mutation;
 

@@ -1,4 +1,4 @@
-//! Mistakes in windows, in the browser view, and in how they steer a simulation.
+//! Mutations of windows, of the browser view, and of their control of a simulation.
 
 use super::Mutation;
 
