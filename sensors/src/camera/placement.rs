@@ -94,9 +94,8 @@ pub trait CameraPlacement: PlaceRows {
     /// camera). For a stereo camera, `eye` is its origin, and the left optical axis is parallel to the line to
     /// `target`.
     ///
-    /// See [`look_at_pose`](super::look_at_pose) for `up`; the pose of one environment never depends on another. To
-    /// point an attached camera at a point of the environment, pass [`look_at_pose`](super::look_at_pose) to
-    /// [`set_world_poses`](Self::set_world_poses).
+    /// See [`look_at_pose`] for `up`; the pose of one environment never depends on another. To point an attached camera
+    /// at a point of the environment, pass [`look_at_pose`] to [`set_world_poses`](Self::set_world_poses).
     ///
     /// One `eye`, `target` and `up` for each of `env_ids` (`None` is all environments of the camera), or one for all
     /// \[m\].
